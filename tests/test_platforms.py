@@ -53,11 +53,11 @@ MACOS = {
 MACOS_VERSION = [11, 0, 0]
 
 # An experiment with the unit of the orchestrator's own tests.
-ONE_UNIT = """
-title = "one unit"
+ONE_COMPONENT = """
+title = "one component"
 simulation = { stop = 4.0, step = 1.0 }
-components.unit = { fmu = "Unit.fmu", unconnected = ["*"] }
-record.variables = ["unit.steps"]
+components.model = { fmu = "Model.fmu", unconnected = ["*"] }
+record.variables = ["model.steps"]
 """
 
 pytestmark = pytest.mark.skipif(not DIST.is_dir(), reason="no packages: run scripts/package")
@@ -360,26 +360,26 @@ def test_windows_names_a_culprit_in_a_path_with_backslashes(wine):
     ("how", "alone", "together"),
     [
         ("EXIT", "it ended its process with exit code 0", "(exit)"),
-        ("ABORT", "its last words: a bolt is loose", "(SIGABRT)"),
+        ("ABORT", "its last output: a bolt is loose", "(SIGABRT)"),
         ("SEGFAULT", "exception 0xc0000005 (access to memory that is not its own)", "(SIGSEGV)"),
     ],
 )
-def test_a_unit_that_ends_its_process_on_windows_is_named(wine, tmp_path, how, alone, together):
-    """The unit harms its process in its third step: in a process of its own, and in that of the program."""
+def test_an_instance_that_ends_its_process_on_windows_is_named(wine, tmp_path, how, alone, together):
+    """The instance harms its process in its third step: in a process of its own, and in that of the program."""
     emulator, environment = wine
-    unit = ROOT / "orchestrator" / "tests" / "unit"
-    library = compiled("windows-x86_64", unit / "unit.c", tmp_path / "unit.dll", "-shared", "-DPLACE=STEP", f"-DHOW={how}")
-    with zipfile.ZipFile(tmp_path / "Unit.fmu", "w") as archive:
-        archive.write(unit / "modelDescription.xml", "modelDescription.xml")
-        archive.write(library, "binaries/win64/unit.dll")
-    (tmp_path / "one.toml").write_text(ONE_UNIT)
+    model = ROOT / "orchestrator" / "tests" / "model"
+    library = compiled("windows-x86_64", model / "model.c", tmp_path / "model.dll", "-shared", "-DPLACE=STEP", f"-DHOW={how}")
+    with zipfile.ZipFile(tmp_path / "Model.fmu", "w") as archive:
+        archive.write(model / "modelDescription.xml", "modelDescription.xml")
+        archive.write(library, "binaries/win64/model.dll")
+    (tmp_path / "one.toml").write_text(ONE_COMPONENT)
     command = [*emulator, orchestrator("windows-x86_64"), "run", "one.toml", "--quiet", "--force"]
     options = {"env": environment, "capture_output": True, "timeout": 120, "cwd": tmp_path}
     there = subprocess.run(command, **options)
     assert there.returncode == 1 and alone in there.stderr.decode()
     assert len((tmp_path / "out" / "one" / "results.csv").read_text().splitlines()) == 4
     there = subprocess.run([*command, "--isolate=false"], **options)
-    assert there.returncode == 1 and f"unit ended this process in doStep {together}" in there.stderr.decode()
+    assert there.returncode == 1 and f"model ended this process in doStep {together}" in there.stderr.decode()
 
 
 def test_ctrl_c_on_windows_ends_a_run_and_keeps_its_results(wine, tmp_path):

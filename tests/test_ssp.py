@@ -50,7 +50,7 @@ def columns(out) -> dict[str, np.ndarray]:
 def test_every_experiment_becomes_a_valid_archive(experiment, tmp_path):
     path = tmp_path / "x.ssp"
     said = pack(experiment, path)
-    assert "the standard has no place for the step" in said
+    assert "SSP has no place for the communication step" in said
     # The description is checked against the schema of SSP 1.0.
     structure = read_ssd(str(path), validate=True)
     assert all(element.source.startswith("resources/") for element in structure.system.elements)

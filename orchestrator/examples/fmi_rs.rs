@@ -1,5 +1,5 @@
-//! Runs FMUs with fmi-rs alone: its importer, its simulation of one unit, and two units that are
-//! wired by hand. The results are written as CSV.
+//! Runs FMUs with fmi-rs alone: its importer, its simulation of one FMU, and two instances that are
+//! connected by hand. The results are written as CSV.
 //!
 //! The usage is `fmi_rs cs|me FMU STEP STOP OUT` or `fmi_rs loop CONTROLLER PLANT STEP STOP OUT`.
 
@@ -39,7 +39,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     }
 }
 
-/// Simulates one unit with its start values, with the library's own simulation. Model exchange uses
+/// Simulates one FMU with its start values, with the library's own simulation. Model exchange uses
 /// the library's Euler method.
 #[expect(clippy::arc_with_non_send_sync, reason = "what the library wants")]
 fn alone(kind: &str, path: &str, step: f64, stop: f64, out: &str) -> Result<(), Box<dyn Error>> {
@@ -84,15 +84,15 @@ fn alone(kind: &str, path: &str, step: f64, stop: f64, out: &str) -> Result<(), 
     Ok(())
 }
 
-/// A unit that is stepped by hand, with the value references of its outputs and inputs.
-struct Unit {
+/// An instance that is stepped by hand, with the value references of its outputs and inputs.
+struct Instance {
     fmu: Arc<FMU2<CS>>,
     state: Vec<u32>,
     moment: Vec<u32>,
     _folder: tempfile::TempDir,
 }
 
-impl Unit {
+impl Instance {
     fn new(path: &str) -> Result<Self, Box<dyn Error>> {
         let opened = FMU2Builder::new(&Path::new(path))?;
         let references = |names: &[&str]| -> Result<Vec<u32>, Box<dyn Error>> {
@@ -101,7 +101,12 @@ impl Unit {
             names.iter().map(reference).collect()
         };
         let (state, moment) = (references(&STATE)?, references(&MOMENT)?);
-        Ok(Unit { fmu: opened.instantiate_cs("unit")?, state, moment, _folder: opened.unzipdir })
+        Ok(Instance {
+            fmu: opened.instantiate_cs("instance")?,
+            state,
+            moment,
+            _folder: opened.unzipdir,
+        })
     }
 }
 
@@ -118,18 +123,18 @@ fn closed_loop(
     stop: f64,
     out: &str,
 ) -> Result<(), Box<dyn Error>> {
-    let (controller, plant) = (Unit::new(controller)?, Unit::new(plant)?);
+    let (controller, plant) = (Instance::new(controller)?, Instance::new(plant)?);
     let (mut state, mut moment) = ([0.0; 6], [0.0; 3]);
-    for unit in [&controller, &plant] {
-        done(unit.fmu.setupExperiment(None, 0.0, None))?;
-        done(unit.fmu.enterInitializationMode())?;
+    for instance in [&controller, &plant] {
+        done(instance.fmu.setupExperiment(None, 0.0, None))?;
+        done(instance.fmu.enterInitializationMode())?;
     }
     done(plant.fmu.getReal(&plant.state, &mut state))?;
     done(controller.fmu.setReal(&controller.state, &state))?;
     done(controller.fmu.getReal(&controller.moment, &mut moment))?;
     done(plant.fmu.setReal(&plant.moment, &moment))?;
-    for unit in [&controller, &plant] {
-        done(unit.fmu.exitInitializationMode())?;
+    for instance in [&controller, &plant] {
+        done(instance.fmu.exitInitializationMode())?;
     }
     let mut file = BufWriter::new(File::create(out)?);
     writeln!(file, "time,{},{}", STATE.join(","), MOMENT.join(","))?;

@@ -19,12 +19,12 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-/// What the commands `campaign` and `falsify` have in common.
+/// Options that the commands `campaign` and `falsify` share.
 #[derive(Args)]
 pub(crate) struct Common {
     /// Campaign: a file, or the name of one below orchestrator/experiments/campaigns.
     campaign: PathBuf,
-    /// Experiment in place of that of the campaign: a file, or the name of an experiment.
+    /// Experiment that replaces that of the campaign: a file, or the name of an experiment.
     #[arg(long, value_name = "EXPERIMENT")]
     experiment: Option<PathBuf>,
     #[command(flatten)]
@@ -32,8 +32,8 @@ pub(crate) struct Common {
     /// Folder for the results [default: out/CAMPAIGN].
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Look for FMUs in this folder, too, besides the experiment's own and target/fmu. The option
-    /// may be given several times.
+    /// Also look for FMUs in this folder, besides the folder of the experiment and target/fmu. The
+    /// option may be given several times.
     #[arg(long, value_name = "DIR")]
     pub(crate) fmu_dir: Vec<PathBuf>,
     /// Number of threads [default: one for each core].
@@ -53,21 +53,21 @@ pub(crate) struct Fly {
     /// everything recorded.
     #[arg(long, value_name = "K", conflicts_with_all = ["cases", "work", "fresh", "csv"])]
     case: Option<u64>,
-    /// Fly only the cases from FIRST to the one before LAST, and keep them for a later run that
-    /// merges all. Several processes may do this at once in the same folder.
+    /// Fly only the cases from FIRST up to, but not including, LAST. A later command for the whole
+    /// campaign merges them. Several processes may work in the same folder at once.
     #[arg(long, value_name = "FIRST..LAST", value_parser = range, conflicts_with_all = ["work", "csv"])]
     cases: Option<Range<u64>>,
-    /// Print which parts of the campaign are not flown yet, as JSON, and fly nothing.
+    /// Print which parts of the campaign are not flown yet, as JSON, and fly no case.
     #[arg(long, conflicts_with_all = ["fresh", "csv"])]
     work: bool,
-    /// Write the campaign into a folder with all that its cases need, for another machine, and fly
-    /// nothing. That machine flies DIR/campaign.toml.
+    /// Write the campaign and everything that its cases need into a folder, for another machine,
+    /// which then flies DIR/campaign.toml. No case is flown here.
     #[arg(long, value_name = "DIR", conflicts_with_all = ["case", "cases", "work", "fresh", "csv"])]
     bundle: Option<PathBuf>,
-    /// Fly everything again, including what is kept.
+    /// Fly all cases again, including those that are finished.
     #[arg(long)]
     fresh: bool,
-    /// Write the table as cases.csv, too.
+    /// Also write the results table as cases.csv.
     #[arg(long)]
     csv: bool,
 }
@@ -88,7 +88,7 @@ pub(crate) struct Falsify {
 fn range(text: &str) -> Result<Range<u64>, String> {
     let number = |text: &str| text.trim().parse::<u64>().ok();
     let ends = text.split_once("..").and_then(|(a, b)| Some((number(a)?, number(b)?)));
-    let (first, last) = ends.ok_or("wants two whole numbers, for example 0..250")?;
+    let (first, last) = ends.ok_or("expected two whole numbers, for example 0..250")?;
     Ok(first..last)
 }
 
@@ -99,7 +99,7 @@ fn prepare(common: &Common) -> Result<Plan, Error> {
     Plan::new(campaign, &changes, &common.fmu_dir)
 }
 
-/// What is to be done after a command.
+/// What the program does after a command.
 pub(crate) enum Next {
     /// Nothing is left.
     Done,
@@ -122,7 +122,7 @@ pub(crate) fn fly(
         if asked.common.overrides
             != (Overrides { fmu: asked.common.overrides.fmu.clone(), ..Overrides::default() })
         {
-            let message = "--bundle takes no changes of the command line: put them into [set] of the campaign";
+            let message = "--bundle cannot be combined with changes on the command line: put them into [set] of the campaign";
             return Err(Error::experiment(message).into());
         }
         bundle::write(&plan, folder)?;
@@ -136,7 +136,8 @@ pub(crate) fn fly(
     }
     if let Some(case) = asked.case {
         if case >= plan.cases() {
-            let message = format!("--case {case}: the campaign has {} cases", plan.cases());
+            let message =
+                format!("--case {case}: the campaign has {} cases, counted from 0", plan.cases());
             return Err(Error::experiment(message).into());
         }
         let folder = match &asked.common.out {
@@ -193,36 +194,37 @@ fn summary(report: &run::Report, out: &mut impl Write) -> std::io::Result<()> {
         writeln!(out, "  {name}: {count}")?;
     }
     for limit in limits {
-        let own = limit.broken;
-        let bound = if own.events == 0 {
-            format!("probability at most {:.3e}", own.high)
+        let broken = limit.broken;
+        let bound = if broken.events == 0 {
+            format!("probability at most {:.3e}", broken.high)
         } else {
-            format!("probability {:.3e} to {:.3e}", own.low, own.high)
+            format!("probability {:.3e} to {:.3e}", broken.low, broken.high)
         };
         writeln!(
             out,
             "  {}: broken by {} of {}, {bound} ({:.0} %)",
             limit.says,
-            own.events,
-            own.cases,
+            broken.events,
+            broken.cases,
             100.0 * CONFIDENCE
         )?;
     }
     for measure in measures {
-        let Some(own) = &measure.summary else { continue };
-        let of = |probability: f64| {
-            let found = own.quantiles.iter().find(|quantile| quantile.probability == probability);
-            found.map_or(f64::NAN, |quantile| quantile.value)
+        let Some(summary) = &measure.summary else { continue };
+        let quantile = |probability: f64| {
+            let mut quantiles = summary.quantiles.iter();
+            let quantile = quantiles.find(|quantile| quantile.probability == probability);
+            quantile.map_or(f64::NAN, |quantile| quantile.value)
         };
         writeln!(
             out,
             "  {}: mean {:.4}, 99 % {:.4}, largest {:.4} {} (case {})",
             measure.name,
-            own.mean,
-            of(0.99),
-            of(1.0),
+            summary.mean,
+            quantile(0.99),
+            quantile(1.0),
             measure.unit,
-            own.worst
+            summary.worst
         )?;
     }
     if let Some(answer) = answer {

@@ -1,8 +1,8 @@
-//! Chooses which variables of a unit are shown, and prints everything that is known about them as
+//! Chooses which variables of an FMU are shown, and prints everything that is known about them as
 //! JSON.
 
 use cosim::error::Error;
-use fmu_import::description::{Interface, Kind, ModelDescription, Variable};
+use fmu_import::description::{Interface, ModelDescription, Variable, VariableKind};
 use fmu_import::fmu::Fmu;
 use fmu_import::names;
 use serde_json::{Value, json};
@@ -38,7 +38,7 @@ impl Filter {
         if self.pattern.is_none() && self.causality.is_none() {
             return Ok(());
         }
-        let known: Vec<String> = description.variables.iter().map(|v| v.name.clone()).collect();
+        let names: Vec<String> = description.variables.iter().map(|v| v.name.clone()).collect();
         description.variables.retain(|variable| self.fits(variable));
         if !description.variables.is_empty() {
             return Ok(());
@@ -49,7 +49,7 @@ impl Filter {
             self.pattern.as_ref().map_or((String::new(), String::new()), |pattern| {
                 (
                     format!(" that fits \"{pattern}\""),
-                    names::hint(pattern, known.iter().map(String::as_str)),
+                    names::hint(pattern, names.iter().map(String::as_str)),
                 )
             });
         let model = &description.model_name;
@@ -69,7 +69,7 @@ pub(crate) fn print(fmu: &Fmu, out: &mut impl Write) -> io::Result<()> {
         )
     };
     let experiment = &d.default_experiment;
-    let all = json!({
+    let description = json!({
         "model_name": d.model_name,
         "fmi_version": d.fmi_version,
         "description": d.description,
@@ -87,12 +87,12 @@ pub(crate) fn print(fmu: &Fmu, out: &mut impl Write) -> io::Result<()> {
         },
         "variables": d.variables.iter().map(variable).collect::<Vec<_>>(),
     });
-    serde_json::to_writer_pretty(&mut *out, &all)?;
+    serde_json::to_writer_pretty(&mut *out, &description)?;
     writeln!(out)
 }
 
 fn variable(variable: &Variable) -> Value {
-    let mut all = json!({
+    let mut printed = json!({
         "name": variable.name,
         "value_reference": variable.reference,
         "causality": variable.causality,
@@ -102,14 +102,18 @@ fn variable(variable: &Variable) -> Value {
         "description": variable.description,
     });
     match &variable.kind {
-        Kind::Real { unit, min, max, .. } => {
-            (all["unit"], all["min"], all["max"]) = (json!(unit), json!(min), json!(max));
+        VariableKind::Real { unit, min, max, .. } => {
+            (printed["unit"], printed["min"], printed["max"]) =
+                (json!(unit), json!(min), json!(max));
         }
-        Kind::Integer { min, max } => (all["min"], all["max"]) = (json!(min), json!(max)),
-        Kind::Enumeration { items } => {
-            all["items"] = items.iter().map(|(name, item)| (name.clone(), json!(item))).collect();
+        VariableKind::Integer { min, max } => {
+            (printed["min"], printed["max"]) = (json!(min), json!(max));
         }
-        Kind::Boolean | Kind::String => {}
+        VariableKind::Enumeration { items } => {
+            printed["items"] =
+                items.iter().map(|(name, item)| (name.clone(), json!(item))).collect();
+        }
+        VariableKind::Boolean | VariableKind::String => {}
     }
-    all
+    printed
 }

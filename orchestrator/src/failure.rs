@@ -30,7 +30,7 @@ pub(crate) enum Failure {
         count: usize,
     },
     /// Standard output could not be written.
-    #[error("standard output: {0}")]
+    #[error("standard output cannot be written: {0}")]
     Output(#[from] io::Error),
 }
 

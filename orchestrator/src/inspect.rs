@@ -1,9 +1,9 @@
-//! Prints what an FMU says about itself, and checks it.
+//! Prints the description of an FMU, and checks it.
 
 use crate::catalogue::{self, Filter};
 use crate::failure::Failure;
 use fmu_import::description::CAUSALITIES;
-use fmu_import::description::{Interface, Kind, ModelDescription, Variable};
+use fmu_import::description::{Interface, ModelDescription, Variable, VariableKind};
 use fmu_import::fmu::Fmu;
 use std::io::{self, Write};
 use std::path::Path;
@@ -49,7 +49,7 @@ pub(crate) fn check(path: &Path, out: &mut impl Write) -> Result<(), Failure> {
 
 fn print(fmu: &Fmu, out: &mut impl Write) -> io::Result<()> {
     let d = &fmu.description;
-    if fmu.is_table() {
+    if fmu.is_lookup_table() {
         writeln!(out, "{}", d.model_name)?;
     } else {
         writeln!(out, "{} (FMI {})", d.model_name, d.fmi_version)?;
@@ -121,25 +121,25 @@ fn row(description: &ModelDescription, variable: &Variable) -> [String; 6] {
     let mut kind = variable.kind.name().to_string();
     let mut unit = String::new();
     match &variable.kind {
-        Kind::Real { unit: own, display_unit, .. } => {
-            unit = own.clone().unwrap_or_default();
+        VariableKind::Real { unit: base, display_unit, .. } => {
+            unit = base.clone().unwrap_or_default();
             if let Some(display) =
-                display_unit.as_ref().filter(|display| Some(*display) != own.as_ref())
+                display_unit.as_ref().filter(|display| Some(*display) != base.as_ref())
             {
-                if let Some(shown) = shown(description, own.as_deref(), display, &start) {
+                if let Some(shown) = shown(description, base.as_deref(), display, &start) {
                     start = format!("{start} ({shown} {display})");
                 }
                 unit = format!("{unit} ({display})");
             }
         }
-        Kind::Enumeration { items } => {
+        VariableKind::Enumeration { items } => {
             let names: Vec<&str> = items.iter().map(|(name, _)| name.as_str()).collect();
             kind = format!("{{{}}}", names.join(", "));
             if let Some((name, _)) = items.iter().find(|(_, value)| start == value.to_string()) {
                 start.clone_from(name);
             }
         }
-        Kind::Integer { .. } | Kind::Boolean | Kind::String => {}
+        VariableKind::Integer { .. } | VariableKind::Boolean | VariableKind::String => {}
     }
     let name = variable.name.clone();
     [name, kind, variable.variability.to_string(), unit, start, variable.description.clone()]

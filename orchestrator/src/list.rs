@@ -1,4 +1,4 @@
-//! Lists the experiments, studies and FMUs that are found.
+//! Lists the experiments, studies, campaigns and FMUs that the program finds.
 
 use crate::failure::Failure;
 use campaign::definition::Campaign;
@@ -24,12 +24,14 @@ pub(crate) fn list(folder: Option<&Path>, out: &mut impl Write) -> Result<(), Fa
     {
         return Err(Error::experiment(format!("{} is not a folder", folder.display())).into());
     }
-    let here = folder.unwrap_or(Path::new("."));
+    let searched = folder.unwrap_or(Path::new("."));
     let find = |extension: &str, others: Vec<PathBuf>| {
-        let mut known = BTreeSet::new();
-        let all =
-            iter::once(here.to_path_buf()).chain(others).flat_map(|root| files(&root, extension));
-        all.filter(|path| fs::canonicalize(path).is_ok_and(|path| known.insert(path)))
+        let mut seen = BTreeSet::new();
+        let paths = iter::once(searched.to_path_buf())
+            .chain(others)
+            .flat_map(|root| files(&root, extension));
+        paths
+            .filter(|path| fs::canonicalize(path).is_ok_and(|path| seen.insert(path)))
             .collect::<Vec<_>>()
     };
     let elsewhere = if folder.is_none() { search::experiments() } else { Vec::new() };
@@ -69,7 +71,8 @@ pub(crate) fn list(folder: Option<&Path>, out: &mut impl Write) -> Result<(), Fa
         .collect();
     print("campaigns", &campaigns, out)?;
 
-    let others = if folder.is_none() { search::units() } else { vec![PathBuf::from("target/fmu")] };
+    let others =
+        if folder.is_none() { search::fmu_folders() } else { vec![PathBuf::from("target/fmu")] };
     let rows: Vec<(PathBuf, String)> = find("fmu", others)
         .into_iter()
         .map(|path| {

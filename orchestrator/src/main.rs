@@ -5,12 +5,12 @@ mod campaign;
 mod catalogue;
 mod failure;
 mod inspect;
+mod isolated;
 mod list;
 mod live;
 mod pack;
 mod run;
 mod schema;
-mod unit;
 
 use catalogue::Filter;
 use cosim::check::check;
@@ -60,8 +60,8 @@ enum Command {
         /// Folder for the results [default: out/EXPERIMENT].
         #[arg(long, value_name = "DIR")]
         out: Option<PathBuf>,
-        /// Look for FMUs in this folder, too, besides the experiment's own and target/fmu. The
-        /// option may be given several times.
+        /// Also look for FMUs in this folder, besides the folder of the experiment and target/fmu.
+        /// The option may be given several times.
         #[arg(long, value_name = "DIR")]
         fmu_dir: Vec<PathBuf>,
         #[command(flatten)]
@@ -69,8 +69,8 @@ enum Command {
         /// Show neither progress nor summary.
         #[arg(long)]
         quiet: bool,
-        /// Run in step with the wall clock, FACTOR times as fast. Without a FACTOR the run keeps
-        /// real time.
+        /// Keep the run in step with the wall clock, FACTOR times as fast as real time. FACTOR is 1
+        /// if it is left out.
         #[arg(long, value_name = "FACTOR", num_args = 0..=1, default_missing_value = "1", allow_negative_numbers = true)]
         real_time: Option<Factor>,
         /// Choose what happens after a missed deadline, that is, if the values that a component
@@ -98,7 +98,7 @@ enum Command {
     /// Repeat a paper's comparison and write report.html, with figures, tables and a verdict on
     /// each claim.
     ///
-    /// Finished parts are kept: after an interruption, the same command continues where it stopped.
+    /// Finished parts are kept. After an interruption the same command continues where it stopped.
     Reproduce {
         /// Study to run: a folder below orchestrator/experiments, a folder with a study.toml, or
         /// such a file.
@@ -106,14 +106,14 @@ enum Command {
         /// Folder for the results [default: out/STUDY].
         #[arg(long, value_name = "DIR")]
         out: Option<PathBuf>,
-        /// Look for FMUs in this folder, too, besides the study's own and target/fmu. The option
-        /// may be given several times.
+        /// Also look for FMUs in this folder, besides the folder of the study and target/fmu. The
+        /// option may be given several times.
         #[arg(long, value_name = "DIR")]
         fmu_dir: Vec<PathBuf>,
         /// Number of threads [default: one for each core].
         #[arg(long, value_name = "N", default_value_t = 0, hide_default_value = true)]
         jobs: usize,
-        /// Run at most this many values of a parameter that a run varies, for a quick look.
+        /// Run at most N values of each parameter that a run varies, for a quick look.
         #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
         members: Option<u32>,
         /// Run everything again, including what is finished.
@@ -127,7 +127,7 @@ enum Command {
     /// summary.json and report.html: how often limits are broken, with which confidence, and the
     /// worst cases.
     ///
-    /// Cases that are flown are kept: after an interruption, the same command goes on.
+    /// Finished cases are kept. After an interruption the same command continues where it stopped.
     Campaign(campaign::Fly),
     /// Look for the worst case of a campaign, and write it as an experiment.
     Falsify(campaign::Falsify),
@@ -136,14 +136,14 @@ enum Command {
     Pack {
         /// Experiment to pack: a file, or the name of an experiment that `list` shows.
         experiment: PathBuf,
-        /// Write an SSP archive, which is the only form there is.
+        /// Write an SSP archive. This is the only format so far, and the option is required.
         #[arg(long)]
         ssp: bool,
         /// Path of the archive [default: EXPERIMENT.ssp].
         #[arg(long, value_name = "FILE")]
         out: Option<PathBuf>,
-        /// Look for FMUs in this folder, too, besides the experiment's own and target/fmu. The
-        /// option may be given several times.
+        /// Also look for FMUs in this folder, besides the folder of the experiment and target/fmu.
+        /// The option may be given several times.
         #[arg(long, value_name = "DIR")]
         fmu_dir: Vec<PathBuf>,
         #[command(flatten)]
@@ -170,16 +170,16 @@ enum Command {
         #[arg(long, conflicts_with_all = ["json", "pattern", "causality"])]
         check: bool,
     },
-    /// Print an experiment or a study with all that it extends, templates and lists spelled out.
+    /// Print an experiment or a study with all that it extends, templates and lists expanded.
     Show {
-        /// What to print: a file, or a name that `list` shows.
+        /// Experiment or study to print: a file, or a name that `list` shows.
         name: PathBuf,
     },
-    /// Print the JSON Schema of a kind of file, with which editors complete and check such files.
+    /// Print the JSON Schema of a kind of file, by which editors complete and check such files.
     Schema {
         /// Kind of file that the schema describes.
         #[arg(value_enum)]
-        kind: schema::Kind,
+        kind: schema::FileKind,
     },
     /// Write a script that completes commands and options in a shell, for example `orchestrator
     /// completions bash`.
@@ -196,12 +196,12 @@ enum Command {
 }
 
 fn main() -> ExitCode {
-    if let Some(code) = unit::serve() {
+    if let Some(code) = isolated::serve() {
         return code;
     }
     let arguments = Arguments::parse();
-    // A study may have a thousand runs; its report counts their warnings instead. Of a campaign the
-    // messages of units are in its table.
+    // A study may have a thousand runs, and its report counts their warnings. The results table of
+    // a campaign holds the messages of instances.
     let usual = match arguments.command {
         Command::Reproduce { .. } => "error",
         Command::Campaign(_) | Command::Falsify(_) => "warn,fmu_import=off",
@@ -220,10 +220,10 @@ fn main() -> ExitCode {
     let interrupt = Interrupt::default();
     let outcome = execute(arguments.command, &mut out, &interrupt)
         .and_then(|()| out.flush().map_err(Failure::from));
-    let left_in_order = unit::left_in_order();
+    let all_freed = isolated::all_freed();
     match outcome {
-        Ok(()) if left_in_order => ExitCode::SUCCESS,
-        // The results are whole, but a unit did harm when it was freed.
+        Ok(()) if all_freed => ExitCode::SUCCESS,
+        // The results are complete, but freeing an instance failed.
         Ok(()) => ExitCode::FAILURE,
         Err(error) if error.is_broken_pipe() => {
             // Output that could not be written must not be written again when the writer is
@@ -240,7 +240,7 @@ fn main() -> ExitCode {
 }
 
 fn execute(command: Command, out: &mut impl Write, interrupt: &Interrupt) -> Result<(), Failure> {
-    let lasts = matches!(
+    let takes_long = matches!(
         command,
         Command::Run { .. }
             | Command::Reproduce { .. }
@@ -248,7 +248,7 @@ fn execute(command: Command, out: &mut impl Write, interrupt: &Interrupt) -> Res
             | Command::Falsify(_)
             | Command::Pack { .. }
     );
-    if lasts {
+    if takes_long {
         interrupt.listen()?;
     }
     match command {
@@ -308,7 +308,7 @@ fn execute(command: Command, out: &mut impl Write, interrupt: &Interrupt) -> Res
         Command::Campaign(asked) => fly(asked, out, interrupt),
         Command::Falsify(asked) => campaign::falsify(&asked, out, interrupt),
         Command::Pack { ssp: false, .. } => {
-            let message = "pack wants the form of the archive, of which there is one: --ssp";
+            let message = "pack needs the format of the archive: add --ssp, the only format so far";
             Err(Error::experiment(message).into())
         }
         Command::Pack {
@@ -379,7 +379,7 @@ fn system(
 fn ended(reason: Option<Error>, quiet: bool) -> Result<(), Failure> {
     match reason {
         None | Some(Error::Interrupted { request: Request::Quit, .. }) => Ok(()),
-        Some(error @ Error::EndedByUnit { .. }) => {
+        Some(error @ Error::EndedByInstance { .. }) => {
             // The summary has already said so.
             if quiet {
                 tracing::warn!("{error}");

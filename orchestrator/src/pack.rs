@@ -16,14 +16,14 @@ pub(crate) struct Archive {
     pub(crate) path: Option<PathBuf>,
     /// Whether outputs that are enumerations get connectors.
     pub(crate) enumerations: bool,
-    /// Whether an archive that is there may be replaced.
+    /// Whether an existing archive may be replaced.
     pub(crate) force: bool,
 }
 
 /// Writes an experiment as an SSP archive.
 ///
 /// # Errors
-/// Returns an error if the experiment is faulty, or if the archive is there or cannot be written.
+/// Returns an error if the experiment is faulty, or if the archive exists or cannot be written.
 pub(crate) fn pack(
     experiment: &Path,
     overrides: &Overrides,
@@ -40,7 +40,7 @@ pub(crate) fn pack(
     if archive.exists() && !force {
         let path = archive.display();
         return Err(Error::experiment(format!(
-            "{path} is there already: --force replaces it, --out takes another name"
+            "{path} already exists: --force replaces it, --out chooses another name"
         ))
         .into());
     }
@@ -55,6 +55,6 @@ fn packed(system: &System, archive: &Path, out: &mut impl Write) -> std::io::Res
     let step = system.experiment.simulation.step;
     writeln!(
         out,
-        "  the standard has no place for the step, {step} s: it stands in annotations, which not every tool reads"
+        "  SSP has no place for the communication step, {step} s: it is stored in annotations, which not every importer reads"
     )
 }

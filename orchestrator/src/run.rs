@@ -49,7 +49,7 @@ impl Files {
     /// Rejects options that would have no effect.
     fn check(self) -> Result<(), Error> {
         if self.labels && self.format != Format::Csv {
-            let problem = "--labels is about results.csv: results.parquet has units and items in its metadata";
+            let problem = "--labels applies to results.csv only: leave it out, because results.parquet has units and items in its metadata";
             return Err(Error::experiment(problem));
         }
         Ok(())
@@ -75,11 +75,11 @@ pub(crate) struct Options {
     pub(crate) interrupt: Interrupt,
 }
 
-/// Runs a system and writes its results. If a unit fails or the run is ended early, the results up
-/// to then are written as well.
+/// Runs a system and writes its results. If an instance fails or the run is ended early, the
+/// results up to then are written as well.
 ///
 /// # Errors
-/// Returns an error if a unit fails, or if a file cannot be written.
+/// Returns an error if an instance fails, or if a file cannot be written.
 pub(crate) fn run(system: &mut System, options: &Options) -> Result<Report, Failure> {
     if options.live {
         live::check_terminal()?;
@@ -130,7 +130,7 @@ pub(crate) fn run(system: &mut System, options: &Options) -> Result<Report, Fail
     let isolated = system.isolated();
     if matches!(scheduling.priority, Priority::Fifo { .. }) && !isolated.is_empty() {
         tracing::warn!(
-            "--priority: the usual priority is kept by the processes of {}; --isolate=false has no such processes",
+            "--priority: the processes of {} keep the usual priority; --isolate=false runs these instances in this process",
             isolated.join(", ")
         );
     }
@@ -179,11 +179,11 @@ pub(crate) fn run(system: &mut System, options: &Options) -> Result<Report, Fail
         Err(
             error @ (Error::Deadline { .. }
             | Error::Interrupted { .. }
-            | Error::EndedByUnit { .. }
+            | Error::EndedByInstance { .. }
             | Error::Lost { .. }),
         ) => Some(error),
         Err(error) => {
-            tracing::warn!("the results until then are in {}", out.display());
+            tracing::warn!("the results up to this failure are in {}", out.display());
             return Err(error.into());
         }
     };

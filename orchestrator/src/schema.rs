@@ -13,9 +13,9 @@ use schemars::transform::{RecursiveTransform, Transform};
 use schemars::{JsonSchema, Schema};
 use serde_json::{Map, Value, json};
 
-/// Kind of file that a schema describes.
+/// FileKind of file that a schema describes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-pub(crate) enum Kind {
+pub(crate) enum FileKind {
     /// The file describes an experiment.
     Experiment,
     /// The file describes a study.
@@ -25,25 +25,25 @@ pub(crate) enum Kind {
 }
 
 /// Returns the schema of a kind of file as text.
-pub(crate) fn text(kind: Kind) -> String {
+pub(crate) fn text(kind: FileKind) -> String {
     let mut schema = match kind {
-        Kind::Campaign => schema_of::<Campaign>(json!({
-            "extends": texts("Files that this one extends, relative to it; a later one has precedence over those before."),
+        FileKind::Campaign => schema_of::<Campaign>(json!({
+            "extends": texts("Files that this one extends, with paths relative to this file. A later file takes precedence over earlier ones."),
         })),
-        Kind::Experiment => schema_of::<Experiment>(json!({
-            "extends": texts("Files that this one extends, relative to it; a later one has precedence over those before."),
-            "unset": texts("Parameters component.parameter of what is extended that are left at the unit's own value."),
+        FileKind::Experiment => schema_of::<Experiment>(json!({
+            "extends": texts("Files that this one extends, with paths relative to this file. A later file takes precedence over earlier ones."),
+            "unset": texts("Parameters, as component.parameter, that an extended file sets and that are left at the FMU's start value here."),
         })),
-        Kind::Study => {
+        FileKind::Study => {
             let mut schema = schema_of::<Study>(json!({
-                "extends": texts("Files that this one extends, relative to it; a later one has precedence over those before."),
+                "extends": texts("Files that this one extends, with paths relative to this file. A later file takes precedence over earlier ones."),
                 "templates": {
-                    "description": "Tables by name, upon which other tables build by `use`.",
+                    "description": "Templates by name, upon which other tables build with `use`.",
                     "type": "object",
                     "additionalProperties": { "type": "object" },
                 },
                 "lists": {
-                    "description": "Lists of rows by name. A table with `each` stands for one table for each row of a list.",
+                    "description": "Lists of rows by name. A table with `each` is repeated for each row of a list.",
                     "type": "object",
                     "additionalProperties": { "type": "array", "items": { "type": "object" } },
                 },
@@ -82,10 +82,10 @@ fn with_templates(schema: &mut Schema) {
     {
         properties.insert(
             "use".into(),
-            texts("Names of templates that this table builds upon. It stands for one table for each of them."),
+            texts("Names of templates that this table builds upon. With several names the table is repeated for each of them."),
         );
         let each = json!({
-            "description": "A list of rows, or its name. The table stands for one table for each row, with the row's values in the place of their names in braces.",
+            "description": "A list of rows, or its name. The table is repeated for each row, and each name in braces is replaced by the row's value.",
             "type": ["string", "array"],
             "items": { "type": "object" },
         });
@@ -111,28 +111,32 @@ mod tests {
     use std::path::Path;
 
     #[test]
-    fn the_kept_schemas_are_those_of_the_types() {
+    fn the_stored_schemas_are_those_of_the_types() {
         let kinds = [
-            (Kind::Experiment, "experiment"),
-            (Kind::Study, "study"),
-            (Kind::Campaign, "campaign"),
+            (FileKind::Experiment, "experiment"),
+            (FileKind::Study, "study"),
+            (FileKind::Campaign, "campaign"),
         ];
         for (kind, name) in kinds {
             let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("schema/{name}.json"));
-            let kept = std::fs::read_to_string(&path).unwrap();
-            assert!(kept == text(kind), "scripts/update-generated writes {} anew", path.display());
+            let stored = std::fs::read_to_string(&path).unwrap();
+            assert!(
+                stored == text(kind),
+                "{} is out of date: run scripts/update-generated",
+                path.display()
+            );
         }
     }
 
     #[test]
     fn the_pages_explain_every_key() {
-        let all = [
-            (Kind::Experiment, &["experiments"][..]),
-            (Kind::Study, &["studies"]),
+        let pages = [
+            (FileKind::Experiment, &["experiments"][..]),
+            (FileKind::Study, &["studies"]),
             // Signals and measures are those of studies.
-            (Kind::Campaign, &["campaigns", "studies"]),
+            (FileKind::Campaign, &["campaigns", "studies"]),
         ];
-        for (kind, names) in all {
+        for (kind, names) in pages {
             let docs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs");
             let read = |name| std::fs::read_to_string(docs.join(format!("{name}.md"))).unwrap();
             let page: String = names.iter().map(read).collect();

@@ -11,7 +11,7 @@ use cosim::variation::SettingValue;
 use cosim_report::metrics::Meters;
 use cosim_report::panels::Panel;
 use cosim_report::plot::Curves;
-use fmu_import::description::Kind as Type;
+use fmu_import::description::VariableKind as Type;
 use fmu_import::error::Error as Import;
 use std::path::Path;
 
@@ -167,7 +167,7 @@ impl<'a> Flight<'a> {
                 let outcome = master.run(&mut observers);
                 let Watch { broken, time, .. } = watch;
                 // A unit that failed is not used again.
-                if !matches!(outcome, Err(Error::Unit { .. })) {
+                if !matches!(outcome, Err(Error::Call { .. })) {
                     self.master = Some(master);
                 }
                 (outcome, broken, time)
@@ -181,8 +181,8 @@ impl<'a> Flight<'a> {
                 (Status::Ended, format!("limit {} broken", limit.unwrap_or_default()))
             }
             Err(error @ Error::Lost { .. }) => (Status::Lost, error.to_string()),
-            Err(error @ Error::EndedByUnit { .. }) => (Status::Ended, error.to_string()),
-            Err(error @ (Error::Unit { .. } | Error::Import(Import::Fmu { .. }))) => {
+            Err(error @ Error::EndedByInstance { .. }) => (Status::Ended, error.to_string()),
+            Err(error @ (Error::Call { .. } | Error::Import(Import::Fmu { .. }))) => {
                 (Status::Failed, error.to_string())
             }
             Err(error) => return Err(error),

@@ -233,7 +233,7 @@ impl Plan {
         let written = self.experiment.components[component].fmu.get_ref();
         let is_there = |folder: &PathBuf| folder.join(written).is_file();
         match self.archives.get(component).and_then(|path| std::path::absolute(path).ok()) {
-            Some(path) if !search::units().iter().any(is_there) => path.display().to_string(),
+            Some(path) if !search::fmu_folders().iter().any(is_there) => path.display().to_string(),
             _ => written.clone(),
         }
     }
@@ -267,10 +267,10 @@ impl Plan {
             .map(|limit| &limit.measure)
             .chain(&self.campaign.keep.by)
             .chain(self.campaign.search.as_ref().map(|search| &search.largest));
-        source.known(referred, "metric or measure", names())?;
+        source.check_names(referred, "metric or measure", names())?;
         for limit in self.campaign.limits.iter().filter(|limit| limit.ends) {
             let measure = self.experiment.observe.metrics.get(limit.measure.get_ref());
-            if measure.is_none_or(|measure| measure.kind != experiment::Kind::Largest) {
+            if measure.is_none_or(|measure| measure.kind != experiment::MeasureKind::Largest) {
                 let message = format!(
                     "[[limit]] {}: ends needs a measure of the kind largest, which only grows",
                     limit.id

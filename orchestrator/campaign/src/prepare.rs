@@ -11,7 +11,7 @@ use cosim::search;
 use cosim::system::System;
 use cosim::variation::Target;
 use cosim_report::metrics::{Meters, Metrics};
-use fmu_import::description::Kind as Type;
+use fmu_import::description::VariableKind as Type;
 use fmu_import::names;
 use std::collections::BTreeMap;
 use std::fs;
@@ -89,7 +89,7 @@ pub(crate) fn observe(campaign: &Campaign, own: &Observe) -> Result<Observe, Err
     signals.extend(campaign.signals.clone());
     let known = Metrics::names(own);
     let known = || known.iter().map(String::as_str).filter(|name| !OF_THE_MACHINE.contains(name));
-    source.known(&campaign.metrics, "metric of the experiment", known())?;
+    source.check_names(&campaign.metrics, "metric of the experiment", known())?;
     let mut metrics = BTreeMap::new();
     for name in &campaign.metrics {
         let Some(measure) = own.metrics.get(name.get_ref()) else { continue };
@@ -103,7 +103,11 @@ pub(crate) fn observe(campaign: &Campaign, own: &Observe) -> Result<Observe, Err
         metrics.insert(name.get_ref().clone(), measure.clone());
     }
     for measure in &campaign.measures {
-        source.known([&measure.signals], "list of signals", signals.keys().map(String::as_str))?;
+        source.check_names(
+            [&measure.signals],
+            "list of signals",
+            signals.keys().map(String::as_str),
+        )?;
         let mut measure = measure.clone();
         let id = std::mem::take(&mut measure.id);
         if metrics.contains_key(&id) || known().any(|name| name == id) {
@@ -195,7 +199,10 @@ pub(crate) fn recorded(campaign: &Campaign, observe: &Observe, meters: &Meters) 
         .map(|name| Recorded {
             unit: units.get(&name).cloned().unwrap_or_default(),
             is_never: observe.metrics.get(&name).is_some_and(|measure| {
-                matches!(measure.kind, experiment::Kind::Settling | experiment::Kind::Leaving)
+                matches!(
+                    measure.kind,
+                    experiment::MeasureKind::Settling | experiment::MeasureKind::Leaving
+                )
             }),
             name,
         })

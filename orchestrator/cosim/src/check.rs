@@ -1,5 +1,5 @@
-//! Checks an experiment in one pass: every name in it is looked up, and everything that cannot be
-//! run is refused. After that only the units themselves can fail.
+//! Checks an experiment in one pass: every name in it is looked up, and whatever cannot be run is
+//! refused. After that only the instances themselves can fail.
 
 use crate::clock::Clock;
 use crate::delay;
@@ -11,8 +11,8 @@ use crate::system::{Opened, System, parts, periods};
 use crate::wiring::{self, Part};
 use fmu_import::faults;
 use fmu_import::fmu::Fmu;
+use fmu_import::lookup_table::is_lookup_table;
 use fmu_import::names;
-use fmu_import::table::is_table;
 use fmu_import::warnings;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -62,7 +62,7 @@ pub fn check(
     if let Some(names) = delay::algebraic_loop(&parts, &wires) {
         let message = format!(
             "algebraic loop: each of these inputs depends on the next at the same instant: {}. \
-             Put a unit with a state or a delay between them",
+             Put an FMU with a state or a delay into the loop",
             names.join(" <- ")
         );
         return Err(experiment.source.error(&(0..0), message));
@@ -80,42 +80,42 @@ fn open(path: &Path) -> Result<Fmu, Error> {
     if let Some(first) = faults.first() {
         let more = match faults.len() {
             1 => String::new(),
-            count => format!(" ({} more: orchestrator inspect --check)", count - 1),
+            count => format!(" ({} more, which orchestrator inspect --check lists)", count - 1),
         };
         warnings::warn_once(format!("{}: {first}{more}", path.display()));
     }
     Ok(fmu)
 }
 
-/// Explains which component was meant if a parameter is given without one, or with a wrong one.
+/// Explains which component may be meant if a parameter is given without one, or with a wrong one.
 fn whereabouts(target: &str, parts: &[Part]) -> String {
-    let of = |part: &Part| {
-        let known = part.description.names("parameter").chain(part.description.names("input"));
-        known.map(|name| format!("{}.{name}", part.name)).collect::<Vec<_>>()
+    let settable = |part: &Part| {
+        let names = part.description.names("parameter").chain(part.description.names("input"));
+        names.map(|name| format!("{}.{name}", part.name)).collect::<Vec<_>>()
     };
-    let all: Vec<String> = parts.iter().flat_map(of).collect();
-    let meant: Vec<&str> = all
+    let paths: Vec<String> = parts.iter().flat_map(settable).collect();
+    let meant: Vec<&str> = paths
         .iter()
         .filter(|name| names::split(name).is_some_and(|(_, rest)| rest == target))
         .map(String::as_str)
         .collect();
     if !meant.is_empty() {
-        return format!("of which component? Write {}", meant.join(" or "));
+        return format!("the component is missing: write {}", meant.join(" or "));
     }
     let component = names::split(target).map_or(target, |(component, _)| component);
-    let hint = match names::nearest(target, all.iter().map(String::as_str)) {
+    let hint = match names::nearest(target, paths.iter().map(String::as_str)) {
         Some(name) => format!("; did you mean \"{name}\"?"),
         None => names::hint(component, parts.iter().map(|part| part.name)),
     };
     format!("there is no component \"{component}\"{hint}")
 }
 
-/// Largest number of steps. Beyond it the times of two steps coincide, because units treat instants
+/// Largest number of steps. Beyond it the times of two steps coincide, because FMUs treat instants
 /// as equal if they differ by less than 1e-9 of their size.
 const MOST_STEPS: u64 = 1_000_000_000;
 /// Approximate size of a number in `results.csv`, bytes.
 const NUMBER: f64 = 20.0;
-/// Lower bound of the computing time of a step of two small units, s.
+/// Lower bound of the computing time of a step of two small FMUs, s.
 const QUICK: f64 = 1e-5;
 
 /// Rejects experiments that no machine can run, and warns of results that fill a disk.
@@ -125,8 +125,8 @@ fn check_size(experiment: &Experiment, clock: &Clock, columns: usize) -> Result<
     let gigabytes = rows * (columns + 1) as f64 * NUMBER / 1e9;
     if steps > MOST_STEPS {
         let message = format!(
-            "[simulation] {steps} steps of {} s: there can be {MOST_STEPS} at most. results.csv would take about \
-             {gigabytes:.0} GB and the run {:.0} h or more: take a longer step or an earlier stop",
+            "[simulation] {steps} steps of {} s are too many, at most {MOST_STEPS} are possible. results.csv would take \
+             about {gigabytes:.0} GB and the run {:.0} h or more: choose a longer step or an earlier stop",
             clock.step(),
             steps as f64 * QUICK / 3600.0
         );
@@ -134,7 +134,7 @@ fn check_size(experiment: &Experiment, clock: &Clock, columns: usize) -> Result<
     }
     if gigabytes > 10.0 {
         warnings::warn_once(format!(
-            "results.csv will take about {gigabytes:.0} GB: [record] every = n writes every n-th step only"
+            "results.csv will take about {gigabytes:.0} GB: with [record] every = n only every n-th communication point is written"
         ));
     }
     Ok(())
@@ -157,7 +157,7 @@ fn check_single_instances(
             && let Some(other) = fmus[..index].iter().position(|other| Rc::ptr_eq(other, fmu))
         {
             let message = format!(
-                "\"{}\" and \"{}\" both use {}, which can be instantiated only once per process",
+                "\"{}\" and \"{}\" both use {}, which can be instantiated only once per process: give one of them isolate = true",
                 order[other],
                 order[index],
                 fmu.path.display()
@@ -173,15 +173,15 @@ fn order(experiment: &Experiment) -> Result<Vec<String>, Error> {
     let refuse = |message: String| Err(experiment.source.error(&(0..0), message));
     let names: Vec<&str> = experiment.components.keys().map(String::as_str).collect();
     if let Some(name) = names.iter().find(|name| name.is_empty() || name.contains('.')) {
-        return refuse(format!("the component name \"{name}\" must not be empty or hold a dot"));
+        return refuse(format!("the component name \"{name}\" must not be empty or contain a dot"));
     }
     if let Some((name, _)) =
         experiment.components.iter().find(|(_, component)| component.every == 0)
     {
-        return refuse(format!("[components.{name}] every = 0: must be at least 1"));
+        return refuse(format!("[components.{name}] every = 0: it must be at least 1"));
     }
     if experiment.record.every == 0 {
-        return refuse("[record] every = 0: must be at least 1".into());
+        return refuse("[record] every = 0: it must be at least 1".into());
     }
     let order = &experiment.simulation.order;
     for name in order {
@@ -199,8 +199,8 @@ fn order(experiment: &Experiment) -> Result<Vec<String>, Error> {
     }
     if order.is_empty() {
         return refuse(format!(
-            "[simulation] there is no order: name the components in the order in which they are stepped, those first \
-             whose outputs respond to their inputs at once, for example order = [{}]",
+            "[simulation] there is no order: list the components in the order in which they are stepped. Those whose \
+             outputs respond to their inputs at once come first, for example order = [{}]",
             names.iter().map(|name| format!("\"{name}\"")).collect::<Vec<_>>().join(", ")
         ));
     }
@@ -209,14 +209,14 @@ fn order(experiment: &Experiment) -> Result<Vec<String>, Error> {
     Ok(order.iter().cloned().chain(others.map(ToString::to_string)).collect())
 }
 
-/// Finds the archive of a component: beside the experiment, in the given folders, or where units
-/// are found from any folder.
+/// Finds the archive of a component: beside the experiment, in the given folders, or where FMUs are
+/// found from any folder.
 fn find_fmu(experiment: &Experiment, name: &str, fmu_dirs: &[PathBuf]) -> Result<PathBuf, Error> {
     let written = &experiment.components[name].fmu;
     let mut folders: Vec<PathBuf> = experiment.source.folders().map(Path::to_path_buf).collect();
     folders.dedup();
     folders.extend(fmu_dirs.iter().cloned());
-    folders.extend(search::units());
+    folders.extend(search::fmu_folders());
     if let Some(path) =
         folders.iter().map(|folder| folder.join(written.get_ref())).find(|path| path.is_file())
     {
@@ -228,16 +228,16 @@ fn find_fmu(experiment: &Experiment, name: &str, fmu_dirs: &[PathBuf]) -> Result
         let message = format!("[components.{name}] {} is a folder, not an archive", path.display());
         return Err(experiment.source.error(&written.span(), message));
     }
-    let there: Vec<String> = folders
+    let files: Vec<String> = folders
         .iter()
         .flat_map(|folder| fs::read_dir(folder).into_iter().flatten().flatten())
         .map(|entry| entry.file_name().to_string_lossy().into_owned())
         .filter(|file| {
             let path = Path::new(file);
-            path.extension().is_some_and(|extension| extension == "fmu") || is_table(path)
+            path.extension().is_some_and(|extension| extension == "fmu") || is_lookup_table(path)
         })
         .collect();
-    let hint = names::hint(written.get_ref(), there.iter().map(String::as_str));
+    let hint = names::hint(written.get_ref(), files.iter().map(String::as_str));
     let searched: Vec<String> = folders.iter().map(|folder| folder.display().to_string()).collect();
     let message = format!(
         "[components.{name}] there is no file \"{}\" in {}{hint}",

@@ -20,7 +20,7 @@ impl Clock {
     pub fn new(start: f64, stop: f64, step: f64) -> Result<Self, String> {
         if !(step > 0.0 && step.is_finite() && start.is_finite() && stop.is_finite()) {
             return Err(format!(
-                "start = {start} s, stop = {stop} s, step = {step} s: all must be finite, the step positive"
+                "start = {start} s, stop = {stop} s, step = {step} s: all must be finite, and the step must be positive"
             ));
         }
         let exact = (stop - start) / step;

@@ -1,17 +1,17 @@
 //! Effective delay of each feedback loop, derived from the connections, the coupling and the
 //! dependencies that the FMUs declare for their outputs.
 //!
-//! An output that depends on its unit's inputs at the same instant is *direct*. It can be read only
-//! after the step for which these inputs are set. If a reader is stepped before that (always with
-//! Jacobi coupling; with sequential coupling if the unit comes later in the order), it gets the
-//! response to the inputs of the previous communication point, which delays it by one of its steps.
-//! An output that depends on states alone is never late. A loop in which every output is direct is
-//! algebraic: no order of calls solves it.
+//! An output that depends on its component's inputs at the same instant is *direct*. It can be read
+//! only after the step for which these inputs are set. If a reader is stepped before that (always
+//! with Jacobi coupling; with sequential coupling if the component comes later in the order), it
+//! gets the response to the inputs of the previous communication point, which delays it by one of
+//! its steps. An output that depends on states alone is never delayed. A loop in which every output
+//! is direct is algebraic: no order of calls solves it.
 
 use crate::experiment::Coupling;
 use crate::settings::{Setting, SettingValue};
 use crate::wiring::{Part, Port, Wire};
-use fmu_import::description::Kind;
+use fmu_import::description::VariableKind;
 use fmu_import::quantity::rounded;
 use std::collections::BTreeSet;
 
@@ -31,14 +31,14 @@ pub enum Reading {
 pub struct FeedbackLoop {
     /// Indices of the components. Each feeds the next one, and the last feeds the first.
     pub components: Vec<usize>,
-    /// Delay in addition to the units' own, in ticks.
+    /// Delay in addition to those within the components, in ticks.
     pub ticks: u64,
     /// Components of the loop that do not declare their outputs' dependencies, so that the worst
     /// case was assumed.
     pub undeclared: Vec<usize>,
 }
 
-/// Way in which an output depends on an input of its unit.
+/// Way in which an output depends on an input of its component.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum Passage {
     /// The output depends on the input through states only.
@@ -52,13 +52,13 @@ enum Passage {
 fn passage(parts: &[Part], component: usize, input: usize, output: usize) -> Passage {
     match parts[component].description.dependencies.get(&output) {
         None => Passage::Undeclared,
-        Some(known) if known.contains(&input) => Passage::Direct,
+        Some(inputs) if inputs.contains(&input) => Passage::Direct,
         Some(_) => Passage::Delayed,
     }
 }
 
-/// Returns when the source of each connection is read. A direct output is read after the step, also
-/// if the dependency is not declared, but never so with Jacobi coupling.
+/// Returns when the source of each connection is read. A direct output, or one that declares no
+/// dependencies, is read after the step. With Jacobi coupling every output is read before it.
 pub fn readings_of_wires(
     parts: &[Part],
     wires: &[Wire],
@@ -71,9 +71,9 @@ pub fn readings_of_wires(
     wires.iter().map(|wire| (*wire, reading(wire))).collect()
 }
 
-/// Returns when each variable that an observer asks for is read, so that it shows at a
-/// communication point what belongs to it: an input, and an output that is declared to be direct,
-/// is read after the step that begins there.
+/// Returns when each variable that an observer asks for is read, so that its value belongs to the
+/// communication point: an input, and an output that is declared to be direct, is read after the
+/// step that begins there.
 pub fn readings_of_probes(parts: &[Part], wires: &[Wire], probes: &[Port]) -> Vec<(Port, Reading)> {
     let reading = |port: &Port| {
         let variable = &parts[port.component].description.variables[port.variable];
@@ -86,9 +86,9 @@ pub fn readings_of_probes(parts: &[Part], wires: &[Wire], probes: &[Port]) -> Ve
     probes.iter().map(|port| (*port, reading(port))).collect()
 }
 
-/// Returns how an output depends on its unit's inputs: on those that are connected, and where it
-/// depends on none of them, on the others, if it changes at instants only and feeds another unit.
-/// `None` says that it depends on none.
+/// Returns how an output depends on its component's inputs. The connected inputs count. If it
+/// depends on none of them, the others count as well, provided that the output is discrete and
+/// feeds another component. `None` says that it depends on no input.
 fn strongest_passage(parts: &[Part], wires: &[Wire], output: Port) -> Option<Passage> {
     let description = parts[output.component].description;
     let connected = wires.iter().filter(|wire| wire.to.component == output.component);
@@ -96,9 +96,9 @@ fn strongest_passage(parts: &[Part], wires: &[Wire], output: Port) -> Option<Pas
         .map(|wire| passage(parts, output.component, wire.to.variable, output.variable))
         .max();
     let is_sampled = description.variables[output.variable].variability == "discrete";
-    let known = description.dependencies.get(&output.variable);
-    let responds = known.is_some_and(|known| {
-        known.iter().any(|&input| description.variables[input].causality == "input")
+    let inputs = description.dependencies.get(&output.variable);
+    let responds = inputs.is_some_and(|inputs| {
+        inputs.iter().any(|&input| description.variables[input].causality == "input")
     });
     let feeds = wires.iter().any(|wire| wire.from == output);
     if is_sampled && responds && feeds { Some(Passage::Direct) } else { strongest }
@@ -123,16 +123,16 @@ pub fn feedback_loops(
     loops
 }
 
-fn extend(path: &mut Vec<usize>, wires: &[Wire], found: &mut impl FnMut(&[usize])) {
+fn extend(path: &mut Vec<usize>, wires: &[Wire], report: &mut impl FnMut(&[usize])) {
     let (first, last) = (path[0], path[path.len() - 1]);
     let next: BTreeSet<usize> =
         wires.iter().filter(|w| w.from.component == last).map(|w| w.to.component).collect();
     for component in next {
         if component == first {
-            found(path);
+            report(path);
         } else if component > first && !path.contains(&component) {
             path.push(component);
-            extend(path, wires, found);
+            extend(path, wires, report);
             path.pop();
         }
     }
@@ -260,11 +260,11 @@ const COUNTED_ERROR: &str = "delayError";
 /// Parameter by which a component states how much later than commanded its actuators act, s.
 const TRANSPORT: &str = "actuation.delay";
 
-/// Returns one warning for each component whose law is designed for another delay than its feedback
-/// loop has, also with the error that it allows for. The loop's delay is its ticks times `step`
-/// (s), plus the transport delays of the other components on it. If there are several loops, the
-/// one with the longest delay counts; the warning says so if another one has the delay that the law
-/// is designed for.
+/// Returns one warning for each component whose control law is designed for another delay than its
+/// feedback loop has, beyond the error that the law allows for. The loop's delay is its ticks times
+/// `step` (s), plus the transport delays of the other components on it. If there are several loops,
+/// the one with the longest delay counts; the warning says so if another one has the delay that the
+/// law is designed for.
 pub fn warnings(
     parts: &[Part],
     settings: &[Vec<Setting>],
@@ -277,11 +277,11 @@ pub fn warnings(
             continue;
         };
         let error = duration(COUNTED_ERROR, parts[component], &settings[component]).unwrap_or(0.0);
-        let own = loops.iter().filter(|feedback| feedback.components.contains(&component));
+        let its_loops = loops.iter().filter(|feedback| feedback.components.contains(&component));
         let fits = |delay: f64| {
             (delay - counted_on).abs() <= error + 1e-9 * delay.abs().max(counted_on.abs())
         };
-        let delays = own.map(|feedback| {
+        let delays = its_loops.map(|feedback| {
             let others = feedback.components.iter().filter(|other| **other != component);
             let transport: f64 = others
                 .filter_map(|&other| duration(TRANSPORT, parts[other], &settings[other]))
@@ -315,7 +315,8 @@ pub fn warnings(
 /// `None` if there is no such parameter.
 fn duration(name: &str, part: Part, settings: &[Setting]) -> Option<f64> {
     let (_, variable) = part.description.find(name)?;
-    let is_duration = matches!(&variable.kind, Kind::Real { unit: Some(unit), .. } if unit == "s");
+    let is_duration =
+        matches!(&variable.kind, VariableKind::Real { unit: Some(unit), .. } if unit == "s");
     if !is_duration || variable.causality != "parameter" {
         return None;
     }

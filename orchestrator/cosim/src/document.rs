@@ -3,7 +3,7 @@
 //!
 //! ```toml
 //! extends = "base.toml"               # a file beside this one, or ["a.toml", "b.toml"]
-//! unset = ["controller.gain.p"]       # parameters that a base sets, left at the unit's own value
+//! unset = ["controller.gain.p"]       # parameters that a base sets, left at the FMU's start value
 //! ```
 //!
 //! Of several extended files, a later one has precedence. Tables are merged key by key; a list or a
@@ -88,7 +88,7 @@ impl Source {
         iter::once((self.path.as_path(), self.text.as_str())).chain(bases)
     }
 
-    /// Creates an error at a place. The place `0..0` stands for the file as a whole.
+    /// Creates an error at a place. The place `0..0` stands for the whole file.
     pub fn error(&self, span: &Range<usize>, message: impl Into<String>) -> Error {
         let mut at = format!("{}: ", self.path.display());
         let mut start = 0;
@@ -106,20 +106,22 @@ impl Source {
         self.path.parent().unwrap_or_else(|| Path::new(".")).join(file)
     }
 
-    /// Checks that all names are among `there`. The message calls such a name a `what`.
+    /// Checks that all names are among the `available` ones. The message calls such a name a
+    /// `what`.
     ///
     /// # Errors
     /// Returns an error that names the first unknown name.
-    pub fn known<'a>(
+    pub fn check_names<'a>(
         &self,
         names: impl IntoIterator<Item = &'a Spanned<String>>,
         what: &str,
-        there: impl Iterator<Item = &'a str> + Clone,
+        available: impl Iterator<Item = &'a str> + Clone,
     ) -> Result<(), Error> {
-        match names.into_iter().find(|name| there.clone().all(|other| other != name.get_ref())) {
+        match names.into_iter().find(|name| available.clone().all(|other| other != name.get_ref()))
+        {
             None => Ok(()),
             Some(name) => {
-                let hint = names::hint(name.get_ref(), there);
+                let hint = names::hint(name.get_ref(), available);
                 Err(self.error(
                     &name.span(),
                     format!("there is no {what} \"{}\"{hint}", name.get_ref()),
@@ -164,7 +166,7 @@ impl Source {
                 self.unset(below.get_mut(), unset)?;
                 overlay(table.get_mut(), below.get_ref());
             } else if let Some(unset) = unset {
-                return Err(self.error(&unset.span(), "unset: the file extends none"));
+                return Err(self.error(&unset.span(), "unset: this file extends no other file"));
             }
             whole = Some(table);
         }
@@ -189,11 +191,15 @@ impl Source {
     fn unset(&self, table: &mut DeTable, unset: Option<Spanned<DeValue>>) -> Result<(), Error> {
         let Some(unset) = unset else { return Ok(()) };
         for (target, place) in texts(&unset).map_err(|place| {
-            self.error(&place, "unset: wants a list of texts, for example [\"controller.gain.p\"]")
+            self.error(
+                &place,
+                "unset: expected a list of texts, for example [\"controller.gain.p\"]",
+            )
         })? {
             let refuse = |message: String| self.error(&place, format!("unset: {message}"));
-            let (component, parameter) = names::split(target)
-                .ok_or_else(|| refuse(format!("\"{target}\" is no component.parameter")))?;
+            let (component, parameter) = names::split(target).ok_or_else(|| {
+                refuse(format!("\"{target}\" is not of the form component.parameter"))
+            })?;
             let parameters = ["components", component, "parameters"].iter().try_fold(
                 &mut *table,
                 |table, key| match table.get_mut(*key)?.get_mut() {
@@ -201,16 +207,14 @@ impl Source {
                     _ => None,
                 },
             );
-            let known: Vec<String> = parameters
+            let set_names: Vec<String> = parameters
                 .iter()
                 .flat_map(|table| table.keys())
                 .map(|key| key.get_ref().to_string())
                 .collect();
             if parameters.and_then(|table| table.remove(parameter)).is_none() {
-                let hint = names::hint(parameter, known.iter().map(String::as_str));
-                return Err(refuse(format!(
-                    "what this file extends does not set \"{target}\"{hint}"
-                )));
+                let hint = names::hint(parameter, set_names.iter().map(String::as_str));
+                return Err(refuse(format!("no extended file sets \"{target}\"{hint}")));
             }
         }
         Ok(())
@@ -244,19 +248,19 @@ pub fn texts<'a>(
         .collect()
 }
 
-/// Adds everything from `below` that is missing in `table`, table by table.
+/// Adds all keys of `below` that are missing in `table`, table by table.
 pub fn overlay<'i>(table: &mut DeTable<'i>, below: &DeTable<'i>) {
     for (key, value) in below {
         match (table.get_mut(key.get_ref().as_ref()).map(Spanned::get_mut), value.get_ref()) {
             (None, _) => drop(table.insert(key.clone(), value.clone())),
-            (Some(DeValue::Table(own)), DeValue::Table(below)) => overlay(own, below),
+            (Some(DeValue::Table(inner)), DeValue::Table(below)) => overlay(inner, below),
             _ => {}
         }
     }
 }
 
 /// Adds the files that this one extends, and then this one, to `files`. The `chain` holds the files
-/// that led here.
+/// that led to this one.
 fn collect(
     path: &Path,
     text: String,
@@ -268,7 +272,7 @@ fn collect(
     let bases = table.get_ref().get("extends").map_or(Ok(Vec::new()), texts).map_err(|place| {
         source.error(
             &place,
-            "extends: wants the name of a file or a list of such, for example \"base.toml\"",
+            "extends: expected the name of a file or a list of names, for example \"base.toml\"",
         )
     })?;
     chain.push(identity(path));
@@ -276,11 +280,11 @@ fn collect(
         let refuse =
             |message: String| source.error(&place, format!("extends = \"{name}\": {message}"));
         let base = path.parent().unwrap_or(Path::new("")).join(name);
-        let own = identity(&base);
-        if chain.contains(&own) {
-            return Err(refuse("extends this file in its turn, a circle".into()));
+        let base_identity = identity(&base);
+        if chain.contains(&base_identity) {
+            return Err(refuse("extends this file in turn, which is a circle".into()));
         }
-        if files.iter().any(|(known, _)| identity(known) == own) {
+        if files.iter().any(|(path, _)| identity(path) == base_identity) {
             continue;
         }
         let text = fs::read_to_string(&base)

@@ -1,5 +1,5 @@
-//! What is doubtful about an experiment although it can be run: a delay that a law counts on and
-//! the loop does not have, and a seed that changes nothing.
+//! Finds what is doubtful about an experiment that can be run: a control law that is designed for
+//! another loop delay, and a seed without effect.
 
 use crate::delay;
 use crate::error::Error;
@@ -18,12 +18,13 @@ pub fn doubts(system: &System, interrupt: &Interrupt) -> Result<Vec<String>, Err
     let mut doubts =
         delay::warnings(&system.parts(), &system.settings, &system.loops, system.clock.step());
     for seed in without_effect(system, interrupt)? {
-        doubts.push(format!("--set {seed}: changes nothing, another seed comes to the same"));
+        doubts
+            .push(format!("--set {seed}: this seed has no effect, another one gives the same run"));
     }
     Ok(doubts)
 }
 
-/// Finds the seeds, as `component.parameter`, that the command line sets and that change nothing,
+/// Finds the seeds, as `component.parameter`, that the command line sets and that have no effect,
 /// for example the seed of a constant disturbance. Two runs with different seeds are compared tick
 /// by tick until they differ, which is soon if the seed has an effect.
 ///
@@ -41,7 +42,8 @@ fn without_effect(system: &System, interrupt: &Interrupt) -> Result<Vec<String>,
             let mut other = system.settings.clone();
             other[component][index].value =
                 SettingValue::Integer(if seed > 0 { seed - 1 } else { seed + 1 });
-            // Messages of the units are hidden here, because they appear again in the run itself.
+            // Messages of the instances are hidden here, because they appear again in the run
+            // itself.
             let same = with_default(NoSubscriber::default(), || {
                 let _warnings = warnings::collect();
                 are_same(system, &other, interrupt)
@@ -49,7 +51,7 @@ fn without_effect(system: &System, interrupt: &Interrupt) -> Result<Vec<String>,
             match same {
                 Ok(true) => idle.push(path),
                 Err(error @ Error::Interrupted { .. }) => return Err(error),
-                // A run that fails is taken as one that differs.
+                // A run that fails counts as one that differs.
                 Ok(false) | Err(_) => {}
             }
         }

@@ -3,8 +3,8 @@
 
 use crate::interrupt::Request;
 use fmu_import::error::Error as Import;
+use fmu_import::instance::CallFailure;
 use fmu_import::quantity::rounded;
-use fmu_import::unit::UnitFailure;
 use std::path::PathBuf;
 
 /// An error that occurs between reading an experiment and writing its results.
@@ -21,29 +21,29 @@ pub enum Error {
     /// An archive cannot be used.
     #[error(transparent)]
     Import(#[from] fmu_import::error::Error),
-    /// A unit failed in a call.
+    /// A call of an instance failed.
     #[error("{component} failed at t = {} s in {}: {}", rounded(*time), failure.call, failure.message)]
-    Unit {
+    Call {
         /// Name of the component in the experiment.
         component: String,
         /// Simulated time of the communication point, s.
         time: f64,
-        /// The call that failed, with the unit's own message.
-        failure: UnitFailure,
+        /// The call that failed, with the instance's own message.
+        failure: CallFailure,
     },
-    /// A unit ended the simulation, which FMI allows.
+    /// An instance ended the simulation, which FMI allows.
     #[error("{component} ended the simulation at t = {} s: {message}", rounded(*time))]
-    EndedByUnit {
+    EndedByInstance {
         /// Name of the component in the experiment.
         component: String,
         /// Time of the last communication point, s.
         time: f64,
-        /// Message of the unit, in its own words.
+        /// Message of the instance, in its own words.
         message: String,
     },
     /// A deadline was missed in a run that was to end in this case.
     #[error(
-        "{component} missed its deadline at t = {} s by {late_ms:.3} ms, which was to end the run (--on-miss stop)",
+        "{component} missed its deadline at t = {} s by {late_ms:.3} ms, which ends the run, as --on-miss stop asks",
         rounded(*time)
     )]
     Deadline {
@@ -97,16 +97,16 @@ impl Error {
         move |source| Self::File { path, source }
     }
 
-    /// Returns the exit code of a process that ends with this error: 0 for a run that a unit or the
-    /// user ended, 1 for a run that failed, 2 for bad usage or a bad experiment, 3 for a run that
-    /// was lost, and 130 or 143 for a run that a signal ended.
+    /// Returns the exit code of a process that ends with this error: 0 for a run that an instance
+    /// or the user ended, 1 for a run that failed, 2 for bad usage or a bad experiment, 3 for a run
+    /// that was lost, and 130 or 143 for a run that a signal ended.
     pub fn exit_code(&self) -> u8 {
         match self {
             Self::Experiment { .. } | Self::Import(Import::Fmu { .. }) => 2,
             Self::Interrupted { request, .. } | Self::Ended(request) => request.exit_code(),
-            Self::EndedByUnit { .. } => 0,
+            Self::EndedByInstance { .. } => 0,
             Self::Lost { .. } => 3,
-            Self::Unit { .. }
+            Self::Call { .. }
             | Self::Deadline { .. }
             | Self::Import(Import::File { .. })
             | Self::File { .. } => 1,

@@ -79,12 +79,12 @@ impl Interrupt {
     /// Returns an error if the system does not accept the handler.
     #[cfg(not(unix))]
     pub fn listen(&self) -> io::Result<()> {
-        let own = self.clone();
+        let interrupt = self.clone();
         let handler = move || {
-            if own.again.swap(true, Ordering::Relaxed) {
+            if interrupt.again.swap(true, Ordering::Relaxed) {
                 std::process::exit(128 + SIGINT);
             }
-            own.ask(Request::INTERRUPT);
+            interrupt.ask(Request::INTERRUPT);
         };
         ctrlc::set_handler(handler).map_err(io::Error::other)
     }

@@ -1,11 +1,11 @@
-//! Steps FMI 2.0 units as an experiment file describes. This crate knows units only; the experiment
-//! says what their variables stand for.
+//! Steps FMI 2.0 instances as an experiment file describes. What their variables stand for is known
+//! to the experiment alone.
 //!
 //! An [`experiment`] is read ([`document`]) and [checked](mod@check) once, from the top down, into
 //! a [`system::System`] (`wiring`, `settings`, [`delay`]). After this no name is looked up. The
-//! [`master`] steps the units on integer ticks ([`clock`]), paced by the wall clock if requested
-//! ([`pacing`]), and observers such as the [`recorder`] see the values. [`metadata`] describes a
-//! finished run, and [`ssp`] reads and writes systems as SSP archives.
+//! [`master`] steps the instances on integer ticks ([`clock`]), paced by the wall clock if
+//! requested ([`pacing`]), and observers such as the [`recorder`] see the values. [`metadata`]
+//! describes a finished run, and [`ssp`] reads and writes systems as SSP archives.
 
 pub mod check;
 pub mod clock;

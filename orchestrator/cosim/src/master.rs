@@ -1,12 +1,14 @@
-//! The master algorithm, which sets the units' inputs, steps the units, and reads their outputs.
+//! The master algorithm, which sets the instances' inputs, steps the instances, and reads their
+//! outputs.
 //!
-//! Every unit sees the calls set, doStep and get in this order, as FMI 2.0.5, section 4.2.1, asks:
-//! nothing is read between setting and stepping. At tick k, every unit that stands at t_k is set
-//! and stepped. With sequential coupling this is done unit by unit, so that outputs which respond
-//! to inputs, such as the moment of a controller, are handed on at once: they are read after the
-//! step for which the inputs were set. All other outputs are those that were read when the unit
-//! came to t_k, even if it has been stepped since. So nothing shows of a unit's future, and a unit
-//! that steps at every n-th tick only is stepped when its interval begins.
+//! Every instance sees the calls set, doStep and get in this order, as FMI 2.0.5, section 4.2.1,
+//! asks: nothing is read between setting and stepping. At tick k, every instance that stands at t_k
+//! is set and stepped. With sequential coupling this is done instance by instance, so that outputs
+//! which respond to inputs, such as the moment of a controller, are handed on at once: they are
+//! read after the step for which the inputs were set. All other outputs are those that were read
+//! when the instance came to t_k, even if it has been stepped since. So no value shows an
+//! instance's future, and an instance that steps at every n-th tick only is stepped when its
+//! interval begins.
 
 mod transfer;
 
@@ -22,7 +24,7 @@ use crate::pacing::pacer::Pacer;
 use crate::pacing::timer::{Monotonic, Timer};
 use crate::stopwatch::{Spent, Stopwatch};
 use crate::wiring::{Port, Wire};
-use fmu_import::unit::{CoSimulationUnit, Outcome, UnitFailure};
+use fmu_import::instance::{CallFailure, Instance, Outcome};
 use fmu_import::warnings;
 use std::rc::Rc;
 use transfer::{Inputs, Row, Values};
@@ -52,28 +54,28 @@ pub trait Observer {
     fn observe(&mut self, sample: &Sample) -> Result<(), Error>;
 }
 
-/// Index of a unit whose call failed, with the failure.
-type Culprit = (usize, UnitFailure);
+/// Index of an instance whose call failed, with the failure.
+type Culprit = (usize, CallFailure);
 
-/// The units with their connections, which are ready to run.
+/// The instances with their connections, ready to run.
 pub struct Master {
     clock: Clock,
     coupling: Coupling,
     members: Vec<Member>,
-    /// Units that are stepping in a process of their own, while others work.
+    /// Instances that are stepping in a process of their own, while others work.
     stepping: Vec<bool>,
     inputs: Vec<Inputs>,
     values: Values,
     row: Row,
-    /// Accumulated computing time of each unit; empty unless it is measured.
+    /// Accumulated computing time of each instance; empty unless it is measured.
     spent: Vec<Rc<Spent>>,
     pacer: Option<Pacer>,
     interrupt: Interrupt,
 }
 
 impl Master {
-    /// Creates a master for units in this order; indices in `wires` and `probes` are positions in
-    /// `members`.
+    /// Creates a master for instances in this order; indices in `wires` and `probes` are positions
+    /// in `members`.
     pub fn new(
         clock: Clock,
         coupling: Coupling,
@@ -100,7 +102,7 @@ impl Master {
 
     /// Sets the interrupt through which the run can be ended from outside. It must be set before
     /// [`Self::pace`] is called.
-    pub fn heed(&mut self, interrupt: &Interrupt) {
+    pub fn set_interrupt(&mut self, interrupt: &Interrupt) {
         self.interrupt = interrupt.clone();
     }
 
@@ -119,7 +121,7 @@ impl Master {
         self.pacer.take()
     }
 
-    /// Measures the computing time of each unit from now on.
+    /// Measures the computing time of each instance from now on.
     pub fn measure_time(&mut self) {
         let timer: Rc<dyn Timer> = Rc::new(Monotonic);
         self.measure(&timer);
@@ -128,30 +130,32 @@ impl Master {
     fn measure(&mut self, timer: &Rc<dyn Timer>) {
         let members = std::mem::take(&mut self.members).into_iter();
         (self.members, self.spent) = members
-            .map(|Member { name, every, unit, .. }| {
-                let (unit, spent) = Stopwatch::new(unit, Rc::clone(timer));
-                // What two units compute at the same time could not be told apart.
-                (Member { name, every, ahead: false, unit: Box::new(unit) }, spent)
+            .map(|Member { name, every, instance, .. }| {
+                let (instance, spent) = Stopwatch::new(instance, Rc::clone(timer));
+                // Computing times of two instances that work at the same time could not be told
+                // apart.
+                (Member { name, every, ahead: false, instance: Box::new(instance) }, spent)
             })
             .unzip();
     }
 
-    /// Returns the mean wall-clock time that each unit took per step, s, by name. There are no
+    /// Returns the mean wall-clock time that each instance took per step, s, by name. There are no
     /// entries if it was not measured.
     pub fn step_seconds(&self) -> impl Iterator<Item = (&str, f64)> {
         let spent = self.members.iter().zip(&self.spent);
         spent.filter_map(|(member, spent)| Some((member.name.as_str(), spent.seconds_per_step()?)))
     }
 
-    /// Initializes all units; their inputs are transferred in initialization mode, in the members'
-    /// order.
+    /// Initializes all instances; their inputs are transferred in initialization mode, in the
+    /// members' order.
     ///
     /// # Errors
-    /// Returns an error if a call of a unit fails.
+    /// Returns an error if a call of an instance fails.
     pub fn initialize(&mut self) -> Result<(), Error> {
         let start = self.clock.start();
         for index in 0..self.members.len() {
-            let outcome = self.members[index].unit.enter_initialization(start, self.clock.stop());
+            let outcome =
+                self.members[index].instance.enter_initialization(start, self.clock.stop());
             outcome.map_err(|failure| self.error(start, (index, failure)))?;
         }
         // Whatever the coupling, inputs are transferred one after the other here, so that the
@@ -160,11 +164,11 @@ impl Master {
             self.pass_on(index).map_err(|culprit| self.error(start, culprit))?;
         }
         for index in 0..self.members.len() {
-            let outcome = self.members[index].unit.exit_initialization();
+            let outcome = self.members[index].instance.exit_initialization();
             outcome.map_err(|failure| self.error(start, (index, failure)))?;
         }
         for index in 0..self.members.len() {
-            self.read_unit(index, true).map_err(|culprit| self.error(start, culprit))?;
+            self.read_instance(index, true).map_err(|culprit| self.error(start, culprit))?;
         }
         Ok(())
     }
@@ -172,38 +176,38 @@ impl Master {
     fn pass_on(&mut self, index: usize) -> Result<(), Culprit> {
         for place in 0..self.inputs[index].sources.len() {
             let source = self.inputs[index].sources[place];
-            self.read_unit(source, false)?;
+            self.read_instance(source, false)?;
             self.values.arrive(source);
         }
         self.set(index)
     }
 
-    /// Sets all units back to their start values, after which [`Self::initialize`] begins another
-    /// run. `prepare` is called with the index of each unit to set its parameters.
+    /// Sets all instances back to their start values, after which [`Self::initialize`] begins
+    /// another run. `prepare` is called with the index of each instance to set its parameters.
     ///
     /// # Errors
-    /// Returns an error if a call of a unit fails.
+    /// Returns an error if a call of an instance fails.
     pub fn reset(
         &mut self,
-        mut prepare: impl FnMut(usize, &mut dyn CoSimulationUnit) -> Outcome,
+        mut prepare: impl FnMut(usize, &mut dyn Instance) -> Outcome,
     ) -> Result<(), Error> {
         let start = self.clock.start();
         for index in 0..self.members.len() {
-            let unit = self.members[index].unit.as_mut();
-            let outcome = unit.reset().and_then(|()| prepare(index, unit));
+            let instance = self.members[index].instance.as_mut();
+            let outcome = instance.reset().and_then(|()| prepare(index, instance));
             outcome.map_err(|failure| self.error(start, (index, failure)))?;
         }
         Ok(())
     }
 
-    /// Reads variables of a unit once, for example parameters after initialization.
+    /// Reads variables of an instance once, for example parameters after initialization.
     ///
     /// # Errors
-    /// Returns an error if a call of the unit fails.
+    /// Returns an error if a call of the instance fails.
     pub fn read(&mut self, ports: &[Port]) -> Result<Vec<f64>, Error> {
         let mut values = Values::new(self.members.len(), &[], ports);
         for index in 0..self.members.len() {
-            let outcome = values.read(index, self.members[index].unit.as_mut(), true);
+            let outcome = values.read(index, self.members[index].instance.as_mut(), true);
             outcome.map_err(|failure| self.error(self.clock.start(), (index, failure)))?;
         }
         let latest: Vec<_> = ports.iter().map(|port| (*port, Reading::AfterStep)).collect();
@@ -215,8 +219,9 @@ impl Master {
     /// Runs from the start time to the stop time.
     ///
     /// # Errors
-    /// Returns an error if a unit or an observer fails, if a missed deadline is to end the run, or
-    /// if the run was asked to end. The observers have seen all communication points up to then.
+    /// Returns an error if an instance or an observer fails, if a missed deadline is to end the
+    /// run, or if the run was asked to end. The observers have seen all communication points up to
+    /// then.
     pub fn run(&mut self, observers: &mut [&mut dyn Observer]) -> Result<(), Error> {
         let outcome = self.pass_through(observers);
         if let Some(pacer) = &mut self.pacer {
@@ -244,17 +249,17 @@ impl Master {
             outcome.and(deadlines)?;
         }
         for index in 0..self.members.len() {
-            let outcome = self.members[index].unit.terminate();
+            let outcome = self.members[index].instance.terminate();
             outcome.map_err(|failure| self.error(self.clock.stop(), (index, failure)))?;
         }
         Ok(())
     }
 
-    /// Does the round of this tick, which must follow the last one; tick 0 follows initialization.
+    /// Does the steps of this tick, which must follow the last one; tick 0 follows initialization.
     /// Returns the probed values at this tick, in the order in which the probes were requested.
     ///
     /// # Errors
-    /// Returns an error if a unit fails, or if the run was ended from outside.
+    /// Returns an error if an instance fails, or if the run was ended from outside.
     pub fn advance(&mut self, tick: u64) -> Result<&[f64], Error> {
         if let Some(request) = self.interrupt.asked() {
             return Err(Error::Interrupted { time: self.clock.time(tick), request });
@@ -263,8 +268,8 @@ impl Master {
         Ok(&self.row.values)
     }
 
-    /// Sets and steps the units whose communication point is this tick, and fills the row. If one
-    /// fails, the row shows what could be read.
+    /// Sets and steps the instances whose communication point is this tick, and fills the row. If
+    /// one fails, the row shows what could be read.
     fn round(&mut self, tick: u64) -> Result<(), Error> {
         let time = self.clock.time(tick);
         warnings::at(time);
@@ -300,7 +305,7 @@ impl Master {
                 self.set(index)?;
             }
         }
-        // Units in processes of their own compute while the others are stepped.
+        // Instances in processes of their own compute while the others are stepped.
         for ahead in [true, false] {
             for index in 0..self.members.len() {
                 if self.begins(index, tick) && self.members[index].ahead == ahead {
@@ -311,7 +316,7 @@ impl Master {
         self.finish_all(tick)
     }
 
-    /// Returns whether a step of the unit begins at this tick and ends by the stop time.
+    /// Returns whether a step of the instance begins at this tick and ends by the stop time.
     fn begins(&self, index: usize, tick: u64) -> bool {
         let every = u64::from(self.members[index].every);
         tick.is_multiple_of(every) && tick + every <= self.clock.ticks()
@@ -320,25 +325,25 @@ impl Master {
     fn set(&mut self, index: usize) -> Result<(), Culprit> {
         let inputs = &mut self.inputs[index];
         inputs.gather(&self.values);
-        inputs.scatter(self.members[index].unit.as_mut()).map_err(|failure| (index, failure))
+        inputs.scatter(self.members[index].instance.as_mut()).map_err(|failure| (index, failure))
     }
 
-    /// Begins the step of a unit at this tick. Only one in a process of its own is not finished yet
-    /// then.
+    /// Begins the step of an instance at this tick. Only an instance in a process of its own still
+    /// computes when this returns.
     fn begin(&mut self, index: usize, tick: u64) -> Result<(), Culprit> {
         self.stepping[index] = true;
         if !self.members[index].ahead {
             return self.finish(index, tick);
         }
-        self.step(index, tick, CoSimulationUnit::begin_step)
+        self.step(index, tick, Instance::begin_step)
     }
 
     fn finish(&mut self, index: usize, tick: u64) -> Result<(), Culprit> {
         if !std::mem::take(&mut self.stepping[index]) {
             return Ok(());
         }
-        self.step(index, tick, CoSimulationUnit::do_step)?;
-        self.read_unit(index, true)
+        self.step(index, tick, Instance::do_step)?;
+        self.read_instance(index, true)
     }
 
     fn finish_all(&mut self, tick: u64) -> Result<(), Culprit> {
@@ -349,25 +354,25 @@ impl Master {
         &mut self,
         index: usize,
         tick: u64,
-        call: impl Fn(&mut (dyn CoSimulationUnit + 'static), f64, f64) -> Outcome,
+        call: impl Fn(&mut (dyn Instance + 'static), f64, f64) -> Outcome,
     ) -> Result<(), Culprit> {
-        let Member { every, unit, .. } = &mut self.members[index];
+        let Member { every, instance, .. } = &mut self.members[index];
         let length = f64::from(*every) * self.clock.step();
-        call(unit.as_mut(), self.clock.time(tick), length).map_err(|failure| (index, failure))
+        call(instance.as_mut(), self.clock.time(tick), length).map_err(|failure| (index, failure))
     }
 
-    fn read_unit(&mut self, index: usize, probed: bool) -> Result<(), Culprit> {
-        let unit = self.members[index].unit.as_mut();
-        self.values.read(index, unit, probed).map_err(|failure| (index, failure))
+    fn read_instance(&mut self, index: usize, probed: bool) -> Result<(), Culprit> {
+        let instance = self.members[index].instance.as_mut();
+        self.values.read(index, instance, probed).map_err(|failure| (index, failure))
     }
 
     #[cold]
     fn error(&self, time: f64, (index, failure): Culprit) -> Error {
         let component = self.members[index].name.clone();
         if failure.ends {
-            Error::EndedByUnit { component, time, message: failure.message }
+            Error::EndedByInstance { component, time, message: failure.message }
         } else {
-            Error::Unit { component, time, failure }
+            Error::Call { component, time, failure }
         }
     }
 }

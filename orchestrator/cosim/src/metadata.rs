@@ -5,7 +5,7 @@ use crate::error::Error;
 use crate::files::digest;
 use crate::pacing;
 use crate::system::{Parameters, System};
-use fmu_import::description::Kind;
+use fmu_import::description::VariableKind;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 
@@ -20,7 +20,9 @@ pub fn metadata(
     let simulation = &experiment.simulation;
     let seeds: BTreeMap<String, &Value> = parameters
         .iter()
-        .flat_map(|(component, own)| own.iter().map(move |(name, value)| (component, name, value)))
+        .flat_map(|(component, values)| {
+            values.iter().map(move |(name, value)| (component, name, value))
+        })
         .filter(|(_, name, _)| is_seed(name))
         .map(|(component, name, value)| (format!("{component}.{name}"), value))
         .collect();
@@ -45,10 +47,13 @@ pub fn metadata(
         .map(|column| {
             let variable =
                 &parts[column.port.component].description.variables[column.port.variable];
-            let unit =
-                if let Kind::Real { unit, .. } = &variable.kind { unit.clone() } else { None };
+            let unit = if let VariableKind::Real { unit, .. } = &variable.kind {
+                unit.clone()
+            } else {
+                None
+            };
             let items = match &variable.kind {
-                Kind::Enumeration { items } => Some(
+                VariableKind::Enumeration { items } => Some(
                     items
                         .iter()
                         .map(|(name, item)| (item.to_string(), name))
@@ -107,7 +112,8 @@ fn status(failure: Option<&Error>) -> String {
     match failure {
         None => "completed".into(),
         Some(
-            error @ (Error::Interrupted { .. } | Error::EndedByUnit { .. } | Error::Lost { .. }),
+            error
+            @ (Error::Interrupted { .. } | Error::EndedByInstance { .. } | Error::Lost { .. }),
         ) => error.to_string(),
         Some(error) => format!("failed: {error}"),
     }

@@ -1,4 +1,4 @@
-//! Folders in which experiments, studies and units are found from any folder: those of the project,
+//! Folders in which experiments, studies and FMUs are found from any folder: those of the project,
 //! those of an environment variable, and those beside this program.
 
 use crate::error::Error;
@@ -26,9 +26,9 @@ fn beside_program(places: &[&str]) -> Vec<PathBuf> {
 }
 
 /// Keeps the folders that exist, each once, with absolute paths made canonical.
-fn there(folders: Vec<PathBuf>) -> Vec<PathBuf> {
-    let mut known = BTreeSet::new();
-    let is_new = |folder: &PathBuf| fs::canonicalize(folder).is_ok_and(|path| known.insert(path));
+fn existing(folders: Vec<PathBuf>) -> Vec<PathBuf> {
+    let mut seen = BTreeSet::new();
+    let is_new = |folder: &PathBuf| fs::canonicalize(folder).is_ok_and(|path| seen.insert(path));
     let straight = |folder: PathBuf| {
         if folder.is_absolute() { fs::canonicalize(&folder).unwrap_or(folder) } else { folder }
     };
@@ -40,15 +40,15 @@ pub fn experiments() -> Vec<PathBuf> {
     let mut folders = vec![PathBuf::from(EXPERIMENTS)];
     folders.extend(by_variable());
     folders.extend(beside_program(&["experiments", "../../orchestrator/experiments"]));
-    there(folders)
+    existing(folders)
 }
 
-/// Returns the folders that hold units.
-pub fn units() -> Vec<PathBuf> {
+/// Returns the folders that hold FMUs.
+pub fn fmu_folders() -> Vec<PathBuf> {
     let mut folders = vec![PathBuf::from("target/fmu")];
     folders.extend(by_variable());
     folders.extend(beside_program(&["fmu", "../fmu"]));
-    there(folders)
+    existing(folders)
 }
 
 /// Lists the files with this extension below a folder. Hidden folders and build folders are
@@ -67,7 +67,7 @@ pub fn files(folder: &Path, extension: &str) -> Vec<PathBuf> {
 }
 
 /// Returns whether a folder or file is skipped. Hidden folders and build folders are large and hold
-/// nothing to run, except `target/fmu`, which is searched by its own name.
+/// nothing to run, except `target/fmu`, which is searched separately.
 fn is_passed_over(name: &str) -> bool {
     name.starts_with('.') || name == "target"
 }
@@ -94,9 +94,9 @@ pub fn is_campaign(text: &str) -> bool {
 
 /// Finds the experiments below a folder.
 fn experiments_below(folder: &Path) -> Vec<PathBuf> {
-    let mut found = files(folder, "toml");
-    found.retain(|path| fs::read_to_string(path).is_ok_and(|text| is_experiment(&text)));
-    found
+    let mut paths = files(folder, "toml");
+    paths.retain(|path| fs::read_to_string(path).is_ok_and(|text| is_experiment(&text)));
+    paths
 }
 
 /// Finds the experiment with this name: a file, or an experiment that `list` shows, by its name or
@@ -110,8 +110,8 @@ pub fn experiment(name: &Path) -> Result<PathBuf, Error> {
     let extension = name.extension().and_then(|extension| extension.to_str()).unwrap_or_default();
     if extension == "fmu" {
         return Err(Error::experiment(format!(
-            "{shown} is a unit, and units are run by an experiment: a file that names it, as in [components.plant] \
-             fmu = \"{}\". --fmu COMPONENT={shown} puts it into an experiment that there is, \
+            "{shown} is an FMU, and FMUs are run by an experiment: a file that names it, as in [components.plant] \
+             fmu = \"{}\". --fmu COMPONENT={shown} puts it into an existing experiment, \
              and `orchestrator inspect {shown}` shows its variables",
             name.file_name().unwrap_or_default().to_string_lossy()
         )));
@@ -123,16 +123,16 @@ pub fn experiment(name: &Path) -> Result<PathBuf, Error> {
         let is_what = if name.is_dir() { "this is a folder" } else { "there is no such file" };
         return Err(Error::experiment(format!("{shown}: {is_what}")));
     }
-    let wanted = with_toml(name);
-    if wanted.is_file() {
-        return Ok(wanted);
+    let file = with_toml(name);
+    if file.is_file() {
+        return Ok(file);
     }
-    let mut all = Vec::new();
+    let mut others = Vec::new();
     for folder in experiments().into_iter().chain([PathBuf::from(".")]) {
-        let here = experiments_below(&folder);
-        let fitting: Vec<&PathBuf> = here.iter().filter(|path| path.ends_with(&wanted)).collect();
+        let below = experiments_below(&folder);
+        let fitting: Vec<&PathBuf> = below.iter().filter(|path| path.ends_with(&file)).collect();
         match fitting[..] {
-            [] => all.extend(here),
+            [] => others.extend(below),
             [path] => return Ok(path.clone()),
             [..] => {
                 let paths: Vec<String> =
@@ -144,7 +144,7 @@ pub fn experiment(name: &Path) -> Result<PathBuf, Error> {
             }
         }
     }
-    let stems: BTreeSet<String> = all
+    let stems: BTreeSet<String> = others
         .iter()
         .filter_map(|path| path.file_stem())
         .map(|stem| stem.to_string_lossy().into_owned())

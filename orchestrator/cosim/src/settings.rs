@@ -3,10 +3,10 @@
 use crate::error::Error;
 use crate::experiment::Experiment;
 use crate::wiring::{Part, Wire};
-use fmu_import::description::{Kind, Variable};
+use fmu_import::description::{Variable, VariableKind};
+use fmu_import::instance::{Instance, Outcome};
 use fmu_import::names;
 use fmu_import::quantity;
-use fmu_import::unit::{CoSimulationUnit, Outcome};
 use fmu_import::warnings::warn_once;
 use toml::Value;
 
@@ -94,7 +94,7 @@ pub(crate) fn resolve(
 }
 
 /// Returns the position of a variable that may be set, among the variables of its component. With
-/// `is_whole` a hint names it together with the component.
+/// `is_whole` a hint names the component as well.
 pub(crate) fn position(
     name: &str,
     component: usize,
@@ -103,11 +103,11 @@ pub(crate) fn position(
     is_whole: bool,
 ) -> Result<usize, String> {
     let (position, variable) = part.description.find(name).ok_or_else(|| {
-        let known = part.description.names("parameter").chain(part.description.names("input"));
-        let known: Vec<&str> = known.collect();
-        let hint = match names::nearest(name, known.iter().copied()) {
+        let names = part.description.names("parameter").chain(part.description.names("input"));
+        let names: Vec<&str> = names.collect();
+        let hint = match names::nearest(name, names.iter().copied()) {
             Some(near) if is_whole => format!("; did you mean \"{}.{near}\"?", part.name),
-            _ => names::hint(name, known.iter().copied()),
+            _ => names::hint(name, names.iter().copied()),
         };
         format!("there is no such parameter{hint}")
     })?;
@@ -127,16 +127,16 @@ pub(crate) fn value(
     variable: &Variable,
     part: Part,
 ) -> Result<SettingValue, String> {
-    let mismatch = |wanted: &str| Err(format!("wants {wanted}, not {written}"));
+    let mismatch = |expected: &str| Err(format!("must be {expected}, not {written}"));
     match (&variable.kind, written) {
-        (Kind::Real { unit, min, max, .. }, _) => {
+        (VariableKind::Real { unit, min, max, .. }, _) => {
             let value = match written {
                 Value::Float(value) => *value,
                 Value::Integer(value) => *value as f64,
                 Value::String(text) => {
                     quantity::convert(text, unit.as_deref(), &part.description.units)?
                 }
-                _ => return mismatch("a number, or text with a number and a unit"),
+                _ => return mismatch("a number, or a text with a number and a unit"),
             };
             let unit = unit.as_ref().map(|unit| format!(" {unit}")).unwrap_or_default();
             if let Some(min) = min.filter(|min| value < *min) {
@@ -147,38 +147,38 @@ pub(crate) fn value(
             }
             Ok(SettingValue::Real(value))
         }
-        (Kind::Integer { min, max }, Value::Integer(written)) => {
+        (VariableKind::Integer { min, max }, Value::Integer(written)) => {
             let (low, high) = (min.unwrap_or(i32::MIN), max.unwrap_or(i32::MAX));
             match i32::try_from(*written) {
                 Ok(value) if (low..=high).contains(&value) => Ok(SettingValue::Integer(value)),
                 _ => Err(format!("{written} is not between {low} and {high}")),
             }
         }
-        (Kind::Integer { .. }, _) => mismatch("an integer"),
-        (Kind::Boolean, Value::Boolean(value)) => Ok(SettingValue::Boolean(*value)),
-        (Kind::Boolean, _) => mismatch("true or false"),
-        (Kind::Enumeration { items }, Value::String(text)) => items
+        (VariableKind::Integer { .. }, _) => mismatch("an integer"),
+        (VariableKind::Boolean, Value::Boolean(value)) => Ok(SettingValue::Boolean(*value)),
+        (VariableKind::Boolean, _) => mismatch("true or false"),
+        (VariableKind::Enumeration { items }, Value::String(text)) => items
             .iter()
             .find(|(name, _)| name == text)
             .map(|(name, value)| SettingValue::Item(name.clone(), *value))
             .ok_or_else(|| {
-                let known: Vec<&str> = items.iter().map(|(name, _)| name.as_str()).collect();
-                format!("has no item \"{text}\"{}", names::hint(text, known.iter().copied()))
+                let names: Vec<&str> = items.iter().map(|(name, _)| name.as_str()).collect();
+                format!("has no item \"{text}\"{}", names::hint(text, names.iter().copied()))
             }),
-        (Kind::Enumeration { items }, _) => {
-            let known: Vec<&str> = items.iter().map(|(name, _)| name.as_str()).collect();
-            mismatch(&format!("the name of an item ({})", known.join(", ")))
+        (VariableKind::Enumeration { items }, _) => {
+            let names: Vec<&str> = items.iter().map(|(name, _)| name.as_str()).collect();
+            mismatch(&format!("the name of an item ({})", names.join(", ")))
         }
-        (Kind::String, Value::String(text)) => Ok(SettingValue::Text(text.clone())),
-        (Kind::String, _) => mismatch("text"),
+        (VariableKind::String, Value::String(text)) => Ok(SettingValue::Text(text.clone())),
+        (VariableKind::String, _) => mismatch("a text"),
     }
 }
 
 /// Sets the values, with one call for all values of a type. Texts take one call each.
 ///
 /// # Errors
-/// Returns an error if the unit reports a failure.
-pub(crate) fn apply(settings: &[Setting], unit: &mut dyn CoSimulationUnit) -> Outcome {
+/// Returns an error if the instance reports a failure.
+pub(crate) fn apply(settings: &[Setting], instance: &mut dyn Instance) -> Outcome {
     let mut reals = (Vec::new(), Vec::new());
     let mut integers = (Vec::new(), Vec::new());
     let mut booleans = (Vec::new(), Vec::new());
@@ -196,17 +196,17 @@ pub(crate) fn apply(settings: &[Setting], unit: &mut dyn CoSimulationUnit) -> Ou
                 booleans.0.push(*reference);
                 booleans.1.push(i32::from(*value));
             }
-            SettingValue::Text(text) => unit.set_string(*reference, text)?,
+            SettingValue::Text(text) => instance.set_string(*reference, text)?,
         }
     }
     if !reals.0.is_empty() {
-        unit.set_real(&reals.0, &reals.1)?;
+        instance.set_real(&reals.0, &reals.1)?;
     }
     if !integers.0.is_empty() {
-        unit.set_integer(&integers.0, &integers.1)?;
+        instance.set_integer(&integers.0, &integers.1)?;
     }
     if !booleans.0.is_empty() {
-        unit.set_boolean(&booleans.0, &booleans.1)?;
+        instance.set_boolean(&booleans.0, &booleans.1)?;
     }
     Ok(())
 }

@@ -53,11 +53,11 @@ impl TryFrom<String> for Signal {
         let broken = |path: &&str| {
             !path.contains('.') || path.contains(|c: char| c.is_whitespace() || c == '(')
         };
-        if let Some(path) = signal.all().find(broken) {
-            return Err(format!("\"{path}\" in \"{text}\" is no component.variable"));
+        if let Some(path) = signal.all_paths().find(broken) {
+            return Err(format!("\"{path}\" in \"{text}\" is not of the form component.variable"));
         }
         if inside.is_none() && signal.terms.len() > 1 {
-            return Err(format!("\"{text}\": several variables stand in norm(…) only"));
+            return Err(format!("\"{text}\": several variables can be combined by norm(…) only"));
         }
         Ok(signal)
     }
@@ -82,14 +82,14 @@ impl fmt::Display for Signal {
 }
 
 impl Signal {
-    fn all(&self) -> impl Iterator<Item = &str> {
+    fn all_paths(&self) -> impl Iterator<Item = &str> {
         let terms = self.terms.iter().flat_map(|term| iter::once(&term.value).chain(&term.minus));
         terms.chain(&self.over).map(String::as_str)
     }
 
     /// Returns the names of all variables in the signal.
     pub fn paths(&self) -> BTreeSet<&str> {
-        self.all().collect()
+        self.all_paths().collect()
     }
 }
 
@@ -116,15 +116,15 @@ pub struct Resolved {
 impl Resolved {
     /// Creates a signal that is the variable at an index of a sample's values.
     pub fn variable(place: usize) -> Self {
-        Self::of(Term { value: place, minus: None })
+        Self::single(Term { value: place, minus: None })
     }
 
     /// Creates a signal that is the difference of two variables at indices of a sample's values.
     pub fn difference(place: usize, minus: usize) -> Self {
-        Self::of(Term { value: place, minus: Some(minus) })
+        Self::single(Term { value: place, minus: Some(minus) })
     }
 
-    fn of(term: Term<usize>) -> Self {
+    fn single(term: Term<usize>) -> Self {
         let terms = vec![term];
         Self {
             terms,

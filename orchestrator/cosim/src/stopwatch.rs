@@ -1,13 +1,13 @@
-//! A unit whose calls are timed. All calls count, because a unit may do the work of a step only
-//! when its outputs are read.
+//! An instance whose calls are timed. All calls count, because an instance may do the work of a
+//! step only when its outputs are read.
 
 use crate::pacing::timer::Timer;
-use fmu_import::unit::{CoSimulationUnit, Outcome};
+use fmu_import::instance::{Instance, Outcome};
 use std::cell::Cell;
 use std::rc::Rc;
 use std::time::Duration;
 
-/// Computing time spent in a unit's calls so far.
+/// Computing time spent in an instance's calls so far.
 #[derive(Debug, Default)]
 pub struct Spent {
     time: Cell<Duration>,
@@ -16,7 +16,7 @@ pub struct Spent {
 }
 
 impl Spent {
-    /// Returns the total time spent in the unit's calls.
+    /// Returns the total time spent in the instance's calls.
     pub fn time(&self) -> Duration {
         self.time.get()
     }
@@ -39,75 +39,76 @@ impl Spent {
     }
 }
 
-/// A unit whose calls are timed.
+/// An instance whose calls are timed.
 pub(crate) struct Stopwatch {
-    unit: Box<dyn CoSimulationUnit>,
+    instance: Box<dyn Instance>,
     timer: Rc<dyn Timer>,
     spent: Rc<Spent>,
 }
 
 impl Stopwatch {
-    /// Wraps a unit so that it is timed from now on. Also returns the shared record of the time.
-    pub(crate) fn new(unit: Box<dyn CoSimulationUnit>, timer: Rc<dyn Timer>) -> (Self, Rc<Spent>) {
+    /// Wraps an instance so that it is timed from now on. Also returns the shared record of the
+    /// time.
+    pub(crate) fn new(instance: Box<dyn Instance>, timer: Rc<dyn Timer>) -> (Self, Rc<Spent>) {
         let spent = Rc::new(Spent::default());
-        (Self { unit, timer, spent: Rc::clone(&spent) }, spent)
+        (Self { instance, timer, spent: Rc::clone(&spent) }, spent)
     }
 
-    fn time(&mut self, call: impl FnOnce(&mut dyn CoSimulationUnit) -> Outcome) -> Outcome {
+    fn time(&mut self, call: impl FnOnce(&mut dyn Instance) -> Outcome) -> Outcome {
         let begin = self.timer.now();
-        let outcome = call(self.unit.as_mut());
+        let outcome = call(self.instance.as_mut());
         self.spent.add(begin, self.timer.now());
         outcome
     }
 }
 
-impl CoSimulationUnit for Stopwatch {
+impl Instance for Stopwatch {
     fn get_real(&mut self, references: &[u32], values: &mut [f64]) -> Outcome {
-        self.time(|unit| unit.get_real(references, values))
+        self.time(|instance| instance.get_real(references, values))
     }
 
     fn get_integer(&mut self, references: &[u32], values: &mut [i32]) -> Outcome {
-        self.time(|unit| unit.get_integer(references, values))
+        self.time(|instance| instance.get_integer(references, values))
     }
 
     fn get_boolean(&mut self, references: &[u32], values: &mut [i32]) -> Outcome {
-        self.time(|unit| unit.get_boolean(references, values))
+        self.time(|instance| instance.get_boolean(references, values))
     }
 
     fn set_real(&mut self, references: &[u32], values: &[f64]) -> Outcome {
-        self.time(|unit| unit.set_real(references, values))
+        self.time(|instance| instance.set_real(references, values))
     }
 
     fn set_integer(&mut self, references: &[u32], values: &[i32]) -> Outcome {
-        self.time(|unit| unit.set_integer(references, values))
+        self.time(|instance| instance.set_integer(references, values))
     }
 
     fn set_boolean(&mut self, references: &[u32], values: &[i32]) -> Outcome {
-        self.time(|unit| unit.set_boolean(references, values))
+        self.time(|instance| instance.set_boolean(references, values))
     }
 
     fn set_string(&mut self, reference: u32, value: &str) -> Outcome {
-        self.time(|unit| unit.set_string(reference, value))
+        self.time(|instance| instance.set_string(reference, value))
     }
 
     fn enter_initialization(&mut self, start: f64, stop: f64) -> Outcome {
-        self.unit.enter_initialization(start, stop)
+        self.instance.enter_initialization(start, stop)
     }
 
     fn exit_initialization(&mut self) -> Outcome {
-        self.unit.exit_initialization()
+        self.instance.exit_initialization()
     }
 
     fn do_step(&mut self, time: f64, step: f64) -> Outcome {
         self.spent.steps.set(self.spent.steps.get() + 1);
-        self.time(|unit| unit.do_step(time, step))
+        self.time(|instance| instance.do_step(time, step))
     }
 
     fn terminate(&mut self) -> Outcome {
-        self.unit.terminate()
+        self.instance.terminate()
     }
 
     fn reset(&mut self) -> Outcome {
-        self.unit.reset()
+        self.instance.reset()
     }
 }

@@ -1,5 +1,5 @@
 //! A checked experiment that is ready to run: observers request the signals that they want to see,
-//! and then the units are initialized and stepped.
+//! and then the instances are initialized and stepped.
 
 use crate::clock::Clock;
 use crate::delay::{self, FeedbackLoop, Reading};
@@ -12,7 +12,7 @@ use crate::settings::{self, Setting};
 use crate::signal::{Resolved, Signal, Term};
 use crate::watch::Watched;
 use crate::wiring::{self, Column, Part, Port, Wire};
-use fmu_import::description::{Kind, ModelDescription};
+use fmu_import::description::{ModelDescription, VariableKind};
 use fmu_import::fmu::Fmu;
 use fmu_import::names;
 use serde_json::Value;
@@ -26,7 +26,7 @@ pub type Opened = BTreeMap<PathBuf, Rc<Fmu>>;
 /// Values of all parameters, by component and name.
 pub type Parameters = BTreeMap<String, BTreeMap<String, Value>>;
 
-/// The units of an experiment with their connections, as [`crate::check::check`] creates them.
+/// The components of an experiment with their connections, as [`crate::check::check`] creates them.
 pub struct System {
     /// The experiment that the system was made from.
     pub experiment: Experiment,
@@ -70,23 +70,26 @@ impl System {
     }
 
     fn place(&mut self, port: Port) -> usize {
-        self.probes.iter().position(|known| *known == port).unwrap_or_else(|| {
+        self.probes.iter().position(|probe| *probe == port).unwrap_or_else(|| {
             self.probes.push(port);
             self.probes.len() - 1
         })
     }
 
-    /// Returns the largest delay of a feedback loop in addition to the units' own, s; `None` if
-    /// there is no loop.
+    /// Returns the largest delay of a feedback loop, in addition to delays within the components,
+    /// s; `None` if there is no loop.
     pub fn loop_delay(&self) -> Option<f64> {
-        let ticks = self.loops.iter().map(|found| found.ticks).max()?;
+        let ticks = self.loops.iter().map(|feedback| feedback.ticks).max()?;
         Some(ticks as f64 * self.clock.step())
     }
 
-    /// Returns the names of the components whose units have processes of their own.
+    /// Returns the names of the components whose instances have processes of their own.
     pub fn isolated(&self) -> Vec<&str> {
-        let all = self.order.iter().enumerate();
-        all.filter(|(index, _)| self.isolates(*index)).map(|(_, name)| name.as_str()).collect()
+        let components = self.order.iter().enumerate();
+        components
+            .filter(|(index, _)| self.isolates(*index))
+            .map(|(_, name)| name.as_str())
+            .collect()
     }
 
     fn isolates(&self, index: usize) -> bool {
@@ -104,8 +107,8 @@ impl System {
         self.find(path).is_some()
     }
 
-    /// Returns whether some of the variables are missing, all of them because the command line
-    /// replaced their units.
+    /// Returns whether some of the variables are missing, and all missing ones because the command
+    /// line replaced their FMUs.
     pub fn lost_by_exchange<'a>(&self, paths: impl IntoIterator<Item = &'a str>) -> bool {
         let is_exchanged = |path: &str| {
             names::split(path)
@@ -123,18 +126,18 @@ impl System {
     pub fn probe(&mut self, path: &str) -> Result<Probed, String> {
         let port = self.find(path).ok_or_else(|| {
             let parts = self.parts();
-            let of = |part: &Part| {
+            let paths_of = |part: &Part| {
                 let names =
                     part.description.variables.iter().map(|v| format!("{}.{}", part.name, v.name));
                 names.collect::<Vec<_>>()
             };
-            let known: Vec<String> = parts.iter().flat_map(of).collect();
-            let hint = names::hint(path, known.iter().map(String::as_str));
+            let paths: Vec<String> = parts.iter().flat_map(paths_of).collect();
+            let hint = names::hint(path, paths.iter().map(String::as_str));
             format!("there is no variable \"{path}\"{hint}")
         })?;
         let place = self.place(port);
         let unit = match self.kind(port) {
-            Kind::Real { unit, .. } => unit.clone().unwrap_or_default(),
+            VariableKind::Real { unit, .. } => unit.clone().unwrap_or_default(),
             _ => String::new(),
         };
         Ok(Probed { name: path.into(), place, unit, items: self.items(port) })
@@ -150,12 +153,12 @@ impl System {
         let terms = signal.terms.iter().map(|term| {
             let mut place = |path: &str| {
                 let probed = self.probe(path)?;
-                let own = self.display(self.probes[probed.place]);
+                let scale = self.display(self.probes[probed.place]);
                 match &shown {
-                    Some(other) if *other != own => {
-                        return Err(format!("\"{signal}\" mixes {} and {}", other.1, own.1));
+                    Some(other) if *other != scale => {
+                        return Err(format!("\"{signal}\" mixes {} and {}", other.1, scale.1));
                     }
-                    _ => shown = Some(own),
+                    _ => shown = Some(scale),
                 }
                 Ok(probed.place)
             };
@@ -166,17 +169,21 @@ impl System {
         });
         let terms = terms.collect::<Result<Vec<_>, String>>()?;
         let (mut factor, mut unit) = shown.unwrap_or((1.0, String::new()));
-        let over =
-            signal.over.as_deref().map(|path| self.probe(path)).transpose()?.map(|own| own.place);
+        let over = signal
+            .over
+            .as_deref()
+            .map(|path| self.probe(path))
+            .transpose()?
+            .map(|probed| probed.place);
         if let Some(over) = over {
-            let (own, name) = self.display(self.probes[over]);
+            let (divisor, name) = self.display(self.probes[over]);
             if name != unit {
                 return Err(format!("\"{signal}\" divides {unit} by {name}"));
             }
-            (factor, unit) = (factor / own, String::new());
+            (factor, unit) = (factor / divisor, String::new());
         }
         let is_integer = matches!(terms[..], [Term { value, minus: None }]
-            if !matches!(self.kind(self.probes[value]), Kind::Real { .. }));
+            if !matches!(self.kind(self.probes[value]), VariableKind::Real { .. }));
         let responds = terms
             .iter()
             .flat_map(|term: &Term<usize>| [Some(term.value), term.minus])
@@ -201,17 +208,17 @@ impl System {
             .flatten()
             .flat_map(Signal::paths)
             .filter_map(|path| self.find(path))
-            .filter_map(|port| self.probes.iter().position(|known| *known == port))
+            .filter_map(|port| self.probes.iter().position(|probe| *probe == port))
             .collect()
     }
 
-    fn kind(&self, port: Port) -> &Kind {
+    fn kind(&self, port: Port) -> &VariableKind {
         &self.fmus[port.component].description.variables[port.variable].kind
     }
 
     fn items(&self, port: Port) -> Vec<(String, i32)> {
         match self.kind(port) {
-            Kind::Enumeration { items } => items.clone(),
+            VariableKind::Enumeration { items } => items.clone(),
             _ => Vec::new(),
         }
     }
@@ -219,7 +226,7 @@ impl System {
     /// Returns the unit in which a variable is to be displayed, with the factor to that unit. Units
     /// with an offset stay as they are.
     fn display(&self, port: Port) -> (f64, String) {
-        let Kind::Real { unit: Some(unit), display_unit, .. } = self.kind(port) else {
+        let VariableKind::Real { unit: Some(unit), display_unit, .. } = self.kind(port) else {
             return (1.0, String::new());
         };
         let units = &self.fmus[port.component].description.units;
@@ -227,10 +234,10 @@ impl System {
             .iter()
             .find(|defined| defined.name == *unit)
             .and_then(|defined| {
-                let wanted = display_unit.as_deref()?;
+                let display = display_unit.as_deref()?;
                 let (_, factor, _) =
-                    defined.displays.iter().find(|d| d.0 == wanted && d.2 == 0.0)?;
-                Some((*factor, wanted.to_string()))
+                    defined.displays.iter().find(|d| d.0 == display && d.2 == 0.0)?;
+                Some((*factor, display.to_string()))
             })
             .unwrap_or((1.0, unit.clone()))
     }
@@ -238,7 +245,7 @@ impl System {
     /// Runs the experiment from its start to its stop time.
     ///
     /// # Errors
-    /// Returns an error if a unit or an observer fails, or if the run was asked to end. The
+    /// Returns an error if an instance or an observer fails, or if the run was asked to end. The
     /// observers have seen all communication points up to then.
     pub fn run(
         &self,
@@ -248,15 +255,15 @@ impl System {
         self.start(interrupt)?.run(observers)
     }
 
-    /// Creates the units, sets their parameters, and initializes them.
+    /// Creates the instances, sets their parameters, and initializes them.
     ///
     /// # Errors
-    /// Returns an error if a unit cannot be instantiated or initialized.
+    /// Returns an error if an instance cannot be made or initialized.
     pub fn start(&self, interrupt: &Interrupt) -> Result<Master, Error> {
         self.start_with(&self.settings, interrupt)
     }
 
-    /// Creates and initializes the units with `settings` in place of the system's own.
+    /// Creates and initializes the instances with `settings` in place of the system's own.
     pub(crate) fn start_with(
         &self,
         settings: &[Vec<Setting>],
@@ -268,23 +275,21 @@ impl System {
             let fmu = &self.fmus[index];
             let isolates = self.isolates(index);
             let limits = isolates.then(|| self.experiment.isolation.limits());
-            let unit = fmu.instantiate(name, limits.as_ref())?;
+            let instance = fmu.instantiate(name, limits.as_ref())?;
             let on_invalid = self.experiment.simulation.on_invalid;
-            let mut unit = Watched::around(unit, name, fmu, on_invalid);
-            settings::apply(&settings[index], unit.as_mut()).map_err(|failure| Error::Unit {
-                component: name.clone(),
-                time: self.clock.start(),
-                failure,
+            let mut instance = Watched::around(instance, name, fmu, on_invalid);
+            settings::apply(&settings[index], instance.as_mut()).map_err(|failure| {
+                Error::Call { component: name.clone(), time: self.clock.start(), failure }
             })?;
             let (name, every) = (name.clone(), every[index]);
-            members.push(Member { name, every, ahead: isolates, unit });
+            members.push(Member { name, every, ahead: isolates, instance });
         }
         let coupling = self.experiment.simulation.coupling;
         let parts = self.parts();
         let wires = delay::readings_of_wires(&parts, &self.wires, coupling);
         let probes = delay::readings_of_probes(&parts, &self.wires, &self.probes);
         let mut master = Master::new(self.clock, coupling, members, &wires, &probes);
-        master.heed(interrupt);
+        master.set_interrupt(interrupt);
         master.initialize()?;
         Ok(master)
     }
@@ -292,9 +297,9 @@ impl System {
     /// Reads the values of all parameters after initialization, except those of type String.
     ///
     /// # Errors
-    /// Returns an error if a unit cannot be read.
+    /// Returns an error if an instance cannot be read.
     pub fn parameters(&self, master: &mut Master) -> Result<Parameters, Error> {
-        let mut all = Parameters::new();
+        let mut parameters = Parameters::new();
         for (component, part) in self.parts().iter().enumerate() {
             let variables = part.description.variables.iter().enumerate();
             let ports: Vec<Port> = variables
@@ -302,13 +307,13 @@ impl System {
                 .filter_map(|(position, variable)| wiring::port(component, position, variable))
                 .collect();
             let values = master.read(&ports)?;
-            let own = ports.iter().zip(values).map(|(port, value)| {
+            let named = ports.iter().zip(values).map(|(port, value)| {
                 let name = part.description.variables[port.variable].name.clone();
                 (name, plain_value(part.description, *port, value))
             });
-            all.insert(part.name.to_string(), own.collect());
+            parameters.insert(part.name.to_string(), named.collect());
         }
-        Ok(all)
+        Ok(parameters)
     }
 
     /// Creates the recorder, which writes the file of the recorded variables into a folder.
@@ -321,7 +326,7 @@ impl System {
         let column = |column: &Column| {
             let port = column.port;
             let unit = match self.kind(port) {
-                Kind::Real { unit, .. } => unit.clone(),
+                VariableKind::Real { unit, .. } => unit.clone(),
                 _ => None,
             };
             let (name, carrier) = (column.name.clone(), port.carrier);
@@ -344,12 +349,12 @@ pub(crate) fn periods(experiment: &Experiment, order: &[String]) -> Vec<u32> {
 
 fn plain_value(description: &ModelDescription, port: Port, value: f64) -> Value {
     match &description.variables[port.variable].kind {
-        Kind::Boolean => (value != 0.0).into(),
-        Kind::Integer { .. } => (value as i64).into(),
-        Kind::Enumeration { items } => items
+        VariableKind::Boolean => (value != 0.0).into(),
+        VariableKind::Integer { .. } => (value as i64).into(),
+        VariableKind::Enumeration { items } => items
             .iter()
             .find(|(_, item)| f64::from(*item) == value)
             .map_or_else(|| (value as i64).into(), |(name, _)| name.as_str().into()),
-        Kind::Real { .. } | Kind::String => value.into(),
+        VariableKind::Real { .. } | VariableKind::String => value.into(),
     }
 }

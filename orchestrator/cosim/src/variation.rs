@@ -1,5 +1,5 @@
-//! Runs of one system that differ in the values of parameters: the units are made once, and reset
-//! between two runs.
+//! Runs of one system that differ in the values of parameters: the instances are made once and
+//! reset between two runs.
 
 use crate::error::Error;
 use crate::interrupt::Interrupt;
@@ -27,9 +27,9 @@ impl System {
     /// Returns an error if there is no such variable, or if it cannot be set.
     pub fn target(&self, path: &str) -> Result<Target, String> {
         let parts = self.parts();
-        let (name, rest) =
-            names::split(path).ok_or_else(|| format!("\"{path}\" is no component.parameter"))?;
-        let component = self.order.iter().position(|known| known == name).ok_or_else(|| {
+        let (name, rest) = names::split(path)
+            .ok_or_else(|| format!("\"{path}\" is not of the form component.parameter"))?;
+        let component = self.order.iter().position(|other| other == name).ok_or_else(|| {
             let hint = names::hint(name, self.order.iter().map(String::as_str));
             format!("there is no component \"{name}\"{hint}")
         })?;
@@ -52,23 +52,24 @@ impl System {
     }
 
     /// Returns the value that a target has in this system: that of the experiment, or else the
-    /// start value of the unit. There is none if the unit does not state it, or if it is not of
-    /// type Real.
+    /// start value of the FMU. There is none if the FMU does not state it, or if it is not of type
+    /// Real.
     pub fn nominal(&self, target: Target) -> Option<f64> {
         let variable = self.variable(target);
-        let own = self.settings[target.component].iter().find(|own| own.name == variable.name);
-        match own.map(|setting| &setting.value) {
+        let mut settings = self.settings[target.component].iter();
+        let setting = settings.find(|setting| setting.name == variable.name);
+        match setting.map(|setting| &setting.value) {
             Some(SettingValue::Real(value)) => Some(*value),
             Some(_) => None,
             None => variable.start.as_ref()?.parse().ok(),
         }
     }
 
-    /// Creates, sets and initializes the units as [`Self::start`] does, with other values for some
-    /// targets.
+    /// Creates, sets and initializes the instances as [`Self::start`] does, with other values for
+    /// some targets.
     ///
     /// # Errors
-    /// Returns an error if a unit cannot be instantiated or initialized.
+    /// Returns an error if an instance cannot be made or initialized.
     pub fn start_varied(
         &self,
         changes: &[(Target, SettingValue)],
@@ -77,18 +78,18 @@ impl System {
         self.start_with(&self.varied(changes), interrupt)
     }
 
-    /// Resets the units of a master that this system has made, and sets and initializes them for
-    /// another run.
+    /// Resets the instances of a master that this system has made, and sets and initializes them
+    /// for another run.
     ///
     /// # Errors
-    /// Returns an error if a call of a unit fails.
+    /// Returns an error if a call of an instance fails.
     pub fn restart(
         &self,
         master: &mut Master,
         changes: &[(Target, SettingValue)],
     ) -> Result<(), Error> {
         let settings = self.varied(changes);
-        master.reset(|index, unit| settings::apply(&settings[index], unit))?;
+        master.reset(|index, instance| settings::apply(&settings[index], instance))?;
         master.initialize()
     }
 
@@ -97,10 +98,10 @@ impl System {
         let mut settings = self.settings.clone();
         for (target, value) in changes {
             let variable = self.variable(*target);
-            let own = &mut settings[target.component];
-            match own.iter_mut().find(|setting| setting.name == variable.name) {
+            let of_component = &mut settings[target.component];
+            match of_component.iter_mut().find(|setting| setting.name == variable.name) {
                 Some(setting) => setting.value = value.clone(),
-                None => own.push(Setting {
+                None => of_component.push(Setting {
                     name: variable.name.clone(),
                     reference: variable.reference,
                     value: value.clone(),

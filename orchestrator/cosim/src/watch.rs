@@ -1,15 +1,16 @@
-//! Watches the values that a unit gives. A value that is not finite, no item of its enumeration, or
-//! neither true nor false would otherwise spread through the loop and pass for a result.
+//! Watches the values that an instance gives. A value that is not finite, no item of its
+//! enumeration, or neither true nor false would otherwise spread through the loop and look like a
+//! result.
 
-use fmu_import::description::{Carrier, Kind, Variable};
+use fmu_import::description::{Carrier, Variable, VariableKind};
 use fmu_import::fmu::Fmu;
-use fmu_import::unit::{CoSimulationUnit, Outcome, UnitFailure};
+use fmu_import::instance::{CallFailure, Instance, Outcome};
 use fmu_import::warnings;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::rc::Rc;
 
-/// Action taken if a unit gives an invalid value.
+/// Action taken if an instance gives an invalid value.
 #[derive(
     Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema, Serialize, clap::ValueEnum,
 )]
@@ -24,11 +25,11 @@ pub enum OnInvalid {
     Allow,
 }
 
-/// A unit whose output values are watched.
+/// An instance whose output values are watched.
 pub(crate) struct Watched {
-    unit: Box<dyn CoSimulationUnit>,
+    instance: Box<dyn Instance>,
     name: String,
-    /// FMU of the unit, which knows the names of the variables.
+    /// FMU of the instance, with the names of the variables.
     fmu: Rc<Fmu>,
     /// Value references of the enumerations, sorted, with the values of their items.
     items: Vec<(u32, Vec<i32>)>,
@@ -36,19 +37,19 @@ pub(crate) struct Watched {
 }
 
 impl Watched {
-    /// Watches `unit`, which is called `name`. With [`OnInvalid::Allow`] the unit is returned
-    /// unchanged.
+    /// Watches `instance`, which is called `name`. With [`OnInvalid::Allow`] the instance is
+    /// returned unchanged.
     pub(crate) fn around(
-        unit: Box<dyn CoSimulationUnit>,
+        instance: Box<dyn Instance>,
         name: &str,
         fmu: &Rc<Fmu>,
         on_invalid: OnInvalid,
-    ) -> Box<dyn CoSimulationUnit> {
+    ) -> Box<dyn Instance> {
         if on_invalid == OnInvalid::Allow {
-            return unit;
+            return instance;
         }
         let of_items = |variable: &Variable| match &variable.kind {
-            Kind::Enumeration { items } => {
+            VariableKind::Enumeration { items } => {
                 Some((variable.reference, items.iter().map(|(_, value)| *value).collect()))
             }
             _ => None,
@@ -57,7 +58,7 @@ impl Watched {
             fmu.description.variables.iter().filter_map(of_items).collect();
         items.sort();
         Box::new(Self {
-            unit,
+            instance,
             name: name.to_string(),
             fmu: fmu.clone(),
             items,
@@ -74,24 +75,28 @@ impl Watched {
         value: &str,
         what: &str,
     ) -> Outcome {
-        let is_meant = |known: &&Variable| {
-            (Carrier::of(&known.kind), known.reference) == (Some(carrier), reference)
+        let is_meant = |variable: &&Variable| {
+            (Carrier::for_kind(&variable.kind), variable.reference) == (Some(carrier), reference)
         };
-        let known = self.fmu.description.variables.iter().find(is_meant);
-        let variable = known
-            .map_or_else(|| format!("variable {reference}"), |known| format!("\"{}\"", known.name));
+        let variable = self.fmu.description.variables.iter().find(is_meant).map_or_else(
+            || format!("variable {reference}"),
+            |variable| format!("\"{}\"", variable.name),
+        );
         if !self.warns {
-            let remedy = "--on-invalid warn lets the run go on";
-            return Err(UnitFailure::new(call, format!("{variable} is {value}, {what}; {remedy}")));
+            let remedy = "with --on-invalid warn the run continues";
+            return Err(CallFailure::new(
+                call,
+                format!("{variable} is {value}, which is {what}; {remedy}"),
+            ));
         }
         warnings::warn(&format!("{}: {variable} is {what}", self.name));
         Ok(())
     }
 }
 
-impl CoSimulationUnit for Watched {
+impl Instance for Watched {
     fn get_real(&mut self, references: &[u32], values: &mut [f64]) -> Outcome {
-        self.unit.get_real(references, values)?;
+        self.instance.get_real(references, values)?;
         for (value, &reference) in values.iter().zip(references) {
             if !value.is_finite() {
                 self.invalid(
@@ -107,7 +112,7 @@ impl CoSimulationUnit for Watched {
     }
 
     fn get_integer(&mut self, references: &[u32], values: &mut [i32]) -> Outcome {
-        self.unit.get_integer(references, values)?;
+        self.instance.get_integer(references, values)?;
         if self.items.is_empty() {
             return Ok(());
         }
@@ -122,7 +127,7 @@ impl CoSimulationUnit for Watched {
     }
 
     fn get_boolean(&mut self, references: &[u32], values: &mut [i32]) -> Outcome {
-        self.unit.get_boolean(references, values)?;
+        self.instance.get_boolean(references, values)?;
         for (value, &reference) in values.iter().zip(references) {
             if !matches!(value, 0 | 1) {
                 let what = "neither true nor false";
@@ -133,42 +138,42 @@ impl CoSimulationUnit for Watched {
     }
 
     fn set_real(&mut self, references: &[u32], values: &[f64]) -> Outcome {
-        self.unit.set_real(references, values)
+        self.instance.set_real(references, values)
     }
 
     fn set_integer(&mut self, references: &[u32], values: &[i32]) -> Outcome {
-        self.unit.set_integer(references, values)
+        self.instance.set_integer(references, values)
     }
 
     fn set_boolean(&mut self, references: &[u32], values: &[i32]) -> Outcome {
-        self.unit.set_boolean(references, values)
+        self.instance.set_boolean(references, values)
     }
 
     fn set_string(&mut self, reference: u32, value: &str) -> Outcome {
-        self.unit.set_string(reference, value)
+        self.instance.set_string(reference, value)
     }
 
     fn enter_initialization(&mut self, start: f64, stop: f64) -> Outcome {
-        self.unit.enter_initialization(start, stop)
+        self.instance.enter_initialization(start, stop)
     }
 
     fn exit_initialization(&mut self) -> Outcome {
-        self.unit.exit_initialization()
+        self.instance.exit_initialization()
     }
 
     fn begin_step(&mut self, time: f64, step: f64) -> Outcome {
-        self.unit.begin_step(time, step)
+        self.instance.begin_step(time, step)
     }
 
     fn do_step(&mut self, time: f64, step: f64) -> Outcome {
-        self.unit.do_step(time, step)
+        self.instance.do_step(time, step)
     }
 
     fn terminate(&mut self) -> Outcome {
-        self.unit.terminate()
+        self.instance.terminate()
     }
 
     fn reset(&mut self) -> Outcome {
-        self.unit.reset()
+        self.instance.reset()
     }
 }

@@ -1,11 +1,10 @@
-//! Resolves the names of an experiment into value references, once: the connections and the
-//! recorded variables. A name that does not fit is refused with its place in the file and the
-//! nearest right name.
+//! Resolves the names of connections and recorded variables into value references, once. A wrong
+//! name is refused with its line in the file and the nearest right name.
 
 use crate::document::Source;
 use crate::error::Error;
 use crate::experiment::Experiment;
-use fmu_import::description::{Carrier, Kind, ModelDescription, Variable};
+use fmu_import::description::{Carrier, ModelDescription, Variable, VariableKind};
 use fmu_import::names;
 use fmu_import::quantity::Scaling;
 use fmu_import::warnings::warn_once;
@@ -13,8 +12,7 @@ use std::collections::{BTreeSet, HashSet};
 use std::ops::Range;
 use toml::Spanned;
 
-/// A component's name and its FMU's description. The position of a component in a list of parts is
-/// its index everywhere.
+/// A component's name and its FMU's description. Its position in the list of parts is its index.
 #[derive(Clone, Copy)]
 pub struct Part<'a> {
     /// Name of the component in the experiment.
@@ -56,7 +54,7 @@ pub(crate) struct Column {
     pub port: Port,
 }
 
-/// One side of a connection, or a recorded variable, whose component has been found.
+/// One side of a connection, or a recorded variable, with its component.
 struct Reference<'a> {
     source: &'a Source,
     span: Range<usize>,
@@ -79,11 +77,8 @@ impl<'a> Reference<'a> {
             refuse(format!("\"{text}\" names no variable: write component.variable"))
         })?;
         let component = parts.iter().position(|part| part.name == name).ok_or_else(|| {
-            let known: Vec<&str> = parts.iter().map(|part| part.name).collect();
-            refuse(format!(
-                "there is no component \"{name}\"{}",
-                names::hint(name, known.iter().copied())
-            ))
+            let hint = names::hint(name, parts.iter().map(|part| part.name));
+            refuse(format!("there is no component \"{name}\"{hint}"))
         })?;
         Ok(Self { source, span: span.clone(), text, component, part: parts[component], rest })
     }
@@ -123,7 +118,7 @@ impl<'a> Reference<'a> {
 }
 
 pub(crate) fn port(component: usize, position: usize, variable: &Variable) -> Option<Port> {
-    let carrier = Carrier::of(&variable.kind)?;
+    let carrier = Carrier::for_kind(&variable.kind)?;
     Some(Port { component, variable: position, reference: variable.reference, carrier })
 }
 
@@ -154,7 +149,7 @@ pub(crate) fn wires(experiment: &Experiment, parts: &[Part]) -> Result<Vec<Wire>
             let conversion = check_match(start, end, &from, &output, &to, &input)?;
             if conversion != Scaling::default() && !connection.convert_units {
                 return Err(to.refuse(format!(
-                    "the units of \"{}.{output}\" and \"{}.{input}\" measure the same quantity in another scale: \
+                    "the units of \"{}.{output}\" and \"{}.{input}\" measure the same quantity on another scale: \
                      write convert_units = true in this connection",
                     from.part.name, to.part.name
                 )));
@@ -180,8 +175,8 @@ pub(crate) fn wires(experiment: &Experiment, parts: &[Part]) -> Result<Vec<Wire>
     Ok(wires)
 }
 
-/// Lists the pairs of names that two patterns stand for: each output that begins with the first
-/// prefix is paired with the variable of the same rest behind the second prefix, if there is one.
+/// Lists the pairs of names that two patterns stand for: an output behind the first prefix is
+/// paired with the variable of the same name behind the second prefix, if there is one.
 fn expand(
     from: &Reference,
     from_prefix: &str,
@@ -229,14 +224,16 @@ fn check_match(
         &to.part.description.variables[end.variable].kind,
     );
     match (a, b) {
-        (Kind::Real { unit: a, .. }, Kind::Real { unit: b, .. }) => from
+        (VariableKind::Real { unit: a, .. }, VariableKind::Real { unit: b, .. }) => from
             .part
             .description
             .conversion(a.as_deref(), to.part.description, b.as_deref())
             .map_err(|difference| {
                 to.refuse(format!("the units of {names} do not match: {difference}"))
             }),
-        (Kind::Enumeration { items: a }, Kind::Enumeration { items: b }) if a != b => {
+        (VariableKind::Enumeration { items: a }, VariableKind::Enumeration { items: b })
+            if a != b =>
+        {
             Err(to.refuse(format!("{names} are enumerations of different items")))
         }
         _ if a.name() == b.name() => Ok(Scaling::default()),
@@ -316,14 +313,18 @@ fn check_unconnected(experiment: &Experiment, parts: &[Part], wires: &[Wire]) ->
     Ok(())
 }
 
-/// Finds patterns that stand for exactly `open` among `all`: a group is named by its prefix if all
-/// of its inputs are open.
-fn shortest_patterns<'a>(open: &[&str], all: &(impl Iterator<Item = &'a str> + Clone)) -> String {
+/// Finds patterns that stand for exactly the `open` ones among the `inputs`: a group is named by
+/// its prefix if all of its inputs are open.
+fn shortest_patterns<'a>(
+    open: &[&str],
+    inputs: &(impl Iterator<Item = &'a str> + Clone),
+) -> String {
     let mut patterns: Vec<String> = Vec::new();
     for name in open {
         let group = name.rsplit_once('.').map(|(prefix, _)| format!("{prefix}.*"));
         let whole = |pattern: &String| {
-            all.clone()
+            inputs
+                .clone()
                 .filter(|name| names::matches(pattern, name))
                 .all(|name| open.contains(&name))
         };
@@ -373,9 +374,8 @@ pub(crate) fn columns(experiment: &Experiment, parts: &[Part]) -> Result<Vec<Col
                 missing.push(text.get_ref().as_str());
                 continue;
             }
-            let known: Vec<&str> =
-                part.description.variables.iter().map(|v| v.name.as_str()).collect();
-            let hint = names::hint(reference.rest.trim_end_matches(".*"), known.iter().copied());
+            let names = part.description.variables.iter().map(|v| v.name.as_str());
+            let hint = names::hint(reference.rest.trim_end_matches(".*"), names);
             return Err(reference.refuse(format!(
                 "\"{}\" has no variable \"{}\"{hint}",
                 part.name, reference.rest
@@ -384,7 +384,7 @@ pub(crate) fn columns(experiment: &Experiment, parts: &[Part]) -> Result<Vec<Col
     }
     if !missing.is_empty() {
         warn_once(format!(
-            "these are not recorded, because the units that take part do not have them: {}",
+            "these variables are not recorded, because the exchanged FMUs do not have them: {}",
             missing.join(", ")
         ));
     }

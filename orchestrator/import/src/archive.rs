@@ -39,7 +39,7 @@ fn unpack_limited(
     }
     if archive.len() > entry_limit {
         return Err(refuse(format!(
-            "refused: {} entries, at most {entry_limit} allowed",
+            "refused: it has {} entries, at most {entry_limit} are allowed",
             archive.len()
         )));
     }
@@ -58,8 +58,8 @@ fn unpack_limited(
         if entry.is_symlink() {
             return Err(refuse(format!("refused: entry \"{shown}\" is a symbolic link")));
         }
-        // A fault names the archive and the entry, because a reader does not know the temporary
-        // folder.
+        // A message names the archive and the entry, because the temporary folder means nothing to
+        // a reader.
         let fault =
             |source: io::Error| refuse(format!("entry \"{shown}\" cannot be unpacked: {source}"));
         let target = folder.path().join(&name);
@@ -75,7 +75,7 @@ fn unpack_limited(
         // counted.
         let written = io::copy(&mut (&mut entry).take(left + 1), &mut out).map_err(fault)?;
         left = left.checked_sub(written).ok_or_else(|| {
-            refuse(format!("refused: unpacks to more than {} MiB", size_limit.div_ceil(1 << 20)))
+            refuse(format!("refused: it unpacks to more than {} MiB", size_limit.div_ceil(1 << 20)))
         })?;
     }
     Ok(folder)
@@ -88,13 +88,13 @@ pub fn unsafe_name(name: &str) -> Option<&'static str> {
     } else if name.starts_with('/') || name.contains(':') {
         Some("is an absolute path")
     } else if name.contains('\\') {
-        Some("uses backslashes; FMI wants forward slashes")
+        Some("uses backslashes; FMI requires forward slashes")
     } else if name.contains('\0') {
-        Some("holds a zero byte")
+        Some("contains a zero byte")
     } else if name.split('/').any(|part| part == "..") {
         Some("leads out of the archive")
     } else if name.ends_with("/.") || name == "." {
-        Some("is a folder that is called a file")
+        Some("names a folder, not a file")
     } else {
         None
     }

@@ -1,4 +1,4 @@
-//! Says which unit and which call it was when a unit in this process ends the process.
+//! Names the instance and the call when an instance ends the process that it runs in.
 
 #![allow(unsafe_code)]
 
@@ -6,9 +6,9 @@ use std::cell::Cell;
 use std::marker::PhantomData;
 
 thread_local! {
-    /// Name of the unit that this thread calls, and name of the call; `None` between calls. A
-    /// constant initialiser keeps the access free of locks and allocation, as in a signal handler
-    /// nothing else is allowed.
+    /// Name of the instance that this thread calls, and name of the call; `None` between calls. A
+    /// constant initialiser keeps the access free of locks and allocation, which a signal handler
+    /// must not use.
     static CURRENT: Cell<Option<(*const str, &'static str)>> = const { Cell::new(None) };
 }
 
@@ -16,10 +16,10 @@ thread_local! {
 pub(crate) struct Calling<'a>(PhantomData<&'a str>);
 
 impl<'a> Calling<'a> {
-    /// Says that this thread makes this call to the unit of this name.
+    /// Records that this thread makes this call of the instance with this name.
     #[inline]
-    pub(crate) fn new(unit: &'a str, call: &'static str) -> Self {
-        CURRENT.set(Some((unit, call)));
+    pub(crate) fn new(instance: &'a str, call: &'static str) -> Self {
+        CURRENT.set(Some((instance, call)));
         Self(PhantomData)
     }
 }
@@ -31,8 +31,8 @@ impl Drop for Calling<'_> {
     }
 }
 
-/// Watches for signals that end this process, and for calls of `exit`, from now on. If a unit was
-/// being called, one line on standard error names it.
+/// Watches for signals that end this process, and for calls of `exit`, from now on. If an instance
+/// was being called, one line on standard error names it.
 #[cfg(unix)]
 pub fn watch() {
     for (place, (signal, _)) in SIGNALS.iter().enumerate() {
@@ -51,7 +51,7 @@ pub fn watch() {
 }
 
 /// Watches for crashes, which the C library passes on as signals, and for calls of `exit`, from now
-/// on. If a unit was being called, one line on standard error names it.
+/// on. If an instance was being called, one line on standard error names it.
 #[cfg(windows)]
 pub fn watch() {
     for (signal, _) in SIGNALS {
@@ -62,7 +62,7 @@ pub fn watch() {
     unsafe { libc::atexit(on_exit) };
 }
 
-/// Watches for nothing: nothing is known of this system.
+/// Does nothing, because such signals are not supported on this system.
 #[cfg(not(any(unix, windows)))]
 pub fn watch() {}
 
@@ -79,13 +79,13 @@ const SIGNALS: &[(libc::c_int, &str)] = &[
 /// Ends the process. The code of `abort` would be that of a run in which the attitude is lost.
 #[cfg(windows)]
 extern "C" fn on_signal(signal: libc::c_int) {
-    let known = SIGNALS.iter().find(|(known, _)| *known == signal);
-    tell(known.map_or("a signal", |(_, name)| name));
+    let entry = SIGNALS.iter().find(|(number, _)| *number == signal);
+    tell(entry.map_or("a signal", |(_, name)| name));
     // SAFETY: this ends the process at once.
     unsafe { libc::_exit(1) };
 }
 
-/// The handlers that were there before: Rust's own tells of a stack that is used up.
+/// The previous handlers. That of Rust reports a stack overflow.
 #[cfg(unix)]
 static mut PREVIOUS: [std::mem::MaybeUninit<libc::sigaction>; SIGNALS.len()] =
     [const { std::mem::MaybeUninit::zeroed() }; SIGNALS.len()];
@@ -99,16 +99,17 @@ extern "C" fn on_signal(
     information: *mut libc::siginfo_t,
     _context: *mut libc::c_void,
 ) {
-    for (place, (known, name)) in SIGNALS.iter().enumerate() {
-        if *known == signal {
+    for (place, (number, name)) in SIGNALS.iter().enumerate() {
+        if *number == signal {
             tell(name);
             // SAFETY: the handler was stored by `watch`, and the system passes the information.
             let code = unsafe {
                 libc::sigaction(signal, (&raw const PREVIOUS[place]).cast(), std::ptr::null_mut());
                 (*information).si_code
             };
-            // An instruction that made the signal is run again and meets the former handler. A
-            // signal that was sent comes once, and must be sent again. (Only Linux tells which.)
+            // A faulty instruction is run again and meets the former handler. A signal that was
+            // sent by a process comes only once, and must be sent again. (Only Linux tells them
+            // apart.)
             if code <= 0 || !cfg!(target_os = "linux") {
                 // SAFETY: the number is that of a signal. It is delivered when this returns.
                 unsafe { libc::raise(signal) };
@@ -120,28 +121,31 @@ extern "C" fn on_signal(
 #[cfg(any(unix, windows))]
 extern "C" fn on_exit() {
     if tell("exit") {
-        // SAFETY: this ends the process at once. A unit that ends it must not pass for success.
+        // SAFETY: this ends the process at once. An instance that ends it must not pass for
+        // success.
         unsafe { libc::_exit(1) };
     }
 }
 
-/// Writes which unit is being called, with system calls only. Returns whether there is one.
+/// Writes which instance is being called, with system calls only. Returns whether one is being
+/// called.
 #[cfg(any(unix, windows))]
 fn tell(what: &str) -> bool {
-    let Some((unit, call)) = CURRENT.get() else { return false };
+    let Some((instance, call)) = CURRENT.get() else { return false };
     // SAFETY: `Calling` borrows the name as long as the call lasts, which has not returned.
-    let unit = unsafe { &*unit };
+    let instance = unsafe { &*instance };
     let parts = [
         "error: ",
-        unit,
+        instance,
         " ended this process in ",
         call,
         " (",
         what,
-        "); with --isolate the run would go on to its end in order\n",
+        "); with --isolate the run would end in order and keep its results\n",
     ];
     for part in parts {
-        // SAFETY: pointer and length are those of the text. Nobody can be told of a failure.
+        // SAFETY: pointer and length are those of the text. There is nobody left to tell of a
+        // failure.
         unsafe { libc::write(2, part.as_ptr().cast(), part.len() as _) };
     }
     true

@@ -1,6 +1,6 @@
-//! The parts of `modelDescription.xml` that the orchestrator needs: variables, units, enumerations,
-//! and the dependencies of outputs on inputs. (The reader in `fmi-rs` drops unit definitions and
-//! all types but the first.)
+//! The parts of `modelDescription.xml` that the orchestrator needs: variables, units of measure,
+//! enumerations, and the dependencies of outputs on inputs. (The reader in `fmi-rs` drops unit
+//! definitions and all types but the first.)
 
 mod read;
 
@@ -14,7 +14,7 @@ use std::sync::OnceLock;
 /// Values of `causality` that FMI 2.0, section 2.2.7, allows.
 pub const CAUSALITIES: [&str; 6] =
     ["parameter", "calculatedParameter", "input", "output", "local", "independent"];
-/// Values of `variability` that the same section of FMI 2.0 allows.
+/// Values of `variability` that the same section allows.
 pub const VARIABILITIES: [&str; 5] = ["constant", "fixed", "tunable", "discrete", "continuous"];
 
 /// The model description of an FMU.
@@ -45,8 +45,8 @@ pub struct ModelDescription {
     /// Positions, in `variables`, of the variables that each output depends on at the same instant;
     /// only for outputs that declare them.
     pub dependencies: BTreeMap<usize, Vec<usize>>,
-    /// Whether this describes a table, whose units are only named.
-    pub is_table: bool,
+    /// Whether this describes a lookup table, which only names its units.
+    pub is_lookup_table: bool,
     /// Whether the file has a `ModelStructure`, which FMI requires.
     pub has_structure: bool,
     /// Index of the variables by name.
@@ -101,14 +101,14 @@ pub struct Variable {
     /// Variability: `fixed`, `discrete`, `continuous`, ….
     pub variability: Cow<'static, str>,
     /// Type of the variable, with its attributes.
-    pub kind: Kind,
+    pub kind: VariableKind,
     /// Start value as the file writes it.
     pub start: Option<String>,
 }
 
 /// Type of a variable, with the attributes of that type.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub enum Kind {
+pub enum VariableKind {
     /// A real number, held as a 64-bit float.
     Real {
         /// Name of the unit, if any.
@@ -139,7 +139,7 @@ pub enum Kind {
     String,
 }
 
-impl Kind {
+impl VariableKind {
     /// Returns the name of the type in FMI.
     pub fn name(&self) -> &'static str {
         match self {
@@ -164,7 +164,8 @@ impl ModelDescription {
         read::description(&root, variables)
     }
 
-    /// Returns the scaling that converts values in a unit of this side to values in one of another.
+    /// Returns the scaling that converts values in a unit of this FMU to values in a unit of
+    /// another.
     ///
     /// # Errors
     /// Returns an error that says how the units differ, if they do not measure the same quantity.
@@ -172,12 +173,12 @@ impl ModelDescription {
         &self,
         unit: Option<&str>,
         to: &Self,
-        wanted: Option<&str>,
+        to_unit: Option<&str>,
     ) -> Result<Scaling, String> {
-        if self.is_table {
-            quantity::named(unit, wanted, &to.units)
+        if self.is_lookup_table {
+            quantity::named(unit, to_unit, &to.units)
         } else {
-            quantity::conversion(unit, &self.units, wanted, &to.units)
+            quantity::conversion(unit, &self.units, to_unit, &to.units)
         }
     }
 
@@ -213,14 +214,14 @@ pub enum Carrier {
 }
 
 impl Carrier {
-    /// Returns the type in which values of a kind are transferred; `None` for texts, which are not
-    /// transferred.
-    pub fn of(kind: &Kind) -> Option<Self> {
+    /// Returns the type in which values of variables of this kind are transferred; `None` for
+    /// texts, which are not transferred.
+    pub fn for_kind(kind: &VariableKind) -> Option<Self> {
         match kind {
-            Kind::Real { .. } => Some(Self::Real),
-            Kind::Integer { .. } | Kind::Enumeration { .. } => Some(Self::Integer),
-            Kind::Boolean => Some(Self::Boolean),
-            Kind::String => None,
+            VariableKind::Real { .. } => Some(Self::Real),
+            VariableKind::Integer { .. } | VariableKind::Enumeration { .. } => Some(Self::Integer),
+            VariableKind::Boolean => Some(Self::Boolean),
+            VariableKind::String => None,
         }
     }
 }

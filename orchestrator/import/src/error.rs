@@ -1,4 +1,4 @@
-//! Errors of opening an archive. Each message names the culprit and says what to do about it.
+//! Errors of opening an archive. Each message names the archive and what is wrong with it.
 
 use std::path::PathBuf;
 

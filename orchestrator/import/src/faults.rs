@@ -1,7 +1,9 @@
-//! Faults of a model description that do not keep it from being read. Units run with most of them,
-//! but not everywhere, and not always as intended.
+//! Faults of a model description that do not keep it from being read. FMUs run with most of them,
+//! but not in every importer, and not always as intended.
 
-use crate::description::{CAUSALITIES, Carrier, Kind, ModelDescription, VARIABILITIES, Variable};
+use crate::description::{
+    CAUSALITIES, Carrier, ModelDescription, VARIABILITIES, Variable, VariableKind,
+};
 use std::collections::{BTreeSet, HashMap, HashSet};
 
 /// Lists the faults of a description, one line for each, in the order of the file.
@@ -20,10 +22,10 @@ pub fn faults(description: &ModelDescription) -> Vec<String> {
         .as_ref()
         .is_some_and(|interface| interface.has("needsExecutionTool"))
     {
-        faults.push("needs the tool that made it on this machine (needsExecutionTool)".to_string());
+        faults.push("needs the program that exported it to be installed on this machine (needsExecutionTool)".to_string());
     }
     if !description.has_structure {
-        faults.push("has no ModelStructure, which says what the outputs are".to_string());
+        faults.push("has no ModelStructure, which lists the outputs".to_string());
     }
     let units: BTreeSet<&str> = description.units.iter().map(|unit| unit.name.as_str()).collect();
     let (mut names, mut handles) = (HashSet::new(), HashMap::new());
@@ -35,7 +37,7 @@ pub fn faults(description: &ModelDescription) -> Vec<String> {
         // Other variables may share a reference as aliases. Of two that are both set, the later one
         // would overwrite the first.
         if matches!(&*variable.causality, "input" | "parameter") {
-            let handle = (variable.reference, Carrier::of(&variable.kind));
+            let handle = (variable.reference, Carrier::for_kind(&variable.kind));
             if let Some(other) = handles.insert(handle, name) {
                 faults.push(format!(
                     "\"{other}\" and \"{name}\" have the same value reference {}",
@@ -43,12 +45,12 @@ pub fn faults(description: &ModelDescription) -> Vec<String> {
                 ));
             }
         }
-        of_variable(variable, &units, &mut faults);
+        check_variable(variable, &units, &mut faults);
     }
     faults
 }
 
-fn of_variable(variable: &Variable, units: &BTreeSet<&str>, faults: &mut Vec<String>) {
+fn check_variable(variable: &Variable, units: &BTreeSet<&str>, faults: &mut Vec<String>) {
     let Variable { name, causality, variability, kind, .. } = variable;
     if !CAUSALITIES.contains(&&**causality) {
         faults.push(format!(
@@ -62,18 +64,18 @@ fn of_variable(variable: &Variable, units: &BTreeSet<&str>, faults: &mut Vec<Str
             variability.escape_default()
         ));
     }
-    if let Kind::Real { unit: Some(unit), .. } = kind
+    if let VariableKind::Real { unit: Some(unit), .. } = kind
         && !units.contains(unit.as_str())
     {
         faults.push(format!("the unit \"{}\" of \"{name}\" is not defined", unit.escape_default()));
     }
     match kind {
-        Kind::Real { min: Some(min), max: Some(max), .. } if min > max => {
+        VariableKind::Real { min: Some(min), max: Some(max), .. } if min > max => {
             faults.push(format!(
                 "the smallest value of \"{name}\", {min}, is above its largest, {max}"
             ));
         }
-        Kind::Integer { min: Some(min), max: Some(max) } if min > max => {
+        VariableKind::Integer { min: Some(min), max: Some(max) } if min > max => {
             faults.push(format!(
                 "the smallest value of \"{name}\", {min}, is above its largest, {max}"
             ));
@@ -88,32 +90,32 @@ fn of_variable(variable: &Variable, units: &BTreeSet<&str>, faults: &mut Vec<Str
 }
 
 /// Describes the fault of a start value, if it has one.
-fn start_fault(start: &str, kind: &Kind) -> Option<String> {
+fn start_fault(start: &str, kind: &VariableKind) -> Option<String> {
     let outside = |below: bool, above: bool| {
         (below || above).then(|| "is outside its min and max".to_string())
     };
     match kind {
-        Kind::Real { min, max, .. } => match start.parse::<f64>() {
+        VariableKind::Real { min, max, .. } => match start.parse::<f64>() {
             Ok(value) if value.is_nan() => Some("is not a number".into()),
             Ok(value) => {
                 outside(min.is_some_and(|min| value < min), max.is_some_and(|max| value > max))
             }
             Err(_) => Some("is not a number".into()),
         },
-        Kind::Integer { min, max } => match start.parse::<i32>() {
+        VariableKind::Integer { min, max } => match start.parse::<i32>() {
             Ok(value) => {
                 outside(min.is_some_and(|min| value < min), max.is_some_and(|max| value > max))
             }
             Err(_) => Some("is not a whole number of 32 bits".into()),
         },
-        Kind::Boolean => (!matches!(start, "true" | "false" | "1" | "0"))
+        VariableKind::Boolean => (!matches!(start, "true" | "false" | "1" | "0"))
             .then(|| "is neither true nor false".into()),
-        Kind::Enumeration { items } => {
-            let known =
+        VariableKind::Enumeration { items } => {
+            let is_item =
                 start.parse::<i32>().is_ok_and(|value| items.iter().any(|item| item.1 == value));
-            (!known).then(|| "is no item of its type".into())
+            (!is_item).then(|| "is no item of its type".into())
         }
-        Kind::String => None,
+        VariableKind::String => None,
     }
 }
 
@@ -136,8 +138,8 @@ mod tests {
 
     #[test]
     fn each_fault_is_named_by_its_variable() {
-        let of = |text: &str| faults(&ModelDescription::parse(text).unwrap());
-        assert_eq!(of(GOOD), Vec::<String>::new());
+        let faults_of = |text: &str| faults(&ModelDescription::parse(text).unwrap());
+        assert_eq!(faults_of(GOOD), Vec::<String>::new());
         for (from, to, fault) in [
             (
                 "start=\"1\"/></ScalarVariable>\n    <ScalarVariable name=\"n\"",
@@ -184,13 +186,13 @@ mod tests {
             (
                 "modelIdentifier=\"a\"",
                 "modelIdentifier=\"a\" needsExecutionTool=\"true\"",
-                "needs the tool that made it",
+                "needs the program that exported it",
             ),
         ] {
             let text = GOOD.replacen(from, to, 1);
             assert_ne!(text, GOOD, "{from}");
-            let found = of(&text);
-            assert!(found.len() == 1 && found[0].starts_with(fault), "{fault}: {found:?}");
+            let listed = faults_of(&text);
+            assert!(listed.len() == 1 && listed[0].starts_with(fault), "{fault}: {listed:?}");
         }
     }
 }

@@ -1,17 +1,17 @@
-//! The types of FMI 2.0's C interface as the master uses them. Values that a unit returns are taken
-//! as the integers that C passes: a unit may return anything, and a Rust enumeration must not hold
-//! a value that is none of its items.
+//! The types of FMI 2.0's C interface as the master uses them. Values that an instance returns are
+//! taken as the integers that C passes: an instance may return anything, and a Rust enumeration
+//! must not hold a value that is none of its items.
 
 pub(crate) use fmi_rs::fmi2::types::{
     fmi2False as FALSE, fmi2Status as Status, fmi2StatusKind, fmi2True as TRUE, fmi2Type,
 };
 use std::ffi::{c_char, c_int, c_uint, c_void};
 
-/// Kind of an instance for co-simulation, fmi2CoSimulation.
+/// VariableKind of an instance for co-simulation, fmi2CoSimulation.
 pub(crate) const CO_SIMULATION: c_int = fmi2Type::CoSimulation as c_int;
-/// Kind of the status fmi2LastSuccessfulTime.
+/// VariableKind of the status fmi2LastSuccessfulTime.
 pub(crate) const LAST_SUCCESSFUL_TIME: c_int = fmi2StatusKind::LastSuccessfulTime as c_int;
-/// Kind of the status fmi2Terminated.
+/// VariableKind of the status fmi2Terminated.
 pub(crate) const TERMINATED: c_int = fmi2StatusKind::Terminated as c_int;
 
 /// Converts the integer that a call returned into a status.
@@ -26,13 +26,13 @@ pub(crate) fn status(code: c_int) -> Result<Status, c_int> {
 /// Formats the status that a call returned.
 pub(crate) fn name_of(status: Result<Status, c_int>) -> String {
     match status {
-        Ok(known) => format!("{known:?}"),
+        Ok(status) => format!("{status:?}"),
         Err(code) => format!("status {code}, which FMI 2.0 does not have"),
     }
 }
 
-/// Pointer to an instance, fmi2Component.
-pub(crate) type Component = *mut c_void;
+/// Pointer to an instance, which FMI calls fmi2Component.
+pub(crate) type Handle = *mut c_void;
 /// Pointer to a C string that ends with a zero byte.
 pub(crate) type Text = *const c_char;
 /// Type of the logger callback, which receives messages whose `printf` arguments are already
@@ -42,7 +42,7 @@ pub(crate) type Logger = unsafe extern "C" fn(*mut c_void, Text, c_int, Text, Te
 /// The callback structure of FMI 2.0, fmi2CallbackFunctions.
 #[repr(C)]
 pub(crate) struct Callbacks {
-    /// Receives the log messages of the unit.
+    /// Receives the log messages of the instance.
     pub logger: Logger,
     /// Allocates zeroed memory, given the number and the size of objects.
     pub allocate: Option<unsafe extern "C" fn(usize, usize) -> *mut c_void>,
@@ -59,27 +59,27 @@ pub(crate) type GetText = unsafe extern "C" fn() -> Text;
 /// Type of the function fmi2Instantiate. The arguments are name, type, GUID, resources, callbacks,
 /// visibility and logging.
 pub(crate) type Instantiate =
-    unsafe extern "C" fn(Text, c_int, Text, Text, *const Callbacks, c_int, c_int) -> Component;
+    unsafe extern "C" fn(Text, c_int, Text, Text, *const Callbacks, c_int, c_int) -> Handle;
 /// Type of the function fmi2FreeInstance.
-pub(crate) type FreeInstance = unsafe extern "C" fn(Component);
+pub(crate) type FreeInstance = unsafe extern "C" fn(Handle);
 /// Type of the function fmi2SetupExperiment. The arguments are whether there is a tolerance, the
 /// tolerance, the start time, whether there is a stop time, and the stop time.
 pub(crate) type SetupExperiment =
-    unsafe extern "C" fn(Component, c_int, f64, f64, c_int, f64) -> c_int;
+    unsafe extern "C" fn(Handle, c_int, f64, f64, c_int, f64) -> c_int;
 /// Type of the functions fmi2EnterInitializationMode, fmi2ExitInitializationMode, fmi2Terminate and
 /// fmi2Reset.
-pub(crate) type Plain = unsafe extern "C" fn(Component) -> c_int;
+pub(crate) type Plain = unsafe extern "C" fn(Handle) -> c_int;
 /// Type of the functions fmi2GetReal, fmi2GetInteger and fmi2GetBoolean. The arguments are the
 /// value references, their number, and the values.
-pub(crate) type Get<T> = unsafe extern "C" fn(Component, *const c_uint, usize, *mut T) -> c_int;
+pub(crate) type Get<T> = unsafe extern "C" fn(Handle, *const c_uint, usize, *mut T) -> c_int;
 /// Type of the functions fmi2SetReal, fmi2SetInteger, fmi2SetBoolean and fmi2SetString.
-pub(crate) type Set<T> = unsafe extern "C" fn(Component, *const c_uint, usize, *const T) -> c_int;
+pub(crate) type Set<T> = unsafe extern "C" fn(Handle, *const c_uint, usize, *const T) -> c_int;
 /// Type of the function fmi2DoStep. The arguments are the time, the step, and whether the state
 /// before the step will never be restored.
-pub(crate) type DoStep = unsafe extern "C" fn(Component, f64, f64, c_int) -> c_int;
+pub(crate) type DoStep = unsafe extern "C" fn(Handle, f64, f64, c_int) -> c_int;
 /// Type of the functions fmi2GetRealStatus and fmi2GetBooleanStatus. The arguments are the kind of
 /// the status and its value.
-pub(crate) type GetStatus<T> = unsafe extern "C" fn(Component, c_int, *mut T) -> c_int;
+pub(crate) type GetStatus<T> = unsafe extern "C" fn(Handle, c_int, *mut T) -> c_int;
 
 #[cfg(test)]
 mod tests {

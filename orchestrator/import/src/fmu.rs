@@ -1,16 +1,16 @@
-//! Opens `.fmu` archives, checks their libraries, and instantiates co-simulation units from them.
-//! Tables are opened like archives.
+//! Opens `.fmu` archives, checks their libraries, and instantiates them for co-simulation. Lookup
+//! tables are opened like archives.
 
 use crate::archive;
 use crate::description::ModelDescription;
 use crate::error::{Error, with_causes};
 use crate::faults;
 use crate::folder::TemporaryFolder;
-use crate::instance::{FmuUnit, Functions};
+use crate::instance::Instance;
 use crate::isolation::{self, Isolation, Library, Loaded};
+use crate::library::{FmuInstance, Functions};
 use crate::log::Log;
-use crate::table::{self, Table, TableUnit};
-use crate::unit::CoSimulationUnit;
+use crate::lookup_table::{self, LookupTable, LookupTableInstance};
 use crate::warnings;
 use crate::xml;
 use fmi_rs::SHARED_LIBRARY_EXTENSION;
@@ -21,18 +21,18 @@ use std::path::{Path, PathBuf};
 use std::rc::Rc;
 use url::Url;
 
-/// An unpacked archive or a table, of which several units can be instantiated.
+/// An unpacked archive or a lookup table, of which several instances can be made.
 pub struct Fmu {
-    /// Path of the archive or table.
+    /// Path of the archive or lookup table.
     pub path: PathBuf,
-    /// The model description in the archive, or that of the table.
+    /// The model description in the archive, or that of the lookup table.
     pub description: ModelDescription,
     content: Content,
 }
 
 enum Content {
     Archive(Archive),
-    Table(Table),
+    LookupTable(LookupTable),
 }
 
 /// An unpacked archive.
@@ -43,24 +43,27 @@ struct Archive {
 }
 
 impl Fmu {
-    /// Unpacks an archive and reads its description, or reads a table if the file is a `.csv`.
+    /// Unpacks an archive and reads its description, or reads a lookup table if the file is a
+    /// `.csv`.
     ///
     /// # Errors
     /// Returns an error if the archive is unsafe or damaged, or is not an FMI 2.0 FMU, or if the
-    /// table has a fault.
+    /// lookup table has a fault.
     pub fn open(path: &Path) -> Result<Self, Error> {
         let refuse = |message: String| Error::Fmu { path: path.to_path_buf(), message };
-        if table::is_table(path) {
-            let table = Table::open(path).map_err(refuse)?;
+        if lookup_table::is_lookup_table(path) {
+            let table = LookupTable::open(path).map_err(refuse)?;
             let name = path.file_stem().unwrap_or_default().to_string_lossy();
             let description = table.description(&name).map_err(refuse)?;
-            let content = Content::Table(table);
+            let content = Content::LookupTable(table);
             return Ok(Self { path: path.to_path_buf(), description, content });
         }
         let folder = archive::unpack(path)?;
         let bytes =
             std::fs::read(folder.path().join("modelDescription.xml")).map_err(|source| {
-                refuse(format!("is no FMU, modelDescription.xml cannot be read: {source}"))
+                refuse(format!(
+                    "is not an FMU, because modelDescription.xml cannot be read: {source}"
+                ))
             })?;
         let description = xml::decode(&bytes)
             .and_then(|text| ModelDescription::parse(&text))
@@ -69,11 +72,11 @@ impl Fmu {
         Ok(Self { path: path.to_path_buf(), description, content: Content::Archive(archive) })
     }
 
-    /// Returns the platforms for which the archive has binaries, by FMI's names.
+    /// Returns the platforms for which the archive has libraries, by FMI's names.
     pub fn platforms(&self) -> Vec<String> {
         match &self.content {
             Content::Archive(archive) => archive.platforms(),
-            Content::Table(_) => Vec::new(),
+            Content::LookupTable(_) => Vec::new(),
         }
     }
 
@@ -92,14 +95,14 @@ impl Fmu {
         faults
     }
 
-    /// Returns whether the file is a table, which runs no code of its own.
-    pub fn is_table(&self) -> bool {
-        self.description.is_table
+    /// Returns whether the file is a lookup table, which runs no code of its own.
+    pub fn is_lookup_table(&self) -> bool {
+        self.description.is_lookup_table
     }
 
-    /// Returns whether this project's packer made the unit, so that it is trusted to do no harm to
-    /// the process that it is loaded into.
-    pub fn is_own(&self) -> bool {
+    /// Returns whether this project's fmu-pack made the FMU, so that it is trusted in the process
+    /// of the program.
+    pub fn is_made_by_fmu_pack(&self) -> bool {
         self.description.generation_tool.starts_with("fmu-pack ")
     }
 
@@ -112,11 +115,11 @@ impl Fmu {
         let platforms = archive.platforms();
         if !platforms.iter().any(|platform| platform == PLATFORM) {
             let offered = if platforms.is_empty() { "none".into() } else { platforms.join(", ") };
-            return Err(format!("has no binary for {PLATFORM}, only for: {offered}"));
+            return Err(format!("has no library for {PLATFORM}, only for: {offered}"));
         }
         let identifier = &interface.model_identifier;
         // The identifier becomes part of a path. FMI 2.0, section 2.2.7, requires a C identifier,
-        // but other programs accept units with a hyphen in it.
+        // but other importers accept a hyphen in it.
         if identifier.is_empty() || identifier.contains(['/', '\\', '.', ':', '\0']) {
             return Err(format!(
                 "the model identifier \"{}\" is refused: it must be the name of a file without folder and ending",
@@ -127,10 +130,10 @@ impl Fmu {
         let name = format!("{identifier}{SHARED_LIBRARY_EXTENSION}");
         let (file, entry) = (folder.join(&name), format!("binaries/{PLATFORM}/{name}"));
         if !file.is_file() {
-            let there = names_in(&folder);
-            let there = if there.is_empty() { "nothing".into() } else { there.join(", ") };
+            let files = names_in(&folder);
+            let files = if files.is_empty() { "nothing".into() } else { files.join(", ") };
             return Err(format!(
-                "has no {entry}, which its model identifier asks for; there is: {there}"
+                "has no {entry}, which its model identifier names; the folder holds: {files}"
             ));
         }
         if !archive.is_sound.get() {
@@ -140,30 +143,32 @@ impl Fmu {
         Ok((file, entry))
     }
 
-    /// Loads the library and instantiates a co-simulation unit called `name`: in this process, or
-    /// in one of its own if `isolation` is given. A table is always in this process.
+    /// Loads the library and makes an instance called `name` for co-simulation: in this process, or
+    /// in a process of its own if `isolation` is given. A lookup table is always in this process.
     ///
     /// # Errors
-    /// Returns an error if the FMU has no binary for this platform or offers no co-simulation, if
+    /// Returns an error if the FMU has no library for this platform or offers no co-simulation, if
     /// the library cannot be loaded, or if the FMU refuses.
     pub fn instantiate(
         &self,
         name: &str,
         isolation: Option<&Isolation>,
-    ) -> Result<Box<dyn CoSimulationUnit>, Error> {
+    ) -> Result<Box<dyn Instance>, Error> {
         let refuse = |message: String| Error::Fmu { path: self.path.clone(), message };
         let archive = match &self.content {
             Content::Archive(archive) => archive,
-            Content::Table(table) => return Ok(Box::new(TableUnit::new(table.clone()))),
+            Content::LookupTable(table) => {
+                return Ok(Box::new(LookupTableInstance::new(table.clone())));
+            }
         };
         let (file, entry) = self.library(archive).map_err(refuse)?;
         let resources = Url::from_directory_path(archive.folder.path().join("resources"))
             .map_err(|()| refuse("the temporary folder has no absolute path".into()))?;
         let guid = &self.description.guid;
-        let (unit, fault) = if let Some(isolation) = isolation {
+        let (instance, fault) = if let Some(isolation) = isolation {
             let library = Library { file, folder: archive.folder.path(), isolation };
             match library.instantiate(name, guid, resources.as_str()) {
-                Loaded::Whole(unit, fault) => (unit, fault),
+                Loaded::Whole(instance, fault) => (instance, fault),
                 Loaded::Unloadable(reason) => {
                     return Err(refuse(archive.not_loaded(&entry, &reason)));
                 }
@@ -174,14 +179,14 @@ impl Fmu {
                 .map_err(|error| refuse(archive.not_loaded(&entry, &with_causes(&error))))?;
             let fault = functions.version_fault();
             let (log, folder) = (Rc::new(Log::new(name)), Some(Rc::clone(&archive.folder)));
-            let unit = FmuUnit::new(functions, log, guid, resources.as_str(), folder)
+            let instance = FmuInstance::new(functions, log, guid, resources.as_str(), folder)
                 .map_err(|reason| refuse(format!("the component \"{name}\" {reason}")))?;
-            (Box::new(unit) as Box<dyn CoSimulationUnit>, fault)
+            (Box::new(instance) as Box<dyn Instance>, fault)
         };
         if let Some(fault) = fault {
             warnings::warn_once(format!("{}: {fault}", self.path.display()));
         }
-        Ok(unit)
+        Ok(instance)
     }
 
     /// Loads the library in a process of its own where that is possible, and returns what is wrong
@@ -210,7 +215,7 @@ impl Archive {
         names_in(&binaries).into_iter().filter(|name| binaries.join(name).is_dir()).collect()
     }
 
-    /// Tells why the system could not load a library.
+    /// Returns the reason why the system could not load a library.
     fn not_loaded(&self, entry: &str, reason: &str) -> String {
         let text = reason.trim_start_matches("dlopen failed: ");
         if let Some((missing, _)) = text.split_once(": cannot open shared object file") {
@@ -231,21 +236,21 @@ fn names_in(folder: &Path) -> Vec<String> {
     names
 }
 
-/// Checks that a library file is complete and made for this machine. Without the check, access to a
-/// missing part would kill the program.
+/// Checks that a library is complete and made for this machine. Access to a missing part would kill
+/// the program.
 fn check_library(file: &Path) -> Result<(), String> {
     let bytes = std::fs::read(file).map_err(|error| format!("cannot be read: {error}"))?;
-    let fault = |error: object::Error| format!("is no sound library: {error}");
+    let fault = |error: object::Error| format!("is damaged or not a library: {error}");
     // The file holds libraries for several architectures, among which the loader chooses.
     if matches!(FileKind::parse(&*bytes), Ok(FileKind::MachOFat32 | FileKind::MachOFat64)) {
         return Ok(());
     }
     let library = object::File::parse(&*bytes).map_err(fault)?;
-    let (own, wanted) = ((library.format(), library.architecture()), HOST);
-    if own != wanted {
+    let target = (library.format(), library.architecture());
+    if target != HOST {
         return Err(format!(
             "is for {:?} ({:?}), this program needs {:?} ({:?})",
-            own.1, own.0, wanted.1, wanted.0
+            target.1, target.0, HOST.1, HOST.0
         ));
     }
     library.segments().try_for_each(|segment| segment.data().map(drop)).map_err(fault)

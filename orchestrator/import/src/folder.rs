@@ -1,5 +1,5 @@
-//! Temporary folders that vanish on every exit that the system lets a process see, and are removed
-//! by the next run after any other.
+//! Temporary folders that are removed when the process ends. If it was killed, the next run removes
+//! them.
 
 use std::fs::{self, File};
 use std::io;
@@ -10,25 +10,27 @@ use tempfile::TempDir;
 
 /// Beginning of the names of these folders.
 const PREFIX: &str = "unpacked-fmu-";
-/// Age from which a folder that nobody holds is removed: a new one is not yet held for a moment.
+/// Age from which a folder that nobody holds is removed, because a new one is not held for a
+/// moment.
 const AGE: Duration = Duration::from_secs(60);
 
 /// A temporary folder that is removed when this value is dropped.
 #[derive(Debug)]
 pub struct TemporaryFolder {
-    /// Says to other processes that the folder is in use. It goes first: some systems keep a folder
-    /// as long as a file in it is open.
+    /// Tells other processes that the folder is in use. It is dropped first, because some systems
+    /// do not remove a folder as long as a file in it is open.
     _hold: Option<File>,
     folder: TempDir,
 }
 
 impl TemporaryFolder {
-    /// Makes a folder. The first call of a process removes those that killed processes left.
+    /// Makes a folder. The first call of a process removes the folders that killed processes have
+    /// left.
     pub(crate) fn new() -> io::Result<Self> {
         static ONCE: Once = Once::new();
         ONCE.call_once(|| remove_orphans(&std::env::temp_dir(), AGE));
         let folder = tempfile::Builder::new().prefix(PREFIX).tempdir()?;
-        // Without a lock the folder is only removed later by a process that cannot know better.
+        // Without a lock, another process may take the folder for an orphan once it is old enough.
         let hold = hold(folder.path()).ok().filter(|hold| hold.try_lock().is_ok());
         Ok(Self { _hold: hold, folder })
     }
@@ -39,7 +41,7 @@ impl TemporaryFolder {
     }
 }
 
-/// Opens what stands for a folder in locks: the folder itself, or a file in it.
+/// Opens the file that is locked in place of a folder: the folder itself, or a file in it.
 fn hold(folder: &Path) -> io::Result<File> {
     if cfg!(unix) {
         File::open(folder)
@@ -52,14 +54,14 @@ fn hold(folder: &Path) -> io::Result<File> {
 fn remove_orphans(within: &Path, age: Duration) {
     let is_old = |path: &PathBuf| {
         let changed = fs::symlink_metadata(path).ok().filter(fs::Metadata::is_dir);
-        let changed = changed.and_then(|found| found.modified().ok());
+        let changed = changed.and_then(|metadata| metadata.modified().ok());
         changed.is_some_and(|at| SystemTime::now().duration_since(at).is_ok_and(|old| old >= age))
     };
-    let all = fs::read_dir(within).into_iter().flatten().flatten();
-    let own = all.filter(|entry| entry.file_name().to_string_lossy().starts_with(PREFIX));
-    for path in own.map(|entry| entry.path()).filter(is_old) {
+    let entries = fs::read_dir(within).into_iter().flatten().flatten();
+    let folders = entries.filter(|entry| entry.file_name().to_string_lossy().starts_with(PREFIX));
+    for path in folders.map(|entry| entry.path()).filter(is_old) {
         if hold(&path).is_ok_and(|hold| hold.try_lock().is_ok()) {
-            // What belongs to somebody else stays.
+            // A folder of another user stays.
             let _ = fs::remove_dir_all(&path);
         }
     }

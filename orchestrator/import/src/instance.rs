@@ -1,350 +1,101 @@
-//! Calls an FMU's library.
-//!
-//! The logger that expands `printf` arguments comes from `fmi-rs`. The calls go through libloading,
-//! because `fmi-rs` frees the callback structure after fmi2Instantiate, while units of several
-//! exporters keep the pointer to it and crash when they log. The C types are in [`fmi`], because
-//! those of `fmi-rs` represent a status as an enumeration.
+//! The interface between the master and an instance, which may be that of an FMU, a lookup table,
+//! or a mock in a test.
 
-#![allow(unsafe_code)]
+use serde::{Deserialize, Serialize};
+use std::borrow::Cow;
 
-use crate::crash::Calling;
-use crate::fmi::{self, Status};
-use crate::folder::TemporaryFolder;
-use crate::log::Log;
-use crate::unit::{CoSimulationUnit, Outcome, UnitFailure};
-use libloading::Library;
-use std::ffi::{CStr, CString, c_int, c_void};
-use std::path::Path;
-use std::rc::Rc;
-
-unsafe extern "C" {
-    /// Wraps the logger in a C function that expands the `printf` arguments of a message. It is
-    /// part of `fmi-rs`.
-    fn add_logger_proxy(functions: *mut fmi::Callbacks);
-    /// The C library's `calloc`, for units that request memory from their environment.
-    fn calloc(count: usize, size: usize) -> *mut c_void;
-    /// The C library's `free`, which releases that memory.
-    fn free(memory: *mut c_void);
+/// A call to an instance that did not succeed.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct CallFailure {
+    /// Whether the instance ended the simulation by this call, which is not a fault.
+    pub ends: bool,
+    /// Name of the call, for example `doStep`.
+    pub call: Cow<'static, str>,
+    /// Message of the instance, or its status if there is none.
+    pub message: String,
 }
 
-/// The FMI functions that this program calls, and the library that holds them.
-pub(crate) struct Functions {
-    instantiate: fmi::Instantiate,
-    free_instance: fmi::FreeInstance,
-    setup_experiment: fmi::SetupExperiment,
-    enter_initialization_mode: fmi::Plain,
-    exit_initialization_mode: fmi::Plain,
-    terminate: fmi::Plain,
-    get_real: fmi::Get<f64>,
-    get_integer: fmi::Get<i32>,
-    get_boolean: fmi::Get<i32>,
-    set_real: fmi::Set<f64>,
-    set_integer: fmi::Set<i32>,
-    set_boolean: fmi::Set<i32>,
-    set_string: fmi::Set<fmi::Text>,
-    do_step: fmi::DoStep,
-    get_real_status: fmi::GetStatus<f64>,
-    get_boolean_status: fmi::GetStatus<c_int>,
-    /// Optional, because nothing depends on it and some units lack it.
-    get_version: Option<fmi::GetText>,
-    /// Optional, because a new instance does the same.
-    reset: Option<fmi::Plain>,
-    _library: Library,
-}
-
-impl Functions {
-    pub(crate) fn load(file: &Path) -> Result<Self, libloading::Error> {
-        // SAFETY: loading runs the library's own initializers, which are sound only if the library
-        // is. Whoever runs an FMU trusts its code.
-        let library = unsafe { Library::new(file) }?;
-        // SAFETY: FMI 2.0 gives each function the type it is loaded as, and `_library` keeps the
-        // code loaded as long as the pointers exist.
-        unsafe {
-            Ok(Self {
-                instantiate: *library.get(b"fmi2Instantiate\0")?,
-                free_instance: *library.get(b"fmi2FreeInstance\0")?,
-                setup_experiment: *library.get(b"fmi2SetupExperiment\0")?,
-                enter_initialization_mode: *library.get(b"fmi2EnterInitializationMode\0")?,
-                exit_initialization_mode: *library.get(b"fmi2ExitInitializationMode\0")?,
-                terminate: *library.get(b"fmi2Terminate\0")?,
-                get_real: *library.get(b"fmi2GetReal\0")?,
-                get_integer: *library.get(b"fmi2GetInteger\0")?,
-                get_boolean: *library.get(b"fmi2GetBoolean\0")?,
-                set_real: *library.get(b"fmi2SetReal\0")?,
-                set_integer: *library.get(b"fmi2SetInteger\0")?,
-                set_boolean: *library.get(b"fmi2SetBoolean\0")?,
-                set_string: *library.get(b"fmi2SetString\0")?,
-                do_step: *library.get(b"fmi2DoStep\0")?,
-                get_real_status: *library.get(b"fmi2GetRealStatus\0")?,
-                get_boolean_status: *library.get(b"fmi2GetBooleanStatus\0")?,
-                get_version: library.get(b"fmi2GetVersion\0").ok().map(|function| *function),
-                reset: library.get(b"fmi2Reset\0").ok().map(|function| *function),
-                _library: library,
-            })
-        }
-    }
-
-    /// Returns a line about the version that the library reports, if it is missing or not FMI 2.0.
-    pub(crate) fn version_fault(&self) -> Option<String> {
-        let Some(get_version) = self.get_version else {
-            return Some("its library has no fmi2GetVersion".into());
-        };
-        // SAFETY: FMI 2.0 gives the function this type and allows the call at any time.
-        let version = text_of(unsafe { get_version() });
-        let is_known = version == "2.0" || version.starts_with("2.0.");
-        (!is_known)
-            .then(|| format!("its library says that it is of FMI \"{}\"", version.escape_default()))
+impl CallFailure {
+    /// Creates a failure of this call that does not end the simulation.
+    pub fn new(call: &'static str, message: impl Into<String>) -> Self {
+        Self { ends: false, call: call.into(), message: message.into() }
     }
 }
 
-/// Copies the C string at `text`; a null pointer gives an empty string.
-fn text_of(text: fmi::Text) -> String {
-    if text.is_null() {
-        return String::new();
+/// Outcome of a call to an instance.
+pub type Outcome = Result<(), CallFailure>;
+
+/// A running copy of an FMU. It is set, stepped and read by value references, in the order that FMI
+/// 2.0 prescribes. Booleans are transferred as 0 and 1, and enumerations as the values of their
+/// items. All slices of one call have the same length.
+pub trait Instance {
+    /// Reads real variables.
+    ///
+    /// # Errors
+    /// Returns an error if the instance reports a failure, as for every call of this trait.
+    fn get_real(&mut self, references: &[u32], values: &mut [f64]) -> Outcome;
+    /// Reads integer and enumeration variables.
+    ///
+    /// # Errors
+    /// Returns an error if the instance reports a failure.
+    fn get_integer(&mut self, references: &[u32], values: &mut [i32]) -> Outcome;
+    /// Reads boolean variables.
+    ///
+    /// # Errors
+    /// Returns an error if the instance reports a failure.
+    fn get_boolean(&mut self, references: &[u32], values: &mut [i32]) -> Outcome;
+    /// Sets real variables.
+    ///
+    /// # Errors
+    /// Returns an error if the instance reports a failure.
+    fn set_real(&mut self, references: &[u32], values: &[f64]) -> Outcome;
+    /// Sets integer and enumeration variables.
+    ///
+    /// # Errors
+    /// Returns an error if the instance reports a failure.
+    fn set_integer(&mut self, references: &[u32], values: &[i32]) -> Outcome;
+    /// Sets boolean variables.
+    ///
+    /// # Errors
+    /// Returns an error if the instance reports a failure.
+    fn set_boolean(&mut self, references: &[u32], values: &[i32]) -> Outcome;
+    /// Sets a text variable.
+    ///
+    /// # Errors
+    /// Returns an error if the instance reports a failure.
+    fn set_string(&mut self, reference: u32, value: &str) -> Outcome;
+    /// Announces the start and stop time of the experiment, s, and enters initialization mode.
+    ///
+    /// # Errors
+    /// Returns an error if the instance reports a failure.
+    fn enter_initialization(&mut self, start: f64, stop: f64) -> Outcome;
+    /// Leaves initialization mode, after which the instance can be stepped.
+    ///
+    /// # Errors
+    /// Returns an error if the instance reports a failure.
+    fn exit_initialization(&mut self) -> Outcome;
+    /// Lets the instance begin a step, which [`Self::do_step`] with the same arguments, as the next
+    /// call, completes. An instance in a process of its own computes meanwhile; others do nothing
+    /// yet.
+    ///
+    /// # Errors
+    /// Returns an error if the instance cannot be reached.
+    fn begin_step(&mut self, _time: f64, _step: f64) -> Outcome {
+        Ok(())
     }
-    // SAFETY: FMI passes strings that end with a zero byte and stay valid during the call; the null
-    // pointer was excluded above.
-    unsafe { CStr::from_ptr(text) }.to_string_lossy().into_owned()
-}
-
-/// The logger callback, called by the C function that expands the arguments.
-unsafe extern "C" fn receive_message(
-    environment: *mut c_void,
-    _instance: fmi::Text,
-    status: c_int,
-    category: fmi::Text,
-    message: fmi::Text,
-) {
-    // SAFETY: the environment is the `Log` passed with the callbacks, which lives as long as the
-    // instance.
-    if let Some(log) = unsafe { environment.cast::<Log>().as_ref() } {
-        log.message(fmi::status(status), &text_of(category), &text_of(message));
-    }
-}
-
-/// The data that must live as long as a unit's instance.
-struct Instance {
-    functions: Functions,
-    _callbacks: Rc<fmi::Callbacks>,
-    log: Rc<Log>,
-}
-
-/// A co-simulation unit that was instantiated from an FMU.
-pub(crate) struct FmuUnit {
-    component: fmi::Component,
-    instance: Rc<Instance>,
-    fatal: bool,
-    _folder: Option<Rc<TemporaryFolder>>,
-}
-
-impl FmuUnit {
-    /// Instantiates a co-simulation unit that is called as its log says. `folder` holds the
-    /// unpacked archive, if it would vanish otherwise.
-    pub(crate) fn new(
-        functions: Functions,
-        log: Rc<Log>,
-        guid: &str,
-        resources: &str,
-        folder: Option<Rc<TemporaryFolder>>,
-    ) -> Result<Self, String> {
-        let text =
-            |text: &str| CString::new(text).map_err(|_| format!("\"{text:?}\" holds a zero byte"));
-        let (name, guid, resources) = (text(&log.component)?, text(guid)?, text(resources)?);
-
-        // Some units refuse to start without memory functions although they declare that they need
-        // none.
-        let mut callbacks = fmi::Callbacks {
-            logger: receive_message,
-            allocate: Some(calloc),
-            free: Some(free),
-            step_finished: None,
-            environment: Rc::as_ptr(&log).cast_mut().cast(),
-        };
-        // SAFETY: `callbacks` is a valid, exclusively borrowed structure for the whole call, which
-        // only replaces the logger in it by one that expands the arguments.
-        unsafe { add_logger_proxy(&raw mut callbacks) };
-        let callbacks = Rc::new(callbacks);
-
-        let calling = Calling::new(&log.component, "instantiate");
-        // SAFETY: FMI 2.0 gives the function this type; the texts outlive the call, and the unit
-        // keeps callbacks and log alive as long as the instance, as FMI demands.
-        let component = unsafe {
-            (functions.instantiate)(
-                name.as_ptr(),
-                fmi::CO_SIMULATION,
-                guid.as_ptr(),
-                resources.as_ptr(),
-                Rc::as_ptr(&callbacks),
-                fmi::FALSE,
-                fmi::TRUE,
-            )
-        };
-        drop(calling);
-        if component.is_null() {
-            let message = log.take().unwrap_or_else(|| "fmi2Instantiate gave no instance".into());
-            return Err(format!("could not be made of it: {message}"));
-        }
-        log.is_instantiated();
-        let instance = Rc::new(Instance { functions, _callbacks: callbacks, log });
-        Ok(Self { component, instance, fatal: false, _folder: folder })
-    }
-
-    /// Makes a call, and names it meanwhile to who asks what a crash came from.
-    #[inline]
-    fn call(
-        &mut self,
-        call: &'static str,
-        function: impl FnOnce(&Functions, fmi::Component) -> c_int,
-    ) -> Outcome {
-        let calling = Calling::new(&self.instance.log.component, call);
-        let status = function(&self.instance.functions, self.component);
-        drop(calling);
-        match fmi::status(status) {
-            Ok(Status::Ok | Status::Warning) => Ok(()),
-            status => Err(self.failure(call, status)),
-        }
-    }
-
-    fn call_plain(&mut self, call: &'static str, function: fmi::Plain) -> Outcome {
-        // SAFETY: the instance is alive until the unit is dropped, and the function is one of its
-        // library with the type that FMI gives it.
-        self.call(call, |_, component| unsafe { function(component) })
-    }
-
-    #[cold]
-    fn failure(&mut self, call: &'static str, status: Result<Status, c_int>) -> UnitFailure {
-        self.fatal |= status == Ok(Status::Fatal);
-        let said = self.instance.log.take();
-        if status == Ok(Status::Discard) && call == "doStep" {
-            return self.discarded(said);
-        }
-        if status == Ok(Status::Pending) {
-            let message = "it wants to step asynchronously, which is not supported";
-            return UnitFailure::new(call, format!("{message} ({:?})", Status::Pending));
-        }
-        let said = said.unwrap_or_else(|| "no message in its log".into());
-        UnitFailure::new(call, format!("{said} ({})", fmi::name_of(status)))
-    }
-
-    /// Describes why a step was discarded. FMI 2.0, section 4.2.3, lets a unit end the simulation
-    /// in this way.
-    fn discarded(&mut self, said: Option<String>) -> UnitFailure {
-        let Functions { get_real_status, get_boolean_status, .. } = self.instance.functions;
-        let (mut time, mut terminated) = (f64::NAN, fmi::FALSE);
-        let calling = Calling::new(&self.instance.log.component, "getStatus");
-        // SAFETY: the instance is alive, both pointers are valid for the calls, and FMI allows
-        // these calls after fmi2Discard.
-        let statuses = unsafe {
-            [
-                get_real_status(self.component, fmi::LAST_SUCCESSFUL_TIME, &raw mut time),
-                get_boolean_status(self.component, fmi::TERMINATED, &raw mut terminated),
-            ]
-        };
-        drop(calling);
-        let [knows_time, knows_end] = statuses.map(|status| fmi::status(status) == Ok(Status::Ok));
-        let ends = knows_end && terminated != fmi::FALSE;
-        let mut parts: Vec<String> = said.into_iter().collect();
-        if !ends && parts.is_empty() {
-            parts.push("no message in its log".into());
-        }
-        if knows_time && time.is_finite() {
-            parts.push(format!("it got as far as t = {time} s"));
-        }
-        UnitFailure {
-            ends,
-            ..UnitFailure::new("doStep", format!("{} ({:?})", parts.join("; "), Status::Discard))
-        }
-    }
-}
-
-impl Drop for FmuUnit {
-    fn drop(&mut self) {
-        if self.fatal {
-            // After a fatal error no function of the FMU may be called, not even fmi2FreeInstance,
-            // so the instance is leaked.
-            std::mem::forget(Rc::clone(&self.instance));
-        } else {
-            let _calling = Calling::new(&self.instance.log.component, "freeInstance");
-            // SAFETY: the instance is alive, is freed only here, and is not used afterwards.
-            unsafe { (self.instance.functions.free_instance)(self.component) };
-        }
-    }
-}
-
-/// Performs a get or set call for arrays of references and values.
-macro_rules! call_with_values {
-    ($self:ident, $function:ident, $name:literal, $references:ident, $values:ident, $pointer:expr) => {{
-        assert_eq!($references.len(), $values.len(), "as many values as references");
-        // SAFETY: the instance is alive, and both arrays have the length that is passed.
-        $self.call($name, |functions, component| unsafe {
-            (functions.$function)(component, $references.as_ptr(), $references.len(), $pointer)
-        })
-    }};
-}
-
-impl CoSimulationUnit for FmuUnit {
-    fn get_real(&mut self, references: &[u32], values: &mut [f64]) -> Outcome {
-        call_with_values!(self, get_real, "getReal", references, values, values.as_mut_ptr())
-    }
-
-    fn get_integer(&mut self, references: &[u32], values: &mut [i32]) -> Outcome {
-        call_with_values!(self, get_integer, "getInteger", references, values, values.as_mut_ptr())
-    }
-
-    fn get_boolean(&mut self, references: &[u32], values: &mut [i32]) -> Outcome {
-        call_with_values!(self, get_boolean, "getBoolean", references, values, values.as_mut_ptr())
-    }
-
-    fn set_real(&mut self, references: &[u32], values: &[f64]) -> Outcome {
-        call_with_values!(self, set_real, "setReal", references, values, values.as_ptr())
-    }
-
-    fn set_integer(&mut self, references: &[u32], values: &[i32]) -> Outcome {
-        call_with_values!(self, set_integer, "setInteger", references, values, values.as_ptr())
-    }
-
-    fn set_boolean(&mut self, references: &[u32], values: &[i32]) -> Outcome {
-        call_with_values!(self, set_boolean, "setBoolean", references, values, values.as_ptr())
-    }
-
-    fn set_string(&mut self, reference: u32, value: &str) -> Outcome {
-        let text = CString::new(value).map_err(|_| {
-            UnitFailure::new("setString", format!("the text {value:?} holds a zero byte"))
-        })?;
-        let (references, values) = ([reference], [text.as_ptr()]);
-        call_with_values!(self, set_string, "setString", references, values, values.as_ptr())
-    }
-
-    fn enter_initialization(&mut self, start: f64, stop: f64) -> Outcome {
-        // SAFETY: the instance is alive, and the function has the type FMI gives it.
-        self.call("setupExperiment", |functions, component| unsafe {
-            (functions.setup_experiment)(component, fmi::FALSE, 0.0, start, fmi::TRUE, stop)
-        })?;
-        self.call_plain(
-            "enterInitializationMode",
-            self.instance.functions.enter_initialization_mode,
-        )
-    }
-
-    fn exit_initialization(&mut self) -> Outcome {
-        self.call_plain("exitInitializationMode", self.instance.functions.exit_initialization_mode)
-    }
-
-    fn do_step(&mut self, time: f64, step: f64) -> Outcome {
-        // SAFETY: the instance is alive, and the function has the type FMI gives it.
-        self.call("doStep", |functions, component| unsafe {
-            (functions.do_step)(component, time, step, fmi::TRUE)
-        })
-    }
-
-    fn terminate(&mut self) -> Outcome {
-        self.call_plain("terminate", self.instance.functions.terminate)
-    }
-
-    fn reset(&mut self) -> Outcome {
-        let Some(reset) = self.instance.functions.reset else {
-            return Err(UnitFailure::new("reset", "its library has no fmi2Reset"));
-        };
-        self.call_plain("reset", reset)
-    }
+    /// Steps the instance from the communication point `time` by `step`, both in s.
+    ///
+    /// # Errors
+    /// Returns an error if the instance reports a failure.
+    fn do_step(&mut self, time: f64, step: f64) -> Outcome;
+    /// Ends the simulation.
+    ///
+    /// # Errors
+    /// Returns an error if the instance reports a failure.
+    fn terminate(&mut self) -> Outcome;
+    /// Sets all variables back to their start values, so that the instance is as if it were new.
+    ///
+    /// # Errors
+    /// Returns an error if the instance reports a failure.
+    fn reset(&mut self) -> Outcome;
 }

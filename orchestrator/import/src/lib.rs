@@ -1,7 +1,7 @@
-//! Imports FMI 2.0 units. An [`fmu::Fmu`] is unpacked ([`archive`]), its description is read
-//! ([`description`], [`xml`], [`quantity`]), and the description is searched for [`faults`]. Units
-//! that are instantiated from it are called through the trait [`unit::CoSimulationUnit`]. A
-//! [`table`] is a unit, too.
+//! Imports FMI 2.0 FMUs. An [`fmu::Fmu`] is unpacked ([`archive`]), its description is read
+//! ([`description`], [`xml`], [`quantity`]), and the description is searched for [`faults`]. Its
+//! instances are called through the trait [`instance::Instance`]. A [`lookup_table`] is opened and
+//! called in the same way.
 
 pub mod archive;
 pub mod crash;
@@ -11,12 +11,12 @@ pub mod faults;
 mod fmi;
 pub mod fmu;
 pub mod folder;
-mod instance;
+pub mod instance;
 pub mod isolation;
+mod library;
 mod log;
+pub mod lookup_table;
 pub mod names;
 pub mod quantity;
-pub mod table;
-pub mod unit;
 pub mod warnings;
 pub mod xml;

@@ -1,4 +1,4 @@
-//! Log messages of units.
+//! Log messages of instances.
 
 use crate::fmi::Status;
 use crate::warnings;
@@ -9,45 +9,45 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-/// Largest number of messages of a unit that are printed in a second, or held until somebody takes
-/// them.
+/// Largest number of messages of an instance that are printed in a second, or held until they are
+/// taken.
 const MOST: u64 = 100;
 /// Largest number of bytes of a message.
 const LONGEST: usize = 2000;
 
-/// A message that a unit logged.
+/// A message that an instance logged.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub(crate) struct Said {
+pub(crate) struct LogMessage {
     pub(crate) status: c_int,
     pub(crate) category: String,
     pub(crate) text: String,
 }
 
-/// Forwards an FMU's log messages, and keeps the last one that reports a problem.
+/// Forwards the log messages of an instance, and stores the last one that reports a problem.
 pub(crate) struct Log {
     pub(crate) component: String,
     last: Mutex<Option<String>>,
-    /// Whether the unit is being instantiated. Messages about problems are then part of the error
-    /// that follows.
+    /// Whether the instance is being instantiated. Messages about problems are then part of the
+    /// error that follows.
     instantiates: AtomicBool,
     sink: Sink,
 }
 
 /// Function that is handed a text.
-type Tell = Box<dyn Fn(&[u8]) + Send + Sync>;
+type ReportProblem = Box<dyn Fn(&[u8]) + Send + Sync>;
 
 enum Sink {
     /// Prints messages as `tracing` does.
     Printed(Mutex<Pace>),
     /// Holds messages for another process, and hands on the text of problems at once.
-    Held(Arc<Held>, Tell),
+    Held(Arc<Held>, ReportProblem),
 }
 
 /// Messages that are held until they are taken.
 #[derive(Default)]
-pub(crate) struct Held(Mutex<(Vec<Said>, u64)>);
+pub(crate) struct Held(Mutex<(Vec<LogMessage>, u64)>);
 
-/// Messages of the second that is running.
+/// Number of messages in the current second.
 #[derive(Default)]
 struct Pace {
     since: Option<Instant>,
@@ -76,18 +76,22 @@ impl Pace {
 
 impl Held {
     /// Takes the messages that came since the last call.
-    pub(crate) fn take(&self) -> Vec<Said> {
-        let (mut said, lost) = std::mem::take(&mut *self.0.lock());
+    pub(crate) fn take(&self) -> Vec<LogMessage> {
+        let (mut messages, lost) = std::mem::take(&mut *self.0.lock());
         if lost > 0 {
             let text = format!("{lost} further messages are left out");
-            said.push(Said { status: Status::Warning as c_int, category: "log".into(), text });
+            messages.push(LogMessage {
+                status: Status::Warning as c_int,
+                category: "log".into(),
+                text,
+            });
         }
-        said
+        messages
     }
 
-    fn add(&self, said: Said) {
+    fn add(&self, message: LogMessage) {
         let mut held = self.0.lock();
-        if (held.0.len() as u64) < MOST { held.0.push(said) } else { held.1 += 1 }
+        if (held.0.len() as u64) < MOST { held.0.push(message) } else { held.1 += 1 }
     }
 }
 
@@ -116,7 +120,7 @@ impl Log {
         }
     }
 
-    /// Says that the unit is instantiated.
+    /// Records that the instance is made.
     pub(crate) fn is_instantiated(&self) {
         self.instantiates.store(false, Ordering::Relaxed);
     }
@@ -135,7 +139,7 @@ impl Log {
                 }
                 let status = status.map_or_else(|code| code, |status| status as c_int);
                 let (category, text) = (cut(category).to_string(), message.clone());
-                held.add(Said { status, category, text });
+                held.add(LogMessage { status, category, text });
             }
             Sink::Printed(pace) => self.print(pace, status, cut(category), &message),
         }
@@ -144,7 +148,7 @@ impl Log {
         }
     }
 
-    fn tell_lost(&self, lost: u64) {
+    fn report_lost(&self, lost: u64) {
         if lost > 0 {
             tracing::warn!("{}: {lost} further messages are left out", self.component);
         }
@@ -169,7 +173,7 @@ impl Log {
             _ => {}
         }
         let (may_print, lost) = pace.lock().count();
-        self.tell_lost(lost);
+        self.report_lost(lost);
         if !may_print {
             return;
         }
@@ -187,7 +191,7 @@ impl Log {
     }
 }
 
-// Units may log from threads of their own.
+// Instances may log from threads of their own.
 const _: () = {
     const fn is_sync<T: Sync>() {}
     is_sync::<Log>();
@@ -197,7 +201,7 @@ impl Drop for Log {
     fn drop(&mut self) {
         if let Sink::Printed(pace) = &self.sink {
             let lost = pace.lock().lost();
-            self.tell_lost(lost);
+            self.report_lost(lost);
         }
     }
 }
@@ -221,10 +225,10 @@ mod tests {
         for number in 0..1000 {
             log.message(Ok(Status::Error), "c", &format!("{number} {}", "é".repeat(2000)));
         }
-        let said = held.take();
-        assert_eq!(said.len() as u64, MOST + 1);
-        assert_eq!(said[MOST as usize].text, "900 further messages are left out");
-        assert!(said.iter().all(|said| said.text.len() <= LONGEST));
+        let messages = held.take();
+        assert_eq!(messages.len() as u64, MOST + 1);
+        assert_eq!(messages[MOST as usize].text, "900 further messages are left out");
+        assert!(messages.iter().all(|message| message.text.len() <= LONGEST));
         assert!(words.lock().starts_with(b"999 "));
         assert!(log.take().unwrap().starts_with("999 ") && log.take().is_none());
         assert!(held.take().is_empty());

@@ -1,11 +1,11 @@
-//! Names that people mistype: the nearest known name, and patterns with a `*`.
+//! Mistyped names and the nearest right name, and patterns with a `*`.
 
-/// Returns the known name that is nearest to `wrong`: one that differs in a few letters, or one
-/// whose prefix was left out.
-pub fn nearest<'a>(wrong: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+/// Returns the name among `names` that is nearest to `wrong`: one that differs in a few letters, or
+/// one whose prefix was left out.
+pub fn nearest<'a>(wrong: &str, names: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     let tolerance = (wrong.chars().count() / 3).clamp(1, 4);
     let lower = wrong.to_lowercase();
-    known
+    names
         .into_iter()
         .filter_map(|name| {
             let candidate = name.to_lowercase();
@@ -17,14 +17,14 @@ pub fn nearest<'a>(wrong: &str, known: impl IntoIterator<Item = &'a str>) -> Opt
         .map(|(_, name)| name)
 }
 
-/// Returns a hint for a message: `; did you mean "x"?` if a known name is near, and otherwise a
-/// list of the known names.
-pub fn hint<'a>(wrong: &str, known: impl IntoIterator<Item = &'a str> + Clone) -> String {
+/// Returns a hint for a message: `; did you mean "x"?` if one of `names` is near, and otherwise a
+/// list of `names`.
+pub fn hint<'a>(wrong: &str, names: impl IntoIterator<Item = &'a str> + Clone) -> String {
     const LISTED: usize = 12;
-    if let Some(name) = nearest(wrong, known.clone()) {
+    if let Some(name) = nearest(wrong, names.clone()) {
         return format!("; did you mean \"{name}\"?");
     }
-    let names: Vec<&str> = known.into_iter().collect();
+    let names: Vec<&str> = names.into_iter().collect();
     match names.len() {
         0 => "; there are none".into(),
         n if n <= LISTED => format!("; there are: {}", names.join(", ")),

@@ -1,5 +1,5 @@
-//! Physical units, as the FMU defines them: conversion of texts such as `"2 deg/s2"`, and the check
-//! whether two variables may be connected.
+//! Units of measure, as the FMU defines them: conversion of texts such as `"2 deg/s2"`, and the
+//! check whether two variables may be connected.
 
 use crate::names;
 
@@ -18,13 +18,13 @@ pub struct UnitDefinition {
     pub displays: Vec<(String, f64, f64)>,
 }
 
-/// Converts a text such as `"2 deg/s2"` to a value in the unit `wanted`. A bare `"2"` is already in
+/// Converts a text such as `"2 deg/s2"` to a value in the unit `target`. A bare `"2"` is already in
 /// that unit.
 ///
 /// # Errors
 /// Returns an error if the text is not a number with a unit that the FMU defines and that measures
-/// the same quantity as `wanted`.
-pub fn convert(text: &str, wanted: Option<&str>, units: &[UnitDefinition]) -> Result<f64, String> {
+/// the same quantity as `target`.
+pub fn convert(text: &str, target: Option<&str>, units: &[UnitDefinition]) -> Result<f64, String> {
     let text = text.trim();
     if let Ok(value) = text.parse::<f64>() {
         return Ok(value);
@@ -33,22 +33,24 @@ pub fn convert(text: &str, wanted: Option<&str>, units: &[UnitDefinition]) -> Re
         .split_once(char::is_whitespace)
         .map(|(number, name)| (number, name.trim()))
         .ok_or_else(|| {
-            format!("\"{text}\" is neither a number nor a number, a space and a unit")
+            format!(
+                "\"{text}\" is neither a plain number nor a number followed by a space and a unit"
+            )
         })?;
     let value: f64 = number.parse().map_err(|_| format!("\"{number}\" is not a number"))?;
-    let wanted =
-        wanted.ok_or_else(|| format!("\"{text}\" has a unit, but the variable has none"))?;
-    if name == wanted {
+    let target =
+        target.ok_or_else(|| format!("\"{text}\" has a unit, but the variable has none"))?;
+    if name == target {
         return Ok(value);
     }
 
-    let target = units.iter().find(|unit| unit.name == wanted).ok_or_else(|| {
-        format!("the FMU does not define its unit \"{wanted}\": give a plain number")
+    let definition = units.iter().find(|unit| unit.name == target).ok_or_else(|| {
+        format!("the FMU does not define its unit \"{target}\": give a plain number")
     })?;
     // A display unit of the variable's own unit takes precedence, because another unit may have a
     // display unit of the same name.
-    let own = target.displays.iter().find(|(display, ..)| display == name);
-    if let Some((_, factor, offset)) = own {
+    let display = definition.displays.iter().find(|(display, ..)| display == name);
+    if let Some((_, factor, offset)) = display {
         return Ok((value - offset) / factor);
     }
     let (unit, in_unit) = units
@@ -61,7 +63,7 @@ pub fn convert(text: &str, wanted: Option<&str>, units: &[UnitDefinition]) -> Re
             Some((unit, (value - offset) / factor))
         })
         .ok_or_else(|| {
-            let known: Vec<&str> = units
+            let names: Vec<&str> = units
                 .iter()
                 .flat_map(|unit| {
                     std::iter::once(unit.name.as_str())
@@ -70,15 +72,15 @@ pub fn convert(text: &str, wanted: Option<&str>, units: &[UnitDefinition]) -> Re
                 .collect();
             format!(
                 "the FMU defines no unit \"{name}\"{}",
-                names::hint(name, known.iter().copied())
+                names::hint(name, names.iter().copied())
             )
         })?;
-    if unit.exponents.is_none() || unit.exponents != target.exponents {
+    if unit.exponents.is_none() || unit.exponents != definition.exponents {
         return Err(format!(
-            "\"{text}\" cannot be converted to {wanted}: they measure different things"
+            "\"{text}\" cannot be converted to {target}: they measure different quantities"
         ));
     }
-    Ok((unit.factor * in_unit + unit.offset - target.offset) / target.factor)
+    Ok((unit.factor * in_unit + unit.offset - definition.offset) / definition.factor)
 }
 
 /// Returns the scaling that converts values in one unit to values in another.
@@ -93,9 +95,9 @@ pub fn conversion(
 ) -> Result<Scaling, String> {
     let unchanged = Ok(Scaling::default());
     let (Some(from), Some(to)) = (from, to) else {
-        // An FMU that defines no units at all cannot be held to them.
-        let known = [(from, from_units), (to, to_units)];
-        return if from == to || known.iter().any(|(unit, units)| unit.is_none() && units.is_empty())
+        // An FMU that defines no units at all fits every unit.
+        let sides = [(from, from_units), (to, to_units)];
+        return if from == to || sides.iter().any(|(unit, units)| unit.is_none() && units.is_empty())
         {
             unchanged
         } else {
@@ -122,8 +124,8 @@ pub fn conversion(
     }
 }
 
-/// Returns the scaling that converts values of a table, whose unit is only named, to values in
-/// another unit. Without a name they are in that unit already.
+/// Returns the scaling that converts values of a lookup table, whose unit is only named, to values
+/// in another unit. Values without a unit are in that unit already.
 ///
 /// # Errors
 /// Returns an error if the other side defines no unit of this name that measures the same quantity.
@@ -137,11 +139,11 @@ pub fn named(
     if from == to {
         return Ok(Scaling::default());
     }
-    let of = |value: f64| convert(&format!("{value} {from}"), Some(to), to_units);
+    let converted = |value: f64| convert(&format!("{value} {from}"), Some(to), to_units);
     let is_known = to_units
         .iter()
         .any(|unit| unit.name == from || unit.displays.iter().any(|(name, ..)| name == from));
-    match of(0.0).and_then(|zero| Ok((zero, of(1.0)?))) {
+    match converted(0.0).and_then(|zero| Ok((zero, converted(1.0)?))) {
         Ok((zero, one)) => Ok(Scaling { factor: one - zero, offset: zero }),
         Err(_) if is_known => Err(format!("{from} against {to}")),
         Err(problem) => Err(format!("{from} against {to}: {problem}")),
@@ -166,14 +168,14 @@ impl Default for Scaling {
 
 impl Scaling {
     /// Returns the scaled value.
-    pub fn of(self, value: f64) -> f64 {
+    pub fn apply(self, value: f64) -> f64 {
         self.factor * value + self.offset
     }
 
     /// Returns the scaling that applies this one first, and `next` afterwards.
     #[must_use]
     pub fn then(self, next: Self) -> Self {
-        Self { factor: next.factor * self.factor, offset: next.of(self.offset) }
+        Self { factor: next.factor * self.factor, offset: next.apply(self.offset) }
     }
 }
 
@@ -236,7 +238,7 @@ mod tests {
         assert!(
             convert("2 deg/s", Some("rad"), &units)
                 .unwrap_err()
-                .contains("measure different things")
+                .contains("measure different quantities")
         );
         assert!(
             convert("2 degs", Some("rad"), &units).unwrap_err().contains("did you mean \"deg\"")
@@ -254,8 +256,8 @@ mod tests {
         assert_eq!(scaling(None, None), Ok(Scaling::default()));
         assert!(scaling(Some("rad"), None).is_err());
         assert!(scaling(Some("rad"), Some("rad/s")).is_err());
-        assert_eq!(scaling(Some("min"), Some("s")).unwrap().of(2.0), 120.0);
-        assert_eq!(scaling(Some("s"), Some("min")).unwrap().of(30.0), 0.5);
+        assert_eq!(scaling(Some("min"), Some("s")).unwrap().apply(2.0), 120.0);
+        assert_eq!(scaling(Some("s"), Some("min")).unwrap().apply(30.0), 0.5);
         // Another name for the same unit is no mismatch, and a description without units fits every
         // unit.
         let mut renamed = units.clone();
@@ -273,10 +275,10 @@ mod tests {
         assert_eq!(scaling(Some("rad"), Some("rad")), Ok(Scaling::default()));
         assert_eq!(scaling(None, Some("rad")), Ok(Scaling::default()));
         let angle = scaling(Some("deg"), Some("rad")).unwrap();
-        assert!((angle.of(180.0) - std::f64::consts::PI).abs() < 1e-15);
+        assert!((angle.apply(180.0) - std::f64::consts::PI).abs() < 1e-15);
         let temperature = scaling(Some("degC"), Some("K")).unwrap();
-        assert!((temperature.of(20.0) - 293.15).abs() < 1e-9);
-        assert_eq!(scaling(Some("min"), Some("s")).unwrap().of(2.0), 120.0);
+        assert!((temperature.apply(20.0) - 293.15).abs() < 1e-9);
+        assert_eq!(scaling(Some("min"), Some("s")).unwrap().apply(2.0), 120.0);
         assert_eq!(scaling(Some("deg"), Some("K")), Err("deg against K".into()));
         let unknown = scaling(Some("knots"), Some("K")).unwrap_err();
         assert!(unknown.contains("defines no unit \"knots\""), "{unknown}");
@@ -298,9 +300,9 @@ mod tests {
             unit("degF", 5.0 / 9.0, 273.15 - 160.0 / 9.0),
         ];
         let celsius = conversion(Some("degF"), &units, Some("degC"), &units).unwrap();
-        assert!((celsius.of(212.0) - 100.0).abs() < 1e-12 && celsius.of(32.0).abs() < 1e-12);
+        assert!((celsius.apply(212.0) - 100.0).abs() < 1e-12 && celsius.apply(32.0).abs() < 1e-12);
         let doubled = celsius.then(Scaling { factor: 2.0, offset: 1.0 });
-        assert!((doubled.of(212.0) - 201.0).abs() < 1e-12);
+        assert!((doubled.apply(212.0) - 201.0).abs() < 1e-12);
     }
 
     proptest::proptest! {

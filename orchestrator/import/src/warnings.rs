@@ -1,15 +1,15 @@
-//! Collects the warnings of units during a run: each is printed once, at the end, with the time at
-//! which it first came and the number of times it came.
+//! Collects the warnings of instances during a run. Each is printed once, at the end, with the time
+//! at which it first came and with its count.
 
 use parking_lot::Mutex;
 use std::cell::RefCell;
 use std::collections::BTreeSet;
 
-/// Largest number of different warnings that are collected, in case a unit never says the same
-/// twice.
+/// Largest number of different warnings that are collected, in case an instance never repeats
+/// itself.
 const MOST: usize = 100;
 
-/// A warning of a unit, in its own words.
+/// A warning of an instance, in its own words.
 struct Warning {
     text: String,
     first: f64,
@@ -18,44 +18,44 @@ struct Warning {
 
 /// Current simulated time, s, and the warnings collected so far.
 #[derive(Default)]
-struct Heard {
+struct Collected {
     now: f64,
     warnings: Vec<Warning>,
 }
 
 thread_local! {
-    static HEARD: RefCell<Option<Heard>> = const { RefCell::new(None) };
+    static COLLECTED: RefCell<Option<Collected>> = const { RefCell::new(None) };
 }
 
-/// A guard: warnings of this thread's units are collected as long as this value lives.
+/// A guard: warnings of this thread's instances are collected as long as this value lives.
 pub struct Collection(());
 
 /// Begins to collect warnings. If no collection is active, warnings are printed as they come.
 pub fn collect() -> Collection {
-    HEARD.with_borrow_mut(|heard| *heard = Some(Heard::default()));
+    COLLECTED.with_borrow_mut(|collection| *collection = Some(Collected::default()));
     Collection(())
 }
 
 /// Sets the current simulated time, s.
 pub fn at(time: f64) {
-    HEARD.with_borrow_mut(|heard| {
-        if let Some(heard) = heard {
-            heard.now = time;
+    COLLECTED.with_borrow_mut(|collection| {
+        if let Some(collection) = collection {
+            collection.now = time;
         }
     });
 }
 
-/// Records or prints a warning of a unit.
+/// Records or prints a warning of an instance.
 pub fn warn(text: &str) {
     if !collected(text) {
         tracing::warn!("{text}");
     }
 }
 
-/// Records a warning of a unit. Returns whether there was room for it.
+/// Records a warning of an instance. Returns whether there was room for it.
 pub(crate) fn collected(text: &str) -> bool {
-    HEARD.with_borrow_mut(|heard| {
-        let Some(Heard { now, warnings }) = heard else { return false };
+    COLLECTED.with_borrow_mut(|collection| {
+        let Some(Collected { now, warnings }) = collection else { return false };
         if let Some(warning) = warnings.iter_mut().find(|warning| warning.text == text) {
             warning.count += 1;
         } else if warnings.len() < MOST {
@@ -69,16 +69,16 @@ pub(crate) fn collected(text: &str) -> bool {
 
 /// Prints a warning about a file once, however many threads open the file and however often.
 pub fn warn_once(text: String) {
-    static TOLD: Mutex<BTreeSet<String>> = Mutex::new(BTreeSet::new());
-    let mut told = TOLD.lock();
-    if !told.contains(&text) {
+    static PRINTED: Mutex<BTreeSet<String>> = Mutex::new(BTreeSet::new());
+    let mut printed = PRINTED.lock();
+    if !printed.contains(&text) {
         tracing::warn!("{text}");
-        told.insert(text);
+        printed.insert(text);
     }
 }
 
 impl Warning {
-    fn told(&self) -> String {
+    fn text(&self) -> String {
         let time = crate::quantity::rounded(self.first);
         match self.count {
             1 => format!("{} (at t = {time} s)", self.text),
@@ -90,9 +90,9 @@ impl Warning {
 impl Drop for Collection {
     /// Prints the warnings that were collected.
     fn drop(&mut self) {
-        let heard = HEARD.with_borrow_mut(Option::take);
-        for warning in heard.iter().flat_map(|heard| &heard.warnings) {
-            tracing::warn!("{}", warning.told());
+        let collection = COLLECTED.with_borrow_mut(Option::take);
+        for warning in collection.iter().flat_map(|collection| &collection.warnings) {
+            tracing::warn!("{}", warning.text());
         }
     }
 }
@@ -108,11 +108,15 @@ mod tests {
             at(time);
             warn(text);
         }
-        let told: Vec<String> = HEARD.with_borrow(|heard| {
-            heard.iter().flat_map(|heard| &heard.warnings).map(Warning::told).collect()
+        let texts: Vec<String> = COLLECTED.with_borrow(|collection| {
+            collection
+                .iter()
+                .flat_map(|collection| &collection.warnings)
+                .map(Warning::text)
+                .collect()
         });
-        assert_eq!(told, ["late (at t = 0 s)", "lost (first at t = 0.3 s, 3 times)"]);
+        assert_eq!(texts, ["late (at t = 0 s)", "lost (first at t = 0.3 s, 3 times)"]);
         drop(collection);
-        assert!(HEARD.with_borrow(Option::is_none));
+        assert!(COLLECTED.with_borrow(Option::is_none));
     }
 }

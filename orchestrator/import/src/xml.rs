@@ -1,4 +1,5 @@
-//! Reads XML of other tools: text in any declared encoding, and elements with any namespace prefix.
+//! Reads XML of any exporter: text in any declared encoding, and elements with any namespace
+//! prefix.
 
 use encoding_rs::{Encoding, UTF_8};
 use quick_xml::events::{BytesStart, Event};
@@ -51,8 +52,8 @@ pub struct Element {
     pub children: Vec<Element>,
 }
 
-/// Depth below which nested elements are not kept. The annotations of some tools are nested so
-/// deeply, but no element that is read is.
+/// Depth below which nested elements are not stored. Annotations of some exporters are nested so
+/// deeply, but no element that is needed is.
 const DEPTH: usize = 100;
 
 impl Element {
@@ -66,7 +67,7 @@ impl Element {
 
     /// Reads an XML document from its text, and offers each element to `take` at its end, with the
     /// root element as far as it was read and the name of the parent. What `take` returns becomes
-    /// part of the document, so that long lists need not be kept.
+    /// part of the document, so that long lists need not be stored.
     ///
     /// # Errors
     /// Returns one line that says what is wrong with the text, or the error of `take`.
@@ -75,12 +76,12 @@ impl Element {
         mut take: impl FnMut(&Self, &str, Self) -> Result<Option<Self>, String>,
     ) -> Result<Self, String> {
         let mut close = |open: &mut Vec<Self>, element: Self| -> Result<(), String> {
-            let kept = match (open.get(1), open.last()) {
+            let child = match (open.get(1), open.last()) {
                 (Some(root), Some(parent)) => take(root, &parent.name, element)?,
                 _ => Some(element),
             };
-            if let (Some(kept), Some(parent)) = (kept, open.last_mut()) {
-                parent.children.push(kept);
+            if let (Some(child), Some(parent)) = (child, open.last_mut()) {
+                parent.children.push(child);
             }
             Ok(())
         };
@@ -153,13 +154,13 @@ impl Element {
     /// Returns the title of the element for messages: its kind, its name if it has one, and its
     /// line.
     pub fn title(&self) -> String {
-        let own = self.attribute("name").map(|name| format!(" \"{}\"", shortened(name)));
-        format!("the element {}{} in line {}", self.name, own.unwrap_or_default(), self.line)
+        let name = self.attribute("name").map(|name| format!(" \"{}\"", shortened(name)));
+        format!("the element {}{} in line {}", self.name, name.unwrap_or_default(), self.line)
     }
 
     /// Returns the value of the attribute with this name, if it is present.
     pub fn attribute(&self, name: &str) -> Option<&str> {
-        self.attributes.iter().find(|(own, _)| own == name).map(|(_, value)| value.as_str())
+        self.attributes.iter().find(|(other, _)| other == name).map(|(_, value)| value.as_str())
     }
 
     /// Returns the attribute with this name, which must be present.
@@ -233,24 +234,25 @@ mod tests {
 
     #[test]
     fn text_of_every_declared_encoding_is_read() {
-        let of = |declaration: &str, rest: &[u8]| decode(&[declaration.as_bytes(), rest].concat());
+        let decoded =
+            |declaration: &str, rest: &[u8]| decode(&[declaration.as_bytes(), rest].concat());
         assert_eq!(
-            of("<?xml version='1.0' encoding='ISO-8859-1'?>", b"\xfc").unwrap().chars().last(),
+            decoded("<?xml version='1.0' encoding='ISO-8859-1'?>", b"\xfc").unwrap().chars().last(),
             Some('ü')
         );
         assert_eq!(
-            of("<?xml version=\"1.0\" encoding = \"utf-8\"?>", "ü".as_bytes())
+            decoded("<?xml version=\"1.0\" encoding = \"utf-8\"?>", "ü".as_bytes())
                 .unwrap()
                 .chars()
                 .last(),
             Some('ü')
         );
-        assert_eq!(of("\u{feff}<a/>", b"").unwrap(), "<a/>");
+        assert_eq!(decoded("\u{feff}<a/>", b"").unwrap(), "<a/>");
         let wide: Vec<u8> =
             "\u{feff}<a b='ü'/>".encode_utf16().flat_map(u16::to_le_bytes).collect();
         assert_eq!(decode(&wide).unwrap(), "<a b='ü'/>");
-        assert!(of("<a>", b"\xfc").unwrap_err().contains("UTF-8"));
-        assert!(of("<?xml encoding='klingon'?>", b"").unwrap_err().contains("klingon"));
+        assert!(decoded("<a>", b"\xfc").unwrap_err().contains("UTF-8"));
+        assert!(decoded("<?xml encoding='klingon'?>", b"").unwrap_err().contains("klingon"));
     }
 
     #[test]

@@ -41,7 +41,7 @@ impl Error {
         match self {
             // A run that ends early has no result to compare, so that this is a failure of the
             // study.
-            Self::Run { source: Single::EndedByUnit { .. }, .. } => 1,
+            Self::Run { source: Single::EndedByInstance { .. }, .. } => 1,
             Self::Single(source) | Self::Run { source, .. } => source.exit_code(),
             Self::Unfinished { request, .. } => request.exit_code(),
         }

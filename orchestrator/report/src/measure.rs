@@ -3,7 +3,7 @@
 mod spectrum;
 
 use cosim::error::Error;
-use cosim::experiment::{Kind, Measure, Observe};
+use cosim::experiment::{Measure, MeasureKind, Observe};
 use cosim::master::{Observer, Sample};
 use cosim::signal::{Resolved, Signal, common_unit};
 use cosim::system::System;
@@ -63,11 +63,11 @@ impl Gauge {
         // At the stop time, responses to inputs are those of the step before; only an integral
         // needs them there.
         let responds = signals.iter().any(|signal| signal.responds);
-        let steps = measure.steps || responds && measure.kind != Kind::Integral;
+        let steps = measure.steps || responds && measure.kind != MeasureKind::Integral;
         let each = measure.each.as_ref().map(|path| system.probe(path)).transpose()?;
         let mut gauge = Self::of(&Measure { steps, ..measure.clone() }, signals);
         gauge.each = each.map(|probed| (probed.place, 0.0));
-        if measure.kind == Kind::P99 {
+        if measure.kind == MeasureKind::P99 {
             // This is enough room for a usual run; a longer run allocates more.
             gauge.samples.reserve(system.clock.ticks().min(1 << 16) as usize + 1);
         }
@@ -111,25 +111,25 @@ impl Gauge {
         (self.count > 0).then_some(())?;
         let count = self.count as f64;
         match self.measure.kind {
-            Kind::Rms => Some(factor * (self.sum / count).sqrt()),
-            Kind::Mean => Some(factor * (self.sum / count)),
-            Kind::Integral => Some(factor * self.integral),
-            Kind::P99 => {
+            MeasureKind::Rms => Some(factor * (self.sum / count).sqrt()),
+            MeasureKind::Mean => Some(factor * (self.sum / count)),
+            MeasureKind::Integral => Some(factor * self.integral),
+            MeasureKind::P99 => {
                 let mut samples = self.samples.clone();
                 samples.sort_by(f64::total_cmp);
                 let rank = (samples.len() * 99).div_ceil(100).checked_sub(1)?;
                 samples.get(rank).map(|sample| factor * sample)
             }
-            Kind::Largest => Some(factor * self.largest),
-            Kind::Last => self.before.first().map(|value| factor * value),
-            Kind::Settling => {
+            MeasureKind::Largest => Some(factor * self.largest),
+            MeasureKind::Last => self.before.first().map(|value| factor * value),
+            MeasureKind::Settling => {
                 self.settled.filter(|settled| self.last - settled >= self.measure.hold)
             }
-            Kind::Pulses => Some(self.pulses as f64),
-            Kind::Leaving => self.left,
-            Kind::Rises => Some(self.rises as f64),
-            Kind::Variation => Some(factor * self.variation),
-            Kind::RmsAbove => {
+            MeasureKind::Pulses => Some(self.pulses as f64),
+            MeasureKind::Leaving => self.left,
+            MeasureKind::Rises => Some(self.rises as f64),
+            MeasureKind::Variation => Some(factor * self.variation),
+            MeasureKind::RmsAbove => {
                 let step = (self.last - self.began) / (count - 1.0);
                 let frequency = self.measure.frequency.unwrap_or(0.0);
                 let signals = self.first.len();
@@ -141,7 +141,7 @@ impl Gauge {
     /// Returns the unit of [`Self::value`], or an empty text if it has none.
     pub(crate) fn unit(&self) -> &str {
         match (self.measure.kind, &self.measure.unit) {
-            (Kind::Settling | Kind::Leaving, _) => "s",
+            (MeasureKind::Settling | MeasureKind::Leaving, _) => "s",
             (_, Some(unit)) => &unit.name,
             _ => self.signals.first().map_or("", |signal| &signal.unit),
         }
@@ -150,8 +150,8 @@ impl Gauge {
     /// Returns whether the number is always whole.
     pub(crate) fn counts(&self) -> bool {
         let is_integer = self.signals.first().is_some_and(|signal| signal.is_integer);
-        let is_count = matches!(self.measure.kind, Kind::Pulses | Kind::Rises);
-        is_count || self.measure.kind == Kind::Last && is_integer
+        let is_count = matches!(self.measure.kind, MeasureKind::Pulses | MeasureKind::Rises);
+        is_count || self.measure.kind == MeasureKind::Last && is_integer
     }
 
     /// Returns the single values of a percentile, in the order of time.
@@ -175,7 +175,7 @@ impl Gauge {
             let least = self.measure.bound.unwrap_or(0.0);
             self.rises += u64::from(rise.is_some_and(|rise| rise > least));
         }
-        if self.measure.kind == Kind::RmsAbove {
+        if self.measure.kind == MeasureKind::RmsAbove {
             self.courses.extend(values);
         }
         // By the trapezoidal rule. At the first sample, the values before it are zero and no time
@@ -188,10 +188,10 @@ impl Gauge {
         self.count += 1;
         self.last = time;
         self.sum += match self.measure.kind {
-            Kind::Mean => values.first().copied().unwrap_or(f64::NAN),
+            MeasureKind::Mean => values.first().copied().unwrap_or(f64::NAN),
             _ => values.iter().map(|value| value * value).sum(),
         };
-        if self.measure.kind == Kind::P99 {
+        if self.measure.kind == MeasureKind::P99 {
             self.samples.extend(values.first());
         }
         self.largest = values.iter().map(|value| value.abs()).fold(self.largest, larger);
@@ -265,7 +265,7 @@ mod tests {
     use toml::Spanned;
 
     fn measured(
-        kind: Kind,
+        kind: MeasureKind,
         over: Option<[f64; 2]>,
         size: Option<f64>,
         rows: &[[f64; 2]],
@@ -279,14 +279,14 @@ mod tests {
     }
 
     fn held(
-        kind: Kind,
+        kind: MeasureKind,
         over: Option<[f64; 2]>,
         size: Option<f64>,
         hold: f64,
         rows: &[[f64; 2]],
     ) -> Option<f64> {
         let signals = Spanned::new(0..0, "x".to_string());
-        let (band, bound) = if kind == Kind::Leaving { (None, size) } else { (size, None) };
+        let (band, bound) = if kind == MeasureKind::Leaving { (None, size) } else { (size, None) };
         let measure =
             Measure { kind, signals, over, band, hold, bound, ..measure("kind = \"rms\"") };
         let mut gauge = Gauge::of(&measure, Vec::new());
@@ -299,26 +299,26 @@ mod tests {
     #[test]
     fn oracle_each_kind_by_hand() {
         let rows = [[10.0, -1.0], [3.0, 0.0], [0.1, 0.6], [0.4, 0.015], [-0.15, 0.0], [0.0, 0.01]];
-        assert_eq!(measured(Kind::Largest, None, None, &rows), Some(10.0));
-        assert_eq!(measured(Kind::Largest, Some([1.0, 2.0]), None, &rows), Some(3.0));
-        assert_eq!(measured(Kind::Rms, Some([1.0, 1.0]), None, &rows), Some(3.0));
-        assert_eq!(measured(Kind::Pulses, None, None, &rows), Some(2.0));
+        assert_eq!(measured(MeasureKind::Largest, None, None, &rows), Some(10.0));
+        assert_eq!(measured(MeasureKind::Largest, Some([1.0, 2.0]), None, &rows), Some(3.0));
+        assert_eq!(measured(MeasureKind::Rms, Some([1.0, 1.0]), None, &rows), Some(3.0));
+        assert_eq!(measured(MeasureKind::Pulses, None, None, &rows), Some(2.0));
         // 6.5 + 1.55 + 0.25 + 0.125 - 0.075
-        let integral = measured(Kind::Integral, None, None, &rows).unwrap();
+        let integral = measured(MeasureKind::Integral, None, None, &rows).unwrap();
         assert!((integral - 8.35).abs() < 1e-12);
         // The first signal is within 0.2 from 4 s on, the second within 0.02 from 3 s on.
-        assert_eq!(measured(Kind::Settling, None, Some(0.02), &rows), Some(4.0));
-        assert_eq!(measured(Kind::Settling, None, Some(0.001), &rows), None);
+        assert_eq!(measured(MeasureKind::Settling, None, Some(0.02), &rows), Some(4.0));
+        assert_eq!(measured(MeasureKind::Settling, None, Some(0.001), &rows), None);
         // The signals are seen within the band for 1 s, until 5 s.
-        assert_eq!(held(Kind::Settling, None, Some(0.02), 1.0, &rows), Some(4.0));
-        assert_eq!(held(Kind::Settling, None, Some(0.02), 1.1, &rows), None);
-        assert_eq!(measured(Kind::Rms, Some([7.0, 8.0]), None, &rows), None);
-        assert_eq!(measured(Kind::Rises, None, None, &rows), Some(2.0));
+        assert_eq!(held(MeasureKind::Settling, None, Some(0.02), 1.0, &rows), Some(4.0));
+        assert_eq!(held(MeasureKind::Settling, None, Some(0.02), 1.1, &rows), None);
+        assert_eq!(measured(MeasureKind::Rms, Some([7.0, 8.0]), None, &rows), None);
+        assert_eq!(measured(MeasureKind::Rises, None, None, &rows), Some(2.0));
         // 7 + 2.9 + 0.3 + 0.55 + 0.15, and 1 + 0.6 + 0.585 + 0.015 + 0.01
-        let variation = measured(Kind::Variation, None, None, &rows).unwrap();
+        let variation = measured(MeasureKind::Variation, None, None, &rows).unwrap();
         assert!((variation - 13.11).abs() < 1e-12, "{variation}");
-        assert_eq!(measured(Kind::Leaving, Some([1.0, 5.0]), Some(0.5), &rows), Some(1.0));
-        assert_eq!(measured(Kind::Leaving, Some([2.0, 5.0]), Some(0.7), &rows), None);
+        assert_eq!(measured(MeasureKind::Leaving, Some([1.0, 5.0]), Some(0.5), &rows), Some(1.0));
+        assert_eq!(measured(MeasureKind::Leaving, Some([2.0, 5.0]), Some(0.7), &rows), None);
     }
 
     #[test]

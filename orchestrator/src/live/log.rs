@@ -12,8 +12,8 @@ pub(crate) struct Messages;
 
 impl Write for Messages {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        if let Some(kept) = KEPT.lock().unwrap_or_else(PoisonError::into_inner).as_mut() {
-            return kept.write(bytes);
+        if let Some(messages) = KEPT.lock().unwrap_or_else(PoisonError::into_inner).as_mut() {
+            return messages.write(bytes);
         }
         // A message that cannot be written is lost, but the run continues.
         let _ = stderr().write_all(bytes);
@@ -33,10 +33,10 @@ pub(super) fn hold() {
     }
 }
 
-/// Writes the messages that were kept, and keeps no more.
+/// Writes the messages that were kept, and keeps no further ones.
 pub(super) fn release() {
-    if let Some(kept) = KEPT.lock().unwrap_or_else(PoisonError::into_inner).take() {
+    if let Some(messages) = KEPT.lock().unwrap_or_else(PoisonError::into_inner).take() {
         // If standard error cannot be written, there is nobody left to tell.
-        let _ = stderr().write_all(&kept);
+        let _ = stderr().write_all(&messages);
     }
 }

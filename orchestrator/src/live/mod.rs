@@ -1,6 +1,6 @@
 //! A view of the run on the terminal while it is in progress, drawn by a thread of its own.
 //!
-//! At every communication point the master leaves a copy of what it sees, unless the view is just
+//! At every communication point the master leaves a copy of the values, unless the view is just
 //! reading the last one; it never waits for the view. [`scene`] holds what is shown, [`view`] draws
 //! it, and [`log`] keeps messages meanwhile.
 
@@ -35,8 +35,8 @@ const BETWEEN_PICTURES: Duration = Duration::from_millis(66);
 pub(crate) struct Live {
     snapshot: Arc<Mutex<Snapshot>>,
     tally: Option<Rc<Cell<Tally>>>,
-    /// Course of the guarantee. It is followed at every communication point, because the view does
-    /// not see them all.
+    /// Status of the guarantee over time. It is followed at every communication point, because the
+    /// view does not see them all.
     guarantee: Option<Course>,
     over: Arc<AtomicBool>,
     thread: Option<JoinHandle<io::Result<()>>>,
@@ -51,7 +51,7 @@ pub(crate) fn check_terminal() -> Result<(), Error> {
         return Ok(());
     }
     Err(Error::experiment(
-        "--live draws on a terminal, and standard output is none: leave --live out, or run it in a terminal",
+        "--live needs a terminal, but standard output is not one: run the command in a terminal, or leave out --live",
     ))
 }
 
@@ -111,7 +111,9 @@ impl Drop for Live {
         log::release();
         match outcome {
             Some(Ok(Err(error))) => tracing::warn!("the live view ended early: {error}"),
-            Some(Err(_)) => tracing::warn!("the live view ended early by a defect"),
+            Some(Err(_)) => {
+                tracing::warn!("the live view ended early because of a defect in this program");
+            }
             _ => {}
         }
     }
@@ -136,7 +138,7 @@ fn show(
             && let Some(request) = request(key)
         {
             if interrupt.asked().is_some() {
-                // The user asked twice, because a unit does not return from a call.
+                // The user asked a second time, because an instance does not return from a call.
                 ratatui::restore();
                 log::release();
                 process::exit(130);

@@ -22,7 +22,7 @@ pub(crate) struct Scene {
     pub(crate) panels: Vec<Panel>,
     /// Further lines of variables, each with its heading.
     pub(crate) readings: Vec<(String, Vec<Probed>)>,
-    /// Variables of the guarantee, if a unit gives one.
+    /// Variables of the guarantee, if a component gives one.
     pub(crate) guarantee: Option<Signals>,
     /// Recorded variables, which are shown if the experiment names no panels.
     pub(crate) recorded: Vec<Probed>,
@@ -37,7 +37,7 @@ pub(crate) struct Snapshot {
     pub(crate) values: Vec<f64>,
     /// State of the pacing, if the run is paced.
     pub(crate) tally: Option<Tally>,
-    /// Course of the controller's guarantee, if it gives one.
+    /// Status of the controller's guarantee over time, if it gives one.
     pub(crate) guarantee: Option<Course>,
 }
 
@@ -62,10 +62,10 @@ impl Scene {
         factor: Option<f64>,
     ) -> Result<Self, Failure> {
         let observe = system.experiment.observe.clone();
-        let mut found = |path: &String| system.has(path).then(|| system.probe(path).ok()).flatten();
-        // A reading that the units lack is left out, like an optional metric.
+        let mut probe = |path: &String| system.has(path).then(|| system.probe(path).ok()).flatten();
+        // A reading that the FMUs lack is left out, like an optional metric.
         let readings = observe.readings.iter().map(|(heading, paths)| {
-            (heading.clone(), paths.iter().filter_map(&mut found).collect::<Vec<_>>())
+            (heading.clone(), paths.iter().filter_map(&mut probe).collect::<Vec<_>>())
         });
         let readings = readings.filter(|(_, variables)| !variables.is_empty()).collect();
         let guarantee = observe.guarantee.as_ref().map(|asked| Signals::find(asked, system));

@@ -73,17 +73,12 @@ impl State {
         for (panel, Chart { values, references }) in self.scene.panels.iter().zip(&mut self.charts)
         {
             let seen = &snapshot.values;
-            values
-                .iter_mut()
-                .zip(panel.values(seen))
-                .for_each(|(course, y)| course.push((time, y)));
+            values.iter_mut().zip(panel.values(seen)).for_each(|(curve, y)| curve.push((time, y)));
             let followed = panel.references(seen);
-            references.iter_mut().zip(followed).for_each(|(course, y)| course.push((time, y)));
-            for course in
-                values.iter_mut().chain(references).filter(|course| course.len() >= POINTS)
-            {
+            references.iter_mut().zip(followed).for_each(|(curve, y)| curve.push((time, y)));
+            for curve in values.iter_mut().chain(references).filter(|curve| curve.len() >= POINTS) {
                 let mut keep = false;
-                course.retain(|_| {
+                curve.retain(|_| {
                     keep = !keep;
                     keep
                 });
@@ -167,16 +162,16 @@ fn colors() -> impl Iterator<Item = Color> {
 }
 
 fn chart(frame: &mut Frame, state: &State, title: Line, drawn: &Chart, area: Rect) {
-    let pale = drawn.references.iter().map(|course| (course, Color::DarkGray));
-    let courses: Vec<(&Points, Color)> = pale.chain(drawn.values.iter().zip(colors())).collect();
-    let datasets = courses.iter().map(|(course, color)| {
+    let pale = drawn.references.iter().map(|curve| (curve, Color::DarkGray));
+    let curves: Vec<(&Points, Color)> = pale.chain(drawn.values.iter().zip(colors())).collect();
+    let datasets = curves.iter().map(|(curve, color)| {
         Dataset::default()
             .marker(Marker::Braille)
             .graph_type(GraphType::Line)
             .style(*color)
-            .data(course)
+            .data(curve)
     });
-    let values = courses.iter().flat_map(|(course, _)| course.iter()).map(|(_, value)| *value);
+    let values = curves.iter().flat_map(|(curve, _)| curve.iter()).map(|(_, value)| *value);
     let (low, high) = values
         .filter(|value| value.is_finite())
         .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| {
@@ -222,11 +217,11 @@ fn numbers(state: &State) -> Vec<Line<'static>> {
         Line::from(spans)
     };
     let rows = state.scene.panels.iter().flat_map(|panel| {
-        let own = row(&panel.name, panel, panel.values(values).collect());
+        let values_row = row(&panel.name, panel, panel.values(values).collect());
         let followed = panel.has_references();
         let followed =
             followed.then(|| row("reference", panel, panel.references(values).collect()));
-        [Some(own), followed].into_iter().flatten()
+        [Some(values_row), followed].into_iter().flatten()
     });
     rows.collect()
 }

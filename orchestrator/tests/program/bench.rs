@@ -1,4 +1,4 @@
-//! A folder to run the program in, with a unit in C that `cc` compiles there.
+//! A folder to run the program in, with an FMU in C that `cc` compiles there.
 
 use std::fs;
 use std::io::Write;
@@ -7,7 +7,7 @@ use std::process::{Command, Output};
 use tempfile::TempDir;
 use zip::write::SimpleFileOptions;
 
-/// Experiment in which two instances of the unit form a loop.
+/// Experiment in which two instances of the FMU form a loop.
 pub(crate) const LOOP: &str = r#"
 title = "gain and integrator"
 [simulation]
@@ -15,9 +15,9 @@ stop = 3.0
 step = 1.0
 order = ["gain", "plant"]
 [components.gain]
-fmu = "Unit.fmu"
+fmu = "Model.fmu"
 [components.plant]
-fmu = "Unit.fmu"
+fmu = "Model.fmu"
 [[connections]]
 from = "plant.output.integral"
 to = "gain.input"
@@ -28,7 +28,7 @@ to = "plant.input"
 variables = ["gain.output.direct", "plant.output.integral", "plant.steps"]
 "#;
 
-/// Instructions to make the unit in C.
+/// Instructions to make the FMU in C.
 pub(crate) struct Recipe<'a> {
     /// Further arguments of the compiler, for instance `-DENDS`.
     pub(crate) flags: &'a [&'a str],
@@ -49,12 +49,12 @@ impl Default for Recipe<'_> {
             description: &|text| text,
             library: &|bytes| bytes,
             prefix: "",
-            name: "unit.so",
+            name: "model.so",
         }
     }
 }
 
-/// A folder that holds `Unit.fmu` and `loop.toml`.
+/// A folder that holds `Model.fmu` and `loop.toml`.
 pub(crate) struct Bench {
     /// Temporary folder, which is removed when the bench is dropped.
     pub(crate) folder: TempDir,
@@ -71,19 +71,19 @@ impl Bench {
 
     pub(crate) fn made(experiment: &str, recipe: &Recipe) -> Self {
         let folder = tempfile::tempdir().unwrap();
-        let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/unit");
-        let library = folder.path().join("unit.so");
+        let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/model");
+        let library = folder.path().join("model.so");
         let compiler = std::env::var("CC").unwrap_or_else(|_| "cc".into());
         let status = Command::new(compiler)
             .args(["-shared", "-fPIC", "-O1", "-Wall", "-Werror", "-o"])
             .arg(&library)
-            .arg(source.join("unit.c"))
+            .arg(source.join("model.c"))
             .args(recipe.flags)
             .status()
             .expect("a C compiler");
         assert!(status.success());
         let mut zip =
-            zip::ZipWriter::new(fs::File::create(folder.path().join("Unit.fmu")).unwrap());
+            zip::ZipWriter::new(fs::File::create(folder.path().join("Model.fmu")).unwrap());
         let mut add = |name: &str, content: &[u8]| {
             zip.start_file(format!("{}{name}", recipe.prefix), SimpleFileOptions::default())
                 .unwrap();

@@ -65,7 +65,7 @@ fn refusal(campaign: &str) -> String {
 }
 
 #[test]
-fn oracle_a_case_is_a_row_also_if_its_unit_fails() {
+fn oracle_a_case_is_a_row_also_if_its_instance_fails() {
     let bench = bench(CAMPAIGN);
     let rows = flown(&bench, &[]);
     assert_eq!(
@@ -97,7 +97,7 @@ fn oracle_a_limit_can_end_a_case() {
 }
 
 #[test]
-fn a_case_that_a_unit_ended_early_keeps_no_limit() {
+fn a_case_that_an_instance_ended_early_keeps_no_limit() {
     let bench = Bench::made(LOOP, &Recipe { flags: &["-DENDS=1"], ..Recipe::default() });
     let discards = "set = { \"plant.fail.status\" = 2 }\n\n[signals]";
     fs::write(bench.path("c.toml"), CAMPAIGN.replace("[signals]", discards)).unwrap();
@@ -178,8 +178,8 @@ fn the_same_bytes_however_the_cases_were_flown() {
     // One case by itself: the same gain, and everything recorded.
     let cells: Vec<&str> = rows[901].split(',').collect();
     call(&["--case", "900"]);
-    let own = fs::read_to_string(bench.path("out/c/cases/900/case.toml")).unwrap();
-    assert!(own.contains(&format!("gain = {}", cells[1])), "{own}");
+    let case = fs::read_to_string(bench.path("out/c/cases/900/case.toml")).unwrap();
+    assert!(case.contains(&format!("gain = {}", cells[1])), "{case}");
     let results = fs::read_to_string(bench.path("out/c/cases/900/results.csv")).unwrap();
     assert!(results.lines().last().unwrap().contains(cells[4]), "{results}");
 }
@@ -203,7 +203,7 @@ fn what_has_changed_is_named_and_flown_again() {
 }
 
 #[test]
-fn a_unit_that_cannot_be_reset_is_made_anew() {
+fn an_instance_that_cannot_be_reset_is_made_anew() {
     let flags = ["-DRESETS=0"];
     let bench = Bench::made(LOOP, &Recipe { flags: &flags, ..Recipe::default() });
     fs::write(bench.path("c.toml"), RANDOM).unwrap();
@@ -316,7 +316,7 @@ fn impossible_ranges_of_cases_are_refused() {
         ("0..100", "multiples of 250"),
         ("250..250", "multiples of 250"),
         ("0..2000", "within 0..1100"),
-        ("0-250", "wants two whole numbers"),
+        ("0-250", "expected two whole numbers"),
     ] {
         let (code, _, errors) = bench.call(&["campaign", "c.toml", "--cases", cases]);
         assert_eq!(code, 2);
@@ -345,15 +345,18 @@ fn oracle_correlated_parameters_have_their_correlation() {
         columns.map(|values| values.iter().map(|v| v - mean(&values)).collect::<Vec<_>>());
     let product = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
     let [x, y] = &centred;
-    let found = product(x, y) / (product(x, x) * product(y, y)).sqrt();
+    let coefficient = product(x, y) / (product(x, x) * product(y, y)).sqrt();
     // A uniform and a normal variable: the coefficient times the root of 3 / pi.
-    assert!((found + 0.8 * (3.0 / std::f64::consts::PI).sqrt()).abs() < 0.05, "{found}");
+    assert!(
+        (coefficient + 0.8 * (3.0 / std::f64::consts::PI).sqrt()).abs() < 0.05,
+        "{coefficient}"
+    );
 }
 
 #[test]
 fn a_case_by_itself_has_the_changes_of_the_command_line() {
     let bench = bench(RANDOM);
-    let changes = ["--stop", "2", "--fmu", "gain=Unit.fmu", "--set", "plant.delay=1e-3"];
+    let changes = ["--stop", "2", "--fmu", "gain=Model.fmu", "--set", "plant.delay=1e-3"];
     let rows = flown(&bench, &changes);
     let (code, _, errors) =
         bench.call(&[&["campaign", "c.toml", "--case", "7"], &changes[..]].concat());

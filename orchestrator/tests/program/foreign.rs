@@ -1,4 +1,4 @@
-//! Units of other makers, imitated by a unit in C. What they do differently must run, and their
+//! FMUs of other makers, imitated by an FMU in C. What they do differently must run, and their
 //! faults must be reported.
 
 use crate::bench::{Bench, LOOP, Recipe};
@@ -8,7 +8,10 @@ use std::process::Command;
 /// Checks that standard error holds one line, which names the archive and not the temporary folder.
 fn told(errors: &str) -> &str {
     assert_eq!(errors.lines().count(), 1, "{errors}");
-    assert!(errors.starts_with("error: Unit.fmu: ") || errors.contains("/Unit.fmu: "), "{errors}");
+    assert!(
+        errors.starts_with("error: Model.fmu: ") || errors.contains("/Model.fmu: "),
+        "{errors}"
+    );
     assert!(!errors.contains("/fmu-"), "{errors}");
     errors.trim_end()
 }
@@ -21,7 +24,7 @@ fn changed<'a>(from: &'a str, to: &'a str) -> impl Fn(String) -> String + 'a {
 }
 
 #[test]
-fn units_that_say_they_need_no_memory_functions_get_them_all_the_same() {
+fn fmus_that_say_they_need_no_memory_functions_get_them_all_the_same() {
     let description =
         changed("modelIdentifier", "canNotUseMemoryManagementFunctions=\"true\" modelIdentifier");
     let bench = Bench::made(LOOP, &Recipe { description: &description, ..Recipe::default() });
@@ -31,19 +34,19 @@ fn units_that_say_they_need_no_memory_functions_get_them_all_the_same() {
 
 #[test]
 fn identifiers_with_a_hyphen_folders_with_a_dot_and_later_revisions_run() {
-    let hyphen = changed("modelIdentifier=\"unit\"", "modelIdentifier=\"unit-7\"");
+    let hyphen = changed("modelIdentifier=\"model\"", "modelIdentifier=\"model-7\"");
     let revision = changed("fmiVersion=\"2.0\"", "fmiVersion=\"2.0.1\"");
     for recipe in [
-        Recipe { description: &hyphen, name: "unit-7.so", ..Recipe::default() },
+        Recipe { description: &hyphen, name: "model-7.so", ..Recipe::default() },
         Recipe { description: &revision, ..Recipe::default() },
         Recipe { prefix: "./", ..Recipe::default() },
     ] {
         let (code, _, errors) = Bench::made(LOOP, &recipe).run(&["--quiet"]);
         assert_eq!((code, errors.as_str()), (0, ""));
     }
-    for name in ["../unit", "a/b", "c:d", ""] {
+    for name in ["../model", "a/b", "c:d", ""] {
         let text = format!("modelIdentifier=\"{name}\"");
-        let description = changed("modelIdentifier=\"unit\"", &text);
+        let description = changed("modelIdentifier=\"model\"", &text);
         let bench = Bench::made(LOOP, &Recipe { description: &description, ..Recipe::default() });
         let (code, _, errors) = bench.run(&["--quiet"]);
         assert_eq!(code, 2);
@@ -52,7 +55,7 @@ fn identifiers_with_a_hyphen_folders_with_a_dot_and_later_revisions_run() {
 }
 
 #[test]
-fn a_unit_may_end_the_simulation() {
+fn an_instance_may_end_the_simulation() {
     let bench = Bench::made(LOOP, &Recipe { flags: &["-DENDS=1"], ..Recipe::default() });
     let fails = ["--set", "plant.fail.time=2", "--set", "plant.fail.status=2"];
     let (code, summary, _) = bench.run(&fails);
@@ -64,8 +67,8 @@ fn a_unit_may_end_the_simulation() {
     assert_eq!(code, 0);
     assert!(errors.contains("plant ended the simulation at t = 2 s"), "{errors}");
 
-    // Without fmi2Terminated the discarded step is a failure, whose message says how far the unit
-    // got.
+    // Without fmi2Terminated the discarded step is a failure, whose message says how far the
+    // instance got.
     let (code, _, errors) = Bench::new().run(&fails);
     assert_eq!(code, 1);
     let last = "error: plant failed at t = 2 s in doStep: out of propellant at 2; it got as far as t = 3 s (fmi2Discard)";
@@ -91,19 +94,19 @@ fn a_status_that_does_not_exist_is_a_failure_of_that_call() {
 
 #[test]
 fn what_is_wrong_with_a_library_is_told_by_its_entry() {
-    let of = |recipe: &Recipe| {
+    let message_with = |recipe: &Recipe| {
         let bench = Bench::made(LOOP, recipe);
         let (code, _, errors) = bench.run(&["--quiet"]);
         assert_eq!(code, 2, "{errors}");
-        let (checked, text, _) = bench.call(&["inspect", "--check", "Unit.fmu"]);
-        let text = text.replace("Unit.fmu: ", "");
+        let (checked, text, _) = bench.call(&["inspect", "--check", "Model.fmu"]);
+        let text = text.replace("Model.fmu: ", "");
         assert!(checked == 1 && errors.trim_end().ends_with(text.trim_end()), "{errors} {text}");
         told(&errors).to_string()
     };
-    let misnamed = of(&Recipe { name: "other.so", ..Recipe::default() });
+    let misnamed = message_with(&Recipe { name: "other.so", ..Recipe::default() });
     assert!(
         misnamed.ends_with(
-            "has no binaries/linux64/unit.so, which its model identifier asks for; there is: other.so"
+            "has no binaries/linux64/model.so, which its model identifier names; the folder holds: other.so"
         ),
         "{misnamed}"
     );
@@ -112,16 +115,17 @@ fn what_is_wrong_with_a_library_is_told_by_its_entry() {
         bytes[18..20].copy_from_slice(&[183, 0]);
         bytes
     };
-    let other = of(&Recipe { library: &for_arm, ..Recipe::default() });
+    let other = message_with(&Recipe { library: &for_arm, ..Recipe::default() });
     assert!(
-        other.contains("binaries/linux64/unit.so is for Aarch64 (Elf), this program needs"),
+        other.contains("binaries/linux64/model.so is for Aarch64 (Elf), this program needs"),
         "{other}"
     );
-    let torn = of(&Recipe { library: &|bytes| bytes[..200].to_vec(), ..Recipe::default() });
-    assert!(torn.contains("binaries/linux64/unit.so is no sound library"), "{torn}");
-    let without = of(&Recipe { flags: &["-Dfmi2DoStep=step"], ..Recipe::default() });
+    let torn =
+        message_with(&Recipe { library: &|bytes| bytes[..200].to_vec(), ..Recipe::default() });
+    assert!(torn.contains("binaries/linux64/model.so is damaged or not a library"), "{torn}");
+    let without = message_with(&Recipe { flags: &["-Dfmi2DoStep=step"], ..Recipe::default() });
     assert!(
-        without.contains("binaries/linux64/unit.so: undefined symbol: fmi2DoStep"),
+        without.contains("binaries/linux64/model.so: undefined symbol: fmi2DoStep"),
         "{without}"
     );
 
@@ -134,11 +138,14 @@ fn what_is_wrong_with_a_library_is_told_by_its_entry() {
         .status();
     assert!(made.unwrap().success());
     let path = format!("-L{}", folder.path().display());
-    let needing =
-        of(&Recipe { flags: &["-Wl,--no-as-needed", &path, "-lnowhere"], ..Recipe::default() });
+    let needing = message_with(&Recipe {
+        flags: &["-Wl,--no-as-needed", &path, "-lnowhere"],
+        ..Recipe::default()
+    });
     assert!(
-        needing
-            .ends_with("binaries/linux64/unit.so needs libnowhere.so, which is not on this system"),
+        needing.ends_with(
+            "binaries/linux64/model.so needs libnowhere.so, which is not on this system"
+        ),
         "{needing}"
     );
 }
@@ -167,7 +174,7 @@ fn what_is_wrong_with_a_description_is_told_by_element_and_line() {
 }
 
 #[test]
-fn doubtful_units_are_warned_of_and_checked() {
+fn doubtful_fmus_are_warned_of_and_checked() {
     let description = |text: String| {
         let text = changed(
             "\"flag\" valueReference=\"6\"",
@@ -182,24 +189,24 @@ fn doubtful_units_are_warned_of_and_checked() {
     let recipe =
         Recipe { description: &description, flags: &["-DVERSION=\"1.0\""], ..Recipe::default() };
     let bench = Bench::made(LOOP, &recipe);
-    let (code, text, errors) = bench.call(&["inspect", "--check", "Unit.fmu"]);
-    let expected = "Unit.fmu: the causality \"paramter\" of \"flag\" is not known\n\
-                    Unit.fmu: the unit \"knots\" of \"speed\" is not defined\n\
-                    Unit.fmu: the start value \"fast\" of \"speed\" is not a number\n\
-                    Unit.fmu: its library says that it is of FMI \"1.0\"\n";
+    let (code, text, errors) = bench.call(&["inspect", "--check", "Model.fmu"]);
+    let expected = "Model.fmu: the causality \"paramter\" of \"flag\" is not known\n\
+                    Model.fmu: the unit \"knots\" of \"speed\" is not defined\n\
+                    Model.fmu: the start value \"fast\" of \"speed\" is not a number\n\
+                    Model.fmu: its library reports version \"1.0\" of FMI\n";
     assert_eq!((code, text.as_str()), (1, expected));
-    assert_eq!(errors, "error: Unit.fmu: 4 faults\n");
+    assert_eq!(errors, "error: Model.fmu: 4 faults\n");
     let (code, _, errors) = bench.run(&["--quiet"]);
     assert_eq!(code, 0, "{errors}");
     assert!(
-        errors.contains("\"flag\" is not known (2 more: orchestrator inspect --check)"),
+        errors.contains("\"flag\" is not known (2 more, which orchestrator inspect --check lists)"),
         "{errors}"
     );
-    assert_eq!(errors.matches("its library says that it is of FMI \"1.0\"").count(), 1, "{errors}");
-    let (_, text, _) = bench.call(&["inspect", "Unit.fmu"]);
+    assert_eq!(errors.matches("its library reports version \"1.0\" of FMI").count(), 1, "{errors}");
+    let (_, text, _) = bench.call(&["inspect", "Model.fmu"]);
     assert!(text.contains("\nparamter (1)\n"), "{text}");
 
-    let (code, text, errors) = Bench::new().call(&["inspect", "--check", "Unit.fmu"]);
+    let (code, text, errors) = Bench::new().call(&["inspect", "--check", "Model.fmu"]);
     assert_eq!((code, text.as_str(), errors.as_str()), (0, "", ""));
 }
 
@@ -208,7 +215,7 @@ fn names_of_any_length_are_shown() {
     let long = format!("name=\"{}\"", "n".repeat(66_000));
     let description = changed("name=\"speed\"", &long);
     let bench = Bench::made(LOOP, &Recipe { description: &description, ..Recipe::default() });
-    let (code, text, errors) = bench.call(&["inspect", "Unit.fmu"]);
+    let (code, text, errors) = bench.call(&["inspect", "Model.fmu"]);
     assert_eq!((code, errors.as_str()), (0, ""));
     assert!(text.len() < 200_000, "{}", text.len());
 }
@@ -245,7 +252,10 @@ fn values_that_are_none_end_the_run() {
         let bench = Bench::made(&recorded, &Recipe { flags: &[flag], ..Recipe::default() });
         let (code, _, errors) = bench.run(&["--quiet"]);
         assert_eq!(code, 1, "{flag}: {errors}");
-        assert!(errors.contains(&format!("{place} is {value}, {what}")), "{flag}: {errors}");
+        assert!(
+            errors.contains(&format!("{place} is {value}, which is {what}")),
+            "{flag}: {errors}"
+        );
         assert_eq!(
             fs::read_to_string(bench.path("out/loop/results.csv")).unwrap().lines().count(),
             3

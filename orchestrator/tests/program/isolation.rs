@@ -1,4 +1,4 @@
-//! Units that do harm to the process they are in.
+//! Instances that do harm to the process they are in.
 
 use crate::bench::{Bench, LOOP, Recipe};
 use crate::campaign::CAMPAIGN;
@@ -11,15 +11,15 @@ use std::time::{Duration, Instant};
 const HARM: [(&str, &str); 8] = [
     ("EXIT", "it ended its process with exit code 0"),
     ("QUICK_EXIT", "it ended its process with exit code 0"),
-    ("ABORT", "killed by signal 6 (SIGABRT, an abort); its last words: a bolt is loose"),
+    ("ABORT", "killed by signal 6 (SIGABRT, an abort); its last output: a bolt is loose"),
     ("SEGFAULT", "killed by signal 11 (SIGSEGV"),
     ("DIVISION", "killed by signal 8 (SIGFPE"),
     ("ENDLESS", "no answer within 0.5 s (call_timeout)"),
     ("OVERWRITE", "killed by signal 11 (SIGSEGV"),
-    ("MEMORY", "killed by signal 6 (SIGABRT, an abort); its last words: no memory is left"),
+    ("MEMORY", "killed by signal 6 (SIGABRT, an abort); its last output: no memory is left"),
 ];
 
-/// Limits with which a unit that never answers, or takes all memory, does so soon.
+/// Limits with which an instance that never answers, or takes all memory, does so soon.
 const LIMITS: [&str; 2] = ["--call-timeout=0.5", "--unit-memory=64"];
 
 fn harmful(place: &str, how: &str) -> Bench {
@@ -42,12 +42,12 @@ fn run_within(bench: &Bench, limits: &[&str], arguments: &[&str]) -> (i32, Strin
     let begin = Instant::now();
     command.args(limits).args(arguments).env("TMPDIR", &folder);
     let child = command.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
-    let own = format!("fmu-{}-", child.id());
+    let prefix = format!("fmu-{}-", child.id());
     let output = child.wait_with_output().unwrap();
     assert!(begin.elapsed() < Duration::from_secs(20), "{:?}", begin.elapsed());
     assert_eq!(fs::read_dir(&folder).unwrap().count(), 0);
     let memory = fs::read_dir("/dev/shm").into_iter().flatten().flatten();
-    let left = memory.filter(|file| file.file_name().to_string_lossy().starts_with(&own));
+    let left = memory.filter(|file| file.file_name().to_string_lossy().starts_with(&prefix));
     assert_eq!(left.count(), 0);
     (output.status.code().expect("no signal"), String::from_utf8(output.stderr).unwrap())
 }
@@ -59,7 +59,7 @@ fn rows(bench: &Bench) -> usize {
 
 /// Returns the only line of an error. One before it may say where the results are.
 fn told(errors: &str) -> &str {
-    let is_remark = |line: &&str| line.contains("the results until then are in");
+    let is_remark = |line: &&str| line.contains("the results up to this failure are in");
     let lines: Vec<&str> = errors.lines().filter(|line| !is_remark(line)).collect();
     assert_eq!(lines.len(), 1, "{errors}");
     lines[0]
@@ -82,12 +82,12 @@ fn harm_in_a_step_or_a_get_call_ends_the_run_with_all_rows() {
 }
 
 #[test]
-fn harm_before_a_run_is_told_with_the_unit_and_the_call() {
+fn harm_before_a_run_is_told_with_the_component_and_the_call() {
     for (how, says) in HARM {
         for place in ["LOAD", "INSTANTIATE"] {
             let (code, errors) = run(&harmful(place, how), &[]);
             assert_eq!(code, 2, "{place} {how}: {errors}");
-            let begin = "error: ./Unit.fmu: the component \"gain\" failed in instantiate: ";
+            let begin = "error: ./Model.fmu: the component \"gain\" failed in instantiate: ";
             assert!(told(&errors).starts_with(begin), "{errors}");
             assert!(errors.contains(says), "{place} {how}: {errors}");
         }
@@ -106,7 +106,7 @@ fn harm_after_a_run_keeps_the_results_but_is_no_success() {
             let bench = harmful(place, how);
             let (code, errors) = run(&bench, &[]);
             assert_eq!(code, 1, "{place} {how}: {errors}");
-            // Both components are of this unit.
+            // Both components are of this FMU.
             assert_eq!(errors.lines().count(), 2, "{errors}");
             for (line, name) in errors.lines().zip(["gain", "plant"]) {
                 let begin = format!("error: {name} failed in freeInstance: ");
@@ -119,7 +119,7 @@ fn harm_after_a_run_keeps_the_results_but_is_no_success() {
 }
 
 #[test]
-fn harm_in_the_same_process_names_the_unit_and_the_call() {
+fn harm_in_the_same_process_names_the_component_and_the_call() {
     for (how, what) in [
         ("EXIT", "exit"),
         ("ABORT", "SIGABRT"),
@@ -135,8 +135,8 @@ fn harm_in_the_same_process_names_the_unit_and_the_call() {
             let output = command.output().unwrap();
             let errors = String::from_utf8(output.stderr).unwrap();
             // The name itself may have been overwritten.
-            let unit = if how == "OVERWRITE" { "" } else { "gain" };
-            let says = format!("{unit} ended this process in {call} ({what})");
+            let component = if how == "OVERWRITE" { "" } else { "gain" };
+            let says = format!("{component} ended this process in {call} ({what})");
             assert!(errors.contains(&says), "{place} {how}: {errors}");
             // A process that a signal has killed has no exit code.
             assert_eq!(output.status.code(), (how == "EXIT").then_some(1), "{place} {how}");
@@ -156,28 +156,28 @@ fn rows_are_on_disk_within_a_second() {
 }
 
 #[test]
-fn a_unit_ends_with_the_process_that_asked_for_it() {
+fn an_instance_ends_with_the_process_that_asked_for_it() {
     let bench = harmful("STEP", "ENDLESS");
-    // The name of the unit's memory is an argument of its process, which is found by it.
-    let own = |pid: u32| {
-        let all = fs::read_dir("/proc").into_iter().flatten().flatten();
+    // The name of the instance's memory is an argument of its process, which is found by it.
+    let children_of = |pid: u32| {
+        let entries = fs::read_dir("/proc").into_iter().flatten().flatten();
         let parent = format!("PPid:\t{pid}\n");
-        let is_own = |folder: &Path| {
+        let is_child = |folder: &Path| {
             fs::read_to_string(folder.join("status")).is_ok_and(|status| status.contains(&parent))
         };
-        all.map(|entry| entry.path()).filter(|folder| is_own(folder)).collect::<Vec<_>>()
+        entries.map(|entry| entry.path()).filter(|folder| is_child(folder)).collect::<Vec<_>>()
     };
     let mut child = bench.command(&["run", "loop.toml", "--quiet"]).spawn().unwrap();
     let begin = Instant::now();
-    let mut units = Vec::new();
-    while units.len() < 2 && begin.elapsed() < Duration::from_secs(10) {
-        units = own(child.id());
+    let mut instances = Vec::new();
+    while instances.len() < 2 && begin.elapsed() < Duration::from_secs(10) {
+        instances = children_of(child.id());
     }
-    assert!(units.len() == 2 || !Path::new("/proc/self/status").exists(), "{units:?}");
+    assert!(instances.len() == 2 || !Path::new("/proc/self/status").exists(), "{instances:?}");
     child.kill().unwrap();
     child.wait().unwrap();
-    while units.iter().any(|unit| unit.exists()) {
-        assert!(begin.elapsed() < Duration::from_secs(20), "{units:?}");
+    while instances.iter().any(|instance| instance.exists()) {
+        assert!(begin.elapsed() < Duration::from_secs(20), "{instances:?}");
         std::thread::sleep(Duration::from_millis(10));
     }
 }
@@ -216,11 +216,14 @@ fn a_component_says_for_itself_whether_it_is_isolated() {
     let wrong = experiment + "[isolation]\ncall_timeout = 0.0\n";
     fs::write(bench.path("loop.toml"), wrong).unwrap();
     let errors = bench.refusal(&["--quiet"]);
-    assert!(errors.contains("[isolation] call_timeout = 0: from 0.001 to 1e6 s"), "{errors}");
+    assert!(
+        errors.contains("[isolation] call_timeout = 0: it must be from 0.001 to 1e6 s"),
+        "{errors}"
+    );
 }
 
 #[test]
-fn units_that_may_be_in_a_process_only_once_have_processes_of_their_own() {
+fn instances_that_may_be_in_a_process_only_once_have_processes_of_their_own() {
     let only_once = |text: String| {
         text.replace("<CoSimulation", "<CoSimulation canBeInstantiatedOnlyOncePerProcess=\"true\"")
     };
@@ -231,8 +234,8 @@ fn units_that_may_be_in_a_process_only_once_have_processes_of_their_own() {
 }
 
 #[test]
-fn a_sandbox_keeps_a_unit_from_files_and_network() {
-    let outside = Path::new(env!("CARGO_TARGET_TMPDIR")).join("written-by-a-unit");
+fn a_sandbox_keeps_an_instance_from_files_and_network() {
+    let outside = Path::new(env!("CARGO_TARGET_TMPDIR")).join("written-by-an-instance");
     let _ = fs::remove_file(&outside);
     let flags = format!("-DREACHES=\"{}\"", outside.display());
     let bench = Bench::made(LOOP, &Recipe { flags: &[&flags], ..Recipe::default() });
@@ -243,7 +246,7 @@ fn a_sandbox_keeps_a_unit_from_files_and_network() {
     let (code, errors) = run(&bench, &["--sandbox"]);
     // Where the system has no Landlock, it is said.
     assert!(
-        !outside.exists() || errors.contains("does not limit these for units: files"),
+        !outside.exists() || errors.contains("cannot limit these for instances: files"),
         "{errors}"
     );
     assert_eq!(code, 0, "{errors}");
@@ -252,9 +255,9 @@ fn a_sandbox_keeps_a_unit_from_files_and_network() {
 }
 
 #[test]
-fn a_campaign_is_the_same_with_units_in_processes_of_their_own() {
+fn a_campaign_is_the_same_with_instances_in_processes_of_their_own() {
     let bench = Bench::new();
-    // The first unit of the order fails while the other one is stepped.
+    // The first component of the order fails while the other one is stepped.
     let campaign = CAMPAIGN.replace("plant.fail.time", "gain.fail.time");
     fs::write(bench.path("c.toml"), campaign).unwrap();
     let table = |isolate| {
@@ -263,14 +266,14 @@ fn a_campaign_is_the_same_with_units_in_processes_of_their_own() {
         assert_eq!(code, 0, "{errors}");
         fs::read_to_string(bench.path("out/c/cases.csv")).unwrap()
     };
-    let own = table("--isolate");
-    assert_eq!(own, table("--isolate=false"));
-    assert_eq!(own.matches(",failed,").count(), 3, "{own}");
-    assert_eq!(own.matches(",completed,").count(), 3, "{own}");
+    let isolated = table("--isolate");
+    assert_eq!(isolated, table("--isolate=false"));
+    assert_eq!(isolated.matches(",failed,").count(), 3, "{isolated}");
+    assert_eq!(isolated.matches(",completed,").count(), 3, "{isolated}");
 }
 
 #[test]
-fn a_campaign_goes_on_after_a_unit_that_does_harm() {
+fn a_campaign_goes_on_after_an_instance_that_does_harm() {
     let bench =
         Bench::made(LOOP, &Recipe { flags: &["-DHARM_BY_GAIN", "-w"], ..Recipe::default() });
     let campaign = CAMPAIGN.replace("[0.5, 1.0, 2.0]", "[0.5, 13.0, 1.0]");
@@ -290,10 +293,10 @@ fn a_campaign_goes_on_after_a_unit_that_does_harm() {
 }
 
 #[test]
-fn a_unit_is_inspected_without_harm() {
+fn an_fmu_is_inspected_without_harm() {
     for (how, says) in HARM.iter().filter(|(how, _)| !["ENDLESS", "MEMORY"].contains(how)) {
         let bench = harmful("LOAD", how);
-        let (code, out, errors) = bench.call(&["inspect", "--check", "Unit.fmu"]);
+        let (code, out, errors) = bench.call(&["inspect", "--check", "Model.fmu"]);
         assert_eq!(code, 1, "{out}{errors}");
         assert!((out + &errors).contains(says), "{how}: {errors}");
     }

@@ -1,4 +1,4 @@
-//! The program as its users run it, with units in C.
+//! The program as its users run it, with FMUs in C.
 
 mod bench;
 mod campaign;

@@ -17,8 +17,8 @@ const END: &[u8] = b"PK\x05\x06";
 
 /// Returns the bytes with others at a place behind the last occurrence of a signature.
 fn with(mut bytes: Vec<u8>, signature: &[u8], place: usize, others: &[u8]) -> Vec<u8> {
-    let found = bytes.windows(4).rposition(|window| window == signature).unwrap();
-    bytes[found + place..found + place + others.len()].copy_from_slice(others);
+    let start = bytes.windows(4).rposition(|window| window == signature).unwrap();
+    bytes[start + place..start + place + others.len()].copy_from_slice(others);
     bytes
 }
 
@@ -59,12 +59,12 @@ type Change = fn(&mut Entries);
 const CONTENTS: &[(&str, Change, &str)] = &[
     ("no entry", Vec::clear, "modelDescription.xml"),
     ("no description", |e| drop(e.remove(0)), "modelDescription.xml"),
-    ("description in a folder", |e| e[0].0.insert_str(0, "unit/"), "modelDescription.xml"),
+    ("description in a folder", |e| e[0].0.insert_str(0, "model/"), "modelDescription.xml"),
     ("name in capitals", |e| e[0].0.make_ascii_uppercase(), "modelDescription.xml"),
     ("empty description", |e| e[0].1.clear(), "modelDescription.xml"),
-    ("no XML", |e| e[0].1 = b"name = unit".to_vec(), "modelDescription.xml"),
+    ("no XML", |e| e[0].1 = b"name = model".to_vec(), "modelDescription.xml"),
     ("XML cut off", |e| e[0].1 = half(e[0].1.clone()), "modelDescription.xml"),
-    ("no UTF-8", |e| change(e, "Unit", b"Un\xff\xfet"), "modelDescription.xml"),
+    ("no UTF-8", |e| change(e, "\"Model\"", b"\"Mod\xff\xfe\""), "modelDescription.xml"),
     ("zero bytes", |e| e[0].1 = vec![0; 3000], "modelDescription.xml"),
     ("another root", |e| change(e, "fmiModelDescription", b"html"), "modelDescription.xml"),
     ("no version", |e| change(e, "fmiVersion", b"fmiVersio"), "fmiVersion"),
@@ -73,8 +73,8 @@ const CONTENTS: &[(&str, Change, &str)] = &[
     ("another GUID", |e| change(e, "guid=\"", b"guid=\"x"), "another GUID"),
     ("no interface", |e| change(e, "<CoSimulation", b"<CoSimulatio"), ""),
     ("no identifier", |e| change(e, "modelIdentifier", b"modelIdentifie"), "modelIdentifier"),
-    ("path as identifier", |e| change(e, "\"unit\"", b"\"../../unit\""), ""),
-    ("identifier of no file", |e| change(e, "\"unit\"", b"\"other\""), "other"),
+    ("path as identifier", |e| change(e, "\"model\"", b"\"../../model\""), ""),
+    ("identifier of no file", |e| change(e, "\"model\"", b"\"other\""), "other"),
     (
         "reference of text",
         |e| change(e, "valueReference=\"0\"", b"valueReference=\"first\""),
@@ -86,13 +86,13 @@ const CONTENTS: &[(&str, Change, &str)] = &[
     ("attribute twice", |e| change(e, "fmiVersion=", b"fmiVersion=\"2.0\" fmiVersion="), ""),
     ("entities of entities", entities, "modelDescription.xml"),
     ("deep nesting", nesting, "modelDescription.xml"),
-    ("no library", |e| drop(e.remove(1)), "has no binary for linux64"),
-    ("library for Windows", |e| e[1].0 = "binaries/win64/unit.dll".into(), "linux64"),
-    ("empty library", |e| e[1].1.clear(), "binaries/linux64/unit.so"),
-    ("library of text", |e| e[1].1 = b"#!/bin/sh\n".to_vec(), "binaries/linux64/unit.so"),
-    ("library cut off", |e| e[1].1 = half(e[1].1.clone()), "binaries/linux64/unit.so"),
-    ("another processor", |e| e[1].1[18] = 0xb7, "binaries/linux64/unit.so"),
-    ("32 bits", |e| e[1].1[4] = 1, "binaries/linux64/unit.so"),
+    ("no library", |e| drop(e.remove(1)), "has no library for linux64"),
+    ("library for Windows", |e| e[1].0 = "binaries/win64/model.dll".into(), "linux64"),
+    ("empty library", |e| e[1].1.clear(), "binaries/linux64/model.so"),
+    ("library of text", |e| e[1].1 = b"#!/bin/sh\n".to_vec(), "binaries/linux64/model.so"),
+    ("library cut off", |e| e[1].1 = half(e[1].1.clone()), "binaries/linux64/model.so"),
+    ("another processor", |e| e[1].1[18] = 0xb7, "binaries/linux64/model.so"),
+    ("32 bits", |e| e[1].1[4] = 1, "binaries/linux64/model.so"),
     ("a function lacks", |e| rename(e, b"fmi2DoStep", b"fmi2DoStop"), "fmi2DoStep"),
     ("path outside", |e| e.push(("../evil".into(), vec![1])), "../evil"),
     ("absolute path", |e| e.push(("/evil".into(), vec![1])), "/evil"),
@@ -151,7 +151,7 @@ fn problem(bench: &Bench, name: &str, says: &str) -> Option<String> {
         // Before it there may be a warning of what would be wrong besides.
         ("one error", errors.lines().filter(|line| line.starts_with("error: ")).count() == 1),
         ("short lines", errors.lines().count() < 3 && errors.len() < 1000),
-        ("names the archive", errors.contains("Unit.fmu")),
+        ("names the archive", errors.contains("Model.fmu")),
         (says, errors.contains(says)),
         ("time", begin.elapsed() < Duration::from_secs(20)),
         ("no temporary file", fs::read_dir(&folder).unwrap().count() == 0),
@@ -164,7 +164,7 @@ fn problem(bench: &Bench, name: &str, says: &str) -> Option<String> {
 #[test]
 fn damaged_archives_are_refused_by_name() {
     let bench = Bench::new();
-    let archive = bench.path("Unit.fmu");
+    let archive = bench.path("Model.fmu");
     let good = fs::read(&archive).unwrap();
     let mut problems = Vec::new();
     for (name, damage, says) in FILES {
@@ -181,7 +181,7 @@ fn damaged_archives_are_refused_by_name() {
 #[test]
 fn archives_with_wrong_content_are_refused_by_name() {
     let bench = Bench::new();
-    let archive = bench.path("Unit.fmu");
+    let archive = bench.path("Model.fmu");
     let mut whole = ZipArchive::new(fs::File::open(&archive).unwrap()).unwrap();
     let mut good = Entries::new();
     for index in 0..whole.len() {

@@ -95,7 +95,11 @@ none = { kind = "mean", signals = "none", optional = true }
             "out = [\"gain.output.direct\", \"plant.steps\"]",
             "mixes signals in",
         ),
-        ("steps = true", "every = 0", "[observe.metrics.mean_square] every = 0: at least 1"),
+        (
+            "steps = true",
+            "every = 0",
+            "[observe.metrics.mean_square] every = 0: it must be at least 1",
+        ),
         (
             "ratio = { kind",
             "samples = { kind",
@@ -104,7 +108,7 @@ none = { kind = "mean", signals = "none", optional = true }
         (
             "ratio = { kind",
             "ratio = { id = \"share\", kind",
-            "[observe.metrics.ratio] id = \"share\": the key is the name",
+            "[observe.metrics.ratio] id = \"share\": leave it out, the key is the name",
         ),
         (
             "reference = \"plant.",
@@ -115,13 +119,13 @@ none = { kind = "mean", signals = "none", optional = true }
         let message = observed(&section.replacen(from, to, 1)).refusal(&[]);
         assert!(message.contains(said), "{message}");
     }
-    // A unit of the command line may lack variables of its own, but not those of others.
+    // An FMU of the command line may lack variables of its own, but not those of others.
     let wrong = section.replace("/ plant.output.integral", "/ plant.output.integal");
-    let message = observed(&wrong).refusal(&["--fmu", "gain=Unit.fmu"]);
+    let message = observed(&wrong).refusal(&["--fmu", "gain=Model.fmu"]);
     assert!(message.contains("there is no variable \"plant.output.integal\""), "{message}");
-    let own = section.replace("\"gain.output.direct /", "\"gain.output.dirct /");
-    let bench = observed(&own);
-    let (code, _, errors) = bench.run(&["--fmu", "gain=Unit.fmu"]);
+    let exchanged = section.replace("\"gain.output.direct /", "\"gain.output.dirct /");
+    let bench = observed(&exchanged);
+    let (code, _, errors) = bench.run(&["--fmu", "gain=Model.fmu"]);
     assert_eq!(code, 0, "{errors}");
     assert!(bench.json("out/loop/metrics.json")["ratio"].is_null());
 }
@@ -237,7 +241,7 @@ margins = {{ rate = "{prefix}.rateMargin", moment = "{prefix}.momentMargin" }}
 }
 
 #[test]
-fn a_failing_unit_ends_the_run_with_its_own_words_and_keeps_the_results() {
+fn a_failing_instance_ends_the_run_with_its_own_words_and_keeps_the_results() {
     let bench = Bench::new();
     // The statuses are fmi2Discard, fmi2Error, and fmi2Fatal, after which not even fmi2FreeInstance
     // may be called.

@@ -11,13 +11,13 @@ fn a_search_finds_the_corner_and_writes_it_as_an_experiment() {
     let (code, said, errors) = bench.call(&["falsify", "c.toml", "--out", "w"]);
     assert_eq!(code, 0, "{errors}");
     assert!(said.contains("breaks small"), "{said}");
-    let found = bench.json("w/search.json");
-    assert!((found["largest"].as_f64().unwrap() - 8.0).abs() < 1e-3, "{found}");
+    let outcome = bench.json("w/search.json");
+    assert!((outcome["largest"].as_f64().unwrap() - 8.0).abs() < 1e-3, "{outcome}");
     let (code, _, errors) = bench.call(&["run", "w/worst.toml", "--fmu-dir", "."]);
     assert_eq!(code, 0, "{errors}");
     let rows = fs::read_to_string(bench.path("out/worst/results.csv")).unwrap();
     let last: f64 = rows.lines().last().unwrap().split(',').nth(2).unwrap().parse().unwrap();
-    assert!((last - found["largest"].as_f64().unwrap()).abs() < 1e-12);
+    assert!((last - outcome["largest"].as_f64().unwrap()).abs() < 1e-12);
     // The same search gives the same bytes, on any number of threads.
     let (code, _, errors) = bench.call(&["falsify", "c.toml", "--out", "w1", "--jobs", "1"]);
     assert_eq!(code, 0, "{errors}");

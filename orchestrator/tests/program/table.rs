@@ -1,9 +1,9 @@
-//! Tables as units, which drive a unit whose answer can be computed by hand.
+//! Lookup tables as components, which drive an FMU whose answer can be computed by hand.
 
 use crate::bench::Bench;
 use std::fs;
 
-/// The unit's first output is twice its input.
+/// The FMU's first output is twice its input.
 const DRIVEN: &str = r#"
 title = "a table drives a gain"
 [simulation]
@@ -13,7 +13,7 @@ order = ["drive", "gain"]
 [components.drive]
 fmu = "drive.csv"
 [components.gain]
-fmu = "Unit.fmu"
+fmu = "Model.fmu"
 [[connections]]
 from = "drive.input"
 to = "gain.input"
@@ -140,5 +140,5 @@ fn a_table_can_be_looked_at_but_not_packed_for_other_tools() {
     assert_eq!(bench.call(&["inspect", "--check", "drive.csv"]), (0, String::new(), String::new()));
     let (code, _, errors) = bench.call(&["pack", "loop.toml", "--ssp"]);
     assert_eq!(code, 2);
-    assert!(errors.contains("[components.drive] is a table"), "{errors}");
+    assert!(errors.contains("[components.drive] is a lookup table"), "{errors}");
 }

@@ -69,7 +69,7 @@ fn every_missed_deadline_is_counted_and_what_was_done_is_said() {
 }
 
 #[test]
-fn a_slow_unit_is_named() {
+fn a_slow_component_is_named() {
     let bench = Bench::new();
     // There are 20 ms from tick to tick, but a step of the plant takes 50 ms.
     let (code, summary, errors) = bench.run(&["--real-time", "50", "--set", "plant.pause=0.05"]);
@@ -120,7 +120,7 @@ fn the_live_view_wants_a_terminal() {
     let bench = Bench::new();
     let message = bench.refusal(&["--live"]);
     assert!(
-        message.contains("--live draws on a terminal, and standard output is none"),
+        message.contains("--live needs a terminal, but standard output is not one"),
         "{message}"
     );
     assert!(!bench.path("out").exists());
@@ -149,7 +149,7 @@ fn signalled(bench: &Bench, arguments: &[&str], signal: &str, awaited: &str) -> 
 fn a_signal_ends_any_run_and_keeps_its_results() {
     let bench = Bench::new();
     fs::create_dir(bench.path("tmp")).unwrap();
-    // A step takes ten hours in the paced run, and as long as the unit takes in the usual one.
+    // A step takes ten hours in the paced run, and as long as the instance takes in the usual one.
     let paced = ["run", "loop.toml", "--force", "--real-time", "2.7e-5"];
     let usual = ["run", "loop.toml", "--force", "--stop", "1000", "--set", "plant.pause=0.02"];
     for (arguments, signal, code) in [
@@ -199,7 +199,7 @@ fn results_of_an_earlier_run_are_replaced_only_if_that_is_asked_for() {
     assert_eq!(pack(&[]).0, 0);
     let (code, _, errors) = pack(&[]);
     assert!(
-        code == 2 && errors.contains("loop.ssp is there already: --force replaces it"),
+        code == 2 && errors.contains("loop.ssp already exists: --force replaces it"),
         "{errors}"
     );
     assert_eq!(pack(&["--force"]).0, 0);
@@ -210,7 +210,7 @@ fn results_of_an_earlier_run_are_replaced_only_if_that_is_asked_for() {
 fn an_archive_that_cannot_be_written_leaves_nothing_behind() {
     let bench = Bench::new();
     // Noise makes the archive larger than any file in it.
-    let archive = fs::File::options().read(true).write(true).open(bench.path("Unit.fmu")).unwrap();
+    let archive = fs::File::options().read(true).write(true).open(bench.path("Model.fmu")).unwrap();
     let mut zip = zip::ZipWriter::new_append(archive).unwrap();
     let mut noise = 1_u32;
     for name in 0..10 {
@@ -288,7 +288,7 @@ fn standard_error_that_cannot_be_written_ends_no_run() {
 fn a_reader_that_goes_away_is_no_failure() {
     let bench = Bench::new();
     let mut child = bench
-        .command(&["inspect", "Unit.fmu"])
+        .command(&["inspect", "Model.fmu"])
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
         .spawn()

@@ -11,9 +11,9 @@ fn successes(bench: &Bench, arguments: &[&str]) -> usize {
     let start = |_| -> Child {
         bench.command(arguments).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap()
     };
-    let all: Vec<_> = (0..20).map(start).collect();
+    let children: Vec<_> = (0..20).map(start).collect();
     let mut count = 0;
-    for child in all {
+    for child in children {
         let Output { status, stderr, .. } = child.wait_with_output().unwrap();
         let errors = String::from_utf8(stderr).unwrap();
         if status.success() {

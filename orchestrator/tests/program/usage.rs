@@ -19,7 +19,7 @@ fn refusal_of(from: &str, to: &str) -> String {
 }
 
 #[test]
-fn experiments_and_units_are_found_from_any_folder() {
+fn experiments_and_fmus_are_found_from_any_folder() {
     let bench = Bench::new();
     let elsewhere = tempfile::tempdir().unwrap();
     let run = |arguments: &[&str]| {
@@ -42,9 +42,9 @@ fn experiments_and_units_are_found_from_any_folder() {
     let (code, _, errors) = run(&["run", "lop"]);
     assert!(code == Some(2) && errors.contains("there is no experiment \"lop\""), "{errors}");
     assert!(errors.contains("did you mean \"loop\"?"), "{errors}");
-    let (code, _, errors) = run(&["run", "some/Unit.fmu"]);
+    let (code, _, errors) = run(&["run", "some/Model.fmu"]);
     assert!(
-        code == Some(2) && errors.contains("is a unit, and units are run by an experiment"),
+        code == Some(2) && errors.contains("is an FMU, and FMUs are run by an experiment"),
         "{errors}"
     );
     fs::create_dir(bench.path("more")).unwrap();
@@ -69,7 +69,7 @@ fn usage_that_is_nearly_right_is_told_what_it_lacks() {
     // The pattern leaves all inputs of this component unconnected, however many there are.
     let lonely = LOOP.replace(
         "[components.plant]",
-        "[components.other]\nfmu = \"Unit.fmu\"\nunconnected = [\"*\"]\n[components.plant]",
+        "[components.other]\nfmu = \"Model.fmu\"\nunconnected = [\"*\"]\n[components.plant]",
     );
     let bench = Bench::with(&lonely);
     let (code, summary, errors) = bench.run(&[]);
@@ -79,14 +79,14 @@ fn usage_that_is_nearly_right_is_told_what_it_lacks() {
 }
 
 #[test]
-fn a_unit_is_exchanged_from_the_command_line() {
+fn an_fmu_is_exchanged_from_the_command_line() {
     let experiment = LOOP.replace(
         "[components.plant]",
         "[components.gain.parameters]\ngain = 3.0\n[components.plant]",
     );
     let bench = Bench::with(&experiment);
-    // The new unit lacks a parameter that the experiment sets.
-    let mut old = zip::ZipArchive::new(fs::File::open(bench.path("Unit.fmu")).unwrap()).unwrap();
+    // The new FMU lacks a parameter that the experiment sets.
+    let mut old = zip::ZipArchive::new(fs::File::open(bench.path("Model.fmu")).unwrap()).unwrap();
     fs::create_dir(bench.path("mine")).unwrap();
     let mut zip = zip::ZipWriter::new(fs::File::create(bench.path("mine/My.fmu")).unwrap());
     for index in 0..old.len() {
@@ -108,14 +108,17 @@ fn a_unit_is_exchanged_from_the_command_line() {
     let told = "as \"gain\" does not have these parameters, which are left out: gain";
     assert!(errors.contains(told), "{errors}");
     let metadata = bench.json("out/loop/results.json");
-    assert!(metadata["title"].as_str().unwrap().starts_with("My in place of Unit: "), "{metadata}");
+    assert!(
+        metadata["title"].as_str().unwrap().starts_with("My in place of Model: "),
+        "{metadata}"
+    );
     assert_eq!(metadata["components"]["gain"]["fmu"], "My.fmu");
     assert_eq!(metadata["components"]["gain"]["set"]["amplification"], 0.5);
     for (assignment, told) in [
         ("gian=mine/My.fmu", "did you mean \"gain\""),
-        ("mine/My.fmu", "wants component=file"),
+        ("mine/My.fmu", "expected component=file"),
         ("gain=mine/Me.fmu", "there is no file \"mine/Me.fmu\""),
-        ("gain=Unti.fmu", "did you mean \"Unit.fmu\""),
+        ("gain=Modle.fmu", "did you mean \"Model.fmu\""),
     ] {
         let message = bench.refusal(&["--fmu", assignment]);
         assert!(message.contains(told), "{message}");
@@ -125,21 +128,25 @@ fn a_unit_is_exchanged_from_the_command_line() {
 #[test]
 fn inspect_filters_and_speaks_json() {
     let bench = Bench::new();
-    let (code, text, _) = bench.call(&["inspect", "Unit.fmu", "guarantee.*", "--json"]);
+    let (code, text, _) = bench.call(&["inspect", "Model.fmu", "guarantee.*", "--json"]);
     assert_eq!(code, 0);
-    let all: serde_json::Value = serde_json::from_str(&text).unwrap();
-    let names: Vec<&str> =
-        all["variables"].as_array().unwrap().iter().map(|v| v["name"].as_str().unwrap()).collect();
+    let printed: serde_json::Value = serde_json::from_str(&text).unwrap();
+    let names: Vec<&str> = printed["variables"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|v| v["name"].as_str().unwrap())
+        .collect();
     assert_eq!(
         names,
         ["guarantee.inForce", "guarantee.status", "guarantee.rateMargin", "guarantee.momentMargin"]
     );
-    assert_eq!(all["guid"], "{u-1}");
-    let (_, text, _) = bench.call(&["inspect", "Unit.fmu", "seed"]);
+    assert_eq!(printed["guid"], "{u-1}");
+    let (_, text, _) = bench.call(&["inspect", "Model.fmu", "seed"]);
     assert!(text.contains("noise.seed") && !text.contains("output.direct"), "{text}");
-    let (_, text, _) = bench.call(&["inspect", "Unit.fmu", "--causality", "input"]);
+    let (_, text, _) = bench.call(&["inspect", "Model.fmu", "--causality", "input"]);
     assert!(text.contains("input (1)") && !text.contains("parameter ("), "{text}");
-    let (code, _, errors) = bench.call(&["inspect", "Unit.fmu", "sed"]);
+    let (code, _, errors) = bench.call(&["inspect", "Model.fmu", "sed"]);
     assert!(code == 2 && errors.contains("has no variable that fits \"sed\""), "{errors}");
 }
 
@@ -181,9 +188,9 @@ fn wrong_names_are_refused_with_place_and_remedy() {
         message.contains("loop.toml:18: ") && message.contains("did you mean \"steps\""),
         "{message}"
     );
-    let message = refusal_of("Unit.fmu\"\n[components.plant]", "Unti.fmu\"\n[components.plant]");
+    let message = refusal_of("Model.fmu\"\n[components.plant]", "Modle.fmu\"\n[components.plant]");
     assert!(
-        message.contains("loop.toml:8: ") && message.contains("did you mean \"Unit.fmu\""),
+        message.contains("loop.toml:8: ") && message.contains("did you mean \"Model.fmu\""),
         "{message}"
     );
     let message = refusal_of("[\"gain\", \"plant\"]", "[\"gain\", \"palnt\"]");
@@ -202,16 +209,16 @@ fn wrong_settings_are_refused() {
     let bench = Bench::new();
     for (setting, remedy) in [
         ("gain.gian=1", "did you mean \"gain.gain\""),
-        ("noise.seed=1", "of which component? Write gain.noise.seed or plant.noise.seed"),
+        ("noise.seed=1", "the component is missing: write gain.noise.seed or plant.noise.seed"),
         ("palnt.gain=1", "did you mean \"plant.gain\""),
         ("gain.seed=1", "did you mean \"gain.noise.seed\""),
         ("gain.kind=ruogh", "did you mean \"rough\""),
         ("gain.kind=2", "the name of an item (calm, rough)"),
-        ("gain.gain=1 m/s", "measure different things"),
+        ("gain.gain=1 m/s", "measure different quantities"),
         ("gain.gain=1 mmm", "did you mean \"mm\""),
         ("gain.gain=2000", "above its maximum 1000"),
         ("gain.fail.status=7", "not between 2 and 4"),
-        ("gain.flag=1", "wants true or false"),
+        ("gain.flag=1", "must be true or false"),
         ("gain.steps=1", "is of causality output"),
         ("gain.input=1", "is an input with a connection"),
     ] {
@@ -316,7 +323,7 @@ fn inputs_without_connection_must_be_meant() {
 #[test]
 fn inspect_and_list_show_what_there_is() {
     let bench = Bench::new();
-    let (code, text, _) = bench.call(&["inspect", "Unit.fmu"]);
+    let (code, text, _) = bench.call(&["inspect", "Model.fmu"]);
     assert_eq!(code, 0);
     for part in [
         "{u-1}",
@@ -330,7 +337,7 @@ fn inspect_and_list_show_what_there_is() {
     let (code, text, _) = bench.call(&["list"]);
     assert_eq!(code, 0);
     assert!(
-        lists(&text, "loop.toml", "gain and integrator") && text.contains("Unit.fmu"),
+        lists(&text, "loop.toml", "gain and integrator") && text.contains("Model.fmu"),
         "{text}"
     );
 }
@@ -342,10 +349,10 @@ fn an_experiment_that_extends_another_is_all_of_them() {
     assert_eq!(code, 0, "{errors}");
     let results =
         |name: &str| fs::read_to_string(bench.path(&format!("out/{name}/results.csv"))).unwrap();
-    let own = "extends = \"../loop.toml\"\ntitle = \"longer\"\n[simulation]\nstop = 4.0\n";
+    let longer = "extends = \"../loop.toml\"\ntitle = \"longer\"\n[simulation]\nstop = 4.0\n";
     fs::create_dir(bench.path("more")).unwrap();
-    fs::write(bench.path("more/longer.toml"), own).unwrap();
-    // The unit stands beside the file that is extended.
+    fs::write(bench.path("more/longer.toml"), longer).unwrap();
+    // The FMU stands beside the file that is extended.
     let (code, _, errors) = bench.call(&["run", "longer", "--quiet"]);
     assert_eq!(code, 0, "{errors}");
     // The last row of the shorter run, where no step begins, keeps the outputs of the step before.
@@ -354,10 +361,10 @@ fn an_experiment_that_extends_another_is_all_of_them() {
     assert!(longer.lines().take(common).eq(shorter.lines().take(common)));
     assert_eq!(longer.lines().count(), common + 2);
     // The kept, the shown and the packed experiment are the merged whole.
-    let kept = bench.json("out/longer/results.json");
+    let metadata = bench.json("out/longer/results.json");
     let (code, shown, _) = bench.call(&["show", "longer"]);
     assert!(
-        code == 0 && kept["experiment"]["text"] == shown && !shown.contains("extends"),
+        code == 0 && metadata["experiment"]["text"] == shown && !shown.contains("extends"),
         "{shown}"
     );
     fs::write(bench.path("whole.toml"), shown).unwrap();

@@ -4,7 +4,7 @@ use super::shape::Shape;
 use crate::definition::Vary;
 use cosim::system::System;
 use cosim::variation::{SettingValue, Target};
-use fmu_import::description::Kind;
+use fmu_import::description::VariableKind;
 use statrs::distribution::{LogNormal, Normal, Triangular};
 use toml::Value;
 
@@ -34,7 +34,7 @@ impl Reader<'_> {
             return Err(format!("one distribution is needed ({all}), there is {said}"));
         }
         let kind = &self.system.variable(self.target).kind;
-        if !matches!(kind, Kind::Real { .. })
+        if !matches!(kind, VariableKind::Real { .. })
             && matches!(chosen[0], "normal" | "log_normal" | "triangular")
         {
             return Err(format!(
@@ -100,16 +100,16 @@ impl Reader<'_> {
             return weighted(vec![self.checked(-size)?, self.checked(size)?], None);
         }
         let first = vary.case.as_ref().map_or(0, |first| *first.get_ref());
-        if !matches!(kind, Kind::Integer { .. }) {
+        if !matches!(kind, VariableKind::Integer { .. }) {
             return Err(format!("case is for parameters of type Integer, not {}", kind.name()));
         }
         self.setting(&Value::Integer(first))?;
         Ok(Shape::Case(first))
     }
 
-    fn uniform(&self, ends: &[Value; 2], kind: &Kind) -> Result<Shape, String> {
+    fn uniform(&self, ends: &[Value; 2], kind: &VariableKind) -> Result<Shape, String> {
         let [low, high] = ends;
-        if matches!(kind, Kind::Integer { .. }) {
+        if matches!(kind, VariableKind::Integer { .. }) {
             let whole = |value: &Value| match self.setting(value)? {
                 SettingValue::Integer(value) => Ok(value),
                 other => Err(format!("uniform: {} is no integer", other.to_json())),
@@ -121,7 +121,7 @@ impl Reader<'_> {
                 Err(format!("uniform = [{low}, {high}]: from a smaller to a larger value"))
             };
         }
-        if !matches!(kind, Kind::Real { .. }) {
+        if !matches!(kind, VariableKind::Real { .. }) {
             return Err(format!("uniform is for numbers, not for {}: take a list", kind.name()));
         }
         let (low, high) = (self.number(low)?, self.number(high)?);
@@ -175,7 +175,7 @@ impl Reader<'_> {
 
     /// Checks a number against the limits of the variable.
     pub(super) fn checked(&self, value: f64) -> Result<SettingValue, String> {
-        let is_real = matches!(self.system.variable(self.target).kind, Kind::Real { .. });
+        let is_real = matches!(self.system.variable(self.target).kind, VariableKind::Real { .. });
         let written = if is_real || value.fract() != 0.0 {
             Value::Float(value)
         } else {

@@ -6,14 +6,14 @@ use fmu_import::quantity::Scaling;
 
 /// Variable 0 is an input; outputs 1, 2, … depend on it directly, not at all, or without a
 /// declaration.
-fn unit(outputs: &[Option<bool>]) -> ModelDescription {
+fn description(outputs: &[Option<bool>]) -> ModelDescription {
     let variable = |(position, causality): (usize, &'static str)| Variable {
         name: format!("v{position}"),
         reference: position as u32,
         description: String::new(),
         causality: causality.into(),
         variability: "continuous".into(),
-        kind: Kind::Boolean,
+        kind: VariableKind::Boolean,
         start: None,
     };
     let causalities = std::iter::once("input").chain(outputs.iter().map(|_| "output"));
@@ -40,19 +40,19 @@ fn wire((from, output): (usize, usize), to: usize) -> Wire {
 }
 
 fn ticks(
-    units: &[ModelDescription],
+    descriptions: &[ModelDescription],
     every: &[u32],
     wires: &[Wire],
     coupling: Coupling,
 ) -> Vec<u64> {
     let parts: Vec<Part> =
-        units.iter().map(|description| Part { name: "c", description }).collect();
+        descriptions.iter().map(|description| Part { name: "c", description }).collect();
     feedback_loops(&parts, every, wires, coupling).iter().map(|l| l.ticks).collect()
 }
 
 #[test]
 fn oracle_controller_and_plant() {
-    let (controller, plant) = (unit(&[Some(true)]), unit(&[Some(false)]));
+    let (controller, plant) = (description(&[Some(true)]), description(&[Some(false)]));
     let wires = [wire((0, 1), 1), wire((1, 1), 0)];
     let in_order = [controller.clone(), plant.clone()];
     let against = [plant, controller];
@@ -68,31 +68,39 @@ fn oracle_controller_and_plant() {
 #[test]
 fn oracle_three_in_a_ring_and_a_loop_within() {
     // The loops are 0 -> 1 -> 2 -> 0 and 1 -> 0; only component 2 has a state.
-    let units = [unit(&[Some(true)]), unit(&[Some(true), Some(false)]), unit(&[Some(false)])];
+    let descriptions = [
+        description(&[Some(true)]),
+        description(&[Some(true), Some(false)]),
+        description(&[Some(false)]),
+    ];
     let wires = [wire((0, 1), 1), wire((1, 1), 2), wire((2, 1), 0), wire((1, 2), 0)];
-    assert_eq!(ticks(&units, &[1; 3], &wires[..3], Coupling::Sequential), [0]);
-    assert_eq!(ticks(&units, &[1; 3], &wires[..3], Coupling::Jacobi), [2]);
-    assert_eq!(ticks(&units, &[1; 3], &wires, Coupling::Sequential), [0, 0]);
-    assert!(ticks(&units, &[1; 3], &wires[..2], Coupling::Jacobi).is_empty());
+    assert_eq!(ticks(&descriptions, &[1; 3], &wires[..3], Coupling::Sequential), [0]);
+    assert_eq!(ticks(&descriptions, &[1; 3], &wires[..3], Coupling::Jacobi), [2]);
+    assert_eq!(ticks(&descriptions, &[1; 3], &wires, Coupling::Sequential), [0, 0]);
+    assert!(ticks(&descriptions, &[1; 3], &wires[..2], Coupling::Jacobi).is_empty());
 }
 
-/// Adds a real parameter in s to the unit's description.
-fn with_duration(mut unit: ModelDescription, name: &str, unit_name: &str) -> ModelDescription {
-    let kind =
-        Kind::Real { unit: Some(unit_name.into()), display_unit: None, min: Some(0.0), max: None };
+/// Adds a real parameter in s to the description.
+fn with_duration(mut description: ModelDescription, name: &str, unit: &str) -> ModelDescription {
+    let kind = VariableKind::Real {
+        unit: Some(unit.into()),
+        display_unit: None,
+        min: Some(0.0),
+        max: None,
+    };
     let start = Some("0".to_string());
     let causality = "parameter".into();
     let variable =
-        Variable { name: name.into(), causality, kind, start, ..unit.variables[0].clone() };
-    unit.variables.push(variable);
-    unit
+        Variable { name: name.into(), causality, kind, start, ..description.variables[0].clone() };
+    description.variables.push(variable);
+    description
 }
 
 /// Returns the warnings for a controller and a plant with these values of `delay` and
 /// `actuation.delay`, at a step of 0.04 s.
 fn warned(counted_on: Option<f64>, transport: Option<f64>, coupling: Coupling) -> Vec<String> {
-    let controller = with_duration(unit(&[Some(true)]), "delay", "s");
-    let plant = with_duration(unit(&[Some(false)]), "actuation.delay", "s");
+    let controller = with_duration(description(&[Some(true)]), "delay", "s");
+    let plant = with_duration(description(&[Some(false)]), "actuation.delay", "s");
     let parts = [
         Part { name: "controller", description: &controller },
         Part { name: "plant", description: &plant },
@@ -134,8 +142,8 @@ fn oracle_a_law_that_counts_on_another_delay_is_told_the_right_one() {
 #[test]
 fn a_delay_within_the_error_that_a_law_allows_for_is_not_warned_of() {
     let controller =
-        with_duration(with_duration(unit(&[Some(true)]), "delay", "s"), "delayError", "s");
-    let plant = unit(&[Some(false)]);
+        with_duration(with_duration(description(&[Some(true)]), "delay", "s"), "delayError", "s");
+    let plant = description(&[Some(false)]);
     let parts = [
         Part { name: "controller", description: &controller },
         Part { name: "plant", description: &plant },
@@ -158,11 +166,11 @@ fn a_delay_within_the_error_that_a_law_allows_for_is_not_warned_of() {
 #[test]
 fn the_longest_loop_counts_and_what_is_on_no_loop_does_not() {
     // The loop 0 -> 1 -> 0 has a delay of one tick, 0 -> 2 -> 0 has none, and 3 is on no loop.
-    let law = with_duration(unit(&[Some(true)]), "delay", "s");
-    let (direct, state) = (unit(&[Some(true)]), unit(&[Some(false)]));
-    let units = [law.clone(), direct, state, law];
+    let law = with_duration(description(&[Some(true)]), "delay", "s");
+    let (direct, state) = (description(&[Some(true)]), description(&[Some(false)]));
+    let descriptions = [law.clone(), direct, state, law];
     let parts: Vec<Part> =
-        units.iter().map(|description| Part { name: "c", description }).collect();
+        descriptions.iter().map(|description| Part { name: "c", description }).collect();
     let wires =
         [wire((0, 1), 1), wire((1, 1), 0), wire((0, 1), 2), wire((2, 1), 0), wire((2, 1), 3)];
     let loops = feedback_loops(&parts, &[1; 4], &wires, Coupling::Sequential);
@@ -177,7 +185,7 @@ fn the_longest_loop_counts_and_what_is_on_no_loop_does_not() {
 
 #[test]
 fn a_parameter_that_is_no_duration_means_something_else() {
-    let law = with_duration(unit(&[Some(true)]), "delay", "1");
+    let law = with_duration(description(&[Some(true)]), "delay", "1");
     let parts = ["a", "b"].map(|name| Part { name, description: &law });
     let loops =
         feedback_loops(&parts, &[1, 1], &[wire((0, 1), 1), wire((1, 1), 0)], Coupling::Jacobi);
@@ -187,9 +195,9 @@ fn a_parameter_that_is_no_duration_means_something_else() {
 
 #[test]
 fn what_is_not_declared_counts_as_direct_and_is_named() {
-    let units = [unit(&[None]), unit(&[Some(false)])];
+    let descriptions = [description(&[None]), description(&[Some(false)])];
     let parts: Vec<Part> =
-        units.iter().map(|description| Part { name: "c", description }).collect();
+        descriptions.iter().map(|description| Part { name: "c", description }).collect();
     let wires = [wire((0, 1), 1), wire((1, 1), 0)];
     let loops = feedback_loops(&parts, &[1, 1], &wires, Coupling::Jacobi);
     assert_eq!(loops, [FeedbackLoop { components: vec![0, 1], ticks: 1, undeclared: vec![0] }]);
@@ -197,11 +205,11 @@ fn what_is_not_declared_counts_as_direct_and_is_named() {
 }
 
 #[test]
-fn algebraic_loops_are_found_through_any_number_of_units() {
-    let direct = unit(&[Some(true)]);
-    let units = [direct.clone(), direct.clone(), direct];
+fn algebraic_loops_are_found_through_any_number_of_components() {
+    let direct = description(&[Some(true)]);
+    let descriptions = [direct.clone(), direct.clone(), direct];
     let parts: Vec<Part> =
-        units.iter().map(|description| Part { name: "c", description }).collect();
+        descriptions.iter().map(|description| Part { name: "c", description }).collect();
     let ring = [wire((0, 1), 1), wire((1, 1), 2), wire((2, 1), 0)];
     assert_eq!(algebraic_loop(&parts, &ring).unwrap().len(), 3);
     assert_eq!(algebraic_loop(&parts, &ring[..2]), None);

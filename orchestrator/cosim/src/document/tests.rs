@@ -6,9 +6,9 @@ fn source(files: &[(&str, &str)]) -> Result<Source, String> {
     for (name, text) in files {
         fs::write(folder.path().join(name), text).unwrap();
     }
-    let here = format!("{}/", folder.path().display());
+    let prefix = format!("{}/", folder.path().display());
     Source::load(&folder.path().join(files[0].0))
-        .map_err(|error| error.to_string().replace(&here, ""))
+        .map_err(|error| error.to_string().replace(&prefix, ""))
 }
 
 fn whole(files: &[(&str, &str)]) -> toml::Table {
@@ -21,8 +21,8 @@ fn tables_merge_by_their_keys_and_all_else_replaces() {
         ("own.toml", "extends = \"base.toml\"\nlist = [3]\n[table]\nb = 3\n[table.inner]\nd = 4"),
         ("base.toml", "text = \"x\"\nlist = [1, 2]\n[table]\na = 1\nb = 2\n[table.inner]\nc = 3"),
     ]);
-    let wanted = "text = \"x\"\nlist = [3]\n[table]\na = 1\nb = 3\n[table.inner]\nc = 3\nd = 4";
-    assert_eq!(merged, wanted.parse().unwrap());
+    let expected = "text = \"x\"\nlist = [3]\n[table]\na = 1\nb = 3\n[table.inner]\nc = 3\nd = 4";
+    assert_eq!(merged, expected.parse().unwrap());
 }
 
 #[test]
@@ -39,14 +39,14 @@ fn a_later_base_has_precedence_and_a_common_one_counts_once() {
 #[test]
 fn a_parameter_of_a_base_can_be_unset_and_set_again() {
     let base = "[components.c.parameters]\n\"p.q\" = 1\n\"p.r\" = 2";
-    let own = "extends = \"base.toml\"\nunset = [\"c.p.q\"]";
-    let merged = whole(&[("own.toml", own), ("base.toml", base)]);
+    let text = "extends = \"base.toml\"\nunset = [\"c.p.q\"]";
+    let merged = whole(&[("own.toml", text), ("base.toml", base)]);
     assert_eq!(merged, "[components.c.parameters]\n\"p.r\" = 2".parse().unwrap());
     let last = "extends = \"own.toml\"\n[components.c.parameters]\n\"p.q\" = 3";
-    let merged = whole(&[("last.toml", last), ("own.toml", own), ("base.toml", base)]);
+    let merged = whole(&[("last.toml", last), ("own.toml", text), ("base.toml", base)]);
     assert_eq!(merged["components"]["c"]["parameters"]["p.q"].as_integer(), Some(3));
-    let own = "extends = \"base.toml\"\n\nunset = [\"c.p.s\"]";
-    let message = source(&[("own.toml", own), ("base.toml", base)]).unwrap_err();
+    let text = "extends = \"base.toml\"\n\nunset = [\"c.p.s\"]";
+    let message = source(&[("own.toml", text), ("base.toml", base)]).unwrap_err();
     assert!(
         message.starts_with("own.toml:3: unset: ") && message.contains("did you mean"),
         "{message}"
@@ -61,16 +61,16 @@ fn faults_name_the_file_they_are_in() {
         #[serde(rename = "a")]
         _a: i32,
     }
-    let both = |own: &str, base: &str| {
-        let own = format!("extends = \"base.toml\"\n{own}");
-        source(&[("own.toml", &own), ("base.toml", base)])
+    let both = |text: &str, base: &str| {
+        let text = format!("extends = \"base.toml\"\n{text}");
+        source(&[("own.toml", &text), ("base.toml", base)])
     };
-    for (own, base, at) in [
+    for (text, base, at) in [
         ("a = 1", "\n\nb = 2", "base.toml:3: "),
         ("\nb = 1", "a = 2", "own.toml:3: "),
         ("", "\na = \"x\"", "base.toml:2: "),
     ] {
-        let message = both(own, base).unwrap().read::<Known>().unwrap_err().to_string();
+        let message = both(text, base).unwrap().read::<Known>().unwrap_err().to_string();
         assert!(message.contains(&format!("/{at}")), "{message}");
     }
     let message = both("", "a = 1\na =").unwrap_err();
@@ -78,7 +78,7 @@ fn faults_name_the_file_they_are_in() {
     let message = source(&[("own.toml", "\nextends = \"none.toml\"")]).unwrap_err();
     assert!(message.starts_with("own.toml:2: extends = \"none.toml\": "), "{message}");
     let message = source(&[("own.toml", "extends = 1")]).unwrap_err();
-    assert!(message.starts_with("own.toml:1: extends: wants"), "{message}");
+    assert!(message.starts_with("own.toml:1: extends: expected"), "{message}");
     let message = both("", "extends = \"own.toml\"").unwrap_err();
     assert!(
         message.starts_with("base.toml:1: extends = \"own.toml\": ") && message.contains("circle"),

@@ -7,8 +7,8 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use toml::Spanned;
 
-/// The section `[observe]` of an experiment, which says what is measured, watched and drawn of a
-/// run.
+/// The section `[observe]` of an experiment: the signals of a run that are measured, watched and
+/// drawn.
 #[derive(Clone, Debug, Default, Deserialize, JsonSchema, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Observe {
@@ -21,7 +21,7 @@ pub struct Observe {
     /// Names of the metrics that the summary prints, in this order.
     #[serde(default)]
     pub summary: Vec<String>,
-    /// Variables in which a unit reports whether it guarantees that limits are kept.
+    /// Variables in which a component reports whether it guarantees that limits are kept.
     #[serde(default)]
     pub guarantee: Option<Guarantee>,
     /// Condition under which a run counts as lost.
@@ -43,7 +43,7 @@ pub struct Measure {
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub id: String,
     /// Quantity that is computed from the signals.
-    pub kind: Kind,
+    pub kind: MeasureKind,
     /// Name of the list of signals that the number is computed from.
     #[schemars(with = "String")]
     pub signals: Spanned<String>,
@@ -54,7 +54,7 @@ pub struct Measure {
     /// has grown.
     #[serde(default)]
     pub each: Option<String>,
-    /// Number n, if only every n-th communication point is used, counted from the start.
+    /// Number n, if only every n-th communication point from the start is used.
     #[serde(default = "super::one")]
     pub every: u32,
     /// Whether only those communication points are used at which a step begins, which are all but
@@ -67,13 +67,13 @@ pub struct Measure {
     /// Heading of the number's line in the summary. Metrics with the same heading share a line.
     #[serde(default)]
     pub label: String,
-    /// Label that tells the number apart from others in the same line of the summary.
+    /// Label that distinguishes the number from others in the same line of the summary.
     #[serde(default)]
     pub part: String,
     /// Name of the metric that is the limit of this one.
     #[serde(default)]
     pub limit: Option<String>,
-    /// Whether the number may be null because the units lack a variable.
+    /// Whether the number may be null because the FMUs lack a variable.
     #[serde(default)]
     pub optional: bool,
     /// Whether the number is a computing time, which differs from run to run.
@@ -82,7 +82,8 @@ pub struct Measure {
     /// For `settling`, the width of the band as a fraction of a signal's first magnitude.
     #[serde(default)]
     pub band: Option<f64>,
-    /// For `settling`, the least time for which the signals must have been seen within the band, s.
+    /// For `settling`, the shortest time for which the signals must have been observed within the
+    /// band, s.
     #[serde(default)]
     pub hold: f64,
     /// For `leaving`, the magnitude that a signal must exceed. For `settling`, in place of `band`,
@@ -97,7 +98,7 @@ pub struct Measure {
 /// Quantity that a measure computes from its signals.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema, Serialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Kind {
+pub enum MeasureKind {
     /// Square root of the mean of the sum of the signals' squares.
     Rms,
     /// Arithmetic mean of the first signal.
@@ -123,7 +124,7 @@ pub enum Kind {
     Rises,
     /// Total variation: sum over the signals of the magnitudes of all changes.
     Variation,
-    /// Root mean square of what the signals contain above `frequency`, over all signals, by the
+    /// Root mean square of the signals' content above `frequency`, over all signals, by the
     /// discrete Fourier transform with a Hann window.
     RmsAbove,
 }
@@ -138,7 +139,7 @@ pub struct Scaled {
     pub factor: f64,
 }
 
-/// Variables in which a unit reports whether it guarantees that limits are kept.
+/// Variables in which a component reports whether it guarantees that limits are kept.
 #[derive(Clone, Debug, Deserialize, JsonSchema, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Guarantee {
@@ -147,15 +148,15 @@ pub struct Guarantee {
     /// Variable that tells why the guarantee is or is not in force, of an enumeration type.
     #[serde(default)]
     pub status: Option<String>,
-    /// Variables with the share of each limit that is left beyond what is reserved, by the names of
-    /// the limits.
+    /// Variables with the unused share of each limit after the reserve for disturbances, by the
+    /// names of the limits.
     #[serde(default)]
     pub margins: BTreeMap<String, String>,
     /// Name of a list of signals that must not exceed 1 while the guarantee is in force. If one
     /// does, the guarantee is broken.
     #[serde(default)]
     pub keeps: Option<String>,
-    /// Whether the units may lack `in_force`, `status` and the margins.
+    /// Whether the FMUs may lack `in_force`, `status` and the margins.
     #[serde(default)]
     pub optional: bool,
 }
@@ -164,7 +165,7 @@ pub struct Guarantee {
 #[derive(Clone, Debug, Deserialize, JsonSchema, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Loss {
-    /// Name of what is lost, for the message.
+    /// Name of the lost quantity, for the message.
     pub what: String,
     /// Name of the list of signals whose norm decides.
     pub signals: String,
@@ -178,7 +179,7 @@ pub struct Loss {
 pub struct Panel {
     /// Short name of the panel, for the live view.
     pub name: String,
-    /// Label of the vertical axis without the unit. Without it the name is the label.
+    /// Label of the vertical axis, without the unit. By default it is the name of the panel.
     #[serde(default)]
     pub label: String,
     /// Unit of the vertical axis, in place of the display unit of the signals.
@@ -204,8 +205,8 @@ pub struct Curve {
     pub reference: Option<Signal>,
 }
 
-fn hint<'a>(wrong: &str, known: impl Iterator<Item = &'a String> + Clone) -> String {
-    names::hint(wrong, known.map(String::as_str))
+fn hint<'a>(wrong: &str, names: impl Iterator<Item = &'a String> + Clone) -> String {
+    names::hint(wrong, names.map(String::as_str))
 }
 
 impl Observe {
@@ -226,8 +227,8 @@ impl Observe {
         }
     }
 
-    /// Describes a metric with an id of its own, or one that the summary or another metric names
-    /// and that is not there.
+    /// Describes a metric that has an id of its own, or one that the summary or another metric
+    /// names and that does not exist.
     pub fn fault(&self) -> Option<String> {
         let unknown = |place: &str, name: &String| {
             let hint = hint(name, self.metrics.keys());
@@ -239,7 +240,10 @@ impl Observe {
         };
         let id = |(name, measure): (&String, &Measure)| {
             (!measure.id.is_empty()).then(|| {
-                format!("[observe.metrics.{name}] id = \"{}\": the key is the name", measure.id)
+                format!(
+                    "[observe.metrics.{name}] id = \"{}\": leave it out, the key is the name",
+                    measure.id
+                )
             })
         };
         let mut summary = self.summary.iter().filter_map(|name| unknown("[observe] summary", name));
@@ -253,25 +257,29 @@ impl Measure {
     pub fn fault(&self) -> Option<String> {
         let is = |kind| self.kind == kind;
         let fault = if self.every == 0 {
-            "every = 0: at least 1"
+            "every = 0: it must be at least 1"
         } else if self.over.is_some_and(|[from, to]| from >= to) {
             "over must be [from, to] with from below to"
-        } else if is(Kind::Leaving) && !self.bound.is_some_and(|bound| bound > 0.0) {
-            "leaving wants a bound above 0"
-        } else if !matches!(self.kind, Kind::Leaving | Kind::Settling | Kind::Rises)
-            && self.bound.is_some()
+        } else if is(MeasureKind::Leaving) && !self.bound.is_some_and(|bound| bound > 0.0) {
+            "leaving needs a bound above 0"
+        } else if !matches!(
+            self.kind,
+            MeasureKind::Leaving | MeasureKind::Settling | MeasureKind::Rises
+        ) && self.bound.is_some()
         {
             "bound is for leaving, settling and rises only"
-        } else if is(Kind::Settling)
+        } else if is(MeasureKind::Settling)
             && !(self.band.xor(self.bound).is_some_and(|band| band > 0.0) && self.hold >= 0.0)
         {
-            "settling wants either a band or a bound above 0, and a hold not below"
-        } else if !is(Kind::Settling) && self.band.is_some() {
+            "settling needs either a band or a bound above 0, and a hold of at least 0"
+        } else if !is(MeasureKind::Settling) && self.band.is_some() {
             "band is for settling only"
-        } else if !is(Kind::Settling) && self.hold != 0.0 {
+        } else if !is(MeasureKind::Settling) && self.hold != 0.0 {
             "hold is for settling only"
-        } else if is(Kind::RmsAbove) != self.frequency.is_some_and(|frequency| frequency > 0.0) {
-            "rms-above, and nothing else, wants a frequency above 0"
+        } else if is(MeasureKind::RmsAbove)
+            != self.frequency.is_some_and(|frequency| frequency > 0.0)
+        {
+            "rms-above needs a frequency above 0, and no other kind has one"
         } else {
             return None;
         };

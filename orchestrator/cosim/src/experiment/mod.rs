@@ -9,7 +9,7 @@ mod overrides;
 mod protection;
 
 pub use crate::watch::OnInvalid;
-pub use measures::{Curve, Guarantee, Kind, Loss, Measure, Observe, Panel, Scaled};
+pub use measures::{Curve, Guarantee, Loss, Measure, MeasureKind, Observe, Panel, Scaled};
 pub use overrides::Overrides;
 pub use protection::Protection;
 
@@ -44,10 +44,10 @@ pub struct Experiment {
     /// Signals that are measured, watched and drawn.
     #[serde(default)]
     pub observe: Observe,
-    /// Processes of units and their limits.
+    /// Processes of instances and their limits.
     #[serde(default)]
     pub isolation: Protection,
-    /// Whether inputs may stay unconnected without being named. This is no key of an experiment
+    /// Whether inputs may stay unconnected without being named. This is not a key of an experiment
     /// file.
     #[serde(skip)]
     pub leaves_inputs_open: bool,
@@ -73,42 +73,43 @@ pub struct Simulation {
     pub stop: f64,
     /// Length of the communication step, s.
     pub step: f64,
-    /// Way in which components are stepped and values handed on.
+    /// Way in which components are stepped and values are passed on.
     #[serde(default)]
     pub coupling: Coupling,
     /// Names of components, in the order in which they are stepped from each communication point.
     #[serde(default)]
     pub order: Vec<String>,
-    /// Action taken if a unit gives a value that is not finite, or not valid for its type.
+    /// Action taken if an instance gives a value that is not finite, or not valid for its type.
     #[serde(default)]
     pub on_invalid: OnInvalid,
 }
 
-/// Way in which components are stepped and values handed on.
+/// Way in which components are stepped and values are passed on.
 #[derive(
     Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema, Serialize, clap::ValueEnum,
 )]
 #[serde(rename_all = "kebab-case")]
 pub enum Coupling {
-    /// One after the other, each component gets its inputs, is stepped, and hands on: those after
-    /// it receive its responses to these inputs. Earlier versions called this "gauss-seidel".
+    /// One after the other, each component gets its inputs, is stepped, and passes its outputs on:
+    /// later components receive its responses to these inputs. Earlier versions called this
+    /// "gauss-seidel".
     #[default]
     #[serde(alias = "gauss-seidel")]
     #[value(alias = "gauss-seidel")]
     Sequential,
-    /// All components get their inputs, then all are stepped: each receives what the others gave
-    /// after their last step.
+    /// All components get their inputs, and then all are stepped: each receives the outputs of the
+    /// others after their last step.
     Jacobi,
 }
 
-/// A component of the experiment: an FMU or a table with its settings.
+/// A component of the experiment: an FMU or a lookup table with its settings.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Component {
-    /// File name of the FMU, or of a table (`.csv`) whose columns are outputs.
+    /// File name of the FMU, or of a lookup table (`.csv`) whose columns are outputs.
     #[schemars(with = "String")]
     pub fmu: Spanned<String>,
-    /// Period of the component: it steps at every n-th communication point.
+    /// Period of the component: it is stepped at every n-th communication point.
     #[serde(default = "one")]
     pub every: u32,
     /// Inputs that stay at their start values.
@@ -119,7 +120,7 @@ pub struct Component {
     #[serde(default)]
     #[schemars(with = "BTreeMap<String, Scalar>")]
     pub parameters: BTreeMap<String, Spanned<Value>>,
-    /// Whether the unit runs in a process of its own, whatever `[isolation]` says.
+    /// Whether the instance runs in a process of its own, whatever `[isolation]` says.
     #[serde(default)]
     pub isolate: Option<bool>,
     /// Whether the FMU takes the place of another one, as after `--fmu`: settings, recorded
@@ -150,11 +151,12 @@ pub struct Connection {
     /// Input that the values go to, as `component.input` or `component.prefix.*`.
     #[schemars(with = "String")]
     pub to: Spanned<String>,
-    /// Whether values are converted if the units differ only in scale. Without this such a
-    /// connection is refused.
+    /// Whether values are converted if the units differ only in scale. Otherwise such a connection
+    /// is refused.
     #[serde(default)]
     pub convert_units: bool,
-    /// Scaling that is applied after the conversion of units. This is no key of an experiment file.
+    /// Scaling that is applied after the conversion of units. This is not a key of an experiment
+    /// file.
     #[serde(skip)]
     pub scaling: Scaling,
 }
@@ -182,7 +184,7 @@ impl Experiment {
     /// # Errors
     /// Returns an error if a file cannot be read, is not TOML, or holds an unknown key.
     pub fn load(path: &Path) -> Result<Self, Error> {
-        Self::of(Source::load(path)?)
+        Self::from_source(Source::load(path)?)
     }
 
     /// Reads the text of an experiment file. The `path` appears in messages, and FMUs and extended
@@ -191,10 +193,10 @@ impl Experiment {
     /// # Errors
     /// Returns an error if the text is not TOML, or holds an unknown key.
     pub fn parse(path: &Path, text: String) -> Result<Self, Error> {
-        Self::of(Source::new(path, text)?)
+        Self::from_source(Source::new(path, text)?)
     }
 
-    fn of(source: Source) -> Result<Self, Error> {
+    fn from_source(source: Source) -> Result<Self, Error> {
         let mut experiment: Self = source.read()?;
         experiment.source = source;
         Ok(experiment)
@@ -234,7 +236,7 @@ impl Experiment {
 
     fn target<'a>(&mut self, target: &'a str) -> Result<(&mut Component, &'a str), String> {
         let (name, parameter) = names::split(target)
-            .ok_or_else(|| format!("\"{target}\" is no component.parameter"))?;
+            .ok_or_else(|| format!("\"{target}\" is not of the form component.parameter"))?;
         let hint = names::hint(name, self.components.keys().map(String::as_str));
         let component = self
             .components

@@ -15,9 +15,9 @@ pub struct Overrides {
     /// `plant.disturbance.bound="1 deg/s2"`.
     #[arg(long = "set", value_name = "COMPONENT.PARAMETER=VALUE")]
     pub set: Vec<String>,
-    /// Replace the FMU of a component: `controller=MyLaw.fmu`, which is a file, or is found by its
-    /// name. Settings, recorded variables and unconnected inputs of the experiment that the new FMU
-    /// does not have are left out.
+    /// Replace the FMU of a component: `controller=MyLaw.fmu`, as a file or by its name. Settings,
+    /// recorded variables and unconnected inputs of the experiment that the new FMU does not have
+    /// are left out.
     #[arg(long = "fmu", value_name = "COMPONENT=FMU")]
     pub fmu: Vec<String>,
     /// Stop time of the simulation, s.
@@ -26,13 +26,14 @@ pub struct Overrides {
     /// Length of the communication step, s.
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
     pub step: Option<f64>,
-    /// Choose how values are passed on at a communication point.
+    /// Choose how components are stepped and values are passed on.
     #[arg(long, value_enum)]
     pub coupling: Option<Coupling>,
-    /// Choose what happens if a unit gives a value that is not finite, or not valid for its type.
+    /// Choose what happens if an instance gives a value that is not finite, or not valid for its
+    /// type.
     #[arg(long, value_enum)]
     pub on_invalid: Option<OnInvalid>,
-    /// Processes of units and their limits.
+    /// Processes of instances and their limits.
     #[command(flatten)]
     pub isolation: Protection,
 }
@@ -52,7 +53,7 @@ impl Experiment {
             let refuse =
                 |message: String| Error::experiment(format!("--fmu {assignment}: {message}"));
             let (name, fmu) = assignment.split_once('=').ok_or_else(|| {
-                refuse("wants component=file, for example controller=MyLaw.fmu".into())
+                refuse("expected component=file, for example controller=MyLaw.fmu".into())
             })?;
             let hint = names::hint(name, self.components.keys().map(String::as_str));
             let component = self
@@ -65,7 +66,7 @@ impl Experiment {
                 file.map_or_else(|| fmu.to_string(), |file| file.to_string_lossy().into_owned());
             let (new, old) = (stem(&file), stem(component.fmu.get_ref()));
             if new != old {
-                // The title of the file is about another unit.
+                // The title of the file is about another FMU.
                 self.title = format!("{new} in place of {old}: {}", self.title);
             }
             (component.fmu, component.is_exchanged) = (Spanned::new(0..0, file), true);
@@ -73,7 +74,7 @@ impl Experiment {
         for assignment in &overrides.set {
             let malformed = || {
                 Error::experiment(format!(
-                    "--set {assignment}: wants component.parameter=value, for example plant.disturbance.seed=7"
+                    "--set {assignment}: expected component.parameter=value, for example plant.disturbance.seed=7"
                 ))
             };
             let (target, value) = assignment.split_once('=').ok_or_else(malformed)?;
@@ -92,7 +93,7 @@ impl Experiment {
             if self.set(target, value).is_ok() {
                 self.assigned.insert(target.to_string());
             } else {
-                // The target is resolved later, when the units are known.
+                // The target is resolved later, when the FMUs are known.
                 self.unplaced.push(target.to_string());
             }
         }
@@ -100,7 +101,7 @@ impl Experiment {
     }
 }
 
-/// Returns the name of a unit's file without folder and ending.
+/// Returns the name of an FMU's file without folder and extension.
 fn stem(path: &str) -> String {
     Path::new(path).file_stem().unwrap_or_default().to_string_lossy().into_owned()
 }

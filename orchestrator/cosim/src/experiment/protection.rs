@@ -1,4 +1,4 @@
-//! How an experiment is kept from harm that units may do.
+//! Protects an experiment from instances that crash, never answer, or take all memory.
 
 use super::Component;
 use fmu_import::fmu::Fmu;
@@ -7,31 +7,34 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::time::Duration;
 
-/// Processes of units and their limits. What is not given is left to the defaults.
+/// Processes of instances and their limits. Keys that are left out keep their defaults.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, JsonSchema, Serialize, clap::Args)]
 #[serde(deny_unknown_fields)]
 pub struct Protection {
-    /// Run every unit in a process of its own (true), or all of them in this one (false). Without
-    /// this, units that this project's fmu-pack did not make get processes of their own.
+    /// Run every instance in a process of its own (true), or all of them in this process (false).
+    /// By default the instances of FMUs that this project's fmu-pack did not make get processes of
+    /// their own.
     #[arg(long, value_name = "BOOL", num_args = 0..=1, default_missing_value = "true", require_equals = true)]
     pub isolate: Option<bool>,
-    /// Time within which a unit in a process of its own must answer each call, s [default: 60].
+    /// Time within which an instance in a process of its own must answer each call, s [default:
+    /// 60].
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
     pub call_timeout: Option<f64>,
-    /// Memory that a unit in a process of its own may write, MiB; 0 means no limit [default: 4096].
+    /// Memory that an instance in a process of its own may write, MiB; 0 means no limit [default:
+    /// 4096].
     #[arg(long = "unit-memory", value_name = "MIB")]
     pub memory: Option<u64>,
-    /// Processor time that a unit in a process of its own may take, s [default: no limit].
+    /// Processor time that an instance in a process of its own may take, s [default: no limit].
     #[arg(long = "unit-cpu", value_name = "SECONDS", value_parser = clap::value_parser!(u64).range(1..))]
     pub cpu: Option<u64>,
-    /// Let units in processes of their own write nowhere but in the folder of their archive, and
-    /// use no network. Linux only; a warning says so where the system cannot do it.
+    /// Let instances in processes of their own write only to the folder of their archive, and keep
+    /// them from the network. This works on Linux only; a warning tells if the system cannot do it.
     #[arg(long, value_name = "BOOL", num_args = 0..=1, default_missing_value = "true", require_equals = true)]
     pub sandbox: Option<bool>,
 }
 
 impl Protection {
-    /// Takes over what `other` gives.
+    /// Takes over the values that `other` gives.
     pub(super) fn apply(&mut self, other: &Self) {
         self.isolate = other.isolate.or(self.isolate);
         self.call_timeout = other.call_timeout.or(self.call_timeout);
@@ -40,14 +43,14 @@ impl Protection {
         self.sandbox = other.sandbox.or(self.sandbox);
     }
 
-    /// Checks that the time to answer is a time.
+    /// Checks that the time limit of calls is in its range.
     ///
     /// # Errors
-    /// Returns a line that names it if it is none.
+    /// Returns a line that names the value if it is not.
     pub fn check(&self) -> Result<(), String> {
         match self.call_timeout {
             Some(seconds) if !(1e-3..=1e6).contains(&seconds) => {
-                Err(format!("call_timeout = {seconds}: from 0.001 to 1e6 s"))
+                Err(format!("call_timeout = {seconds}: it must be from 0.001 to 1e6 s"))
             }
             _ => Ok(()),
         }
@@ -56,10 +59,12 @@ impl Protection {
     /// Returns whether a component gets a process of its own.
     pub fn isolates(&self, component: &Component, fmu: &Fmu) -> bool {
         let asked = component.isolate.or(self.isolate);
-        isolation::is_enabled() && !fmu.is_table() && asked.unwrap_or_else(|| !fmu.is_own())
+        isolation::is_enabled()
+            && !fmu.is_lookup_table()
+            && asked.unwrap_or_else(|| !fmu.is_made_by_fmu_pack())
     }
 
-    /// Returns what the process of a unit is given.
+    /// Returns the limits that the process of an instance gets.
     pub(crate) fn limits(&self) -> Isolation {
         let usual = Isolation::default();
         let timeout = self.call_timeout.map(Duration::try_from_secs_f64);

@@ -64,6 +64,6 @@ fn bad_assignments_are_refused() {
         let overrides = Overrides { set: vec![text.into()], ..Overrides::default() };
         parse(TEXT).unwrap().apply(&overrides).unwrap_err().to_string()
     };
-    assert!(refusal("a.p").contains("wants component.parameter=value"));
-    assert!(refusal("=1").contains("wants component.parameter=value"));
+    assert!(refusal("a.p").contains("expected component.parameter=value"));
+    assert!(refusal("=1").contains("expected component.parameter=value"));
 }

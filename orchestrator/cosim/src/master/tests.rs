@@ -1,7 +1,7 @@
 use super::*;
 use fmu_import::description::Carrier;
+use fmu_import::instance::{Instance, Outcome};
 use fmu_import::quantity::Scaling;
-use fmu_import::unit::{CoSimulationUnit, Outcome};
 use std::cell::RefCell;
 use std::rc::Rc;
 
@@ -28,7 +28,7 @@ impl Mock {
     }
 }
 
-impl CoSimulationUnit for Mock {
+impl Instance for Mock {
     fn get_real(&mut self, references: &[u32], values: &mut [f64]) -> Outcome {
         assert!(!(self.runs && self.is_set), "{} is read after it was set", self.name);
         for (reference, value) in references.iter().zip(values.iter_mut()) {
@@ -73,7 +73,7 @@ impl CoSimulationUnit for Mock {
     }
     fn do_step(&mut self, time: f64, step: f64) -> Outcome {
         if time >= self.fails_after {
-            return Err(UnitFailure::new("doStep", "out of propellant"));
+            return Err(CallFailure::new("doStep", "out of propellant"));
         }
         self.state += step * self.input;
         self.is_set = false;
@@ -135,7 +135,7 @@ fn run(
                 fails_after,
                 journal: Rc::clone(&journal),
             };
-            Member { name: name.into(), every, ahead: false, unit: Box::new(mock) }
+            Member { name: name.into(), every, ahead: false, instance: Box::new(mock) }
         })
         .collect();
     let gain = order.iter().position(|name| *name == "gain").unwrap();
@@ -253,7 +253,7 @@ fn a_failing_unit_is_named_with_time_and_words_and_the_rows_stay() {
 }
 
 proptest::proptest! {
-    /// Units that all step at every n-th tick give the same results as at every tick of a clock
+    /// Instances that all step at every n-th tick give the same results as at every tick of a clock
     /// n times slower.
     #[test]
     fn oracle_equal_periods_are_a_slower_clock(n in 1u32..6, periods in 1u32..6, jacobi: bool, swap: bool) {

@@ -1,26 +1,27 @@
-//! Values on their way from unit to unit, which are read with one call per unit and type.
+//! Values on their way from instance to instance, which are read with one call per instance and
+//! type.
 
 use crate::delay::Reading;
 use crate::wiring::{Port, Wire};
 use fmu_import::description::Carrier;
+use fmu_import::instance::{Instance, Outcome};
 use fmu_import::quantity::Scaling;
-use fmu_import::unit::{CoSimulationUnit, Outcome};
 use std::collections::BTreeSet;
 
-/// A unit together with what the master must know to step it. Members are kept in the order in
+/// An instance together with what the master must know to step it. Members are kept in the order in
 /// which they are stepped.
 pub struct Member {
     /// Name of the component in the experiment.
     pub name: String,
-    /// Period of the unit: it steps at every n-th tick.
+    /// Period of the instance: it steps at every n-th tick.
     pub every: u32,
     /// Whether others may work while it steps, because it has a process of its own.
     pub ahead: bool,
-    /// The unit itself, instantiated and with its parameters set.
-    pub unit: Box<dyn CoSimulationUnit>,
+    /// The instance itself, instantiated and with its parameters set.
+    pub instance: Box<dyn Instance>,
 }
 
-/// Variables of one unit and type, which are read by one call into neighbouring places.
+/// Variables of one instance and type, which are read by one call into neighbouring places.
 struct Read {
     carrier: Carrier,
     references: Vec<u32>,
@@ -29,25 +30,26 @@ struct Read {
     integers: Vec<i32>,
 }
 
-/// All values that are read from the units. Integers and booleans are kept as floats, which hold
-/// them without loss.
+/// All values that are read from the instances. Integers and booleans are kept as floats, which
+/// hold them without loss.
 pub(super) struct Values {
     ports: Vec<Port>,
-    /// Reads of each unit: those of connected outputs, then those that only observers ask for.
+    /// Reads of each instance: those of connected outputs, then those that only observers ask for.
     reads: Vec<[Vec<Read>; 2]>,
-    /// Values at the communication point at which a unit stands before its step.
+    /// Values at the communication point at which an instance stands before its step.
     before: Vec<f64>,
     /// Values that were read last.
     latest: Vec<f64>,
 }
 
 impl Values {
-    /// Provides for what this number of units give to one another, `wired`, and to observers.
-    pub(super) fn new(units: usize, wired: &[Port], probed: &[Port]) -> Self {
+    /// Makes room for the values that this number of instances give to one another (`wired`) and to
+    /// observers (`probed`).
+    pub(super) fn new(instances: usize, wired: &[Port], probed: &[Port]) -> Self {
         let mut values =
             Self { ports: Vec::new(), reads: Vec::new(), before: Vec::new(), latest: Vec::new() };
-        for unit in 0..units {
-            let reads = [values.add(unit, wired), values.add(unit, probed)];
+        for instance in 0..instances {
+            let reads = [values.add(instance, wired), values.add(instance, probed)];
             values.reads.push(reads);
         }
         values.before = vec![0.0; values.ports.len()];
@@ -55,12 +57,12 @@ impl Values {
         values
     }
 
-    /// Adds those ports of a unit that are not there yet.
-    fn add(&mut self, unit: usize, ports: &[Port]) -> Vec<Read> {
+    /// Adds those ports of an instance that are not there yet.
+    fn add(&mut self, instance: usize, ports: &[Port]) -> Vec<Read> {
         let mut reads = Vec::new();
         for carrier in [Carrier::Real, Carrier::Integer, Carrier::Boolean] {
             let first = self.ports.len();
-            for port in ports.iter().filter(|p| p.component == unit && p.carrier == carrier) {
+            for port in ports.iter().filter(|p| p.component == instance && p.carrier == carrier) {
                 if !self.ports.contains(port) {
                     self.ports.push(*port);
                 }
@@ -75,15 +77,16 @@ impl Values {
     }
 
     fn place(&self, port: &Port) -> usize {
-        let place = self.ports.iter().position(|known| known == port);
+        let place = self.ports.iter().position(|other| other == port);
         place.expect("every connected or probed output has a place")
     }
 
-    /// Reads the connected outputs of a unit, and with `probed` what observers ask for.
+    /// Reads the connected outputs of an instance, and with `probed` also the variables that
+    /// observers ask for.
     pub(super) fn read(
         &mut self,
         index: usize,
-        unit: &mut dyn CoSimulationUnit,
+        instance: &mut dyn Instance,
         probed: bool,
     ) -> Outcome {
         let [wired, others] = &mut self.reads[index];
@@ -91,9 +94,9 @@ impl Values {
         for read in wired.iter_mut().chain(others) {
             let into = &mut self.latest[read.first..read.first + read.references.len()];
             match read.carrier {
-                Carrier::Real => unit.get_real(&read.references, into)?,
-                Carrier::Integer => unit.get_integer(&read.references, &mut read.integers)?,
-                Carrier::Boolean => unit.get_boolean(&read.references, &mut read.integers)?,
+                Carrier::Real => instance.get_real(&read.references, into)?,
+                Carrier::Integer => instance.get_integer(&read.references, &mut read.integers)?,
+                Carrier::Boolean => instance.get_boolean(&read.references, &mut read.integers)?,
             }
             for (value, integer) in into.iter_mut().zip(&read.integers) {
                 *value = f64::from(*integer);
@@ -102,7 +105,7 @@ impl Values {
         Ok(())
     }
 
-    /// Makes the values that a unit shows at its communication point those before its step.
+    /// Keeps the values that an instance has at its communication point as those before its step.
     pub(super) fn arrive(&mut self, index: usize) {
         for read in self.reads[index].iter().flatten() {
             let range = read.first..read.first + read.references.len();
@@ -119,7 +122,7 @@ struct Place {
 }
 
 impl Place {
-    fn of(self, values: &Values) -> f64 {
+    fn value(self, values: &Values) -> f64 {
         match self.reading {
             Reading::BeforeStep => values.before[self.index],
             Reading::AfterStep => values.latest[self.index],
@@ -145,19 +148,19 @@ impl Row {
 
     pub(super) fn fill(&mut self, values: &Values) {
         for (value, place) in self.values.iter_mut().zip(&self.places) {
-            *value = place.of(values);
+            *value = place.value(values);
         }
     }
 }
 
-/// All values that one unit receives, grouped by type.
+/// All values that one instance receives, grouped by type.
 pub(super) struct Inputs {
     real: Bundle<f64>,
     integer: Bundle<i32>,
     boolean: Bundle<i32>,
-    /// Units that must have stepped before the values are there.
+    /// Instances that must have stepped before the values are there.
     pub(super) awaited: Vec<usize>,
-    /// Units that give any of the values.
+    /// Instances that give any of the values.
     pub(super) sources: Vec<usize>,
 }
 
@@ -183,8 +186,9 @@ impl<T: Copy + Default> Bundle<T> {
     /// Takes the values over; `convert` is exact for what was read.
     fn gather(&mut self, values: &Values, convert: impl Fn(f64) -> T) {
         for (value, (place, scaling)) in self.values.iter_mut().zip(&self.places) {
-            let read = place.of(values);
-            *value = convert(if *scaling == Scaling::default() { read } else { scaling.of(read) });
+            let read = place.value(values);
+            *value =
+                convert(if *scaling == Scaling::default() { read } else { scaling.apply(read) });
         }
     }
 }
@@ -213,15 +217,15 @@ impl Inputs {
         self.boolean.gather(values, |value| value as i32);
     }
 
-    pub(super) fn scatter(&self, unit: &mut dyn CoSimulationUnit) -> Outcome {
+    pub(super) fn scatter(&self, instance: &mut dyn Instance) -> Outcome {
         if !self.real.references.is_empty() {
-            unit.set_real(&self.real.references, &self.real.values)?;
+            instance.set_real(&self.real.references, &self.real.values)?;
         }
         if !self.integer.references.is_empty() {
-            unit.set_integer(&self.integer.references, &self.integer.values)?;
+            instance.set_integer(&self.integer.references, &self.integer.values)?;
         }
         if !self.boolean.references.is_empty() {
-            unit.set_boolean(&self.boolean.references, &self.boolean.values)?;
+            instance.set_boolean(&self.boolean.references, &self.boolean.values)?;
         }
         Ok(())
     }

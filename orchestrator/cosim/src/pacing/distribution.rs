@@ -78,8 +78,8 @@ mod tests {
             distribution.record(Duration::from_millis(milliseconds));
         }
         let summary = distribution.summary();
-        let near = |found: f64, expected: f64| {
-            assert!((found / expected - 1.0).abs() < 1e-3, "{found} {expected}");
+        let near = |value: f64, expected: f64| {
+            assert!((value / expected - 1.0).abs() < 1e-3, "{value} {expected}");
         };
         near(summary.min, 1.0);
         near(summary.median, 50.0);

@@ -2,9 +2,9 @@
 //!
 //! Communication point t is due at t₀ + (t − start) / factor on the monotonic clock: these instants
 //! are absolute, so that errors do not accumulate. The master waits for each instant ([`timer`]),
-//! then steps the units and transfers values. The values that a component computes at one of its
-//! communication points must be ready before its next one; if they are not, a *deadline is missed*.
-//! The [`pacer`] counts missed deadlines, takes the requested action, and measures times;
+//! then steps the instances and transfers values. The values that a component computes at one of
+//! its communication points must be ready before its next one; if they are not, a *deadline is
+//! missed*. The [`pacer`] counts missed deadlines, takes the requested action, and measures times;
 //! [`report`] summarizes them.
 
 pub mod distribution;

@@ -1,7 +1,7 @@
 //! The pacer keeps a run in step with a timer and checks the deadlines.
 
 use super::distribution::Distribution;
-use super::report::{Component, Lag, Late, RealTime, Series};
+use super::report::{ComponentTiming, Lag, Late, RealTime, Series};
 use super::timer::Timer;
 use super::{OnMiss, Settings};
 use crate::clock::Clock;
@@ -40,7 +40,7 @@ pub struct Step {
     pub component: usize,
     /// Simulated time of the communication point at its end, s.
     pub time: f64,
-    /// Computing time spent in the unit.
+    /// Computing time spent in the instance.
     pub duration: Duration,
 }
 
@@ -92,7 +92,7 @@ pub struct Pacer {
     began: Duration,
     elapsed: Duration,
     /// Instant at which the work of the current tick began. `tick_spent` is the computing time of
-    /// all units up to then.
+    /// all instances up to then.
     tick_began: Duration,
     tick_spent: Duration,
     /// Wake-up jitter of the current tick, if there was a wait.
@@ -107,7 +107,7 @@ pub struct Pacer {
     slips: u64,
     tally: Rc<Cell<Tally>>,
     /// Time that the orchestrator itself takes at a communication point.
-    own: Distribution,
+    overhead: Distribution,
     wake_ups: Distribution,
     wake_up_series: Series,
 }
@@ -153,7 +153,7 @@ impl Pacer {
             largest_lag: Duration::ZERO,
             slips: 0,
             tally: Rc::default(),
-            own: Distribution::default(),
+            overhead: Distribution::default(),
             wake_ups: Distribution::default(),
             wake_up_series: Series::new(clock.ticks()),
         }
@@ -170,7 +170,7 @@ impl Pacer {
         if tick == 0 {
             (self.base, self.began) = (now, now);
         } else {
-            self.count_own(now);
+            self.count_overhead(now);
         }
         let mut release = self.release(tick);
         let lag = now.saturating_sub(release);
@@ -277,7 +277,7 @@ impl Pacer {
     /// Records the end of the run.
     pub fn finish(&mut self) {
         let now = self.timer.now();
-        self.count_own(now);
+        self.count_overhead(now);
         self.elapsed = now.saturating_sub(self.began);
     }
 
@@ -298,9 +298,9 @@ impl Pacer {
         self.tasks.iter().map(|task| task.spent.time()).sum()
     }
 
-    fn count_own(&mut self, now: Duration) {
-        let in_units = self.spent().saturating_sub(self.tick_spent);
-        self.own.record(now.saturating_sub(self.tick_began).saturating_sub(in_units));
+    fn count_overhead(&mut self, now: Duration) {
+        let in_instances = self.spent().saturating_sub(self.tick_spent);
+        self.overhead.record(now.saturating_sub(self.tick_began).saturating_sub(in_instances));
     }
 
     fn update(&self, change: impl FnOnce(&mut Tally)) {
@@ -333,7 +333,7 @@ impl Pacer {
         let mut components = BTreeMap::new();
         let mut series = Vec::new();
         for task in self.tasks {
-            let component = Component {
+            let component = ComponentTiming {
                 period_ms: period * task.every as f64,
                 misses: task.misses,
                 step_ms: task.steps.summary(),
@@ -361,13 +361,13 @@ impl Pacer {
             },
             components,
             wake_up_ms: self.wake_ups.summary(),
-            orchestrator_ms: self.own.summary(),
+            orchestrator_ms: self.overhead.summary(),
         };
         (report, self.wake_up_series, series)
     }
 }
 
-/// Rounds a time, to remove digits that stem from the multiplication of tick and step.
+/// Rounds a time, to remove digits that come from the multiplication of tick and step.
 fn shown(time: f64) -> f64 {
     (time * 1e9).round() / 1e9
 }

@@ -60,12 +60,12 @@ mod system {
             });
         if let Err(reason) = outcome {
             return Priority::Refused(format!(
-                "{reason}; SCHED_FIFO wants the capability CAP_SYS_NICE or a limit (ulimit -r) of at least {priority}"
+                "{reason}; SCHED_FIFO needs the capability CAP_SYS_NICE or a limit (ulimit -r) of at least {priority}"
             ));
         }
         let locked = mlockall(MlockAllFlags::CURRENT | MlockAllFlags::FUTURE);
         let unlocked = locked.err().map(|error| {
-            format!("{error}; locking memory wants the capability CAP_IPC_LOCK or a higher limit (ulimit -l)")
+            format!("{error}; locking memory needs the capability CAP_IPC_LOCK or a higher limit (ulimit -l)")
         });
         Priority::Fifo { priority, unlocked }
     }
@@ -95,7 +95,7 @@ mod system {
     use super::Priority;
 
     pub(super) fn request(_: u8) -> Priority {
-        Priority::Refused("only on Linux".into())
+        Priority::Refused("real-time scheduling is available on Linux only".into())
     }
 
     pub(super) fn release() {}

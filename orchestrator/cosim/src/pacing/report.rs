@@ -30,7 +30,7 @@ pub struct RealTime {
     /// Delay of the run against the wall clock.
     pub lag: Lag,
     /// Timing of each component, by its name.
-    pub components: BTreeMap<String, Component>,
+    pub components: BTreeMap<String, ComponentTiming>,
     /// Wake-up jitter: delay of each wake-up, over all communication points with a wait.
     pub wake_up_ms: Summary,
     /// Time that the orchestrator itself took at a communication point to transfer and record
@@ -75,12 +75,12 @@ pub struct Lag {
 
 /// Timing figures of one component.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Component {
+pub struct ComponentTiming {
     /// Time between two communication points of the component on the wall clock, ms.
     pub period_ms: f64,
     /// Number of deadlines that the component missed.
     pub misses: u64,
-    /// Computing time of the unit per step, over all of its calls.
+    /// Computing time of the instance per step, over all of its calls.
     pub step_ms: Summary,
     /// Time from the instant of the communication point until the component's values are ready. It
     /// must be shorter than the period.
@@ -183,7 +183,7 @@ impl RealTime {
         )?;
         for name in order {
             let Some(component) = self.components.get(name) else { continue };
-            let Component { step_ms: step, response_ms: response, wake_up_ms: woken, .. } =
+            let ComponentTiming { step_ms: step, response_ms: response, wake_up_ms: woken, .. } =
                 component;
             let woken = [woken.median, woken.p99, woken.max]
                 .map(|ms| if woken.count > 0 { plain(ms) } else { "-".into() });
@@ -203,12 +203,12 @@ impl RealTime {
             ];
             row("", name, cells)?;
         }
-        let own = &self.orchestrator_ms;
-        let own = [own.min, own.median, own.p99, own.max].map(plain);
+        let overhead = &self.orchestrator_ms;
+        let overhead = [overhead.min, overhead.median, overhead.p99, overhead.max].map(plain);
         row(
             "",
             "orchestrator",
-            std::array::from_fn(|k| own.get(k.wrapping_sub(1)).cloned().unwrap_or_default()),
+            std::array::from_fn(|k| overhead.get(k.wrapping_sub(1)).cloned().unwrap_or_default()),
         )?;
         for (label, miss) in [("first miss", &self.first_miss), ("worst miss", &self.worst_miss)] {
             if let Some(miss) = miss {

@@ -156,20 +156,21 @@ fn schema<'a>(
 
 /// Collects the units of the columns that have one.
 fn units(columns: &[Column]) -> Map<String, Value> {
-    let own = columns
+    let column_units = columns
         .iter()
         .filter_map(|column| Some((column.name.clone(), json!(column.unit.as_ref()?))));
-    std::iter::once(("time".to_owned(), json!("s"))).chain(own).collect()
+    std::iter::once(("time".to_owned(), json!("s"))).chain(column_units).collect()
 }
 
 /// Collects the names of the items of each enumeration, by their numbers.
 fn items(columns: &[Column]) -> Map<String, Value> {
-    let own = columns.iter().filter(|column| !column.items.is_empty());
-    own.map(|column| {
-        let items = column.items.iter().map(|(name, item)| (item.to_string(), json!(name)));
-        (column.name.clone(), Value::Object(items.collect()))
-    })
-    .collect()
+    let enumerations = columns.iter().filter(|column| !column.items.is_empty());
+    enumerations
+        .map(|column| {
+            let items = column.items.iter().map(|(name, item)| (item.to_string(), json!(name)));
+            (column.name.clone(), Value::Object(items.collect()))
+        })
+        .collect()
 }
 
 fn failed(path: &Path) -> impl FnOnce(ParquetError) -> Error {

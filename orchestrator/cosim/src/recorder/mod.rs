@@ -33,14 +33,14 @@ impl Format {
     }
 }
 
-enum Table {
+enum ResultsTable {
     Text(Text),
     Columnar(Box<Columnar>),
 }
 
 /// A results file that is being written.
 pub struct Recorder {
-    table: Table,
+    table: ResultsTable,
     every: u64,
 }
 
@@ -58,8 +58,8 @@ impl Recorder {
         labels: bool,
     ) -> Result<Self, Error> {
         let table = match format {
-            Format::Csv => Table::Text(Text::create(path, columns, labels)?),
-            Format::Parquet => Table::Columnar(Box::new(Columnar::create(path, columns)?)),
+            Format::Csv => ResultsTable::Text(Text::create(path, columns, labels)?),
+            Format::Parquet => ResultsTable::Columnar(Box::new(Columnar::create(path, columns)?)),
         };
         Ok(Self { table, every: u64::from(every) })
     }
@@ -70,8 +70,8 @@ impl Recorder {
     /// Returns an error if the file cannot be written.
     pub fn finish(&mut self) -> Result<(), Error> {
         match &mut self.table {
-            Table::Text(text) => text.finish(),
-            Table::Columnar(columnar) => columnar.finish(),
+            ResultsTable::Text(text) => text.finish(),
+            ResultsTable::Columnar(columnar) => columnar.finish(),
         }
     }
 }
@@ -82,8 +82,8 @@ impl Observer for Recorder {
             return Ok(());
         }
         match &mut self.table {
-            Table::Text(text) => text.row(sample.time, sample.values),
-            Table::Columnar(columnar) => columnar.row(sample.time, sample.values),
+            ResultsTable::Text(text) => text.row(sample.time, sample.values),
+            ResultsTable::Columnar(columnar) => columnar.row(sample.time, sample.values),
         }
     }
 }

@@ -73,11 +73,11 @@ fn columnar_reads_back_to_the_same_bits_with_units_and_items() {
     let names: Vec<&str> = rows[0].iter().map(|(name, _)| name.as_str()).collect();
     assert_eq!(names, ["time", "a.x", "a.n", "a.on"]);
     assert_eq!(rows.len(), ROWS.len());
-    for (row, of) in rows.iter().zip(ROWS) {
+    for (row, tick) in rows.iter().zip(ROWS) {
         let Field::Double(value) = row[1].1 else { panic!("{row:?}") };
-        assert_eq!(value.to_bits(), VALUES[of].to_bits());
+        assert_eq!(value.to_bits(), VALUES[tick].to_bits());
         assert_eq!(row[2].1, Field::Int(7));
-        assert_eq!(row[3].1, Field::Bool(of % 2 == 1));
+        assert_eq!(row[3].1, Field::Bool(tick % 2 == 1));
     }
 }
 

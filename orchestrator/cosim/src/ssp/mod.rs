@@ -1,5 +1,6 @@
 //! Archives of the standard System Structure and Parameterization 1.0 (SSP). Such an archive holds
-//! a system of FMUs, its connections and its parameter values for any tool that reads the format.
+//! a system of FMUs, its connections and its parameter values for any importer that reads the
+//! format.
 
 mod read;
 mod structure;
@@ -11,10 +12,9 @@ pub use write::pack;
 
 /// Path of the system structure in an archive.
 const STRUCTURE: &str = "SystemStructure.ssd";
-/// Type of the annotation that holds the settings for which the standard has no place, in this
-/// program's own words.
-const OWN: &str = "orchestrator";
-/// Type of an annotation that other tools read as well, which holds the step.
+/// Type of this program's annotation, which holds the settings for which the standard has no place.
+const RUN_SETTINGS: &str = "orchestrator";
+/// Type of an annotation that other importers read as well, which holds the step.
 const OPEN_MODELICA: &str = "org.openmodelica";
 /// Type of a component that is an FMU, which is also the type of a component that states none.
 const FMU: &str = "application/x-fmu-sharedlibrary";

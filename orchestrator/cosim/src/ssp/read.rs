@@ -1,7 +1,7 @@
 //! Reads an SSP archive as an experiment.
 
-use super::structure::{Found, Structure};
-use super::{OPEN_MODELICA, OWN, STRUCTURE};
+use super::structure::{Structure, SystemComponent};
+use super::{OPEN_MODELICA, RUN_SETTINGS, STRUCTURE};
 use crate::delay;
 use crate::document::Source;
 use crate::error::Error;
@@ -60,7 +60,7 @@ fn of_entry(error: Error, archive: &Path, folder: &Path) -> Error {
 }
 
 /// Run settings that this program stored in the archive.
-struct Own {
+struct RunSettings {
     title: String,
     description: String,
     step: f64,
@@ -72,11 +72,11 @@ struct Own {
     observe: Observe,
 }
 
-impl Own {
+impl RunSettings {
     fn read(element: &Element) -> Result<Self, String> {
         let count = |element: &Element, name: &str| {
             let text = element.required(name)?;
-            text.parse::<u32>().map_err(|_| format!("{name}=\"{text}\" is no count"))
+            text.parse::<u32>().map_err(|_| format!("{name}=\"{text}\" is not a whole number"))
         };
         let coupling = match element.required("coupling")? {
             "sequential" | "gauss-seidel" => Coupling::Sequential,
@@ -93,7 +93,7 @@ impl Own {
         Ok(Self {
             title: element.required("title")?.to_string(),
             description: element.attribute("description").unwrap_or_default().to_string(),
-            step: element.number("step")?.ok_or("the annotation of the run says no step")?,
+            step: element.number("step")?.ok_or("the annotation of the run has no step")?,
             coupling,
             order: those("Component")
                 .map(|child| Ok((child.required("name")?.to_string(), count(child, "every")?)))
@@ -136,7 +136,7 @@ pub fn load(path: &Path, overrides: &Overrides) -> Result<Loaded, Error> {
     let folder = archive::unpack(path)?;
     let refuse = |message: String| Error::from(Import::Fmu { path: path.to_path_buf(), message });
     let bytes = std::fs::read(folder.path().join(STRUCTURE)).map_err(|error| {
-        refuse(format!("is no SSP archive, {STRUCTURE} cannot be read: {error}"))
+        refuse(format!("is not an SSP archive, because {STRUCTURE} cannot be read: {error}"))
     })?;
     let in_structure = |message: String| refuse(format!("{STRUCTURE}: {message}"));
     let text = xml::decode(&bytes).map_err(in_structure)?;
@@ -147,24 +147,26 @@ pub fn load(path: &Path, overrides: &Overrides) -> Result<Loaded, Error> {
     for component in &structure.components {
         let fmu = structure.folder.join(&component.source);
         if !opened.contains_key(&fmu) {
-            let unit =
+            let archive =
                 Fmu::open(&fmu).map_err(|error| of_entry(error.into(), path, folder.path()))?;
-            opened.insert(fmu.clone(), Rc::new(unit));
+            opened.insert(fmu.clone(), Rc::new(archive));
         }
     }
-    let of = |component: &Found| &opened[&structure.folder.join(&component.source)].description;
+    let description_of = |component: &SystemComponent| {
+        &opened[&structure.folder.join(&component.source)].description
+    };
 
     let system = root.child("System");
     let annotation = |kind: &str| {
-        let mut all =
+        let mut annotations =
             system.into_iter().flat_map(|system| system.list("Annotations", "Annotation"));
-        all.find(|annotation| annotation.attribute("type") == Some(kind))
+        annotations.find(|annotation| annotation.attribute("type") == Some(kind))
     };
-    let own = annotation(OWN).and_then(|annotation| annotation.child("Experiment"));
-    let own = own.map(Own::read).transpose().map_err(in_structure)?;
+    let stored = annotation(RUN_SETTINGS).and_then(|annotation| annotation.child("Experiment"));
+    let stored = stored.map(RunSettings::read).transpose().map_err(in_structure)?;
     let master = annotation(OPEN_MODELICA)
         .and_then(|annotation| annotation.child("Annotations"))
-        .and_then(|all| all.child("SimulationInformation"))
+        .and_then(|annotations| annotations.child("SimulationInformation"))
         .and_then(|information| information.child("FixedStepMaster"));
     let common =
         master.map_or(Ok(None), |master| master.number("stepSize")).map_err(in_structure)?;
@@ -172,9 +174,11 @@ pub fn load(path: &Path, overrides: &Overrides) -> Result<Loaded, Error> {
     let experiment = root.child("DefaultExperiment");
     let time = |name| experiment.map_or(Ok(None), |e| e.number(name)).map_err(in_structure);
     let stop = overrides.stop.map_or_else(|| time("stopTime"), |stop| Ok(Some(stop)))?;
-    let proposed =
-        structure.components.iter().filter_map(|component| of(component).default_experiment.step);
-    let stated = own.as_ref().map(|own| own.step).or(common);
+    let proposed = structure
+        .components
+        .iter()
+        .filter_map(|component| description_of(component).default_experiment.step);
+    let stated = stored.as_ref().map(|settings| settings.step).or(common);
     let step = overrides.step.or(stated).or(proposed.reduce(f64::min));
     let simulation = Simulation {
         on_invalid: OnInvalid::default(),
@@ -187,7 +191,9 @@ pub fn load(path: &Path, overrides: &Overrides) -> Result<Loaded, Error> {
     let text_of = |text: String| Spanned::new(0..0, text);
     let recorded = structure.components.iter().flat_map(|component| {
         let seen = |causality| {
-            of(component).names(causality).map(|name| format!("{}.{name}", component.name))
+            description_of(component)
+                .names(causality)
+                .map(|name| format!("{}.{name}", component.name))
         };
         seen("input").chain(seen("output")).collect::<Vec<_>>()
     });
@@ -219,15 +225,19 @@ pub fn load(path: &Path, overrides: &Overrides) -> Result<Loaded, Error> {
         .into_iter()
         .map(|index| parts[index].name.to_string())
         .collect();
-    if let Some(own) = own {
-        own.apply(&mut experiment).map_err(in_structure)?;
+    if let Some(settings) = stored {
+        settings.apply(&mut experiment).map_err(in_structure)?;
     }
     experiment.apply(overrides)?;
     Ok(Loaded { experiment, opened, entries: Entries { path: path.to_path_buf(), folder } })
 }
 
-fn parts<'a>(components: &'a [Found], opened: &'a Opened, folder: &Path) -> Vec<Part<'a>> {
-    let part = |component: &'a Found| Part {
+fn parts<'a>(
+    components: &'a [SystemComponent],
+    opened: &'a Opened,
+    folder: &Path,
+) -> Vec<Part<'a>> {
+    let part = |component: &'a SystemComponent| Part {
         name: &component.name,
         description: &opened[&folder.join(&component.source)].description,
     };

@@ -12,14 +12,14 @@ use std::path::{Path, PathBuf};
 use toml::{Spanned, Value};
 
 /// A component of the system or of one of its subsystems.
-pub(super) struct Found {
+pub(super) struct SystemComponent {
     pub(super) name: String,
     /// Path of the component's FMU in the archive.
     pub(super) source: String,
     pub(super) parameters: BTreeMap<String, Value>,
 }
 
-impl Found {
+impl SystemComponent {
     pub(super) fn component(&self, folder: &Path) -> Component {
         let value =
             |(name, value): (&String, &Value)| (name.clone(), Spanned::new(0..0, value.clone()));
@@ -49,14 +49,14 @@ struct Edge {
 /// A system into which its subsystems have been merged.
 pub(super) struct Structure {
     pub(super) folder: PathBuf,
-    pub(super) components: Vec<Found>,
+    pub(super) components: Vec<SystemComponent>,
     pub(super) connections: Vec<Connection>,
 }
 
 /// Collects components, connections and values while the systems are traversed.
 #[derive(Default)]
 struct Walk {
-    components: Vec<Found>,
+    components: Vec<SystemComponent>,
     edges: BTreeMap<Node, Edge>,
     /// Parameter values that belong to systems, by the full name of the variable.
     parameters: Vec<(String, Value)>,
@@ -152,19 +152,18 @@ impl Walk {
             return refuse(format!("is of type {kind}: only FMUs are supported"));
         }
         if element.attribute("implementation") == Some("ModelExchange") {
-            return refuse("wants model exchange: only co-simulation is supported".into());
+            return refuse("needs model exchange: only co-simulation is supported".into());
         }
         let source = file(element.required("source")?)?;
         let parameters = parameters(element, folder)?.into_iter().collect();
         if self.components.iter().any(|other| other.name == name) {
-            return refuse("is there twice".into());
+            return refuse("is defined twice".into());
         }
-        self.components.push(Found { name, source, parameters });
+        self.components.push(SystemComponent { name, source, parameters });
         Ok(())
     }
 
-    /// Returns the connections between components, in which the connectors of systems have been
-    /// passed over.
+    /// Returns the connections between components, with the connectors of systems left out.
     fn connections(&self) -> Result<Vec<Connection>, String> {
         let is_component =
             |node: &Node| self.components.iter().any(|component| component.name == node.0);
@@ -238,7 +237,7 @@ fn value(parameter: &Element) -> Result<Value, String> {
     let typed = parameter.children.iter().find(|child| child.name != "Annotations");
     let typed = typed.ok_or_else(|| format!("the parameter \"{name}\" has no value"))?;
     let text = typed.required("value")?;
-    let fault = |what: &str| format!("the parameter \"{name}\" = \"{text}\" is no {what}");
+    let fault = |what: &str| format!("the parameter \"{name}\" = \"{text}\" is not a valid {what}");
     Ok(match typed.name.as_str() {
         "Real" => {
             let number: f64 = text.trim().parse().map_err(|_| fault("real number"))?;

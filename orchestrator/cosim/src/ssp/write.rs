@@ -1,14 +1,14 @@
 //! Writes an experiment to an SSP archive.
 
 use super::xml::{Xml, element, leaf, real};
-use super::{FMU, OPEN_MODELICA, OWN, STRUCTURE};
+use super::{FMU, OPEN_MODELICA, RUN_SETTINGS, STRUCTURE};
 use crate::error::Error;
 use crate::experiment::Coupling;
 use crate::files;
 use crate::interrupt::Interrupt;
 use crate::settings::SettingValue;
 use crate::system::System;
-use fmu_import::description::{Kind, Variable};
+use fmu_import::description::{Variable, VariableKind};
 use fmu_import::quantity::Scaling;
 use quick_xml::Writer;
 use quick_xml::events::{BytesDecl, Event};
@@ -42,9 +42,9 @@ impl Deref for Source<'_> {
 }
 
 /// Writes an experiment as an archive. Settings for which the standard has no place, above all the
-/// step, are stored in annotations; values that equal the FMU's own are left out. Outputs that are
-/// enumerations become connectors if `enumerations` is true. The same experiment always gives the
-/// same bytes.
+/// step, are stored in annotations. Values that equal the FMU's start values are left out. Outputs
+/// that are enumerations become connectors if `enumerations` is true. The same experiment always
+/// gives the same bytes.
 ///
 /// # Errors
 /// Returns an error if a file cannot be read or written, or if the work was asked to end. Nothing
@@ -56,8 +56,11 @@ pub fn pack(
     interrupt: &Interrupt,
 ) -> Result<(), Error> {
     let goes_on = || interrupt.asked().map_or(Ok(()), |request| Err(Error::Ended(request)));
-    if let Some((name, _)) = system.order.iter().zip(&system.fmus).find(|(_, fmu)| fmu.is_table()) {
-        let message = format!("[components.{name}] is a table, which other tools cannot run");
+    if let Some((name, _)) =
+        system.order.iter().zip(&system.fmus).find(|(_, fmu)| fmu.is_lookup_table())
+    {
+        let message =
+            format!("[components.{name}] is a lookup table, which other importers cannot run");
         return Err(system.experiment.source.error(&(0..0), message));
     }
     let mut entries: BTreeMap<String, Vec<u8>> = BTreeMap::new();
@@ -70,9 +73,9 @@ pub fn pack(
         .last_modified_time(DateTime::default());
     // The archive is made in memory, so that a failure leaves no incomplete file.
     let mut archive = ZipWriter::new(Cursor::new(Vec::new()));
-    let all =
+    let files =
         [(STRUCTURE, &structure)].into_iter().chain(entries.iter().map(|(n, c)| (n.as_str(), c)));
-    for (name, content) in all {
+    for (name, content) in files {
         goes_on()?;
         archive.start_file(name, options).map_err(|error| Error::file(path)(error.into()))?;
         archive.write_all(content).map_err(Error::file(path))?;
@@ -107,7 +110,9 @@ fn structure(system: &Source) -> io::Result<Vec<u8>> {
                 element(xml, "ssc:Annotation", &[("type", OPEN_MODELICA.into())], |xml| {
                     open_modelica(xml, system)
                 })?;
-                element(xml, "ssc:Annotation", &[("type", OWN.into())], |xml| own(xml, system))
+                element(xml, "ssc:Annotation", &[("type", RUN_SETTINGS.into())], |xml| {
+                    run_settings(xml, system)
+                })
             })
         })?;
         enumerations(xml, system)?;
@@ -121,7 +126,7 @@ fn structure(system: &Source) -> io::Result<Vec<u8>> {
     Ok(bytes)
 }
 
-/// Converts a text to an identifier, because some tools require every name to be one.
+/// Converts a text to an identifier, because some importers require every name to be one.
 fn identifier(text: &str) -> String {
     let mut name: String =
         text.chars().map(|c| if c.is_ascii_alphanumeric() || c == '_' { c } else { '_' }).collect();
@@ -131,7 +136,7 @@ fn identifier(text: &str) -> String {
     name
 }
 
-/// Writes the step in the way of OMSimulator, which other tools read as well.
+/// Writes the step in the way of OMSimulator, which other importers read as well.
 fn open_modelica(xml: &mut Xml, system: &Source) -> io::Result<()> {
     let schema = "https://raw.githubusercontent.com/OpenModelica/OMSimulator/master/schema/oms.xsd";
     element(xml, "oms:Annotations", &[("xmlns:oms", schema.into())], |xml| {
@@ -149,7 +154,7 @@ fn open_modelica(xml: &mut Xml, system: &Source) -> io::Result<()> {
 
 /// Writes the settings that are needed to repeat the same run: step, coupling, order, periods,
 /// recorded variables, and what is measured, watched and drawn.
-fn own(xml: &mut Xml, system: &Source) -> io::Result<()> {
+fn run_settings(xml: &mut Xml, system: &Source) -> io::Result<()> {
     let experiment = &system.experiment;
     let coupling = match experiment.simulation.coupling {
         Coupling::Sequential => "sequential",
@@ -202,8 +207,8 @@ fn connectors<'a>(system: &'a Source, index: usize) -> impl Iterator<Item = &'a 
         match &*variable.causality {
             "input" if is_connected(position) => Some(variable),
             "output" => match variable.kind {
-                Kind::String => None,
-                Kind::Enumeration { .. } => system.enumerations.then_some(variable),
+                VariableKind::String => None,
+                VariableKind::Enumeration { .. } => system.enumerations.then_some(variable),
                 _ => Some(variable),
             },
             _ => None,
@@ -217,8 +222,8 @@ fn kinds<'a>(system: &'a Source) -> Vec<(String, &'a [(String, i32)])> {
     let mut kinds: Vec<(String, &'a [(String, i32)])> = Vec::new();
     for (index, fmu) in system.fmus.iter().enumerate() {
         for variable in connectors(system, index) {
-            if let Kind::Enumeration { items } = &variable.kind
-                && !kinds.iter().any(|(_, known)| *known == items.as_slice())
+            if let VariableKind::Enumeration { items } = &variable.kind
+                && !kinds.iter().any(|(_, listed)| *listed == items.as_slice())
             {
                 let name = identifier(&format!("{}_{}", fmu.description.model_name, variable.name));
                 kinds.push((name, items));
@@ -248,11 +253,11 @@ fn connector(xml: &mut Xml, system: &Source, variable: &Variable) -> io::Result<
     let attributes = [("name", variable.name.clone()), ("kind", variable.causality.to_string())];
     element(xml, "ssd:Connector", &attributes, |xml| {
         let unit = match &variable.kind {
-            Kind::Real { unit: Some(unit), .. } => vec![("unit", unit.clone())],
-            Kind::Enumeration { items } => {
+            VariableKind::Real { unit: Some(unit), .. } => vec![("unit", unit.clone())],
+            VariableKind::Enumeration { items } => {
                 let kinds = kinds(system).into_iter();
-                let known = kinds.filter(|(_, known)| *known == items.as_slice());
-                known.map(|(name, _)| ("name", name)).collect()
+                let same = kinds.filter(|(_, listed)| *listed == items.as_slice());
+                same.map(|(name, _)| ("name", name)).collect()
             }
             _ => Vec::new(),
         };
@@ -262,15 +267,19 @@ fn connector(xml: &mut Xml, system: &Source, variable: &Variable) -> io::Result<
 
 fn parameters(xml: &mut Xml, system: &Source, index: usize) -> io::Result<()> {
     let description = &system.fmus[index].description;
-    let own =
+    let start_of =
         |name: &str| description.find(name).and_then(|(_, variable)| variable.start.as_deref());
     let differs = |name: &str, value: &SettingValue| match value {
-        SettingValue::Real(value) => own(name).and_then(|start| start.parse().ok()) != Some(*value),
-        SettingValue::Integer(value) | SettingValue::Item(_, value) => {
-            own(name).and_then(|start| start.parse().ok()) != Some(*value)
+        SettingValue::Real(value) => {
+            start_of(name).and_then(|start| start.parse().ok()) != Some(*value)
         }
-        SettingValue::Boolean(value) => own(name) != Some(if *value { "true" } else { "false" }),
-        SettingValue::Text(value) => own(name) != Some(value),
+        SettingValue::Integer(value) | SettingValue::Item(_, value) => {
+            start_of(name).and_then(|start| start.parse().ok()) != Some(*value)
+        }
+        SettingValue::Boolean(value) => {
+            start_of(name) != Some(if *value { "true" } else { "false" })
+        }
+        SettingValue::Text(value) => start_of(name) != Some(value),
     };
     let set: Vec<_> =
         system.settings[index].iter().filter(|s| differs(&s.name, &s.value)).collect();
@@ -330,7 +339,7 @@ fn connections(xml: &mut Xml, system: &Source) -> io::Result<()> {
         if wire.scaling == Scaling::default() {
             return leaf(xml, "ssd:Connection", &attributes);
         }
-        // The conversion is written here, so that all tools convert in the same way.
+        // The conversion is written here, so that all importers convert in the same way.
         attributes.push(("suppressUnitConversion", "true".into()));
         element(xml, "ssd:Connection", &attributes, |xml| {
             let linear =
@@ -345,7 +354,7 @@ fn units(xml: &mut Xml, system: &Source) -> io::Result<()> {
     let mut units = BTreeMap::new();
     for (index, fmu) in system.fmus.iter().enumerate() {
         for variable in connectors(system, index) {
-            let Kind::Real { unit: Some(unit), .. } = &variable.kind else { continue };
+            let VariableKind::Real { unit: Some(unit), .. } = &variable.kind else { continue };
             if let Some(defined) =
                 fmu.description.units.iter().find(|defined| defined.name == *unit)
             {

@@ -1,8 +1,8 @@
 //! Builds a description from the elements of the file.
 
 use super::{
-    ByName, CAUSALITIES, DefaultExperiment, Interface, Kind, ModelDescription, VARIABILITIES,
-    Variable,
+    ByName, CAUSALITIES, DefaultExperiment, Interface, ModelDescription, VARIABILITIES, Variable,
+    VariableKind,
 };
 use crate::quantity::UnitDefinition;
 use crate::xml::Element;
@@ -27,11 +27,11 @@ const BASE: [&str; 8] = ["kg", "m", "s", "A", "K", "mol", "cd", "rad"];
 
 type Types = BTreeMap<String, Element>;
 
-/// Variables that are taken from the file as it is read, so that their elements need not be kept.
+/// Variables that are taken from the file as it is read, so that their elements need not be stored.
 #[derive(Default)]
 pub(super) struct Variables {
-    all: Vec<Variable>,
-    /// Definitions of types by name, once the first variable is there.
+    listed: Vec<Variable>,
+    /// Definitions of types by name, once the first variable is read.
     types: Option<Types>,
     /// Variables that come before the definition of their type, with their places.
     early: Vec<(usize, Element)>,
@@ -56,10 +56,10 @@ impl Variables {
             kind.attribute("declaredType").is_some_and(|name| !types.contains_key(name))
         };
         if element.children.iter().any(is_early) {
-            self.early.push((self.all.len(), element));
-            self.all.push(Variable::default());
+            self.early.push((self.listed.len(), element));
+            self.listed.push(Variable::default());
         } else {
-            self.all.push(variable(&element, types)?);
+            self.listed.push(variable(&element, types)?);
         }
         Ok(None)
     }
@@ -69,22 +69,22 @@ impl Variables {
         if !self.early.is_empty() {
             let types = types(root);
             for (place, element) in self.early {
-                self.all[place] = variable(&element, &types)?;
+                self.listed[place] = variable(&element, &types)?;
             }
         }
-        Ok(self.all)
+        Ok(self.listed)
     }
 }
 
 fn types(root: &Element) -> Types {
     let types = root.list("TypeDefinitions", "SimpleType");
-    types.filter_map(|of| Some((of.attribute("name")?.to_string(), of.clone()))).collect()
+    types.filter_map(|kind| Some((kind.attribute("name")?.to_string(), kind.clone()))).collect()
 }
 
 /// Returns the version of FMI, which must be one that can be read.
 fn version(root: &Element) -> Result<String, String> {
     if root.name != "fmiModelDescription" {
-        return Err(format!("is no FMI description: it begins with {}", root.title()));
+        return Err(format!("is not an FMI description: it begins with {}", root.title()));
     }
     let version = root.required("fmiVersion")?.to_string();
     if version != "2.0" && !version.starts_with("2.0.") {
@@ -119,7 +119,7 @@ pub(super) fn description(
         },
         units: units.map(unit).collect::<Result<_, _>>()?,
         dependencies: dependencies(root, variables.len())?,
-        is_table: false,
+        is_lookup_table: false,
         has_structure: root.child("ModelStructure").is_some(),
         variables,
         by_name: ByName::default(),
@@ -173,34 +173,35 @@ fn unit(element: &Element) -> Result<UnitDefinition, String> {
 }
 
 fn variable(element: &Element, types: &Types) -> Result<Variable, String> {
-    let own = ["Real", "Integer", "Boolean", "String", "Enumeration"];
-    let own = own.iter().find_map(|kind| element.child(kind));
-    let own = own.ok_or_else(|| format!("{} has no type", element.title()))?;
+    let kinds = ["Real", "Integer", "Boolean", "String", "Enumeration"];
+    let typed = kinds.iter().find_map(|kind| element.child(kind));
+    let typed = typed.ok_or_else(|| format!("{} has no type", element.title()))?;
     // An attribute of the variable itself takes precedence over that of its declared type.
-    let declared = own.attribute("declaredType").and_then(|name| types.get(name)?.child(&own.name));
+    let declared =
+        typed.attribute("declaredType").and_then(|name| types.get(name)?.child(&typed.name));
     let text = |name: &str| {
-        own.attribute(name).or_else(|| declared?.attribute(name)).map(ToString::to_string)
+        typed.attribute(name).or_else(|| declared?.attribute(name)).map(ToString::to_string)
     };
-    let kind = match own.name.as_str() {
+    let kind = match typed.name.as_str() {
         "Real" => {
-            let bound = |name: &str| match own.number(name)? {
+            let bound = |name: &str| match typed.number(name)? {
                 None => declared.map_or(Ok(None), |declared| declared.number(name)),
-                own => Ok(own),
+                bound => Ok(bound),
             };
             let (min, max) = (bound("min")?, bound("max")?);
-            Kind::Real { unit: text("unit"), display_unit: text("displayUnit"), min, max }
+            VariableKind::Real { unit: text("unit"), display_unit: text("displayUnit"), min, max }
         }
         "Integer" => {
-            let bound = |name: &str| match own.parsed(name, "a whole number")? {
+            let bound = |name: &str| match typed.parsed(name, "a whole number")? {
                 None => {
                     declared.map_or(Ok(None), |declared| declared.parsed(name, "a whole number"))
                 }
-                own => Ok::<_, String>(own),
+                bound => Ok::<_, String>(bound),
             };
-            Kind::Integer { min: bound("min")?, max: bound("max")? }
+            VariableKind::Integer { min: bound("min")?, max: bound("max")? }
         }
-        "Boolean" => Kind::Boolean,
-        "String" => Kind::String,
+        "Boolean" => VariableKind::Boolean,
+        "String" => VariableKind::String,
         _ => {
             let declared =
                 declared.ok_or_else(|| format!("{} has no type definition", element.title()))?;
@@ -211,33 +212,35 @@ fn variable(element: &Element, types: &Types) -> Result<Variable, String> {
                 Ok((item.required("name")?.to_string(), value))
             };
             let items = declared.children.iter().filter(|child| child.name == "Item");
-            Kind::Enumeration { items: items.map(item).collect::<Result<_, String>>()? }
+            VariableKind::Enumeration { items: items.map(item).collect::<Result<_, String>>()? }
         }
     };
     let reference = element.parsed("valueReference", "a whole number from 0 to 4294967295")?;
-    let known = |name: &str, usual: &'static str| {
-        let own = element.attribute(name).unwrap_or(usual);
-        let known = CAUSALITIES.iter().chain(&VARIABILITIES).find(|known| **known == own);
-        // What the standard knows is not copied for each variable.
-        known.map_or_else(|| Cow::Owned(own.to_string()), |known| Cow::Borrowed(*known))
+    let keyword = |name: &str, default: &'static str| {
+        let text = element.attribute(name).unwrap_or(default);
+        let keyword = CAUSALITIES.iter().chain(&VARIABILITIES).find(|keyword| **keyword == text);
+        // Keywords of the standard are not copied for each variable.
+        keyword.map_or_else(|| Cow::Owned(text.to_string()), |keyword| Cow::Borrowed(*keyword))
     };
     Ok(Variable {
         name: element.required("name")?.to_string(),
         reference: reference
             .ok_or_else(|| format!("{} has no attribute valueReference", element.title()))?,
         description: element.attribute("description").unwrap_or_default().to_string(),
-        causality: known("causality", "local"),
-        variability: known("variability", "continuous"),
+        causality: keyword("causality", "local"),
+        variability: keyword("variability", "continuous"),
         kind,
-        start: own.attribute("start").map(ToString::to_string),
+        start: typed.attribute("start").map(ToString::to_string),
     })
 }
 
 /// Returns the positions of the inputs that each output depends on, by the position of the
 /// output. Only outputs that declare their dependencies have an entry.
 fn dependencies(root: &Element, variables: usize) -> Result<BTreeMap<usize, Vec<usize>>, String> {
-    let unknowns =
-        root.child("ModelStructure").into_iter().flat_map(|of| of.list("Outputs", "Unknown"));
+    let unknowns = root
+        .child("ModelStructure")
+        .into_iter()
+        .flat_map(|structure| structure.list("Outputs", "Unknown"));
     let mut dependencies = BTreeMap::new();
     for unknown in unknowns {
         // Indices in the file count from 1.
@@ -245,7 +248,7 @@ fn dependencies(root: &Element, variables: usize) -> Result<BTreeMap<usize, Vec<
             let position = index.checked_sub(1).filter(|&position| position < variables);
             position.ok_or_else(|| {
                 format!(
-                    "{} names variable {index} of {variables} of ModelStructure",
+                    "{} refers to variable {index}, but there are only {variables}",
                     unknown.title()
                 )
             })
@@ -255,8 +258,9 @@ fn dependencies(root: &Element, variables: usize) -> Result<BTreeMap<usize, Vec<
             position(index.ok_or_else(|| format!("{} has no attribute index", unknown.title()))?)?;
         if let Some(text) = unknown.attribute("dependencies") {
             let parse = |text: &str| {
-                let fault =
-                    || format!("\"{}\" in {} is no index", text.escape_default(), unknown.title());
+                let fault = || {
+                    format!("\"{}\" in {} is not an index", text.escape_default(), unknown.title())
+                };
                 text.parse().map_err(|_| fault()).and_then(position)
             };
             dependencies

@@ -42,11 +42,15 @@ fn everything_needed_is_read() {
     assert_eq!(description.default_experiment.stop, Some(50.0));
     assert_eq!(description.units[0].displays[0].0, "deg");
     let (_, u) = description.find("u").unwrap();
-    let real =
-        Kind::Real { unit: Some("rad".into()), display_unit: None, min: None, max: Some(2.0) };
+    let real = VariableKind::Real {
+        unit: Some("rad".into()),
+        display_unit: None,
+        min: None,
+        max: Some(2.0),
+    };
     assert_eq!((u.reference, &u.kind, u.start.as_deref()), (7, &real, Some("0.5")));
     let items = vec![("none".to_string(), 1), ("white".to_string(), 2)];
-    assert_eq!(description.find("kind").unwrap().1.kind, Kind::Enumeration { items });
+    assert_eq!(description.find("kind").unwrap().1.kind, VariableKind::Enumeration { items });
     // A declaration of no dependencies is distinguished from a missing declaration.
     assert_eq!(description.dependencies, BTreeMap::from([(1, vec![0])]));
 }
@@ -56,7 +60,9 @@ fn what_cannot_be_used_is_refused() {
     let other = TEXT.replace("fmiVersion=\"2.0\"", "fmiVersion=\"3.0\"");
     assert!(ModelDescription::parse(&other).unwrap_err().contains("FMI 3.0"));
     let index = TEXT.replace("index=\"4\"", "index=\"5\"");
-    assert!(ModelDescription::parse(&index).unwrap_err().contains("variable 5 of 4"));
+    assert!(
+        ModelDescription::parse(&index).unwrap_err().contains("variable 5, but there are only 4")
+    );
     let reference = TEXT.replace("valueReference=\"9\"", "valueReference=\"-1\"");
     let fault = "valueReference = \"-1\" of the element ScalarVariable \"kind\" in line 19 is not a whole number";
     assert!(ModelDescription::parse(&reference).unwrap_err().starts_with(fault));

@@ -1,7 +1,7 @@
-//! Memory that two processes share, through which one asks and the other answers.
+//! Memory that two processes share, through which one sends requests and the other answers.
 //!
-//! Whoever waits looks at the memory for about a millisecond first, and leaves the processor to
-//! others in between: on one machine an answer comes faster than the system wakes a process.
+//! A waiting process first looks at the memory for about a millisecond, and yields the processor in
+//! between: an answer comes faster than the system wakes a process.
 
 #![allow(unsafe_code)]
 
@@ -20,17 +20,17 @@ const SIZE: usize = HEAD + 3 * LARGEST;
 /// Distance between counters, so that the two processes do not write to one line of the cache.
 const LINE: usize = 128;
 /// Time for which a process looks at the memory before it sleeps.
-const PATIENCE: Duration = Duration::from_millis(1);
+const SPIN_TIME: Duration = Duration::from_millis(1);
 /// Time after which a sleeping process looks whether the other one is still there.
-const NAP: Duration = Duration::from_millis(20);
+const SLEEP_TIME: Duration = Duration::from_millis(20);
 
 /// Place of a message in the memory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Slot {
     Request = 0,
     Reply = 1,
-    /// What a unit said last about a problem, which is read when its process has ended.
-    LastWords = 2,
+    /// Last message of the instance about a problem, which is read when its process has ended.
+    LastMessage = 2,
 }
 
 /// One end of the memory.
@@ -53,7 +53,7 @@ impl Channel {
         Ok(Self { map: MmapOptions::new().len(SIZE).map_raw(file)? })
     }
 
-    /// The counters of a slot: number of the message, length, and whether somebody sleeps.
+    /// The counters of a slot: number of the message, length, and whether a process sleeps.
     fn counter(&self, slot: Slot, which: usize) -> &AtomicU32 {
         let offset = (3 * slot as usize + which) * LINE;
         // SAFETY: the offset is a multiple of the alignment and less than HEAD, the map begins at
@@ -82,7 +82,7 @@ impl Channel {
 
     /// Copies the message that lies in a slot into `message`.
     pub(crate) fn copy(&self, slot: Slot, message: &mut Vec<u8>) {
-        // The other process may be broken and have written anything.
+        // A broken process may have written any length.
         let length = (self.counter(slot, 1).load(Ordering::Relaxed) as usize).min(LARGEST);
         message.clear();
         message.reserve(length);
@@ -116,7 +116,7 @@ impl Channel {
                 }
                 std::thread::yield_now();
             }
-            if begin.elapsed() > PATIENCE {
+            if begin.elapsed() > SPIN_TIME {
                 break;
             }
         }
@@ -140,7 +140,7 @@ impl Channel {
 #[cfg(target_os = "linux")]
 fn sleep(counter: &AtomicU32, value: u32) {
     use rustix::thread::futex;
-    let nap = futex::Timespec { tv_sec: 0, tv_nsec: NAP.as_nanos() as _ };
+    let nap = futex::Timespec { tv_sec: 0, tv_nsec: SLEEP_TIME.as_nanos() as _ };
     // Whatever ended the sleep, the caller looks again.
     let _ = futex::wait(counter, futex::Flags::empty(), value, Some(&nap));
 }
@@ -155,7 +155,7 @@ fn wake(counter: &AtomicU32) {
 /// Other systems wake only threads of the same process: here a sleeper looks often.
 #[cfg(not(target_os = "linux"))]
 fn sleep(_counter: &AtomicU32, _value: u32) {
-    std::thread::sleep(NAP / 100);
+    std::thread::sleep(SLEEP_TIME / 100);
 }
 
 #[cfg(not(target_os = "linux"))]
@@ -175,7 +175,7 @@ mod tests {
                 answers.wait(Slot::Request, number, |_| Ok::<(), ()>(())).unwrap();
                 answers.copy(Slot::Request, &mut message);
                 if number % 100 == 0 {
-                    std::thread::sleep(3 * PATIENCE);
+                    std::thread::sleep(3 * SPIN_TIME);
                 }
                 message.reverse();
                 answers.put(Slot::Reply, number, &message);
@@ -197,7 +197,7 @@ mod tests {
     fn a_wait_can_be_ended_and_a_false_length_is_cut() {
         let file = tempfile::tempfile().unwrap();
         let channel = Channel::create(&file).unwrap();
-        let late = |waited| if waited > 3 * PATIENCE { Err("late") } else { Ok(()) };
+        let late = |waited| if waited > 3 * SPIN_TIME { Err("late") } else { Ok(()) };
         assert_eq!(channel.wait(Slot::Reply, 1, late), Err("late"));
         channel.put(Slot::Reply, 1, b"four");
         channel.counter(Slot::Reply, 1).store(u32::MAX, Ordering::SeqCst);

@@ -1,13 +1,13 @@
-//! The process of a unit: it loads the library and makes the calls that the master asks for.
+//! The process of an instance: it loads the library and makes the calls that the master requests.
 
 use super::channel::{Channel, LARGEST, Slot};
 use super::limits;
-use super::protocol::{Action, InstanceOf, List, Ready, Reply, Request, Set, Setup};
+use super::protocol::{Action, InstanceArguments, List, Ready, Reply, Request, Set, Setup};
 use crate::description::Carrier;
 use crate::error::with_causes;
-use crate::instance::{FmuUnit, Functions};
+use crate::instance::{Instance, Outcome};
+use crate::library::{FmuInstance, Functions};
 use crate::log::{Held, Log};
-use crate::unit::{CoSimulationUnit, Outcome};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use std::fs::OpenOptions;
@@ -17,15 +17,15 @@ use std::rc::Rc;
 use std::sync::Arc;
 use std::time::Duration;
 
-/// Serves one unit by the memory in this file, and ends when the unit is freed or the master is
-/// gone.
+/// Serves one instance through the shared memory in this file, and ends when the instance is freed
+/// or the master has ended.
 ///
 /// # Errors
 /// Returns an error if the file is not what the master makes, or if a message cannot be decoded.
 pub fn serve(memory: &Path) -> io::Result<()> {
     let file = OpenOptions::new().read(true).write(true).open(memory)?;
     let channel = Arc::new(Channel::open(&file)?);
-    // A unit must not find the file open: if it cut it off, the master would crash.
+    // An instance must not find the file open: if it truncated the file, the master would crash.
     drop(file);
     // The master holds the other end of this pipe, which the system closes when the master ends.
     std::thread::spawn(|| {
@@ -37,7 +37,7 @@ pub fn serve(memory: &Path) -> io::Result<()> {
     let held = Arc::new(Held::default());
     let words = Arc::clone(&host.channel);
     let log = |name: &str| {
-        Log::held(name, Arc::clone(&held), move |text| words.put(Slot::LastWords, 1, text))
+        Log::held(name, Arc::clone(&held), move |text| words.put(Slot::LastMessage, 1, text))
     };
     let without = limits::apply(&setup.limits);
     let functions = match Functions::load(&setup.library) {
@@ -45,26 +45,27 @@ pub fn serve(memory: &Path) -> io::Result<()> {
         Err(error) => return host.send(&Ready::Unloadable(with_causes(&error))),
     };
     let version_fault = functions.version_fault();
-    let Some(InstanceOf { name, guid, resources }) = setup.instance else {
-        host.send(&Ready::Loaded { version_fault, without, said: Vec::new() })?;
+    let Some(InstanceArguments { name, guid, resources }) = setup.instance else {
+        host.send(&Ready::Loaded { version_fault, without, messages: Vec::new() })?;
         host.receive::<Request>()?;
         drop(functions);
         return host.send(&Reply::default());
     };
-    let mut unit = match FmuUnit::new(functions, Rc::new(log(&name)), &guid, &resources, None) {
-        Ok(unit) => unit,
-        Err(reason) => return host.send(&Ready::Refused { reason, said: held.take() }),
-    };
-    host.send(&Ready::Loaded { version_fault, without, said: held.take() })?;
+    let mut instance =
+        match FmuInstance::new(functions, Rc::new(log(&name)), &guid, &resources, None) {
+            Ok(instance) => instance,
+            Err(reason) => return host.send(&Ready::Refused { reason, messages: held.take() }),
+        };
+    host.send(&Ready::Loaded { version_fault, without, messages: held.take() })?;
     let (mut lists, mut values) = (Vec::new(), Vec::new());
     loop {
         let request: Request = host.receive()?;
         if request.action == Action::Free {
-            drop(unit);
-            return host.send(&Reply { said: held.take(), ..Reply::default() });
+            drop(instance);
+            return host.send(&Reply { messages: held.take(), ..Reply::default() });
         }
-        let reply = answer(&mut unit, request, &mut lists, &mut values);
-        host.send_with(&Reply { said: held.take(), ..reply }, &values)?;
+        let reply = answer(&mut instance, request, &mut lists, &mut values);
+        host.send_with(&Reply { messages: held.take(), ..reply }, &values)?;
     }
 }
 
@@ -88,7 +89,7 @@ impl Host {
         self.send_with(message, &[])
     }
 
-    /// Sends a message with these bytes behind it.
+    /// Sends a message, followed by these bytes.
     fn send_with(&mut self, message: &impl Serialize, behind: &[u8]) -> io::Result<()> {
         self.bytes.clear();
         self.bytes = postcard::to_extend(message, std::mem::take(&mut self.bytes))
@@ -117,12 +118,12 @@ impl Values {
     }
 
     /// Reads the values and appends their bytes.
-    fn read(&mut self, unit: &mut impl CoSimulationUnit, bytes: &mut Vec<u8>) -> Outcome {
+    fn read(&mut self, instance: &mut impl Instance, bytes: &mut Vec<u8>) -> Outcome {
         let references = &self.list.references;
         let outcome = match self.list.carrier {
-            Carrier::Real => unit.get_real(references, &mut self.reals),
-            Carrier::Integer => unit.get_integer(references, &mut self.wholes),
-            Carrier::Boolean => unit.get_boolean(references, &mut self.wholes),
+            Carrier::Real => instance.get_real(references, &mut self.reals),
+            Carrier::Integer => instance.get_integer(references, &mut self.wholes),
+            Carrier::Boolean => instance.get_boolean(references, &mut self.wholes),
         };
         bytes.extend(self.reals.iter().flat_map(|value| value.to_le_bytes()));
         bytes.extend(self.wholes.iter().flat_map(|value| value.to_le_bytes()));
@@ -130,15 +131,18 @@ impl Values {
     }
 }
 
-/// Makes the calls of a request until one fails, and reads what is to be read.
+/// Makes the calls of a request until one fails, and reads the requested variables.
 fn answer(
-    unit: &mut impl CoSimulationUnit,
+    instance: &mut impl Instance,
     request: Request,
     lists: &mut Vec<Values>,
     bytes: &mut Vec<u8>,
 ) -> Reply {
     let Request { sets, action, reads, once } = request;
-    let outcome = sets.iter().try_for_each(|own| set(unit, own)).and_then(|()| act(unit, action));
+    let outcome = sets
+        .iter()
+        .try_for_each(|values| set(instance, values))
+        .and_then(|()| act(instance, action));
     if !action.reads() {
         lists.clear();
     }
@@ -149,7 +153,7 @@ fn answer(
         let mut once: Vec<Values> = once.into_iter().map(Values::new).collect();
         let read = if once.is_empty() { lists } else { &mut once };
         for (place, list) in read.iter_mut().enumerate() {
-            if let Err(failure) = list.read(unit, bytes) {
+            if let Err(failure) = list.read(instance, bytes) {
                 reply.unread.push((place, failure));
             }
         }
@@ -157,22 +161,22 @@ fn answer(
     reply
 }
 
-fn set(unit: &mut impl CoSimulationUnit, set: &Set) -> Outcome {
+fn set(instance: &mut impl Instance, set: &Set) -> Outcome {
     match set {
-        Set::Real(references, values) => unit.set_real(references, values),
-        Set::Integer(references, values) => unit.set_integer(references, values),
-        Set::Boolean(references, values) => unit.set_boolean(references, values),
-        Set::Text(reference, value) => unit.set_string(*reference, value),
+        Set::Real(references, values) => instance.set_real(references, values),
+        Set::Integer(references, values) => instance.set_integer(references, values),
+        Set::Boolean(references, values) => instance.set_boolean(references, values),
+        Set::Text(reference, value) => instance.set_string(*reference, value),
     }
 }
 
-fn act(unit: &mut impl CoSimulationUnit, action: Action) -> Outcome {
+fn act(instance: &mut impl Instance, action: Action) -> Outcome {
     match action {
         Action::Read | Action::Free => Ok(()),
-        Action::EnterInitialization { start, stop } => unit.enter_initialization(start, stop),
-        Action::ExitInitialization => unit.exit_initialization(),
-        Action::DoStep { time, step } => unit.do_step(time, step),
-        Action::Terminate => unit.terminate(),
-        Action::Reset => unit.reset(),
+        Action::EnterInitialization { start, stop } => instance.enter_initialization(start, stop),
+        Action::ExitInitialization => instance.exit_initialization(),
+        Action::DoStep { time, step } => instance.do_step(time, step),
+        Action::Terminate => instance.terminate(),
+        Action::Reset => instance.reset(),
     }
 }

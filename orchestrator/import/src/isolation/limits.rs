@@ -1,14 +1,14 @@
-//! Limits that the process of a unit sets itself before it loads the library.
+//! Limits that the process of an instance sets itself before it loads the library.
 
 use super::protocol::Limits;
 #[cfg(unix)]
 use std::path::Path;
 
-/// Sets the limits. Returns those that the system does not know, as a text.
+/// Sets the limits. Returns those that the system does not support, as a text.
 #[cfg(unix)]
 pub(super) fn apply(limits: &Limits) -> Option<String> {
     use rustix::process::{Resource, Rlimit, setrlimit};
-    // The reason of a failure is told; an image of the memory would be of little more use.
+    // The reason of a crash is reported; an image of the memory would be of little more use.
     let _ = setrlimit(Resource::Core, Rlimit { current: Some(0), maximum: Some(0) });
     let mut without = Vec::new();
     let mut limit = |resource, most: u64, name: &str| {
@@ -39,7 +39,7 @@ fn closed(_folder: &Path) -> Vec<String> {
     vec!["files and network".into()]
 }
 
-/// Sets the limits. Returns those that the system does not know, as a text.
+/// Sets the limits. Returns those that the system does not support, as a text.
 #[cfg(not(unix))]
 pub(super) fn apply(limits: &Limits) -> Option<String> {
     let without = [

@@ -1,14 +1,14 @@
-//! Units in processes of their own. A unit that crashes, ends its process, or never answers then
-//! fails like one that returns an error: the master goes on, and says which unit it was and in
-//! which call.
+//! Instances in processes of their own. An instance that crashes, ends its process, or never
+//! answers then fails like one that returns an error: the master goes on, and names the instance
+//! and the call.
 //!
-//! | module | what it knows |
+//! | module | content |
 //! |---|---|
 //! | `channel` | memory that both processes share |
 //! | `protocol` | the messages in it |
-//! | `host` | the process of the unit, which makes the calls |
-//! | `process`, `remote` | its master's side: a process that is watched, and the unit it stands for |
-//! | `settings`, `limits`, `sandbox` | what the process may use |
+//! | `host` | the process of the instance, which makes the calls |
+//! | `process`, `remote` | the master's side: the process that is watched, and the instance in it |
+//! | `settings`, `limits`, `sandbox` | resources that the process may use |
 
 mod channel;
 mod host;
@@ -24,48 +24,48 @@ pub use host::serve;
 pub use process::late_failures;
 pub use settings::{COMMAND, Isolation};
 
-use crate::unit::CoSimulationUnit;
+use crate::instance::Instance;
 use process::Process;
-use protocol::{InstanceOf, Limits, Ready, Setup};
-use remote::RemoteUnit;
+use protocol::{InstanceArguments, Limits, Ready, Setup};
+use remote::RemoteInstance;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
-/// Program that is started for a unit.
+/// Program that is started for each instance.
 static PROGRAM: OnceLock<PathBuf> = OnceLock::new();
 
-/// Says that this process' program has the command [`COMMAND`], so that units can have processes
-/// of their own.
+/// Declares that this program has the command [`COMMAND`], so that instances can have processes of
+/// their own.
 pub fn enable() {
-    // On Linux this is the program that runs, also if its file was replaced since. Other systems
-    // may have such a file, too: under Wine it is Wine itself.
-    let own = Path::new("/proc/self/exe");
-    let own = if cfg!(target_os = "linux") && own.exists() {
-        Ok(own.to_path_buf())
+    // On Linux this is the running program, even if its file was replaced since. Other systems may
+    // have such a file, too: under Wine it is Wine itself.
+    let program = Path::new("/proc/self/exe");
+    let program = if cfg!(target_os = "linux") && program.exists() {
+        Ok(program.to_path_buf())
     } else {
         std::env::current_exe()
     };
-    if let Ok(own) = own {
-        PROGRAM.get_or_init(|| own);
+    if let Ok(program) = program {
+        PROGRAM.get_or_init(|| program);
     }
 }
 
-/// Returns whether units can have processes of their own.
+/// Returns whether instances can have processes of their own.
 pub fn is_enabled() -> bool {
     PROGRAM.get().is_some()
 }
 
-/// What became of a library in a process of its own.
+/// Outcome of loading a library in a process of its own.
 pub(crate) enum Loaded<T> {
     /// It was loaded. The text says what is wrong with the version of FMI that it names.
     Whole(T, Option<String>),
     /// The system could not load it, for this reason.
     Unloadable(String),
-    /// The unit refused or failed, for this reason.
+    /// The library or the instance refused or failed, for this reason.
     Refused(String),
 }
 
-/// A library with what is needed to make a process for it.
+/// A library with the data that its process needs.
 pub(crate) struct Library<'a> {
     pub(crate) file: PathBuf,
     /// Folder of the unpacked archive.
@@ -80,13 +80,13 @@ impl Library<'_> {
         name: &str,
         guid: &str,
         resources: &str,
-    ) -> Loaded<Box<dyn CoSimulationUnit>> {
+    ) -> Loaded<Box<dyn Instance>> {
         let (guid, resources) = (guid.into(), resources.into());
-        let instance = InstanceOf { name: name.into(), guid, resources };
+        let instance = InstanceArguments { name: name.into(), guid, resources };
         let refused = |reason: &str| Loaded::Refused(format!("the component \"{name}\" {reason}"));
         match self.load(name, Some(instance)) {
             Loaded::Whole(process, fault) => {
-                Loaded::Whole(Box::new(RemoteUnit::new(process)), fault)
+                Loaded::Whole(Box::new(RemoteInstance::new(process)), fault)
             }
             Loaded::Unloadable(reason) => Loaded::Unloadable(reason),
             Loaded::Refused(reason) => refused(&reason),
@@ -102,13 +102,15 @@ impl Library<'_> {
         }
     }
 
-    fn load(self, name: &str, instance: Option<InstanceOf>) -> Loaded<Process> {
+    fn load(self, name: &str, instance: Option<InstanceArguments>) -> Loaded<Process> {
         let Some(program) = PROGRAM.get() else {
-            return Loaded::Refused("has no process: this program cannot make any".into());
+            return Loaded::Refused(
+                "has no process of its own, because this program cannot start any".into(),
+            );
         };
         let mut process = match Process::start(program, name, self.isolation) {
             Ok(process) => process,
-            Err(error) => return Loaded::Refused(format!("has no process: {error}")),
+            Err(error) => return Loaded::Refused(format!("has no process of its own: {error}")),
         };
         let limits = Limits {
             memory: self.isolation.memory,
@@ -119,7 +121,7 @@ impl Library<'_> {
             Ok(Ready::Loaded { version_fault, without, .. }) => {
                 if let Some(without) = without {
                     crate::warnings::warn_once(format!(
-                        "this system does not limit these for units: {without}"
+                        "this system cannot limit these for instances: {without}"
                     ));
                 }
                 Loaded::Whole(process, version_fault)

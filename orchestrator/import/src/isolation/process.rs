@@ -1,11 +1,11 @@
-//! The process of a unit, as the master sees it: it is started, asked, watched, and ended.
+//! The process of an instance, as the master sees it: it is started, asked, watched, and ended.
 
 use super::channel::{Channel, LARGEST, Slot};
 use super::protocol::{Action, Ready, Reply, Request, Setup};
 use super::settings::{COMMAND, Isolation};
 use crate::fmi;
-use crate::log::{Log, Said};
-use crate::unit::UnitFailure;
+use crate::instance::CallFailure;
+use crate::log::{Log, LogMessage};
 use parking_lot::Mutex;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -17,30 +17,30 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 use tempfile::NamedTempFile;
 
-/// Time within which a unit must be freed, and its process ended.
-const FAREWELL: Duration = Duration::from_secs(10);
-/// Time within which what an ended process has printed must have arrived.
-const ECHO: Duration = Duration::from_millis(200);
-/// Largest number of bytes of a line of a unit that is passed on.
+/// Time within which an instance must be freed, and its process ended.
+const FREE_TIMEOUT: Duration = Duration::from_secs(10);
+/// Time within which the last output of an ended process must have arrived.
+const OUTPUT_TIMEOUT: Duration = Duration::from_millis(200);
+/// Largest number of bytes of a printed line that is passed on.
 const LINE: usize = 2000;
 
-/// Failures that came when the unit's run was over.
+/// Failures that came when the run was over.
 static LATE: Mutex<Vec<String>> = Mutex::new(Vec::new());
 
-/// Returns the failures that came when a run was over: units that could not be freed. They are
-/// forgotten by this call.
+/// Returns the failures that came when a run was over, of instances that could not be freed, and
+/// clears them.
 pub fn late_failures() -> Vec<String> {
     std::mem::take(&mut LATE.lock())
 }
 
-/// The process of a unit.
+/// The process of an instance.
 pub(super) struct Process {
     child: Child,
     channel: Channel,
     /// File of the memory, until the process has opened it.
     memory: Option<NamedTempFile>,
     number: u32,
-    /// The last message, and where the values behind it begin.
+    /// The last message, and the position at which the values behind it begin.
     bytes: Vec<u8>,
     values: usize,
     log: Log,
@@ -48,7 +48,7 @@ pub(super) struct Process {
     timeout: Duration,
     /// Call whose answer was not waited for yet.
     pending: Option<&'static str>,
-    /// Why the process can no longer be asked.
+    /// Reason why the process can no longer be called, if so.
     gone: Option<String>,
 }
 
@@ -59,8 +59,8 @@ struct Printed {
     is_over: AtomicBool,
 }
 
-/// Why a wait has ended without an answer.
-enum Silence {
+/// Reason why a wait has ended without an answer.
+enum NoAnswer {
     Ended(ExitStatus),
     Late,
     Fault(io::Error),
@@ -69,7 +69,7 @@ enum Silence {
 impl Process {
     /// Starts a process, which then waits for [`Self::set_up`].
     pub(super) fn start(program: &Path, name: &str, isolation: &Isolation) -> io::Result<Self> {
-        // Memory that is no file of a disk, where the system has it.
+        // Where the system offers it, the file is in memory and not on a disk.
         let folder = Path::new("/dev/shm");
         let prefix = format!("fmu-{}-", std::process::id());
         let memory = if cfg!(target_os = "linux") && folder.is_dir() {
@@ -84,7 +84,8 @@ impl Process {
         command.stdout(pipe.try_clone()?).stderr(pipe);
         apart(&mut command);
         let child = command.spawn()?;
-        // It holds the writing end of the pipe, which must end with the process.
+        // The command holds the writing end of the pipe, which must be closed when the process
+        // ends.
         drop(command);
         let printed = Arc::new(Printed::default());
         let (heard, component) = (Arc::clone(&printed), name.to_string());
@@ -105,15 +106,16 @@ impl Process {
     }
 
     /// Lets the process load its library and make an instance.
-    pub(super) fn set_up(&mut self, setup: &Setup) -> Result<Ready, UnitFailure> {
+    pub(super) fn set_up(&mut self, setup: &Setup) -> Result<Ready, CallFailure> {
         self.put("instantiate", setup)?;
         let mut ready = self.answer("instantiate")?;
-        // Both have opened it. Systems that keep a file which is in use remove it later.
+        // Both processes have opened the file. Systems that cannot remove a file in use remove it
+        // later.
         if cfg!(unix) {
             self.memory = None;
         }
-        if let Ready::Loaded { said, .. } | Ready::Refused { said, .. } = &mut ready {
-            self.repeat(std::mem::take(said));
+        if let Ready::Loaded { messages, .. } | Ready::Refused { messages, .. } = &mut ready {
+            self.repeat(std::mem::take(messages));
         }
         self.log.is_instantiated();
         if !matches!(ready, Ready::Loaded { .. }) {
@@ -128,7 +130,7 @@ impl Process {
         &mut self,
         call: &'static str,
         request: &Request,
-    ) -> Result<Reply, UnitFailure> {
+    ) -> Result<Reply, CallFailure> {
         self.send(call, request)?;
         self.reply(call)
     }
@@ -138,8 +140,8 @@ impl Process {
         &mut self,
         call: &'static str,
         request: &Request,
-    ) -> Result<(), UnitFailure> {
-        // Whoever failed to fetch the last answer no longer wants it.
+    ) -> Result<(), CallFailure> {
+        // An answer that was never fetched is no longer needed.
         if let Some(last) = self.pending.take() {
             self.reply(last)?;
         }
@@ -149,47 +151,47 @@ impl Process {
     }
 
     /// Waits for the answer to what was sent.
-    pub(super) fn reply(&mut self, call: &'static str) -> Result<Reply, UnitFailure> {
+    pub(super) fn reply(&mut self, call: &'static str) -> Result<Reply, CallFailure> {
         self.pending = None;
         let mut reply: Reply = self.answer(call)?;
-        self.repeat(std::mem::take(&mut reply.said));
+        self.repeat(std::mem::take(&mut reply.messages));
         Ok(reply)
     }
 
-    fn repeat(&self, said: Vec<Said>) {
-        for Said { status, category, text } in said {
+    fn repeat(&self, messages: Vec<LogMessage>) {
+        for LogMessage { status, category, text } in messages {
             self.log.message(fmi::status(status), &category, &text);
         }
     }
 
-    fn put(&mut self, call: &'static str, message: &impl Serialize) -> Result<(), UnitFailure> {
+    fn put(&mut self, call: &'static str, message: &impl Serialize) -> Result<(), CallFailure> {
         if let Some(reason) = &self.gone {
-            return Err(UnitFailure::new(call, reason.clone()));
+            return Err(CallFailure::new(call, reason.clone()));
         }
         self.bytes.clear();
         let bytes = postcard::to_extend(message, std::mem::take(&mut self.bytes));
-        self.bytes = bytes.map_err(|error| UnitFailure::new(call, error.to_string()))?;
+        self.bytes = bytes.map_err(|error| CallFailure::new(call, error.to_string()))?;
         if self.bytes.len() > LARGEST {
-            return Err(UnitFailure::new(call, "the values are too many for one message"));
+            return Err(CallFailure::new(call, "there are too many values for one message"));
         }
         self.number = self.number.wrapping_add(1);
         self.channel.put(Slot::Request, self.number, &self.bytes);
         Ok(())
     }
 
-    fn answer<T: DeserializeOwned>(&mut self, call: &'static str) -> Result<T, UnitFailure> {
+    fn answer<T: DeserializeOwned>(&mut self, call: &'static str) -> Result<T, CallFailure> {
         let (child, timeout) = (&mut self.child, self.timeout);
         let waited = self.channel.wait(Slot::Reply, self.number, |waited| match child.try_wait() {
-            Ok(Some(status)) => Err(Silence::Ended(status)),
-            Err(error) => Err(Silence::Fault(error)),
-            Ok(None) if waited > timeout => Err(Silence::Late),
+            Ok(Some(status)) => Err(NoAnswer::Ended(status)),
+            Err(error) => Err(NoAnswer::Fault(error)),
+            Ok(None) if waited > timeout => Err(NoAnswer::Late),
             Ok(None) => Ok(()),
         });
         // A process may end right after its last answer.
-        if let Err(silence) = waited
+        if let Err(no_answer) = waited
             && !self.channel.has(Slot::Reply, self.number)
         {
-            return Err(self.end(call, &silence));
+            return Err(self.end(call, &no_answer));
         }
         self.channel.copy(Slot::Reply, &mut self.bytes);
         match postcard::take_from_bytes(&self.bytes) {
@@ -197,7 +199,7 @@ impl Process {
                 self.values = self.bytes.len() - behind.len();
                 Ok(answer)
             }
-            Err(_) => Err(self.nonsense(call)),
+            Err(_) => Err(self.undecodable(call)),
         }
     }
 
@@ -206,53 +208,54 @@ impl Process {
         &self.bytes[self.values..]
     }
 
-    /// Returns the failure of a process whose answer is none. It is not asked again.
-    pub(super) fn nonsense(&mut self, call: &'static str) -> UnitFailure {
+    /// Ends a process whose answer cannot be decoded, and returns the failure.
+    pub(super) fn undecodable(&mut self, call: &'static str) -> CallFailure {
         self.kill();
-        let reason = "its process has lost its way: what it answers makes no sense";
+        let reason = "its process gave an answer that cannot be decoded";
         self.gone = Some(reason.into());
-        UnitFailure::new(call, reason)
+        CallFailure::new(call, reason)
     }
 
-    fn end(&mut self, call: &'static str, silence: &Silence) -> UnitFailure {
-        let reason = match silence {
-            Silence::Ended(status) => ended(*status),
-            Silence::Late => {
+    fn end(&mut self, call: &'static str, no_answer: &NoAnswer) -> CallFailure {
+        let reason = match no_answer {
+            NoAnswer::Ended(status) => ended(*status),
+            NoAnswer::Late => {
                 format!("no answer within {} s (call_timeout)", self.timeout.as_secs_f64())
             }
-            Silence::Fault(error) => format!("its process cannot be watched: {error}"),
+            NoAnswer::Fault(error) => format!("its process cannot be watched: {error}"),
         };
         self.kill();
-        let words = self.last_words();
-        let words = words.map(|words| format!("; its last words: {words}")).unwrap_or_default();
-        let reason = reason + &words;
-        self.gone = Some(format!("its process is gone: {reason}"));
-        UnitFailure::new(call, reason)
+        let output = self.last_message();
+        let output = output.map(|text| format!("; its last output: {text}")).unwrap_or_default();
+        let reason = reason + &output;
+        self.gone = Some(format!("its process has ended: {reason}"));
+        CallFailure::new(call, reason)
     }
 
-    /// Returns what the unit said last: about a problem, or else what it printed.
-    fn last_words(&self) -> Option<String> {
+    /// Returns the last message of the instance about a problem, or else the last line that it
+    /// printed.
+    fn last_message(&self) -> Option<String> {
         let begin = Instant::now();
-        while !self.printed.is_over.load(Ordering::SeqCst) && begin.elapsed() < ECHO {
+        while !self.printed.is_over.load(Ordering::SeqCst) && begin.elapsed() < OUTPUT_TIMEOUT {
             std::thread::sleep(Duration::from_millis(1));
         }
-        let mut said = Vec::new();
-        self.channel.copy(Slot::LastWords, &mut said);
-        let said = String::from_utf8_lossy(&said[..said.len().min(LINE)]).into_owned();
+        let mut bytes = Vec::new();
+        self.channel.copy(Slot::LastMessage, &mut bytes);
+        let logged = String::from_utf8_lossy(&bytes[..bytes.len().min(LINE)]).into_owned();
         let printed = self.printed.last.lock().clone();
-        [said, printed].into_iter().find(|words| !words.is_empty())
+        [logged, printed].into_iter().find(|text| !text.is_empty())
     }
 
     fn kill(&mut self) {
-        // It may be gone already.
+        // It may have ended already.
         let _ = self.child.kill();
         let _ = self.child.wait();
     }
 
-    /// Frees the unit and ends the process.
-    fn free(&mut self) -> Result<(), UnitFailure> {
-        self.timeout = self.timeout.min(FAREWELL);
-        // The run ended, by the failure of another unit, before it wanted this answer.
+    /// Frees the instance and ends the process.
+    fn free(&mut self) -> Result<(), CallFailure> {
+        self.timeout = self.timeout.min(FREE_TIMEOUT);
+        // The run ended, by the failure of another instance, before it needed this answer.
         if let Some(last) = self.pending.take()
             && self.reply(last).is_err()
         {
@@ -264,12 +267,12 @@ impl Process {
         loop {
             match self.child.try_wait() {
                 Ok(Some(status)) if status.success() => return Ok(()),
-                Ok(Some(status)) => return Err(self.end(call, &Silence::Ended(status))),
+                Ok(Some(status)) => return Err(self.end(call, &NoAnswer::Ended(status))),
                 Ok(None) if begin.elapsed() > self.timeout => {
-                    return Err(self.end(call, &Silence::Late));
+                    return Err(self.end(call, &NoAnswer::Late));
                 }
                 Ok(None) => std::thread::sleep(Duration::from_micros(200)),
-                Err(error) => return Err(self.end(call, &Silence::Fault(error))),
+                Err(error) => return Err(self.end(call, &NoAnswer::Fault(error))),
             }
         }
     }
@@ -324,7 +327,7 @@ fn apart(command: &mut Command) {
 #[cfg(not(any(unix, windows)))]
 fn apart(_command: &mut Command) {}
 
-/// Tells how a process has ended.
+/// Describes how a process has ended.
 fn ended(status: ExitStatus) -> String {
     #[cfg(unix)]
     if let Some(signal) = std::os::unix::process::ExitStatusExt::signal(&status) {

@@ -1,30 +1,30 @@
-//! What the master and the process of a unit say to each other.
+//! Messages between the master and the process of an instance.
 
 use crate::description::Carrier;
-use crate::log::Said;
-use crate::unit::UnitFailure;
+use crate::instance::CallFailure;
+use crate::log::LogMessage;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
-/// First message: what is to be loaded.
+/// First message: the library to be loaded.
 #[derive(Debug, Serialize, Deserialize)]
 pub(super) struct Setup {
-    /// The unit's library.
+    /// The instance's library.
     pub(super) library: PathBuf,
-    /// What an instance needs; `None` if the library is only loaded to see whether it can be.
-    pub(super) instance: Option<InstanceOf>,
+    /// Arguments of the instance; `None` if the library is only loaded to see whether it can be.
+    pub(super) instance: Option<InstanceArguments>,
     pub(super) limits: Limits,
 }
 
 /// Arguments of fmi2Instantiate.
 #[derive(Debug, Serialize, Deserialize)]
-pub(super) struct InstanceOf {
+pub(super) struct InstanceArguments {
     pub(super) name: String,
     pub(super) guid: String,
     pub(super) resources: String,
 }
 
-/// What the process of a unit may use.
+/// Resources that the process of an instance may use.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub(super) struct Limits {
     /// Number of bytes of memory that it may write.
@@ -38,13 +38,13 @@ pub(super) struct Limits {
 /// Answer to [`Setup`].
 #[derive(Debug, Serialize, Deserialize)]
 pub(super) enum Ready {
-    /// The library is loaded and the instance made. The texts say what is wrong with the version
-    /// of FMI that the library names, and which limits the system does not know.
-    Loaded { version_fault: Option<String>, without: Option<String>, said: Vec<Said> },
+    /// The library is loaded and the instance made. The texts say what is wrong with the version of
+    /// FMI that the library names, and which limits the system does not support.
+    Loaded { version_fault: Option<String>, without: Option<String>, messages: Vec<LogMessage> },
     /// The library cannot be loaded, as the system says.
     Unloadable(String),
-    /// The unit refused.
-    Refused { reason: String, said: Vec<Said> },
+    /// The instance refused.
+    Refused { reason: String, messages: Vec<LogMessage> },
 }
 
 /// Calls that are made one after the other until one fails, and values that are read then.
@@ -125,8 +125,8 @@ impl List {
 #[derive(Debug, Default, Serialize, Deserialize)]
 pub(super) struct Reply {
     /// Failure of a set call or of the action, after which nothing is read.
-    pub(super) failure: Option<UnitFailure>,
-    /// Lists that could not be read, by their places. Their values are of no meaning.
-    pub(super) unread: Vec<(usize, UnitFailure)>,
-    pub(super) said: Vec<Said>,
+    pub(super) failure: Option<CallFailure>,
+    /// Lists that could not be read, by their places. Their values have no meaning.
+    pub(super) unread: Vec<(usize, CallFailure)>,
+    pub(super) messages: Vec<LogMessage>,
 }

@@ -1,14 +1,14 @@
-//! A unit in a process of its own, as the master sees it.
+//! An instance in a process of its own, as the master sees it.
 //!
 //! Set calls are kept until the next call that needs an answer, and each answer to a step or a get
-//! call brings the values of all lists of variables that were read before: at a communication
-//! point there is one round trip for the step and one for the exchange of values. A set call that
-//! fails is told by the call that follows it.
+//! call brings the values of all lists of variables that were read before: at a communication point
+//! there is one round trip for the step and one for the exchange of values. A set call that fails
+//! is reported by the call that follows it.
 
 use super::process::Process;
 use super::protocol::{Action, List, Request, Set};
 use crate::description::Carrier;
-use crate::unit::{CoSimulationUnit, Outcome, UnitFailure};
+use crate::instance::{CallFailure, Instance, Outcome};
 
 /// Number of values that are set or read by one message; longer lists are cut.
 const CHUNK: usize = 4096;
@@ -17,8 +17,8 @@ const PREFETCHED: usize = 1 << 18;
 /// Number of bytes of a text that can be set.
 const TEXT: usize = 1 << 19;
 
-/// A unit in a process of its own.
-pub(crate) struct RemoteUnit {
+/// An instance in a process of its own.
+pub(crate) struct RemoteInstance {
     process: Process,
     /// Calls that wait for the next request, and the number of their values.
     sets: Vec<Set>,
@@ -27,14 +27,15 @@ pub(crate) struct RemoteUnit {
     lists: Vec<List>,
     size: usize,
     /// Lists that could not be read, by their places.
-    unread: Vec<(usize, UnitFailure)>,
-    /// Whether the values of the last answer are those of the lists and still those of the unit.
+    unread: Vec<(usize, CallFailure)>,
+    /// Whether the values of the last answer are those of the lists and still those of the
+    /// instance.
     is_fresh: bool,
     /// Step whose answer was not waited for yet.
     begun: Option<Action>,
 }
 
-impl RemoteUnit {
+impl RemoteInstance {
     pub(super) fn new(process: Process) -> Self {
         Self {
             process,
@@ -76,7 +77,7 @@ impl RemoteUnit {
         reply.failure.map_or(Ok(()), Err)?;
         self.unread = reply.unread;
         if action.reads() && self.process.values().len() != once.unwrap_or(self.size) {
-            return Err(self.process.nonsense(action.call()));
+            return Err(self.process.undecodable(action.call()));
         }
         self.is_fresh = action.reads() && once.is_none();
         Ok(())
@@ -94,22 +95,22 @@ impl RemoteUnit {
     }
 
     /// Returns the bytes of the values of a list.
-    fn read(&mut self, carrier: Carrier, references: &[u32]) -> Result<&[u8], UnitFailure> {
+    fn read(&mut self, carrier: Carrier, references: &[u32]) -> Result<&[u8], CallFailure> {
         let is_it = |list: &List| list.carrier == carrier && list.references == references;
-        let mut known = self.lists.iter().position(is_it);
-        if known.is_none() {
+        let mut prefetched = self.lists.iter().position(is_it);
+        if prefetched.is_none() {
             let list = List { carrier, references: references.to_vec() };
             if self.size + list.size() > PREFETCHED {
                 self.ask(Action::Read, Vec::new(), vec![list])?;
             } else {
-                known = Some(self.lists.len());
+                prefetched = Some(self.lists.len());
                 self.ask(Action::Read, vec![list], Vec::new())?;
             }
         } else if !self.is_fresh {
             self.act(Action::Read)?;
         }
-        // A list that is read only this time stands alone.
-        let place = known.unwrap_or(0);
+        // A list that is read only this time is the only one.
+        let place = prefetched.unwrap_or(0);
         if let Some((_, failure)) = self.unread.iter().find(|(unread, _)| *unread == place) {
             return Err(failure.clone());
         }
@@ -123,12 +124,12 @@ impl RemoteUnit {
         carrier: Carrier,
         references: &[u32],
         values: &mut [T],
-        of: fn([u8; N]) -> T,
+        decode: fn([u8; N]) -> T,
     ) -> Outcome {
         for (references, values) in references.chunks(CHUNK).zip(values.chunks_mut(CHUNK)) {
             let bytes = self.read(carrier, references)?.as_chunks::<N>().0;
             for (value, bytes) in values.iter_mut().zip(bytes) {
-                *value = of(*bytes);
+                *value = decode(*bytes);
             }
         }
         Ok(())
@@ -139,15 +140,15 @@ impl RemoteUnit {
         &mut self,
         references: &[u32],
         values: &[T],
-        of: fn(Vec<u32>, Vec<T>) -> Set,
+        to_set: fn(Vec<u32>, Vec<T>) -> Set,
     ) -> Outcome {
         references.chunks(CHUNK).zip(values.chunks(CHUNK)).try_for_each(|(references, values)| {
-            self.set(of(references.to_vec(), values.to_vec()), values.len())
+            self.set(to_set(references.to_vec(), values.to_vec()), values.len())
         })
     }
 }
 
-impl CoSimulationUnit for RemoteUnit {
+impl Instance for RemoteInstance {
     fn get_real(&mut self, references: &[u32], values: &mut [f64]) -> Outcome {
         self.get(Carrier::Real, references, values, f64::from_le_bytes)
     }
@@ -175,9 +176,9 @@ impl CoSimulationUnit for RemoteUnit {
     fn set_string(&mut self, reference: u32, value: &str) -> Outcome {
         if value.len() > TEXT {
             let message = format!("the text has {} bytes, at most {TEXT} can be set", value.len());
-            return Err(UnitFailure::new("setString", message));
+            return Err(CallFailure::new("setString", message));
         }
-        // A long text is sent at once.
+        // A long text fills the message at once.
         self.set(Set::Text(reference, value.to_string()), 1 + value.len() / 16)
     }
 

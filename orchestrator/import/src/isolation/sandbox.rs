@@ -1,5 +1,5 @@
-//! What the process of a unit may not do under Linux: write to files of others, use the network, or
-//! reach into other processes.
+//! Keeps the process of an instance, under Linux, from writing to files outside its folder, from
+//! the network, and from other processes.
 
 use landlock::{
     ABI, AccessFs, PathBeneath, PathFd, Ruleset, RulesetAttr, RulesetCreatedAttr, RulesetError,
@@ -12,7 +12,7 @@ use seccompiler::{
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// Closes everything to this thread, and to those that it starts, but this folder. Returns what the
+/// Closes everything but this folder to this thread and to those that it starts. Returns what the
 /// system cannot close.
 pub(super) fn close(folder: &Path) -> Vec<String> {
     let mut open = Vec::new();
@@ -40,21 +40,22 @@ fn close_files(folder: &Path) -> Result<RulesetStatus, RulesetError> {
 }
 
 fn close_calls() -> Result<(), Error> {
-    let own = u64::from(std::process::id());
+    let process = u64::from(std::process::id());
     let unless_first = |value: u64| -> Result<Vec<SeccompRule>, Error> {
         let other = SeccompCondition::new(0, SeccompCmpArgLen::Dword, SeccompCmpOp::Ne, value);
         Ok(vec![SeccompRule::new(vec![other.map_err(Error::Backend)?]).map_err(Error::Backend)?])
     };
     let refused = BTreeMap::from([
-        // Not even to programs of this machine, which could do what the unit may not.
+        // Sockets are refused even to programs on this machine, which could do what the instance
+        // may not.
         (libc::SYS_socket, Vec::new()),
-        // It would open sockets and files past these rules.
+        // It could open sockets and files past these rules.
         (libc::SYS_io_uring_setup, Vec::new()),
         (libc::SYS_ptrace, Vec::new()),
         (libc::SYS_process_vm_readv, Vec::new()),
         (libc::SYS_process_vm_writev, Vec::new()),
-        (libc::SYS_kill, unless_first(own)?),
-        (libc::SYS_tgkill, unless_first(own)?),
+        (libc::SYS_kill, unless_first(process)?),
+        (libc::SYS_tgkill, unless_first(process)?),
         (libc::SYS_tkill, Vec::new()),
         (libc::SYS_pidfd_send_signal, Vec::new()),
     ]);

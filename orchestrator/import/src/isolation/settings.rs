@@ -1,12 +1,12 @@
-//! What is asked of the process of a unit.
+//! Settings of the process of an instance.
 
 use std::time::Duration;
 
-/// Name of the program's command that [`serve`](super::serve)s a unit. Its argument is the path of
-/// the memory.
-pub const COMMAND: &str = "serve-unit";
+/// Name of the program's command that [`serve`](super::serve)s an instance. Its argument is the
+/// path of the shared memory.
+pub const COMMAND: &str = "serve-instance";
 
-/// How a unit is kept from doing harm.
+/// Limits that keep an instance from doing harm.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Isolation {
     /// Time within which a call must be answered.

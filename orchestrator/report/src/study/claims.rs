@@ -4,7 +4,7 @@ use super::comparisons::{Check, Claim, Relation};
 use super::definition::Study;
 use super::results::{Metric, Numbers, Results, is_reference, resolve};
 use super::values::Quantity;
-use cosim::experiment::Kind;
+use cosim::experiment::MeasureKind;
 use serde::Serialize;
 
 /// Verdict on a claim of the paper.
@@ -179,7 +179,7 @@ fn never_is_infinite(
 ) -> Vec<Option<f64>> {
     let settles = |id: &str| {
         let measure = results.study.measures.iter().find(|measure| measure.id == id);
-        measure.is_some_and(|measure| measure.kind == Kind::Settling)
+        measure.is_some_and(|measure| measure.kind == MeasureKind::Settling)
     };
     match resolve(results.study, reference) {
         Ok((_, Metric::Measure(id))) if settles(&id) => {

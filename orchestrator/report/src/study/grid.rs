@@ -83,7 +83,7 @@ impl Grid {
         for scenario in &self.scenarios {
             let experiment = Experiment::load(&source.beside(&scenario.experiment))?;
             let ids = self.candidates.iter().map(|candidate| candidate.id.as_str());
-            source.known(scenario.set_for.keys(), "[[grid.candidate]]", ids)?;
+            source.check_names(scenario.set_for.keys(), "[[grid.candidate]]", ids)?;
             for candidate in &self.candidates {
                 let own = scenario.set_for.iter().find(|(id, _)| *id.get_ref() == candidate.id);
                 let own = own.into_iter().flat_map(|(_, set)| set.clone());

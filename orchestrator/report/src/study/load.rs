@@ -133,12 +133,12 @@ impl Study {
             if run.vary.as_ref().is_some_and(|vary| vary.count == 0) {
                 return fault("vary.count = 0: at least 1");
             }
-            self.source.known(
+            self.source.check_names(
                 &run.within,
                 "[[within]]",
                 self.within.iter().map(|within| within.id.as_str()),
             )?;
-            self.source.known(
+            self.source.check_names(
                 &run.measures,
                 "[[measure]]",
                 self.measures.iter().map(|measure| measure.id.as_str()),
@@ -163,10 +163,14 @@ impl Study {
         }
         let bounded = self.within.iter().map(|within| &within.signals);
         for list in bounded.chain(self.measures.iter().map(|measure| &measure.signals)) {
-            self.source.known([list], "[signals]", self.signals.keys().map(String::as_str))?;
+            self.source.check_names(
+                [list],
+                "[signals]",
+                self.signals.keys().map(String::as_str),
+            )?;
         }
         for figure in &self.figures {
-            self.source.known(&figure.runs, "[[run]]", ids.iter().copied())?;
+            self.source.check_names(&figure.runs, "[[run]]", ids.iter().copied())?;
             for panel in &figure.panels {
                 let through = panel
                     .across
@@ -174,7 +178,7 @@ impl Study {
                     .flat_map(|across| &across.lines)
                     .flat_map(|line| &line.runs);
                 let named = panel.runs.iter().flatten().chain(through);
-                self.source.known(named, "[[run]]", ids.iter().copied())?;
+                self.source.check_names(named, "[[run]]", ids.iter().copied())?;
                 let drawn = [
                     panel.signal.is_some(),
                     !panel.signals.is_empty(),
@@ -200,7 +204,7 @@ impl Study {
             }
         }
         for overview in &self.overviews {
-            self.source.known(&overview.runs, "[[run]]", ids.iter().copied())?;
+            self.source.check_names(&overview.runs, "[[run]]", ids.iter().copied())?;
         }
         for quantity in
             self.tables.iter().flat_map(|table| &table.rows).filter_map(|row| row.paper.as_ref())

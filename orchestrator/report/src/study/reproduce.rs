@@ -340,7 +340,7 @@ impl Work<'_> {
                             Err(error) => {
                                 // The other runs know nothing of a unit that failed, and are kept.
                                 let is_of_unit =
-                                    matches!(error, Error::Run { source: Single::Unit { .. }, .. });
+                                    matches!(error, Error::Run { source: Single::Call { .. }, .. });
                                 if !is_of_unit {
                                     queue.lock().clear();
                                 }

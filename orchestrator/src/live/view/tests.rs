@@ -24,15 +24,15 @@ fn panel(
     names: [&str; 3],
     unit: &str,
     factor: f64,
-    of: [usize; 3],
+    places: [usize; 3],
     minus: Option<[usize; 3]>,
 ) -> Panel {
     let signal = |place: usize| Resolved { factor, ..Resolved::variable(place) };
     let curve = |axis: usize| Curve {
         name: names[axis].into(),
-        of: minus.filter(|_| name == "error").map_or(signal(of[axis]), |minus| Resolved {
+        of: minus.filter(|_| name == "error").map_or(signal(places[axis]), |minus| Resolved {
             factor,
-            ..Resolved::difference(of[axis], minus[axis])
+            ..Resolved::difference(places[axis], minus[axis])
         }),
         reference: minus.filter(|_| name == "attitude").map(|minus| signal(minus[axis])),
     };

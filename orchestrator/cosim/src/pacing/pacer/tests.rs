@@ -47,8 +47,8 @@ fn paced(
     (outcome, pacer.report().0, begins)
 }
 
-fn near(found: f64, expected: f64) {
-    assert!((found - expected).abs() <= 1e-3 * expected, "{found} {expected}");
+fn near(value: f64, expected: f64) {
+    assert!((value - expected).abs() <= 1e-3 * expected, "{value} {expected}");
 }
 
 #[test]

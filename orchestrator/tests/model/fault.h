@@ -1,4 +1,4 @@
-/* Harm that a unit does in the place PLACE, in the way HOW. */
+/* Harm that a model does in the place PLACE, in the way HOW. */
 #include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -47,7 +47,7 @@ static void fault(int place, Logger logger, void *environment) {
         }
     case FLOOD:
         for (int i = 0; i < 200000; i++) {
-            if (logger) logger(environment, "unit", i % 2 ? 3 : 1, "flood", "wave %d", i);
+            if (logger) logger(environment, "model", i % 2 ? 3 : 1, "flood", "wave %d", i);
             printf("wave %d\n", i);
         }
     }
@@ -58,7 +58,7 @@ static void fault(int place, Logger logger, void *environment) {
 void reach(const char *path, Logger logger, void *environment) {
     FILE *file = fopen(path, "w");
     int network = socket(AF_INET, SOCK_STREAM, 0);
-    if (!file && network < 0) logger(environment, "unit", 1, "reach", "no file, no network");
+    if (!file && network < 0) logger(environment, "model", 1, "reach", "no file, no network");
     if (file) fclose(file);
     if (network >= 0) close(network);
 }

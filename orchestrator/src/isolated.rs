@@ -1,12 +1,12 @@
-//! Units in processes of their own, as the command line knows them.
+//! Instances in processes of their own, on the side of the command line.
 
 use fmu_import::{crash, isolation};
 use std::io::{Write, stderr};
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-/// Serves a unit if another process of this program has started this one for it, and returns the
-/// exit code then. In any other process it prepares for units that do harm.
+/// Serves an instance if another process of this program has started this one for it, and returns
+/// the exit code then. In any other process it prepares to report instances that crash.
 pub(crate) fn serve() -> Option<ExitCode> {
     let mut words = std::env::args_os().skip(1);
     if words.next().is_none_or(|word| word != isolation::COMMAND) {
@@ -24,8 +24,8 @@ pub(crate) fn serve() -> Option<ExitCode> {
     })
 }
 
-/// Prints which units could not be freed. Returns whether all could.
-pub(crate) fn left_in_order() -> bool {
+/// Prints which instances could not be freed. Returns whether all were freed.
+pub(crate) fn all_freed() -> bool {
     let late = isolation::late_failures();
     for failure in &late {
         let _ = writeln!(stderr(), "error: {failure}");

@@ -1,19 +1,19 @@
-//! A table that is stepped as a unit.
+//! An instance of a lookup table.
 
 use super::description::{HOLD, LINEAR, Place};
-use super::{Form, LONGEST, Table};
-use crate::unit::{CoSimulationUnit, Outcome, UnitFailure};
+use super::{Form, LONGEST, LookupTable};
+use crate::instance::{CallFailure, Instance, Outcome};
 use std::sync::Arc;
 
 /// Part of a time by which two times may differ and still be the same.
 const TOLERANCE: f64 = 1e-9;
 
-/// A table with the time that it has reached.
-pub(crate) struct TableUnit {
+/// A lookup table with the time that it has reached.
+pub(crate) struct LookupTableInstance {
     /// The table as its file has it.
-    file: Table,
+    file: LookupTable,
     /// The table with the values that were set.
-    table: Table,
+    table: LookupTable,
     places: Vec<Place>,
     interpolation: i32,
     shift: f64,
@@ -23,7 +23,7 @@ pub(crate) struct TableUnit {
     is_running: bool,
 }
 
-/// Where the present time is among the rows.
+/// Place of the present time among the rows.
 #[derive(Clone, Copy, Default)]
 struct Present {
     last: usize,
@@ -32,8 +32,8 @@ struct Present {
     part: f64,
 }
 
-impl TableUnit {
-    pub(crate) fn new(table: Table) -> Self {
+impl LookupTableInstance {
+    pub(crate) fn new(table: LookupTable) -> Self {
         Self {
             places: table.places(),
             interpolation: HOLD,
@@ -46,13 +46,13 @@ impl TableUnit {
         }
     }
 
-    fn place(&self, call: &'static str, reference: u32) -> Result<Place, UnitFailure> {
+    fn place(&self, call: &'static str, reference: u32) -> Result<Place, CallFailure> {
         let place = self.places.get(reference as usize).copied();
-        place.ok_or_else(|| UnitFailure::new(call, format!("there is no variable {reference}")))
+        place.ok_or_else(|| CallFailure::new(call, format!("there is no variable {reference}")))
     }
 
-    /// Goes to a time. Before the first row the values are those of the first, and after the last
-    /// row those of the last.
+    /// Goes to a time. Before the first row its values hold, and after the last row the values of
+    /// that row.
     fn go_to(&mut self, time: f64) {
         let (times, time) = (&self.table.times, time - self.shift);
         let is_past = |row: &f64| *row <= time + TOLERANCE * time.abs().max(1.0);
@@ -68,20 +68,20 @@ impl TableUnit {
 
     /// Returns the value of a column at the present time.
     fn at_present(&self, column: usize) -> f64 {
-        let Table { columns, values, .. } = &self.table;
-        let of = |row: usize| values[row * columns.len() + column];
+        let LookupTable { columns, values, .. } = &self.table;
+        let value_in = |row: usize| values[row * columns.len() + column];
         let Present { last, next, part } = self.present;
         let is_held = self.interpolation == HOLD || !matches!(columns[column].form, Form::Real(_));
         // Neither the difference of two values nor a product with zero may overflow.
         let value = if is_held || part == 0.0 {
-            of(last)
+            value_in(last)
         } else {
-            (1.0 - part) * of(last) + part * of(next)
+            (1.0 - part) * value_in(last) + part * value_in(next)
         };
         self.scales[column] * value
     }
 
-    fn get(&self, call: &'static str, reference: u32) -> Result<f64, UnitFailure> {
+    fn get(&self, call: &'static str, reference: u32) -> Result<f64, CallFailure> {
         Ok(match self.place(call, reference)? {
             Place::Output(column) => self.at_present(column),
             Place::Interpolation => self.interpolation.into(),
@@ -93,9 +93,9 @@ impl TableUnit {
     }
 
     fn set(&mut self, call: &'static str, reference: u32, value: f64) -> Outcome {
-        let refuse = |problem: String| Err(UnitFailure::new(call, problem));
+        let refuse = |problem: String| Err(CallFailure::new(call, problem));
         if self.is_running {
-            return refuse("a table can be set before the run begins only".into());
+            return refuse("a lookup table can be set only before the run begins".into());
         }
         if !value.is_finite() {
             return refuse(format!("{value} is not finite"));
@@ -106,7 +106,9 @@ impl TableUnit {
                 self.interpolation = value as i32;
             }
             Place::Interpolation => {
-                return refuse(format!("interpolation = {value} is neither {HOLD} nor {LINEAR}"));
+                return refuse(format!(
+                    "interpolation = {value} is neither {HOLD} (hold) nor {LINEAR} (linear)"
+                ));
             }
             Place::Shift | Place::Time(_) if value.abs() > LONGEST => {
                 return refuse(format!("{value} s is not within {LONGEST:e} s of zero"));
@@ -133,7 +135,7 @@ impl TableUnit {
     }
 }
 
-impl CoSimulationUnit for TableUnit {
+impl Instance for LookupTableInstance {
     fn get_real(&mut self, references: &[u32], values: &mut [f64]) -> Outcome {
         for (value, reference) in values.iter_mut().zip(references) {
             *value = self.get("getReal", *reference)?;
@@ -163,13 +165,13 @@ impl CoSimulationUnit for TableUnit {
     }
 
     fn set_string(&mut self, reference: u32, _value: &str) -> Outcome {
-        Err(UnitFailure::new("setString", format!("variable {reference} is no text")))
+        Err(CallFailure::new("setString", format!("variable {reference} is not a text")))
     }
 
     fn enter_initialization(&mut self, start: f64, _stop: f64) -> Outcome {
         let times = &self.table.times;
         if let Some(row) = times.windows(2).position(|pair| pair[0] > pair[1]) {
-            return Err(UnitFailure::new(
+            return Err(CallFailure::new(
                 "enterInitializationMode",
                 format!(
                     "time[{}] = {} s is earlier than time[{}] = {} s",

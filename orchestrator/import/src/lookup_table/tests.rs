@@ -1,6 +1,6 @@
 use super::*;
-use crate::description::Kind;
-use crate::unit::CoSimulationUnit;
+use crate::description::VariableKind;
+use crate::instance::Instance;
 use proptest::prelude::*;
 
 const FILE: &str = "\u{feff}time,gust.x [N.m],count [Integer],open [Boolean],plain\r\n\
@@ -10,18 +10,18 @@ const FILE: &str = "\u{feff}time,gust.x [N.m],count [Integer],open [Boolean],pla
                     2,-20,5,1,1.5\r\n\
                     4,0,6,false,2.5\r\n";
 
-fn unit(text: &str) -> (TableUnit, crate::description::ModelDescription) {
-    let table = Table::parse(text.as_bytes()).unwrap();
+fn opened(text: &str) -> (LookupTableInstance, crate::description::ModelDescription) {
+    let table = LookupTable::parse(text.as_bytes()).unwrap();
     let description = table.description("gusts").unwrap();
-    (TableUnit::new(table), description)
+    (LookupTableInstance::new(table), description)
 }
 
-fn at(unit: &mut TableUnit, time: f64) -> (f64, i32, i32, f64) {
-    unit.do_step(time - 0.1, 0.1).unwrap();
+fn at(instance: &mut LookupTableInstance, time: f64) -> (f64, i32, i32, f64) {
+    instance.do_step(time - 0.1, 0.1).unwrap();
     let (mut reals, mut count, mut open) = ([0.0; 2], [0], [0]);
-    unit.get_real(&[0, 3], &mut reals).unwrap();
-    unit.get_integer(&[1], &mut count).unwrap();
-    unit.get_boolean(&[2], &mut open).unwrap();
+    instance.get_real(&[0, 3], &mut reals).unwrap();
+    instance.get_integer(&[1], &mut count).unwrap();
+    instance.get_boolean(&[2], &mut open).unwrap();
     (reals[0], count[0], open[0], reals[1])
 }
 
@@ -31,8 +31,8 @@ fn reference(description: &crate::description::ModelDescription, name: &str) -> 
 
 #[test]
 fn oracle_rows_hold_until_the_next_one() {
-    let (mut unit, _) = unit(FILE);
-    unit.enter_initialization(0.0, 5.0).unwrap();
+    let (mut instance, _) = opened(FILE);
+    instance.enter_initialization(0.0, 5.0).unwrap();
     for (time, row) in [
         (0.0, (10.0, 3, 1, 0.5)),
         (1.0, (10.0, 3, 1, 0.5)),
@@ -43,17 +43,17 @@ fn oracle_rows_hold_until_the_next_one() {
         (4.0, (0.0, 6, 0, 2.5)),
         (9.0, (0.0, 6, 0, 2.5)),
     ] {
-        assert_eq!(at(&mut unit, time), row, "at {time} s");
+        assert_eq!(at(&mut instance, time), row, "at {time} s");
     }
 }
 
 #[test]
 fn oracle_lines_between_rows_and_jumps_at_equal_times() {
-    let (mut unit, description) = unit(FILE);
-    unit.set_integer(&[reference(&description, "interpolation")], &[2]).unwrap();
-    unit.set_real(&[reference(&description, "shift")], &[0.5]).unwrap();
-    unit.set_real(&[reference(&description, "scale.gust.x")], &[2.0]).unwrap();
-    unit.enter_initialization(0.0, 5.0).unwrap();
+    let (mut instance, description) = opened(FILE);
+    instance.set_integer(&[reference(&description, "interpolation")], &[2]).unwrap();
+    instance.set_real(&[reference(&description, "shift")], &[0.5]).unwrap();
+    instance.set_real(&[reference(&description, "scale.gust.x")], &[2.0]).unwrap();
+    instance.enter_initialization(0.0, 5.0).unwrap();
     for (time, row) in [
         (1.0, (20.0, 3, 1, 0.5)),
         (1.75, (25.0, 3, 1, 0.75)),
@@ -61,56 +61,61 @@ fn oracle_lines_between_rows_and_jumps_at_equal_times() {
         (3.5, (-20.0, 5, 1, 2.0)),
         (5.0, (0.0, 6, 0, 2.5)),
     ] {
-        assert_eq!(at(&mut unit, time), row, "at {time} s");
+        assert_eq!(at(&mut instance, time), row, "at {time} s");
     }
 }
 
 #[test]
 fn times_and_values_are_parameters_until_the_run_begins() {
-    let (mut unit, description) = unit(FILE);
+    let (mut instance, description) = opened(FILE);
     let variable = description.find("gust.x[3]").unwrap().1;
     let kind = &variable.kind;
-    assert!(matches!(kind, Kind::Real { unit: Some(unit), .. } if unit == "N.m"), "{kind:?}");
+    assert!(
+        matches!(kind, VariableKind::Real { unit: Some(unit), .. } if unit == "N.m"),
+        "{kind:?}"
+    );
     assert_eq!(variable.start.as_deref(), Some("-20"));
     assert_eq!(description.find("open[1]").unwrap().1.start.as_deref(), Some("true"));
-    unit.set_real(&[variable.reference, reference(&description, "time[4]")], &[7.0, 3.0]).unwrap();
-    unit.set_boolean(&[reference(&description, "open[4]")], &[1]).unwrap();
-    unit.enter_initialization(0.0, 5.0).unwrap();
-    assert_eq!(at(&mut unit, 2.5), (7.0, 5, 1, 1.5));
-    assert_eq!(at(&mut unit, 3.0), (0.0, 6, 1, 2.5));
-    let late = unit.set_real(&[variable.reference], &[8.0]).unwrap_err();
+    instance
+        .set_real(&[variable.reference, reference(&description, "time[4]")], &[7.0, 3.0])
+        .unwrap();
+    instance.set_boolean(&[reference(&description, "open[4]")], &[1]).unwrap();
+    instance.enter_initialization(0.0, 5.0).unwrap();
+    assert_eq!(at(&mut instance, 2.5), (7.0, 5, 1, 1.5));
+    assert_eq!(at(&mut instance, 3.0), (0.0, 6, 1, 2.5));
+    let late = instance.set_real(&[variable.reference], &[8.0]).unwrap_err();
     assert!(late.message.contains("before the run begins"), "{late:?}");
-    unit.reset().unwrap();
-    unit.set_real(&[reference(&description, "time[1]")], &[3.0]).unwrap();
-    let order = unit.enter_initialization(0.0, 5.0).unwrap_err();
+    instance.reset().unwrap();
+    instance.set_real(&[reference(&description, "time[1]")], &[3.0]).unwrap();
+    let order = instance.enter_initialization(0.0, 5.0).unwrap_err();
     assert_eq!(order.message, "time[2] = 2 s is earlier than time[1] = 3 s");
-    unit.reset().unwrap();
-    unit.enter_initialization(0.0, 5.0).unwrap();
-    assert_eq!(at(&mut unit, 3.0), (-20.0, 5, 1, 1.5));
+    instance.reset().unwrap();
+    instance.enter_initialization(0.0, 5.0).unwrap();
+    assert_eq!(at(&mut instance, 3.0), (-20.0, 5, 1, 1.5));
 }
 
 #[test]
 fn large_tables_have_no_parameters_for_their_values() {
     let rows = "0,1\n".repeat(500);
-    assert!(unit(&format!("time,x\n{rows}")).1.find("x[500]").is_some());
-    assert!(unit(&format!("time,x\n{rows}0,1\n")).1.find("x[1]").is_none());
+    assert!(opened(&format!("time,x\n{rows}")).1.find("x[500]").is_some());
+    assert!(opened(&format!("time,x\n{rows}0,1\n")).1.find("x[1]").is_none());
 }
 
 #[test]
 fn faults_name_line_and_column() {
     let fault = |text: &str| {
-        let table = Table::parse(text.as_bytes());
+        let table = LookupTable::parse(text.as_bytes());
         table.and_then(|table| table.description("gusts").map(drop)).unwrap_err()
     };
     for (text, message) in [
-        ("", "is no table: the first column is \"\", not \"time\""),
-        ("time;x\n0;1\n", "is no table: there must be commas between the columns"),
-        ("t,x\n0,1\n", "is no table: the first column is \"t\", not \"time\""),
-        ("time\n0\n", "is a table without columns beside \"time\""),
-        ("time,x\n", "is a table without rows"),
-        ("time,\n0,1\n", "is a table with a column that has no name"),
-        ("time,x,x\n0,1,1\n", "is a table in which \"x\" has two meanings"),
-        ("time,shift\n0,1\n", "is a table in which \"shift\" has two meanings"),
+        ("", "is not a lookup table: the first column is \"\", not \"time\""),
+        ("time;x\n0;1\n", "is not a lookup table: there must be commas between the columns"),
+        ("t,x\n0,1\n", "is not a lookup table: the first column is \"t\", not \"time\""),
+        ("time\n0\n", "is a lookup table without columns beside \"time\""),
+        ("time,x\n", "is a lookup table without rows"),
+        ("time,\n0,1\n", "is a lookup table with a column that has no name"),
+        ("time,x,x\n0,1,1\n", "is a lookup table in which \"x\" has two meanings"),
+        ("time,shift\n0,1\n", "is a lookup table in which \"shift\" has two meanings"),
         ("time,x\n0,1\n1\n", "line 3 has 1 values for 2 columns"),
         ("time,x\n0,1\n1,2,3\n", "line 3 has 3 values for 2 columns"),
         ("time,x\nnow,1\n", "line 2: \"time\" is \"now\", it must be a finite number"),
@@ -132,7 +137,9 @@ fn faults_name_line_and_column() {
     ] {
         assert_eq!(fault(text), message, "{text}");
     }
-    assert!(Table::parse(b"time,x\n0,\xff\n").unwrap_err().starts_with("is no table: "));
+    assert!(
+        LookupTable::parse(b"time,x\n0,\xff\n").unwrap_err().starts_with("is not a lookup table: ")
+    );
 }
 
 proptest! {
@@ -145,12 +152,12 @@ proptest! {
         rows.sort_by(|a, b| a.0.total_cmp(&b.0));
         let lines = rows.iter().map(|(time, value)| format!("{time},{value}"));
         let text = std::iter::once("time,x".to_string()).chain(lines).collect::<Vec<_>>().join("\n");
-        let (mut unit, description) = unit(&text);
-        unit.set_integer(&[reference(&description, "interpolation")], &[2]).unwrap();
-        unit.enter_initialization(0.0, 12.0).unwrap();
-        unit.do_step(time, 0.0).unwrap();
+        let (mut instance, description) = opened(&text);
+        instance.set_integer(&[reference(&description, "interpolation")], &[2]).unwrap();
+        instance.enter_initialization(0.0, 12.0).unwrap();
+        instance.do_step(time, 0.0).unwrap();
         let mut value = [0.0];
-        unit.get_real(&[0], &mut value).unwrap();
+        instance.get_real(&[0], &mut value).unwrap();
         let before = rows.iter().rposition(|row| row.0 <= time).unwrap_or(0);
         let after = rows.iter().position(|row| row.0 > time).unwrap_or(rows.len() - 1);
         let (low, high) = (rows[before].1.min(rows[after].1), rows[before].1.max(rows[after].1));
@@ -159,6 +166,6 @@ proptest! {
 
     #[test]
     fn no_text_breaks_the_reader(bytes in prop::collection::vec(any::<u8>(), 0..200)) {
-        let _ = Table::parse(&bytes).and_then(|table| table.description("x"));
+        let _ = LookupTable::parse(&bytes).and_then(|table| table.description("x"));
     }
 }

@@ -1,7 +1,7 @@
-//! The variables of a table as a unit.
+//! The model description of a lookup table.
 
-use super::{Column, Form, MOST_PARAMETERS, Table};
-use crate::description::{Interface, Kind, ModelDescription, Variable};
+use super::{Column, Form, LookupTable, MOST_PARAMETERS};
+use crate::description::{Interface, ModelDescription, Variable, VariableKind};
 use crate::quantity::UnitDefinition;
 use std::collections::BTreeSet;
 
@@ -9,7 +9,7 @@ use std::collections::BTreeSet;
 pub(super) const HOLD: i32 = 1;
 pub(super) const LINEAR: i32 = 2;
 
-/// What a variable of the unit stands for.
+/// Meaning of a variable of a lookup table.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Place {
     /// A column, as an output.
@@ -24,8 +24,8 @@ pub(super) enum Place {
     Value(usize),
 }
 
-impl Table {
-    /// Lists what the variables stand for. The position in the list is the value reference.
+impl LookupTable {
+    /// Lists the meanings of the variables. The position in the list is the value reference.
     pub(super) fn places(&self) -> Vec<Place> {
         let (columns, rows) = (self.columns.len(), self.times.len());
         let mut places: Vec<Place> = (0..columns).map(Place::Output).collect();
@@ -39,14 +39,14 @@ impl Table {
         places
     }
 
-    /// Describes the unit. Its name is that of the file.
+    /// Returns the model description. Its name is that of the file.
     pub(crate) fn description(&self, name: &str) -> Result<ModelDescription, String> {
         let places = self.places().into_iter();
         let variables: Vec<Variable> =
             (0..).zip(places).map(|(reference, place)| self.variable(reference, place)).collect();
         let mut names = BTreeSet::new();
         if let Some(twice) = variables.iter().find(|variable| !names.insert(&variable.name)) {
-            return Err(format!("is a table in which \"{}\" has two meanings", twice.name));
+            return Err(format!("is a lookup table in which \"{}\" has two meanings", twice.name));
         }
         let units = self.columns.iter().filter_map(Column::unit);
         let units: BTreeSet<&str> = units.chain(["s"]).collect();
@@ -61,7 +61,7 @@ impl Table {
             }),
             units: units.into_iter().map(unit).collect(),
             dependencies: (0..self.columns.len()).map(|output| (output, Vec::new())).collect(),
-            is_table: true,
+            is_lookup_table: true,
             has_structure: true,
             variables,
             ..ModelDescription::default()
@@ -71,9 +71,11 @@ impl Table {
     fn summary(&self) -> String {
         let rows = self.times.len();
         if self.is_settable() {
-            return format!("table of {rows} rows");
+            return format!("lookup table of {rows} rows");
         }
-        format!("table of {rows} rows, whose values are no parameters: more than {MOST_PARAMETERS}")
+        format!(
+            "lookup table of {rows} rows, whose values cannot be set because there are more than {MOST_PARAMETERS}"
+        )
     }
 
     fn variable(&self, reference: u32, place: Place) -> Variable {
@@ -83,13 +85,13 @@ impl Table {
         let (name, kind, start, description) = match place {
             Place::Output(index) => {
                 let column = &self.columns[index];
-                (column.name.clone(), column.kind(), None, "Column of the table".to_string())
+                (column.name.clone(), column.kind(), None, "Column of the lookup table".to_string())
             }
             Place::Interpolation => (
                 "interpolation".into(),
-                Kind::Enumeration { items: items() },
+                VariableKind::Enumeration { items: items() },
                 start(HOLD.into()),
-                "Course between two rows: the value of the first one, or a straight line. Whole \
+                "Value between two rows: that of the first one, or on a straight line. Whole \
                  numbers and truth values are held"
                     .into(),
             ),
@@ -108,7 +110,7 @@ impl Table {
             Place::Value(index) => {
                 let (column, row) = (&self.columns[index % count], index / count + 1);
                 let kind = column.kind();
-                let start = if kind == Kind::Boolean {
+                let start = if kind == VariableKind::Boolean {
                     Some((self.values[index] != 0.0).to_string())
                 } else {
                     start(self.values[index])
@@ -134,28 +136,29 @@ impl Column {
         if let Form::Real(unit) = &self.form { unit.as_deref() } else { None }
     }
 
-    fn kind(&self) -> Kind {
+    fn kind(&self) -> VariableKind {
         self.form.kind()
     }
 }
 
 impl Form {
-    fn kind(&self) -> Kind {
+    fn kind(&self) -> VariableKind {
         match self {
             Self::Real(unit) => {
-                Kind::Real { unit: unit.clone(), display_unit: None, min: None, max: None }
+                VariableKind::Real { unit: unit.clone(), display_unit: None, min: None, max: None }
             }
-            Self::Integer => Kind::Integer { min: None, max: None },
-            Self::Boolean => Kind::Boolean,
+            Self::Integer => VariableKind::Integer { min: None, max: None },
+            Self::Boolean => VariableKind::Boolean,
         }
     }
 }
 
-fn seconds() -> Kind {
+fn seconds() -> VariableKind {
     Form::Real(Some("s".into())).kind()
 }
 
-/// Names a unit. What it measures is defined where the column is connected to.
+/// Returns a unit that is only named. What it measures is defined by the FMU that the column is
+/// connected to.
 fn unit(name: &str) -> UnitDefinition {
     UnitDefinition {
         name: name.into(),

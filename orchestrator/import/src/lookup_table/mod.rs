@@ -1,23 +1,23 @@
-//! A table as a unit: a CSV file whose columns over time are outputs. It needs no library, and is
-//! described, set, stepped and read as other units are.
+//! Lookup tables: CSV files whose columns over time are outputs. They need no library, and are
+//! described, set, stepped and read as FMUs are.
 
 mod description;
-mod unit;
+mod instance;
 
+pub(crate) use instance::LookupTableInstance;
 use std::fs;
 use std::io;
 use std::path::Path;
 use std::sync::Arc;
-pub(crate) use unit::TableUnit;
 
-/// Returns whether a path is that of a table, by its extension.
-pub fn is_table(path: &Path) -> bool {
+/// Returns whether a path is that of a lookup table, by its extension.
+pub fn is_lookup_table(path: &Path) -> bool {
     path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("csv"))
 }
 
 /// Largest number of bytes of a file.
 const LARGEST: u64 = 1 << 30;
-/// Largest number of times and values of a table in which they are parameters.
+/// Largest number of times and values up to which they are parameters.
 const MOST_PARAMETERS: usize = 1000;
 
 /// Largest magnitude of a time, s, with which all differences of times can be computed.
@@ -25,7 +25,7 @@ const LONGEST: f64 = 1e12;
 
 /// The columns of a file over time.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Table {
+pub(crate) struct LookupTable {
     columns: Vec<Column>,
     /// Times of the rows, s, none earlier than the one before.
     times: Arc<Vec<f64>>,
@@ -80,8 +80,8 @@ fn number(text: &str) -> Result<f64, &'static str> {
     text.parse().ok().filter(|value: &f64| value.is_finite()).ok_or("a finite number")
 }
 
-impl Table {
-    /// Reads a table. Its first line names the columns: `time`, and then the outputs as
+impl LookupTable {
+    /// Reads a lookup table. Its first line names the columns: `time`, and then the outputs as
     /// [`Column::new`] reads them. Lines that begin with `#` are comments.
     ///
     /// # Errors
@@ -101,7 +101,7 @@ impl Table {
             .trim(csv::Trim::All)
             .flexible(true)
             .from_reader(bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes));
-        let unreadable = |error: csv::Error| format!("is no table: {error}");
+        let unreadable = |error: csv::Error| format!("is not a lookup table: {error}");
         let headings = reader.headers().map_err(unreadable)?.clone();
         let columns = columns(&headings)?;
         let (mut times, mut values) = (Vec::<f64>::new(), Vec::new());
@@ -109,14 +109,14 @@ impl Table {
         while reader.read_record(&mut row).map_err(unreadable)? {
             let line = row.position().map_or(0, csv::Position::line);
             if row.len() != headings.len() {
-                let (has, wanted) = (row.len(), headings.len());
-                return Err(format!("line {line} has {has} values for {wanted} columns"));
+                let (values, columns) = (row.len(), headings.len());
+                return Err(format!("line {line} has {values} values for {columns} columns"));
             }
-            let wrong = |place: usize, wanted: &str| {
+            let wrong = |place: usize, expected: &str| {
                 let (name, text) = (&headings[place], row[place].escape_default());
-                format!("line {line}: \"{name}\" is \"{text}\", it must be {wanted}")
+                format!("line {line}: \"{name}\" is \"{text}\", it must be {expected}")
             };
-            let time = number(&row[0]).map_err(|wanted| wrong(0, wanted))?;
+            let time = number(&row[0]).map_err(|expected| wrong(0, expected))?;
             if time.abs() > LONGEST {
                 return Err(wrong(0, &format!("within {LONGEST:e} s of zero")));
             }
@@ -125,16 +125,16 @@ impl Table {
             }
             times.push(time);
             for (place, column) in (1..).zip(&columns) {
-                values.push(column.value(&row[place]).map_err(|wanted| wrong(place, wanted))?);
+                values.push(column.value(&row[place]).map_err(|expected| wrong(place, expected))?);
             }
         }
         if times.is_empty() {
-            return Err("is a table without rows".into());
+            return Err("is a lookup table without rows".into());
         }
         Ok(Self { columns, times: times.into(), values: values.into() })
     }
 
-    /// Returns whether times and values are parameters. Those of a large table are not.
+    /// Returns whether times and values are parameters. Those of a large lookup table are not.
     fn is_settable(&self) -> bool {
         self.times.len() + self.values.len() <= MOST_PARAMETERS
     }
@@ -146,19 +146,21 @@ fn columns(headings: &csv::StringRecord) -> Result<Vec<Column>, String> {
     match texts.next().unwrap_or_default() {
         "time" | "time [s]" => {}
         other if other.contains(';') => {
-            return Err("is no table: there must be commas between the columns".into());
+            return Err("is not a lookup table: there must be commas between the columns".into());
         }
         other => {
             let other = other.escape_default();
-            return Err(format!("is no table: the first column is \"{other}\", not \"time\""));
+            return Err(format!(
+                "is not a lookup table: the first column is \"{other}\", not \"time\""
+            ));
         }
     }
     let columns: Vec<Column> = texts.map(Column::new).collect();
     if columns.is_empty() {
-        return Err("is a table without columns beside \"time\"".into());
+        return Err("is a lookup table without columns beside \"time\"".into());
     }
     if columns.iter().any(|column| column.name.is_empty()) {
-        return Err("is a table with a column that has no name".into());
+        return Err("is a lookup table with a column that has no name".into());
     }
     Ok(columns)
 }

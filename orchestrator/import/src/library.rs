@@ -1,0 +1,349 @@
+//! Calls an FMU's library.
+//!
+//! The logger that expands `printf` arguments comes from `fmi-rs`. The calls go through libloading,
+//! because `fmi-rs` frees the callback structure after fmi2Instantiate, while FMUs of several
+//! exporters keep the pointer to it and crash when they log. The C types are in [`fmi`], because
+//! those of `fmi-rs` represent a status as an enumeration.
+
+#![allow(unsafe_code)]
+
+use crate::crash::Calling;
+use crate::fmi::{self, Status};
+use crate::folder::TemporaryFolder;
+use crate::instance::{CallFailure, Instance, Outcome};
+use crate::log::Log;
+use libloading::Library;
+use std::ffi::{CStr, CString, c_int, c_void};
+use std::path::Path;
+use std::rc::Rc;
+
+unsafe extern "C" {
+    /// Wraps the logger in a C function that expands the `printf` arguments of a message. It is
+    /// part of `fmi-rs`.
+    fn add_logger_proxy(functions: *mut fmi::Callbacks);
+    /// The C library's `calloc`, for FMUs that request memory from their environment.
+    fn calloc(count: usize, size: usize) -> *mut c_void;
+    /// The C library's `free`, which releases that memory.
+    fn free(memory: *mut c_void);
+}
+
+/// The FMI functions that this program calls, and the library that holds them.
+pub(crate) struct Functions {
+    instantiate: fmi::Instantiate,
+    free_instance: fmi::FreeInstance,
+    setup_experiment: fmi::SetupExperiment,
+    enter_initialization_mode: fmi::Plain,
+    exit_initialization_mode: fmi::Plain,
+    terminate: fmi::Plain,
+    get_real: fmi::Get<f64>,
+    get_integer: fmi::Get<i32>,
+    get_boolean: fmi::Get<i32>,
+    set_real: fmi::Set<f64>,
+    set_integer: fmi::Set<i32>,
+    set_boolean: fmi::Set<i32>,
+    set_string: fmi::Set<fmi::Text>,
+    do_step: fmi::DoStep,
+    get_real_status: fmi::GetStatus<f64>,
+    get_boolean_status: fmi::GetStatus<c_int>,
+    /// Optional, because nothing depends on it and some libraries lack it.
+    get_version: Option<fmi::GetText>,
+    /// Optional, because a new instance does the same.
+    reset: Option<fmi::Plain>,
+    _library: Library,
+}
+
+impl Functions {
+    pub(crate) fn load(file: &Path) -> Result<Self, libloading::Error> {
+        // SAFETY: loading runs the library's own initializers, which are sound only if the library
+        // is. Whoever runs an FMU trusts its code.
+        let library = unsafe { Library::new(file) }?;
+        // SAFETY: FMI 2.0 gives each function the type it is loaded as, and `_library` keeps the
+        // code loaded as long as the pointers exist.
+        unsafe {
+            Ok(Self {
+                instantiate: *library.get(b"fmi2Instantiate\0")?,
+                free_instance: *library.get(b"fmi2FreeInstance\0")?,
+                setup_experiment: *library.get(b"fmi2SetupExperiment\0")?,
+                enter_initialization_mode: *library.get(b"fmi2EnterInitializationMode\0")?,
+                exit_initialization_mode: *library.get(b"fmi2ExitInitializationMode\0")?,
+                terminate: *library.get(b"fmi2Terminate\0")?,
+                get_real: *library.get(b"fmi2GetReal\0")?,
+                get_integer: *library.get(b"fmi2GetInteger\0")?,
+                get_boolean: *library.get(b"fmi2GetBoolean\0")?,
+                set_real: *library.get(b"fmi2SetReal\0")?,
+                set_integer: *library.get(b"fmi2SetInteger\0")?,
+                set_boolean: *library.get(b"fmi2SetBoolean\0")?,
+                set_string: *library.get(b"fmi2SetString\0")?,
+                do_step: *library.get(b"fmi2DoStep\0")?,
+                get_real_status: *library.get(b"fmi2GetRealStatus\0")?,
+                get_boolean_status: *library.get(b"fmi2GetBooleanStatus\0")?,
+                get_version: library.get(b"fmi2GetVersion\0").ok().map(|function| *function),
+                reset: library.get(b"fmi2Reset\0").ok().map(|function| *function),
+                _library: library,
+            })
+        }
+    }
+
+    /// Returns a line about the version that the library reports, if it is missing or not FMI 2.0.
+    pub(crate) fn version_fault(&self) -> Option<String> {
+        let Some(get_version) = self.get_version else {
+            return Some("its library has no fmi2GetVersion".into());
+        };
+        // SAFETY: FMI 2.0 gives the function this type and allows the call at any time.
+        let version = text_of(unsafe { get_version() });
+        let is_supported = version == "2.0" || version.starts_with("2.0.");
+        (!is_supported)
+            .then(|| format!("its library reports version \"{}\" of FMI", version.escape_default()))
+    }
+}
+
+/// Copies the C string at `text`; a null pointer gives an empty string.
+fn text_of(text: fmi::Text) -> String {
+    if text.is_null() {
+        return String::new();
+    }
+    // SAFETY: FMI passes strings that end with a zero byte and stay valid during the call; the null
+    // pointer was excluded above.
+    unsafe { CStr::from_ptr(text) }.to_string_lossy().into_owned()
+}
+
+/// The logger callback, called by the C function that expands the arguments.
+unsafe extern "C" fn receive_message(
+    environment: *mut c_void,
+    _instance: fmi::Text,
+    status: c_int,
+    category: fmi::Text,
+    message: fmi::Text,
+) {
+    // SAFETY: the environment is the `Log` passed with the callbacks, which lives as long as the
+    // instance.
+    if let Some(log) = unsafe { environment.cast::<Log>().as_ref() } {
+        log.message(fmi::status(status), &text_of(category), &text_of(message));
+    }
+}
+
+/// The data that must live as long as an instance.
+struct InstanceData {
+    functions: Functions,
+    _callbacks: Rc<fmi::Callbacks>,
+    log: Rc<Log>,
+}
+
+/// An instance of an FMU, in this process.
+pub(crate) struct FmuInstance {
+    handle: fmi::Handle,
+    data: Rc<InstanceData>,
+    fatal: bool,
+    _folder: Option<Rc<TemporaryFolder>>,
+}
+
+impl FmuInstance {
+    /// Makes an instance with the name in its log. `folder` holds the unpacked archive, if it would
+    /// vanish otherwise.
+    pub(crate) fn new(
+        functions: Functions,
+        log: Rc<Log>,
+        guid: &str,
+        resources: &str,
+        folder: Option<Rc<TemporaryFolder>>,
+    ) -> Result<Self, String> {
+        let text = |text: &str| {
+            CString::new(text).map_err(|_| format!("\"{text:?}\" contains a zero byte"))
+        };
+        let (name, guid, resources) = (text(&log.component)?, text(guid)?, text(resources)?);
+
+        // Some FMUs refuse to start without memory functions although they declare that they need
+        // none.
+        let mut callbacks = fmi::Callbacks {
+            logger: receive_message,
+            allocate: Some(calloc),
+            free: Some(free),
+            step_finished: None,
+            environment: Rc::as_ptr(&log).cast_mut().cast(),
+        };
+        // SAFETY: `callbacks` is a valid, exclusively borrowed structure for the whole call, which
+        // only replaces the logger in it by one that expands the arguments.
+        unsafe { add_logger_proxy(&raw mut callbacks) };
+        let callbacks = Rc::new(callbacks);
+
+        let calling = Calling::new(&log.component, "instantiate");
+        // SAFETY: FMI 2.0 gives the function this type; the texts outlive the call, and the
+        // instance keeps callbacks and log alive as long as the instance, as FMI demands.
+        let handle = unsafe {
+            (functions.instantiate)(
+                name.as_ptr(),
+                fmi::CO_SIMULATION,
+                guid.as_ptr(),
+                resources.as_ptr(),
+                Rc::as_ptr(&callbacks),
+                fmi::FALSE,
+                fmi::TRUE,
+            )
+        };
+        drop(calling);
+        if handle.is_null() {
+            let message =
+                log.take().unwrap_or_else(|| "fmi2Instantiate returned no instance".into());
+            return Err(format!("could not be instantiated: {message}"));
+        }
+        log.is_instantiated();
+        let data = Rc::new(InstanceData { functions, _callbacks: callbacks, log });
+        Ok(Self { handle, data, fatal: false, _folder: folder })
+    }
+
+    /// Makes a call, whose name is recorded meanwhile in case it crashes.
+    #[inline]
+    fn call(
+        &mut self,
+        call: &'static str,
+        function: impl FnOnce(&Functions, fmi::Handle) -> c_int,
+    ) -> Outcome {
+        let calling = Calling::new(&self.data.log.component, call);
+        let status = function(&self.data.functions, self.handle);
+        drop(calling);
+        match fmi::status(status) {
+            Ok(Status::Ok | Status::Warning) => Ok(()),
+            status => Err(self.failure(call, status)),
+        }
+    }
+
+    fn call_plain(&mut self, call: &'static str, function: fmi::Plain) -> Outcome {
+        // SAFETY: the instance is alive until this value is dropped, and the function is one of its
+        // library with the type that FMI gives it.
+        self.call(call, |_, handle| unsafe { function(handle) })
+    }
+
+    #[cold]
+    fn failure(&mut self, call: &'static str, status: Result<Status, c_int>) -> CallFailure {
+        self.fatal |= status == Ok(Status::Fatal);
+        let message = self.data.log.take();
+        if status == Ok(Status::Discard) && call == "doStep" {
+            return self.discarded(message);
+        }
+        if status == Ok(Status::Pending) {
+            let message = "the step is asynchronous, which is not supported";
+            return CallFailure::new(call, format!("{message} ({:?})", Status::Pending));
+        }
+        let message = message.unwrap_or_else(|| "its log holds no message".into());
+        CallFailure::new(call, format!("{message} ({})", fmi::name_of(status)))
+    }
+
+    /// Describes why a step was discarded. FMI 2.0, section 4.2.3, lets an FMU end the simulation
+    /// in this way.
+    fn discarded(&mut self, message: Option<String>) -> CallFailure {
+        let Functions { get_real_status, get_boolean_status, .. } = self.data.functions;
+        let (mut time, mut terminated) = (f64::NAN, fmi::FALSE);
+        let calling = Calling::new(&self.data.log.component, "getStatus");
+        // SAFETY: the instance is alive, both pointers are valid for the calls, and FMI allows
+        // these calls after fmi2Discard.
+        let statuses = unsafe {
+            [
+                get_real_status(self.handle, fmi::LAST_SUCCESSFUL_TIME, &raw mut time),
+                get_boolean_status(self.handle, fmi::TERMINATED, &raw mut terminated),
+            ]
+        };
+        drop(calling);
+        let [knows_time, knows_end] = statuses.map(|status| fmi::status(status) == Ok(Status::Ok));
+        let ends = knows_end && terminated != fmi::FALSE;
+        let mut parts: Vec<String> = message.into_iter().collect();
+        if !ends && parts.is_empty() {
+            parts.push("its log holds no message".into());
+        }
+        if knows_time && time.is_finite() {
+            parts.push(format!("it got as far as t = {time} s"));
+        }
+        CallFailure {
+            ends,
+            ..CallFailure::new("doStep", format!("{} ({:?})", parts.join("; "), Status::Discard))
+        }
+    }
+}
+
+impl Drop for FmuInstance {
+    fn drop(&mut self) {
+        if self.fatal {
+            // After a fatal error no function of the FMU may be called, not even fmi2FreeInstance,
+            // so the instance is leaked.
+            std::mem::forget(Rc::clone(&self.data));
+        } else {
+            let _calling = Calling::new(&self.data.log.component, "freeInstance");
+            // SAFETY: the instance is alive, is freed only here, and is not used afterwards.
+            unsafe { (self.data.functions.free_instance)(self.handle) };
+        }
+    }
+}
+
+/// Performs a get or set call for arrays of references and values.
+macro_rules! call_with_values {
+    ($self:ident, $function:ident, $name:literal, $references:ident, $values:ident, $pointer:expr) => {{
+        assert_eq!($references.len(), $values.len(), "as many values as references");
+        // SAFETY: the instance is alive, and both arrays have the length that is passed.
+        $self.call($name, |functions, handle| unsafe {
+            (functions.$function)(handle, $references.as_ptr(), $references.len(), $pointer)
+        })
+    }};
+}
+
+impl Instance for FmuInstance {
+    fn get_real(&mut self, references: &[u32], values: &mut [f64]) -> Outcome {
+        call_with_values!(self, get_real, "getReal", references, values, values.as_mut_ptr())
+    }
+
+    fn get_integer(&mut self, references: &[u32], values: &mut [i32]) -> Outcome {
+        call_with_values!(self, get_integer, "getInteger", references, values, values.as_mut_ptr())
+    }
+
+    fn get_boolean(&mut self, references: &[u32], values: &mut [i32]) -> Outcome {
+        call_with_values!(self, get_boolean, "getBoolean", references, values, values.as_mut_ptr())
+    }
+
+    fn set_real(&mut self, references: &[u32], values: &[f64]) -> Outcome {
+        call_with_values!(self, set_real, "setReal", references, values, values.as_ptr())
+    }
+
+    fn set_integer(&mut self, references: &[u32], values: &[i32]) -> Outcome {
+        call_with_values!(self, set_integer, "setInteger", references, values, values.as_ptr())
+    }
+
+    fn set_boolean(&mut self, references: &[u32], values: &[i32]) -> Outcome {
+        call_with_values!(self, set_boolean, "setBoolean", references, values, values.as_ptr())
+    }
+
+    fn set_string(&mut self, reference: u32, value: &str) -> Outcome {
+        let text = CString::new(value).map_err(|_| {
+            CallFailure::new("setString", format!("the text {value:?} contains a zero byte"))
+        })?;
+        let (references, values) = ([reference], [text.as_ptr()]);
+        call_with_values!(self, set_string, "setString", references, values, values.as_ptr())
+    }
+
+    fn enter_initialization(&mut self, start: f64, stop: f64) -> Outcome {
+        // SAFETY: the instance is alive, and the function has the type FMI gives it.
+        self.call("setupExperiment", |functions, handle| unsafe {
+            (functions.setup_experiment)(handle, fmi::FALSE, 0.0, start, fmi::TRUE, stop)
+        })?;
+        self.call_plain("enterInitializationMode", self.data.functions.enter_initialization_mode)
+    }
+
+    fn exit_initialization(&mut self) -> Outcome {
+        self.call_plain("exitInitializationMode", self.data.functions.exit_initialization_mode)
+    }
+
+    fn do_step(&mut self, time: f64, step: f64) -> Outcome {
+        // SAFETY: the instance is alive, and the function has the type FMI gives it.
+        self.call("doStep", |functions, handle| unsafe {
+            (functions.do_step)(handle, time, step, fmi::TRUE)
+        })
+    }
+
+    fn terminate(&mut self) -> Outcome {
+        self.call_plain("terminate", self.data.functions.terminate)
+    }
+
+    fn reset(&mut self) -> Outcome {
+        let Some(reset) = self.data.functions.reset else {
+            return Err(CallFailure::new("reset", "its library has no fmi2Reset"));
+        };
+        self.call_plain("reset", reset)
+    }
+}
