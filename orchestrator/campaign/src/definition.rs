@@ -45,7 +45,7 @@ pub struct Campaign {
     pub cases: Option<u64>,
     /// Way in which the cases fill the space of what varies.
     #[serde(default)]
-    pub design: Kind,
+    pub design: DesignKind,
     /// Parameters that differ from case to case.
     #[serde(default)]
     pub vary: Vec<Vary>,
@@ -82,7 +82,7 @@ pub struct Campaign {
 /// Way in which the cases fill the space of what varies.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Deserialize, JsonSchema, Serialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Kind {
+pub enum DesignKind {
     /// Each case is drawn independently of all others.
     #[default]
     Random,
@@ -204,10 +204,10 @@ impl Campaign {
     /// Returns an error if a file cannot be read, is not TOML, holds an unknown key, or contradicts
     /// itself.
     pub fn load(path: &Path) -> Result<Self, Error> {
-        Self::of(Source::load(path)?)
+        Self::read(Source::load(path)?)
     }
 
-    fn of(source: Source) -> Result<Self, Error> {
+    fn read(source: Source) -> Result<Self, Error> {
         let mut campaign: Self = source.read()?;
         campaign.source = source;
         campaign.check()?;
@@ -224,10 +224,10 @@ impl Campaign {
     fn check(&self) -> Result<(), Error> {
         let whole = |message: String| self.source.error(&(0..0), message);
         let mut ids = BTreeSet::new();
-        let all = self.measures.iter().map(|measure| ("measure", &measure.id));
-        for (what, id) in all.chain(self.limits.iter().map(|limit| ("limit", &limit.id))) {
+        let measures = self.measures.iter().map(|measure| ("measure", &measure.id));
+        for (what, id) in measures.chain(self.limits.iter().map(|limit| ("limit", &limit.id))) {
             if id.is_empty() {
-                return Err(whole(format!("[[{what}]] id is missing: the results need a name")));
+                return Err(whole(format!("[[{what}]] has no id, which names it in the results")));
             }
             if !ids.insert((what, id)) {
                 return Err(whole(format!("there are two [[{what}]] with the id \"{id}\"")));
@@ -245,7 +245,7 @@ impl Campaign {
                 return fault("the limit is not a number");
             }
             if limit.ends && limit.at_most.is_none() {
-                return fault("ends needs an at_most: nothing is above its least value at first");
+                return fault("ends needs an at_most, because the largest value only grows");
             }
         }
         if let Some(until) = &self.until {
@@ -256,23 +256,23 @@ impl Campaign {
             }
             for (key, value) in [("below", until.below), ("confidence", until.confidence)] {
                 if !(value > 0.0 && value < 1.0) {
-                    return Err(whole(format!("[until] {key} = {value}: between 0 and 1")));
+                    return Err(whole(format!(
+                        "[until] {key} = {value}, but it must be between 0 and 1"
+                    )));
                 }
             }
-            if self.design != Kind::Random {
-                return Err(whole(
-                    "[until] counts on independent cases: it needs design = \"random\"".into(),
-                ));
+            if self.design != DesignKind::Random {
+                return Err(whole("[until] needs independent cases: design = \"random\"".into()));
             }
         }
         if self.cases == Some(0) {
-            return Err(whole("cases = 0: at least 1".into()));
+            return Err(whole("cases = 0, but it must be at least 1".into()));
         }
         if self.keep.worst > 0 && self.keep.by.is_none() {
             return Err(whole("[keep] worst needs by, the measure that orders the cases".into()));
         }
         if self.keep.every == Some(0) {
-            return Err(whole("[keep] every = 0: at least 1".into()));
+            return Err(whole("[keep] every = 0, but it must be at least 1".into()));
         }
         if self.vary.is_empty() {
             return Err(whole("nothing varies: add a [[vary]]".into()));

@@ -82,8 +82,8 @@ pub enum OneOrMore {
 }
 
 impl OneOrMore {
-    /// Returns all names.
-    pub fn all(&self) -> &[String] {
+    /// Returns the names.
+    pub fn names(&self) -> &[String] {
         match self {
             Self::One(name) => std::slice::from_ref(name),
             Self::More(names) => names,

@@ -87,7 +87,8 @@ pub struct Panel {
 #[serde(deny_unknown_fields)]
 pub struct Curve {
     /// Signal that is drawn as the curve.
-    pub of: Signal,
+    #[serde(rename = "of")]
+    pub signal: Signal,
     /// Name of the curve in the legend.
     pub label: String,
     /// Colour of the curve.
@@ -121,7 +122,8 @@ pub struct Across {
 #[serde(deny_unknown_fields)]
 pub struct Axis {
     /// Name of the metric along the axis.
-    pub of: String,
+    #[serde(rename = "of")]
+    pub metric: String,
     /// Factor by which the metric is multiplied to get the unit of the axis.
     #[serde(default = "super::values::unscaled")]
     pub factor: f64,

@@ -109,7 +109,7 @@ pub enum Parameters {
 
 impl Parameters {
     /// Returns the names of all parameters.
-    pub fn all(&self) -> &[String] {
+    pub fn names(&self) -> &[String] {
         match self {
             Self::One(parameter) => std::slice::from_ref(parameter),
             Self::Several(parameters) => parameters,
