@@ -18,7 +18,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use toml::{Spanned, Value};
 
-/// A campaign: an experiment, what varies from case to case, and what is asked of all cases.
+/// A campaign: an experiment, the parameters that vary from case to case, and the limits that the
+/// cases are to keep.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Campaign {
@@ -43,16 +44,16 @@ pub struct Campaign {
     /// Number of cases, and with `until` the largest number. A factorial design needs none.
     #[serde(default)]
     pub cases: Option<u64>,
-    /// Way in which the cases fill the space of what varies.
+    /// Design that places the cases in the space of the varied parameters.
     #[serde(default)]
     pub design: DesignKind,
     /// Parameters that differ from case to case.
     #[serde(default)]
     pub vary: Vec<Vary>,
-    /// Correlations among what varies.
+    /// Correlations between varied parameters.
     #[serde(default, rename = "correlation")]
     pub correlations: Vec<Correlation>,
-    /// Lists of signals that measures refer to, by name, besides those of the experiment.
+    /// Lists of signals that measures refer to, by name, in addition to those of the experiment.
     #[serde(default)]
     pub signals: BTreeMap<String, Vec<Signal>>,
     /// Names of metrics of the experiment that are recorded of each case.
@@ -79,29 +80,29 @@ pub struct Campaign {
     pub source: Source,
 }
 
-/// Way in which the cases fill the space of what varies.
+/// Design that places the cases in the space of the varied parameters.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Deserialize, JsonSchema, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum DesignKind {
     /// Each case is drawn independently of all others.
     #[default]
     Random,
-    /// Each parameter falls once into each of as many strata of equal probability as there are
-    /// cases.
+    /// The range of each parameter is divided into as many strata of equal probability as there are
+    /// cases, and each stratum holds one case.
     LatinHypercube,
     /// Points of Sobol's sequence, scrambled by Owen's method.
     Sobol,
-    /// All combinations of the levels of what varies.
+    /// All combinations of the levels of the varied parameters.
     Factorial,
-    /// The corners of the box of what varies, and random cases. If there are more corners than
-    /// cases, every other case is a corner that is chosen at random.
+    /// The corners of the parameter space, and random cases. If there are more corners than cases,
+    /// every other case is a corner that is chosen at random.
     Corners,
-    /// Pairs of random points with exchanged coordinates, which Sobol's indices are computed from.
+    /// Pairs of random points with exchanged coordinates, from which Sobol's indices are computed.
     /// The number of cases is a multiple of the number of parameters plus two.
     Sensitivity,
 }
 
-/// Correlation of two parameters that vary. It is that of the normal scores behind their
+/// Correlation of two varied parameters. It is the correlation of the normal scores behind their
 /// distributions (a Gaussian copula).
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -113,13 +114,14 @@ pub struct Correlation {
     pub coefficient: f64,
 }
 
-/// A limit on a measure, which each case keeps or breaks. A case that is lost or fails keeps none.
+/// A limit on a measure, which each case keeps or breaks. A case that is lost, fails or ends early
+/// breaks all limits.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Limit {
     /// Name of the limit in the results.
     pub id: String,
-    /// The limit in words, for the report.
+    /// Wording of the limit in the report.
     #[serde(default)]
     pub says: String,
     /// Metric or measure that is limited.
@@ -155,17 +157,17 @@ pub struct Until {
 #[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Keep {
-    /// Number of cases with the largest values of `by`.
+    /// Number of kept cases with the largest values of `by`.
     #[serde(default)]
     pub worst: u32,
     /// Measure that orders the cases.
     #[serde(default)]
     #[schemars(with = "Option<String>")]
     pub by: Option<Spanned<String>>,
-    /// Largest number of cases that broke a limit, were lost or failed.
+    /// Largest number of kept cases that broke a limit, were lost or failed.
     #[serde(default)]
     pub failed: u32,
-    /// Number m, if every m-th case is kept.
+    /// Interval m, so that every m-th case is kept.
     #[serde(default)]
     pub every: Option<u64>,
 }

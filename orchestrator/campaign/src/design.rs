@@ -1,5 +1,5 @@
-//! The place of each case in the space of what varies. It depends on the seed and the number of the
-//! case alone, so that any case can be computed by itself.
+//! The place of each case in the space of the varied parameters. It depends on the seed and the
+//! number of the case alone, so that any case can be computed by itself.
 
 use crate::definition::DesignKind;
 use rand_chacha::ChaCha8Rng;

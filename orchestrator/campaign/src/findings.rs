@@ -1,4 +1,4 @@
-//! What a campaign found out.
+//! Findings of a campaign.
 
 use crate::definition::{Limit, Until};
 use crate::flight::{CaseStatus, kept_column};
@@ -10,7 +10,7 @@ use cosim::error::Error;
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// What a campaign found out, which `summary.json` holds.
+/// Findings of a campaign, as `summary.json` holds them.
 #[derive(Clone, Debug, Serialize)]
 pub struct Findings {
     /// Title of the campaign.
@@ -32,7 +32,7 @@ pub struct Findings {
 pub struct LimitFinding {
     /// Id of the limit.
     pub id: String,
-    /// The limit in words.
+    /// Wording of the limit.
     pub says: String,
     /// Probability that a case breaks the limit, with 95 % confidence.
     pub broken: Probability,
@@ -47,7 +47,7 @@ pub struct Measured {
     pub unit: String,
     /// Its distribution; none if no case has a value.
     pub summary: Option<Summary>,
-    /// What the parameters have to do with it.
+    /// Sensitivity of the measure to each parameter.
     pub sensitivities: Vec<Sensitivity>,
 }
 
@@ -64,7 +64,7 @@ pub struct Answer {
     pub confidence_of_each_look: f64,
 }
 
-/// Computes what a table of cases shows.
+/// Computes the findings from a table of cases.
 pub(crate) fn findings(
     plan: &Plan,
     table: &Reader,
@@ -108,7 +108,7 @@ pub(crate) fn findings(
     Ok(Findings { title: plan.campaign.title.clone(), cases, status, limits, measures, answer })
 }
 
-/// Returns a limit in words.
+/// Returns the wording of a limit.
 fn says(plan: &Plan, limit: &Limit) -> String {
     if !limit.says.is_empty() {
         return limit.says.clone();

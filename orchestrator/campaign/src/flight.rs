@@ -48,7 +48,7 @@ impl CaseStatus {
 pub struct Row {
     /// Number of the case.
     pub case: u64,
-    /// Values of what varies.
+    /// Values of the varied parameters.
     pub values: Vec<SettingValue>,
     /// Recorded numbers; `None` if a number has no value.
     pub numbers: Vec<Option<f64>>,
@@ -128,8 +128,8 @@ impl<'a> Flight<'a> {
     /// Flies the case with this number.
     ///
     /// # Errors
-    /// Returns an error if the work was asked to end, or if the values of the case cannot be set. An
-    /// FMU that fails is a result.
+    /// Returns an error if the work was asked to end, or if the values of the case cannot be set.
+    /// An FMU that fails is a result.
     pub fn fly(&mut self, case: u64) -> Result<Row, Error> {
         self.fly_with(case, self.plan.values(case)?, &mut [])
     }

@@ -1,6 +1,5 @@
-//! Parts of a campaign: consecutive cases, whose results are kept in a file of their own. A part
-//! whose file is there and fits is not flown again, whoever flew it: this thread, an earlier run,
-//! or another machine.
+//! Parts of a campaign: consecutive cases, whose results share a file. A part with a valid file is
+//! not flown again, whether this thread, an earlier run or another machine flew it.
 
 use crate::flight::{Flight, Row, kept_column, table};
 use crate::plan::Plan;
@@ -26,7 +25,7 @@ pub fn path(out: &Path, part: &Range<u64>) -> PathBuf {
 /// State of a part's file in the folder of the results.
 #[derive(Clone, Debug, PartialEq)]
 pub enum PartState {
-    /// The part is there and fits: the number of its cases that broke each limit.
+    /// The file is valid: the number of cases that broke each limit.
     Whole(Vec<u64>),
     /// There is no such file.
     Missing,

@@ -23,7 +23,7 @@ use std::path::PathBuf;
 pub struct Plan {
     /// The campaign as its file describes it.
     pub campaign: Campaign,
-    /// What varies, in the order of the design's dimensions.
+    /// Varied parameters, in the order of the design's dimensions.
     pub varied: Vec<Varied>,
     /// Numbers that are recorded of each case.
     pub recorded: Vec<Recorded>,

@@ -1,4 +1,5 @@
-//! Looks up what a campaign names: its experiment, what is observed, and what varies.
+//! Looks up what a campaign names: its experiment, its metrics and measures, and the varied
+//! parameters.
 
 use crate::changes::Changes;
 use crate::definition::{Campaign, DesignKind, Vary};
@@ -128,7 +129,7 @@ pub(crate) fn observe(campaign: &Campaign, experiment: &Observe) -> Result<Obser
     })
 }
 
-/// Makes the distributions of one entry of what varies.
+/// Makes the distributions of one `[[vary]]`.
 pub(crate) fn distributions(
     vary: &Vary,
     source: &Source,
@@ -223,8 +224,8 @@ pub(crate) fn keys(
         table.remove("cases");
     }
     let text = toml::to_string(&table).map_err(|error| Error::experiment(error.to_string()))?;
-    // FMUs count by their content here as well, and it is the same for a case in which processes its
-    // instances run.
+    // FMUs count by their content here as well, and it is the same for a case in which processes
+    // its instances run.
     let (fmu, isolation) = (Vec::new(), Protection::default());
     let overrides = Overrides { fmu, isolation, ..changes.overrides.clone() };
     let text = format!("{text}{overrides:?}");

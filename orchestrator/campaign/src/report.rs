@@ -1,5 +1,5 @@
-//! The report of a campaign: one page with verdicts, distributions, sensitivities and the worst
-//! cases, which needs no other file.
+//! The report of a campaign: one self-contained page with verdicts, distributions, sensitivities
+//! and the worst cases.
 
 mod cloud;
 mod figures;
@@ -68,7 +68,7 @@ fn ranking(plan: &Plan) -> Option<String> {
     by.or_else(limited).or_else(|| plan.recorded.first().map(|recorded| recorded.name.clone()))
 }
 
-/// Flies cases once more and keeps everything of them.
+/// Flies cases again and writes their full results.
 fn keep(plan: &Plan, flight: &mut Flight, cases: &BTreeSet<u64>, out: &Path) -> Result<(), Error> {
     for case in cases {
         let folder = out.join("cases").join(case.to_string());
@@ -253,7 +253,7 @@ fn measures(measures: &[Measured]) -> Markup {
     }
 }
 
-/// Returns a p-value as text. What is smaller than any test of it could show is not written as 0.
+/// Returns a p-value as text. A very small one is not written as 0.
 fn chance(p_value: f64) -> String {
     if p_value < 1e-4 { "< 0.0001".into() } else { short(p_value) }
 }

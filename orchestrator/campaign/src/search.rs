@@ -1,5 +1,5 @@
-//! Looks for the worst case: an evolution strategy (CMA-ES) with restarts moves through the space
-//! of what varies towards larger values of a measure.
+//! Looks for the worst case: an evolution strategy (CMA-ES) with restarts moves through the
+//! space of the varied parameters towards larger values of a measure.
 
 use crate::definition::Search;
 use crate::design::Place;
@@ -95,8 +95,8 @@ struct Tried {
 /// Looks for the worst case of a campaign.
 ///
 /// # Errors
-/// Returns an error if the campaign does not say what to look for, if a file cannot be written, or if
-/// the first generation was ended.
+/// Returns an error if the campaign does not say what to look for, if a file cannot be written, or
+/// if the first generation was ended.
 pub fn search(plan: &Plan, options: &Options) -> Result<SearchOutcome, Error> {
     let begin = Instant::now();
     let search = plan.campaign.search.as_ref().ok_or_else(|| {

@@ -1,4 +1,4 @@
-//! How much each parameter that varies has to do with a measure.
+//! Sensitivity of a measure to each varied parameter.
 
 use crate::definition::DesignKind;
 use serde::Serialize;
@@ -11,8 +11,7 @@ pub struct Sensitivity {
     pub parameter: String,
     /// Rank correlation of parameter and measure (Spearman); none if one of them is constant.
     pub rank_correlation: Option<f64>,
-    /// Probability of a rank correlation at least as large if they had nothing to do with each
-    /// other.
+    /// Probability of a rank correlation at least as large if the two were independent.
     pub p_value: Option<f64>,
     /// Share of the measure's variance that the parameter explains by itself (Sobol's first-order
     /// index), if the design allows it.
@@ -68,7 +67,8 @@ fn correlation(x: &[f64], y: &[f64]) -> Option<f64> {
 }
 
 /// Computes the indices of all parameters, first-order and total, from a measure of the cases of a
-/// design of the kind [`DesignKind::Sensitivity`]: first-order by Saltelli et al. 2010, total by Jansen
+/// design of the kind [`DesignKind::Sensitivity`]: first-order by Saltelli et al. 2010, total by
+/// Jansen
 /// 1999. Samples with a value that is not a number are left out.
 pub fn indices(measure: &[f64], parameters: usize) -> Option<Vec<(f64, f64)>> {
     let block = parameters + 2;

@@ -1,4 +1,4 @@
-//! What a sample of cases says about all cases, with confidence.
+//! Statistics of a sample of cases, with confidence intervals.
 
 use serde::Serialize;
 use statrs::distribution::{Beta, Binomial, ContinuousCDF, DiscreteCDF};

@@ -17,10 +17,10 @@ pub struct GuaranteeSignals {
     pub in_force: usize,
     /// Variable that tells why the guarantee is or is not in force, of an enumeration type.
     pub status: Option<Probed>,
-    /// Names of the limits, with the indices of the variables that hold the unused share of
-    /// the limit after the reserve for disturbances.
+    /// Names of the limits, with the indices of the variables that hold the unused share of the
+    /// limit after the reserve for disturbances.
     pub margins: Vec<(String, usize)>,
-    /// GuaranteeSignals as multiples of their limits, which must not exceed 1 while the guarantee is in
+    /// Signals as multiples of their limits, which must not exceed 1 while the guarantee is in
     /// force.
     pub keeps: Vec<Resolved>,
 }

@@ -98,7 +98,7 @@ impl Gauge {
         }
     }
 
-    /// Forgets what was measured, so that another run can be measured.
+    /// Forgets all samples, so that another run can be measured.
     pub(crate) fn reset(&mut self) {
         let signals = std::mem::take(&mut self.signals);
         let each = self.each.map(|(place, _)| (place, 0.0));

@@ -199,7 +199,7 @@ impl Meters {
         self
     }
 
-    /// Forgets what was measured, so that another run of the system can be measured.
+    /// Forgets all samples, so that another run of the system can be measured.
     pub fn reset(&mut self) {
         self.gauges.values_mut().flatten().for_each(Gauge::reset);
         if let Some(record) = &mut self.guarantee.1 {

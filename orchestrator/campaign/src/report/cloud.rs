@@ -1,5 +1,5 @@
-//! The worst case over the cloud of the others: median and band of each signal that the experiment
-//! draws.
+//! The worst case over the median and the band of the other cases, for each signal that the
+//! experiment draws.
 
 use crate::flight::Flight;
 use crate::plan::Plan;

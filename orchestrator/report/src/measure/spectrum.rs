@@ -1,14 +1,14 @@
-//! What signals contain above a frequency.
+//! Content of signals above a frequency.
 
 use rustfft::FftPlanner;
 use rustfft::num_complex::Complex;
 use std::f64::consts::PI;
 
-/// Returns the root of the sum over the signals of the mean square of what lies above `frequency`
-/// (Hz). `values` holds the values of all `signals`, sample by sample, `step` (s) apart. Each
-/// signal's mean is taken away, and a Hann window keeps slow changes from leaking into fast ones.
-/// The result is `None` with fewer than 16 samples, or if `frequency` is not below half of the
-/// sampling rate.
+/// Returns the RMS of the content above `frequency` (Hz), as the root of the sum of the signals'
+/// mean squares. `values` holds the values of all `signals`, sample by sample, `step` (s) apart.
+/// Each signal's mean is taken away, and a Hann window keeps slow changes from leaking into fast
+/// ones. The result is `None` with fewer than 16 samples, or if `frequency` is not below half of
+/// the sampling rate.
 pub(super) fn rms_above(values: &[f64], signals: usize, step: f64, frequency: f64) -> Option<f64> {
     let samples = values.len().checked_div(signals)?;
     if samples < 16 || frequency >= 0.5 / step {

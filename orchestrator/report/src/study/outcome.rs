@@ -7,7 +7,7 @@ use cosim::system::Parameters;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// Results that are kept of a part.
+/// Results of a part.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Outcome {
     /// Results of each member, one for each value of the parameter.
@@ -21,7 +21,7 @@ pub struct Outcome {
     pub spread: BTreeMap<Signal, Spread>,
 }
 
-/// Results that are kept of one member of a run.
+/// Results of one member of a run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Member {
     /// Value of the parameter, if one is varied.
@@ -111,7 +111,7 @@ pub(super) struct MemberResult {
 }
 
 impl MemberResult {
-    /// Keeps the smaller one of each computing time of two runs that are otherwise the same.
+    /// Replaces each computing time by the smaller one of two runs that are otherwise the same.
     pub(super) fn keep_least_times(&mut self, other: &Self, observe: &Observe) {
         let (metrics, others) = (&mut self.member.metrics, &other.member.metrics);
         for (name, value) in &mut metrics.asked {

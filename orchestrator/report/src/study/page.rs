@@ -1,9 +1,7 @@
-//! The report as one HTML page, which needs no other file.
+//! The report as one self-contained HTML page.
 
 use super::claims::{Checked, Judged, Verdict};
-use super::comparisons::{
-    Check, Claim, ComparisonRow, ComparisonTable, Overview, OverviewColumn, Relation,
-};
+use super::comparisons::{Check, Claim, ComparisonRow, ComparisonTable, Overview, Relation};
 use super::results::{Numbers, Results};
 use super::texts::{percent, several, shown, signed};
 use super::values::{Quantity, ValueKind};
@@ -79,7 +77,7 @@ pub(super) fn page(
                         h2 { "How the numbers were computed" }
                         p {
                             "Orchestrator " (env!("CARGO_PKG_VERSION")) " made " (runs) " simulation runs. All numbers of this page are in "
-                            code { "results.json" } ". The folder " code { "runs" } " holds the signals of the first run of each row. "
+                            code { "results.json" } ". The folder " code { "runs" } " holds the signals of the first run of each row below. "
                             "A repetition gives the same bits, except for computing times."
                         }
                         (all_runs(results))
@@ -296,14 +294,13 @@ fn overview(overview: &Overview, results: &Results) -> Markup {
     let mut rows = Vec::new();
     for id in &overview.runs {
         let Some(run) = results.study.run(id.get_ref()) else { continue };
-        let number = |column: &OverviewColumn| {
+        let numbers = overview.metrics.iter().map(|column| {
             let reference = format!("{}.{}", id.get_ref(), column.metric);
             let numbers =
                 results.numbers(&reference).map_or_else(|_| Vec::new(), |numbers| numbers.0);
             Numbers(numbers.into_iter().map(|number| number * column.factor).collect())
-        };
-        let numbers: Vec<Numbers> = overview.metrics.iter().map(number).collect();
-        rows.push((run, numbers));
+        });
+        rows.push((run, numbers.collect::<Vec<_>>()));
     }
     html! {
         h3 { (overview.title) }

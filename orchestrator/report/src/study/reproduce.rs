@@ -1,4 +1,4 @@
-//! Runs a study on all cores, keeps the finished parts, and writes the report.
+//! Runs a study on all cores, stores the finished parts, and writes the report.
 //!
 //! The work is divided into parts. The results of a finished part are written to a file at once,
 //! together with a hash of everything that they depend on. A part whose file exists with the same
@@ -345,7 +345,8 @@ impl Work<'_> {
                             // kept.
                             Err(Error::Single(Single::Interrupted { .. })) => queue.lock().clear(),
                             Err(error) => {
-                                // An FMU that failed does not concern the other runs, which are kept.
+                                // An FMU that failed does not concern the other runs, which are
+                                // kept.
                                 let is_of_fmu =
                                     matches!(error, Error::Run { source: Single::Unit { .. }, .. });
                                 if !is_of_fmu {

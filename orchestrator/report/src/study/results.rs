@@ -10,7 +10,7 @@ use cosim::system::Parameters;
 use fmu_import::names;
 use std::collections::BTreeMap;
 
-/// All results that are kept of one run of the study.
+/// Results of one run of the study.
 #[derive(Clone, Debug, Default)]
 pub struct RunResult {
     /// Results of the members, one for each value of the parameter, in that order.
