@@ -243,7 +243,7 @@ def test_the_scheduler_is_started_anew(file, expected, tmp_path):
     out = tmp_path / "out"
     with started(*scheduler) as first, started(*worker), Client(address, timeout=LONG) as client:
         with meanwhile(out, lambda: os.kill(first.pid, signal.SIGKILL), parts=3):
-            with pytest.raises(ClusterError, match="the same call of run goes on") as caught:
+            with pytest.raises(ClusterError, match="the same call of run continues") as caught:
                 campaign(file).run(client, out=out)
     kept = {path: path.stat().st_mtime_ns for path in (out / "parts").glob("*.parquet")}
     assert 3 <= len(kept) < PARTS and f"{len(kept)} parts are flown and kept" in str(caught.value)
