@@ -102,8 +102,8 @@ impl<'a> Flight<'a> {
         &mut self.system
     }
 
-    /// Flies a case to its end and writes what a single run writes of it: the recorded variables
-    /// and the plot.
+    /// Flies a case to its end and writes the files of a single run: the recorded variables and the
+    /// plot.
     ///
     /// # Errors
     /// The errors are those of [`Self::fly`], and of files that cannot be written.
@@ -197,8 +197,8 @@ impl<'a> Flight<'a> {
                 limit.at_most.is_none_or(|most| number <= most)
                     && limit.at_least.is_none_or(|least| number >= least)
             });
-            // What a case that ended early would have done about its other limits is not known:
-            // it counts against them.
+            // Whether a case that ended early would have kept its other limits is not known: it
+            // counts as breaking them.
             within && status == CaseStatus::Completed
         });
         Ok(Row { case, values, limits_kept: limits_kept.collect(), numbers, status, time, message })

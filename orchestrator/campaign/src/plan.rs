@@ -29,7 +29,7 @@ pub struct Plan {
     pub recorded: Vec<Recorded>,
     /// Places of the cases.
     pub design: Design,
-    /// Hashes of all that the cases depend on, by what it is.
+    /// Hashes of all inputs of the cases, by their names.
     pub keys: BTreeMap<String, String>,
     /// Simulated time at which the cases start and stop, s.
     pub span: [f64; 2],
@@ -47,7 +47,7 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// Prepares a campaign, with what the command line changes.
+    /// Prepares a campaign, with the changes of the command line.
     ///
     /// # Errors
     /// Returns an error that names the key at fault, with its line and the nearest right name.

@@ -56,7 +56,7 @@ pub struct Recorded {
     pub is_never: bool,
 }
 
-/// Reads the experiment of a campaign, with what the campaign and the command line set in it.
+/// Reads the experiment of a campaign, with the settings of the campaign and the command line.
 pub(crate) fn read_experiment(campaign: &Campaign, changes: &Changes) -> Result<Experiment, Error> {
     let source = &campaign.source;
     let span = campaign.experiment.span();
@@ -83,7 +83,7 @@ pub(crate) fn read_experiment(campaign: &Campaign, changes: &Changes) -> Result<
     Ok(experiment)
 }
 
-/// Returns what is observed of each case: the metrics that the campaign names and its measures.
+/// Returns the observations of each case: the metrics that the campaign names and its measures.
 pub(crate) fn observe(campaign: &Campaign, experiment: &Observe) -> Result<Observe, Error> {
     let source = &campaign.source;
     let mut signals = experiment.signals.clone();
@@ -207,7 +207,7 @@ pub(crate) fn recorded(campaign: &Campaign, observe: &Observe, meters: &Meters) 
         .collect()
 }
 
-/// Hashes what the cases depend on.
+/// Hashes all inputs of the cases.
 pub(crate) fn keys(
     campaign: &Campaign,
     changes: &Changes,

@@ -58,10 +58,10 @@ pub struct CampaignReport {
     pub notes: Vec<String>,
 }
 
-/// Work that is left of a campaign, for programs that share it among machines.
+/// Remaining work of a campaign, for programs that share it among machines.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Work {
-    /// Number of cases that are needed as far as is known.
+    /// Number of cases that are needed, as far as the finished parts show.
     pub cases: u64,
     /// First and last-plus-one case of each part that is missing.
     pub missing: Vec<[u64; 2]>,
@@ -174,7 +174,7 @@ impl<'a> State<'a> {
     }
 }
 
-/// Returns the work that is left of a campaign.
+/// Returns the remaining work of a campaign.
 pub fn work(plan: &Plan, out: &Path) -> Work {
     let (cases, missing, _) = State::new(plan, out).needed();
     Work { cases, missing: missing.into_iter().map(|part| [part.start, part.end]).collect() }
@@ -209,7 +209,7 @@ pub fn fly_range(plan: &Plan, range: &Range<u64>, options: &Options) -> Result<u
     Ok(flown)
 }
 
-/// Flies what is left of a campaign, and writes its tables and its report.
+/// Flies the remaining cases of a campaign, and writes its tables and its report.
 ///
 /// # Errors
 /// Returns an error if a file cannot be written, or if the work was asked to end; what was flown by

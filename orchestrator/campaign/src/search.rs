@@ -78,13 +78,13 @@ pub struct SearchOutcome {
     pub elapsed: f64,
 }
 
-/// A place that is to be flown, and where its result goes.
+/// A place that is to be flown, and the channel for its result.
 struct Order {
     places: Vec<Place>,
     reply: Sender<Result<Row, Single>>,
 }
 
-/// A case that was tried: where it lies, and what came of it.
+/// A case that was tried: its place and its result.
 struct Tried {
     generation: u64,
     point: Vec<f64>,
@@ -196,7 +196,7 @@ pub fn search(plan: &Plan, options: &Options) -> Result<SearchOutcome, Error> {
     Ok(outcome)
 }
 
-/// Flies what is ordered, until nothing can be ordered any more.
+/// Flies the ordered cases until no more can be ordered.
 fn serve(plan: &Plan, interrupt: &Interrupt, waiting: &Mutex<Receiver<Order>>) {
     let mut flight: Option<Flight> = None;
     loop {
@@ -227,7 +227,7 @@ struct Searched<'a> {
 
 impl Searched<'_> {
     /// Flies the case at a point, whose coordinates are cut off at 0 and 1. The strategy looks for
-    /// the smallest value; what has none is as bad as can be.
+    /// the smallest value; a case without a value counts as the worst point.
     fn evaluate(&self, point: &DVector<f64>, orders: &Sender<Order>) -> f64 {
         let point: Vec<f64> = point.iter().map(|unit| unit.clamp(0.0, 1.0)).collect();
         let places = point.iter().copied().map(Place::Quantile).collect();

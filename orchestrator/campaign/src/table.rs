@@ -47,8 +47,8 @@ impl Values {
         self.len() == 0
     }
 
-    /// Returns the values as numbers, with 1 and 0 for yes and no; what is missing, and texts, are
-    /// not numbers.
+    /// Returns the values as numbers, with 1 and 0 for yes and no. Missing values and texts become
+    /// NaN.
     pub fn numbers(&self) -> Vec<f64> {
         match self {
             Self::Real(values) => values.clone(),

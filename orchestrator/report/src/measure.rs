@@ -246,7 +246,7 @@ impl Observer for Gauge {
 ///
 /// # Errors
 /// Returns an error if a list or a variable does not exist.
-pub(crate) fn asked(
+pub(crate) fn gauge_for(
     measure: &Measure,
     observe: &Observe,
     system: &mut System,

@@ -164,7 +164,10 @@ impl Meters {
                     "metrics.json already has an entry of this name: choose another one".into(),
                 ));
             }
-            gauges.insert(name.clone(), measure::asked(measure, &observe, system).map_err(fault)?);
+            gauges.insert(
+                name.clone(),
+                measure::gauge_for(measure, &observe, system).map_err(fault)?,
+            );
         }
         let fault = |problem| Error::experiment(format!("[observe.guarantee] {problem}"));
         let guarantee = observe.guarantee.clone();

@@ -45,7 +45,7 @@ pub fn summary(system: &System, report: &RunReport, out: &mut impl Write) -> io:
         order.join(", ")
     )?;
     let mut line = |label: &str, text: String| writeln!(out, "  {label:<17} {text}");
-    for (label, text) in asked(&experiment.observe, metrics) {
+    for (label, text) in metric_lines(&experiment.observe, metrics) {
         line(&label, text)?;
     }
     if experiment.observe.metrics.is_empty() {
@@ -157,9 +157,8 @@ fn guarantee(metrics: &Metrics) -> Option<String> {
     Some(text + if broken { "; DEFECT: a limit was EXCEEDED while it was in force" } else { "" })
 }
 
-/// Returns the lines for the metrics that the experiment wants in the summary, as headings and
-/// texts.
-fn asked(observe: &Observe, metrics: &Metrics) -> Vec<(String, String)> {
+/// Returns the lines for the metrics that the experiment lists in `summary`, as headings and texts.
+fn metric_lines(observe: &Observe, metrics: &Metrics) -> Vec<(String, String)> {
     let mut lines: Vec<(String, String)> = Vec::new();
     for name in &observe.summary {
         let (Some(measure), Some(value)) = (observe.metrics.get(name), metrics.asked.get(name))
@@ -274,7 +273,7 @@ mod tests {
         let units = ["mean", "largest"].map(|name| (name.to_string(), "ms".to_string()));
         let metrics = Metrics { asked: asked.into(), units: units.into(), ..Metrics::default() };
         assert_eq!(
-            super::asked(&observe, &metrics),
+            metric_lines(&observe, &metrics),
             [
                 ("time".to_string(), "mean 4.0000e-4 ms, max 2.0000 ms".to_string()),
                 ("largest rate".into(), "6.0000   EXCEEDS its limit 5.0000: 120.0 %".into()),

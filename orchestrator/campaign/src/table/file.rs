@@ -99,7 +99,7 @@ impl Writer {
 
 impl Drop for Writer {
     fn drop(&mut self) {
-        // What was not finished is of no use. If it cannot be removed, the next run writes over it.
+        // An unfinished file is of no use. If it cannot be removed, the next run overwrites it.
         if self.file.take().is_some() {
             let _ = fs::remove_file(&self.unfinished);
         }

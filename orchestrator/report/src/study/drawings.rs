@@ -16,7 +16,7 @@ pub struct Figure {
     pub id: String,
     /// Title of the figure, in one line.
     pub title: String,
-    /// Caption, which tells what the figure shows.
+    /// Caption, which explains the figure.
     #[serde(default)]
     pub caption: String,
     /// Number of panels in a row, side by side.
@@ -36,7 +36,7 @@ fn one() -> usize {
 }
 
 /// A panel of a figure. Exactly one of `signal`, `signals`, `histogram`, `scatter` and `across`
-/// says what is drawn; a panel may also have `points` alone.
+/// selects the curves; a panel may also have `points` alone.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Panel {

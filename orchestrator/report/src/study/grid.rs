@@ -46,7 +46,7 @@ struct Candidate {
     measures: Vec<Spanned<String>>,
 }
 
-/// An experiment in which all candidates are run, with what is computed for its runs.
+/// An experiment in which all candidates are run, with the measures of its runs.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct Scenario {

@@ -85,8 +85,8 @@ impl Study {
         Ok(study.to_string())
     }
 
-    /// Notes what the experiments ask for. An experiment that cannot be read is reported later,
-    /// when it is to be run.
+    /// Reads the metrics that the experiments define. An experiment that cannot be read is reported
+    /// later, when it is to be run.
     fn learn_metrics(&mut self) {
         let mut observed: BTreeMap<PathBuf, Observe> = BTreeMap::new();
         for run in &mut self.runs {

@@ -72,7 +72,7 @@ pub struct Run {
     #[serde(default)]
     #[schemars(with = "Vec<String>")]
     pub measures: Vec<Spanned<String>>,
-    /// What the experiment of the run asks for. This is no key of a study file.
+    /// Metrics, panels and limits of the run's experiment. This is no key of a study file.
     #[serde(skip)]
     pub observe: Observe,
 }
