@@ -1,4 +1,4 @@
-"""Adds units, program and experiments to a wheel, and gives it the platform that they are built
+"""Adds FMUs, program and experiments to a wheel, and gives it the platform that they are built
 for. Environment variables say where they are; `scripts/wheel` sets them."""
 
 from __future__ import annotations
@@ -48,11 +48,11 @@ def machine_code(content: bytes) -> str:
 
 def glibc(content: bytes) -> int:
     """Returns the newest minor version of glibc 2 that a program or library asks for."""
-    return max((int(found) for found in re.findall(rb"GLIBC_2\.(\d+)", content)), default=0)
+    return max((int(minor) for minor in re.findall(rb"GLIBC_2\.(\d+)", content)), default=0)
 
 
 def libraries(path: Path) -> list[bytes]:
-    """Returns the libraries in a unit's archive."""
+    """Returns the libraries in an FMU."""
     with zipfile.ZipFile(path) as archive:
         return [archive.read(name) for name in archive.namelist() if name.endswith(LIBRARIES)]
 
@@ -67,28 +67,28 @@ class PlatformHook(BuildHookInterface):  # type: ignore[type-arg]
 
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:
         platform = self.given("WHEEL_PLATFORM")
-        units = Path(self.given("WHEEL_UNITS"))
+        fmus = Path(self.given("WHEEL_FMUS"))
         program = Path(self.given("WHEEL_PROGRAM"))
         if platform not in PLATFORMS:
-            known = ", ".join(PLATFORMS)
-            self.app.abort(f"there is no platform {platform}; there are: {known}")
-        tag, wanted = PLATFORMS[platform]
-        wanted = wanted or machine_code(program.read_bytes())
-        archives = sorted(units.glob("*.fmu"))
+            names = ", ".join(PLATFORMS)
+            self.app.abort(f"there is no platform {platform}; there are: {names}")
+        tag, required = PLATFORMS[platform]
+        required = required or machine_code(program.read_bytes())
+        archives = sorted(fmus.glob("*.fmu"))
         if not archives:
-            self.app.abort(f"there are no units (*.fmu) in {units}")
-        binaries = {program: [program.read_bytes()]}
-        binaries |= {archive: libraries(archive) for archive in archives}
-        for path, contents in binaries.items():
+            self.app.abort(f"there are no FMUs (*.fmu) in {fmus}")
+        libraries_of = {program: [program.read_bytes()]}
+        libraries_of |= {archive: libraries(archive) for archive in archives}
+        for path, contents in libraries_of.items():
             formats = sorted(machine_code(content) for content in contents)
-            if wanted not in formats:
-                self.app.abort(f"{path} has {formats}, but {wanted} is needed")
+            if required not in formats:
+                self.app.abort(f"{path} has {formats}, but {required} is needed")
             newest = max(glibc(content) for content in contents)
             if "manylinux2014" in tag and newest > GLIBC:
                 self.app.abort(f"{path} needs glibc 2.{newest}, but {tag} allows 2.{GLIBC}")
 
         root = Path(self.root).parent / "orchestrator"
-        # The program finds experiments and units that lie beside it from any folder. Editors find
+        # The program finds experiments and FMUs that lie beside it from any folder. Editors find
         # the schema by the first line of each experiment.
         files = {archive: f"fmu/{archive.name}" for archive in archives}
         files[program] = "orchestrator" + program.suffix

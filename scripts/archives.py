@@ -30,41 +30,41 @@ PLATFORMS = {
     "windows-x86_64": "Windows 10 or later on x86-64",
     "macos-universal": "macOS 11 or later on both processors",
 }
-# Those whose units and program go into wheels alone.
+# Platforms whose FMUs and program go into wheels alone.
 IN_WHEELS = ("macos-x86_64", "macos-aarch64")
 LICENCES = ("LICENSE-APACHE", "LICENSE-MIT")
 # What inventory.py and the Rust distribution know of the linked packages.
 NOTICES = ("LICENSES.txt", "LICENSES-rust-std.html")
 
-UNITS_README = """# Re-entry attitude control: FMI 2.0 units {version}
+FMUS_README = """# Re-entry attitude control: FMUs (FMI 2.0) {version}
 
-The archives (*.fmu) hold the units for {systems}. Any tool for FMI 2.0
+The archives (*.fmu) hold the FMUs for {systems}. Any importer for FMI 2.0
 co-simulation opens them; each has its documentation in documentation/index.html.
 
-LICENSE-MIT and LICENSE-APACHE are the licences of the units, either of which may be chosen.
+LICENSE-MIT and LICENSE-APACHE are the licences of the FMUs, either of which may be chosen.
 LICENSES.txt and LICENSES-rust-std.html are those of what is linked in.
 """
 PROGRAM_README = """# Re-entry attitude control: the orchestrator {version}
 
 For {systems}.
 
-    {program} list                        shows experiments, studies and units
+    {program} list                        shows experiments, studies and FMUs
     {program} run crmpc-2022/crmpc-robust  flies an experiment
-    {program} --help                      says everything else
+    {program} --help                      explains all commands
 
 The program finds experiments/ and fmu/ beside itself, from any folder.
 
-LICENSE-MIT and LICENSE-APACHE are the licences of program and units, either of which may be chosen.
+LICENSE-MIT and LICENSE-APACHE are the licences of program and FMUs, either of which may be chosen.
 LICENSES.txt and LICENSES-rust-std.html are those of what is linked in.
 """
 RELEASE_README = """# Re-entry attitude control {version}
 
 | file | is |
 |---|---|
-| reentry-fmus-{version}.zip | every unit, for Linux and Windows on x86-64 and for macOS |
-| reentry-fmus-{version}-linux-aarch64.zip | every unit, for Linux on aarch64 |
-| orchestrator-{version}-PLATFORM | the program with experiments and the platform's units |
-| *.whl | the Python package, with program, experiments and units |
+| reentry-fmus-{version}.zip | every FMU, for Linux and Windows on x86-64 and for macOS |
+| reentry-fmus-{version}-linux-aarch64.zip | every FMU, for Linux on aarch64 |
+| orchestrator-{version}-PLATFORM | the program with experiments and the platform's FMUs |
+| *.whl | the Python package, with program, experiments and FMUs |
 | LICENSES.txt, LICENSES-rust-std.html | the licences of what is linked in |
 | sbom.cdx.json | what is linked in, as a bill of materials (CycloneDX) |
 | SHA256SUMS | checksums: `sha256sum --check SHA256SUMS` |
@@ -77,31 +77,31 @@ Entry = tuple[str, bytes, int]
 
 
 class Fault(Exception):
-    """Something that a release needs and that is not there."""
+    """A fault of the files that a release needs."""
 
 
-def folder_of_units(dist: Path, platform: str) -> Iterator[Entry]:
+def fmus_of(dist: Path, platform: str) -> Iterator[Entry]:
     for path in (dist / platform / "fmu").glob("*.fmu"):
         yield path.name, path.read_bytes(), 0o644
 
 
 def check(dist: Path) -> None:
-    """Raises a fault unless every platform has the program and all units of this version."""
+    """Raises a fault unless every platform has the program and all FMUs of this version."""
     described = {path.stem: path.read_bytes() for path in ROOT.glob("fmu-*/generated/*.xml")}
     platforms = (*PLATFORMS, *IN_WHEELS)
-    # Wheels may have units of their own.
+    # Wheels may have FMUs of their own.
     of_wheels = [folder for each in platforms if (folder := dist / each / "fmu-wheel").is_dir()]
     for folder in [*(dist / each / "fmu" for each in ("all", *platforms)), *of_wheels]:
         for name, description in sorted(described.items()):
             path = folder / f"{name}.fmu"
             if not path.is_file():
                 raise Fault(f"{path} does not exist: run scripts/package")
-            with zipfile.ZipFile(path) as unit:
-                if unit.read("modelDescription.xml") != description:
-                    raise Fault(f"{path} is another version of the unit: run scripts/package")
+            with zipfile.ZipFile(path) as archive:
+                if archive.read("modelDescription.xml") != description:
+                    raise Fault(f"{path} is another version of the FMU: run scripts/package")
         for path in sorted(folder.glob("*.fmu")):
             if path.stem not in described:
-                raise Fault(f"{path} is no unit of this version: remove it")
+                raise Fault(f"{path} is no FMU of this version: remove it")
     for platform in platforms:
         if not program(dist, platform).is_file():
             raise Fault(f"{program(dist, platform)} does not exist: run scripts/package")
@@ -150,14 +150,14 @@ def readme(text: str, **values: str) -> Entry:
     return "README.md", text.format(**values).encode(), 0o644
 
 
-def write_units(dist: Path, output: Path, version: str, epoch: int) -> None:
-    """Writes the archives of the units alone."""
+def write_fmus(dist: Path, output: Path, version: str, epoch: int) -> None:
+    """Writes the archives of the FMUs alone."""
     for platform, suffix, systems in (
         ("all", "", "Linux and Windows on x86-64 and for macOS"),
         ("linux-aarch64", "-linux-aarch64", PLATFORMS["linux-aarch64"]),
     ):
-        said = readme(UNITS_README, version=version, systems=systems)
-        entries = [*folder_of_units(dist, platform), *licences(output), said]
+        said = readme(FMUS_README, version=version, systems=systems)
+        entries = [*fmus_of(dist, platform), *licences(output), said]
         write(output / f"reentry-fmus-{version}{suffix}.zip", entries, epoch)
 
 
@@ -174,8 +174,7 @@ def write_programs(dist: Path, output: Path, version: str, epoch: int) -> None:
         binary = program(dist, platform)
         name = binary.stem if binary.suffix else f"./{binary.name}"
         said = readme(PROGRAM_README, version=version, systems=systems, program=name)
-        units = folder_of_units(dist, platform)
-        fmus = [(f"fmu/{name}", content, mode) for name, content, mode in units]
+        fmus = [(f"fmu/{name}", content, mode) for name, content, mode in fmus_of(dist, platform)]
         entries = [
             (binary.name, binary.read_bytes(), 0o755),
             *shown,
@@ -198,7 +197,7 @@ def write_checksums(output: Path) -> None:
 
 def main(dist: str, output: str, version: str, note: str) -> None:
     folder, epoch = Path(output), int(os.environ["SOURCE_DATE_EPOCH"])
-    write_units(Path(dist), folder, version, epoch)
+    write_fmus(Path(dist), folder, version, epoch)
     write_programs(Path(dist), folder, version, epoch)
     text = RELEASE_README.format(version=version, note=note)
     (folder / "README.md").write_text(text, newline="\n")

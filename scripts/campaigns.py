@@ -10,37 +10,37 @@ from pathlib import Path
 
 OUT = Path("out/campaigns")
 PAGE = Path("docs/campaigns-results.md")
-HEAD = """# Limits kept by each controller, with probabilities
+HEAD = """# Probabilities of breaking the limits
 
 `scripts/campaigns` flies the campaigns in
 [orchestrator/experiments/campaigns](../orchestrator/experiments/campaigns) with each controller and
-writes this page. Probabilities are those of breaking a limit, with 95 % confidence by Clopper and
-Pearson; at corners, levels and for adversaries they are only shares of the cases. The last column
-has the mean share of the time in which the guarantee of CRMPC is in force, and the number of cases
-that broke a limit while it was. [campaigns.md](campaigns.md) explains the numbers.
+writes this page. The probabilities are those of breaking a limit, as 95 % confidence intervals of
+Clopper and Pearson; at corners, levels and for adversaries they are only shares. The last column
+has the mean share of the time in which CRMPC reports that its guarantee is in force, and the number
+of cases that broke a limit while it was. [campaigns.md](campaigns.md) explains the numbers.
 
-Controllers with the name of an experiment (`crmpc-robust`) have the settings of Chai 2022. The
-others have the start values of their FMUs, and take only the assumed inertia, the limits and the
-reference from the scenario. No controller was designed for the other papers' scenarios. With
-sensors, CRMPC has the softer gain and the bounds of the campaign's experiment.
+Controllers whose names are those of experiments (`crmpc-robust`) have the settings of Chai 2022.
+The others have the default settings of their FMUs: only their inertia, the limits and the reference
+come from the scenario. None was designed for the scenarios of the others. With sensors, CRMPC has
+the softer gain and the bounds of the campaign's experiment.
 """
 
 PAPER_SETS = ["controller.constraints=paper", "controller.feedback.k1=-5", "controller.feedback.k2=-5"]
 FURTHER = ("FBL", "BTVSMC", "BTVSMC_DO", "SOTVSMC_DO", "TwoLoopSMC")
 
 
-def exchanged(unit: str, *changes: str) -> list[str]:
-    """Returns the arguments that put a unit in the controller's place, and change its settings."""
-    return ["--fmu", f"controller={unit}.fmu", *(word for each in changes for word in ("--set", each))]
+def exchanged(fmu: str, *changes: str) -> list[str]:
+    """Returns the arguments that replace the controller by an FMU, and change its settings."""
+    return ["--fmu", f"controller={fmu}.fmu", *(word for each in changes for word in ("--set", each))]
 
 
 # Controllers with the arguments that choose them.
 CHAI = {name: ["--experiment", name] for name in ("crmpc-robust", "crmpc-paper", "dlmpc-tuned", "lqr")}
-ON_CHAI = {unit: ["--experiment", "exchange/crmpc-2022", *exchanged(unit)] for unit in FURTHER}
+ON_CHAI = {fmu: ["--experiment", "exchange/crmpc-2022", *exchanged(fmu)] for fmu in FURTHER}
 ANY = {
     "CRMPC": exchanged("CRMPC"),
     "CRMPC, paper sets": exchanged("CRMPC", *PAPER_SETS),
-    **{unit: exchanged(unit) for unit in ("DLMPC", "LQR", *FURTHER)},
+    **{fmu: exchanged(fmu) for fmu in ("DLMPC", "LQR", *FURTHER)},
 }
 
 
@@ -88,8 +88,8 @@ def percent(probability: float) -> str:
 
 
 def measure(summary: dict, name: str) -> tuple[dict | None, str]:
-    found = [each for each in summary["measures"] if each["name"] == name]
-    return (found[0]["summary"], found[0]["unit"]) if found else (None, "")
+    matches = [each for each in summary["measures"] if each["name"] == name]
+    return (matches[0]["summary"], matches[0]["unit"]) if matches else (None, "")
 
 
 def largest(summary: dict, name: str) -> str:

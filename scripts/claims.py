@@ -105,12 +105,12 @@ def spelled_out(study: str) -> dict:
     return tomllib.loads(shown.stdout)
 
 
-Found = dict[str, dict[str, list[str]]]
+Referable = dict[str, dict[str, list[str]]]
 
 
-def found(names: list[str]) -> Found:
-    """What items can refer to in each study: ids of figures, titles of tables and overviews, words of
-    claims."""
+def referable(names: list[str]) -> Referable:
+    """The ids of figures, titles of tables and overviews, and words of claims that items can refer to in
+    each study."""
     marks = {"figure": "id", "table": "title", "overview": "title", "claim": "says"}
     studies = {name: spelled_out(name) for name in names}
     return {name: {what: [entry[mark] for entry in study.get(what, [])] for what, mark in marks.items()} for name, study in studies.items()}
@@ -121,7 +121,7 @@ def words(claim: str) -> str:
     return re.sub(r"^(?:Direct|Surfaces and jets)[^:]*: ", "", claim)
 
 
-def matches(reference: str, studies: Found) -> list[tuple[str, str, str]]:
+def matches(reference: str, studies: Referable) -> list[tuple[str, str, str]]:
     """The entries of the studies that a reference means, with study and kind: a figure's id, or how a
     title or a claim begins. "SETUP…: WORDS" means a claim in all setups that begin so."""
     setup, several, rest = reference.partition("…: ")
@@ -138,16 +138,16 @@ def cell(text: str) -> str:
     return text.replace("|", r"\|") or "–"
 
 
-def evidence(item: dict, studies: Found) -> str:
+def evidence(item: dict, studies: Referable) -> str:
     parts = [f"`{test}`" for test in item.get("shown", [])]
     for study in studies:
         entries: dict[str, list[str]] = {}
         for _, what, name in (hit for reference in item.get("study", []) for hit in matches(reference, studies) if hit[0] == study):
             shown = {"figure": f"figure `{name}`", "claim": f"“{words(name)}”"}.get(what, f"{what} “{name}”")
             entries.setdefault(shown, []).extend([name.removesuffix(f": {words(name)}")] if words(name) != name else [])
-        told = [shown + (f" ({'; '.join(setups)})" if setups else "") for shown, setups in entries.items()]
-        if told:
-            parts.append(f"[{study}](../orchestrator/experiments/{study}/study.toml): {'; '.join(told)}")
+        texts = [shown + (f" ({'; '.join(setups)})" if setups else "") for shown, setups in entries.items()]
+        if texts:
+            parts.append(f"[{study}](../orchestrator/experiments/{study}/study.toml): {'; '.join(texts)}")
     parts += [f"[{page.split('#')[0]}]({page})" for page in item.get("page", [])]
     return ", ".join(parts)
 
@@ -166,14 +166,14 @@ def page() -> str:
     lines = [HEAD.rstrip(), ""]
     lines += table(["verdict", "meaning"], [[f"**{name}**", meaning] for name, meaning in VERDICTS.items()])
     lines += ["", "## How many", ""]
-    for heading, names, of in [("verdict", list(VERDICTS), lambda item: item["verdict"]), ("kind", KINDS, lambda item: kind(item["place"]))]:
-        counts = {key: Counter(of(item) for item in items(paper)) for key, paper in data.items()}
+    for heading, names, group_of in [("verdict", list(VERDICTS), lambda item: item["verdict"]), ("kind", KINDS, lambda item: kind(item["place"]))]:
+        counts = {key: Counter(group_of(item) for item in items(paper)) for key, paper in data.items()}
         rows = [[name, *(str(counts[key][name]) for key in data), str(sum(counts[key][name] for key in data))] for name in names]
         totals = [sum(counts[key].values()) for key in data]
         rows.append(["all", *map(str, totals), str(sum(totals))])
         lines += [*table([heading, *(paper["paper"] for paper in data.values()), "all"], rows), ""]
     for paper in data.values():
-        studies = found(paper["studies"])
+        studies = referable(paper["studies"])
         lines += [f"## {paper['paper']}", ""]
         for section in paper["section"]:
             lines += [f"### {section['title']}", ""]

@@ -1,4 +1,4 @@
-"""Writes what is linked into the units and the orchestrator: `LICENSES.txt`, with the licence
+"""Writes what is linked into the FMUs and the orchestrator: `LICENSES.txt`, with the licence
 texts, and `sbom.cdx.json`, a bill of materials in CycloneDX's format.
 
     inventory.py OUTPUT ZIG TRIPLE...
@@ -74,7 +74,7 @@ def said(*command: str) -> str:
 def linked(triples: list[str]) -> list[dict[str, Any]]:
     """Returns the packages, as `cargo metadata` describes them, that are linked in for any of the
     triples, sorted. `needs` has the identifiers of those that each of them uses."""
-    wanted = set()
+    linked_versions = set()
     for triple in triples:
         packages = [argument for root in ROOTS for argument in ("--package", root)]
         # Procedural macros, and what builds need, are not in the binaries.
@@ -84,21 +84,27 @@ def linked(triples: list[str]) -> list[dict[str, Any]]:
         ).splitlines():
             if line.strip():
                 name, version = line.split()[:2]
-                wanted.add((name, version.removeprefix("v")))
+                linked_versions.add((name, version.removeprefix("v")))
     metadata = json.loads(said("cargo", "metadata", "--locked", "--format-version", "1"))
-    found = [each for each in metadata["packages"] if (each["name"], each["version"]) in wanted]
-    known = {package["id"] for package in found}
-    if len(known) != len(wanted):
-        raise Fault(f"cargo tree names {len(wanted)} packages, cargo metadata {len(known)} of them")
+    described = [
+        each
+        for each in metadata["packages"]
+        if (each["name"], each["version"]) in linked_versions
+    ]
+    ids = {package["id"] for package in described}
+    if len(ids) != len(linked_versions):
+        raise Fault(
+            f"cargo tree names {len(linked_versions)} packages, cargo metadata {len(ids)} of them"
+        )
     for node in metadata["resolve"]["nodes"]:
-        if node["id"] in known:
-            (package,) = (each for each in found if each["id"] == node["id"])
+        if node["id"] in ids:
+            (package,) = (each for each in described if each["id"] == node["id"])
             package["needs"] = {
                 used["pkg"]
                 for used in node["deps"]
-                if used["pkg"] in known and any(kind["kind"] is None for kind in used["dep_kinds"])
+                if used["pkg"] in ids and any(kind["kind"] is None for kind in used["dep_kinds"])
             }
-    return sorted(found, key=lambda package: (package["name"], package["version"]))
+    return sorted(described, key=lambda package: (package["name"], package["version"]))
 
 
 # Licences
@@ -149,9 +155,11 @@ def texts(package: dict[str, Any], sysroot: Path) -> list[str]:
     if package["source"] is None:
         files = set(Path().glob("LICENSE-*"))
     ordered = sorted(path for path in files if path.is_file() and path.suffix != ".rs")
-    found = [path.read_text("utf-8", "replace").replace("\r\n", "\n").strip() for path in ordered]
-    if found:
-        return found
+    own_texts = [
+        path.read_text("utf-8", "replace").replace("\r\n", "\n").strip() for path in ordered
+    ]
+    if own_texts:
+        return own_texts
     # The Rust distribution has the texts of SPDX for what its own sources use.
     folder = sysroot / "share" / "doc" / "rust" / "licenses"
     symbols = [str(symbol) for symbol in expression(package).get_symbols()]
@@ -171,7 +179,7 @@ def licences(packages: list[dict[str, Any]], others: dict[str, Path]) -> str:
     # Texts that differ in their line breaks alone are one.
     users: dict[str, tuple[str, list[str]]] = {}
     lines = [
-        "What is linked into the units and the orchestrator, and under which licences.",
+        "What is linked into the FMUs and the orchestrator, and under which licences.",
         "The texts follow below, each after the names of those that bring it.",
         "",
     ]
@@ -201,8 +209,8 @@ def licences(packages: list[dict[str, Any]], others: dict[str, Path]) -> str:
 def checksums() -> dict[tuple[str, str], str]:
     """Returns the checksums of the packages in the lock file."""
     entry = re.compile(r'name = "(.+)"\nversion = "(.+)"\n(?:source = .+\nchecksum = "(.+)")?')
-    found = entry.findall(Path("Cargo.lock").read_text("utf-8"))
-    return {(name, version): checksum for name, version, checksum in found}
+    entries = entry.findall(Path("Cargo.lock").read_text("utf-8"))
+    return {(name, version): checksum for name, version, checksum in entries}
 
 
 def component(package: dict[str, Any], sums: dict[tuple[str, str], str]) -> Component:
@@ -255,15 +263,15 @@ def bill(packages: list[dict[str, Any]], version: str, epoch: int) -> str:
 
 def of_the_compiler(zig: Path) -> dict[str, Path]:
     """Returns what the cross compiler links in beside the packages, with the licence texts."""
-    found = {
+    licence_files = {
         "Zig's start-up code and compiler-rt": zig / "LICENSE",
         "mingw-w64's start-up code (Windows)": zig / "lib" / "libc" / "mingw" / "COPYING",
         "libunwind (Windows)": zig / "lib" / "libunwind" / "LICENSE.TXT",
     }
-    for path in found.values():
+    for path in licence_files.values():
         if not path.is_file():
             raise Fault(f"the cross compiler's licence {path} does not exist")
-    return found
+    return licence_files
 
 
 def main(output: str, zig: str, *triples: str) -> None:

@@ -47,10 +47,10 @@ def failing(package: str, tests: list[str]) -> str | None:
 
 def main() -> None:
     mutations = tomllib.loads((ROOT / "tests" / "mutations.toml").read_text(encoding="utf-8"))["mutation"]
-    wanted = [int(argument) for argument in sys.argv[1:]] or list(range(1, len(mutations) + 1))
+    numbers = [int(argument) for argument in sys.argv[1:]] or list(range(1, len(mutations) + 1))
     copy_sources()
     survivors = 0
-    for number in wanted:
+    for number in numbers:
         mutation = mutations[number - 1]
         path = COPY / mutation["file"]
         text = path.read_text(encoding="utf-8")
@@ -63,7 +63,7 @@ def main() -> None:
             path.write_text(text, encoding="utf-8")
         survivors += failed is None
         print(f"{number:2} {'SURVIVES' if failed is None else 'fails ' + failed}: {mutation['what']}", flush=True)
-    print(f"{survivors} of {len(wanted)} survive")
+    print(f"{survivors} of {len(numbers)} survive")
     sys.exit(survivors > 0)
 
 

@@ -85,22 +85,22 @@ class Study:
             keys[0] = "measures"
         elif keys[0] != "within":
             keys.insert(0, "metrics")
-        found = []
+        values = []
         for member in self.results["runs"][run]["members"]:
             for key in keys:
                 member = member[key]
-            found.append(member)
-        return found
+            values.append(member)
+        return values
 
     def value(self, name: str) -> float:
-        found = [value["value"] for value in self.results["values"] if value["id"] == name]
-        assert len(found) == 1, f"the study has {len(found)} values {name}"
-        return found[0]
+        matches = [value["value"] for value in self.results["values"] if value["id"] == name]
+        assert len(matches) == 1, f"the study has {len(matches)} values {name}"
+        return matches[0]
 
     def claim(self, words: str) -> dict:
-        found = [claim for claim in self.results["claims"] if claim["says"].startswith(words)]
-        assert len(found) == 1, f"{len(found)} claims begin with {words!r}"
-        return found[0]
+        matches = [claim for claim in self.results["claims"] if claim["says"].startswith(words)]
+        assert len(matches) == 1, f"{len(matches)} claims begin with {words!r}"
+        return matches[0]
 
 
 class Hole:
@@ -128,10 +128,10 @@ class Hole:
             return spec["none"]
         over = spec.get("over", "mean")
         if over == "spread":
-            least, largest = (self.shown(self.scaled(study, of(members))) for of in (min, max))
+            least, largest = (self.shown(self.scaled(study, bound(members))) for bound in (min, max))
             return least if least == largest else f"{least} to {largest}"
-        of = {"mean": lambda all: sum(all) / len(all), "largest": max, "least": min, "first": lambda all: all[0]}[over]
-        return self.shown(self.scaled(study, of(members)))
+        combined = {"mean": lambda values: sum(values) / len(values), "largest": max, "least": min, "first": lambda values: values[0]}[over]
+        return self.shown(self.scaled(study, combined(members)))
 
     def scaled(self, study: Study, number: float) -> float:
         for key in ("below", "per"):
@@ -183,10 +183,10 @@ def significant(number: float, digits: int) -> str:
 
 
 def number_of(text: str) -> float | None:
-    found = NUMBER.search(text)
-    if found is None:
+    match = NUMBER.search(text)
+    if match is None:
         return None
-    mantissa, _, exponent = found[0].replace(",", "").replace("−", "-").partition("·10")
+    mantissa, _, exponent = match[0].replace(",", "").replace("−", "-").partition("·10")
     return float(mantissa) * 10.0 ** float(exponent.translate(PLAIN) or 0)
 
 
@@ -208,10 +208,10 @@ class Text:
         parts[1::2] = [f"(?P<{name}>\\S(?:[^|]*?\\S)?)" for name in parts[1::2]]
         return "".join(parts)
 
-    def differences(self, found: re.Match | None) -> list[str]:
-        if found is None:
+    def differences(self, match: re.Match | None) -> list[str]:
+        if match is None:
             return ["is not there"]
-        pairs = [(" ".join(found[name].split()), hole) for name, hole in self.holes.items()]
+        pairs = [(" ".join(match[name].split()), hole) for name, hole in self.holes.items()]
         return [f"{page!r}, the runs give {hole.text!r}" for page, hole in pairs if not hole.agrees(page)]
 
 
@@ -306,8 +306,8 @@ def rows_of_campaigns(table: dict) -> list[list]:
         section = page.split(f"/{row['campaign']}.toml)")[1]
         heading, _, *lines = re.search(r"(?:^\|.*\n)+", section, re.MULTILINE)[0].splitlines()
         names = [name.strip() for name in heading.strip("|").split("|")]
-        (found,) = [line for line in lines if line.startswith(f"| {table['controller']} |")]
-        values = dict(zip(names, (cell.strip() for cell in found.strip("|").split("|")), strict=True))
+        (row_text,) = [line for line in lines if line.startswith(f"| {table['controller']} |")]
+        values = dict(zip(names, (cell.strip() for cell in row_text.strip("|").split("|")), strict=True))
         broken = [re.search(r"(\d+) of (\d+)", values[f"{limit} limit broken"]) for limit in ("rate", "moment")]
         cells = [
             broken[0][2],
@@ -341,10 +341,10 @@ def line(cells: list[str]) -> str:
     return "| " + " | ".join(cells) + " |" if any(cells) else "|"
 
 
-def written(table: dict, found: list[list]) -> str:
+def written(table: dict, body: list[list]) -> str:
     heading = header(table)
     lines = [line(heading), "|" + "---|" * len(heading)]
-    lines += [line([cell.text for cell in row]) for row in found]
+    lines += [line([cell.text for cell in row]) for row in body]
     return "\n".join(re.sub(r"\|  (?=\|)", "| ", one) for one in lines)
 
 
@@ -352,14 +352,14 @@ def cells_of(text: str) -> list[list[str]]:
     return [[cell.strip() for cell in one.strip().strip("|").split("|")] for one in text.strip().splitlines()]
 
 
-def differences_of_table(table: dict, found: list[list], text: str) -> list[str]:
+def differences_of_table(table: dict, body: list[list], text: str) -> list[str]:
     heading, _, *page = cells_of(text)
     problems = []
     if heading != [name.strip() for name in header(table)]:
         problems.append("the heading differs")
-    if [row[0] for row in page] != [row[0].text for row in found]:
+    if [row[0] for row in page] != [row[0].text for row in body]:
         return [*problems, "the rows differ"]
-    for theirs, ours in zip(page, found, strict=True):
+    for theirs, ours in zip(page, body, strict=True):
         theirs = theirs + [""] * (len(ours) - len(theirs))
         for name, cell, one in zip(header(table), theirs, ours, strict=True):
             problems += [f"row {theirs[0]!r}, column {name!r}: {said}" for said in one.differences(cell)]
@@ -387,22 +387,22 @@ def problems(studies: dict[str, Study], described: dict | None = None, pages: di
     """Where pages differ from the results of the studies."""
     described = described or data()
     read_page = lambda name: (pages or {}).get(name) or (ROOT / name).read_text(encoding="utf-8")
-    on_page = {name: text for text, name in ((found[0], found[2]) for found in TABLE.finditer(read_page("docs/results.md")))}
-    found = [f"table {name} is on the page and not in docs/results.toml" for name in on_page.keys() - {table["name"] for table in described["table"]}]
+    on_page = {name: text for text, name in ((match[0], match[2]) for match in TABLE.finditer(read_page("docs/results.md")))}
+    faults = [f"table {name} is on the page and not in docs/results.toml" for name in on_page.keys() - {table["name"] for table in described["table"]}]
     for table in described["table"]:
         if table["name"] not in on_page:
-            found.append(f"table {table['name']} is not on the page")
+            faults.append(f"table {table['name']} is not on the page")
             continue
         ours = rows(table, studies)
         if ours is not None:
             text = "\n".join(one for one in on_page[table["name"]].splitlines() if one.startswith("|"))
-            found += [f"table {table['name']}: {said}" for said in differences_of_table(table, ours, text)]
+            faults += [f"table {table['name']}: {said}" for said in differences_of_table(table, ours, text)]
     for sentence in described["sentence"]:
         if sentence["study"] in studies:
             text = Text(studies[sentence["study"]], sentence["says"], sentence)
             match = re.search(text.pattern(), read_page(sentence["page"]))
-            found += [f"{sentence['page']}: {sentence['says']!r}: {said}" for said in text.differences(match)]
-    return found
+            faults += [f"{sentence['page']}: {sentence['says']!r}: {said}" for said in text.differences(match)]
+    return faults
 
 
 def write(studies: dict[str, Study], described: dict) -> None:
@@ -411,9 +411,9 @@ def write(studies: dict[str, Study], described: dict) -> None:
             sys.exit(f"{name}: the page has other numbers of members of {', '.join(study.fewer[:3])}: run the whole study, or see docs/results.toml")
     tables = {table["name"]: table for table in described["table"]}
 
-    def filled(found: re.Match) -> str:
-        ours = rows(tables[found[2]], studies)
-        return found[0] if ours is None else found[1] + written(tables[found[2]], ours) + "\n\n" + found[3].lstrip("\n")
+    def filled(match: re.Match) -> str:
+        ours = rows(tables[match[2]], studies)
+        return match[0] if ours is None else match[1] + written(tables[match[2]], ours) + "\n\n" + match[3].lstrip("\n")
 
     PAGE.write_text(TABLE.sub(filled, PAGE.read_text(encoding="utf-8")), encoding="utf-8")
 
@@ -424,9 +424,9 @@ def main() -> int:
     studies = read(folders, described)
     if "--check" not in sys.argv[1:]:
         write(studies, described)
-    found = problems(studies, described)
-    print("".join(f"{said}\n" for said in found), end="", file=sys.stderr)
-    return 1 if found else 0
+    faults = problems(studies, described)
+    print("".join(f"{fault}\n" for fault in faults), end="", file=sys.stderr)
+    return 1 if faults else 0
 
 
 if __name__ == "__main__":

@@ -15,7 +15,7 @@ import claims
 
 PAPERS = claims.papers()
 ITEMS = [(name, item) for name, paper in PAPERS.items() for item in claims.items(paper)]
-STUDIES = {name: claims.found(paper["studies"]) for name, paper in PAPERS.items()}
+STUDIES = {name: claims.referable(paper["studies"]) for name, paper in PAPERS.items()}
 
 
 def label(pair) -> str:

@@ -280,12 +280,12 @@ def test_missing_and_foreign_units_are_named(dist, tmp_path):
     (tmp_path / "kept").rename(binary)
     foreign = folder / "all" / "fmu" / "Foreign.fmu"
     foreign.touch()
-    assert f"{foreign} is no unit of this version" in said()
+    assert f"{foreign} is no FMU of this version" in said()
     foreign.unlink()
     one = folder / "windows-x86_64" / "fmu" / "LQR.fmu"
     with zipfile.ZipFile(one, "w") as archive:
         archive.writestr("modelDescription.xml", "<fmiModelDescription/>")
-    assert f"{one} is another version of the unit" in said()
+    assert f"{one} is another version of the FMU" in said()
     one.unlink()
     assert f"{one} does not exist: run scripts/package" in said()
     shutil.copy(dist / "windows-x86_64" / "fmu" / "LQR.fmu", one)

@@ -309,7 +309,7 @@ right = 1.0
     assert "not judged" in finished.stdout
     (claim,) = json.loads((tmp_path / "out" / "results.json").read_text())["claims"]
     assert claim["verdict"] == "not-judged" and claim["checks"][0]["label"] == "mean of 3"
-    assert "lqr: plant.disturbance.seed changes nothing, all 3 runs are the same" in finished.stdout
+    assert "lqr: plant.disturbance.seed has no effect, all 3 runs are the same" in finished.stdout
     assert re.search(r"lqr: the attitude is lost in 3 of 3 runs, at t = \S+ s or later", finished.stdout)
 
 

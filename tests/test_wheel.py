@@ -146,7 +146,7 @@ def test_what_is_not_for_the_platform_is_refused(tmp_path, platform, message):
 def test_units_without_a_library_and_folders_without_units_are_refused(tmp_path):
     units = tmp_path / "units"
     units.mkdir()
-    assert "there are no units (*.fmu)" in make(units, tmp_path / "out").stderr
+    assert "there are no FMUs (*.fmu)" in make(units, tmp_path / "out").stderr
     assert "there is no folder" in make(tmp_path / "nowhere", tmp_path / "out").stderr
     with zipfile.ZipFile(units / "Empty.fmu", "w") as empty:
         empty.writestr("modelDescription.xml", "")

@@ -177,7 +177,7 @@ fn write_case(plan: &Plan, case: u64, folder: &Path) -> Result<PathBuf, Error> {
     Ok(path)
 }
 
-fn summary(report: &run::Report, out: &mut impl Write) -> std::io::Result<()> {
+fn summary(report: &run::CampaignReport, out: &mut impl Write) -> std::io::Result<()> {
     let Findings { title, cases, status, limits, measures, answer } = &report.findings;
     let rate = report.flown as f64 / report.elapsed;
     writeln!(out, "{title}")?;

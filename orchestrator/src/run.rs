@@ -20,7 +20,7 @@ use cosim_report::metrics::{Meters, Metrics};
 use cosim_report::panels::Panel;
 use cosim_report::plot::Curves;
 use cosim_report::progress::Progress;
-use cosim_report::summary::Report;
+use cosim_report::summary::RunReport;
 use fmu_import::warnings;
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
@@ -79,14 +79,14 @@ pub(crate) struct Options {
 /// results up to then are written as well.
 ///
 /// # Errors
-/// Returns an error if an instance fails, or if a file cannot be written.
-pub(crate) fn run(system: &mut System, options: &Options) -> Result<Report, Failure> {
+/// Returns an error if a unit fails, or if a file cannot be written.
+pub(crate) fn run(system: &mut System, options: &Options) -> Result<RunReport, Failure> {
     if options.live {
         live::check_terminal()?;
     }
     options.files.check()?;
     let mut meters = Meters::new(system)?.ending_when_lost();
-    let panels = Panel::all(system)?;
+    let panels = Panel::resolve_all(system)?;
     for doubt in doubts(system, &options.interrupt)? {
         tracing::warn!("{doubt}");
     }
@@ -187,7 +187,7 @@ pub(crate) fn run(system: &mut System, options: &Options) -> Result<Report, Fail
             return Err(error.into());
         }
     };
-    Ok(Report { metrics, out, files, ended })
+    Ok(RunReport { metrics, out, files, ended })
 }
 
 /// Warns of missed deadlines and of a refused priority if no summary is printed.

@@ -83,7 +83,7 @@ def test_the_summary_follows_from_the_table(flown):
     assert flown.summary["cases"] == 600
     (limit,) = flown.summary["limits"]
     assert limit["broken"]["events"] == (~flown.table["kept.rate"]).sum()
-    (rate,) = [own for own in flown.summary["measures"] if own["name"] == "rate"]
+    (rate,) = [measure for measure in flown.summary["measures"] if measure["name"] == "rate"]
     assert rate["summary"]["worst"] == flown.table["rate"].idxmax()
     assert rate["summary"]["mean"] == pytest.approx(flown.table["rate"].mean(), rel=1e-12)
     assert flown.report.read_text().lstrip().lower().startswith("<!doctype html>")
@@ -123,8 +123,8 @@ def test_a_case_is_run_again_with_everything_recorded(file, flown, tmp_path):
 def test_parts_do_not_depend_on_where_the_files_are(file, flown, tmp_path):
     """The experiment is another file with the same text, at another place."""
     here = tmp_path / "elsewhere"
-    own = campaign(file)
-    own.call("--bundle", str(here))
+    bundled = campaign(file)
+    bundled.call("--bundle", str(here))
     names = {path.name for path in here.iterdir()}
     assert {"campaign.toml", "experiment.toml"} < names and len(names) == 4
     taken = campaign(here / "campaign.toml")
@@ -139,11 +139,11 @@ def test_parts_do_not_depend_on_where_the_files_are(file, flown, tmp_path):
 def test_a_bundle_holds_what_a_campaign_extends_and_replaces(file, tmp_path):
     (tmp_path / "deep").mkdir()
     (tmp_path / "base.toml").write_text(CAMPAIGN.replace("cases = 600", "cases = 250"))
-    own = tmp_path / "deep" / "own.toml"
-    own.write_text('extends = "../base.toml"\nseed = 5\n[fmu]\ncontroller = "FBL.fmu"\n')
-    whole = campaign(own).run(out=tmp_path / "whole")
-    campaign(own).call("--bundle", str(tmp_path / "bundle"))
-    own.unlink()
+    extended = tmp_path / "deep" / "own.toml"
+    extended.write_text('extends = "../base.toml"\nseed = 5\n[fmu]\ncontroller = "FBL.fmu"\n')
+    whole = campaign(extended).run(out=tmp_path / "whole")
+    campaign(extended).call("--bundle", str(tmp_path / "bundle"))
+    extended.unlink()
     (tmp_path / "base.toml").unlink()
     taken = campaign(tmp_path / "bundle" / "campaign.toml").run(out=tmp_path / "taken")
     bytes_of = [(run.folder / "cases.parquet").read_bytes() for run in (whole, taken)]

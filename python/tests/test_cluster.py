@@ -82,7 +82,7 @@ def content(folder):
 def workers(count=2, **options):
     """A cluster of processes with one thread each."""
     options = {"processes": True, "threads_per_worker": 1, "dashboard_address": ":0"} | options
-    with LocalCluster(n_workers=count, **options) as own, Client(own) as client:
+    with LocalCluster(n_workers=count, **options) as cluster, Client(cluster) as client:
         yield client
 
 
@@ -173,11 +173,11 @@ def test_parts_are_kept_at_an_address(kind, file, expected, tmp_path, monkeypatc
 def test_a_campaign_ends_at_the_same_case_when_its_question_is_answered(
     file, expected, client, tmp_path
 ):
-    own = file.with_name("until.toml")
+    until = file.with_name("until.toml")
     question = '[until]\nlimit = "rate"\nbelow = 0.4\n'
-    own.write_text(CAMPAIGN.replace(f"cases = {CASES}", "cases = 20000") + question)
-    alone = campaign(own).run(out=tmp_path / "alone")
-    together = campaign(own).run(client, out=tmp_path / "together")
+    until.write_text(CAMPAIGN.replace(f"cases = {CASES}", "cases = 20000") + question)
+    alone = campaign(until).run(out=tmp_path / "alone")
+    together = campaign(until).run(client, out=tmp_path / "together")
     assert alone.summary["answer"]["holds"] is not None
     assert 500 < alone.summary["cases"] < 20000
     for name in ("cases.parquet", "summary.json"):
@@ -243,7 +243,7 @@ def test_the_scheduler_is_started_anew(file, expected, tmp_path):
     out = tmp_path / "out"
     with started(*scheduler) as first, started(*worker), Client(address, timeout=LONG) as client:
         with meanwhile(out, lambda: os.kill(first.pid, signal.SIGKILL), parts=3):
-            with pytest.raises(ClusterError, match="the same call of run goes on") as caught:
+            with pytest.raises(ClusterError, match="the same call of run continues") as caught:
                 campaign(file).run(client, out=out)
     kept = {path: path.stat().st_mtime_ns for path in (out / "parts").glob("*.parquet")}
     assert 3 <= len(kept) < PARTS and f"{len(kept)} parts are flown and kept" in str(caught.value)
@@ -296,8 +296,8 @@ def test_workers_on_hosts_of_their_own(file, expected, tmp_path, monkeypatch):
             left.enter_context(started("ip", "netns", "exec", host, *worker))
         client = left.enter_context(Client(address, timeout=LONG))
         client.wait_for_workers(2, timeout=LONG)
-        found = sorted(worker.split(":")[1] for worker in client.nthreads())
-        assert found == [f"//{net}.1", f"//{net}.2"]
+        addresses = sorted(worker.split(":")[1] for worker in client.nthreads())
+        assert addresses == [f"//{net}.1", f"//{net}.2"]
 
         # The cable of one host is pulled in the middle.
         def pull():

@@ -1,4 +1,4 @@
-"""Units, experiments, and the command."""
+"""FMUs, experiments, and the command."""
 
 import json
 import os
@@ -18,7 +18,7 @@ COMMAND = Path(sysconfig.get_path("scripts"), "orchestrator" + (".exe" if os.nam
 ALPHA = "plant.attitude.alpha"
 
 
-def test_every_unit_is_there_and_simulates():
+def test_every_fmu_is_there_and_simulates():
     names = "AttitudeEstimator BTVSMC BTVSMC_DO ControlAllocator CRMPC DLMPC FBL LQR ReentryPlant"
     assert units() == [*names.split(), "SOTVSMC_DO", "TwoLoopSMC"]
     for name in units():
@@ -30,14 +30,14 @@ def test_every_unit_is_there_and_simulates():
 @pytest.mark.parametrize(
     ("name", "message"),
     [
-        ("CRPMC", 'there is no unit "CRPMC"; did you mean "CRMPC"?'),
-        ("plant", 'there is no unit "plant"; did you mean "ReentryPlant"?'),
-        ("xyz", 'there is no unit "xyz"; there are: AttitudeEstimator, BTVSMC'),
-        ("", 'there is no unit ""; there are: AttitudeEstimator, BTVSMC'),
-        ("../fmu/CRMPC", 'there is no unit "../fmu/CRMPC"; there are: AttitudeEstimator, BTVSMC'),
+        ("CRPMC", 'there is no FMU "CRPMC"; did you mean "CRMPC"?'),
+        ("plant", 'there is no FMU "plant"; did you mean "ReentryPlant"?'),
+        ("xyz", 'there is no FMU "xyz"; there are: AttitudeEstimator, BTVSMC'),
+        ("", 'there is no FMU ""; there are: AttitudeEstimator, BTVSMC'),
+        ("../fmu/CRMPC", 'there is no FMU "../fmu/CRMPC"; there are: AttitudeEstimator, BTVSMC'),
     ],
 )
-def test_unknown_units_are_refused_with_the_nearest_name(name, message):
+def test_unknown_fmus_are_refused_with_the_nearest_name(name, message):
     with pytest.raises(ValueError) as caught:
         fmu(name)
     assert str(caught.value).startswith(message)
@@ -80,8 +80,8 @@ def test_degrees_are_for_reading():
     si, deg = experiment("lqr", stop=1.0).table, experiment("lqr", stop=1.0, units="deg").table
     assert np.allclose(deg[ALPHA], np.degrees(si[ALPHA]), rtol=1e-15)
     assert deg["controller.moment.x"].equals(si["controller.moment.x"])
-    found = {unit for unit in deg.attrs["units"].values() if unit}
-    assert {"deg", "deg/s", "N.m"} <= found and not [u for u in found if u.startswith("rad")]
+    names = {unit for unit in deg.attrs["units"].values() if unit}
+    assert {"deg", "deg/s", "N.m"} <= names and not [u for u in names if u.startswith("rad")]
 
 
 def test_parameters_are_set():
@@ -103,7 +103,7 @@ def test_step_and_units_are_chosen(tmp_path):
     copy = tmp_path / "My law.fmu"
     shutil.copy(fmu("FBL"), copy)
     by_name, by_path = (
-        experiment("lqr", fmu={"controller": unit}, stop=1.0).table for unit in ("FBL", copy)
+        experiment("lqr", fmu={"controller": archive}, stop=1.0).table for archive in ("FBL", copy)
     )
     assert by_name.equals(by_path) and not by_name.equals(experiment("lqr", stop=1.0).table)
 
@@ -139,8 +139,8 @@ def test_files_are_kept_where_they_are_wanted(tmp_path, temporary):
     assert caught.value.run is None
 
 
-def test_the_units_are_those_of_the_package(tmp_path, monkeypatch):
-    """A folder with other units and experiments of the same names changes nothing."""
+def test_the_fmus_are_those_of_the_package(tmp_path, monkeypatch):
+    """A folder with other FMUs and experiments of the same names changes nothing."""
     usual = experiment("lqr", stop=1.0).table
     for folder in ("target/fmu", "orchestrator/experiments"):
         (tmp_path / folder).mkdir(parents=True)
@@ -178,7 +178,7 @@ def test_the_orchestrators_errors_are_exceptions(name, arguments, message):
         ({"set": {"plant.disturbance.bound": [1.0]}}, "not list"),
         ({"set": {"plant.disturbance.bound": None}}, "not NoneType"),
         ({"fmu": {"controller": "LQQ"}}, 'did you mean "LQR"?'),
-        ({"fmu": {"controller": "nowhere.fmu"}}, "nowhere.fmu: there is no such unit"),
+        ({"fmu": {"controller": "nowhere.fmu"}}, "nowhere.fmu: there is no such FMU"),
     ],
 )
 def test_bad_arguments_are_refused(arguments, message):

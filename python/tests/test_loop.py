@@ -36,14 +36,14 @@ def test_oracle_the_state_at_10_s_is_the_orchestrators():
             state = loop.step()
     assert state.time == 10.0
     # The moment is that of the step that ends at 10 s; a row has that of the step that begins.
-    for found, names, row in [
+    for values, names, row in [
         (state.attitude, ATTITUDE, 250),
         (state.rate, RATE, 250),
         (state.reference, REFERENCE, 250),
         (state.moment, MOMENT, 249),
     ]:
-        assert found.shape == (3,)
-        assert np.array_equal(found, recorded[names].iloc[row].to_numpy(dtype=float))
+        assert values.shape == (3,)
+        assert np.array_equal(values, recorded[names].iloc[row].to_numpy(dtype=float))
 
 
 def test_oracle_parameters_are_those_of_an_experiment():
@@ -104,8 +104,8 @@ def test_degrees_are_for_reading():
         deg = loop.run(1.0, pd_law, units="deg")
     assert np.allclose(deg[ATTITUDE + RATE], np.degrees(si[ATTITUDE + RATE]), rtol=1e-15)
     assert deg[MOMENT].equals(si[MOMENT])
-    wanted = {ATTITUDE[0]: "deg", RATE[0]: "deg/s", MOMENT[0]: "N.m"}
-    assert {name: deg.attrs["units"][name] for name in wanted} == wanted
+    expected = {ATTITUDE[0]: "deg", RATE[0]: "deg/s", MOMENT[0]: "N.m"}
+    assert {name: deg.attrs["units"][name] for name in expected} == expected
     assert deg.attrs["units"]["controller.referenceAcceleration.alpha"] == "deg/s2"
     assert deg.attrs["descriptions"][ATTITUDE[0]] == "Angle of attack"
 
@@ -140,7 +140,7 @@ def test_inputs_that_are_not_connected_can_be_set():
         assert loop.get("plant.disturbanceMoment.x") == 1e4
 
 
-def test_a_unit_may_be_a_file(tmp_path):
+def test_an_fmu_may_be_a_file(tmp_path):
     copy = tmp_path / "Other name.fmu"
     copy.write_bytes(fmu("LQR").read_bytes())
     with ClosedLoop(controller=copy) as loop, ClosedLoop(controller="LQR") as usual:
@@ -176,8 +176,8 @@ def test_nothing_is_left_behind(temporary):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ({"plant": "RentryPlant"}, 'there is no unit "RentryPlant"; did you mean "ReentryPlant"?'),
-        ({"controller": "nowhere/My.fmu"}, "My.fmu: there is no such unit"),
+        ({"plant": "RentryPlant"}, 'there is no FMU "RentryPlant"; did you mean "ReentryPlant"?'),
+        ({"controller": "nowhere/My.fmu"}, "My.fmu: there is no such FMU"),
         ({"controller": "ControlAllocator"}, 'ControlAllocator has no variable "attitude.alpha"'),
         ({"step": 0.0}, "step = 0.0 s, but a positive time is needed"),
         ({"step": math.nan}, "step = nan s, but a positive time is needed"),
@@ -188,13 +188,13 @@ def test_nothing_is_left_behind(temporary):
         ),
         (
             {"parameters": {"plant.disturbance.kind": "wite"}},
-            "disturbance.kind wants one of its items, not 'wite'; did you mean \"white\"?",
+            "disturbance.kind needs one of its items, not 'wite'; did you mean \"white\"?",
         ),
         (
             {"parameters": {"plant.disturbance.bound": "2 deg/s2"}},
-            "disturbance.bound wants a number in rad/s2, not '2 deg/s2'",
+            "disturbance.bound needs a number in rad/s2, not '2 deg/s2'",
         ),
-        ({"parameters": {"plant.disturbance.seed": 1.5}}, "disturbance.seed wants an integer"),
+        ({"parameters": {"plant.disturbance.seed": 1.5}}, "disturbance.seed needs an integer"),
         ({"parameters": {"plant.moment.x": 1.0}}, "moment.x is no parameter"),
         ({"parameters": {"plant.disturbance.bound": -1.0}}, "= -1.0 is below the minimum 0"),
         (
@@ -262,7 +262,7 @@ def test_variables_are_named_in_errors():
             loop.set("plant.attitude.alpha", 1.0)
 
 
-def test_a_unit_that_fails_says_why_and_can_be_reset():
+def test_an_fmu_that_fails_says_why_and_can_be_reset():
     def spin(loop):
         while True:
             loop.step([3e6, 3e6, 3e6])
@@ -278,7 +278,7 @@ def test_a_unit_that_fails_says_why_and_can_be_reset():
         assert loop.step([0.0, 0.0, 0.0]).time == 0.04
 
 
-def test_warnings_of_units_are_warnings():
+def test_warnings_of_fmus_are_warnings():
     # The plant is lighter than the controller is told by far, which no guarantee covers.
     with ClosedLoop(controller="CRMPC", parameters={"plant.inertia.scale": 0.5}) as loop:
         with pytest.warns(UnitWarning, match="CRMPC: the guarantee is no longer in force"):

@@ -2,8 +2,8 @@
 IPOPT, CasADi's sqpmethod, QOCO.
 
 All solvers get the same samples, each from the same previous plan, shifted. IPOPT and sqpmethod
-solve the nonlinear programme as it is (multiple shooting, exact derivatives, warm-started in the
-primal unknowns). QOCO solves the cone programme linearised about that plan, with its data updated
+solve the nonlinear problem as it is (multiple shooting, exact derivatives, warm-started in the
+primal unknowns). QOCO solves the cone problem linearised about that plan, with its data updated
 in place. Only the solve calls are timed; ours include the preview of the references, the
 linearisation and the certificate. The fastest repetition of each sample counts, as other load on
 the machine can only add time. This is no test: times differ from machine to machine, so only the
@@ -41,7 +41,7 @@ PATIENCE = 60.0
 
 
 def pieces(kind: str) -> ca.Function:
-    """The two balls of a stage as (theta, x_omega, a) -> the vectors y of rates and of input, not
+    """The two norm constraints of a stage as (theta, x_omega, a) -> the vectors y of rates and of input, not
     yet divided by their bounds.
 
     W = R^-1 is used in closed form, so that the expressions are as short as ours: m = I (W a +
@@ -61,7 +61,7 @@ def pieces(kind: str) -> ca.Function:
     u = ca.mtimes(nlp.kinematics(angles), ca.mtimes(ca.inv(inertia), m))
     check = ca.Function("check", [angles, rates, a], [u - (a - nlp.drift_function()(angles, rates))])
     assert np.abs(np.array(check([0.2, -0.1, 0.3], [0.05, 0.02, -0.04], [0.03, -0.02, 0.01]))).max() < 1e-12
-    return ca.Function("balls", [angles, rates, a], [rates, u] if kind == "paper" else [omega, m])
+    return ca.Function("norm_constraints", [angles, rates, a], [rates, u] if kind == "paper" else [omega, m])
 
 
 @dataclass
@@ -123,10 +123,10 @@ def target(sample: Sample) -> np.ndarray:
 
 
 class Casadi:
-    """The nonlinear programme with start, references and bounds as its parameters."""
+    """The nonlinear problem with start, references and bounds as its parameters."""
 
     def __init__(self, kind: str, plugin: str, options: dict):
-        balls = pieces(kind)
+        norm_constraints = pieces(kind)
         x, a = ca.SX.sym("x", 6, N + 1), ca.SX.sym("a", 3, N)
         start, references = ca.SX.sym("start", 6), ca.SX.sym("references", 9, N + 1)
         bounds = ca.SX.sym("bounds", 2 * N + 1)
@@ -137,8 +137,8 @@ class Casadi:
             cost += ca.bilin(w, x[:, k] - references[:6, k]) + ca.bilin(v, a[:, k] - references[6:, k])
             angles, rates = x[:3, k], x[3:, k]
             equal += [x[:3, k + 1] - (angles + H * rates + 0.5 * H * H * a[:, k]), x[3:, k + 1] - (rates + H * a[:, k])]
-            after, _ = balls(x[:3, k + 1], x[3:, k + 1], np.zeros(3))
-            _, moment = balls(angles, rates, a[:, k])
+            after, _ = norm_constraints(x[:3, k + 1], x[3:, k + 1], np.zeros(3))
+            _, moment = norm_constraints(angles, rates, a[:, k])
             below_one += [ca.sumsqr(after / bounds[k]), ca.sumsqr(moment / bounds[N + k])]
         terminal = ca.bilin(g, x[:, N] - references[:6, N])
         below_one.append(terminal / bounds[2 * N] ** 2)
@@ -165,16 +165,16 @@ class Casadi:
 
 
 class Qoco:
-    """The cone programme, linearised about the previous plan. The first one is linearised about its
-    own solution until that stands still, as in our solver."""
+    """The cone problem, linearised about the previous plan. The first one is linearised about its
+    own solution until that converges, as in our solver."""
 
     def __init__(self, kind: str):
-        balls = pieces(kind)
+        norm_constraints = pieces(kind)
         arguments = [ca.SX.sym(name, 3) for name in ("angles", "rates", "a")]
-        rate, moment = balls(*arguments)
+        rate, moment = norm_constraints(*arguments)
         point = ca.vertcat(*arguments)
         values = [rate, ca.jacobian(rate, point), moment, ca.jacobian(moment, point)]
-        self.balls = ca.Function("linear", arguments, [ca.densify(value) for value in values]).map(N + 1)
+        self.norm_constraints = ca.Function("linear", arguments, [ca.densify(value) for value in values]).map(N + 1)
         self.p = hessian()
         e, b = sparse.eye(6), np.vstack([0.5 * H * H * np.eye(3), H * np.eye(3)])
         step = np.block([[np.eye(3), H * np.eye(3)], [np.zeros((3, 3)), np.eye(3)]])
@@ -182,15 +182,15 @@ class Qoco:
         chain = sparse.hstack([moved, -sparse.kron(sparse.eye(N), b)])
         first = sparse.hstack([e, sparse.csc_matrix((6, 9 * N))])
         self.a = sparse.csc_matrix(sparse.vstack([first, chain]))
-        # Rows and columns of G's blocks: for each stage the ball on its state, then that on its
-        # input, with zeros included.
-        column = lambda k, of: 6 * k + np.arange(6) if of == "x" else 6 * (N + 1) + 3 * k + np.arange(3)
+        # Rows and columns of G's blocks: for each stage the norm constraint on its state, then that on
+        # its input, with zeros included.
+        column = lambda k, kind: 6 * k + np.arange(6) if kind == "x" else 6 * (N + 1) + 3 * k + np.arange(3)
         self.columns = [(column(k + 1, "x"), np.concatenate([column(k, "x"), column(k, "a")])) for k in range(N)]
         rows, columns = [], []
         for k, (state, both) in enumerate(self.columns):
-            for row, own in ((8 * k + 1, state), (8 * k + 5, both)):
-                rows.append(np.repeat(row + np.arange(3), len(own)))
-                columns.append(np.tile(own, 3))
+            for row, of_row in ((8 * k + 1, state), (8 * k + 5, both)):
+                rows.append(np.repeat(row + np.arange(3), len(of_row)))
+                columns.append(np.tile(of_row, 3))
         self.root = np.linalg.cholesky(stage_weights()[2]).T
         rows.append(np.repeat(8 * N + 1 + np.arange(6), 6))
         columns.append(np.tile(column(N, "x"), 6))
@@ -202,21 +202,21 @@ class Qoco:
         self.marked = marked
         self.solver = None
 
-    def linearise(self, sample: Sample, about: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def linearise(self, sample: Sample, point: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Returns the entries of G, column by column, and h, so that h - G z lies in the cones."""
-        states, inputs = about[: 6 * (N + 1)].reshape(N + 1, 6), about[6 * (N + 1) :].reshape(N, 3)
+        states, inputs = point[: 6 * (N + 1)].reshape(N + 1, 6), point[6 * (N + 1) :].reshape(N, 3)
         rate, by_rate, moment, by_moment = (
-            np.array(value) for value in self.balls(states[:, :3].T, states[:, 3:].T, np.vstack([inputs, np.zeros(3)]).T)
+            np.array(value) for value in self.norm_constraints(states[:, :3].T, states[:, 3:].T, np.vstack([inputs, np.zeros(3)]).T)
         )
         entries, h = [], np.zeros(self.m)
         for k, (state, both) in enumerate(self.columns):
-            own = by_rate[:, 9 * (k + 1) : 9 * (k + 1) + 6] / sample.bounds[k]
-            entries.append(-own.ravel())
+            block = by_rate[:, 9 * (k + 1) : 9 * (k + 1) + 6] / sample.bounds[k]
+            entries.append(-block.ravel())
             h[8 * k] = h[8 * k + 4] = 1.0
-            h[8 * k + 1 : 8 * k + 4] = rate[:, k + 1] / sample.bounds[k] - own @ about[state]
-            own = by_moment[:, 9 * k : 9 * k + 9] / sample.bounds[N + k]
-            entries.append(-own.ravel())
-            h[8 * k + 5 : 8 * k + 8] = moment[:, k] / sample.bounds[N + k] - own @ about[both]
+            h[8 * k + 1 : 8 * k + 4] = rate[:, k + 1] / sample.bounds[k] - block @ point[state]
+            block = by_moment[:, 9 * k : 9 * k + 9] / sample.bounds[N + k]
+            entries.append(-block.ravel())
+            h[8 * k + 5 : 8 * k + 8] = moment[:, k] / sample.bounds[N + k] - block @ point[both]
         root = self.root / sample.bounds[2 * N]
         entries.append(-root.ravel())
         h[8 * N] = 1.0
@@ -225,13 +225,13 @@ class Qoco:
 
     def solve(self, sample: Sample) -> tuple[float, int, float | None]:
         """Returns seconds, iterations and cost; the cost is None if the solver failed."""
-        about, best = sample.guess.copy(), target(sample)
-        about[:6] = sample.start
+        point, best = sample.guess.copy(), target(sample)
+        point[:6] = sample.start
         c = -self.p @ best
         b = np.concatenate([sample.start, np.zeros(6 * N)])
         seconds, iterations = 0.0, 0
         for _ in range(FIRST_PASSES if sample.first else 1):
-            g, h = self.linearise(sample, about)
+            g, h = self.linearise(sample, point)
             if self.solver is None:
                 self.solver = qoco.QOCO()
                 tolerances = {"abstol": 1e-8, "reltol": 1e-8}
@@ -249,11 +249,11 @@ class Qoco:
             if result.status != "QOCO_SOLVED":
                 return seconds, iterations, None
             x = np.array(result.x)
-            moved = np.abs(x - about)[: 6 * (N + 1)].max()
-            about = x
+            moved = np.abs(x - point)[: 6 * (N + 1)].max()
+            point = x
             if moved < STANDSTILL:
                 break
-        error = about - best
+        error = point - best
         return seconds, iterations, float(0.5 * error @ (self.p @ error)) / SCALE
 
 
@@ -270,7 +270,7 @@ def others(kind: str) -> dict:
     }
 
 
-# Our variant that solves the same programme as each other solver.
+# Our variant that solves the same problem as each other solver.
 SAME = {"CasADi + IPOPT": "riccati", "CasADi sqpmethod": "riccati", "QOCO": "cone"}
 
 
@@ -292,12 +292,12 @@ class Timed:
 
 def measure(kind: str, samples: list[Sample], every: int | None, repeat: int) -> dict[str, Timed]:
     """Runs all solvers on the samples of one constraint set."""
-    found = {name: Timed() for name in OURS}
+    timed_by_solver = {name: Timed() for name in OURS}
     for index, sample in enumerate(samples):
         for name in OURS:
             way = sample.ways[name]
             cost = None if way["status"] == "Fallback" else way["cost"]
-            found[name].add(index, way["seconds"], way["iterations"], cost)
+            timed_by_solver[name].add(index, way["seconds"], way["iterations"], cost)
     for name, solver in others(kind).items():
         step = every
         if step is None:
@@ -305,19 +305,19 @@ def measure(kind: str, samples: list[Sample], every: int | None, repeat: int) ->
             step = max(1, int(np.ceil(np.mean(trial) * len(samples) * repeat / PATIENCE)))
         if step > 1:
             print(f"{kind}: {name} gets every {step}th sample only", flush=True)
-        found[name] = Timed()
+        timed_by_solver[name] = Timed()
         for index in range(0, len(samples), step):
-            found[name].add(index, *min((solver.solve(samples[index]) for _ in range(repeat)), key=lambda result: result[0]))
-    return found
+            timed_by_solver[name].add(index, *min((solver.solve(samples[index]) for _ in range(repeat)), key=lambda result: result[0]))
+    return timed_by_solver
 
 
-def table(kind: str, found: dict[str, Timed]) -> None:
+def table(kind: str, timed_by_solver: dict[str, Timed]) -> None:
     """Prints a table of the times, iterations and costs."""
-    ours = np.array(found[OURS[0]].seconds)
+    ours = np.array(timed_by_solver[OURS[0]].seconds)
     print(f"\n{kind} set, {len(ours)} optimisations, times in ms; the ratio is that of the means over the same samples")
     columns = ("mean", "median", "p99", "max", "first", "iterations", "solved", "ratio", "cost differs by")
     print(f"  {'':<18}" + "".join(f"{column:>11}" for column in columns[:-1]) + f"{columns[-1]:>18}")
-    for name, timed in found.items():
+    for name, timed in timed_by_solver.items():
         ms = np.array(timed.seconds) * 1e3
         ratio = np.mean(timed.seconds) / np.mean(ours[timed.samples])
         numbers = [ms.mean(), np.median(ms), np.percentile(ms, 99), ms.max(), ms[0]]
@@ -325,19 +325,19 @@ def table(kind: str, found: dict[str, Timed]) -> None:
         text = f"  {name:<18}" + "".join(f"{number:11.4f}" for number in numbers)
         text += f"{np.mean(timed.iterations):11.1f}{solved:>7}/{len(ms):<3}{ratio:11.1f}"
         if name in SAME:
-            other = found[SAME[name]].costs
+            other = timed_by_solver[SAME[name]].costs
             pairs = [(cost, other[i]) for i, cost in zip(timed.samples, timed.costs) if cost and other[i]]
-            largest = max((abs(cost / own - 1.0) for cost, own in pairs), default=np.nan)
+            largest = max((abs(cost / reference - 1.0) for cost, reference in pairs), default=np.nan)
             text += f"{largest:18.1e}"
         print(text)
 
 
-def draw(all_found: dict[str, dict[str, Timed]]) -> None:
+def draw(by_kind: dict[str, dict[str, Timed]]) -> None:
     """Draws every time as a point, with median and 99th percentile."""
-    figure, axes = plt.subplots(1, len(all_found), figsize=(11, 3.8), layout="constrained", sharex=True, sharey=True)
+    figure, axes = plt.subplots(1, len(by_kind), figsize=(11, 3.8), layout="constrained", sharex=True, sharey=True)
     scatter = np.random.default_rng(0)
-    for axis, (kind, found) in zip(np.atleast_1d(axes), all_found.items()):
-        for row, (name, timed) in enumerate(found.items()):
+    for axis, (kind, timed_by_solver) in zip(np.atleast_1d(axes), by_kind.items()):
+        for row, (name, timed) in enumerate(timed_by_solver.items()):
             ms = np.array(timed.seconds) * 1e3
             colour = "#1f77b4" if name in OURS else "#d62728"
             rows = row + scatter.uniform(-0.28, 0.28, len(ms))
@@ -345,7 +345,7 @@ def draw(all_found: dict[str, dict[str, Timed]]) -> None:
             for share, style in ((50, "-"), (99, ":")):
                 axis.plot([np.percentile(ms, share)] * 2, [row - 0.4, row + 0.4], style, color="black", linewidth=1.4)
         axis.set(title=f"{kind} set", xlabel="one optimisation, ms", xscale="log")
-        axis.set_yticks(range(len(found)), list(found))
+        axis.set_yticks(range(len(timed_by_solver)), list(timed_by_solver))
         axis.grid(axis="x", which="major", linewidth=0.5, alpha=0.6)
     axes = np.atleast_1d(axes)
     axes[0].invert_yaxis()
@@ -365,20 +365,20 @@ def main() -> None:
     samples = [Sample.read(line) for line in lines]
     out = ROOT / "out" / "bench"
     out.mkdir(parents=True, exist_ok=True)
-    found = {}
+    by_kind = {}
     for kind in ("robust", "paper"):
-        own = [sample for sample in samples if sample.kind == kind]
-        found[kind] = measure(kind, own, arguments.every, arguments.repeat_others)
-        table(kind, found[kind])
+        of_kind = [sample for sample in samples if sample.kind == kind]
+        by_kind[kind] = measure(kind, of_kind, arguments.every, arguments.repeat_others)
+        table(kind, by_kind[kind])
     with (out / "solvers.csv").open("w", newline="") as file:
         writer = csv.writer(file)
         writer.writerow(["set", "solver", "time_s", "seconds", "iterations", "cost"])
-        for kind, solvers in found.items():
+        for kind, solvers in by_kind.items():
             times = [sample.time for sample in samples if sample.kind == kind]
             for name, timed in solvers.items():
                 for row in zip(timed.samples, timed.seconds, timed.iterations, timed.costs):
                     writer.writerow([kind, name, times[row[0]], *row[1:]])
-    draw(found)
+    draw(by_kind)
     print(f"\n{out}: solvers.csv, solvers.png, solvers.svg")
 
 

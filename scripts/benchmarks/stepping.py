@@ -23,9 +23,9 @@ STEP = 0.04
 
 def orchestrator(path: Path, outputs: list[str], steps: int, folder: Path) -> None:
     experiment = folder / "x.toml"
-    recorded = ", ".join(f'"unit.{name}"' for name in outputs)
+    recorded = ", ".join(f'"component.{name}"' for name in outputs)
     experiment.write_text(
-        f'title = "x"\n[simulation]\nstop = {steps * STEP!r}\nstep = {STEP}\n[components.unit]\nfmu = "{path}"\n'
+        f'title = "x"\n[simulation]\nstop = {steps * STEP!r}\nstep = {STEP}\n[components.component]\nfmu = "{path}"\n'
         f'unconnected = ["*"]\n[record]\nvariables = [{recorded}]\n'
     )
     command = [program("orchestrator"), "run", experiment, "--out", folder / "out", "--force", "--quiet"]
@@ -46,8 +46,8 @@ def with_fmpy(path: Path, outputs: list[str], steps: int, _folder: Path) -> None
     simulate_fmu(str(path), output=outputs, step_size=STEP, output_interval=STEP, stop_time=steps * STEP)
 
 
-# The numbers of steps make all tools take about equally long.
-TOOLS = {
+# The numbers of steps make all importers take about equally long.
+IMPORTERS = {
     "orchestrator": (orchestrator, 500_000),
     "fmi-sim": (fmi_sim, 250_000),
     "FMPy": (with_fmpy, 100_000),
@@ -70,27 +70,27 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--repeat", type=int, default=5, help="runs of each, of which the median counts")
     repeat = parser.parse_args().repeat
-    units = ["LQR", "ReentryPlant"]
-    found: dict[str, dict[str, float]] = {}
-    for unit in units:
-        description = fmpy.read_model_description(str(archive(unit)))
+    names = ["LQR", "ReentryPlant"]
+    medians: dict[str, dict[str, float]] = {}
+    for fmu in names:
+        description = fmpy.read_model_description(str(archive(fmu)))
         outputs = [v.name for v in description.modelVariables if v.causality == "output" and v.type == "Real"]
-        rates: dict[str, list[float]] = {name: [] for name in TOOLS}
-        # The tools run in turns, so that other load on the machine affects all alike.
+        rates: dict[str, list[float]] = {name: [] for name in IMPORTERS}
+        # The importers run in turns, so that other load on the machine affects all alike.
         for _ in range(repeat):
-            for name, (run, steps) in TOOLS.items():
-                rates[name].append(rate(run, archive(unit), outputs, steps))
-        found[unit] = {name: statistics.median(values) for name, values in rates.items()}
-        print(f"\n{unit}, {len(outputs)} outputs recorded at every step of {STEP} s, median of {repeat}")
-        for name, value in found[unit].items():
-            ratio = value / found[unit]["orchestrator"]
+            for name, (run, steps) in IMPORTERS.items():
+                rates[name].append(rate(run, archive(fmu), outputs, steps))
+        medians[fmu] = {name: statistics.median(values) for name, values in rates.items()}
+        print(f"\n{fmu}, {len(outputs)} outputs recorded at every step of {STEP} s, median of {repeat}")
+        for name, value in medians[fmu].items():
+            ratio = value / medians[fmu]["orchestrator"]
             print(f"  {name:<14}{value / 1e6:8.3f} million steps/s, {ratio:5.2f} of the orchestrator's")
 
-    figure, axes = plt.subplots(1, len(units), figsize=(10, 3.2), layout="constrained")
-    for axis, unit in zip(axes, units):
-        bars = axis.barh(list(found[unit]), [value / 1e6 for value in found[unit].values()], color="#1f77b4")
+    figure, axes = plt.subplots(1, len(names), figsize=(10, 3.2), layout="constrained")
+    for axis, fmu in zip(axes, names):
+        bars = axis.barh(list(medians[fmu]), [value / 1e6 for value in medians[fmu].values()], color="#1f77b4")
         axis.bar_label(bars, fmt="%.3g", padding=3)
-        axis.set(title=unit, xlabel="million steps per second, all outputs recorded", xscale="log")
+        axis.set(title=fmu, xlabel="million steps per second, all outputs recorded", xscale="log")
         axis.margins(x=0.25)
         axis.invert_yaxis()
     (ROOT / "out").mkdir(exist_ok=True)

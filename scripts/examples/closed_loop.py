@@ -19,8 +19,8 @@ MOMENT = ["moment.x", "moment.y", "moment.z"]  # N m
 REFERENCE = ["reference.alpha", "reference.beta", "reference.sigma"]  # rad
 
 
-class Unit:
-    """An FMU whose variables, real or integer, are read and set by name."""
+class Instance:
+    """An instance of an FMU whose variables, real or integer, are read and set by name."""
 
     def __init__(self, path, parameters=None):
         description = read_model_description(path)
@@ -55,12 +55,12 @@ class Unit:
 def simulate(controller, stop=50.0, step=0.04, parameters=None, fmus=FMUS):
     """Steps the loop and returns rows of time, attitude, rate, moment and reference. The parameters
     are those of the plant."""
-    plant = Unit(str(fmus / "ReentryPlant.fmu"), parameters)
-    law = Unit(str(fmus / f"{controller}.fmu"))
+    plant = Instance(str(fmus / "ReentryPlant.fmu"), parameters)
+    law = Instance(str(fmus / f"{controller}.fmu"))
     rows = []
     for k in range(round(stop / step)):
         state, reference = plant.get(ATTITUDE + RATE), law.get(REFERENCE)
-        # Each unit is set, stepped, and then read: FMI 2.0 forbids reading between setting and
+        # Each instance is set, stepped, and then read: FMI 2.0 forbids reading between setting and
         # stepping. The controller is stepped first, so there is no delay in the loop.
         law.set(ATTITUDE + RATE, state)
         law.fmu.doStep(k * step, step)
@@ -75,7 +75,7 @@ def simulate(controller, stop=50.0, step=0.04, parameters=None, fmus=FMUS):
 
 
 def mean_error(rows):
-    """Figure of merit EMS of the papers, in degrees: the root of the mean of
+    """The metric EMS of the papers, in degrees: the root of the mean of
     |attitude - reference|^2 over the instants at which steps begin."""
     squares = [sum((row[1 + i] - row[10 + i]) ** 2 for i in range(3)) for row in rows[:-1]]
     return math.degrees(math.sqrt(sum(squares) / len(squares)))
@@ -91,9 +91,9 @@ def arguments(description):
 
 
 if __name__ == "__main__":
-    given = arguments(__doc__).parse_args()
-    result = simulate(given.controller, given.stop, fmus=given.fmus)
-    given.out.mkdir(exist_ok=True)
-    with open(given.out / "closed_loop.csv", "w", newline="") as file:
+    options = arguments(__doc__).parse_args()
+    result = simulate(options.controller, options.stop, fmus=options.fmus)
+    options.out.mkdir(exist_ok=True)
+    with open(options.out / "closed_loop.csv", "w", newline="") as file:
         csv.writer(file).writerows([["time", *ATTITUDE, *RATE, *MOMENT, *REFERENCE], *result])
-    print(f"{given.controller}: EMS {mean_error(result):.3f} deg; {given.out / 'closed_loop.csv'}")
+    print(f"{options.controller}: EMS {mean_error(result):.3f} deg; {options.out / 'closed_loop.csv'}")

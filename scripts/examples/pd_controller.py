@@ -2,7 +2,7 @@
 `pythonfmu build -f pd_controller.py`.
 
 The moment is proportional to the errors of the angles and damped by their rates. It is computed in
-the step for which the inputs are set and read after it: where this unit is stepped before the
+the step for which the inputs are set and read after it: where this FMU is stepped before the
 vehicle, as in the orchestrator, the loop has no delay.
 """
 

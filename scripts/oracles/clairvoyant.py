@@ -1,7 +1,7 @@
 """The best tracking that is possible at all in the scenario of Chai 2022, with the whole run known
 beforehand and no disturbance.
 
-A nonlinear programme (CasADi, IPOPT) over the exact double integrator of the angles: the input is
+A nonlinear problem (CasADi, IPOPT) over the exact double integrator of the angles: the input is
 the acceleration a of the angles, held for a given time. The objective is EMS itself, summed at the
 communication points t_k = 0.04 k before each step as in metrics.json (docs/symbols.md). The
 constraints are imposed where an input begins to be held, and nowhere between. IPOPT finds a local

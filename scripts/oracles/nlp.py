@@ -1,8 +1,8 @@
-"""The first optimisation of CRMPC as a nonlinear programme, made from the raw data of Chai 2022,
+"""The first optimisation of CRMPC as a nonlinear problem, made from the raw data of Chai 2022,
 section 5.1, alone.
 
 Nothing here comes from the project's code: the constants are computed with numpy from the values
-that the paper prints, the dynamics are written with CasADi, and IPOPT solves the programme by
+that the paper prints, the dynamics are written with CasADi, and IPOPT solves the problem by
 multiple shooting. Angles are in rad, all other values in SI units.
 """
 
@@ -104,7 +104,7 @@ def drift_function() -> ca.Function:
 
 @dataclass(frozen=True)
 class Optimum:
-    """Solution of the nonlinear programme."""
+    """Solution of the nonlinear problem."""
 
     cost: float
     moment: np.ndarray
@@ -114,7 +114,7 @@ class Optimum:
 
 
 def first_optimum() -> Optimum:
-    """Solves the programme at t = 0 from the paper's initial state, at rest."""
+    """Solves the problem at t = 0 from the paper's initial state, at rest."""
     sets = printed_sets()
     n, h = HORIZON, STEP
     f = drift_function()
@@ -140,8 +140,8 @@ def first_optimum() -> Optimum:
     error = x[:, n] - guess[-1]
     terminal = 0.0
     for i in range(3):
-        own = ca.vertcat(error[i], error[3 + i])
-        terminal += ca.bilin(ca.DM(sets.weight), own, own)
+        axis_error = ca.vertcat(error[i], error[3 + i])
+        terminal += ca.bilin(ca.DM(sets.weight), axis_error, axis_error)
     cost += terminal
     below_one.append(terminal / sets.epsilon**2)
 

@@ -43,9 +43,9 @@ def reach(direction, matrix=ALL, bounds=BOUNDS) -> float:
     columns = matrix.shape[1]
     system = np.column_stack([matrix, -np.array(direction, float)])
     cost = np.append(np.zeros(columns), -1.0)
-    found = linprog(cost, A_eq=system, b_eq=np.zeros(3), bounds=[*bounds, (0, None)])
-    assert found.status == 0, found.message
-    return found.x[-1]
+    optimum = linprog(cost, A_eq=system, b_eq=np.zeros(3), bounds=[*bounds, (0, None)])
+    assert optimum.status == 0, optimum.message
+    return optimum.x[-1]
 
 
 def _rate_limits(samples: int, columns: int) -> tuple[sparse.csr_matrix, np.ndarray]:
@@ -76,9 +76,9 @@ def cancelled(samples: int = 64) -> float:
     limits, most = _rate_limits(samples, columns)
     bounds = [*zip(LOW, HIGH)] * samples + [(0, 1)] * (N_JETS * samples) + [(0, None)]
     cost = np.append(np.zeros(columns - 1), -1.0)
-    found = linprog(cost, A_ub=limits, b_ub=most, A_eq=system.tocsr(), b_eq=np.zeros(3 * samples), bounds=bounds)
-    assert found.status == 0, found.message
-    return found.x[-1]
+    optimum = linprog(cost, A_ub=limits, b_ub=most, A_eq=system.tocsr(), b_eq=np.zeros(3 * samples), bounds=bounds)
+    assert optimum.status == 0, optimum.message
+    return optimum.x[-1]
 
 
 def least_error(amplitude, samples: int = 64) -> float:
@@ -103,10 +103,10 @@ def least_error(amplitude, samples: int = 64) -> float:
         angles, rates = slice(6 * k, 6 * k + 3), slice(6 * k + 3, 6 * k + 6)
         # Angles and deflections are integrated by the trapezoidal rule; jets are held.
         for at, sign in ((k, -1.0), (then, 1.0)):
-            of = states + 6 * at
-            system[angles, of : of + 3] = sign * np.eye(3)
-            system[angles, of + 3 : of + 6] = -step / 2 * np.eye(3)
-            system[rates, of + 3 : of + 6] = sign * np.eye(3)
+            start = states + 6 * at
+            system[angles, start : start + 3] = sign * np.eye(3)
+            system[angles, start + 3 : start + 6] = -step / 2 * np.eye(3)
+            system[rates, start + 3 : start + 6] = sign * np.eye(3)
             system[rates, N_SURFACES * at : N_SURFACES * (at + 1)] = -step / 2 * by_moment @ SURFACES
         system[rates, duties + N_JETS * k : duties + N_JETS * (k + 1)] = -step * by_moment @ JETS
         right[rates] = step * by_moment @ (np.array(amplitude) * np.sin((k + 0.5) * step))
@@ -119,9 +119,9 @@ def least_error(amplitude, samples: int = 64) -> float:
     cost = np.append(np.zeros(columns - 1), 1.0)
     upper = sparse.vstack([limits, bounded.tocsr()])
     most = np.append(most, np.zeros(6 * samples))
-    found = linprog(cost, A_ub=upper, b_ub=most, A_eq=system.tocsr(), b_eq=right, bounds=bounds)
-    assert found.status == 0, found.message
-    return found.x[-1]
+    optimum = linprog(cost, A_ub=upper, b_ub=most, A_eq=system.tocsr(), b_eq=right, bounds=bounds)
+    assert optimum.status == 0, optimum.message
+    return optimum.x[-1]
 
 
 def values() -> list[tuple[str, float, str, str]]:

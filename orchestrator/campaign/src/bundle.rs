@@ -1,4 +1,4 @@
-//! A campaign in a folder that holds all that its cases need, so that another machine can fly them.
+//! A campaign in a folder with all files that its cases need, so that another machine can fly them.
 
 use crate::plan::Plan;
 use cosim::error::Error;

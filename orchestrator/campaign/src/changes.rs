@@ -19,7 +19,7 @@ impl Changes {
     /// Returns the arguments that name a campaign and these changes.
     pub(crate) fn command(&self, campaign: &Campaign) -> String {
         let mut words = vec![campaign.source.path.display().to_string()];
-        // Processes of units change nothing of a case.
+        // A case is the same in whichever process its instances run.
         let Overrides { set, fmu, stop, step, coupling, on_invalid, isolation: _ } =
             &self.overrides;
         let name = |value: Option<PossibleValue>| value.map(|value| value.get_name().to_string());

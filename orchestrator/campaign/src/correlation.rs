@@ -2,7 +2,7 @@
 
 use crate::definition::Campaign;
 use crate::design::Place;
-use crate::law::Law;
+use crate::distribution::Distribution;
 use cosim::error::Error;
 use statrs::distribution::{ContinuousCDF, Normal};
 use toml::Spanned;
@@ -35,7 +35,7 @@ impl Correlated {
 /// Reads the correlations of a campaign.
 pub(crate) fn correlation(
     campaign: &Campaign,
-    varied: &[(&str, &Law)],
+    varied: &[(&str, &Distribution)],
 ) -> Result<Option<Correlated>, Error> {
     let source = &campaign.source;
     let mut dimensions: Vec<usize> = Vec::new();
@@ -45,25 +45,27 @@ pub(crate) fn correlation(
         let fault = |problem: String| source.error(&span, format!("[[correlation]] {problem}"));
         let mut pair = [0; 2];
         for (place, name) in pair.iter_mut().zip(correlation.between.get_ref()) {
-            let known = varied.iter().map(|(name, _)| *name);
-            source.check_names(
+            let names = varied.iter().map(|(name, _)| *name);
+            source.known(
                 [&Spanned::new(span.clone(), name.clone())],
                 "parameter that varies",
-                known,
+                names,
             )?;
-            let dimension = varied.iter().position(|(own, _)| own == name).unwrap_or(0);
+            let dimension = varied.iter().position(|(other, _)| other == name).unwrap_or(0);
             if !varied[dimension].1.is_ordered() {
-                return Err(fault(format!("\"{name}\" has no order that could be correlated")));
+                return Err(fault(format!(
+                    "\"{name}\" cannot be correlated, because its values have no order"
+                )));
             }
             if !dimensions.contains(&dimension) {
                 dimensions.push(dimension);
             }
-            *place = dimensions.iter().position(|known| *known == dimension).unwrap_or(0);
+            *place = dimensions.iter().position(|other| *other == dimension).unwrap_or(0);
         }
         let coefficient = correlation.coefficient;
         if pair[0] == pair[1] || !(coefficient > -1.0 && coefficient < 1.0) {
             return Err(fault(format!(
-                "coefficient = {coefficient}: of two parameters, above -1 and below 1"
+                "coefficient = {coefficient}: two different parameters and a value between -1 and 1 are needed"
             )));
         }
         entries.push((pair, coefficient));
@@ -77,28 +79,28 @@ pub(crate) fn correlation(
         (matrix[i][j], matrix[j][i]) = (coefficient, coefficient);
     }
     let factor = cholesky(&matrix).ok_or_else(|| {
-        source.error(&(0..0), "[[correlation]] no parameters can be correlated like this: the matrix of the coefficients is not positive definite")
+        source.error(&(0..0), "[[correlation]] the coefficients contradict each other: their matrix is not positive definite")
     })?;
     Ok(Some(Correlated { dimensions, factor }))
 }
 
 /// Returns the lower triangular factor of a symmetric matrix, row by row; `None` if the matrix is
-/// not positive definite. (`nalgebra` is built without matrices of any size here, so that the units
+/// not positive definite. (`nalgebra` is built without matrices of any size here, so that the FMUs
 /// compute the same everywhere.)
 fn cholesky(matrix: &[Vec<f64>]) -> Option<Vec<Vec<f64>>> {
     let mut factor: Vec<Vec<f64>> = Vec::new();
     for (i, row) in matrix.iter().enumerate() {
-        let mut own: Vec<f64> = Vec::new();
+        let mut factor_row: Vec<f64> = Vec::new();
         for j in 0..=i {
-            let other = factor.get(j).unwrap_or(&own);
-            let rest = row[j] - own.iter().zip(other).map(|(a, b)| a * b).sum::<f64>();
+            let other = factor.get(j).unwrap_or(&factor_row);
+            let rest = row[j] - factor_row.iter().zip(other).map(|(a, b)| a * b).sum::<f64>();
             let entry = if i == j { rest.sqrt() } else { rest / other[j] };
             if !entry.is_finite() || i == j && entry <= 0.0 {
                 return None;
             }
-            own.push(entry);
+            factor_row.push(entry);
         }
-        factor.push(own);
+        factor.push(factor_row);
     }
     Some(factor)
 }

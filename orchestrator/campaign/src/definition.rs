@@ -18,7 +18,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use toml::{Spanned, Value};
 
-/// A campaign: an experiment, what varies from case to case, and what is asked of all cases.
+/// A campaign: an experiment, the parameters that vary from case to case, and the limits that the
+/// cases are to keep.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Campaign {
@@ -43,16 +44,16 @@ pub struct Campaign {
     /// Number of cases, and with `until` the largest number. A factorial design needs none.
     #[serde(default)]
     pub cases: Option<u64>,
-    /// Way in which the cases fill the space of what varies.
+    /// Design that places the cases in the space of the varied parameters.
     #[serde(default)]
-    pub design: Kind,
+    pub design: DesignKind,
     /// Parameters that differ from case to case.
     #[serde(default)]
     pub vary: Vec<Vary>,
-    /// Correlations among what varies.
+    /// Correlations between varied parameters.
     #[serde(default, rename = "correlation")]
     pub correlations: Vec<Correlation>,
-    /// Lists of signals that measures refer to, by name, besides those of the experiment.
+    /// Lists of signals that measures refer to, by name, in addition to those of the experiment.
     #[serde(default)]
     pub signals: BTreeMap<String, Vec<Signal>>,
     /// Names of metrics of the experiment that are recorded of each case.
@@ -79,29 +80,29 @@ pub struct Campaign {
     pub source: Source,
 }
 
-/// Way in which the cases fill the space of what varies.
+/// Design that places the cases in the space of the varied parameters.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Deserialize, JsonSchema, Serialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Kind {
+pub enum DesignKind {
     /// Each case is drawn independently of all others.
     #[default]
     Random,
-    /// Each parameter falls once into each of as many strata of equal probability as there are
-    /// cases.
+    /// The range of each parameter is divided into as many strata of equal probability as there are
+    /// cases, and each stratum holds one case.
     LatinHypercube,
     /// Points of Sobol's sequence, scrambled by Owen's method.
     Sobol,
-    /// All combinations of the levels of what varies.
+    /// All combinations of the levels of the varied parameters.
     Factorial,
-    /// The corners of the box of what varies, and random cases. If there are more corners than
-    /// cases, every other case is a corner that is chosen at random.
+    /// The corners of the parameter space, and random cases. If there are more corners than cases,
+    /// every other case is a corner that is chosen at random.
     Corners,
-    /// Pairs of random points with exchanged coordinates, which Sobol's indices are computed from.
+    /// Pairs of random points with exchanged coordinates, from which Sobol's indices are computed.
     /// The number of cases is a multiple of the number of parameters plus two.
     Sensitivity,
 }
 
-/// Correlation of two parameters that vary. It is that of the normal scores behind their
+/// Correlation of two varied parameters. It is the correlation of the normal scores behind their
 /// distributions (a Gaussian copula).
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -113,13 +114,14 @@ pub struct Correlation {
     pub coefficient: f64,
 }
 
-/// A limit on a measure, which each case keeps or breaks. A case that is lost or fails keeps none.
+/// A limit on a measure, which each case keeps or breaks. A case that is lost, fails or ends early
+/// breaks all limits.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Limit {
     /// Name of the limit in the results.
     pub id: String,
-    /// The limit in words, for the report.
+    /// Wording of the limit in the report.
     #[serde(default)]
     pub says: String,
     /// Metric or measure that is limited.
@@ -155,17 +157,17 @@ pub struct Until {
 #[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Keep {
-    /// Number of cases with the largest values of `by`.
+    /// Number of kept cases with the largest values of `by`.
     #[serde(default)]
     pub worst: u32,
     /// Measure that orders the cases.
     #[serde(default)]
     #[schemars(with = "Option<String>")]
     pub by: Option<Spanned<String>>,
-    /// Largest number of cases that broke a limit, were lost or failed.
+    /// Largest number of kept cases that broke a limit, were lost or failed.
     #[serde(default)]
     pub failed: u32,
-    /// Number m, if every m-th case is kept.
+    /// Interval m, so that every m-th case is kept.
     #[serde(default)]
     pub every: Option<u64>,
 }
@@ -204,10 +206,10 @@ impl Campaign {
     /// Returns an error if a file cannot be read, is not TOML, holds an unknown key, or contradicts
     /// itself.
     pub fn load(path: &Path) -> Result<Self, Error> {
-        Self::of(Source::load(path)?)
+        Self::read(Source::load(path)?)
     }
 
-    fn of(source: Source) -> Result<Self, Error> {
+    fn read(source: Source) -> Result<Self, Error> {
         let mut campaign: Self = source.read()?;
         campaign.source = source;
         campaign.check()?;
@@ -224,10 +226,10 @@ impl Campaign {
     fn check(&self) -> Result<(), Error> {
         let whole = |message: String| self.source.error(&(0..0), message);
         let mut ids = BTreeSet::new();
-        let all = self.measures.iter().map(|measure| ("measure", &measure.id));
-        for (what, id) in all.chain(self.limits.iter().map(|limit| ("limit", &limit.id))) {
+        let measures = self.measures.iter().map(|measure| ("measure", &measure.id));
+        for (what, id) in measures.chain(self.limits.iter().map(|limit| ("limit", &limit.id))) {
             if id.is_empty() {
-                return Err(whole(format!("[[{what}]] id is missing: the results need a name")));
+                return Err(whole(format!("[[{what}]] has no id, which names it in the results")));
             }
             if !ids.insert((what, id)) {
                 return Err(whole(format!("there are two [[{what}]] with the id \"{id}\"")));
@@ -245,7 +247,7 @@ impl Campaign {
                 return fault("the limit is not a number");
             }
             if limit.ends && limit.at_most.is_none() {
-                return fault("ends needs an at_most: nothing is above its least value at first");
+                return fault("ends needs an at_most, because the largest value only grows");
             }
         }
         if let Some(until) = &self.until {
@@ -256,23 +258,23 @@ impl Campaign {
             }
             for (key, value) in [("below", until.below), ("confidence", until.confidence)] {
                 if !(value > 0.0 && value < 1.0) {
-                    return Err(whole(format!("[until] {key} = {value}: between 0 and 1")));
+                    return Err(whole(format!(
+                        "[until] {key} = {value}, but it must be between 0 and 1"
+                    )));
                 }
             }
-            if self.design != Kind::Random {
-                return Err(whole(
-                    "[until] counts on independent cases: it needs design = \"random\"".into(),
-                ));
+            if self.design != DesignKind::Random {
+                return Err(whole("[until] needs independent cases: design = \"random\"".into()));
             }
         }
         if self.cases == Some(0) {
-            return Err(whole("cases = 0: at least 1".into()));
+            return Err(whole("cases = 0, but it must be at least 1".into()));
         }
         if self.keep.worst > 0 && self.keep.by.is_none() {
             return Err(whole("[keep] worst needs by, the measure that orders the cases".into()));
         }
         if self.keep.every == Some(0) {
-            return Err(whole("[keep] every = 0: at least 1".into()));
+            return Err(whole("[keep] every = 0, but it must be at least 1".into()));
         }
         if self.vary.is_empty() {
             return Err(whole("nothing varies: add a [[vary]]".into()));

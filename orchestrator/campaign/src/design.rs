@@ -1,7 +1,7 @@
-//! The place of each case in the space of what varies. It depends on the seed and the number of the
-//! case alone, so that any case can be computed by itself.
+//! The place of each case in the space of the varied parameters. It depends on the seed and the
+//! number of the case alone, so that any case can be computed by itself.
 
-use crate::definition::Kind;
+use crate::definition::DesignKind;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 use sobol::Sobol;
@@ -24,7 +24,7 @@ pub enum Place {
 /// A design of experiments.
 #[derive(Clone, Debug)]
 pub struct Design {
-    kind: Kind,
+    kind: DesignKind,
     seed: u64,
     cases: u64,
     /// Number of levels of each dimension in a factorial design, and 0 in others.
@@ -39,41 +39,44 @@ impl Design {
     /// # Errors
     /// Returns an error if the number of cases does not suit the design, or is missing.
     pub fn new(
-        kind: Kind,
+        kind: DesignKind,
         seed: u64,
         cases: Option<u64>,
         levels: Vec<u64>,
     ) -> Result<Self, String> {
         let dimensions = levels.len() as u64;
-        let wanted = cases.ok_or_else(|| "cases is missing: how many are to be flown?".to_string());
+        let required_cases =
+            cases.ok_or_else(|| "cases is missing: it is the number of cases to fly".to_string());
         let cases = match kind {
-            Kind::Factorial => {
-                let product = levels.iter().try_fold(1_u64, |all, own| all.checked_mul(*own));
-                let product = product.filter(|all| u32::try_from(*all).is_ok());
-                let product = product.ok_or("there are more combinations than can be flown")?;
+            DesignKind::Factorial => {
+                let product =
+                    levels.iter().try_fold(1_u64, |product, count| product.checked_mul(*count));
+                let product = product.filter(|product| u32::try_from(*product).is_ok());
+                let product =
+                    product.ok_or("the levels have more combinations than can be flown")?;
                 if let Some(cases) = cases.filter(|cases| *cases != product) {
                     return Err(format!(
-                        "cases = {cases}: the levels have {product} combinations; leave cases out"
+                        "cases = {cases}, but the levels have {product} combinations: leave cases out"
                     ));
                 }
                 product
             }
-            Kind::Sensitivity => {
-                let (wanted, block) = (wanted?, dimensions + 2);
-                if wanted % block != 0 || wanted / block < 2 {
+            DesignKind::Sensitivity => {
+                let (cases, block) = (required_cases?, dimensions + 2);
+                if cases % block != 0 || cases / block < 2 {
                     return Err(format!(
-                        "cases = {wanted}: for {dimensions} parameters this design needs a multiple of {block}, at least {}",
+                        "cases = {cases}: for {dimensions} parameters this design needs a multiple of {block}, at least {}",
                         2 * block
                     ));
                 }
-                wanted
+                cases
             }
-            _ => wanted?,
+            _ => required_cases?,
         };
         if cases > u64::from(u32::MAX) {
-            return Err(format!("cases = {cases}: at most {}", u32::MAX));
+            return Err(format!("cases = {cases}, but there can be at most {}", u32::MAX));
         }
-        let directions = if kind == Kind::Sobol {
+        let directions = if kind == DesignKind::Sobol {
             let params = JoeKuoD6::standard();
             if levels.len() > params.max_dims {
                 return Err(format!("Sobol's sequence has at most {} parameters", params.max_dims));
@@ -99,8 +102,8 @@ impl Design {
     pub fn place(&self, case: u64) -> Vec<Place> {
         let dimensions = self.dimensions();
         match self.kind {
-            Kind::Random => quantiles(&self.random(case, 0)),
-            Kind::LatinHypercube => {
+            DesignKind::Random => quantiles(&self.random(case, 0)),
+            DesignKind::LatinHypercube => {
                 let within = self.random(case, 0);
                 let stratum = |(dimension, within): (usize, &f64)| {
                     let key = mixed(self.seed, dimension as u64);
@@ -109,7 +112,7 @@ impl Design {
                 };
                 within.iter().enumerate().map(stratum).collect()
             }
-            Kind::Sobol => {
+            DesignKind::Sobol => {
                 let rest = self.random(case, 0);
                 let point = |dimension: usize| {
                     let bits = self.sobol(case as u32, dimension);
@@ -118,7 +121,7 @@ impl Design {
                 };
                 (0..dimensions).map(point).collect()
             }
-            Kind::Factorial => {
+            DesignKind::Factorial => {
                 let mut rest = case;
                 // The last parameter changes fastest.
                 let mut places: Vec<Place> = self
@@ -134,7 +137,7 @@ impl Design {
                 places.reverse();
                 places
             }
-            Kind::Corners => {
+            DesignKind::Corners => {
                 let corners = u32::try_from(dimensions).ok().and_then(|n| 1_u64.checked_shl(n));
                 match corners.filter(|corners| *corners <= self.cases) {
                     Some(corners) if case < corners => {
@@ -146,7 +149,7 @@ impl Design {
                     _ => quantiles(&self.random(case, 0)),
                 }
             }
-            Kind::Sensitivity => {
+            DesignKind::Sensitivity => {
                 let (sample, member) = (self.sample(case), case % self.block());
                 let (a, b) = (self.random(sample, 0), self.random(sample, 1));
                 // Members: A, B, and A with one coordinate of B each.
@@ -168,7 +171,7 @@ impl Design {
     /// sensitivity design differ in nothing but their places.
     pub fn sample(&self, case: u64) -> u64 {
         match self.kind {
-            Kind::Sensitivity => case / self.block(),
+            DesignKind::Sensitivity => case / self.block(),
             _ => case,
         }
     }
@@ -251,7 +254,7 @@ mod tests {
     use super::*;
     use std::collections::BTreeSet;
 
-    fn design(kind: Kind, cases: u64, dimensions: usize) -> Design {
+    fn design(kind: DesignKind, cases: u64, dimensions: usize) -> Design {
         Design::new(kind, 7, Some(cases), vec![0; dimensions]).unwrap()
     }
 
@@ -265,19 +268,19 @@ mod tests {
 
     #[test]
     fn a_case_depends_on_the_seed_and_its_number_alone() {
-        for kind in [Kind::Random, Kind::Sobol, Kind::Corners] {
+        for kind in [DesignKind::Random, DesignKind::Sobol, DesignKind::Corners] {
             let (short, long) = (design(kind, 100, 3), design(kind, 1000, 3));
             assert_eq!(short.place(57), long.place(57));
             assert_ne!(short.place(57), short.place(58));
         }
-        let other = Design::new(Kind::Random, 8, Some(100), vec![0; 3]).unwrap();
-        assert_ne!(other.place(57), design(Kind::Random, 100, 3).place(57));
+        let other = Design::new(DesignKind::Random, 8, Some(100), vec![0; 3]).unwrap();
+        assert_ne!(other.place(57), design(DesignKind::Random, 100, 3).place(57));
     }
 
     #[test]
     fn a_latin_hypercube_has_one_case_in_each_stratum_of_each_parameter() {
         for cases in [1, 2, 7, 64, 1000] {
-            let design = design(Kind::LatinHypercube, cases, 3);
+            let design = design(DesignKind::LatinHypercube, cases, 3);
             for dimension in 0..3 {
                 let strata: BTreeSet<u64> = (0..cases)
                     .map(|case| (units(&design, case)[dimension] * cases as f64) as u64)
@@ -291,7 +294,7 @@ mod tests {
     fn sobol_points_fill_each_box_of_equal_volume_once() {
         // Every elementary interval of a (0, 2)-sequence in base 2, which the first two dimensions
         // are; scrambling keeps this.
-        let design = design(Kind::Sobol, 256, 2);
+        let design = design(DesignKind::Sobol, 256, 2);
         for across in 0..=8 {
             let (x, y) = (2.0_f64.powi(across), 2.0_f64.powi(8 - across));
             let boxes: BTreeSet<(u64, u64)> = (0..256)
@@ -305,7 +308,7 @@ mod tests {
     #[test]
     fn oracle_random_access_to_sobol_agrees_with_the_sequence() {
         let params = JoeKuoD6::standard();
-        let mut design = design(Kind::Sobol, 64, 5);
+        let mut design = design(DesignKind::Sobol, 64, 5);
         design.seed = 0;
         let bare = |index: u32, dimension: usize| {
             let gray = index ^ (index >> 1);
@@ -313,31 +316,32 @@ mod tests {
             directions.filter(|(bit, _)| gray >> bit & 1 == 1).fold(0, |x, (_, d)| x ^ d)
         };
         for (index, point) in Sobol::<u32>::new(5, &params).take(64).enumerate() {
-            let own: Vec<u32> = (0..5).map(|dimension| bare(index as u32, dimension)).collect();
-            assert_eq!(own, point);
+            let computed: Vec<u32> =
+                (0..5).map(|dimension| bare(index as u32, dimension)).collect();
+            assert_eq!(computed, point);
         }
     }
 
     #[test]
     fn a_factorial_design_has_every_combination_once() {
-        let design = Design::new(Kind::Factorial, 1, None, vec![2, 3, 4]).unwrap();
+        let design = Design::new(DesignKind::Factorial, 1, None, vec![2, 3, 4]).unwrap();
         assert_eq!(design.cases(), 24);
-        let all: BTreeSet<String> =
+        let combinations: BTreeSet<String> =
             (0..24).map(|case| format!("{:?}", design.place(case))).collect();
-        assert_eq!(all.len(), 24);
+        assert_eq!(combinations.len(), 24);
         assert_eq!(design.place(1), [Place::Level(0), Place::Level(0), Place::Level(1)]);
-        let error = Design::new(Kind::Factorial, 1, Some(25), vec![2, 3, 4]).unwrap_err();
+        let error = Design::new(DesignKind::Factorial, 1, Some(25), vec![2, 3, 4]).unwrap_err();
         assert!(error.contains("24 combinations"), "{error}");
     }
 
     #[test]
     fn corners_come_first_or_every_other_time() {
-        let few = design(Kind::Corners, 20, 3);
+        let few = design(DesignKind::Corners, 20, 3);
         let corners: BTreeSet<String> =
             (0..8).map(|case| format!("{:?}", few.place(case))).collect();
         assert_eq!(corners.len(), 8);
         assert!((8..20).all(|case| matches!(few.place(case)[0], Place::Quantile(_))));
-        let many = design(Kind::Corners, 20, 30);
+        let many = design(DesignKind::Corners, 20, 30);
         for case in 0..20 {
             let is_corner = many.place(case).iter().all(|place| matches!(place, Place::End(_)));
             assert_eq!(is_corner, case % 2 == 0);
@@ -346,10 +350,10 @@ mod tests {
 
     #[test]
     fn the_pairs_of_a_sensitivity_design_differ_in_one_coordinate() {
-        let design = design(Kind::Sensitivity, 20, 3);
-        let of = |member| units(&design, 5 + member);
+        let design = design(DesignKind::Sensitivity, 20, 3);
+        let point = |member| units(&design, 5 + member);
         for dimension in 0..3 {
-            let (a, b, mixed) = (of(0), of(1), of(2 + dimension as u64));
+            let (a, b, mixed) = (point(0), point(1), point(2 + dimension as u64));
             for other in 0..3 {
                 assert_eq!(mixed[other], if other == dimension { b[other] } else { a[other] });
             }
@@ -357,7 +361,7 @@ mod tests {
         // What differs from case to case otherwise, such as a seed, is the same within a sample.
         let samples: Vec<u64> = (0..12).map(|case| design.sample(case)).collect();
         assert_eq!(samples, [0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 2, 2]);
-        let error = Design::new(Kind::Sensitivity, 1, Some(21), vec![0; 3]).unwrap_err();
+        let error = Design::new(DesignKind::Sensitivity, 1, Some(21), vec![0; 3]).unwrap_err();
         assert!(error.contains("multiple of 5"), "{error}");
     }
 
@@ -369,7 +373,7 @@ mod tests {
                 (0..4096).map(|case| units(&design, case).iter().product::<f64>()).sum::<f64>();
             (mean / 4096.0 * 64.0 - 1.0).abs()
         };
-        assert!(off(Kind::Sobol) < 0.01, "{}", off(Kind::Sobol));
-        assert!(off(Kind::Random) < 0.1);
+        assert!(off(DesignKind::Sobol) < 0.01, "{}", off(DesignKind::Sobol));
+        assert!(off(DesignKind::Random) < 0.1);
     }
 }

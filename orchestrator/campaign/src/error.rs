@@ -12,14 +12,14 @@ pub enum Error {
     Single(#[from] Single),
     /// A campaign was asked to end before all of its cases were flown.
     #[error(
-        "ended by {request}: {done} of {all} cases are flown and kept in {}; the same command goes on from there",
+        "ended by {request}: {done} of {total} cases are flown and kept in {}; the same command continues from there",
         out.display()
     )]
     Unfinished {
         /// Number of cases that are kept.
         done: u64,
         /// Number of cases in the campaign.
-        all: u64,
+        total: u64,
         /// Folder of the results.
         out: PathBuf,
         /// The request that ended the campaign.

@@ -1,7 +1,7 @@
-//! What a campaign found out.
+//! Findings of a campaign.
 
 use crate::definition::{Limit, Until};
-use crate::flight::{Status, kept};
+use crate::flight::{CaseStatus, kept_column};
 use crate::plan::Plan;
 use crate::sensitivity::{Sensitivity, sensitivities};
 use crate::statistics::{CONFIDENCE, Probability, Summary, summary};
@@ -10,7 +10,7 @@ use cosim::error::Error;
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// What a campaign found out, which `summary.json` holds.
+/// Findings of a campaign, as `summary.json` holds them.
 #[derive(Clone, Debug, Serialize)]
 pub struct Findings {
     /// Title of the campaign.
@@ -20,7 +20,7 @@ pub struct Findings {
     /// Number of cases with each status.
     pub status: BTreeMap<&'static str, u64>,
     /// Limits, with the probability that a case breaks them.
-    pub limits: Vec<Kept>,
+    pub limits: Vec<LimitFinding>,
     /// Measures over all cases.
     pub measures: Vec<Measured>,
     /// Answer to the question of the campaign.
@@ -29,10 +29,10 @@ pub struct Findings {
 
 /// A limit over all cases.
 #[derive(Clone, Debug, Serialize)]
-pub struct Kept {
+pub struct LimitFinding {
     /// Id of the limit.
     pub id: String,
-    /// The limit in words.
+    /// Wording of the limit.
     pub says: String,
     /// Probability that a case breaks the limit, with 95 % confidence.
     pub broken: Probability,
@@ -47,7 +47,7 @@ pub struct Measured {
     pub unit: String,
     /// Its distribution; none if no case has a value.
     pub summary: Option<Summary>,
-    /// What the parameters have to do with it.
+    /// Sensitivity of the measure to each parameter.
     pub sensitivities: Vec<Sensitivity>,
 }
 
@@ -64,7 +64,7 @@ pub struct Answer {
     pub confidence_of_each_look: f64,
 }
 
-/// Computes what a table of cases shows.
+/// Computes the findings from a table of cases.
 pub(crate) fn findings(
     plan: &Plan,
     table: &Reader,
@@ -72,33 +72,35 @@ pub(crate) fn findings(
 ) -> Result<Findings, Error> {
     let cases = table.rows();
     let mut status: BTreeMap<&'static str, u64> =
-        Status::ALL.iter().map(|own| (own.name(), 0)).collect();
-    if let Values::Text(all) = table.column("status")? {
-        for own in all {
-            if let Some(count) = status.get_mut(own.as_str()) {
+        CaseStatus::ALL.iter().map(|status| (status.name(), 0)).collect();
+    if let Values::Text(names) = table.column("status")? {
+        for name in names {
+            if let Some(count) = status.get_mut(name.as_str()) {
                 *count += 1;
             }
         }
     }
     let mut limits = Vec::new();
     for limit in &plan.campaign.limits {
-        let kept = table.column(&kept(&limit.id))?.numbers();
-        let broken = kept.iter().filter(|kept| **kept == 0.0).count() as u64;
-        limits.push(Kept {
+        let flags = table.column(&kept_column(&limit.id))?.numbers();
+        let broken = flags.iter().filter(|is_kept| **is_kept == 0.0).count() as u64;
+        limits.push(LimitFinding {
             id: limit.id.clone(),
             says: says(plan, limit),
             broken: Probability::new(broken, cases, CONFIDENCE),
         });
     }
-    let columns =
-        plan.varied.iter().map(|own| Ok((own.name.clone(), table.column(&own.name)?.numbers())));
+    let columns = plan
+        .varied
+        .iter()
+        .map(|varied| Ok((varied.name.clone(), table.column(&varied.name)?.numbers())));
     let columns = columns.collect::<Result<Vec<_>, Error>>()?;
     let mut measures = Vec::new();
-    for own in &plan.recorded {
-        let values = table.column(&own.name)?.numbers();
+    for recorded in &plan.recorded {
+        let values = table.column(&recorded.name)?.numbers();
         measures.push(Measured {
-            name: own.name.clone(),
-            unit: own.unit.clone(),
+            name: recorded.name.clone(),
+            unit: recorded.unit.clone(),
             summary: summary(&values),
             sensitivities: sensitivities(plan.campaign.design, &columns, &values),
         });
@@ -106,14 +108,14 @@ pub(crate) fn findings(
     Ok(Findings { title: plan.campaign.title.clone(), cases, status, limits, measures, answer })
 }
 
-/// Returns a limit in words.
+/// Returns the wording of a limit.
 fn says(plan: &Plan, limit: &Limit) -> String {
     if !limit.says.is_empty() {
         return limit.says.clone();
     }
     let name = limit.measure.get_ref();
-    let own = plan.recorded.iter().find(|own| own.name == *name);
-    let unit = own.map(|own| own.unit.as_str()).unwrap_or_default();
+    let measure = plan.recorded.iter().find(|recorded| recorded.name == *name);
+    let unit = measure.map(|measure| measure.unit.as_str()).unwrap_or_default();
     let (sign, bound) = match (limit.at_most, limit.at_least) {
         (Some(most), _) => ("≤", most),
         (None, least) => ("≥", least.unwrap_or(f64::NAN)),
@@ -131,13 +133,14 @@ pub(crate) fn chosen(plan: &Plan, table: &Reader) -> Result<BTreeSet<u64>, Error
     if keep.failed > 0 {
         let mut broken: BTreeSet<u64> = BTreeSet::new();
         for limit in &plan.campaign.limits {
-            let kept = table.column(&kept(&limit.id))?.numbers();
-            broken
-                .extend(kept.iter().enumerate().filter(|(_, k)| **k == 0.0).map(|(i, _)| i as u64));
+            let flags = table.column(&kept_column(&limit.id))?.numbers();
+            broken.extend(
+                flags.iter().enumerate().filter(|(_, k)| **k == 0.0).map(|(i, _)| i as u64),
+            );
         }
-        if let Values::Text(all) = table.column("status")? {
-            let bad = [Status::Lost.name(), Status::Failed.name()];
-            let bad = all.iter().enumerate().filter(|(_, own)| bad.contains(&own.as_str()));
+        if let Values::Text(names) = table.column("status")? {
+            let bad = [CaseStatus::Lost.name(), CaseStatus::Failed.name()];
+            let bad = names.iter().enumerate().filter(|(_, name)| bad.contains(&name.as_str()));
             broken.extend(bad.map(|(i, _)| i as u64));
         }
         chosen.extend(broken.into_iter().take(keep.failed as usize));

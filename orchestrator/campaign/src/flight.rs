@@ -1,7 +1,7 @@
-//! Flies cases one after the other with the same units, which are reset between cases.
+//! Flies cases one after the other with the same instances, which are reset between cases.
 
 use crate::plan::Plan;
-use crate::table::{Column, Table, Values};
+use crate::table::{CaseTable, Column, Values};
 use cosim::error::Error;
 use cosim::interrupt::Interrupt;
 use cosim::master::{Master, Observer, Sample};
@@ -17,18 +17,18 @@ use std::path::Path;
 
 /// How a case ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Status {
+pub enum CaseStatus {
     /// It reached its stop time.
     Completed,
-    /// It broke a limit that ends cases, or a unit ended it, which is no fault.
+    /// It broke a limit that ends cases, or an FMU ended it, which is no fault.
     Ended,
     /// It was lost, as the experiment defines it.
     Lost,
-    /// A unit failed.
+    /// An FMU failed.
     Failed,
 }
 
-impl Status {
+impl CaseStatus {
     /// Every status, in the order of their severity.
     pub const ALL: [Self; 4] = [Self::Completed, Self::Ended, Self::Lost, Self::Failed];
 
@@ -48,35 +48,35 @@ impl Status {
 pub struct Row {
     /// Number of the case.
     pub case: u64,
-    /// Values of what varies.
+    /// Values of the varied parameters.
     pub values: Vec<SettingValue>,
     /// Recorded numbers; `None` if a number has no value.
     pub numbers: Vec<Option<f64>>,
     /// Whether each limit was kept.
-    pub kept: Vec<bool>,
+    pub limits_kept: Vec<bool>,
     /// How the case ended.
-    pub status: Status,
+    pub status: CaseStatus,
     /// Simulated time that the case reached, s.
     pub time: f64,
     /// Reason why the case ended early, or an empty text.
     pub message: String,
 }
 
-/// Units that fly one case after the other.
+/// Instances that fly one case after the other.
 pub struct Flight<'a> {
     plan: &'a Plan,
     system: System,
     meters: Meters,
     master: Option<Master>,
     interrupt: &'a Interrupt,
-    /// Whether units are reset instead of made anew.
+    /// Whether instances are reset instead of created again.
     resets: bool,
     /// Limits that end a case: index among the limits, metric, and largest value.
     ends: Vec<(usize, String, f64)>,
 }
 
 impl<'a> Flight<'a> {
-    /// Opens the units of a plan.
+    /// Opens the FMUs of a plan.
     ///
     /// # Errors
     /// Returns an error if an archive cannot be opened.
@@ -102,8 +102,8 @@ impl<'a> Flight<'a> {
         &mut self.system
     }
 
-    /// Flies a case to its end and writes what a single run writes of it: the recorded variables
-    /// and the plot.
+    /// Flies a case to its end and writes the files of a single run: the recorded variables and the
+    /// plot.
     ///
     /// # Errors
     /// The errors are those of [`Self::fly`], and of files that cannot be written.
@@ -114,7 +114,7 @@ impl<'a> Flight<'a> {
         folder: &Path,
         title: &str,
     ) -> Result<Row, Error> {
-        let panels = Panel::all(&mut self.system)?;
+        let panels = Panel::resolve_all(&mut self.system)?;
         let mut recorder = self.system.recorder(folder, Format::Csv, false)?;
         let mut curves = Curves::new(panels, self.system.clock.ticks());
         let ends = std::mem::take(&mut self.ends);
@@ -128,8 +128,8 @@ impl<'a> Flight<'a> {
     /// Flies the case with this number.
     ///
     /// # Errors
-    /// Returns an error if the work was asked to end, or if the values of the case cannot be set. A
-    /// unit that fails is a result.
+    /// Returns an error if the work was asked to end, or if the values of the case cannot be set.
+    /// An FMU that fails is a result.
     pub fn fly(&mut self, case: u64) -> Result<Row, Error> {
         self.fly_with(case, self.plan.values(case)?, &mut [])
     }
@@ -166,8 +166,8 @@ impl<'a> Flight<'a> {
                 observers.push(&mut watch);
                 let outcome = master.run(&mut observers);
                 let Watch { broken, time, .. } = watch;
-                // A unit that failed is not used again.
-                if !matches!(outcome, Err(Error::Call { .. })) {
+                // An instance that failed is not used again.
+                if !matches!(outcome, Err(Error::Unit { .. })) {
                     self.master = Some(master);
                 }
                 (outcome, broken, time)
@@ -175,33 +175,33 @@ impl<'a> Flight<'a> {
             Err(error) => (Err(error), None, self.plan.span[0]),
         };
         let (status, message) = match outcome {
-            Ok(()) => (Status::Completed, String::new()),
+            Ok(()) => (CaseStatus::Completed, String::new()),
             Err(Error::Lost { .. }) if broken.is_some() => {
                 let limit = broken.map(|index| self.plan.campaign.limits[index].id.as_str());
-                (Status::Ended, format!("limit {} broken", limit.unwrap_or_default()))
+                (CaseStatus::Ended, format!("limit {} broken", limit.unwrap_or_default()))
             }
-            Err(error @ Error::Lost { .. }) => (Status::Lost, error.to_string()),
-            Err(error @ Error::EndedByInstance { .. }) => (Status::Ended, error.to_string()),
-            Err(error @ (Error::Call { .. } | Error::Import(Import::Fmu { .. }))) => {
-                (Status::Failed, error.to_string())
+            Err(error @ Error::Lost { .. }) => (CaseStatus::Lost, error.to_string()),
+            Err(error @ Error::EndedByUnit { .. }) => (CaseStatus::Ended, error.to_string()),
+            Err(error @ (Error::Unit { .. } | Error::Import(Import::Fmu { .. }))) => {
+                (CaseStatus::Failed, error.to_string())
             }
             Err(error) => return Err(error),
         };
         let metrics = self.meters.metrics();
         let numbers: Vec<Option<f64>> =
-            self.plan.recorded.iter().map(|own| metrics.number(&own.name)).collect();
-        let kept = self.plan.limits().map(|(limit, place)| {
-            let own = &self.plan.recorded[place];
-            let number = numbers[place].or(own.is_never.then_some(f64::INFINITY));
+            self.plan.recorded.iter().map(|recorded| metrics.number(&recorded.name)).collect();
+        let limits_kept = self.plan.limits().map(|(limit, place)| {
+            let measure = &self.plan.recorded[place];
+            let number = numbers[place].or(measure.is_never.then_some(f64::INFINITY));
             let within = number.is_some_and(|number| {
                 limit.at_most.is_none_or(|most| number <= most)
                     && limit.at_least.is_none_or(|least| number >= least)
             });
-            // What a case that ended early would have done about its other limits is not known:
-            // it counts against them.
-            within && status == Status::Completed
+            // Whether a case that ended early would have kept its other limits is not known: it
+            // counts as breaking them.
+            within && status == CaseStatus::Completed
         });
-        Ok(Row { case, values, kept: kept.collect(), numbers, status, time, message })
+        Ok(Row { case, values, limits_kept: limits_kept.collect(), numbers, status, time, message })
     }
 }
 
@@ -231,33 +231,33 @@ impl Observer for Watch<'_> {
 }
 
 /// Makes a table of rows.
-pub fn table(plan: &Plan, rows: &[Row]) -> Table {
+pub fn table(plan: &Plan, rows: &[Row]) -> CaseTable {
     let mut columns = vec![Column {
         name: "case".into(),
         values: Values::Count(rows.iter().map(|row| row.case.cast_signed()).collect()),
     }];
-    for (place, own) in plan.varied.iter().enumerate() {
+    for (place, varied) in plan.varied.iter().enumerate() {
         let values = rows.iter().map(|row| &row.values[place]);
-        columns.push(Column { name: own.name.clone(), values: typed(&own.kind, values) });
+        columns.push(Column { name: varied.name.clone(), values: typed(&varied.kind, values) });
     }
-    for (place, own) in plan.recorded.iter().enumerate() {
+    for (place, recorded) in plan.recorded.iter().enumerate() {
         let values = rows.iter().map(|row| row.numbers[place]).collect();
-        columns.push(Column { name: own.name.clone(), values: Values::Optional(values) });
+        columns.push(Column { name: recorded.name.clone(), values: Values::Optional(values) });
     }
     for (place, limit) in plan.campaign.limits.iter().enumerate() {
-        let values = rows.iter().map(|row| row.kept[place]).collect();
-        columns.push(Column { name: kept(&limit.id), values: Values::Flag(values) });
+        let values = rows.iter().map(|row| row.limits_kept[place]).collect();
+        columns.push(Column { name: kept_column(&limit.id), values: Values::Flag(values) });
     }
     let text = |text: fn(&Row) -> String| Values::Text(rows.iter().map(text).collect());
     columns.push(Column { name: "status".into(), values: text(|row| row.status.name().into()) });
     let times = rows.iter().map(|row| row.time).collect();
     columns.push(Column { name: "time".into(), values: Values::Real(times) });
     columns.push(Column { name: "message".into(), values: text(|row| row.message.clone()) });
-    Table { columns }
+    CaseTable { columns }
 }
 
 /// Returns the name of the column that says whether a limit was kept.
-pub fn kept(limit: &str) -> String {
+pub fn kept_column(limit: &str) -> String {
     format!("kept.{limit}")
 }
 
@@ -287,8 +287,8 @@ fn typed<'a>(kind: &Type, values: impl Iterator<Item = &'a SettingValue>) -> Val
     }
 }
 
-/// Returns whether units can be reset: a case that is flown with units that were reset after
-/// another case gives the same result as with new units.
+/// Returns whether instances can be reset: a case that is flown with instances that were reset
+/// after another case gives the same result as with new ones.
 ///
 /// # Errors
 /// The errors are those of [`Flight::fly`].

@@ -1,10 +1,9 @@
-//! Parts of a campaign: consecutive cases, whose results are kept in a file of their own. A part
-//! whose file is there and fits is not flown again, whoever flew it: this thread, an earlier run,
-//! or another machine.
+//! Parts of a campaign: consecutive cases, whose results share a file. A part with a valid file is
+//! not flown again, whether this thread, an earlier run or another machine flew it.
 
-use crate::flight::{Flight, Row, kept, table};
+use crate::flight::{Flight, Row, kept_column, table};
 use crate::plan::Plan;
-use crate::table::{Reader, Table, Values, Writer};
+use crate::table::{CaseTable, Reader, Values, Writer};
 use cosim::error::Error;
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -23,28 +22,28 @@ pub fn path(out: &Path, part: &Range<u64>) -> PathBuf {
     out.join("parts").join(format!("{:010}-{:010}.parquet", part.start, part.end))
 }
 
-/// What is found of a part in the folder of the results.
+/// State of a part's file in the folder of the results.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Found {
-    /// The part is there and fits: the number of its cases that broke each limit.
+pub enum PartState {
+    /// The file is valid: the number of cases that broke each limit.
     Whole(Vec<u64>),
     /// There is no such file.
     Missing,
     /// The file is damaged.
     Damaged,
-    /// The file was made with something else, which is named.
+    /// The file was made from other inputs, whose names are given.
     Other(Vec<String>),
 }
 
 /// Looks for a part.
-pub fn find(plan: &Plan, out: &Path, part: &Range<u64>) -> Found {
+pub fn find(plan: &Plan, out: &Path, part: &Range<u64>) -> PartState {
     let path = path(out, part);
     if !path.exists() {
-        return Found::Missing;
+        return PartState::Missing;
     }
-    let Ok(reader) = Reader::open(&path) else { return Found::Damaged };
+    let Ok(reader) = Reader::open(&path) else { return PartState::Damaged };
     let keys = reader.metadata("keys").map(serde_json::from_str::<BTreeMap<String, String>>);
-    let Some(Ok(keys)) = keys else { return Found::Damaged };
+    let Some(Ok(keys)) = keys else { return PartState::Damaged };
     let mut others: Vec<String> = plan
         .keys
         .iter()
@@ -53,16 +52,16 @@ pub fn find(plan: &Plan, out: &Path, part: &Range<u64>) -> Found {
         .collect();
     others.extend(keys.keys().filter(|name| !plan.keys.contains_key(*name)).cloned());
     if !others.is_empty() {
-        return Found::Other(others);
+        return PartState::Other(others);
     }
     match read(&reader, part) {
-        Some(rows) => Found::Whole(broken(plan, &rows)),
-        None => Found::Damaged,
+        Some(rows) => PartState::Whole(broken(plan, &rows)),
+        None => PartState::Damaged,
     }
 }
 
 /// Reads the rows of a part that is whole.
-fn read(reader: &Reader, part: &Range<u64>) -> Option<Table> {
+fn read(reader: &Reader, part: &Range<u64>) -> Option<CaseTable> {
     if reader.rows() != part.end - part.start {
         return None;
     }
@@ -76,22 +75,23 @@ fn read(reader: &Reader, part: &Range<u64>) -> Option<Table> {
 ///
 /// # Errors
 /// Returns an error if the file is missing or damaged.
-pub fn rows(out: &Path, part: &Range<u64>) -> Result<Table, Error> {
+pub fn rows(out: &Path, part: &Range<u64>) -> Result<CaseTable, Error> {
     let path = path(out, part);
     read(&Reader::open(&path)?, part).ok_or_else(|| {
         Error::experiment(format!(
-            "{} is damaged: remove it, and it is flown again",
+            "{} is damaged: remove it, and its cases are flown again",
             path.display()
         ))
     })
 }
 
 /// Returns the number of cases that broke each limit.
-fn broken(plan: &Plan, rows: &Table) -> Vec<u64> {
-    let broken = plan.campaign.limits.iter().map(|limit| match rows.column(&kept(&limit.id)) {
-        Some(Values::Flag(kept)) => kept.iter().filter(|kept| !**kept).count() as u64,
-        _ => 0,
-    });
+fn broken(plan: &Plan, rows: &CaseTable) -> Vec<u64> {
+    let broken =
+        plan.campaign.limits.iter().map(|limit| match rows.column(&kept_column(&limit.id)) {
+            Some(Values::Flag(flags)) => flags.iter().filter(|is_kept| !**is_kept).count() as u64,
+            _ => 0,
+        });
     broken.collect()
 }
 

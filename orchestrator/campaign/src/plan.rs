@@ -3,9 +3,9 @@
 
 use crate::changes::Changes;
 use crate::correlation::{Correlated, correlation};
-use crate::definition::{Campaign, Kind, Limit};
+use crate::definition::{Campaign, DesignKind, Limit};
 use crate::design::{Design, Place};
-use crate::prepare::{Recorded, Varied, keys, laws, observe, read_experiment, recorded};
+use crate::prepare::{Recorded, Varied, distributions, keys, observe, read_experiment, recorded};
 use cosim::check::check;
 use cosim::error::Error;
 use cosim::experiment::{self, Experiment};
@@ -23,13 +23,13 @@ use std::path::PathBuf;
 pub struct Plan {
     /// The campaign as its file describes it.
     pub campaign: Campaign,
-    /// What varies, in the order of the design's dimensions.
+    /// Varied parameters, in the order of the design's dimensions.
     pub varied: Vec<Varied>,
     /// Numbers that are recorded of each case.
     pub recorded: Vec<Recorded>,
     /// Places of the cases.
     pub design: Design,
-    /// Hashes of all that the cases depend on, by what it is.
+    /// Hashes of all inputs of the cases, by their names.
     pub keys: BTreeMap<String, String>,
     /// Simulated time at which the cases start and stop, s.
     pub span: [f64; 2],
@@ -42,12 +42,12 @@ pub struct Plan {
     replaced: Option<PathBuf>,
     fmu_dirs: Vec<PathBuf>,
     correlation: Option<Correlated>,
-    /// Archive of a unit that can be instantiated only once per process, if there is one.
+    /// Archive of an FMU that can be instantiated only once per process, if there is one.
     pub(crate) single: Option<PathBuf>,
 }
 
 impl Plan {
-    /// Prepares a campaign, with what the command line changes.
+    /// Prepares a campaign, with the changes of the command line.
     ///
     /// # Errors
     /// Returns an error that names the key at fault, with its line and the nearest right name.
@@ -59,27 +59,30 @@ impl Plan {
         let mut system = check(experiment.clone(), &fmu_dirs, &mut opened)?;
         let mut varied = Vec::new();
         for vary in &campaign.vary {
-            varied.extend(laws(vary, &campaign.source, &system)?);
+            varied.extend(distributions(vary, &campaign.source, &system)?);
         }
-        for (i, own) in varied.iter().enumerate() {
-            let twice = own.paths.iter().find(|path| {
+        for (i, entry) in varied.iter().enumerate() {
+            let twice = entry.paths.iter().find(|path| {
                 varied[..i].iter().any(|other: &Varied| other.paths.contains(path))
-                    || own.paths.iter().filter(|other| other == path).count() > 1
+                    || entry.paths.iter().filter(|other| other == path).count() > 1
             });
             if let Some(path) = twice {
                 let message = format!("[[vary]] \"{path}\" varies twice");
-                return Err(campaign.source.error(&own.span, message));
+                return Err(campaign.source.error(&entry.span, message));
             }
         }
-        let laws: Vec<_> = varied.iter().map(|own| (own.name.as_str(), &own.law)).collect();
-        let correlation = correlation(&campaign, &laws)?;
-        let levels = varied.iter().map(|own| {
+        let by_name: Vec<_> =
+            varied.iter().map(|entry| (entry.name.as_str(), &entry.distribution)).collect();
+        let correlation = correlation(&campaign, &by_name)?;
+        let levels = varied.iter().map(|entry| {
             let fault = |problem| {
-                campaign.source.error(&own.span, format!("[[vary]] \"{}\": {problem}", own.name))
+                campaign
+                    .source
+                    .error(&entry.span, format!("[[vary]] \"{}\": {problem}", entry.name))
             };
             match campaign.design {
-                Kind::Factorial => own.law.levels().map_err(fault),
-                Kind::Corners => own.law.check_ends().map(|()| 0).map_err(fault),
+                DesignKind::Factorial => entry.distribution.levels().map_err(fault),
+                DesignKind::Corners => entry.distribution.check_ends().map(|()| 0).map_err(fault),
                 _ => Ok(0),
             }
         });
@@ -93,7 +96,7 @@ impl Plan {
         let command = changes.command(&campaign);
         let single = system.order.iter().zip(&system.fmus).find(|(name, fmu)| {
             let interface = fmu.description.co_simulation.as_ref();
-            interface.is_some_and(|own| own.has("canBeInstantiatedOnlyOncePerProcess"))
+            interface.is_some_and(|interface| interface.has("canBeInstantiatedOnlyOncePerProcess"))
                 && !experiment.isolation.isolates(&experiment.components[*name], fmu)
         });
         let single = single.map(|(_, fmu)| fmu.path.clone());
@@ -166,16 +169,16 @@ impl Plan {
         if let Some(correlated) = &self.correlation {
             correlated.apply(&mut places);
         }
-        let values = self.varied.iter().zip(places).map(|(own, place)| {
-            own.law.value(place, sample).map_err(|problem| {
-                let message = format!("[[vary]] \"{}\", sample {sample}: {problem}", own.name);
-                self.campaign.source.error(&own.span, message)
+        let values = self.varied.iter().zip(places).map(|(varied, place)| {
+            varied.distribution.value(place, sample).map_err(|problem| {
+                let message = format!("[[vary]] \"{}\", sample {sample}: {problem}", varied.name);
+                self.campaign.source.error(&varied.span, message)
             })
         });
         let mut values = values.collect::<Result<Vec<_>, _>>()?;
-        let groups = self.varied.iter().enumerate().filter(|(_, own)| own.sorted > 0);
-        for (first, own) in groups {
-            values[first..first + own.sorted].sort_by(|a, b| match (a, b) {
+        let groups = self.varied.iter().enumerate().filter(|(_, varied)| varied.sorted > 0);
+        for (first, varied) in groups {
+            values[first..first + varied.sorted].sort_by(|a, b| match (a, b) {
                 (SettingValue::Real(a), SettingValue::Real(b)) => a.total_cmp(b),
                 _ => Ordering::Equal,
             });
@@ -186,8 +189,10 @@ impl Plan {
     /// Returns the changes that these values make to the system.
     pub fn changes(&self, values: &[SettingValue]) -> Vec<(Target, SettingValue)> {
         let each = self.varied.iter().zip(values);
-        each.flat_map(|(own, value)| own.targets.iter().map(|target| (*target, value.clone())))
-            .collect()
+        each.flat_map(|(varied, value)| {
+            varied.targets.iter().map(|target| (*target, value.clone()))
+        })
+        .collect()
     }
 
     /// Writes a case as the text of an experiment that extends the one of the campaign.
@@ -206,23 +211,23 @@ impl Plan {
         table.insert("simulation".into(), simulation);
         let components = table.entry("components").or_insert_with(|| toml::Table::new().into());
         for (name, component) in &self.experiment.components {
-            let own = components.as_table_mut().and_then(|all| all.get_mut(name));
-            let Some(own) = own.and_then(toml::Value::as_table_mut) else { continue };
-            own.insert("fmu".into(), self.archive(name).into());
+            let entry = components.as_table_mut().and_then(|table| table.get_mut(name));
+            let Some(entry) = entry.and_then(toml::Value::as_table_mut) else { continue };
+            entry.insert("fmu".into(), self.archive(name).into());
             if component.is_exchanged {
-                own.insert("exchanged".into(), true.into());
+                entry.insert("exchanged".into(), true.into());
             }
             let parameters = component.parameters.iter();
             let mut parameters: toml::Table =
                 parameters.map(|(name, value)| (name.clone(), value.get_ref().clone())).collect();
             for (varied, value) in self.varied.iter().zip(values) {
                 for path in &varied.paths {
-                    if let Some((_, rest)) = names::split(path).filter(|(of, _)| of == name) {
+                    if let Some((_, rest)) = names::split(path).filter(|(owner, _)| owner == name) {
                         parameters.insert(rest.into(), written(value));
                     }
                 }
             }
-            own.insert("parameters".into(), parameters.into());
+            entry.insert("parameters".into(), parameters.into());
         }
         toml::to_string(&table).map_err(|error| Error::experiment(error.to_string()))
     }
@@ -241,15 +246,15 @@ impl Plan {
     /// Returns the limits with the position of their measure in [`Self::recorded`].
     pub fn limits(&self) -> impl Iterator<Item = (&Limit, usize)> {
         let place = |limit: &Limit| {
-            self.recorded.iter().position(|own| own.name == *limit.measure.get_ref())
+            self.recorded.iter().position(|recorded| recorded.name == *limit.measure.get_ref())
         };
         self.campaign.limits.iter().filter_map(move |limit| Some((limit, place(limit)?)))
     }
 
     /// Returns units by column, as JSON for the metadata of a table.
     pub fn units(&self) -> String {
-        let varied = self.varied.iter().map(|own| (&own.name, &own.unit));
-        let recorded = self.recorded.iter().map(|own| (&own.name, &own.unit));
+        let varied = self.varied.iter().map(|entry| (&entry.name, &entry.unit));
+        let recorded = self.recorded.iter().map(|entry| (&entry.name, &entry.unit));
         let units = varied.chain(recorded).filter(|(_, unit)| !unit.is_empty());
         let mut units: Map<String, Value> =
             units.map(|(name, unit)| (name.clone(), json!(unit))).collect();
@@ -258,7 +263,7 @@ impl Plan {
     }
 
     fn check_limits(&self) -> Result<(), Error> {
-        let names = || self.recorded.iter().map(|own| own.name.as_str());
+        let names = || self.recorded.iter().map(|recorded| recorded.name.as_str());
         let source = &self.campaign.source;
         let referred = self
             .campaign
@@ -272,7 +277,7 @@ impl Plan {
             let measure = self.experiment.observe.metrics.get(limit.measure.get_ref());
             if measure.is_none_or(|measure| measure.kind != experiment::MeasureKind::Largest) {
                 let message = format!(
-                    "[[limit]] {}: ends needs a measure of the kind largest, which only grows",
+                    "[[limit]] {}: ends needs a measure of the kind largest, because it only grows",
                     limit.id
                 );
                 return Err(source.error(&limit.measure.span(), message));

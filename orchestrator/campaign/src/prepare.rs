@@ -1,8 +1,9 @@
-//! Looks up what a campaign names: its experiment, what is observed, and what varies.
+//! Looks up what a campaign names: its experiment, its metrics and measures, and the varied
+//! parameters.
 
 use crate::changes::Changes;
-use crate::definition::{Campaign, Kind, Vary};
-use crate::law::Law;
+use crate::definition::{Campaign, DesignKind, Vary};
+use crate::distribution::Distribution;
 use cosim::document::Source;
 use cosim::error::Error;
 use cosim::experiment::{self, Experiment, Observe, Overrides, Protection};
@@ -21,7 +22,7 @@ use toml::Spanned;
 
 /// Version of the files of parts, which must be raised when their content changes.
 const FORMAT: u32 = 1;
-/// Metrics of every run that are those of the machine, not of the case.
+/// Metrics of every run that depend on the machine, not on the case.
 const OF_THE_MACHINE: [&str; 2] = ["real_time_factor", "wall_s"];
 
 /// A parameter that varies, or several that always have the same value.
@@ -34,7 +35,7 @@ pub struct Varied {
     /// Type of the values.
     pub kind: Type,
     /// Distribution of the values.
-    pub law: Law,
+    pub distribution: Distribution,
     /// Number of entries, from this one on, whose values are put into ascending order; 0 except in
     /// the first of them.
     pub(crate) sorted: usize,
@@ -55,7 +56,7 @@ pub struct Recorded {
     pub is_never: bool,
 }
 
-/// Reads the experiment of a campaign, with what the campaign and the command line set in it.
+/// Reads the experiment of a campaign, with the settings of the campaign and the command line.
 pub(crate) fn read_experiment(campaign: &Campaign, changes: &Changes) -> Result<Experiment, Error> {
     let source = &campaign.source;
     let span = campaign.experiment.span();
@@ -82,17 +83,17 @@ pub(crate) fn read_experiment(campaign: &Campaign, changes: &Changes) -> Result<
     Ok(experiment)
 }
 
-/// Returns what is observed of each case: the metrics that the campaign names and its measures.
-pub(crate) fn observe(campaign: &Campaign, own: &Observe) -> Result<Observe, Error> {
+/// Returns the observations of each case: the metrics that the campaign names and its measures.
+pub(crate) fn observe(campaign: &Campaign, experiment: &Observe) -> Result<Observe, Error> {
     let source = &campaign.source;
-    let mut signals = own.signals.clone();
+    let mut signals = experiment.signals.clone();
     signals.extend(campaign.signals.clone());
-    let known = Metrics::names(own);
-    let known = || known.iter().map(String::as_str).filter(|name| !OF_THE_MACHINE.contains(name));
-    source.check_names(&campaign.metrics, "metric of the experiment", known())?;
+    let names = Metrics::names(experiment);
+    let names = || names.iter().map(String::as_str).filter(|name| !OF_THE_MACHINE.contains(name));
+    source.known(&campaign.metrics, "metric of the experiment", names())?;
     let mut metrics = BTreeMap::new();
     for name in &campaign.metrics {
-        let Some(measure) = own.metrics.get(name.get_ref()) else { continue };
+        let Some(measure) = experiment.metrics.get(name.get_ref()) else { continue };
         if measure.timing {
             let message = format!(
                 "metrics: \"{}\" is a computing time, which differs from run to run",
@@ -110,7 +111,7 @@ pub(crate) fn observe(campaign: &Campaign, own: &Observe) -> Result<Observe, Err
         )?;
         let mut measure = measure.clone();
         let id = std::mem::take(&mut measure.id);
-        if metrics.contains_key(&id) || known().any(|name| name == id) {
+        if metrics.contains_key(&id) || names().any(|name| name == id) {
             let message = format!("[[measure]] {id}: the experiment has a metric of this name");
             return Err(source.error(&measure.signals.span(), message));
         }
@@ -120,31 +121,35 @@ pub(crate) fn observe(campaign: &Campaign, own: &Observe) -> Result<Observe, Err
         measure.limit = None;
     }
     let asks_guarantee =
-        campaign.metrics.iter().any(|name| !own.metrics.contains_key(name.get_ref()));
+        campaign.metrics.iter().any(|name| !experiment.metrics.contains_key(name.get_ref()));
     Ok(Observe {
         signals,
         metrics,
         summary: Vec::new(),
-        guarantee: own.guarantee.clone().filter(|_| asks_guarantee),
-        loss: own.loss.clone(),
-        panels: own.panels.clone(),
+        guarantee: experiment.guarantee.clone().filter(|_| asks_guarantee),
+        loss: experiment.loss.clone(),
+        panels: experiment.panels.clone(),
         readings: BTreeMap::new(),
     })
 }
 
-/// Makes the distributions of one entry of what varies.
-pub(crate) fn laws(vary: &Vary, source: &Source, system: &System) -> Result<Vec<Varied>, Error> {
+/// Makes the distributions of one `[[vary]]`.
+pub(crate) fn distributions(
+    vary: &Vary,
+    source: &Source,
+    system: &System,
+) -> Result<Vec<Varied>, Error> {
     let mut groups: Vec<(Range<usize>, Vec<String>)> = Vec::new();
     if let Some(parameter) = &vary.parameter {
-        groups.push((parameter.span(), parameter.get_ref().all().to_vec()));
+        groups.push((parameter.span(), parameter.get_ref().names().to_vec()));
     }
     groups.extend(vary.each.iter().map(|name| (name.span(), vec![name.get_ref().clone()])));
     let both = vary.parameter.is_some() && !vary.each.is_empty();
     if groups.is_empty() || both || groups.iter().any(|(_, names)| names.is_empty()) {
         let span = groups.first().map_or(0..0, |(span, _)| span.clone());
-        return Err(source.error(&span, "[[vary]] wants either parameter or each"));
+        return Err(source.error(&span, "[[vary]] needs either parameter or each"));
     }
-    let mut all = Vec::new();
+    let mut varied = Vec::new();
     for (span, paths) in groups {
         let name = paths[0].clone();
         let fault =
@@ -158,19 +163,19 @@ pub(crate) fn laws(vary: &Vary, source: &Source, system: &System) -> Result<Vec<
         let variable = system.variable(targets[0]);
         for other in &targets[1..] {
             if system.variable(*other).kind.name() != variable.kind.name() {
-                return Err(fault("parameters with the same value must be of one type".into()));
+                return Err(fault("parameters that share a value must be of the same type".into()));
             }
         }
-        let law = Law::new(vary, targets[0], system).map_err(&fault)?;
+        let distribution = Distribution::new(vary, targets[0], system).map_err(&fault)?;
         let unit = match &variable.kind {
             Type::Real { unit, .. } => unit.clone().unwrap_or_default(),
             _ => String::new(),
         };
-        all.push(Varied {
+        varied.push(Varied {
             name: name.clone(),
             unit,
             kind: variable.kind.clone(),
-            law,
+            distribution,
             sorted: 0,
             targets,
             paths,
@@ -178,8 +183,8 @@ pub(crate) fn laws(vary: &Vary, source: &Source, system: &System) -> Result<Vec<
         });
     }
     if vary.sorted {
-        let is_real = all.iter().all(|own| matches!(own.kind, Type::Real { .. }));
-        let Some(first) = all.first_mut().filter(|_| is_real && vary.each.len() > 1) else {
+        let is_real = varied.iter().all(|entry| matches!(entry.kind, Type::Real { .. }));
+        let Some(first) = varied.first_mut().filter(|_| is_real && vary.each.len() > 1) else {
             let span = vary.each.first().map_or(0..0, Spanned::span);
             return Err(
                 source.error(&span, "[[vary]] sorted is for several real parameters in each")
@@ -187,7 +192,7 @@ pub(crate) fn laws(vary: &Vary, source: &Source, system: &System) -> Result<Vec<
         };
         first.sorted = vary.each.len();
     }
-    Ok(all)
+    Ok(varied)
 }
 
 /// Lists the numbers that are recorded: the metrics in the order of the file, then the measures.
@@ -209,29 +214,30 @@ pub(crate) fn recorded(campaign: &Campaign, observe: &Observe, meters: &Meters) 
         .collect()
 }
 
-/// Hashes what the cases depend on.
+/// Hashes all inputs of the cases.
 pub(crate) fn keys(
     campaign: &Campaign,
     changes: &Changes,
     system: &System,
 ) -> Result<BTreeMap<String, String>, Error> {
-    let mut own: toml::Table = toml::from_str(campaign.source.whole())
+    let mut table: toml::Table = toml::from_str(campaign.source.whole())
         .map_err(|error| campaign.source.error(&(0..0), error.to_string()))?;
     // These change neither the cases nor what is recorded of them. Experiment and FMUs count by
     // their content, wherever they are.
     for key in ["title", "description", "extends", "experiment", "fmu", "until", "keep", "search"] {
-        own.remove(key);
+        table.remove(key);
     }
-    if campaign.design != Kind::LatinHypercube && campaign.design != Kind::Corners {
-        own.remove("cases");
+    if campaign.design != DesignKind::LatinHypercube && campaign.design != DesignKind::Corners {
+        table.remove("cases");
     }
-    let own = toml::to_string(&own).map_err(|error| Error::experiment(error.to_string()))?;
-    // FMUs count by their content here as well, and processes of units change nothing of a case.
+    let text = toml::to_string(&table).map_err(|error| Error::experiment(error.to_string()))?;
+    // FMUs count by their content here as well, and it is the same for a case in which processes
+    // its instances run.
     let (fmu, isolation) = (Vec::new(), Protection::default());
     let overrides = Overrides { fmu, isolation, ..changes.overrides.clone() };
-    let own = format!("{own}{overrides:?}");
+    let text = format!("{text}{overrides:?}");
     let mut keys = BTreeMap::from([
-        ("campaign".to_string(), files::digest(own)),
+        ("campaign".to_string(), files::digest(text)),
         ("experiment".to_string(), files::digest(system.experiment.source.whole())),
         ("program".to_string(), format!("{} {FORMAT}", env!("CARGO_PKG_VERSION"))),
     ]);

@@ -1,11 +1,11 @@
-//! The report of a campaign: one page with verdicts, distributions, sensitivities and the worst
-//! cases, which needs no other file.
+//! The report of a campaign: one self-contained page with verdicts, distributions, sensitivities
+//! and the worst cases.
 
 mod cloud;
 mod figures;
 
-use crate::definition::Kind;
-use crate::findings::{Answer, Findings, Kept, Measured, chosen, worst};
+use crate::definition::DesignKind;
+use crate::findings::{Answer, Findings, LimitFinding, Measured, chosen, worst};
 use crate::flight::Flight;
 use crate::plan::Plan;
 use crate::sensitivity::Sensitivity;
@@ -36,8 +36,8 @@ pub fn write(
 ) -> Result<(), Error> {
     let table = Reader::open(&out.join("cases.parquet"))?;
     let mut flight = Flight::new(plan, false, interrupt)?;
-    let kept = chosen(plan, &table)?;
-    keep(plan, &mut flight, &kept, out)?;
+    let kept_cases = chosen(plan, &table)?;
+    keep(plan, &mut flight, &kept_cases, out)?;
     let ranking = ranking(plan);
     let ranked = match &ranking {
         Some(name) => worst(&table.column(name)?.numbers(), SHOWN),
@@ -49,7 +49,7 @@ pub fn write(
         pictures.extend(cloud::draw(plan, flight.without_ends(), *worst, table.rows())?);
     }
     let drawn = pictures.iter().map(drawn).collect::<Result<Vec<_>, _>>()?;
-    let page = page(plan, findings, &drawn, &kept, ranking.zip(Some(ranked)).as_ref());
+    let page = page(plan, findings, &drawn, &kept_cases, ranking.zip(Some(ranked)).as_ref());
     files::write(&out.join("report.html"), page)
 }
 
@@ -65,10 +65,10 @@ fn drawn(figure: &Figure) -> Result<(String, String), Error> {
 fn ranking(plan: &Plan) -> Option<String> {
     let by = plan.campaign.keep.by.as_ref().map(|by| by.get_ref().clone());
     let limited = || plan.campaign.limits.first().map(|limit| limit.measure.get_ref().clone());
-    by.or_else(limited).or_else(|| plan.recorded.first().map(|own| own.name.clone()))
+    by.or_else(limited).or_else(|| plan.recorded.first().map(|recorded| recorded.name.clone()))
 }
 
-/// Flies cases once more and keeps everything of them.
+/// Flies cases again and writes their full results.
 fn keep(plan: &Plan, flight: &mut Flight, cases: &BTreeSet<u64>, out: &Path) -> Result<(), Error> {
     for case in cases {
         let folder = out.join("cases").join(case.to_string());
@@ -85,7 +85,7 @@ fn page(
     plan: &Plan,
     findings: &Findings,
     figures: &[(String, String)],
-    kept: &BTreeSet<u64>,
+    kept_cases: &BTreeSet<u64>,
     ranked: Option<&(String, Vec<u64>)>,
 ) -> String {
     let campaign = &plan.campaign;
@@ -97,14 +97,14 @@ fn page(
             body {
                 header {
                     h1 { (campaign.title) }
-                    p.paper { (findings.cases) " cases of " (plan.experiment().title) }
+                    p.paper { (findings.cases) " cases of the experiment " (plan.experiment().title) }
                     nav {
                         a href="#limits" { "Limits" } " "
                         a href="#measures" { "Measures" } " "
                         a href="#figures" { "Figures" } " "
                         a href="#sensitivity" { "Sensitivity" } " "
                         a href="#worst" { "Worst cases" } " "
-                        a href="#varied" { "What varies" }
+                        a href="#varied" { "Varied parameters" }
                     }
                 }
                 main {
@@ -115,13 +115,13 @@ fn page(
                         h2 { "Limits" }
                         p {
                             (ended("completed")) " cases completed"
-                            @for (status, words) in [("ended", "ended early by a limit or a unit"), ("lost", "lost"), ("failed", "failed")] {
+                            @for (status, words) in [("ended", "ended early by a limit or an FMU"), ("lost", "lost"), ("failed", "failed")] {
                                 @if ended(status) > 0 { ", " (ended(status)) " " (words) }
                             }
                             "."
                         }
                         @if let Some(answer) = &findings.answer { (answered(answer)) }
-                        @if findings.limits.is_empty() { p { "The campaign states no limit." } }
+                        @if findings.limits.is_empty() { p { "The campaign defines no limits." } }
                         @else { (limits(&findings.limits, campaign.design)) }
                     }
                     section id="measures" {
@@ -135,39 +135,39 @@ fn page(
                     }
                     section id="sensitivity" {
                         h2 { "Sensitivity" }
-                        @for own in &findings.measures { (tornado(own)) }
+                        @for measure in &findings.measures { (tornado(measure)) }
                         p.note {
-                            "Rank correlation of Spearman: 1 or −1 if the measure only rises or only falls with the parameter. "
-                            "A small p-value says that so large a correlation would hardly come by chance."
+                            "Spearman's rank correlation is 1 or −1 if the measure only rises or only falls with the parameter. "
+                            "A small p-value says that a correlation this large would hardly arise by chance."
                         }
                     }
                     section id="worst" {
                         h2 { "Worst cases" }
                         @if let Some((name, cases)) = ranked {
-                            p { "Largest " code { (name) } " first. Each command flies the case again, with everything recorded:" }
+                            p { "These cases have the largest values of " code { (name) } ", in descending order. Each command runs a case again and records all of its variables:" }
                             ul { @for case in cases { li { code { "orchestrator campaign " (plan.command) " --case " (case) } } } }
                         }
-                        @if !kept.is_empty() {
+                        @if !kept_cases.is_empty() {
                             p {
-                                "Kept in full, below " code { "cases" } ": "
-                                @for (i, case) in kept.iter().take(200).enumerate() { @if i > 0 { ", " } (case) }
-                                @if kept.len() > 200 { ", …" }
+                                "The folder " code { "cases" } " holds the full results of the cases "
+                                @for (i, case) in kept_cases.iter().take(200).enumerate() { @if i > 0 { ", " } (case) }
+                                @if kept_cases.len() > 200 { ", …" }
                             }
                         }
                     }
                     section id="varied" {
-                        h2 { "What varies" }
+                        h2 { "Varied parameters" }
                         table {
                             thead { tr { th { "Parameter" } th { "Unit" } th { "Distribution" } } }
-                            tbody { @for own in &plan.varied {
-                                tr { td { code { (own.name) } } td { (own.unit) } td { (own.law.told()) } }
+                            tbody { @for varied in &plan.varied {
+                                tr { td { code { (varied.name) } } td { (varied.unit) } td { (varied.distribution.in_words()) } }
                             } }
                         }
                         p.note {
                             "Design: " (format!("{:?}", campaign.design)) ", seed " (campaign.seed)
-                            ". A case depends on the seed and its number alone. All rows are in "
-                            code { "cases.parquet" } ", what is on this page in " code { "summary.json" }
-                            ". Written by orchestrator " (env!("CARGO_PKG_VERSION")) "."
+                            ". A case depends on the seed and its number alone. "
+                            code { "cases.parquet" } " holds all cases, and " code { "summary.json" } " the numbers of this page. "
+                            "Written by orchestrator " (env!("CARGO_PKG_VERSION")) "."
                         }
                     }
                 }
@@ -193,36 +193,36 @@ fn answered(answer: &Answer) -> Markup {
     }
 }
 
-fn limits(limits: &[Kept], design: Kind) -> Markup {
+fn limits(limits: &[LimitFinding], design: DesignKind) -> Markup {
     html! {
         table.numbers {
             thead { tr {
-                th { "Limit" } th { "Broken by" } th { "Share" } th { "Probability, 95 %" } th { "" }
+                th { "Limit" } th { "Broken by" } th { "Share" } th { "Probability, 95 % interval" } th { "" }
             } }
-            tbody { @for own in limits { tr {
-                td { (own.says) }
-                td { (own.broken.events) " of " (own.broken.cases) }
-                td { (percent(own.broken.share)) }
-                td { (interval(&own.broken)) }
-                td { @if own.broken.events == 0 { span class="verdict holds" { "kept by all" } }
+            tbody { @for limit in limits { tr {
+                td { (limit.says) }
+                td { (limit.broken.events) " of " (limit.broken.cases) }
+                td { (percent(limit.broken.share)) }
+                td { (interval(&limit.broken)) }
+                td { @if limit.broken.events == 0 { span class="verdict holds" { "kept by all" } }
                      @else { span class="verdict not" { "broken" } } }
             } } }
         }
         p.note {
-            "A case that was lost, failed or ended early keeps no limit. Intervals by Clopper and Pearson; without a broken case, the bound "
-            "that so many cases prove. "
-            @if design != Kind::Random {
-                "They are exact for independent cases; those of this design are spread more evenly over what was asked, and say nothing about "
-                "how often a limit is broken where its points are not drawn by probability (corners, levels)."
+            "A case that was lost, failed or ended early counts as breaking every limit. The intervals are those of Clopper and Pearson. "
+            "If no case broke the limit, the number is the upper bound that this many cases prove. "
+            @if design != DesignKind::Random {
+                "The intervals are exact for independent cases, but this design spreads its cases more evenly. Where cases are not drawn by "
+                "probability (corners, levels), their share says nothing about how often a limit is broken."
             }
         }
     }
 }
 
-fn interval(own: &Probability) -> String {
-    match own.events {
-        0 => format!("≤ {}", short(own.high)),
-        _ => format!("{} to {}", short(own.low), short(own.high)),
+fn interval(probability: &Probability) -> String {
+    match probability.events {
+        0 => format!("≤ {}", short(probability.high)),
+        _ => format!("{} to {}", short(probability.low), short(probability.high)),
     }
 }
 
@@ -230,12 +230,12 @@ fn measures(measures: &[Measured]) -> Markup {
     html! {
         table.numbers {
             thead { tr {
-                th { "Measure" } th { "Cases" } th { "Mean" } th { "Deviation" } th { "Smallest" } th { "5 %" } th { "Median" } th { "95 %" }
-                th { "99 %" } th { "99.9 %" } th { "Largest" } th { "in case" }
+                th { "Measure" } th { "Cases" } th { "Mean" } th { "Standard deviation" } th { "Smallest" } th { "5 %" } th { "Median" } th { "95 %" }
+                th { "99 %" } th { "99.9 %" } th { "Largest" } th { "Case of the largest" }
             } }
-            tbody { @for own in measures { tr {
-                td { (own.name) @if !own.unit.is_empty() { ", " (own.unit) } }
-                @if let Some(summary) = &own.summary {
+            tbody { @for measure in measures { tr {
+                td { (measure.name) @if !measure.unit.is_empty() { ", " (measure.unit) } }
+                @if let Some(summary) = &measure.summary {
                     td { (summary.cases) } td { (short(summary.mean)) } td { (short(summary.deviation)) }
                     @for quantile in &summary.quantiles {
                         td {
@@ -249,25 +249,25 @@ fn measures(measures: &[Measured]) -> Markup {
                 } @else { td colspan="11" { "no case has a value" } }
             } } }
         }
-        p.note { "Below a quantile stands its 95 % interval, two values of the sample." }
+        p.note { "Below a quantile stands its 95 % interval, whose ends are values of the sample." }
     }
 }
 
-/// Returns a p-value as text. What is smaller than any test of it could show is not written as 0.
+/// Returns a p-value as text. A very small one is not written as 0.
 fn chance(p_value: f64) -> String {
     if p_value < 1e-4 { "< 0.0001".into() } else { short(p_value) }
 }
 
 /// Returns the parameters in the order of their weight, as bars.
-fn tornado(own: &Measured) -> Markup {
-    let weight = |own: &Sensitivity| own.total.or(own.rank_correlation).map_or(0.0, f64::abs);
+fn tornado(measure: &Measured) -> Markup {
+    let weight = |row: &Sensitivity| row.total.or(row.rank_correlation).map_or(0.0, f64::abs);
     let mut rows: Vec<&Sensitivity> =
-        own.sensitivities.iter().filter(|own| own.rank_correlation.is_some()).collect();
+        measure.sensitivities.iter().filter(|row| row.rank_correlation.is_some()).collect();
     rows.sort_by(|a, b| weight(b).total_cmp(&weight(a)));
     let has_indices = rows.iter().any(|row| row.total.is_some());
     html! {
         @if !rows.is_empty() {
-            h3 { (own.name) }
+            h3 { (measure.name) }
             table.numbers {
                 thead { tr {
                     th { "Parameter" } th { "Rank correlation" } th { "" } th { "p-value" }

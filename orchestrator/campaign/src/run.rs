@@ -3,11 +3,11 @@
 use crate::error::Error;
 use crate::findings::{Answer, Findings, findings};
 use crate::flight::{Flight, can_reset};
-use crate::parts::{self, Found};
+use crate::parts::{self, PartState};
 use crate::plan::Plan;
 use crate::report;
 use crate::statistics::{Probability, looks};
-use crate::table::{Reader, Table, Values, Writer};
+use crate::table::{CaseTable, Reader, Values, Writer};
 use cosim::error::Error as Single;
 use cosim::files;
 use cosim::interrupt::Interrupt;
@@ -43,10 +43,10 @@ pub struct Options {
     pub interrupt: Interrupt,
 }
 
-/// Outcome of a campaign.
+/// Report on a campaign that was flown.
 #[derive(Debug)]
-pub struct Report {
-    /// What was found out.
+pub struct CampaignReport {
+    /// Findings over all cases.
     pub findings: Findings,
     /// Folder of the results.
     pub out: PathBuf,
@@ -58,10 +58,10 @@ pub struct Report {
     pub notes: Vec<String>,
 }
 
-/// Work that is left of a campaign, for programs that share it among machines.
+/// Remaining work of a campaign, for programs that share it among machines.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Work {
-    /// Number of cases that are needed as far as is known.
+    /// Number of cases that are needed, as far as the finished parts show.
     pub cases: u64,
     /// First and last-plus-one case of each part that is missing.
     pub missing: Vec<[u64; 2]>,
@@ -77,15 +77,15 @@ struct State<'a> {
     plan: &'a Plan,
     out: &'a Path,
     /// Number of cases that broke each limit, by the first case of each part.
-    found: BTreeMap<u64, Vec<u64>>,
+    broken_counts: BTreeMap<u64, Vec<u64>>,
     notes: Vec<String>,
-    /// Whether units can be reset, once this is known.
+    /// Whether instances can be reset, once this is known.
     resets: Option<bool>,
 }
 
 impl<'a> State<'a> {
     fn new(plan: &'a Plan, out: &'a Path) -> Self {
-        Self { plan, out, found: BTreeMap::new(), notes: Vec::new(), resets: None }
+        Self { plan, out, broken_counts: BTreeMap::new(), notes: Vec::new(), resets: None }
     }
 
     /// Looks for the parts of the first `cases` cases, and returns those that are missing.
@@ -93,42 +93,44 @@ impl<'a> State<'a> {
         let (mut missing, mut damaged) = (Vec::new(), 0);
         let mut others: BTreeMap<String, u64> = BTreeMap::new();
         for part in parts::parts(self.plan.cases()).take_while(|part| part.start < cases) {
-            if self.found.contains_key(&part.start) {
+            if self.broken_counts.contains_key(&part.start) {
                 continue;
             }
             match parts::find(self.plan, self.out, &part) {
-                Found::Whole(broken) => {
-                    self.found.insert(part.start, broken);
+                PartState::Whole(broken) => {
+                    self.broken_counts.insert(part.start, broken);
                     continue;
                 }
-                Found::Missing => {}
-                Found::Damaged => damaged += 1,
-                Found::Other(names) => *others.entry(names.join(", ")).or_default() += 1,
+                PartState::Missing => {}
+                PartState::Damaged => damaged += 1,
+                PartState::Other(names) => *others.entry(names.join(", ")).or_default() += 1,
             }
             missing.push(part);
         }
         if damaged > 0 {
-            self.notes.push(format!("damaged, flown again: {damaged} parts"));
+            self.notes
+                .push(format!("flown again because their files are damaged: {damaged} parts"));
         }
         for (what, count) in others {
-            self.notes.push(format!("flown again, as this has changed: {what} ({count} parts)"));
+            self.notes
+                .push(format!("flown again because this has changed: {what} ({count} parts)"));
         }
         missing
     }
 
     fn broken(&self, limit: usize, cases: u64) -> u64 {
-        self.found.range(..cases).filter_map(|(_, broken)| broken.get(limit)).sum()
+        self.broken_counts.range(..cases).filter_map(|(_, broken)| broken.get(limit)).sum()
     }
 
-    /// Returns whether units can be reset. This is tried once.
+    /// Returns whether instances can be reset. This is tried once.
     fn resets(&mut self, interrupt: &Interrupt) -> Result<bool, Single> {
-        if let Some(known) = self.resets {
-            return Ok(known);
+        if let Some(resets) = self.resets {
+            return Ok(resets);
         }
         let resets = can_reset(self.plan, interrupt)?;
         if !resets {
             tracing::warn!(
-                "a case gave another result after fmi2Reset than with a new instance: units are made anew for each case"
+                "a case gave another result after fmi2Reset than with a new instance: each case gets new instances"
             );
         }
         self.resets = Some(resets);
@@ -138,12 +140,12 @@ impl<'a> State<'a> {
     /// Returns the number of cases that are needed as far as the parts tell, and the answer to the
     /// campaign's question if it has one and the parts are all there.
     fn needed(&mut self) -> (u64, Vec<Range<u64>>, Option<Answer>) {
-        let all = self.plan.cases();
+        let total = self.plan.cases();
         let Some(until) = &self.plan.campaign.until else {
-            return (all, self.missing(all), None);
+            return (total, self.missing(total), None);
         };
         let limit = self.plan.campaign.limits.iter().position(|limit| limit.id == until.limit);
-        let (counts, each) = looks(until.below, until.confidence, all, parts::LENGTH);
+        let (counts, each) = looks(until.below, until.confidence, total, parts::LENGTH);
         let mut answer = None;
         for cases in counts {
             let missing = self.missing(cases);
@@ -168,11 +170,11 @@ impl<'a> State<'a> {
                 return (cases, Vec::new(), answer);
             }
         }
-        (all, Vec::new(), answer)
+        (total, Vec::new(), answer)
     }
 }
 
-/// Returns the work that is left of a campaign.
+/// Returns the remaining work of a campaign.
 pub fn work(plan: &Plan, out: &Path) -> Work {
     let (cases, missing, _) = State::new(plan, out).needed();
     Work { cases, missing: missing.into_iter().map(|part| [part.start, part.end]).collect() }
@@ -184,11 +186,12 @@ pub fn work(plan: &Plan, out: &Path) -> Work {
 /// # Errors
 /// Returns an error if the range does not consist of parts, or if a file cannot be written.
 pub fn fly_range(plan: &Plan, range: &Range<u64>, options: &Options) -> Result<u64, Error> {
-    let all = plan.cases();
-    let is_edge = |case: u64| case.is_multiple_of(parts::LENGTH) || case == all;
-    if range.start >= range.end || range.end > all || !is_edge(range.start) || !is_edge(range.end) {
+    let total = plan.cases();
+    let is_edge = |case: u64| case.is_multiple_of(parts::LENGTH) || case == total;
+    if range.start >= range.end || range.end > total || !is_edge(range.start) || !is_edge(range.end)
+    {
         let message = format!(
-            "--cases {}..{}: within 0..{all}, with ends that are multiples of {} or the last one",
+            "--cases {}..{}: the range must lie within 0..{total}, and its ends must be multiples of {} or the last case",
             range.start,
             range.end,
             parts::LENGTH
@@ -198,19 +201,20 @@ pub fn fly_range(plan: &Plan, range: &Range<u64>, options: &Options) -> Result<u
     let out = folder(plan, options.out.as_deref());
     let mut state = State::new(plan, &out);
     let missing = if options.fresh { Vec::new() } else { state.missing(range.end) };
-    let asked = parts::parts(all).filter(|part| range.contains(&part.start));
-    let asked: Vec<_> = asked.filter(|part| options.fresh || missing.contains(part)).collect();
-    let flown = asked.iter().map(|part| part.end - part.start).sum();
-    fly_parts(plan, &out, &asked, options, &mut state)?;
+    let requested = parts::parts(total).filter(|part| range.contains(&part.start));
+    let requested: Vec<_> =
+        requested.filter(|part| options.fresh || missing.contains(part)).collect();
+    let flown = requested.iter().map(|part| part.end - part.start).sum();
+    fly_parts(plan, &out, &requested, options, &mut state)?;
     Ok(flown)
 }
 
-/// Flies what is left of a campaign, and writes its tables and its report.
+/// Flies the remaining cases of a campaign, and writes its tables and its report.
 ///
 /// # Errors
 /// Returns an error if a file cannot be written, or if the work was asked to end; what was flown by
 /// then is kept.
-pub fn fly(plan: &Plan, options: &Options) -> Result<Report, Error> {
+pub fn fly(plan: &Plan, options: &Options) -> Result<CampaignReport, Error> {
     let begin = Instant::now();
     let out = folder(plan, options.out.as_deref());
     if out.join("metrics.json").exists() || (out.exists() && !out.is_dir()) {
@@ -245,7 +249,7 @@ pub fn fly(plan: &Plan, options: &Options) -> Result<Report, Error> {
     let findings = findings(plan, &Reader::open(&path)?, answer)?;
     files::write_json(&out.join("summary.json"), &findings)?;
     report::write(plan, &findings, &out, &options.interrupt)?;
-    Ok(Report { findings, out, flown, elapsed: begin.elapsed().as_secs_f64(), notes })
+    Ok(CampaignReport { findings, out, flown, elapsed: begin.elapsed().as_secs_f64(), notes })
 }
 
 fn remove_results(out: &Path) -> Result<(), Single> {
@@ -271,23 +275,23 @@ fn fly_parts(
     let interrupt = &options.interrupt;
     let resets = state.resets(interrupt)?;
     let left: u64 = missing.iter().map(|part| part.end - part.start).sum();
-    let done = state.found.keys().count() as u64 * parts::LENGTH;
+    let done = state.broken_counts.keys().count() as u64 * parts::LENGTH;
     let done = done.min(plan.cases().saturating_sub(left));
-    let progress = Parts::of("cases", &plan.campaign.title, done + left, done, options.quiet);
+    let progress = Parts::new("cases", &plan.campaign.title, done + left, done, options.quiet);
     let next = AtomicUsize::new(0);
-    let found = Mutex::new(BTreeMap::new());
+    let broken_counts = Mutex::new(BTreeMap::new());
     let failure: Mutex<Option<Single>> = Mutex::new(None);
     let pool = ThreadPoolBuilder::new()
         .num_threads(threads(plan, options.jobs).min(missing.len()))
         .build()
         .map_err(|error| Single::experiment(error.to_string()))?;
     let work = || -> Result<(), Single> {
-        // Each thread has units of its own, from an archive that it unpacks itself.
+        // Each thread has instances of its own, from an archive that it unpacks itself.
         let mut flight = Flight::new(plan, resets, interrupt)?;
         while failure.lock().is_none() {
             let Some(part) = missing.get(next.fetch_add(1, Ordering::Relaxed)) else { break };
             let broken = parts::fly(plan, out, part, &mut flight, |_| progress.advance(1))?;
-            found.lock().insert(part.start, broken);
+            broken_counts.lock().insert(part.start, broken);
         }
         Ok(())
     };
@@ -297,18 +301,18 @@ fn fly_parts(
         }
     });
     progress.finish();
-    state.found.append(&mut found.lock());
+    state.broken_counts.append(&mut broken_counts.lock());
     match failure.into_inner() {
         None => Ok(()),
         Some(Single::Interrupted { request, .. }) => {
-            let done = (state.found.len() as u64 * parts::LENGTH).min(plan.cases());
-            Err(Error::Unfinished { done, all: plan.cases(), out: out.to_path_buf(), request })
+            let done = (state.broken_counts.len() as u64 * parts::LENGTH).min(plan.cases());
+            Err(Error::Unfinished { done, total: plan.cases(), out: out.to_path_buf(), request })
         }
         Some(error) => Err(error.into()),
     }
 }
 
-/// Returns the number of threads: one, if a unit can be made only once in a process.
+/// Returns the number of threads: one, if an FMU can be instantiated only once in a process.
 pub(crate) fn threads(plan: &Plan, jobs: usize) -> usize {
     if let Some(path) = &plan.single {
         tracing::warn!(
@@ -350,7 +354,7 @@ fn merge(plan: &Plan, out: &Path, cases: u64, csv: bool) -> Result<(), Single> {
     writer.finish()
 }
 
-fn write_csv(text: &mut csv::Writer<fs::File>, rows: &Table) -> Result<(), csv::Error> {
+fn write_csv(text: &mut csv::Writer<fs::File>, rows: &CaseTable) -> Result<(), csv::Error> {
     for row in 0..rows.rows() {
         let cell = |values: &Values| match values {
             Values::Real(values) => values[row].to_string(),

@@ -1,10 +1,10 @@
-//! Looks for the worst case: an evolution strategy (CMA-ES) with restarts moves through the space
-//! of what varies towards larger values of a measure.
+//! Looks for the worst case: an evolution strategy (CMA-ES) with restarts moves through the
+//! space of the varied parameters towards larger values of a measure.
 
 use crate::definition::Search;
 use crate::design::Place;
 use crate::error::Error;
-use crate::flight::{Flight, Row, Status, table};
+use crate::flight::{CaseStatus, Flight, Row, table};
 use crate::plan::Plan;
 use crate::run;
 use crate::table::Writer;
@@ -49,7 +49,7 @@ pub struct Options {
 
 /// Outcome of a search.
 #[derive(Clone, Debug, Serialize)]
-pub struct Outcome {
+pub struct SearchOutcome {
     /// Title of the campaign.
     pub title: String,
     /// Measure whose largest value was looked for.
@@ -66,7 +66,7 @@ pub struct Outcome {
     pub cases: u64,
     /// Number of searches from different starts.
     pub searches: u64,
-    /// Number of cases in which a unit failed. They are in the table with their messages.
+    /// Number of cases in which an FMU failed. They are in the table with their messages.
     pub failed: u64,
     /// Why the search ended.
     pub ended: &'static str,
@@ -78,13 +78,13 @@ pub struct Outcome {
     pub elapsed: f64,
 }
 
-/// A place that is to be flown, and where its result goes.
+/// A place that is to be flown, and the channel for its result.
 struct Order {
     places: Vec<Place>,
     reply: Sender<Result<Row, Single>>,
 }
 
-/// A case that was tried: where it lies, and what came of it.
+/// A case that was tried: its place and its result.
 struct Tried {
     generation: u64,
     point: Vec<f64>,
@@ -95,23 +95,26 @@ struct Tried {
 /// Looks for the worst case of a campaign.
 ///
 /// # Errors
-/// Returns an error if the campaign says not what to look for, if a file cannot be written, or if
-/// the first generation was ended.
-pub fn search(plan: &Plan, options: &Options) -> Result<Outcome, Error> {
+/// Returns an error if the campaign does not say what to look for, if a file cannot be written, or
+/// if the first generation was ended.
+pub fn search(plan: &Plan, options: &Options) -> Result<SearchOutcome, Error> {
     let begin = Instant::now();
     let search = plan.campaign.search.as_ref().ok_or_else(|| {
-        plan.campaign.source.error(&(0..0), "[search] is missing: what is to be the largest?")
+        plan.campaign.source.error(
+            &(0..0),
+            "[search] is missing: it names the measure whose largest value is looked for",
+        )
     })?;
     let measure = plan
         .recorded
         .iter()
-        .position(|own| own.name == *search.largest.get_ref())
+        .position(|recorded| recorded.name == *search.largest.get_ref())
         .unwrap_or_default();
-    for own in &plan.varied {
-        let problem = own.law.check_ends().err();
+    for varied in &plan.varied {
+        let problem = varied.distribution.check_ends().err();
         if let Some(problem) = problem {
-            let message = format!("[[vary]] \"{}\": {problem}", own.name);
-            return Err(plan.campaign.source.error(&own.span, message).into());
+            let message = format!("[[vary]] \"{}\": {problem}", varied.name);
+            return Err(plan.campaign.source.error(&varied.span, message).into());
         }
     }
     let out = options
@@ -120,13 +123,13 @@ pub fn search(plan: &Plan, options: &Options) -> Result<Outcome, Error> {
         .unwrap_or_else(|| PathBuf::from("out").join(format!("{}-worst", plan.name())));
     if out.join("search.json").exists() && !options.force {
         let message = format!(
-            "{} holds the results of an earlier search: --force replaces them, --out takes another folder",
+            "{} holds the results of an earlier search: --force replaces them, --out chooses another folder",
             out.display()
         );
         return Err(Single::experiment(message).into());
     }
     let _folder = Folder::take(&out)?;
-    let progress = Parts::of("cases", &plan.campaign.title, search.cases, 0, options.quiet);
+    let progress = Parts::new("cases", &plan.campaign.title, search.cases, 0, options.quiet);
     let threads = run::threads(plan, options.jobs);
     let (orders, waiting) = channel::<Order>();
     let waiting = Mutex::new(waiting);
@@ -138,19 +141,19 @@ pub fn search(plan: &Plan, options: &Options) -> Result<Outcome, Error> {
         tried: Mutex::default(),
         failure: Mutex::default(),
     };
-    let found = std::thread::scope(|scope| {
+    let result = std::thread::scope(|scope| {
         for _ in 0..threads {
             scope.spawn(|| serve(plan, &options.interrupt, &waiting));
         }
-        let found = look(&searched, search, &orders, &|| {
+        let result = look(&searched, search, &orders, &|| {
             options.time.is_some_and(|time| begin.elapsed() >= time)
         });
         // The threads end when nobody can order anything any more.
         drop(orders);
-        found
+        result
     });
     progress.finish();
-    let (searches, ended) = found?;
+    let (searches, ended) = result?;
     let mut tried = searched.tried.into_inner();
     // Within a generation, the threads finish in any order.
     tried.sort_by(|a, b| {
@@ -158,20 +161,23 @@ pub fn search(plan: &Plan, options: &Options) -> Result<Outcome, Error> {
         let differing = || points().find(|order| order.is_ne()).unwrap_or(CmpOrdering::Equal);
         a.generation.cmp(&b.generation).then_with(differing)
     });
-    let worst = tried.iter().filter(|own| !own.value.is_nan());
+    let worst = tried.iter().filter(|case| !case.value.is_nan());
     let worst = worst.max_by(|a, b| a.value.total_cmp(&b.value)).or(tried.first());
     let worst = worst.ok_or_else(|| Single::experiment("no case was flown"))?;
-    let limits = plan.campaign.limits.iter().zip(&worst.row.kept);
-    let outcome = Outcome {
+    let limits = plan.campaign.limits.iter().zip(&worst.row.limits_kept);
+    let outcome = SearchOutcome {
         title: plan.campaign.title.clone(),
         measure: plan.recorded[measure].name.clone(),
         unit: plan.recorded[measure].unit.clone(),
         largest: Some(worst.value).filter(|value| !value.is_nan()),
-        broken: limits.filter(|(_, kept)| !**kept).map(|(limit, _)| limit.id.clone()).collect(),
+        broken: limits
+            .filter(|(_, is_kept)| !**is_kept)
+            .map(|(limit, _)| limit.id.clone())
+            .collect(),
         status: worst.row.status.name(),
         cases: tried.len() as u64,
         searches,
-        failed: tried.iter().filter(|own| own.row.status == Status::Failed).count() as u64,
+        failed: tried.iter().filter(|case| case.row.status == CaseStatus::Failed).count() as u64,
         ended,
         out: out.clone(),
         elapsed: begin.elapsed().as_secs_f64(),
@@ -180,7 +186,7 @@ pub fn search(plan: &Plan, options: &Options) -> Result<Outcome, Error> {
     let title = format!("{}, the worst case that a search found", plan.campaign.title);
     let text = plan.experiment_of(&title, &worst.row.values)?;
     files::write(&path, text)?;
-    let rows: Vec<Row> = tried.iter().map(|own| own.row.clone()).collect();
+    let rows: Vec<Row> = tried.iter().map(|case| case.row.clone()).collect();
     let mut writer = Writer::create(&out.join("search.parquet"), &[("units", plan.units())])?;
     writer.add(table(plan, &rows))?;
     writer.finish()?;
@@ -190,19 +196,18 @@ pub fn search(plan: &Plan, options: &Options) -> Result<Outcome, Error> {
     Ok(outcome)
 }
 
-/// Flies what is ordered, until nothing can be ordered any more.
+/// Flies the ordered cases until no more can be ordered.
 fn serve(plan: &Plan, interrupt: &Interrupt, waiting: &Mutex<Receiver<Order>>) {
     let mut flight: Option<Flight> = None;
     loop {
         let Ok(order) = waiting.lock().recv() else { return };
         let result = (|| {
-            let own = match flight.take() {
+            let current = match flight.take() {
                 Some(flight) => flight,
                 // A case that ends at its limit would hide how much worse it becomes.
                 None => Flight::new(plan, false, interrupt)?.without_ends(),
             };
-            let own = flight.insert(own);
-            own.fly_with(CASE, plan.values_at(&order.places, CASE)?, &mut [])
+            flight.insert(current).fly_with(CASE, plan.values_at(&order.places, CASE)?, &mut [])
         })();
         // If nobody waits for the result any more, it is of no use.
         let _ = order.reply.send(result);
@@ -222,7 +227,7 @@ struct Searched<'a> {
 
 impl Searched<'_> {
     /// Flies the case at a point, whose coordinates are cut off at 0 and 1. The strategy looks for
-    /// the smallest value; what has none is as bad as can be.
+    /// the smallest value; a case without a value counts as the worst point.
     fn evaluate(&self, point: &DVector<f64>, orders: &Sender<Order>) -> f64 {
         let point: Vec<f64> = point.iter().map(|unit| unit.clamp(0.0, 1.0)).collect();
         let places = point.iter().copied().map(Place::Quantile).collect();
@@ -253,7 +258,7 @@ impl Searched<'_> {
             None => {}
         }
         let tried = self.tried.lock();
-        let best = tried.iter().map(|own| own.value).fold(f64::NEG_INFINITY, f64::max);
+        let best = tried.iter().map(|case| case.value).fold(f64::NEG_INFINITY, f64::max);
         Ok(if search.enough.is_some_and(|enough| best >= enough) {
             Some("the value is enough")
         } else if tried.len() as u64 >= search.cases {
@@ -305,11 +310,11 @@ fn look(
 }
 
 /// Draws the values that were tried, and the largest one so far.
-fn history(outcome: &Outcome, tried: &[Tried]) -> Figure {
+fn history(outcome: &SearchOutcome, tried: &[Tried]) -> Figure {
     let number = (1..=tried.len()).map(|i| i as f64);
     let mut largest = f64::NEG_INFINITY;
-    let so_far = tried.iter().map(|own| {
-        largest = largest.max(own.value);
+    let so_far = tried.iter().map(|case| {
+        largest = largest.max(case.value);
         largest
     });
     let curve = |name: &str, color, shape, y: Vec<f64>| Curve {
@@ -320,7 +325,7 @@ fn history(outcome: &Outcome, tried: &[Tried]) -> Figure {
         y,
     };
     let unit = if outcome.unit.is_empty() { String::new() } else { format!(", {}", outcome.unit) };
-    let values = tried.iter().map(|own| own.value).collect();
+    let values = tried.iter().map(|case| case.value).collect();
     let curves = vec![
         curve("case", Color(31, 119, 180), Shape::Dots, values),
         curve("largest so far", Color(214, 39, 40), Shape::Line, so_far.collect()),
@@ -331,7 +336,7 @@ fn history(outcome: &Outcome, tried: &[Tried]) -> Figure {
         legend: Legend::Above,
         panels: vec![Panel {
             title: String::new(),
-            x_label: "cases flown".into(),
+            x_label: "number of cases".into(),
             y_label: format!("{}{unit}", outcome.measure),
             log_x: false,
             x_range: None,

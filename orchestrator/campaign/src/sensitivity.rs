@@ -1,6 +1,6 @@
-//! How much each parameter that varies has to do with a measure.
+//! Sensitivity of a measure to each varied parameter.
 
-use crate::definition::Kind;
+use crate::definition::DesignKind;
 use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
@@ -11,8 +11,7 @@ pub struct Sensitivity {
     pub parameter: String,
     /// Rank correlation of parameter and measure (Spearman); none if one of them is constant.
     pub rank_correlation: Option<f64>,
-    /// Probability of a rank correlation at least as large if they had nothing to do with each
-    /// other.
+    /// Probability of a rank correlation at least as large if the two were independent.
     pub p_value: Option<f64>,
     /// Share of the measure's variance that the parameter explains by itself (Sobol's first-order
     /// index), if the design allows it.
@@ -33,8 +32,8 @@ pub fn rank_correlation(x: &[f64], y: &[f64]) -> Option<(f64, f64)> {
     }
     let rest = 1.0 - correlation * correlation;
     let t = if rest > 0.0 { correlation * (freedom / rest).sqrt() } else { f64::INFINITY };
-    let law = StudentsT::new(0.0, 1.0, freedom).ok()?;
-    Some((correlation, 2.0 * (1.0 - law.cdf(t.abs()))))
+    let t_distribution = StudentsT::new(0.0, 1.0, freedom).ok()?;
+    Some((correlation, 2.0 * (1.0 - t_distribution.cdf(t.abs()))))
 }
 
 /// Returns the rank of each value; equal values share the mean of their ranks.
@@ -68,23 +67,24 @@ fn correlation(x: &[f64], y: &[f64]) -> Option<f64> {
 }
 
 /// Computes the indices of all parameters, first-order and total, from a measure of the cases of a
-/// design of the kind [`Kind::Sensitivity`]: first-order by Saltelli et al. 2010, total by Jansen
+/// design of the kind [`DesignKind::Sensitivity`]: first-order by Saltelli et al. 2010, total by
+/// Jansen
 /// 1999. Samples with a value that is not a number are left out.
 pub fn indices(measure: &[f64], parameters: usize) -> Option<Vec<(f64, f64)>> {
     let block = parameters + 2;
     let samples: Vec<&[f64]> =
-        measure.chunks_exact(block).filter(|own| own.iter().all(|v| v.is_finite())).collect();
+        measure.chunks_exact(block).filter(|sample| sample.iter().all(|v| v.is_finite())).collect();
     let n = samples.len() as f64;
-    let of_both = || samples.iter().flat_map(|own| own[..2].iter());
-    let mean = of_both().sum::<f64>() / (2.0 * n);
-    let variance = of_both().map(|value| (value - mean).powi(2)).sum::<f64>() / (2.0 * n);
+    let both_points = || samples.iter().flat_map(|sample| sample[..2].iter());
+    let mean = both_points().sum::<f64>() / (2.0 * n);
+    let variance = both_points().map(|value| (value - mean).powi(2)).sum::<f64>() / (2.0 * n);
     if samples.len() < 2 || variance.is_nan() || variance <= 0.0 {
         return None;
     }
     let index = |parameter: usize| {
         let (mut first, mut total) = (0.0, 0.0);
-        for own in &samples {
-            let (a, b, mixed) = (own[0], own[1], own[2 + parameter]);
+        for sample in &samples {
+            let (a, b, mixed) = (sample[0], sample[1], sample[2 + parameter]);
             // The mean is taken off, which changes nothing in theory and much of the noise.
             first += (b - mean) * (mixed - a);
             total += 0.5 * (a - mixed).powi(2);
@@ -97,14 +97,15 @@ pub fn indices(measure: &[f64], parameters: usize) -> Option<Vec<(f64, f64)>> {
 /// Computes the sensitivities of a measure to all parameters; `columns` holds the values of each
 /// parameter by name.
 pub fn sensitivities(
-    design: Kind,
+    design: DesignKind,
     columns: &[(String, Vec<f64>)],
     measure: &[f64],
 ) -> Vec<Sensitivity> {
-    let indices = (design == Kind::Sensitivity).then(|| indices(measure, columns.len())).flatten();
+    let indices =
+        (design == DesignKind::Sensitivity).then(|| indices(measure, columns.len())).flatten();
     let sensitivity = |(place, (name, values)): (usize, &(String, Vec<f64>))| {
         let ranks = rank_correlation(values, measure);
-        let index = indices.as_ref().map(|all| all[place]);
+        let index = indices.as_ref().map(|indices| indices[place]);
         Sensitivity {
             parameter: name.clone(),
             rank_correlation: ranks.map(|(correlation, _)| correlation),
@@ -136,7 +137,8 @@ mod tests {
     fn published_indices_of_the_ishigami_function() {
         // Saltelli et al. 2008, a = 7, b = 0.1: S = 0.3139, 0.4424, 0; T = 0.5576, 0.4424, 0.2437.
         let samples = 1 << 14;
-        let design = Design::new(Kind::Sensitivity, 3, Some(samples * 5), vec![0; 3]).unwrap();
+        let design =
+            Design::new(DesignKind::Sensitivity, 3, Some(samples * 5), vec![0; 3]).unwrap();
         let ishigami = |case: u64| {
             let x: Vec<f64> = design
                 .place(case)
@@ -149,9 +151,9 @@ mod tests {
             x[0].sin() + 7.0 * x[1].sin().powi(2) + 0.1 * x[2].powi(4) * x[0].sin()
         };
         let measure: Vec<f64> = (0..design.cases()).map(ishigami).collect();
-        let found = indices(&measure, 3).unwrap();
+        let computed = indices(&measure, 3).unwrap();
         let published = [(0.3139, 0.5576), (0.4424, 0.4424), (0.0, 0.2437)];
-        for ((first, total), (s, t)) in found.into_iter().zip(published) {
+        for ((first, total), (s, t)) in computed.into_iter().zip(published) {
             assert!((first - s).abs() < 0.03 && (total - t).abs() < 0.03, "{first} {total}");
         }
     }

@@ -1,4 +1,4 @@
-//! What a sample of cases says about all cases, with confidence.
+//! Statistics of a sample of cases, with confidence intervals.
 
 use serde::Serialize;
 use statrs::distribution::{Beta, Binomial, ContinuousCDF, DiscreteCDF};
@@ -33,7 +33,7 @@ impl Probability {
         let rest = 1.0 - confidence;
         let tail = if events == 0 || events == cases { rest } else { rest / 2.0 };
         let quantile =
-            |a: f64, b: f64, p: f64| Beta::new(a, b).map_or(f64::NAN, |law| law.inverse_cdf(p));
+            |a: f64, b: f64, p: f64| Beta::new(a, b).map_or(f64::NAN, |beta| beta.inverse_cdf(p));
         let low = if events == 0 { 0.0 } else { quantile(k, n - k + 1.0, tail) };
         let high = if events == cases { 1.0 } else { quantile(k + 1.0, n - k, 1.0 - tail) };
         Self { events, cases, share: k / n, low, high }
@@ -52,9 +52,9 @@ pub fn looks(bound: f64, confidence: f64, most: u64, multiple: u64) -> (Vec<u64>
     let counts = |each: f64| {
         let first = cases_without_event(bound, each).next_multiple_of(multiple);
         let doubled = std::iter::successors(Some(first), |count| count.checked_mul(2));
-        let mut all: Vec<u64> = doubled.take_while(|count| *count < most).collect();
-        all.push(most);
-        all
+        let mut counts: Vec<u64> = doubled.take_while(|count| *count < most).collect();
+        counts.push(most);
+        counts
     };
     let mut number = counts(confidence).len();
     let each = |number: usize| 1.0 - (1.0 - confidence) / number as f64;
@@ -133,8 +133,8 @@ fn quantile(sorted: &[f64], probability: f64) -> Quantile {
     let ranks = 0..=n as u64;
     let r = first(&ranks, |count| below.cdf(count) > tail);
     let s = first(&ranks, |count| below.sf(count) <= tail) + 1;
-    let of_rank = |rank: u64| sorted.get((rank as usize).checked_sub(1)?).copied();
-    Quantile { low: of_rank(r), high: of_rank(s), ..none }
+    let value_at = |rank: u64| sorted.get((rank as usize).checked_sub(1)?).copied();
+    Quantile { low: value_at(r), high: value_at(s), ..none }
 }
 
 /// Returns the first number in a range from which on a condition holds, or the last one.
@@ -164,21 +164,21 @@ mod tests {
         // R: binom.test(7, 20)$conf.int
         let some = Probability::new(7, 20, 0.95);
         assert!((some.low - 0.1539092).abs() < 1e-6 && (some.high - 0.5921885).abs() < 1e-6);
-        let all = Probability::new(20, 20, 0.95);
-        assert!(all.high == 1.0 && (all.low - 0.05_f64.powf(1.0 / 20.0)).abs() < 1e-9);
+        let certain = Probability::new(20, 20, 0.95);
+        assert!(certain.high == 1.0 && (certain.low - 0.05_f64.powf(1.0 / 20.0)).abs() < 1e-9);
     }
 
     #[test]
     fn oracle_an_interval_covers_as_often_as_it_says() {
         // All outcomes of 40 cases, weighed with their probability.
         for probability in [0.02, 0.2, 0.5] {
-            let law = Binomial::new(probability, 40).unwrap();
+            let binomial = Binomial::new(probability, 40).unwrap();
             let covered: f64 = (0..=40)
                 .filter(|k| {
-                    let own = Probability::new(*k, 40, 0.95);
-                    own.low <= probability && probability <= own.high
+                    let estimate = Probability::new(*k, 40, 0.95);
+                    estimate.low <= probability && probability <= estimate.high
                 })
-                .map(|k| law.pmf(k))
+                .map(|k| binomial.pmf(k))
                 .sum();
             // Without an event the interval has one side: twice the error there.
             assert!(covered >= 0.925, "{probability}: {covered}");
@@ -205,18 +205,18 @@ mod tests {
     #[test]
     fn oracle_quantiles_by_hand() {
         let values: Vec<f64> = (1..=100).rev().map(f64::from).collect();
-        let own = summary(&values).unwrap();
-        assert_eq!((own.cases, own.mean, own.worst), (100, 50.5, 0));
-        let of = |p: f64| *own.quantiles.iter().find(|q| q.probability == p).unwrap();
+        let summary = summary(&values).unwrap();
+        assert_eq!((summary.cases, summary.mean, summary.worst), (100, 50.5, 0));
+        let quantile = |p: f64| *summary.quantiles.iter().find(|q| q.probability == p).unwrap();
         assert_eq!(
-            (of(0.0).value, of(0.5).value, of(0.95).value, of(1.0).value),
+            (quantile(0.0).value, quantile(0.5).value, quantile(0.95).value, quantile(1.0).value),
             (1.0, 50.0, 95.0, 100.0)
         );
         // The usual interval of the median of 100 values: the 40th to the 61st.
-        assert_eq!((of(0.5).low, of(0.5).high), (Some(40.0), Some(61.0)));
-        assert_eq!(of(0.999).high, None);
-        assert!(summary(&[f64::NAN]).is_none());
-        assert_eq!(summary(&[f64::NAN, 3.0, 1.0]).unwrap().worst, 1);
+        assert_eq!((quantile(0.5).low, quantile(0.5).high), (Some(40.0), Some(61.0)));
+        assert_eq!(quantile(0.999).high, None);
+        assert!(super::summary(&[f64::NAN]).is_none());
+        assert_eq!(super::summary(&[f64::NAN, 3.0, 1.0]).unwrap().worst, 1);
     }
 
     #[test]
@@ -225,11 +225,13 @@ mod tests {
         // and s with the probability that r to s - 1 of n values are below it.
         for (n, p) in [(100, 0.5), (60, 0.95), (1000, 0.99)] {
             let values: Vec<f64> = (1..=n).map(f64::from).collect();
-            let own = quantile(&values, p);
-            let (low, high) =
-                (own.low.unwrap_or(0.0) as u64, own.high.map_or(n as u64 + 1, |h| h as u64));
-            let law = Binomial::new(p, n as u64).unwrap();
-            let covered: f64 = (low..high).map(|k| law.pmf(k)).sum();
+            let estimate = quantile(&values, p);
+            let (low, high) = (
+                estimate.low.unwrap_or(0.0) as u64,
+                estimate.high.map_or(n as u64 + 1, |h| h as u64),
+            );
+            let binomial = Binomial::new(p, n as u64).unwrap();
+            let covered: f64 = (low..high).map(|k| binomial.pmf(k)).sum();
             assert!(covered >= 0.95, "{n} {p}: {covered}");
         }
     }

@@ -21,7 +21,7 @@ pub enum Values {
     Optional(Vec<Option<f64>>),
     /// Whole numbers, such as that of a case.
     Count(Vec<i64>),
-    /// Integers of a unit.
+    /// Integers of an FMU.
     Integer(Vec<i32>),
     /// Truth values.
     Flag(Vec<bool>),
@@ -47,8 +47,8 @@ impl Values {
         self.len() == 0
     }
 
-    /// Returns the values as numbers, with 1 and 0 for yes and no; what is missing, and texts, are
-    /// not numbers.
+    /// Returns the values as numbers, with 1 and 0 for yes and no. Missing values and texts become
+    /// NaN.
     pub fn numbers(&self) -> Vec<f64> {
         match self {
             Self::Real(values) => values.clone(),
@@ -63,12 +63,12 @@ impl Values {
     /// Moves the values of another column of the same type behind these.
     fn append(&mut self, other: Self) -> Result<(), ParquetError> {
         match (self, other) {
-            (Self::Real(own), Self::Real(mut other)) => own.append(&mut other),
-            (Self::Optional(own), Self::Optional(mut other)) => own.append(&mut other),
-            (Self::Count(own), Self::Count(mut other)) => own.append(&mut other),
-            (Self::Integer(own), Self::Integer(mut other)) => own.append(&mut other),
-            (Self::Flag(own), Self::Flag(mut other)) => own.append(&mut other),
-            (Self::Text(own), Self::Text(mut other)) => own.append(&mut other),
+            (Self::Real(values), Self::Real(mut more)) => values.append(&mut more),
+            (Self::Optional(values), Self::Optional(mut more)) => values.append(&mut more),
+            (Self::Count(values), Self::Count(mut more)) => values.append(&mut more),
+            (Self::Integer(values), Self::Integer(mut more)) => values.append(&mut more),
+            (Self::Flag(values), Self::Flag(mut more)) => values.append(&mut more),
+            (Self::Text(values), Self::Text(mut more)) => values.append(&mut more),
             _ => return Err(ParquetError::General("columns of different types".into())),
         }
         Ok(())
@@ -158,14 +158,14 @@ pub struct Column {
     pub values: Values,
 }
 
-/// A table whose columns have the same length.
+/// A table of cases, whose columns have the same length.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Table {
+pub struct CaseTable {
     /// Columns of the table, in order.
     pub columns: Vec<Column>,
 }
 
-impl Table {
+impl CaseTable {
     /// Returns the number of rows.
     pub fn rows(&self) -> usize {
         self.columns.first().map_or(0, |column| column.values.len())
@@ -192,8 +192,8 @@ impl Table {
             *self = other;
             return Ok(());
         }
-        for (own, other) in self.columns.iter_mut().zip(other.columns) {
-            own.values.append(other.values)?;
+        for (column, more) in self.columns.iter_mut().zip(other.columns) {
+            column.values.append(more.values)?;
         }
         Ok(())
     }

@@ -20,14 +20,14 @@ pub enum Error {
     },
     /// A study was asked to end before all of its runs were complete.
     #[error(
-        "ended by {request}: {done} of {all} parts are finished and kept in {}; the same command goes on from there",
+        "ended by {request}: {done} of {total} parts are finished and kept in {}; the same command continues from there",
         out.display()
     )]
     Unfinished {
         /// Number of parts that are complete and kept.
         done: usize,
         /// Number of parts in the study.
-        all: usize,
+        total: usize,
         /// Folder of the study's results.
         out: PathBuf,
         /// The request that ended the study.

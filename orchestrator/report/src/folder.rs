@@ -24,7 +24,7 @@ impl Folder {
     pub fn check(path: &Path, replaces: bool) -> Result<(), Error> {
         if path.exists() && !path.is_dir() {
             return Err(Error::experiment(format!(
-                "--out {} is a file: results go into a folder, name another one",
+                "--out {} is a file, but results go into a folder",
                 path.display()
             )));
         }

@@ -1,5 +1,5 @@
-//! A unit's guarantee that limits are kept: when it is in force, and whether the limits are kept
-//! then.
+//! A controller's guarantee that limits are kept: when it is in force, and whether the limits are
+//! kept then.
 
 use crate::measure::larger;
 use cosim::error::Error;
@@ -9,16 +9,16 @@ use cosim::signal::Resolved;
 use cosim::system::{Probed, System};
 use std::sync::Arc;
 
-/// Variables in which a unit reports whether its guarantee is in force.
+/// Variables in which a controller reports whether its guarantee is in force.
 #[derive(Clone, Debug, Default)]
-pub struct Signals {
+pub struct GuaranteeSignals {
     /// Index, among a sample's values, of the variable that tells whether the guarantee is in
     /// force.
     pub in_force: usize,
     /// Variable that tells why the guarantee is or is not in force, of an enumeration type.
     pub status: Option<Probed>,
-    /// Names of the limits, with the indices of the variables that hold the share left beyond what
-    /// is reserved.
+    /// Names of the limits, with the indices of the variables that hold the unused share of the
+    /// limit after the reserve for disturbances.
     pub margins: Vec<(String, usize)>,
     /// Signals as multiples of their limits, which must not exceed 1 while the guarantee is in
     /// force.
@@ -27,24 +27,24 @@ pub struct Signals {
 
 /// The first tick at which the guarantee was no longer in force.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Loss {
+pub struct GuaranteeLoss {
     /// Time of that tick, s.
     pub time: f64,
     /// Status of the guarantee at that tick.
     pub status: Option<f64>,
 }
 
-/// Course of the guarantee up to a tick.
+/// Record of the guarantee up to a tick.
 #[derive(Clone, Debug, Default)]
-pub struct Course {
-    /// Variables that the course is computed from. They are shared, because the live view copies
-    /// the course at every communication point.
-    pub signals: Arc<Signals>,
+pub struct GuaranteeRecord {
+    /// Variables that the record is computed from. They are shared, because the live view copies
+    /// the record at every communication point.
+    pub signals: Arc<GuaranteeSignals>,
     ticks: u64,
     ticks_in_force: u64,
     status: Option<f64>,
     /// Tick at which the guarantee was first lost, if it was.
-    pub lost: Option<Loss>,
+    pub lost: Option<GuaranteeLoss>,
     /// Smallest margins seen while the guarantee was in force; `None` if it never was.
     pub margins: Vec<Option<f64>>,
     /// Whether a limit was exceeded at a tick at which the guarantee was in force.
@@ -59,31 +59,31 @@ fn smaller(a: f64, b: f64) -> f64 {
     if b < a || b.is_nan() { b } else { a }
 }
 
-impl Signals {
-    /// Finds the variables of a guarantee; `None` if they may be missing and the units lack one
+impl GuaranteeSignals {
+    /// Finds the variables of a guarantee; `None` if they may be missing and the FMUs lack one
     /// that is needed.
     ///
     /// # Errors
     /// Returns an error if a required variable does not exist.
-    pub fn find(asked: &Guarantee, system: &mut System) -> Result<Option<Self>, String> {
+    pub fn find(guarantee: &Guarantee, system: &mut System) -> Result<Option<Self>, String> {
         let is_left_out = |path: &str, system: &System| {
-            asked.optional && !system.has(path) || system.lost_by_exchange([path])
+            guarantee.optional && !system.has(path) || system.lost_by_exchange([path])
         };
-        if is_left_out(&asked.in_force, system) {
+        if is_left_out(&guarantee.in_force, system) {
             return Ok(None);
         }
-        let in_force = system.probe(&asked.in_force)?.place;
+        let in_force = system.probe(&guarantee.in_force)?.place;
         let mut signals = Self { in_force, ..Self::default() };
-        if let Some(path) = asked.status.as_ref().filter(|path| !is_left_out(path, system)) {
+        if let Some(path) = guarantee.status.as_ref().filter(|path| !is_left_out(path, system)) {
             signals.status = Some(system.probe(path)?);
         }
-        for (name, path) in &asked.margins {
+        for (name, path) in &guarantee.margins {
             if !is_left_out(path, system) {
                 signals.margins.push((name.clone(), system.probe(path)?.place));
             }
         }
         let observe = system.experiment.observe.clone();
-        let keeps = asked.keeps.as_ref().map_or(Ok(&[][..]), |name| observe.list(name))?;
+        let keeps = guarantee.keeps.as_ref().map_or(Ok(&[][..]), |name| observe.list(name))?;
         for signal in keeps {
             if !system.lost_by_exchange(signal.paths()) {
                 signals.keeps.push(system.resolve(signal)?);
@@ -93,9 +93,9 @@ impl Signals {
     }
 }
 
-impl Course {
-    /// Creates a course that has seen no samples.
-    pub fn new(signals: Signals) -> Self {
+impl GuaranteeRecord {
+    /// Creates a record that has seen no samples.
+    pub fn new(signals: GuaranteeSignals) -> Self {
         let margins = vec![None; signals.margins.len()];
         Self { margins, signals: Arc::new(signals), ..Self::default() }
     }
@@ -141,22 +141,22 @@ impl Course {
     }
 
     /// Formats margins as part of a sentence.
-    pub fn told(&self, margins: &[Option<f64>]) -> String {
-        told(
+    pub fn margins_text(&self, margins: &[Option<f64>]) -> String {
+        margins_text(
             margins.iter().copied().zip(self.signals.margins.iter().map(|(name, _)| name.as_str())),
         )
     }
 }
 
 /// Formats margins with their names as part of a sentence.
-pub(crate) fn told<'a>(margins: impl Iterator<Item = (Option<f64>, &'a str)>) -> String {
-    let known = margins.filter_map(|(margin, name)| Some((margin?, name)));
+pub(crate) fn margins_text<'a>(margins: impl Iterator<Item = (Option<f64>, &'a str)>) -> String {
+    let present = margins.filter_map(|(margin, name)| Some((margin?, name)));
     let texts: Vec<String> =
-        known.map(|(margin, name)| format!("{:.1} % ({name})", margin * 100.0)).collect();
+        present.map(|(margin, name)| format!("{:.1} % ({name})", margin * 100.0)).collect();
     if texts.is_empty() { String::new() } else { format!(", margins {}", texts.join(", ")) }
 }
 
-impl Observer for Course {
+impl Observer for GuaranteeRecord {
     fn observe(&mut self, sample: &Sample) -> Result<(), Error> {
         let values = sample.values;
         // At the stop time the status is that of the step before, which covers the state there.
@@ -173,7 +173,7 @@ impl Observer for Course {
                 self.signals.keeps.iter().map(|signal| signal.value(values)).fold(0.0, larger);
             self.broken |= largest.is_nan() || largest > 1.0 + ROUNDING;
         } else if self.ticks_in_force > 0 && self.lost.is_none() {
-            self.lost = Some(Loss { time: sample.time, status: self.status });
+            self.lost = Some(GuaranteeLoss { time: sample.time, status: self.status });
         }
         Ok(())
     }
@@ -183,11 +183,11 @@ impl Observer for Course {
 mod tests {
     use super::*;
 
-    /// Creates a course from rows of values: in force, status, margins of rate and moment, and rate
+    /// Creates a record from rows of values: in force, status, margins of rate and moment, and rate
     /// and moment, whose limits are 0.1 and 10.
-    fn course(rows: &[[f64; 6]]) -> Course {
+    fn record(rows: &[[f64; 6]]) -> GuaranteeRecord {
         let keeps = |place| Resolved::variable(place);
-        let mut course = Course::new(Signals {
+        let mut record = GuaranteeRecord::new(GuaranteeSignals {
             in_force: 0,
             status: Some(Probed { place: 1, ..Probed::default() }),
             margins: vec![("rate".into(), 2), ("moment".into(), 3)],
@@ -198,14 +198,14 @@ mod tests {
             (values[4], values[5]) = (row[4] / 0.1, row[5] / 10.0);
             let time = 0.5 * tick as f64;
             let last = tick + 1 == rows.len();
-            course.observe(&Sample { tick: tick as u64, time, last, values: &values }).unwrap();
+            record.observe(&Sample { tick: tick as u64, time, last, values: &values }).unwrap();
         }
-        course
+        record
     }
 
     #[test]
     fn oracle_share_loss_and_margins_by_hand() {
-        let course = course(&[
+        let record = record(&[
             // The guarantee is not in force yet: this is no loss, and margins and limits do not
             // count.
             [0.0, 2.0, -1.0, -1.0, 9.0, 99.0],
@@ -217,32 +217,32 @@ mod tests {
             [0.0, 4.0, 0.0, 0.0, 0.0, 0.0],
         ]);
         // At the last row no step begins.
-        assert_eq!(course.share(), Some(0.6));
-        assert_eq!(course.lost, Some(Loss { time: 1.5, status: Some(5.0) }));
-        assert_eq!(course.status(), Some(5.0));
-        assert_eq!(course.margins, [Some(0.2), Some(0.1)]);
-        assert!(!course.broken);
+        assert_eq!(record.share(), Some(0.6));
+        assert_eq!(record.lost, Some(GuaranteeLoss { time: 1.5, status: Some(5.0) }));
+        assert_eq!(record.status(), Some(5.0));
+        assert_eq!(record.margins, [Some(0.2), Some(0.1)]);
+        assert!(!record.broken);
     }
 
     #[test]
     fn a_limit_that_is_exceeded_in_force_is_a_defect() {
-        assert!(!course(&[[1.0, 1.0, 0.0, 0.0, 0.1 * (1.0 + 1e-12), 10.0]]).broken);
-        assert!(course(&[[1.0, 1.0, 0.0, 0.0, 0.1001, 0.0]]).broken);
-        assert!(course(&[[1.0, 1.0, 0.0, 0.0, 0.0, 10.01]]).broken);
-        assert!(course(&[[1.0, 1.0, 0.0, 0.0, f64::NAN, 0.0]]).broken);
-        assert!(!course(&[[0.0, 3.0, 0.0, 0.0, 0.2, 20.0]]).broken);
+        assert!(!record(&[[1.0, 1.0, 0.0, 0.0, 0.1 * (1.0 + 1e-12), 10.0]]).broken);
+        assert!(record(&[[1.0, 1.0, 0.0, 0.0, 0.1001, 0.0]]).broken);
+        assert!(record(&[[1.0, 1.0, 0.0, 0.0, 0.0, 10.01]]).broken);
+        assert!(record(&[[1.0, 1.0, 0.0, 0.0, f64::NAN, 0.0]]).broken);
+        assert!(!record(&[[0.0, 3.0, 0.0, 0.0, 0.2, 20.0]]).broken);
     }
 
     #[test]
     fn what_was_never_in_force_was_not_lost_and_has_no_margins() {
-        let course = course(&[[0.0, 2.0, 0.1, 0.1, 0.0, 0.0], [0.0, 3.0, 0.1, 0.1, 0.0, 0.0]]);
-        assert_eq!((course.share(), course.lost, course.status()), (Some(0.0), None, Some(3.0)));
-        assert_eq!(course.margins, [None; 2]);
+        let record = record(&[[0.0, 2.0, 0.1, 0.1, 0.0, 0.0], [0.0, 3.0, 0.1, 0.1, 0.0, 0.0]]);
+        assert_eq!((record.share(), record.lost, record.status()), (Some(0.0), None, Some(3.0)));
+        assert_eq!(record.margins, [None; 2]);
     }
 
     #[test]
     fn a_margin_that_is_not_a_number_is_not_hidden() {
-        let course = course(&[[1.0, 1.0, 0.1, f64::NAN, 0.0, 0.0], [1.0, 1.0, 0.1, 0.1, 0.0, 0.0]]);
-        assert!(course.margins[1].is_some_and(f64::is_nan));
+        let record = record(&[[1.0, 1.0, 0.1, f64::NAN, 0.0, 0.0], [1.0, 1.0, 0.1, 0.1, 0.0, 0.0]]);
+        assert!(record.margins[1].is_some_and(f64::is_nan));
     }
 }

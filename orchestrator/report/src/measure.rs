@@ -32,7 +32,7 @@ pub(crate) struct Gauge {
     samples: Vec<f64>,
     /// Values of all signals, sample by sample, which are kept only for their spectrum, and the
     /// time of the first one.
-    courses: Vec<f64>,
+    spectrum_samples: Vec<f64>,
     began: f64,
     variation: f64,
     rises: u64,
@@ -65,7 +65,7 @@ impl Gauge {
         let responds = signals.iter().any(|signal| signal.responds);
         let steps = measure.steps || responds && measure.kind != MeasureKind::Integral;
         let each = measure.each.as_ref().map(|path| system.probe(path)).transpose()?;
-        let mut gauge = Self::of(&Measure { steps, ..measure.clone() }, signals);
+        let mut gauge = Self::empty(&Measure { steps, ..measure.clone() }, signals);
         gauge.each = each.map(|probed| (probed.place, 0.0));
         if measure.kind == MeasureKind::P99 {
             // This is enough room for a usual run; a longer run allocates more.
@@ -74,7 +74,7 @@ impl Gauge {
         Ok(gauge)
     }
 
-    pub(crate) fn of(measure: &Measure, signals: Vec<Resolved>) -> Self {
+    pub(crate) fn empty(measure: &Measure, signals: Vec<Resolved>) -> Self {
         Self {
             measure: measure.clone(),
             signals,
@@ -88,7 +88,7 @@ impl Gauge {
             largest: 0.0,
             pulses: 0,
             samples: Vec::new(),
-            courses: Vec::new(),
+            spectrum_samples: Vec::new(),
             began: 0.0,
             variation: 0.0,
             rises: 0,
@@ -98,14 +98,14 @@ impl Gauge {
         }
     }
 
-    /// Forgets what was measured, so that another run can be measured.
+    /// Forgets all samples, so that another run can be measured.
     pub(crate) fn reset(&mut self) {
         let signals = std::mem::take(&mut self.signals);
         let each = self.each.map(|(place, _)| (place, 0.0));
-        *self = Self { each, ..Self::of(&self.measure, signals) };
+        *self = Self { each, ..Self::empty(&self.measure, signals) };
     }
 
-    /// Returns the number, or `None` if there is none.
+    /// Returns the value of the measure; `None` if it has none.
     pub(crate) fn value(&self) -> Option<f64> {
         let factor = self.measure.unit.as_ref().map_or(1.0, |unit| unit.factor);
         (self.count > 0).then_some(())?;
@@ -133,7 +133,8 @@ impl Gauge {
                 let step = (self.last - self.began) / (count - 1.0);
                 let frequency = self.measure.frequency.unwrap_or(0.0);
                 let signals = self.first.len();
-                spectrum::rms_above(&self.courses, signals, step, frequency).map(|rms| factor * rms)
+                spectrum::rms_above(&self.spectrum_samples, signals, step, frequency)
+                    .map(|rms| factor * rms)
             }
         }
     }
@@ -175,8 +176,8 @@ impl Gauge {
             let least = self.measure.bound.unwrap_or(0.0);
             self.rises += u64::from(rise.is_some_and(|rise| rise > least));
         }
-        if self.measure.kind == MeasureKind::RmsAbove {
-            self.courses.extend(values);
+        if self.measure.kind == Kind::RmsAbove {
+            self.spectrum_samples.extend(values);
         }
         // By the trapezoidal rule. At the first sample, the values before it are zero and no time
         // has passed.
@@ -240,12 +241,12 @@ impl Observer for Gauge {
     }
 }
 
-/// Creates the gauge that an experiment asks for; `None` if the measure is optional and the units
+/// Creates the gauge that an experiment asks for; `None` if the measure is optional and the FMUs
 /// lack what it needs.
 ///
 /// # Errors
 /// Returns an error if a list or a variable does not exist.
-pub(crate) fn asked(
+pub(crate) fn gauge_for(
     measure: &Measure,
     observe: &Observe,
     system: &mut System,
@@ -289,7 +290,7 @@ mod tests {
         let (band, bound) = if kind == MeasureKind::Leaving { (None, size) } else { (size, None) };
         let measure =
             Measure { kind, signals, over, band, hold, bound, ..measure("kind = \"rms\"") };
-        let mut gauge = Gauge::of(&measure, Vec::new());
+        let mut gauge = Gauge::empty(&measure, Vec::new());
         for (time, row) in rows.iter().enumerate() {
             gauge.see(time as f64, row);
         }
@@ -342,7 +343,7 @@ mod tests {
     /// Computes a measure of the first of two variables from rows of both.
     fn taken(text: &str, rows: &[[f64; 2]]) -> Option<f64> {
         let measure = measure(text);
-        let mut gauge = Gauge::of(&measure, vec![Resolved::variable(0)]);
+        let mut gauge = Gauge::empty(&measure, vec![Resolved::variable(0)]);
         gauge.each = measure.each.as_ref().map(|_| (1, 0.0));
         for (tick, row) in rows.iter().enumerate() {
             let (time, last) = (tick as f64, tick + 1 == rows.len());

@@ -1,7 +1,7 @@
 //! The metrics that an experiment asks for. They are computed during the run, and written to
 //! `metrics.json`.
 
-use crate::guarantee::{Course, Signals};
+use crate::guarantee::{GuaranteeRecord, GuaranteeSignals};
 use crate::measure::{self, Gauge};
 use cosim::error::Error;
 use cosim::experiment::{Guarantee, Observe};
@@ -26,7 +26,7 @@ pub enum Value {
     Text(String),
 }
 
-/// The metrics of a run. A metric is `None` (null) if the units lack a variable that it needs.
+/// The metrics of a run. A metric is `None` (null) if the FMUs lack a variable that it needs.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Metrics {
     /// Metrics that the experiment asks for, and those of the guarantee, by name.
@@ -36,7 +36,8 @@ pub struct Metrics {
     pub real_time_factor: Option<f64>,
     /// Elapsed wall-clock time, s.
     pub wall_s: f64,
-    /// Largest delay of a feedback loop in addition to the units' own, s; null if there is no loop.
+    /// Largest delay of a feedback loop in addition to the delays inside the FMUs, s; null if there
+    /// is no loop.
     pub loop_delay_s: Option<f64>,
     /// Number of communication points that the run reached.
     pub samples: u64,
@@ -63,12 +64,12 @@ const ALWAYS: [&str; 6] =
     ["real_time_factor", "wall_s", "loop_delay_s", "samples", "completed", "lost_at"];
 
 /// Further names in `metrics.json`, which stand for more than one number.
-const TABLES: [&str; 2] = ["step_us", "real_time"];
+const GROUPS: [&str; 2] = ["step_us", "real_time"];
 
 impl Metrics {
     /// Returns the names of the metrics that runs of an experiment have.
     pub fn names(observe: &Observe) -> Vec<String> {
-        let guarantee = observe.guarantee.iter().flat_map(of_guarantee);
+        let guarantee = observe.guarantee.iter().flat_map(guarantee_names);
         ALWAYS
             .map(String::from)
             .into_iter()
@@ -107,11 +108,11 @@ impl Metrics {
 }
 
 /// Returns the names of the metrics of a guarantee.
-fn of_guarantee(asked: &Guarantee) -> Vec<String> {
-    let margins = asked.margins.keys().map(|name| margin(name));
-    let kept = asked.keeps.iter().map(|_| "broken".into());
+fn guarantee_names(guarantee: &Guarantee) -> Vec<String> {
+    let margins = guarantee.margins.keys().map(|name| margin(name));
+    let broken = guarantee.keeps.iter().map(|_| "broken".into());
     let names =
-        ["share", "lost_at", "status"].map(String::from).into_iter().chain(margins).chain(kept);
+        ["share", "lost_at", "status"].map(String::from).into_iter().chain(margins).chain(broken);
     names.map(|name| format!("guarantee_{name}")).collect()
 }
 
@@ -122,9 +123,9 @@ fn margin(name: &str) -> String {
 /// An observer that computes the metrics of a run.
 pub struct Meters {
     gauges: BTreeMap<String, Option<Gauge>>,
-    /// Guarantee that the experiment names, if any, and its course, if the units have its
+    /// Guarantee that the experiment names, if any, and its record, if the FMUs have its
     /// variables.
-    guarantee: (Option<Guarantee>, Option<Course>),
+    guarantee: (Option<Guarantee>, Option<GuaranteeRecord>),
     loss: Option<Loss>,
     samples: u64,
     completed: bool,
@@ -153,24 +154,30 @@ impl Meters {
             return Err(Error::experiment(fault));
         }
         let mut taken: Vec<String> =
-            ALWAYS.iter().chain(&TABLES).map(ToString::to_string).collect();
-        taken.extend(observe.guarantee.iter().flat_map(of_guarantee));
+            ALWAYS.iter().chain(&GROUPS).map(ToString::to_string).collect();
+        taken.extend(observe.guarantee.iter().flat_map(guarantee_names));
         let mut gauges = BTreeMap::new();
         for (name, measure) in &observe.metrics {
             let fault = |problem| Error::experiment(format!("[observe.metrics.{name}] {problem}"));
             if taken.contains(name) {
-                return Err(fault("metrics.json has this name already: choose another".into()));
+                return Err(fault(
+                    "metrics.json already has an entry of this name: choose another one".into(),
+                ));
             }
-            gauges.insert(name.clone(), measure::asked(measure, &observe, system).map_err(fault)?);
+            gauges.insert(
+                name.clone(),
+                measure::gauge_for(measure, &observe, system).map_err(fault)?,
+            );
         }
         let fault = |problem| Error::experiment(format!("[observe.guarantee] {problem}"));
         let guarantee = observe.guarantee.clone();
-        let signals = guarantee.as_ref().map(|asked| Signals::find(asked, system)).transpose();
-        let course = signals.map_err(fault)?.flatten().map(Course::new);
+        let signals =
+            guarantee.as_ref().map(|asked| GuaranteeSignals::find(asked, system)).transpose();
+        let record = signals.map_err(fault)?.flatten().map(GuaranteeRecord::new);
         let loss = observe.loss.as_ref().map(|loss| {
             let fault = |problem| Error::experiment(format!("[observe.loss] {problem}"));
             if loss.beyond.is_nan() || loss.beyond <= 0.0 {
-                return Err(fault(format!("beyond = {}: above 0", loss.beyond)));
+                return Err(fault(format!("beyond = {}, but it must be above 0", loss.beyond)));
             }
             let signals = observe.list(&loss.signals).map_err(fault)?;
             let (what, list, beyond) = (loss.what.clone(), loss.signals.clone(), loss.beyond);
@@ -183,7 +190,7 @@ impl Meters {
             Ok(Some(Loss { what, list, signals, beyond, ends_run: false, at: None }))
         });
         let loss = loss.transpose()?.flatten();
-        Ok(Self { gauges, guarantee: (guarantee, course), loss, samples: 0, completed: false })
+        Ok(Self { gauges, guarantee: (guarantee, record), loss, samples: 0, completed: false })
     }
 
     /// Makes the run end when it is lost.
@@ -195,11 +202,11 @@ impl Meters {
         self
     }
 
-    /// Forgets what was measured, so that another run of the system can be measured.
+    /// Forgets all samples, so that another run of the system can be measured.
     pub fn reset(&mut self) {
         self.gauges.values_mut().flatten().for_each(Gauge::reset);
-        if let Some(course) = &mut self.guarantee.1 {
-            course.reset();
+        if let Some(record) = &mut self.guarantee.1 {
+            record.reset();
         }
         if let Some(loss) = &mut self.loss {
             loss.at = None;
@@ -242,20 +249,20 @@ impl Meters {
         let gauges = self.gauges.iter();
         let mut asked: BTreeMap<_, _> =
             gauges.map(|(name, gauge)| (name.clone(), gauge.as_ref().and_then(value))).collect();
-        if let (Some(guarantee), course) = &self.guarantee {
-            asked.extend(of_guarantee(guarantee).into_iter().map(|name| (name, None)));
-            if let Some(course) = course {
+        if let (Some(guarantee), record) = &self.guarantee {
+            asked.extend(guarantee_names(guarantee).into_iter().map(|name| (name, None)));
+            if let Some(record) = record {
                 let mut set = |name: &str, value: Option<Value>| {
                     asked.insert(format!("guarantee_{name}"), value);
                 };
-                set("share", course.share().map(Value::Number));
-                set("lost_at", course.lost.map(|loss| Value::Number(loss.time)));
-                set("status", course.status().map(|status| Value::Text(course.name_of(status))));
-                for ((name, _), least) in course.signals.margins.iter().zip(&course.margins) {
+                set("share", record.share().map(Value::Number));
+                set("lost_at", record.lost.map(|loss| Value::Number(loss.time)));
+                set("status", record.status().map(|status| Value::Text(record.name_of(status))));
+                for ((name, _), least) in record.signals.margins.iter().zip(&record.margins) {
                     set(&margin(name), least.map(Value::Number));
                 }
-                if !course.signals.keeps.is_empty() {
-                    set("broken", Some(Value::Flag(course.broken)));
+                if !record.signals.keeps.is_empty() {
+                    set("broken", Some(Value::Flag(record.broken)));
                 }
             }
         }
@@ -277,8 +284,8 @@ impl Observer for Meters {
         for gauge in self.gauges.values_mut().flatten() {
             gauge.observe(sample)?;
         }
-        if let Some(course) = &mut self.guarantee.1 {
-            course.observe(sample)?;
+        if let Some(record) = &mut self.guarantee.1 {
+            record.observe(sample)?;
         }
         self.samples += 1;
         self.completed |= sample.last;

@@ -56,7 +56,7 @@ pub fn draw(
         curves,
     };
     let names: Vec<String> = steps.iter().map(|(name, _)| name.clone()).collect();
-    let courses = steps
+    let step_curves = steps
         .into_iter()
         .enumerate()
         .map(|(index, (name, series))| line(&name, color(index), series));
@@ -67,7 +67,7 @@ pub fn draw(
             .map(|component| columns(name, color(index), &component.step_ms.histogram))
     });
     let mut panels = vec![
-        panel("step time, ms", "time, s", false, courses.collect()),
+        panel("step time, ms", "time, s", false, step_curves.collect()),
         panel("number of steps", "duration, ms", true, counts.collect()),
     ];
     if report.wake_up_ms.count > 0 {

@@ -29,54 +29,57 @@ pub struct Curve {
     /// Name of the curve in the legend.
     pub name: String,
     /// Signal that is drawn as the curve.
-    pub of: Resolved,
+    pub signal: Resolved,
     /// Signal that the curve is to follow, if any.
     pub reference: Option<Resolved>,
 }
 
 impl Panel {
     /// Finds the signals of all panels of an experiment. Signals that are missing because the
-    /// command line replaced their unit are left out.
+    /// command line replaced their FMU are left out.
     ///
     /// # Errors
     /// Returns an error if a variable does not exist.
-    pub fn all(system: &mut System) -> Result<Vec<Self>, Error> {
+    pub fn resolve_all(system: &mut System) -> Result<Vec<Self>, Error> {
         let panels = system.experiment.observe.panels.clone();
-        let found = panels.iter().map(|panel| {
+        let resolved = panels.iter().map(|panel| {
             let fault = |problem| {
                 Error::experiment(format!("[[observe.panels]] \"{}\": {problem}", panel.name))
             };
-            Self::find(panel, system).map_err(fault)
+            Self::resolve(panel, system).map_err(fault)
         });
-        let found = found.collect::<Result<Vec<_>, _>>()?;
-        Ok(found.into_iter().filter(|panel| !panel.curves.is_empty()).collect())
+        let resolved = resolved.collect::<Result<Vec<_>, _>>()?;
+        Ok(resolved.into_iter().filter(|panel| !panel.curves.is_empty()).collect())
     }
 
-    fn find(asked: &experiment::Panel, system: &mut System) -> Result<Self, String> {
-        let mut found = |signal: &Signal| {
+    fn resolve(requested: &experiment::Panel, system: &mut System) -> Result<Self, String> {
+        let mut resolve = |signal: &Signal| {
             if system.lost_by_exchange(signal.paths()) {
                 return Ok(None);
             }
             system.resolve(signal).map(Some)
         };
         let mut curves = Vec::new();
-        for experiment::Curve { name, of, reference } in &asked.curves {
-            let reference = reference.as_ref().map(&mut found).transpose()?.flatten();
-            curves.extend(found(of)?.map(|of| Curve { name: name.clone(), of, reference }));
+        for experiment::Curve { name, of, reference } in &requested.curves {
+            let reference = reference.as_ref().map(&mut resolve).transpose()?.flatten();
+            let signal = resolve(of)?;
+            curves.extend(signal.map(|signal| Curve { name: name.clone(), signal, reference }));
         }
-        let limit = asked.limit.as_ref().map(&mut found).transpose()?.flatten();
+        let limit = requested.limit.as_ref().map(&mut resolve).transpose()?.flatten();
         let followed = curves.iter().filter_map(|curve| curve.reference.as_ref());
-        let drawn = curves.iter().map(|curve| &curve.of).chain(followed).chain(&limit);
-        let own = common_unit(drawn)?.to_string();
-        let (unit, factor) =
-            asked.unit.as_ref().map_or((own, 1.0), |unit| (unit.name.clone(), unit.factor));
-        let label = if asked.label.is_empty() { &asked.name } else { &asked.label };
-        Ok(Self { name: asked.name.clone(), label: label.clone(), unit, factor, curves, limit })
+        let drawn = curves.iter().map(|curve| &curve.signal).chain(followed).chain(&limit);
+        let signal_unit = common_unit(drawn)?.to_string();
+        let (unit, factor) = requested
+            .unit
+            .as_ref()
+            .map_or((signal_unit, 1.0), |unit| (unit.name.clone(), unit.factor));
+        let label = if requested.label.is_empty() { &requested.name } else { &requested.label };
+        Ok(Self { name: requested.name.clone(), label: label.clone(), unit, factor, curves, limit })
     }
 
     /// Returns the values of the curves in a sample.
     pub fn values<'a>(&'a self, sample: &'a [f64]) -> impl Iterator<Item = f64> + 'a {
-        self.curves.iter().map(|curve| self.factor * curve.of.value(sample))
+        self.curves.iter().map(|curve| self.factor * curve.signal.value(sample))
     }
 
     /// Returns whether any of the curves has a reference.
@@ -87,8 +90,8 @@ impl Panel {
     /// Returns the references of the curves in a sample. A value is not a number if a curve has no
     /// reference.
     pub fn references<'a>(&'a self, sample: &'a [f64]) -> impl Iterator<Item = f64> + 'a {
-        let of = |signal: &Resolved| self.factor * signal.value(sample);
-        self.curves.iter().map(move |curve| curve.reference.as_ref().map_or(f64::NAN, of))
+        let scaled = |signal: &Resolved| self.factor * signal.value(sample);
+        self.curves.iter().map(move |curve| curve.reference.as_ref().map_or(f64::NAN, scaled))
     }
 
     /// Returns the limit of the norm of all curves in a sample, if there is one.

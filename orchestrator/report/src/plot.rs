@@ -72,9 +72,9 @@ impl Curves {
         let mut curves: Vec<_> = pale
             .map(|(y, color)| self.curve("thin: reference", color, Shape::Pale, y.clone()))
             .collect();
-        let own = panel.curves.iter().zip(values).zip(colors());
+        let named = panel.curves.iter().zip(values).zip(colors());
         curves.extend(
-            own.map(|((curve, y), color)| self.curve(&curve.name, color, Shape::Line, y.clone())),
+            named.map(|((curve, y), color)| self.curve(&curve.name, color, Shape::Line, y.clone())),
         );
         if let Some(limit) = *limit {
             let norm = |k: usize| values.iter().map(|y| y[k] * y[k]).sum::<f64>().sqrt();

@@ -72,7 +72,7 @@ pub struct Parts {
     bar: ProgressBar,
     what: &'static str,
     quiet: bool,
-    all: u64,
+    total: u64,
     last_line: Mutex<Instant>,
 }
 
@@ -80,20 +80,20 @@ pub struct Parts {
 const BETWEEN_LINES: Duration = Duration::from_secs(5);
 
 impl Parts {
-    /// Creates a display for `all` parts, of which `done` are complete already. `what` names the
+    /// Creates a display for `total` parts, of which `done` are complete already. `what` names the
     /// parts, in the plural.
-    pub fn of(what: &'static str, title: &str, all: u64, done: u64, quiet: bool) -> Self {
-        let quiet = quiet || done == all;
+    pub fn new(what: &'static str, title: &str, total: u64, done: u64, quiet: bool) -> Self {
+        let quiet = quiet || done == total;
         if !stderr().is_terminal() && !quiet {
-            tell(format_args!("{title}: {} of {all} {what} to run", all - done));
+            tell(format_args!("{title}: {} of {total} {what} to run", total - done));
         }
         let template =
             format!("[{{bar:40}}] {{pos}} of {{len}} {what}, {{per_sec}}, {{eta}} left, {{msg}}");
-        let bar = bar(all, quiet, &template);
+        let bar = bar(total, quiet, &template);
         bar.set_position(done);
         bar.reset_eta();
         bar.enable_steady_tick(Duration::from_millis(200));
-        Self { bar, what, quiet, all, last_line: Mutex::new(Instant::now()) }
+        Self { bar, what, quiet, total, last_line: Mutex::new(Instant::now()) }
     }
 
     /// Counts one more part as finished.
@@ -111,7 +111,7 @@ impl Parts {
             tell(format_args!(
                 "{} of {} {what} done, {rate:.0} per second",
                 self.bar.position(),
-                self.all
+                self.total
             ));
             *last = Instant::now();
         }

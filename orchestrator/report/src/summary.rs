@@ -1,8 +1,8 @@
 //! Prints the outcome of a run or of a study to standard output.
 
-use crate::guarantee::told;
+use crate::guarantee::margins_text;
 use crate::metrics::{Metrics, Value};
-use crate::study::reproduce;
+use crate::study::reproduce::StudyReport;
 use cosim::error::Error;
 use cosim::experiment::{Coupling, Observe};
 use cosim::system::System;
@@ -10,9 +10,9 @@ use fmu_import::quantity::rounded;
 use std::io::{self, Write};
 use std::path::PathBuf;
 
-/// Outcome of a run.
+/// Report on a run.
 #[derive(Debug)]
-pub struct Report {
+pub struct RunReport {
     /// Metrics of the run.
     pub metrics: Metrics,
     /// Folder that holds the results.
@@ -28,7 +28,7 @@ pub struct Report {
 ///
 /// # Errors
 /// Returns an error if the text cannot be written.
-pub fn summary(system: &System, report: &Report, out: &mut impl Write) -> io::Result<()> {
+pub fn summary(system: &System, report: &RunReport, out: &mut impl Write) -> io::Result<()> {
     let (System { clock, experiment, order, loops, .. }, metrics) = (system, &report.metrics);
     let coupling = match experiment.simulation.coupling {
         Coupling::Sequential => "sequential",
@@ -45,11 +45,11 @@ pub fn summary(system: &System, report: &Report, out: &mut impl Write) -> io::Re
         order.join(", ")
     )?;
     let mut line = |label: &str, text: String| writeln!(out, "  {label:<17} {text}");
-    for (label, text) in asked(&experiment.observe, metrics) {
+    for (label, text) in metric_lines(&experiment.observe, metrics) {
         line(&label, text)?;
     }
     if experiment.observe.metrics.is_empty() {
-        line("metrics", "none: the experiment asks for none ([observe.metrics])".into())?;
+        line("metrics", "none: the experiment defines none ([observe.metrics])".into())?;
     }
     if let Some(guarantee) = guarantee(metrics) {
         line("guarantee", guarantee)?;
@@ -82,7 +82,7 @@ pub fn summary(system: &System, report: &Report, out: &mut impl Write) -> io::Re
             String::new()
         } else {
             format!(
-                " (the worst case; not declared what outputs depend on: {})",
+                " (at most; the dependencies of the outputs are not declared: {})",
                 undeclared.join(", ")
             )
         };
@@ -105,14 +105,14 @@ pub fn summary(system: &System, report: &Report, out: &mut impl Write) -> io::Re
 ///
 /// # Errors
 /// Returns an error if the text cannot be written.
-pub fn reproduction(report: &reproduce::Report, out: &mut impl Write) -> io::Result<()> {
-    let (run, kept) = report.parts;
+pub fn reproduction(report: &StudyReport, out: &mut impl Write) -> io::Result<()> {
+    let (run, stored) = report.parts;
     writeln!(out, "{}", report.title)?;
     writeln!(
         out,
-        "  {} runs in {} parts: {run} run now, {kept} kept from before; {:.1} s elapsed",
+        "  {} runs in {} parts: {run} run now, {stored} kept from before; {:.1} s elapsed",
         report.runs,
-        run + kept,
+        run + stored,
         report.elapsed
     )?;
     for note in &report.notes {
@@ -122,7 +122,7 @@ pub fn reproduction(report: &reproduce::Report, out: &mut impl Write) -> io::Res
         writeln!(out, "  {:<14} {claim}", verdict.text())?;
     }
     writeln!(out, "  report: {}", report.page.display())?;
-    writeln!(out, "  beside it: {}", report.files[1..].join("; "))
+    writeln!(out, "  in the same folder: {}", report.files[1..].join("; "))
 }
 
 /// Formats the ratio of a value to its limit.
@@ -142,8 +142,8 @@ fn guarantee(metrics: &Metrics) -> Option<String> {
         let margin = name.strip_prefix("guarantee_")?.strip_suffix("_margin_min")?;
         Some((metrics.number(name), margin))
     });
-    let margins = told(margins);
-    let course = match number("lost_at").map(rounded) {
+    let margins = margins_text(margins);
+    let text = match number("lost_at").map(rounded) {
         _ if share == 0.0 => format!("never in force{status}"),
         Some(time) => {
             format!("in force at {:.1} % of the ticks, lost at t = {time} s{status}", share * 100.0)
@@ -154,12 +154,11 @@ fn guarantee(metrics: &Metrics) -> Option<String> {
         None => format!("in force throughout{margins}"),
     };
     let broken = number("broken") == Some(1.0);
-    Some(course + if broken { "; DEFECT: a limit was EXCEEDED while it was in force" } else { "" })
+    Some(text + if broken { "; DEFECT: a limit was EXCEEDED while it was in force" } else { "" })
 }
 
-/// Returns the lines for the metrics that the experiment wants in the summary, as headings and
-/// texts.
-fn asked(observe: &Observe, metrics: &Metrics) -> Vec<(String, String)> {
+/// Returns the lines for the metrics that the experiment lists in `summary`, as headings and texts.
+fn metric_lines(observe: &Observe, metrics: &Metrics) -> Vec<(String, String)> {
     let mut lines: Vec<(String, String)> = Vec::new();
     for name in &observe.summary {
         let (Some(measure), Some(value)) = (observe.metrics.get(name), metrics.asked.get(name))
@@ -233,9 +232,9 @@ mod tests {
             "in force throughout, margins 1.2 % (moment), 3.1 % (rate); \
              DEFECT: a limit was EXCEEDED while it was in force"
         );
-        let kept = [("share", number(0.972)), ("broken", Value::Flag(false))];
+        let intact = [("share", number(0.972)), ("broken", Value::Flag(false))];
         assert_eq!(
-            told(&kept),
+            told(&intact),
             "in force at 97.2 % of the ticks, never lost, margins 1.2 % (moment), 3.1 % (rate)"
         );
         let lost = [
@@ -274,7 +273,7 @@ mod tests {
         let units = ["mean", "largest"].map(|name| (name.to_string(), "ms".to_string()));
         let metrics = Metrics { asked: asked.into(), units: units.into(), ..Metrics::default() };
         assert_eq!(
-            super::asked(&observe, &metrics),
+            metric_lines(&observe, &metrics),
             [
                 ("time".to_string(), "mean 4.0000e-4 ms, max 2.0000 ms".to_string()),
                 ("largest rate".into(), "6.0000   EXCEEDS its limit 5.0000: 120.0 %".into()),

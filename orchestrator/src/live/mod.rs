@@ -13,7 +13,7 @@ use cosim::error::Error;
 use cosim::interrupt::{Interrupt, Request};
 use cosim::master::{Observer, Sample};
 use cosim::pacing::pacer::Tally;
-use cosim_report::guarantee::Course;
+use cosim_report::guarantee::GuaranteeRecord;
 use ratatui::DefaultTerminal;
 use ratatui::crossterm::event::{self, Event, KeyCode, KeyEvent, KeyEventKind, KeyModifiers};
 use scene::{Scene, Snapshot};
@@ -35,9 +35,9 @@ const BETWEEN_PICTURES: Duration = Duration::from_millis(66);
 pub(crate) struct Live {
     snapshot: Arc<Mutex<Snapshot>>,
     tally: Option<Rc<Cell<Tally>>>,
-    /// Status of the guarantee over time. It is followed at every communication point, because the
-    /// view does not see them all.
-    guarantee: Option<Course>,
+    /// Record of the guarantee. It is followed at every communication point, because the view does
+    /// not see them all.
+    guarantee: Option<GuaranteeRecord>,
     over: Arc<AtomicBool>,
     thread: Option<JoinHandle<io::Result<()>>>,
 }
@@ -66,7 +66,7 @@ impl Live {
         interrupt: Interrupt,
     ) -> Result<Self, Failure> {
         check_terminal()?;
-        let guarantee = scene.guarantee.clone().map(Course::new);
+        let guarantee = scene.guarantee.clone().map(GuaranteeRecord::new);
         let mut live =
             Self { snapshot: Arc::default(), tally, guarantee, over: Arc::default(), thread: None };
         log::hold();
@@ -165,7 +165,7 @@ fn request(key: KeyEvent) -> Option<Request> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use cosim_report::guarantee::Signals;
+    use cosim_report::guarantee::GuaranteeSignals;
 
     #[test]
     fn q_and_control_c_end_the_run() {
@@ -184,7 +184,7 @@ mod tests {
         let mut live = Live {
             snapshot: Arc::clone(&snapshot),
             tally: None,
-            guarantee: Some(Course::new(Signals::default())),
+            guarantee: Some(GuaranteeRecord::new(GuaranteeSignals::default())),
             over: Arc::default(),
             thread: None,
         };

@@ -4,7 +4,7 @@ use crate::failure::Failure;
 use cosim::error::Error;
 use cosim::pacing::pacer::Tally;
 use cosim::system::{Probed, System};
-use cosim_report::guarantee::{Course, Signals};
+use cosim_report::guarantee::{GuaranteeRecord, GuaranteeSignals};
 use cosim_report::panels::Panel;
 
 /// Everything in the view that stays the same during the run.
@@ -22,8 +22,8 @@ pub(crate) struct Scene {
     pub(crate) panels: Vec<Panel>,
     /// Further lines of variables, each with its heading.
     pub(crate) readings: Vec<(String, Vec<Probed>)>,
-    /// Variables of the guarantee, if a component gives one.
-    pub(crate) guarantee: Option<Signals>,
+    /// Variables of the guarantee, if a unit gives one.
+    pub(crate) guarantee: Option<GuaranteeSignals>,
     /// Recorded variables, which are shown if the experiment names no panels.
     pub(crate) recorded: Vec<Probed>,
 }
@@ -37,8 +37,8 @@ pub(crate) struct Snapshot {
     pub(crate) values: Vec<f64>,
     /// State of the pacing, if the run is paced.
     pub(crate) tally: Option<Tally>,
-    /// Status of the controller's guarantee over time, if it gives one.
-    pub(crate) guarantee: Option<Course>,
+    /// Record of the controller's guarantee, if it gives one.
+    pub(crate) guarantee: Option<GuaranteeRecord>,
 }
 
 /// Formats a variable's value with its unit, or as the name of its enumeration item.
@@ -68,7 +68,8 @@ impl Scene {
             (heading.clone(), paths.iter().filter_map(&mut probe).collect::<Vec<_>>())
         });
         let readings = readings.filter(|(_, variables)| !variables.is_empty()).collect();
-        let guarantee = observe.guarantee.as_ref().map(|asked| Signals::find(asked, system));
+        let guarantee =
+            observe.guarantee.as_ref().map(|asked| GuaranteeSignals::find(asked, system));
         let recorded = system.recorded();
         Ok(Self {
             title: system.experiment.title.clone(),

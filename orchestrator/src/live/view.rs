@@ -284,7 +284,7 @@ fn guarantee(state: &State) -> Option<Line<'static>> {
     let course = state.now.guarantee.as_ref()?;
     let status = |value: f64| format!(" ({})", course.name_of(value));
     let now = if course.is_in_force(&state.now.values) {
-        format!("in force{}", course.told(&course.margins_at(&state.now.values)))
+        format!("in force{}", course.margins_text(&course.margins_at(&state.now.values)))
     } else {
         format!("not in force{}", course.status_now().map_or(String::new(), status))
     };

@@ -196,10 +196,10 @@ fn what_has_changed_is_named_and_flown_again() {
     assert!(said.contains("1500 cases, 500 flown now") && !said.contains("changed"), "{said}");
     fs::write(bench.path("c.toml"), RANDOM.replace("1000 mm", "900 mm")).unwrap();
     let (_, said, _) = bench.call(&["campaign", "c.toml"]);
-    assert!(said.contains("flown again, as this has changed: campaign (5 parts)"), "{said}");
+    assert!(said.contains("flown again because this has changed: campaign (5 parts)"), "{said}");
     fs::write(bench.path("loop.toml"), LOOP.replace("stop = 3.0", "stop = 4.0")).unwrap();
     let (_, said, _) = bench.call(&["campaign", "c.toml"]);
-    assert!(said.contains("as this has changed: experiment (5 parts)"), "{said}");
+    assert!(said.contains("because this has changed: experiment (5 parts)"), "{said}");
 }
 
 #[test]
@@ -258,7 +258,7 @@ fn a_wrong_file_is_refused_with_the_key_the_line_and_the_nearest_name() {
             "normal = { mean = 1.0, deviation = 0.1 }",
             "a factorial design needs levels here",
         ),
-        ("list = [0.5, 1.0, 2.0]", "uniform = [2.0, 1.0]", "from a smaller to a larger value"),
+        ("list = [0.5, 1.0, 2.0]", "uniform = [2.0, 1.0]", "must be larger than the first one"),
         ("list = [0.5, 1.0, 2.0]", "list = [1.0]\nsign = 2.0", "one distribution is needed"),
         (
             "parameter = \"plant.fail.time\"\nlist = [1e9, 2.0]",

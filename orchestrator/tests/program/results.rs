@@ -103,7 +103,7 @@ none = { kind = "mean", signals = "none", optional = true }
         (
             "ratio = { kind",
             "samples = { kind",
-            "[observe.metrics.samples] metrics.json has this name already",
+            "[observe.metrics.samples] metrics.json already has an entry of this name",
         ),
         (
             "ratio = { kind",

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
-from ._data import UNITS
+from ._data import FMUS
 from ._experiment import Figure, OrchestratorError, Run, orchestrate, recorded
 from ._table import Units, check_units, convert
 
@@ -25,15 +25,15 @@ class Flown:
     """Results of a campaign."""
 
     table: pd.DataFrame
-    """One row for each case, with its number as index: what varied, metrics and measures, whether
-    each limit was kept ("kept.…"), how the case ended ("status"), and when ("time", s).
+    """One row for each case, with its number as index: varied parameters, metrics and measures,
+    whether each limit was kept ("kept.…"), how the case ended ("status"), and when ("time", s).
     `table.attrs["units"]` gives the unit of each column. Texts are categoricals, except for the
     messages of cases that failed. A number that a case does not have is NaN."""
 
     summary: dict[str, Any]
-    """What the cases show: numbers of cases, limits with the probability that they are broken,
+    """Findings over all cases: numbers of cases, limits with the probability that they are broken,
     distributions and sensitivities of the measures. Its numbers have the units of the campaign's
-    file, whatever those of the table."""
+    file, whatever the units of the table are."""
 
     folder: Path
     """Folder of the results: cases.parquet, summary.json, report.html, and the parts."""
@@ -52,8 +52,8 @@ class Search:
     """One row for each case in the order in which they were tried, as in `Flown.table`."""
 
     outcome: dict[str, Any]
-    """What was found: "largest" is the largest value of "measure", in "unit"; "broken" are the
-    limits that this case breaks, "ended" tells why the search ended."""
+    """Outcome of the search: "largest" is the largest value of "measure", in "unit"; "broken" are
+    the limits that this case breaks; "ended" tells why the search ended."""
 
     figure: Figure
     """The largest value against the number of cases, as the text of an SVG file."""
@@ -71,8 +71,8 @@ class Search:
 
 
 class Campaign:
-    """A campaign: an experiment, what varies from case to case, and what is asked of all cases.
-    `campaign` makes one."""
+    """A campaign: an experiment, the parameters that vary from case to case, and the limits that
+    the cases are to keep. `campaign` makes one."""
 
     def __init__(self, path: str) -> None:
         self.path = path
@@ -96,22 +96,22 @@ class Campaign:
     ) -> Flown:
         """Flies the cases that are not flown yet, and returns the results of all.
 
-        What is flown is kept in the folder of the results at once. A run that was ended, by
-        whatever means, goes on from there when it is started again. The results are the same
-        bytes however the cases were shared out.
+        Finished parts are stored in the folder of the results at once. A run that was ended in any
+        way continues from there when it is started again. The results are the same bytes, however
+        the cases were distributed.
 
         Args:
             client: Dask client whose workers fly the cases (`reentry_fmus.cluster`). Without one
                 this machine does.
             out: Folder of the results, by default out/NAME. With a client it may be the address
-                of a folder that all workers reach, such as "s3://bucket/folder", where they keep
-                what they have flown; the results are then in out/NAME as well.
+                of a folder that all workers reach, such as "s3://bucket/folder", where they store
+                the finished parts; the results are then in out/NAME as well.
             jobs: Number of threads without a client, by default one for each core.
             units: "deg" gives angles and angular rates of the table in degrees.
 
         Raises:
             OrchestratorError: The campaign was refused, or flying it failed.
-            ClusterError: The cluster failed. What was flown is kept.
+            ClusterError: The cluster failed. Finished parts are kept.
         """
         check_units(units)
         is_address = out is not None and "://" in os.fspath(out)
@@ -151,25 +151,25 @@ class Campaign:
 
     def command(self, name: str) -> list[str]:
         """Returns the arguments of a command of the orchestrator for this campaign."""
-        return [name, self.path, "--fmu-dir", str(UNITS), "--quiet"]
+        return [name, self.path, "--fmu-dir", str(FMUS), "--quiet"]
 
     def call(self, *arguments: str, command: str = "campaign") -> str:
         """Calls the orchestrator with this campaign, and returns what it prints."""
-        asked = [*self.command(command), *arguments]
-        exit_code, error, printed = orchestrate(asked, stacklevel=4)
+        command_line = [*self.command(command), *arguments]
+        exit_code, error, printed = orchestrate(command_line, stacklevel=4)
         if exit_code != 0:
             raise OrchestratorError(error, exit_code, None)
         return printed
 
 
 def campaign(name: str | os.PathLike[str]) -> Campaign:
-    """Returns a campaign, which its `run` flies.
+    """Returns a campaign, whose `run` flies it.
 
     Args:
         name: Path of a campaign file (TOML), or the name of a campaign of this package.
 
     Raises:
-        ModuleNotFoundError: There is no pyarrow, which reads the results.
+        ModuleNotFoundError: pyarrow, which reads the results, is not installed.
     """
     need("pyarrow", "campaign")
     path = Path(name)
@@ -198,13 +198,13 @@ def falsify(
         OrchestratorError: The campaign was refused, or the search failed.
     """
     check_units(units)
-    own = campaign(name)
-    folder = Path("out", f"{own.name}-worst") if out is None else Path(out)
+    searched = campaign(name)
+    folder = Path("out", f"{searched.name}-worst") if out is None else Path(out)
     arguments = ["--out", str(folder), "--force"]
     for option, value in (("--time", time), ("--jobs", jobs)):
         if value is not None:
             arguments += [option, str(value)]
-    own.call(*arguments, command="falsify")
+    searched.call(*arguments, command="falsify")
     return Search(
         table=read_cases(folder / "search.parquet", units),
         outcome=json.loads((folder / "search.json").read_text("utf-8")),
@@ -214,14 +214,14 @@ def falsify(
 
 
 def need(module: str, extra: str) -> None:
-    """Refuses to go on without a package that only some uses need."""
+    """Raises an error if an optional package is not installed."""
     try:
         __import__(module)
     except ModuleNotFoundError as error:
         if error.name is None or error.name.partition(".")[0] != module:
             raise
-        wanted = f'there is no {module}, which this needs: pip install "reentry-fmus[{extra}]"'
-        raise ModuleNotFoundError(wanted, name=module) from None
+        message = f'{module} is not installed: pip install "reentry-fmus[{extra}]"'
+        raise ModuleNotFoundError(message, name=module) from None
 
 
 def read_cases(path: Path, units: Units) -> pd.DataFrame:
@@ -229,12 +229,12 @@ def read_cases(path: Path, units: Units) -> pd.DataFrame:
     from pyarrow import parquet
 
     content = parquet.read_table(path)
-    known = json.loads(content.schema.metadata[b"units"])
+    column_units = json.loads(content.schema.metadata[b"units"])
     table: pd.DataFrame = content.to_pandas().set_index("case")
     for name in table.columns:
         if name != "message" and table[name].dtype.kind not in "bif":
             levels = STATUS if name == "status" else sorted(table[name].unique())
             table[name] = pd.Categorical(table[name], categories=levels)
-    table.attrs["units"] = {name: known.get(name) for name in table.columns}
+    table.attrs["units"] = {name: column_units.get(name) for name in table.columns}
     convert(table, units)
     return table

@@ -1,4 +1,4 @@
-"""The command `orchestrator`: the packaged program, which finds the packaged units and experiments
+"""The command `orchestrator`: the packaged program, which finds the packaged FMUs and experiments
 beside itself."""
 
 from __future__ import annotations

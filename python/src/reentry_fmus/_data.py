@@ -1,4 +1,4 @@
-"""What the wheel contains besides Python: the units, the orchestrator and its experiments."""
+"""The data of the wheel: the FMUs, the orchestrator and its experiments."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from difflib import get_close_matches
 from pathlib import Path
 
 DATA = Path(__file__).parent / "data"
-UNITS = DATA / "fmu"
+FMUS = DATA / "fmu"
 EXPERIMENTS = DATA / "experiments"
 
 
-def hint(wrong: str, known: Iterable[str]) -> str:
+def hint(wrong: str, right: Iterable[str]) -> str:
     """Ends a message about an unknown name with the nearest right one, or with all of them."""
-    names = list(known)
+    names = list(right)
     by_case = {name.lower(): name for name in names}
     wrong = wrong.lower()
     near = get_close_matches(wrong, by_case, n=1)
@@ -29,40 +29,40 @@ def hint(wrong: str, known: Iterable[str]) -> str:
 
 
 def units() -> list[str]:
-    """Returns the names of the units, in alphabetical order.
+    """Returns the names of the FMUs, in alphabetical order.
 
     >>> units()[:3]
     ['AttitudeEstimator', 'BTVSMC', 'BTVSMC_DO']
     """
-    return sorted((path.stem for path in UNITS.glob("*.fmu")), key=str.lower)
+    return sorted((path.stem for path in FMUS.glob("*.fmu")), key=str.lower)
 
 
 def fmu(name: str) -> Path:
-    """Returns the path of a unit (an FMI 2.0 archive) by its name.
+    """Returns the path of an FMU (an FMI 2.0 archive) by its name.
 
     >>> fmu("CRMPC").name
     'CRMPC.fmu'
     >>> fmu("CRPMC")
     Traceback (most recent call last):
         ...
-    ValueError: there is no unit "CRPMC"; did you mean "CRMPC"?
+    ValueError: there is no FMU "CRPMC"; did you mean "CRMPC"?
 
     Raises:
-        ValueError: there is no unit of this name. The message gives the nearest one.
+        ValueError: there is no FMU of this name. The message gives the nearest one.
     """
-    known = units()
-    if name not in known:
-        raise ValueError(f'there is no unit "{name}"{hint(name, known)}')
-    return UNITS / f"{name}.fmu"
+    names = units()
+    if name not in names:
+        raise ValueError(f'there is no FMU "{name}"{hint(name, names)}')
+    return FMUS / f"{name}.fmu"
 
 
-def unit_path(unit: str | os.PathLike[str]) -> Path:
-    """Returns the path of a unit that is given by its name or as a file."""
-    path = Path(unit)
+def fmu_path(name_or_file: str | os.PathLike[str]) -> Path:
+    """Returns the path of an FMU that is given by its name or as a file."""
+    path = Path(name_or_file)
     if path.suffix != ".fmu":
-        return fmu(str(unit))
+        return fmu(str(name_or_file))
     if not path.is_file():
-        raise FileNotFoundError(f"{path}: there is no such unit")
+        raise FileNotFoundError(f"{path}: there is no such FMU")
     return path.absolute()
 
 
@@ -93,14 +93,14 @@ def experiments() -> dict[str, str]:
 
 
 def experiment_path(experiment: str | os.PathLike[str]) -> str:
-    """Returns the file of an experiment of this package, or else what was given, of which the
-    orchestrator knows what it is."""
+    """Returns the file of an experiment of this package. Any other name is returned as it is, and
+    the orchestrator looks it up."""
     if Path(experiment).is_file():
         return str(Path(experiment).absolute())
-    wanted = os.fspath(experiment).removesuffix(".toml") + ".toml"
-    found = [
+    file = os.fspath(experiment).removesuffix(".toml") + ".toml"
+    paths = [
         path
         for path in EXPERIMENTS.rglob("*.toml")
-        if path.as_posix().endswith(f"/{wanted}") and path.name != "study.toml"
+        if path.as_posix().endswith(f"/{file}") and path.name != "study.toml"
     ]
-    return str(found[0]) if len(found) == 1 else os.fspath(experiment)
+    return str(paths[0]) if len(paths) == 1 else os.fspath(experiment)

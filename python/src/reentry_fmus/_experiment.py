@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from ._data import UNITS, experiment_path, program, unit_path
+from ._data import FMUS, experiment_path, fmu_path, program
 from ._table import Units, check_units, convert
 
 Value = bool | int | float | str
@@ -39,35 +39,36 @@ class Run:
     table: pd.DataFrame
     """Recorded variables, one row for each communication point, with the time (s) as index. A
     column is named component.variable, such as "plant.attitude.alpha". `table.attrs["units"]` and
-    `table.attrs["descriptions"]` say for each column what it holds. Enumerations are
+    `table.attrs["descriptions"]` give the unit and the meaning of each column. Enumerations are
     categoricals of their items' names."""
 
     metrics: dict[str, Any]
-    """Figures of merit, such as "ems_deg" (deg) and "max_rate_deg_s" (deg/s)."""
+    """Metrics, such as "ems_deg" (deg) and "max_rate_deg_s" (deg/s)."""
 
     figure: Figure
-    """The plot that the experiment asks for."""
+    """The plot that the experiment defines."""
 
     description: dict[str, Any]
-    """What was run: the experiment, all parameters, seeds, and the GUIDs of the units."""
+    """Description of the run: the experiment, all parameters, seeds, and the GUIDs of the FMUs."""
 
     def _repr_svg_(self) -> str:
         return str(self.figure)
 
 
 class OrchestratorError(RuntimeError):
-    """The orchestrator refused an experiment, or its run failed. The text is the orchestrator's."""
+    """The orchestrator refused an experiment, or its run failed. The text is the
+    orchestrator's."""
 
     def __init__(self, message: str, exit_code: int, run: Run | None) -> None:
         super().__init__(message)
         self.exit_code = exit_code
         """1: the run failed, 2: bad experiment, 3: the attitude was lost."""
         self.run = run
-        """What was recorded until then, if anything was."""
+        """Results that were recorded until then, if there are any."""
 
 
 class OrchestratorWarning(UserWarning):
-    """A warning of the orchestrator, or of a unit that it steps."""
+    """A warning of the orchestrator, or of an FMU that it steps."""
 
 
 def experiment(
@@ -80,7 +81,7 @@ def experiment(
     units: Units = "si",
     out: str | os.PathLike[str] | None = None,
 ) -> Run:
-    """Runs an experiment with the units of this package.
+    """Runs an experiment with the FMUs of this package.
 
     >>> run = experiment("lqr", set={"plant.disturbance.kind": "none"}, stop=10.0, units="deg")
     >>> run.table.shape[0]
@@ -93,7 +94,7 @@ def experiment(
     Args:
         name: An experiment of `experiments()`, or the path of an experiment file (TOML).
         set: Parameters by component.parameter, such as {"plant.disturbance.seed": 7}.
-        fmu: Units that replace those of components: {"controller": "LQR"}, or the path of an FMU.
+        fmu: FMUs that replace those of components, by name as in {"controller": "LQR"} or by path.
         stop: Stop time of the simulation, s.
         step: Length of the communication step, s.
         units: "deg" gives angles and angular rates in degrees for reading.
@@ -105,9 +106,9 @@ def experiment(
     """
     check_units(units)
     command = ["run", experiment_path(name), "--quiet", "--force"]
-    command += ["--fmu-dir", str(UNITS)]
-    for component, unit in (fmu or {}).items():
-        command += ["--fmu", f"{component}={unit_path(unit)}"]
+    command += ["--fmu-dir", str(FMUS)]
+    for component, replacement in (fmu or {}).items():
+        command += ["--fmu", f"{component}={fmu_path(replacement)}"]
     for parameter, value in (set or {}).items():
         command += ["--set", f"{parameter}={written(parameter, value)}"]
     for option, number in (("--stop", stop), ("--step", step)):

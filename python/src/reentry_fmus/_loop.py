@@ -11,9 +11,9 @@ import numpy as np
 import numpy.typing as npt
 import pandas as pd
 
-from ._data import hint, unit_path
+from ._data import fmu_path, hint
+from ._instance import Instance, UnitError, Value
 from ._table import Units, check_units, convert
-from ._unit import Unit, UnitError, Value
 
 Vector = npt.NDArray[np.float64]
 
@@ -55,12 +55,12 @@ class State:
     """Second derivative of the reference, rad/s2."""
 
     moment: Vector
-    """Roll, pitch and yaw moment of the last step, N m. Before the first it is what the controller
-    gives at the start, and zero without a controller."""
+    """Roll, pitch and yaw moment of the last step, N m. Before the first step it is the
+    controller's initial moment, or zero without a controller."""
 
 
 class ClosedLoop:
-    """The vehicle and, if wanted, a controller, advanced step by step by FMPy.
+    """The vehicle and optionally a controller, advanced step by step by FMPy.
 
     Without a controller the loop is closed in Python: `step` takes the moment.
 
@@ -75,8 +75,8 @@ class ClosedLoop:
 
     With a controller of the package, or an FMU with the same inputs and outputs, the loop is that
     of the orchestrator bit for bit, and has no delay: in each step the controller gets the state,
-    is stepped, and hands its moment to the plant, which is then stepped. Nothing is read between
-    setting and stepping, as FMI 2.0 asks.
+    is stepped, and gives its moment to the plant, which is then stepped. Nothing is read between
+    setting and stepping, as FMI 2.0 requires.
 
     >>> with ClosedLoop(controller="LQR") as loop:
     ...     state = loop.step()
@@ -84,16 +84,16 @@ class ClosedLoop:
     0.04
 
     Args:
-        plant: Name of a unit of the package, or the path of an FMU with the same variables.
-        controller: The same for the controller. None: `step` is given the moment.
+        plant: Name of an FMU of the package, or the path of one with the same variables.
+        controller: The same for the controller. With None, `step` takes the moment.
         step: Length of a communication step, s.
         parameters: Parameters by component, such as {"plant.disturbance.seed": 7,
             "controller.constraints": "paper"}: numbers in SI units, enumerations by their items'
             names. Without a controller, "controller.reference.*" chooses the reference.
 
     Raises:
-        ValueError: There is no such unit, variable or item.
-        UnitError: A unit refused a parameter.
+        ValueError: There is no such FMU, variable or item.
+        UnitError: An FMU refused a parameter.
     """
 
     def __init__(
@@ -105,18 +105,18 @@ class ClosedLoop:
     ) -> None:
         if not (np.isfinite(step) and step > 0.0):
             raise ValueError(f"step = {step} s, but a positive time is needed")
-        own = split(parameters or {}, has_controller=controller is not None)
+        by_component = split(parameters or {}, has_controller=controller is not None)
         self._step = float(step)
         self._is_open = True
         self._failure: UnitError | None = None
         self._has_controller = controller is not None
-        self._parameters = own
-        self._plant = Unit(unit_path(plant), own["plant"])
+        self._parameters = by_component
+        self._plant = Instance(fmu_path(plant), by_component["plant"])
         try:
-            # Every controller computes the reference. Where the law is in Python, one of them is
-            # there for that alone: its inputs stay as they are, and nobody asks for its moment.
-            path = unit_path(controller if controller is not None else "LQR")
-            self._controller = Unit(path, own["controller"])
+            # Every controller computes the reference. If the law is in Python, one of them is
+            # used for that alone: its inputs are not set, and its moment is not read.
+            path = fmu_path(controller if controller is not None else "LQR")
+            self._controller = Instance(path, by_component["controller"])
         except BaseException:
             self._plant.close()
             raise
@@ -138,7 +138,7 @@ class ClosedLoop:
     def _initialize(self) -> None:
         self._tick = 0
         self._moment = [0.0, 0.0, 0.0]
-        self._pending: list[tuple[Unit, str, Value]] = []
+        self._pending: list[tuple[Instance, str, Value]] = []
         self._controller.enter()
         self._plant.enter()
         if self._has_controller:
@@ -151,7 +151,7 @@ class ClosedLoop:
         self._measured, self._state = self._read()
 
     def _read(self) -> tuple[list[float], State]:
-        """Returns what the controller is to be given, and the state."""
+        """Returns the next inputs of the controller, and the state."""
         measured = self._plant.get_reals(self._from_plant)
         reference = self._controller.get_reals(self._reference)
         return measured, State(
@@ -180,12 +180,12 @@ class ClosedLoop:
         Raises:
             ValueError: The moment is not three finite numbers, or the loop is closed.
             TypeError: A moment is missing, or is given although there is a controller.
-            UnitError: A unit refused the moment or the step. `reset` makes the loop usable again.
+            UnitError: An FMU refused the moment or the step. `reset` makes the loop usable again.
         """
         self._check_open()
         if self._failure is not None:
-            unit, call = self._failure.unit, self._failure.call
-            raise UnitError(unit, call, "the loop ended when this unit failed: reset the loop")
+            name, call = self._failure.unit, self._failure.call
+            raise UnitError(name, call, "the loop ended when this FMU failed: reset the loop")
         if moment is None and not self._has_controller:
             raise TypeError("step needs a moment, because the loop has no controller")
         if moment is not None:
@@ -195,14 +195,14 @@ class ClosedLoop:
         try:
             self._advance()
         except UnitError as failure:
-            # The units stand at different times now.
+            # The instances are at different times now.
             self._failure = failure
             raise
         return self._state
 
     def _advance(self) -> None:
-        for unit, name, value in self._pending:
-            unit.set({name: value}, "input")
+        for instance, name, value in self._pending:
+            instance.set({name: value}, "input")
         self._pending.clear()
         now = self._tick * self._step
         if self._has_controller:
@@ -237,7 +237,7 @@ class ClosedLoop:
         Returns:
             One row for each communication point, the present one included, with the time (s) as
             index. The moment is that of the step which begins there; the last row repeats the one
-            before, or has the law's. Columns and `attrs` are those of `experiment`:
+            before, or has the moment of the law. Columns and `attrs` are those of `experiment`:
             "plant.attitude.alpha", ...
         """
         check_units(units)
@@ -306,7 +306,7 @@ class ClosedLoop:
         component.values({variable: value}, "input")
         self._pending.append((component, variable, value))
 
-    def _component(self, name: str) -> tuple[Unit, str]:
+    def _component(self, name: str) -> tuple[Instance, str]:
         components = {"plant": self._plant, "controller": self._controller}
         component, _, variable = name.partition(".")
         if component not in components:
@@ -316,18 +316,18 @@ class ClosedLoop:
         return components[component], variable
 
     def reset(self, parameters: Mapping[str, Value] | None = None) -> State:
-        """Begins again at t = 0 and returns the state there.
+        """Starts again at t = 0 and returns the state there.
 
         Args:
-            parameters: Parameters in place of those that the loop was made with, or None for the
-                same again.
+            parameters: Parameters in place of the present ones, or None for the same
+                again.
         """
         self._check_open()
         if parameters is not None:
-            own = split(parameters, self._has_controller)
-            self._plant.values(own["plant"], "parameter")
-            self._controller.values(own["controller"], "parameter")
-            self._parameters = own
+            by_component = split(parameters, self._has_controller)
+            self._plant.values(by_component["plant"], "parameter")
+            self._controller.values(by_component["controller"], "parameter")
+            self._parameters = by_component
         self._failure = None
         self._plant.reset(self._parameters["plant"])
         self._controller.reset(self._parameters["controller"])
@@ -335,14 +335,14 @@ class ClosedLoop:
         return self._state
 
     def close(self) -> None:
-        """Frees the units and removes their temporary folders. A second call does nothing."""
+        """Frees the instances and removes their temporary folders. A second call does nothing."""
         self._is_open = False
         self._controller.close()
         self._plant.close()
 
     def _check_open(self) -> None:
         if not self._is_open:
-            raise ValueError("the loop is closed: its units are freed")
+            raise ValueError("the loop is closed: its instances are freed")
 
     def __enter__(self) -> ClosedLoop:
         return self
@@ -359,25 +359,27 @@ class ClosedLoop:
 def vector(moment: npt.ArrayLike) -> Vector:
     """Checks a moment and returns it as an array of the shape (3,)."""
     try:
-        given = np.asarray(moment, dtype=np.float64)
+        components = np.asarray(moment, dtype=np.float64)
     except (TypeError, ValueError):
-        given = np.array(np.nan)
-    if given.shape != (3,) or not np.isfinite(given).all():
+        components = np.array(np.nan)
+    if components.shape != (3,) or not np.isfinite(components).all():
         raise ValueError(
             f"a moment is three finite numbers, x, y and z in N m, but this is {moment!r}"
         )
-    return given
+    return components
 
 
 def split(parameters: Mapping[str, Value], has_controller: bool) -> dict[str, dict[str, Value]]:
     """Sorts parameters by component."""
-    own: dict[str, dict[str, Value]] = {"plant": {}, "controller": {}}
+    by_component: dict[str, dict[str, Value]] = {"plant": {}, "controller": {}}
     for name, value in parameters.items():
         component, _, variable = name.partition(".")
-        if component not in own:
-            raise ValueError(f'{name}: there is no component "{component}"{hint(component, own)}')
+        if component not in by_component:
+            raise ValueError(
+                f'{name}: there is no component "{component}"{hint(component, by_component)}'
+            )
         if component == "controller" and not has_controller:
             if not variable.startswith("reference."):
                 raise ValueError(f"{name}: the loop has no controller, only a reference")
-        own[component][variable] = value
-    return own
+        by_component[component][variable] = value
+    return by_component

@@ -1,4 +1,4 @@
-"""Units of measurement of tables."""
+"""Units of measure of tables."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def check_units(units: str) -> None:
 
 
 def convert(table: pd.DataFrame, units: Units) -> None:
-    """Converts the columns in rad, rad/s and rad/s2 to degrees, if that is asked for. Expects the
+    """Converts the columns in rad, rad/s and rad/s2 to degrees, if `units` says so. Expects the
     columns' units in `attrs["units"]` and changes them too."""
     if units == "si":
         return

@@ -1,7 +1,7 @@
 """Campaigns on a cluster: the workers of a Dask client fly parts of a campaign.
 
 A worker needs this package with its extra `cluster`, in the driver's version, and nothing else: the
-campaign, its experiment and its units are sent to it. `Campaign.run(client)` uses this module.
+campaign, its experiment and its FMUs are sent to it. `Campaign.run(client)` uses this module.
 """
 
 from __future__ import annotations
@@ -47,20 +47,21 @@ if TYPE_CHECKING:
 __all__ = ["ClusterError", "fly"]
 
 TASK = 10.0
-"""Time that a task should take, s: long against the start of the program (about 0.1 s), and short
-enough to be lost."""
+"""Intended duration of a task, s: long compared with the start of the program (about 0.1 s), and
+short enough that losing a task costs little."""
 QUEUED = 2
-"""Tasks for each thread of the workers. The second one is there when the first one ends."""
+"""Tasks for each thread of the workers. The second one waits until the first one ends."""
 LOOK = 5.0
 """Longest time between two looks for new workers and for a lost scheduler, s."""
 GIVEN_UP = 4
 """Number of times that Dask gives a task up before the campaign is ended."""
 CANCELLED = (asyncio.CancelledError, concurrent.futures.CancelledError)
-"""What Dask raises for a task that the scheduler does not know any more."""
+"""Errors that Dask raises for a task that the scheduler no longer knows."""
 
 
 class ClusterError(RuntimeError):
-    """Workers or scheduler failed. The text says what is kept and how to go on."""
+    """Workers or scheduler failed. The text says which parts are kept and how to
+    continue."""
 
 
 class Bundle(WorkerPlugin):  # type: ignore[misc]
@@ -88,8 +89,8 @@ def place(worker: Worker, name: str) -> Path:
 def fly(campaign: Campaign, client: Client, folder: Path, address: str | None = None) -> None:
     """Flies the missing parts of a campaign on the workers of a client, and merges all parts.
 
-    Parts come back through Dask and are kept in the folder at once. With an address the workers
-    keep them there, and they are fetched from there.
+    Parts come back through Dask and are stored in the folder at once. With an address the workers
+    store them there, and they are fetched from there.
 
     Args:
         campaign: The campaign.
@@ -115,7 +116,7 @@ def fly(campaign: Campaign, client: Client, folder: Path, address: str | None = 
     flown: set[int] = set()
     is_sent = False
     try:
-        # A campaign that ends at an answer wants more cases from look to look.
+        # A campaign that ends with an answer needs more cases at each look.
         while missing := work(campaign, folder):
             again = flown.intersection(first for first, _ in missing)
             if again:
@@ -143,7 +144,7 @@ def work(campaign: Campaign, folder: Path) -> list[tuple[int, int]]:
 
 
 def pack(campaign: Campaign) -> Bundle:
-    """Packs campaign, experiment and units, with all that they extend."""
+    """Packs campaign, experiment and FMUs, with all that they extend."""
     with tempfile.TemporaryDirectory(prefix="reentry-") as temporary:
         campaign.call("--bundle", temporary)
         content = io.BytesIO()
@@ -155,7 +156,7 @@ def pack(campaign: Campaign) -> Bundle:
 
 
 class Flight:
-    """Hands out missing parts as tasks, and keeps what comes back."""
+    """Submits missing parts as tasks, and stores the parts that come back."""
 
     def __init__(self, client: Client, bundle: str, folder: Path, store: Store | None) -> None:
         self.client = client
@@ -163,7 +164,7 @@ class Flight:
         self.folder = folder
         self.store = store
         self.part = 0.0
-        """Time that a part takes, s; 0 before the first one is flown."""
+        """Time that a part takes, s; 0 before the first one was flown."""
         self.given_up: Counter[tuple[int, int]] = Counter()
         """How often Dask gave a task up, by its first part."""
 
@@ -225,12 +226,12 @@ class Flight:
         if self.client.status != "running":
             raise self.lost("the connection to the scheduler was closed")
         if any(task.status in ("lost", "cancelled") for task in tasks):
-            raise self.lost("the scheduler does not know its tasks any more")
+            raise self.lost("the scheduler no longer knows its tasks")
         return [task for task in tasks if task.done()]
 
     def keep(self, task: Future, parts: list[tuple[int, int]]) -> bool:
-        """Keeps what a task has flown. Returns whether it has: Dask gives up a task that was lost
-        with several workers, although they may have been taken away for reasons of their own."""
+        """Stores the parts that a task has flown. Returns False if Dask gave the task up because it
+        was lost with several workers, which may have been taken away for other reasons."""
         try:
             flown, seconds = task.result()
         except KilledWorker as error:
@@ -251,24 +252,27 @@ class Flight:
         return True
 
     def lost(self, problem: str) -> ClusterError:
-        kept = sum(1 for _ in (self.folder / "parts").glob("*.parquet"))
+        part_count = sum(1 for _ in (self.folder / "parts").glob("*.parquet"))
         where = "" if self.store is None else f" and {self.store.address}"
         return ClusterError(
-            f"{problem}. {kept} parts are flown and kept in {self.folder}{where}; "
-            "the same call of run goes on from there, with a client that is connected"
+            f"{problem}. {part_count} parts are flown and kept in {self.folder}{where}; "
+            "the same call of run continues from there, with a client that is connected"
         )
 
 
 def fly_cases(
-    bundle: str, wanted: str, first: int, last: int, address: str | None
+    bundle: str, driver_version: str, first: int, last: int, address: str | None
 ) -> tuple[dict[str, bytes], float]:
     """Flies parts on a worker. Returns the parts' files by name, which are empty if they are kept
     at the address, and the time that it took, s."""
     begin = time.perf_counter()
     worker = get_worker()
-    own = version("reentry-fmus")
-    if own != wanted:
-        raise ClusterError(f"{worker.address} has reentry-fmus {own}, but the driver has {wanted}")
+    worker_version = version("reentry-fmus")
+    if worker_version != driver_version:
+        raise ClusterError(
+            f"{worker.address} has reentry-fmus {worker_version}, "
+            f"but the driver has {driver_version}"
+        )
     # Dask removes the folder of a worker that was killed.
     with tempfile.TemporaryDirectory(prefix="cases-", dir=worker.local_directory) as out:
         path = place(worker, bundle) / "campaign.toml"
@@ -304,16 +308,16 @@ class Store:
         self.files, self.root = fsspec.core.url_to_fs(self.address)
 
     def names(self) -> set[str]:
-        """Returns the names of the parts that are there."""
+        """Returns the names of the parts at the address."""
         self.files.invalidate_cache()
         try:
-            found = self.files.ls(f"{self.root}/parts", detail=False)
+            paths = self.files.ls(f"{self.root}/parts", detail=False)
         except FileNotFoundError:
             return set()
-        return {Path(path).name for path in found if path.endswith(".parquet")}
+        return {Path(path).name for path in paths if path.endswith(".parquet")}
 
     def keep(self, path: Path, name: str) -> None:
-        """Copies a file there. It appears under its name when it is complete."""
+        """Copies a file to the address. It appears under its name when it is complete."""
         target = f"{self.root}/{name}"
         unfinished = f"{target}.unfinished-{uuid.uuid4().hex}"
         self.files.makedirs(target.rpartition("/")[0], exist_ok=True)
@@ -321,5 +325,5 @@ class Store:
         self.files.mv(unfinished, target)
 
     def fetch(self, name: str, folder: Path) -> None:
-        """Copies a part from there into a folder."""
+        """Copies a part from the address into a folder."""
         put(folder / name, self.files.cat_file(f"{self.root}/parts/{name}"))

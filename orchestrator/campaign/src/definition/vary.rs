@@ -1,17 +1,17 @@
-//! What varies from case to case.
+//! The parameters that vary from case to case.
 
 use schemars::JsonSchema;
 use serde::Deserialize;
 use toml::{Spanned, Value};
 
-/// What varies: one parameter or several, with the distribution of their values. Exactly one of the
-/// keys from `uniform` to `case` is given. A number may be a text with a unit (`"5 deg"`), or with
-/// a percent sign, which stands for percent of the value in the experiment.
+/// A parameter that varies from case to case, or several, with the distribution of the values.
+/// Exactly one of the keys from `uniform` to `case` is given. A number may be a text with a unit
+/// (`"5 deg"`), or with a percent sign, which stands for percent of the value in the experiment.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Vary {
-    /// Parameter, or input without a connection, as `component.parameter`; of several in a list,
-    /// all get the same value.
+    /// Parameter, or input without a connection, as `component.parameter`. Several in a list all
+    /// get the same value.
     #[serde(default)]
     #[schemars(with = "Option<OneOrMore>")]
     pub parameter: Option<Spanned<OneOrMore>>,
@@ -19,7 +19,7 @@ pub struct Vary {
     #[serde(default)]
     #[schemars(with = "Vec<String>")]
     pub each: Vec<Spanned<String>>,
-    /// Whether the values of `each` are put into ascending order, as times that switch something.
+    /// Whether the values of `each` are sorted in ascending order, as switching times must be.
     #[serde(default)]
     pub sorted: bool,
     /// Smallest and largest value of a uniform distribution. An integer parameter gets integers,
@@ -57,7 +57,7 @@ pub struct Vary {
     #[serde(default)]
     #[schemars(with = "Option<i64>")]
     pub case: Option<Spanned<i64>>,
-    /// Bounds that cut off a continuous distribution.
+    /// Lower and upper bound at which a continuous distribution is truncated.
     #[serde(default)]
     #[schemars(with = "Option<[cosim::experiment::Scalar; 2]>")]
     pub within: Option<Spanned<[Value; 2]>>,
@@ -82,8 +82,8 @@ pub enum OneOrMore {
 }
 
 impl OneOrMore {
-    /// Returns all names.
-    pub fn all(&self) -> &[String] {
+    /// Returns the names.
+    pub fn names(&self) -> &[String] {
         match self {
             Self::One(name) => std::slice::from_ref(name),
             Self::More(names) => names,

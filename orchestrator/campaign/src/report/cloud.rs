@@ -1,5 +1,5 @@
-//! The worst case over the cloud of the others: median and band of each signal that the experiment
-//! draws.
+//! The worst case over the median and the band of the other cases, for each signal that the
+//! experiment draws.
 
 use crate::flight::Flight;
 use crate::plan::Plan;
@@ -48,7 +48,7 @@ impl Observer for Watch<'_> {
     }
 }
 
-/// Draws the worst case over the band of the first cases, flown with these units. There is no
+/// Draws the worst case over the band of the first cases, flown with these instances. There is no
 /// figure if the experiment draws nothing.
 pub(super) fn draw(
     plan: &Plan,
@@ -56,7 +56,7 @@ pub(super) fn draw(
     worst: u64,
     cases: u64,
 ) -> Result<Option<Figure>, Error> {
-    let panels = Panel::all(flight.system())?;
+    let panels = Panel::resolve_all(flight.system())?;
     if panels.is_empty() {
         return Ok(None);
     }
@@ -84,7 +84,7 @@ pub(super) fn draw(
                     x: x.to_vec(),
                     y,
                 };
-                let own = bad.values.get(place).cloned().unwrap_or_default();
+                let worst_values = bad.values.get(place).cloned().unwrap_or_default();
                 let unit =
                     if panel.unit.is_empty() { String::new() } else { format!(", {}", panel.unit) };
                 drawn.push(figure::Panel {
@@ -96,14 +96,15 @@ pub(super) fn draw(
                     curves: vec![
                         line("5 % to 95 %", BAND, Shape::Band(high), time, low),
                         line("median", BAND, Shape::Line, time, median),
-                        line(&format!("case {worst}"), WORST, Shape::Line, &bad.time, own),
+                        line(&format!("case {worst}"), WORST, Shape::Line, &bad.time, worst_values),
                     ],
                 });
             }
             place += 1;
         }
     }
-    let title = format!("The worst case over the first {} cases", others.len());
+    let title =
+        format!("The worst case, over the median and the band of the first {} cases", others.len());
     Ok(Some(Figure { title, columns: 3.min(drawn.len()), legend: Legend::Above, panels: drawn }))
 }
 

@@ -1,7 +1,7 @@
 //! Histograms, empirical distributions and scatter plots of a campaign's cases.
 
 use crate::findings::Findings;
-use crate::flight::kept;
+use crate::flight::kept_column;
 use crate::plan::Plan;
 use crate::prepare::Recorded;
 use crate::table::Reader;
@@ -20,8 +20,12 @@ const MARKED: usize = 300;
 const PARAMETERS: usize = 12;
 const MEASURES: usize = 3;
 
-fn label(own: &Recorded) -> String {
-    if own.unit.is_empty() { own.name.clone() } else { format!("{}, {}", own.name, own.unit) }
+fn label(measure: &Recorded) -> String {
+    if measure.unit.is_empty() {
+        measure.name.clone()
+    } else {
+        format!("{}, {}", measure.name, measure.unit)
+    }
 }
 
 fn curve(name: &str, color: Color, shape: Shape, x: Vec<f64>, y: Vec<f64>) -> Curve {
@@ -46,8 +50,8 @@ pub(super) fn distributions(
     table: &Reader,
 ) -> Result<Vec<Figure>, Error> {
     let mut figures = Vec::new();
-    for own in &plan.recorded {
-        let mut values = table.column(&own.name)?.numbers();
+    for measure in &plan.recorded {
+        let mut values = table.column(&measure.name)?.numbers();
         values.retain(|value| value.is_finite());
         values.sort_unstable_by(f64::total_cmp);
         let (Some(low), Some(high)) = (values.first().copied(), values.last().copied()) else {
@@ -56,7 +60,7 @@ pub(super) fn distributions(
         if low == high {
             continue;
         }
-        let limits = plan.limits().filter(|(limit, _)| limit.measure.get_ref() == &own.name);
+        let limits = plan.limits().filter(|(limit, _)| limit.measure.get_ref() == &measure.name);
         let limits: Vec<f64> =
             limits.filter_map(|(limit, _)| limit.at_most.or(limit.at_least)).collect();
         let marks = || {
@@ -68,7 +72,7 @@ pub(super) fn distributions(
         let (edges, counts) = histogram(&values, low, high);
         let mut bars = vec![curve("cases", BLUE, Shape::Steps, edges, counts)];
         bars.extend(marks());
-        let mut panels = vec![panel(&label(own), "cases", bars)];
+        let mut panels = vec![panel(&label(measure), "number of cases", bars)];
         let n = values.len();
         // Every value at the upper end, where few are and where one looks; fewer below.
         let tail = n.saturating_sub(POINTS / 3);
@@ -78,8 +82,8 @@ pub(super) fn distributions(
         let y = places().map(|i| (i + 1) as f64 / n as f64).collect();
         let mut steps = vec![curve("share of cases up to this value", RED, Shape::Line, x, y)];
         steps.extend(marks());
-        panels.push(panel(&label(own), "share of cases", steps));
-        let title = format!("Distribution of {} over {} cases", own.name, findings.cases);
+        panels.push(panel(&label(measure), "share of cases", steps));
+        let title = format!("Distribution of {} over {} cases", measure.name, findings.cases);
         figures.push(Figure { title, columns: 2, legend: Legend::Above, panels });
     }
     Ok(figures)
@@ -103,27 +107,28 @@ fn histogram(sorted: &[f64], low: f64, high: f64) -> (Vec<f64>, Vec<f64>) {
 pub(super) fn scatters(plan: &Plan, table: &Reader) -> Result<Vec<Figure>, Error> {
     let mut bad = vec![false; table.rows() as usize];
     for limit in &plan.campaign.limits {
-        let kept = table.column(&kept(&limit.id))?.numbers();
-        bad.iter_mut().zip(kept).for_each(|(bad, kept)| *bad |= kept == 0.0);
+        let flags = table.column(&kept_column(&limit.id))?.numbers();
+        bad.iter_mut().zip(flags).for_each(|(bad, is_kept)| *bad |= is_kept == 0.0);
     }
     let mut shown: Vec<(usize, Vec<f64>)> = Vec::new();
-    for (place, own) in plan.varied.iter().enumerate() {
+    for (place, varied) in plan.varied.iter().enumerate() {
         if shown.len() == PARAMETERS {
             break;
         }
-        let values = table.column(&own.name)?.numbers();
-        if !own.law.is_counted() && values.iter().any(|value| value.is_finite()) {
+        let values = table.column(&varied.name)?.numbers();
+        if !varied.distribution.is_counted() && values.iter().any(|value| value.is_finite()) {
             shown.push((place, values));
         }
     }
-    let limited =
-        |own: &&Recorded| plan.limits().any(|(limit, _)| limit.measure.get_ref() == &own.name);
+    let limited = |measure: &&Recorded| {
+        plan.limits().any(|(limit, _)| limit.measure.get_ref() == &measure.name)
+    };
     let mut measures: Vec<&Recorded> = plan.recorded.iter().filter(limited).collect();
-    measures.extend(plan.recorded.iter().filter(|own| !limited(own)));
+    measures.extend(plan.recorded.iter().filter(|measure| !limited(measure)));
     let stride = bad.len().div_ceil(POINTS).max(1);
     let mut figures = Vec::new();
-    for own in measures.into_iter().take(MEASURES) {
-        let y = table.column(&own.name)?.numbers();
+    for measure in measures.into_iter().take(MEASURES) {
+        let y = table.column(&measure.name)?.numbers();
         let finite = || y.iter().filter(|value| value.is_finite());
         if finite().all(|value| Some(value) == finite().next()) {
             continue;
@@ -144,11 +149,11 @@ pub(super) fn scatters(plan: &Plan, table: &Reader) -> Result<Vec<Figure>, Error
             if !bad_x.is_empty() {
                 curves.push(curve("broke a limit", RED, Shape::Dots, bad_x, bad_y));
             }
-            Panel { title: x_label, ..panel("", &label(own), curves) }
+            Panel { title: x_label, ..panel("", &label(measure), curves) }
         });
         let panels: Vec<Panel> = panels.collect();
         if !panels.is_empty() {
-            let title = format!("{} against what varies", own.name);
+            let title = format!("{} against the varied parameters", measure.name);
             figures.push(Figure {
                 title,
                 columns: 3.min(panels.len()),

@@ -1,7 +1,7 @@
 //! Parquet files of cases.
 
 use super::guard::guarded;
-use super::{Column, Table, Values};
+use super::{CaseTable, Column, Values};
 use cosim::error::Error;
 use parquet::basic::{LogicalType, Type as Physical};
 use parquet::column::reader::{ColumnReader, ColumnReaderImpl};
@@ -26,7 +26,7 @@ pub struct Writer {
     unfinished: PathBuf,
     metadata: Vec<KeyValue>,
     file: Option<SerializedFileWriter<File>>,
-    waiting: Table,
+    waiting: CaseTable,
 }
 
 impl Writer {
@@ -47,7 +47,7 @@ impl Writer {
             unfinished,
             metadata: metadata.collect(),
             file: None,
-            waiting: Table::default(),
+            waiting: CaseTable::default(),
         })
     }
 
@@ -55,7 +55,7 @@ impl Writer {
     ///
     /// # Errors
     /// Returns an error if the file cannot be written.
-    pub fn add(&mut self, rows: Table) -> Result<(), Error> {
+    pub fn add(&mut self, rows: CaseTable) -> Result<(), Error> {
         self.waiting.append(rows).map_err(failed(&self.unfinished))?;
         while self.waiting.rows() >= GROUP {
             let group = self.waiting.take(GROUP);
@@ -79,7 +79,7 @@ impl Writer {
         fs::rename(&self.unfinished, &self.path).map_err(Error::file(&self.path))
     }
 
-    fn write(&mut self, rows: &Table) -> Result<(), Error> {
+    fn write(&mut self, rows: &CaseTable) -> Result<(), Error> {
         let mut write = || {
             let writer = match &mut self.file {
                 Some(writer) => writer,
@@ -99,7 +99,7 @@ impl Writer {
 
 impl Drop for Writer {
     fn drop(&mut self) {
-        // What was not finished is of no use. If it cannot be removed, the next run writes over it.
+        // An unfinished file is of no use. If it cannot be removed, the next run overwrites it.
         if self.file.take().is_some() {
             let _ = fs::remove_file(&self.unfinished);
         }
@@ -108,7 +108,7 @@ impl Drop for Writer {
 
 fn begin(
     path: &Path,
-    table: &Table,
+    table: &CaseTable,
     metadata: &[KeyValue],
 ) -> Result<SerializedFileWriter<File>, ParquetError> {
     let file = File::create(path).map_err(|error| ParquetError::External(Box::new(error)))?;
@@ -154,8 +154,8 @@ impl Reader {
 
     /// Returns a text of the metadata.
     pub fn metadata(&self, key: &str) -> Option<&str> {
-        let all = self.file.metadata().file_metadata().key_value_metadata()?;
-        all.iter().find(|entry| entry.key == key)?.value.as_deref()
+        let entries = self.file.metadata().file_metadata().key_value_metadata()?;
+        entries.iter().find(|entry| entry.key == key)?.value.as_deref()
     }
 
     /// Returns the number of rows.
@@ -180,7 +180,7 @@ impl Reader {
     ///
     /// # Errors
     /// Returns an error if the file is damaged.
-    pub fn table(&self) -> Result<Table, Error> {
+    pub fn table(&self) -> Result<CaseTable, Error> {
         let names = self.file.metadata().file_metadata().schema_descr().columns();
         let column = |(index, name): (usize, &str)| {
             Ok(Column { name: name.to_string(), values: self.read(index)? })
@@ -188,11 +188,11 @@ impl Reader {
         let columns = names.iter().map(|column| column.name()).enumerate().map(column);
         let columns: Result<_, ParquetError> = guarded(|| columns.collect());
         let columns = columns.map_err(failed(&self.path))?;
-        Ok(Table { columns })
+        Ok(CaseTable { columns })
     }
 
     fn read(&self, index: usize) -> Result<Values, ParquetError> {
-        let mut all: Option<Values> = None;
+        let mut column: Option<Values> = None;
         for group in 0..self.file.num_row_groups() {
             let group = self.file.get_row_group(group)?;
             let rows = u64::try_from(group.metadata().num_rows()).ok();
@@ -230,12 +230,12 @@ impl Reader {
             if values.len() != rows {
                 return Err(ParquetError::General("a column is too short".into()));
             }
-            match &mut all {
-                Some(all) => all.append(values)?,
-                None => all = Some(values),
+            match &mut column {
+                Some(column) => column.append(values)?,
+                None => column = Some(values),
             }
         }
-        Ok(all.unwrap_or(Values::Real(Vec::new())))
+        Ok(column.unwrap_or(Values::Real(Vec::new())))
     }
 }
 

@@ -23,7 +23,7 @@ pub(super) fn guarded<T>(
         }));
     });
     IS_GUARDED.set(true);
-    // What is read is dropped after a panic, so that nobody sees it half made.
+    // After a panic the value is dropped, so that nobody sees it half made.
     let outcome = panic::catch_unwind(AssertUnwindSafe(read));
     IS_GUARDED.set(false);
     outcome.unwrap_or_else(|_| Err(ParquetError::General("the file is damaged".into())))

@@ -1,9 +1,9 @@
 use super::*;
 use std::fs;
 
-fn table(rows: std::ops::Range<i32>) -> Table {
+fn table(rows: std::ops::Range<i32>) -> CaseTable {
     let column = |name: &str, values| Column { name: name.into(), values };
-    Table {
+    CaseTable {
         columns: vec![
             column("case", Values::Count(rows.clone().map(i64::from).collect())),
             column("plant.x", Values::Real(rows.clone().map(|i| f64::from(i) / 7.0).collect())),
@@ -91,8 +91,8 @@ fn no_changed_bit_goes_unseen_or_ends_the_program() {
         let reader = Reader::open(&path);
         let read = reader.and_then(|reader| Ok((reader.table()?, reader)));
         match read {
-            Ok((found, reader)) if reader.metadata("digest") == Some(&found.digest()) => {
-                assert_eq!(found, whole, "bit {bit}");
+            Ok((rows, reader)) if reader.metadata("digest") == Some(&rows.digest()) => {
+                assert_eq!(rows, whole, "bit {bit}");
             }
             _ => seen += 1,
         }

@@ -1,16 +1,16 @@
-//! What signals contain above a frequency.
+//! Content of signals above a frequency.
 
 use rustfft::FftPlanner;
 use rustfft::num_complex::Complex;
 use std::f64::consts::PI;
 
-/// Returns the root of the sum over the signals of the mean square of what lies above `frequency`
-/// (Hz). `courses` has the values of all `signals`, sample by sample, `step` (s) apart. Each
-/// signal's mean is taken away, and a Hann window keeps slow changes from leaking into fast ones.
-/// The result is `None` with fewer than 16 samples, or if `frequency` is not below half of the
-/// sampling rate.
-pub(super) fn rms_above(courses: &[f64], signals: usize, step: f64, frequency: f64) -> Option<f64> {
-    let samples = courses.len().checked_div(signals)?;
+/// Returns the RMS of the content above `frequency` (Hz), as the root of the sum of the signals'
+/// mean squares. `values` holds the values of all `signals`, sample by sample, `step` (s) apart.
+/// Each signal's mean is taken away, and a Hann window keeps slow changes from leaking into fast
+/// ones. The result is `None` with fewer than 16 samples, or if `frequency` is not below half of
+/// the sampling rate.
+pub(super) fn rms_above(values: &[f64], signals: usize, step: f64, frequency: f64) -> Option<f64> {
+    let samples = values.len().checked_div(signals)?;
     if samples < 16 || frequency >= 0.5 / step {
         return None;
     }
@@ -18,9 +18,9 @@ pub(super) fn rms_above(courses: &[f64], signals: usize, step: f64, frequency: f
     let window = |k: usize| 1.0 - (2.0 * PI * k as f64 / count).cos();
     let transform = FftPlanner::new().plan_fft_forward(samples);
     let mean_square = |signal: usize| {
-        let course = || courses.iter().skip(signal).step_by(signals);
-        let mean = course().sum::<f64>() / count;
-        let windowed = course().enumerate().map(|(k, value)| window(k) * (value - mean));
+        let samples_of_signal = || values.iter().skip(signal).step_by(signals);
+        let mean = samples_of_signal().sum::<f64>() / count;
+        let windowed = samples_of_signal().enumerate().map(|(k, value)| window(k) * (value - mean));
         let mut spectrum: Vec<_> = windowed.map(|value| Complex::new(value, 0.0)).collect();
         transform.process(&mut spectrum);
         let first = (frequency * count * step).ceil() as usize;
@@ -57,8 +57,8 @@ mod tests {
 
     #[test]
     fn nothing_is_above_half_of_the_sampling_rate() {
-        let courses = sampled(0.2, |_| [0.0, 1.0]);
-        assert_eq!(rms_above(&courses, 2, 0.2, 5.0), None);
+        let values = sampled(0.2, |_| [0.0, 1.0]);
+        assert_eq!(rms_above(&values, 2, 0.2, 5.0), None);
         assert_eq!(rms_above(&[], 0, 0.2, 1.0), None);
     }
 }

@@ -11,7 +11,7 @@ fn meters() -> Meters {
     };
     let gauge = |text: &str, signals: Vec<Resolved>| {
         let measure: Measure = toml::from_str(&format!("signals = \"x\"\n{text}")).unwrap();
-        Some(Gauge::of(&measure, signals))
+        Some(Gauge::empty(&measure, signals))
     };
     let errors = || vec![difference(0), difference(1), difference(2)];
     let count = Resolved { is_integer: true, ..Resolved::variable(7) };
@@ -78,9 +78,12 @@ fn a_run_is_lost_beyond_its_bound_or_where_the_signal_is_no_number() {
         row[0] = alpha;
         row
     };
-    let mut kept = meters();
-    feed(&mut kept, &[row(0.5), row(-5.4), row(5.5)]);
-    assert_eq!((kept.metrics().lost_at, kept.metrics().completed), (None, true));
+    let mut meters_in_bounds = meters();
+    feed(&mut meters_in_bounds, &[row(0.5), row(-5.4), row(5.5)]);
+    assert_eq!(
+        (meters_in_bounds.metrics().lost_at, meters_in_bounds.metrics().completed),
+        (None, true)
+    );
     for lost in [5.6, f64::NAN] {
         let mut meters = meters();
         feed(&mut meters, &[row(0.5), row(lost), row(20.0), row(0.0)]);
@@ -121,7 +124,7 @@ fn the_guarantee_is_among_the_metrics() {
         "in_force = \"a.b\"\nkeeps = \"x\"\nmargins = { moment = \"a.m\", rate = \"a.r\" }",
     )
     .unwrap();
-    let signals = Signals {
+    let signals = GuaranteeSignals {
         in_force: 0,
         status: Some(status),
         margins: vec![("moment".into(), 3), ("rate".into(), 2)],
@@ -132,7 +135,7 @@ fn the_guarantee_is_among_the_metrics() {
     for name in ["share", "lost_at", "status", "rate_margin_min", "moment_margin_min", "broken"] {
         assert_eq!(meters.metrics().asked[&format!("guarantee_{name}")], None, "{name}");
     }
-    meters.guarantee.1 = Some(Course::new(signals));
+    meters.guarantee.1 = Some(GuaranteeRecord::new(signals));
     let mut rows = [[0.0; 8]; 4];
     rows[0][..5].copy_from_slice(&[1.0, 1.0, 0.25, 0.5, 1.1]);
     rows[1][..5].copy_from_slice(&[1.0, 1.0, 0.5, 0.125, 0.1]);

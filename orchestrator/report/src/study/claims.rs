@@ -32,11 +32,11 @@ impl Verdict {
         }
     }
 
-    fn of(held: usize, all: usize) -> Self {
+    fn from_counts(held: usize, total: usize) -> Self {
         match held {
-            _ if all == 0 => Self::NotJudged,
+            _ if total == 0 => Self::NotJudged,
             0 => Self::DoesNotHold,
-            _ if held == all => Self::Holds,
+            _ if held == total => Self::Holds,
             _ => Self::HoldsPartly,
         }
     }
@@ -63,7 +63,7 @@ pub struct Checked {
 impl Checked {
     /// Returns the verdict of this check alone.
     pub fn verdict(&self) -> Verdict {
-        Verdict::of(self.held, self.pairs)
+        Verdict::from_counts(self.held, self.pairs)
     }
 }
 
@@ -76,7 +76,7 @@ pub struct Judged {
     pub checks: Vec<Checked>,
 }
 
-/// Rejects checks that refer to missing items, or compare runs that cannot be paired.
+/// Rejects checks that refer to missing items or compare runs that cannot be paired.
 ///
 /// # Errors
 /// Returns an error that describes the first faulty check.
@@ -115,12 +115,12 @@ pub fn judge(claim: &Claim, results: &Results) -> Result<Judged, String> {
     let checks =
         claim.checks.iter().map(|check| compare(check, results)).collect::<Result<Vec<_>, _>>()?;
     let any_left_open = checks.iter().any(|check| check.verdict() == Verdict::NotJudged);
-    let all = |verdict| checks.iter().all(|check| check.verdict() == verdict);
+    let every_check = |verdict| checks.iter().all(|check| check.verdict() == verdict);
     let verdict = if any_left_open || checks.is_empty() {
         Verdict::NotJudged
-    } else if all(Verdict::Holds) {
+    } else if every_check(Verdict::Holds) {
         Verdict::Holds
-    } else if all(Verdict::DoesNotHold) {
+    } else if every_check(Verdict::DoesNotHold) {
         Verdict::DoesNotHold
     } else {
         Verdict::HoldsPartly
@@ -129,7 +129,7 @@ pub fn judge(claim: &Claim, results: &Results) -> Result<Judged, String> {
 }
 
 fn compare(check: &Check, results: &Results) -> Result<Checked, String> {
-    let left = never_is_infinite(&check.left, results, results.of_members(&check.left)?);
+    let left = never_is_infinite(&check.left, results, results.member_numbers(&check.left)?);
     let right = results.quantity(&check.right)?;
     let right = match &check.right {
         Quantity::Named(name) => never_is_infinite(name, results, right),
@@ -198,10 +198,10 @@ mod tests {
     use std::collections::BTreeMap;
     use std::path::Path;
 
-    fn checked(held: usize, all: usize) -> Checked {
+    fn checked(held: usize, pairs: usize) -> Checked {
         let one = Numbers(vec![1.0]);
-        let difference = Numbers(vec![0.0; all]);
-        Checked { left: one.clone(), right: one, difference, by: None, pairs: all, held }
+        let difference = Numbers(vec![0.0; pairs]);
+        Checked { left: one.clone(), right: one, difference, by: None, pairs, held }
     }
 
     #[test]
@@ -281,7 +281,7 @@ mod tests {
         let check = check.clone().find(|check| check.left == "direct.measure.settling-02").unwrap();
         let mut runs = vec![RunResult::default(); study.runs.len()];
         let (place, _) = resolve(&study, &check.left).unwrap();
-        // The motion of the second member does not settle.
+        // The second member does not settle.
         runs[place].members = [Some(5.0), None, Some(6.0)]
             .map(|settling| Member {
                 value: None,

@@ -16,7 +16,7 @@ fn ours() -> String {
 /// A table that compares numbers of the paper with ours.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct Table {
+pub struct ComparisonTable {
     /// Title of the table, in one line.
     pub title: String,
     /// Note that is shown with the table.
@@ -33,13 +33,13 @@ pub struct Table {
     pub beside: String,
     /// Rows of the table, each with one quantity.
     #[serde(rename = "row")]
-    pub rows: Vec<Row>,
+    pub rows: Vec<ComparisonRow>,
 }
 
 /// A row of a table, which compares one quantity.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct Row {
+pub struct ComparisonRow {
     /// Name of the quantity, with its unit.
     pub label: String,
     /// Value of the paper, or another value to compare with.
@@ -66,15 +66,16 @@ pub struct Overview {
     #[schemars(with = "Vec<String>")]
     pub runs: Vec<Spanned<String>>,
     /// Columns of the table, each with one metric.
-    pub metrics: Vec<Column>,
+    pub metrics: Vec<OverviewColumn>,
 }
 
 /// A column of an overview.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct Column {
+pub struct OverviewColumn {
     /// Name of the metric, which is shown for each run.
-    pub of: String,
+    #[serde(rename = "of")]
+    pub metric: String,
     /// Heading of the column, with the unit.
     pub label: String,
     /// Factor by which the metric is multiplied to get the unit of the heading. Parameters are in

@@ -1,6 +1,6 @@
 //! A study as its file describes it, with all of its parts.
 
-use super::comparisons::{Claim, Overview, Table};
+use super::comparisons::{Claim, ComparisonTable, Overview};
 use super::drawings::{Figure, Panel};
 use super::grid::Grid;
 use super::runs::{Assumption, Fact, Run, Within};
@@ -55,7 +55,7 @@ pub struct Study {
     pub figures: Vec<Figure>,
     /// Tables that compare numbers of the paper with ours.
     #[serde(default, rename = "table")]
-    pub tables: Vec<Table>,
+    pub tables: Vec<ComparisonTable>,
     /// Tables that show metrics of several runs.
     #[serde(default, rename = "overview")]
     pub overviews: Vec<Overview>,

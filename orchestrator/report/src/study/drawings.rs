@@ -16,7 +16,7 @@ pub struct Figure {
     pub id: String,
     /// Title of the figure, in one line.
     pub title: String,
-    /// Caption, which tells what the figure shows.
+    /// Caption, which explains the figure.
     #[serde(default)]
     pub caption: String,
     /// Number of panels in a row, side by side.
@@ -36,7 +36,7 @@ fn one() -> usize {
 }
 
 /// A panel of a figure. Exactly one of `signal`, `signals`, `histogram`, `scatter` and `across`
-/// says what is drawn; a panel may also have `points` alone.
+/// selects the curves; a panel may also have `points` alone.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Panel {
@@ -87,7 +87,8 @@ pub struct Panel {
 #[serde(deny_unknown_fields)]
 pub struct Curve {
     /// Signal that is drawn as the curve.
-    pub of: Signal,
+    #[serde(rename = "of")]
+    pub signal: Signal,
     /// Name of the curve in the legend.
     pub label: String,
     /// Colour of the curve.
@@ -121,7 +122,8 @@ pub struct Across {
 #[serde(deny_unknown_fields)]
 pub struct Axis {
     /// Name of the metric along the axis.
-    pub of: String,
+    #[serde(rename = "of")]
+    pub metric: String,
     /// Factor by which the metric is multiplied to get the unit of the axis.
     #[serde(default = "super::values::unscaled")]
     pub factor: f64,

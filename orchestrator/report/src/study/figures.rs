@@ -56,7 +56,7 @@ fn panel(figure: &Figure, panel: &Panel, results: &Results) -> Result<figure::Pa
             });
         }
     } else if let Some(across) = &panel.across {
-        x_label.clone_from(&across.x.of);
+        x_label.clone_from(&across.x.metric);
         for line in &across.lines {
             curves.push(through(across, line, results)?);
         }
@@ -144,7 +144,7 @@ fn straight(panel: &Panel, results: &Results) -> Result<Vec<Curve>, String> {
 fn through(across: &Across, line: &Through, results: &Results) -> Result<Curve, String> {
     let along = |axis: &Axis| {
         let mean = |run: &Spanned<String>| {
-            let numbers = results.numbers(&format!("{}.{}", run.get_ref(), axis.of))?;
+            let numbers = results.numbers(&format!("{}.{}", run.get_ref(), axis.metric))?;
             // A run without this metric leaves a gap.
             Ok(if numbers.0.is_empty() { f64::NAN } else { numbers.mean() * axis.factor })
         };
@@ -157,8 +157,9 @@ fn through(across: &Across, line: &Through, results: &Results) -> Result<Curve, 
 
 /// Returns the curves that a panel draws for a run, each with its signal, name and colour.
 fn drawn<'a>(panel: &'a Panel, run: &'a Run) -> Vec<(&'a Signal, String, Color)> {
-    let own = panel.signal.iter().map(|signal| (signal, run.label.clone(), run.color));
-    own.chain(panel.signals.iter().map(|curve| (&curve.of, curve.label.clone(), curve.color)))
+    let for_run = panel.signal.iter().map(|signal| (signal, run.label.clone(), run.color));
+    for_run
+        .chain(panel.signals.iter().map(|curve| (&curve.signal, curve.label.clone(), curve.color)))
         .collect()
 }
 

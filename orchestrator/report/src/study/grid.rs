@@ -46,7 +46,7 @@ struct Candidate {
     measures: Vec<Spanned<String>>,
 }
 
-/// An experiment in which all candidates are run, with what is computed for its runs.
+/// An experiment in which all candidates are run, with the measures of its runs.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 struct Scenario {
@@ -85,8 +85,8 @@ impl Grid {
             let ids = self.candidates.iter().map(|candidate| candidate.id.as_str());
             source.check_names(scenario.set_for.keys(), "[[grid.candidate]]", ids)?;
             for candidate in &self.candidates {
-                let own = scenario.set_for.iter().find(|(id, _)| *id.get_ref() == candidate.id);
-                let own = own.into_iter().flat_map(|(_, set)| set.clone());
+                let set_for = scenario.set_for.iter().find(|(id, _)| *id.get_ref() == candidate.id);
+                let set_for = set_for.into_iter().flat_map(|(_, set)| set.clone());
                 let has = |name: &String| !candidate.without.contains(name);
                 let common = scenario.set.clone().into_iter().filter(|(name, _)| has(name));
                 let id = format!("{}-{}", scenario.id.get_ref(), candidate.id);
@@ -97,7 +97,7 @@ impl Grid {
                     group: scenario.label.clone(),
                     experiment: scenario.experiment.clone(),
                     fmu: candidate.fmu.clone(),
-                    set: common.chain(candidate.set.clone()).chain(own).collect(),
+                    set: common.chain(candidate.set.clone()).chain(set_for).collect(),
                     unset: candidate
                         .without
                         .iter()
@@ -125,20 +125,20 @@ pub(super) fn expand(
     names: &[Spanned<String>],
     ids: &[&str],
 ) -> Result<Vec<Spanned<String>>, Spanned<String>> {
-    let mut all = Vec::new();
+    let mut expanded = Vec::new();
     for name in names {
         if !name.get_ref().contains('*') {
-            all.push(name.clone());
+            expanded.push(name.clone());
             continue;
         }
-        let before = all.len();
+        let before = expanded.len();
         let fitting = ids.iter().filter(|id| names::matches(name.get_ref(), id));
-        all.extend(fitting.map(|id| Spanned::new(name.span(), (*id).to_string())));
-        if all.len() == before {
+        expanded.extend(fitting.map(|id| Spanned::new(name.span(), (*id).to_string())));
+        if expanded.len() == before {
             return Err(name.clone());
         }
     }
-    Ok(all)
+    Ok(expanded)
 }
 
 #[cfg(test)]
@@ -151,7 +151,7 @@ mod tests {
         let names = |names: &[&str]| -> Vec<_> {
             names.iter().map(|name| Spanned::new(0..0, (*name).to_string())).collect()
         };
-        let expanded = |of: &[&str]| expand(&names(of), &ids);
+        let expanded = |patterns: &[&str]| expand(&names(patterns), &ids);
         assert_eq!(
             expanded(&["storm-*", "calm-*"]).unwrap(),
             names(&["storm-lqr", "calm-lqr", "calm-fbl"])

@@ -85,13 +85,13 @@ impl Study {
         Ok(study.to_string())
     }
 
-    /// Notes what the experiments ask for. An experiment that cannot be read is reported later,
-    /// when it is to be run.
+    /// Reads the metrics that the experiments define. An experiment that cannot be read is reported
+    /// later, when it is to be run.
     fn learn_metrics(&mut self) {
-        let mut known: BTreeMap<PathBuf, Observe> = BTreeMap::new();
+        let mut observed: BTreeMap<PathBuf, Observe> = BTreeMap::new();
         for run in &mut self.runs {
             let path = self.source.beside(&run.experiment);
-            let asked = known.entry(path).or_insert_with_key(|path| {
+            let asked = observed.entry(path).or_insert_with_key(|path| {
                 Experiment::load(path).map(|read| read.observe).unwrap_or_default()
             });
             run.observe.clone_from(asked);
@@ -102,11 +102,11 @@ impl Study {
     fn expand(&mut self) -> Result<(), Error> {
         let ids: Vec<&str> = self.runs.iter().map(|run| run.id.get_ref().as_str()).collect();
         let panels = self.figures.iter_mut().flat_map(|figure| {
-            let own = figure.panels.iter_mut().flat_map(|panel| {
+            let of_panels = figure.panels.iter_mut().flat_map(|panel| {
                 let lines = panel.across.iter_mut().flat_map(|across| &mut across.lines);
                 lines.map(|line| &mut line.runs).chain(&mut panel.runs)
             });
-            own.chain([&mut figure.runs])
+            of_panels.chain([&mut figure.runs])
         });
         for names in panels.chain(self.overviews.iter_mut().map(|overview| &mut overview.runs)) {
             *names = grid::expand(names, &ids).map_err(|name| {
@@ -125,13 +125,13 @@ impl Study {
                 Err(self.source.error(&run.id.span(), format!("[[run]] id = \"{id}\": {message}")))
             };
             if id.is_empty() || !id.chars().all(|c| c.is_ascii_alphanumeric() || c == '-') {
-                return fault("letters, digits and - only");
+                return fault("an id consists of letters, digits and -");
             }
             if ids[..place].contains(&id.as_str()) {
-                return fault("there is another run of that id");
+                return fault("there is another run with this id");
             }
             if run.vary.as_ref().is_some_and(|vary| vary.count == 0) {
-                return fault("vary.count = 0: at least 1");
+                return fault("vary.count = 0, but it must be at least 1");
             }
             self.source.check_names(
                 &run.within,
@@ -152,7 +152,7 @@ impl Study {
             let fault = match measure.fault() {
                 _ if id.is_empty() => Some("a measure of a study needs an id".into()),
                 _ if self.measures[..place].iter().any(|other| other.id == *id) => {
-                    Some("there is another measure of that id".into())
+                    Some("there is another measure with this id".into())
                 }
                 fault => fault,
             };
@@ -191,7 +191,7 @@ impl Study {
                     return Err(self.source.error(
                         &(0..0),
                         format!(
-                            "[[figure]] id = \"{}\", panel \"{}\": exactly one of signal, signals, histogram, scatter, across, or points alone",
+                            "[[figure]] id = \"{}\", panel \"{}\": a panel needs exactly one of signal, signals, histogram, scatter and across, or points alone",
                             figure.id, panel.label
                         ),
                     ));
@@ -228,13 +228,13 @@ mod tests {
         let loaded = |measures: &[&str]| {
             let measure =
                 |id: &&str| format!("[[measure]]\n{id}\nkind = \"rms\"\nsignals = \"x\"\n");
-            let text = measures.iter().map(measure).fold(head.to_string(), |all, one| all + &one);
+            let text = measures.iter().map(measure).fold(head.to_string(), |text, one| text + &one);
             std::fs::write(&path, text).unwrap();
             Study::load(&path).map_err(|error| error.to_string())
         };
         assert!(loaded(&["id = \"a\"", "id = \"b\""]).is_ok());
         assert!(loaded(&[""]).unwrap_err().contains("needs an id"));
         let twice = loaded(&["id = \"a\"", "id = \"a\""]).unwrap_err();
-        assert!(twice.contains("\"a\": there is another measure of that id"), "{twice}");
+        assert!(twice.contains("\"a\": there is another measure with this id"), "{twice}");
     }
 }

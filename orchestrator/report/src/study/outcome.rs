@@ -1,4 +1,4 @@
-//! What the runs of a study give, and what is kept of it.
+//! Results of the runs of a study, as they are stored.
 
 use crate::metrics::{Metrics, Value};
 use cosim::experiment::Observe;
@@ -7,7 +7,7 @@ use cosim::system::Parameters;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// Results that are kept of a part.
+/// Results of a part.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Outcome {
     /// Results of each member, one for each value of the parameter.
@@ -21,12 +21,12 @@ pub struct Outcome {
     pub spread: BTreeMap<Signal, Spread>,
 }
 
-/// Results that are kept of one member of a run.
+/// Results of one member of a run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Member {
     /// Value of the parameter, if one is varied.
     pub value: Option<i32>,
-    /// Figures of merit of the member.
+    /// Metrics of the member.
     pub metrics: Metrics,
     /// Comparisons of signals with bounds, by id.
     pub within: BTreeMap<String, Compared>,
@@ -36,7 +36,7 @@ pub struct Member {
 
 impl Member {
     /// Returns whether this member has the same results as another one, apart from computing times.
-    pub fn moves_as(&self, other: &Self, asked: &Observe) -> bool {
+    pub fn has_same_results(&self, other: &Self, asked: &Observe) -> bool {
         let timeless = |metrics: &Metrics| {
             let mut metrics = Metrics { step_us: BTreeMap::new(), ..metrics.clone() };
             metrics
@@ -88,11 +88,11 @@ pub struct Spread {
 impl Spread {
     /// Extends the band so that it also covers these values.
     pub fn widen(&mut self, low: &[f64], high: &[f64]) {
-        for (own, value) in self.low.iter_mut().zip(low) {
-            *own = own.min(*value);
+        for (least, value) in self.low.iter_mut().zip(low) {
+            *least = least.min(*value);
         }
-        for (own, value) in self.high.iter_mut().zip(high) {
-            *own = own.max(*value);
+        for (most, value) in self.high.iter_mut().zip(high) {
+            *most = most.max(*value);
         }
     }
 }
@@ -100,8 +100,8 @@ impl Spread {
 /// Number of times that a timed run is made; the least of each computing time counts.
 pub(super) const REPETITIONS: u32 = 5;
 
-/// What one member gave.
-pub(super) struct Flown {
+/// Results of one member.
+pub(super) struct MemberResult {
     /// Numbers of the member.
     pub(super) member: Member,
     /// Its signals.
@@ -110,24 +110,24 @@ pub(super) struct Flown {
     pub(super) parameters: Parameters,
 }
 
-impl Flown {
-    /// Keeps the smaller one of each computing time of two runs that are otherwise the same.
+impl MemberResult {
+    /// Replaces each computing time by the smaller one of two runs that are otherwise the same.
     pub(super) fn keep_least_times(&mut self, other: &Self, observe: &Observe) {
-        let (own, theirs) = (&mut self.member.metrics, &other.member.metrics);
-        for (name, value) in &mut own.asked {
+        let (metrics, others) = (&mut self.member.metrics, &other.member.metrics);
+        for (name, value) in &mut metrics.asked {
             let is_timing = observe.metrics.get(name).is_some_and(|measure| measure.timing);
-            if let (true, Some(Value::Number(own)), Some(Some(Value::Number(theirs)))) =
-                (is_timing, value, theirs.asked.get(name))
+            if let (true, Some(Value::Number(time)), Some(Some(Value::Number(other)))) =
+                (is_timing, value, others.asked.get(name))
             {
-                *own = own.min(*theirs);
+                *time = time.min(*other);
             }
         }
-        for (name, own) in &mut own.step_us {
-            *own = theirs.step_us.get(name).map_or(*own, |theirs| own.min(*theirs));
+        for (name, time) in &mut metrics.step_us {
+            *time = others.step_us.get(name).map_or(*time, |other| time.min(*other));
         }
-        for (name, own) in &mut self.series.samples {
-            let theirs = other.series.samples.get(name).into_iter().flatten();
-            own.iter_mut().zip(theirs).for_each(|(own, theirs)| *own = own.min(*theirs));
+        for (name, times) in &mut self.series.samples {
+            let others = other.series.samples.get(name).into_iter().flatten();
+            times.iter_mut().zip(others).for_each(|(time, other)| *time = time.min(*other));
         }
     }
 }

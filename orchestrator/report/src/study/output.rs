@@ -42,7 +42,7 @@ pub(super) fn write(results: &Results, out: &Path) -> Result<(Vec<Judgement>, Ve
     Ok((verdicts, files))
 }
 
-/// Returns all numbers as JSON, for other programs.
+/// Returns all numbers as JSON for other programs.
 fn numbers(results: &Results, judged: &[claims::Judged]) -> String {
     let study = results.study;
     let runs: serde_json::Map<String, Value> = study
@@ -50,7 +50,7 @@ fn numbers(results: &Results, judged: &[claims::Judged]) -> String {
         .iter()
         .zip(&results.runs)
         .map(|(run, result)| {
-            let own = json!({
+            let entry = json!({
                 "label": run.label,
                 "experiment": run.experiment,
                 "fmu": run.fmu,
@@ -59,7 +59,7 @@ fn numbers(results: &Results, judged: &[claims::Judged]) -> String {
                 "members": result.members,
                 "samples": result.series.samples,
             });
-            (run.id.get_ref().clone(), own)
+            (run.id.get_ref().clone(), entry)
         })
         .collect();
     let claims: Vec<Value> = study
@@ -85,9 +85,9 @@ fn numbers(results: &Results, judged: &[claims::Judged]) -> String {
             json!({ "says": claim.says, "verdict": judged.verdict, "checks": checks })
         })
         .collect();
-    let all =
+    let document =
         json!({ "title": study.title, "values": study.values.0, "runs": runs, "claims": claims });
-    let mut text = serde_json::to_string_pretty(&all).unwrap_or_default();
+    let mut text = serde_json::to_string_pretty(&document).unwrap_or_default();
     text.push('\n');
     text
 }
@@ -97,23 +97,23 @@ fn numbers(results: &Results, judged: &[claims::Judged]) -> String {
 pub(super) fn notes(results: &Results) -> Vec<String> {
     let mut notes = Vec::new();
     for (run, result) in results.study.runs.iter().zip(&results.runs) {
-        let (id, all) = (run.id.get_ref(), result.members.len());
+        let (id, count) = (run.id.get_ref(), result.members.len());
         let lost: Vec<f64> =
             result.members.iter().filter_map(|member| member.metrics.lost_at).collect();
         if let Some(first) = lost.iter().copied().reduce(f64::min) {
             let time = rounded(first);
             let what = run.observe.loss.as_ref().map_or("run", |loss| &loss.what);
             notes.push(format!(
-                "{id}: the {what} is lost in {} of {all} runs, at t = {time} s or later",
+                "{id}: the {what} is lost in {} of {count} runs, at t = {time} s or later",
                 lost.len()
             ));
         }
         if let (Some(vary), Some((first, others))) = (&run.vary, result.members.split_first())
             && !others.is_empty()
-            && others.iter().all(|other| other.moves_as(first, &run.observe))
+            && others.iter().all(|other| other.has_same_results(first, &run.observe))
         {
-            let names = vary.parameter.all().join(" and ");
-            notes.push(format!("{id}: {names} changes nothing, all {all} runs are the same"));
+            let names = vary.parameter.names().join(" and ");
+            notes.push(format!("{id}: {names} has no effect, all {count} runs are the same"));
         }
     }
     notes

@@ -1,7 +1,7 @@
-//! The report as one HTML page, which needs no other file.
+//! The report as one self-contained HTML page.
 
 use super::claims::{Checked, Judged, Verdict};
-use super::comparisons::{Check, Claim, Column, Overview, Relation, Row, Table};
+use super::comparisons::{Check, Claim, ComparisonRow, ComparisonTable, Overview, Relation};
 use super::results::{Numbers, Results};
 use super::texts::{percent, several, shown, signed};
 use super::values::{Quantity, ValueKind};
@@ -55,14 +55,14 @@ pub(super) fn page(
                     @for paragraph in paragraphs(&study.summary) { p { (paragraph) } }
                     @if !claims.is_empty() {
                     section id="claims" {
-                        h2 { "What the paper claims, and what came out" }
+                        h2 { "Claims of the paper, and whether they hold here" }
                         table.claims {
-                            thead { tr { th { "Claim" } th { "Verdict" } th { "Because" } } }
+                            thead { tr { th { "Claim" } th { "Verdict" } th { "Evidence" } } }
                             tbody { @for row in &claims { (row) } }
                         }
                         p.note {
-                            "A number with a range in brackets is a mean over several runs, with the smallest and the "
-                            "largest. Differences are taken run by run, between runs with the same disturbance."
+                            "A number with a range in brackets is the mean over several runs, followed by the smallest and the largest "
+                            "value. Differences are taken between runs with the same disturbance."
                         }
                     }
                     }
@@ -74,15 +74,15 @@ pub(super) fn page(
                     (plots(results, drawn))
                     (scenario(results))
                     section id="origin" {
-                        h2 { "Origin of the numbers" }
+                        h2 { "How the numbers were computed" }
                         p {
-                            (runs) " runs of FMUs, by orchestrator " (env!("CARGO_PKG_VERSION")) ". All numbers of this page are in "
-                            code { "results.json" } ", signals of each first run in " code { "runs" }
-                            ". Everything but the times repeats bit for bit."
+                            "Orchestrator " (env!("CARGO_PKG_VERSION")) " made " (runs) " simulation runs. All numbers of this page are in "
+                            code { "results.json" } ". The folder " code { "runs" } " holds the signals of the first run of each row below. "
+                            "A repetition gives the same bits, except for computing times."
                         }
                         (all_runs(results))
                         @if !study.values.0.is_empty() {
-                            h3 { "Values that are compared with" }
+                            h3 { "Reference values" }
                             (all_values(results))
                         }
                     }
@@ -104,8 +104,8 @@ fn plots(results: &Results, drawn: &[figure::Figure]) -> Markup {
         section id="figures" {
             h2 { "Figures" }
             p.note {
-                "Drag to zoom, double-click to see everything again. A click on a name in a legend hides the curve, a double-click "
-                "hides all others. Each figure stands as SVG and PNG in the folder " code { "figures" } " beside this page."
+                "Drag to zoom, and double-click to return to the whole view. A click on a name in a legend hides its curve, a "
+                "double-click hides all others. The folder " code { "figures" } " beside this page holds each figure as SVG and PNG."
             }
             @for (figure, picture) in results.study.figures.iter().zip(drawn) {
                 figure id=(figure.id) {
@@ -128,7 +128,7 @@ fn scenario(results: &Results) -> Markup {
         @if !results.study.scenario.is_empty() { section id="scenario" {
             h2 { "Scenario" }
             table {
-                thead { tr { th { "What" } th { "Value" } th { "Source" } } }
+                thead { tr { th { "Quantity" } th { "Value" } th { "Source" } } }
                 tbody {
                     @for fact in &results.study.scenario {
                         tr { td { (fact.what) } td { (fact.value) } td { (fact.source) } }
@@ -137,9 +137,9 @@ fn scenario(results: &Results) -> Markup {
             }
         } }
         @if !results.study.assumptions.is_empty() { section id="assumptions" {
-            h2 { "Where the paper is silent, or cannot be meant as it stands" }
+            h2 { "Assumptions where the paper is incomplete or in error" }
             table {
-                thead { tr { th { "Open in the paper" } th { "Taken here" } } }
+                thead { tr { th { "Gap or error in the paper" } th { "Assumption made here" } } }
                 tbody {
                     @for assumption in &results.study.assumptions {
                         tr { td { (assumption.silent) } td { (assumption.taken) } }
@@ -153,7 +153,7 @@ fn scenario(results: &Results) -> Markup {
 /// Returns the ids and the names of the sections that the page has.
 fn sections(results: &Results) -> impl Iterator<Item = (&'static str, &'static str)> {
     let study = results.study;
-    let all = [
+    let sections = [
         ("claims", "Claims", study.claims.is_empty()),
         ("tables", "Numbers", study.tables.is_empty() && study.overviews.is_empty()),
         ("figures", "Figures", study.figures.is_empty()),
@@ -161,7 +161,7 @@ fn sections(results: &Results) -> impl Iterator<Item = (&'static str, &'static s
         ("assumptions", "Assumptions", study.assumptions.is_empty()),
         ("origin", "Origin", false),
     ];
-    all.into_iter().filter(|(.., empty)| !empty).map(|(id, name, _)| (id, name))
+    sections.into_iter().filter(|(.., empty)| !empty).map(|(id, name, _)| (id, name))
 }
 
 fn paragraphs(text: &str) -> impl Iterator<Item = &str> {
@@ -183,7 +183,7 @@ fn claim(claim: &Claim, judged: &Judged) -> Markup {
             td { (claim.says) " " span.source { "(" (claim.source) ")" } }
             td { span class=(class(judged.verdict)) { (judged.verdict.text()) } }
             td {
-                ul { @for (check, checked) in claim.checks.iter().zip(&judged.checks) { li { (because(check, checked)) } } }
+                ul { @for (check, checked) in claim.checks.iter().zip(&judged.checks) { li { (evidence(check, checked)) } } }
                 @if !claim.remark.is_empty() { p.remark { (claim.remark) } }
             }
         }
@@ -199,12 +199,12 @@ fn class(verdict: Verdict) -> &'static str {
     }
 }
 
-fn because(check: &Check, checked: &Checked) -> Markup {
-    let (held, all) = (checked.held, checked.pairs);
-    if all == 0 {
-        return html! { span.verdict { (checked.verdict().text()) } " " (check.label) ": there is no such number" };
+fn evidence(check: &Check, checked: &Checked) -> Markup {
+    let (held, pairs) = (checked.held, checked.pairs);
+    if pairs == 0 {
+        return html! { span.verdict { (checked.verdict().text()) } " " (check.label) ": no run has this number" };
     }
-    let asked = match (check.relation, checked.by) {
+    let required = match (check.relation, checked.by) {
         (Relation::Below, None) => "below".to_string(),
         (Relation::Above, None) => "above".to_string(),
         (Relation::AtMost, None) => "not above".to_string(),
@@ -222,10 +222,10 @@ fn because(check: &Check, checked: &Checked) -> Markup {
             format!("at least {}\u{a0}% above", shown(100.0 * by))
         }
     };
-    let mut count = if all > 1 { format!(", in {held} of {all} runs") } else { String::new() };
-    let missing = all - checked.difference.0.len();
-    if all > 1 && missing > 0 {
-        let _ = write!(count, ", of which {missing} have no such number");
+    let mut count = if pairs > 1 { format!(", in {held} of {pairs} runs") } else { String::new() };
+    let missing = pairs - checked.difference.0.len();
+    if pairs > 1 && missing > 0 {
+        let _ = write!(count, ", of which {missing} do not have this number");
     }
     // Only a time after which something settles can be without a number here.
     let side = |side: &Numbers| if side.0.is_empty() { "never".into() } else { several(side) };
@@ -234,11 +234,11 @@ fn because(check: &Check, checked: &Checked) -> Markup {
         span class=(class(checked.verdict())) { (checked.verdict().text()) } " "
         (check.label) ": " (side(&checked.left)) " against " (side(&checked.right)) " ("
         @if is_compared { (percent(&checked.difference)) "; " }
-        "asked: " (asked) (count) ")"
+        "required: " (required) (count) ")"
     }
 }
 
-fn table(table: &Table, results: &Results) -> Result<Markup, String> {
+fn table(table: &ComparisonTable, results: &Results) -> Result<Markup, String> {
     let rows = table
         .rows
         .iter()
@@ -260,7 +260,7 @@ fn table(table: &Table, results: &Results) -> Result<Markup, String> {
     })
 }
 
-fn row(row: &Row, has_beside: bool, results: &Results) -> Result<Markup, String> {
+fn row(row: &ComparisonRow, has_beside: bool, results: &Results) -> Result<Markup, String> {
     let ours = results.numbers(&row.ours)?;
     let beside = row.beside.as_ref().map(|beside| results.numbers(beside)).transpose()?;
     let paper = row.paper.as_ref().map(|paper| results.study.values.number(paper)).transpose()?;
@@ -294,14 +294,13 @@ fn overview(overview: &Overview, results: &Results) -> Markup {
     let mut rows = Vec::new();
     for id in &overview.runs {
         let Some(run) = results.study.run(id.get_ref()) else { continue };
-        let number = |column: &Column| {
-            let reference = format!("{}.{}", id.get_ref(), column.of);
+        let numbers = overview.metrics.iter().map(|column| {
+            let reference = format!("{}.{}", id.get_ref(), column.metric);
             let numbers =
                 results.numbers(&reference).map_or_else(|_| Vec::new(), |numbers| numbers.0);
             Numbers(numbers.into_iter().map(|number| number * column.factor).collect())
-        };
-        let numbers: Vec<Numbers> = overview.metrics.iter().map(number).collect();
-        rows.push((run, numbers));
+        });
+        rows.push((run, numbers.collect::<Vec<_>>()));
     }
     html! {
         h3 { (overview.title) }
@@ -326,7 +325,7 @@ fn overview(overview: &Overview, results: &Results) -> Markup {
 fn all_runs(results: &Results) -> Markup {
     html! {
         table {
-            thead { tr { th { "Run" } th { "Experiment" } th { "With" } th { "Runs" } } }
+            thead { tr { th { "Run" } th { "Experiment" } th { "Changes to it" } th { "Number of runs" } } }
             tbody {
                 @for (run, result) in results.study.runs.iter().zip(&results.runs) {
                     tr {
@@ -339,7 +338,7 @@ fn all_runs(results: &Results) -> Markup {
                             @for (name, fmu) in &run.fmu { code { (name) " = " (fmu) } " " }
                             @for (name, value) in &run.set { code { (name) " = " (value) } " " }
                             @if let Some(vary) = &run.vary {
-                                code { (vary.parameter.all().join(" = ")) " = " (vary.first) "…" (i64::from(vary.first) + i64::from(vary.count) - 1) }
+                                code { (vary.parameter.names().join(" = ")) " = " (vary.first) "…" (i64::from(vary.first) + i64::from(vary.count) - 1) }
                             }
                         }
                         td { (result.members.len()) }
@@ -354,12 +353,12 @@ fn all_values(results: &Results) -> Markup {
     let kind = |kind| match kind {
         ValueKind::Table => "table",
         ValueKind::Text => "text",
-        ValueKind::Figure => "read off a figure",
-        ValueKind::Computed => "computed",
+        ValueKind::Figure => "figure, read off",
+        ValueKind::Computed => "not printed, computed",
     };
     html! {
         table {
-            thead { tr { th { "Value" } th { "" } th { "Kind" } th { "Source" } } }
+            thead { tr { th { "Id" } th { "Value" } th { "Printed in" } th { "Source" } } }
             tbody {
                 @for value in &results.study.values.0 {
                     tr {

@@ -1,8 +1,8 @@
 //! One part of the work of a study: a run for some values of its parameter, from reading the
-//! experiment to the results that are kept.
+//! experiment to its stored results.
 
 use super::definition::Study;
-use super::outcome::{Compared, Flown, Member, Outcome, REPETITIONS, Series, Spread};
+use super::outcome::{Compared, Member, MemberResult, Outcome, REPETITIONS, Series, Spread};
 use super::runs::Run;
 use crate::error::Error;
 use crate::measure::{Gauge, larger};
@@ -34,32 +34,33 @@ const ROUNDING: f64 = 1e-9;
 
 /// Signals that the figures of a study need from a run.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Wanted {
+pub(super) struct DrawnSignals {
     /// Signals that are drawn as lines.
     pub series: BTreeSet<Signal>,
     /// Signals that are drawn as bands.
     pub spread: BTreeSet<Signal>,
 }
 
-impl Wanted {
+impl DrawnSignals {
     /// Collects the signals of a run that the study's figures draw.
-    pub(super) fn of(study: &Study, run: &Run) -> Self {
-        let mut wanted = Self::default();
+    pub(super) fn collect(study: &Study, run: &Run) -> Self {
+        let mut signals = Self::default();
         for figure in &study.figures {
             for panel in &figure.panels {
                 if !study.runs_of(figure, panel).any(|drawn| drawn.id == run.id) {
                     continue;
                 }
-                let drawn = panel.signal.iter().chain(panel.signals.iter().map(|curve| &curve.of));
+                let drawn =
+                    panel.signal.iter().chain(panel.signals.iter().map(|curve| &curve.signal));
                 let drawn: Vec<Signal> = drawn.cloned().collect();
                 if panel.spread {
-                    wanted.spread.extend(drawn.iter().cloned());
+                    signals.spread.extend(drawn.iter().cloned());
                 }
-                wanted.series.extend(drawn);
-                wanted.series.extend(panel.reference.clone());
+                signals.series.extend(drawn);
+                signals.series.extend(panel.reference.clone());
             }
         }
-        wanted
+        signals
     }
 }
 
@@ -68,7 +69,7 @@ pub(super) struct Preparation<'a> {
     study: &'a Study,
     run: &'a Run,
     /// Signals of the run that the figures draw.
-    pub wanted: Wanted,
+    pub drawn: DrawnSignals,
     /// The experiment, read once so that all members use the same text.
     experiment: Experiment,
     fmu_dirs: &'a [PathBuf],
@@ -84,11 +85,11 @@ impl<'a> Preparation<'a> {
         run: &'a Run,
         fmu_dirs: &'a [PathBuf],
     ) -> Result<Self, Error> {
-        let wanted = Wanted::of(study, run);
+        let drawn = DrawnSignals::collect(study, run);
         let experiment = study
             .experiment(run)
             .map_err(|source| Error::Run { run: run.id.get_ref().clone(), source })?;
-        Ok(Self { study, run, wanted, experiment, fmu_dirs })
+        Ok(Self { study, run, drawn, experiment, fmu_dirs })
     }
 
     /// Checks the experiment for the member with this number, with all names resolved.
@@ -100,7 +101,7 @@ impl<'a> Preparation<'a> {
         let mut experiment = self.experiment.clone();
         if let Some(vary) = &self.run.vary {
             let value = Value::Integer(i64::from(vary.first) + i64::from(member));
-            for parameter in vary.parameter.all() {
+            for parameter in vary.parameter.names() {
                 experiment.set(parameter, value.clone()).map_err(|message| self.fault(&message))?;
             }
         }
@@ -124,8 +125,8 @@ impl<'a> Preparation<'a> {
         let mut system = self.system(0, opened).map_err(|source| self.failed(source))?;
         let bounded = self.study.bounds_of(self.run).flat_map(|(_, signals)| signals);
         let measured = self.study.measures_of(self.run).flat_map(|(_, signals)| signals);
-        let mut all = self.wanted.series.iter().chain(bounded).chain(measured);
-        all.try_for_each(|signal| self.resolve(signal, &mut system).map(drop))?;
+        let mut signals = self.drawn.series.iter().chain(bounded).chain(measured);
+        signals.try_for_each(|signal| self.resolve(signal, &mut system).map(drop))?;
         Meters::new(&mut system).map(drop).map_err(|source| self.failed(source))
     }
 
@@ -136,7 +137,7 @@ impl<'a> Preparation<'a> {
     /// Runs the members with these numbers.
     ///
     /// # Errors
-    /// Returns an error if a unit fails, or if the run was asked to end.
+    /// Returns an error if an FMU fails, or if the run was asked to end.
     pub(super) fn execute(
         &self,
         range: Range<u32>,
@@ -145,22 +146,22 @@ impl<'a> Preparation<'a> {
     ) -> Result<Outcome, Single> {
         let mut outcome = Outcome::default();
         for number in range {
-            let mut flown = self.fly(number, opened, interrupt)?;
+            let mut result = self.fly(number, opened, interrupt)?;
             // Computing times are only meaningful if the run has the machine for itself, and what
             // interrupts a run can only lengthen them.
             for _ in 1..if self.is_timed(number) { REPETITIONS } else { 1 } {
                 let again = self.fly(number, opened, interrupt)?;
-                flown.keep_least_times(&again, &self.experiment.observe);
+                result.keep_least_times(&again, &self.experiment.observe);
             }
-            for (signal, values) in &flown.series.signals {
-                if self.wanted.spread.contains(signal) {
+            for (signal, values) in &result.series.signals {
+                if self.drawn.spread.contains(signal) {
                     widen(&mut outcome.spread, signal, values);
                 }
             }
-            outcome.members.push(flown.member);
+            outcome.members.push(result.member);
             if number == 0 {
-                outcome.parameters = flown.parameters;
-                outcome.series = Some(flown.series);
+                outcome.parameters = result.parameters;
+                outcome.series = Some(result.series);
             }
         }
         Ok(outcome)
@@ -176,9 +177,9 @@ impl<'a> Preparation<'a> {
         number: u32,
         opened: &mut Opened,
         interrupt: &Interrupt,
-    ) -> Result<Flown, Single> {
+    ) -> Result<MemberResult, Single> {
         let mut system = self.system(number, opened)?;
-        let mut series = Watch::new(&self.wanted.series, self, &mut system)?;
+        let mut series = Watch::new(&self.drawn.series, self, &mut system)?;
         let mut bounds = Vec::new();
         for (within, signals) in self.study.bounds_of(self.run) {
             let signals = signals.iter().map(|signal| self.resolve(signal, &mut system));
@@ -212,15 +213,15 @@ impl<'a> Preparation<'a> {
         let units = series.resolved.iter().map(|(s, r)| (s.clone(), r.unit.clone())).collect();
         let series =
             Series { time: series.time, signals: series.signals, units, samples: meters.samples() };
-        Ok(Flown { member: Member { value, metrics, within, measures }, series, parameters })
+        Ok(MemberResult { member: Member { value, metrics, within, measures }, series, parameters })
     }
 }
 
 fn widen(spread: &mut BTreeMap<Signal, Spread>, signal: &Signal, values: &[f64]) {
-    let own = spread
+    let band = spread
         .entry(signal.clone())
         .or_insert_with(|| Spread { low: values.to_vec(), high: values.to_vec() });
-    own.widen(values, values);
+    band.widen(values, values);
 }
 
 impl Compared {
@@ -289,8 +290,8 @@ impl Observer for Watch {
         self.time.push(sample.time);
         for ((_, resolved), values) in self.resolved.iter().zip(self.signals.values_mut()) {
             // At the stop time, a signal with responses keeps its value of the step before.
-            let kept = values.last().copied().filter(|_| sample.last && resolved.responds);
-            values.push(kept.unwrap_or_else(|| resolved.value(sample.values)));
+            let last = values.last().copied().filter(|_| sample.last && resolved.responds);
+            values.push(last.unwrap_or_else(|| resolved.value(sample.values)));
         }
         Ok(())
     }

@@ -1,4 +1,4 @@
-//! Runs a study on all cores, keeps the finished parts, and writes the report.
+//! Runs a study on all cores, stores the finished parts, and writes the report.
 //!
 //! The work is divided into parts. The results of a finished part are written to a file at once,
 //! together with a hash of everything that they depend on. A part whose file exists with the same
@@ -6,11 +6,11 @@
 
 use super::claims;
 use super::definition::Study;
-use super::kept::{Kept, kept};
 use super::outcome::Outcome;
 use super::output::{Judgement, notes, write};
 use super::part::{Part, Preparation};
 use super::results::{Results, RunResult, resolve};
+use super::stored::{self, StoredOutcome};
 use crate::error::Error;
 use crate::folder::Folder;
 use crate::progress::Parts;
@@ -48,9 +48,9 @@ pub struct Options {
     pub interrupt: Interrupt,
 }
 
-/// Outcome of the reproduction of a study.
+/// Report on a study that was reproduced.
 #[derive(Debug)]
-pub struct Report {
+pub struct StudyReport {
     /// Title of the study.
     pub title: String,
     /// Path of the report page.
@@ -98,10 +98,10 @@ pub fn find(name: &Path) -> Result<PathBuf, Single> {
 /// Runs those parts of a study that are not finished yet, and writes its report.
 ///
 /// # Errors
-/// Returns an error before anything is run if the study is faulty. It also returns one if a unit
+/// Returns an error before anything is run if the study is faulty. It also returns one if an FMU
 /// fails, if a file cannot be written, or if the work was asked to end; the parts that are finished
 /// by then are kept.
-pub fn reproduce(study: &Study, options: &Options) -> Result<Report, Error> {
+pub fn reproduce(study: &Study, options: &Options) -> Result<StudyReport, Error> {
     let begin = Instant::now();
     let out = options.out.clone().unwrap_or_else(|| Path::new("out").join(name(study)));
     let preparations = study
@@ -118,7 +118,7 @@ pub fn reproduce(study: &Study, options: &Options) -> Result<Report, Error> {
         return Err(Single::experiment(message).into());
     }
     let _folder = Folder::take(&out)?;
-    let all = parts(study);
+    let all_parts = parts(study);
     let file = |part: &Part| {
         let id = study.runs[part.run].id.get_ref();
         out.join("runs")
@@ -127,19 +127,19 @@ pub fn reproduce(study: &Study, options: &Options) -> Result<Report, Error> {
     };
     let mut done: BTreeMap<(usize, u32), Outcome> = BTreeMap::new();
     if !options.fresh {
-        for part in &all {
-            if let Some(outcome) = kept(&file(part), &keys[part.run], part) {
+        for part in &all_parts {
+            if let Some(outcome) = stored::load(&file(part), &keys[part.run], part) {
                 done.insert((part.run, part.range.start), outcome);
             }
         }
     }
-    let missing: Vec<Part> = all
+    let missing: Vec<Part> = all_parts
         .iter()
         .filter(|part| !done.contains_key(&(part.run, part.range.start)))
         .cloned()
         .collect();
     let progress =
-        Parts::of("parts", &study.title, all.len() as u64, done.len() as u64, options.quiet);
+        Parts::new("parts", &study.title, all_parts.len() as u64, done.len() as u64, options.quiet);
 
     if !missing.is_empty() {
         // An earlier report is removed, because it would not fit the new results if the work is
@@ -172,7 +172,12 @@ pub fn reproduce(study: &Study, options: &Options) -> Result<Report, Error> {
         done.extend(work.run(parts, threads)?);
         if let Some(request) = interrupt.asked() {
             progress.finish();
-            return Err(Error::Unfinished { done: done.len(), all: all.len(), out, request });
+            return Err(Error::Unfinished {
+                done: done.len(),
+                total: all_parts.len(),
+                out,
+                request,
+            });
         }
     }
     progress.finish();
@@ -183,7 +188,7 @@ pub fn reproduce(study: &Study, options: &Options) -> Result<Report, Error> {
     }
     let results = Results { study, runs };
     let (verdicts, files) = write(&results, &out)?;
-    Ok(Report {
+    Ok(StudyReport {
         title: study.title.clone(),
         page: out.join("report.html"),
         parts: computed,
@@ -217,7 +222,9 @@ fn check(study: &Study, preparations: &[Preparation], opened: &mut Opened) -> Re
             let mut tried = overview
                 .runs
                 .iter()
-                .map(|run| resolve(study, &format!("{}.{}", run.get_ref(), column.of)).map(drop))
+                .map(|run| {
+                    resolve(study, &format!("{}.{}", run.get_ref(), column.metric)).map(drop)
+                })
                 .collect::<Vec<_>>();
             if let Some(Err(message)) =
                 tried.iter().all(Result::is_err).then(|| tried.pop()).flatten()
@@ -231,7 +238,7 @@ fn check(study: &Study, preparations: &[Preparation], opened: &mut Opened) -> Re
     {
         for run in across.lines.iter().flat_map(|line| &line.runs) {
             for axis in [&across.x, &across.y] {
-                resolve(study, &format!("{}.{}", run.get_ref(), axis.of)).map_err(fault)?;
+                resolve(study, &format!("{}.{}", run.get_ref(), axis.metric)).map_err(fault)?;
             }
         }
     }
@@ -281,7 +288,7 @@ fn keys(
             .collect::<Result<Vec<_>, Error>>()?;
         let measures: Vec<Value> =
             study.measures_of(run).map(|measure_and_signals| json!(measure_and_signals)).collect();
-        let all = json!({
+        let inputs = json!({
             "format": FORMAT,
             "program": program,
             "experiment": system.experiment.source.whole(),
@@ -290,18 +297,18 @@ fn keys(
             "vary": run.vary.as_ref().map(|vary| (&vary.parameter, vary.first)),
             "within": within,
             "measures": measures,
-            "series": preparation.wanted.series,
-            "spread": preparation.wanted.spread,
+            "series": preparation.drawn.series,
+            "spread": preparation.drawn.spread,
             "timed": run.timed,
             "fmus": fmus,
         });
-        keys.push(files::digest(all.to_string()));
+        keys.push(files::digest(inputs.to_string()));
     }
     Ok(keys)
 }
 
-/// Number of failures that are told besides the first one, which ends the study.
-const FAILURES_TOLD: usize = 9;
+/// Number of failures that are reported besides the first one, which ends the study.
+const FAILURES_REPORTED: usize = 9;
 
 /// Parts of a study's work, shared by several threads.
 struct Work<'a> {
@@ -324,8 +331,8 @@ impl Work<'_> {
         std::thread::scope(|scope| {
             for _ in 0..threads.max(1) {
                 scope.spawn(|| {
-                    // An archive is opened by each thread for itself, because its units stay in
-                    // that thread.
+                    // An archive is opened by each thread for itself, because its instances
+                    // stay in that thread.
                     let mut opened = Opened::default();
                     loop {
                         let Some(part) = queue.lock().pop_front() else { break };
@@ -338,10 +345,11 @@ impl Work<'_> {
                             // kept.
                             Err(Error::Single(Single::Interrupted { .. })) => queue.lock().clear(),
                             Err(error) => {
-                                // The other runs know nothing of a unit that failed, and are kept.
-                                let is_of_unit =
-                                    matches!(error, Error::Run { source: Single::Call { .. }, .. });
-                                if !is_of_unit {
+                                // An FMU that failed does not concern the other runs, which are
+                                // kept.
+                                let is_of_fmu =
+                                    matches!(error, Error::Run { source: Single::Unit { .. }, .. });
+                                if !is_of_fmu {
                                     queue.lock().clear();
                                 }
                                 failed.lock().insert(place, error);
@@ -353,7 +361,7 @@ impl Work<'_> {
         });
         let mut failed = failed.into_inner().into_values();
         let Some(first) = failed.next() else { return Ok(done.into_inner()) };
-        for error in failed.by_ref().take(FAILURES_TOLD) {
+        for error in failed.by_ref().take(FAILURES_REPORTED) {
             tracing::error!("{error}");
         }
         if failed.len() > 0 {
@@ -372,11 +380,11 @@ impl Work<'_> {
             })?;
         let path = (self.file)(part);
         let fault = |error: serde_json::Error| Single::file(&path)(error.into());
-        let kept =
-            Kept::new(self.keys[part.run].clone(), part.range.clone(), outcome).map_err(fault)?;
-        let text = serde_json::to_vec(&kept).map_err(fault)?;
+        let stored = StoredOutcome::new(self.keys[part.run].clone(), part.range.clone(), outcome)
+            .map_err(fault)?;
+        let text = serde_json::to_vec(&stored).map_err(fault)?;
         files::write(&path, &text)?;
         self.progress.finished(&run.label);
-        Ok(kept.outcome)
+        Ok(stored.outcome)
     }
 }

@@ -10,7 +10,7 @@ use cosim::system::Parameters;
 use fmu_import::names;
 use std::collections::BTreeMap;
 
-/// All results that are kept of one run of the study.
+/// Results of one run of the study.
 #[derive(Clone, Debug, Default)]
 pub struct RunResult {
     /// Results of the members, one for each value of the parameter, in that order.
@@ -33,7 +33,7 @@ impl RunResult {
         }
         for (signal, spread) in part.spread {
             match self.spread.get_mut(&signal) {
-                Some(own) => own.widen(&spread.low, &spread.high),
+                Some(band) => band.widen(&spread.low, &spread.high),
                 None => {
                     self.spread.insert(signal, spread);
                 }
@@ -46,7 +46,7 @@ impl RunResult {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Metric {
     /// A metric by its name in `metrics.json`, with 1 or 0 for yes or no.
-    Merit {
+    Defined {
         /// Name of the metric in `metrics.json`.
         name: String,
         /// Whether the metric is a computing time.
@@ -89,7 +89,9 @@ impl Metric {
                 "share" => Ok(Self::Share(id.into())),
                 "largest" => Ok(Self::Largest(id.into())),
                 "ratio" => Ok(Self::Ratio(id.into())),
-                _ => Err(format!("\"{text}\": within.{id} has share, largest, ratio")),
+                _ => {
+                    Err(format!("\"{text}\": within.{id} has the metrics share, largest and ratio"))
+                }
             };
         }
         if let Some(id) = text.strip_prefix("measure.") {
@@ -111,31 +113,31 @@ impl Metric {
                 Err(format!("\"{text}\": the run \"{}\" is not timed", run.id.get_ref()))
             };
         }
-        let names = Metrics::names(&run.observe);
-        let known: Vec<&str> = names.iter().map(String::as_str).collect();
-        if known.contains(&text) {
-            return Ok(Self::Merit {
+        let metrics = Metrics::names(&run.observe);
+        let names: Vec<&str> = metrics.iter().map(String::as_str).collect();
+        if names.contains(&text) {
+            return Ok(Self::Defined {
                 name: text.into(),
                 timing: run.observe.metrics.get(text).is_some_and(|measure| measure.timing),
             });
         }
-        Err(format!("there is no metric \"{text}\"{}", names::hint(text, known.iter().copied())))
+        Err(format!("there is no metric \"{text}\"{}", names::hint(text, names.iter().copied())))
     }
 
     /// Returns whether the metric is a computing time, which differs from run to run and is taken
     /// from the first member only.
     fn is_time(&self) -> bool {
         match self {
-            Self::Merit { timing, .. } => *timing,
+            Self::Defined { timing, .. } => *timing,
             Self::StepTime(_) => true,
             _ => false,
         }
     }
 
-    fn of(&self, member: &Member) -> Option<f64> {
+    fn value_for(&self, member: &Member) -> Option<f64> {
         let within = |id: &String| member.within.get(id);
         match self {
-            Self::Merit { name, .. } => member.metrics.number(name),
+            Self::Defined { name, .. } => member.metrics.number(name),
             // Parameters belong to the run, not to its members.
             Self::Parameter(..) => None,
             Self::StepTime(component) => member.metrics.step_us.get(component).copied(),
@@ -183,8 +185,8 @@ pub struct Results<'a> {
 /// # Errors
 /// Returns an error that names the missing run or metric.
 pub(super) fn resolve(study: &Study, reference: &str) -> Result<(usize, Metric), String> {
-    let (id, metric) =
-        names::split(reference).ok_or_else(|| format!("\"{reference}\" is no run.metric"))?;
+    let (id, metric) = names::split(reference)
+        .ok_or_else(|| format!("\"{reference}\" does not have the form run.metric"))?;
     let place = study.runs.iter().position(|run| run.id.get_ref() == id).ok_or_else(|| {
         let hint = names::hint(id, study.runs.iter().map(|run| run.id.get_ref().as_str()));
         format!("\"{reference}\": there is no run \"{id}\"{hint}")
@@ -215,35 +217,35 @@ impl Results<'_> {
     /// # Errors
     /// Returns an error if there is no such run or metric.
     pub fn numbers(&self, reference: &str) -> Result<Numbers, String> {
-        Ok(Numbers(self.of_members(reference)?.into_iter().flatten().collect()))
+        Ok(Numbers(self.member_numbers(reference)?.into_iter().flatten().collect()))
     }
 
     /// Returns the number of each member that `run.metric` refers to. It is `None` if a member has
-    /// no such quantity, for example a settling time if the motion did not settle.
+    /// no such quantity, for example a settling time if the error did not settle.
     ///
     /// # Errors
     /// Returns an error if there is no such run or metric.
-    pub fn of_members(&self, reference: &str) -> Result<Vec<Option<f64>>, String> {
+    pub fn member_numbers(&self, reference: &str) -> Result<Vec<Option<f64>>, String> {
         let (place, metric) = resolve(self.study, reference)?;
         let RunResult { members, parameters, .. } = &self.runs[place];
         if let Metric::Parameter(component, pattern) = &metric {
-            let own = parameters.get(component).into_iter().flatten();
-            let fitting = own.filter(|(name, _)| names::matches(pattern, name));
+            let of_component = parameters.get(component).into_iter().flatten();
+            let fitting = of_component.filter(|(name, _)| names::matches(pattern, name));
             let numbers: Vec<_> =
                 fitting.filter_map(|(_, value)| value.as_f64()).map(Some).collect();
-            let there =
+            let names =
                 parameters.get(component).into_iter().flatten().map(|(name, _)| name.as_str());
             return if numbers.is_empty() {
                 Err(format!(
                     "\"{reference}\": there is no such parameter{}",
-                    names::hint(pattern, there)
+                    names::hint(pattern, names)
                 ))
             } else {
                 Ok(numbers)
             };
         }
         let counted = if metric.is_time() { &members[..members.len().min(1)] } else { members };
-        Ok(counted.iter().map(|member| metric.of(member)).collect())
+        Ok(counted.iter().map(|member| metric.value_for(member)).collect())
     }
 
     /// Returns the number of each member that a reference stands for, or the single number of a
@@ -253,7 +255,9 @@ impl Results<'_> {
     /// Returns an error if the quantity refers to something that does not exist.
     pub fn quantity(&self, quantity: &Quantity) -> Result<Vec<Option<f64>>, String> {
         match quantity {
-            Quantity::Named(name) if is_reference(self.study, quantity) => self.of_members(name),
+            Quantity::Named(name) if is_reference(self.study, quantity) => {
+                self.member_numbers(name)
+            }
             _ => self.study.values.number(quantity).map(|number| vec![Some(number)]),
         }
     }

@@ -72,7 +72,7 @@ pub struct Run {
     #[serde(default)]
     #[schemars(with = "Vec<String>")]
     pub measures: Vec<Spanned<String>>,
-    /// What the experiment of the run asks for. This is no key of a study file.
+    /// Metrics, panels and limits of the run's experiment. This is no key of a study file.
     #[serde(skip)]
     pub observe: Observe,
 }
@@ -109,7 +109,7 @@ pub enum Parameters {
 
 impl Parameters {
     /// Returns the names of all parameters.
-    pub fn all(&self) -> &[String] {
+    pub fn names(&self) -> &[String] {
         match self {
             Self::One(parameter) => std::slice::from_ref(parameter),
             Self::Several(parameters) => parameters,

@@ -43,14 +43,14 @@ pub(super) fn expand(study: &mut DeTable) -> Result<(), Fault> {
         |key: &str| match study.remove(key).map(|value| (value.span(), value.into_inner())) {
             None => Ok(DeTable::new()),
             Some((_, DeValue::Table(table))) => Ok(table),
-            Some((span, _)) => Err((span, format!("{key}: wants a table"))),
+            Some((span, _)) => Err((span, format!("{key} must be a table"))),
         };
     let shared = Shared { templates: shared("templates")?, lists: shared("lists")? };
     for (_, value) in study {
         shared.inside(value, &DeTable::new(), 0)?;
         let left_over = |text: &str| match variables(text).next() {
             None => Ok(None),
-            Some((name, _)) => Err(format!("\"{text}\": nothing here is called {{{name}}}")),
+            Some((name, _)) => Err(format!("\"{text}\": no row here has a value {{{name}}}")),
         };
         rewrite(value, &left_over)?;
     }
@@ -97,24 +97,24 @@ impl<'i> Shared<'i> {
                 table.iter_mut().try_for_each(|(_, value)| self.inside(value, row, depth))
             }
             DeValue::Array(items) => {
-                let mut all = DeArray::new();
+                let mut expanded = DeArray::new();
                 for item in items.iter() {
-                    self.item(item.clone(), row, depth, &mut all)?;
+                    self.item(item.clone(), row, depth, &mut expanded)?;
                 }
-                *items = all;
+                *items = expanded;
                 Ok(())
             }
             _ => Ok(()),
         }
     }
 
-    /// Adds the tables that an item of a list stands for to `all`.
+    /// Adds the tables that an item of a list stands for to `expanded`.
     fn item(
         &self,
         mut item: Spanned<DeValue<'i>>,
         outer: &DeTable<'i>,
         depth: usize,
-        all: &mut DeArray<'i>,
+        expanded: &mut DeArray<'i>,
     ) -> Result<(), Fault> {
         let span = item.span();
         let (mut uses, mut each) = (None, None);
@@ -123,7 +123,7 @@ impl<'i> Shared<'i> {
         }
         if uses.is_none() && each.is_none() {
             self.inside(&mut item, outer, depth)?;
-            all.push(item);
+            expanded.push(item);
             return Ok(());
         }
         if depth > DEPTH {
@@ -131,25 +131,25 @@ impl<'i> Shared<'i> {
         }
         for mut row in self.rows(each.as_ref())? {
             overlay(&mut row, outer);
-            let mut own = item.clone();
-            substitute(&mut own, &row);
+            let mut copy = item.clone();
+            substitute(&mut copy, &row);
             let Some(mut uses) = uses.clone() else {
-                self.item(own, &row, depth + 1, all)?;
+                self.item(copy, &row, depth + 1, expanded)?;
                 continue;
             };
             substitute(&mut uses, &row);
             for (name, place) in
-                texts(&uses).map_err(|place| (place, "use: wants names of templates".into()))?
+                texts(&uses).map_err(|place| (place, "use needs names of templates".into()))?
             {
                 let mut template = find(&self.templates, "template", name, place)?.clone();
                 substitute(&mut template, &row);
-                let mut copy = own.clone();
+                let mut copy = copy.clone();
                 if let (DeValue::Table(copy), DeValue::Table(template)) =
                     (copy.get_mut(), template.get_ref())
                 {
                     overlay(copy, template);
                 }
-                self.item(copy, &row, depth + 1, all)?;
+                self.item(copy, &row, depth + 1, expanded)?;
             }
         }
         Ok(())
@@ -165,11 +165,11 @@ impl<'i> Shared<'i> {
         };
         let row = |row: &Spanned<DeValue<'i>>| match row.get_ref() {
             DeValue::Table(row) => Ok(row.clone()),
-            _ => Err((row.span(), "each: wants a list of tables".to_string())),
+            _ => Err((row.span(), "each needs a list of tables".to_string())),
         };
         match list.get_ref() {
             DeValue::Array(rows) => rows.iter().map(row).collect(),
-            _ => Err((list.span(), "each: wants a list of tables, or the name of one".into())),
+            _ => Err((list.span(), "each needs a list of tables, or the name of one".into())),
         }
     }
 }
@@ -181,10 +181,10 @@ fn find<'a, 'i>(
     place: Range<usize>,
 ) -> Result<&'a Spanned<DeValue<'i>>, Fault> {
     table.get(name).ok_or_else(|| {
-        let known: Vec<&str> = table.keys().map(|key| key.get_ref().as_ref()).collect();
+        let names: Vec<&str> = table.keys().map(|key| key.get_ref().as_ref()).collect();
         (
             place,
-            format!("there is no {what} \"{name}\"{}", names::hint(name, known.iter().copied())),
+            format!("there is no {what} \"{name}\"{}", names::hint(name, names.iter().copied())),
         )
     })
 }
@@ -268,7 +268,7 @@ inner = { x = 1, y = 2 }
 [figure]
 panel = [{ use = ["angle", "error"], each = "axes", at = "{n}", "k{n}" = "{runs:{a}}", inner.y = 3 }, { label = "last" }]
 "#;
-        let wanted = r#"
+        let expected = r#"
 [figure]
 panel = [
     { label = "angle alpha", signal = "plant.alpha", at = 1, k1 = "{runs:alpha}", inner = { y = 3 } },
@@ -278,7 +278,7 @@ panel = [
     { label = "last" },
 ]
 "#;
-        assert_eq!(expanded(text).unwrap(), wanted.parse().unwrap());
+        assert_eq!(expanded(text).unwrap(), expected.parse().unwrap());
     }
 
     #[test]
@@ -296,10 +296,10 @@ list = [{ use = "d", each = [{ m = "3" }], id = "{m}{n}" }]
 [templates.d]
 of = "{kind}{n}"
 "#;
-        let wanted = r#"
+        let expected = r#"
 run = [{ id = "c1", own = 1, list = [{ id = "31", of = "x1" }] }, { id = "c2", own = 1, list = [{ id = "32", of = "x2" }] }]
 "#;
-        assert_eq!(expanded(text).unwrap(), wanted.parse().unwrap());
+        assert_eq!(expanded(text).unwrap(), expected.parse().unwrap());
     }
 
     #[test]

@@ -2,7 +2,7 @@ use super::*;
 use cosim::master::{Observer, Sample};
 use cosim::pacing::pacer::{Miss, Step};
 use cosim::signal::Resolved;
-use cosim_report::guarantee::{Course, Signals};
+use cosim_report::guarantee::{GuaranteeRecord, GuaranteeSignals};
 use cosim_report::panels::Curve;
 use ratatui::Terminal;
 use ratatui::backend::TestBackend;
@@ -30,7 +30,7 @@ fn panel(
     let signal = |place: usize| Resolved { factor, ..Resolved::variable(place) };
     let curve = |axis: usize| Curve {
         name: names[axis].into(),
-        of: minus.filter(|_| name == "error").map_or(signal(places[axis]), |minus| Resolved {
+        signal: minus.filter(|_| name == "error").map_or(signal(of[axis]), |minus| Resolved {
             factor,
             ..Resolved::difference(places[axis], minus[axis])
         }),
@@ -154,14 +154,14 @@ fn a_picture_shows_angles_limits_solver_and_deadlines() {
 
 #[test]
 fn the_guarantee_has_a_line_that_turns_red_when_it_is_lost() {
-    let signals = Signals {
+    let signals = GuaranteeSignals {
         in_force: 0,
         status: Some(probed("s.status", 1, "", &[("inForce", 1), ("none", 2), ("exceeded", 5)])),
         margins: vec![("moment".into(), 3), ("rate".into(), 2)],
         keeps: Vec::new(),
     };
     let mut state = State::new(Scene { span: [0.0, 1.0], ..Scene::default() });
-    let mut course = Course::new(signals);
+    let mut course = GuaranteeRecord::new(signals);
     let mut told = |time: f64, values: [f64; 4]| {
         course.observe(&Sample { tick: 0, time, last: false, values: &values }).unwrap();
         let snapshot = Snapshot {

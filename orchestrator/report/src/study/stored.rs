@@ -1,4 +1,4 @@
-//! Files in which the finished parts of a study are kept, so that they need not be run again.
+//! Files that hold the finished parts of a study, so that they need not be run again.
 
 use super::outcome::Outcome;
 use super::part::Part;
@@ -9,7 +9,7 @@ use std::path::Path;
 
 /// Content of the file of a finished part.
 #[derive(Serialize, Deserialize)]
-pub(super) struct Kept {
+pub(super) struct StoredOutcome {
     key: String,
     members: std::ops::Range<u32>,
     /// Hash of all other fields, so that no number is used that was changed later.
@@ -17,7 +17,7 @@ pub(super) struct Kept {
     pub(super) outcome: Outcome,
 }
 
-impl Kept {
+impl StoredOutcome {
     pub(super) fn new(
         key: String,
         members: std::ops::Range<u32>,
@@ -41,15 +41,16 @@ impl Kept {
     }
 }
 
-/// Reads the outcome that a part has kept earlier, if it is still valid.
-pub(super) fn kept(path: &Path, key: &str, part: &Part) -> Option<Outcome> {
+/// Reads the outcome of a part that was finished earlier, if it is still valid.
+pub(super) fn load(path: &Path, key: &str, part: &Part) -> Option<Outcome> {
     let text = fs::read(path).ok()?;
-    let kept = serde_json::from_slice::<Kept>(&text).ok().filter(Kept::is_whole);
-    let Some(kept) = kept else {
-        tracing::error!("{} is damaged: it is run again", path.display());
+    let stored = serde_json::from_slice::<StoredOutcome>(&text).ok();
+    let stored = stored.filter(StoredOutcome::is_whole);
+    let Some(stored) = stored else {
+        tracing::error!("{} is damaged: its runs are repeated", path.display());
         return None;
     };
-    (kept.key == key && kept.members == part.range).then_some(kept.outcome)
+    (stored.key == key && stored.members == part.range).then_some(stored.outcome)
 }
 
 #[cfg(test)]
@@ -77,13 +78,13 @@ mod tests {
             ..Outcome::default()
         };
         let part = Part { run: 0, range: 0..1 };
-        let kept_now = Kept::new("key".into(), part.range.clone(), outcome.clone()).unwrap();
-        let sound = serde_json::to_vec(&kept_now).unwrap();
+        let stored = StoredOutcome::new("key".into(), part.range.clone(), outcome.clone()).unwrap();
+        let sound = serde_json::to_vec(&stored).unwrap();
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("part.json");
         let read = |bytes: &[u8]| {
             fs::write(&path, bytes).unwrap();
-            with_default(NoSubscriber::default(), || kept(&path, "key", &part))
+            with_default(NoSubscriber::default(), || load(&path, "key", &part))
         };
         assert_eq!(read(&sound), Some(outcome.clone()));
         let mut seen = 0;
@@ -92,7 +93,7 @@ mod tests {
             broken[bit / 8] ^= 1 << (bit % 8);
             match read(&broken) {
                 None => seen += 1,
-                found => assert_eq!(found.as_ref(), Some(&outcome), "bit {bit}"),
+                outcome_read => assert_eq!(outcome_read.as_ref(), Some(&outcome), "bit {bit}"),
             }
         }
         // The others change how a number is written, or a space.

@@ -23,7 +23,9 @@ impl Shape {
         match self {
             Self::Uniform(ends) => Some(*ends),
             Self::Whole(ends) => Some(ends.map(f64::from)),
-            Self::Triangular(law) => Some([law.inverse_cdf(0.0), law.inverse_cdf(1.0)]),
+            Self::Triangular(distribution) => {
+                Some([distribution.inverse_cdf(0.0), distribution.inverse_cdf(1.0)])
+            }
             _ => None,
         }
     }
@@ -32,9 +34,9 @@ impl Shape {
     pub(super) fn below(&self, value: f64) -> f64 {
         match self {
             Self::Uniform([low, high]) => ((value - low) / (high - low)).clamp(0.0, 1.0),
-            Self::Normal(law) => law.cdf(value),
-            Self::LogNormal(law) => law.cdf(value),
-            Self::Triangular(law) => law.cdf(value),
+            Self::Normal(distribution) => distribution.cdf(value),
+            Self::LogNormal(distribution) => distribution.cdf(value),
+            Self::Triangular(distribution) => distribution.cdf(value),
             Self::Whole(_) | Self::List(..) | Self::Case(_) => f64::NAN,
         }
     }
@@ -44,9 +46,9 @@ impl Shape {
         let inside = unit.clamp(f64::MIN_POSITIVE, 1.0 - f64::EPSILON / 2.0);
         match self {
             Self::Uniform([low, high]) => low + unit * (high - low),
-            Self::Normal(law) => law.inverse_cdf(inside),
-            Self::LogNormal(law) => law.inverse_cdf(inside),
-            Self::Triangular(law) => law.inverse_cdf(unit),
+            Self::Normal(distribution) => distribution.inverse_cdf(inside),
+            Self::LogNormal(distribution) => distribution.inverse_cdf(inside),
+            Self::Triangular(distribution) => distribution.inverse_cdf(unit),
             Self::Whole(_) | Self::List(..) | Self::Case(_) => f64::NAN,
         }
     }

@@ -1,4 +1,4 @@
-"""One co-simulation instance of a unit, driven through FMPy, with variables by name."""
+"""One co-simulation instance of an FMU, driven through FMPy, with variables by name."""
 
 from __future__ import annotations
 
@@ -20,26 +20,26 @@ enumeration's item."""
 
 
 class UnitError(RuntimeError):
-    """A unit refused a call. The text is the unit's own."""
+    """An FMU refused a call. The text is the FMU's message."""
 
     def __init__(self, unit: str, call: str, message: str) -> None:
         super().__init__(f"{unit}: {message}")
         self.unit = unit
-        """Name of the unit."""
+        """Name of the FMU."""
         self.call = call
         """Function of FMI 2.0 that was refused."""
 
 
 class UnitWarning(UserWarning):
-    """A warning of a unit."""
+    """A warning of an FMU."""
 
 
-class Unit:
-    """An instance of a unit with its unpacked archive. `close` frees both."""
+class Instance:
+    """An instance of an FMU with its unpacked archive. `close` frees both."""
 
     def __init__(self, path: Path, parameters: Mapping[str, Value]) -> None:
         self._messages: list[tuple[int, str]] = []
-        self._slave: Any = None
+        self._fmpy: Any = None
         self._folder = tempfile.TemporaryDirectory(prefix="reentry-")
         try:
             fmpy.extract(str(path), self._folder.name)
@@ -48,7 +48,7 @@ class Unit:
             self.variables: dict[str, Any] = {v.name: v for v in description.modelVariables}
             self.values(parameters, "parameter")
             identifier = description.coSimulation.modelIdentifier
-            slave = fmi2.FMU2Slave(
+            instance = fmi2.FMU2Slave(
                 guid=description.guid,
                 modelIdentifier=identifier,
                 unzipDirectory=self._folder.name,
@@ -56,15 +56,15 @@ class Unit:
                 libraryPath=self._library(identifier),
             )
             callbacks = fmi2.fmi2CallbackFunctions()
-            callbacks.logger = fmi2.fmi2CallbackLoggerTYPE(self._logged)
+            callbacks.logger = fmi2.fmi2CallbackLoggerTYPE(self._log)
             callbacks.allocateMemory = fmi2.defaultCallbacks.allocateMemory
             callbacks.freeMemory = fmi2.defaultCallbacks.freeMemory
             try:
-                slave.instantiate(callbacks=callbacks, loggingOn=True)
+                instance.instantiate(callbacks=callbacks, loggingOn=True)
             except Exception as error:
-                slave.freeLibrary()
-                raise UnitError(self.name, "fmi2Instantiate", self._said(str(error))) from error
-            self._slave = slave
+                instance.freeLibrary()
+                raise UnitError(self.name, "fmi2Instantiate", self._errors(str(error))) from error
+            self._fmpy = instance
             self.set(parameters, "parameter")
         except BaseException:
             self.close()
@@ -74,29 +74,29 @@ class Unit:
         # FMI 2.0 names no folder for ARM processors; FMI 3.0 does.
         file = f"{identifier}{fmpy.sharedLibraryExtension}"
         places = [Path(self._folder.name, "binaries", name, file) for name in self._platforms()]
-        found = [place for place in places if place.is_file()]
-        if not found:
+        present = [place for place in places if place.is_file()]
+        if not present:
             raise FileNotFoundError(f"{self.name} has no library for {fmpy.platform_tuple}")
-        return str(found[0])
+        return str(present[0])
 
     @staticmethod
     def _platforms() -> tuple[str, str]:
         return fmpy.platform_tuple, fmpy.platform
 
-    def _logged(self, _: Any, __: bytes, status: int, ___: bytes, message: bytes) -> None:
+    def _log(self, _: Any, __: bytes, status: int, ___: bytes, message: bytes) -> None:
         self._messages.append((status, message.decode(errors="replace")))
 
-    def _said(self, otherwise: str) -> str:
-        said = [message for status, message in self._messages if status > fmi2.fmi2Warning]
-        return "; ".join(said) or otherwise
+    def _errors(self, otherwise: str) -> str:
+        errors = [message for status, message in self._messages if status > fmi2.fmi2Warning]
+        return "; ".join(errors) or otherwise
 
     def _call(self, function: Callable[..., Any], *arguments: Any, **named: Any) -> Any:
-        """Calls a function of the unit: errors become exceptions with the unit's own words."""
+        """Calls a function of the FMU. Its errors become exceptions with the FMU's message."""
         self._messages.clear()
         try:
             result = function(*arguments, **named)
         except FMICallException as error:
-            raise UnitError(self.name, error.function, self._said(str(error))) from None
+            raise UnitError(self.name, error.function, self._errors(str(error))) from None
         for status, message in self._messages:
             if status == fmi2.fmi2Warning:
                 warnings.warn(f"{self.name}: {message}", UnitWarning, stacklevel=4)
@@ -116,12 +116,12 @@ class Unit:
 
     def get_reals(self, references: list[int]) -> list[float]:
         """Returns real variables by value reference."""
-        values: list[float] = self._call(self._slave.getReal, references)
+        values: list[float] = self._call(self._fmpy.getReal, references)
         return values
 
     def set_reals(self, references: list[int], values: Sequence[float]) -> None:
         """Sets real variables by value reference."""
-        self._call(self._slave.setReal, references, values)
+        self._call(self._fmpy.setReal, references, values)
 
     def get(self, name: str) -> Value:
         """Returns a variable; an enumeration as its item's name."""
@@ -130,11 +130,11 @@ class Unit:
         if variable.type == "Real":
             return self.get_reals(references)[0]
         if variable.type == "String":
-            text = self._call(self._slave.getString, references)[0]
+            text = self._call(self._fmpy.getString, references)[0]
             return text.decode() if isinstance(text, bytes) else str(text)
         if variable.type == "Boolean":
-            return bool(self._call(self._slave.getBoolean, references)[0])
-        number = int(self._call(self._slave.getInteger, references)[0])
+            return bool(self._call(self._fmpy.getBoolean, references)[0])
+        number = int(self._call(self._fmpy.getInteger, references)[0])
         if variable.type == "Enumeration":
             return next(
                 str(item.name) for item in variable.declaredType.items if int(item.value) == number
@@ -147,75 +147,75 @@ class Unit:
         for name, value in settings.items():
             variable = self.variable(name)
             if variable.causality != causality:
-                problem = f"{self.name}: {name} is no {causality}, but of causality"
+                problem = f"{self.name}: {name} is no {causality}, but has the causality"
                 raise ValueError(f"{problem} {variable.causality}")
             pairs.append((variable, self._checked(variable, value)))
         return pairs
 
     def _checked(self, variable: Any, value: Value) -> Any:
-        wants = f"{self.name}: {variable.name} wants"
+        needs = f"{self.name}: {variable.name} needs"
         if variable.type == "Enumeration":
             items = {str(item.name): int(item.value) for item in variable.declaredType.items}
             if value not in items:
                 raise ValueError(
-                    f"{wants} one of its items, not {value!r}{hint(str(value), items)}"
+                    f"{needs} one of its items, not {value!r}{hint(str(value), items)}"
                 )
             return items[str(value)]
         if variable.type == "String":
             if isinstance(value, str):
                 return value
-            raise TypeError(f"{wants} a text, not {value!r}")
+            raise TypeError(f"{needs} a text, not {value!r}")
         if variable.type == "Boolean":
             if value in (True, False):
                 return bool(value)
-            raise TypeError(f"{wants} True or False, not {value!r}")
+            raise TypeError(f"{needs} True or False, not {value!r}")
         unit = f" in {variable.unit}" if getattr(variable, "unit", None) else ""
         try:
             number = float(value)
         except (TypeError, ValueError):
-            raise TypeError(f"{wants} a number{unit}, not {value!r}") from None
+            raise TypeError(f"{needs} a number{unit}, not {value!r}") from None
         if variable.type == "Real":
             return number
         if not number.is_integer():
-            raise TypeError(f"{wants} an integer, not {value!r}")
+            raise TypeError(f"{needs} an integer, not {value!r}")
         return int(number)
 
     def set(self, settings: Mapping[str, Value], causality: str) -> None:
         """Sets variables of a causality by name."""
         setters = {
-            "Real": self._slave.setReal,
-            "Integer": self._slave.setInteger,
-            "Enumeration": self._slave.setInteger,
-            "Boolean": self._slave.setBoolean,
-            "String": self._slave.setString,
+            "Real": self._fmpy.setReal,
+            "Integer": self._fmpy.setInteger,
+            "Enumeration": self._fmpy.setInteger,
+            "Boolean": self._fmpy.setBoolean,
+            "String": self._fmpy.setString,
         }
         for variable, value in self.values(settings, causality):
             self._call(setters[variable.type], [variable.valueReference], [value])
 
-    # Life
+    # States of the instance
 
     def enter(self) -> None:
         """Enters initialization mode at t = 0."""
-        self._call(self._slave.setupExperiment, startTime=0.0)
-        self._call(self._slave.enterInitializationMode)
+        self._call(self._fmpy.setupExperiment, startTime=0.0)
+        self._call(self._fmpy.enterInitializationMode)
 
     def exit(self) -> None:
         """Leaves initialization mode."""
-        self._call(self._slave.exitInitializationMode)
+        self._call(self._fmpy.exitInitializationMode)
 
     def step(self, time: float, step: float) -> None:
         """Advances by one communication step, s."""
-        self._call(self._slave.doStep, currentCommunicationPoint=time, communicationStepSize=step)
+        self._call(self._fmpy.doStep, currentCommunicationPoint=time, communicationStepSize=step)
 
     def reset(self, parameters: Mapping[str, Value]) -> None:
-        """Makes the instance new. FMI resets parameters to their start values, so they are set
-        anew."""
-        self._call(self._slave.reset)
+        """Resets the instance. FMI resets parameters to their start values, so they are set
+        again."""
+        self._call(self._fmpy.reset)
         self.set(parameters, "parameter")
 
     def close(self) -> None:
         """Frees the instance and removes the unpacked archive. A second call does nothing."""
-        slave, self._slave = self._slave, None
-        if slave is not None:
-            slave.freeInstance()
+        instance, self._fmpy = self._fmpy, None
+        if instance is not None:
+            instance.freeInstance()
         self._folder.cleanup()

@@ -29,9 +29,9 @@ impl Reader<'_> {
         let chosen: Vec<&str> =
             given.iter().filter(|(_, is_given)| *is_given).map(|(name, _)| *name).collect();
         if chosen.len() != 1 {
-            let all = given.map(|(name, _)| name).join(", ");
+            let names = given.map(|(name, _)| name).join(", ");
             let said = if chosen.is_empty() { "none".into() } else { chosen.join(" and ") };
-            return Err(format!("one distribution is needed ({all}), there is {said}"));
+            return Err(format!("one distribution is needed ({names}), but there is {said}"));
         }
         let kind = &self.system.variable(self.target).kind;
         if !matches!(kind, VariableKind::Real { .. })
@@ -50,27 +50,27 @@ impl Reader<'_> {
             let normal = normal.get_ref();
             let (mean, deviation) =
                 (self.number(&normal.mean)?, self.difference(&normal.deviation)?);
-            let law = Normal::new(mean, deviation);
-            return law
+            let normal = Normal::new(mean, deviation);
+            return normal
                 .map(Shape::Normal)
-                .map_err(|_| format!("normal: deviation = {deviation}: above 0"));
+                .map_err(|_| format!("normal: deviation = {deviation}, but it must be above 0"));
         }
         if let Some(log_normal) = &vary.log_normal {
             let log_normal = log_normal.get_ref();
             let (median, sigma) = (self.number(&log_normal.median)?, log_normal.sigma);
             if median.is_nan() || median <= 0.0 {
-                return Err(format!("log_normal: median = {median}: above 0"));
+                return Err(format!("log_normal: median = {median}, but it must be above 0"));
             }
             return LogNormal::new(median.ln(), sigma)
                 .map(Shape::LogNormal)
-                .map_err(|_| format!("log_normal: sigma = {sigma}: above 0"));
+                .map_err(|_| format!("log_normal: sigma = {sigma}, but it must be above 0"));
         }
         if let Some(triangular) = &vary.triangular {
             let [low, mode, high] = triangular.get_ref();
             let [low, mode, high] = [self.number(low)?, self.number(mode)?, self.number(high)?];
             return Triangular::new(low, high, mode).map(Shape::Triangular).map_err(|_| {
                 format!(
-                    "triangular = [{low}, {mode}, {high}]: smallest, most likely and largest value"
+                    "triangular = [{low}, {mode}, {high}]: the values must be the smallest, the most likely and the largest one"
                 )
             });
         }
@@ -85,7 +85,7 @@ impl Reader<'_> {
         if let Some(range) = &vary.range {
             let range = range.get_ref();
             if range.count < 2 {
-                return Err(format!("range: count = {}: at least 2", range.count));
+                return Err(format!("range: count = {}, but it must be at least 2", range.count));
             }
             let (from, to) = (self.number(&range.from)?, self.number(&range.to)?);
             let last = f64::from(range.count - 1);
@@ -118,17 +118,21 @@ impl Reader<'_> {
             return if low < high {
                 Ok(Shape::Whole([low, high]))
             } else {
-                Err(format!("uniform = [{low}, {high}]: from a smaller to a larger value"))
+                Err(format!(
+                    "uniform = [{low}, {high}]: the second value must be larger than the first one"
+                ))
             };
         }
-        if !matches!(kind, VariableKind::Real { .. }) {
-            return Err(format!("uniform is for numbers, not for {}: take a list", kind.name()));
+        if !matches!(kind, Kind::Real { .. }) {
+            return Err(format!("uniform is for numbers, not for {}: use a list", kind.name()));
         }
         let (low, high) = (self.number(low)?, self.number(high)?);
         if low < high && (high - low).is_finite() {
             Ok(Shape::Uniform([low, high]))
         } else {
-            Err(format!("uniform = [{low}, {high}]: from a smaller to a larger value"))
+            Err(format!(
+                "uniform = [{low}, {high}]: the second value must be larger than the first one"
+            ))
         }
     }
 
@@ -145,9 +149,9 @@ impl Reader<'_> {
             return Ok(None);
         };
         let percent: f64 =
-            number.trim().parse().map_err(|_| format!("{written} is no number of percent"))?;
+            number.trim().parse().map_err(|_| format!("{written} is no percentage"))?;
         let nominal = self.system.nominal(self.target).ok_or_else(|| {
-            format!("{written}: the unit states no value that this could be percent of")
+            format!("{written}: neither the experiment nor the FMU gives a value of which this could be a percentage")
         })?;
         Ok(Some(nominal * percent / 100.0))
     }

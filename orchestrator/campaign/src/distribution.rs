@@ -11,11 +11,11 @@ use cosim::variation::{SettingValue, Target};
 use reader::Reader;
 use shape::Shape;
 use statrs::distribution::ContinuousCDF;
-use statrs::statistics::{Distribution, Mode};
+use statrs::statistics::{Distribution as _, Mode};
 
 /// Distribution of the values of a parameter.
 #[derive(Clone, Debug)]
-pub struct Law {
+pub struct Distribution {
     shape: Shape,
     /// Probabilities between which the quantiles lie, if the distribution is cut off.
     between: [f64; 2],
@@ -25,7 +25,7 @@ pub struct Law {
     levels: u64,
 }
 
-impl Law {
+impl Distribution {
     /// Reads the distribution of `vary` for a target.
     ///
     /// # Errors
@@ -35,7 +35,7 @@ impl Law {
         let reader = Reader { system, target };
         let shape = reader.shape(vary)?;
         let is_continuous = !matches!(shape, Shape::List(..) | Shape::Case(_) | Shape::Whole(_));
-        let mut law = Self {
+        let mut distribution = Self {
             ends: shape.ends(),
             shape,
             between: [0.0, 1.0],
@@ -48,31 +48,33 @@ impl Law {
             let [low, high] = within.get_ref();
             let (low, high) = (reader.number(low)?, reader.number(high)?);
             if low.is_nan() || high.is_nan() || low >= high {
-                return Err(format!("within = [{low}, {high}]: from a smaller to a larger value"));
-            }
-            law.between = [law.shape.below(low), law.shape.below(high)];
-            if law.between[0] >= law.between[1] {
                 return Err(format!(
-                    "within = [{low}, {high}]: the distribution has no value there"
+                    "within = [{low}, {high}]: the second value must be larger than the first one"
                 ));
             }
-            let [least, most] = law.ends.unwrap_or([f64::NEG_INFINITY, f64::INFINITY]);
-            law.ends = Some([low.max(least), high.min(most)]);
+            distribution.between = [distribution.shape.below(low), distribution.shape.below(high)];
+            if distribution.between[0] >= distribution.between[1] {
+                return Err(format!(
+                    "within = [{low}, {high}]: the distribution has no values between them"
+                ));
+            }
+            let [least, most] = distribution.ends.unwrap_or([f64::NEG_INFINITY, f64::INFINITY]);
+            distribution.ends = Some([low.max(least), high.min(most)]);
         }
         if vary.levels.is_some() && !is_continuous {
             return Err("levels is for continuous distributions only".into());
         }
         if vary.levels.is_some_and(|levels| levels < 2) {
-            return Err("levels: at least 2".into());
+            return Err("levels must be at least 2".into());
         }
         if vary.weights.is_some() && vary.list.is_none() {
-            return Err("weights belong to a list".into());
+            return Err("weights are for a list only".into());
         }
         // What can be drawn must be within the limits of the variable.
-        for end in law.ends.into_iter().flatten() {
+        for end in distribution.ends.into_iter().flatten() {
             reader.checked(end)?;
         }
-        Ok(law)
+        Ok(distribution)
     }
 
     /// Returns the number of levels in a factorial design.
@@ -83,10 +85,13 @@ impl Law {
         match &self.shape {
             Shape::List(values, _) => Ok(values.len() as u64),
             Shape::Whole([low, high]) => Ok((i64::from(*high) - i64::from(*low) + 1) as u64),
-            Shape::Case(_) => Err("case has no levels: a factorial design cannot vary it".into()),
+            Shape::Case(_) => {
+                Err("a factorial design cannot vary a parameter by case, which has no levels"
+                    .into())
+            }
             _ if self.levels == 0 => Err("a factorial design needs levels here".into()),
             _ if self.ends.is_none() => {
-                Err("has no ends: a factorial design needs within here".into())
+                Err("the distribution is unbounded: a factorial design needs within here".into())
             }
             _ => Ok(self.levels),
         }
@@ -100,29 +105,31 @@ impl Law {
         match self.shape {
             Shape::List(..) | Shape::Whole(_) | Shape::Case(_) => Ok(()),
             _ if self.ends.is_some() => Ok(()),
-            _ => Err("has no ends: corners need within here".into()),
+            _ => Err("the distribution is unbounded: corners and searches need within here".into()),
         }
     }
 
     /// Returns the distribution in words.
-    pub fn told(&self) -> String {
+    pub fn in_words(&self) -> String {
         let ends = |[low, high]: [f64; 2]| format!("{} to {}", short(low), short(high));
         let whole = match &self.shape {
-            Shape::Uniform(own) => format!("uniform, {}", ends(*own)),
+            Shape::Uniform(bounds) => format!("uniform, {}", ends(*bounds)),
             Shape::Whole([low, high]) => format!("integers, {low} to {high}"),
-            Shape::Normal(law) => {
-                let (mean, deviation) = (law.mean(), law.std_dev());
+            Shape::Normal(normal) => {
+                let (mean, deviation) = (normal.mean(), normal.std_dev());
                 format!(
                     "normal, mean {}, deviation {}",
                     short(mean.unwrap_or(f64::NAN)),
                     short(deviation.unwrap_or(f64::NAN))
                 )
             }
-            Shape::LogNormal(law) => format!("log-normal, median {}", short(law.inverse_cdf(0.5))),
-            Shape::Triangular(law) => format!(
+            Shape::LogNormal(log_normal) => {
+                format!("log-normal, median {}", short(log_normal.inverse_cdf(0.5)))
+            }
+            Shape::Triangular(triangular) => format!(
                 "triangular, {}, most likely {}",
-                ends([law.inverse_cdf(0.0), law.inverse_cdf(1.0)]),
-                short(law.mode().unwrap_or(f64::NAN))
+                ends([triangular.inverse_cdf(0.0), triangular.inverse_cdf(1.0)]),
+                short(triangular.mode().unwrap_or(f64::NAN))
             ),
             Shape::List(values, _) => {
                 let shown = values.iter().take(6).map(|value| match value {
@@ -135,7 +142,9 @@ impl Law {
             Shape::Case(first) => format!("number of the case + {first}"),
         };
         match (self.ends, self.shape.ends()) {
-            (Some(own), uncut) if uncut != Some(own) => format!("{whole}, within {}", ends(own)),
+            (Some(bounds), uncut) if uncut != Some(bounds) => {
+                format!("{whole}, within {}", ends(bounds))
+            }
             _ => whole,
         }
     }
