@@ -18,7 +18,7 @@
 mod harness;
 
 use control::Crmpc;
-use control::crmpc::{Constraints, Memory, Settings, Standing, Status};
+use control::crmpc::{Constraints, Memory, Settings, SolverStatus, Standing};
 use control::error_dynamics::Gain;
 use harness::flight::{Flight, optimised_every};
 use harness::{Case, constant, in_parallel, settings, simulate, white};
@@ -115,7 +115,7 @@ fn add(cost: &mut Cost, settings: &Settings, case: &Case) {
             if tick % ratio == 0 {
                 cost.times.push(memory.report.time);
                 cost.iterations += u64::from(memory.report.iterations);
-                cost.kept += u32::from(memory.report.status == Status::Kept);
+                cost.kept += u32::from(memory.report.status == SolverStatus::Kept);
             }
         },
     );

@@ -11,7 +11,7 @@ use control::lqr::{Lqr, LqrSettings};
 use control::{Crmpc, error::DesignError};
 use nalgebra::Vector3;
 use vehicle::Scenario;
-use vehicle::disturbance::Kind;
+use vehicle::disturbance::DisturbanceKind;
 use vehicle::plant::Plant;
 
 const PERIOD: f64 = 0.04;
@@ -57,7 +57,7 @@ fn fly<C: Controller>(
 }
 
 /// Returns the scenario of a flight: a seed, a corner, a square wave and an inertia of its own.
-fn scenario(kind: Kind, flight: u64) -> Scenario {
+fn scenario(kind: DisturbanceKind, flight: u64) -> Scenario {
     let mut scenario = Scenario::crmpc2022();
     let corner = |bit: u64| if flight >> bit & 1 == 0 { 1.0 } else { -1.0 };
     let disturbance = &mut scenario.disturbance;
@@ -85,7 +85,7 @@ fn main() {
         "law, disturbance, told, truly: share found within 10 s, found ever, 95 % found at; assumptions contradicted within 10 s, ever; estimates"
     );
     for is_lqr in [false, true] {
-        for kind in [Kind::White, Kind::Constant, Kind::Square] {
+        for kind in [DisturbanceKind::White, DisturbanceKind::Constant, DisturbanceKind::Square] {
             for delays in [(0.0, 0.04), (0.04, 0.0), (0.0, 0.12), (0.0, 0.0), (0.04, 0.04)] {
                 let all = (0..flights).map(|n| outcome(is_lqr, &scenario(kind, n), delays));
                 let mut sorted = [Vec::new(), Vec::new(), Vec::new()];

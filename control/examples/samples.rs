@@ -16,7 +16,7 @@ use harness::{disturbance, settings, simulate};
 use serde_json::json;
 use std::hint::black_box;
 use std::io::{self, Write};
-use vehicle::disturbance::Kind;
+use vehicle::disturbance::DisturbanceKind;
 use vehicle::scenario::Scenario;
 
 /// Number of repetitions of each sample, if the first argument gives none.
@@ -61,7 +61,7 @@ fn write_samples(
         &mut ways[0].1,
         &mut memory,
         INERTIA_SCALE,
-        disturbance(Kind::White),
+        disturbance(DisturbanceKind::White),
         |after, tick, &measured| {
             ticks.push((tick, before.clone(), measured));
             before.clone_from(after);

@@ -24,7 +24,7 @@ use control::Dlmpc;
 use control::dlmpc::{Memory, Settings, SlidingMode};
 use harness::{disturbance, in_parallel, simulate};
 use std::ops::RangeInclusive;
-use vehicle::disturbance::{Disturbance, Kind};
+use vehicle::disturbance::{Disturbance, DisturbanceKind};
 
 /// Number of sets of the grid that are evaluated again, and number of those from which steps are
 /// taken.
@@ -63,7 +63,7 @@ fn score(gains: SlidingMode, seeds: RangeInclusive<u64>) -> Score {
     for seed in seeds {
         let mut controller = Dlmpc::new(Settings { sliding_mode: gains, ..Settings::published() })
             .unwrap_or_else(|error| panic!("{error}"));
-        let noise = Disturbance { seed, ..disturbance(Kind::White) };
+        let noise = Disturbance { seed, ..disturbance(DisturbanceKind::White) };
         let outcome = simulate(&mut controller, &mut Memory::default(), 1.05, noise, |_, _, _| {});
         score.ems_deg += outcome.ems_deg / runs;
         score.cms += outcome.cms / runs;

@@ -18,7 +18,7 @@ use cmaes::{CMAESOptions, DVector};
 use control::crmpc::{Constraints, Design, Settings};
 use control::error_dynamics::Gain;
 use control::mpc::SolverSettings;
-use harness::flight::{Course, Flight, Random, Shown, Sight};
+use harness::flight::{Flight, Random, Shown, Sight, Waveform};
 use harness::in_parallel;
 use nalgebra::Vector3;
 
@@ -207,7 +207,7 @@ fn decoded(flight: &Flight, x: &DVector<f64>) -> Flight {
         rates: of_three(3) * (if moves { 0.7 * limit_rate } else { 0.0 }),
         inertia_scale: 1.0 + inertia_error * limited(6),
         duration: (end + 0.5).min(40.0),
-        disturbance: Course::Segments(pieces),
+        disturbance: Waveform::Segments(pieces),
         ..flight.clone()
     }
 }

@@ -28,7 +28,7 @@ mod harness;
 use cmaes::{CMAESOptions, DVector};
 use control::crmpc::Constraints;
 use control::delay::Latency;
-use control::report::{Report, Status};
+use control::report::{SolverReport, SolverStatus};
 use control::{Crmpc, Delayed, Dlmpc, dlmpc};
 use harness::draws::{Case, UNKNOWNS};
 use harness::flight::{Flight, Random};
@@ -97,19 +97,21 @@ fn go<C: Optimising>(
             // other.
             let law = &mut new(budget);
             let repetitions = if budget > 0.0 { 1 } else { REPETITIONS };
-            let reports: Vec<[Report; 3]> = seeds
+            let reports: Vec<[SolverReport; 3]> = seeds
                 .iter()
                 .map(|&seed| Case::random(seed, size).optimise(law, repetitions))
                 .collect();
             for (situation, title) in SITUATIONS.iter().enumerate() {
-                let own: Vec<Report> = reports.iter().map(|reports| reports[situation]).collect();
+                let own: Vec<SolverReport> =
+                    reports.iter().map(|reports| reports[situation]).collect();
                 print(&format!("{name}, {title}"), &seeds, &own);
             }
         }
         "list" => {
             let law = &mut new(0.0);
-            let most = |reports: &[Report; 3]| reports.iter().map(|report| report.iterations).max();
-            let mut all: Vec<(u64, [Report; 3])> = seeds
+            let most =
+                |reports: &[SolverReport; 3]| reports.iter().map(|report| report.iterations).max();
+            let mut all: Vec<(u64, [SolverReport; 3])> = seeds
                 .iter()
                 .map(|&seed| (seed, Case::random(seed, 1.0).optimise(law, 1)))
                 .collect();
@@ -124,7 +126,8 @@ fn go<C: Optimising>(
                 (number(4).unwrap_or(1000.0) as usize, number(5).unwrap_or(1.0));
             let worst = in_parallel(&seeds, |&seed| search(&mut new(0.0), seed, evaluations, size));
             for (situation, title) in SITUATIONS.iter().enumerate() {
-                let own: Vec<Report> = worst.iter().map(|reports| reports[situation]).collect();
+                let own: Vec<SolverReport> =
+                    worst.iter().map(|reports| reports[situation]).collect();
                 print(&format!("{name}, {title}, worst of each search"), &seeds, &own);
             }
         }
@@ -143,7 +146,7 @@ fn jumps(name: &str, number: impl Fn(usize) -> Option<f64>) {
     let mut settings = settings(Constraints::Robust);
     settings.delay = if name == "delayed" { DELAY } else { 0.0 };
     let jump = ENTERS + settings.horizon as f64 * settings.period_optimisation;
-    let mut all: [Vec<(u64, Report)>; 3] = Default::default();
+    let mut all: [Vec<(u64, SolverReport)>; 3] = Default::default();
     for seed in first..first + count {
         let mut flight = Flight::random(&settings, seed);
         let random = &mut Random::new(seed);
@@ -153,7 +156,7 @@ fn jumps(name: &str, number: impl Fn(usize) -> Option<f64>) {
         (flight.reference, flight.reference_start) =
             (Profile::step(before, before + step, jump), 0.0);
         flight.duration = DURATION;
-        let mut best: Vec<(f64, Report)> = Vec::new();
+        let mut best: Vec<(f64, SolverReport)> = Vec::new();
         for repetition in 0..REPETITIONS {
             let (mut solves, mut place) = (0, 0);
             flight.fly_seen(|memory, tick, _, _| {
@@ -179,16 +182,21 @@ fn jumps(name: &str, number: impl Fn(usize) -> Option<f64>) {
         }
     }
     for (title, own) in ["before a jump enters", "as it enters", "afterwards"].iter().zip(all) {
-        let (seeds, reports): (Vec<u64>, Vec<Report>) = own.into_iter().unzip();
+        let (seeds, reports): (Vec<u64>, Vec<SolverReport>) = own.into_iter().unzip();
         print(&format!("{name}, {title}"), &seeds, &reports);
     }
 }
 
 /// Returns the reports of the worst optimisations that a search found, one for each situation.
-fn search<C: Optimising>(law: &mut C, seed: u64, evaluations: usize, size: f64) -> [Report; 3] {
+fn search<C: Optimising>(
+    law: &mut C,
+    seed: u64,
+    evaluations: usize,
+    size: f64,
+) -> [SolverReport; 3] {
     let random = &mut Random::new(seed);
     let start = DVector::from_fn(UNKNOWNS, |_, _| random.between(-1.0, 1.0));
-    let mut worst = [Report::default(); 3];
+    let mut worst = [SolverReport::default(); 3];
     let situation = (seed % 3) as usize;
     let objective = |x: &DVector<f64>| {
         let reports = Case::of(x.as_slice(), size).optimise(law, 1);
@@ -207,19 +215,19 @@ fn search<C: Optimising>(law: &mut C, seed: u64, evaluations: usize, size: f64) 
     worst
 }
 
-fn print(title: &str, seeds: &[u64], reports: &[Report]) {
+fn print(title: &str, seeds: &[u64], reports: &[SolverReport]) {
     let mut counts: BTreeMap<String, usize> = BTreeMap::new();
     for report in reports {
         *counts.entry(format!("{:?}", report.status)).or_default() += 1;
     }
     println!("{title}: {counts:?}");
-    let line = |of: &str, taken: &dyn Fn(&Report) -> bool| {
-        let mut own: Vec<(&u64, &Report)> =
+    let line = |of: &str, taken: &dyn Fn(&SolverReport) -> bool| {
+        let mut own: Vec<(&u64, &SolverReport)> =
             seeds.iter().zip(reports).filter(|(_, report)| taken(report)).collect();
         if own.is_empty() {
             return;
         }
-        let mean = |value: fn(&Report) -> f64| {
+        let mean = |value: fn(&SolverReport) -> f64| {
             own.iter().map(|(_, report)| value(report)).sum::<f64>() / own.len() as f64
         };
         let (mean_iterations, mean_ms) =
@@ -244,7 +252,9 @@ fn print(title: &str, seeds: &[u64], reports: &[Report]) {
         );
     };
     line("all", &|_| true);
-    line("with an optimum", &|report| !matches!(report.status, Status::Fallback | Status::Kept));
-    line("by the cone solver", &|report| report.status == Status::Cone);
-    line("without", &|report| matches!(report.status, Status::Fallback | Status::Kept));
+    line("with an optimum", &|report| {
+        !matches!(report.status, SolverStatus::Fallback | SolverStatus::Kept)
+    });
+    line("by the cone solver", &|report| report.status == SolverStatus::Cone);
+    line("without", &|report| matches!(report.status, SolverStatus::Fallback | SolverStatus::Kept));
 }

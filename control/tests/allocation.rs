@@ -2,7 +2,9 @@
 //! selector of Jia et al.
 
 use control::allocation::pwpf::Modulator;
-use control::allocation::{Allocator, Command, JetCommand, Memory, Method, Settings, Status};
+use control::allocation::{
+    AllocationStatus, Allocator, Command, JetCommand, Memory, Method, Settings,
+};
 use control::error::DesignError;
 use nalgebra::Vector3;
 use vehicle::effectors::{Effectors, SURFACES};
@@ -28,7 +30,7 @@ fn settled(allocator: &mut Allocator, samples: u64, command: &Command) -> Memory
     let mut memory = Memory::default();
     for tick in 0..samples {
         allocator.update(&mut memory, tick, command);
-        assert_eq!(memory.report.status, Status::Optimal, "{tick}");
+        assert_eq!(memory.report.status, AllocationStatus::Optimal, "{tick}");
     }
     memory
 }
@@ -80,7 +82,7 @@ fn published_limits_hold_at_every_sample_of_200_random_cases() {
                 let before = memory;
                 allocator.update(&mut memory, tick, &command);
                 let what = format!("case {case}, {method:?}, sample {tick}");
-                assert_eq!(memory.report.status, Status::Optimal, "{what}");
+                assert_eq!(memory.report.status, AllocationStatus::Optimal, "{what}");
                 assert_within_limits(&before, &memory, &what);
                 let matrix = Effectors::published();
                 let achieved = matrix
@@ -188,7 +190,7 @@ fn without_an_optimum_the_previous_allocation_is_kept_within_the_limits() {
                 .unwrap();
         let wanted = command([-8e4, 1e5, 2e4], PRESSURE);
         stopped.update(&mut memory, 0, &wanted);
-        assert_eq!(memory.report.status, Status::Fallback);
+        assert_eq!(memory.report.status, AllocationStatus::Fallback);
         assert_eq!((memory.report.fallbacks, memory.duty), (1, before.duty));
         assert_within_limits(&before, &memory, "stopped");
         if method == Method::Optimal {
@@ -203,7 +205,7 @@ fn without_an_optimum_the_previous_allocation_is_kept_within_the_limits() {
         allocator(method).update(&mut memory, 0, &command([0.0; 3], f64::NAN));
         assert_within_limits(&before, &memory, "bad");
         allocator(method).update(&mut memory, 1, &wanted);
-        assert_eq!(memory.report.status, Status::Optimal, "it recovers");
+        assert_eq!(memory.report.status, AllocationStatus::Optimal, "it recovers");
     }
 }
 

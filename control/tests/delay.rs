@@ -12,7 +12,7 @@ use control::{Controller, Crmpc, Delayed, DesignError, Lqr, Measurement};
 use harness::{FEEDBACK, disturbance, garbage, lqr, settings};
 use nalgebra::Vector3;
 use vehicle::Error;
-use vehicle::disturbance::{Disturbance, Kind};
+use vehicle::disturbance::{Disturbance, DisturbanceKind};
 use vehicle::plant::{Plant, State, state};
 use vehicle::reference::Reference;
 use vehicle::scenario::Scenario;
@@ -185,7 +185,13 @@ struct Merit {
     cms: f64,
 }
 
-fn merit(q: f64, delay: f64, predicts: bool, scale: f64, kind: Kind) -> Result<Merit, Error> {
+fn merit(
+    q: f64,
+    delay: f64,
+    predicts: bool,
+    scale: f64,
+    kind: DisturbanceKind,
+) -> Result<Merit, Error> {
     let mut late = Late::new(delay, scale, disturbance(kind));
     let mut controller = delayed(regulator(q), if predicts { delay } else { 0.0 });
     let errors = late.run(&mut controller, FEEDBACK, 50.0, |_, _, _| {})?;
@@ -196,7 +202,7 @@ fn merit(q: f64, delay: f64, predicts: bool, scale: f64, kind: Kind) -> Result<M
 
 #[test]
 fn regress_prediction_keeps_tracking_and_effort_that_a_delay_spoils() {
-    let of = |delay, predicts| merit(10.0, delay, predicts, 1.0, Kind::None).unwrap();
+    let of = |delay, predicts| merit(10.0, delay, predicts, 1.0, DisturbanceKind::None).unwrap();
     let (none, without, with) = (of(0.0, false), of(0.1, false), of(0.1, true));
     // The EMS between 10 and 25 s is 0.0040 deg, without prediction 0.0245 deg; the CMS is 0.282,
     // without prediction 0.340.
@@ -215,7 +221,7 @@ fn regress_prediction_keeps_tracking_and_effort_that_a_delay_spoils() {
 #[test]
 fn a_loop_that_a_delay_makes_unstable_is_stable_with_prediction() {
     for scale in harness::INERTIA_SCALES {
-        let of = |delay, predicts| merit(0.3, delay, predicts, scale, Kind::White);
+        let of = |delay, predicts| merit(0.3, delay, predicts, scale, DisturbanceKind::White);
         assert!(matches!(of(0.1, false), Err(Error::Singular { .. })), "the attitude is not lost");
         let (none, with) = (of(0.0, false).unwrap(), of(0.1, true).unwrap());
         assert!(with.ems_deg < 1.1 * none.ems_deg && with.cms < 1.05 * none.cms);

@@ -146,7 +146,7 @@ fn carried(switching: &Switching, plan: &impl Fn(i32) -> f64, ratio: i32) -> Vec
 #[test]
 fn oracle_changes_of_the_plan_leave_no_more_than_is_carried_along() {
     let ratio = 5;
-    let courses: [fn(i32) -> f64; 4] = [
+    let waveforms: [fn(i32) -> f64; 4] = [
         |stage| if stage < 0 { 0.0 } else { 1.0 },
         |stage| if stage == 2 { 1.0 } else { 0.0 },
         |stage| if stage < 0 { 0.0 } else { f64::from(stage % 2) },
@@ -157,10 +157,11 @@ fn oracle_changes_of_the_plan_leave_no_more_than_is_carried_along() {
         let tightening = Design::new(&settings).unwrap().tightening;
         let switching = tightening.switching.unwrap();
         let mut closest: f64 = 0.0;
-        for (late, course) in
-            [-error, -1, 1, error].into_iter().flat_map(|late| courses.map(|course| (late, course)))
+        for (late, waveform) in [-error, -1, 1, error]
+            .into_iter()
+            .flat_map(|late| waveforms.map(|waveform| (late, waveform)))
         {
-            let plan = |tick: i32| course(tick.div_euclid(ratio));
+            let plan = |tick: i32| waveform(tick.div_euclid(ratio));
             let axis = Axis::new((&settings, delay, late), plan, |_| 0.0);
             let all = carried(&switching, &plan, ratio);
             for (stage, here) in (0_i32..).zip(&all) {

@@ -8,7 +8,7 @@ use control::crmpc::{Constraints, Design, Guarantee, Settings};
 use control::delay::Predictor;
 use control::error_dynamics::Gain;
 use harness::flight::{
-    Course, Flight, Random, Shown, Sight, Tried, optimised_every, random_settings, tried,
+    Flight, Random, Shown, Sight, Tried, Waveform, optimised_every, random_settings, tried,
 };
 use harness::{constant, in_parallel, run, settings};
 use nalgebra::Vector3;
@@ -21,16 +21,16 @@ use vehicle::plant::{self, Load};
 /// 2022.
 fn flights(settings: &Settings, sights: &[Sight]) -> Vec<Flight> {
     let corner = Vector3::new(1.0, -1.0, 1.0);
-    let courses = [
-        Course::White,
-        Course::Constant(corner),
-        Course::Square(2.5, corner),
-        Course::Switching(1.0),
-        Course::AlongRate(1.0),
-        Course::AlongMoment(-1.0),
+    let waveforms = [
+        Waveform::White,
+        Waveform::Constant(corner),
+        Waveform::Square(2.5, corner),
+        Waveform::Switching(1.0),
+        Waveform::AlongRate(1.0),
+        Waveform::AlongMoment(-1.0),
     ];
     let mut flights = Vec::new();
-    for (i, disturbance) in courses.into_iter().enumerate() {
+    for (i, disturbance) in waveforms.into_iter().enumerate() {
         flights.push(Flight {
             disturbance,
             inertia_scale: harness::INERTIA_SCALES[i % 2],
@@ -115,9 +115,13 @@ fn guarantee_is_kept_with_a_long_delay() {
 
 /// Returns errors of every kind within their bounds.
 fn erroneous() -> [Sight; 4] {
-    let courses =
-        [Course::White, Course::Switching(0.2), Course::AlongRate(-1.0), Course::AlongMoment(1.0)];
-    courses.map(Sight::Errors)
+    let waveforms = [
+        Waveform::White,
+        Waveform::Switching(0.2),
+        Waveform::AlongRate(-1.0),
+        Waveform::AlongMoment(1.0),
+    ];
+    waveforms.map(Sight::Errors)
 }
 
 #[test]

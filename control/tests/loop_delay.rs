@@ -4,7 +4,7 @@ use control::controller::{Controller, Measurement};
 use control::crmpc::{Constraints, Contradiction, Crmpc, Guarantee, Settings, Standing};
 use control::delay::{Delayed, Latency};
 use vehicle::Scenario;
-use vehicle::disturbance::Kind;
+use vehicle::disturbance::DisturbanceKind;
 use vehicle::plant::Plant;
 
 const PERIOD: f64 = 0.04;
@@ -19,7 +19,7 @@ struct Flight {
     status: Standing,
 }
 
-fn fly(kind: Kind, seed: u64, (told, truly): (f64, f64), scale: f64) -> Flight {
+fn fly(kind: DisturbanceKind, seed: u64, (told, truly): (f64, f64), scale: f64) -> Flight {
     let mut scenario = Scenario::crmpc2022();
     (scenario.disturbance.kind, scenario.disturbance.seed) = (kind, seed);
     scenario.disturbance.square_period = 1.5;
@@ -53,7 +53,7 @@ fn fly(kind: Kind, seed: u64, (told, truly): (f64, f64), scale: f64) -> Flight {
 
 #[test]
 fn oracle_a_delay_that_was_not_told_is_found_and_ends_the_guarantee() {
-    for kind in [Kind::White, Kind::Constant, Kind::Square] {
+    for kind in [DisturbanceKind::White, DisturbanceKind::Constant, DisturbanceKind::Square] {
         for (told, truly) in [(0.0, 0.04), (0.04, 0.0), (0.0, 0.12)] {
             let flight = fly(kind, 3, (told, truly), 0.97);
             let found = flight.found.is_some_and(|time| time <= 15.0);
@@ -67,7 +67,7 @@ fn oracle_a_delay_that_was_not_told_is_found_and_ends_the_guarantee() {
 
 #[test]
 fn oracle_a_delay_that_was_told_is_not_doubted() {
-    for kind in [Kind::White, Kind::Constant, Kind::Square] {
+    for kind in [DisturbanceKind::White, DisturbanceKind::Constant, DisturbanceKind::Square] {
         for delay in [0.0, 0.04] {
             for scale in [0.95, 1.05] {
                 let flight = fly(kind, 5, (delay, delay), scale);

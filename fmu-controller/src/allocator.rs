@@ -1,7 +1,7 @@
 //! `ControlAllocator` divides the commanded moment among surfaces and jets.
 
 use control::allocation::{
-    Allocator, Command, JetCommand, Memory, Method, Report, Settings, Status,
+    AllocationReport, AllocationStatus, Allocator, Command, JetCommand, Memory, Method, Settings,
 };
 use controller_export::sampled::{SampledFmu, SampledUnit, Ticks};
 use controller_export::table::AXES;
@@ -39,13 +39,13 @@ static JET_COMMANDS: Enumeration<JetCommand> = Enumeration {
         (JetCommand::Duty, "duty", "duty cycles from 0 to 1"),
     ],
 };
-static STATUSES: Enumeration<Status> = Enumeration {
+static STATUSES: Enumeration<AllocationStatus> = Enumeration {
     name: "AllocationStatus",
     description: "How an allocation came about",
     items: &[
-        (Status::None, "none", "no allocation yet"),
-        (Status::Optimal, "optimal", "the optimum"),
-        (Status::Fallback, "fallback", "the previous allocation, within the limits"),
+        (AllocationStatus::None, "none", "no allocation yet"),
+        (AllocationStatus::Optimal, "optimal", "the optimum"),
+        (AllocationStatus::Fallback, "fallback", "the previous allocation, within the limits"),
     ],
 };
 
@@ -70,7 +70,7 @@ struct Output {
     residual: Vector3<f64>,
     modulated: Vector3<f64>,
     by_surfaces: Vector3<f64>,
-    report: Report,
+    report: AllocationReport,
 }
 
 impl From<&Memory> for Output {

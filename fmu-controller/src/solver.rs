@@ -1,33 +1,33 @@
 //! Solver parameters and outputs that all controllers with an optimisation share.
 
 use control::mpc::{Method, Nonlinearity, SolverSettings};
-use control::report::{Report, Status};
+use control::report::{SolverReport, SolverStatus};
 use controller_export::table::{sampled_output, shown};
 use controller_export::{ControllerFmu, Law};
 use fmi2_export::table::parameter;
 use fmi2_export::{Enumeration, Table};
 use model_description::unit;
 
-static STATUSES: Enumeration<Status> = Enumeration {
+static STATUSES: Enumeration<SolverStatus> = Enumeration {
     name: "SolverStatus",
     description: "How a plan came about",
     items: &[
-        (Status::None, "none", "no optimisation yet"),
+        (SolverStatus::None, "none", "no optimisation yet"),
         (
-            Status::Unconstrained,
+            SolverStatus::Unconstrained,
             "unconstrained",
             "the unconstrained optimum, checked to satisfy every constraint",
         ),
         (
-            Status::TerminalBall,
+            SolverStatus::TerminalConstraint,
             "terminalBall",
             "the optimum with the terminal ball alone, checked to satisfy every other constraint",
         ),
-        (Status::Constrained, "constrained", "the optimum by the Riccati method"),
-        (Status::Cone, "cone", "the optimum by the cone solver"),
-        (Status::Fallback, "fallback", "the previous plan, shifted, with the terminal law"),
+        (SolverStatus::Constrained, "constrained", "the optimum by the Riccati method"),
+        (SolverStatus::Cone, "cone", "the optimum by the cone solver"),
+        (SolverStatus::Fallback, "fallback", "the previous plan, shifted, with the terminal law"),
         (
-            Status::Kept,
+            SolverStatus::Kept,
             "kept",
             "the previous plan as it is, which keeps the conditions of the guarantee",
         ),
@@ -57,14 +57,14 @@ static NONLINEARITIES: Enumeration<Nonlinearity> = Enumeration {
 };
 
 /// Returns the report with finite numbers, as outputs require.
-pub(crate) fn shown_report(report: &Report) -> Report {
-    Report { cost: shown(report.cost), residual: shown(report.residual), ..*report }
+pub(crate) fn shown_report(report: &SolverReport) -> SolverReport {
+    SolverReport { cost: shown(report.cost), residual: shown(report.residual), ..*report }
 }
 
 /// Adds the outputs of the solver.
 pub(crate) fn outputs<L: Law>(
     table: Table<ControllerFmu<L>>,
-    solver: impl Fn(&mut L) -> &mut Report + Copy + Send + Sync + 'static,
+    solver: impl Fn(&mut L) -> &mut SolverReport + Copy + Send + Sync + 'static,
 ) -> Table<ControllerFmu<L>> {
     let sampled = sampled_output;
     let status = sampled("solver.status", "How the plan in force came about");
@@ -136,7 +136,7 @@ pub(crate) fn parameters<L: Law>(
 }
 
 /// Returns a warning if an optimisation failed between the two reports.
-pub(crate) fn warning(before: &Report, after: &Report) -> Option<&'static str> {
+pub(crate) fn warning(before: &SolverReport, after: &SolverReport) -> Option<&'static str> {
     (after.fallbacks > before.fallbacks).then_some(
         "the optimisation did not succeed: the previous plan with the terminal law is used (solver.fallbacks)",
     )

@@ -7,7 +7,9 @@ use vehicle::Scenario;
 use vehicle::actuators::{self, JetMode};
 use vehicle::atmosphere::Flight;
 use vehicle::calibration::Sequence;
-use vehicle::disturbance::{Disturbance, Kind, MomentWave, Row, SineMoment, Table};
+use vehicle::disturbance::{
+    Disturbance, DisturbanceKind, DisturbanceTable, MomentWave, Row, SineMoment,
+};
 use vehicle::dynamics::Inertia;
 use vehicle::effectors::Effectors;
 use vehicle::error::Error;
@@ -26,35 +28,35 @@ const STEP: f64 = 0.01;
 const NEVER: f64 = 1e15;
 
 /// Kinds of disturbance as an FMI enumeration.
-pub(crate) static KINDS: Enumeration<Kind> = Enumeration {
+pub(crate) static KINDS: Enumeration<DisturbanceKind> = Enumeration {
     name: "DisturbanceKind",
     description: "Course of the disturbance",
     items: &[
-        (Kind::None, "none", "no disturbance"),
+        (DisturbanceKind::None, "none", "no disturbance"),
         (
-            Kind::White,
+            DisturbanceKind::White,
             "white",
             "each component uniform within the bound, drawn anew every disturbance.period",
         ),
-        (Kind::Constant, "constant", "bound times direction"),
-        (Kind::Sine, "sine", "a moment: offset plus two sinusoids"),
+        (DisturbanceKind::Constant, "constant", "bound times direction"),
+        (DisturbanceKind::Sine, "sine", "a moment: offset plus two sinusoids"),
         (
-            Kind::Square,
+            DisturbanceKind::Square,
             "square",
             "bound times direction, the sign changing every half disturbance.square.period",
         ),
         (
-            Kind::AlongRate,
+            DisturbanceKind::AlongRate,
             "alongRate",
             "plus or minus the bound so that the angular rate grows fastest, chosen every disturbance.period",
         ),
         (
-            Kind::AgainstMoment,
+            DisturbanceKind::AgainstMoment,
             "againstMoment",
             "plus or minus the bound against the control moment, chosen every disturbance.period",
         ),
         (
-            Kind::Table,
+            DisturbanceKind::Table,
             "table",
             "bound times the direction of the row in force, rows beginning at given times",
         ),
@@ -118,7 +120,7 @@ pub(crate) struct Parameters {
     pub(crate) inertia_scale: f64,
     pub(crate) initial_angles: Vector3<f64>,
     pub(crate) initial_rates: Vector3<f64>,
-    pub(crate) kind: Kind,
+    pub(crate) kind: DisturbanceKind,
     pub(crate) bound: f64,
     pub(crate) period: f64,
     pub(crate) seed: u64,
@@ -215,12 +217,12 @@ impl Parameters {
     }
 
     /// Table of the disturbance, with the rows that are used.
-    fn table(&self) -> Result<Table, Error> {
+    fn table(&self) -> Result<DisturbanceTable, Error> {
         let rows = self.table.get(..self.table_rows).ok_or_else(|| Error::Parameter {
             name: "disturbance.table.rows".into(),
             problem: format!("= {} must lie between 0 and {TABLE_ROWS}", self.table_rows),
         })?;
-        Ok(Table { period: self.table_period, rows: rows.to_vec() })
+        Ok(DisturbanceTable { period: self.table_period, rows: rows.to_vec() })
     }
 
     /// Configuration of the actuators, or `None` if the control moment is an input.

@@ -5,7 +5,7 @@ mod sensing;
 
 use crate::actuators::{self, Actuators, Command, Drive};
 use crate::calibration::Sequence;
-use crate::disturbance::{Disturbance, Kind, View};
+use crate::disturbance::{Disturbance, DisturbanceKind, View};
 use crate::dynamics::{Inertia, RigidBody};
 use crate::effectors::{JETS, SURFACES, Surfaces};
 use crate::error::Error;
@@ -168,7 +168,7 @@ pub struct Config {
 }
 
 /// Quantities that are held for a while. The disturbance is held from one tick or change of its
-/// course to the next, and the motion of the actuators until commands are taken or a deflection
+/// waveform to the next, and the motion of the actuators until commands are taken or a deflection
 /// comes to rest.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Held {
@@ -464,7 +464,7 @@ impl Plant {
     }
 
     fn adopt(&mut self, held: &Held) -> Held {
-        if self.disturbance.kind == Kind::White {
+        if self.disturbance.kind == DisturbanceKind::White {
             let seed = self.disturbance.seed;
             self.noise.get_or_insert_with(|| Stream::new(seed)).move_to(held.tick);
         }

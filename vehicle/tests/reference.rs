@@ -2,7 +2,7 @@
 //! and tables that are refused.
 
 use nalgebra::Vector3;
-use vehicle::profile::{Course, Segment, Wave};
+use vehicle::profile::{AngleProfile, Segment, Wave};
 use vehicle::table::LookupTable;
 use vehicle::{Profile, Reference, Scenario};
 
@@ -77,7 +77,7 @@ fn oracle_waves_add_up_whichever_of_them_share_a_frequency() {
     let frequencies = [vec![0.5, 0.25], vec![0.25, 0.0, 0.5], vec![0.5]];
     let angles = frequencies
         .clone()
-        .map(|axis| Course { constant: 0.2, waves: axis.into_iter().map(wave).collect() });
+        .map(|axis| AngleProfile { constant: 0.2, waves: axis.into_iter().map(wave).collect() });
     let profile = Profile::Piecewise(vec![Segment { until: f64::INFINITY, angles }]);
     let at = profile.at(3.0);
     for (i, axis) in frequencies.iter().enumerate() {

@@ -29,7 +29,7 @@ pub struct Command {
 
 /// The way in which an allocation was found.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Status {
+pub enum AllocationStatus {
     /// No allocation has been computed yet.
     #[default]
     None,
@@ -41,9 +41,9 @@ pub enum Status {
 
 /// The figures that the allocation reports.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Report {
+pub struct AllocationReport {
     /// Origin of the allocation in force.
-    pub status: Status,
+    pub status: AllocationStatus,
     /// Number of iterations of the cone solver.
     pub iterations: u32,
     /// Wall-clock time of the last allocation, s; not reproducible.
@@ -70,7 +70,7 @@ pub struct Memory {
     /// Moment D δ with the present commands to the jets, N m.
     pub modulated: Vector3<f64>,
     /// Outcome of the last allocation.
-    pub report: Report,
+    pub report: AllocationReport,
     /// Moment of the surfaces in the last allocation, N m.
     pub by_surfaces: Vector3<f64>,
 }
@@ -210,8 +210,12 @@ impl Allocator {
         memory.by_surfaces = matrix * memory.surfaces;
         memory.achieved = memory.by_surfaces + self.settings.effectors.moment_of_jets(&memory.duty);
         memory.residual = moment - memory.achieved;
-        memory.report = Report {
-            status: if found.is_some() { Status::Optimal } else { Status::Fallback },
+        memory.report = AllocationReport {
+            status: if found.is_some() {
+                AllocationStatus::Optimal
+            } else {
+                AllocationStatus::Fallback
+            },
             iterations: first + iterations,
             time: begin.elapsed().as_secs_f64(),
             fallbacks: memory.report.fallbacks.saturating_add(u32::from(found.is_none())),

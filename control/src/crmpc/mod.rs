@@ -17,7 +17,7 @@ mod sets;
 mod settings;
 mod supervision;
 
-pub use crate::report::{Report, Status};
+pub use crate::report::{SolverReport, SolverStatus};
 pub use commands::Commands;
 pub use design::{
     Design, PaperConstants, held_terminal_weight, step_response_peak, terminal_weight,
@@ -37,7 +37,9 @@ use crate::controller::{Controller, Explained, Measurement, ReferenceAt};
 use crate::error::DesignError;
 use crate::error_dynamics::InvariantSet;
 use crate::linearise;
-use crate::mpc::{self, Chain, Cost, Layout, Motion, Nonlinearity, Optimiser, State, per_axis};
+use crate::mpc::{
+    self, Chain, Cost, ErrorTrajectory, Layout, Nonlinearity, Optimiser, State, per_axis,
+};
 use nalgebra::{Vector3, Vector6};
 use serde::{Deserialize, Serialize};
 use sets::{Certified, Sets};
@@ -54,7 +56,7 @@ pub struct Memory {
     /// Whether `plan` has been filled by an optimisation.
     pub started: bool,
     /// Outcome of the last optimisation.
-    pub report: Report,
+    pub report: SolverReport,
     /// Nominal state (Θ̃, x̃_ω) at the last tick.
     pub nominal: Vector6<f64>,
     /// Whether the plan in force gives the guarantee, or the reason why not.
@@ -176,7 +178,7 @@ pub struct Crmpc {
     optimiser: Optimiser<2>,
     // Scratch memory of one optimisation.
     affine: Vec<State<2>>,
-    previous: Motion<2>,
+    previous: ErrorTrajectory<2>,
     /// Shift of the reference's angles by the observer, rad.
     shift: Vector3<f64>,
 }
@@ -226,7 +228,7 @@ impl Crmpc {
             chain,
             cost,
             horizon: n,
-            state_balls: true,
+            constrains_states: true,
             // With the robust set the horizon ends in a bound on the rates (docs/guarantee.md).
             terminal: settings.constraints == Constraints::Paper,
             start,
@@ -245,7 +247,7 @@ impl Crmpc {
             sets,
             optimiser,
             affine: vec![[Vector3::zeros(); 2]; n],
-            previous: Motion::new(n),
+            previous: ErrorTrajectory::new(n),
             shift: Vector3::zeros(),
         })
     }
@@ -315,20 +317,20 @@ impl Crmpc {
         memory: &mut Memory,
         measured: &Vector6<f64>,
         first: bool,
-    ) -> mpc::Report {
+    ) -> mpc::OptimiserReport {
         let start = match self.settings.initial_state {
             InitialState::Nominal if !first => memory.plan.states[0],
             _ => *measured,
         };
         let report = self.solve(memory, &start, first);
-        if report.status != Status::Fallback {
+        if report.status != SolverStatus::Fallback {
             self.follow_optimum(memory, &start);
             return report;
         }
         if first {
             self.follow_terminal_law(&mut memory.plan, start);
         }
-        self.keep(memory, &start, (Status::Fallback, report.iterations))
+        self.keep(memory, &start, (SolverStatus::Fallback, report.iterations))
     }
 
     /// Returns what a nominal motion follows on that begins at the measured state.
@@ -365,7 +367,7 @@ impl Crmpc {
         memory: &mut Memory,
         measured: &Vector6<f64>,
         anew: bool,
-    ) -> mpc::Report {
+    ) -> mpc::OptimiserReport {
         let assured = memory.assured();
         if !self.credible(memory) {
             return self.violate_least(memory, measured, 0);
@@ -382,7 +384,7 @@ impl Crmpc {
             self.sets.begin(age as usize, 1.0, &onset);
             let (report, certified) = self.certified(memory, &start, anew);
             iterations += report.iterations;
-            let solved = report.status != Status::Fallback;
+            let solved = report.status != SolverStatus::Fallback;
             // Linearised constraints serve for comparison, so their optimum is accepted without
             // guarantee.
             let taken = !assured || self.settings.solver.nonlinearity == Nonlinearity::Frozen;
@@ -390,12 +392,12 @@ impl Crmpc {
                 self.follow_optimum(memory, &start);
                 (memory.age, memory.plan.onset) = (age, onset);
                 self.take_over(memory, certified);
-                return mpc::Report { iterations, ..report };
+                return mpc::OptimiserReport { iterations, ..report };
             }
         }
         if assured {
             self.go_towards_the_optimum(memory);
-            let report = self.keep(memory, measured, (Status::Kept, iterations));
+            let report = self.keep(memory, measured, (SolverStatus::Kept, iterations));
             memory.margins = self.sets.margins(&self.previous);
             return report;
         }
@@ -405,7 +407,7 @@ impl Crmpc {
     /// Follows the motion that has just become the plan, under guarantee if it is certified.
     fn take_over(&mut self, memory: &mut Memory, certified: Option<Certified>) {
         let Some(Certified { margins, braking }) = certified else {
-            memory.margins = self.sets.margins(self.optimiser.motion());
+            memory.margins = self.sets.margins(self.optimiser.trajectory());
             memory.standing = self.without_guarantee(memory);
             return;
         };
@@ -424,7 +426,7 @@ impl Crmpc {
         self.optimiser.without_constraints(&self.previous.states[0], &self.affine);
         for _ in 0..HALVINGS {
             self.optimiser.halve_the_way_to(&self.previous);
-            if let Some(certified) = self.sets.certify(self.optimiser.motion(), false) {
+            if let Some(certified) = self.sets.certify(self.optimiser.trajectory(), false) {
                 let start = memory.plan.states[0];
                 self.follow_optimum(memory, &start);
                 self.take_over(memory, Some(certified));
@@ -440,12 +442,12 @@ impl Crmpc {
         memory: &Memory,
         start: &Vector6<f64>,
         first: bool,
-    ) -> (mpc::Report, Option<Certified>) {
+    ) -> (mpc::OptimiserReport, Option<Certified>) {
         let report = self.solve(memory, start, first);
-        if report.status == Status::Fallback {
+        if report.status == SolverStatus::Fallback {
             return (report, None);
         }
-        (report, self.sets.certify(self.optimiser.motion(), report.settled))
+        (report, self.sets.certify(self.optimiser.trajectory(), report.settled))
     }
 
     /// Plans by the optimum with less tightening, or by the terminal law from the measured state
@@ -455,7 +457,7 @@ impl Crmpc {
         memory: &mut Memory,
         measured: &Vector6<f64>,
         tried: u32,
-    ) -> mpc::Report {
+    ) -> mpc::OptimiserReport {
         memory.standing = self.without_guarantee(memory);
         let onset = self.onset_anew(memory, measured);
         (memory.age, memory.plan.onset) = (0, onset);
@@ -467,14 +469,14 @@ impl Crmpc {
             self.sets.begin(0, share, &onset);
             let report = self.solve(memory, measured, true);
             iterations += report.iterations;
-            if report.status != Status::Fallback {
+            if report.status != SolverStatus::Fallback {
                 self.follow_optimum(memory, measured);
-                memory.margins = self.sets.margins(self.optimiser.motion());
-                return mpc::Report { iterations, ..report };
+                memory.margins = self.sets.margins(self.optimiser.trajectory());
+                return mpc::OptimiserReport { iterations, ..report };
             }
         }
         self.follow_terminal_law(&mut memory.plan, *measured);
-        let report = self.keep(memory, measured, (Status::Fallback, iterations));
+        let report = self.keep(memory, measured, (SolverStatus::Fallback, iterations));
         memory.margins = self.sets.margins(&self.previous);
         report
     }
@@ -501,7 +503,12 @@ impl Crmpc {
 
     /// Returns the optimum from `start` with the bounds about the previous plan, or about itself if
     /// there is none (`first`).
-    fn solve(&mut self, memory: &Memory, start: &Vector6<f64>, first: bool) -> mpc::Report {
+    fn solve(
+        &mut self,
+        memory: &Memory,
+        start: &Vector6<f64>,
+        first: bool,
+    ) -> mpc::OptimiserReport {
         let error = error(start, &self.sets.references[0]);
         let previous = (!first).then(|| {
             memory.plan.errors(&self.sets.references, &mut self.previous);
@@ -516,7 +523,7 @@ impl Crmpc {
     /// Makes the optimum the plan in force.
     fn follow_optimum(&mut self, memory: &mut Memory, start: &Vector6<f64>) {
         let start = (self.settings.initial_state != InitialState::Tube).then_some(*start);
-        let motion = self.optimiser.motion();
+        let motion = self.optimiser.trajectory();
         memory.plan.follow(motion, start, &self.sets.references, self.settings.period_optimisation);
         memory.plan.shift = self.shift;
         memory.plan.multipliers.clear();
@@ -524,7 +531,12 @@ impl Crmpc {
     }
 
     /// Keeps the present plan and returns a report on it.
-    fn keep(&mut self, memory: &Memory, start: &Vector6<f64>, ended: (Status, u32)) -> mpc::Report {
+    fn keep(
+        &mut self,
+        memory: &Memory,
+        start: &Vector6<f64>,
+        ended: (SolverStatus, u32),
+    ) -> mpc::OptimiserReport {
         let error = error(start, &self.sets.references[0]);
         memory.plan.errors(&self.sets.references, &mut self.previous);
         let Self { optimiser, sets, affine, previous, .. } = self;
@@ -726,7 +738,7 @@ impl Controller for Crmpc {
     /// robust set, the command is limited as well.
     fn limit(&self, memory: &Memory) -> f64 {
         let robust = self.settings.constraints == Constraints::Robust;
-        if robust || memory.report.status == Status::Fallback {
+        if robust || memory.report.status == SolverStatus::Fallback {
             self.settings.limit_moment
         } else {
             f64::INFINITY

@@ -1,7 +1,7 @@
 //! The plan: a nominal motion over the horizon.
 
 use super::guarantee::{Carried, Onset, Switching};
-use crate::mpc::Motion;
+use crate::mpc::ErrorTrajectory;
 use nalgebra::{Vector3, Vector6};
 use serde::{Deserialize, Serialize};
 use vehicle::reference::Reference;
@@ -77,7 +77,7 @@ impl Plan {
     }
 
     /// Computes the errors E = x̃ − x_r and v = a − Θ̈_r of the plan.
-    pub(super) fn errors(&self, references: &[Reference], motion: &mut Motion<2>) {
+    pub(super) fn errors(&self, references: &[Reference], motion: &mut ErrorTrajectory<2>) {
         for ((error, state), reference) in
             motion.states.iter_mut().zip(&self.states).zip(references)
         {
@@ -93,7 +93,7 @@ impl Plan {
     /// first state) so that it is an exact motion of the nominal model.
     pub(super) fn follow(
         &mut self,
-        motion: &Motion<2>,
+        motion: &ErrorTrajectory<2>,
         start: Option<Vector6<f64>>,
         references: &[Reference],
         h: f64,

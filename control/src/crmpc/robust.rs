@@ -5,7 +5,7 @@ use super::design::Design;
 use super::guarantee::{self, Carried, Dynamics, End, Held, MomentLoss, Onset, Switching};
 use super::settings::Settings;
 use crate::linearise::{BodyMotion, InverseKinematics, Linear};
-use crate::mpc::Motion;
+use crate::mpc::ErrorTrajectory;
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 use std::cell::{OnceCell, RefCell};
@@ -90,7 +90,7 @@ impl Point {
         Self { angles, rates, size, acceleration, pull, turned: OnceCell::new() }
     }
 
-    pub(super) fn at(references: &[Reference], motion: &Motion<2>, k: usize) -> Self {
+    pub(super) fn at(references: &[Reference], motion: &ErrorTrajectory<2>, k: usize) -> Self {
         let Reference { angles, rates, accelerations } = &references[k];
         let acceleration =
             motion.inputs.get(k).map_or_else(Vector3::zeros, |input| accelerations + input);

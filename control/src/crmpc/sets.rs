@@ -7,8 +7,8 @@ use super::robust::{Margins, Point, Robust, norm_of_columns};
 use super::settings::{Constraints, Settings};
 use crate::error::DesignError;
 use crate::linearise::{self, InverseKinematics, Linear};
-use crate::mpc::balls::At;
-use crate::mpc::{self, Ball, Balls, Bounded, Motion, State};
+use crate::mpc::constraints::StagePoint;
+use crate::mpc::{self, Bounded, ErrorTrajectory, NormConstraint, StageConstraints, State};
 use nalgebra::{Matrix3, Vector3};
 use std::ops::Range;
 use vehicle::dynamics::RigidBody;
@@ -104,7 +104,7 @@ impl Sets {
     }
 
     /// Carries along what the motion's changes of acceleration leave.
-    fn carry(&self, motion: &Motion<2>) {
+    fn carry(&self, motion: &ErrorTrajectory<2>) {
         if let Kind::Robust(robust) = &self.kind {
             let stages = motion.inputs.iter().zip(&self.references);
             robust.carry(stages.map(|(input, reference)| input + reference.accelerations));
@@ -115,7 +115,7 @@ impl Sets {
     /// theorem (docs/guarantee.md), which require the whole tightening.
     ///
     /// `checked` says that [`mpc::Bounded::violated`] has already found no violation in it.
-    pub(super) fn certify(&self, motion: &Motion<2>, checked: bool) -> Option<Certified> {
+    pub(super) fn certify(&self, motion: &ErrorTrajectory<2>, checked: bool) -> Option<Certified> {
         let Kind::Robust(robust) = &self.kind else { return None };
         let n = motion.inputs.len();
         if robust.design.counted < 1.0
@@ -156,7 +156,7 @@ impl Sets {
     }
 
     /// Returns the [`Margins`] of a motion; they are zero unless the set is the robust one.
-    pub(super) fn margins(&self, motion: &Motion<2>) -> Margins {
+    pub(super) fn margins(&self, motion: &ErrorTrajectory<2>) -> Margins {
         let Kind::Robust(robust) = &self.kind else { return Margins::default() };
         self.carry(motion);
         robust.margins(&self.point(motion, 0), &self.point(motion, 1))
@@ -179,7 +179,7 @@ impl Sets {
     }
 
     /// Returns stage `k` of a motion of the errors.
-    fn point(&self, motion: &Motion<2>, k: usize) -> Point {
+    fn point(&self, motion: &ErrorTrajectory<2>, k: usize) -> Point {
         Point::at(&self.references, motion, k)
     }
 
@@ -187,7 +187,7 @@ impl Sets {
     /// with the bounds about itself or smaller ones. `keep` receives the bounds of the robust set.
     fn first_and_last(
         &self,
-        motion: &Motion<2>,
+        motion: &ErrorTrajectory<2>,
         of: Range<usize>,
         mut keep: impl FnMut(usize, (f64, f64)),
     ) -> Option<Range<usize>> {
@@ -233,27 +233,27 @@ impl Sets {
 }
 
 impl Bounded<2> for Sets {
-    fn has_state_balls(&self) -> bool {
+    fn constrains_states(&self) -> bool {
         true
     }
 
-    fn balls(
+    fn norm_constraints(
         &self,
         k: usize,
         state: &State<2>,
         input: &Vector3<f64>,
         bounds: (f64, f64),
-    ) -> Balls<2> {
+    ) -> StageConstraints<2> {
         let [angles, rates, a] = self.nominal(k, state, input);
         let kinematics = InverseKinematics::at(&angles);
         let at = kinematics.linearise(&self.body, &rates, &a);
         match &self.kind {
             Kind::Robust(robust) => {
                 let (rate, moment) = robust.nonempty(bounds);
-                Balls { state: ball(&at.rates, rate), input: ball(&at.moment, moment) }
+                StageConstraints { state: ball(&at.rates, rate), input: ball(&at.moment, moment) }
             }
-            Kind::Paper { x_tube, u_tube, .. } => Balls {
-                state: Ball {
+            Kind::Paper { x_tube, u_tube, .. } => StageConstraints {
+                state: NormConstraint {
                     value: rates / *x_tube,
                     by_state: [Matrix3::zeros(), Matrix3::from_diagonal_element(1.0 / x_tube)],
                     by_input: Matrix3::zeros(),
@@ -289,14 +289,19 @@ impl Bounded<2> for Sets {
 
     fn violated(
         &self,
-        motion: &Motion<2>,
+        motion: &ErrorTrajectory<2>,
         of: Range<usize>,
         bounds: &mut mpc::Bounds,
     ) -> Option<Range<usize>> {
         self.first_and_last(motion, of, |k, about| bounds.set(k, about))
     }
 
-    fn bounds_about(&self, motion: &Motion<2>, of: Range<usize>, bounds: &mut mpc::Bounds) {
+    fn bounds_about(
+        &self,
+        motion: &ErrorTrajectory<2>,
+        of: Range<usize>,
+        bounds: &mut mpc::Bounds,
+    ) {
         let Kind::Robust(robust) = &self.kind else { return };
         self.carry(motion);
         let mut here = self.point(motion, of.start);
@@ -308,9 +313,14 @@ impl Bounded<2> for Sets {
         }
     }
 
-    fn bounds_between(&self, k: usize, here: At<2>, next: At<2>) -> Option<(f64, f64)> {
+    fn bounds_between(
+        &self,
+        k: usize,
+        here: StagePoint<2>,
+        next: StagePoint<2>,
+    ) -> Option<(f64, f64)> {
         let Kind::Robust(robust) = &self.kind else { return None };
-        let point = |k: usize, (state, input): At<2>| {
+        let point = |k: usize, (state, input): StagePoint<2>| {
             let [angles, rates, a] = self.nominal(k, state, input);
             let last = k == robust.settings.horizon;
             Point::new(angles, rates, if last { Vector3::zeros() } else { a })
@@ -319,7 +329,7 @@ impl Bounded<2> for Sets {
         Some((interval.rate_bound, interval.moment_bound))
     }
 
-    fn depends_on_motion(&self) -> bool {
+    fn depends_on_trajectory(&self) -> bool {
         matches!(self.kind, Kind::Robust(_))
     }
 
@@ -372,11 +382,11 @@ pub(super) struct Certified {
 }
 
 /// Expresses ‖y‖ ≤ bound in terms of the tracking error and v = a − Θ̈_r.
-fn ball(y: &Linear, bound: f64) -> Ball<2> {
+fn ball(y: &Linear, bound: f64) -> NormConstraint<2> {
     let share = 1.0 / bound;
     let mut by_angles = Matrix3::zeros();
     by_angles.fixed_view_mut::<3, 2>(0, 0).copy_from(&(y.by_angles * share));
-    Ball {
+    NormConstraint {
         value: y.value * share,
         by_state: [by_angles, y.by_rates * share],
         by_input: y.by_acceleration * share,

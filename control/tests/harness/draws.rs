@@ -5,7 +5,7 @@
 use super::flight::Random;
 use super::{FEEDBACK, Optimising};
 use control::Measurement;
-use control::report::Report;
+use control::report::SolverReport;
 use nalgebra::Vector3;
 use vehicle::kinematics;
 use vehicle::profile::Profile;
@@ -70,7 +70,7 @@ impl Case {
 
     /// Returns the reports of three optimisations, each with its shortest time: the first one
     /// (cold), the one after the kick, and the one that follows.
-    pub fn optimise<C: Optimising>(&self, law: &mut C, repetitions: usize) -> [Report; 3] {
+    pub fn optimise<C: Optimising>(&self, law: &mut C, repetitions: usize) -> [SolverReport; 3] {
         let (period, ratio) = (FEEDBACK, law.ratio());
         let mut memory = law.memory();
         let begin = (self.time / period).round() as u64 / ratio * ratio;
@@ -100,7 +100,7 @@ impl Case {
             }
             // This is about the motion until the next optimisation.
             state.0 += state.1 * (ratio as f64 * period);
-            Report { time: best, ..C::report(&memory) }
+            SolverReport { time: best, ..C::report(&memory) }
         })
     }
 }

@@ -12,7 +12,7 @@ const SHORTEST_PERIOD: f64 = 1e-3;
 /// times is passed over.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Table {
+pub struct DisturbanceTable {
     /// Time after which the table repeats, with the time before the first row, s. A table with
     /// period 0 does not repeat, and its last row holds.
     #[serde(default)]
@@ -32,7 +32,7 @@ pub struct Row {
     pub direction: Vector3<f64>,
 }
 
-impl Table {
+impl DisturbanceTable {
     /// Refuses values that the definitions of the fields do not allow.
     ///
     /// # Errors

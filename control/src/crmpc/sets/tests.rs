@@ -12,12 +12,12 @@ fn robust() -> Sets {
 }
 
 /// A wave of (Θ̃, x̃_ω, a) over the horizon, which is all that the check needs of a motion.
-fn wave() -> impl Strategy<Value = Motion<2>> {
+fn wave() -> impl Strategy<Value = ErrorTrajectory<2>> {
     let component = || (-1.0..1.0, -1.0..1.0, 0.0..0.3, 0.0..6.3);
     let sizes = ((-2.0..0.0), (-3.0..-0.8), (-3.0..-0.8));
     (sizes, prop::collection::vec(component(), 9)).prop_map(
         |((angle, rate, acceleration), components)| {
-            let mut motion = Motion::new(100);
+            let mut motion = ErrorTrajectory::new(100);
             let at = |k: usize, first: usize, decade: f64| {
                 Vector3::from_fn(|i, _| {
                     let (mean, amplitude, frequency, phase) = components[first + i];
@@ -36,7 +36,7 @@ fn wave() -> impl Strategy<Value = Motion<2>> {
     )
 }
 
-fn run(cases: u32, property: impl Fn(Motion<2>) -> Result<(), TestCaseError>) {
+fn run(cases: u32, property: impl Fn(ErrorTrajectory<2>) -> Result<(), TestCaseError>) {
     let random = TestRng::deterministic_rng(RngAlgorithm::ChaCha);
     let config = Config { cases, failure_persistence: None, ..Config::default() };
     TestRunner::new_with_rng(config, random).run(&wave(), property).unwrap();
