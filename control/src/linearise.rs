@@ -413,7 +413,7 @@ mod tests {
             let at = |i: usize| Vector3::new(z[i], z[i + 1], z[i + 2]);
             (at(0), at(3), at(6))
         };
-        let all = |z: &[f64; 9]| {
+        let quantities = |z: &[f64; 9]| {
             let (angles, rates, a) = split(z);
             [
                 body_rates(&angles, &rates),
@@ -425,7 +425,7 @@ mod tests {
         let exact = linearise(&body, &angles, &rates, &a);
         let exact_input = InverseKinematics::at(&angles).input_of_moment(&body, &exact.moment);
         for (y, linear) in [exact.rates, exact.moment, exact_input].iter().enumerate() {
-            assert!((linear.value - all(&point)[y]).norm() <= 1e-12 * linear.value.norm());
+            assert!((linear.value - quantities(&point)[y]).norm() <= 1e-12 * linear.value.norm());
             let motion = InverseKinematics::at(&angles).motion(&body, &rates);
             assert!(
                 (motion.moment(&a) - exact.moment.value).norm()
@@ -436,7 +436,7 @@ mod tests {
                 let (mut plus, mut minus) = (point, point);
                 plus[i] += step;
                 minus[i] -= step;
-                let numeric = (all(&plus)[y] - all(&minus)[y]) / (2.0 * step);
+                let numeric = (quantities(&plus)[y] - quantities(&minus)[y]) / (2.0 * step);
                 let analytic = match i {
                     0 | 1 => linear.by_angles.column(i).into_owned(),
                     2 => Vector3::zeros(),

@@ -1,9 +1,10 @@
-//! Estimate of the delay of a controller's own loop, from its commands and the measured rates.
+//! Estimate of the delay of the loop that a controller closes, from its commands and the measured
+//! rates.
 //!
-//! In many tools nobody knows how long a loop takes from a measurement to the moment that results
-//! from it. The vehicle shows it: its angular acceleration over a period is I⁻¹ (m − ω × I ω) with
-//! the moment m that acts then, and a disturbance. For a delay of (j + f) τ, m is the mean (1 − f)
-//! m_{k−1−j} + f m_{k−2−j} of two commands. The estimate is the delay that leaves least
+//! With many importers nobody knows how long a loop takes from a measurement to the moment that
+//! results from it. The vehicle shows it: its angular acceleration over a period is I⁻¹ (m − ω × I
+//! ω) with the moment m that acts then, and a disturbance. For a delay of (j + f) τ, m is the mean
+//! (1 − f) m_{k−1−j} + f m_{k−2−j} of two commands. The estimate is the delay that leaves least
 //! unexplained, by least squares: of the acceleration, if the disturbance is like noise, of its
 //! change from period to period, if it seldom changes, or of the change of that, if it changes
 //! smoothly. A factor that the inertia is wrong by is found beside it. Periods that no delay
@@ -54,7 +55,8 @@ pub struct LoopDelay {
     rates: Option<Vector3<f64>>,
     /// Accelerations over the last periods, the newest first, rad/s², and their number.
     accelerations: [Vector3<f64>; ORDERS],
-    known: usize,
+    #[serde(rename = "known")]
+    available: usize,
     /// Fits of the acceleration, of its change, and of the change of that.
     fits: [Fit; ORDERS],
     /// Number of periods in the fits.
@@ -99,7 +101,7 @@ struct Sums {
     product: f64,
 }
 
-/// What the estimate is made with.
+/// Settings of the estimate.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LoopDelaySettings {
     /// Model of the vehicle.
@@ -143,7 +145,7 @@ impl LoopDelaySettings {
     /// Returns whether a restored memory has the right shape.
     pub fn fits(&self, memory: &LoopDelay) -> bool {
         memory.commands.len() <= self.remembered()
-            && memory.known <= ORDERS
+            && memory.available <= ORDERS
             && memory.fits.iter().all(|fit| fit.sums.len() == self.candidates())
     }
 
@@ -151,7 +153,7 @@ impl LoopDelaySettings {
     pub fn observe(&self, memory: &mut LoopDelay, measured: &Measurement) {
         memory.is_unexplained = false;
         if self.is_filtered || measured.stale || measured.achieved_moment.is_some() {
-            (memory.rates, memory.known) = (None, 0);
+            (memory.rates, memory.available) = (None, 0);
             return;
         }
         let Some(before) = memory.rates.replace(measured.rates) else { return };
@@ -160,9 +162,9 @@ impl LoopDelaySettings {
         memory.accelerations.rotate_right(1);
         memory.accelerations[0] =
             (measured.rates - before) / *period + body.inverse * mean.cross(&(body.inertia * mean));
-        memory.known = ORDERS.min(memory.known + 1);
+        memory.available = ORDERS.min(memory.available + 1);
         // Before the first commands, importers differ in what acts.
-        if memory.known == ORDERS && memory.commands.len() == self.remembered() {
+        if memory.available == ORDERS && memory.commands.len() == self.remembered() {
             memory.is_unexplained = self
                 .explained
                 .is_some_and(|explained| !self.explains(explained, memory, &measured.angles));
@@ -218,15 +220,15 @@ impl LoopDelaySettings {
 
     /// Adds the last period to the fits, and makes the estimate anew from time to time.
     fn weigh(&self, memory: &mut LoopDelay) {
-        let kept = exp(-self.period / FORGETTING);
+        let retained = exp(-self.period / FORGETTING);
         let commands = &memory.commands[self.first()..];
         let best = memory.fits.iter().map(|fit| fit.scale).fold(f64::INFINITY, f64::min);
         for (order, fit) in memory.fits.iter_mut().enumerate() {
             let y = difference(order, &memory.accelerations);
-            let weight = fit.add(kept, &y, |j| difference(order, &commands[j..]));
+            let weight = fit.add(retained, &y, |j| difference(order, &commands[j..]));
             if weight < 1.0 && fit.scale <= best {
                 // A jump within a period shows in the next one too, when the law responds to it.
-                memory.known = 0;
+                memory.available = 0;
             }
         }
         memory.periods = memory.periods.saturating_add(1);
@@ -269,33 +271,38 @@ impl Fit {
     }
 
     /// Adds a period with `y`; `command` returns u for a number of periods of delay. Earlier
-    /// periods are `kept` by this share. Returns the weight of the period, which is below 1 if no
+    /// periods keep the weight `retained`. Returns the weight of the period, which is below 1 if no
     /// delay explains it.
-    fn add(&mut self, kept: f64, y: &Vector3<f64>, command: impl Fn(usize) -> Vector3<f64>) -> f64 {
+    fn add(
+        &mut self,
+        retained: f64,
+        y: &Vector3<f64>,
+        command: impl Fn(usize) -> Vector3<f64>,
+    ) -> f64 {
         let last = self.sums.len() - 1;
         let left = |j| (y - command(j)).norm_squared();
         let least = (0..=last).map(left).fold(f64::INFINITY, f64::min);
         let usual = USUAL * USUAL * 3.0 * self.scale;
         let weight = if self.scale > 0.0 && least > usual { usual / least } else { 1.0 };
-        let mut here = command(0);
+        let mut present = command(0);
         for (j, sums) in self.sums.iter_mut().enumerate() {
             let next = command((j + 1).min(last));
-            sums.explained = kept * sums.explained + weight * y.dot(&here);
-            sums.square = kept * sums.square + weight * here.norm_squared();
-            sums.product = kept * sums.product + weight * here.dot(&next);
-            here = next;
+            sums.explained = retained * sums.explained + weight * y.dot(&present);
+            sums.square = retained * sums.square + weight * present.norm_squared();
+            sums.product = retained * sums.product + weight * present.dot(&next);
+            present = next;
         }
-        self.square = kept * self.square + weight * y.norm_squared();
-        self.count = kept * self.count + weight;
+        self.square = retained * self.square + weight * y.norm_squared();
+        self.count = retained * self.count + weight;
         weight
     }
 
     /// Returns the number of periods of delay, from the first on, that leaves least.
     fn least(&mut self) -> f64 {
         let places = (0..=(self.sums.len() - 1) * PARTS).map(|part| part as f64 / PARTS as f64);
-        let all = places.map(|place| (place, self.unexplained(place)));
-        let (place, least) =
-            all.fold((0.0, f64::INFINITY), |least, one| if one.1 < least.1 { one } else { least });
+        let candidates = places.map(|place| (place, self.unexplained(place)));
+        let (place, least) = candidates
+            .fold((0.0, f64::INFINITY), |least, one| if one.1 < least.1 { one } else { least });
         self.scale = (least / (3.0 * self.count)).max(FLOOR * FLOOR);
         place
     }
@@ -321,11 +328,11 @@ impl Fit {
     fn unexplained(&self, place: f64) -> f64 {
         let j = (place as usize).min(self.sums.len() - 2);
         let f = (place - j as f64).min(1.0);
-        let (here, next) = (&self.sums[j], &self.sums[j + 1]);
-        let explained = (1.0 - f) * here.explained + f * next.explained;
-        let square = (1.0 - f) * (1.0 - f) * here.square
-            + 2.0 * f * (1.0 - f) * here.product
-            + f * f * next.square;
+        let (lower, upper) = (&self.sums[j], &self.sums[j + 1]);
+        let explained = (1.0 - f) * lower.explained + f * upper.explained;
+        let square = (1.0 - f) * (1.0 - f) * lower.square
+            + 2.0 * f * (1.0 - f) * lower.product
+            + f * f * upper.square;
         let gain = if square > 0.0 { explained / square } else { 1.0 };
         let gain = gain.clamp(1.0 / GAIN, GAIN);
         self.square - gain * (2.0 * explained - gain * square)
@@ -356,7 +363,7 @@ impl Clone for LoopDelay {
             commands,
             rates,
             accelerations,
-            known,
+            available,
             fits,
             periods,
             unexplained,
@@ -368,7 +375,7 @@ impl Clone for LoopDelay {
         for (fit, source) in self.fits.iter_mut().zip(fits) {
             fit.clone_from(source);
         }
-        (self.rates, self.accelerations, self.known) = (*rates, *accelerations, *known);
+        (self.rates, self.accelerations, self.available) = (*rates, *accelerations, *available);
         (self.periods, self.unexplained) = (*periods, *unexplained);
         self.is_unexplained = *is_unexplained;
         (self.estimate, self.is_other) = (*estimate, *is_other);

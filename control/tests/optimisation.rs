@@ -125,7 +125,7 @@ fn shortcuts_lead_to_the_optimum_of_the_whole_horizon() {
 }
 
 #[test]
-fn oracle_terminal_constraint_bounds_the_norm_of_g() {
+fn oracle_terminal_constraint_is_a_ball_in_the_norm_of_g() {
     // Chai 2022, (12): the print has the index R, which is 3×3, where E has six components.
     let mut controller = controller(Constraints::Paper);
     let (g, paper) = (controller.design().g, controller.design().paper.unwrap());

@@ -17,16 +17,16 @@ use vehicle::transport::Transport;
 /// A plan that the controller accepted, as it follows it from an optimisation on.
 #[derive(Clone, Debug)]
 pub struct Recorded {
-    /// Nominal motion over the horizon, with its braking rate.
+    /// Nominal trajectory over the horizon, with its braking rate.
     pub plan: Plan,
-    /// Feedback ticks from the beginning of the nominal motion to the beginning of the plan.
+    /// Feedback ticks from the beginning of the nominal trajectory to the beginning of the plan.
     pub age: usize,
     /// Time of the optimisation, s.
     pub time: f64,
     /// Deviation of the predicted state from the plan's first state, rad and rad/s.
     pub deviation: Vector6<f64>,
     /// Whether the previous plan was kept.
-    pub kept: bool,
+    pub is_kept: bool,
 }
 
 /// Pseudo-random numbers (SplitMix64), the same on every platform.
@@ -280,7 +280,7 @@ fn recorded(memory: &control::crmpc::Memory, predicted: &Measurement, time: f64)
         age: memory.age as usize,
         time,
         deviation,
-        kept: memory.report.status == control::crmpc::Status::Kept,
+        is_kept: memory.report.status == control::crmpc::SolverStatus::Kept,
     }
 }
 

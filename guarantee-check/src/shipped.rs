@@ -22,8 +22,8 @@ pub struct Shipped {
 /// Result of reading all files of a folder.
 #[derive(Clone, Debug, Default)]
 pub struct Scan {
-    /// Settings that were found, file by file.
-    pub found: Vec<Shipped>,
+    /// Settings of every CRMPC in the files, file by file.
+    pub shipped: Vec<Shipped>,
     /// Number of experiments, studies and campaigns that were read.
     pub read: [usize; 3],
     /// Files that are none of these, or only a part of one that others extend, with the reason.
@@ -90,7 +90,7 @@ impl Scan {
                 let settings =
                     settings(component).map_err(|error| format!("{run} {name}: {error}"))?;
                 let place = format!("{run} {name}").trim().to_owned();
-                self.found.push(Shipped { file: file.to_path_buf(), place, settings });
+                self.shipped.push(Shipped { file: file.to_path_buf(), place, settings });
             }
         }
         Ok(())
@@ -142,22 +142,22 @@ fn refuse_varied<'a>(
 /// All TOML files below a folder, in order of their names.
 fn files(folder: &Path) -> Result<Vec<PathBuf>, String> {
     let fault = |error: std::io::Error| format!("{}: {error}", folder.display());
-    let mut all = Vec::new();
+    let mut paths = Vec::new();
     for entry in std::fs::read_dir(folder).map_err(fault)? {
         let path = entry.map_err(fault)?.path();
         if path.is_dir() {
-            all.extend(files(&path)?);
+            paths.extend(files(&path)?);
         } else if path.extension().is_some_and(|extension| extension == "toml") {
-            all.push(path);
+            paths.push(path);
         }
     }
-    all.sort();
-    Ok(all)
+    paths.sort();
+    Ok(paths)
 }
 
 /// Converts a value to SI units.
 fn quantity(value: &Value) -> Result<f64, String> {
-    let refused = || format!("{value} is no quantity that is understood here");
+    let refused = || format!("{value} is not a number, or a number with a known unit");
     match value {
         Value::Float(number) => Ok(*number),
         Value::Integer(number) => i32::try_from(*number).map(f64::from).map_err(|_| refused()),

@@ -21,7 +21,7 @@ fn plans_of_all_shipped_settings_are_confirmed() {
     }
     let mut done: Vec<Settings> = Vec::new();
     let mut confirmed = 0;
-    for shipped in &scan.found {
+    for shipped in &scan.shipped {
         let s = &shipped.settings;
         let given = s.constraints == Constraints::Robust
             && Design::new(s).is_ok_and(|design| design.counted >= 1.0);

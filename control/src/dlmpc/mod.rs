@@ -226,14 +226,14 @@ impl Bounded<1> for RateLimit {
     fn violated(
         &self,
         trajectory: &ErrorTrajectory<1>,
-        mut of: Range<usize>,
+        mut intervals: Range<usize>,
         _: &mut mpc::Bounds,
     ) -> Option<Range<usize>> {
         let bound = powi(1.0 + CHECK_SLACK, 2);
         let violates =
             |k: usize| self.square(k, &trajectory.states[k], &trajectory.inputs[k]) > bound;
-        let first = of.find(|&k| violates(k))?;
-        let last = of.rev().find(|&k| violates(k)).unwrap_or(first);
+        let first = intervals.find(|&k| violates(k))?;
+        let last = intervals.rev().find(|&k| violates(k)).unwrap_or(first);
         Some(first..last + 1)
     }
 }

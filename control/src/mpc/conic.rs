@@ -37,7 +37,7 @@ impl<const O: usize> ConicSolver<O> {
     /// Sets up the program and its solver.
     ///
     /// # Errors
-    /// Returns the solver's own message if it refuses the data, for example weights that are not
+    /// Returns the solver's message if it refuses the data, for example weights that are not
     /// positive semidefinite.
     pub fn new(layout: Layout<O>, max_iterations: u32) -> Result<Self, String> {
         let Layout { horizon: n, scale, .. } = &layout;

@@ -201,11 +201,11 @@ impl<R: Reaching> Controller for Tvsmc<R> {
         let b = surface.equivalent(&memory.anchor, time, &error, &reference.accelerations);
         // Wu 2015, (27) and (15).
         let v = b - memory.estimate.disturbance + reaching.sliding_rate(&memory.integral, &s);
-        let wanted = linearise::moment(body, &measured.angles, &angle_rates, &v);
+        let moment = linearise::moment(body, &measured.angles, &angle_rates, &v);
         memory.sliding = s;
         memory.drive = v - b;
-        memory.commanded = Commanded::new(measured, wanted);
-        wanted
+        memory.commanded = Commanded::new(measured, moment);
+        moment
     }
 
     fn limited(&mut self, memory: &mut Self::Memory, applied: &Vector3<f64>) {
