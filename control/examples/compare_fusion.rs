@@ -182,15 +182,15 @@ fn run(filter: &Filter, motion: &[Truth], readings: &[Readings]) -> (f64, f64, f
     };
     let [_, force, field] = &felt(&motion[0]);
     let mut step = (filter.begin)(&triad(force, field).expect("a force and a field"));
-    let mut found = Vec::with_capacity(motion.len());
+    let mut estimates = Vec::with_capacity(motion.len());
     let (allocations, begin) = (ALLOCATIONS.load(Relaxed), Instant::now());
     for readings in readings {
-        found.push(step(readings));
+        estimates.push(step(readings));
     }
-    let count = found.len() as f64;
+    let count = estimates.len() as f64;
     let time = begin.elapsed().as_nanos() as f64 / count;
     let allocations = (ALLOCATIONS.load(Relaxed) - allocations) as f64 / count;
-    let errors = motion.iter().zip(&found).map(|(truth, rotation)| {
+    let errors = motion.iter().zip(&estimates).map(|(truth, rotation)| {
         let error = angles(&(rotation * declination)) - truth.angles;
         (truth.time, error)
     });
@@ -243,8 +243,8 @@ fn main() {
         let mut squares = [Vector3::<f64>::zeros(); 2];
         for seed in seeds.clone() {
             let motion = motion(seed as usize - 1);
-            let found = estimates(&settings, &lines(&motion, &mems(seed)));
-            for (square, rms) in squares.iter_mut().zip(errors(&motion, &found, 0.0)) {
+            let estimated = estimates(&settings, &lines(&motion, &mems(seed)));
+            for (square, rms) in squares.iter_mut().zip(errors(&motion, &estimated, 0.0)) {
                 *square += rms.component_mul(&rms) / 10.0;
             }
         }
@@ -263,8 +263,8 @@ fn main() {
     let magnetometer =
         SensorData::embedded().mems[2].matrix * SensorData::embedded().surroundings.field.norm();
     let left = seeds.map(|seed| {
-        let found = calibrated(&mems(seed), CALIBRATION_DURATION).corrections[2].matrix;
-        (found * magnetometer - Matrix3::identity()).singular_values().max()
+        let matrix = calibrated(&mems(seed), CALIBRATION_DURATION).corrections[2].matrix;
+        (matrix * magnetometer - Matrix3::identity()).singular_values().max()
     });
     println!("ellipsoid: largest norm of W A - I {:.1e}", left.fold(0.0, f64::max));
 }

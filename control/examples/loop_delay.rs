@@ -56,7 +56,7 @@ fn fly<C: Controller>(
     [found, contradicted, law.estimated_delay(&memory)]
 }
 
-/// Returns the scenario of a flight: a seed, a corner, a square wave and an inertia of its own.
+/// Returns the scenario of a flight, with a seed, a corner, a square wave and an inertia.
 fn scenario(kind: DisturbanceKind, flight: u64) -> Scenario {
     let mut scenario = Scenario::crmpc2022();
     let corner = |bit: u64| if flight >> bit & 1 == 0 { 1.0 } else { -1.0 };
@@ -87,14 +87,14 @@ fn main() {
     for is_lqr in [false, true] {
         for kind in [DisturbanceKind::White, DisturbanceKind::Constant, DisturbanceKind::Square] {
             for delays in [(0.0, 0.04), (0.04, 0.0), (0.0, 0.12), (0.0, 0.0), (0.04, 0.04)] {
-                let all = (0..flights).map(|n| outcome(is_lqr, &scenario(kind, n), delays));
+                let outcomes = (0..flights).map(|n| outcome(is_lqr, &scenario(kind, n), delays));
                 let mut sorted = [Vec::new(), Vec::new(), Vec::new()];
-                for outcome in all {
-                    sorted.iter_mut().zip(outcome).for_each(|(all, value)| all.push(value));
+                for outcome in outcomes {
+                    sorted.iter_mut().zip(outcome).for_each(|(values, value)| values.push(value));
                 }
-                let [found, contradicted, estimates] = sorted.map(|mut all| {
-                    all.sort_by(f64::total_cmp);
-                    all
+                let [found_times, contradicted, estimates] = sorted.map(|mut values| {
+                    values.sort_by(f64::total_cmp);
+                    values
                 });
                 let share = |times: &[f64], within: f64| {
                     100.0 * times.partition_point(|time| *time <= within) as f64 / flights as f64
@@ -102,9 +102,9 @@ fn main() {
                 println!(
                     "{} {kind:?} {delays:?}: {:.1} %, {:.1} %, {:.2} s; {:.1} %, {:.1} %; {:.3} to {:.3} s",
                     if is_lqr { "LQR" } else { "CRMPC" },
-                    share(&found, 10.0),
-                    share(&found, SECONDS),
-                    found[found.len() * 95 / 100],
+                    share(&found_times, 10.0),
+                    share(&found_times, SECONDS),
+                    found_times[found_times.len() * 95 / 100],
                     share(&contradicted, 10.0),
                     share(&contradicted, SECONDS),
                     estimates[0],

@@ -67,11 +67,11 @@ fn main() {
     if let Some(bound) = number(7) {
         settings.disturbance_bound = bound.to_radians();
     }
-    let mut all: Vec<Flown> = delays.iter().map(|_| Flown::default()).collect();
+    let mut flights: Vec<Flown> = delays.iter().map(|_| Flown::default()).collect();
     for case in first as u64..(first + count) as u64 {
         let mut best: Vec<Vec<Optimisation>> = vec![Vec::new(); delays.len()];
         for repetition in 0..repetitions {
-            for ((&delay, best), flown) in delays.iter().zip(&mut best).zip(&mut all) {
+            for ((&delay, best), flown) in delays.iter().zip(&mut best).zip(&mut flights) {
                 let (optimisations, shown) = fly(&Settings { delay, ..settings }, kind, case);
                 if repetition == 0 {
                     *best = optimisations;
@@ -83,12 +83,12 @@ fn main() {
                 }
             }
         }
-        for (flown, best) in all.iter_mut().zip(best) {
+        for (flown, best) in flights.iter_mut().zip(best) {
             flown.optimisations.extend(best);
         }
     }
-    let base = mean(&all[0].optimisations, |o| o.ms);
-    for (delay, flown) in delays.iter().zip(&mut all) {
+    let base = mean(&flights[0].optimisations, |o| o.ms);
+    for (delay, flown) in delays.iter().zip(&mut flights) {
         print(*delay, flown, base);
     }
 }
@@ -144,7 +144,7 @@ fn mean<T>(items: &[T], value: impl Fn(&T) -> f64) -> f64 {
 fn print(delay: f64, flown: &mut Flown, base: f64) {
     let Flown { optimisations, shown } = flown;
     let count = |status: SolverStatus| optimisations.iter().filter(|o| o.status == status).count();
-    let (kept, fallbacks) = (count(SolverStatus::Kept), count(SolverStatus::Fallback));
+    let (kept_plans, fallbacks) = (count(SolverStatus::Kept), count(SolverStatus::Fallback));
     let active = optimisations.iter().filter(|o| o.iterations > 0).count();
     let iterations: u32 = optimisations.iter().map(|o| o.iterations).sum();
     let mean_ms = mean(optimisations, |o| o.ms);
@@ -178,7 +178,7 @@ fn print(delay: f64, flown: &mut Flown, base: f64) {
         most.join(", "),
     );
     println!(
-        "    kept {kept}, fallbacks {fallbacks}, residual {residual:.1e}; EMS mean {:.4}, largest {:.3} deg; in force {:.2} % at least; \
+        "    kept {kept_plans}, fallbacks {fallbacks}, residual {residual:.1e}; EMS mean {:.4}, largest {:.3} deg; in force {:.2} % at least; \
          rate up to {:.4}, moment up to {:.4} of the limit; guarantee ended in {} flights",
         mean(shown, |shown| shown.ems_deg),
         largest(|shown| shown.ems_deg),

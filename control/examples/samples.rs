@@ -92,16 +92,16 @@ fn write_samples(
             .map(|k| reference(time + k as f64 * settings.period_optimisation))
             .map(|at| [at.angles, at.rates, at.accelerations].map(<[f64; 3]>::from))
             .collect();
-        let own: serde_json::Map<_, _> = std::iter::zip(&ways, std::iter::zip(reports, best))
+        let by_way: serde_json::Map<_, _> = std::iter::zip(&ways, std::iter::zip(reports, best))
             .map(|((name, _), (report, seconds))| {
-                let own = json!({
+                let figures = json!({
                     "seconds": seconds,
                     "iterations": report.iterations,
                     "cost": report.cost,
                     "residual": report.residual,
                     "status": format!("{:?}", report.status),
                 });
-                ((*name).to_string(), own)
+                ((*name).to_string(), figures)
             })
             .collect();
         let angle_rates = vehicle::kinematics::r(&measured.angles) * measured.rates;
@@ -124,7 +124,7 @@ fn write_samples(
             "bounds": { "rate": bounds.rate, "input": bounds.input, "terminal": bounds.terminal },
             // This is the plan of the optimisation before, not shifted; it is empty at first.
             "previous": previous,
-            "ways": own,
+            "ways": by_way,
         });
         writeln!(out, "{sample}")?;
     }

@@ -202,8 +202,9 @@ fn merit(
 
 #[test]
 fn regress_prediction_keeps_tracking_and_effort_that_a_delay_spoils() {
-    let of = |delay, predicts| merit(10.0, delay, predicts, 1.0, DisturbanceKind::None).unwrap();
-    let (none, without, with) = (of(0.0, false), of(0.1, false), of(0.1, true));
+    let merit_of =
+        |delay, predicts| merit(10.0, delay, predicts, 1.0, DisturbanceKind::None).unwrap();
+    let (none, without, with) = (merit_of(0.0, false), merit_of(0.1, false), merit_of(0.1, true));
     // The EMS between 10 and 25 s is 0.0040 deg, without prediction 0.0245 deg; the CMS is 0.282,
     // without prediction 0.340.
     assert!(
@@ -221,9 +222,12 @@ fn regress_prediction_keeps_tracking_and_effort_that_a_delay_spoils() {
 #[test]
 fn a_loop_that_a_delay_makes_unstable_is_stable_with_prediction() {
     for scale in harness::INERTIA_SCALES {
-        let of = |delay, predicts| merit(0.3, delay, predicts, scale, DisturbanceKind::White);
-        assert!(matches!(of(0.1, false), Err(Error::Singular { .. })), "the attitude is not lost");
-        let (none, with) = (of(0.0, false).unwrap(), of(0.1, true).unwrap());
+        let merit_of = |delay, predicts| merit(0.3, delay, predicts, scale, DisturbanceKind::White);
+        assert!(
+            matches!(merit_of(0.1, false), Err(Error::Singular { .. })),
+            "the attitude is not lost"
+        );
+        let (none, with) = (merit_of(0.0, false).unwrap(), merit_of(0.1, true).unwrap());
         assert!(with.ems_deg < 1.1 * none.ems_deg && with.cms < 1.05 * none.cms);
     }
 }

@@ -117,8 +117,11 @@ fn oracle_the_worst_disturbance_reaches_no_further() {
                 let more = bound.feedback / exact.at(n).feedback.max(1e-9);
                 assert!(feedback[n] <= bound.feedback + 1e-12, "{delay} {late} {tick}");
                 assert!(seen[n].x <= bound.seen_angle && seen[n].y <= bound.seen_rate);
-                let own = vehicle[(delay + tick * PARTS) as usize];
-                assert!(own.x <= bound.angle && own.y <= bound.rate, "{delay} {late} {tick}");
+                let vehicle_state = vehicle[(delay + tick * PARTS) as usize];
+                assert!(
+                    vehicle_state.x <= bound.angle && vehicle_state.y <= bound.rate,
+                    "{delay} {late} {tick}"
+                );
                 if n + 1 == TICKS as usize {
                     closest = closest.max(feedback[n] / bound.feedback);
                     assert!(more > 1.0);
@@ -136,9 +139,9 @@ fn carried(switching: &Switching, plan: &impl Fn(i32) -> f64, ratio: i32) -> Vec
     let stages = 0..TICKS / ratio;
     let stage = |i: i32| {
         let change = plan(i * ratio) - plan(i * ratio - 1);
-        let here = switching.begin(&carried, change.abs());
-        carried = switching.next(&here);
-        here
+        let begun = switching.begin(&carried, change.abs());
+        carried = switching.next(&begun);
+        begun
     };
     stages.map(stage).collect()
 }
@@ -163,10 +166,10 @@ fn oracle_changes_of_the_plan_leave_no_more_than_is_carried_along() {
         {
             let plan = |tick: i32| waveform(tick.div_euclid(ratio));
             let axis = Axis::new((&settings, delay, late), plan, |_| 0.0);
-            let all = carried(&switching, &plan, ratio);
-            for (stage, here) in (0_i32..).zip(&all) {
-                let bound = switching.deviation(here);
-                let next = all.get(stage as usize + 1).copied().unwrap_or_default();
+            let carried_changes = carried(&switching, &plan, ratio);
+            for (stage, begun) in (0_i32..).zip(&carried_changes) {
+                let bound = switching.deviation(begun);
+                let next = carried_changes.get(stage as usize + 1).copied().unwrap_or_default();
                 let early = switching.early(&next);
                 for tick in stage * ratio..(stage + 1) * ratio {
                     let n = tick as usize;
@@ -176,9 +179,12 @@ fn oracle_changes_of_the_plan_leave_no_more_than_is_carried_along() {
                     assert!(feedback <= bound.feedback_norm + 1e-12, "{delay} {late} {tick}");
                     closest = closest.max(feedback / bound.feedback_norm);
                     for part in tick * PARTS..(tick + 1) * PARTS {
-                        let own = axis.vehicle(part);
-                        assert!(own.x.abs() <= bound.angle + early.0 + 1e-12);
-                        assert!(own.y.abs() <= bound.rate + early.1 + 1e-12, "{delay} {late}");
+                        let vehicle_state = axis.vehicle(part);
+                        assert!(vehicle_state.x.abs() <= bound.angle + early.0 + 1e-12);
+                        assert!(
+                            vehicle_state.y.abs() <= bound.rate + early.1 + 1e-12,
+                            "{delay} {late}"
+                        );
                     }
                 }
             }

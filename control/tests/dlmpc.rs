@@ -53,13 +53,13 @@ impl Recorded {
 /// Returns all ticks of the scenario with white noise.
 fn recorded() -> Vec<Recorded> {
     let mut before = Memory::default();
-    let mut all = Vec::new();
+    let mut samples = Vec::new();
     let noise = disturbance(DisturbanceKind::White);
     simulate(&mut dlmpc(), &mut Memory::default(), 1.05, noise, |after, tick, &measured| {
-        all.push(Recorded { tick, before: before.clone(), measured });
+        samples.push(Recorded { tick, before: before.clone(), measured });
         before.clone_from(after);
     });
-    all
+    samples
 }
 
 fn optimisations() -> Vec<Recorded> {
@@ -136,11 +136,11 @@ fn oracle_first_optimum_satisfies_the_karush_kuhn_tucker_conditions() {
         );
         assert!((memory.report.cost - program.cost(&v)).abs() < 1e-9 * program.cost(&v));
 
-        let derivative = |of: &dyn Fn(&DVector<f64>) -> DVector<f64>, i: usize| {
+        let derivative = |function: &dyn Fn(&DVector<f64>) -> DVector<f64>, i: usize| {
             let (mut plus, mut minus) = (v.clone(), v.clone());
             plus[i] += step;
             minus[i] -= step;
-            (of(&plus) - of(&minus)) / (2.0 * step)
+            (function(&plus) - function(&minus)) / (2.0 * step)
         };
         let cost = |v: &DVector<f64>| DVector::repeat(1, program.cost(v));
         let gradient = DVector::from_fn(v.len(), |i, _| derivative(&cost, i)[0]);
@@ -202,13 +202,13 @@ fn without_a_solution_the_shifted_plan_is_tracked_within_the_limit() {
     })
     .unwrap();
     let limit = settings.limit_rate * (1.0 + 1e-12);
-    let mut found = 0;
+    let mut fallbacks = 0;
     for sample in optimisations() {
         let (after, moment) = sample.update(&mut failing);
         if after.report.status != SolverStatus::Fallback || sample.tick == 0 {
             continue;
         }
-        found += 1;
+        fallbacks += 1;
         assert_eq!(after.report.fallbacks, sample.before.report.fallbacks + 1);
         assert!(moment.norm() <= settings.limit_moment);
         let (plan, before) = (&after.plan, &sample.before.plan);
@@ -222,7 +222,7 @@ fn without_a_solution_the_shifted_plan_is_tracked_within_the_limit() {
         let gap = |k: usize| (plan.angles[k] - before.angles[k + 1]).norm();
         assert!(gap(30) <= 1e-3 * gap(0).max(1e-6), "{} of {}", gap(30), gap(0));
     }
-    assert!(found > 50, "{found}");
+    assert!(fallbacks > 50, "{fallbacks}");
 }
 
 /// A controller whose solver fails during some ticks.

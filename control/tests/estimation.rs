@@ -41,9 +41,9 @@ fn health_at(estimates: &[Estimate], time: f64) -> Health {
 proptest! {
     #[test]
     fn oracle_angles_come_back_from_the_rotation(alpha in -3.1..3.1, beta in -1.5..1.5, sigma in -3.1..3.1) {
-        let wanted = Vector3::new(alpha, beta, sigma);
-        let rotation = Rotation3::from_matrix_unchecked(body_from_velocity(&wanted));
-        prop_assert!((angles(&rotation) - wanted).amax() < 1e-12);
+        let expected = Vector3::new(alpha, beta, sigma);
+        let rotation = Rotation3::from_matrix_unchecked(body_from_velocity(&expected));
+        prop_assert!((angles(&rotation) - expected).amax() < 1e-12);
     }
 }
 
@@ -65,19 +65,19 @@ fn oracle_the_calibration_flight_finds_the_magnetometers_errors() {
 /// The values agree except for rounding, which may differ from machine to machine.
 #[test]
 fn regress_the_corrections_in_the_data_file_are_those_of_the_flight() {
-    let found = calibrated(&mems(CALIBRATION_SEED), CALIBRATION_DURATION).corrections;
-    for (found, file) in found.iter().zip(&CALIBRATED.corrections) {
+    let corrections = calibrated(&mems(CALIBRATION_SEED), CALIBRATION_DURATION).corrections;
+    for (correction, file) in corrections.iter().zip(&CALIBRATED.corrections) {
         let size = file.matrix.norm();
         assert!(
-            (found.matrix - file.matrix).norm() < 1e-9 * size,
+            (correction.matrix - file.matrix).norm() < 1e-9 * size,
             "{} {}",
-            found.matrix,
+            correction.matrix,
             file.matrix
         );
         assert!(
-            (found.bias - file.bias).norm() < 1e-9 / size.min(1.0),
+            (correction.bias - file.bias).norm() < 1e-9 / size.min(1.0),
             "{} {}",
-            found.bias,
+            correction.bias,
             file.bias
         );
     }
@@ -97,12 +97,12 @@ fn a_calibration_flight_cut_short_is_refused() {
     let mut memory = estimator.memory();
     for (truth, line) in motion.iter().zip(&lines) {
         estimator.update(&mut memory, truth.time, line);
-        let wanted = match truth.time {
+        let expected = match truth.time {
             time if time < 0.005 => Health::Waiting,
             time if time < 5.005 => Health::Calibrating,
             _ => Health::Uncalibrated,
         };
-        assert_eq!(memory.estimate.health, wanted, "t = {}", truth.time);
+        assert_eq!(memory.estimate.health, expected, "t = {}", truth.time);
     }
     assert_eq!(memory.calibration.status, CalibrationStatus::Refused);
     assert_eq!(
@@ -181,10 +181,10 @@ fn without_prediction_the_angles_are_late_by_the_delays() {
 fn the_printed_kinematics_get_the_rates_that_they_take() {
     let motion = scenario(1);
     let lines = lines(&motion, &ideal());
-    let of = |kinematics| {
+    let rms_of = |kinematics| {
         errors(&motion, &estimates(&Settings { kinematics, ..sharp() }, &lines), 0.02)[1]
     };
-    let (printed, exact) = (of(Kinematics::Printed), of(Kinematics::Exact));
+    let (printed, exact) = (rms_of(Kinematics::Printed), rms_of(Kinematics::Exact));
     assert!(printed.norm() < 0.03, "one tick late: {printed}");
     assert!(exact.norm() > 1.5 * printed.norm(), "what the printed R lacks: {exact}");
 }
@@ -309,11 +309,11 @@ fn error_after(
     let mut lines = good[..number + 550].to_vec();
     change(&mut lines[number]);
     let mut worst = 0.0_f64;
-    let wanted =
+    let expected =
         Rotation3::from_matrix_unchecked(body_from_velocity(&Scenario::crmpc2022().initial_angles));
     for estimate in &estimates(settings, &lines)[number + 500..] {
-        let found = Rotation3::from_matrix_unchecked(body_from_velocity(&estimate.angles));
-        let error = found.angle_to(&wanted).to_degrees();
+        let estimated = Rotation3::from_matrix_unchecked(body_from_velocity(&estimate.angles));
+        let error = estimated.angle_to(&expected).to_degrees();
         worst = if error.is_finite() { worst.max(error) } else { f64::INFINITY };
     }
     worst

@@ -248,10 +248,10 @@ fn second_prediction(settings: &Settings) -> f64 {
         let true_end = predictor.predict(&[under_way, under_way, next], &moved);
         let end = predictor
             .predict(&[under_way, under_way, next], &measured(&moved, &-corner, &-of_angles));
-        let kept = |state: &Measurement| {
+        let within_limits = |state: &Measurement| {
             state.rates.norm() <= limit_rate && state.angles.y.abs() <= settings.sideslip_domain
         };
-        if !(kept(&start) && kept(&moved) && kept(&true_end)) {
+        if !(within_limits(&start) && within_limits(&moved) && within_limits(&true_end)) {
             return 0.0;
         }
         // The plan's acceleration is the one for which the law commands `next`.

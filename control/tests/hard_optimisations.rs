@@ -89,9 +89,9 @@ fn every_optimum_of_the_paper_from_a_random_start_shows_that_it_is_one() {
     let parts: Vec<&[u64]> = seeds.chunks(100).collect();
     let optimise = |part: &&[u64]| {
         let law = &mut crmpc(Constraints::Paper);
-        let of =
+        let steps_of =
             |&seed: &u64| Case::random(seed, 1.0).optimise(law, 1).map(|report| (seed, report));
-        part.iter().flat_map(of).collect::<Vec<_>>()
+        part.iter().flat_map(steps_of).collect::<Vec<_>>()
     };
     for (seed, report) in in_parallel(&parts, optimise).concat() {
         assert!(has_optimum(&report) && report.residual <= 2e-6, "seed {seed}: {report:?}");

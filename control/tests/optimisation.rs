@@ -63,7 +63,7 @@ fn recorded(constraints: Constraints) -> Vec<Recorded> {
     let mut controller = controller(constraints);
     let ratio = controller.design().ratio as u64;
     let mut before = Memory::default();
-    let mut all = Vec::new();
+    let mut samples = Vec::new();
     simulate(
         &mut controller,
         &mut Memory::default(),
@@ -71,12 +71,12 @@ fn recorded(constraints: Constraints) -> Vec<Recorded> {
         disturbance(DisturbanceKind::White),
         |after, tick, &measured| {
             if tick % ratio == 0 {
-                all.push(Recorded { tick, before: before.clone(), measured });
+                samples.push(Recorded { tick, before: before.clone(), measured });
             }
             before.clone_from(after);
         },
     );
-    all
+    samples
 }
 
 #[test]

@@ -43,8 +43,8 @@ fn shape() -> impl Strategy<Value = Shape> {
     let weights = [weight(), weight(), weight()];
     (10..=200usize, weights, any::<bool>()).prop_map(|(horizon, [angle, rate, input], terminal)| {
         let h = 0.2;
-        let of = |decade: f64, typical: f64| h * typical * 10.0_f64.powf(decade);
-        let (p1, p2, q) = (of(angle, 50.0), of(rate, 50.0), of(input, 10.0));
+        let weight_of = |decade: f64, typical: f64| h * typical * 10.0_f64.powf(decade);
+        let (p1, p2, q) = (weight_of(angle, 50.0), weight_of(rate, 50.0), weight_of(input, 10.0));
         let each = SMatrix::<f64, 2, 2>::new(
             8.0 * p1,
             3.0 * (p1 * p2).sqrt(),
@@ -165,14 +165,14 @@ impl Solvers {
         let outcome =
             riccati.solve(&problem, &mut solution, 0, false, &mut Budget::unlimited(), None);
         let verdict = cone.solve(&problem, &mut judged, (u32::MAX, f64::INFINITY));
-        let of = |outcome, solution: &Solution<2>| {
+        let assessed = |outcome, solution: &Solution<2>| {
             (
                 outcome,
                 shape.cost.total(&solution.trajectory),
                 Certificate::new(&problem, solution, false),
             )
         };
-        [of(outcome, &solution), of(verdict, &judged)]
+        [assessed(outcome, &solution), assessed(verdict, &judged)]
     }
 }
 
@@ -417,13 +417,13 @@ impl Bounded<2> for Spoilt {
     fn violated(
         &self,
         trajectory: &ErrorTrajectory<2>,
-        mut of: Range<usize>,
+        mut intervals: Range<usize>,
         _: &mut Bounds,
     ) -> Option<Range<usize>> {
         let violates =
             |k: usize| self.sets.squares(k, &trajectory.states[k], &trajectory.inputs[k]).1 > 1.0;
-        let first = of.find(|&k| violates(k))?;
-        let last = of.rev().find(|&k| violates(k)).unwrap_or(first);
+        let first = intervals.find(|&k| violates(k))?;
+        let last = intervals.rev().find(|&k| violates(k)).unwrap_or(first);
         Some(first..last + 1)
     }
 }

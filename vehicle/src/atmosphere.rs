@@ -46,7 +46,7 @@ pub struct Air {
 pub fn air(altitude: f64) -> Result<Air, Error> {
     if !(0.0..=TOP).contains(&altitude) {
         let problem = format!("= {altitude} m must lie between 0 and {TOP} m");
-        return Err(Error::of("flight.altitude", problem));
+        return Err(Error::parameter("flight.altitude", problem));
     }
     let height = EARTH_RADIUS * altitude / (EARTH_RADIUS + altitude); // geopotential
     let weight = GRAVITY * MOLAR_MASS / GAS_CONSTANT;
@@ -86,7 +86,7 @@ impl Flight {
     pub fn dynamic_pressure(&self) -> Result<f64, Error> {
         if !(self.mach >= 0.0 && self.mach.is_finite()) {
             let problem = format!("= {} must not be negative", self.mach);
-            return Err(Error::of("flight.mach", problem));
+            return Err(Error::parameter("flight.mach", problem));
         }
         let air = air(self.altitude)?;
         Ok(0.5 * air.density * powi(self.mach * air.sound_speed, 2))

@@ -132,7 +132,7 @@ impl Disturbance {
     /// # Errors
     /// Names the value at fault by its path in the configuration of the plant.
     pub fn check(&self) -> Result<(), Error> {
-        let refuse = |name: &'static str, problem: String| Err(Error::of(name, problem));
+        let refuse = |name: &'static str, problem: String| Err(Error::parameter(name, problem));
         if !(self.bound >= 0.0 && self.bound.is_finite()) {
             return refuse(
                 "disturbance.bound",

@@ -66,7 +66,10 @@ pub enum Error {
 
 impl Error {
     /// Returns the error for a configuration value, with the path of its field.
-    pub(crate) fn of(name: impl Into<Cow<'static, str>>, problem: impl Into<String>) -> Self {
+    pub(crate) fn parameter(
+        name: impl Into<Cow<'static, str>>,
+        problem: impl Into<String>,
+    ) -> Self {
         Self::Parameter { name: name.into(), problem: problem.into() }
     }
 }

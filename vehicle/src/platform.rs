@@ -29,7 +29,7 @@ impl Surroundings {
     /// # Errors
     /// Names the value at fault by its path in the configuration of the plant.
     pub fn check(&self) -> Result<(), Error> {
-        let refuse = |name: &'static str, problem: String| Err(Error::of(name, problem));
+        let refuse = |name: &'static str, problem: String| Err(Error::parameter(name, problem));
         if !(self.gravity >= 0.0 && self.gravity.is_finite()) {
             return refuse(
                 "surroundings.gravity",

@@ -60,7 +60,7 @@ impl Turntable {
             ("turntable.resolution", config.resolution),
         ] {
             if !(value >= 0.0 && value.is_finite()) {
-                return Err(Error::of(name, format!("= {value} must not be negative")));
+                return Err(Error::parameter(name, format!("= {value} must not be negative")));
             }
         }
         Ok((config.bandwidth > 0.0).then_some(Self { config: *config, before: None, last: None }))

@@ -226,7 +226,7 @@ fn oracle_square_and_constant_as_tables_bit_for_bit() {
         let table = DisturbanceTable { period, rows: rows.iter().map(row).collect() };
         disturbed(Disturbance { kind: DisturbanceKind::Table, table, ..Disturbance::default() })
     };
-    let of = |kind, square_period| {
+    let disturbed_by = |kind, square_period| {
         disturbed(Disturbance { kind, direction, square_period, ..Disturbance::default() })
     };
     // The jumps k · period / 2 of the square wave and the table's repetition · period + time are
@@ -236,7 +236,7 @@ fn oracle_square_and_constant_as_tables_bit_for_bit() {
         (DisturbanceKind::Square, 0.7, 0.7, vec![(0.0, 1.0), (0.35, -1.0)], 1e-14),
         (DisturbanceKind::Constant, 1.0, 0.0, vec![(0.0, 1.0)], 0.0),
     ] {
-        let (mut kind, mut table) = (of(kind, square_period), tabulated(period, &rows));
+        let (mut kind, mut table) = (disturbed_by(kind, square_period), tabulated(period, &rows));
         for k in 0..125 {
             let [from, to] = [0.04 * f64::from(k), 0.04 * f64::from(k + 1)];
             kind.advance(from, to, moment(k / 5)).unwrap();

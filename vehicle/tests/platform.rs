@@ -173,7 +173,7 @@ fn in_two_minutes_the_calibration_sequence_sees_every_direction_within_13_degree
             })
             .collect();
         let farthest = directions(1000)
-            .map(|wanted| seen.iter().map(|seen| seen.dot(&wanted)).fold(-1.0, f64::max))
+            .map(|axis| seen.iter().map(|seen| seen.dot(&axis)).fold(-1.0, f64::max))
             .fold(1.0, f64::min);
         assert!(farthest > 13f64.to_radians().cos(), "{} deg", farthest.acos().to_degrees());
     }

@@ -16,8 +16,8 @@ fn derivative_error(profile: &Profile, from: f64, to: f64) -> f64 {
         .filter(|time| jumps.iter().all(|jump| (time - jump).abs() > 3.0 * h))
         .map(|time| {
             let [a, b, c, d, e] = [-2.0, -1.0, 0.0, 1.0, 2.0].map(|k| profile.at(time + k * h));
-            let difference = |of: fn(&Reference) -> Vector3<f64>| {
-                (of(&a) - of(&b) * 8.0 + of(&d) * 8.0 - of(&e)) / (12.0 * h)
+            let difference = |value: fn(&Reference) -> Vector3<f64>| {
+                (value(&a) - value(&b) * 8.0 + value(&d) * 8.0 - value(&e)) / (12.0 * h)
             };
             let rates = (difference(|r| r.angles) - c.rates).amax();
             rates.max((difference(|r| r.rates) - c.accelerations).amax())
@@ -192,11 +192,11 @@ fn csv_faults_are_named_with_file_line_and_column() {
 
 #[test]
 fn a_table_of_more_points_than_anybody_needs_is_refused() {
-    let of = |n: u32| {
+    let table_of = |n: u32| {
         LookupTable::new((0..n).map(f64::from).collect(), vec![Vector3::zeros(); n as usize])
     };
-    assert!(of(100_000).is_ok());
-    let text = of(100_001).unwrap_err().to_string();
+    assert!(table_of(100_000).is_ok());
+    let text = table_of(100_001).unwrap_err().to_string();
     assert!(text.contains("more than 100000 points"), "{text}");
     let lines: Vec<_> = (0..=100_000).map(|k| format!("{k},0,0,0")).collect();
     let csv = format!("time_s,alpha_deg,beta_deg,sigma_deg\n{}", lines.join("\n"));

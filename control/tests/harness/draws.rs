@@ -32,7 +32,7 @@ fn degrees(values: [f64; 3]) -> Vector3<f64> {
 
 impl Case {
     /// Returns the case that these numbers define, with errors scaled by `size`.
-    pub fn of(x: &[f64], size: f64) -> Self {
+    pub fn from_numbers(x: &[f64], size: f64) -> Self {
         let at = |i: usize| x[i].clamp(-1.0, 1.0);
         let three = |i: usize| Vector3::new(at(i), at(i + 1), at(i + 2));
         let mean = degrees([10.0, 0.0, -30.0]) + three(2).component_mul(&degrees([5.0, 3.0, 20.0]));
@@ -65,7 +65,7 @@ impl Case {
     pub fn random(seed: u64, size: f64) -> Self {
         let random = &mut Random::new(seed);
         let x: Vec<f64> = (0..UNKNOWNS).map(|_| random.between(-1.0, 1.0)).collect();
-        Self::of(&x, size)
+        Self::from_numbers(&x, size)
     }
 
     /// Returns the reports of three optimisations, each with its shortest time: the first one

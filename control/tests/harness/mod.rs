@@ -200,10 +200,10 @@ pub fn constant() -> Vec<Case> {
 /// periods.
 pub fn square(periods: &[f64]) -> Vec<Case> {
     let directions = [(1.0, 1.0), (-1.0, 1.0), (1.0, -1.0), (-1.0, -1.0)];
-    let all = periods
+    let waves = periods
         .iter()
         .flat_map(|&period| directions.map(|(y, z)| (period, Vector3::new(1.0, y, z))));
-    cases(all.map(|(square_period, direction)| {
+    cases(waves.map(|(square_period, direction)| {
         let name = format!("square wave of {square_period} s along {:?}", direction.as_slice());
         (name, Disturbance { square_period, direction, ..disturbance(DisturbanceKind::Square) })
     }))
@@ -234,11 +234,11 @@ pub fn in_parallel<T: Sync, R: Send>(items: &[T], work: impl Fn(&T) -> R + Sync)
 /// Measurements that no controller may remember after the tick is evaluated again.
 pub fn garbage() -> [Measurement; 4] {
     let measured = |angles, rates| Measurement { angles, rates, ..Measurement::default() };
-    let all = Vector3::repeat;
+    let uniform = Vector3::repeat;
     [
         measured(Vector3::new(0.5, -0.4, 1.0), Vector3::new(0.2, -0.3, 0.1)),
-        measured(all(f64::NAN), all(f64::NAN)),
-        measured(all(1.0), all(f64::INFINITY)),
-        measured(all(1e300), all(-1e300)),
+        measured(uniform(f64::NAN), uniform(f64::NAN)),
+        measured(uniform(1.0), uniform(f64::INFINITY)),
+        measured(uniform(1e300), uniform(-1e300)),
     ]
 }

@@ -30,7 +30,7 @@ impl Constraints<2> for Sets {
     ) -> StageConstraints<2> {
         let kinematics = InverseKinematics::at(&state[0]);
         let at = kinematics.linearise(&self.body, &state[1], input);
-        let of = |y: &Linear, bound: f64| {
+        let constraint = |y: &Linear, bound: f64| {
             let mut by_angles = Matrix3::zeros();
             by_angles.fixed_view_mut::<3, 2>(0, 0).copy_from(&y.by_angles);
             NormConstraint {
@@ -46,11 +46,11 @@ impl Constraints<2> for Sets {
                 by_input: Matrix3::zeros(),
             };
             let u = kinematics.input_of_moment(&self.body, &at.moment);
-            StageConstraints { state: rates, input: of(&u, self.bounds.1) }
+            StageConstraints { state: rates, input: constraint(&u, self.bounds.1) }
         } else {
             StageConstraints {
-                state: of(&at.rates, self.bounds.0),
-                input: of(&at.moment, self.bounds.1),
+                state: constraint(&at.rates, self.bounds.0),
+                input: constraint(&at.moment, self.bounds.1),
             }
         }
     }

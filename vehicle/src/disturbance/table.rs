@@ -42,11 +42,11 @@ impl DisturbanceTable {
         let repeats = self.period >= SHORTEST_PERIOD && self.period.is_finite();
         if !(repeats || self.period == 0.0) {
             let problem = format!("= {} s must be 0 or at least {SHORTEST_PERIOD} s", self.period);
-            return Err(Error::of("disturbance.table.period", problem));
+            return Err(Error::parameter("disturbance.table.period", problem));
         }
         let mut before: Option<f64> = None;
         for (i, Row { time, direction }) in self.rows.iter().enumerate() {
-            let refuse = |problem: String| Err(Error::of(name(i, "time"), problem));
+            let refuse = |problem: String| Err(Error::parameter(name(i, "time"), problem));
             if !(*time >= 0.0 && time.is_finite()) {
                 return refuse(format!("= {time} s must be finite and not negative"));
             }
@@ -63,7 +63,7 @@ impl DisturbanceTable {
             for (axis, factor) in ["x", "y", "z"].into_iter().zip(direction) {
                 if !(-1.0..=1.0).contains(factor) {
                     let problem = format!("= {factor} must lie between -1 and 1");
-                    return Err(Error::of(name(i, &format!("direction.{axis}")), problem));
+                    return Err(Error::parameter(name(i, &format!("direction.{axis}")), problem));
                 }
             }
             before = Some(*time);
