@@ -105,7 +105,7 @@ fn print_distribution<C: Optimising>(name: &str, controller: &mut C, ticks: &[Ti
     );
 }
 
-/// The ways of solving that are compared.
+/// The solvers and shortcuts that are compared.
 const WAYS: [(&str, SolverSettings); 4] = [
     ("shortcuts, then riccati", WAY),
     ("riccati", SolverSettings { shortcuts: false, ..WAY }),

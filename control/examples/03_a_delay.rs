@@ -1,5 +1,5 @@
 //! Flies CRMPC with its command acting 0.117 s late, the computing time that Chai et al. (2022)
-//! print: once without knowing of it, and once with the state predicted over the delay.
+//! print: once without compensation, and once with the state predicted over the delay.
 //!
 //! ```text
 //! cargo run --release -p reentry-control --example 03_a_delay
@@ -14,7 +14,7 @@ use vehicle::plant::Plant;
 /// s.
 const DELAY: f64 = 0.117;
 
-/// Largest rate and moment as shares of their limits, where the law knows of this delay (s).
+/// Largest rate and moment as shares of their limits; the law compensates `expected_delay` (s).
 fn flown(expected_delay: f64) -> Result<(f64, f64), Box<dyn std::error::Error>> {
     let scenario = Scenario::crmpc2022();
     let settings = Settings { delay: expected_delay, ..Settings::new(Constraints::Robust) };
@@ -40,7 +40,7 @@ fn flown(expected_delay: f64) -> Result<(f64, f64), Box<dyn std::error::Error>> 
 }
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    for (text, expected_delay) in [("not known to the law", 0.0), ("predicted over", DELAY)] {
+    for (text, expected_delay) in [("not compensated", 0.0), ("compensated", DELAY)] {
         let (rate, moment) = flown(expected_delay)?;
         println!("delay of {DELAY} s, {text}: ‖ω‖ {rate:.3}, ‖m‖ {moment:.3} of their limits");
     }

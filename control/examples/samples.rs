@@ -1,10 +1,9 @@
-//! Prints every optimisation of CRMPC over the 50 s scenario of Chai 2022
-//! (white noise, inertia + 5 %), as one JSON object per line: the data that another solver needs to
-//! solve the same problem, our optimum, and the time of each of our ways. `scripts/bench` reads the
-//! output.
+//! Prints every optimisation of CRMPC over the 50 s scenario of Chai 2022 (white noise, inertia + 5
+//! %), as one JSON object per line: the data that another solver needs to solve the same problem,
+//! our optimum, and the time of each of our solvers. `scripts/bench` reads the output.
 //!
-//! Each sample is repeated from the same memory, and the smallest time counts. The ways are timed
-//! in turns, so that other load on the machine affects all alike.
+//! Each sample is repeated from the same memory, and the smallest time counts. The solvers are
+//! timed in turns, so that other load on the machine affects all alike.
 
 #[path = "../tests/harness/mod.rs"]
 mod harness;

@@ -1,9 +1,9 @@
 //! Sampled error dynamics under the feedback law: the effect of a bounded disturbance.
 //!
-//! Per axis the deviation o = (angle, rate) of the vehicle from the nominal motion obeys
-//! ö = K o + Δ (Chai 2022, (22)), with K o computed every `period` and held. The bounds here are
-//! exact: they are sums of absolute impulse responses (L1 norms) under zero-order hold. The paper's
-//! c̄ is the peak of the step response instead, which holds for a constant Δ only.
+//! Per axis the deviation o = (angle, rate) of the vehicle from the nominal trajectory obeys ö = K
+//! o + Δ (Chai 2022, (22)), with K o computed every `period` and held. The bounds here are exact:
+//! they are sums of absolute impulse responses (L1 norms) under zero-order hold. The paper's c̄ is
+//! the peak of the step response instead, which holds for a constant Δ only.
 
 use nalgebra::{Matrix2, RowVector2, Vector2};
 use serde::{Deserialize, Serialize};
@@ -143,8 +143,8 @@ pub struct SampledError {
     to_middle: Matrix2<f64>,
 }
 
-/// The first ticks of a nominal motion, before which the prediction has begun, and by which share
-/// of itself an effect is larger there.
+/// The first ticks of a nominal trajectory, before which the prediction has begun, and the share by
+/// which an effect is larger there.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Early {
     /// Number of these ticks.
@@ -204,7 +204,7 @@ impl InvariantSet {
             middle_angle: middle(0),
             middle_rate: middle(1),
             feedback: self.support(&self.gain.row().transpose()),
-            // No use is made of these.
+            // These fields are not used.
             feedback_age: 0.0,
             change: 0.0,
         }
@@ -323,7 +323,7 @@ impl SampledError {
 
     /// Returns the largest effect of errors of the measured angle and of the measured rate within
     /// 0, 1, …, `steps` periods, per unit of their bound. The errors may take any value within the
-    /// bound at every tick. The motion begins at the measured state.
+    /// bound at every tick. The nominal trajectory begins at the measured state.
     pub fn errors(&self, steps: usize) -> [Vec<Reach>; 2] {
         let always = Early { ticks: 0, excess: 0.0 };
         [Vector2::new(1.0, 0.0), Vector2::new(self.latency, 1.0)]
@@ -627,7 +627,7 @@ mod tests {
                     .map(|n| {
                         let time = f64::from(n) * period;
                         let free = (time - begins).max(0.0);
-                        // Before a measurement has seen the pulse, the motion is free.
+                        // Before a measurement has seen the pulse, the vehicle moves freely.
                         let fresh = if free > 0.0 && free < latency {
                             Vector2::new(free, 1.0)
                         } else {

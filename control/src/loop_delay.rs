@@ -2,20 +2,21 @@
 //! rates.
 //!
 //! With many importers nobody knows how long a loop takes from a measurement to the moment that
-//! results from it. The vehicle shows it: its angular acceleration over a period is I⁻¹ (m − ω × I
-//! ω) with the moment m that acts then, and a disturbance. For a delay of (j + f) τ, m is the mean
-//! (1 − f) m_{k−1−j} + f m_{k−2−j} of two commands. The estimate is the delay that leaves least
-//! unexplained, by least squares: of the acceleration, if the disturbance is like noise, of its
-//! change from period to period, if it seldom changes, or of the change of that, if it changes
-//! smoothly. A factor that the inertia is wrong by is found beside it. Periods that no delay
-//! explains, such as those in which the disturbance jumps, count less.
+//! results from it. The measured rates show it: the angular acceleration over a period is I⁻¹ (m −
+//! ω × I ω) with the moment m that acts then, plus a disturbance. For a delay of (j + f) τ, m is
+//! the mean (1 − f) m_{k−1−j} + f m_{k−2−j} of two commands. The estimate is the delay with the
+//! smallest residual in the least-squares sense: of the acceleration, if the disturbance is like
+//! noise; of its first difference from period to period, if the disturbance seldom changes; or of
+//! its second difference, if it changes smoothly. A common factor of the inertia error is estimated
+//! with it. Periods that no delay explains, such as those in which the disturbance jumps, have a
+//! smaller weight.
 //!
 //! This is a prediction-error method (L. Ljung, System Identification, 1999, section 13.4), which
-//! may be used in a closed loop: at the right delay, what is left is new, and no earlier command is
-//! related to it. That is not so for noise of the measurements, to which the next command responds
-//! while the noise itself looks like an acceleration, nor for a disturbance that repeats itself.
-//! Where a law says what its assumptions explain, another delay is therefore only said to be there
-//! if the motion shows more than that with the delay that was told.
+//! may be used in a closed loop: at the right delay the residual is not correlated with any earlier
+//! command. That is not so for noise of the measurements, to which the next command responds while
+//! the noise itself looks like an acceleration, nor for a disturbance that repeats itself. Where a
+//! law states the acceleration that its assumptions explain, another delay is therefore reported
+//! only if the measurements show more than that with the declared delay.
 
 use crate::controller::{Explained, Measurement};
 use nalgebra::Vector3;
@@ -24,26 +25,26 @@ use vehicle::dynamics::RigidBody;
 use vehicle::kinematics;
 use vehicle::math::exp;
 
-/// Number of periods by which a delay may differ from the one that was told to be found.
+/// Largest difference from the declared delay that can be found, in periods.
 const FURTHER: usize = 4;
 /// Time after which a period counts by 1/e, s.
 const FORGETTING: f64 = 15.0;
-/// Smallest evidence for an estimate: what another delay leaves unexplained beyond what the
-/// estimated one does, relative to the mean square of a component.
+/// Smallest evidence for an estimate: the residual of another delay beyond that of the estimated
+/// one, relative to the mean square of a component.
 const EVIDENCE: f64 = 20.0;
-/// Shortest motion for an estimate, s, and in periods; number of periods from one estimate to the
+/// Shortest record for an estimate, s, and in periods; number of periods from one estimate to the
 /// next.
-const MOTION: f64 = 1.0;
+const SHORTEST_RECORD: f64 = 1.0;
 const PERIODS: u32 = 20;
 const PAUSE: u32 = 5;
 /// Parts of a period to which a delay is estimated.
 const PARTS: usize = 4;
-/// Size of what the best delay leaves of a period, relative to the root mean square, beyond which
-/// the period counts less.
+/// Residual of a period with the best delay, relative to the root mean square, above which the
+/// period has a smaller weight.
 const USUAL: f64 = 3.0;
 /// Acceleration below which nothing is evidence, because the model is not exact, rad/s².
 const FLOOR: f64 = 1e-3;
-/// Largest factor that the inertia may be wrong by.
+/// Largest factor between the actual and the assumed inertia.
 const GAIN: f64 = 1.25;
 
 /// Estimate of the delay, with the sums from which it follows.
@@ -57,26 +58,27 @@ pub struct LoopDelay {
     accelerations: [Vector3<f64>; ORDERS],
     #[serde(rename = "known")]
     available: usize,
-    /// Fits of the acceleration, of its change, and of the change of that.
+    /// Fits of the acceleration, and of its first and second differences.
     fits: [Fit; ORDERS],
     /// Number of periods in the fits.
     periods: u32,
-    /// Number of further periods in which an acceleration that nothing explains still counts.
+    /// Number of further periods for which an unexplained acceleration is remembered.
     unexplained: u32,
     /// Whether the law's assumptions do not explain the acceleration over the last period.
     pub is_unexplained: bool,
-    /// Estimated delay, s, if the motion tells it.
+    /// Estimated delay, s, if the measurements suffice for an estimate.
     pub estimate: Option<f64>,
-    /// Whether it differs from the delay that was told by more than half a period and what was said
-    /// of its error, and the law's assumptions do not explain the motion with the latter.
+    /// Whether it differs from the declared delay by more than half a period plus the declared
+    /// error of the delay, and the law's assumptions do not explain the measurements with the
+    /// declared delay.
     pub is_other: bool,
 }
 
 /// Number of fits: of differences of order 0, 1 and 2.
 const ORDERS: usize = 3;
 
-/// Sums over the periods from which it follows what a delay leaves unexplained of y, the
-/// acceleration or a difference of it.
+/// Sums over the periods from which the residual of a delay follows; y is the acceleration or a
+/// difference of it.
 #[derive(Debug, Default, PartialEq, Serialize, Deserialize)]
 struct Fit {
     /// Sum of y · y, (rad/s²)².
@@ -108,9 +110,9 @@ pub struct LoopDelaySettings {
     pub body: RigidBody,
     /// Time between two ticks, s.
     pub period: f64,
-    /// Delay that was told, s.
-    pub told: f64,
-    /// What the law's assumptions explain of the acceleration with that delay, if it has any.
+    /// Declared delay, s.
+    pub declared: f64,
+    /// Acceleration that the law's assumptions explain with that delay, if it has any.
     pub explained: Option<Explained>,
     /// Whether measurements are old when they arrive. They come through a filter then, and their
     /// noise would be taken for a response: no estimate is made.
@@ -118,14 +120,14 @@ pub struct LoopDelaySettings {
 }
 
 impl LoopDelaySettings {
-    /// Returns the least delay that is compared with the one that was told, in periods.
+    /// Returns the smallest delay that is examined, in periods.
     fn first(&self) -> usize {
-        ((self.told / self.period) as usize).saturating_sub(FURTHER)
+        ((self.declared / self.period) as usize).saturating_sub(FURTHER)
     }
 
-    /// Returns the number of delays of whole periods that are compared.
+    /// Returns the number of delays of whole periods that are examined.
     fn candidates(&self) -> usize {
-        (self.told / self.period).ceil() as usize + FURTHER + 1 - self.first()
+        (self.declared / self.period).ceil() as usize + FURTHER + 1 - self.first()
     }
 
     /// Returns the number of commands that are remembered.
@@ -177,8 +179,8 @@ impl LoopDelaySettings {
         }
     }
 
-    /// Returns whether the law's assumptions explain the acceleration over the last period with
-    /// some delay that is not another one than was told.
+    /// Returns whether the law's assumptions explain the acceleration over the last period with the
+    /// declared delay or with one at the ends of its interval.
     fn explains(&self, explained: Explained, memory: &LoopDelay, angles: &Vector3<f64>) -> bool {
         let Explained { disturbance, share, delay_error } = explained;
         let r = kinematics::r(angles);
@@ -189,7 +191,7 @@ impl LoopDelaySettings {
             let (left, command) = (r * (memory.accelerations[0] - command), r * command);
             (0..3).all(|i| left[i].abs() <= disturbance + share * command[i].abs() + FLOOR)
         };
-        [0.0, -delay_error, delay_error].into_iter().any(|error| explains(self.told + error))
+        [0.0, -delay_error, delay_error].into_iter().any(|error| explains(self.declared + error))
     }
 
     /// Returns the acceleration by the moment that acts over the last period if the delay is the
@@ -233,7 +235,7 @@ impl LoopDelaySettings {
         }
         memory.periods = memory.periods.saturating_add(1);
         let suffices =
-            memory.periods >= PERIODS && f64::from(memory.periods) * self.period >= MOTION;
+            memory.periods >= PERIODS && f64::from(memory.periods) * self.period >= SHORTEST_RECORD;
         if suffices && memory.periods.is_multiple_of(PAUSE) {
             self.estimate(memory);
         }
@@ -241,17 +243,17 @@ impl LoopDelaySettings {
 
     fn estimate(&self, memory: &mut LoopDelay) {
         let places = memory.fits.each_mut().map(Fit::least);
-        let told = self.told / self.period - self.first() as f64;
+        let declared = self.declared / self.period - self.first() as f64;
         let error = self.explained.map_or(0.0, |explained| explained.delay_error);
         let slack = 0.5 + error / self.period;
-        // Where several leave next to nothing, the highest difference is the least misled by a
-        // smooth disturbance.
+        // Among fits with nearly the same residual, a smooth disturbance misleads that of the
+        // highest difference least.
         let best = memory.fits.iter().zip(places).rev();
         let best = best.min_by(|(a, _), (b, _)| a.scale.total_cmp(&b.scale));
         let Some((fit, place)) = best else { return };
         let delay = (self.first() as f64 + place) * self.period;
-        memory.estimate = fit.tells(place, (told, slack)).then_some(delay);
-        let is_other = memory.estimate.is_some() && (place - told).abs() > slack;
+        memory.estimate = fit.suffices(place, (declared, slack)).then_some(delay);
+        let is_other = memory.estimate.is_some() && (place - declared).abs() > slack;
         memory.is_other = is_other && (self.explained.is_none() || memory.unexplained > 0);
     }
 }
@@ -297,7 +299,7 @@ impl Fit {
         weight
     }
 
-    /// Returns the number of periods of delay, from the first on, that leaves least.
+    /// Returns the delay with the smallest residual, in periods from the first on.
     fn least(&mut self) -> f64 {
         let places = (0..=(self.sums.len() - 1) * PARTS).map(|part| part as f64 / PARTS as f64);
         let candidates = places.map(|place| (place, self.unexplained(place)));
@@ -307,24 +309,25 @@ impl Fit {
         place
     }
 
-    /// Returns whether the evidence suffices to prefer `place`, which leaves least, to the delay
-    /// that was `told` with some slack, or to any other by a period; all in periods. The commands
-    /// must explain something at all: they do not act on a vehicle that rests.
-    fn tells(&self, place: f64, (told, slack): (f64, f64)) -> bool {
+    /// Returns whether the evidence suffices to prefer `place`, which has the smallest residual, to
+    /// the `declared` delay with some slack, or to a delay that differs by a period; all in
+    /// periods. The commands must also explain a part of y, which they do not while the vehicle is
+    /// at rest.
+    fn suffices(&self, place: f64, (declared, slack): (f64, f64)) -> bool {
         let least = self.unexplained(place);
         let is_evidence = |left: f64| left - least > EVIDENCE * self.scale;
         let against = |other: f64| is_evidence(self.unexplained(other));
         if !is_evidence(self.square) {
             return false;
         }
-        if (place - told).abs() > slack {
-            return against(told);
+        if (place - declared).abs() > slack {
+            return against(declared);
         }
         against(place + 1.0) && (place < 1.0 || against(place - 1.0))
     }
 
-    /// Returns the sum of the squares that a delay of this many periods leaves, with the factor of
-    /// the inertia that fits best, (rad/s²)².
+    /// Returns the sum of the squared residuals for a delay of this many periods, with the factor
+    /// of the inertia that fits best, (rad/s²)².
     fn unexplained(&self, place: f64) -> f64 {
         let j = (place as usize).min(self.sums.len() - 2);
         let f = (place - j as f64).min(1.0);

@@ -309,8 +309,8 @@ impl TwoLoopSmc {
         Ok(Self { settings })
     }
 
-    /// Returns the filtered command. It starts at the measured motion and follows a smooth
-    /// reference without lag.
+    /// Returns the filtered command. It starts at the measured angles and rates and follows a
+    /// smooth reference without lag.
     fn filter(
         &self,
         memory: &TwoLoopMemory,

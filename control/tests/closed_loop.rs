@@ -133,10 +133,9 @@ fn paper_set_with_a_free_initial_state_never_falls_back_and_starts_inside_its_se
     assert!(largest > 0.9, "the freedom is not used: {largest}");
 }
 
-/// Returns the nominal motion at every tick, bit for bit, and the deviation O_e = x − x̃ there,
-/// with
-/// `initialState = nominal`.
-fn around_the_nominal_motion(
+/// Returns the nominal trajectory at every tick, bit for bit, and the deviation O_e = x − x̃ there,
+/// with `initialState = nominal`.
+fn around_the_nominal_trajectory(
     constraints: Constraints,
     inertia_scale: f64,
     disturbance: Disturbance,
@@ -159,10 +158,11 @@ fn around_the_nominal_motion(
 #[test]
 fn a_nominal_motion_that_starts_from_its_own_plan_knows_no_disturbance() {
     for constraints in [Constraints::Robust, Constraints::Paper] {
-        let (undisturbed, _) = around_the_nominal_motion(constraints, 1.0, Disturbance::default());
+        let (undisturbed, _) =
+            around_the_nominal_trajectory(constraints, 1.0, Disturbance::default());
         for case in white(1..=1, 0.04).into_iter().chain(adversaries(0.04)) {
             let (nominal, deviations) =
-                around_the_nominal_motion(constraints, case.inertia_scale, case.disturbance);
+                around_the_nominal_trajectory(constraints, case.inertia_scale, case.disturbance);
             assert!(nominal == undisturbed, "{}", case.name);
             assert!(
                 deviations.iter().any(|o| o.amax() > 1e-3),
@@ -181,7 +181,8 @@ fn oracle_deviation_from_the_nominal_motion_obeys_the_error_dynamics() {
         let design = Crmpc::new(settings(constraints)).unwrap().design().clone();
         let (reach, paper) = (design.reach, design.paper.unwrap());
         let Settings { feedback, disturbance_bound: bound, .. } = settings(constraints);
-        let deviations = |disturbance| around_the_nominal_motion(constraints, 1.0, disturbance).1;
+        let deviations =
+            |disturbance| around_the_nominal_trajectory(constraints, 1.0, disturbance).1;
         let largest = |deviations: &[Vector6<f64>], components: [usize; 3]| {
             deviations.iter().flat_map(|o| components.map(|i| o[i].abs())).fold(0.0, f64::max)
         };

@@ -55,7 +55,7 @@ impl Axis {
                 axis.see(i, &plan);
             }
             let begun = |late: i32| (i - delay - late).div_euclid(PARTS);
-            // The nominal motion takes the plan's acceleration as assumed.
+            // The nominal trajectory has the plan's acceleration as assumed.
             let acts = axis.acceleration(begun(late), &plan) - plan(begun(0));
             let mut state = axis.vehicle[i as usize];
             // A jump of the rate belongs to the middle of the part.

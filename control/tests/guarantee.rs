@@ -223,7 +223,7 @@ fn accepted_settings_keep_the_guarantee_and_refused_ones_name_bounds_that_are_ac
 }
 
 /// Largest ‖x̂_ω − x̃_ω‖ of the second predicted state, relative to its bound, that a search over
-/// states, moments and errors of two measurements finds. Nothing else drives the motion.
+/// states, moments and errors of two measurements finds. Nothing else drives the deviation.
 fn second_prediction(settings: &Settings) -> f64 {
     let Settings { body, limit_moment, limit_rate, delay, period_feedback: tau, .. } = *settings;
     let predictor = Predictor::new(body, delay, tau).unwrap();

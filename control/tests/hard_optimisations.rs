@@ -61,7 +61,7 @@ fn regress_the_longest_of_20000_random_optimisations_take_no_more_iterations() {
 
 #[test]
 fn regress_starts_that_once_took_hundreds_of_iterations_take_some_thirty() {
-    // The cases include a first guess with ‖y‖² of 118 and one that a unit was given. They once
+    // The cases include a first guess with ‖y‖² of 118 and one that occurred in an FMU. They once
     // took 228, 241 and 249 iterations.
     let scenario = Scenario::crmpc2022();
     let angles = scenario.reference.at(31.35).angles + degrees([-14.34, -1.84, 0.35]);
@@ -83,7 +83,7 @@ fn degrees(values: [f64; 3]) -> Vector3<f64> {
 
 #[test]
 fn every_optimum_of_the_paper_from_a_random_start_shows_that_it_is_one() {
-    // With these seeds a first guess once violated the chain, and so did the resulting motion.
+    // With these seeds a first guess once violated the chain, and so did the resulting trajectory.
     let mut seeds = vec![2480, 7527, 8436, 13191, 32585, 33560, 38426, 38433];
     seeds.extend(0..2000);
     let parts: Vec<&[u64]> = seeds.chunks(100).collect();

@@ -11,7 +11,7 @@ const PERIOD: f64 = 0.04;
 
 /// Outcome of a flight.
 struct Flight {
-    /// Time at which another delay than the one that was told is found, s.
+    /// Time at which another delay than the declared one is found, s.
     found_at: Option<f64>,
     /// Estimated delay at the end, s.
     estimate: f64,
@@ -79,7 +79,7 @@ fn oracle_a_delay_that_was_told_is_not_doubted() {
     }
 }
 
-/// A unit that only serves for its reference has no motion to look at.
+/// A controller that only serves for its reference has no measurements.
 #[test]
 fn oracle_commands_that_do_not_act_tell_no_delay() {
     let scenario = Scenario::crmpc2022();

@@ -194,9 +194,9 @@ fn oracle_off_the_nominal_motion_the_input_changes_by_k_times_the_deviation() {
 fn shortcuts_change_nothing_along_a_run() {
     // The first solver has the norm constraints as functions of the trajectory; the second, the
     // cone solver, has them linearised.
-    let ways = [(Nonlinearity::Exact, Method::Riccati), (Nonlinearity::Frozen, Method::Cone)];
+    let solvers = [(Nonlinearity::Exact, Method::Riccati), (Nonlinearity::Frozen, Method::Cone)];
     for constraints in [Constraints::Robust, Constraints::Paper] {
-        for (nonlinearity, method) in ways {
+        for (nonlinearity, method) in solvers {
             let settings = settings(constraints);
             let solver = SolverSettings { nonlinearity, ..settings.solver };
             let mut with = Crmpc::new(Settings { solver, ..settings }).unwrap();
@@ -256,8 +256,8 @@ fn oracle_without_a_disturbance_bound_all_solvers_agree_however_the_plan_begins(
 #[test]
 fn every_way_to_the_optimum_shows_that_it_is_one() {
     // The measure is the residual of the conditions of optimality, with the constraints as
-    // functions of the motion. Where the bounds follow the motion, as in the robust set, the solver
-    // stops when a norm constraint is exceeded by 1e-5 (docs/solver.md).
+    // functions of the trajectory. Where the bounds follow the trajectory, as in the robust set,
+    // the solver stops when a norm constraint is exceeded by 1e-5 (docs/solver.md).
     for constraints in [Constraints::Robust, Constraints::Paper] {
         let mut controller = controller(constraints);
         let mut seen = Vec::new();
@@ -383,7 +383,7 @@ fn published_fallback_is_the_shifted_plan_with_the_terminal_law() {
 
 #[test]
 fn the_robust_plan_is_kept_where_no_optimum_is_found() {
-    // Beyond the horizon the motion brakes (docs/guarantee.md), so that the guarantee stays in
+    // Beyond the horizon the trajectory brakes (docs/guarantee.md), so that the guarantee stays in
     // force. The plan moves towards the optimum without constraints only as far as that is
     // certified.
     let settings = settings(Constraints::Robust);

@@ -173,7 +173,7 @@ fn quantity(value: &Value) -> Result<f64, String> {
     }
 }
 
-/// Settings of a component, from the unit's own values and the parameters that the file sets.
+/// Settings of a component, from the defaults of the FMU and the parameters that the file sets.
 fn settings(component: &Component) -> Result<Settings, String> {
     let mut s = Settings::new(Constraints::Robust);
     let mut inertia = Inertia {

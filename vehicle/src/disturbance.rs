@@ -13,7 +13,7 @@ use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 pub use table::{DisturbanceTable, Row};
 
-/// Kind of disturbance, which decides its waveform.
+/// Kind of disturbance, which determines its waveform.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "camelCase")]
 pub enum DisturbanceKind {
@@ -103,8 +103,8 @@ pub struct View<'a> {
     pub rates: Vector3<f64>,
     /// Control moment m about the body axes, N m.
     pub moment: Vector3<f64>,
-    /// Random numbers of the disturbance's seed, from a tick near the present one: the white noise
-    /// has a short way to its own.
+    /// Random numbers of the disturbance's seed, from a tick near the present one, so that the
+    /// white noise needs only a short jump.
     pub noise: Option<&'a Stream<3>>,
 }
 

@@ -107,7 +107,7 @@ impl LookupTable {
                     return Err(refuse(
                         heading_line,
                         Some(quantity),
-                        format!("is missing; head it {}", allowed()),
+                        format!("is missing; its heading is {}", allowed()),
                     ));
                 }
                 _ => {
@@ -125,7 +125,7 @@ impl LookupTable {
             return Err(refuse(
                 heading_line,
                 Some(unknown.1),
-                "is not known here; remove it".into(),
+                "is not a column of a reference table; remove it".into(),
             ));
         }
 

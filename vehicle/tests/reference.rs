@@ -174,11 +174,11 @@ fn csv_faults_are_named_with_file_line_and_column() {
         (head.to_string(), "no points"),
         (
             "time_s,alpha,beta_deg,sigma_deg\n".into(),
-            "column alpha: is missing; head it alpha_rad or alpha_deg",
+            "column alpha: is missing; its heading is alpha_rad or alpha_deg",
         ),
         (format!("q,{head}"), "column q: is not known"),
         ("time_s,alpha_deg,alpha_rad,beta_deg,sigma_deg\n".into(), "column alpha: is given twice"),
-        (String::new(), "column time: is missing; head it time_s"),
+        (String::new(), "column time: is missing; its heading is time_s"),
     ] {
         let message = read(&text).unwrap_err().to_string();
         assert!(

@@ -53,7 +53,7 @@ pub type Btvsmc = Tvsmc<BoundaryLayer>;
 /// The law SOTVSMC/DO, (45).
 pub type SotvsmcDo = Tvsmc<SecondOrder>;
 
-/// A commanded moment, with the data that tell how far the actuators fell short of it.
+/// A commanded moment, with the data from which the shortfall of the actuators follows.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Commanded {
     /// Commanded moment M, N m.
@@ -65,12 +65,12 @@ pub struct Commanded {
 }
 
 impl Commanded {
-    /// Returns the command of `moment` (N m), of which no limit has taken anything.
+    /// Returns the command of `moment` (N m), which no limit has reduced.
     pub(crate) fn new(measured: &Measurement, moment: Vector3<f64>) -> Self {
         Self { moment, angles: measured.angles, cut: Vector3::zeros() }
     }
 
-    /// Takes `applied` (N m) for the command, and the rest for lost.
+    /// Replaces the command by `applied` (N m) and records the rest as the loss.
     pub(crate) fn limit(&mut self, body: &RigidBody, applied: &Vector3<f64>) {
         self.cut = gain(body, &self.angles, applied - self.moment);
         self.moment = *applied;

@@ -98,7 +98,7 @@ impl Case {
             for tick in tick + 1..tick + ratio {
                 law.update(&mut memory, tick, tick as f64 * period, &measured(state), &reference);
             }
-            // This is about the motion until the next optimisation.
+            // This is about how far the vehicle moves until the next optimisation.
             state.0 += state.1 * (ratio as f64 * period);
             SolverReport { time: best, ..C::report(&memory) }
         })

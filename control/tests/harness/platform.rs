@@ -26,7 +26,7 @@ pub const CALIBRATION_DURATION: f64 = 120.0;
 /// Seed of the calibration flight.
 pub const CALIBRATION_SEED: u64 = 100;
 
-/// True motion of the platform at a tick.
+/// True state of the platform at a tick.
 #[derive(Clone, Copy, Debug)]
 pub struct Truth {
     /// Time of the tick, s.
@@ -41,13 +41,13 @@ fn times(duration: f64) -> impl Iterator<Item = f64> {
     (0..(duration / PERIOD).round() as u32).map(|k| f64::from(k) * PERIOD)
 }
 
-/// Returns the motion at rest in the scenario's initial attitude.
+/// Returns the true states at rest in the scenario's initial attitude.
 pub fn rest(duration: f64) -> Vec<Truth> {
     let angles = Scenario::crmpc2022().initial_angles;
     times(duration).map(|time| Truth { time, angles, rates: Vector3::zeros() }).collect()
 }
 
-/// Returns the motion under CRMPC with exact measurements and the noise of this seed.
+/// Returns the true states under CRMPC with exact measurements and the noise of this seed.
 pub fn scenario(seed: u64) -> Vec<Truth> {
     let scenario = Scenario::crmpc2022();
     let mut config = scenario.config(PERIOD);
@@ -74,7 +74,7 @@ pub fn scenario(seed: u64) -> Vec<Truth> {
         .collect()
 }
 
-/// Returns the motion of the calibration sequence.
+/// Returns the true states along the calibration sequence.
 pub fn calibration(duration: f64) -> Vec<Truth> {
     let start = Scenario::crmpc2022().initial_angles;
     let sequence = SensorData::embedded().calibration;
@@ -85,7 +85,7 @@ pub fn calibration(duration: f64) -> Vec<Truth> {
     times(duration).map(at).collect()
 }
 
-/// Returns the readings of sensors without errors in this motion.
+/// Returns the readings of sensors without errors in this state.
 pub fn felt(truth: &Truth) -> Readings {
     let pose = Pose {
         kinematics: Kinematics::Printed,

@@ -1,4 +1,5 @@
-//! Disturbance as a table: every row has a time and a direction, which holds until the next row.
+//! Disturbance as a lookup table: every row has a time and a direction, which holds until the next
+//! row.
 
 use crate::error::Error;
 use crate::time::tolerance;
@@ -8,8 +9,8 @@ use serde::{Deserialize, Serialize};
 /// Shortest period with which a table repeats, s.
 const SHORTEST_PERIOD: f64 = 1e-3;
 
-/// Table of a piecewise constant disturbance. A row that holds for no longer than the tolerance of
-/// times is passed over.
+/// Lookup table of a piecewise constant disturbance. A row that holds for no longer than the
+/// tolerance of times is passed over.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct DisturbanceTable {
@@ -110,7 +111,7 @@ impl DisturbanceTable {
             None if self.rows.is_empty() || self.period == 0.0 => return None,
             None => self.begin(start, repetition + 1.0),
         };
-        // Far from its start a table cannot be told apart from its next repetition.
+        // Far from its start, rounding makes a table and its next repetition indistinguishable.
         (next > time).then_some(next)
     }
 
