@@ -1,6 +1,5 @@
-//! Flies loops whose delay is another one than the controller was told, and loops with the delay
-//! that it was told, and prints how soon the difference is found, and how often it is found where
-//! there is none.
+//! Flies loops whose delay differs from the declared one, and loops with the declared delay. It
+//! prints how soon a difference is found, and how often one is found where there is none.
 //!
 //! `cargo run --release -p reentry-control --example loop_delay -- 1000`
 
@@ -19,8 +18,8 @@ const SECONDS: f64 = 50.0;
 /// Periods of the square waves, s. Those up to some optimisation periods are the hardest.
 const SQUARE_PERIODS: [f64; 12] = [0.08, 0.12, 0.16, 0.2, 0.24, 0.4, 0.6, 0.8, 1.2, 2.0, 5.0, 11.0];
 
-/// Returns the time at which another delay is found, s, that at which the assumptions do not
-/// explain the motion, s, and the estimate at the end, s.
+/// Returns the time at which another delay is found, s, the time at which the assumptions no longer
+/// explain the measurements, s, and the estimate at the end, s.
 fn fly<C: Controller>(
     law: Result<C, DesignError>,
     scenario: &Scenario,
@@ -36,7 +35,7 @@ fn fly<C: Controller>(
     let mut config = scenario.config(0.01);
     config.moment_delay = truly;
     let mut plant = Plant::new(&config, 0.0).unwrap();
-    let [mut found, mut contradicted] = [f64::INFINITY; 2];
+    let [mut found_at, mut contradicted] = [f64::INFINITY; 2];
     for tick in 0..(seconds / PERIOD) as u64 {
         let time = tick as f64 * PERIOD;
         let measured =
@@ -44,7 +43,7 @@ fn fly<C: Controller>(
         let moment =
             law.update(&mut memory, tick, time, &measured, &|time| scenario.reference.at(time));
         if memory.loop_delay.is_other {
-            found = found.min(time);
+            found_at = found_at.min(time);
         }
         if memory.loop_delay.is_unexplained {
             contradicted = contradicted.min(time);
@@ -53,7 +52,7 @@ fn fly<C: Controller>(
             break;
         }
     }
-    [found, contradicted, law.estimated_delay(&memory)]
+    [found_at, contradicted, law.estimated_delay(&memory)]
 }
 
 /// Returns the scenario of a flight, with a seed, a corner, a square wave and an inertia.

@@ -96,12 +96,14 @@ struct Criterion {
 const CRITERIA: [Criterion; 2] = [
     Criterion {
         name: "tuned",
-        allows: |own, published| own.ems_deg <= published.ems_deg && own.rate <= published.rate,
+        allows: |score, published| {
+            score.ems_deg <= published.ems_deg && score.rate <= published.rate
+        },
         objective: |score| score.cms,
     },
     Criterion {
         name: "within limits",
-        allows: |own, _| own.rate <= 1.0,
+        allows: |score, _| score.rate <= 1.0,
         objective: |score| score.ems_deg,
     },
 ];

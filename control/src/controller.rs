@@ -13,7 +13,7 @@ pub struct Measurement {
     /// Body rates, ω = [p, q, r], rad/s.
     pub rates: Vector3<f64>,
     /// The moment that acted since the last tick, N m, if it is measured. Without it a controller
-    /// assumes that its own command acted.
+    /// assumes that its command acted.
     pub achieved_moment: Option<Vector3<f64>>,
     /// Whether the measurement was made at an earlier instant than the tick, because the
     /// communication step is longer than the period or no multiple of it.
@@ -127,7 +127,8 @@ pub trait Controller {
     fn limited(&mut self, _memory: &mut Self::Memory, _applied: &Vector3<f64>) {}
 
     /// Evaluates a tick, and returns the moment to hold until the next one, N m. Commands are
-    /// limited here alone, except that the inner law of [`Dlmpc`](crate::Dlmpc) limits its own too.
+    /// limited here alone, except that the inner law of [`Dlmpc`](crate::Dlmpc) also limits its
+    /// moment.
     fn update(
         &mut self,
         memory: &mut Self::Memory,

@@ -93,7 +93,7 @@ impl Reach {
     /// Returns the sum of each bound and its counterpart.
     #[must_use]
     pub fn plus(&self, other: &Self) -> Self {
-        self.with(other, |own, other| own + other)
+        self.with(other, |a, b| a + b)
     }
 
     fn with(&self, other: &Self, combine: impl Fn(f64, f64) -> f64) -> Self {
@@ -113,7 +113,7 @@ impl Reach {
     /// Returns the difference of each bound and its counterpart.
     #[must_use]
     pub fn minus(&self, other: &Self) -> Self {
-        self.with(other, |own, other| own - other)
+        self.with(other, |a, b| a - b)
     }
 
     /// Returns the larger of each bound and its counterpart.
@@ -125,7 +125,7 @@ impl Reach {
     /// Returns every bound multiplied by `size`.
     #[must_use]
     pub fn times(&self, size: f64) -> Self {
-        self.with(self, |own, _| own * size)
+        self.with(self, |value, _| value * size)
     }
 }
 
@@ -261,8 +261,8 @@ impl SampledError {
     /// Returns the largest effect of pulses of Δ, by which the rate jumps by at most 1 in any time
     /// as long as a period, within 0, 1, …, `steps` periods from o = 0. The units are those for a
     /// jump of the rate in rad/s: s for an angle, 1 for a rate, and 1/s for K o. A pulse may also
-    /// show later than at once, by what it changes in the mismatch, so that it counts with its
-    /// largest response over the whole time until it is seen.
+    /// act later, through the mismatch, so that it counts with its largest response over the whole
+    /// time until it is seen.
     pub fn pulses(&self, steps: usize) -> Vec<Reach> {
         // A latency that is a whole number of periods may be inexact by rounding.
         let unseen = (self.latency / self.period - 1e-9).ceil().max(0.0);

@@ -165,7 +165,7 @@ impl LoopDelaySettings {
         memory.accelerations[0] =
             (measured.rates - before) / *period + body.inverse * mean.cross(&(body.inertia * mean));
         memory.available = ORDERS.min(memory.available + 1);
-        // Before the first commands, importers differ in what acts.
+        // Before the first commands, the acting moment depends on the importer.
         if memory.available == ORDERS && memory.commands.len() == self.remembered() {
             memory.is_unexplained = self
                 .explained

@@ -211,9 +211,9 @@ fn regress_prediction_keeps_tracking_and_effort_that_a_delay_spoils() {
         with.settled_deg < 1.01 * none.settled_deg && without.settled_deg > 6.0 * none.settled_deg
     );
     assert!(with.cms < 1.01 * none.cms && without.cms > 1.2 * none.cms);
-    // The EMS over the whole time is no measure of it, because the start dominates. A loop that
-    // does not know the commands under way commands more and is less damped, which hides the dead
-    // time: 1.642, 1.653 and 1.720 deg.
+    // The EMS over the whole time does not show the difference, because the start dominates it. A
+    // loop without prediction commands more and is less damped, which hides the dead time: 1.642,
+    // 1.653 and 1.720 deg.
     assert!(
         none.ems_deg < without.ems_deg && without.ems_deg < with.ems_deg && with.ems_deg < 1.73
     );
@@ -321,7 +321,7 @@ fn the_law_is_told_the_time_at_which_its_moment_acts() {
     controller.update(&mut memory, 50, 2.0, &measured, &reference);
     let (time, told) = controller.inner().told.unwrap();
     assert_eq!((time, controller.inner().asked), (2.1, 2.1));
-    // The motion is about the pitch axis at beta = 0: alpha = q t.
+    // The vehicle turns about the pitch axis at beta = 0: alpha = q t.
     assert!((told.angles - Vector3::new(0.01, 0.0, 0.0)).amax() < 1e-15, "{told:?}");
     assert_eq!((told.rates, told.achieved_moment), (measured.rates, achieved_moment));
     assert_eq!(memory.under_way.len(), 3);

@@ -69,7 +69,7 @@ fn optimisations() -> Vec<Recorded> {
 
 // Tests of the outer layer.
 
-/// The program written in its commands v_0 … v_{N−1} alone.
+/// The optimisation problem as a function of the commands v_0 … v_{N−1} alone.
 struct ConicProgram {
     settings: Settings,
     time: f64,
@@ -317,7 +317,7 @@ fn oracle_sampled_sliding_mode_chatters_with_the_closed_form_amplitude() {
                 assert!(now[i] * next[i] < 0.0);
             }
         }
-        // The manifold's own gain changes it little.
+        // The gain of the manifold changes it little.
         let seen = inner_law(
             SlidingMode { q, p, gamma: 0.15, rho },
             Vector3::new(5e-3, -3e-3, 1e-3),

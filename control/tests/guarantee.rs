@@ -1,4 +1,4 @@
-//! The guarantee of the robust set in closed loops: it is in force throughout, and kept. The
+//! The guarantee of the robust set in closed loops: it is in force throughout, and it holds. The
 //! examples `worst_case` and `random_settings` search for its limits with many more flights.
 
 mod harness;

@@ -1,5 +1,5 @@
 //! Optimisations that take long, and those that a budget ends: starts far from the reference,
-//! kicks, and infeasible problems.
+//! disturbed starts, and infeasible problems.
 
 mod harness;
 

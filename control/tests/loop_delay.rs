@@ -1,4 +1,4 @@
-//! Tests of the estimate of a loop's own delay.
+//! Tests of the estimate of the delay of a loop.
 
 use control::controller::{Controller, Measurement};
 use control::crmpc::{Constraints, Contradiction, Crmpc, Guarantee, Settings, Standing};

@@ -12,7 +12,7 @@ fn plans_of_all_shipped_settings_are_confirmed() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../orchestrator/experiments");
     let scan = Scan::new(&folder).unwrap();
     assert!(scan.read.iter().all(|&count| count > 0), "{:?}", scan.read);
-    // Only parts that other files extend, and files of values, are no experiment of their own.
+    // Only parts that other files extend, and files of values, are not experiments.
     for (file, reason) in &scan.left_out {
         let part = file.parent().is_some_and(|folder| folder.ends_with("base"));
         let exchange =

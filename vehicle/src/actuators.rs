@@ -262,7 +262,7 @@ mod tests {
 
     #[test]
     fn the_position_limit_acts_before_the_rate_limit() {
-        // A command far beyond the limit does not wind up: the way back begins at once.
+        // A command far beyond the limit does not wind up: the deflection turns back at once.
         let actuators = actuators(JetMode::OnOff);
         let away = moved(&actuators, &surfaces([-90.0; SURFACES]), 0.0, 10.0).0;
         let back = actuators.commanded(10.0, &surfaces([0.0; SURFACES]), &away);

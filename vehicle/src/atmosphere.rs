@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 // U.S. Standard Atmosphere, 1976 (NOAA, NASA, USAF), tables 1 to 4.
 const GRAVITY: f64 = 9.80665; // m/s²
 const MOLAR_MASS: f64 = 0.028_964_4; // kg/mol, at sea level
-const GAS_CONSTANT: f64 = 8.314_32; // J/(mol K), the standard's own value
+const GAS_CONSTANT: f64 = 8.314_32; // J/(mol K), the value of the standard
 const HEAT_RATIO: f64 = 1.4;
 const EARTH_RADIUS: f64 = 6_356_766.0; // m
 const SEA_LEVEL: (f64, f64) = (288.15, 101_325.0); // K, Pa

@@ -4,7 +4,7 @@
 use crate::error::Error;
 use crate::kinematics::Kinematics;
 use crate::math::sin_cos;
-use crate::motion::{BETA_LIMIT, State, state};
+use crate::state::{BETA_LIMIT, State, state};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
@@ -61,7 +61,7 @@ impl Sequence {
 
     /// State and its derivative at `time` (s) after the start. The rates ω follow from Θ̇ with the
     /// matrix R in use and a trajectory that does not turn.
-    pub fn motion(
+    pub fn state_at(
         &self,
         kinematics: Kinematics,
         initial: &Vector3<f64>,

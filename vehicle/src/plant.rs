@@ -1,5 +1,5 @@
-//! Plant: the vehicle in motion. It integrates Θ̇ = R ω, plus the effect of a turning trajectory,
-//! and ω̇ = I⁻¹(m − ω × I ω) + R⁻¹ Δ from one communication point to the next.
+//! Plant: the moving vehicle. It integrates Θ̇ = R ω, plus the effect of a turning trajectory, and
+//! ω̇ = I⁻¹(m − ω × I ω) + R⁻¹ Δ from one communication point to the next.
 
 mod sensing;
 
@@ -11,10 +11,10 @@ use crate::effectors::{JETS, SURFACES, Surfaces};
 use crate::error::Error;
 use crate::integrator::{equal_steps, rk4};
 use crate::kinematics::{Kinematics, TRAJECTORY, Trajectory};
-pub use crate::motion::{BETA_LIMIT, State, angles, rates, state};
 use crate::noise::Stream;
 use crate::platform::Surroundings;
 use crate::sensors::{self, Sensors};
+pub use crate::state::{BETA_LIMIT, State, angles, rates, state};
 use crate::time::{check_resolution, tolerance};
 use crate::transport::Transport;
 use crate::turntable::{self, Turntable};
@@ -288,7 +288,7 @@ impl Plant {
         let mut state = config.initial;
         if let Some(sequence) = &config.calibration {
             sequence.check(&initial)?;
-            (state, _) = sequence.motion(config.kinematics, &initial, 0.0);
+            (state, _) = sequence.state_at(config.kinematics, &initial, 0.0);
         }
         Ok(Self {
             body,
@@ -570,7 +570,7 @@ impl Plant {
         match &self.calibration {
             None => derivative(&self.body, self.kinematics, state, load),
             Some(Calibration { sequence, initial }) => {
-                sequence.motion(self.kinematics, initial, time - self.start_time).1
+                sequence.state_at(self.kinematics, initial, time - self.start_time).1
             }
         }
     }

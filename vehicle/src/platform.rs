@@ -64,10 +64,10 @@ pub fn velocity_from_level(trajectory: &Trajectory) -> Matrix3<f64> {
     climb * turn
 }
 
-/// Orientation of the platform and its motion.
+/// Orientation of the platform and its rates.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pose {
-    /// Attitude kinematics that the motion obeys.
+    /// Attitude kinematics in use.
     pub kinematics: Kinematics,
     /// Attitude angles Θ of the platform, rad.
     pub angles: Vector3<f64>,

@@ -176,7 +176,7 @@ fn csv_faults_are_named_with_file_line_and_column() {
             "time_s,alpha,beta_deg,sigma_deg\n".into(),
             "column alpha: is missing; its heading is alpha_rad or alpha_deg",
         ),
-        (format!("q,{head}"), "column q: is not known"),
+        (format!("q,{head}"), "column q: is not a column"),
         ("time_s,alpha_deg,alpha_rad,beta_deg,sigma_deg\n".into(), "column alpha: is given twice"),
         (String::new(), "column time: is missing; its heading is time_s"),
     ] {

@@ -548,7 +548,7 @@ impl Vehicle {
     }
 }
 
-/// The source of the measurements of the motion.
+/// The source of the measurements.
 struct Eyes {
     errors: Option<Progress>,
     /// Bounds on the errors of angles (rad) and rates (rad/s).

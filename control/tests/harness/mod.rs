@@ -97,7 +97,7 @@ pub struct Kept {
     /// Whether ‖ω‖ or |β| exceeded its bound at a tick before which the guarantee was in force.
     pub broken: bool,
     /// Number of times that the guarantee was withdrawn. If the assumptions were true, each time is
-    /// a broken promise.
+    /// a failure of the guarantee.
     pub withdrawn: u32,
 }
 
@@ -209,7 +209,7 @@ pub fn square(periods: &[f64]) -> Vec<Case> {
     }))
 }
 
-/// Returns the cases of disturbances that depend on the motion and are chosen again every `period`.
+/// Returns the cases of disturbances that depend on the state and are chosen again every `period`.
 pub fn adversaries(period: f64) -> Vec<Case> {
     let kinds = [DisturbanceKind::AlongRate, DisturbanceKind::AgainstMoment];
     cases(kinds.map(|kind| {

@@ -135,7 +135,7 @@ impl Causes {
 }
 
 /// The law evaluates F at the middle of a parabola, from which the predicted trajectory differs by
-/// what the change of F does within half a period, and by the difference at the middle itself.
+/// the effect of the change of F within half a period, and by the difference at the middle itself.
 fn middle(bounds: &Smoothness, tau: Interval) -> Interval {
     let Smoothness { by_rates, by_angles, slope, .. } = *bounds;
     let (eighth, square) = (number(0.125), tau.square());

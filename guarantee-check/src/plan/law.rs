@@ -18,7 +18,7 @@ pub(super) struct Range {
     pub(super) centre: [Interval; COORDINATES],
     /// Half widths about the middle.
     pub(super) radii: [Interval; COORDINATES],
-    /// Norms of further deviations of the angles (rad) and of the rates (rad/s).
+    /// Bounds on the norms of further deviations of the angles (rad) and of the rates (rad/s).
     pub(super) norms: [Interval; 2],
     /// Acceleration in the middle, rad/s², and half widths about it.
     pub(super) acceleration: Vector,
@@ -57,7 +57,7 @@ fn square(a: &Vector) -> Interval {
     a[0].square() + a[1].square() + a[2].square()
 }
 
-/// Upper bound of the norm of what the first-order expansion leaves out, N m.
+/// Upper bound of the remainder of the first-order expansion, as a norm, N m.
 pub(super) fn remainder(body: &Body, range: &Range) -> Interval {
     let reach = range.reach();
     let [alpha, beta] = [0, 1].map(|i| range.centre[i] + about_zero(reach[i]));
@@ -111,8 +111,8 @@ pub(super) fn divided(body: &Body, range: &Range, limit: f64, halvings: u32) -> 
 struct Expansion {
     value: Vector,
     slopes: [Vector; COORDINATES],
-    /// Change by the half width of each component of the acceleration, and its own changes by the
-    /// angles.
+    /// Change by the half width of each component of the acceleration, and the derivatives of this
+    /// change by the angles.
     columns: [Vector; 3],
     column_slopes: [[Vector; 2]; 3],
 }

@@ -21,8 +21,8 @@ use control::error_dynamics::InvariantSet;
 use nalgebra::Vector2;
 use std::collections::VecDeque;
 
-/// Bound on a vector with three components: its part in a box of this half width, and the norm of
-/// the remaining part.
+/// Bound on a vector with three components: the half width of the box that contains one part of it,
+/// and the norm of the other part.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Extent {
     pub(super) half: Interval,

@@ -144,7 +144,7 @@ fn oracle_no_adversary_exceeds_the_deviation_and_the_worst_one_comes_near() {
             for (i, row) in rows.into_iter().enumerate() {
                 let deviations = attained(&s, inertia, row, ticks);
                 for (j, deviation) in deviations.into_iter().enumerate() {
-                    // K o compensates the inertia error, too, which has a bound of its own.
+                    // K o compensates the inertia error, too, which has a separate bound.
                     let more = if j == 2 { 0.2 * bounds[2].half.high } else { 0.0 };
                     assert!(
                         deviation <= bounds[j].component().high + more,

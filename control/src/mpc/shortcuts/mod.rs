@@ -3,8 +3,8 @@
 //! optimum of the whole problem, so that no shortcut loses accuracy.
 //!
 //! The gains in the files' heads are the times of `cargo bench -p reentry-control --bench
-//! optimisation` (250 samples of 50 s) without and with the shortcut, in the same run. The checks
-//! have a shortcut of their own, `few_stages` of CRMPC.
+//! optimisation` (250 samples of 50 s) without and with the shortcut, in the same run. The check of
+//! the constraints has a shortcut, too: `few_stages` of CRMPC.
 
 mod terminal_constraint;
 mod unconstrained;
