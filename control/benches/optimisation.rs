@@ -12,12 +12,12 @@ mod harness;
 use control::crmpc::{self, Constraints};
 use control::dlmpc;
 use control::mpc::{Method, Nonlinearity, SolverSettings};
-use control::report::Status;
+use control::report::SolverStatus;
 use control::{Crmpc, Dlmpc, Measurement};
 use criterion::{BatchSize, Criterion, criterion_group, criterion_main};
 use harness::{FEEDBACK, Optimising, disturbance, settings, simulate};
 use std::hint::black_box;
-use vehicle::disturbance::Kind;
+use vehicle::disturbance::DisturbanceKind;
 use vehicle::scenario::Scenario;
 
 /// Number of repetitions of each sample.
@@ -28,7 +28,7 @@ struct Tick<Memory> {
     number: u64,
     before: Memory,
     measured: Measurement,
-    status: Status,
+    status: SolverStatus,
 }
 
 fn run<C: Optimising>(controller: &mut C) -> Vec<Tick<C::Memory>> {
@@ -39,7 +39,7 @@ fn run<C: Optimising>(controller: &mut C) -> Vec<Tick<C::Memory>> {
         controller,
         &mut memory,
         1.05,
-        disturbance(Kind::White),
+        disturbance(DisturbanceKind::White),
         |after, number, &measured| {
             ticks.push(Tick {
                 number,
@@ -105,7 +105,7 @@ fn print_distribution<C: Optimising>(name: &str, controller: &mut C, ticks: &[Ti
     );
 }
 
-/// The ways of solving that are compared.
+/// The solvers and shortcuts that are compared.
 const WAYS: [(&str, SolverSettings); 4] = [
     ("shortcuts, then riccati", WAY),
     ("riccati", SolverSettings { shortcuts: false, ..WAY }),
@@ -154,7 +154,7 @@ fn optimisations(criterion: &mut Criterion) {
         let ticks = run(&mut controller);
         let ratio = controller.ratio();
         let mut group = criterion.benchmark_group(name);
-        let after = |time: f64, status: Status| {
+        let after = |time: f64, status: SolverStatus| {
             let first = (time / FEEDBACK).round() as u64;
             let mut optimised =
                 ticks.iter().filter(|tick| tick.number >= first && tick.number % ratio == 0);
@@ -162,10 +162,10 @@ fn optimisations(criterion: &mut Criterion) {
         };
         let situations = [
             ("first optimisation", Some(&ticks[0])),
-            ("start of the manoeuvre", after(0.2, Status::Constrained)),
-            ("jump at the end of the horizon", after(5.0, Status::Constrained)),
-            ("jump within the horizon", after(12.0, Status::Constrained)),
-            ("unconstrained optimum", after(40.0, Status::Unconstrained)),
+            ("start of the manoeuvre", after(0.2, SolverStatus::Constrained)),
+            ("jump at the end of the horizon", after(5.0, SolverStatus::Constrained)),
+            ("jump within the horizon", after(12.0, SolverStatus::Constrained)),
+            ("unconstrained optimum", after(40.0, SolverStatus::Unconstrained)),
             ("feedback between optimisations", Some(&ticks[1])),
         ];
         for (situation, tick) in situations {
@@ -178,7 +178,7 @@ fn optimisations(criterion: &mut Criterion) {
                 );
             });
         }
-        if let Some(tick) = after(0.2, Status::Constrained) {
+        if let Some(tick) = after(0.2, SolverStatus::Constrained) {
             let cone = SolverSettings { shortcuts: false, method: Method::Cone, ..WAY };
             let mut whole =
                 Crmpc::new(crmpc::Settings { solver: cone, ..settings(constraints) }).unwrap();

@@ -1,21 +1,20 @@
 //! Time of the Riccati method alone, on CRMPC's first problem of Chai 2022 with its reference at
-//! rest: the exact balls of rates and moment, and the terminal ball.
+//! rest: the exact norm constraints of rates and moment, and the terminal constraint.
 //!
 //! The method stops after a given number of iterations. The difference between two of these times,
-//! per iteration, is the time of one: balls with derivatives, one factorisation, predictor and
-//! corrector. The rest is the start. The sweeps without balls, whose factors are known beforehand,
-//! are measured for comparison.
+//! per iteration, is the time of one: norm constraints with derivatives, one factorisation,
+//! predictor and corrector. The rest is the start. The unconstrained sweeps, whose factors are
+//! known beforehand, are measured for comparison.
 
-#[path = "../tests/harness/balls.rs"]
-mod balls;
 #[path = "../tests/harness/mod.rs"]
 mod harness;
+#[path = "../tests/harness/norm_constraints.rs"]
+mod norm_constraints;
 
-use balls::Sets;
 use control::Crmpc;
 use control::crmpc::Constraints;
 use control::mpc::Budget;
-use control::mpc::balls::Frozen;
+use control::mpc::constraints::LinearisedConstraints;
 use control::mpc::lq::Unconstrained;
 use control::mpc::problem::{End, Problem, Solution, Start};
 use control::mpc::riccati::Riccati;
@@ -23,6 +22,7 @@ use control::mpc::{self, Chain, Cost, per_axis};
 use criterion::{BatchSize, Criterion, criterion_group, criterion_main};
 use harness::settings;
 use nalgebra::Vector3;
+use norm_constraints::Sets;
 use std::hint::black_box;
 use vehicle::scenario::Scenario;
 
@@ -53,12 +53,12 @@ fn riccati(criterion: &mut Criterion) {
 
     let mut unconstrained = Unconstrained::new(n, &chain, &cost);
     let mut cold = Solution::new(n);
-    criterion.bench_function("sweeps without balls", |bencher| {
-        bencher.iter(|| unconstrained.solve(black_box(&start), &affine, &mut cold.motion));
+    criterion.bench_function("unconstrained sweeps", |bencher| {
+        bencher.iter(|| unconstrained.solve(black_box(&start), &affine, &mut cold.trajectory));
     });
 
-    let mut frozen = Frozen::new(n);
-    frozen.set(&sets, &cold.motion, 0);
+    let mut linearised = LinearisedConstraints::new(n);
+    linearised.set(&sets, &cold.trajectory, 0);
     iterations(criterion, "exact", &cold, || Problem {
         chain: &chain,
         cost: &cost,
@@ -67,12 +67,12 @@ fn riccati(criterion: &mut Criterion) {
         constraints: &sets,
         end: end(),
     });
-    iterations(criterion, "frozen", &cold, || Problem {
+    iterations(criterion, "linearised", &cold, || Problem {
         chain: &chain,
         cost: &cost,
         start: Start::Fixed(start),
         affine: &affine,
-        constraints: &frozen,
+        constraints: &linearised,
         end: end(),
     });
 }

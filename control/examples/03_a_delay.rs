@@ -1,5 +1,5 @@
 //! Flies CRMPC with its command acting 0.117 s late, the computing time that Chai et al. (2022)
-//! print: once without knowing of it, and once with the state predicted over the delay.
+//! print: once without compensation, and once with the state predicted over the delay.
 //!
 //! ```text
 //! cargo run --release -p reentry-control --example 03_a_delay
@@ -14,11 +14,11 @@ use vehicle::plant::Plant;
 /// s.
 const DELAY: f64 = 0.117;
 
-/// Largest rate and moment as shares of their limits, where the law knows of this delay (s).
-fn flown(known: f64) -> Result<(f64, f64), Box<dyn std::error::Error>> {
+/// Largest rate and moment as shares of their limits; the law compensates `expected_delay` (s).
+fn flown(expected_delay: f64) -> Result<(f64, f64), Box<dyn std::error::Error>> {
     let scenario = Scenario::crmpc2022();
-    let settings = Settings { delay: known, ..Settings::new(Constraints::Robust) };
-    let latency = Latency::of_action(known);
+    let settings = Settings { delay: expected_delay, ..Settings::new(Constraints::Robust) };
+    let latency = Latency::of_action(expected_delay);
     let Settings { body, period_feedback, .. } = settings;
     let law = Crmpc::new(settings)?;
     let mut law = Delayed::new(law, body, period_feedback, latency, f64::INFINITY)?;
@@ -40,8 +40,8 @@ fn flown(known: f64) -> Result<(f64, f64), Box<dyn std::error::Error>> {
 }
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    for (text, known) in [("not known to the law", 0.0), ("predicted over", DELAY)] {
-        let (rate, moment) = flown(known)?;
+    for (text, expected_delay) in [("not compensated", 0.0), ("compensated", DELAY)] {
+        let (rate, moment) = flown(expected_delay)?;
         println!("delay of {DELAY} s, {text}: ‖ω‖ {rate:.3}, ‖m‖ {moment:.3} of their limits");
     }
     Ok(())

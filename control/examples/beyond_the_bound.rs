@@ -57,13 +57,13 @@ fn main() {
                 (outcome, Kept { fallbacks: 0, in_force: 0.0, broken: false, withdrawn: 0 })
             });
             let crmpc = [robust(&published), robust(&told)];
-            let only = crmpc.each_ref().map(|all| {
-                let pairs = all.iter().zip(&regulated);
+            let only = crmpc.each_ref().map(|outcomes| {
+                let pairs = outcomes.iter().zip(&regulated);
                 pairs
                     .filter(|((crmpc, _), (lqr, _))| crmpc.ems_deg > LOST && lqr.ems_deg <= LOST)
                     .count()
             });
-            let [published, told] = crmpc.map(|all| shown(&all));
+            let [published, told] = crmpc.map(|outcomes| shown(&outcomes));
             println!(
                 "{scale:5} {name:14} {published} {told} {}  lost by CRMPC alone: {only:?}",
                 shown(&regulated)
@@ -72,10 +72,11 @@ fn main() {
     }
 }
 
-fn shown(all: &[(Outcome, Kept)]) -> String {
-    let mean = all.iter().map(|(outcome, _)| outcome.ems_deg).sum::<f64>() / all.len() as f64;
-    let largest = all.iter().map(|(outcome, _)| outcome.ems_deg).fold(0.0, f64::max);
-    let rate = all.iter().map(|(outcome, _)| outcome.rate).fold(0.0, f64::max);
-    let lost = all.iter().filter(|(outcome, _)| outcome.ems_deg > LOST).count();
+fn shown(outcomes: &[(Outcome, Kept)]) -> String {
+    let mean =
+        outcomes.iter().map(|(outcome, _)| outcome.ems_deg).sum::<f64>() / outcomes.len() as f64;
+    let largest = outcomes.iter().map(|(outcome, _)| outcome.ems_deg).fold(0.0, f64::max);
+    let rate = outcomes.iter().map(|(outcome, _)| outcome.rate).fold(0.0, f64::max);
+    let lost = outcomes.iter().filter(|(outcome, _)| outcome.ems_deg > LOST).count();
     format!("{mean:6.2}° {largest:6.2}° {rate:7.3} {lost:3}")
 }

@@ -18,7 +18,7 @@
 mod harness;
 
 use control::Crmpc;
-use control::crmpc::{Constraints, Memory, Settings, Standing, Status};
+use control::crmpc::{Constraints, Memory, Settings, SolverStatus, Standing};
 use control::error_dynamics::Gain;
 use harness::flight::{Flight, optimised_every};
 use harness::{Case, constant, in_parallel, settings, simulate, white};
@@ -29,7 +29,7 @@ use std::ops::Range;
 struct Cost {
     ems_deg: f64,
     in_force: f64,
-    kept: u32,
+    kept_plans: u32,
     iterations: u64,
     /// Computing times of all optimisations, s.
     times: Vec<f64>,
@@ -92,7 +92,7 @@ fn cost(settings: &Settings) {
             "{name:12} {runs} runs: EMS {:.4}°, in force {:.2} %, {} kept plans, {} iterations, mean time {:.4} ms, median {:.4} ms",
             cost.ems_deg / runs,
             100.0 * cost.in_force / runs,
-            cost.kept,
+            cost.kept_plans,
             cost.iterations,
             1e3 * mean,
             1e3 * median
@@ -115,7 +115,7 @@ fn add(cost: &mut Cost, settings: &Settings, case: &Case) {
             if tick % ratio == 0 {
                 cost.times.push(memory.report.time);
                 cost.iterations += u64::from(memory.report.iterations);
-                cost.kept += u32::from(memory.report.status == Status::Kept);
+                cost.kept_plans += u32::from(memory.report.status == SolverStatus::Kept);
             }
         },
     );

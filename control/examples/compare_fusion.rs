@@ -175,22 +175,22 @@ fn vqf(tau_acc: f64, tau_mag: f64, rest: bool) -> Filter {
 
 /// Returns the attitude errors (root mean square of their norm, deg) after the first second, and
 /// nanoseconds and allocations of an update.
-fn run(filter: &Filter, motion: &[Truth], readings: &[Readings]) -> (f64, f64, f64) {
+fn run(filter: &Filter, trajectory: &[Truth], readings: &[Readings]) -> (f64, f64, f64) {
     let declination = {
         let field = SensorData::embedded().surroundings.field;
         Rotation3::from_axis_angle(&Vector3::z_axis(), -field.y.atan2(field.x))
     };
-    let [_, force, field] = &felt(&motion[0]);
+    let [_, force, field] = &felt(&trajectory[0]);
     let mut step = (filter.begin)(&triad(force, field).expect("a force and a field"));
-    let mut found = Vec::with_capacity(motion.len());
+    let mut estimates = Vec::with_capacity(trajectory.len());
     let (allocations, begin) = (ALLOCATIONS.load(Relaxed), Instant::now());
     for readings in readings {
-        found.push(step(readings));
+        estimates.push(step(readings));
     }
-    let count = found.len() as f64;
+    let count = estimates.len() as f64;
     let time = begin.elapsed().as_nanos() as f64 / count;
     let allocations = (ALLOCATIONS.load(Relaxed) - allocations) as f64 / count;
-    let errors = motion.iter().zip(&found).map(|(truth, rotation)| {
+    let errors = trajectory.iter().zip(&estimates).map(|(truth, rotation)| {
         let error = angles(&(rotation * declination)) - truth.angles;
         (truth.time, error)
     });
@@ -211,7 +211,7 @@ fn main() {
     );
     let corrections = mems_corrections();
     let seeds = 1..=10;
-    let motions: Vec<_> = seeds.clone().map(scenario).collect();
+    let trajectories: Vec<_> = seeds.clone().map(scenario).collect();
     println!(
         "{:38} {:>9} {:>9} {:>9} {:>6} {:>6}",
         "RMS, deg", "at rest", "moving", "with bias", "ns", "allocs"
@@ -219,13 +219,13 @@ fn main() {
     for filter in &filters {
         let mut sums = [0.0; 3];
         let (mut time, mut allocations) = (f64::INFINITY, 0.0f64);
-        for (seed, scenario) in seeds.clone().zip(&motions) {
+        for (seed, scenario) in seeds.clone().zip(&trajectories) {
             let still = rest(50.0);
-            for (sum, (motion, bias)) in
+            for (sum, (trajectory, bias)) in
                 sums.iter_mut().zip([(&still, 0.0), (scenario, 0.0), (scenario, 0.2)])
             {
-                let readings: Vec<Readings> = samples(motion, &corrections, seed, bias);
-                let (error, each, allocated) = run(filter, motion, &readings);
+                let readings: Vec<Readings> = samples(trajectory, &corrections, seed, bias);
+                let (error, each, allocated) = run(filter, trajectory, &readings);
                 *sum += error * error / 10.0;
                 time = time.min(each);
                 allocations = allocations.max(allocated);
@@ -239,12 +239,12 @@ fn main() {
     }
 
     let settings = Settings { corrections, ..Settings::default() };
-    let whole = |name: &str, motion: &dyn Fn(usize) -> Vec<Truth>| {
+    let whole = |name: &str, trajectory: &dyn Fn(usize) -> Vec<Truth>| {
         let mut squares = [Vector3::<f64>::zeros(); 2];
         for seed in seeds.clone() {
-            let motion = motion(seed as usize - 1);
-            let found = estimates(&settings, &lines(&motion, &mems(seed)));
-            for (square, rms) in squares.iter_mut().zip(errors(&motion, &found, 0.0)) {
+            let trajectory = trajectory(seed as usize - 1);
+            let estimated = estimates(&settings, &lines(&trajectory, &mems(seed)));
+            for (square, rms) in squares.iter_mut().zip(errors(&trajectory, &estimated, 0.0)) {
                 *square += rms.component_mul(&rms) / 10.0;
             }
         }
@@ -259,12 +259,12 @@ fn main() {
         );
     };
     whole("at rest", &|_| rest(50.0));
-    whole("moving", &|i| motions[i].clone());
+    whole("moving", &|i| trajectories[i].clone());
     let magnetometer =
         SensorData::embedded().mems[2].matrix * SensorData::embedded().surroundings.field.norm();
     let left = seeds.map(|seed| {
-        let found = calibrated(&mems(seed), CALIBRATION_DURATION).corrections[2].matrix;
-        (found * magnetometer - Matrix3::identity()).singular_values().max()
+        let matrix = calibrated(&mems(seed), CALIBRATION_DURATION).corrections[2].matrix;
+        (matrix * magnetometer - Matrix3::identity()).singular_values().max()
     });
     println!("ellipsoid: largest norm of W A - I {:.1e}", left.fold(0.0, f64::max));
 }
@@ -272,7 +272,7 @@ fn main() {
 /// Returns calibrated readings at the tick at which they were taken, with `bias` (deg/s) left on
 /// each axis.
 fn samples(
-    motion: &[Truth],
+    trajectory: &[Truth],
     corrections: &[control::estimation::ellipsoid::Correction; 3],
     seed: u64,
     bias: f64,
@@ -284,5 +284,5 @@ fn samples(
         readings[0].add_scalar_mut(bias.to_radians());
         readings
     };
-    lines(motion, &config).iter().map(correct).collect()
+    lines(trajectory, &config).iter().map(correct).collect()
 }

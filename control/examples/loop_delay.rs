@@ -1,6 +1,5 @@
-//! Flies loops whose delay is another one than the controller was told, and loops with the delay
-//! that it was told, and prints how soon the difference is found, and how often it is found where
-//! there is none.
+//! Flies loops whose delay differs from the declared one, and loops with the declared delay. It
+//! prints how soon a difference is found, and how often one is found where there is none.
 //!
 //! `cargo run --release -p reentry-control --example loop_delay -- 1000`
 
@@ -11,7 +10,7 @@ use control::lqr::{Lqr, LqrSettings};
 use control::{Crmpc, error::DesignError};
 use nalgebra::Vector3;
 use vehicle::Scenario;
-use vehicle::disturbance::Kind;
+use vehicle::disturbance::DisturbanceKind;
 use vehicle::plant::Plant;
 
 const PERIOD: f64 = 0.04;
@@ -19,8 +18,8 @@ const SECONDS: f64 = 50.0;
 /// Periods of the square waves, s. Those up to some optimisation periods are the hardest.
 const SQUARE_PERIODS: [f64; 12] = [0.08, 0.12, 0.16, 0.2, 0.24, 0.4, 0.6, 0.8, 1.2, 2.0, 5.0, 11.0];
 
-/// Returns the time at which another delay is found, s, that at which the assumptions do not
-/// explain the motion, s, and the estimate at the end, s.
+/// Returns the time at which another delay is found, s, the time at which the assumptions no longer
+/// explain the measurements, s, and the estimate at the end, s.
 fn fly<C: Controller>(
     law: Result<C, DesignError>,
     scenario: &Scenario,
@@ -36,7 +35,7 @@ fn fly<C: Controller>(
     let mut config = scenario.config(0.01);
     config.moment_delay = truly;
     let mut plant = Plant::new(&config, 0.0).unwrap();
-    let [mut found, mut contradicted] = [f64::INFINITY; 2];
+    let [mut found_at, mut contradicted] = [f64::INFINITY; 2];
     for tick in 0..(seconds / PERIOD) as u64 {
         let time = tick as f64 * PERIOD;
         let measured =
@@ -44,7 +43,7 @@ fn fly<C: Controller>(
         let moment =
             law.update(&mut memory, tick, time, &measured, &|time| scenario.reference.at(time));
         if memory.loop_delay.is_other {
-            found = found.min(time);
+            found_at = found_at.min(time);
         }
         if memory.loop_delay.is_unexplained {
             contradicted = contradicted.min(time);
@@ -53,11 +52,11 @@ fn fly<C: Controller>(
             break;
         }
     }
-    [found, contradicted, law.estimated_delay(&memory)]
+    [found_at, contradicted, law.estimated_delay(&memory)]
 }
 
-/// Returns the scenario of a flight: a seed, a corner, a square wave and an inertia of its own.
-fn scenario(kind: Kind, flight: u64) -> Scenario {
+/// Returns the scenario of a flight, with a seed, a corner, a square wave and an inertia.
+fn scenario(kind: DisturbanceKind, flight: u64) -> Scenario {
     let mut scenario = Scenario::crmpc2022();
     let corner = |bit: u64| if flight >> bit & 1 == 0 { 1.0 } else { -1.0 };
     let disturbance = &mut scenario.disturbance;
@@ -85,16 +84,16 @@ fn main() {
         "law, disturbance, told, truly: share found within 10 s, found ever, 95 % found at; assumptions contradicted within 10 s, ever; estimates"
     );
     for is_lqr in [false, true] {
-        for kind in [Kind::White, Kind::Constant, Kind::Square] {
+        for kind in [DisturbanceKind::White, DisturbanceKind::Constant, DisturbanceKind::Square] {
             for delays in [(0.0, 0.04), (0.04, 0.0), (0.0, 0.12), (0.0, 0.0), (0.04, 0.04)] {
-                let all = (0..flights).map(|n| outcome(is_lqr, &scenario(kind, n), delays));
+                let outcomes = (0..flights).map(|n| outcome(is_lqr, &scenario(kind, n), delays));
                 let mut sorted = [Vec::new(), Vec::new(), Vec::new()];
-                for outcome in all {
-                    sorted.iter_mut().zip(outcome).for_each(|(all, value)| all.push(value));
+                for outcome in outcomes {
+                    sorted.iter_mut().zip(outcome).for_each(|(values, value)| values.push(value));
                 }
-                let [found, contradicted, estimates] = sorted.map(|mut all| {
-                    all.sort_by(f64::total_cmp);
-                    all
+                let [found_times, contradicted, estimates] = sorted.map(|mut values| {
+                    values.sort_by(f64::total_cmp);
+                    values
                 });
                 let share = |times: &[f64], within: f64| {
                     100.0 * times.partition_point(|time| *time <= within) as f64 / flights as f64
@@ -102,9 +101,9 @@ fn main() {
                 println!(
                     "{} {kind:?} {delays:?}: {:.1} %, {:.1} %, {:.2} s; {:.1} %, {:.1} %; {:.3} to {:.3} s",
                     if is_lqr { "LQR" } else { "CRMPC" },
-                    share(&found, 10.0),
-                    share(&found, SECONDS),
-                    found[found.len() * 95 / 100],
+                    share(&found_times, 10.0),
+                    share(&found_times, SECONDS),
+                    found_times[found_times.len() * 95 / 100],
                     share(&contradicted, 10.0),
                     share(&contradicted, SECONDS),
                     estimates[0],

@@ -19,8 +19,8 @@ mod harness;
 
 use control::crmpc::{Constraints, Settings};
 use control::error_dynamics::Gain;
-use control::report::Status;
-use harness::flight::{Course, Flight, Shown};
+use control::report::SolverStatus;
+use harness::flight::{Flight, Shown, Waveform};
 use nalgebra::Vector3;
 
 /// Number of flights of each loop, if the arguments give none.
@@ -34,7 +34,7 @@ struct Optimisation {
     ms: f64,
     iterations: u32,
     residual: f64,
-    status: Status,
+    status: SolverStatus,
     /// Time in the flight, s.
     at: f64,
 }
@@ -67,11 +67,11 @@ fn main() {
     if let Some(bound) = number(7) {
         settings.disturbance_bound = bound.to_radians();
     }
-    let mut all: Vec<Flown> = delays.iter().map(|_| Flown::default()).collect();
+    let mut flights: Vec<Flown> = delays.iter().map(|_| Flown::default()).collect();
     for case in first as u64..(first + count) as u64 {
         let mut best: Vec<Vec<Optimisation>> = vec![Vec::new(); delays.len()];
         for repetition in 0..repetitions {
-            for ((&delay, best), flown) in delays.iter().zip(&mut best).zip(&mut all) {
+            for ((&delay, best), flown) in delays.iter().zip(&mut best).zip(&mut flights) {
                 let (optimisations, shown) = fly(&Settings { delay, ..settings }, kind, case);
                 if repetition == 0 {
                     *best = optimisations;
@@ -83,12 +83,12 @@ fn main() {
                 }
             }
         }
-        for (flown, best) in all.iter_mut().zip(best) {
+        for (flown, best) in flights.iter_mut().zip(best) {
             flown.optimisations.extend(best);
         }
     }
-    let base = mean(&all[0].optimisations, |o| o.ms);
-    for (delay, flown) in delays.iter().zip(&mut all) {
+    let base = mean(&flights[0].optimisations, |o| o.ms);
+    for (delay, flown) in delays.iter().zip(&mut flights) {
         print(*delay, flown, base);
     }
 }
@@ -99,17 +99,17 @@ fn fly(settings: &Settings, kind: &str, case: u64) -> (Vec<Optimisation>, Shown)
         Vector3::from([0, 1, 2].map(|bit| if case >> bit & 1 == 0 { 1.0 } else { -1.0 }))
     };
     let (disturbance, hold) = match kind {
-        "white" => (Course::White, 0.04),
-        "corners" => (Course::Constant(corner(case)), 0.04),
+        "white" => (Waveform::White, 0.04),
+        "corners" => (Waveform::Constant(corner(case)), 0.04),
         // Periods of 0.16 s to 20.5 s.
         "square" => {
-            (Course::Square(0.16 * 2.0_f64.powi((case / 4) as i32), corner(case % 4)), 0.01)
+            (Waveform::Square(0.16 * 2.0_f64.powi((case / 4) as i32), corner(case % 4)), 0.01)
         }
         "adversaries" => {
             let sign = if (case / 2).is_multiple_of(2) { 1.0 } else { -1.0 };
-            let course =
-                if case.is_multiple_of(2) { Course::AlongRate } else { Course::AlongMoment };
-            (course(sign), if (case / 4).is_multiple_of(2) { 0.01 } else { 0.04 })
+            let waveform =
+                if case.is_multiple_of(2) { Waveform::AlongRate } else { Waveform::AlongMoment };
+            (waveform(sign), if (case / 4).is_multiple_of(2) { 0.01 } else { 0.04 })
         }
         _ => panic!("'{kind}' is not white, corners, square or adversaries"),
     };
@@ -143,14 +143,14 @@ fn mean<T>(items: &[T], value: impl Fn(&T) -> f64) -> f64 {
 
 fn print(delay: f64, flown: &mut Flown, base: f64) {
     let Flown { optimisations, shown } = flown;
-    let count = |wanted: Status| optimisations.iter().filter(|o| o.status == wanted).count();
-    let (kept, fallbacks) = (count(Status::Kept), count(Status::Fallback));
+    let count = |status: SolverStatus| optimisations.iter().filter(|o| o.status == status).count();
+    let (kept_plans, fallbacks) = (count(SolverStatus::Kept), count(SolverStatus::Fallback));
     let active = optimisations.iter().filter(|o| o.iterations > 0).count();
     let iterations: u32 = optimisations.iter().map(|o| o.iterations).sum();
     let mean_ms = mean(optimisations, |o| o.ms);
     let residual = optimisations
         .iter()
-        .filter(|o| o.status != Status::Kept)
+        .filter(|o| o.status != SolverStatus::Kept)
         .map(|o| o.residual)
         .fold(0.0, f64::max);
     optimisations.sort_by_key(|o| std::cmp::Reverse(o.iterations));
@@ -178,7 +178,7 @@ fn print(delay: f64, flown: &mut Flown, base: f64) {
         most.join(", "),
     );
     println!(
-        "    kept {kept}, fallbacks {fallbacks}, residual {residual:.1e}; EMS mean {:.4}, largest {:.3} deg; in force {:.2} % at least; \
+        "    kept {kept_plans}, fallbacks {fallbacks}, residual {residual:.1e}; EMS mean {:.4}, largest {:.3} deg; in force {:.2} % at least; \
          rate up to {:.4}, moment up to {:.4} of the limit; guarantee ended in {} flights",
         mean(shown, |shown| shown.ems_deg),
         largest(|shown| shown.ems_deg),

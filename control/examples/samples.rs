@@ -1,10 +1,9 @@
-//! Prints every optimisation of CRMPC over the 50 s scenario of Chai 2022
-//! (white noise, inertia + 5 %), as one JSON object per line: the data that another solver needs to
-//! solve the same problem, our optimum, and the time of each of our ways. `scripts/bench` reads the
-//! output.
+//! Prints every optimisation of CRMPC over the 50 s scenario of Chai 2022 (white noise, inertia + 5
+//! %), as one JSON object per line: the data that another solver needs to solve the same problem,
+//! our optimum, and the time of each of our solvers. `scripts/bench` reads the output.
 //!
-//! Each sample is repeated from the same memory, and the smallest time counts. The ways are timed
-//! in turns, so that other load on the machine affects all alike.
+//! Each sample is repeated from the same memory, and the smallest time counts. The solvers are
+//! timed in turns, so that other load on the machine affects all alike.
 
 #[path = "../tests/harness/mod.rs"]
 mod harness;
@@ -16,7 +15,7 @@ use harness::{disturbance, settings, simulate};
 use serde_json::json;
 use std::hint::black_box;
 use std::io::{self, Write};
-use vehicle::disturbance::Kind;
+use vehicle::disturbance::DisturbanceKind;
 use vehicle::scenario::Scenario;
 
 /// Number of repetitions of each sample, if the first argument gives none.
@@ -61,7 +60,7 @@ fn write_samples(
         &mut ways[0].1,
         &mut memory,
         INERTIA_SCALE,
-        disturbance(Kind::White),
+        disturbance(DisturbanceKind::White),
         |after, tick, &measured| {
             ticks.push((tick, before.clone(), measured));
             before.clone_from(after);
@@ -92,16 +91,16 @@ fn write_samples(
             .map(|k| reference(time + k as f64 * settings.period_optimisation))
             .map(|at| [at.angles, at.rates, at.accelerations].map(<[f64; 3]>::from))
             .collect();
-        let own: serde_json::Map<_, _> = std::iter::zip(&ways, std::iter::zip(reports, best))
+        let by_way: serde_json::Map<_, _> = std::iter::zip(&ways, std::iter::zip(reports, best))
             .map(|((name, _), (report, seconds))| {
-                let own = json!({
+                let figures = json!({
                     "seconds": seconds,
                     "iterations": report.iterations,
                     "cost": report.cost,
                     "residual": report.residual,
                     "status": format!("{:?}", report.status),
                 });
-                ((*name).to_string(), own)
+                ((*name).to_string(), figures)
             })
             .collect();
         let angle_rates = vehicle::kinematics::r(&measured.angles) * measured.rates;
@@ -124,7 +123,7 @@ fn write_samples(
             "bounds": { "rate": bounds.rate, "input": bounds.input, "terminal": bounds.terminal },
             // This is the plan of the optimisation before, not shifted; it is empty at first.
             "previous": previous,
-            "ways": own,
+            "ways": by_way,
         });
         writeln!(out, "{sample}")?;
     }

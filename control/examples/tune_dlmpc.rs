@@ -24,7 +24,7 @@ use control::Dlmpc;
 use control::dlmpc::{Memory, Settings, SlidingMode};
 use harness::{disturbance, in_parallel, simulate};
 use std::ops::RangeInclusive;
-use vehicle::disturbance::{Disturbance, Kind};
+use vehicle::disturbance::{Disturbance, DisturbanceKind};
 
 /// Number of sets of the grid that are evaluated again, and number of those from which steps are
 /// taken.
@@ -63,7 +63,7 @@ fn score(gains: SlidingMode, seeds: RangeInclusive<u64>) -> Score {
     for seed in seeds {
         let mut controller = Dlmpc::new(Settings { sliding_mode: gains, ..Settings::published() })
             .unwrap_or_else(|error| panic!("{error}"));
-        let noise = Disturbance { seed, ..disturbance(Kind::White) };
+        let noise = Disturbance { seed, ..disturbance(DisturbanceKind::White) };
         let outcome = simulate(&mut controller, &mut Memory::default(), 1.05, noise, |_, _, _| {});
         score.ems_deg += outcome.ems_deg / runs;
         score.cms += outcome.cms / runs;
@@ -76,7 +76,7 @@ fn score(gains: SlidingMode, seeds: RangeInclusive<u64>) -> Score {
 fn front(scores: &[Score]) -> Vec<Score> {
     let mut front: Vec<Score> = scores
         .iter()
-        .filter(|own| !scores.iter().any(|other| other.dominates(own)))
+        .filter(|score| !scores.iter().any(|other| other.dominates(score)))
         .copied()
         .collect();
     front.sort_by(|a, b| a.ems_deg.total_cmp(&b.ems_deg));
@@ -96,13 +96,15 @@ struct Criterion {
 const CRITERIA: [Criterion; 2] = [
     Criterion {
         name: "tuned",
-        allows: |own, published| own.ems_deg <= published.ems_deg && own.rate <= published.rate,
-        objective: |own| own.cms,
+        allows: |score, published| {
+            score.ems_deg <= published.ems_deg && score.rate <= published.rate
+        },
+        objective: |score| score.cms,
     },
     Criterion {
         name: "within limits",
-        allows: |own, _| own.rate <= 1.0,
-        objective: |own| own.ems_deg,
+        allows: |score, _| score.rate <= 1.0,
+        objective: |score| score.ems_deg,
     },
 ];
 
@@ -110,7 +112,7 @@ impl Criterion {
     /// Returns the allowed sets among `scores`, best first.
     fn sorted(&self, scores: &[Score], published: &Score) -> Vec<Score> {
         let mut allowed: Vec<Score> =
-            scores.iter().filter(|own| (self.allows)(own, published)).copied().collect();
+            scores.iter().filter(|score| (self.allows)(score, published)).copied().collect();
         allowed.sort_by(|a, b| (self.objective)(a).total_cmp(&(self.objective)(b)));
         allowed
     }
@@ -128,7 +130,7 @@ impl Criterion {
                 let better = self.sorted(&more, published).into_iter().next();
                 tried.extend(more);
                 if let Some(better) =
-                    better.filter(|own| (self.objective)(own) < (self.objective)(&chosen))
+                    better.filter(|score| (self.objective)(score) < (self.objective)(&chosen))
                 {
                     chosen = better;
                     continue 'steps;
@@ -141,41 +143,41 @@ impl Criterion {
 }
 
 fn grid() -> Vec<SlidingMode> {
-    let mut all = Vec::new();
+    let mut grid = Vec::new();
     for q in [0.0, 1.0, 2.0, 3.5, 5.0] {
         for p in [0.0, 0.3, 0.7, 1.5, 3.0] {
             for gamma in [0.0, 0.05, 0.15, 0.5] {
                 for rho in [0.5, 0.7, 0.9] {
-                    all.push(SlidingMode { q, p, gamma, rho });
+                    grid.push(SlidingMode { q, p, gamma, rho });
                 }
             }
         }
     }
-    all
+    grid
 }
 
 /// Returns the gains changed by this share, `changes` of them at a time, within the range that the
 /// controller accepts. A gain of zero starts from a tenth of `share`.
-fn neighbours(of: &SlidingMode, share: f64, changes: usize) -> Vec<SlidingMode> {
+fn neighbours(gains: &SlidingMode, share: f64, changes: usize) -> Vec<SlidingMode> {
     let moved = |value: f64, direction: i32| match direction {
         0 => value,
         _ if value == 0.0 => 0.1 * share * f64::from(direction.max(0)),
         1 => value * (1.0 + share),
         _ => value / (1.0 + share),
     };
-    let mut all = Vec::new();
+    let mut neighbours = Vec::new();
     for code in 0..81 {
         let directions = [code % 3 - 1, code / 3 % 3 - 1, code / 9 % 3 - 1, code / 27 - 1];
         if directions.iter().filter(|&&direction| direction != 0).count() == changes {
-            all.push(SlidingMode {
-                q: moved(of.q, directions[0]).min(40.0),
-                p: moved(of.p, directions[1]),
-                gamma: moved(of.gamma, directions[2]),
-                rho: moved(of.rho, directions[3]).clamp(0.1, 0.98),
+            neighbours.push(SlidingMode {
+                q: moved(gains.q, directions[0]).min(40.0),
+                p: moved(gains.p, directions[1]),
+                gamma: moved(gains.gamma, directions[2]),
+                rho: moved(gains.rho, directions[3]).clamp(0.1, 0.98),
             });
         }
     }
-    all
+    neighbours
 }
 
 fn main() {
@@ -191,7 +193,7 @@ fn main() {
     let coarse = in_parallel(&grid(), |&gains| score(gains, 1..=3));
     let coarse_published = score(published_gains, 1..=3);
     let mut tried = vec![published];
-    let mut found = Vec::new();
+    let mut chosen = Vec::new();
     for criterion in CRITERIA {
         // The best sets of the grid are evaluated again with all seeds, as the largest rate of
         // three seeds is a weak bound.
@@ -199,7 +201,7 @@ fn main() {
             .sorted(&coarse, &coarse_published)
             .iter()
             .take(STARTS)
-            .map(|own| own.gains)
+            .map(|score| score.gains)
             .collect();
         tried.extend(in_parallel(&starts, |&gains| score(gains, 1..=seeds)));
         let mut best: Option<Score> = None;
@@ -209,7 +211,7 @@ fn main() {
                 best = Some(end);
             }
         }
-        found.extend(best.map(|best| (criterion.name, best)));
+        chosen.extend(best.map(|best| (criterion.name, best)));
     }
 
     println!("Pareto front of {} sets with {seeds} seeds:", tried.len());
@@ -222,12 +224,12 @@ fn main() {
         }
     }
     println!("found:");
-    for (name, score) in &found {
+    for (name, score) in &chosen {
         score.print(name);
     }
     println!("with {seeds} seeds that the search has not seen:");
     score(published_gains, 1001..=1000 + seeds).print("published");
-    for (name, found) in found {
-        score(found.gains, 1001..=1000 + seeds).print(name);
+    for (name, chosen) in chosen {
+        score(chosen.gains, 1001..=1000 + seeds).print(name);
     }
 }

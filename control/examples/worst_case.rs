@@ -18,7 +18,7 @@ use cmaes::{CMAESOptions, DVector};
 use control::crmpc::{Constraints, Design, Settings};
 use control::error_dynamics::Gain;
 use control::mpc::SolverSettings;
-use harness::flight::{Course, Flight, Random, Shown, Sight};
+use harness::flight::{Flight, Random, Shown, Sight, Waveform};
 use harness::in_parallel;
 use nalgebra::Vector3;
 
@@ -149,18 +149,19 @@ fn main() {
     }
 }
 
-fn report(name: &str, settings: &Settings, seeds: &[u64], all: &[Shown]) {
-    let largest = |value: fn(&Shown) -> f64| all.iter().map(value).fold(0.0, f64::max);
-    let count = |value: fn(&Shown) -> bool| all.iter().filter(|shown| value(shown)).count();
-    let mean = |value: fn(&Shown) -> f64| all.iter().map(value).sum::<f64>() / all.len() as f64;
+fn report(name: &str, settings: &Settings, seeds: &[u64], outcomes: &[Shown]) {
+    let largest = |value: fn(&Shown) -> f64| outcomes.iter().map(value).fold(0.0, f64::max);
+    let count = |value: fn(&Shown) -> bool| outcomes.iter().filter(|shown| value(shown)).count();
+    let mean =
+        |value: fn(&Shown) -> f64| outcomes.iter().map(value).sum::<f64>() / outcomes.len() as f64;
     let worst = |value: fn(&Shown) -> f64| {
-        let places = seeds.iter().zip(all).max_by(|a, b| value(a.1).total_cmp(&value(b.1)));
+        let places = seeds.iter().zip(outcomes).max_by(|a, b| value(a.1).total_cmp(&value(b.1)));
         places.map_or(0, |(seed, _)| *seed)
     };
     println!(
         "{name:17} {:10.4} {:6} {:7} {:8.4} {:8.4} {:8.4} {:7} {:9} {:5} {:6} {:7.2} % {:8.3}° {:8.3}°  errors up to {:.3}°, {:.3}°/s; worst seeds {} and {}",
         settings.disturbance_bound.to_degrees(),
-        all.len(),
+        outcomes.len(),
         count(|s| s.assumed),
         largest(|s| s.rate),
         largest(|s| s.moment),
@@ -168,7 +169,7 @@ fn report(name: &str, settings: &Settings, seeds: &[u64], all: &[Shown]) {
         count(|s| s.broken),
         count(|s| s.assumed && s.withdrawn.is_some()),
         count(|s| s.lost),
-        all.iter().map(|s| s.fallbacks).sum::<u32>(),
+        outcomes.iter().map(|s| s.fallbacks).sum::<u32>(),
         100.0 * mean(|s| s.in_force),
         mean(|s| s.ems_deg),
         largest(|s| s.ems_deg),
@@ -207,7 +208,7 @@ fn decoded(flight: &Flight, x: &DVector<f64>) -> Flight {
         rates: of_three(3) * (if moves { 0.7 * limit_rate } else { 0.0 }),
         inertia_scale: 1.0 + inertia_error * limited(6),
         duration: (end + 0.5).min(40.0),
-        disturbance: Course::Segments(pieces),
+        disturbance: Waveform::Segments(pieces),
         ..flight.clone()
     }
 }

@@ -28,7 +28,7 @@ mod harness;
 use cmaes::{CMAESOptions, DVector};
 use control::crmpc::Constraints;
 use control::delay::Latency;
-use control::report::{Report, Status};
+use control::report::{SolverReport, SolverStatus};
 use control::{Crmpc, Delayed, Dlmpc, dlmpc};
 use harness::draws::{Case, UNKNOWNS};
 use harness::flight::{Flight, Random};
@@ -97,24 +97,26 @@ fn go<C: Optimising>(
             // other.
             let law = &mut new(budget);
             let repetitions = if budget > 0.0 { 1 } else { REPETITIONS };
-            let reports: Vec<[Report; 3]> = seeds
+            let reports: Vec<[SolverReport; 3]> = seeds
                 .iter()
                 .map(|&seed| Case::random(seed, size).optimise(law, repetitions))
                 .collect();
             for (situation, title) in SITUATIONS.iter().enumerate() {
-                let own: Vec<Report> = reports.iter().map(|reports| reports[situation]).collect();
-                print(&format!("{name}, {title}"), &seeds, &own);
+                let reports_of_situation: Vec<SolverReport> =
+                    reports.iter().map(|reports| reports[situation]).collect();
+                print(&format!("{name}, {title}"), &seeds, &reports_of_situation);
             }
         }
         "list" => {
             let law = &mut new(0.0);
-            let most = |reports: &[Report; 3]| reports.iter().map(|report| report.iterations).max();
-            let mut all: Vec<(u64, [Report; 3])> = seeds
+            let most =
+                |reports: &[SolverReport; 3]| reports.iter().map(|report| report.iterations).max();
+            let mut ranked: Vec<(u64, [SolverReport; 3])> = seeds
                 .iter()
                 .map(|&seed| (seed, Case::random(seed, 1.0).optimise(law, 1)))
                 .collect();
-            all.sort_by_key(|(_, reports)| std::cmp::Reverse(most(reports)));
-            for (seed, reports) in all.iter().take(LISTED) {
+            ranked.sort_by_key(|(_, reports)| std::cmp::Reverse(most(reports)));
+            for (seed, reports) in ranked.iter().take(LISTED) {
                 let [cold, kicked, next] = reports.map(|report| report.iterations);
                 println!("{name},{seed},{cold},{kicked},{next}");
             }
@@ -124,8 +126,13 @@ fn go<C: Optimising>(
                 (number(4).unwrap_or(1000.0) as usize, number(5).unwrap_or(1.0));
             let worst = in_parallel(&seeds, |&seed| search(&mut new(0.0), seed, evaluations, size));
             for (situation, title) in SITUATIONS.iter().enumerate() {
-                let own: Vec<Report> = worst.iter().map(|reports| reports[situation]).collect();
-                print(&format!("{name}, {title}, worst of each search"), &seeds, &own);
+                let reports_of_situation: Vec<SolverReport> =
+                    worst.iter().map(|reports| reports[situation]).collect();
+                print(
+                    &format!("{name}, {title}, worst of each search"),
+                    &seeds,
+                    &reports_of_situation,
+                );
             }
         }
         _ => {
@@ -143,7 +150,7 @@ fn jumps(name: &str, number: impl Fn(usize) -> Option<f64>) {
     let mut settings = settings(Constraints::Robust);
     settings.delay = if name == "delayed" { DELAY } else { 0.0 };
     let jump = ENTERS + settings.horizon as f64 * settings.period_optimisation;
-    let mut all: [Vec<(u64, Report)>; 3] = Default::default();
+    let mut by_situation: [Vec<(u64, SolverReport)>; 3] = Default::default();
     for seed in first..first + count {
         let mut flight = Flight::random(&settings, seed);
         let random = &mut Random::new(seed);
@@ -153,7 +160,7 @@ fn jumps(name: &str, number: impl Fn(usize) -> Option<f64>) {
         (flight.reference, flight.reference_start) =
             (Profile::step(before, before + step, jump), 0.0);
         flight.duration = DURATION;
-        let mut best: Vec<(f64, Report)> = Vec::new();
+        let mut best: Vec<(f64, SolverReport)> = Vec::new();
         for repetition in 0..REPETITIONS {
             let (mut solves, mut place) = (0, 0);
             flight.fly_seen(|memory, tick, _, _| {
@@ -175,23 +182,30 @@ fn jumps(name: &str, number: impl Fn(usize) -> Option<f64>) {
             let seen = time + settings.delay + 1e-9 - ENTERS;
             let situation =
                 usize::from(seen >= 0.0) + usize::from(seen >= settings.period_optimisation);
-            all[situation].push((seed, report));
+            by_situation[situation].push((seed, report));
         }
     }
-    for (title, own) in ["before a jump enters", "as it enters", "afterwards"].iter().zip(all) {
-        let (seeds, reports): (Vec<u64>, Vec<Report>) = own.into_iter().unzip();
+    for (title, drawn) in
+        ["before a jump enters", "as it enters", "afterwards"].iter().zip(by_situation)
+    {
+        let (seeds, reports): (Vec<u64>, Vec<SolverReport>) = drawn.into_iter().unzip();
         print(&format!("{name}, {title}"), &seeds, &reports);
     }
 }
 
 /// Returns the reports of the worst optimisations that a search found, one for each situation.
-fn search<C: Optimising>(law: &mut C, seed: u64, evaluations: usize, size: f64) -> [Report; 3] {
+fn search<C: Optimising>(
+    law: &mut C,
+    seed: u64,
+    evaluations: usize,
+    size: f64,
+) -> [SolverReport; 3] {
     let random = &mut Random::new(seed);
     let start = DVector::from_fn(UNKNOWNS, |_, _| random.between(-1.0, 1.0));
-    let mut worst = [Report::default(); 3];
+    let mut worst = [SolverReport::default(); 3];
     let situation = (seed % 3) as usize;
     let objective = |x: &DVector<f64>| {
-        let reports = Case::of(x.as_slice(), size).optimise(law, 1);
+        let reports = Case::from_numbers(x.as_slice(), size).optimise(law, 1);
         for (worst, report) in worst.iter_mut().zip(reports) {
             if report.iterations > worst.iterations {
                 *worst = report;
@@ -207,34 +221,34 @@ fn search<C: Optimising>(law: &mut C, seed: u64, evaluations: usize, size: f64) 
     worst
 }
 
-fn print(title: &str, seeds: &[u64], reports: &[Report]) {
+fn print(title: &str, seeds: &[u64], reports: &[SolverReport]) {
     let mut counts: BTreeMap<String, usize> = BTreeMap::new();
     for report in reports {
         *counts.entry(format!("{:?}", report.status)).or_default() += 1;
     }
     println!("{title}: {counts:?}");
-    let line = |of: &str, taken: &dyn Fn(&Report) -> bool| {
-        let mut own: Vec<(&u64, &Report)> =
+    let line = |name: &str, taken: &dyn Fn(&SolverReport) -> bool| {
+        let mut selected: Vec<(&u64, &SolverReport)> =
             seeds.iter().zip(reports).filter(|(_, report)| taken(report)).collect();
-        if own.is_empty() {
+        if selected.is_empty() {
             return;
         }
-        let mean = |value: fn(&Report) -> f64| {
-            own.iter().map(|(_, report)| value(report)).sum::<f64>() / own.len() as f64
+        let mean = |value: fn(&SolverReport) -> f64| {
+            selected.iter().map(|(_, report)| value(report)).sum::<f64>() / selected.len() as f64
         };
         let (mean_iterations, mean_ms) =
             (mean(|r| f64::from(r.iterations)), mean(|r| r.time * 1e3));
-        let last = (own.len() - 1) as f64;
+        let last = (selected.len() - 1) as f64;
         let place = |share: f64| (last * share).round() as usize;
-        own.sort_by_key(|(_, report)| report.iterations);
-        let iterations = [0.99, 0.999, 1.0].map(|share| own[place(share)].1.iterations);
-        let most: Vec<u64> = own.iter().rev().take(5).map(|(seed, _)| **seed).collect();
-        own.sort_by(|a, b| a.1.time.total_cmp(&b.1.time));
-        let ms = [0.99, 0.999, 1.0].map(|share| own[place(share)].1.time * 1e3);
+        selected.sort_by_key(|(_, report)| report.iterations);
+        let iterations = [0.99, 0.999, 1.0].map(|share| selected[place(share)].1.iterations);
+        let most: Vec<u64> = selected.iter().rev().take(5).map(|(seed, _)| **seed).collect();
+        selected.sort_by(|a, b| a.1.time.total_cmp(&b.1.time));
+        let ms = [0.99, 0.999, 1.0].map(|share| selected[place(share)].1.time * 1e3);
         println!(
-            "  {of:22} {:6}: iterations mean {mean_iterations:.2}, p99 {}, p99.9 {}, most {} (seeds {most:?}); \
+            "  {name:22} {:6}: iterations mean {mean_iterations:.2}, p99 {}, p99.9 {}, most {} (seeds {most:?}); \
              ms mean {mean_ms:.3}, p99 {:.3}, p99.9 {:.3}, worst {:.3}",
-            own.len(),
+            selected.len(),
             iterations[0],
             iterations[1],
             iterations[2],
@@ -244,7 +258,9 @@ fn print(title: &str, seeds: &[u64], reports: &[Report]) {
         );
     };
     line("all", &|_| true);
-    line("with an optimum", &|report| !matches!(report.status, Status::Fallback | Status::Kept));
-    line("by the cone solver", &|report| report.status == Status::Cone);
-    line("without", &|report| matches!(report.status, Status::Fallback | Status::Kept));
+    line("with an optimum", &|report| {
+        !matches!(report.status, SolverStatus::Fallback | SolverStatus::Kept)
+    });
+    line("by the cone solver", &|report| report.status == SolverStatus::Cone);
+    line("without", &|report| matches!(report.status, SolverStatus::Fallback | SolverStatus::Kept));
 }

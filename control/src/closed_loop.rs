@@ -12,8 +12,9 @@
 //! let mut memory = law.memory();
 //! let summary = fly(&mut law, &mut memory, settings.period_feedback, &scenario, |sample| {
 //!     println!("{:.2} s: {:.0} N m", sample.time, sample.moment.norm());
-//! })?; assert!(summary.largest_rate <= scenario.limit_rate && summary.largest_moment <=
-//! scenario.limit_moment);
+//! })?;
+//! assert!(summary.largest_rate <= scenario.limit_rate);
+//! assert!(summary.largest_moment <= scenario.limit_moment);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 

@@ -62,7 +62,7 @@ impl ConicProgram {
     /// Sets up the solver for these sparsity patterns.
     ///
     /// # Errors
-    /// Returns the solver's own message if it refuses the data, for example weights that are not
+    /// Returns the solver's message if it refuses the data, for example weights that are not
     /// positive semidefinite.
     pub(crate) fn new(
         cost: CscMatrix<f64>,

@@ -13,26 +13,26 @@ pub struct Measurement {
     /// Body rates, ω = [p, q, r], rad/s.
     pub rates: Vector3<f64>,
     /// The moment that acted since the last tick, N m, if it is measured. Without it a controller
-    /// assumes that its own command acted.
+    /// assumes that its command acted.
     pub achieved_moment: Option<Vector3<f64>>,
     /// Whether the measurement was made at an earlier instant than the tick, because the
     /// communication step is longer than the period or no multiple of it.
     pub stale: bool,
-    /// Whether the motion shows another delay of the loop than the one that was told.
+    /// Whether the measurements show another delay of the loop than the declared one.
     pub has_other_delay: bool,
     /// Whether the acceleration over the last period is larger than [`Controller::explained`].
     pub is_unexplained: bool,
 }
 
-/// What the assumptions of a law explain of the angular acceleration, beyond that of the moment
-/// that acts after the delay that was told.
+/// Largest angular acceleration that the assumptions of a law explain, beyond that of the moment
+/// that acts after the declared delay.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Explained {
     /// Largest part in each component of ẋ_ω, whatever the moment, rad/s².
     pub disturbance: f64,
     /// Largest part relative to the acceleration by the moment.
     pub share: f64,
-    /// Largest difference of the delay from the one that was told, s.
+    /// Largest difference of the delay from the declared one, s.
     pub delay_error: f64,
 }
 
@@ -40,13 +40,13 @@ pub struct Explained {
 /// future.
 pub type ReferenceAt<'a> = &'a dyn Fn(f64) -> Reference;
 
-/// The knowledge of the reference that is available at a tick.
+/// What is known of the reference at a tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Preview<'a> {
     /// The whole reference is known in advance and does not change during an experiment.
     Profile(&'a Profile),
-    /// The reference is given from outside and valid until a time (s). Nothing is known of what
-    /// follows; its angles are assumed to stay constant.
+    /// The reference is given from outside and valid until a time (s). What follows is unknown; the
+    /// angles are assumed to stay constant.
     External(Reference, f64),
 }
 
@@ -81,10 +81,10 @@ pub fn saturated(moment: Vector3<f64>, limit: f64) -> Vector3<f64> {
     scaled(scaled(moment))
 }
 
-/// A sampled attitude controller: a law that commands a moment, and is told if a limit leaves less
-/// of it. `update` changes nothing that a later call could notice except `memory`. A tick can
-/// therefore be evaluated again with other inputs from the same memory, and a saved memory
-/// continues bit for bit.
+/// A sampled attitude controller: a law that commands a moment, and that is informed if a limit
+/// reduces it. Of what later calls depend on, `update` changes `memory` alone. A tick can therefore
+/// be evaluated again with other inputs from the same memory, and a saved memory continues bit for
+/// bit.
 pub trait Controller {
     /// The state of the controller that is carried from tick to tick.
     type Memory: Clone + Default + Serialize + DeserializeOwned + Send;
@@ -116,8 +116,8 @@ pub trait Controller {
         f64::INFINITY
     }
 
-    /// Returns what the law's assumptions explain of the motion, if it has any. Another delay than
-    /// the one that was told is then only said to be there if they do not explain the motion.
+    /// Returns the angular acceleration that the law's assumptions explain, if it has any. Another
+    /// delay than the declared one is then reported only if they do not explain the measurements.
     fn explained(&self) -> Option<Explained> {
         None
     }
@@ -127,7 +127,8 @@ pub trait Controller {
     fn limited(&mut self, _memory: &mut Self::Memory, _applied: &Vector3<f64>) {}
 
     /// Evaluates a tick, and returns the moment to hold until the next one, N m. Commands are
-    /// limited here alone, except that the inner law of [`Dlmpc`](crate::Dlmpc) limits its own too.
+    /// limited here alone, except that the inner law of [`Dlmpc`](crate::Dlmpc) also limits its
+    /// moment.
     fn update(
         &mut self,
         memory: &mut Self::Memory,

@@ -7,7 +7,7 @@
 //! act on the vehicle before, over [t, t + delay), were commanded earlier and are known. The state
 //! at t + delay can therefore be computed from the measured one by the nominal equations of motion,
 //! and the law is evaluated for that state and that time. Without disturbances and with the right
-//! inertia the loop then moves as it would without delay, only later by the delay.
+//! inertia the loop then behaves as it would without delay, only later by the delay.
 //!
 //! This is the prediction of the Smith predictor for a model in state-space form, as in Z.
 //! Artstein, "Linear systems with delayed controls: a reduction", IEEE Transactions on Automatic
@@ -125,7 +125,7 @@ pub struct Memory<M> {
     /// Commands whose action has not ended yet, oldest first, N m. They are zero until enough ticks
     /// have passed.
     pub under_way: Vec<Vector3<f64>>,
-    /// Estimate of the delay that the loop really has.
+    /// Estimate of the actual delay of the loop.
     pub loop_delay: LoopDelay,
 }
 
@@ -193,7 +193,7 @@ impl<C: Controller> Delayed<C> {
         let loop_delay = LoopDelaySettings {
             body,
             period,
-            told: latency.total(),
+            declared: latency.total(),
             explained: inner.explained(),
             is_filtered: measurement > 0.0,
         };
@@ -205,10 +205,10 @@ impl<C: Controller> Delayed<C> {
         self.latency.action
     }
 
-    /// Returns the estimated delay of the loop, s; the one that was told as long as the motion does
-    /// not tell it.
+    /// Returns the estimated delay of the loop, s; the declared one as long as the measurements do
+    /// not show it.
     pub fn estimated_delay(&self, memory: &Memory<C::Memory>) -> f64 {
-        memory.loop_delay.estimate.unwrap_or(self.loop_delay.told)
+        memory.loop_delay.estimate.unwrap_or(self.loop_delay.declared)
     }
 
     /// Returns the law behind the prediction.

@@ -1,5 +1,5 @@
 //! Errors in the settings of a controller. Their texts name fields of the settings in backticks, so
-//! that a unit can say its own names of them.
+//! that an FMU can replace them by the names of its parameters.
 
 /// A setting that the design refuses. Each `name` is the path of a field from the settings on.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -20,8 +20,8 @@ pub enum DesignError {
         /// Spectral radius of the sampled error dynamics.
         radius: f64,
     },
-    /// The terminal gain does not stabilise the nominal motion when it is held between two
-    /// optimisations.
+    /// The terminal gain does not stabilise the nominal trajectory when its command is held between
+    /// two optimisations.
     #[error(
         "terminal gain K~ = [{k1}, {k2}] held for {period} s is not stable: spectral radius {radius:.6} is not below 1; use a smaller gain or a shorter `period_optimisation`"
     )]
@@ -38,9 +38,9 @@ pub enum DesignError {
     /// The limits leave too little room for a guarantee.
     #[error("`constraints` = robust cannot be guaranteed: {}", no_guarantee(self))]
     NoGuarantee {
-        /// Share of the moment limit that is left; negative if there is not enough.
+        /// Unused share of the moment limit; negative if the limit is exceeded.
         moment_left: f64,
-        /// Share of the rate limit that is left.
+        /// Unused share of the rate limit; negative if the limit is exceeded.
         rate_left: f64,
         /// Limit on the moment, N m.
         limit_moment: f64,
@@ -58,7 +58,7 @@ pub enum DesignError {
     },
     /// The delay could be negative, or a command could begin to act after the next one should.
     #[error(
-        "`delay_error` = {value} s, but it can be at most {largest} s here: neither more than the delay nor more than a period of the feedback law"
+        "`delay_error` = {value} s must be at most {largest} s, the smaller of the delay and the period of the feedback law"
     )]
     DelayError {
         /// Value of the setting, s.
@@ -152,7 +152,7 @@ pub enum DesignError {
     },
     /// One of the paper's sets is empty after tightening.
     #[error(
-        "nothing is left of the paper's set: {name} = {value:.4}; lower `disturbance_bound` or the reference bounds, or raise the limits"
+        "the paper's set is empty after tightening: {name} = {value:.4}; lower `disturbance_bound` or the reference bounds, or raise the limits"
     )]
     EmptySet {
         /// Symbol of the set's size.
@@ -215,7 +215,7 @@ pub enum DesignError {
     Solver(String),
 }
 
-/// Returns what is missing for a guarantee, and which values would be accepted.
+/// Returns why there is no guarantee, and which values would be accepted.
 fn no_guarantee(error: &DesignError) -> String {
     let DesignError::NoGuarantee {
         moment_left,
@@ -230,21 +230,21 @@ fn no_guarantee(error: &DesignError) -> String {
     else {
         return String::new();
     };
-    let mut lacks = Vec::new();
+    let mut reasons = Vec::new();
     for (what, left, limit) in [
         ("moment", *moment_left, format!("`limit_moment` = {limit_moment} N m")),
         ("rate", *rate_left, format!("`limit_rate` = {:.4} deg/s", limit_rate.to_degrees())),
     ] {
         if left <= 0.0 {
-            lacks.push(format!(
-                "the {what} that the worst disturbance takes exceeds {limit} by {:.1} %",
+            reasons.push(format!(
+                "the {what} required under the worst disturbance exceeds {limit} by {:.1} %",
                 -100.0 * left
             ));
         }
     }
-    if lacks.is_empty() {
-        lacks.push(format!(
-            "only {:.1} % of the moment and {:.1} % of the rate are left to move with",
+    if reasons.is_empty() {
+        reasons.push(format!(
+            "the worst disturbance leaves only {:.1} % of the moment and {:.1} % of the rate for manoeuvres",
             100.0 * moment_left,
             100.0 * rate_left
         ));
@@ -252,26 +252,29 @@ fn no_guarantee(error: &DesignError) -> String {
     let mut accepted = Vec::new();
     match disturbance {
         Some(bound) => {
-            accepted.push(format!("`disturbance_bound` = {:.4} deg/s2", down(bound.to_degrees())));
+            accepted.push(format!(
+                "at most `disturbance_bound` = {:.4} deg/s2",
+                down(bound.to_degrees())
+            ));
         }
         None => accepted.push("no `disturbance_bound`".into()),
     }
     if let Some((angle, rate)) = errors {
         accepted.push(format!(
-            "`angle_error` = {:.4} deg with `rate_error` = {:.4} deg/s",
+            "at most `angle_error` = {:.4} deg with `rate_error` = {:.4} deg/s",
             down(angle.to_degrees()),
             down(rate.to_degrees())
         ));
     }
     if let Some(delay) = delay {
-        accepted.push(format!("`delay` = {:.4} s", down(*delay)));
+        accepted.push(format!("at most `delay` = {:.4} s", down(*delay)));
     }
     if let Some(error) = delay_error {
-        accepted.push(format!("`delay_error` = {:.4} s", down(*error)));
+        accepted.push(format!("at most `delay_error` = {:.4} s", down(*error)));
     }
     format!(
-        "{}; with all else as it is, what would be accepted is at most {}; `guarantee` = bestEffort runs all the same, without guarantee",
-        lacks.join(" and "),
+        "{}; accepted with the other settings unchanged: {}; `guarantee` = bestEffort runs without a guarantee",
+        reasons.join(" and "),
         accepted.join(", or ")
     )
 }

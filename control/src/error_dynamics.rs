@@ -1,9 +1,9 @@
 //! Sampled error dynamics under the feedback law: the effect of a bounded disturbance.
 //!
-//! Per axis the deviation o = (angle, rate) of the vehicle from the nominal motion obeys
-//! ö = K o + Δ (Chai 2022, (22)), with K o computed every `period` and held. The bounds here are
-//! exact: they are sums of absolute impulse responses (L1 norms) under zero-order hold. The paper's
-//! c̄ is the peak of the step response instead, which holds for a constant Δ only.
+//! Per axis the deviation o = (angle, rate) of the vehicle from the nominal trajectory obeys ö = K
+//! o + Δ (Chai 2022, (22)), with K o computed every `period` and held. The bounds here are exact:
+//! they are sums of absolute impulse responses (L1 norms) under zero-order hold. The paper's c̄ is
+//! the peak of the step response instead, which holds for a constant Δ only.
 
 use nalgebra::{Matrix2, RowVector2, Vector2};
 use serde::{Deserialize, Serialize};
@@ -93,27 +93,27 @@ impl Reach {
     /// Returns the sum of each bound and its counterpart.
     #[must_use]
     pub fn plus(&self, other: &Self) -> Self {
-        self.with(other, |own, other| own + other)
+        self.with(other, |a, b| a + b)
     }
 
-    fn with(&self, other: &Self, of: impl Fn(f64, f64) -> f64) -> Self {
+    fn with(&self, other: &Self, combine: impl Fn(f64, f64) -> f64) -> Self {
         Self {
-            angle: of(self.angle, other.angle),
-            rate: of(self.rate, other.rate),
-            seen_angle: of(self.seen_angle, other.seen_angle),
-            seen_rate: of(self.seen_rate, other.seen_rate),
-            middle_angle: of(self.middle_angle, other.middle_angle),
-            middle_rate: of(self.middle_rate, other.middle_rate),
-            feedback: of(self.feedback, other.feedback),
-            feedback_age: of(self.feedback_age, other.feedback_age),
-            change: of(self.change, other.change),
+            angle: combine(self.angle, other.angle),
+            rate: combine(self.rate, other.rate),
+            seen_angle: combine(self.seen_angle, other.seen_angle),
+            seen_rate: combine(self.seen_rate, other.seen_rate),
+            middle_angle: combine(self.middle_angle, other.middle_angle),
+            middle_rate: combine(self.middle_rate, other.middle_rate),
+            feedback: combine(self.feedback, other.feedback),
+            feedback_age: combine(self.feedback_age, other.feedback_age),
+            change: combine(self.change, other.change),
         }
     }
 
     /// Returns the difference of each bound and its counterpart.
     #[must_use]
     pub fn minus(&self, other: &Self) -> Self {
-        self.with(other, |own, other| own - other)
+        self.with(other, |a, b| a - b)
     }
 
     /// Returns the larger of each bound and its counterpart.
@@ -125,7 +125,7 @@ impl Reach {
     /// Returns every bound multiplied by `size`.
     #[must_use]
     pub fn times(&self, size: f64) -> Self {
-        self.with(self, |own, _| own * size)
+        self.with(self, |value, _| value * size)
     }
 }
 
@@ -143,8 +143,8 @@ pub struct SampledError {
     to_middle: Matrix2<f64>,
 }
 
-/// The first ticks of a nominal motion, before which the prediction has begun, and by which share
-/// of itself an effect is larger there.
+/// The first ticks of a nominal trajectory, before which the prediction has begun, and the share by
+/// which an effect is larger there.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Early {
     /// Number of these ticks.
@@ -204,7 +204,7 @@ impl InvariantSet {
             middle_angle: middle(0),
             middle_rate: middle(1),
             feedback: self.support(&self.gain.row().transpose()),
-            // No use is made of these.
+            // These fields are not used.
             feedback_age: 0.0,
             change: 0.0,
         }
@@ -261,8 +261,8 @@ impl SampledError {
     /// Returns the largest effect of pulses of Δ, by which the rate jumps by at most 1 in any time
     /// as long as a period, within 0, 1, …, `steps` periods from o = 0. The units are those for a
     /// jump of the rate in rad/s: s for an angle, 1 for a rate, and 1/s for K o. A pulse may also
-    /// show later than at once, by what it changes in the mismatch, so that it counts with its
-    /// largest response over the whole time until it is seen.
+    /// act later, through the mismatch, so that it counts with its largest response over the whole
+    /// time until it is seen.
     pub fn pulses(&self, steps: usize) -> Vec<Reach> {
         // A latency that is a whole number of periods may be inexact by rounding.
         let unseen = (self.latency / self.period - 1e-9).ceil().max(0.0);
@@ -280,8 +280,8 @@ impl SampledError {
     ) -> Vec<Reach> {
         let within = (self.latency, self.latency + self.period);
         let mut reach = unseen;
-        let mut all = Vec::with_capacity(steps + 1);
-        all.push(reach);
+        let mut reaches = Vec::with_capacity(steps + 1);
+        reaches.push(reach);
         let (mut power, mut before) = (Matrix2::identity(), Matrix2::zeros());
         for n in 0..steps {
             // By now [u; 1] has become Φⁿ [u; 1].
@@ -300,11 +300,11 @@ impl SampledError {
                 feedback_age: reach.feedback_age + feedback * (within.1 + n as f64 * self.period),
                 change: reach.change + size(self.gain.row() * (power - before)),
             };
-            all.push(reach);
+            reaches.push(reach);
             before = power;
             power = self.phi * power;
         }
-        all
+        reaches
     }
 
     /// Returns the limit of [`Self::reach`] for infinitely many periods; `None` if the dynamics are
@@ -323,7 +323,7 @@ impl SampledError {
 
     /// Returns the largest effect of errors of the measured angle and of the measured rate within
     /// 0, 1, …, `steps` periods, per unit of their bound. The errors may take any value within the
-    /// bound at every tick. The motion begins at the measured state.
+    /// bound at every tick. The nominal trajectory begins at the measured state.
     pub fn errors(&self, steps: usize) -> [Vec<Reach>; 2] {
         let always = Early { ticks: 0, excess: 0.0 };
         [Vector2::new(1.0, 0.0), Vector2::new(self.latency, 1.0)]
@@ -356,9 +356,9 @@ impl SampledError {
         let weight = |j: usize| if j < early.ticks { 1.0 + early.excess } else { 1.0 };
         // Sums of the sizes of the older responses.
         let mut sums = vec![[0.0; 5]];
-        let mut all = Vec::with_capacity(steps + 1);
+        let mut reaches = Vec::with_capacity(steps + 1);
         let begin = newest.abs() * weight(0);
-        all.push(Reach { angle: begin.x, rate: begin.y, ..Reach::default() });
+        reaches.push(Reach { angle: begin.x, rate: begin.y, ..Reach::default() });
         for n in 1..=steps {
             if n > 1 {
                 let next = sum_of(sums[n - 2], sizes(&older));
@@ -371,11 +371,11 @@ impl SampledError {
                 let sum = sums[n - 1][i];
                 sum + early.excess * (sum - oldest[i])
             });
-            let own = sum_of(sum, sizes(&first).map(|size| weight(0) * size));
-            let seen = sum_of(own, sizes(&newest).map(|size| weight(n) * size));
-            all.push(Reach {
-                angle: own[0],
-                rate: own[1],
+            let actual = sum_of(sum, sizes(&first).map(|size| weight(0) * size));
+            let seen = sum_of(actual, sizes(&newest).map(|size| weight(n) * size));
+            reaches.push(Reach {
+                angle: actual[0],
+                rate: actual[1],
                 seen_angle: seen[0],
                 seen_rate: seen[1],
                 middle_angle: seen[2],
@@ -386,7 +386,7 @@ impl SampledError {
             });
             first = phi * first;
         }
-        all
+        reaches
     }
 
     /// Returns the largest effect, within 0, 1, …, `steps` periods, of changes of the rate by up
@@ -396,7 +396,7 @@ impl SampledError {
         let Self { gain, period, latency, phi, to_middle, .. } = *self;
         let mut sum = Reach::default();
         let (mut power, mut before) = (Matrix2::identity(), Matrix2::zeros());
-        let mut all = vec![sum];
+        let mut reaches = vec![sum];
         for _ in 0..steps {
             // A change at the time u before the tick has become Φⁿ [u; 1].
             let most =
@@ -415,10 +415,10 @@ impl SampledError {
                 change: most(gain.row() * (power - before)),
             });
             before = power;
-            all.push(sum);
+            reaches.push(sum);
             power = phi * power;
         }
-        all
+        reaches
     }
 
     /// Returns the largest effect of shifts of the angle alone, by at most the period at each tick,
@@ -426,8 +426,8 @@ impl SampledError {
     pub fn shifts(&self, steps: usize) -> Vec<Reach> {
         let mut shift = Vector2::new(self.period, 0.0);
         let mut reach = Reach::default();
-        let mut all = Vec::with_capacity(steps + 1);
-        all.push(reach);
+        let mut reaches = Vec::with_capacity(steps + 1);
+        reaches.push(reach);
         for _ in 0..steps {
             let middle = self.to_middle * shift;
             reach = Reach {
@@ -441,10 +441,10 @@ impl SampledError {
                 feedback_age: 0.0,
                 change: 2.0 * (reach.feedback + (self.gain.row() * shift).x.abs()),
             };
-            all.push(reach);
+            reaches.push(reach);
             shift = self.phi * shift;
         }
-        all
+        reaches
     }
 
     /// Returns a set that the deviation never leaves under any |Δ| ≤ 1 that is held over each
@@ -561,16 +561,16 @@ mod tests {
         transition(half) * deviation + response(half) * (error.gain.row() * deviation).x
     }
 
-    fn assert_agree(found: &[Reach], expected: &[[f64; 7]], tolerance: f64) {
-        for (n, (found, expected)) in found.iter().zip(expected).enumerate() {
+    fn assert_agree(computed: &[Reach], expected: &[[f64; 7]], tolerance: f64) {
+        for (n, (reach, expected)) in computed.iter().zip(expected).enumerate() {
             let Reach { angle, rate, seen_angle, seen_rate, middle_angle, middle_rate, .. } =
-                *found;
-            let found =
-                [angle, rate, seen_angle, seen_rate, middle_angle, middle_rate, found.feedback];
-            for (found, expected) in found.iter().zip(expected) {
+                *reach;
+            let values =
+                [angle, rate, seen_angle, seen_rate, middle_angle, middle_rate, reach.feedback];
+            for (value, expected) in values.iter().zip(expected) {
                 assert!(
-                    (found - expected).abs() <= tolerance * (1.0 + expected),
-                    "tick {n}: {found} {expected}"
+                    (value - expected).abs() <= tolerance * (1.0 + expected),
+                    "tick {n}: {value} {expected}"
                 );
             }
         }
@@ -578,11 +578,11 @@ mod tests {
 
     #[test]
     fn oracle_errors_of_measurement_add_up_as_in_a_simulation() {
-        for (of, latency) in [(0, 0.0), (0, 0.05), (1, 0.0), (1, 0.05)] {
+        for (component, latency) in [(0, 0.0), (0, 0.05), (1, 0.0), (1, 0.05)] {
             let error = SampledError::delayed(Gain { k1: -5.0, k2: -4.0 }, 0.04, latency);
             let steps = 12;
             let expected = superposed(steps, steps + 1, |at| {
-                let error_of_state = [Vector2::x(), Vector2::new(latency, 1.0)][of];
+                let error_of_state = [Vector2::x(), Vector2::new(latency, 1.0)][component];
                 let off = |n: usize| error_of_state * if n == at { 1.0 } else { 0.0 };
                 let mut deviation = -off(0);
                 (0..=steps)
@@ -604,7 +604,7 @@ mod tests {
                     })
                     .collect()
             });
-            assert_agree(&error.errors(steps)[of], &expected, 1e-12);
+            assert_agree(&error.errors(steps)[component], &expected, 1e-12);
         }
     }
 
@@ -627,7 +627,7 @@ mod tests {
                     .map(|n| {
                         let time = f64::from(n) * period;
                         let free = (time - begins).max(0.0);
-                        // Before a measurement has seen the pulse, the motion is free.
+                        // Before a measurement has seen the pulse, the vehicle moves freely.
                         let fresh = if free > 0.0 && free < latency {
                             Vector2::new(free, 1.0)
                         } else {
@@ -639,10 +639,10 @@ mod tests {
                                 seen = Vector2::new(free, 1.0);
                             }
                         }
-                        let own = seen + fresh;
+                        let actual = seen + fresh;
                         let middle = in_the_middle(&error, &seen);
                         let feedback = (error.gain.row() * seen).x;
-                        [own.x, own.y, seen.x, seen.y, middle.x, middle.y, feedback]
+                        [actual.x, actual.y, seen.x, seen.y, middle.x, middle.y, feedback]
                             .map(|value| value * pulse)
                     })
                     .collect()
@@ -658,9 +658,9 @@ mod tests {
         for ticks in [0, 1, 3] {
             let early = Early { ticks, excess: 0.3 };
             let weight = |j: usize| if j < ticks { 1.3 } else { 1.0 };
-            let sized = |own: Vector2<f64>, seen: Vector2<f64>| {
+            let sized = |actual: Vector2<f64>, seen: Vector2<f64>| {
                 let (middle, k) = (in_the_middle(&error, &seen), error.gain.row());
-                [own.x, own.y, seen.x, seen.y, middle.x, middle.y, (k * seen).x]
+                [actual.x, actual.y, seen.x, seen.y, middle.x, middle.y, (k * seen).x]
             };
             // Source j is a change before tick j + 1.
             let [old, new] = [0.117 + tau, 0.0].map(|u| {
@@ -679,8 +679,8 @@ mod tests {
             });
             let changes = early.count(&error.changes(steps));
             for n in 0..=steps {
-                for (of, value) in [(1, changes[n].rate), (6, changes[n].feedback)] {
-                    let (old, new) = (old[n][of], new[n][of]);
+                for (component, value) in [(1, changes[n].rate), (6, changes[n].feedback)] {
+                    let (old, new) = (old[n][component], new[n][component]);
                     let (low, high) = (old.max(new) - 1e-12, old + new + 1e-12);
                     assert!(low <= value && value <= high, "{n}: {old} {new} {value}");
                 }

@@ -1,5 +1,5 @@
-//! Body rates, control moment and input as functions of the nominal motion (Θ, x_ω, a), a = ẋ_ω,
-//! with exact derivatives.
+//! Body rates, control moment and input as functions of the nominal state and acceleration (Θ, x_ω,
+//! a), a = ẋ_ω, with exact derivatives.
 //!
 //! ω = W x_ω with W = R⁻¹ (Chai 2022, proof of Lemma 1), hence ω̇ = W a + Ẇ x_ω, and from Euler's
 //! equation and u = R I⁻¹ m (4)
@@ -152,7 +152,7 @@ impl InverseKinematics {
     }
 }
 
-/// Properties of a motion at given angles and rates, for any acceleration.
+/// Body rates and moment at given angles and rates, for any acceleration.
 #[derive(Clone, Copy, Debug)]
 pub struct BodyMotion {
     /// Body rates ω, rad/s.
@@ -182,8 +182,8 @@ pub fn body_rates(angles: &Vector3<f64>, angle_rates: &Vector3<f64>) -> Vector3<
     InverseKinematics::at(angles).w(angle_rates)
 }
 
-/// Returns the control moment that gives the nominal motion the acceleration `a` (rad/s²): m = I
-/// R⁻¹ (a − f), N m.
+/// Returns the control moment that gives the nominal model the acceleration `a` (rad/s²): m = I R⁻¹
+/// (a − f), N m.
 pub fn moment(
     body: &RigidBody,
     angles: &Vector3<f64>,
@@ -203,7 +203,7 @@ pub fn input(
     InverseKinematics::at(angles).input(body, angle_rates, acceleration)
 }
 
-/// Body rates and moment with their derivatives at one point of a motion.
+/// Body rates and moment with their derivatives at one point (Θ, x_ω, a).
 #[derive(Clone, Copy, Debug)]
 pub struct Linearisation {
     /// Body rates ω with derivatives, rad/s.
@@ -274,8 +274,8 @@ impl InverseKinematics {
 /// and is below 5/2 at any β.
 pub const TURN_BY_ANGLES: f64 = 1.581_138_830_084_189_8;
 
-/// Bounds on the derivatives of the moment that follow from the size of a motion alone, relative to
-/// the largest moment of inertia.
+/// Bounds on the derivatives of the moment that follow from the sizes of x_ω and a alone, relative
+/// to the largest moment of inertia.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MomentSlopeBounds {
     /// Bound on ‖∂m/∂(α, β)‖ (Frobenius).
@@ -413,7 +413,7 @@ mod tests {
             let at = |i: usize| Vector3::new(z[i], z[i + 1], z[i + 2]);
             (at(0), at(3), at(6))
         };
-        let all = |z: &[f64; 9]| {
+        let quantities = |z: &[f64; 9]| {
             let (angles, rates, a) = split(z);
             [
                 body_rates(&angles, &rates),
@@ -425,7 +425,7 @@ mod tests {
         let exact = linearise(&body, &angles, &rates, &a);
         let exact_input = InverseKinematics::at(&angles).input_of_moment(&body, &exact.moment);
         for (y, linear) in [exact.rates, exact.moment, exact_input].iter().enumerate() {
-            assert!((linear.value - all(&point)[y]).norm() <= 1e-12 * linear.value.norm());
+            assert!((linear.value - quantities(&point)[y]).norm() <= 1e-12 * linear.value.norm());
             let motion = InverseKinematics::at(&angles).motion(&body, &rates);
             assert!(
                 (motion.moment(&a) - exact.moment.value).norm()
@@ -436,7 +436,7 @@ mod tests {
                 let (mut plus, mut minus) = (point, point);
                 plus[i] += step;
                 minus[i] -= step;
-                let numeric = (all(&plus)[y] - all(&minus)[y]) / (2.0 * step);
+                let numeric = (quantities(&plus)[y] - quantities(&minus)[y]) / (2.0 * step);
                 let analytic = match i {
                     0 | 1 => linear.by_angles.column(i).into_owned(),
                     2 => Vector3::zeros(),

@@ -1,20 +1,22 @@
-//! Estimate of the delay of a controller's own loop, from its commands and the measured rates.
+//! Estimate of the delay of the loop that a controller closes, from its commands and the measured
+//! rates.
 //!
-//! In many tools nobody knows how long a loop takes from a measurement to the moment that results
-//! from it. The vehicle shows it: its angular acceleration over a period is I⁻¹ (m − ω × I ω) with
-//! the moment m that acts then, and a disturbance. For a delay of (j + f) τ, m is the mean (1 − f)
-//! m_{k−1−j} + f m_{k−2−j} of two commands. The estimate is the delay that leaves least
-//! unexplained, by least squares: of the acceleration, if the disturbance is like noise, of its
-//! change from period to period, if it seldom changes, or of the change of that, if it changes
-//! smoothly. A factor that the inertia is wrong by is found beside it. Periods that no delay
-//! explains, such as those in which the disturbance jumps, count less.
+//! With many importers nobody knows how long a loop takes from a measurement to the moment that
+//! results from it. The measured rates show it: the angular acceleration over a period is I⁻¹ (m −
+//! ω × I ω) with the moment m that acts then, plus a disturbance. For a delay of (j + f) τ, m is
+//! the mean (1 − f) m_{k−1−j} + f m_{k−2−j} of two commands. The estimate is the delay with the
+//! smallest residual in the least-squares sense: of the acceleration, if the disturbance is like
+//! noise; of its first difference from period to period, if the disturbance seldom changes; or of
+//! its second difference, if it changes smoothly. A common factor of the inertia error is estimated
+//! with it. Periods that no delay explains, such as those in which the disturbance jumps, have a
+//! smaller weight.
 //!
 //! This is a prediction-error method (L. Ljung, System Identification, 1999, section 13.4), which
-//! may be used in a closed loop: at the right delay, what is left is new, and no earlier command is
-//! related to it. That is not so for noise of the measurements, to which the next command responds
-//! while the noise itself looks like an acceleration, nor for a disturbance that repeats itself.
-//! Where a law says what its assumptions explain, another delay is therefore only said to be there
-//! if the motion shows more than that with the delay that was told.
+//! may be used in a closed loop: at the right delay the residual is not correlated with any earlier
+//! command. That is not so for noise of the measurements, to which the next command responds while
+//! the noise itself looks like an acceleration, nor for a disturbance that repeats itself. Where a
+//! law states the acceleration that its assumptions explain, another delay is therefore reported
+//! only if the measurements show more than that with the declared delay.
 
 use crate::controller::{Explained, Measurement};
 use nalgebra::Vector3;
@@ -23,26 +25,26 @@ use vehicle::dynamics::RigidBody;
 use vehicle::kinematics;
 use vehicle::math::exp;
 
-/// Number of periods by which a delay may differ from the one that was told to be found.
+/// Largest difference from the declared delay that can be found, in periods.
 const FURTHER: usize = 4;
 /// Time after which a period counts by 1/e, s.
 const FORGETTING: f64 = 15.0;
-/// Smallest evidence for an estimate: what another delay leaves unexplained beyond what the
-/// estimated one does, relative to the mean square of a component.
+/// Smallest evidence for an estimate: the residual of another delay beyond that of the estimated
+/// one, relative to the mean square of a component.
 const EVIDENCE: f64 = 20.0;
-/// Shortest motion for an estimate, s, and in periods; number of periods from one estimate to the
+/// Shortest record for an estimate, s, and in periods; number of periods from one estimate to the
 /// next.
-const MOTION: f64 = 1.0;
+const SHORTEST_RECORD: f64 = 1.0;
 const PERIODS: u32 = 20;
 const PAUSE: u32 = 5;
 /// Parts of a period to which a delay is estimated.
 const PARTS: usize = 4;
-/// Size of what the best delay leaves of a period, relative to the root mean square, beyond which
-/// the period counts less.
+/// Residual of a period with the best delay, relative to the root mean square, above which the
+/// period has a smaller weight.
 const USUAL: f64 = 3.0;
 /// Acceleration below which nothing is evidence, because the model is not exact, rad/s².
 const FLOOR: f64 = 1e-3;
-/// Largest factor that the inertia may be wrong by.
+/// Largest factor between the actual and the assumed inertia.
 const GAIN: f64 = 1.25;
 
 /// Estimate of the delay, with the sums from which it follows.
@@ -54,27 +56,29 @@ pub struct LoopDelay {
     rates: Option<Vector3<f64>>,
     /// Accelerations over the last periods, the newest first, rad/s², and their number.
     accelerations: [Vector3<f64>; ORDERS],
-    known: usize,
-    /// Fits of the acceleration, of its change, and of the change of that.
+    #[serde(rename = "known")]
+    available: usize,
+    /// Fits of the acceleration, and of its first and second differences.
     fits: [Fit; ORDERS],
     /// Number of periods in the fits.
     periods: u32,
-    /// Number of further periods in which an acceleration that nothing explains still counts.
+    /// Number of further periods for which an unexplained acceleration is remembered.
     unexplained: u32,
     /// Whether the law's assumptions do not explain the acceleration over the last period.
     pub is_unexplained: bool,
-    /// Estimated delay, s, if the motion tells it.
+    /// Estimated delay, s, if the measurements suffice for an estimate.
     pub estimate: Option<f64>,
-    /// Whether it differs from the delay that was told by more than half a period and what was said
-    /// of its error, and the law's assumptions do not explain the motion with the latter.
+    /// Whether it differs from the declared delay by more than half a period plus the declared
+    /// error of the delay, and the law's assumptions do not explain the measurements with the
+    /// declared delay.
     pub is_other: bool,
 }
 
 /// Number of fits: of differences of order 0, 1 and 2.
 const ORDERS: usize = 3;
 
-/// Sums over the periods from which it follows what a delay leaves unexplained of y, the
-/// acceleration or a difference of it.
+/// Sums over the periods from which the residual of a delay follows; y is the acceleration or a
+/// difference of it.
 #[derive(Debug, Default, PartialEq, Serialize, Deserialize)]
 struct Fit {
     /// Sum of y · y, (rad/s²)².
@@ -99,16 +103,16 @@ struct Sums {
     product: f64,
 }
 
-/// What the estimate is made with.
+/// Settings of the estimate.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LoopDelaySettings {
     /// Model of the vehicle.
     pub body: RigidBody,
     /// Time between two ticks, s.
     pub period: f64,
-    /// Delay that was told, s.
-    pub told: f64,
-    /// What the law's assumptions explain of the acceleration with that delay, if it has any.
+    /// Declared delay, s.
+    pub declared: f64,
+    /// Acceleration that the law's assumptions explain with that delay, if it has any.
     pub explained: Option<Explained>,
     /// Whether measurements are old when they arrive. They come through a filter then, and their
     /// noise would be taken for a response: no estimate is made.
@@ -116,14 +120,14 @@ pub struct LoopDelaySettings {
 }
 
 impl LoopDelaySettings {
-    /// Returns the least delay that is compared with the one that was told, in periods.
+    /// Returns the smallest delay that is examined, in periods.
     fn first(&self) -> usize {
-        ((self.told / self.period) as usize).saturating_sub(FURTHER)
+        ((self.declared / self.period) as usize).saturating_sub(FURTHER)
     }
 
-    /// Returns the number of delays of whole periods that are compared.
+    /// Returns the number of delays of whole periods that are examined.
     fn candidates(&self) -> usize {
-        (self.told / self.period).ceil() as usize + FURTHER + 1 - self.first()
+        (self.declared / self.period).ceil() as usize + FURTHER + 1 - self.first()
     }
 
     /// Returns the number of commands that are remembered.
@@ -143,7 +147,7 @@ impl LoopDelaySettings {
     /// Returns whether a restored memory has the right shape.
     pub fn fits(&self, memory: &LoopDelay) -> bool {
         memory.commands.len() <= self.remembered()
-            && memory.known <= ORDERS
+            && memory.available <= ORDERS
             && memory.fits.iter().all(|fit| fit.sums.len() == self.candidates())
     }
 
@@ -151,7 +155,7 @@ impl LoopDelaySettings {
     pub fn observe(&self, memory: &mut LoopDelay, measured: &Measurement) {
         memory.is_unexplained = false;
         if self.is_filtered || measured.stale || measured.achieved_moment.is_some() {
-            (memory.rates, memory.known) = (None, 0);
+            (memory.rates, memory.available) = (None, 0);
             return;
         }
         let Some(before) = memory.rates.replace(measured.rates) else { return };
@@ -160,9 +164,9 @@ impl LoopDelaySettings {
         memory.accelerations.rotate_right(1);
         memory.accelerations[0] =
             (measured.rates - before) / *period + body.inverse * mean.cross(&(body.inertia * mean));
-        memory.known = ORDERS.min(memory.known + 1);
-        // Before the first commands, importers differ in what acts.
-        if memory.known == ORDERS && memory.commands.len() == self.remembered() {
+        memory.available = ORDERS.min(memory.available + 1);
+        // Before the first commands, the acting moment depends on the importer.
+        if memory.available == ORDERS && memory.commands.len() == self.remembered() {
             memory.is_unexplained = self
                 .explained
                 .is_some_and(|explained| !self.explains(explained, memory, &measured.angles));
@@ -175,8 +179,8 @@ impl LoopDelaySettings {
         }
     }
 
-    /// Returns whether the law's assumptions explain the acceleration over the last period with
-    /// some delay that is not another one than was told.
+    /// Returns whether the law's assumptions explain the acceleration over the last period with the
+    /// declared delay or with one at the ends of its interval.
     fn explains(&self, explained: Explained, memory: &LoopDelay, angles: &Vector3<f64>) -> bool {
         let Explained { disturbance, share, delay_error } = explained;
         let r = kinematics::r(angles);
@@ -187,7 +191,7 @@ impl LoopDelaySettings {
             let (left, command) = (r * (memory.accelerations[0] - command), r * command);
             (0..3).all(|i| left[i].abs() <= disturbance + share * command[i].abs() + FLOOR)
         };
-        [0.0, -delay_error, delay_error].into_iter().any(|error| explains(self.told + error))
+        [0.0, -delay_error, delay_error].into_iter().any(|error| explains(self.declared + error))
     }
 
     /// Returns the acceleration by the moment that acts over the last period if the delay is the
@@ -218,20 +222,20 @@ impl LoopDelaySettings {
 
     /// Adds the last period to the fits, and makes the estimate anew from time to time.
     fn weigh(&self, memory: &mut LoopDelay) {
-        let kept = exp(-self.period / FORGETTING);
+        let retained = exp(-self.period / FORGETTING);
         let commands = &memory.commands[self.first()..];
         let best = memory.fits.iter().map(|fit| fit.scale).fold(f64::INFINITY, f64::min);
         for (order, fit) in memory.fits.iter_mut().enumerate() {
             let y = difference(order, &memory.accelerations);
-            let weight = fit.add(kept, &y, |j| difference(order, &commands[j..]));
+            let weight = fit.add(retained, &y, |j| difference(order, &commands[j..]));
             if weight < 1.0 && fit.scale <= best {
                 // A jump within a period shows in the next one too, when the law responds to it.
-                memory.known = 0;
+                memory.available = 0;
             }
         }
         memory.periods = memory.periods.saturating_add(1);
         let suffices =
-            memory.periods >= PERIODS && f64::from(memory.periods) * self.period >= MOTION;
+            memory.periods >= PERIODS && f64::from(memory.periods) * self.period >= SHORTEST_RECORD;
         if suffices && memory.periods.is_multiple_of(PAUSE) {
             self.estimate(memory);
         }
@@ -239,17 +243,17 @@ impl LoopDelaySettings {
 
     fn estimate(&self, memory: &mut LoopDelay) {
         let places = memory.fits.each_mut().map(Fit::least);
-        let told = self.told / self.period - self.first() as f64;
+        let declared = self.declared / self.period - self.first() as f64;
         let error = self.explained.map_or(0.0, |explained| explained.delay_error);
         let slack = 0.5 + error / self.period;
-        // Where several leave next to nothing, the highest difference is the least misled by a
-        // smooth disturbance.
+        // Among fits with nearly the same residual, a smooth disturbance misleads that of the
+        // highest difference least.
         let best = memory.fits.iter().zip(places).rev();
         let best = best.min_by(|(a, _), (b, _)| a.scale.total_cmp(&b.scale));
         let Some((fit, place)) = best else { return };
         let delay = (self.first() as f64 + place) * self.period;
-        memory.estimate = fit.tells(place, (told, slack)).then_some(delay);
-        let is_other = memory.estimate.is_some() && (place - told).abs() > slack;
+        memory.estimate = fit.suffices(place, (declared, slack)).then_some(delay);
+        let is_other = memory.estimate.is_some() && (place - declared).abs() > slack;
         memory.is_other = is_other && (self.explained.is_none() || memory.unexplained > 0);
     }
 }
@@ -269,63 +273,69 @@ impl Fit {
     }
 
     /// Adds a period with `y`; `command` returns u for a number of periods of delay. Earlier
-    /// periods are `kept` by this share. Returns the weight of the period, which is below 1 if no
+    /// periods keep the weight `retained`. Returns the weight of the period, which is below 1 if no
     /// delay explains it.
-    fn add(&mut self, kept: f64, y: &Vector3<f64>, command: impl Fn(usize) -> Vector3<f64>) -> f64 {
+    fn add(
+        &mut self,
+        retained: f64,
+        y: &Vector3<f64>,
+        command: impl Fn(usize) -> Vector3<f64>,
+    ) -> f64 {
         let last = self.sums.len() - 1;
         let left = |j| (y - command(j)).norm_squared();
         let least = (0..=last).map(left).fold(f64::INFINITY, f64::min);
         let usual = USUAL * USUAL * 3.0 * self.scale;
         let weight = if self.scale > 0.0 && least > usual { usual / least } else { 1.0 };
-        let mut here = command(0);
+        let mut present = command(0);
         for (j, sums) in self.sums.iter_mut().enumerate() {
             let next = command((j + 1).min(last));
-            sums.explained = kept * sums.explained + weight * y.dot(&here);
-            sums.square = kept * sums.square + weight * here.norm_squared();
-            sums.product = kept * sums.product + weight * here.dot(&next);
-            here = next;
+            sums.explained = retained * sums.explained + weight * y.dot(&present);
+            sums.square = retained * sums.square + weight * present.norm_squared();
+            sums.product = retained * sums.product + weight * present.dot(&next);
+            present = next;
         }
-        self.square = kept * self.square + weight * y.norm_squared();
-        self.count = kept * self.count + weight;
+        self.square = retained * self.square + weight * y.norm_squared();
+        self.count = retained * self.count + weight;
         weight
     }
 
-    /// Returns the number of periods of delay, from the first on, that leaves least.
+    /// Returns the delay with the smallest residual, in periods from the first on.
     fn least(&mut self) -> f64 {
         let places = (0..=(self.sums.len() - 1) * PARTS).map(|part| part as f64 / PARTS as f64);
-        let all = places.map(|place| (place, self.unexplained(place)));
-        let (place, least) =
-            all.fold((0.0, f64::INFINITY), |least, one| if one.1 < least.1 { one } else { least });
+        let candidates = places.map(|place| (place, self.unexplained(place)));
+        let (place, least) = candidates
+            .fold((0.0, f64::INFINITY), |least, one| if one.1 < least.1 { one } else { least });
         self.scale = (least / (3.0 * self.count)).max(FLOOR * FLOOR);
         place
     }
 
-    /// Returns whether the evidence suffices to prefer `place`, which leaves least, to the delay
-    /// that was `told` with some slack, or to any other by a period; all in periods. The commands
-    /// must explain something at all: they do not act on a vehicle that rests.
-    fn tells(&self, place: f64, (told, slack): (f64, f64)) -> bool {
+    /// Returns whether the evidence suffices to prefer `place`, which has the smallest residual, to
+    /// the `declared` delay with some slack, or to a delay that differs by a period; all in
+    /// periods. The commands must also explain a part of y, which they do not while the vehicle is
+    /// at rest.
+    fn suffices(&self, place: f64, (declared, slack): (f64, f64)) -> bool {
         let least = self.unexplained(place);
         let is_evidence = |left: f64| left - least > EVIDENCE * self.scale;
         let against = |other: f64| is_evidence(self.unexplained(other));
         if !is_evidence(self.square) {
             return false;
         }
-        if (place - told).abs() > slack {
-            return against(told);
+        if (place - declared).abs() > slack {
+            return against(declared);
         }
         against(place + 1.0) && (place < 1.0 || against(place - 1.0))
     }
 
-    /// Returns the sum of the squares that a delay of this many periods leaves, with the factor of
-    /// the inertia that fits best, (rad/s²)².
+    /// Returns the sum of the squared residuals for a delay of this many periods, with the factor
+    /// of the inertia that fits best, (rad/s²)².
     fn unexplained(&self, place: f64) -> f64 {
         let j = (place as usize).min(self.sums.len() - 2);
         let f = (place - j as f64).min(1.0);
-        let (here, next) = (&self.sums[j], &self.sums[j + 1]);
-        let explained = (1.0 - f) * here.explained + f * next.explained;
-        let square = (1.0 - f) * (1.0 - f) * here.square
-            + 2.0 * f * (1.0 - f) * here.product
-            + f * f * next.square;
+        let (lower, upper) = (&self.sums[j], &self.sums[j + 1]);
+        let explained = (1.0 - f) * lower.explained + f * upper.explained;
+        let square = (1.0 - f) * (1.0 - f) * lower.square
+            + 2.0 * f * (1.0 - f) * lower.product
+            + f * f * upper.square;
         let gain = if square > 0.0 { explained / square } else { 1.0 };
         let gain = gain.clamp(1.0 / GAIN, GAIN);
         self.square - gain * (2.0 * explained - gain * square)
@@ -356,7 +366,7 @@ impl Clone for LoopDelay {
             commands,
             rates,
             accelerations,
-            known,
+            available,
             fits,
             periods,
             unexplained,
@@ -368,7 +378,7 @@ impl Clone for LoopDelay {
         for (fit, source) in self.fits.iter_mut().zip(fits) {
             fit.clone_from(source);
         }
-        (self.rates, self.accelerations, self.known) = (*rates, *accelerations, *known);
+        (self.rates, self.accelerations, self.available) = (*rates, *accelerations, *available);
         (self.periods, self.unexplained) = (*periods, *unexplained);
         self.is_unexplained = *is_unexplained;
         (self.estimate, self.is_other) = (*estimate, *is_other);

@@ -140,13 +140,18 @@ mod tests {
         let moment = law.command(&mut (), 0, 0.0, &measured, &|_| reference);
         let rates = kinematics::r(&measured.angles) * measured.rates;
         let acceleration = body.angular_acceleration(&measured.rates, &moment);
-        let found: Vector3<f64> = kinematics::r_dot(&measured.angles, &rates) * measured.rates
+        let acceleration: Vector3<f64> = kinematics::r_dot(&measured.angles, &rates)
+            * measured.rates
             + kinematics::r(&measured.angles) * acceleration;
         for (i, Gain { k1, k2 }) in law.gains().into_iter().enumerate() {
-            let wanted = reference.accelerations[i]
+            let required = reference.accelerations[i]
                 + k1 * (measured.angles[i] - reference.angles[i])
                 + k2 * (rates[i] - reference.rates[i]);
-            assert!((found[i] - wanted).abs() < 1e-14, "{i}: {} {wanted}", found[i]);
+            assert!(
+                (acceleration[i] - required).abs() < 1e-14,
+                "{i}: {} {required}",
+                acceleration[i]
+            );
         }
     }
 

@@ -4,17 +4,18 @@ use crate::mpc;
 use serde::{Deserialize, Serialize};
 use std::time::Instant;
 
-/// The way in which the last plan was found.
+/// How the plan in force came about.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Status {
+pub enum SolverStatus {
     /// No optimisation has been run yet.
     #[default]
     None,
     /// The unconstrained optimum satisfies every constraint exactly, so it is the optimum.
     Unconstrained,
-    /// The optimum with the terminal ball alone satisfies every other constraint exactly, so it is
-    /// the optimum.
-    TerminalBall,
+    /// The optimum with the terminal constraint alone satisfies every other constraint exactly, so
+    /// it is the optimum.
+    #[serde(rename = "TerminalBall")]
+    TerminalConstraint,
     /// The Riccati method found the optimum.
     Constrained,
     /// The cone solver found the optimum.
@@ -27,17 +28,17 @@ pub enum Status {
     Kept,
 }
 
-/// The figures that an optimisation reports.
+/// What an optimisation reports.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Report {
+pub struct SolverReport {
     /// Origin of the plan in force.
-    pub status: Status,
+    pub status: SolverStatus,
     /// Cost of the optimum, or of the shifted plan in a fallback.
     pub cost: f64,
     /// Iterations of the solvers, summed over their passes.
     pub iterations: u32,
     /// Relative residual of the conditions of optimality with the constraints as functions of the
-    /// motion; in a fallback that of the shifted plan.
+    /// trajectory; in a fallback that of the shifted plan.
     pub residual: f64,
     /// Wall-clock time of the last optimisation, s; not reproducible.
     pub time: f64,
@@ -49,16 +50,17 @@ pub struct Report {
     pub exhausted: u32,
 }
 
-impl Report {
+impl SolverReport {
     /// Records the outcome of an optimisation that began at `clock`, and whether its budget ended
     /// it.
-    pub(crate) fn record(&mut self, ended: &mpc::Report, exhausted: bool, clock: Instant) {
+    pub(crate) fn record(&mut self, ended: &mpc::OptimiserReport, exhausted: bool, clock: Instant) {
         self.status = ended.status;
         self.cost = ended.certificate.cost;
         self.iterations = ended.iterations;
         self.residual = ended.certificate.residual();
         self.solves = self.solves.saturating_add(1);
-        self.fallbacks = self.fallbacks.saturating_add(u32::from(ended.status == Status::Fallback));
+        self.fallbacks =
+            self.fallbacks.saturating_add(u32::from(ended.status == SolverStatus::Fallback));
         self.exhausted = self.exhausted.saturating_add(u32::from(exhausted));
         self.time = clock.elapsed().as_secs_f64();
     }

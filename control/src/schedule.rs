@@ -1,5 +1,5 @@
-//! The sampled side of a controller on integer ticks: t_k = t₀ + k·period, never accumulated. The
-//! schedule is the only one who knows start and period at run time.
+//! The sampled side of a controller on integer ticks: t_k = t₀ + k·period, never accumulated. At
+//! run time the schedule alone knows start and period.
 
 use crate::controller::{Controller, Measurement, Preview};
 use nalgebra::Vector3;
@@ -10,10 +10,10 @@ use vehicle::time::{check_resolution, tick_time, tick_tolerance};
 /// Largest number of a tick; beyond it the time of a tick is not exact.
 const LAST_TICK: u64 = 1 << 53;
 
-/// Memory of a sampled unit, its period and its position in time. At a tick the output is a
-/// function of the committed memory and of the present input. It may be evaluated any number of
-/// times, and is committed when time leaves the tick. Attitude controllers have the default input
-/// and output.
+/// Memory of a sampled controller or estimator, its period and its position in time. At a tick the
+/// output is a function of the committed memory and of the present input. It may be evaluated any
+/// number of times, and is committed when time leaves the tick. Attitude controllers have the
+/// default input and output.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Sampled<Memory, Input = ControllerInput, Output = Vector3<f64>> {
     start: f64,
@@ -68,7 +68,7 @@ where
         self.next > 0
     }
 
-    /// Returns whether a unit with this `period` (s) can be in this state at `time` (s) in an
+    /// Returns whether an instance with this `period` (s) can be in this state at `time` (s) in an
     /// experiment that began at `start` (s). All earlier ticks must be committed and, unless a step
     /// has `failed` in the middle, no later ones. `fits` checks each memory.
     pub fn fits(

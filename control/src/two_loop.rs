@@ -309,8 +309,8 @@ impl TwoLoopSmc {
         Ok(Self { settings })
     }
 
-    /// Returns the filtered command. It starts at the measured motion and follows a smooth
-    /// reference without lag.
+    /// Returns the filtered command. It starts at the measured angles and rates and follows a
+    /// smooth reference without lag.
     fn filter(
         &self,
         memory: &TwoLoopMemory,
@@ -403,7 +403,7 @@ impl Controller for TwoLoopSmc {
         let s_n = inner.sliding(&omega_e, &memory.inner_integral);
         let acceleration =
             omega_c_dot + inner.k().component_mul(&omega_e) + inner.layer.value(&s_n) * inner_sign;
-        let wanted = body.inertia * acceleration + rates.cross(&(body.inertia * rates));
+        let moment = body.inertia * acceleration + rates.cross(&(body.inertia * rates));
 
         *memory = TwoLoopMemory {
             started: true,
@@ -414,10 +414,10 @@ impl Controller for TwoLoopSmc {
             outer_sliding: s_w,
             inner_sliding: s_n,
             rate_command: omega_c,
-            commanded: Commanded::new(measured, wanted),
+            commanded: Commanded::new(measured, moment),
             ..*memory
         };
-        wanted
+        moment
     }
 
     fn limited(&mut self, memory: &mut TwoLoopMemory, applied: &Vector3<f64>) {

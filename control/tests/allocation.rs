@@ -2,7 +2,9 @@
 //! selector of Jia et al.
 
 use control::allocation::pwpf::Modulator;
-use control::allocation::{Allocator, Command, JetCommand, Memory, Method, Settings, Status};
+use control::allocation::{
+    AllocationStatus, Allocator, Command, JetCommand, Memory, Method, Settings,
+};
 use control::error::DesignError;
 use nalgebra::Vector3;
 use vehicle::effectors::{Effectors, SURFACES};
@@ -28,7 +30,7 @@ fn settled(allocator: &mut Allocator, samples: u64, command: &Command) -> Memory
     let mut memory = Memory::default();
     for tick in 0..samples {
         allocator.update(&mut memory, tick, command);
-        assert_eq!(memory.report.status, Status::Optimal, "{tick}");
+        assert_eq!(memory.report.status, AllocationStatus::Optimal, "{tick}");
     }
     memory
 }
@@ -80,7 +82,7 @@ fn published_limits_hold_at_every_sample_of_200_random_cases() {
                 let before = memory;
                 allocator.update(&mut memory, tick, &command);
                 let what = format!("case {case}, {method:?}, sample {tick}");
-                assert_eq!(memory.report.status, Status::Optimal, "{what}");
+                assert_eq!(memory.report.status, AllocationStatus::Optimal, "{what}");
                 assert_within_limits(&before, &memory, &what);
                 let matrix = Effectors::published();
                 let achieved = matrix
@@ -118,10 +120,10 @@ fn oracle_duty_cycles_of_the_modulator() {
         let exact = pulse / (pulse + pause);
         assert!((exact - rounded).abs() <= 0.005, "{duty}: {exact}");
         // Pulse and pause each end up to one evaluation of 1 ms late.
-        let found = duty_cycle(duty);
+        let computed = duty_cycle(duty);
         let slack = pwpf.period / (pulse + pause);
-        assert!((found - exact).abs() <= slack, "{duty}: {found} instead of {exact}");
-        assert!((found - rounded).abs() <= 0.006, "{duty}: {found} instead of {rounded}");
+        assert!((computed - exact).abs() <= slack, "{duty}: {computed} instead of {exact}");
+        assert!((computed - rounded).abs() <= 0.006, "{duty}: {computed} instead of {rounded}");
     }
     // The dead band is u_on/K_m.
     assert_eq!(duty_cycle(0.0999), 0.0);
@@ -130,12 +132,12 @@ fn oracle_duty_cycles_of_the_modulator() {
 
 #[test]
 fn surfaces_alone_give_what_they_can_once_the_rate_let_them() {
-    let wanted = command([1e4, -1e4, -3e3], PRESSURE);
+    let commanded = command([1e4, -1e4, -3e3], PRESSURE);
     let mut optimal = allocator(Method::Optimal);
-    let memory = settled(&mut optimal, 1, &wanted);
+    let memory = settled(&mut optimal, 1, &commanded);
     assert!(memory.duty.sum() > 0.1, "the rate leaves most to the jets at first");
     assert!(memory.residual.norm() < 1e-3 && memory.surfaces.amax() <= 0.1f64.to_radians());
-    let memory = settled(&mut optimal, 300, &wanted);
+    let memory = settled(&mut optimal, 300, &commanded);
     assert!(memory.duty.sum() < 1e-6 && memory.residual.norm() < 1e-3, "{memory:?}");
 }
 
@@ -143,21 +145,21 @@ fn surfaces_alone_give_what_they_can_once_the_rate_let_them() {
 fn blending_uses_surfaces_first_and_above_the_threshold_only() {
     let mut blending = allocator(Method::Blending);
     let threshold = Settings::published().threshold;
-    let wanted = [1e4, -1e4, -3e3];
-    let memory = settled(&mut blending, 300, &command(wanted, threshold - 1.0));
+    let commanded = [1e4, -1e4, -3e3];
+    let memory = settled(&mut blending, 300, &command(commanded, threshold - 1.0));
     assert_eq!(memory.surfaces.amax(), 0.0);
     assert!(memory.duty.sum() > 0.5 && memory.residual.norm() < 1e-3);
 
-    let memory = settled(&mut blending, 300, &command(wanted, PRESSURE));
+    let memory = settled(&mut blending, 300, &command(commanded, PRESSURE));
     assert!(memory.duty.sum() < 1e-6 && memory.residual.norm() < 1e-3, "{memory:?}");
 
     // The moment exceeds the position limits, so that the remainder goes to the jets.
-    let wanted = command([0.0, -3.2e5, 0.0], PRESSURE);
-    let memory = settled(&mut blending, 600, &wanted);
+    let commanded = command([0.0, -3.2e5, 0.0], PRESSURE);
+    let memory = settled(&mut blending, 600, &commanded);
     let effectors = Effectors::published();
     // An interior-point solution comes only close to a limit.
     assert!((memory.surfaces[4] - effectors.max[4]).abs() < 1e-6, "{}", memory.surfaces);
-    let rest = wanted.moment - effectors.moment_of_surfaces(&memory.surfaces, PRESSURE);
+    let rest = commanded.moment - effectors.moment_of_surfaces(&memory.surfaces, PRESSURE);
     assert!((effectors.moment_of_jets(&memory.duty) - (rest - memory.residual)).norm() < 1e-6);
     assert!(memory.duty.sum() > 1.0);
 }
@@ -186,9 +188,9 @@ fn without_an_optimum_the_previous_allocation_is_kept_within_the_limits() {
         let mut stopped =
             Allocator::new(Settings { max_iterations: 1, ..settings(method, JetCommand::Duty) })
                 .unwrap();
-        let wanted = command([-8e4, 1e5, 2e4], PRESSURE);
-        stopped.update(&mut memory, 0, &wanted);
-        assert_eq!(memory.report.status, Status::Fallback);
+        let commanded = command([-8e4, 1e5, 2e4], PRESSURE);
+        stopped.update(&mut memory, 0, &commanded);
+        assert_eq!(memory.report.status, AllocationStatus::Fallback);
         assert_eq!((memory.report.fallbacks, memory.duty), (1, before.duty));
         assert_within_limits(&before, &memory, "stopped");
         if method == Method::Optimal {
@@ -202,8 +204,8 @@ fn without_an_optimum_the_previous_allocation_is_kept_within_the_limits() {
         let before = memory;
         allocator(method).update(&mut memory, 0, &command([0.0; 3], f64::NAN));
         assert_within_limits(&before, &memory, "bad");
-        allocator(method).update(&mut memory, 1, &wanted);
-        assert_eq!(memory.report.status, Status::Optimal, "it recovers");
+        allocator(method).update(&mut memory, 1, &commanded);
+        assert_eq!(memory.report.status, AllocationStatus::Optimal, "it recovers");
     }
 }
 
@@ -212,12 +214,12 @@ fn jets_switch_between_allocations() {
     let mut allocator = Allocator::new(settings(Method::Optimal, JetCommand::Pwpf)).unwrap();
     assert_eq!((allocator.period(), allocator.ratio()), (0.001, 10));
     let mut memory = Memory::default();
-    let wanted = command([0.0, 0.0, 2e4], 0.0);
+    let commanded = command([0.0, 0.0, 2e4], 0.0);
     let mut mean = Vector3::zeros();
     let mut switched_between = 0;
     for tick in 0..20_000 {
         let before = memory;
-        allocator.update(&mut memory, tick, &wanted);
+        allocator.update(&mut memory, tick, &commanded);
         assert!(memory.jets.iter().all(|&jet| jet == 0.0 || jet == 1.0));
         switched_between += u32::from(memory.jets != before.jets && tick % 10 != 0);
         mean += memory.modulated / 20_000.0;
@@ -225,7 +227,7 @@ fn jets_switch_between_allocations() {
     assert!(switched_between > 100);
     // The dead band of the modulator reduces the moment: the jet fires less than its commanded duty
     // cycle.
-    assert!(mean.z > 0.5 * wanted.moment.z && mean.z < wanted.moment.z, "{mean}");
+    assert!(mean.z > 0.5 * commanded.moment.z && mean.z < commanded.moment.z, "{mean}");
 }
 
 #[test]

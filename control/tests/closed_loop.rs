@@ -3,13 +3,13 @@
 
 mod harness;
 
-use control::crmpc::{Constraints, InitialState, Settings, Status};
+use control::crmpc::{Constraints, InitialState, Settings, SolverStatus};
 use control::{Crmpc, crmpc::Memory};
 use harness::{
     Case, adversaries, constant, disturbance, in_parallel, settings, simulate, square, white,
 };
 use nalgebra::{Vector2, Vector3, Vector6};
-use vehicle::disturbance::{Disturbance, Kind};
+use vehicle::disturbance::{Disturbance, DisturbanceKind};
 use vehicle::scenario::Scenario;
 
 /// Returns the largest EMS (deg) over the cases, each of which must keep both limits without a
@@ -110,10 +110,10 @@ fn paper_set_with_a_free_initial_state_never_falls_back_and_starts_inside_its_se
         &mut controller,
         &mut memory,
         1.05,
-        disturbance(Kind::White),
+        disturbance(DisturbanceKind::White),
         |memory, tick, measured| {
             if tick % design.ratio as u64 == 0 {
-                assert_eq!(memory.report.status, Status::Constrained);
+                assert_eq!(memory.report.status, SolverStatus::Constrained);
                 let angle_rates = vehicle::kinematics::r(&measured.angles) * measured.rates;
                 for i in 0..3 {
                     let o = Vector2::new(measured.angles[i], angle_rates[i])
@@ -133,10 +133,9 @@ fn paper_set_with_a_free_initial_state_never_falls_back_and_starts_inside_its_se
     assert!(largest > 0.9, "the freedom is not used: {largest}");
 }
 
-/// Returns the nominal motion at every tick, bit for bit, and the deviation O_e = x − x̃ there,
-/// with
-/// `initialState = nominal`.
-fn around_the_nominal_motion(
+/// Returns the nominal trajectory at every tick, bit for bit, and the deviation O_e = x − x̃ there,
+/// with `initialState = nominal`.
+fn around_the_nominal_trajectory(
     constraints: Constraints,
     inertia_scale: f64,
     disturbance: Disturbance,
@@ -159,10 +158,11 @@ fn around_the_nominal_motion(
 #[test]
 fn a_nominal_motion_that_starts_from_its_own_plan_knows_no_disturbance() {
     for constraints in [Constraints::Robust, Constraints::Paper] {
-        let (undisturbed, _) = around_the_nominal_motion(constraints, 1.0, Disturbance::default());
+        let (undisturbed, _) =
+            around_the_nominal_trajectory(constraints, 1.0, Disturbance::default());
         for case in white(1..=1, 0.04).into_iter().chain(adversaries(0.04)) {
             let (nominal, deviations) =
-                around_the_nominal_motion(constraints, case.inertia_scale, case.disturbance);
+                around_the_nominal_trajectory(constraints, case.inertia_scale, case.disturbance);
             assert!(nominal == undisturbed, "{}", case.name);
             assert!(
                 deviations.iter().any(|o| o.amax() > 1e-3),
@@ -181,7 +181,8 @@ fn oracle_deviation_from_the_nominal_motion_obeys_the_error_dynamics() {
         let design = Crmpc::new(settings(constraints)).unwrap().design().clone();
         let (reach, paper) = (design.reach, design.paper.unwrap());
         let Settings { feedback, disturbance_bound: bound, .. } = settings(constraints);
-        let deviations = |disturbance| around_the_nominal_motion(constraints, 1.0, disturbance).1;
+        let deviations =
+            |disturbance| around_the_nominal_trajectory(constraints, 1.0, disturbance).1;
         let largest = |deviations: &[Vector6<f64>], components: [usize; 3]| {
             deviations.iter().flat_map(|o| components.map(|i| o[i].abs())).fold(0.0, f64::max)
         };
@@ -196,17 +197,18 @@ fn oracle_deviation_from_the_nominal_motion_obeys_the_error_dynamics() {
         // Seven seconds between two switches are three time constants of the slow mode of the
         // robust set's K, -0.42 1/s, so that the deviation has all but settled before a switch.
         let square_period = 14.0;
-        for kind in [Kind::Constant, Kind::Square, Kind::AlongRate] {
+        for kind in [DisturbanceKind::Constant, DisturbanceKind::Square, DisturbanceKind::AlongRate]
+        {
             let direction = Vector3::new(1.0, -1.0, 1.0);
             let deviations =
                 deviations(Disturbance { direction, square_period, ..disturbance(kind) });
             let (angle, rate) = (largest(&deviations, [0, 1, 2]), largest(&deviations, [3, 4, 5]));
             assert!(angle <= reach.angle * bound + slack, "{constraints:?}, {kind:?}: {angle}");
             assert!(rate <= reach.rate * bound + rate_slack, "{constraints:?}, {kind:?}: {rate}");
-            if kind == Kind::Square {
+            if kind == DisturbanceKind::Square {
                 assert!(rate > 1.9 * paper.rate_tube, "{constraints:?}: {rate}");
             }
-            if kind == Kind::Constant {
+            if kind == DisturbanceKind::Constant {
                 let last = deviations.last().unwrap() / settings(constraints).disturbance_bound;
                 for i in 0..3 {
                     let settled = direction[i] / feedback.k1.abs();
@@ -240,7 +242,7 @@ fn a_run_repeats_bit_for_bit() {
             &mut controller,
             &mut Memory::default(),
             1.05,
-            disturbance(Kind::White),
+            disturbance(DisturbanceKind::White),
             |memory, _, measured| {
                 trace.push((
                     *measured,
@@ -266,7 +268,7 @@ fn without_disturbance_nothing_is_constrained_once_the_jump_is_over() {
         1.0,
         Disturbance::default(),
         |memory, tick, _| {
-            if memory.report.status == Status::Constrained {
+            if memory.report.status == SolverStatus::Constrained {
                 constrained.push(tick as f64 * harness::FEEDBACK);
             }
         },

@@ -12,7 +12,7 @@ use control::{Controller, Crmpc, Delayed, DesignError, Lqr, Measurement};
 use harness::{FEEDBACK, disturbance, garbage, lqr, settings};
 use nalgebra::Vector3;
 use vehicle::Error;
-use vehicle::disturbance::{Disturbance, Kind};
+use vehicle::disturbance::{Disturbance, DisturbanceKind};
 use vehicle::plant::{Plant, State, state};
 use vehicle::reference::Reference;
 use vehicle::scenario::Scenario;
@@ -185,7 +185,13 @@ struct Merit {
     cms: f64,
 }
 
-fn merit(q: f64, delay: f64, predicts: bool, scale: f64, kind: Kind) -> Result<Merit, Error> {
+fn merit(
+    q: f64,
+    delay: f64,
+    predicts: bool,
+    scale: f64,
+    kind: DisturbanceKind,
+) -> Result<Merit, Error> {
     let mut late = Late::new(delay, scale, disturbance(kind));
     let mut controller = delayed(regulator(q), if predicts { delay } else { 0.0 });
     let errors = late.run(&mut controller, FEEDBACK, 50.0, |_, _, _| {})?;
@@ -196,17 +202,18 @@ fn merit(q: f64, delay: f64, predicts: bool, scale: f64, kind: Kind) -> Result<M
 
 #[test]
 fn regress_prediction_keeps_tracking_and_effort_that_a_delay_spoils() {
-    let of = |delay, predicts| merit(10.0, delay, predicts, 1.0, Kind::None).unwrap();
-    let (none, without, with) = (of(0.0, false), of(0.1, false), of(0.1, true));
+    let merit_of =
+        |delay, predicts| merit(10.0, delay, predicts, 1.0, DisturbanceKind::None).unwrap();
+    let (none, without, with) = (merit_of(0.0, false), merit_of(0.1, false), merit_of(0.1, true));
     // The EMS between 10 and 25 s is 0.0040 deg, without prediction 0.0245 deg; the CMS is 0.282,
     // without prediction 0.340.
     assert!(
         with.settled_deg < 1.01 * none.settled_deg && without.settled_deg > 6.0 * none.settled_deg
     );
     assert!(with.cms < 1.01 * none.cms && without.cms > 1.2 * none.cms);
-    // The EMS over the whole time is no measure of it, because the start dominates. A loop that
-    // does not know the commands under way commands more and is less damped, which hides the dead
-    // time: 1.642, 1.653 and 1.720 deg.
+    // The EMS over the whole time does not show the difference, because the start dominates it. A
+    // loop without prediction commands more and is less damped, which hides the dead time: 1.642,
+    // 1.653 and 1.720 deg.
     assert!(
         none.ems_deg < without.ems_deg && without.ems_deg < with.ems_deg && with.ems_deg < 1.73
     );
@@ -215,9 +222,12 @@ fn regress_prediction_keeps_tracking_and_effort_that_a_delay_spoils() {
 #[test]
 fn a_loop_that_a_delay_makes_unstable_is_stable_with_prediction() {
     for scale in harness::INERTIA_SCALES {
-        let of = |delay, predicts| merit(0.3, delay, predicts, scale, Kind::White);
-        assert!(matches!(of(0.1, false), Err(Error::Singular { .. })), "the attitude is not lost");
-        let (none, with) = (of(0.0, false).unwrap(), of(0.1, true).unwrap());
+        let merit_of = |delay, predicts| merit(0.3, delay, predicts, scale, DisturbanceKind::White);
+        assert!(
+            matches!(merit_of(0.1, false), Err(Error::Singular { .. })),
+            "the attitude is not lost"
+        );
+        let (none, with) = (merit_of(0.0, false).unwrap(), merit_of(0.1, true).unwrap());
         assert!(with.ems_deg < 1.1 * none.ems_deg && with.cms < 1.05 * none.cms);
     }
 }
@@ -311,7 +321,7 @@ fn the_law_is_told_the_time_at_which_its_moment_acts() {
     controller.update(&mut memory, 50, 2.0, &measured, &reference);
     let (time, told) = controller.inner().told.unwrap();
     assert_eq!((time, controller.inner().asked), (2.1, 2.1));
-    // The motion is about the pitch axis at beta = 0: alpha = q t.
+    // The vehicle turns about the pitch axis at beta = 0: alpha = q t.
     assert!((told.angles - Vector3::new(0.01, 0.0, 0.0)).amax() < 1e-15, "{told:?}");
     assert_eq!((told.rates, told.achieved_moment), (measured.rates, achieved_moment));
     assert_eq!(memory.under_way.len(), 3);

@@ -55,7 +55,7 @@ impl Axis {
                 axis.see(i, &plan);
             }
             let begun = |late: i32| (i - delay - late).div_euclid(PARTS);
-            // The nominal motion takes the plan's acceleration as assumed.
+            // The nominal trajectory has the plan's acceleration as assumed.
             let acts = axis.acceleration(begun(late), &plan) - plan(begun(0));
             let mut state = axis.vehicle[i as usize];
             // A jump of the rate belongs to the middle of the part.
@@ -117,8 +117,11 @@ fn oracle_the_worst_disturbance_reaches_no_further() {
                 let more = bound.feedback / exact.at(n).feedback.max(1e-9);
                 assert!(feedback[n] <= bound.feedback + 1e-12, "{delay} {late} {tick}");
                 assert!(seen[n].x <= bound.seen_angle && seen[n].y <= bound.seen_rate);
-                let own = vehicle[(delay + tick * PARTS) as usize];
-                assert!(own.x <= bound.angle && own.y <= bound.rate, "{delay} {late} {tick}");
+                let vehicle_state = vehicle[(delay + tick * PARTS) as usize];
+                assert!(
+                    vehicle_state.x <= bound.angle && vehicle_state.y <= bound.rate,
+                    "{delay} {late} {tick}"
+                );
                 if n + 1 == TICKS as usize {
                     closest = closest.max(feedback[n] / bound.feedback);
                     assert!(more > 1.0);
@@ -136,9 +139,9 @@ fn carried(switching: &Switching, plan: &impl Fn(i32) -> f64, ratio: i32) -> Vec
     let stages = 0..TICKS / ratio;
     let stage = |i: i32| {
         let change = plan(i * ratio) - plan(i * ratio - 1);
-        let here = switching.begin(&carried, change.abs());
-        carried = switching.next(&here);
-        here
+        let begun = switching.begin(&carried, change.abs());
+        carried = switching.next(&begun);
+        begun
     };
     stages.map(stage).collect()
 }
@@ -146,7 +149,7 @@ fn carried(switching: &Switching, plan: &impl Fn(i32) -> f64, ratio: i32) -> Vec
 #[test]
 fn oracle_changes_of_the_plan_leave_no_more_than_is_carried_along() {
     let ratio = 5;
-    let courses: [fn(i32) -> f64; 4] = [
+    let waveforms: [fn(i32) -> f64; 4] = [
         |stage| if stage < 0 { 0.0 } else { 1.0 },
         |stage| if stage == 2 { 1.0 } else { 0.0 },
         |stage| if stage < 0 { 0.0 } else { f64::from(stage % 2) },
@@ -157,15 +160,16 @@ fn oracle_changes_of_the_plan_leave_no_more_than_is_carried_along() {
         let tightening = Design::new(&settings).unwrap().tightening;
         let switching = tightening.switching.unwrap();
         let mut closest: f64 = 0.0;
-        for (late, course) in
-            [-error, -1, 1, error].into_iter().flat_map(|late| courses.map(|course| (late, course)))
+        for (late, waveform) in [-error, -1, 1, error]
+            .into_iter()
+            .flat_map(|late| waveforms.map(|waveform| (late, waveform)))
         {
-            let plan = |tick: i32| course(tick.div_euclid(ratio));
+            let plan = |tick: i32| waveform(tick.div_euclid(ratio));
             let axis = Axis::new((&settings, delay, late), plan, |_| 0.0);
-            let all = carried(&switching, &plan, ratio);
-            for (stage, here) in (0_i32..).zip(&all) {
-                let bound = switching.deviation(here);
-                let next = all.get(stage as usize + 1).copied().unwrap_or_default();
+            let carried_changes = carried(&switching, &plan, ratio);
+            for (stage, begun) in (0_i32..).zip(&carried_changes) {
+                let bound = switching.deviation(begun);
+                let next = carried_changes.get(stage as usize + 1).copied().unwrap_or_default();
                 let early = switching.early(&next);
                 for tick in stage * ratio..(stage + 1) * ratio {
                     let n = tick as usize;
@@ -175,9 +179,12 @@ fn oracle_changes_of_the_plan_leave_no_more_than_is_carried_along() {
                     assert!(feedback <= bound.feedback_norm + 1e-12, "{delay} {late} {tick}");
                     closest = closest.max(feedback / bound.feedback_norm);
                     for part in tick * PARTS..(tick + 1) * PARTS {
-                        let own = axis.vehicle(part);
-                        assert!(own.x.abs() <= bound.angle + early.0 + 1e-12);
-                        assert!(own.y.abs() <= bound.rate + early.1 + 1e-12, "{delay} {late}");
+                        let vehicle_state = axis.vehicle(part);
+                        assert!(vehicle_state.x.abs() <= bound.angle + early.0 + 1e-12);
+                        assert!(
+                            vehicle_state.y.abs() <= bound.rate + early.1 + 1e-12,
+                            "{delay} {late}"
+                        );
                     }
                 }
             }

@@ -345,7 +345,7 @@ mod properties {
             let set = SampledError::new(gain(k), period).invariant_set(0.0).unwrap();
             let normals = set.normals();
             let size = |o: &Vector2<f64>| normals.iter().map(|normal| normal.dot(o).abs()).fold(0.0, f64::max);
-            // The motion starts anywhere on the border of the set.
+            // The deviation starts anywhere on the border of the set.
             let direction = Vector2::new(direction.cos(), direction.sin());
             let mut simulation = Simulation { gain: gain(k), period, deviation: direction / size(&direction) };
             let reach = set.reach();

@@ -4,14 +4,14 @@
 mod harness;
 
 use control::controller::Preview;
-use control::dlmpc::{Memory, Plan, Report, Settings, SlidingMode, Status};
+use control::dlmpc::{Memory, Plan, Settings, SlidingMode, SolverReport, SolverStatus};
 use control::mpc::{Method, Nonlinearity, SolverSettings};
 use control::schedule::Sampled;
 use control::{Controller, DesignError, Dlmpc, Measurement};
 use harness::{FEEDBACK, disturbance, in_parallel, simulate, white};
 use nalgebra::{DMatrix, DVector, Vector3};
 use std::ops::Range;
-use vehicle::disturbance::Kind;
+use vehicle::disturbance::DisturbanceKind;
 use vehicle::kinematics::r_inverse;
 use vehicle::reference::Reference;
 use vehicle::scenario::Scenario;
@@ -27,7 +27,11 @@ fn dlmpc() -> Dlmpc {
 
 /// Returns the memory without values from a clock.
 fn timeless(memory: &Memory) -> Memory {
-    Memory { report: Report { time: 0.0, ..memory.report }, inner_time: 0.0, ..memory.clone() }
+    Memory {
+        report: SolverReport { time: 0.0, ..memory.report },
+        inner_time: 0.0,
+        ..memory.clone()
+    }
 }
 
 /// Input of one tick of a run.
@@ -49,13 +53,13 @@ impl Recorded {
 /// Returns all ticks of the scenario with white noise.
 fn recorded() -> Vec<Recorded> {
     let mut before = Memory::default();
-    let mut all = Vec::new();
-    let noise = disturbance(Kind::White);
+    let mut samples = Vec::new();
+    let noise = disturbance(DisturbanceKind::White);
     simulate(&mut dlmpc(), &mut Memory::default(), 1.05, noise, |after, tick, &measured| {
-        all.push(Recorded { tick, before: before.clone(), measured });
+        samples.push(Recorded { tick, before: before.clone(), measured });
         before.clone_from(after);
     });
-    all
+    samples
 }
 
 fn optimisations() -> Vec<Recorded> {
@@ -65,7 +69,7 @@ fn optimisations() -> Vec<Recorded> {
 
 // Tests of the outer layer.
 
-/// The program written in its commands v_0 … v_{N−1} alone.
+/// The optimisation problem as a function of the commands v_0 … v_{N−1} alone.
 struct ConicProgram {
     settings: Settings,
     time: f64,
@@ -124,7 +128,7 @@ fn oracle_first_optimum_satisfies_the_karush_kuhn_tucker_conditions() {
             Measurement { angles: start, rates: Vector3::zeros(), ..Measurement::default() };
         let mut memory = Memory::default();
         dlmpc().update(&mut memory, 0, time, &measured, &reference());
-        assert_eq!(memory.report.status, Status::Constrained);
+        assert_eq!(memory.report.status, SolverStatus::Constrained);
         let program = ConicProgram { settings, time, start };
         let v = DVector::from_iterator(
             3 * settings.horizon,
@@ -132,11 +136,11 @@ fn oracle_first_optimum_satisfies_the_karush_kuhn_tucker_conditions() {
         );
         assert!((memory.report.cost - program.cost(&v)).abs() < 1e-9 * program.cost(&v));
 
-        let derivative = |of: &dyn Fn(&DVector<f64>) -> DVector<f64>, i: usize| {
+        let derivative = |function: &dyn Fn(&DVector<f64>) -> DVector<f64>, i: usize| {
             let (mut plus, mut minus) = (v.clone(), v.clone());
             plus[i] += step;
             minus[i] -= step;
-            (of(&plus) - of(&minus)) / (2.0 * step)
+            (function(&plus) - function(&minus)) / (2.0 * step)
         };
         let cost = |v: &DVector<f64>| DVector::repeat(1, program.cost(v));
         let gradient = DVector::from_fn(v.len(), |i, _| derivative(&cost, i)[0]);
@@ -175,8 +179,8 @@ fn shortcuts_change_nothing_along_a_run() {
     for sample in optimisations().iter().step_by(3) {
         let (memory, _) = sample.update(&mut with);
         let (whole, _) = sample.update(&mut without);
-        counts[usize::from(memory.report.status == Status::Constrained)] += 1;
-        assert_eq!(whole.report.status, Status::Cone);
+        counts[usize::from(memory.report.status == SolverStatus::Constrained)] += 1;
+        assert_eq!(whole.report.status, SolverStatus::Cone);
         let (cost, cost_whole) = (memory.report.cost, whole.report.cost);
         assert!(
             (cost - cost_whole).abs() <= 1e-7 * cost_whole,
@@ -198,13 +202,13 @@ fn without_a_solution_the_shifted_plan_is_tracked_within_the_limit() {
     })
     .unwrap();
     let limit = settings.limit_rate * (1.0 + 1e-12);
-    let mut found = 0;
+    let mut fallbacks = 0;
     for sample in optimisations() {
         let (after, moment) = sample.update(&mut failing);
-        if after.report.status != Status::Fallback || sample.tick == 0 {
+        if after.report.status != SolverStatus::Fallback || sample.tick == 0 {
             continue;
         }
-        found += 1;
+        fallbacks += 1;
         assert_eq!(after.report.fallbacks, sample.before.report.fallbacks + 1);
         assert!(moment.norm() <= settings.limit_moment);
         let (plan, before) = (&after.plan, &sample.before.plan);
@@ -218,7 +222,7 @@ fn without_a_solution_the_shifted_plan_is_tracked_within_the_limit() {
         let gap = |k: usize| (plan.angles[k] - before.angles[k + 1]).norm();
         assert!(gap(30) <= 1e-3 * gap(0).max(1e-6), "{} of {}", gap(30), gap(0));
     }
-    assert!(found > 50, "{found}");
+    assert!(fallbacks > 50, "{fallbacks}");
 }
 
 /// A controller whose solver fails during some ticks.
@@ -259,12 +263,12 @@ fn a_solver_that_fails_is_outlived() {
             during: during.clone(),
         };
         let mut memory = Memory::default();
-        let noise = disturbance(Kind::White);
+        let noise = disturbance(DisturbanceKind::White);
         let outcome = simulate(&mut controller, &mut memory, 1.05, noise, |_, _, _| {});
         assert!(memory.report.fallbacks > 0, "{during:?}");
         assert!(outcome.moment <= 1.0 && outcome.rate <= 1.05, "{during:?}: {outcome:?}");
         assert!(outcome.ems_deg < 2.0, "{during:?}: {outcome:?}");
-        assert_eq!(memory.report.status, Status::Unconstrained, "{during:?}");
+        assert_eq!(memory.report.status, SolverStatus::Unconstrained, "{during:?}");
     }
 }
 
@@ -313,7 +317,7 @@ fn oracle_sampled_sliding_mode_chatters_with_the_closed_form_amplitude() {
                 assert!(now[i] * next[i] < 0.0);
             }
         }
-        // The manifold's own gain changes it little.
+        // The gain of the manifold changes it little.
         let seen = inner_law(
             SlidingMode { q, p, gamma: 0.15, rho },
             Vector3::new(5e-3, -3e-3, 1e-3),

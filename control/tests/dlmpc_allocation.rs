@@ -3,11 +3,11 @@
 
 mod harness;
 
-use control::dlmpc::{Memory, Settings, Status};
+use control::dlmpc::{Memory, Settings, SolverStatus};
 use control::{Controller, Dlmpc, Measurement};
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
-use vehicle::disturbance::Kind;
+use vehicle::disturbance::DisturbanceKind;
 use vehicle::scenario::Scenario;
 
 thread_local! {
@@ -38,7 +38,7 @@ fn ticks_without_the_cone_solver_allocate_nothing() {
     let scenario = Scenario::crmpc2022();
     let mut truth: Vec<Measurement> = Vec::new();
     let mut controller = Dlmpc::new(Settings::published()).unwrap();
-    let noise = harness::disturbance(Kind::White);
+    let noise = harness::disturbance(DisturbanceKind::White);
     harness::simulate(&mut controller, &mut Memory::default(), 1.05, noise, |_, _, &measured| {
         truth.push(measured);
     });
@@ -55,8 +55,8 @@ fn ticks_without_the_cone_solver_allocate_nothing() {
         controller.update(&mut memory, tick, tick as f64 * harness::FEEDBACK, measured, &reference);
         assert_eq!(COUNT.get() - counted, 0, "tick {tick}");
         if tick % controller.ratio() == 0 {
-            unconstrained += usize::from(memory.report.status == Status::Unconstrained);
-            constrained += usize::from(memory.report.status == Status::Constrained);
+            unconstrained += usize::from(memory.report.status == SolverStatus::Unconstrained);
+            constrained += usize::from(memory.report.status == SolverStatus::Constrained);
         }
     }
     assert!(unconstrained > 50 && constrained > 50, "{unconstrained} {constrained}");

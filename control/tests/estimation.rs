@@ -41,9 +41,9 @@ fn health_at(estimates: &[Estimate], time: f64) -> Health {
 proptest! {
     #[test]
     fn oracle_angles_come_back_from_the_rotation(alpha in -3.1..3.1, beta in -1.5..1.5, sigma in -3.1..3.1) {
-        let wanted = Vector3::new(alpha, beta, sigma);
-        let rotation = Rotation3::from_matrix_unchecked(body_from_velocity(&wanted));
-        prop_assert!((angles(&rotation) - wanted).amax() < 1e-12);
+        let expected = Vector3::new(alpha, beta, sigma);
+        let rotation = Rotation3::from_matrix_unchecked(body_from_velocity(&expected));
+        prop_assert!((angles(&rotation) - expected).amax() < 1e-12);
     }
 }
 
@@ -65,19 +65,19 @@ fn oracle_the_calibration_flight_finds_the_magnetometers_errors() {
 /// The values agree except for rounding, which may differ from machine to machine.
 #[test]
 fn regress_the_corrections_in_the_data_file_are_those_of_the_flight() {
-    let found = calibrated(&mems(CALIBRATION_SEED), CALIBRATION_DURATION).corrections;
-    for (found, file) in found.iter().zip(&CALIBRATED.corrections) {
+    let corrections = calibrated(&mems(CALIBRATION_SEED), CALIBRATION_DURATION).corrections;
+    for (correction, file) in corrections.iter().zip(&CALIBRATED.corrections) {
         let size = file.matrix.norm();
         assert!(
-            (found.matrix - file.matrix).norm() < 1e-9 * size,
+            (correction.matrix - file.matrix).norm() < 1e-9 * size,
             "{} {}",
-            found.matrix,
+            correction.matrix,
             file.matrix
         );
         assert!(
-            (found.bias - file.bias).norm() < 1e-9 / size.min(1.0),
+            (correction.bias - file.bias).norm() < 1e-9 / size.min(1.0),
             "{} {}",
-            found.bias,
+            correction.bias,
             file.bias
         );
     }
@@ -85,8 +85,8 @@ fn regress_the_corrections_in_the_data_file_are_those_of_the_flight() {
 
 #[test]
 fn a_calibration_flight_cut_short_is_refused() {
-    let motion = calibration(10.0);
-    let lines = lines(&motion, &mems(1));
+    let trajectory = calibration(10.0);
+    let lines = lines(&trajectory, &mems(1));
     let settings = Settings {
         calibration: CalibrationMode::Fit,
         calibration_duration: 5.0,
@@ -95,23 +95,23 @@ fn a_calibration_flight_cut_short_is_refused() {
     };
     let estimator = Estimator::new(settings).unwrap();
     let mut memory = estimator.memory();
-    for (truth, line) in motion.iter().zip(&lines) {
+    for (truth, line) in trajectory.iter().zip(&lines) {
         estimator.update(&mut memory, truth.time, line);
-        let wanted = match truth.time {
+        let expected = match truth.time {
             time if time < 0.005 => Health::Waiting,
             time if time < 5.005 => Health::Calibrating,
             _ => Health::Uncalibrated,
         };
-        assert_eq!(memory.estimate.health, wanted, "t = {}", truth.time);
+        assert_eq!(memory.estimate.health, expected, "t = {}", truth.time);
     }
     assert_eq!(memory.calibration.status, CalibrationStatus::Refused);
     assert_eq!(
         memory.calibration.correction, settings.corrections[2],
         "the given one stays in use"
     );
-    let [found, wanted] = [memory.estimate.angles, motion[motion.len() - 1].angles]
+    let [estimated, actual] = [memory.estimate.angles, trajectory[trajectory.len() - 1].angles]
         .map(|angles| Rotation3::from_matrix_unchecked(body_from_velocity(&angles)));
-    assert!(found.angle_to(&wanted) < 2f64.to_radians(), "and the attitude is found with it");
+    assert!(estimated.angle_to(&actual) < 2f64.to_radians(), "and the attitude is found with it");
 }
 
 /// With the MEMS set the errors are within 0.15 deg and 0.1 deg/s, for the norm of the three angles
@@ -120,10 +120,10 @@ fn a_calibration_flight_cut_short_is_refused() {
 fn oracle_errors_with_the_mems_set_are_within_what_is_required() {
     let settings = *CALIBRATED;
     for seed in 101..=105 {
-        for (name, motion) in [("rest", rest(50.0)), ("motion", scenario(seed))] {
-            let lines = lines(&motion, &mems(seed));
+        for (name, trajectory) in [("rest", rest(50.0)), ("motion", scenario(seed))] {
+            let lines = lines(&trajectory, &mems(seed));
             let estimates = estimates(&settings, &lines);
-            let [angles, rates] = errors(&motion, &estimates, 0.0);
+            let [angles, rates] = errors(&trajectory, &estimates, 0.0);
             assert!(angles.norm() < 0.15, "{name}, seed {seed}: {angles}");
             assert!(rates.max() < 0.1, "{name}, seed {seed}: {rates}");
             assert!(estimates[1..].iter().all(|estimate| estimate.health == Health::Ok));
@@ -144,15 +144,15 @@ fn oracle_without_errors_a_steady_turn_is_followed_exactly() {
             rates: Kinematics::Printed.r_inverse(&angles) * Vector3::new(0.0, 0.0, rate),
         }
     };
-    let motion: Vec<_> = (0..1000).map(|k| turning(f64::from(k) * PERIOD)).collect();
-    let lines = lines(&motion, &ideal());
+    let trajectory: Vec<_> = (0..1000).map(|k| turning(f64::from(k) * PERIOD)).collect();
+    let lines = lines(&trajectory, &ideal());
     for (name, settings, limit) in [
         ("without filter", sharp(), 1e-6),
         ("with filter and prediction", Settings { sensor_delay: 0.0, ..Settings::default() }, 2e-4),
     ] {
         let settings = Settings { frozen_samples: 0, ..settings };
         let estimates = estimates(&settings, &lines);
-        let [angles, rates] = errors(&motion, &estimates, 5.0);
+        let [angles, rates] = errors(&trajectory, &estimates, 5.0);
         assert!(angles.norm() < limit, "{name}: {angles} deg");
         assert!(rates.norm() < limit.min(1.1e-4), "{name}: {rates} deg/s");
     }
@@ -169,35 +169,35 @@ fn without_prediction_the_angles_are_late_by_the_delays() {
             rates: Kinematics::Printed.r_inverse(&angles) * Vector3::new(0.0, 0.0, rate),
         }
     };
-    let motion: Vec<_> = (0..1000).map(|k| turning(f64::from(k) * PERIOD)).collect();
-    let lines = lines(&motion, &ideal());
+    let trajectory: Vec<_> = (0..1000).map(|k| turning(f64::from(k) * PERIOD)).collect();
+    let lines = lines(&trajectory, &ideal());
     let settings = Settings { prediction: false, ..sharp() };
     let estimate = estimates(&settings, &lines)[900];
     // A sample arrives one tick after it was taken.
-    assert!((motion[900].angles.z - estimate.angles.z - rate * PERIOD).abs() < 1e-6);
+    assert!((trajectory[900].angles.z - estimate.angles.z - rate * PERIOD).abs() < 1e-6);
 }
 
 #[test]
 fn the_printed_kinematics_get_the_rates_that_they_take() {
-    let motion = scenario(1);
-    let lines = lines(&motion, &ideal());
-    let of = |kinematics| {
-        errors(&motion, &estimates(&Settings { kinematics, ..sharp() }, &lines), 0.02)[1]
+    let trajectory = scenario(1);
+    let lines = lines(&trajectory, &ideal());
+    let rms_of = |kinematics| {
+        errors(&trajectory, &estimates(&Settings { kinematics, ..sharp() }, &lines), 0.02)[1]
     };
-    let (printed, exact) = (of(Kinematics::Printed), of(Kinematics::Exact));
+    let (printed, exact) = (rms_of(Kinematics::Printed), rms_of(Kinematics::Exact));
     assert!(printed.norm() < 0.03, "one tick late: {printed}");
     assert!(exact.norm() > 1.5 * printed.norm(), "what the printed R lacks: {exact}");
 }
 
 #[test]
 fn dropped_samples_are_bridged_counted_and_flagged() {
-    let motion = scenario(1);
+    let trajectory = scenario(1);
     let mut config = mems(1);
     config.line.drop_probability = 0.3;
     let settings = *CALIBRATED;
-    let lines = lines(&motion, &config);
+    let lines = lines(&trajectory, &config);
     let estimates = estimates(&settings, &lines);
-    let [angles, rates] = errors(&motion, &estimates, 0.0);
+    let [angles, rates] = errors(&trajectory, &estimates, 0.0);
     assert!(angles.norm() < 0.17 && rates.max() < 0.15, "{angles} {rates}");
     let dropped = estimates[estimates.len() - 1].dropped;
     assert!((1400..1600).contains(&dropped), "{dropped}");
@@ -207,21 +207,21 @@ fn dropped_samples_are_bridged_counted_and_flagged() {
 
 #[test]
 fn after_a_long_silence_the_attitude_is_lost_and_found_again() {
-    let motion = scenario(1);
+    let trajectory = scenario(1);
     let mut config = mems(1);
     config.line.drop_probability = 1.0;
     config.line.drop_window = Window { start: 10.0, end: 13.0 };
     let settings = *CALIBRATED;
-    let estimates = estimates(&settings, &lines(&motion, &config));
+    let estimates = estimates(&settings, &lines(&trajectory, &config));
     assert_eq!(health_at(&estimates, 9.99), Health::Ok);
     assert_eq!(health_at(&estimates, 10.2), Health::Bridging);
     assert_eq!(health_at(&estimates, 12.0), Health::Lost);
     assert_eq!(health_at(&estimates, 13.1), Health::Ok);
-    let [angles, _] = errors(&motion[1300..1500], &estimates[1300..1500], 13.5);
+    let [angles, _] = errors(&trajectory[1300..1500], &estimates[1300..1500], 13.5);
     assert!(angles.norm() < 0.28, "{angles}");
     let bridged = |time: f64| {
         let k = (time / PERIOD).round() as usize;
-        (estimates[k].angles - motion[k].angles).norm().to_degrees()
+        (estimates[k].angles - trajectory[k].angles).norm().to_degrees()
     };
     assert!(bridged(10.2) < 0.16, "{}", bridged(10.2));
 }
@@ -230,14 +230,14 @@ fn after_a_long_silence_the_attitude_is_lost_and_found_again() {
 fn a_frozen_sensor_is_left_out() {
     let settings = *CALIBRATED;
     for sensor in 0..3 {
-        let motion = scenario(1);
+        let trajectory = scenario(1);
         let mut config = mems(1);
         config.triads[sensor].freeze = Window { start: 10.0, end: 10.4 };
-        let estimates = estimates(&settings, &lines(&motion, &config));
+        let estimates = estimates(&settings, &lines(&trajectory, &config));
         assert_eq!(health_at(&estimates, 10.02), Health::Ok, "one equal reading is no proof");
         assert_eq!(health_at(&estimates, 10.2), Health::Frozen);
         assert_eq!(health_at(&estimates, 10.5), Health::Ok);
-        let [angles, _] = errors(&motion, &estimates, 10.0);
+        let [angles, _] = errors(&trajectory, &estimates, 10.0);
         assert!(angles.norm() < 0.15, "sensor {sensor}: {angles}");
     }
 }
@@ -250,9 +250,9 @@ fn the_gyroscopes_bias_is_learned_and_seen_at_rest() {
     config.triads[0].noise = 1e-3;
     let settings = Settings { frozen_samples: 0, ..Settings::default() };
     let seen = Settings { rest_duration: 5.0, ..settings };
-    let motion = rest(120.0);
-    let lines = lines(&motion, &config);
-    let learned = estimates(&settings, &lines)[motion.len() - 1].gyroscope_bias;
+    let trajectory = rest(120.0);
+    let lines = lines(&trajectory, &config);
+    let learned = estimates(&settings, &lines)[trajectory.len() - 1].gyroscope_bias;
     assert!((learned - bias).amax() < 0.0017f64.to_radians(), "{}", learned.map(f64::to_degrees));
     let estimates = estimates(&seen, &lines);
     let at_rest = estimates[600].gyroscope_bias;
@@ -261,13 +261,13 @@ fn the_gyroscopes_bias_is_learned_and_seen_at_rest() {
 
 #[test]
 fn the_first_estimate_is_the_given_attitude_or_the_measured_one() {
-    let motion = rest(1.0);
-    let lines = lines(&motion, &ideal());
+    let trajectory = rest(1.0);
+    let lines = lines(&trajectory, &ideal());
     let elsewhere =
         Settings { initial: Vector3::new(0.3, 0.2, 0.1), frozen_samples: 0, ..Settings::default() };
     let measured = estimates(&elsewhere, &lines);
     assert_eq!((measured[0].health, measured[0].angles), (Health::Waiting, elsewhere.initial));
-    assert!((measured[1].angles - motion[1].angles).amax() < 1e-12);
+    assert!((measured[1].angles - trajectory[1].angles).amax() < 1e-12);
     let given = estimates(&Settings { alignment: Alignment::Given, ..elsewhere }, &lines);
     assert!((given[1].angles - elsewhere.initial).amax() < 0.01);
 }
@@ -309,11 +309,11 @@ fn error_after(
     let mut lines = good[..number + 550].to_vec();
     change(&mut lines[number]);
     let mut worst = 0.0_f64;
-    let wanted =
+    let expected =
         Rotation3::from_matrix_unchecked(body_from_velocity(&Scenario::crmpc2022().initial_angles));
     for estimate in &estimates(settings, &lines)[number + 500..] {
-        let found = Rotation3::from_matrix_unchecked(body_from_velocity(&estimate.angles));
-        let error = found.angle_to(&wanted).to_degrees();
+        let estimated = Rotation3::from_matrix_unchecked(body_from_velocity(&estimate.angles));
+        let error = estimated.angle_to(&expected).to_degrees();
         worst = if error.is_finite() { worst.max(error) } else { f64::INFINITY };
     }
     worst
@@ -360,8 +360,8 @@ fn five_seconds_after_any_single_bad_sample_the_attitude_is_known_to_a_degree() 
 #[test]
 fn a_sample_that_cannot_be_believed_is_left_out_and_shown() {
     let settings = *CALIBRATED;
-    let motion = rest(10.0);
-    let good = lines(&motion, &mems(1));
+    let trajectory = rest(10.0);
+    let good = lines(&trajectory, &mems(1));
     for change in [
         |line: &mut estimation::Line| line.readings[0].x = 100.0,
         |line: &mut estimation::Line| line.readings[1] *= -1.0,
@@ -380,8 +380,8 @@ fn a_sample_that_cannot_be_believed_is_left_out_and_shown() {
 
 #[test]
 fn readings_that_confirm_each_other_are_believed() {
-    let motion = rest(10.0);
-    let mut lines = lines(&motion, &mems(1));
+    let trajectory = rest(10.0);
+    let mut lines = lines(&trajectory, &mems(1));
     let step = Vector3::new(0.5, 0.0, 0.0);
     lines[500..].iter_mut().for_each(|line| line.readings[0] += step);
     let estimates = estimates(&CALIBRATED, &lines);
@@ -392,8 +392,8 @@ fn readings_that_confirm_each_other_are_believed() {
 
 #[test]
 fn a_sensor_that_stays_beyond_its_range_means_a_lost_attitude() {
-    let motion = rest(10.0);
-    let mut lines = lines(&motion, &mems(1));
+    let trajectory = rest(10.0);
+    let mut lines = lines(&trajectory, &mems(1));
     for (k, line) in lines.iter_mut().enumerate().skip(500) {
         line.readings[1].x = 1e3 + k as f64;
     }

@@ -2,7 +2,7 @@
 
 mod harness;
 
-use control::crmpc::{Constraints, Memory, Settings, Status};
+use control::crmpc::{Constraints, Memory, Settings, SolverStatus};
 use control::{Controller, Crmpc, Measurement};
 use harness::flight::Random;
 use harness::settings;
@@ -25,7 +25,7 @@ fn feasible(constraints: Constraints, horizon: usize) -> Vec<bool> {
             Measurement { angles, rates: random.direction(size), ..Measurement::default() };
         let mut memory = Memory::default();
         controller.update(&mut memory, 0, 0.0, &measured, &reference);
-        !matches!(memory.report.status, Status::Fallback | Status::Kept)
+        !matches!(memory.report.status, SolverStatus::Fallback | SolverStatus::Kept)
     };
     (0..STARTS).map(|_| is_feasible()).collect()
 }

@@ -1,4 +1,4 @@
-//! The guarantee of the robust set in closed loops: it is in force throughout, and kept. The
+//! The guarantee of the robust set in closed loops: it is in force throughout, and it holds. The
 //! examples `worst_case` and `random_settings` search for its limits with many more flights.
 
 mod harness;
@@ -8,7 +8,7 @@ use control::crmpc::{Constraints, Design, Guarantee, Settings};
 use control::delay::Predictor;
 use control::error_dynamics::Gain;
 use harness::flight::{
-    Course, Flight, Random, Shown, Sight, Tried, optimised_every, random_settings, tried,
+    Flight, Random, Shown, Sight, Tried, Waveform, optimised_every, random_settings, tried,
 };
 use harness::{constant, in_parallel, run, settings};
 use nalgebra::Vector3;
@@ -21,16 +21,16 @@ use vehicle::plant::{self, Load};
 /// 2022.
 fn flights(settings: &Settings, sights: &[Sight]) -> Vec<Flight> {
     let corner = Vector3::new(1.0, -1.0, 1.0);
-    let courses = [
-        Course::White,
-        Course::Constant(corner),
-        Course::Square(2.5, corner),
-        Course::Switching(1.0),
-        Course::AlongRate(1.0),
-        Course::AlongMoment(-1.0),
+    let waveforms = [
+        Waveform::White,
+        Waveform::Constant(corner),
+        Waveform::Square(2.5, corner),
+        Waveform::Switching(1.0),
+        Waveform::AlongRate(1.0),
+        Waveform::AlongMoment(-1.0),
     ];
     let mut flights = Vec::new();
-    for (i, disturbance) in courses.into_iter().enumerate() {
+    for (i, disturbance) in waveforms.into_iter().enumerate() {
         flights.push(Flight {
             disturbance,
             inertia_scale: harness::INERTIA_SCALES[i % 2],
@@ -115,9 +115,13 @@ fn guarantee_is_kept_with_a_long_delay() {
 
 /// Returns errors of every kind within their bounds.
 fn erroneous() -> [Sight; 4] {
-    let courses =
-        [Course::White, Course::Switching(0.2), Course::AlongRate(-1.0), Course::AlongMoment(1.0)];
-    courses.map(Sight::Errors)
+    let waveforms = [
+        Waveform::White,
+        Waveform::Switching(0.2),
+        Waveform::AlongRate(-1.0),
+        Waveform::AlongMoment(1.0),
+    ];
+    waveforms.map(Sight::Errors)
 }
 
 #[test]
@@ -219,7 +223,7 @@ fn accepted_settings_keep_the_guarantee_and_refused_ones_name_bounds_that_are_ac
 }
 
 /// Largest ‖x̂_ω − x̃_ω‖ of the second predicted state, relative to its bound, that a search over
-/// states, moments and errors of two measurements finds. Nothing else drives the motion.
+/// states, moments and errors of two measurements finds. Nothing else drives the deviation.
 fn second_prediction(settings: &Settings) -> f64 {
     let Settings { body, limit_moment, limit_rate, delay, period_feedback: tau, .. } = *settings;
     let predictor = Predictor::new(body, delay, tau).unwrap();
@@ -244,10 +248,10 @@ fn second_prediction(settings: &Settings) -> f64 {
         let true_end = predictor.predict(&[under_way, under_way, next], &moved);
         let end = predictor
             .predict(&[under_way, under_way, next], &measured(&moved, &-corner, &-of_angles));
-        let kept = |state: &Measurement| {
+        let within_limits = |state: &Measurement| {
             state.rates.norm() <= limit_rate && state.angles.y.abs() <= settings.sideslip_domain
         };
-        if !(kept(&start) && kept(&moved) && kept(&true_end)) {
+        if !(within_limits(&start) && within_limits(&moved) && within_limits(&true_end)) {
             return 0.0;
         }
         // The plan's acceleration is the one for which the law commands `next`.

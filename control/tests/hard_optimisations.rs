@@ -1,9 +1,9 @@
 //! Optimisations that take long, and those that a budget ends: starts far from the reference,
-//! kicks, and infeasible problems.
+//! disturbed starts, and infeasible problems.
 
 mod harness;
 
-use control::crmpc::{Constraints, Memory, Report, Settings, Standing, Status};
+use control::crmpc::{Constraints, Memory, Settings, SolverReport, SolverStatus, Standing};
 use control::linearise::InverseKinematics;
 use control::mpc::SolverSettings;
 use control::{Controller, Crmpc, Dlmpc, Measurement, dlmpc};
@@ -12,7 +12,7 @@ use harness::flight::Random;
 use harness::{Optimising, disturbance, in_parallel, settings, simulate};
 use nalgebra::{Matrix3, Vector3};
 use proptest::prelude::*;
-use vehicle::disturbance::Kind;
+use vehicle::disturbance::DisturbanceKind;
 use vehicle::kinematics;
 use vehicle::scenario::Scenario;
 
@@ -20,8 +20,8 @@ fn crmpc(constraints: Constraints) -> Crmpc {
     Crmpc::new(settings(constraints)).unwrap()
 }
 
-fn has_optimum(report: &Report) -> bool {
-    !matches!(report.status, Status::None | Status::Fallback | Status::Kept)
+fn has_optimum(report: &SolverReport) -> bool {
+    !matches!(report.status, SolverStatus::None | SolverStatus::Fallback | SolverStatus::Kept)
 }
 
 /// Returns the rows of the list for `law`: seed, and iterations of the three optimisations.
@@ -61,7 +61,7 @@ fn regress_the_longest_of_20000_random_optimisations_take_no_more_iterations() {
 
 #[test]
 fn regress_starts_that_once_took_hundreds_of_iterations_take_some_thirty() {
-    // The cases include a first guess with ‖y‖² of 118 and one that a unit was given. They once
+    // The cases include a first guess with ‖y‖² of 118 and one that occurred in an FMU. They once
     // took 228, 241 and 249 iterations.
     let scenario = Scenario::crmpc2022();
     let angles = scenario.reference.at(31.35).angles + degrees([-14.34, -1.84, 0.35]);
@@ -83,15 +83,15 @@ fn degrees(values: [f64; 3]) -> Vector3<f64> {
 
 #[test]
 fn every_optimum_of_the_paper_from_a_random_start_shows_that_it_is_one() {
-    // With these seeds a first guess once violated the chain, and so did the resulting motion.
+    // With these seeds a first guess once violated the chain, and so did the resulting trajectory.
     let mut seeds = vec![2480, 7527, 8436, 13191, 32585, 33560, 38426, 38433];
     seeds.extend(0..2000);
     let parts: Vec<&[u64]> = seeds.chunks(100).collect();
     let optimise = |part: &&[u64]| {
         let law = &mut crmpc(Constraints::Paper);
-        let of =
+        let steps_of =
             |&seed: &u64| Case::random(seed, 1.0).optimise(law, 1).map(|report| (seed, report));
-        part.iter().flat_map(of).collect::<Vec<_>>()
+        part.iter().flat_map(steps_of).collect::<Vec<_>>()
     };
     for (seed, report) in in_parallel(&parts, optimise).concat() {
         assert!(has_optimum(&report) && report.residual <= 2e-6, "seed {seed}: {report:?}");
@@ -129,7 +129,7 @@ fn oracle_where_no_optimisation_is_begun_no_moment_keeps_the_rates() {
         let least = (0..2000)
             .map(|_| after(random.direction(settings.limit_moment)))
             .fold(after(Vector3::zeros()), f64::min);
-        if memory.report.status == Status::Fallback && memory.report.iterations == 0 {
+        if memory.report.status == SolverStatus::Fallback && memory.report.iterations == 0 {
             refused += 1;
             assert!(least > 1.0, "{angles} {rates}: {least}");
         }
@@ -139,7 +139,7 @@ fn oracle_where_no_optimisation_is_begun_no_moment_keeps_the_rates() {
 
 /// Runs the paper's scenario with a budget of iterations. Returns the outcome, the last memory, the
 /// most iterations of an optimisation, and whether a limit was violated under guarantee.
-fn budgeted(budget: u32, kind: Kind) -> (harness::Outcome, Memory, u32, bool) {
+fn budgeted(budget: u32, kind: DisturbanceKind) -> (harness::Outcome, Memory, u32, bool) {
     let settings = settings(Constraints::Robust);
     let solver = SolverSettings { iteration_budget: budget, ..settings.solver };
     let mut controller = Crmpc::new(Settings { solver, ..settings }).unwrap();
@@ -157,10 +157,11 @@ fn budgeted(budget: u32, kind: Kind) -> (harness::Outcome, Memory, u32, bool) {
 #[test]
 fn a_budget_of_iterations_is_never_exceeded_and_costs_no_limit() {
     let budgets = [0, 1, 2, 3, 4, 6, 8];
-    let cases: Vec<(u32, Kind)> = budgets
+    let cases: Vec<(u32, DisturbanceKind)> = budgets
         .into_iter()
         .flat_map(|budget| {
-            [Kind::White, Kind::AlongRate, Kind::AgainstMoment].map(|kind| (budget, kind))
+            [DisturbanceKind::White, DisturbanceKind::AlongRate, DisturbanceKind::AgainstMoment]
+                .map(|kind| (budget, kind))
         })
         .collect();
     let runs = in_parallel(&cases, |&(budget, kind)| (budget, budgeted(budget, kind)));
@@ -177,9 +178,9 @@ fn a_budget_of_iterations_is_never_exceeded_and_costs_no_limit() {
 
 #[test]
 fn a_run_with_a_budget_of_iterations_repeats_bit_for_bit() {
-    let [first, second] = [0; 2].map(|_| budgeted(4, Kind::White).1);
+    let [first, second] = [0; 2].map(|_| budgeted(4, DisturbanceKind::White).1);
     let timeless =
-        |memory: Memory| Memory { report: Report { time: 0.0, ..memory.report }, ..memory };
+        |memory: Memory| Memory { report: SolverReport { time: 0.0, ..memory.report }, ..memory };
     assert_eq!(timeless(first), timeless(second));
 }
 
@@ -205,7 +206,7 @@ proptest! {
         }
         // A sufficient budget changes nothing.
         if cold.iterations < budget {
-            prop_assert_eq!(Report { time: 0.0, ..reports[0] }, Report { time: 0.0, ..cold });
+            prop_assert_eq!(SolverReport { time: 0.0, ..reports[0] }, SolverReport { time: 0.0, ..cold });
         } else if cold.iterations > budget {
             prop_assert_eq!(reports[0].exhausted, 1);
         }

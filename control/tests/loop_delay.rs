@@ -1,25 +1,25 @@
-//! Tests of the estimate of a loop's own delay.
+//! Tests of the estimate of the delay of a loop.
 
 use control::controller::{Controller, Measurement};
 use control::crmpc::{Constraints, Contradiction, Crmpc, Guarantee, Settings, Standing};
 use control::delay::{Delayed, Latency};
 use vehicle::Scenario;
-use vehicle::disturbance::Kind;
+use vehicle::disturbance::DisturbanceKind;
 use vehicle::plant::Plant;
 
 const PERIOD: f64 = 0.04;
 
 /// Outcome of a flight.
 struct Flight {
-    /// Time at which another delay than the one that was told is found, s.
-    found: Option<f64>,
+    /// Time at which another delay than the declared one is found, s.
+    found_at: Option<f64>,
     /// Estimated delay at the end, s.
     estimate: f64,
     contradiction: Contradiction,
     status: Standing,
 }
 
-fn fly(kind: Kind, seed: u64, (told, truly): (f64, f64), scale: f64) -> Flight {
+fn fly(kind: DisturbanceKind, seed: u64, (told, truly): (f64, f64), scale: f64) -> Flight {
     let mut scenario = Scenario::crmpc2022();
     (scenario.disturbance.kind, scenario.disturbance.seed) = (kind, seed);
     scenario.disturbance.square_period = 1.5;
@@ -32,19 +32,19 @@ fn fly(kind: Kind, seed: u64, (told, truly): (f64, f64), scale: f64) -> Flight {
     let mut config = scenario.config(0.01);
     config.moment_delay = truly;
     let mut plant = Plant::new(&config, 0.0).unwrap();
-    let mut found = None;
+    let mut found_at = None;
     for tick in 0..500 {
         let time = f64::from(tick) * PERIOD;
         let measured =
             Measurement { angles: plant.angles(), rates: plant.rates(), ..Measurement::default() };
         let reference = |time: f64| scenario.reference.at(time);
         let moment = law.update(&mut memory, tick as u64, time, &measured, &reference);
-        found = found.or(memory.loop_delay.is_other.then_some(time));
+        found_at = found_at.or(memory.loop_delay.is_other.then_some(time));
         plant.advance(time, time + PERIOD, moment).unwrap();
     }
     let supervision = memory.inner.supervision;
     Flight {
-        found,
+        found_at,
         estimate: law.estimated_delay(&memory),
         contradiction: supervision.contradiction,
         status: supervision.status,
@@ -53,11 +53,11 @@ fn fly(kind: Kind, seed: u64, (told, truly): (f64, f64), scale: f64) -> Flight {
 
 #[test]
 fn oracle_a_delay_that_was_not_told_is_found_and_ends_the_guarantee() {
-    for kind in [Kind::White, Kind::Constant, Kind::Square] {
+    for kind in [DisturbanceKind::White, DisturbanceKind::Constant, DisturbanceKind::Square] {
         for (told, truly) in [(0.0, 0.04), (0.04, 0.0), (0.0, 0.12)] {
             let flight = fly(kind, 3, (told, truly), 0.97);
-            let found = flight.found.is_some_and(|time| time <= 15.0);
-            assert!(found, "{kind:?} {told} {truly} {:?}", flight.found);
+            let is_found = flight.found_at.is_some_and(|time| time <= 15.0);
+            assert!(is_found, "{kind:?} {told} {truly} {:?}", flight.found_at);
             assert!((flight.estimate - truly).abs() <= 0.25 * PERIOD + 1e-9, "{}", flight.estimate);
             assert_eq!(flight.contradiction, Contradiction::Delay);
             assert_eq!(flight.status, Standing::Exceeded);
@@ -67,11 +67,11 @@ fn oracle_a_delay_that_was_not_told_is_found_and_ends_the_guarantee() {
 
 #[test]
 fn oracle_a_delay_that_was_told_is_not_doubted() {
-    for kind in [Kind::White, Kind::Constant, Kind::Square] {
+    for kind in [DisturbanceKind::White, DisturbanceKind::Constant, DisturbanceKind::Square] {
         for delay in [0.0, 0.04] {
             for scale in [0.95, 1.05] {
                 let flight = fly(kind, 5, (delay, delay), scale);
-                assert_eq!(flight.found, None, "{kind:?} {delay}");
+                assert_eq!(flight.found_at, None, "{kind:?} {delay}");
                 assert!((flight.estimate - delay).abs() <= 0.5 * PERIOD);
                 assert_eq!(flight.contradiction, Contradiction::None);
             }
@@ -79,7 +79,7 @@ fn oracle_a_delay_that_was_told_is_not_doubted() {
     }
 }
 
-/// A unit that only serves for its reference has no motion to look at.
+/// A controller that only serves for its reference has no measurements.
 #[test]
 fn oracle_commands_that_do_not_act_tell_no_delay() {
     let scenario = Scenario::crmpc2022();

@@ -4,7 +4,9 @@
 mod harness;
 
 use control::controller::Preview;
-use control::crmpc::{Constraints, InitialState, Memory, Plan, Report, Settings, Standing, Status};
+use control::crmpc::{
+    Constraints, InitialState, Memory, Plan, Settings, SolverReport, SolverStatus, Standing,
+};
 use control::mpc::{Method, Nonlinearity, SolverSettings};
 use control::schedule::Sampled;
 use control::{Controller, Crmpc, Measurement};
@@ -14,7 +16,7 @@ use proptest::prelude::*;
 use proptest::test_runner::{RngAlgorithm, TestRng, TestRunner};
 use std::cell::{Cell, RefCell};
 use std::ops::Range;
-use vehicle::disturbance::Kind;
+use vehicle::disturbance::DisturbanceKind;
 use vehicle::kinematics;
 use vehicle::reference::Reference;
 use vehicle::scenario::Scenario;
@@ -37,7 +39,7 @@ fn cone(constraints: Constraints) -> Crmpc {
 
 /// Returns the memory without values from a clock.
 fn timeless(memory: &Memory) -> Memory {
-    Memory { report: Report { time: 0.0, ..memory.report }, ..memory.clone() }
+    Memory { report: SolverReport { time: 0.0, ..memory.report }, ..memory.clone() }
 }
 
 /// Input of one optimisation of a recorded run.
@@ -61,20 +63,20 @@ fn recorded(constraints: Constraints) -> Vec<Recorded> {
     let mut controller = controller(constraints);
     let ratio = controller.design().ratio as u64;
     let mut before = Memory::default();
-    let mut all = Vec::new();
+    let mut samples = Vec::new();
     simulate(
         &mut controller,
         &mut Memory::default(),
         1.05,
-        disturbance(Kind::White),
+        disturbance(DisturbanceKind::White),
         |after, tick, &measured| {
             if tick % ratio == 0 {
-                all.push(Recorded { tick, before: before.clone(), measured });
+                samples.push(Recorded { tick, before: before.clone(), measured });
             }
             before.clone_from(after);
         },
     );
-    all
+    samples
 }
 
 #[test]
@@ -106,9 +108,9 @@ fn shortcuts_lead_to_the_optimum_of_the_whole_horizon() {
                     let moment = controller.update(&mut memory, 0, time, &measured, &reference());
                     (memory.report.status, memory.report.cost, moment)
                 });
-            prop_assume!(status_whole == Status::Cone);
-            prop_assert_ne!(status, Status::Fallback);
-            counts[usize::from(status == Status::Constrained)].update(|count| count + 1);
+            prop_assume!(status_whole == SolverStatus::Cone);
+            prop_assert_ne!(status, SolverStatus::Fallback);
+            counts[usize::from(status == SolverStatus::Constrained)].update(|count| count + 1);
             prop_assert!((cost - cost_whole).abs() <= 1e-6 * cost_whole, "{cost} {cost_whole}");
             let difference = (moment - moment_whole).norm() / limit;
             prop_assert!(difference < 1e-4, "{status:?}: {difference}");
@@ -142,7 +144,7 @@ fn oracle_terminal_constraint_is_a_ball_in_the_norm_of_g() {
         assert!(norm <= epsilon * (1.0 + 1e-6), "tick {}: {norm}", sample.tick);
         active += usize::from(norm >= epsilon * (1.0 - 1e-6));
     }
-    // The ball is active while the jump is at the end of the horizon.
+    // The terminal constraint is active while the jump is at the end of the horizon.
     assert!(active >= 3, "{active}");
 }
 
@@ -190,11 +192,11 @@ fn oracle_off_the_nominal_motion_the_input_changes_by_k_times_the_deviation() {
 
 #[test]
 fn shortcuts_change_nothing_along_a_run() {
-    // The balls are functions of the motion in the first way, and linearised in the second, which
-    // is the cone solver's.
-    let ways = [(Nonlinearity::Exact, Method::Riccati), (Nonlinearity::Frozen, Method::Cone)];
+    // The first solver has the norm constraints as functions of the trajectory; the second, the
+    // cone solver, has them linearised.
+    let solvers = [(Nonlinearity::Exact, Method::Riccati), (Nonlinearity::Frozen, Method::Cone)];
     for constraints in [Constraints::Robust, Constraints::Paper] {
-        for (nonlinearity, method) in ways {
+        for (nonlinearity, method) in solvers {
             let settings = settings(constraints);
             let solver = SolverSettings { nonlinearity, ..settings.solver };
             let mut with = Crmpc::new(Settings { solver, ..settings }).unwrap();
@@ -205,7 +207,7 @@ fn shortcuts_change_nothing_along_a_run() {
             for sample in recorded(constraints).iter().step_by(3) {
                 let (memory, moment) = sample.update(&mut with);
                 let (whole, moment_whole) = sample.update(&mut without);
-                counts[usize::from(memory.report.status == Status::Constrained)] += 1;
+                counts[usize::from(memory.report.status == SolverStatus::Constrained)] += 1;
                 let (cost, cost_whole) = (memory.report.cost, whole.report.cost);
                 let tick = sample.tick;
                 assert!(
@@ -237,8 +239,11 @@ fn oracle_without_a_disturbance_bound_all_solvers_agree_however_the_plan_begins(
                 let mut controller = Crmpc::new(Settings { solver, ..settings }).unwrap();
                 let mut memory = Memory::default();
                 controller.update(&mut memory, 0, 0.0, &measured, &reference());
-                let expected =
-                    if method == Method::Riccati { Status::Constrained } else { Status::Cone };
+                let expected = if method == Method::Riccati {
+                    SolverStatus::Constrained
+                } else {
+                    SolverStatus::Cone
+                };
                 assert_eq!(memory.report.status, expected, "{constraints:?}, {initial_state:?}");
                 memory.report.cost
             });
@@ -251,15 +256,15 @@ fn oracle_without_a_disturbance_bound_all_solvers_agree_however_the_plan_begins(
 #[test]
 fn every_way_to_the_optimum_shows_that_it_is_one() {
     // The measure is the residual of the conditions of optimality, with the constraints as
-    // functions of the motion. Where the bounds follow the motion, as in the robust set, the solver
-    // stops at an excess of 1e-5 of a ball (docs/solver.md).
+    // functions of the trajectory. Where the bounds follow the trajectory, as in the robust set,
+    // the solver stops when a norm constraint is exceeded by 1e-5 (docs/solver.md).
     for constraints in [Constraints::Robust, Constraints::Paper] {
         let mut controller = controller(constraints);
         let mut seen = Vec::new();
         for sample in recorded(constraints) {
-            let Report { status, residual, .. } = sample.update(&mut controller).0.report;
+            let SolverReport { status, residual, .. } = sample.update(&mut controller).0.report;
             let largest = match status {
-                Status::Unconstrained | Status::TerminalBall => 1e-9,
+                SolverStatus::Unconstrained | SolverStatus::TerminalConstraint => 1e-9,
                 _ if constraints == Constraints::Robust => 1e-5,
                 _ => 2e-6,
             };
@@ -269,11 +274,12 @@ fn every_way_to_the_optimum_shows_that_it_is_one() {
             }
         }
         assert!(
-            seen.contains(&Status::Unconstrained) && seen.contains(&Status::Constrained),
+            seen.contains(&SolverStatus::Unconstrained)
+                && seen.contains(&SolverStatus::Constrained),
             "{seen:?}"
         );
         assert!(
-            constraints == Constraints::Robust || seen.contains(&Status::TerminalBall),
+            constraints == Constraints::Robust || seen.contains(&SolverStatus::TerminalConstraint),
             "{seen:?}"
         );
     }
@@ -312,13 +318,13 @@ fn published_fallback_is_the_shifted_plan_with_the_terminal_law() {
     let constrained = |sample: &&Recorded| {
         sample.tick > 0
             && sample.update(&mut controller(Constraints::Paper)).0.report.status
-                == Status::Constrained
+                == SolverStatus::Constrained
     };
     let samples: Vec<_> = recorded.iter().filter(constrained).take(3).collect();
     assert_eq!(samples.len(), 3);
     for sample in samples {
         let (after, moment) = sample.update(&mut failing);
-        assert_eq!(after.report.status, Status::Fallback);
+        assert_eq!(after.report.status, SolverStatus::Fallback);
         assert_eq!(after.report.fallbacks, sample.before.report.fallbacks + 1);
         assert_eq!(after.report.solves, sample.before.report.solves + 1);
         let time = sample.tick as f64 * settings.period_feedback;
@@ -377,16 +383,15 @@ fn published_fallback_is_the_shifted_plan_with_the_terminal_law() {
 
 #[test]
 fn the_robust_plan_is_kept_where_no_optimum_is_found() {
-    // Beyond the horizon the motion brakes (docs/guarantee.md), so that the guarantee stays in
-    // force. The plan moves towards the optimum without constraints only as far as that is
-    // certified.
+    // Beyond the horizon the trajectory brakes (docs/guarantee.md), so that the guarantee stays in
+    // force. The plan moves towards the unconstrained optimum only as far as that is certified.
     let settings = settings(Constraints::Robust);
     let solver = SolverSettings { max_iterations: 1, ..settings.solver };
     let mut failing = Crmpc::new(Settings { solver, ..settings }).unwrap();
     let (mut shifted, mut moved) = (0, 0);
     for sample in recorded(Constraints::Robust).iter().skip(1) {
         let (after, _) = sample.update(&mut failing);
-        if after.report.status != Status::Kept {
+        if after.report.status != SolverStatus::Kept {
             continue;
         }
         let before = &sample.before.plan;
@@ -459,9 +464,10 @@ fn run_failing(during: Range<u64>) -> (harness::Outcome, [u32; 2], Memory) {
         &mut controller,
         &mut memory,
         1.05,
-        disturbance(Kind::White),
+        disturbance(DisturbanceKind::White),
         |memory, tick, _| {
-            let without = matches!(memory.report.status, Status::Fallback | Status::Kept);
+            let without =
+                matches!(memory.report.status, SolverStatus::Fallback | SolverStatus::Kept);
             fallbacks[usize::from(!during.contains(&tick))] +=
                 u32::from(without && memory.report.solves > last);
             last = memory.report.solves;
@@ -481,7 +487,7 @@ fn a_solver_that_fails_for_a_while_costs_no_limit() {
             "{during:?}: {inside} fallbacks inside, {outside} outside"
         );
         assert!(outcome.rate <= 1.0 && outcome.moment <= 1.0, "{during:?}: {outcome:?}");
-        assert_eq!(memory.report.status, Status::Unconstrained, "{during:?}");
+        assert_eq!(memory.report.status, SolverStatus::Unconstrained, "{during:?}");
     }
 }
 
@@ -497,7 +503,7 @@ fn a_solver_that_fails_from_the_start_is_outlived() {
         );
         assert!(outcome.rate <= 1.0 && outcome.moment <= 1.0 + 1e-12, "{during:?}: {outcome:?}");
         assert!(outcome.ems_deg < 2.5, "{during:?}: {outcome:?}");
-        assert_eq!(memory.report.status, Status::Unconstrained, "{during:?}");
+        assert_eq!(memory.report.status, SolverStatus::Unconstrained, "{during:?}");
     }
 }
 
@@ -511,7 +517,7 @@ fn another_evaluation_of_a_tick_leaves_no_trace() {
         &mut controller(Constraints::Robust),
         &mut Memory::default(),
         1.05,
-        disturbance(Kind::White),
+        disturbance(DisturbanceKind::White),
         |_, _, &measured| truth.push(measured),
     );
     let (mut disturbed_controller, mut calm_controller) =
@@ -540,7 +546,7 @@ fn a_saved_memory_continues_bit_for_bit_in_a_new_controller() {
             &mut controller(constraints),
             &mut Memory::default(),
             0.95,
-            disturbance(Kind::White),
+            disturbance(DisturbanceKind::White),
             |_, _, &measured| truth.push(measured),
         );
         let scenario = Scenario::crmpc2022();

@@ -9,13 +9,13 @@ use control::allocation::{self, Allocator, Command};
 use control::crmpc::{self, Constraints, Settings};
 use control::dlmpc;
 use control::mpc::{Method, SolverSettings};
-use control::report::Status;
+use control::report::SolverStatus;
 use control::{Crmpc, Dlmpc};
 use harness::{Optimising, disturbance, settings, simulate};
 use nalgebra::Vector3;
 use std::hint::black_box;
 use std::sync::atomic::{AtomicUsize, Ordering};
-use vehicle::disturbance::Kind;
+use vehicle::disturbance::DisturbanceKind;
 use vehicle::math;
 
 static CALLS: AtomicUsize = AtomicUsize::new(0);
@@ -44,9 +44,15 @@ extern "C" fn pow(x: f64, y: f64) -> f64 {
 /// Flies the scenario and asserts that the cone solver finds every plan.
 fn fly<C: Optimising>(mut controller: C) {
     let mut memory = controller.memory();
-    simulate(&mut controller, &mut memory, 1.05, disturbance(Kind::White), |memory, _, _| {
-        assert_eq!(C::report(memory).status, Status::Cone);
-    });
+    simulate(
+        &mut controller,
+        &mut memory,
+        1.05,
+        disturbance(DisturbanceKind::White),
+        |memory, _, _| {
+            assert_eq!(C::report(memory).status, SolverStatus::Cone);
+        },
+    );
 }
 
 #[test]
@@ -66,7 +72,7 @@ fn the_cone_solver_takes_no_exp_log_or_pow_from_the_platform() {
         0,
         &Command { moment, dynamic_pressure: 2859.0 },
     );
-    assert_eq!(memory.report.status, allocation::Status::Optimal);
+    assert_eq!(memory.report.status, allocation::AllocationStatus::Optimal);
 
     assert_eq!(CALLS.load(Ordering::Relaxed), 0);
     // The count works.

@@ -80,9 +80,9 @@ fn sotvsmc_do() -> SotvsmcDo {
 
 /// Compares angles in deg, to 2 % or half a unit of the last digit given.
 fn assert_rms(outcome: &Outcome, expected: [f64; 3], digit: f64) {
-    for (found, expected) in outcome.rms.iter().zip(expected) {
+    for (computed, expected) in outcome.rms.iter().zip(expected) {
         assert!(
-            (found - expected).abs() <= (0.02 * expected).max(0.5 * digit),
+            (computed - expected).abs() <= (0.02 * expected).max(0.5 * digit),
             "{:?}",
             outcome.rms
         );
@@ -230,12 +230,12 @@ fn a_known_limit_needs_no_measured_moment() {
     let Settings { body, period, .. } = Settings::sotvsmc_do();
     let latency = Latency::default();
     let mut limited = Delayed::new(sotvsmc_do(), body, period, latency, limit_moment).unwrap();
-    let known = simulate(&mut limited, &scenario, false, |moment| moment, |_, _| ());
-    assert!(known.moment <= limit_moment * (1.0 + 1e-12));
+    let outcome = simulate(&mut limited, &scenario, false, |moment| moment, |_, _| ());
+    assert!(outcome.moment <= limit_moment * (1.0 + 1e-12));
     let within = |moment: Vector3<f64>| moment / (moment.norm() / limit_moment).max(1.0);
     let measured = simulate(&mut sotvsmc_do(), &scenario, true, within, |_, _| ());
-    assert!((known.rms - measured.rms).norm() < 1e-3 * measured.rms.norm());
-    assert!(known.settling.max() < 4.0, "{:?}", known.settling);
+    assert!((outcome.rms - measured.rms).norm() < 1e-3 * measured.rms.norm());
+    assert!(outcome.settling.max() < 4.0, "{:?}", outcome.settling);
 }
 
 #[test]

@@ -86,24 +86,24 @@ proptest! {
             [rates, moment, delta_d, amplitude].map(Vector3::from);
         let delta_f = |t: f64| amplitude * f64::sin(phase + 2.0 * t);
         let delta_f_dot = amplitude * (2.0 * f64::cos(phase));
-        let found = differenced_acceleration(&body, [angles, rates, moment, delta_d], delta_f);
+        let acceleration = differenced_acceleration(&body, [angles, rates, moment, delta_d], delta_f);
         let matrix = r(&angles);
-        let known = matrix * body.inverse * moment + body.drift(&angles, &(matrix * rates));
+        let modelled = matrix * body.inverse * moment + body.drift(&angles, &(matrix * rates));
         let f = f_of_13(&angles, &rates, false) * delta_f(0.0);
         let scale = 1.0 / angles.y.cos().powi(3);
-        let right = known + matrix * delta_d + f + delta_f_dot;
-        prop_assert!((found - right).amax() < 5e-11 * scale, "{}", found - right);
+        let right = modelled + matrix * delta_d + f + delta_f_dot;
+        prop_assert!((acceleration - right).amax() < 5e-11 * scale, "{}", acceleration - right);
         // Each of the three misprints by itself makes the sum wrong: Δd, which (8) has already
         // divided by the inertia, is divided again, the derivative of Δf is missing, and F is wrong
         // in four entries.
-        let divided = known + matrix * body.inverse * delta_d + f + delta_f_dot;
-        let without = known + matrix * delta_d + f;
-        let other = known + matrix * delta_d + f_of_13(&angles, &rates, true) * delta_f(0.0) + delta_f_dot;
-        let off = |sum: Vector3<f64>| (found - sum).norm();
+        let divided = modelled + matrix * body.inverse * delta_d + f + delta_f_dot;
+        let without = modelled + matrix * delta_d + f;
+        let other = modelled + matrix * delta_d + f_of_13(&angles, &rates, true) * delta_f(0.0) + delta_f_dot;
+        let off = |sum: Vector3<f64>| (acceleration - sum).norm();
         prop_assert!(off(divided) > 0.999 * (matrix * delta_d).norm() - 5e-11 * scale);
         prop_assert!(off(without) > 0.999 * delta_f_dot.norm());
         // Of F, (1,1), (2,2) and (3,3) carry a 1 too many, which in α and σ adds Δf itself.
-        prop_assert!((other - found).x > 0.999 * delta_f(0.0).x && (other - found).z > 0.999 * delta_f(0.0).z);
+        prop_assert!((other - acceleration).x > 0.999 * delta_f(0.0).x && (other - acceleration).z > 0.999 * delta_f(0.0).z);
     }
 
     // Lemma 2: the motion on the surface s = 0.
@@ -405,10 +405,10 @@ proptest! {
     #[test]
     fn oracle_v2_lies_between_the_bounds_of_51(law in gains(), states in states()) {
         for (axis, (s, tau)) in states.into_iter().enumerate() {
-            let of = Axis { law, axis };
-            let (xi, eigenvalues) = (of.xi(s, tau), of.lambda().symmetric_eigenvalues());
-            let v2 = of.v2(s, tau);
-            prop_assert!((xi.dot(&(of.lambda() * xi)) / v2 - 1.0).abs() < 1.5e-15);
+            let axis_law = Axis { law, axis };
+            let (xi, eigenvalues) = (axis_law.xi(s, tau), axis_law.lambda().symmetric_eigenvalues());
+            let v2 = axis_law.v2(s, tau);
+            prop_assert!((xi.dot(&(axis_law.lambda() * xi)) / v2 - 1.0).abs() < 1.5e-15);
             prop_assert!(eigenvalues.min() > 0.0);
             prop_assert!(v2 >= eigenvalues.min() * xi.norm_squared() * (1.0 - 1e-13));
             prop_assert!(v2 <= eigenvalues.max() * xi.norm_squared() * (1.0 + 1e-13));
@@ -418,11 +418,11 @@ proptest! {
     #[test]
     fn published_49_has_the_wrong_sign_before_gamma_2(law in gains(), states in states()) {
         for (axis, (s, tau)) in states.into_iter().enumerate() {
-            let of = Axis { law, axis };
-            let (found, right, printed) = (of.v2_rate(s, tau), of.by_49(s, tau, -1.0), of.by_49(s, tau, 1.0));
-            prop_assert!((found - right).abs() < 2e-8 * right.abs(), "{found} {right}");
-            let xi = of.xi(s, tau);
-            prop_assert!(printed - found > 1.999 * xi.dot(&(of.gamma_2() * xi)));
+            let axis_law = Axis { law, axis };
+            let (rate, right, printed) = (axis_law.v2_rate(s, tau), axis_law.by_49(s, tau, -1.0), axis_law.by_49(s, tau, 1.0));
+            prop_assert!((rate - right).abs() < 2e-8 * right.abs(), "{rate} {right}");
+            let xi = axis_law.xi(s, tau);
+            prop_assert!(printed - rate > 1.999 * xi.dot(&(axis_law.gamma_2() * xi)));
         }
     }
 
@@ -434,12 +434,12 @@ proptest! {
     ) {
         let axes = [0, 1, 2].map(|axis| Axis { law, axis });
         let chi = [0, 1, 2].map(|i| axes[i].chi());
-        let least = |of: fn(&(f64, f64)) -> f64| chi.iter().map(of).fold(f64::INFINITY, f64::min);
+        let least = |value: fn(&(f64, f64)) -> f64| chi.iter().map(value).fold(f64::INFINITY, f64::min);
         let (chi_1, chi_2) = (least(|chi| chi.0), least(|chi| chi.1));
         prop_assert!(chi_1 > 0.0 && chi_2 > 0.0);
         // The other axes are at rest.
-        let sum = |of: &dyn Fn(&Axis, f64, f64) -> f64| -> f64 {
-            off.iter().map(|&i: &usize| of(&axes[i], states[i].0, states[i].1)).sum()
+        let sum = |value: &dyn Fn(&Axis, f64, f64) -> f64| -> f64 {
+            off.iter().map(|&i: &usize| value(&axes[i], states[i].0, states[i].1)).sum()
         };
         let (v2, rate) = (sum(&Axis::v2), sum(&Axis::v2_rate));
         // (55), for which Lemma 9 puts the power of the sum in place of the sum of powers.
@@ -726,7 +726,7 @@ fn regress_v2_decreases_in_flight_and_faster_than_56() {
     let axes = [0, 1, 2].map(|axis| Axis { law: settings.reaching, axis });
     let v = |tick: &Tick<SecondOrder>| -> f64 {
         let Memory { sliding, integral, .. } = &tick.memory;
-        axes.iter().map(|of| of.v2(sliding[of.axis], integral[of.axis])).sum()
+        axes.iter().map(|axis| axis.v2(sliding[axis.axis], integral[axis.axis])).sum()
     };
     let (falling, _) = after_t_ob(&flight, v, 2e-7);
     assert!(falling.windows(2).all(|pair| v(&pair[1]) < v(&pair[0])));

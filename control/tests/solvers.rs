@@ -1,23 +1,23 @@
 //! The Riccati method compared with the cone solver: for the same problem both find the same cost,
 //! or neither finds an optimum.
 
-#[path = "harness/balls.rs"]
-mod balls;
+#[path = "harness/norm_constraints.rs"]
+mod norm_constraints;
 
-use balls::Sets;
 use control::mpc::Budget;
-use control::mpc::balls::Frozen;
 use control::mpc::certificate::Certificate;
 use control::mpc::conic::ConicSolver;
+use control::mpc::constraints::LinearisedConstraints;
 use control::mpc::lq::Unconstrained;
 use control::mpc::problem::{End, Outcome, Problem, Solution, Start};
 use control::mpc::riccati::Riccati;
 use control::mpc::{
-    Balls, Bounded, Bounds, Chain, Constraints, Cost, Layout, Motion, Optimiser, SolverSettings,
-    State,
+    Bounded, Bounds, Chain, Constraints, Cost, ErrorTrajectory, Layout, Optimiser, SolverSettings,
+    StageConstraints, State,
 };
-use control::report::Status;
+use control::report::SolverStatus;
 use nalgebra::{SMatrix, SVector, Vector3};
+use norm_constraints::Sets;
 use proptest::prelude::*;
 use proptest::test_runner::{RngAlgorithm, TestRng, TestRunner};
 use std::cell::Cell;
@@ -43,8 +43,8 @@ fn shape() -> impl Strategy<Value = Shape> {
     let weights = [weight(), weight(), weight()];
     (10..=200usize, weights, any::<bool>()).prop_map(|(horizon, [angle, rate, input], terminal)| {
         let h = 0.2;
-        let of = |decade: f64, typical: f64| h * typical * 10.0_f64.powf(decade);
-        let (p1, p2, q) = (of(angle, 50.0), of(rate, 50.0), of(input, 10.0));
+        let weight_of = |decade: f64, typical: f64| h * typical * 10.0_f64.powf(decade);
+        let (p1, p2, q) = (weight_of(angle, 50.0), weight_of(rate, 50.0), weight_of(input, 10.0));
         let each = SMatrix::<f64, 2, 2>::new(
             8.0 * p1,
             3.0 * (p1 * p2).sqrt(),
@@ -69,7 +69,7 @@ struct Sample {
     printed: bool,
     /// Decades of both bounds about 5 °/s and 1.356e5 N m.
     bounds: (f64, f64),
-    /// Radius ε relative to ‖E_N‖_G of the motion without balls.
+    /// Radius ε relative to ‖E_N‖_G of the unconstrained optimum.
     radius: f64,
 }
 
@@ -96,7 +96,7 @@ struct Solvers {
     unconstrained: Unconstrained<2>,
     riccati: Riccati<2>,
     cone: ConicSolver<2>,
-    frozen: Frozen<2>,
+    linearised: LinearisedConstraints<2>,
     affine: Vec<State<2>>,
 }
 
@@ -111,7 +111,7 @@ impl Solvers {
             chain,
             cost: shape.cost,
             horizon: shape.horizon,
-            state_balls: true,
+            constrains_states: true,
             terminal: shape.terminal,
             start,
             margin: 0.5,
@@ -124,16 +124,16 @@ impl Solvers {
             unconstrained: Unconstrained::new(shape.horizon, &chain, &shape.cost),
             riccati: Riccati::new(shape.horizon, faces, MAX_ITERATIONS),
             cone: cone.unwrap(),
-            frozen: Frozen::new(shape.horizon),
+            linearised: LinearisedConstraints::new(shape.horizon),
             affine: vec![[Vector3::zeros(); 2]; shape.horizon],
             shape,
         }
     }
 
-    /// Solves the sample's problem with both solvers, with its balls linearised about the optimum
-    /// without balls.
+    /// Solves the sample's problem with both solvers, with its norm constraints linearised about
+    /// the unconstrained optimum.
     fn solve(&mut self, sample: &Sample, normals: Option<&[Vec<SVector<f64, 2>>; 3]>) -> Verdict {
-        let Self { shape, chain, unconstrained, riccati, cone, frozen, affine } = self;
+        let Self { shape, chain, unconstrained, riccati, cone, linearised, affine } = self;
         affine.fill([Vector3::zeros(); 2]);
         let at = (sample.jump.0 * shape.horizon as f64) as usize;
         affine[at.min(shape.horizon - 1)][0] = Vector3::from(sample.jump.1);
@@ -146,9 +146,9 @@ impl Solvers {
             ),
         };
         let mut solution = Solution::new(shape.horizon);
-        unconstrained.solve(&sample.start, affine, &mut solution.motion);
-        frozen.set(&sets, &solution.motion, 0);
-        let end = &solution.motion.states[shape.horizon];
+        unconstrained.solve(&sample.start, affine, &mut solution.trajectory);
+        linearised.set(&sets, &solution.trajectory, 0);
+        let end = &solution.trajectory.states[shape.horizon];
         let radius =
             shape.terminal.then(|| (sample.radius * shape.cost.end_square(end).sqrt()).max(1e-4));
         let zero = [Vector3::zeros(); 2];
@@ -158,17 +158,21 @@ impl Solvers {
             start: normals
                 .map_or(Start::Fixed(sample.start), |normals| Start::Within(sample.start, normals)),
             affine,
-            constraints: &*frozen,
+            constraints: &*linearised,
             end: End { weight: &shape.cost.end, slope: zero, radius },
         };
         let mut judged = solution.clone();
         let outcome =
             riccati.solve(&problem, &mut solution, 0, false, &mut Budget::unlimited(), None);
         let verdict = cone.solve(&problem, &mut judged, (u32::MAX, f64::INFINITY));
-        let of = |outcome, solution: &Solution<2>| {
-            (outcome, shape.cost.of(&solution.motion), Certificate::of(&problem, solution, false))
+        let assessed = |outcome, solution: &Solution<2>| {
+            (
+                outcome,
+                shape.cost.total(&solution.trajectory),
+                Certificate::new(&problem, solution, false),
+            )
         };
-        [of(outcome, &solution), of(verdict, &judged)]
+        [assessed(outcome, &solution), assessed(verdict, &judged)]
     }
 }
 
@@ -224,7 +228,7 @@ fn oracle_riccati_and_cone_agree_on_the_cost_of_5500_random_problems() {
     assert!(both >= 4000 && neither >= 20, "{both} {neither} {alone}");
 }
 
-/// The problem of Chai 2022, section 5.1, with a terminal ball.
+/// The problem of Chai 2022, section 5.1, with a terminal constraint.
 fn published() -> Shape {
     let settings = control::crmpc::Settings::new(control::crmpc::Constraints::Robust);
     let h = settings.period_optimisation;
@@ -279,12 +283,15 @@ fn oracle_riccati_and_cone_agree_in_degenerate_cases() {
         solvers.solve(&Sample { start, ..MODERATE }, None),
         "rate at its bound at the start",
     );
-    // These are balls so large that none is active, and an end that is almost given.
-    assert_agree(solvers.solve(&Sample { bounds: (3.0, 3.0), ..MODERATE }, None), "no ball active");
+    // These bounds are so large that no constraint is active; then the end state is almost given.
+    assert_agree(
+        solvers.solve(&Sample { bounds: (3.0, 3.0), ..MODERATE }, None),
+        "no constraint active",
+    );
     let jump = (0.99, [0.012, 0.0, -0.087]);
     assert_agree(
         solvers.solve(&Sample { radius: 1e-3, jump, ..MODERATE }, None),
-        "tiny terminal ball",
+        "tiny terminal constraint",
     );
     // One axis is already at its reference.
     let start = [Vector3::new(0.3, 0.0, 0.0), Vector3::zeros()];
@@ -329,7 +336,7 @@ fn oracle_riccati_and_cone_agree_where_the_start_is_free_within_a_set() {
 }
 
 #[test]
-fn oracle_balls_that_only_the_iterates_come_near_are_found() {
+fn oracle_constraints_that_only_the_iterates_come_near_are_found() {
     let Shape { horizon, cost, .. } = published();
     let chain = Chain::new(0.2);
     let affine = vec![[Vector3::zeros(); 2]; horizon];
@@ -346,8 +353,8 @@ fn oracle_balls_that_only_the_iterates_come_near_are_found() {
     };
     // One guess violates its bounds, the other rests at the start, far from all bounds.
     let (mut fast, mut still) = (Solution::new(horizon), Solution::new(horizon));
-    Unconstrained::new(horizon, &chain, &cost).solve(&start, &affine, &mut fast.motion);
-    still.motion.states.fill(start);
+    Unconstrained::new(horizon, &chain, &cost).solve(&start, &affine, &mut fast.trajectory);
+    still.trajectory.states.fill(start);
     let optima = [fast, still].map(|mut solution| {
         let outcome = Riccati::new(horizon, 0, MAX_ITERATIONS).solve(
             &problem,
@@ -358,10 +365,10 @@ fn oracle_balls_that_only_the_iterates_come_near_are_found() {
             None,
         );
         assert!(outcome.solved(), "{outcome:?}");
-        let residual = Certificate::of(&problem, &solution, false).residual();
+        let residual = Certificate::new(&problem, &solution, false).residual();
         assert!(residual <= 1e-6, "{residual}");
         assert!(solution.multipliers.state.iter().any(|multiplier| *multiplier > 1e-3));
-        cost.of(&solution.motion)
+        cost.total(&solution.trajectory)
     });
     assert!((optima[0] - optima[1]).abs() <= 1e-8 * optima[0], "{optima:?}");
 }
@@ -374,16 +381,22 @@ struct Spoilt {
 }
 
 impl Bounded<2> for Spoilt {
-    fn has_state_balls(&self) -> bool {
+    fn constrains_states(&self) -> bool {
         true
     }
 
-    fn balls(&self, k: usize, state: &State<2>, input: &Vector3<f64>, _: (f64, f64)) -> Balls<2> {
-        let mut balls = self.sets.balls(k, state, input);
+    fn norm_constraints(
+        &self,
+        k: usize,
+        state: &State<2>,
+        input: &Vector3<f64>,
+        _: (f64, f64),
+    ) -> StageConstraints<2> {
+        let mut constraints = self.sets.norm_constraints(k, state, input);
         if self.computed.get() == 1 {
-            balls.input.value *= f64::NAN;
+            constraints.input.value *= f64::NAN;
         }
-        balls
+        constraints
     }
 
     fn squares(
@@ -393,24 +406,24 @@ impl Bounded<2> for Spoilt {
         input: &Vector3<f64>,
         bounds: (f64, f64),
     ) -> (f64, f64) {
-        let Balls { state, input } = self.balls(k, state, input, bounds);
+        let StageConstraints { state, input } = self.norm_constraints(k, state, input, bounds);
         (state.value.norm_squared(), input.value.norm_squared())
     }
 
-    fn bounds_about(&self, _: &Motion<2>, _: Range<usize>, _: &mut Bounds) {
+    fn bounds_about(&self, _: &ErrorTrajectory<2>, _: Range<usize>, _: &mut Bounds) {
         self.computed.update(|computed| computed + 1);
     }
 
     fn violated(
         &self,
-        motion: &Motion<2>,
-        mut of: Range<usize>,
+        trajectory: &ErrorTrajectory<2>,
+        mut intervals: Range<usize>,
         _: &mut Bounds,
     ) -> Option<Range<usize>> {
         let violates =
-            |k: usize| self.sets.squares(k, &motion.states[k], &motion.inputs[k]).1 > 1.0;
-        let first = of.find(|&k| violates(k))?;
-        let last = of.rev().find(|&k| violates(k)).unwrap_or(first);
+            |k: usize| self.sets.squares(k, &trajectory.states[k], &trajectory.inputs[k]).1 > 1.0;
+        let first = intervals.find(|&k| violates(k))?;
+        let last = intervals.rev().find(|&k| violates(k)).unwrap_or(first);
         Some(first..last + 1)
     }
 }
@@ -423,7 +436,7 @@ fn the_cone_solver_takes_over_where_the_riccati_method_fails() {
         chain,
         cost,
         horizon,
-        state_balls: true,
+        constrains_states: true,
         terminal: false,
         start: None,
         margin: 0.5,
@@ -432,9 +445,9 @@ fn the_cone_solver_takes_over_where_the_riccati_method_fails() {
     };
     let affine = vec![[Vector3::zeros(); 2]; horizon];
     let body = Scenario::crmpc2022().inertia.body(1.0).unwrap();
-    let previous = Motion::new(horizon);
+    let previous = ErrorTrajectory::new(horizon);
     // The spoilt sets are valid again when the cone solver asks.
-    for (computed, status) in [(0, Status::Cone), (1, Status::Constrained)] {
+    for (computed, status) in [(0, SolverStatus::Cone), (1, SolverStatus::Constrained)] {
         let solver = SolverSettings { shortcuts: false, ..SolverSettings::new(MAX_ITERATIONS) };
         let mut optimiser = Optimiser::new(layout.clone(), solver).unwrap();
         let sets = Sets { body, printed: false, bounds: (0.0873, 1.356e5) };
@@ -460,5 +473,5 @@ fn the_cone_solver_takes_over_where_the_riccati_method_fails() {
     optimiser.begin();
     let report =
         optimiser.optimise(&sets, &MODERATE.start, &affine, Some((&previous, &[[0.0; 2]; 100])));
-    assert_eq!((report.status, report.iterations), (Status::Fallback, 0));
+    assert_eq!((report.status, report.iterations), (SolverStatus::Fallback, 0));
 }

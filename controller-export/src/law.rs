@@ -127,7 +127,7 @@ pub trait Law: Default + Serialize + DeserializeOwned + Send + 'static {
     fn period() -> f64;
 
     /// Adds the variables of the law to the table.
-    fn declare(table: Table<ControllerFmu<Self>>) -> Table<ControllerFmu<Self>> {
+    fn declare(table: VariableTable<ControllerFmu<Self>>) -> VariableTable<ControllerFmu<Self>> {
         table
     }
 

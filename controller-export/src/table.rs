@@ -208,7 +208,7 @@ fn amplitude(axis: &str, meaning: &str) -> Real {
     parameter(&format!("reference.amplitude.{axis}"), &text).real().unit(unit::angle()).nominal(0.1)
 }
 
-fn reference<L: Law>(table: Table<ControllerFmu<L>>) -> Table<ControllerFmu<L>> {
+fn reference<L: Law>(table: VariableTable<ControllerFmu<L>>) -> VariableTable<ControllerFmu<L>> {
     let profile = parameter("reference.profile", PROFILES.description);
     let file = parameter(
         "reference.file",
@@ -238,7 +238,7 @@ fn moment_of_inertia(name: &str, meaning: &str) -> Real {
     parameter(name, &text).real().unit(unit::inertia()).nominal(1e6)
 }
 
-fn vehicle<L: Law>(table: Table<ControllerFmu<L>>) -> Table<ControllerFmu<L>> {
+fn vehicle<L: Law>(table: VariableTable<ControllerFmu<L>>) -> VariableTable<ControllerFmu<L>> {
     let rate = parameter("limit.rate", "Upper limit on the norm of the body rates").real();
     let moment = parameter("limit.moment", "Upper limit on the norm of the control moment").real();
     let saturation = parameter(
@@ -313,7 +313,10 @@ pub fn disturbance_estimate(axis: &str, meaning: &str) -> Real {
 }
 
 /// Adds the parameter period.feedback, the sampling period of `part`, such as "control law".
-pub fn period<L: Law>(table: Table<ControllerFmu<L>>, part: &str) -> Table<ControllerFmu<L>> {
+pub fn period<L: Law>(
+    table: VariableTable<ControllerFmu<L>>,
+    part: &str,
+) -> VariableTable<ControllerFmu<L>> {
     let text = format!("Sampling period of the {part}");
     let period = parameter("period.feedback", &text).real().unit(unit::time());
     table.real(period.min(1e-4).max(10.0).nominal(L::period()), |m| &mut m.parameters.period)

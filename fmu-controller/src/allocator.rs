@@ -1,7 +1,7 @@
 //! `ControlAllocator` divides the commanded moment among surfaces and jets.
 
 use control::allocation::{
-    Allocator, Command, JetCommand, Memory, Method, Report, Settings, Status,
+    AllocationReport, AllocationStatus, Allocator, Command, JetCommand, Memory, Method, Settings,
 };
 use controller_export::sampled::{SampledFmu, SampledInstance, Ticks};
 use controller_export::table::{AXES, capital};
@@ -43,14 +43,14 @@ static JET_COMMANDS: Enumeration<JetCommand> = Enumeration {
         (JetCommand::Duty, "duty", "duty cycle from 0 to 1, without modulation"),
     ],
 };
-static STATUSES: Enumeration<Status> = Enumeration {
+static STATUSES: Enumeration<AllocationStatus> = Enumeration {
     name: "AllocationStatus",
     description: "Origin of the allocation in force",
     items: &[
-        (Status::None, "none", "no allocation yet"),
-        (Status::Optimal, "optimal", "optimum"),
+        (AllocationStatus::None, "none", "no allocation yet"),
+        (AllocationStatus::Optimal, "optimal", "optimum"),
         (
-            Status::Fallback,
+            AllocationStatus::Fallback,
             "fallback",
             "previous allocation within the limits, because the optimisation failed",
         ),
@@ -78,7 +78,7 @@ struct Output {
     residual: Vector3<f64>,
     modulated: Vector3<f64>,
     by_surfaces: Vector3<f64>,
-    report: Report,
+    report: AllocationReport,
 }
 
 impl From<&Memory> for Output {

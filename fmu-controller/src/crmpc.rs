@@ -7,7 +7,7 @@ use control::crmpc::{
 };
 use control::error::DesignError;
 use control::error_dynamics::Gain;
-use control::report::Report;
+use control::report::SolverReport;
 use controller_export::table::{self, ANGLES, sampled_output, shown, shown_vector, vector};
 use controller_export::{ControllerFmu, Law, Vehicle};
 use fmi2_export::fields::Fields;
@@ -40,7 +40,7 @@ struct Shown {
     margins: Margins,
     moment_left: f64,
     disturbance: Vector3<f64>,
-    report: Report,
+    report: SolverReport,
 }
 
 static CONSTRAINTS: Enumeration<Constraints> = Enumeration {

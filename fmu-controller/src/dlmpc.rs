@@ -3,7 +3,7 @@
 use crate::solver;
 use control::dlmpc::{Dlmpc, Memory, Settings};
 use control::error::DesignError;
-use control::report::Report;
+use control::report::SolverReport;
 use controller_export::table::{self, ANGLES, RATES, sampled_output, shown_vector, vector};
 use controller_export::{ControllerFmu, Law, Vehicle};
 use fmi2_export::VariableTable;
@@ -26,7 +26,7 @@ pub struct DlmpcLaw {
 struct Shown {
     rate_command: Vector3<f64>,
     sliding: Vector3<f64>,
-    report: Report,
+    report: SolverReport,
     inner_time: f64,
 }
 

@@ -35,7 +35,7 @@ impl Law for FblLaw {
         FblSettings::published().period
     }
 
-    fn declare(table: Table<ControllerFmu<Self>>) -> Table<ControllerFmu<Self>> {
+    fn declare(table: VariableTable<ControllerFmu<Self>>) -> VariableTable<ControllerFmu<Self>> {
         let p = parameter("gain.p", "Gain on the tracking error of the angles").real().min(0.0);
         let d = parameter("gain.d", "Gain on the derivative of the tracking error of the angles")
             .real()

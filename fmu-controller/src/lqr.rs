@@ -34,7 +34,7 @@ impl Law for LqrLaw {
         Settings::new(Constraints::Robust).period_feedback
     }
 
-    fn declare(table: Table<ControllerFmu<Self>>) -> Table<ControllerFmu<Self>> {
+    fn declare(table: VariableTable<ControllerFmu<Self>>) -> VariableTable<ControllerFmu<Self>> {
         let table = table::period(table, "control law");
         table::weights(table, |law| &mut law.settings.p, |law| &mut law.settings.q)
     }

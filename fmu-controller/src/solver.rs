@@ -1,33 +1,37 @@
 //! Solver parameters and outputs that all controllers with an optimisation share.
 
 use control::mpc::{Method, Nonlinearity, SolverSettings};
-use control::report::{Report, Status};
+use control::report::{SolverReport, SolverStatus};
 use controller_export::table::{sampled_output, shown};
 use controller_export::{ControllerFmu, Law};
 use fmi2_export::table::parameter;
 use fmi2_export::{Enumeration, VariableTable};
 use model_description::unit;
 
-static STATUSES: Enumeration<Status> = Enumeration {
+static STATUSES: Enumeration<SolverStatus> = Enumeration {
     name: "SolverStatus",
     description: "Origin of the plan in force",
     items: &[
-        (Status::None, "none", "no optimisation yet"),
+        (SolverStatus::None, "none", "no optimisation yet"),
         (
-            Status::Unconstrained,
+            SolverStatus::Unconstrained,
             "unconstrained",
             "optimum without constraints, checked to satisfy every constraint",
         ),
         (
-            Status::TerminalBall,
+            SolverStatus::TerminalConstraint,
             "terminalBall",
             "optimum with the terminal constraint only, checked to satisfy every other constraint",
         ),
-        (Status::Constrained, "constrained", "optimum found by the Riccati method"),
-        (Status::Cone, "cone", "optimum found by the cone solver"),
-        (Status::Fallback, "fallback", "shifted previous plan, continued with the terminal law"),
+        (SolverStatus::Constrained, "constrained", "optimum found by the Riccati method"),
+        (SolverStatus::Cone, "cone", "optimum found by the cone solver"),
         (
-            Status::Kept,
+            SolverStatus::Fallback,
+            "fallback",
+            "shifted previous plan, continued with the terminal law",
+        ),
+        (
+            SolverStatus::Kept,
             "kept",
             "previous plan, which satisfies the conditions of the guarantee; no optimum that does was found",
         ),
@@ -57,14 +61,14 @@ static NONLINEARITIES: Enumeration<Nonlinearity> = Enumeration {
 };
 
 /// Returns the report with finite numbers, as outputs require.
-pub(crate) fn shown_report(report: &Report) -> Report {
-    Report { cost: shown(report.cost), residual: shown(report.residual), ..*report }
+pub(crate) fn shown_report(report: &SolverReport) -> SolverReport {
+    SolverReport { cost: shown(report.cost), residual: shown(report.residual), ..*report }
 }
 
 /// Adds the outputs of the solver.
 pub(crate) fn outputs<L: Law>(
     table: VariableTable<ControllerFmu<L>>,
-    solver: impl Fn(&mut L) -> &mut Report + Copy + Send + Sync + 'static,
+    solver: impl Fn(&mut L) -> &mut SolverReport + Copy + Send + Sync + 'static,
 ) -> VariableTable<ControllerFmu<L>> {
     let sampled = sampled_output;
     let status = sampled("solver.status", STATUSES.description);
@@ -99,7 +103,7 @@ pub(crate) fn outputs<L: Law>(
 pub(crate) fn parameters<L: Law>(
     table: VariableTable<ControllerFmu<L>>,
     solver: impl Fn(&mut L) -> &mut SolverSettings + Copy + Send + Sync + 'static,
-) -> Table<ControllerFmu<L>> {
+) -> VariableTable<ControllerFmu<L>> {
     let method = parameter("solver", METHODS.description);
     let nonlinearity = parameter("solver.nonlinearity", NONLINEARITIES.description);
     let iterations = parameter(
@@ -132,7 +136,7 @@ pub(crate) fn parameters<L: Law>(
 }
 
 /// Returns a warning if an optimisation failed between the two reports.
-pub(crate) fn warning(before: &Report, after: &Report) -> Option<&'static str> {
+pub(crate) fn warning(before: &SolverReport, after: &SolverReport) -> Option<&'static str> {
     (after.fallbacks > before.fallbacks).then_some(
         "the optimisation failed: the shifted previous plan with the terminal law is used (see solver.fallbacks)",
     )

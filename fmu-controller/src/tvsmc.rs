@@ -85,7 +85,7 @@ impl<V: Variant> Law for TvsmcLaw<V> {
         V::published().period
     }
 
-    fn declare(table: Table<ControllerFmu<Self>>) -> Table<ControllerFmu<Self>> {
+    fn declare(table: VariableTable<ControllerFmu<Self>>) -> VariableTable<ControllerFmu<Self>> {
         let table = table::period(table, "control law");
         let table = anti_windup(V::reaching(surface(table)));
         let table = if V::OBSERVER { observer(table) } else { table };
@@ -114,8 +114,8 @@ impl<V: Variant> Law for TvsmcLaw<V> {
 }
 
 fn surface<V: Variant>(
-    table: Table<ControllerFmu<TvsmcLaw<V>>>,
-) -> Table<ControllerFmu<TvsmcLaw<V>>> {
+    table: VariableTable<ControllerFmu<TvsmcLaw<V>>>,
+) -> VariableTable<ControllerFmu<TvsmcLaw<V>>> {
     let c = ("surface.c", "Gain c of the sliding surface");
     let lambda = parameter(
         "surface.lambda",

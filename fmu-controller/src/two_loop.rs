@@ -81,7 +81,7 @@ impl Law for TwoLoopLaw {
         TwoLoopSettings::ours().period
     }
 
-    fn declare(table: Table<ControllerFmu<Self>>) -> Table<ControllerFmu<Self>> {
+    fn declare(table: VariableTable<ControllerFmu<Self>>) -> VariableTable<ControllerFmu<Self>> {
         let table = table::period(table, "control law");
         let outer = ["outer", "outer loop", ""];
         let table = reaching(table, outer, ANGLES, &unit::angular_rate(), &unit::angle(), |law| {

@@ -7,7 +7,9 @@ use vehicle::Scenario;
 use vehicle::actuators::{self, JetMode};
 use vehicle::atmosphere::Flight;
 use vehicle::calibration::Sequence;
-use vehicle::disturbance::{Disturbance, Kind, MomentWave, Row, SineMoment, Table};
+use vehicle::disturbance::{
+    Disturbance, DisturbanceKind, DisturbanceTable, MomentWave, Row, SineMoment,
+};
 use vehicle::dynamics::Inertia;
 use vehicle::effectors::Effectors;
 use vehicle::error::Error;
@@ -26,35 +28,35 @@ const STEP: f64 = 0.01;
 const NEVER: f64 = 1e15;
 
 /// Kinds of disturbance as an FMI enumeration.
-pub(crate) static KINDS: Enumeration<Kind> = Enumeration {
+pub(crate) static KINDS: Enumeration<DisturbanceKind> = Enumeration {
     name: "DisturbanceKind",
     description: "Waveform of the disturbance",
     items: &[
-        (Kind::None, "none", "no disturbance"),
+        (DisturbanceKind::None, "none", "no disturbance"),
         (
-            Kind::White,
+            DisturbanceKind::White,
             "white",
             "each component is drawn uniformly within disturbance.bound every disturbance.period",
         ),
-        (Kind::Constant, "constant", "disturbance.bound times disturbance.direction"),
-        (Kind::Sine, "sine", "a moment that is an offset plus two sinusoids"),
+        (DisturbanceKind::Constant, "constant", "disturbance.bound times disturbance.direction"),
+        (DisturbanceKind::Sine, "sine", "a moment that is an offset plus two sinusoids"),
         (
-            Kind::Square,
+            DisturbanceKind::Square,
             "square",
             "disturbance.bound times disturbance.direction, with the sign changing every half disturbance.square.period",
         ),
         (
-            Kind::AlongRate,
+            DisturbanceKind::AlongRate,
             "alongRate",
             "each component is plus or minus disturbance.bound, chosen every disturbance.period so that the angular rate grows fastest",
         ),
         (
-            Kind::AgainstMoment,
+            DisturbanceKind::AgainstMoment,
             "againstMoment",
             "each component is plus or minus disturbance.bound, chosen every disturbance.period to oppose the control moment",
         ),
         (
-            Kind::Table,
+            DisturbanceKind::Table,
             "table",
             "disturbance.bound times the factors in the current row of a lookup table over time",
         ),
@@ -118,7 +120,7 @@ pub(crate) struct Parameters {
     pub(crate) inertia_scale: f64,
     pub(crate) initial_angles: Vector3<f64>,
     pub(crate) initial_rates: Vector3<f64>,
-    pub(crate) kind: Kind,
+    pub(crate) kind: DisturbanceKind,
     pub(crate) bound: f64,
     pub(crate) period: f64,
     pub(crate) seed: u64,
@@ -215,12 +217,12 @@ impl Parameters {
     }
 
     /// Lookup table of the disturbance, with the rows that are used.
-    fn table(&self) -> Result<Table, Error> {
+    fn table(&self) -> Result<DisturbanceTable, Error> {
         let rows = self.table.get(..self.table_rows).ok_or_else(|| Error::Parameter {
             name: "disturbance.table.rows".into(),
             problem: format!("= {} must lie between 0 and {TABLE_ROWS}", self.table_rows),
         })?;
-        Ok(Table { period: self.table_period, rows: rows.to_vec() })
+        Ok(DisturbanceTable { period: self.table_period, rows: rows.to_vec() })
     }
 
     /// Configuration of the actuators, or `None` if the control moment is an input.

@@ -10,7 +10,7 @@ use fmi2_export::{Context, Failure, Inputs, LastEvent, Model, describe};
 use model_description::variable::{Causality, Variability, VariableKind};
 use nalgebra::Vector3;
 use vehicle::Scenario;
-use vehicle::disturbance::{Kind, Row};
+use vehicle::disturbance::{DisturbanceKind, Row};
 use vehicle::effectors::{Jets, Surfaces};
 use vehicle::kinematics::{Kinematics, Trajectory};
 
@@ -201,13 +201,13 @@ const STATES: [f64; 14] =
     [0.3, 0.2, -0.5, 0.08, -0.05, 0.06, -0.01, -0.02, -0.01, -0.01, 0.01, -0.01, 0.01, 0.01];
 
 /// Iterates over all kinds of disturbance.
-fn all_kinds() -> impl Iterator<Item = Kind> {
+fn all_kinds() -> impl Iterator<Item = DisturbanceKind> {
     KINDS.items.iter().map(|(kind, ..)| *kind)
 }
 
 /// Returns an instance in model exchange after the first event, in a general attitude, with a
 /// disturbance of this kind.
-fn in_model_exchange(kind: Kind) -> ReentryPlant {
+fn in_model_exchange(kind: DisturbanceKind) -> ReentryPlant {
     let mut instance = started(|instance| instance.parameters.kind = kind);
     instance.input.moment = Vector3::new(3e4, -2e4, 1e4);
     instance.input.disturbance_moment = Vector3::new(1e3, 2e3, -3e3);
@@ -226,7 +226,7 @@ fn actuate(instance: &mut ReentryPlant) {
 
 /// Returns an instance with actuators in model exchange; its jets take a duty cycle or switch.
 fn actuated_in_model_exchange(duty: bool) -> ReentryPlant {
-    let mut instance = in_model_exchange(Kind::None);
+    let mut instance = in_model_exchange(DisturbanceKind::None);
     instance.parameters.jet_duty = duty;
     actuate(&mut instance);
     instance.initialize(&CONTEXT).unwrap();
@@ -236,7 +236,7 @@ fn actuated_in_model_exchange(duty: bool) -> ReentryPlant {
 }
 
 /// Returns an instance in model exchange on a trajectory that turns in every way.
-fn along_a_trajectory(kind: Kind, kinematics: Kinematics) -> ReentryPlant {
+fn along_a_trajectory(kind: DisturbanceKind, kinematics: Kinematics) -> ReentryPlant {
     let mut instance = in_model_exchange(kind);
     instance.parameters.kinematics = kinematics;
     instance.parameters.earth_rate = 7.2921e-5;
@@ -258,7 +258,7 @@ fn along_a_trajectory(kind: Kind, kinematics: Kinematics) -> ReentryPlant {
 /// Returns an instance in co-simulation at a communication point, with jets that take a duty cycle.
 fn at_a_communication_point() -> ReentryPlant {
     let mut instance = started(|instance| {
-        instance.parameters.kind = Kind::None;
+        instance.parameters.kind = DisturbanceKind::None;
         instance.parameters.jet_duty = true;
         actuate(instance);
     });
@@ -313,9 +313,9 @@ fn oracle_partial_derivatives_against_differences_and_declared_dependencies() {
         .map(in_model_exchange)
         .chain([false, true].map(actuated_in_model_exchange))
         .chain([
-            along_a_trajectory(Kind::None, Kinematics::Printed),
-            along_a_trajectory(Kind::Constant, Kinematics::Exact),
-            along_a_trajectory(Kind::AgainstMoment, Kinematics::Exact),
+            along_a_trajectory(DisturbanceKind::None, Kinematics::Printed),
+            along_a_trajectory(DisturbanceKind::Constant, Kinematics::Exact),
+            along_a_trajectory(DisturbanceKind::AgainstMoment, Kinematics::Exact),
         ])
         .chain([at_a_communication_point(), under_a_delayed_moment()]);
     for (case, mut instance) in instances.enumerate() {
@@ -353,7 +353,7 @@ fn oracle_partial_derivatives_against_differences_and_declared_dependencies() {
     }
     let mut duty = at_a_communication_point();
     assert!((duty.partial_derivative(0.0, 14, 44).unwrap() - 19897.0).abs() < 1e-9, "yaw by jet 1");
-    let mut exact = along_a_trajectory(Kind::None, Kinematics::Exact);
+    let mut exact = along_a_trajectory(DisturbanceKind::None, Kinematics::Exact);
     assert!(exact.partial_derivative(0.0, 8, 63).unwrap() != 0.0, "bank rate by heading");
     assert!(
         (exact.partial_derivative(0.0, 6, 65).unwrap() + 0.5f64.cos() / 0.2f64.cos()).abs() < 1e-15
@@ -362,7 +362,7 @@ fn oracle_partial_derivatives_against_differences_and_declared_dependencies() {
 
 #[test]
 fn derivatives_by_parameters_are_refused() {
-    let mut instance = in_model_exchange(Kind::None);
+    let mut instance = in_model_exchange(DisturbanceKind::None);
     for (unknown, known_position) in
         [(6, 69), (6, 6), (6, 35), (69, 0), (21, 21), (36, 36), (62, 62)]
     {
@@ -387,7 +387,8 @@ fn outputs_are_right_from_initialization_on() {
 
 #[test]
 fn at_a_tick_the_outputs_show_the_disturbance_of_the_step_to_come() {
-    for kind in [Kind::White, Kind::AlongRate, Kind::AgainstMoment] {
+    for kind in [DisturbanceKind::White, DisturbanceKind::AlongRate, DisturbanceKind::AgainstMoment]
+    {
         let mut instance = started(|instance| instance.parameters.kind = kind);
         instance.input.moment = Vector3::new(1e4, -1e4, 1e4);
         step(&mut instance, 0.0, 0.04).unwrap();
@@ -400,8 +401,8 @@ fn at_a_tick_the_outputs_show_the_disturbance_of_the_step_to_come() {
 
 #[test]
 fn looking_changes_nothing() {
-    let [mut looked_at, mut left_alone] =
-        [0, 1].map(|_| started(|instance| instance.parameters.kind = Kind::AgainstMoment));
+    let [mut looked_at, mut left_alone] = [0, 1]
+        .map(|_| started(|instance| instance.parameters.kind = DisturbanceKind::AgainstMoment));
     for k in 0..50 {
         let [from, to] = [0.04 * f64::from(k), 0.04 * f64::from(k + 1)];
         looked_at.input.moment = Vector3::repeat(-1e4);
@@ -526,7 +527,7 @@ fn tabulate(instance: &mut ReentryPlant, period: f64, rows: &[(f64, [f64; 3])]) 
 /// Returns an instance under a table that does not repeat and begins at 0.3 s.
 fn tabulated() -> ReentryPlant {
     started(|instance| {
-        instance.parameters.kind = Kind::Table;
+        instance.parameters.kind = DisturbanceKind::Table;
         instance.parameters.start = 0.3;
         tabulate(instance, 0.0, &TABLE);
     })
@@ -582,8 +583,9 @@ fn a_state_saved_in_the_middle_of_the_table_goes_on_bit_for_bit() {
 
 #[test]
 fn oracle_model_exchange_agrees_with_co_simulation_under_surfaces_and_jets() {
-    for (kind, duty) in
-        [Kind::None, Kind::AgainstMoment].into_iter().flat_map(|kind| [(kind, false), (kind, true)])
+    for (kind, duty) in [DisturbanceKind::None, DisturbanceKind::AgainstMoment]
+        .into_iter()
+        .flat_map(|kind| [(kind, false), (kind, true)])
     {
         let set = |instance: &mut ReentryPlant| {
             instance.parameters.kind = kind;
@@ -617,7 +619,7 @@ const FAR: [f64; 8] = [-90.0, 4.0, -3.0, 0.0, 90.0, 0.0, 0.0, 0.0];
 
 fn commanded(degrees: [f64; 8]) -> ReentryPlant {
     started(|instance| {
-        instance.parameters.kind = Kind::None;
+        instance.parameters.kind = DisturbanceKind::None;
         actuate(instance);
         instance.command.surfaces = Surfaces::from(degrees).map(f64::to_radians);
     })
@@ -807,7 +809,7 @@ fn with_a_moment_actuators_stay_at_rest_and_commands_do_nothing() {
 
 #[test]
 fn between_events_the_disturbance_is_held_even_beyond_a_tick() {
-    let mut instance = in_model_exchange(Kind::White);
+    let mut instance = in_model_exchange(DisturbanceKind::White);
     let held = outputs(&mut instance, 0.0).delta;
     for time in [0.01, 0.04, 0.041] {
         assert_eq!(outputs(&mut instance, time).delta, held);
@@ -818,7 +820,8 @@ fn between_events_the_disturbance_is_held_even_beyond_a_tick() {
 
 #[test]
 fn an_event_iteration_sees_the_latest_moment() {
-    let mut instance = started(|instance| instance.parameters.kind = Kind::AgainstMoment);
+    let mut instance =
+        started(|instance| instance.parameters.kind = DisturbanceKind::AgainstMoment);
     instance.new_discrete_states(0.0).unwrap();
     let before = outputs(&mut instance, 0.0).delta;
     instance.input.moment = vehicle::kinematics::r_inverse(&instance.output.angles) * before * 1e7;
@@ -833,7 +836,7 @@ fn an_event_iteration_sees_the_latest_moment() {
 fn oracle_input_derivatives_are_integrated() {
     // At beta = 0 a pitch moment k t alone gives q = k t² / 2 Iyy.
     let mut instance = started(|instance| {
-        instance.parameters.kind = Kind::None;
+        instance.parameters.kind = DisturbanceKind::None;
         instance.parameters.initial_angles = Vector3::new(0.1, 0.0, 0.2);
     });
     instance.step(0.0, 2.0, &Ramp(1e4), &mut |_| {}).unwrap();
@@ -942,7 +945,7 @@ fn impossible_parameters_are_refused_by_name() {
 fn a_singular_attitude_is_an_error_in_co_simulation_and_discarded_in_model_exchange() {
     let mut singular = [0.0; 14];
     singular[1] = 1.6;
-    let mut instance = in_model_exchange(Kind::None);
+    let mut instance = in_model_exchange(DisturbanceKind::None);
     instance.set_continuous_states(&singular);
     assert!(
         matches!(instance.calculate(0.1, LastEvent::InputSet), Err(Failure::Discard(text)) if text.contains("singular"))
@@ -953,7 +956,7 @@ fn a_singular_attitude_is_an_error_in_co_simulation_and_discarded_in_model_excha
         matches!(instance.calculate(0.0, LastEvent::InputSet), Err(Failure::Error(text)) if text.contains("singular"))
     );
     let mut instance = started(|instance| {
-        instance.parameters.kind = Kind::None;
+        instance.parameters.kind = DisturbanceKind::None;
         instance.parameters.inertia.Ixz = 0.0;
         instance.parameters.initial_angles = Vector3::new(0.0, 1.5, 0.0);
         instance.parameters.initial_rates = Vector3::new(0.0, 0.0, -0.5);

@@ -7,9 +7,9 @@ use crate::sums::{Axis, Bounds};
 use control::crmpc::{Deviation, InitialState, Lemmas, Settings, Tightening};
 use control::error_dynamics::{Early, SampledError};
 
-/// What drives the motion off its prediction but for the mismatch.
+/// What drives the vehicle off its prediction, apart from the mismatch.
 struct Drive {
-    all: Interval,
+    of_three: Interval,
     of_two: Interval,
     of_inertia: Interval,
     /// Errors of all rates, of two of them, and of two angles.
@@ -31,7 +31,7 @@ struct Mismatch {
     domain: [Interval; 2],
 }
 
-/// Quantities that drive the deviation from the nominal motion.
+/// Quantities that drive the deviation from the nominal trajectory.
 struct Driven {
     drive: Drive,
     mismatch: Mismatch,
@@ -43,7 +43,7 @@ struct Driven {
     early_moment: Interval,
     /// Largest ‖I^½ D I^−½‖ of a symmetric D with ‖D‖ ≤ 1.
     root_condition: Interval,
-    /// Largest ‖ω‖ and |β| of the vehicle before the nominal motion began.
+    /// Largest ‖ω‖ and |β| of the vehicle before the nominal trajectory began.
     vehicle_before: [Interval; 2],
     domain_before: [Interval; 2],
 }
@@ -65,7 +65,7 @@ fn drive(s: &Settings, lemmas: &Lemmas) -> Drive {
     let cosine = number(sideslip).sin_cos().1;
     let of_inertia = (inertia[0] + inertia[1]) / (cosine * smallest);
     Drive {
-        all: root3 * disturbance + of_inertia,
+        of_three: root3 * disturbance + of_inertia,
         of_two: root2 * disturbance + of_inertia,
         of_inertia,
         errors: [
@@ -82,32 +82,32 @@ fn mismatch(s: &Settings, lemmas: &Lemmas, drive: &Drive) -> Mismatch {
     let (half, sixth) = (number(0.5), Interval::ONE / number(6.0));
     let [tau, d] = [s.period_feedback, s.delay].map(number);
     let [by_rates, by_angles, jerk] = [lemmas.by_rates, lemmas.by_angles, lemmas.jerk].map(number);
-    let Drive { all, of_two, errors: [rates, rates_of_two, angles], .. } = *drive;
+    let Drive { of_three, of_two, errors: [rates, rates_of_two, angles], .. } = *drive;
     let end = d + tau;
     let growth = ((by_rates + by_angles * end) * end).exp();
     let square = tau.square();
     let slope = by_rates * number(lemmas.acceleration) + by_angles * number(lemmas.rate);
-    // Where the motion is in the middle of the period, beside its prediction with a constant
-    // acceleration: F there drives it off in turn, which sums up to a geometric series.
+    // Distance of the vehicle, in the middle of the period, from its prediction with a constant
+    // acceleration. F there drives it further off, which sums up to a geometric series.
     let in_turn = by_rates * half * tau + by_angles * square / number(8.0);
     let beside = slope
         * (by_rates * square / number(8.0) + by_angles * square * tau / number(24.0))
         / (Interval::ONE - in_turn);
     // Integrals over [0, τ], and over [τ, d + τ], of the distances of rates and angles that the
     // drive causes. Up to τ it acts, and from then on both are predictions.
-    let of_rates = half * all * square + all * tau * d;
+    let of_rates = half * of_three * square + of_three * tau * d;
     let of_angles = of_two * (sixth * square * tau + half * square * d + half * tau * d.square());
     let ((inner, _), (outer, _)) = (lemmas.vehicle, lemmas.domain);
     let halfway = half * (number(inner) + number(outer)) / number(outer);
     let revised = halfway * by_rates * of_rates + by_angles * of_angles;
     let erred =
         by_rates * rates * tau + by_angles * (angles * tau + rates_of_two * tau * (d + half * tau));
-    let apart = by_rates * (all * end + rates)
+    let apart = by_rates * (of_three * end + rates)
         + by_angles * (half * of_two * end.square() + angles + rates_of_two * end);
     let f = apart * growth;
     let off = number(0.25) * slope * square;
     let far = [
-        rates + (all + f) * end + off,
+        rates + (of_three + f) * end + off,
         angles + rates_of_two * end + half * (of_two + f) * end.square() + off * tau,
     ];
     let (vehicle_rate, vehicle_sideslip) = lemmas.vehicle;
@@ -115,7 +115,7 @@ fn mismatch(s: &Settings, lemmas: &Lemmas, drive: &Drive) -> Mismatch {
     Mismatch {
         mean: (revised + erred) * growth / tau + jerk * square / number(24.0) + beside,
         peak: f + beside + jerk * square / number(8.0) + half * slope * tau,
-        unseen_rate: (half * by_rates * all * d.square()
+        unseen_rate: (half * by_rates * of_three * d.square()
             + sixth * by_angles * of_two * d.square() * d)
             * growth,
         mispredicted: (by_rates * rates * d
@@ -163,7 +163,7 @@ fn driven(s: &Settings, lemmas: &Lemmas, before: &Lemmas) -> Driven {
             * number(before.r),
         root_condition: (largest / smallest).sqrt(),
         vehicle_before: [
-            number(s.limit_rate) + (spin + larger.all) * d,
+            number(s.limit_rate) + (spin + larger.of_three) * d,
             number(s.sideslip_domain) + number(rate) * d,
         ],
         domain_before: first.domain,
@@ -203,7 +203,7 @@ fn values(deviation: &Deviation) -> [f64; 9] {
 /// Bounds at one tick on the effects of Δ, of the errors of angle and rate, and of the others.
 struct Effects<'a> {
     reach: &'a Bounds,
-    /// Part of the feedback by what happened before the nominal motion began.
+    /// Part of the feedback by what happened before the nominal trajectory began.
     early_feedback: Interval,
     errors: [&'a Bounds; 2],
     changes: &'a Bounds,
@@ -220,15 +220,17 @@ fn deviation(s: &Settings, driven: &Driven, effects: &Effects) -> Deviations {
     let Driven { drive, mismatch, .. } = driven;
     let errors: Bounds =
         std::array::from_fn(|i| errors[0][i] * angle_error + errors[1][i] * rate_error);
-    let ball: Bounds = std::array::from_fn(|i| {
+    let in_norm: Bounds = std::array::from_fn(|i| {
         changes[i] * mismatch.mean
             + mispredictions[i] * mismatch.mispredicted
             + shifts[i] * mismatch.swing
     });
-    let accelerated =
-        drive.all * (Interval::ONE + reach[6]) + root3 * errors[6] + ball[6] + mismatch.peak;
-    let of_angles = |i: usize| reach[i] * drive.of_two + root2 * errors[i] + ball[i];
-    let of_rates = |i: usize| reach[i] * drive.all + root3 * errors[i] + ball[i];
+    let accelerated = drive.of_three * (Interval::ONE + reach[6])
+        + root3 * errors[6]
+        + in_norm[6]
+        + mismatch.peak;
+    let of_angles = |i: usize| reach[i] * drive.of_two + root2 * errors[i] + in_norm[i];
+    let of_rates = |i: usize| reach[i] * drive.of_three + root3 * errors[i] + in_norm[i];
     let any_and_along = drive.inertia[0] + drive.inertia[1];
     [
         of_angles(0) + mismatch.unseen_rate * delay + tau.square() / number(8.0) * accelerated,
@@ -238,7 +240,7 @@ fn deviation(s: &Settings, driven: &Driven, effects: &Effects) -> Deviations {
         of_angles(4),
         of_rates(5),
         reach[6] * number(s.disturbance_bound) + errors[6],
-        ball[6],
+        in_norm[6],
         (drive.inertia[0] + driven.root_condition * drive.inertia[1]) * reach[6]
             + any_and_along
                 * (driven.turning * (reach[7] + number(0.5) * tau * reach[6])
@@ -248,8 +250,8 @@ fn deviation(s: &Settings, driven: &Driven, effects: &Effects) -> Deviations {
     ]
 }
 
-/// Rate (rad/s) and moment (N m) needed for ‖x‖ ≤ `x` beyond the horizon, where the motion brakes.
-/// Both grow with `x`, so limits that hold for `x` hold for all smaller ones as well.
+/// Rate (rad/s) and moment (N m) needed for ‖x‖ ≤ `x` beyond the horizon, where the trajectory
+/// brakes. Both grow with `x`, so limits that hold for `x` hold for all smaller ones as well.
 fn needed(lemmas: &Lemmas, forever: &Deviations, x: f64) -> [Interval; 2] {
     let number = Interval::from;
     let half = number(0.5);
@@ -318,9 +320,9 @@ pub fn check(
         mispredictions: &mispredictions[n],
         shifts: &shifts[n],
     };
-    let all: Vec<Deviations> =
+    let deviations: Vec<Deviations> =
         (0..reach.len()).map(|n| deviation(s, &driven, &effects(n))).collect();
-    let forever = all.last()?;
+    let forever = deviations.last()?;
 
     let mut findings = Vec::new();
     let mut note = |statement: &str, bound: f64, truth: Interval| {
@@ -332,14 +334,14 @@ pub fn check(
     note("mismatch since a measurement", lemmas.unseen_rate, mismatch.unseen_rate);
     note("mismatch of a prediction by errors", lemmas.mispredicted, mismatch.mispredicted);
     note("swing of the cancelled drift", lemmas.swing, mismatch.swing);
-    note("‖drive‖", lemmas.norm, driven.drive.all + mismatch.mean);
+    note("‖drive‖", lemmas.norm, driven.drive.of_three + mismatch.mean);
     let ((rate, sideslip), [of_rate, of_sideslip]) = (lemmas.domain, mismatch.domain);
     note("‖ω‖ of predictions", rate, of_rate);
     note("|β| of predictions", sideslip, of_sideslip);
     if s.delay > 0.0 {
         let ((rate, sideslip), [of_rate, of_sideslip]) = (before.vehicle, driven.vehicle_before);
-        note("‖ω‖ before the motion began", rate, of_rate);
-        note("|β| before the motion began", sideslip, of_sideslip);
+        note("‖ω‖ before the trajectory began", rate, of_rate);
+        note("|β| before the trajectory began", sideslip, of_sideslip);
         let ((rate, sideslip), [of_rate, of_sideslip]) = (before.domain, driven.domain_before);
         note("‖ω‖ of predictions before", rate, of_rate);
         note("|β| of predictions before", sideslip, of_sideslip);
@@ -360,16 +362,16 @@ pub fn check(
         "deviation of the rates, seen",
         "deviation of the angles, in the middle",
         "deviation of the rates, in the middle",
-        "feedback, box",
-        "feedback, ball",
+        "feedback, part bounded per component",
+        "feedback, part bounded in norm",
         "feedback, moment of the inertia error",
     ];
     for ((name, bound), truth) in names.into_iter().zip(values(tightening.forever())).zip(forever) {
         note(&format!("{name}, for ever"), bound, *truth);
     }
-    // The largest share of its bound that any field needs at any tick.
+    // Largest share of its bound that any field needs at any tick.
     let mut share = Interval::ZERO;
-    for (n, truths) in all.iter().enumerate() {
+    for (n, truths) in deviations.iter().enumerate() {
         for (bound, truth) in values(tightening.at(n)).into_iter().zip(truths) {
             if truth.high > 0.0 {
                 share = share.max(*truth / Interval::from(bound));

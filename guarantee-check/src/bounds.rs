@@ -3,29 +3,29 @@
 use clap::Args;
 use control::crmpc::{Constraints, Settings};
 use control::error_dynamics::Gain;
-use guarantee_check::Report;
+use guarantee_check::CheckReport;
 use guarantee_check::lemmas::Finding;
 use vehicle::dynamics::Inertia;
 
-/// Settings whose bounds are checked.
+/// Options for the settings whose bounds are checked.
 #[derive(Args)]
 pub(crate) struct Bounds {
-    /// K of the feedback law on the angle, 1/s².
+    /// Gain of the feedback law on the angle, 1/s².
     #[arg(long)]
     k1: Option<f64>,
-    /// K of the feedback law on the rate, 1/s.
+    /// Gain of the feedback law on the rate, 1/s.
     #[arg(long)]
     k2: Option<f64>,
-    /// Time from a measurement to its moment, s.
+    /// Time from a measurement until its moment acts, s.
     #[arg(long)]
     delay: Option<f64>,
     /// Bound on the disturbance of each axis, deg/s².
     #[arg(long)]
     disturbance_deg: Option<f64>,
-    /// Relative error of the inertia that is a common factor of the tensor.
+    /// Relative error of the inertia, as a common factor of all entries of the tensor.
     #[arg(long)]
     inertia_error: Option<f64>,
-    /// Relative error of the tensor of inertia in all six entries.
+    /// Relative error of the inertia tensor, in any of its six entries.
     #[arg(long)]
     tensor_error: Option<f64>,
     /// Bound on the error of each measured angle, deg.
@@ -34,13 +34,13 @@ pub(crate) struct Bounds {
     /// Bound on the error of each measured rate, deg/s.
     #[arg(long)]
     rate_error_deg: Option<f64>,
-    /// Sideslip angle of the domain, deg.
+    /// Largest sideslip angle of the domain, deg.
     #[arg(long)]
     sideslip_deg: Option<f64>,
-    /// Ixx, Iyy, Izz, Ixz in kg m².
+    /// Inertia of the vehicle: Ixx, Iyy, Izz and Ixz, kg m².
     #[arg(long, num_args = 4)]
     inertia: Option<Vec<f64>>,
-    /// Relative width of the enclosures that is aimed for.
+    /// Relative width of the enclosures at which the search stops.
     #[arg(long, default_value_t = 1e-3)]
     gap: f64,
 }
@@ -51,7 +51,8 @@ impl Bounds {
     /// # Errors
     /// Says why the settings are refused.
     pub(crate) fn run(&self) -> Result<bool, String> {
-        let report = Report::new(&self.settings()?, self.gap).map_err(|error| error.to_string())?;
+        let report =
+            CheckReport::new(&self.settings()?, self.gap).map_err(|error| error.to_string())?;
         for (title, findings) in report.sections() {
             section(title, findings);
         }

@@ -5,7 +5,7 @@ use control::DesignError;
 use control::crmpc::{Constraints, Design, InitialState, Settings};
 use control::error_dynamics::Gain;
 
-/// What a draw varies besides the share of the largest disturbance that is accepted.
+/// Number of kinds of draws; every kind also varies the share of the largest accepted disturbance.
 const KINDS: u64 = 8;
 
 /// Returns the settings of draw `seed`, or `None` if the design accepts nothing near them.
@@ -16,7 +16,8 @@ pub fn accepted(seed: u64) -> Option<Settings> {
         match Design::new(&settings) {
             Ok(design) if design.counted >= 1.0 => return Some(settings),
             Err(DesignError::NoGuarantee { disturbance: Some(bound), .. }) => {
-                // Near the largest value little is left of the moment, and more plans are kept.
+                // Near the largest value little of the moment is left, and previous plans are kept
+                // more often.
                 settings.disturbance_bound = bound * random.between(0.5, 1.0);
             }
             _ => return None,

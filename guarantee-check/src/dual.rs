@@ -51,7 +51,7 @@ pub struct Dual<const N: usize> {
 
 impl<const N: usize> Dual<N> {
     /// Makes a value that does not depend on the coordinates.
-    pub fn known(value: Interval) -> Self {
+    pub fn fixed(value: Interval) -> Self {
         Self { value, slope: [Interval::ZERO; N] }
     }
 
@@ -65,7 +65,7 @@ impl<const N: usize> Dual<N> {
 
 impl<const N: usize> Number for Dual<N> {
     fn constant(value: f64) -> Self {
-        Self::known(Interval::point(value))
+        Self::fixed(Interval::point(value))
     }
     fn squared(self) -> Self {
         let twice = self.value + self.value;
@@ -135,10 +135,13 @@ mod tests {
         let [x, y] = [2.0, 1.0].map(Interval::point);
         let (x, y) = (Dual::<2>::coordinate(0, x), Dual::coordinate(1, y));
         let f = x.squared() / (x + y);
-        for (found, expected) in
+        for (computed, expected) in
             [(f.value, 4.0 / 3.0), (f.slope[0], 8.0 / 9.0), (f.slope[1], -4.0 / 9.0)]
         {
-            assert!(found.contains(expected) && found.width() < 1e-14, "{found:?} {expected}");
+            assert!(
+                computed.contains(expected) && computed.width() < 1e-14,
+                "{computed:?} {expected}"
+            );
         }
     }
 }

@@ -232,14 +232,14 @@ fn attained(s: &Settings, sizes: (f64, f64), curved: (f64, f64)) -> [f64; 12] {
     let jerk = |z: &[f64; COORDINATES]| {
         let (from, x, m) = state(z);
         let m = vector(&m);
-        let mut motion = vector(&x);
+        let mut series = vector(&x);
         for _ in 0..2 {
-            let angles = std::array::from_fn(|i| Series([from[i], x[i], 0.5 * motion[i].0[1]]));
-            let a = body.acceleration(&angles, &motion, &m);
-            motion = std::array::from_fn(|i| Series([x[i], a[i].0[0], 0.5 * a[i].0[1]]));
+            let angles = std::array::from_fn(|i| Series([from[i], x[i], 0.5 * series[i].0[1]]));
+            let a = body.acceleration(&angles, &series, &m);
+            series = std::array::from_fn(|i| Series([x[i], a[i].0[0], 0.5 * a[i].0[1]]));
         }
-        let angles = std::array::from_fn(|i| Series([from[i], x[i], 0.5 * motion[i].0[1]]));
-        2.0 * norm(&coefficient(&body.acceleration(&angles, &motion, &m), 2))
+        let angles = std::array::from_fn(|i| Series([from[i], x[i], 0.5 * series[i].0[1]]));
+        2.0 * norm(&coefficient(&body.acceleration(&angles, &series, &m), 2))
     };
     let nominal = |z: &[f64; COORDINATES], (x, a): (f64, f64)| {
         (angles(z), ball(&z[2..5], x), ball(&z[5..8], a))
@@ -257,7 +257,7 @@ fn attained(s: &Settings, sizes: (f64, f64), curved: (f64, f64)) -> [f64; 12] {
         norm(&coefficient(&body.moment(&held(angles), &vector(&x), &vector(&a)), 0))
     };
     let [moment_curvature, rate_curvature, by_angles_curvature, by_rates_curvature, bearing] =
-        attained_along_a_motion(s, &body, curved);
+        attained_along_a_trajectory(s, &body, curved);
     [
         ascent(acceleration),
         ascent(by_rates),
@@ -274,22 +274,22 @@ fn attained(s: &Settings, sizes: (f64, f64), curved: (f64, f64)) -> [f64; 12] {
     ]
 }
 
-/// Returns the largest second derivatives that the search found along motions with a held.
-fn attained_along_a_motion(s: &Settings, body: &Body, curved: (f64, f64)) -> [f64; 5] {
+/// Returns the largest second derivatives that the search found along trajectories with a held.
+fn attained_along_a_trajectory(s: &Settings, body: &Body, curved: (f64, f64)) -> [f64; 5] {
     let angles = |z: &[f64; COORDINATES]| [PI * z[1], s.sideslip_domain * z[0]];
-    // This gives a motion along which a is held.
-    let motion = |z: &[f64; COORDINATES]| {
+    // This gives a trajectory along which a is held.
+    let trajectory = |z: &[f64; COORDINATES]| {
         let from = angles(z);
         let (x, a) = (ball(&z[2..5], curved.0), ball(&z[5..8], curved.1));
         let angles: [Series; 2] = std::array::from_fn(|i| Series([from[i], x[i], 0.5 * a[i]]));
         (angles, line(&x, &a), vector(&a))
     };
     let moment_curvature = |z: &[f64; COORDINATES]| {
-        let (angles, x, a) = motion(z);
+        let (angles, x, a) = trajectory(z);
         2.0 * norm(&coefficient(&body.moment(&angles, &x, &a), 2))
     };
     let rate_curvature = |z: &[f64; COORDINATES]| {
-        let (angles, x, _) = motion(z);
+        let (angles, x, _) = trajectory(z);
         2.0 * norm(&coefficient(&Body::rates(&angles, &x), 2))
     };
     // The derivatives by the angles and rates are those of differences over a short distance.
@@ -299,7 +299,7 @@ fn attained_along_a_motion(s: &Settings, body: &Body, curved: (f64, f64)) -> [f6
         norm(&coefficient(&change, 2)) / short
     };
     let curvature_by_angles = |z: &[f64; COORDINATES]| {
-        let (angles, x, a) = motion(z);
+        let (angles, x, a) = trajectory(z);
         let o = angle_unit(z);
         let moved = |side: f64| {
             let turned = std::array::from_fn(|i| angles[i] + Series::constant(side * short * o[i]));
@@ -308,7 +308,7 @@ fn attained_along_a_motion(s: &Settings, body: &Body, curved: (f64, f64)) -> [f6
         difference(moved(1.0), moved(-1.0))
     };
     let curvature_by_rates = |z: &[f64; COORDINATES]| {
-        let (angles, x, a) = motion(z);
+        let (angles, x, a) = trajectory(z);
         let v = unit(&z[10..]);
         let moved = |side: f64| {
             let changed = std::array::from_fn(|i| x[i] + Series::constant(side * short * v[i]));
@@ -317,7 +317,7 @@ fn attained_along_a_motion(s: &Settings, body: &Body, curved: (f64, f64)) -> [f6
         difference(moved(1.0), moved(-1.0))
     };
     let curvature_of_bearing = |z: &[f64; COORDINATES]| {
-        let (angles, ..) = motion(z);
+        let (angles, ..) = trajectory(z);
         let corner = [z[10], z[11], z[12]].map(|z| if z < 0.0 { -1.0 } else { 1.0 });
         let at_rest = vector(&[0.0; 3]);
         2.0 * norm(&coefficient(&body.moment(&angles, &at_rest, &vector(&corner)), 2))
@@ -341,7 +341,7 @@ fn from_lemmas(
 ) -> [Interval; 12] {
     let number = Interval::from;
     let (two, half) = (number(2.0), number(0.5));
-    let upper = |of: Interval| number(of.high);
+    let upper = |value: Interval| number(value.high);
     let [drift, curvature, turn, mixed, third, fourth, r] =
         [sup.drift, sup.curvature, sup.turn, sup.mixed, sup.twice, sup.fourth, sup.r].map(upper);
     let [largest, inverse, bilinear, bilinear_inverse] =
@@ -379,7 +379,7 @@ fn from_lemmas(
         + (largest * third + bilinear * (turn.square() + curvature)) * x.square().square()
         + (largest * curvature + bilinear * turn) * x.square() * a;
     let rate_curvature = number(3.0) * turn * x * a + curvature * x.square() * x;
-    // The derivatives of ω and of P = ∂W[o] x, or of W v, along the motion.
+    // The derivatives of ω and of P = ∂W[o] x, or of W v, along the trajectory.
     let (root2, root3) = (two.sqrt(), number(3.0).sqrt());
     let three = number(3.0);
     let [omega, omega_first, omega_second] = [x, turn * x.square() + a, rate_curvature];
@@ -461,13 +461,13 @@ mod tests {
         let body = Body::new(&s);
         let (angles, x, m) = ([0.3, -0.2], [0.05, -0.07, 0.04], [1e5, -5e4, 7e4]);
         let held = angles.map(Series::constant);
-        let found = coefficient(&body.acceleration(&held, &vector(&x), &vector(&m)), 0);
+        let acceleration = coefficient(&body.acceleration(&held, &vector(&x), &vector(&m)), 0);
         let attitude = Vector3::new(angles[0], angles[1], 0.4);
         let r =
             control::linearise::InverseKinematics::at(&attitude).matrix().try_inverse().unwrap();
         let expected = s.body.drift(&attitude, &x.into()) + r * s.body.inverse * Vector3::from(m);
-        assert!((Vector3::from(found) - expected).norm() < 1e-14);
-        let found = coefficient(&body.moment(&held, &vector(&x), &vector(&found)), 0);
-        assert!((Vector3::from(found) - Vector3::from(m)).norm() < 1e-8);
+        assert!((Vector3::from(acceleration) - expected).norm() < 1e-14);
+        let moment = coefficient(&body.moment(&held, &vector(&x), &vector(&acceleration)), 0);
+        assert!((Vector3::from(moment) - Vector3::from(m)).norm() < 1e-8);
     }
 }

@@ -17,16 +17,16 @@ use vehicle::transport::Transport;
 /// A plan that the controller accepted, as it follows it from an optimisation on.
 #[derive(Clone, Debug)]
 pub struct Recorded {
-    /// Nominal motion over the horizon, with its braking rate.
+    /// Nominal trajectory over the horizon, with its braking rate.
     pub plan: Plan,
-    /// Feedback ticks from the beginning of the nominal motion to the beginning of the plan.
+    /// Feedback ticks from the beginning of the nominal trajectory to the beginning of the plan.
     pub age: usize,
     /// Time of the optimisation, s.
     pub time: f64,
     /// Deviation of the predicted state from the plan's first state, rad and rad/s.
     pub deviation: Vector6<f64>,
     /// Whether the previous plan was kept.
-    pub kept: bool,
+    pub is_kept: bool,
 }
 
 /// Pseudo-random numbers (SplitMix64), the same on every platform.
@@ -72,7 +72,7 @@ fn sign(value: f64) -> f64 {
 
 /// How a bounded vector changes over time, relative to its bound.
 #[derive(Clone, Copy, Debug)]
-enum Course {
+enum Waveform {
     White,
     Corner(Vector3<f64>),
     Switching(f64),
@@ -80,7 +80,7 @@ enum Course {
     AlongMoment(f64),
 }
 
-impl Course {
+impl Waveform {
     fn random(random: &mut Random) -> Self {
         let direction = sign(random.between(-1.0, 1.0));
         match random.below(5) {
@@ -100,8 +100,8 @@ pub struct Flight {
     start: State,
     reference: Profile,
     begin: f64,
-    disturbance: Course,
-    errors: Course,
+    disturbance: Waveform,
+    errors: Waveform,
     random: Random,
     duration: f64,
 }
@@ -147,8 +147,8 @@ impl Flight {
             start: plant::state(&angles, &rates),
             reference,
             begin,
-            disturbance: Course::random(&mut random),
-            errors: Course::random(&mut random),
+            disturbance: Waveform::random(&mut random),
+            errors: Waveform::random(&mut random),
             random,
             duration,
         })
@@ -207,8 +207,8 @@ impl Flight {
     fn measure(&mut self, state: &State, moment: &Vector3<f64>, time: f64) -> Measurement {
         let (angles, rates) = (plant::angles(state), plant::rates(state));
         let Settings { angle_error, rate_error, .. } = self.settings;
-        let course = self.errors;
-        let error = self.value(course, state, moment, time);
+        let waveform = self.errors;
+        let error = self.value(waveform, state, moment, time);
         let seen = angles + error * angle_error;
         let angle_rates = kinematics::r(&angles) * rates + error * rate_error;
         let rates = kinematics::r_inverse(&seen) * angle_rates;
@@ -217,21 +217,21 @@ impl Flight {
 
     fn value(
         &mut self,
-        course: Course,
+        waveform: Waveform,
         state: &State,
         moment: &Vector3<f64>,
         time: f64,
     ) -> Vector3<f64> {
         let r = kinematics::r(&plant::angles(state));
-        match course {
-            Course::White => self.random.vector(),
-            Course::Corner(corner) => corner,
-            Course::Switching(period) => {
+        match waveform {
+            Waveform::White => self.random.vector(),
+            Waveform::Corner(corner) => corner,
+            Waveform::Switching(period) => {
                 let place = (time / period).floor() as u64;
                 Random::new(place ^ (period.to_bits() >> 20)).corner()
             }
-            Course::AlongRate(direction) => (r * plant::rates(state)).map(sign) * direction,
-            Course::AlongMoment(direction) => {
+            Waveform::AlongRate(direction) => (r * plant::rates(state)).map(sign) * direction,
+            Waveform::AlongMoment(direction) => {
                 (r * self.body.inverse * moment).map(sign) * direction
             }
         }
@@ -255,8 +255,8 @@ impl Flight {
                     until = until.min(arrival);
                 }
             }
-            let course = self.disturbance;
-            let delta = self.value(course, &state, acting, now) * self.settings.disturbance_bound;
+            let waveform = self.disturbance;
+            let delta = self.value(waveform, &state, acting, now) * self.settings.disturbance_bound;
             let load = Load { moment: *acting, delta, ..Load::default() };
             let mut f = |_: f64, state: &State| {
                 plant::derivative(&self.body, Kinematics::Printed, state, &load)
@@ -280,7 +280,7 @@ fn recorded(memory: &control::crmpc::Memory, predicted: &Measurement, time: f64)
         age: memory.age as usize,
         time,
         deviation,
-        kept: memory.report.status == control::crmpc::Status::Kept,
+        is_kept: memory.report.status == control::crmpc::SolverStatus::Kept,
     }
 }
 

@@ -236,11 +236,11 @@ mod tests {
             let x = f64::from(i) / 100.0;
             let (sine, cosine) = Interval::point(x).sin_cos();
             let exp = Interval::point(x).exp();
-            for (found, expected) in [(sine, x.sin()), (cosine, x.cos()), (exp, x.exp())] {
+            for (computed, expected) in [(sine, x.sin()), (cosine, x.cos()), (exp, x.exp())] {
                 assert!(
-                    found.low <= expected + 1e-15
-                        && found.high >= expected - 1e-15
-                        && found.width() < 1e-13
+                    computed.low <= expected + 1e-15
+                        && computed.high >= expected - 1e-15
+                        && computed.width() < 1e-13
                 );
             }
             assert!((sine.square() + cosine.square()).contains(1.0));

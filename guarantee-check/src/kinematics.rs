@@ -158,9 +158,9 @@ mod tests {
                 Vector3::new(c * y[0] + s * y[2], y[1], c * y[2] - s * y[0])
             };
             let numeric = (at(step) - at(-step)) / (2.0 * step);
-            let mut all = vec![direction];
-            all.extend(&before);
-            let exact = Turn::new(beta.sin(), beta.cos()).along(&all, &x);
+            let mut directions = vec![direction];
+            directions.extend(&before);
+            let exact = Turn::new(beta.sin(), beta.cos()).along(&directions, &x);
             assert!((numeric - Vector3::from(exact)).norm() < 1e-8, "{numeric} {exact:?}");
         }
         let angles = Vector3::new(0.0, beta, 0.0);

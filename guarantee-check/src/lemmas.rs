@@ -157,8 +157,8 @@ pub fn inverse(rows: &[Vector<Interval>; 3]) -> [Vector<Interval>; 3] {
     std::array::from_fn(|i| std::array::from_fn(|j| columns[j][i] / determinant))
 }
 
-fn known<const N: usize>(rows: &[Vector<Interval>; 3]) -> [Vector<Dual<N>>; 3] {
-    rows.map(|row| row.map(Dual::known))
+fn fixed<const N: usize>(rows: &[Vector<Interval>; 3]) -> [Vector<Dual<N>>; 3] {
+    rows.map(|row| row.map(Dual::fixed))
 }
 
 /// Rows of ∂(ω × I ω)/∂ω, whose columns are e × I ω + ω × I e.
@@ -244,8 +244,8 @@ fn geometry(search: &mut Search, lemmas: &Lemmas) -> [Interval; 6] {
     let curvature =
         search.check(statement, lemmas.curvature, 1.0, 3, three, |chart, &[u, a, b]| {
             let (y, turn) = (space(chart, a, b), turn(u));
-            let of = |i, j| square(&turn.derivative(i, j, &y));
-            (of(2, 0) + of(1, 1) + of(1, 1) + of(0, 2)) / square(&y)
+            let squared = |i, j| square(&turn.derivative(i, j, &y));
+            (squared(2, 0) + squared(1, 1) + squared(1, 1) + squared(0, 2)) / square(&y)
         });
     let statement = "‖∂(W y)/∂(α, β)‖ ≤ b ‖y‖ (Frobenius)";
     search.check(statement, lemmas.turn_by_angles, 1.0, 3, three, |chart, &[u, a, b]| {
@@ -316,8 +316,8 @@ fn inertia(
     // The inertia is divided by its largest moment, so that all numbers are near one.
     let unit = lemmas.largest;
     let rows = rows(&s.body.inertia, unit);
-    let inverse = known::<2>(&inverse(&rows));
-    let rows = known::<2>(&rows);
+    let inverse = fixed::<2>(&inverse(&rows));
+    let rows = fixed::<2>(&rows);
     let two = [SIDE, SIDE];
     let largest =
         search.check("‖I y‖ ≤ b ‖y‖", lemmas.largest, unit, 3, two, |chart, &[a, b]| {
@@ -360,7 +360,7 @@ fn inertia(
 
 fn bearing(search: &mut Search, s: &Settings, lemmas: &Lemmas) -> Interval {
     let unit = lemmas.largest;
-    let rows = known::<2>(&rows(&s.body.inertia, unit));
+    let rows = fixed::<2>(&rows(&s.body.inertia, unit));
     // There are two charts of α, half a turn apart, and four corners up to their common sign.
     let sides = [search.u, SIDE];
     let statement = "‖I W s‖ ≤ b over the corners s of the unit box";

@@ -34,7 +34,7 @@ use lemmas::Finding;
 
 /// Findings of all checks for one set of settings.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Report {
+pub struct CheckReport {
     /// Findings about the geometry and the inertia.
     pub lemmas: Vec<Finding>,
     /// Findings about the dynamics.
@@ -50,7 +50,7 @@ pub struct Report {
     pub terminal_rate: f64,
 }
 
-impl Report {
+impl CheckReport {
     /// Checks `settings` with enclosures of the relative width `gap`.
     ///
     /// # Errors
@@ -62,7 +62,7 @@ impl Report {
         let terminal_rate = design.assessment.terminal_rate;
         let mut dynamics = dynamics::check(settings, &bounds, &suprema, terminal_rate);
         if settings.delay > 0.0 {
-            // The larger domain before the nominal motion began.
+            // The domain is larger before the nominal trajectory began.
             let before = Lemmas::before(settings);
             let (more, suprema) = lemmas::check(settings, &before, gap);
             lemmas.extend(more);

@@ -7,7 +7,7 @@ use guarantee_check::tally::{Tally, check_flights};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError};
 
-/// Plans of random flights.
+/// Options for the check of plans from random flights.
 #[derive(Args)]
 pub(crate) struct Plans {
     /// Number of draws of settings.
@@ -67,11 +67,11 @@ impl Plans {
     }
 }
 
-/// Prints the outcomes of some plans.
+/// Prints the outcomes of the checks of plans.
 pub(crate) fn report(title: &str, tally: &Tally) {
     println!(
-        "{title}: {} plans ({} kept, {} older than one optimisation), {} not confirmed",
-        tally.plans, tally.kept, tally.aged, tally.not_confirmed
+        "{title}: {} plans ({} kept from the previous optimisation, {} on an older trajectory), {} not confirmed",
+        tally.plans, tally.kept_plans, tally.aged, tally.not_confirmed
     );
     if tally.outside > 0 {
         println!("  {} begin outside of the set of `tube`", tally.outside);

@@ -147,10 +147,10 @@ mod tests {
         let f = |_: usize, [x, y]: &[Dual<2>; 2]| *x * *y * (Dual::constant(1.0) - *x - *y);
         let unit = Interval::new(0.0, 1.0);
         let effort = Effort { gap: 1e-9, goal: f64::INFINITY, boxes: 100_000 };
-        let found = supremum(&f, 1, [unit, unit], effort);
+        let largest = supremum(&f, 1, [unit, unit], effort);
         assert!(
-            found.low <= 1.0 / 27.0 && found.high >= 1.0 / 27.0 && found.width() < 1e-9,
-            "{found:?}"
+            largest.low <= 1.0 / 27.0 && largest.high >= 1.0 / 27.0 && largest.width() < 1e-9,
+            "{largest:?}"
         );
     }
 }

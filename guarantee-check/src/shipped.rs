@@ -22,8 +22,8 @@ pub struct Shipped {
 /// Result of reading all files of a folder.
 #[derive(Clone, Debug, Default)]
 pub struct Scan {
-    /// Settings that were found, file by file.
-    pub found: Vec<Shipped>,
+    /// Settings of every CRMPC in the files, file by file.
+    pub shipped: Vec<Shipped>,
     /// Number of experiments, studies and campaigns that were read.
     pub read: [usize; 3],
     /// Files that are none of these, or only a part of one that others extend, with the reason.
@@ -90,7 +90,7 @@ impl Scan {
                 let settings =
                     settings(component).map_err(|error| format!("{run} {name}: {error}"))?;
                 let place = format!("{run} {name}").trim().to_owned();
-                self.found.push(Shipped { file: file.to_path_buf(), place, settings });
+                self.shipped.push(Shipped { file: file.to_path_buf(), place, settings });
             }
         }
         Ok(())
@@ -99,7 +99,7 @@ impl Scan {
     fn study(&mut self, file: &Path, study: &Study) -> Result<(), String> {
         for run in &study.runs {
             let experiment = study.experiment(run).map_err(|error| error.to_string())?;
-            let varied = run.vary.iter().flat_map(|vary| vary.parameter.all());
+            let varied = run.vary.iter().flat_map(|vary| vary.parameter.names());
             refuse_varied(&experiment, varied)?;
             self.experiment(file, run.id.get_ref(), &experiment)?;
         }
@@ -123,7 +123,7 @@ impl Scan {
 }
 
 fn names_of(vary: &Vary) -> Vec<&String> {
-    let named = vary.parameter.iter().flat_map(|names| names.get_ref().all());
+    let named = vary.parameter.iter().flat_map(|names| names.get_ref().names());
     vary.each.iter().map(toml::Spanned::get_ref).chain(named).collect()
 }
 
@@ -142,22 +142,22 @@ fn refuse_varied<'a>(
 /// All TOML files below a folder, in order of their names.
 fn files(folder: &Path) -> Result<Vec<PathBuf>, String> {
     let fault = |error: std::io::Error| format!("{}: {error}", folder.display());
-    let mut all = Vec::new();
+    let mut paths = Vec::new();
     for entry in std::fs::read_dir(folder).map_err(fault)? {
         let path = entry.map_err(fault)?.path();
         if path.is_dir() {
-            all.extend(files(&path)?);
+            paths.extend(files(&path)?);
         } else if path.extension().is_some_and(|extension| extension == "toml") {
-            all.push(path);
+            paths.push(path);
         }
     }
-    all.sort();
-    Ok(all)
+    paths.sort();
+    Ok(paths)
 }
 
 /// Converts a value to SI units.
 fn quantity(value: &Value) -> Result<f64, String> {
-    let refused = || format!("{value} is no quantity that is understood here");
+    let refused = || format!("{value} is not a number, or a number with a known unit");
     match value {
         Value::Float(number) => Ok(*number),
         Value::Integer(number) => i32::try_from(*number).map(f64::from).map_err(|_| refused()),
@@ -173,7 +173,7 @@ fn quantity(value: &Value) -> Result<f64, String> {
     }
 }
 
-/// Settings of a component, from the unit's own values and the parameters that the file sets.
+/// Settings of a component, from the defaults of the FMU and the parameters that the file sets.
 fn settings(component: &Component) -> Result<Settings, String> {
     let mut s = Settings::new(Constraints::Robust);
     let mut inertia = Inertia {

@@ -7,7 +7,7 @@ use guarantee_check::shipped::{Scan, Shipped};
 use guarantee_check::tally::{Tally, check_flights};
 use std::path::PathBuf;
 
-/// Plans for the settings of a folder.
+/// Options for the check of plans with the settings in a folder.
 #[derive(Args)]
 pub(crate) struct ShippedFiles {
     /// Folder of experiments, studies and campaigns.
@@ -31,9 +31,9 @@ impl ShippedFiles {
         }
         let mut done: Vec<(Settings, Option<Tally>)> = Vec::new();
         let mut confirmed = true;
-        for Shipped { file, place, settings } in &scan.found {
-            let known = done.iter().find(|(other, _)| other == settings);
-            let (tally, new) = match known {
+        for Shipped { file, place, settings } in &scan.shipped {
+            let earlier = done.iter().find(|(other, _)| other == settings);
+            let (tally, new) = match earlier {
                 Some((_, tally)) => (tally.clone(), false),
                 None => (self.check(settings)?, true),
             };

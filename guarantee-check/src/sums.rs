@@ -41,13 +41,13 @@ pub(crate) fn norm(a: &Matrix) -> Interval {
 pub(crate) fn integral_of_size([c1, c0]: &Pair, low: Interval, width: Interval) -> Interval {
     let (a, b) = (*c0 + *c1 * low, *c0 + *c1 * (low + width));
     let half = Interval::from(0.5) * width;
-    let all = (a.abs() + b.abs()) * half;
+    let area = (a.abs() + b.abs()) * half;
     if (a.low >= 0.0 && b.low >= 0.0) || (a.high <= 0.0 && b.high <= 0.0) {
-        all
+        area
     } else if (a.low > 0.0 && b.high < 0.0) || (a.high < 0.0 && b.low > 0.0) {
         (a.square() + b.square()) / (a.abs() + b.abs()) * half
     } else {
-        Interval::new(((a + b).abs() * half).low, all.high)
+        Interval::new(((a + b).abs() * half).low, area.high)
     }
 }
 
@@ -133,13 +133,13 @@ impl Axis {
         let unseen = [Interval::from(0.5) * self.latency.square(), self.latency];
         let (mut seen, mut middle) = ([Interval::ZERO; 2], [Interval::ZERO; 2]);
         let (mut feedback, mut age) = (Interval::ZERO, Interval::ZERO);
-        let mut all = Vec::with_capacity(steps + 2);
+        let mut by_tick = Vec::with_capacity(steps + 2);
         let bounds = |seen: &Pair, middle: &Pair, feedback: Interval, age: Interval| {
             let [angle, rate] = *seen;
             let [of_angle, of_rate] = *middle;
             [angle + unseen[0], rate + unseen[1], angle, rate, of_angle, of_rate, feedback, age]
         };
-        all.push(bounds(&seen, &middle, feedback, age));
+        by_tick.push(bounds(&seen, &middle, feedback, age));
         let end = self.latency + self.period;
         for (n, power) in self.transitions(steps).enumerate() {
             let size = |row: &Pair| integral_of_size(row, self.latency, self.period);
@@ -149,7 +149,7 @@ impl Axis {
             let fed = size(&applied(&transposed(&power), &self.gain));
             feedback = feedback + fed;
             age = age + fed * (end + Interval::from(n as f64) * self.period);
-            all.push(bounds(&seen, &middle, feedback, age));
+            by_tick.push(bounds(&seen, &middle, feedback, age));
         }
         // The tail uses ‖Φⁿ [u, 1]‖ ≤ ‖Φⁿ‖ max(u, 1).
         let scale = self.period * end.max(Interval::ONE);
@@ -160,13 +160,13 @@ impl Axis {
         let more = |value: Interval, by: Interval| value + Interval::new(0.0, by.high);
         let seen = seen.map(|seen| more(seen, tail));
         let middle = middle.map(|middle| more(middle, norm(&self.to_middle) * tail));
-        all.push(bounds(
+        by_tick.push(bounds(
             &seen,
             &middle,
             more(feedback, gain * tail),
             more(age, gain * (tail * old + moment)),
         ));
-        all
+        by_tick
     }
 
     /// Sizes of the components of x, of those in the middle of the period, and of K x.
@@ -184,15 +184,15 @@ impl Axis {
     /// Sums of [`Self::sizes`] of Φʲ x over j < 0, 1, …, `steps`, and last over all j.
     fn series(&self, x: &Pair, steps: usize) -> Vec<[Interval; 5]> {
         let mut sum = [Interval::ZERO; 5];
-        let mut all = vec![sum];
+        let mut by_tick = vec![sum];
         for power in self.transitions(steps) {
             let sizes = self.sizes(&applied(&power, x));
             sum = std::array::from_fn(|i| sum[i] + sizes[i]);
-            all.push(sum);
+            by_tick.push(sum);
         }
         let tails = self.sizes_within(self.tails(steps).0 * x[0].abs().max(x[1].abs()));
-        all.push(std::array::from_fn(|i| sum[i] + Interval::new(0.0, tails[i].high)));
-        all
+        by_tick.push(std::array::from_fn(|i| sum[i] + Interval::new(0.0, tails[i].high)));
+        by_tick
     }
 
     /// Bounds on the effect of errors of up to 1 at every tick, of the angle and of the rate, as in
@@ -228,29 +228,29 @@ impl Axis {
             let parts = tick - 1;
             let (sum, young) =
                 (&sums[parts], &sums[parts - parts.min(early.ticks.saturating_sub(1))]);
-            let own: [Interval; 5] = std::array::from_fn(|i| {
+            let actual: [Interval; 5] = std::array::from_fn(|i| {
                 sum[i] + excess * (sum[i] - young[i]) + weight(0) * first[i]
             });
             let seen: [Interval; 5] =
-                std::array::from_fn(|i| own[i] + weight(tick) * newest_sizes[i]);
-            [own[0], own[1], seen[0], seen[1], seen[2], seen[3], seen[4], Interval::ZERO]
+                std::array::from_fn(|i| actual[i] + weight(tick) * newest_sizes[i]);
+            [actual[0], actual[1], seen[0], seen[1], seen[2], seen[3], seen[4], Interval::ZERO]
         };
-        let mut all = Vec::with_capacity(steps + 2);
+        let mut by_tick = Vec::with_capacity(steps + 2);
         let mut begin = [Interval::ZERO; 8];
         [begin[0], begin[1]] = newest.map(|size| weight(0) * size);
-        all.push(begin);
+        by_tick.push(begin);
         let mut largest = [Interval::ZERO; 5];
         for (n, power) in self.transitions(steps).enumerate() {
             let sizes = self.sizes(&applied(&power, &first));
-            all.push(bounds(n + 1, &sizes));
+            by_tick.push(bounds(n + 1, &sizes));
             largest = sizes;
         }
         // After the last period no power of Φ makes the first error larger than this, because
         // ‖Φᵐᵇ⁺ʳ‖ ≤ ‖Φʳ‖.
         let after = self.powers.iter().fold(Interval::ZERO, |most, power| most.max(norm(power)));
         let faded = self.sizes_within(after * largest[0].max(largest[1]));
-        all.push(bounds(steps + 2, &faded));
-        all
+        by_tick.push(bounds(steps + 2, &faded));
+        by_tick
     }
 
     /// Bounds on the effect of changes of the rate by up to the period in all before each tick, at
@@ -259,17 +259,17 @@ impl Axis {
         let end = self.latency + self.period;
         // Each part may have another time, so that its largest size counts.
         let mut sum = [Interval::ZERO; 5];
-        let mut all = vec![sum];
+        let mut by_tick = vec![sum];
         for power in self.transitions(steps) {
             let [last, first] = [Interval::ZERO, end]
                 .map(|u| self.sizes(&applied(&power, &[u * self.period, self.period])));
             sum = std::array::from_fn(|i| sum[i] + last[i].max(first[i]));
-            all.push(sum);
+            by_tick.push(sum);
         }
         let tail = self.tails(steps).0 * self.period * end.max(Interval::ONE);
         let more = self.sizes_within(tail);
-        all.push(std::array::from_fn(|i| sum[i] + Interval::new(0.0, more[i].high)));
-        counted(early, &all.iter().map(spread).collect::<Vec<Bounds>>())
+        by_tick.push(std::array::from_fn(|i| sum[i] + Interval::new(0.0, more[i].high)));
+        counted(early, &by_tick.iter().map(spread).collect::<Vec<Bounds>>())
     }
 
     /// Bounds on the effect of shifts of the angle by up to the period at every tick, as in
@@ -287,7 +287,7 @@ fn spread([angle, rate, of_angle, of_rate, feedback]: &[Interval; 5]) -> Bounds 
 
 const NEVER: Early = Early { ticks: 0, excess: 0.0 };
 
-/// Counts effects that are larger for the first ticks of a nominal motion.
+/// Counts effects that are larger for the first ticks of a nominal trajectory.
 fn counted(early: Early, sums: &[Bounds]) -> Vec<Bounds> {
     let excess = Interval::from(early.excess);
     let at = |n: usize| -> Bounds {
@@ -319,11 +319,11 @@ fn decrease(s: &Settings, weight: &Matrix2<f64>, p: Vector2<f64>, q: f64) -> Int
         std::array::from_fn(|i| std::array::from_fn(|j| Interval::from(weight[(i, j)])));
     let after = product(&transposed(&phi), &product(&g, &phi));
     let h = Interval::from(s.period_optimisation);
-    let of = |i: usize, j: usize| {
+    let entry = |i: usize, j: usize| {
         let diagonal = if i == j { Interval::from(p[i]) } else { Interval::ZERO };
         after[i][j] - g[i][j] + h * (diagonal + Interval::from(q) * gain[i] * gain[j])
     };
-    let (a, b, d) = (of(0, 0), of(0, 1).hull(of(1, 0)), of(1, 1));
+    let (a, b, d) = (entry(0, 0), entry(0, 1).hull(entry(1, 0)), entry(1, 1));
     let half = Interval::from(0.5);
     half * (a + d) + ((half * (a - d)).square() + b.square()).sqrt()
 }

@@ -20,13 +20,13 @@ pub struct Refuted {
 pub struct Tally {
     /// Number of plans that were checked.
     pub plans: u64,
-    /// Number of these that are previous plans which were kept.
-    pub kept: u64,
-    /// Number of plans whose nominal motion began at an earlier optimisation.
+    /// Number of these that are previous plans, kept because no optimum was certified.
+    pub kept_plans: u64,
+    /// Number of plans whose nominal trajectory began at an earlier optimisation.
     pub aged: u64,
-    /// Number of plans of `tube` that begin outside of the set in which they may.
+    /// Number of plans with the initial state `tube` that begin outside the permitted set.
     pub outside: u64,
-    /// The least that any plan leaves of each limit; `None` without plans.
+    /// Smallest share of each limit that any plan leaves unused; `None` without plans.
     pub left: Option<Left>,
     /// Number of plans that were not confirmed.
     pub not_confirmed: u64,
@@ -34,14 +34,14 @@ pub struct Tally {
     pub refuted: Vec<Refuted>,
 }
 
-/// Number of refuted plans that are kept for the report.
+/// Largest number of refuted plans in the report.
 const SHOWN: usize = 10;
 
 impl Tally {
     /// Adds the outcomes of another tally.
     pub fn add(&mut self, other: Self) {
         self.plans += other.plans;
-        self.kept += other.kept;
+        self.kept_plans += other.kept_plans;
         self.aged += other.aged;
         self.outside += other.outside;
         self.not_confirmed += other.not_confirmed;
@@ -62,7 +62,7 @@ impl Tally {
     fn record(&mut self, seed: u64, recorded: &Recorded, check: &PlanCheck) {
         let verdict = check.check(&recorded.plan, recorded.age);
         self.plans += 1;
-        self.kept += u64::from(recorded.kept);
+        self.kept_plans += u64::from(recorded.is_kept);
         self.aged += u64::from(recorded.age > 0);
         self.outside += u64::from(recorded.age == 0 && !check.may_begin(&recorded.deviation));
         self.left = Some(self.left.map_or(verdict.left, |left| left.min(&verdict.left)));

@@ -3,7 +3,7 @@
 use control::crmpc::{Constraints, Guarantee, InitialState, Lemmas, Settings};
 use control::error_dynamics::Gain;
 use guarantee_check::lemmas::{self, Finding};
-use guarantee_check::{Report, assessment, dynamics};
+use guarantee_check::{CheckReport, assessment, dynamics};
 use vehicle::dynamics::Inertia;
 
 const GAP: f64 = 3e-3;
@@ -24,7 +24,7 @@ fn every_bound_holds_for_the_published_settings_and_with_a_delay() {
     for settings in
         [Settings::new(Constraints::Robust), with(-5.0, -5.0, 0.0)].into_iter().chain(delayed)
     {
-        let report = Report::new(&settings, GAP).unwrap();
+        let report = CheckReport::new(&settings, GAP).unwrap();
         for (_, findings) in report.sections() {
             assert!(!findings.is_empty());
             assert_all(findings);
@@ -37,7 +37,7 @@ fn every_bound_holds_for_the_published_settings_and_with_a_delay() {
 fn every_bound_holds_with_errors_of_the_measurement() {
     let error = 0.015_f64.to_radians();
     let settings = Settings { angle_error: error, rate_error: error, ..with(-2.0, -4.0, 0.04) };
-    let report = Report::new(&settings, GAP).unwrap();
+    let report = CheckReport::new(&settings, GAP).unwrap();
     assert!(report.holds(), "{report:?}");
 }
 
@@ -102,7 +102,7 @@ fn a_terminal_rate_that_is_too_large_is_found_false() {
 
 #[test]
 fn published_terminal_weight_does_not_decrease_with_the_sampled_law() {
-    let report = Report::new(&Settings::new(Constraints::Robust), 0.1).unwrap();
+    let report = CheckReport::new(&Settings::new(Constraints::Robust), 0.1).unwrap();
     assert_all(&report.terminal);
     for printed in report.printed_terminal {
         assert!(printed.low > 50.0 && printed.high < 50.1, "{printed:?}");

@@ -1,7 +1,7 @@
 //! Check of the settings of every experiment that claims the guarantee, as its file gives them.
 
 use control::crmpc::{Constraints, Settings};
-use guarantee_check::Report;
+use guarantee_check::CheckReport;
 use std::path::Path;
 use toml::{Table, Value};
 
@@ -30,11 +30,11 @@ fn parameters(file: &Path) -> Table {
         None => &[],
     };
     let beside = |base: &Value| file.parent().unwrap().join(base.as_str().unwrap());
-    let mut all: Table = bases.iter().flat_map(|base| parameters(&beside(base))).collect();
+    let mut merged: Table = bases.iter().flat_map(|base| parameters(&beside(base))).collect();
     let controller = table.get("components").and_then(|components| components.get("controller"));
-    let own = controller.and_then(|controller| controller.get("parameters"));
-    all.extend(own.and_then(Value::as_table).cloned().unwrap_or_default());
-    all
+    let parameters = controller.and_then(|controller| controller.get("parameters"));
+    merged.extend(parameters.and_then(Value::as_table).cloned().unwrap_or_default());
+    merged
 }
 
 /// The settings of the component `controller`.
@@ -76,7 +76,7 @@ fn settings(experiment: &str) -> Settings {
 #[test]
 fn every_bound_holds_for_the_experiments() {
     for experiment in ["crmpc-robust.toml", "estimator.toml"] {
-        let report = Report::new(&settings(experiment), GAP).unwrap();
+        let report = CheckReport::new(&settings(experiment), GAP).unwrap();
         for (_, findings) in report.sections() {
             for finding in findings {
                 assert!(finding.holds(), "{experiment}: {finding:?}");

@@ -12,7 +12,7 @@ fn plans_of_all_shipped_settings_are_confirmed() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../orchestrator/experiments");
     let scan = Scan::new(&folder).unwrap();
     assert!(scan.read.iter().all(|&count| count > 0), "{:?}", scan.read);
-    // Only parts that other files extend, and files of values, are no experiment of their own.
+    // Only parts that other files extend, and files of values, are not experiments.
     for (file, reason) in &scan.left_out {
         let part = file.parent().is_some_and(|folder| folder.ends_with("base"));
         let exchange =
@@ -21,7 +21,7 @@ fn plans_of_all_shipped_settings_are_confirmed() {
     }
     let mut done: Vec<Settings> = Vec::new();
     let mut confirmed = 0;
-    for shipped in &scan.found {
+    for shipped in &scan.shipped {
         let s = &shipped.settings;
         let given = s.constraints == Constraints::Robust
             && Design::new(s).is_ok_and(|design| design.counted >= 1.0);

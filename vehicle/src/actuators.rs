@@ -92,7 +92,7 @@ impl Actuators {
         let scale = config.aerodynamics_scale;
         if !(scale >= 0.0 && scale.is_finite()) {
             let problem = format!("= {scale} must not be negative");
-            return Err(Error::of("actuators.aerodynamics_scale", problem));
+            return Err(Error::parameter("actuators.aerodynamics_scale", problem));
         }
         let Effectors { min, max, rate, jet_moments, .. } = config.effectors;
         Ok(Self {
@@ -245,8 +245,11 @@ mod tests {
             (3.5, [-15.0, -15.0, 0.0, -3.0, 15.0, -10.0, 15.0, -15.0]),
             (9.0, [-25.0, -20.0, 0.0, -3.0, 30.0, -10.0, 30.0, -30.0]),
         ] {
-            let found = degrees(&moved(&actuators, &surfaces(FAR), 2.0, time).0);
-            assert!((found - Surfaces::from(expected)).amax() < 1e-12, "{found} at {time}");
+            let deflections = degrees(&moved(&actuators, &surfaces(FAR), 2.0, time).0);
+            assert!(
+                (deflections - Surfaces::from(expected)).amax() < 1e-12,
+                "{deflections} at {time}"
+            );
         }
         let effectors = Effectors::published();
         let rest = moved(&actuators, &surfaces(FAR), 2.0, 9.0).0;
@@ -259,12 +262,15 @@ mod tests {
 
     #[test]
     fn the_position_limit_acts_before_the_rate_limit() {
-        // A command far beyond the limit does not wind up: the way back begins at once.
+        // A command far beyond the limit does not wind up: the deflection turns back at once.
         let actuators = actuators(JetMode::OnOff);
         let away = moved(&actuators, &surfaces([-90.0; SURFACES]), 0.0, 10.0).0;
         let back = actuators.commanded(10.0, &surfaces([0.0; SURFACES]), &away);
-        let found = degrees(&(away + actuators.rates(&back) * 0.1));
-        assert!((found[0] + 24.0).abs() < 1e-12 && (found[4] + 9.0).abs() < 1e-12, "{found}");
+        let deflections = degrees(&(away + actuators.rates(&back) * 0.1));
+        assert!(
+            (deflections[0] + 24.0).abs() < 1e-12 && (deflections[4] + 9.0).abs() < 1e-12,
+            "{deflections}"
+        );
     }
 
     #[test]

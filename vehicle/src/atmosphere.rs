@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 // U.S. Standard Atmosphere, 1976 (NOAA, NASA, USAF), tables 1 to 4.
 const GRAVITY: f64 = 9.80665; // m/s²
 const MOLAR_MASS: f64 = 0.028_964_4; // kg/mol, at sea level
-const GAS_CONSTANT: f64 = 8.314_32; // J/(mol K), the standard's own value
+const GAS_CONSTANT: f64 = 8.314_32; // J/(mol K), the value of the standard
 const HEAT_RATIO: f64 = 1.4;
 const EARTH_RADIUS: f64 = 6_356_766.0; // m
 const SEA_LEVEL: (f64, f64) = (288.15, 101_325.0); // K, Pa
@@ -46,7 +46,7 @@ pub struct Air {
 pub fn air(altitude: f64) -> Result<Air, Error> {
     if !(0.0..=TOP).contains(&altitude) {
         let problem = format!("= {altitude} m must lie between 0 and {TOP} m");
-        return Err(Error::of("flight.altitude", problem));
+        return Err(Error::parameter("flight.altitude", problem));
     }
     let height = EARTH_RADIUS * altitude / (EARTH_RADIUS + altitude); // geopotential
     let weight = GRAVITY * MOLAR_MASS / GAS_CONSTANT;
@@ -86,7 +86,7 @@ impl Flight {
     pub fn dynamic_pressure(&self) -> Result<f64, Error> {
         if !(self.mach >= 0.0 && self.mach.is_finite()) {
             let problem = format!("= {} must not be negative", self.mach);
-            return Err(Error::of("flight.mach", problem));
+            return Err(Error::parameter("flight.mach", problem));
         }
         let air = air(self.altitude)?;
         Ok(0.5 * air.density * powi(self.mach * air.sound_speed, 2))

@@ -4,7 +4,7 @@
 use crate::error::Error;
 use crate::kinematics::Kinematics;
 use crate::math::sin_cos;
-use crate::motion::{BETA_LIMIT, State, state};
+use crate::state::{BETA_LIMIT, State, state};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
@@ -32,7 +32,7 @@ impl Sequence {
         let values = [self.alpha_rate, self.sigma_rate, self.beta_amplitude, self.beta_frequency];
         if !values.iter().all(|value| value.is_finite()) {
             let problem = "holds a value that is not finite";
-            return Err(Error::of("calibration", problem));
+            return Err(Error::parameter("calibration", problem));
         }
         let reach = initial.y.abs() + self.beta_amplitude.abs();
         if reach >= BETA_LIMIT {
@@ -41,7 +41,7 @@ impl Sequence {
                 self.beta_amplitude.to_degrees(),
                 reach.to_degrees()
             );
-            return Err(Error::of("calibration.beta_amplitude", problem));
+            return Err(Error::parameter("calibration.beta_amplitude", problem));
         }
         Ok(())
     }
@@ -61,7 +61,7 @@ impl Sequence {
 
     /// State and its derivative at `time` (s) after the start. The rates ω follow from Θ̇ with the
     /// matrix R in use and a trajectory that does not turn.
-    pub fn motion(
+    pub fn state_at(
         &self,
         kinematics: Kinematics,
         initial: &Vector3<f64>,

@@ -6,7 +6,7 @@ use toml::Table;
 /// Reads the text of a TOML file that is part of the program; `file` is its name.
 ///
 /// The text is parsed as a table first. `toml::from_str` would make a parser for each type, and
-/// these parsers took a fifth of the units' libraries.
+/// these parsers took a fifth of the FMUs' libraries.
 ///
 /// # Panics
 /// Panics if the text does not describe a value of this type. Tests read every file.

@@ -11,12 +11,12 @@ use crate::noise::{Stream, uniform};
 use crate::time::{tick, tick_time, tolerance};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
-pub use table::{Row, Table};
+pub use table::{DisturbanceTable, Row};
 
-/// Kind of disturbance, which decides its course over time.
+/// Kind of disturbance, which determines its waveform.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "camelCase")]
-pub enum Kind {
+pub enum DisturbanceKind {
     /// No disturbance acts on the vehicle.
     #[default]
     None,
@@ -42,7 +42,7 @@ pub enum Kind {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Disturbance {
     /// Kind of the disturbance, which selects the values below that are used.
-    pub kind: Kind,
+    pub kind: DisturbanceKind,
     /// Bound on the magnitude of each component of Δ, rad/s².
     pub bound: f64,
     /// Time between the ticks of white noise and of the state-dependent kinds, s.
@@ -56,7 +56,7 @@ pub struct Disturbance {
     /// Moment of the sinusoidal kind, N m.
     pub sine: SineMoment,
     /// Rows of the kind `table`.
-    pub table: Table,
+    pub table: DisturbanceTable,
     /// Start of the interval start ≤ t < end in which the disturbance acts, s. The square wave and
     /// the table begin here.
     pub start: f64,
@@ -103,8 +103,8 @@ pub struct View<'a> {
     pub rates: Vector3<f64>,
     /// Control moment m about the body axes, N m.
     pub moment: Vector3<f64>,
-    /// Random numbers of the disturbance's seed, from a tick near the present one: the white noise
-    /// has a short way to its own.
+    /// Random numbers of the disturbance's seed, from a tick near the present one, so that the
+    /// white noise needs only a short jump.
     pub noise: Option<&'a Stream<3>>,
 }
 
@@ -112,14 +112,14 @@ impl Default for Disturbance {
     /// Returns a disturbance that does nothing, with neutral values in the other fields.
     fn default() -> Self {
         Self {
-            kind: Kind::None,
+            kind: DisturbanceKind::None,
             bound: 0.0,
             period: 1.0,
             seed: 1,
             direction: Vector3::repeat(1.0),
             square_period: 1.0,
             sine: SineMoment::default(),
-            table: Table::default(),
+            table: DisturbanceTable::default(),
             start: 0.0,
             end: f64::INFINITY,
         }
@@ -132,7 +132,7 @@ impl Disturbance {
     /// # Errors
     /// Names the value at fault by its path in the configuration of the plant.
     pub fn check(&self) -> Result<(), Error> {
-        let refuse = |name: &'static str, problem: String| Err(Error::of(name, problem));
+        let refuse = |name: &'static str, problem: String| Err(Error::parameter(name, problem));
         if !(self.bound >= 0.0 && self.bound.is_finite()) {
             return refuse(
                 "disturbance.bound",
@@ -170,7 +170,7 @@ impl Disturbance {
 
     /// Whether the disturbance acts at `time` (s).
     pub fn acts(&self, time: f64) -> bool {
-        self.kind != Kind::None
+        self.kind != DisturbanceKind::None
             && time + tolerance(time) >= self.start
             && time + tolerance(time) < self.end
     }
@@ -179,16 +179,21 @@ impl Disturbance {
     /// length; `origin` is the start of the experiment (s).
     pub(crate) fn intervals(&self, origin: f64) -> Option<(f64, f64)> {
         match self.kind {
-            Kind::None | Kind::Constant | Kind::Sine | Kind::Table => None,
-            Kind::White | Kind::AlongRate | Kind::AgainstMoment => Some((origin, self.period)),
-            Kind::Square => Some((self.start, self.square_period / 2.0)),
+            DisturbanceKind::None
+            | DisturbanceKind::Constant
+            | DisturbanceKind::Sine
+            | DisturbanceKind::Table => None,
+            DisturbanceKind::White
+            | DisturbanceKind::AlongRate
+            | DisturbanceKind::AgainstMoment => Some((origin, self.period)),
+            DisturbanceKind::Square => Some((self.start, self.square_period / 2.0)),
         }
     }
 
     /// Number of the interval with constant Δ that contains `time` (s). For the table it is the
     /// number of the row in force, from 1, or 0 before the first row.
     pub fn tick(&self, origin: f64, time: f64) -> i64 {
-        if self.kind == Kind::Table {
+        if self.kind == DisturbanceKind::Table {
             return i64::try_from(self.table.row(self.start, time)).unwrap_or(i64::MAX);
         }
         self.intervals(origin).map_or(0, |(start, length)| tick(time, start, length))
@@ -196,13 +201,13 @@ impl Disturbance {
 
     /// First time (s) after `time` at which the disturbance may jump.
     pub fn next_change(&self, origin: f64, time: f64) -> Option<f64> {
-        if self.kind == Kind::None || time + tolerance(time) >= self.end {
+        if self.kind == DisturbanceKind::None || time + tolerance(time) >= self.end {
             return None;
         }
         if time + tolerance(time) < self.start {
             return Some(self.start);
         }
-        let next = if self.kind == Kind::Table {
+        let next = if self.kind == DisturbanceKind::Table {
             self.table.next_change(self.start, time)
         } else {
             self.intervals(origin)
@@ -215,22 +220,22 @@ impl Disturbance {
     /// Value of Δ (rad/s²) in the interval with number `tick`, provided that the disturbance acts.
     pub fn sample(&self, tick: i64, view: &View) -> Vector3<f64> {
         match self.kind {
-            Kind::None | Kind::Sine => Vector3::zeros(),
-            Kind::White => {
+            DisturbanceKind::None | DisturbanceKind::Sine => Vector3::zeros(),
+            DisturbanceKind::White => {
                 let near = view.noise.filter(|noise| noise.seed() == self.seed);
                 let drawn = near.map_or_else(|| uniform(self.seed, tick), |noise| noise.at(tick));
                 Vector3::from(drawn) * self.bound
             }
-            Kind::Constant => self.direction * self.bound,
-            Kind::Square => {
+            DisturbanceKind::Constant => self.direction * self.bound,
+            DisturbanceKind::Square => {
                 self.direction * if tick.rem_euclid(2) == 0 { self.bound } else { -self.bound }
             }
-            Kind::Table => self.table.direction(tick) * self.bound,
+            DisturbanceKind::Table => self.table.direction(tick) * self.bound,
             // d‖ω‖²/dt contains 2 ωᵀ R⁻¹ Δ
-            Kind::AlongRate => {
+            DisturbanceKind::AlongRate => {
                 signs(&view.kinematics.r_inverse(&view.angles).tr_mul(&view.rates)) * self.bound
             }
-            Kind::AgainstMoment => {
+            DisturbanceKind::AgainstMoment => {
                 signs(&(view.kinematics.r(&view.angles) * (view.body.inverse * view.moment)))
                     * -self.bound
             }
@@ -239,7 +244,7 @@ impl Disturbance {
 
     /// Disturbance moment (N m) at `time` (s), provided that the disturbance acts.
     pub fn moment(&self, time: f64) -> Vector3<f64> {
-        if self.kind != Kind::Sine {
+        if self.kind != DisturbanceKind::Sine {
             return Vector3::zeros();
         }
         let wave = |wave: &MomentWave| wave.amplitude * sin(wave.frequency * time + wave.phase);

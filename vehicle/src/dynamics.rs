@@ -33,7 +33,7 @@ impl Inertia {
     /// Names the moment or product of inertia that no body can have: I must be positive definite,
     /// and no principal moment may exceed the sum of the other two.
     pub fn body(&self, scale: f64) -> Result<RigidBody, Error> {
-        let refuse = |name: &'static str, problem: String| Err(Error::of(name, problem));
+        let refuse = |name: &'static str, problem: String| Err(Error::parameter(name, problem));
         for (name, value) in
             [("inertia.Ixx", self.Ixx), ("inertia.Iyy", self.Iyy), ("inertia.Izz", self.Izz)]
         {

@@ -36,8 +36,8 @@ pub enum Error {
     /// A configuration value lies outside the range that the equations allow.
     #[error("`{name}` {problem}")]
     Parameter {
-        /// Path of the field that holds the value. Errors name fields in backticks, so that a unit
-        /// can say its own names of them.
+        /// Path of the field that holds the value. Errors name fields in backticks, so that an FMU
+        /// can replace them by the names of its parameters.
         name: Cow<'static, str>,
         /// Description of the fault in the value.
         problem: String,
@@ -66,7 +66,10 @@ pub enum Error {
 
 impl Error {
     /// Returns the error for a configuration value, with the path of its field.
-    pub(crate) fn of(name: impl Into<Cow<'static, str>>, problem: impl Into<String>) -> Self {
+    pub(crate) fn parameter(
+        name: impl Into<Cow<'static, str>>,
+        problem: impl Into<String>,
+    ) -> Self {
         Self::Parameter { name: name.into(), problem: problem.into() }
     }
 }

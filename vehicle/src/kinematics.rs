@@ -157,8 +157,8 @@ impl Kinematics {
         }
     }
 
-    /// Inverse of the matrix that [`Self::with_alpha_rate`] makes, given the inverse of what it is
-    /// made of: (E R)⁻¹ = R⁻¹ E⁻¹ with E = 1 + `factor` e₃ e₁ᵀ.
+    /// Inverse of the matrix that [`Self::with_alpha_rate`] makes, given the inverse of R: (E R)⁻¹
+    /// = R⁻¹ E⁻¹ with E = 1 + `factor` e₃ e₁ᵀ.
     fn inverse_with_alpha_rate(mut inverse: Matrix3<f64>, factor: f64) -> Matrix3<f64> {
         let bank = inverse.column(2) * factor;
         inverse.set_column(0, &(inverse.column(0) - bank));

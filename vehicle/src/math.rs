@@ -1,7 +1,7 @@
 //! Elementary functions that give the same bits on every platform.
 //!
 //! `f64::sin` and its like call the C library of the platform, and these libraries differ in the
-//! last digit. The units therefore take the functions from here, which are plain arithmetic in
+//! last digit. The FMUs therefore use the functions of this module, which are plain arithmetic in
 //! Rust's `libm`. `sqrt`, `abs`, `floor` and the like are exact everywhere and need no substitute.
 //!
 //! ```

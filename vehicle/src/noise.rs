@@ -79,8 +79,8 @@ mod tests {
         let mut stream = Stream::<3>::new(7);
         for tick in [5, 6, 1250, -3, i64::MAX, i64::MIN, 0] {
             stream.move_to(tick);
-            for wanted in [tick, tick.saturating_add(1), tick.saturating_sub(1), 0] {
-                assert_eq!(stream.at(wanted), uniform(7, wanted), "from {tick} to {wanted}");
+            for target in [tick, tick.saturating_add(1), tick.saturating_sub(1), 0] {
+                assert_eq!(stream.at(target), uniform(7, target), "from {tick} to {target}");
             }
         }
     }
@@ -102,14 +102,17 @@ mod tests {
         // The bounds are five standard deviations of each estimate: variances 1, 2, 15 and 96 over
         // the number of values.
         let n = 2.0 * COUNT as f64;
-        for (found, expected, variance) in [
+        for (computed, expected, variance) in [
             (moments[0], 0.0, 1.0),
             (moments[1], 1.0, 2.0),
             (moments[2], 0.0, 15.0),
             (moments[3], 3.0, 96.0),
             (product, 0.0, 2.0),
         ] {
-            assert!((found - expected).abs() < 5.0 * (variance / n).sqrt(), "{found} {expected}");
+            assert!(
+                (computed - expected).abs() < 5.0 * (variance / n).sqrt(),
+                "{computed} {expected}"
+            );
         }
         assert!(
             normal_pair([-1.0, 0.5])

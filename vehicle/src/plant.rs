@@ -1,20 +1,20 @@
-//! Plant: the vehicle in motion. It integrates Θ̇ = R ω, plus the effect of a turning trajectory,
-//! and ω̇ = I⁻¹(m − ω × I ω) + R⁻¹ Δ from one communication point to the next.
+//! Plant: the moving vehicle. It integrates Θ̇ = R ω, plus the effect of a turning trajectory, and
+//! ω̇ = I⁻¹(m − ω × I ω) + R⁻¹ Δ from one communication point to the next.
 
 mod sensing;
 
 use crate::actuators::{self, Actuators, Command, Drive};
 use crate::calibration::Sequence;
-use crate::disturbance::{Disturbance, Kind, View};
+use crate::disturbance::{Disturbance, DisturbanceKind, View};
 use crate::dynamics::{Inertia, RigidBody};
 use crate::effectors::{JETS, SURFACES, Surfaces};
 use crate::error::Error;
 use crate::integrator::{equal_steps, rk4};
 use crate::kinematics::{Kinematics, TRAJECTORY, Trajectory};
-pub use crate::motion::{BETA_LIMIT, State, angles, rates, state};
 use crate::noise::Stream;
 use crate::platform::Surroundings;
 use crate::sensors::{self, Sensors};
+pub use crate::state::{BETA_LIMIT, State, angles, rates, state};
 use crate::time::{check_resolution, tolerance};
 use crate::transport::Transport;
 use crate::turntable::{self, Turntable};
@@ -168,7 +168,7 @@ pub struct Config {
 }
 
 /// Quantities that are held for a while. The disturbance is held from one tick or change of its
-/// course to the next, and the motion of the actuators until commands are taken or a deflection
+/// waveform to the next, and the motion of the actuators until commands are taken or a deflection
 /// comes to rest.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Held {
@@ -232,7 +232,7 @@ impl Plant {
     /// # Errors
     /// Names the value of the configuration that is out of range.
     pub fn new(config: &Config, start_time: f64) -> Result<Self, Error> {
-        let refuse = |name: &'static str, problem: String| Err(Error::of(name, problem));
+        let refuse = |name: &'static str, problem: String| Err(Error::parameter(name, problem));
         if !(config.inertia_scale > 0.0 && config.inertia_scale.is_finite()) {
             return refuse("inertia_scale", format!("= {} must be positive", config.inertia_scale));
         }
@@ -288,7 +288,7 @@ impl Plant {
         let mut state = config.initial;
         if let Some(sequence) = &config.calibration {
             sequence.check(&initial)?;
-            (state, _) = sequence.motion(config.kinematics, &initial, 0.0);
+            (state, _) = sequence.state_at(config.kinematics, &initial, 0.0);
         }
         Ok(Self {
             body,
@@ -464,7 +464,7 @@ impl Plant {
     }
 
     fn adopt(&mut self, held: &Held) -> Held {
-        if self.disturbance.kind == Kind::White {
+        if self.disturbance.kind == DisturbanceKind::White {
             let seed = self.disturbance.seed;
             self.noise.get_or_insert_with(|| Stream::new(seed)).move_to(held.tick);
         }
@@ -485,8 +485,9 @@ impl Plant {
     /// Disturbing moment (N m) at `time` (s): the sum of the external moment and that of the
     /// disturbance.
     pub fn disturbance_moment(&self, time: f64, input: &Input, held: &Held) -> Vector3<f64> {
-        let own = if held.acts { self.disturbance.moment(time) } else { Vector3::zeros() };
-        input.disturbance_moment + own
+        let disturbance_moment =
+            if held.acts { self.disturbance.moment(time) } else { Vector3::zeros() };
+        input.disturbance_moment + disturbance_moment
     }
 
     /// Control moment (N m) at the time `elapsed` (s) after the present one, provided that the
@@ -500,7 +501,9 @@ impl Plant {
     ) -> Vector3<f64> {
         self.actuators.as_ref().map_or_else(
             || self.converted(&delayed.unwrap_or(input.moment)),
-            |all| all.moment(drive, &(self.deflections + all.rates(drive) * elapsed)),
+            |actuators| {
+                actuators.moment(drive, &(self.deflections + actuators.rates(drive) * elapsed))
+            },
         )
     }
 
@@ -519,7 +522,9 @@ impl Plant {
 
     /// Rate of each deflection, rad/s: plus or minus the rate limit, or zero.
     pub fn deflection_rates(&self, held: &Held) -> Surfaces {
-        self.actuators.as_ref().map_or_else(Surfaces::zeros, |all| all.rates(&held.drive))
+        self.actuators
+            .as_ref()
+            .map_or_else(Surfaces::zeros, |actuators| actuators.rates(&held.drive))
     }
 
     /// Partial derivatives of [`Plant::applied_moment`] with respect to the input moment (3 × 3)
@@ -529,15 +534,17 @@ impl Plant {
     ) -> (Matrix3<f64>, SMatrix<f64, 3, SURFACES>) {
         let held = self.transport.is_some() || self.moment_resolution > 0.0;
         let at_once = if held { Matrix3::zeros() } else { Matrix3::identity() };
-        self.actuators.as_ref().map_or((at_once, SMatrix::zeros()), |all| {
-            (Matrix3::zeros(), *all.moment_by_deflections())
+        self.actuators.as_ref().map_or((at_once, SMatrix::zeros()), |actuators| {
+            (Matrix3::zeros(), *actuators.moment_by_deflections())
         })
     }
 
     /// Partial derivative of the applied moment with respect to the jet commands at the instant at
     /// which they are taken (3 × 10).
     pub fn applied_moment_by_jets(&self, command: &Command) -> SMatrix<f64, 3, JETS> {
-        self.actuators.as_ref().map_or_else(SMatrix::zeros, |all| all.moment_by_jets(command))
+        self.actuators
+            .as_ref()
+            .map_or_else(SMatrix::zeros, |actuators| actuators.moment_by_jets(command))
     }
 
     /// Turn rate (rad/s) of the trajectory, which is zero during the calibration sequence.
@@ -563,7 +570,7 @@ impl Plant {
         match &self.calibration {
             None => derivative(&self.body, self.kinematics, state, load),
             Some(Calibration { sequence, initial }) => {
-                sequence.motion(self.kinematics, initial, time - self.start_time).1
+                sequence.state_at(self.kinematics, initial, time - self.start_time).1
             }
         }
     }
@@ -618,7 +625,7 @@ impl Plant {
         let problem = format!(
             "= {done} a moment that is held over each communication step; give its inputs no derivatives"
         );
-        Err(Error::of(name, problem))
+        Err(Error::parameter(name, problem))
     }
 
     /// Moves the plant from `from` to `to` (s) under a constant control moment (N m).

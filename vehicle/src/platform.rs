@@ -29,7 +29,7 @@ impl Surroundings {
     /// # Errors
     /// Names the value at fault by its path in the configuration of the plant.
     pub fn check(&self) -> Result<(), Error> {
-        let refuse = |name: &'static str, problem: String| Err(Error::of(name, problem));
+        let refuse = |name: &'static str, problem: String| Err(Error::parameter(name, problem));
         if !(self.gravity >= 0.0 && self.gravity.is_finite()) {
             return refuse(
                 "surroundings.gravity",
@@ -64,10 +64,10 @@ pub fn velocity_from_level(trajectory: &Trajectory) -> Matrix3<f64> {
     climb * turn
 }
 
-/// Orientation of the platform and its motion.
+/// Orientation of the platform and its rates.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pose {
-    /// Attitude kinematics that the motion obeys.
+    /// Attitude kinematics in use.
     pub kinematics: Kinematics,
     /// Attitude angles Θ of the platform, rad.
     pub angles: Vector3<f64>,

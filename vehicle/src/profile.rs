@@ -1,4 +1,4 @@
-//! Courses of the reference attitude over time.
+//! Profiles of the reference attitude over time.
 
 use crate::math::{cos, sin, sin_cos};
 use crate::reference::Reference;
@@ -22,13 +22,13 @@ pub enum Profile {
 pub struct Segment {
     /// Time up to which the segment applies, t ≤ `until`, s.
     pub until: f64,
-    /// Courses of the angles α, β and σ.
-    pub angles: [Course; 3],
+    /// Profiles of the angles α, β and σ.
+    pub angles: [AngleProfile; 3],
 }
 
-/// Course of one angle, c + Σ (a sin ω t + b cos ω t).
+/// Profile of one angle, c + Σ (a sin ω t + b cos ω t).
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Course {
+pub struct AngleProfile {
     /// Constant part c of the angle, rad.
     pub constant: f64,
     /// Sinusoids that are added to the constant part.
@@ -65,7 +65,7 @@ impl Profile {
     /// in rad and the frequency in rad/s.
     pub fn sine(mean: Vector3<f64>, amplitude: Vector3<f64>, frequency: f64, phase: f64) -> Self {
         let (sine, cosine) = (cos(phase), sin(phase));
-        let angles = [0, 1, 2].map(|i| Course {
+        let angles = [0, 1, 2].map(|i| AngleProfile {
             constant: mean[i],
             waves: vec![Wave {
                 frequency,
@@ -102,16 +102,19 @@ impl Profile {
 
 impl Segment {
     fn constant(until: f64, angles: Vector3<f64>) -> Self {
-        Self { until, angles: [0, 1, 2].map(|i| Course { constant: angles[i], waves: Vec::new() }) }
+        Self {
+            until,
+            angles: [0, 1, 2].map(|i| AngleProfile { constant: angles[i], waves: Vec::new() }),
+        }
     }
 
     fn at(&self, time: f64) -> Reference {
         let mut reference = Reference::default();
         // Angles that oscillate together share one sine and cosine.
         let (mut frequency, mut s, mut c) = (0.0, 0.0, 1.0);
-        for (i, course) in self.angles.iter().enumerate() {
-            reference.angles[i] = course.constant;
-            for wave in &course.waves {
+        for (i, profile) in self.angles.iter().enumerate() {
+            reference.angles[i] = profile.constant;
+            for wave in &profile.waves {
                 if wave.frequency != frequency {
                     frequency = wave.frequency;
                     (s, c) = sin_cos(frequency * time);

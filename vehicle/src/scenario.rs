@@ -3,13 +3,13 @@
 
 use crate::atmosphere::Flight;
 use crate::data;
-use crate::disturbance::{Disturbance, Kind, SineMoment, Table};
+use crate::disturbance::{Disturbance, DisturbanceKind, DisturbanceTable, SineMoment};
 use crate::dynamics::Inertia;
 use crate::error::Error;
 use crate::kinematics::Kinematics;
 use crate::plant::{self, Config};
 use crate::platform::Surroundings;
-use crate::profile::{Course, Profile, Segment, Wave};
+use crate::profile::{AngleProfile, Profile, Segment, Wave};
 use crate::turntable;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
@@ -163,7 +163,7 @@ struct FileLimit {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct FileDisturbance {
-    kind: Kind,
+    kind: DisturbanceKind,
     #[serde(default)]
     bound_deg_s2: f64,
     period: f64,
@@ -173,7 +173,7 @@ struct FileDisturbance {
     #[serde(default)]
     sine: SineMoment,
     #[serde(default)]
-    table: Table,
+    table: DisturbanceTable,
     start: Option<f64>,
     end: Option<f64>,
 }
@@ -188,14 +188,14 @@ struct FileReference {
 #[serde(deny_unknown_fields)]
 struct FileSegment {
     until: Option<f64>,
-    alpha: FileCourse,
-    beta: FileCourse,
-    sigma: FileCourse,
+    alpha: FileAngleProfile,
+    beta: FileAngleProfile,
+    sigma: FileAngleProfile,
 }
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-struct FileCourse {
+struct FileAngleProfile {
     constant_deg: f64,
     #[serde(default)]
     wave: Vec<FileWave>,
@@ -250,19 +250,19 @@ impl FileDisturbance {
 
 impl FileSegment {
     fn into_segment(self) -> Segment {
-        let angles = [self.alpha, self.beta, self.sigma].map(FileCourse::into_course);
+        let angles = [self.alpha, self.beta, self.sigma].map(FileAngleProfile::into_profile);
         Segment { until: self.until.unwrap_or(f64::INFINITY), angles }
     }
 }
 
-impl FileCourse {
-    fn into_course(self) -> Course {
+impl FileAngleProfile {
+    fn into_profile(self) -> AngleProfile {
         let wave = |wave: FileWave| Wave {
             frequency: wave.frequency,
             sine: wave.sine_deg.to_radians(),
             cosine: wave.cosine_deg.to_radians(),
         };
-        Course {
+        AngleProfile {
             constant: self.constant_deg.to_radians(),
             waves: self.wave.into_iter().map(wave).collect(),
         }

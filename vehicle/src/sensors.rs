@@ -92,7 +92,7 @@ pub struct Sensors {
 
 impl Config {
     fn check(&self) -> Result<(), Error> {
-        let refuse = |name: &'static str, problem: String| Err(Error::of(name, problem));
+        let refuse = |name: &'static str, problem: String| Err(Error::parameter(name, problem));
         let Line { period, delay, drop_probability, .. } = self.line;
         if !(period > 0.0 && period.is_finite()) {
             return refuse("sensors.line.period", format!("= {period} s must be positive"));

@@ -53,7 +53,7 @@ impl LookupTable {
         if self.curvatures.len() == self.times.len() && finite {
             return Ok(());
         }
-        Err(Error::of("reference table", "has other curvatures than points"))
+        Err(Error::parameter("reference table", "has other curvatures than points"))
     }
 
     /// Reads a CSV file with the headings `time_s` and, in any order, `alpha_deg` or `alpha_rad`,
@@ -94,20 +94,20 @@ impl LookupTable {
         let mut columns = Vec::new();
         for (quantity, forms) in COLUMNS {
             let allowed = || forms.iter().map(|form| form.0).collect::<Vec<_>>().join(" or ");
-            let found: Vec<_> = headings
+            let matching: Vec<_> = headings
                 .iter()
                 .enumerate()
                 .filter_map(|(i, heading)| {
                     forms.iter().find(|form| form.0 == heading).map(|form| (i, form.1))
                 })
                 .collect();
-            match found[..] {
+            match matching[..] {
                 [column] => columns.push(column),
                 [] => {
                     return Err(refuse(
                         heading_line,
                         Some(quantity),
-                        format!("is missing; head it {}", allowed()),
+                        format!("is missing; its heading is {}", allowed()),
                     ));
                 }
                 _ => {
@@ -125,7 +125,7 @@ impl LookupTable {
             return Err(refuse(
                 heading_line,
                 Some(unknown.1),
-                "is not known here; remove it".into(),
+                "is not a column of a reference table; remove it".into(),
             ));
         }
 
@@ -191,7 +191,7 @@ impl LookupTable {
 }
 
 fn check(times: &[f64], angles: &[Vector3<f64>]) -> Result<(), Error> {
-    let refuse = |problem: String| Err(Error::of("reference table", problem));
+    let refuse = |problem: String| Err(Error::parameter("reference table", problem));
     if times.len() > MOST_POINTS {
         return refuse(too_many());
     }

@@ -37,7 +37,7 @@ pub fn check_resolution(start: f64, period: f64) -> Result<(), Error> {
     let problem = format!(
         "= {start} s is too large to tell apart ticks with a period of {period} s; start between -{latest:.1e} s and {latest:.1e} s"
     );
-    Err(Error::of("start time", problem))
+    Err(Error::parameter("start time", problem))
 }
 
 /// Number of the last tick at or before `time` (s), counted from 0 at `start`.

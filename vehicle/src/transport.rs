@@ -40,7 +40,7 @@ impl Transport {
     pub fn new(delay: f64) -> Result<Option<Self>, Error> {
         if !(0.0..=LONGEST).contains(&delay) {
             let problem = format!("= {delay} s must lie between 0 and {LONGEST} s");
-            return Err(Error::of(NAME, problem));
+            return Err(Error::parameter(NAME, problem));
         }
         Ok((delay > 0.0).then(|| Self { delay, changes: VecDeque::new() }))
     }
@@ -97,7 +97,7 @@ impl Transport {
                 "= {} s at t = {time} s: the moment changed more than {UNDER_WAY} times within it; use longer communication steps or a shorter delay",
                 self.delay
             );
-            return Err(Error::of(NAME, problem));
+            return Err(Error::parameter(NAME, problem));
         }
         self.changes.push_back(Change { time, moment });
         Ok(())

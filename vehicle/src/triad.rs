@@ -85,7 +85,7 @@ impl Triad {
         ] {
             if !(value >= 0.0 && value.is_finite()) {
                 let problem = format!("= {value} must not be negative");
-                return Err(Error::of(format!("{path}.{name}"), problem));
+                return Err(Error::parameter(format!("{path}.{name}"), problem));
             }
         }
         for (name, finite) in [
@@ -94,7 +94,7 @@ impl Triad {
             ("drift", self.drift.iter().all(|value| value.is_finite())),
         ] {
             if !finite {
-                return Err(Error::of(
+                return Err(Error::parameter(
                     format!("{path}.{name}"),
                     "holds a value that is not finite",
                 ));

@@ -4,7 +4,7 @@
 //! θ̇ = sat((Θ_c − θ)/τ)
 //!
 //! Θ_c are the vehicle's angles, rounded by a converter. They are given at the sensors' samples and
-//! lie on a straight line between them, so that the motion has a closed form.
+//! lie on a straight line between them, so that the solution has a closed form.
 
 use crate::error::Error;
 use crate::kinematics::Kinematics;
@@ -60,7 +60,7 @@ impl Turntable {
             ("turntable.resolution", config.resolution),
         ] {
             if !(value >= 0.0 && value.is_finite()) {
-                return Err(Error::of(name, format!("= {value} must not be negative")));
+                return Err(Error::parameter(name, format!("= {value} must not be negative")));
             }
         }
         Ok((config.bandwidth > 0.0).then_some(Self { config: *config, before: None, last: None }))

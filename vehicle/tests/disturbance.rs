@@ -1,37 +1,37 @@
-//! Tests of disturbances: bounds, reproducibility, signs and course over time.
+//! Tests of disturbances: bounds, reproducibility, signs and waveforms.
 
 use nalgebra::Vector3;
 use proptest::prelude::*;
 use rand_pcg::Pcg64;
 use rand_pcg::rand_core::SeedableRng;
-use vehicle::disturbance::{Disturbance, Kind, Row, Table, View};
+use vehicle::disturbance::{Disturbance, DisturbanceKind, DisturbanceTable, Row, View};
 use vehicle::dynamics::RigidBody;
 use vehicle::kinematics::Kinematics;
 use vehicle::{Scenario, kinematics};
 
-fn of(kind: Kind) -> Disturbance {
+fn of_kind(kind: DisturbanceKind) -> Disturbance {
     Disturbance { kind, bound: 0.035, period: 0.04, square_period: 3.0, ..Disturbance::default() }
 }
 
 /// Returns a table whose rows have these times (s) and α factors.
 fn table(start: f64, period: f64, rows: &[(f64, f64)]) -> Disturbance {
     let row = |&(time, alpha): &(f64, f64)| Row { time, direction: Vector3::new(alpha, 0.0, -0.5) };
-    let table = Table { period, rows: rows.iter().map(row).collect() };
-    Disturbance { start, table, bound: 1.0, ..of(Kind::Table) }
+    let table = DisturbanceTable { period, rows: rows.iter().map(row).collect() };
+    Disturbance { start, table, bound: 1.0, ..of_kind(DisturbanceKind::Table) }
 }
 
 /// Times (s) and values of Δ_α after each change until `end` (s).
-fn course(disturbance: &Disturbance, end: f64) -> Vec<(f64, f64)> {
+fn waveform(disturbance: &Disturbance, end: f64) -> Vec<(f64, f64)> {
     let body = body();
     let mut time = disturbance.start;
-    let mut course = Vec::new();
+    let mut waveform = Vec::new();
     while time < end {
-        course.push((time, disturbance.sample(disturbance.tick(0.0, time), &still(&body)).x));
+        waveform.push((time, disturbance.sample(disturbance.tick(0.0, time), &still(&body)).x));
         let Some(next) = disturbance.next_change(0.0, time) else { break };
         assert!(next > time, "{next} after {time}");
         time = next;
     }
-    course
+    waveform
 }
 
 fn body() -> RigidBody {
@@ -58,8 +58,8 @@ proptest! {
     fn each_component_keeps_the_bound(seed: u64, tick in 0..1_000_000_i64, angles in vector(1.0), rates in vector(0.1), moment in vector(1e5)) {
         let body = body();
         let view = View { body: &body, kinematics: Kinematics::Printed, angles, rates, moment, noise: None };
-        for kind in [Kind::None, Kind::White, Kind::Constant, Kind::Square, Kind::AlongRate, Kind::AgainstMoment] {
-            let delta = Disturbance { seed, ..of(kind) }.sample(tick, &view);
+        for kind in [DisturbanceKind::None, DisturbanceKind::White, DisturbanceKind::Constant, DisturbanceKind::Square, DisturbanceKind::AlongRate, DisturbanceKind::AgainstMoment] {
+            let delta = Disturbance { seed, ..of_kind(kind) }.sample(tick, &view);
             prop_assert!(delta.amax() <= 0.035, "{kind:?}: {delta}");
         }
     }
@@ -68,8 +68,8 @@ proptest! {
     fn state_dependent_kinds_choose_the_worst_corner(angles in vector(1.0), rates in vector(0.1), moment in vector(1e5)) {
         let body = body();
         let view = View { body: &body, kinematics: Kinematics::Printed, angles, rates, moment, noise: None };
-        let along = of(Kind::AlongRate).sample(0, &view);
-        let against = of(Kind::AgainstMoment).sample(0, &view);
+        let along = of_kind(DisturbanceKind::AlongRate).sample(0, &view);
+        let against = of_kind(DisturbanceKind::AgainstMoment).sample(0, &view);
         let control = kinematics::r(&angles) * body.inverse * moment;
         for corner in 0..8 {
             let other = Vector3::from_fn(|i, _| if corner >> i & 1 == 0 { 0.035 } else { -0.035 });
@@ -103,17 +103,17 @@ proptest! {
             expected.extend((first > 0.0).then_some((begin, 0.0)));
             expected.extend(rows.iter().map(|(time, alpha)| (begin + time, *alpha)));
         }
-        let found = course(&disturbance, if repeats { start + 3.0 * period - 1e-9 } else { 1e9 });
-        prop_assert_eq!(found.len(), expected.len());
-        for (found, expected) in found.iter().zip(&expected) {
-            prop_assert_eq!(found.1, expected.1);
-            prop_assert!((found.0 - expected.0).abs() <= 1e-12, "{:?} {:?}", found, expected);
+        let changes = waveform(&disturbance, if repeats { start + 3.0 * period - 1e-9 } else { 1e9 });
+        prop_assert_eq!(changes.len(), expected.len());
+        for (change, expected) in changes.iter().zip(&expected) {
+            prop_assert_eq!(change.1, expected.1);
+            prop_assert!((change.0 - expected.0).abs() <= 1e-12, "{:?} {:?}", change, expected);
         }
     }
 
     #[test]
     fn changes_come_one_after_the_other(origin in -10.0..10.0, period in 1e-3..1.0) {
-        let disturbance = Disturbance { period, start: origin + 0.5, end: origin + 2.0, ..of(Kind::White) };
+        let disturbance = Disturbance { period, start: origin + 0.5, end: origin + 2.0, ..of_kind(DisturbanceKind::White) };
         let mut time = origin;
         let mut changes = Vec::new();
         while let Some(next) = disturbance.next_change(origin, time) {
@@ -131,7 +131,7 @@ proptest! {
 #[test]
 fn white_noise_is_a_pure_function_of_seed_and_tick() {
     let body = body();
-    let noise = of(Kind::White);
+    let noise = of_kind(DisturbanceKind::White);
     let forward: Vec<_> = (0..200).map(|tick| noise.sample(tick, &still(&body))).collect();
     let backward: Vec<_> = (0..200).rev().map(|tick| noise.sample(tick, &still(&body))).collect();
     assert!(forward.iter().eq(backward.iter().rev()));
@@ -141,7 +141,7 @@ fn white_noise_is_a_pure_function_of_seed_and_tick() {
 #[test]
 fn oracle_random_access_gives_the_generator_s_sequence() {
     let body = body();
-    let unit = Disturbance { bound: 1.0, seed: 42, ..of(Kind::White) };
+    let unit = Disturbance { bound: 1.0, seed: 42, ..of_kind(DisturbanceKind::White) };
     let mut generator = Pcg64::seed_from_u64(42);
     for tick in 0..1000 {
         let expected =
@@ -153,7 +153,7 @@ fn oracle_random_access_gives_the_generator_s_sequence() {
 #[test]
 fn regress_white_noise_of_seed_1() {
     let body = body();
-    let unit = Disturbance { bound: 1.0, ..of(Kind::White) };
+    let unit = Disturbance { bound: 1.0, ..of_kind(DisturbanceKind::White) };
     let got = [0, 1, 1_000_000].map(|tick| unit.sample(tick, &still(&body)).x);
     assert_eq!(got, [0.6797473170518498, 0.9660317626188819, 0.08812515661859677]);
 }
@@ -162,7 +162,7 @@ fn regress_white_noise_of_seed_1() {
 fn oracle_white_noise_has_the_moments_of_a_uniform_distribution_and_no_memory() {
     let body = body();
     for seed in [1, 2, 3] {
-        let unit = Disturbance { bound: 1.0, seed, ..of(Kind::White) };
+        let unit = Disturbance { bound: 1.0, seed, ..of_kind(DisturbanceKind::White) };
         let n = 100_000;
         let samples: Vec<_> = (0..n).map(|tick| unit.sample(tick, &still(&body))).collect();
         let mean = samples.iter().sum::<Vector3<f64>>() / n as f64;
@@ -184,7 +184,8 @@ fn different_seeds_are_uncorrelated() {
     let sum: f64 = (0..10_000)
         .map(|tick| {
             let [a, b] = [7, 8].map(|seed| {
-                Disturbance { bound: 1.0, seed, ..of(Kind::White) }.sample(tick, &still(&body))
+                Disturbance { bound: 1.0, seed, ..of_kind(DisturbanceKind::White) }
+                    .sample(tick, &still(&body))
             });
             a.dot(&b)
         })
@@ -195,8 +196,11 @@ fn different_seeds_are_uncorrelated() {
 #[test]
 fn square_wave_begins_positive_at_its_start() {
     let body = body();
-    let square =
-        Disturbance { start: 1.0, direction: Vector3::new(1.0, 0.0, -0.5), ..of(Kind::Square) };
+    let square = Disturbance {
+        start: 1.0,
+        direction: Vector3::new(1.0, 0.0, -0.5),
+        ..of_kind(DisturbanceKind::Square)
+    };
     let at = |time: f64| square.sample(square.tick(0.0, time), &still(&body));
     let high = Vector3::new(0.035, 0.0, -0.0175);
     for (time, expected) in [(1.0, high), (2.4, high), (2.5, -high), (3.9, -high), (4.0, high)] {
@@ -211,11 +215,11 @@ fn square_wave_begins_positive_at_its_start() {
 fn a_table_holds_each_row_until_the_next_and_the_last_one_for_ever() {
     let table = table(1.0, 0.0, &[(0.5, 1.0), (2.0, -0.25), (2.5, 0.75)]);
     table.check().unwrap();
-    assert_eq!(course(&table, 99.0), [(1.0, 0.0), (1.5, 1.0), (3.0, -0.25), (3.5, 0.75)]);
+    assert_eq!(waveform(&table, 99.0), [(1.0, 0.0), (1.5, 1.0), (3.0, -0.25), (3.5, 0.75)]);
     assert_eq!(table.next_change(0.0, 0.0), Some(1.0), "the start of the disturbance");
     assert_eq!(table.next_change(0.0, 3.5), None);
     let ended = Disturbance { end: 3.25, ..table.clone() };
-    assert_eq!(course(&ended, 3.25), [(1.0, 0.0), (1.5, 1.0), (3.0, -0.25)]);
+    assert_eq!(waveform(&ended, 3.25), [(1.0, 0.0), (1.5, 1.0), (3.0, -0.25)]);
     let body = body();
     let at = |time: f64| table.sample(table.tick(0.0, time), &still(&body));
     for (time, alpha) in [(1.5 - 1e-12, 1.0), (1.5 - 1e-6, 0.0), (2.999, 1.0), (3.0, -0.25)] {
@@ -228,11 +232,11 @@ fn a_table_holds_each_row_until_the_next_and_the_last_one_for_ever() {
 fn a_table_repeats_with_the_time_before_its_first_row() {
     let rows = [(0.5, 1.0), (2.0, -0.25)];
     let expected = [(-1.0, 0.0), (-0.5, 1.0), (1.0, -0.25), (3.0, 0.0), (3.5, 1.0), (5.0, -0.25)];
-    assert_eq!(course(&table(-1.0, 4.0, &rows), 7.0), expected);
+    assert_eq!(waveform(&table(-1.0, 4.0, &rows), 7.0), expected);
     let rows = [(0.0, 1.0), (2.0, -0.25)];
     let expected = [(0.0, 1.0), (2.0, -0.25), (4.0, 1.0), (6.0, -0.25)];
-    assert_eq!(course(&table(0.0, 4.0, &rows), 8.0), expected);
-    assert_eq!(course(&table(0.0, 4.0, &[]), 99.0), [(0.0, 0.0)], "without rows nothing changes");
+    assert_eq!(waveform(&table(0.0, 4.0, &rows), 8.0), expected);
+    assert_eq!(waveform(&table(0.0, 4.0, &[]), 99.0), [(0.0, 0.0)], "without rows nothing changes");
 }
 
 #[test]
@@ -278,8 +282,10 @@ fn far_from_its_start_a_table_still_goes_through_all_rows() {
 fn tables_out_of_range_are_refused_by_name() {
     let row = |time: f64, x: f64| Row { time, direction: Vector3::new(x, 0.5, -1.0) };
     let refusal = |period: f64, rows: [Row; 2]| {
-        let table = Table { period, rows: rows.to_vec() };
-        Disturbance { table, ..of(Kind::Table) }.check().map_err(|error| error.to_string())
+        let table = DisturbanceTable { period, rows: rows.to_vec() };
+        Disturbance { table, ..of_kind(DisturbanceKind::Table) }
+            .check()
+            .map_err(|error| error.to_string())
     };
     assert_eq!(refusal(0.0, [row(0.0, 1.0), row(1e9, -1.0)]), Ok(()));
     assert_eq!(refusal(1.5, [row(0.5, 1.0), row(1.0, -1.0)]), Ok(()));
@@ -316,7 +322,7 @@ fn tables_out_of_range_are_refused_by_name() {
 
 #[test]
 fn values_out_of_range_are_refused_by_name() {
-    let good = of(Kind::White);
+    let good = of_kind(DisturbanceKind::White);
     good.check().unwrap();
     for (bad, name) in [
         (Disturbance { bound: -1.0, ..good.clone() }, "disturbance.bound"),

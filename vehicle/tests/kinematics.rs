@@ -58,10 +58,10 @@ proptest! {
             (r_beta, 0, r_alpha_beta),
             (r_beta, 1, r_beta_beta),
         ];
-        for (of, axis, exact) in pairs {
+        for (matrix, axis, exact) in pairs {
             let mut shift = Vector3::zeros();
             shift[axis] = h;
-            let numeric = (of(&(angles + shift)) - of(&(angles - shift))) / (2.0 * h);
+            let numeric = (matrix(&(angles + shift)) - matrix(&(angles - shift))) / (2.0 * h);
             let error = (numeric - exact(&angles)).amax();
             prop_assert!(error < 1e-8 * scale, "{error}");
         }
@@ -215,14 +215,14 @@ proptest! {
         let rates = body_rates(&trajectory, earth_rate, &angles, &angle_rates);
         let exact = Kinematics::Exact;
         let turn_rate = trajectory.turn_rate(earth_rate);
-        let found = exact.r(&angles) * rates + exact.turn(&angles) * turn_rate;
+        let computed = exact.r(&angles) * rates + exact.turn(&angles) * turn_rate;
         let scale = 1.0 / angles.y.cos();
-        prop_assert!((found - angle_rates).amax() < 1e-9 * scale, "{}", found - angle_rates);
+        prop_assert!((computed - angle_rates).amax() < 1e-9 * scale, "{}", computed - angle_rates);
         // The printed kinematics lack α̇ sin β and nothing else.
         let printed = Kinematics::Printed;
-        let mut found = printed.r(&angles) * rates + printed.turn(&angles) * turn_rate;
-        found.z += angle_rates.x * angles.y.sin();
-        prop_assert!((found - angle_rates).amax() < 1e-9 * scale, "{}", found - angle_rates);
+        let mut computed = printed.r(&angles) * rates + printed.turn(&angles) * turn_rate;
+        computed.z += angle_rates.x * angles.y.sin();
+        prop_assert!((computed - angle_rates).amax() < 1e-9 * scale, "{}", computed - angle_rates);
     }
 
     /// Wu 2015 (1) as printed differs from the true kinematics in one sign, that of sin φ sin γ in
@@ -257,10 +257,10 @@ proptest! {
             let product = kinematics.r(&angles) * kinematics.r_inverse(&angles);
             prop_assert!((product - Matrix3::identity()).amax() < 1e-14 * scale);
             let h = 1e-5;
-            let slope = |of: &dyn Fn(&Vector3<f64>) -> Matrix3<f64>, axis: usize| {
+            let slope = |matrix: &dyn Fn(&Vector3<f64>) -> Matrix3<f64>, axis: usize| {
                 let mut shift = Vector3::zeros();
                 shift[axis] = h;
-                (of(&(angles + shift)) - of(&(angles - shift))) / (2.0 * h)
+                (matrix(&(angles + shift)) - matrix(&(angles - shift))) / (2.0 * h)
             };
             for (numeric, exact) in [
                 (slope(&|angles| kinematics.r(angles), 0), kinematics.r_alpha(&angles)),

@@ -3,7 +3,9 @@
 use nalgebra::{Vector3, Vector6};
 use proptest::prelude::*;
 use vehicle::actuators::{self, Command, JetMode};
-use vehicle::disturbance::{Disturbance, Kind, MomentWave, Row, SineMoment, Table};
+use vehicle::disturbance::{
+    Disturbance, DisturbanceKind, DisturbanceTable, MomentWave, Row, SineMoment,
+};
 use vehicle::effectors::Effectors;
 use vehicle::kinematics::{Kinematics, Trajectory};
 use vehicle::plant::{
@@ -24,7 +26,7 @@ const TUMBLING: [f64; 6] = [0.2, 0.1, -0.5, 0.08, -0.05, 0.06];
 
 /// One plant for each kind of disturbance, all with the data of crmpc-2022.
 fn kinds() -> impl Iterator<Item = Config> {
-    use Kind::{AgainstMoment, AlongRate, Constant, None, Sine, Square, Table, White};
+    use DisturbanceKind::{AgainstMoment, AlongRate, Constant, None, Sine, Square, Table, White};
     [None, White, Constant, Sine, Square, AlongRate, AgainstMoment, Table].into_iter().map(|kind| {
         let wave = |frequency| MomentWave {
             amplitude: Vector3::new(1e4, 2e4, -1e4),
@@ -46,10 +48,10 @@ fn kinds() -> impl Iterator<Item = Config> {
 }
 
 /// Returns a table with jumps between the communication points of any test.
-fn table() -> Table {
+fn table() -> DisturbanceTable {
     let rows = [(0.113, [1.0, 0.0, -1.0]), (0.3141, [-0.4, 0.7, 1.0]), (0.7, [0.0, -1.0, 0.2])];
     let row = |(time, direction)| Row { time, direction: Vector3::from(direction) };
-    Table { period: 0.9, rows: rows.map(row).to_vec() }
+    DisturbanceTable { period: 0.9, rows: rows.map(row).to_vec() }
 }
 
 fn moment(k: u32) -> Vector3<f64> {
@@ -139,7 +141,8 @@ fn long_and_short_steps(config: &Config) -> impl Iterator<Item = (State, State)>
 
 #[test]
 fn one_long_step_equals_five_short_ones_bit_for_bit() {
-    for kind in [Kind::White, Kind::AlongRate, Kind::AgainstMoment] {
+    for kind in [DisturbanceKind::White, DisturbanceKind::AlongRate, DisturbanceKind::AgainstMoment]
+    {
         let mut config = config();
         config.disturbance.kind = kind;
         assert!(long_and_short_steps(&config).all(|(long, short)| long == short), "{kind:?}");
@@ -220,20 +223,20 @@ fn oracle_square_and_constant_as_tables_bit_for_bit() {
     let direction = Vector3::new(1.0, -0.3, 0.8);
     let tabulated = |period: f64, rows: &[(f64, f64)]| {
         let row = |&(time, sign)| Row { time, direction: direction * sign };
-        let table = Table { period, rows: rows.iter().map(row).collect() };
-        disturbed(Disturbance { kind: Kind::Table, table, ..Disturbance::default() })
+        let table = DisturbanceTable { period, rows: rows.iter().map(row).collect() };
+        disturbed(Disturbance { kind: DisturbanceKind::Table, table, ..Disturbance::default() })
     };
-    let of = |kind, square_period| {
+    let disturbed_by = |kind, square_period| {
         disturbed(Disturbance { kind, direction, square_period, ..Disturbance::default() })
     };
     // The jumps k · period / 2 of the square wave and the table's repetition · period + time are
     // the same numbers if period / 2 is a short binary fraction, and otherwise rounded differently.
     for (kind, square_period, period, rows, bound) in [
-        (Kind::Square, 1.5, 1.5, vec![(0.0, 1.0), (0.75, -1.0)], 0.0),
-        (Kind::Square, 0.7, 0.7, vec![(0.0, 1.0), (0.35, -1.0)], 1e-14),
-        (Kind::Constant, 1.0, 0.0, vec![(0.0, 1.0)], 0.0),
+        (DisturbanceKind::Square, 1.5, 1.5, vec![(0.0, 1.0), (0.75, -1.0)], 0.0),
+        (DisturbanceKind::Square, 0.7, 0.7, vec![(0.0, 1.0), (0.35, -1.0)], 1e-14),
+        (DisturbanceKind::Constant, 1.0, 0.0, vec![(0.0, 1.0)], 0.0),
     ] {
-        let (mut kind, mut table) = (of(kind, square_period), tabulated(period, &rows));
+        let (mut kind, mut table) = (disturbed_by(kind, square_period), tabulated(period, &rows));
         for k in 0..125 {
             let [from, to] = [0.04 * f64::from(k), 0.04 * f64::from(k + 1)];
             kind.advance(from, to, moment(k / 5)).unwrap();
@@ -249,9 +252,14 @@ fn oracle_a_table_gives_the_parabolas_of_its_rows_whatever_the_communication_ste
     // At beta = 0, without roll and yaw, Δ_α is the second derivative of α.
     let rows = [(0.3, 1.0), (0.7001, -0.5), (1.15, 0.0), (1.3, -1.0)];
     let row = |(time, x)| Row { time, direction: Vector3::new(x, 0.0, 0.0) };
-    let table = Table { period: 1.7, rows: rows.map(row).to_vec() };
-    let disturbance =
-        Disturbance { kind: Kind::Table, bound: 0.03, table, start: 0.1, ..Disturbance::default() };
+    let table = DisturbanceTable { period: 1.7, rows: rows.map(row).to_vec() };
+    let disturbance = Disturbance {
+        kind: DisturbanceKind::Table,
+        bound: 0.03,
+        table,
+        start: 0.1,
+        ..Disturbance::default()
+    };
     let (mut alpha, mut rate, mut time) = (0.1, 0.0, 0.0);
     for (until, factor) in [0.0, 1.7].into_iter().flat_map(|begin| {
         [(0.3, 0.0), (0.7001, 1.0), (1.15, -0.5), (1.3, 0.0), (1.7, -1.0)]
@@ -277,8 +285,13 @@ fn oracle_a_table_gives_the_parabolas_of_its_rows_whatever_the_communication_ste
 
 #[test]
 fn communication_points_at_the_jumps_of_a_table_change_nothing() {
-    let plant =
-        || disturbed(Disturbance { kind: Kind::Table, table: table(), ..Disturbance::default() });
+    let plant = || {
+        disturbed(Disturbance {
+            kind: DisturbanceKind::Table,
+            table: table(),
+            ..Disturbance::default()
+        })
+    };
     let [mut between, mut at_jumps] = [0, 1].map(|_| plant());
     let jumps = (0..4).flat_map(|repetition| {
         let begin = 0.5 + f64::from(repetition) * 0.9;
@@ -305,7 +318,7 @@ fn communication_points_at_the_jumps_of_a_table_change_nothing() {
 #[test]
 fn state_dependent_disturbance_is_drawn_at_the_tick_and_held() {
     let mut config = config();
-    config.disturbance.kind = Kind::AgainstMoment;
+    config.disturbance.kind = DisturbanceKind::AgainstMoment;
     config.disturbance.period = 0.2;
     let mut plant = Plant::new(&config, 0.0).unwrap();
     let push = Vector3::new(1e4, 1e4, 1e4);
@@ -378,7 +391,7 @@ proptest! {
     #[test]
     fn any_communication_points_lead_to_the_same_state(
         mut points in proptest::collection::vec(0.0..2.0, 0..40),
-        kind in prop::sample::select(vec![Kind::White, Kind::Constant, Kind::Sine, Kind::Square, Kind::Table]),
+        kind in prop::sample::select(vec![DisturbanceKind::White, DisturbanceKind::Constant, DisturbanceKind::Sine, DisturbanceKind::Square, DisturbanceKind::Table]),
     ) {
         let mut config = kinds().find(|config| config.disturbance.kind == kind).unwrap();
         config.disturbance.end = 1.5;
@@ -653,9 +666,9 @@ fn a_delay_that_cannot_work_is_refused_by_name() {
     let text = Plant::new(&with_actuators, 0.0).unwrap_err().to_string();
     assert!(text.contains("moment_delay") && text.contains("actuators"), "{text}");
     let mut plant = Plant::new(&Config { moment_delay: 0.1, ..config() }, 0.0).unwrap();
-    let courses: [fn(f64) -> f64; 2] = [|t| t, |t| t * (t - 0.04)];
-    for course in courses {
-        let input = |time: f64| Vector3::new(0.0, 1e4 * course(time), 0.0).into();
+    let profiles: [fn(f64) -> f64; 2] = [|t| t, |t| t * (t - 0.04)];
+    for profile in profiles {
+        let input = |time: f64| Vector3::new(0.0, 1e4 * profile(time), 0.0).into();
         let text =
             plant.advance_with(0.0, 0.04, &Command::default(), input).unwrap_err().to_string();
         assert!(text.contains("moment_delay") && text.contains("derivatives"), "{text}");

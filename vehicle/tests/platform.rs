@@ -91,13 +91,13 @@ proptest! {
     fn oracle_the_gyroscope_against_differences_of_the_orientation(
         angles in attitude(),
         rates in proptest::array::uniform3(-0.5..0.5),
-        course in proptest::array::uniform4(-0.5..0.5),
+        drawn in proptest::array::uniform4(-0.5..0.5),
     ) {
         let trajectory = Trajectory {
-            flight_path_angle: course[0],
-            heading: course[1],
-            flight_path_angle_rate: course[2],
-            heading_rate: course[3],
+            flight_path_angle: drawn[0],
+            heading: drawn[1],
+            flight_path_angle_rate: drawn[2],
+            heading_rate: drawn[3],
             ..Trajectory::default()
         };
         for kinematics in [Kinematics::Printed, Kinematics::Exact] {
@@ -107,12 +107,12 @@ proptest! {
             let pose = Pose { kinematics, angles, rates, alpha_rate: angle_rates.x, trajectory };
             // Over an Earth that neither turns nor curves, the level axes are inertial.
             let expected = rate_of(|t| {
-                let course = Trajectory {
+                let later = Trajectory {
                     flight_path_angle: trajectory.flight_path_angle + t * trajectory.flight_path_angle_rate,
                     heading: trajectory.heading + t * trajectory.heading_rate,
                     ..Trajectory::default()
                 };
-                body_from_velocity(&(angles + angle_rates * t)) * velocity_from_level(&course)
+                body_from_velocity(&(angles + angle_rates * t)) * velocity_from_level(&later)
             });
             let [found, ..] = pose.felt(&AROUND);
             let scale = 1.0 + angle_rates.amax().powi(5);
@@ -173,7 +173,7 @@ fn in_two_minutes_the_calibration_sequence_sees_every_direction_within_13_degree
             })
             .collect();
         let farthest = directions(1000)
-            .map(|wanted| seen.iter().map(|seen| seen.dot(&wanted)).fold(-1.0, f64::max))
+            .map(|axis| seen.iter().map(|seen| seen.dot(&axis)).fold(-1.0, f64::max))
             .fold(1.0, f64::min);
         assert!(farthest > 13f64.to_radians().cos(), "{} deg", farthest.acos().to_degrees());
     }

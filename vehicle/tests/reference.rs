@@ -2,7 +2,7 @@
 //! and tables that are refused.
 
 use nalgebra::Vector3;
-use vehicle::profile::{Course, Segment, Wave};
+use vehicle::profile::{AngleProfile, Segment, Wave};
 use vehicle::table::LookupTable;
 use vehicle::{Profile, Reference, Scenario};
 
@@ -16,8 +16,8 @@ fn derivative_error(profile: &Profile, from: f64, to: f64) -> f64 {
         .filter(|time| jumps.iter().all(|jump| (time - jump).abs() > 3.0 * h))
         .map(|time| {
             let [a, b, c, d, e] = [-2.0, -1.0, 0.0, 1.0, 2.0].map(|k| profile.at(time + k * h));
-            let difference = |of: fn(&Reference) -> Vector3<f64>| {
-                (of(&a) - of(&b) * 8.0 + of(&d) * 8.0 - of(&e)) / (12.0 * h)
+            let difference = |value: fn(&Reference) -> Vector3<f64>| {
+                (value(&a) - value(&b) * 8.0 + value(&d) * 8.0 - value(&e)) / (12.0 * h)
             };
             let rates = (difference(|r| r.angles) - c.rates).amax();
             rates.max((difference(|r| r.rates) - c.accelerations).amax())
@@ -77,7 +77,7 @@ fn oracle_waves_add_up_whichever_of_them_share_a_frequency() {
     let frequencies = [vec![0.5, 0.25], vec![0.25, 0.0, 0.5], vec![0.5]];
     let angles = frequencies
         .clone()
-        .map(|axis| Course { constant: 0.2, waves: axis.into_iter().map(wave).collect() });
+        .map(|axis| AngleProfile { constant: 0.2, waves: axis.into_iter().map(wave).collect() });
     let profile = Profile::Piecewise(vec![Segment { until: f64::INFINITY, angles }]);
     let at = profile.at(3.0);
     for (i, axis) in frequencies.iter().enumerate() {
@@ -174,11 +174,11 @@ fn csv_faults_are_named_with_file_line_and_column() {
         (head.to_string(), "no points"),
         (
             "time_s,alpha,beta_deg,sigma_deg\n".into(),
-            "column alpha: is missing; head it alpha_rad or alpha_deg",
+            "column alpha: is missing; its heading is alpha_rad or alpha_deg",
         ),
-        (format!("q,{head}"), "column q: is not known"),
+        (format!("q,{head}"), "column q: is not a column"),
         ("time_s,alpha_deg,alpha_rad,beta_deg,sigma_deg\n".into(), "column alpha: is given twice"),
-        (String::new(), "column time: is missing; head it time_s"),
+        (String::new(), "column time: is missing; its heading is time_s"),
     ] {
         let message = read(&text).unwrap_err().to_string();
         assert!(
@@ -192,11 +192,11 @@ fn csv_faults_are_named_with_file_line_and_column() {
 
 #[test]
 fn a_table_of_more_points_than_anybody_needs_is_refused() {
-    let of = |n: u32| {
+    let table_of = |n: u32| {
         LookupTable::new((0..n).map(f64::from).collect(), vec![Vector3::zeros(); n as usize])
     };
-    assert!(of(100_000).is_ok());
-    let text = of(100_001).unwrap_err().to_string();
+    assert!(table_of(100_000).is_ok());
+    let text = table_of(100_001).unwrap_err().to_string();
     assert!(text.contains("more than 100000 points"), "{text}");
     let lines: Vec<_> = (0..=100_000).map(|k| format!("{k},0,0,0")).collect();
     let csv = format!("time_s,alpha_deg,beta_deg,sigma_deg\n{}", lines.join("\n"));

@@ -30,7 +30,7 @@ fn with(change: impl Fn(&mut Config)) -> Sensors {
 }
 
 /// Readings in which every sensor measures `value` along every axis.
-fn all(value: f64) -> Readings {
+fn uniform(value: f64) -> Readings {
     [Vector3::repeat(value); 3]
 }
 
@@ -61,7 +61,7 @@ fn oracle_the_bias_drifts_linearly_from_the_start() {
         config.triads[1].bias = Vector3::new(1.0, 2.0, 3.0);
         config.triads[1].drift = drift;
     });
-    for (k, sample) in run(&mut sensors, 1000, |_| all(0.0)).iter().enumerate() {
+    for (k, sample) in run(&mut sensors, 1000, |_| uniform(0.0)).iter().enumerate() {
         let expected = Vector3::new(1.0, 2.0, 3.0) + drift * (k as f64 * PERIOD);
         assert_eq!(sample.readings, [Vector3::zeros(), expected, Vector3::zeros()], "{k}");
     }
@@ -72,8 +72,8 @@ fn published_data_sheet_values_of_the_mems_set() {
     // InvenSense DS-000189 1.3, sections 3.1 to 3.3
     let data = SensorData::embedded();
     let [gyroscope, accelerometer, magnetometer] = data.mems;
-    let near = |found: f64, expected: f64| {
-        assert!((found / expected - 1.0).abs() < 5e-3, "{found} {expected}");
+    let near = |value: f64, expected: f64| {
+        assert!((value / expected - 1.0).abs() < 5e-3, "{value} {expected}");
     };
     near(gyroscope.noise.to_degrees(), 0.015 * 73.3f64.sqrt());
     near(1f64.to_radians() / gyroscope.resolution, 131.0);
@@ -112,10 +112,10 @@ fn oracle_a_magnetometer_shows_soft_iron_times_field_plus_hard_iron() {
     });
     let field = Vector3::new(2e-5, -1e-5, 4e-5);
     sensors.take(0.0, &[Vector3::x(), Vector3::y(), field]);
-    let [x, y, found] = sensors.arrived().readings;
+    let [x, y, z] = sensors.arrived().readings;
     // 1.1·2 − 0.05 − 0.08 + 3; 0.06 − 0.9 + 0.16 − 2; −0.02 − 0.02 + 4.2 + 1
     let expected = Vector3::new(5.07e-5, -2.68e-5, 5.16e-5);
-    assert!((found - expected).amax() < 1e-19, "{found}");
+    assert!((z - expected).amax() < 1e-19, "{z}");
     assert_eq!([x, y], [Vector3::x(), Vector3::y()]);
 }
 
@@ -128,7 +128,7 @@ fn oracle_noise_has_the_standard_deviation_that_is_set_and_no_memory() {
             triad.noise = sigma;
         }
     });
-    let samples = run(&mut sensors, COUNT, |_| all(0.0));
+    let samples = run(&mut sensors, COUNT, |_| uniform(0.0));
     let n = f64::from(COUNT);
     // All nine noise values have variance 1.
     let values = |sample: &Sample| -> [f64; 9] {
@@ -159,7 +159,7 @@ fn the_seed_determines_the_noise() {
             config.seed = seed;
             config.triads[0].noise = 1.0;
         });
-        run(&mut sensors, 10, |_| all(0.0))
+        run(&mut sensors, 10, |_| uniform(0.0))
     };
     assert_eq!(noisy(5), noisy(5));
     assert_ne!(noisy(5)[0].readings[0], noisy(6)[0].readings[0]);
@@ -174,9 +174,9 @@ fn oracle_bandwidth_against_integration_of_the_filter() {
     // A step at tick 0 would be measured from the start, because the first sample finds the filter
     // at rest.
     let signal = |time: f64| (3.0 * time).sin() + 20.0 * time;
-    let found = run(&mut sensors, 200, |time| all(signal(time)));
+    let samples = run(&mut sensors, 200, |time| uniform(signal(time)));
     let (mut y, fine) = (signal(0.0), 2000);
-    for (k, sample) in (0u32..).zip(&found) {
+    for (k, sample) in (0u32..).zip(&samples) {
         let begin = f64::from(k) * PERIOD;
         assert!((sample.readings[1].x - y).abs() < 2e-4, "{k}: {} {y}", sample.readings[1].x);
         assert_eq!(sample.readings[0].x, signal(begin), "no bandwidth");
@@ -192,9 +192,9 @@ fn oracle_bandwidth_against_integration_of_the_filter() {
 fn oracle_a_ramp_comes_out_of_the_filter_late_by_its_time_constant() {
     let bandwidth = 20.0;
     let mut sensors = with(|config| config.triads[0].bandwidth = bandwidth);
-    let found = run(&mut sensors, 500, all);
+    let samples = run(&mut sensors, 500, uniform);
     let lag = 1.0 / (std::f64::consts::TAU * bandwidth);
-    let last = found.last().unwrap();
+    let last = samples.last().unwrap();
     assert!((last.readings[0].z - (last.time - lag)).abs() < 1e-13);
 }
 
@@ -202,7 +202,7 @@ fn oracle_a_ramp_comes_out_of_the_filter_late_by_its_time_constant() {
 fn oracle_range_is_applied_before_resolution_and_after_noise() {
     let shown = |value: f64, change: fn(&mut Triad)| {
         let mut sensors = with(|config| change(&mut config.triads[0]));
-        sensors.take(0.0, &all(value));
+        sensors.take(0.0, &uniform(value));
         sensors.arrived().readings[0].x
     };
     let limited: fn(&mut Triad) = |triad| triad.range = 4.0;
@@ -216,8 +216,8 @@ fn oracle_range_is_applied_before_resolution_and_after_noise() {
     let mut sensors = with(|config| {
         config.triads[0] = Triad { noise: 3.0, range: 2.0, resolution: 0.5, ..Triad::default() };
     });
-    let found = run(&mut sensors, 1000, |_| all(0.0));
-    let values: Vec<f64> = found.iter().map(|sample| sample.readings[0].y).collect();
+    let samples = run(&mut sensors, 1000, |_| uniform(0.0));
+    let values: Vec<f64> = samples.iter().map(|sample| sample.readings[0].y).collect();
     assert!(values.iter().all(|value| value.abs() <= 2.0 && (value / 0.5).fract() == 0.0));
     assert!(values.contains(&2.0) && values.contains(&-2.0) && values.contains(&0.5));
 }
@@ -226,22 +226,26 @@ fn oracle_range_is_applied_before_resolution_and_after_noise() {
 fn oracle_samples_arrive_late_by_any_delay() {
     for ticks in [0.0, 0.4, 1.0, 2.5, 7.0] {
         let mut sensors = with(|config| config.line.delay = ticks * PERIOD);
-        assert_eq!((sensors.arrived().number, sensors.arrived().readings), (0, all(0.0)));
+        assert_eq!((sensors.arrived().number, sensors.arrived().readings), (0, uniform(0.0)));
         for quarter in 0..400 {
             let time = f64::from(quarter) * PERIOD / 4.0;
-            sensors.take(time, &all(1.0 + time));
+            sensors.take(time, &uniform(1.0 + time));
             let newest = (f64::from(quarter) / 4.0 - ticks).floor();
-            let found = sensors.arrived();
+            let arrived = sensors.arrived();
             if newest < 0.0 {
-                assert_eq!((found.number, found.readings), (0, all(0.0)), "{ticks} {quarter}");
+                assert_eq!(
+                    (arrived.number, arrived.readings),
+                    (0, uniform(0.0)),
+                    "{ticks} {quarter}"
+                );
             } else {
                 let taken = newest * PERIOD;
                 assert_eq!(
-                    (f64::from(found.number), found.time),
+                    (f64::from(arrived.number), arrived.time),
                     (newest + 1.0, taken),
                     "{ticks} {quarter}"
                 );
-                assert_eq!(found.readings, all(1.0 + taken));
+                assert_eq!(arrived.readings, uniform(1.0 + taken));
             }
         }
     }
@@ -257,11 +261,11 @@ fn events_are_where_samples_are_taken_and_where_they_arrive() {
     ] {
         let sensors = with(|config| config.line.delay = ticks * PERIOD);
         let mut time = 0.0;
-        let found = [0; 5].map(|_| {
+        let events = [0; 5].map(|_| {
             time = sensors.next_event(time);
             time / PERIOD
         });
-        assert_eq!(found, expected, "delay of {ticks}");
+        assert_eq!(events, expected, "delay of {ticks}");
     }
 }
 
@@ -274,17 +278,21 @@ fn a_dropped_sample_leaves_a_gap_in_the_numbers_and_the_one_before_in_place() {
             config.line.drop_probability = 1.0;
             config.line.drop_window = window;
         });
-        let found = run(&mut sensors, 30, all);
+        let samples = run(&mut sensors, 30, uniform);
         let mut numbers: Vec<i32> =
-            found.iter().map(|sample| sample.number).filter(|&number| number > 0).collect();
+            samples.iter().map(|sample| sample.number).filter(|&number| number > 0).collect();
         numbers.dedup();
         // Ticks 10, 11 and 12 have the numbers 11, 12 and 13.
         assert_eq!(
             numbers,
             (1..=*numbers.last().unwrap()).filter(|k| !(11..14).contains(k)).collect::<Vec<_>>()
         );
-        for sample in found.iter().filter(|sample| sample.number > 0) {
-            assert_eq!(sample.readings, all(f64::from(sample.number - 1) * PERIOD), "consistent");
+        for sample in samples.iter().filter(|sample| sample.number > 0) {
+            assert_eq!(
+                sample.readings,
+                uniform(f64::from(sample.number - 1) * PERIOD),
+                "consistent"
+            );
         }
     }
 }
@@ -294,7 +302,7 @@ fn oracle_samples_are_dropped_as_often_as_set() {
     const COUNT: u32 = 20_000;
     let mut sensors = with(|config| config.line.drop_probability = 0.3);
     let mut numbers: Vec<i32> =
-        run(&mut sensors, COUNT, all).iter().map(|sample| sample.number).collect();
+        run(&mut sensors, COUNT, uniform).iter().map(|sample| sample.number).collect();
     numbers.retain(|&number| number > 0);
     numbers.dedup();
     let n = f64::from(COUNT);
@@ -308,17 +316,17 @@ fn a_frozen_sensor_repeats_its_value_while_the_samples_count_on() {
         config.triads[2].noise = 1.0;
         config.triads[2].freeze = Window { start: 5.0 * PERIOD, end: 8.0 * PERIOD };
     });
-    let found = run(&mut sensors, 12, all);
-    for (k, sample) in found.iter().enumerate() {
+    let samples = run(&mut sensors, 12, uniform);
+    for (k, sample) in samples.iter().enumerate() {
         assert_eq!(sample.number as usize, k + 1);
         assert_eq!(sample.readings[0].x, k as f64 * PERIOD, "the others go on");
-        let repeats = k > 0 && sample.readings[2] == found[k - 1].readings[2];
+        let repeats = k > 0 && sample.readings[2] == samples[k - 1].readings[2];
         assert_eq!(repeats, (5..8).contains(&k), "{k}");
     }
     // A window from the start on repeats the first sample.
     let mut sensors = with(|config| config.triads[0].freeze = Window { start: 0.0, end: 1.0 });
-    let found = run(&mut sensors, 4, |time| all(1.0 + time));
-    assert!(found.iter().all(|sample| sample.readings[0] == Vector3::repeat(1.0)));
+    let samples = run(&mut sensors, 4, |time| uniform(1.0 + time));
+    assert!(samples.iter().all(|sample| sample.readings[0] == Vector3::repeat(1.0)));
 }
 
 #[test]
@@ -329,25 +337,25 @@ fn a_sample_is_taken_again_when_asked_again_at_its_tick_and_looking_takes_none()
     let [mut once, mut often] = [0, 1].map(|_| with(change));
     for k in 0..20 {
         let time = f64::from(k) * PERIOD;
-        assert_eq!(often.shown(time, &all(9.0)).number, k + 1);
-        often.take(time, &all(9.0));
-        often.take(time + 1e-10, &all(time));
-        once.take(time, &all(time));
-        assert_eq!(once.shown(time, &all(time)), once.arrived());
+        assert_eq!(often.shown(time, &uniform(9.0)).number, k + 1);
+        often.take(time, &uniform(9.0));
+        often.take(time + 1e-10, &uniform(time));
+        once.take(time, &uniform(time));
+        assert_eq!(once.shown(time, &uniform(time)), once.arrived());
         assert_eq!(once.arrived(), often.arrived(), "{k}");
         // Between ticks no sample is taken.
-        often.take(time + PERIOD / 3.0, &all(7.0));
-        assert_eq!(often.shown(time + PERIOD / 2.0, &all(8.0)), once.arrived());
+        often.take(time + PERIOD / 3.0, &uniform(7.0));
+        assert_eq!(often.shown(time + PERIOD / 2.0, &uniform(8.0)), once.arrived());
     }
 }
 
 #[test]
 fn a_sample_whose_tick_was_missed_is_taken_late_and_says_so() {
     let mut sensors = with(|_| {});
-    sensors.take(0.0, &all(0.0));
-    sensors.take(3.25 * PERIOD, &all(3.25));
+    sensors.take(0.0, &uniform(0.0));
+    sensors.take(3.25 * PERIOD, &uniform(3.25));
     let late = sensors.arrived();
-    assert_eq!((late.number, late.time, late.readings), (4, 3.25 * PERIOD, all(3.25)));
+    assert_eq!((late.number, late.time, late.readings), (4, 3.25 * PERIOD, uniform(3.25)));
 }
 
 #[test]

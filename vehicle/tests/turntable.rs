@@ -75,12 +75,12 @@ proptest! {
             Some(*angle)
         }).collect();
         let vectors: Vec<_> = samples.iter().map(|&angle| Vector3::new(angle, -angle, 0.5 * angle)).collect();
-        let found = followed(config, &vectors);
+        let poses = followed(config, &vectors);
         let halves: Vec<f64> = samples.iter().map(|angle| 0.5 * angle).collect();
         let expected = integrated(config, &samples);
-        prop_assert!((found.angles.x - expected).abs() < 2e-7, "{found:?} {expected}");
-        prop_assert!((found.angles.y + expected).abs() < 2e-7);
-        prop_assert!((found.angles.z - integrated(config, &halves)).abs() < 2e-7);
+        prop_assert!((poses.angles.x - expected).abs() < 2e-7, "{poses:?} {expected}");
+        prop_assert!((poses.angles.y + expected).abs() < 2e-7);
+        prop_assert!((poses.angles.z - integrated(config, &halves)).abs() < 2e-7);
     }
 }
 
@@ -136,10 +136,10 @@ fn a_sample_that_is_taken_again_replaces_the_last_one() {
 fn oracle_the_turn_of_the_trajectory_is_felt_as_on_the_vehicle() {
     let turn = Vector3::new(0.01, -0.02, 0.03);
     let pose = vehicle(Vector3::new(0.2, -0.3, 0.5));
-    let found = table(SERVO).pose(tick(0), &pose, &turn);
+    let shown = table(SERVO).pose(tick(0), &pose, &turn);
     // The angles rest: R ω = -T times the turn.
     let exact = Kinematics::Exact;
-    let rest = exact.r(&pose.angles) * found.rates + exact.turn(&pose.angles) * turn;
+    let rest = exact.r(&pose.angles) * shown.rates + exact.turn(&pose.angles) * turn;
     assert!(rest.amax() < 1e-16, "{rest}");
 }
 

@@ -27,9 +27,9 @@ pub struct Command {
     pub dynamic_pressure: f64,
 }
 
-/// The way in which an allocation was found.
+/// How the allocation in force came about.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Status {
+pub enum AllocationStatus {
     /// No allocation has been computed yet.
     #[default]
     None,
@@ -39,11 +39,11 @@ pub enum Status {
     Fallback,
 }
 
-/// The figures that the allocation reports.
+/// What an allocation reports.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Report {
+pub struct AllocationReport {
     /// Origin of the allocation in force.
-    pub status: Status,
+    pub status: AllocationStatus,
     /// Number of iterations of the cone solver.
     pub iterations: u32,
     /// Wall-clock time of the last allocation, s; not reproducible.
@@ -70,7 +70,7 @@ pub struct Memory {
     /// Moment D δ with the present commands to the jets, N m.
     pub modulated: Vector3<f64>,
     /// Outcome of the last allocation.
-    pub report: Report,
+    pub report: AllocationReport,
     /// Moment of the surfaces in the last allocation, N m.
     pub by_surfaces: Vector3<f64>,
 }
@@ -184,37 +184,42 @@ impl Allocator {
         if finite && self.settings.method == Method::Blending {
             // Jia et al., section IV: the surfaces give as much as they can; below the threshold
             // they return to zero.
-            let mut wanted = Surfaces::zeros();
+            let mut target = Surfaces::zeros();
             if dynamic_pressure >= self.settings.threshold {
                 let (middle, half) = middle_and_half(&low, &high);
-                let (found, iterations) = self.without_jets.solve(&moment, &matrix, &middle, &half);
-                (wanted, first) = (found.map_or(before, |(surfaces, _)| surfaces), iterations);
+                let (optimum, iterations) =
+                    self.without_jets.solve(&moment, &matrix, &middle, &half);
+                (target, first) = (optimum.map_or(before, |(surfaces, _)| surfaces), iterations);
             }
-            low = clamp(&wanted, &low, &high);
+            low = clamp(&target, &low, &high);
             high = low;
         }
         let rest = (moment - matrix * low).component_mul(&self.settings.weight_moment).norm();
-        let all = moment.component_mul(&self.settings.weight_moment).norm();
-        let (found, iterations) = if !finite {
+        let total = moment.component_mul(&self.settings.weight_moment).norm();
+        let (optimum, iterations) = if !finite {
             (None, 0)
-        } else if low == high && rest <= NEGLIGIBLE * all {
+        } else if low == high && rest <= NEGLIGIBLE * total {
             // No moment is left for the jets.
             (Some((low, Jets::zeros())), 0)
         } else {
             let (middle, half) = middle_and_half(&low, &high);
             self.problem.solve(&moment, &matrix, &middle, &half)
         };
-        let (surfaces, duty) = found.unwrap_or((before, memory.duty));
+        let (surfaces, duty) = optimum.unwrap_or((before, memory.duty));
         memory.surfaces = clamp(&surfaces, &low, &high);
         memory.duty = duty.map(|duty| duty.clamp(0.0, 1.0));
         memory.by_surfaces = matrix * memory.surfaces;
         memory.achieved = memory.by_surfaces + self.settings.effectors.moment_of_jets(&memory.duty);
         memory.residual = moment - memory.achieved;
-        memory.report = Report {
-            status: if found.is_some() { Status::Optimal } else { Status::Fallback },
+        memory.report = AllocationReport {
+            status: if optimum.is_some() {
+                AllocationStatus::Optimal
+            } else {
+                AllocationStatus::Fallback
+            },
             iterations: first + iterations,
             time: begin.elapsed().as_secs_f64(),
-            fallbacks: memory.report.fallbacks.saturating_add(u32::from(found.is_none())),
+            fallbacks: memory.report.fallbacks.saturating_add(u32::from(optimum.is_none())),
         };
     }
 }
@@ -230,7 +235,7 @@ fn scarcity(jets: &JetMatrix) -> Vector3<f64> {
             .fold((0.0, 0.0), |(up, down), &m: &f64| (up + m.max(0.0), down - m.min(0.0)));
         f64::min(up, down)
     });
-    authority.map(|own| if own > 0.0 { authority.max() / own } else { 1.0 })
+    authority.map(|moment| if moment > 0.0 { authority.max() / moment } else { 1.0 })
 }
 
 /// Returns the middle of an interval and half its width.

@@ -41,7 +41,7 @@ impl OptimalAllocation {
     /// Sets up the program and its solver.
     ///
     /// # Errors
-    /// Returns the solver's own message if it refuses the data.
+    /// Returns the solver's message if it refuses the data.
     pub(super) fn new(
         weights: Weights,
         jets: &SMatrix<f64, 3, JETS>,
@@ -85,7 +85,7 @@ impl OptimalAllocation {
         Ok(Self { program, weights, surface_slots })
     }
 
-    /// Returns the optimum for the moment `moment` (N m), if it is found, and the iterations.
+    /// Returns the optimum for `moment` (N m), if it is found, and the number of iterations.
     /// `matrix` is D_A in N m/rad.
     pub(super) fn solve(
         &mut self,
@@ -109,11 +109,11 @@ impl OptimalAllocation {
         }
         let (solution, iterations) = self.program.solve();
         let solution = solution.map(|optimum| optimum.x);
-        let found = solution.map(|solution| {
+        let optimum = solution.map(|solution| {
             let x = Surfaces::from_column_slice(&solution[1..=SURFACES]);
             let u = Jets::from_column_slice(&solution[1 + SURFACES..]);
             (middle + half.component_mul(&x), u)
         });
-        (found, iterations)
+        (optimum, iterations)
     }
 }

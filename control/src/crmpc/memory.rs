@@ -5,7 +5,7 @@ use super::observer::Observed;
 use super::plan::Plan;
 use super::robust::Margins;
 use super::supervision::Supervision;
-use crate::report::Report;
+use crate::report::SolverReport;
 use nalgebra::Vector6;
 use serde::{Deserialize, Serialize};
 
@@ -17,7 +17,7 @@ pub struct Memory {
     /// Whether `plan` has been filled by an optimisation.
     pub started: bool,
     /// Outcome of the last optimisation.
-    pub report: Report,
+    pub report: SolverReport,
     /// Nominal state (Θ̃, x̃_ω) at the last tick.
     pub nominal: Vector6<f64>,
     /// Whether the plan in force gives the guarantee, or the reason why not.

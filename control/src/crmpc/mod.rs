@@ -17,7 +17,7 @@ mod stages;
 mod supervision;
 mod terminal;
 
-pub use crate::report::{Report, Status};
+pub use crate::report::{SolverReport, SolverStatus};
 pub use commands::Commands;
 pub use design::{
     Design, PaperConstants, held_terminal_weight, step_response_peak, terminal_weight,

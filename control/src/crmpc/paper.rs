@@ -4,7 +4,7 @@ use super::design::Design;
 use super::memory::Memory;
 use super::plan::Plan;
 use super::planner::{Planner, follow_terminal_law};
-use super::set::{Bounds, ConstraintSet, Planned, ROUNDING, Tick, ball};
+use super::set::{Bounds, ConstraintSet, Planned, ROUNDING, Tick, norm_constraint};
 use super::settings::{InitialState, Settings};
 use super::stages::{Point, Stages};
 use super::supervision::Contradiction;
@@ -12,8 +12,8 @@ use super::terminal;
 use crate::controller::Explained;
 use crate::error::DesignError;
 use crate::linearise::{self, InverseKinematics};
-use crate::mpc::{self, Ball, Balls, Bounded, Motion, State};
-use crate::report::Status;
+use crate::mpc::{self, Bounded, ErrorTrajectory, NormConstraint, StageConstraints, State};
+use crate::report::SolverStatus;
 use nalgebra::{Matrix3, Vector3, Vector6};
 use std::ops::Range;
 use vehicle::reference::Reference;
@@ -105,14 +105,15 @@ impl ConstraintSet for Paper {
             _ => *measured,
         };
         let report = planner.solve(self, memory, &start, first);
-        if report.status != Status::Fallback {
+        if report.status != SolverStatus::Fallback {
             planner.follow_optimum(&self.stages, memory, &start);
             return Planned { report, left_behind: false };
         }
         if first {
             follow_terminal_law(self, &mut memory.plan, start);
         }
-        let report = planner.keep(self, memory, &start, (Status::Fallback, report.iterations));
+        let report =
+            planner.keep(self, memory, &start, (SolverStatus::Fallback, report.iterations));
         Planned { report, left_behind: false }
     }
 
@@ -145,7 +146,7 @@ impl ConstraintSet for Paper {
 
     /// The limit is left to the optimisation, unless it has no solution.
     fn limit(&self, memory: &Memory) -> f64 {
-        if memory.report.status == Status::Fallback {
+        if memory.report.status == SolverStatus::Fallback {
             self.settings.limit_moment
         } else {
             f64::INFINITY
@@ -158,27 +159,27 @@ impl ConstraintSet for Paper {
 }
 
 impl Bounded<2> for Paper {
-    fn has_state_balls(&self) -> bool {
+    fn constrains_states(&self) -> bool {
         true
     }
 
-    fn balls(
+    fn norm_constraints(
         &self,
         k: usize,
         state: &State<2>,
         input: &Vector3<f64>,
         _bounds: (f64, f64),
-    ) -> Balls<2> {
+    ) -> StageConstraints<2> {
         let [angles, rates, a] = self.stages.nominal(k, state, input);
         let (kinematics, body) = (InverseKinematics::at(&angles), &self.settings.body);
         let at = kinematics.linearise(body, &rates, &a);
-        Balls {
-            state: Ball {
+        StageConstraints {
+            state: NormConstraint {
                 value: rates / self.x_tube,
                 by_state: [Matrix3::zeros(), Matrix3::from_diagonal_element(1.0 / self.x_tube)],
                 by_input: Matrix3::zeros(),
             },
-            input: ball(&kinematics.input_of_moment(body, &at.moment), self.u_tube),
+            input: norm_constraint(&kinematics.input_of_moment(body, &at.moment), self.u_tube),
         }
     }
 
@@ -197,7 +198,7 @@ impl Bounded<2> for Paper {
 
     fn violated(
         &self,
-        motion: &Motion<2>,
+        motion: &ErrorTrajectory<2>,
         intervals: Range<usize>,
         _bounds: &mut mpc::Bounds,
     ) -> Option<Range<usize>> {

@@ -1,7 +1,7 @@
 //! The plan: a nominal motion over the horizon.
 
 use super::guarantee::{Carried, Onset, Switching};
-use crate::mpc::Motion;
+use crate::mpc::ErrorTrajectory;
 use nalgebra::{Vector3, Vector6};
 use serde::{Deserialize, Serialize};
 use vehicle::reference::Reference;
@@ -13,7 +13,7 @@ pub struct Plan {
     pub states: Vec<Vector6<f64>>,
     /// Nominal accelerations a = ẋ̃_ω, N of them, rad/s².
     pub accelerations: Vec<Vector3<f64>>,
-    /// Multipliers of the state ball at each interval's end and of the ball on its input, from
+    /// Multipliers of the state norm_constraint at each interval's end and of the norm_constraint on its input, from
     /// which the next optimisation starts.
     pub multipliers: Vec<[f64; 2]>,
     /// Braking rate κ of β̈ = −κ β̇ beyond the horizon, 1/s; used with the robust set.
@@ -90,7 +90,7 @@ impl Plan {
     }
 
     /// Computes the errors E = x̃ − x_r and v = a − Θ̈_r of the plan.
-    pub(super) fn errors(&self, references: &[Reference], motion: &mut Motion<2>) {
+    pub(super) fn errors(&self, references: &[Reference], motion: &mut ErrorTrajectory<2>) {
         for ((error, state), reference) in
             motion.states.iter_mut().zip(&self.states).zip(references)
         {
@@ -106,7 +106,7 @@ impl Plan {
     /// first state) so that it is an exact motion of the nominal model.
     pub(super) fn follow(
         &mut self,
-        motion: &Motion<2>,
+        motion: &ErrorTrajectory<2>,
         start: Option<Vector6<f64>>,
         references: &[Reference],
         h: f64,

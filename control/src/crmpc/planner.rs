@@ -13,8 +13,8 @@ use super::stages::Stages;
 use crate::controller::ReferenceAt;
 use crate::error::DesignError;
 use crate::error_dynamics::InvariantSet;
-use crate::mpc::{self, Chain, Cost, Layout, Motion, Optimiser, State, per_axis};
-use crate::report::Status;
+use crate::mpc::{self, Chain, Cost, ErrorTrajectory, Layout, Optimiser, State, per_axis};
+use crate::report::SolverStatus;
 use nalgebra::{Vector3, Vector6};
 
 /// Largest change of any state (rad, rad/s) between passes at which the first optimisation has
@@ -31,7 +31,7 @@ pub(super) struct Planner {
     pub settings: Settings,
     pub optimiser: Optimiser<2>,
     /// The plan as errors from the reference.
-    pub previous: Motion<2>,
+    pub previous: ErrorTrajectory<2>,
     chain: Chain<2>,
     affine: Vec<State<2>>,
     /// Shift of the reference's angles by the observer, rad.
@@ -65,7 +65,7 @@ impl Planner {
             chain,
             cost,
             horizon: n,
-            state_balls: true,
+            constrains_states: true,
             terminal: set.terminal_radius().is_some(),
             start,
             margin: set.window_margin(),
@@ -76,7 +76,7 @@ impl Planner {
         Ok(Self {
             settings: *settings,
             optimiser,
-            previous: Motion::new(n),
+            previous: ErrorTrajectory::new(n),
             chain,
             affine: vec![[Vector3::zeros(); 2]; n],
             shift: Vector3::zeros(),
@@ -112,7 +112,7 @@ impl Planner {
         memory: &Memory,
         start: &Vector6<f64>,
         first: bool,
-    ) -> mpc::Report {
+    ) -> mpc::OptimiserReport {
         let references = &set.stages().references;
         let error = super::error(start, &references[0]);
         let previous = (!first).then(|| {
@@ -139,7 +139,7 @@ impl Planner {
         start: &Vector6<f64>,
     ) {
         let start = (self.settings.initial_state != InitialState::Tube).then_some(*start);
-        memory.plan.follow(self.optimiser.motion(), start, &stages.references, stages.step);
+        memory.plan.follow(self.optimiser.trajectory(), start, &stages.references, stages.step);
         memory.plan.shift = self.shift;
         memory.plan.multipliers.clear();
         memory.plan.multipliers.extend(self.optimiser.multipliers());
@@ -151,8 +151,8 @@ impl Planner {
         set: &dyn ConstraintSet,
         memory: &Memory,
         start: &Vector6<f64>,
-        ended: (Status, u32),
-    ) -> mpc::Report {
+        ended: (SolverStatus, u32),
+    ) -> mpc::OptimiserReport {
         let references = &set.stages().references;
         let error = super::error(start, &references[0]);
         memory.plan.errors(references, &mut self.previous);

@@ -11,7 +11,7 @@ use super::stages::Stages;
 use crate::controller::{Explained, Measurement};
 use crate::error::DesignError;
 use crate::linearise::Linear;
-use crate::mpc::{self, Ball, Bounded};
+use crate::mpc::{self, Bounded, NormConstraint};
 use nalgebra::{Matrix3, Vector3, Vector6};
 use vehicle::reference::Reference;
 
@@ -84,7 +84,7 @@ pub(super) trait ConstraintSet: Bounded<2> + Send {
 
 /// Outcome of planning.
 pub(super) struct Planned {
-    pub report: mpc::Report,
+    pub report: mpc::OptimiserReport,
     /// Whether a guarantee was given, but the vehicle was further from the plan than the
     /// assumptions explain.
     pub left_behind: bool,
@@ -144,11 +144,11 @@ pub struct Bounds {
 }
 
 /// Expresses ‖y‖ ≤ bound in terms of the tracking error and v = a − Θ̈_r.
-pub(super) fn ball(y: &Linear, bound: f64) -> Ball<2> {
+pub(super) fn norm_constraint(y: &Linear, bound: f64) -> NormConstraint<2> {
     let share = 1.0 / bound;
     let mut by_angles = Matrix3::zeros();
     by_angles.fixed_view_mut::<3, 2>(0, 0).copy_from(&(y.by_angles * share));
-    Ball {
+    NormConstraint {
         value: y.value * share,
         by_state: [by_angles, y.by_rates * share],
         by_input: y.by_acceleration * share,

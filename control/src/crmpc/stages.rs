@@ -1,7 +1,7 @@
 //! The stages of the horizon: references, and the nominal states that follow from tracking errors.
 
 use crate::linearise::{BodyMotion, InverseKinematics};
-use crate::mpc::{Motion, State};
+use crate::mpc::{ErrorTrajectory, State};
 use nalgebra::Vector3;
 use std::cell::OnceCell;
 use std::ops::Range;
@@ -40,7 +40,7 @@ impl Stages {
     }
 
     /// Returns stage `k` of a trajectory of the errors.
-    pub(super) fn point(&self, motion: &Motion<2>, k: usize) -> Point {
+    pub(super) fn point(&self, motion: &ErrorTrajectory<2>, k: usize) -> Point {
         let Reference { angles, rates, accelerations } = &self.references[k];
         let acceleration =
             motion.inputs.get(k).map_or_else(Vector3::zeros, |input| accelerations + input);
@@ -52,7 +52,7 @@ impl Stages {
     /// has computed for neighbouring intervals.
     pub(super) fn first_and_last<Kept: Default>(
         &self,
-        motion: &Motion<2>,
+        motion: &ErrorTrajectory<2>,
         intervals: Range<usize>,
         mut violates: impl FnMut(usize, &Point, &Point, &mut Kept) -> bool,
     ) -> Option<Range<usize>> {

@@ -147,8 +147,10 @@ impl Robust {
         let bounds = self.explained_deviation(tick, &carried.unwrap_or_default());
         let slack = 1.0 + ROUNDING;
         let r = 1.0 / cos(self.settings.sideslip_domain);
-        let ball = bounds.feedback_norm + bounds.feedback_moment * r / self.design.smallest_inertia;
-        let within = |i: usize| feedback[i].abs() <= (bounds.feedback + ball) * slack + 1e-12;
+        let norm_constraint =
+            bounds.feedback_norm + bounds.feedback_moment * r / self.design.smallest_inertia;
+        let within =
+            |i: usize| feedback[i].abs() <= (bounds.feedback + norm_constraint) * slack + 1e-12;
         angles.xy().norm() <= bounds.seen_angle * slack + 1e-12
             && rates.norm() <= bounds.seen_rate * slack + 1e-12
             && (0..3).all(within)

@@ -8,13 +8,16 @@
 
 mod settings;
 
-pub use crate::report::{Report, Status};
+pub use crate::report::{SolverReport, SolverStatus};
 pub use settings::{Settings, SlidingMode};
 
 use crate::controller::{Controller, Measurement, ReferenceAt};
 use crate::error::DesignError;
 use crate::linearise::{self, InverseKinematics};
-use crate::mpc::{self, Ball, Balls, Bounded, Chain, Cost, Layout, Motion, Optimiser, State};
+use crate::mpc::{
+    self, Bounded, Chain, Cost, ErrorTrajectory, Layout, NormConstraint, Optimiser,
+    StageConstraints, State,
+};
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 use std::ops::Range;
@@ -23,7 +26,7 @@ use vehicle::kinematics;
 use vehicle::math::{powf, powi};
 use vehicle::reference::Reference;
 
-/// A motion of the angles over the horizon.
+/// A trajectory of the angles over the horizon.
 #[derive(Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Plan {
     /// Angles Θ_0 … Θ_N, rad.
@@ -63,28 +66,29 @@ impl Plan {
     }
 
     /// Computes the errors Θ − Θ_r and v − Θ̇_r of the plan.
-    fn errors(&self, references: &[Reference], motion: &mut Motion<1>) {
+    fn errors(&self, references: &[Reference], trajectory: &mut ErrorTrajectory<1>) {
         for ((error, angles), reference) in
-            motion.states.iter_mut().zip(&self.angles).zip(references)
+            trajectory.states.iter_mut().zip(&self.angles).zip(references)
         {
             *error = [angles - reference.angles];
         }
-        for ((w, v), reference) in motion.inputs.iter_mut().zip(&self.commands).zip(references) {
+        for ((w, v), reference) in trajectory.inputs.iter_mut().zip(&self.commands).zip(references)
+        {
             *w = v - reference.rates;
         }
     }
 
-    /// Sets the plan from a motion of the errors, rolled out from `start` so that it is an exact
-    /// motion of the model.
+    /// Sets the plan from a trajectory of the errors, rolled out from `start` so that it is an
+    /// exact trajectory of the model.
     fn follow(
         &mut self,
-        motion: &Motion<1>,
+        trajectory: &ErrorTrajectory<1>,
         start: Vector3<f64>,
         references: &[Reference],
         h: f64,
     ) {
         self.angles[0] = start;
-        for (k, (w, reference)) in motion.inputs.iter().zip(references).enumerate() {
+        for (k, (w, reference)) in trajectory.inputs.iter().zip(references).enumerate() {
             self.commands[k] = w + reference.rates;
             self.angles[k + 1] = self.angles[k] + self.commands[k] * h;
         }
@@ -99,7 +103,7 @@ pub struct Memory {
     /// Whether `plan` has been filled by an optimisation.
     pub started: bool,
     /// Outcome of the last optimisation.
-    pub report: Report,
+    pub report: SolverReport,
     /// Commanded body rates ω_c in force, rad/s.
     pub rate_command: Vector3<f64>,
     /// Integral z of the sliding manifold.
@@ -155,7 +159,7 @@ pub struct Dlmpc {
     optimiser: Optimiser<1>,
     // Scratch memory of one optimisation.
     affine: Vec<State<1>>,
-    previous: Motion<1>,
+    previous: ErrorTrajectory<1>,
 }
 
 /// The limit on ‖R⁻¹(Θ) v‖ as a function of the errors from these references.
@@ -185,22 +189,28 @@ impl RateLimit {
 }
 
 impl Bounded<1> for RateLimit {
-    fn has_state_balls(&self) -> bool {
+    fn constrains_states(&self) -> bool {
         false
     }
 
-    fn balls(&self, k: usize, state: &State<1>, input: &Vector3<f64>, _: (f64, f64)) -> Balls<1> {
+    fn norm_constraints(
+        &self,
+        k: usize,
+        state: &State<1>,
+        input: &Vector3<f64>,
+        _: (f64, f64),
+    ) -> StageConstraints<1> {
         let reference = &self.references[k];
         let command = reference.rates + input;
         let kinematics = InverseKinematics::at(&(reference.angles + state[0]));
         let (rates, [by_alpha, by_beta]) = kinematics.body_rates(&command);
         let by_state = Matrix3::from_columns(&[by_alpha, by_beta, Vector3::zeros()]) / self.limit;
-        let input = Ball {
+        let input = NormConstraint {
             value: rates / self.limit,
             by_state: [by_state],
             by_input: kinematics.matrix() / self.limit,
         };
-        Balls { state: Ball::default(), input }
+        StageConstraints { state: NormConstraint::default(), input }
     }
 
     fn squares(
@@ -215,14 +225,15 @@ impl Bounded<1> for RateLimit {
 
     fn violated(
         &self,
-        motion: &Motion<1>,
-        mut of: Range<usize>,
+        trajectory: &ErrorTrajectory<1>,
+        mut intervals: Range<usize>,
         _: &mut mpc::Bounds,
     ) -> Option<Range<usize>> {
         let bound = powi(1.0 + CHECK_SLACK, 2);
-        let violates = |k: usize| self.square(k, &motion.states[k], &motion.inputs[k]) > bound;
-        let first = of.find(|&k| violates(k))?;
-        let last = of.rev().find(|&k| violates(k)).unwrap_or(first);
+        let violates =
+            |k: usize| self.square(k, &trajectory.states[k], &trajectory.inputs[k]) > bound;
+        let first = intervals.find(|&k| violates(k))?;
+        let last = intervals.rev().find(|&k| violates(k)).unwrap_or(first);
         Some(first..last + 1)
     }
 }
@@ -241,7 +252,7 @@ impl Dlmpc {
             chain: Chain::new(h),
             cost,
             horizon: n,
-            state_balls: false,
+            constrains_states: false,
             terminal: false,
             start: None,
             margin: MARGIN,
@@ -258,7 +269,7 @@ impl Dlmpc {
             },
             optimiser,
             affine: vec![[Vector3::zeros()]; n],
-            previous: Motion::new(n),
+            previous: ErrorTrajectory::new(n),
             settings,
         })
     }
@@ -292,7 +303,7 @@ impl Dlmpc {
         memory.plan.errors(&self.rates.references, &mut self.previous);
         let previous = (!first).then_some((&self.previous, &memory.plan.multipliers[..]));
         let mut report = self.optimiser.optimise(&self.rates, &start, &self.affine, previous);
-        if report.status == Status::Fallback {
+        if report.status == SolverStatus::Fallback {
             self.track(&mut memory.plan, measured);
             memory.plan.errors(&self.rates.references, &mut self.previous);
             let Self { optimiser, rates, affine, previous, .. } = self;
@@ -301,12 +312,12 @@ impl Dlmpc {
                 &start,
                 affine,
                 previous,
-                (Status::Fallback, report.iterations),
+                (SolverStatus::Fallback, report.iterations),
             );
         } else {
-            let motion = self.optimiser.motion();
+            let trajectory = self.optimiser.trajectory();
             memory.plan.follow(
-                motion,
+                trajectory,
                 measured,
                 &self.rates.references,
                 self.settings.period_optimisation,
@@ -354,8 +365,8 @@ impl Dlmpc {
         plan.angles[n] = last + plan.commands[n - 1] * self.settings.period_optimisation;
     }
 
-    /// Replaces `plan` by a motion that follows it from the measured angles with the terminal law's
-    /// gain, within the limit.
+    /// Replaces `plan` by a trajectory that follows it from the measured angles with the terminal
+    /// law's gain, within the limit.
     fn track(&self, plan: &mut Plan, measured: Vector3<f64>) {
         let mut angles = measured;
         for k in 0..self.settings.horizon {

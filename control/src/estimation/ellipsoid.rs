@@ -41,9 +41,9 @@ pub struct Fit {
     pub correction: Correction,
     /// Root mean square of ‖W (m − b)‖ − 1, to first order.
     pub residual: f64,
-    /// Condition of the fit, which says how badly the readings distinguish ellipsoids: largest over
-    /// second-smallest eigenvalue of the scatter of W (m − b). The smallest eigenvalue belongs to
-    /// the ellipsoid itself. The condition is 16 if all directions are covered evenly.
+    /// Condition number of the ellipsoid fit: largest over second-smallest eigenvalue of the
+    /// scatter of W (m − b), as the smallest eigenvalue belongs to the ellipsoid itself. It is 16
+    /// for uniform coverage of all directions.
     pub condition: f64,
 }
 
@@ -58,7 +58,7 @@ pub enum FitError {
     Coverage(f64),
 }
 
-/// Largest condition of a fit that is accepted.
+/// Largest accepted condition number of a fit.
 const CONDITION: f64 = 1000.0;
 
 type Row = SVector<f64, 10>;

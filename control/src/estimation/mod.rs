@@ -82,7 +82,7 @@ pub struct Settings {
 }
 
 /// Condition for accepting the readings of a sensor. Readings outside the sensor's range, and
-/// changes that no motion can cause, are left out.
+/// changes that no rotation of the vehicle can cause, are left out.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Gate {
     /// Largest reading along an axis, in either direction.
@@ -252,7 +252,7 @@ pub struct Calibration {
     pub correction: Correction,
     /// Residual of the fit, see [`ellipsoid::Fit`].
     pub residual: f64,
-    /// Condition of the fit, see [`ellipsoid::Fit`].
+    /// Condition number of the fit, see [`ellipsoid::Fit`].
     pub condition: f64,
 }
 

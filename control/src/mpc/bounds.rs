@@ -1,13 +1,13 @@
-//! The bounds of the balls. They are a value that a pure function computes from a motion and that
-//! the optimiser holds, or they follow the iterates of the solver.
+//! The bounds of the norm constraints. A pure function computes them from a trajectory. The
+//! optimiser holds them, or they follow the iterates of the solver.
 
-use super::balls::{At, Balls, Constraints};
-use super::problem::{Motion, State};
+use super::constraints::{Constraints, StageConstraints, StagePoint};
+use super::problem::{ErrorTrajectory, State};
 use nalgebra::Vector3;
 use std::cell::Cell;
 use std::ops::Range;
 
-/// Largest norms that the balls allow at each stage.
+/// Bounds of the norm constraints at each stage.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Bounds {
     /// Bounds on the states of stages 0..=N; the first one has no effect.
@@ -57,22 +57,22 @@ impl Cells<'_> {
     }
 }
 
-/// The constraints of a controller: balls whose bounds are a function of the motion.
+/// The constraints of a controller: norm constraints whose bounds are a function of the trajectory.
 pub trait Bounded<const O: usize> {
-    /// Returns whether the states have balls of their own.
-    fn has_state_balls(&self) -> bool;
+    /// Returns whether the states have norm constraints.
+    fn constrains_states(&self) -> bool;
 
-    /// Returns the balls of stage `k` at (E_k, v_k) with these bounds on state and input, and with
-    /// their derivatives.
-    fn balls(
+    /// Returns the norm constraints of stage `k` at (E_k, v_k) with these bounds on state and
+    /// input, and with their derivatives.
+    fn norm_constraints(
         &self,
         k: usize,
         state: &State<O>,
         input: &Vector3<f64>,
         bounds: (f64, f64),
-    ) -> Balls<O>;
+    ) -> StageConstraints<O>;
 
-    /// Returns only the two values ‖y‖², of the state ball and of the input ball.
+    /// Returns only the values ‖y‖² of the state constraint and of the input constraint.
     fn squares(
         &self,
         k: usize,
@@ -81,47 +81,60 @@ pub trait Bounded<const O: usize> {
         bounds: (f64, f64),
     ) -> (f64, f64);
 
-    /// Returns the range from the first to the last of the intervals `of` that `motion` violates
-    /// with the bounds about itself: by its input, or by its state at the interval's end.
+    /// Returns the range from the first to the last of `intervals` in which `trajectory` violates
+    /// the bounds computed about it: by its input, or by its state at the interval's end.
     ///
-    /// If the bounds depend on the motion, those of the satisfied intervals are written to
+    /// If the bounds depend on the trajectory, those of the satisfied intervals are written to
     /// `bounds`. They may be smaller than those of [`Self::bounds_about`], where a smaller bound is
     /// cheaper and suffices. Intervals between the first and the last violated one may be left out.
     fn violated(
         &self,
-        motion: &Motion<O>,
-        of: Range<usize>,
+        trajectory: &ErrorTrajectory<O>,
+        intervals: Range<usize>,
         bounds: &mut Bounds,
     ) -> Option<Range<usize>>;
 
-    /// Computes the bounds of the intervals `of` about `motion`: for the input of each, and for the
-    /// state at its end. Bounds that do not depend on the motion need no implementation.
-    fn bounds_about(&self, _motion: &Motion<O>, _of: Range<usize>, _bounds: &mut Bounds) {}
+    /// Computes the bounds of `intervals` with `trajectory` as the linearisation point: for the
+    /// input of each interval, and for the state at its end. Bounds that do not depend on the
+    /// trajectory need no implementation.
+    fn bounds_about(
+        &self,
+        _motion: &ErrorTrajectory<O>,
+        _intervals: Range<usize>,
+        _bounds: &mut Bounds,
+    ) {
+    }
 
-    /// Returns the bounds of interval `k` about the stages at its ends: for the state at its end,
-    /// and for its input. `None` if they do not depend on the motion.
-    fn bounds_between(&self, _k: usize, _here: At<O>, _next: At<O>) -> Option<(f64, f64)> {
+    /// Returns the bounds of interval `k`, computed from the stages at its ends: for the state at
+    /// its end, and for its input. `None` if they do not depend on the trajectory.
+    fn bounds_between(
+        &self,
+        _k: usize,
+        _stage: StagePoint<O>,
+        _next: StagePoint<O>,
+    ) -> Option<(f64, f64)> {
         None
     }
 
-    /// Returns whether the bounds depend on the motion.
-    fn depends_on_motion(&self) -> bool {
+    /// Returns whether the bounds depend on the trajectory.
+    fn depends_on_trajectory(&self) -> bool {
         false
     }
 
     /// Returns whether the bounds of a first optimisation follow its iterates to the end. The
-    /// solver then satisfies the balls only as closely as the derivatives that are left out permit.
+    /// solver then satisfies the norm constraints less accurately, because it leaves out the
+    /// derivatives of the bounds.
     fn follows_at_first(&self) -> bool {
-        self.depends_on_motion()
+        self.depends_on_trajectory()
     }
 
-    /// Returns whether no motion from this start can satisfy the constraints. `false` leaves the
-    /// question open.
+    /// Returns whether no trajectory from this start can satisfy the constraints. `false` leaves
+    /// the question open.
     fn out_of_reach(&self, _start: &State<O>) -> bool {
         false
     }
 
-    /// Returns the radius ε of the terminal ball, if there is one.
+    /// Returns the radius ε of the terminal constraint, if there is one.
     fn terminal_radius(&self) -> Option<f64> {
         None
     }
@@ -141,20 +154,25 @@ impl<const O: usize> Constraints<O> for Within<'_, O> {
         self.follows
     }
 
-    fn renew(&self, k: usize, here: At<O>, next: At<O>) {
+    fn renew(&self, k: usize, stage: StagePoint<O>, next: StagePoint<O>) {
         let k = self.first + k;
-        if let Some(bounds) = self.bounded.bounds_between(k, here, next) {
+        if let Some(bounds) = self.bounded.bounds_between(k, stage, next) {
             self.bounds.set(k, bounds);
         }
     }
 
-    fn has_state_balls(&self) -> bool {
-        self.bounded.has_state_balls()
+    fn constrains_states(&self) -> bool {
+        self.bounded.constrains_states()
     }
 
-    fn balls(&self, k: usize, state: &State<O>, input: &Vector3<f64>) -> Balls<O> {
+    fn norm_constraints(
+        &self,
+        k: usize,
+        state: &State<O>,
+        input: &Vector3<f64>,
+    ) -> StageConstraints<O> {
         let k = self.first + k;
-        self.bounded.balls(k, state, input, self.bounds.at(k))
+        self.bounded.norm_constraints(k, state, input, self.bounds.at(k))
     }
 
     fn squares(&self, k: usize, state: &State<O>, input: &Vector3<f64>) -> (f64, f64) {

@@ -7,8 +7,8 @@ use std::time::{Duration, Instant};
 /// time, because its setup takes longer than one iteration.
 const FOR_THE_CONE: u32 = 4;
 
-/// Number of iterations for which time must remain: the next one, and about as much for the plan
-/// and the report after it.
+/// Number of iterations for which time must remain: the next one, and about the same time for the
+/// plan and the report after it.
 const TO_END: u32 = 2;
 
 /// The budget of one optimisation of a controller, which may solve several problems.

@@ -1,10 +1,10 @@
-//! The problem with its balls linearised, as a second-order cone program for Clarabel. It serves as
-//! a check of [`super::riccati`] and as a substitute where that method fails.
+//! The problem with its norm constraints linearised, as a second-order cone program for Clarabel.
+//! It serves as a check of [`super::riccati`] and as a substitute where that method fails.
 //!
 //! The unknowns are the scaled errors E_k, k = 0..=N. The inputs are eliminated, as the error of
 //! the last derivative changes by h v_k = E_{k+1} − E_k − d_k.
 
-use super::balls::{Balls, Frozen};
+use super::constraints::{LinearisedConstraints, StageConstraints};
 use super::layout::Layout;
 use super::problem::{Outcome, Problem, Solution, Start, of_axis};
 use crate::conic_program::{ConicProgram, Optimum, Triplets};
@@ -17,8 +17,8 @@ pub struct ConicSolver<const O: usize> {
     layout: Layout<O>,
     max_iterations: u32,
     program: ConicProgram,
-    /// Positions of each stage's ball coefficients in the matrix, and of its rows in the right
-    /// side.
+    /// Positions of the coefficients of each stage's norm constraint in the matrix, and of its rows
+    /// in the right side.
     state_slots: Vec<Slots<O>>,
     input_slots: Vec<Slots<O>>,
     start_row: usize,
@@ -27,9 +27,9 @@ pub struct ConicSolver<const O: usize> {
 
 struct Slots<const O: usize> {
     row: usize,
-    /// Positions of the block on E_k of the stage to which the ball belongs.
-    here: [[[usize; 3]; O]; 3],
-    /// Positions of the block on the last derivative of E_{k+1} (input balls).
+    /// Positions of the block on E_k of the stage to which the norm constraint belongs.
+    state: [[[usize; 3]; O]; 3],
+    /// Positions of the block on the last derivative of E_{k+1} (input constraints).
     next: Option<[[usize; 3]; 3]>,
 }
 
@@ -37,7 +37,7 @@ impl<const O: usize> ConicSolver<O> {
     /// Sets up the program and its solver.
     ///
     /// # Errors
-    /// Returns the solver's own message if it refuses the data, for example weights that are not
+    /// Returns the solver's message if it refuses the data, for example weights that are not
     /// positive semidefinite.
     pub fn new(layout: Layout<O>, max_iterations: u32) -> Result<Self, String> {
         let Layout { horizon: n, scale, .. } = &layout;
@@ -74,25 +74,26 @@ impl<const O: usize> ConicSolver<O> {
                 cones.push(NonnegativeConeT(row - start_row));
             }
         }
-        let mut ball = |a: &mut Triplets, k: usize, next: bool| {
+        let mut add_cone = |a: &mut Triplets, k: usize, next: bool| {
             let mut block = |k: usize, i: usize, component: usize| {
                 std::array::from_fn(|axis| {
                     a.push(row + 1 + component, column::<O>(k, i, axis), 0.0)
                 })
             };
-            let here =
+            let state =
                 std::array::from_fn(|component| std::array::from_fn(|i| block(k, i, component)));
             let next = next.then(|| std::array::from_fn(|component| block(k + 1, top, component)));
-            let slots = Slots { row, here, next };
+            let slots = Slots { row, state, next };
             row += 4;
             cones.push(SecondOrderConeT(4));
             slots
         };
-        let stages = if layout.state_balls { n } else { 0 };
-        let mut state_slots: Vec<Slots<O>> = (1..=stages).map(|k| ball(&mut a, k, false)).collect();
-        let mut input_slots: Vec<Slots<O>> = (0..n).map(|k| ball(&mut a, k, true)).collect();
+        let stages = if layout.constrains_states { n } else { 0 };
+        let mut state_slots: Vec<Slots<O>> =
+            (1..=stages).map(|k| add_cone(&mut a, k, false)).collect();
+        let mut input_slots: Vec<Slots<O>> = (0..n).map(|k| add_cone(&mut a, k, true)).collect();
         let terminal_row = layout.terminal.then(|| {
-            // Terminal ball ‖Lᵀ E_N‖ ≤ ε with G = L Lᵀ, divided by the scale.
+            // Terminal constraint ‖Lᵀ E_N‖ ≤ ε with G = L Lᵀ, divided by the scale.
             for axis in 0..3 {
                 let root = square_root(&of_axis(&layout.cost.end, axis));
                 for i in 0..O {
@@ -113,7 +114,7 @@ impl<const O: usize> ConicSolver<O> {
         let (matrix, position) = a.compress(row, 3 * O * (n + 1));
         for slots in state_slots.iter_mut().chain(&mut input_slots) {
             let next = slots.next.iter_mut().flatten().flatten();
-            for i in slots.here.iter_mut().flatten().flatten().chain(next) {
+            for i in slots.state.iter_mut().flatten().flatten().chain(next) {
                 *i = position[*i];
             }
         }
@@ -135,34 +136,35 @@ impl<const O: usize> ConicSolver<O> {
         })
     }
 
-    /// Solves `problem` within the given number of iterations and time (s). The motion in
+    /// Solves `problem` within the given number of iterations and time (s). The trajectory in
     /// `solution` is replaced if the optimum is found.
     pub fn solve(
         &mut self,
-        problem: &Problem<O, Frozen<O>>,
+        problem: &Problem<O, LinearisedConstraints<O>>,
         solution: &mut Solution<O>,
         (iterations, seconds): (u32, f64),
     ) -> Outcome {
         self.update(problem);
         self.program.limit(iterations.min(self.max_iterations), seconds);
         let Layout { chain, scale, horizon: n, .. } = &self.layout;
-        let (found, iterations) = self.program.solve();
-        let Some(Optimum { x, duals }) = found else { return Outcome::Failed(iterations) };
-        let Solution { motion, multipliers } = solution;
+        let (optimum, iterations) = self.program.solve();
+        let Some(Optimum { x, duals }) = optimum else { return Outcome::Failed(iterations) };
+        let Solution { trajectory, multipliers } = solution;
         for (k, x) in x.chunks_exact(3 * O).enumerate() {
-            motion.states[k] = std::array::from_fn(|i| {
+            trajectory.states[k] = std::array::from_fn(|i| {
                 Vector3::new(x[3 * i], x[3 * i + 1], x[3 * i + 2]) * scale[i]
             });
         }
         if let Start::Fixed(given) = problem.start {
-            motion.states[0] = given;
+            trajectory.states[0] = given;
         }
         for k in 0..*n {
-            let moved =
-                motion.states[k + 1][O - 1] - motion.states[k][O - 1] - problem.affine[k][O - 1];
-            motion.inputs[k] = moved / chain.step;
+            let moved = trajectory.states[k + 1][O - 1]
+                - trajectory.states[k][O - 1]
+                - problem.affine[k][O - 1];
+            trajectory.inputs[k] = moved / chain.step;
         }
-        motion.roll_out(chain, problem.affine);
+        trajectory.roll_out(chain, problem.affine);
         // The dual of ‖y‖ ≤ 1 is the multiplier of ½(‖y‖² − 1) for the whole cost; the factor ½
         // converts it to half the cost.
         multipliers.clear();
@@ -181,7 +183,7 @@ impl<const O: usize> ConicSolver<O> {
                 for normal in normals {
                     let force = 0.5 * (duals[row] - duals[row + 1]);
                     let deviation: f64 = (0..O)
-                        .map(|i| normal[i] * (given[i][axis] - motion.states[0][i][axis]))
+                        .map(|i| normal[i] * (given[i][axis] - trajectory.states[0][i][axis]))
                         .sum();
                     for i in 0..O {
                         multipliers.start[i][axis] -= normal[i] * force;
@@ -196,7 +198,7 @@ impl<const O: usize> ConicSolver<O> {
         Outcome::Solved(iterations)
     }
 
-    fn update(&mut self, problem: &Problem<O, Frozen<O>>) {
+    fn update(&mut self, problem: &Problem<O, LinearisedConstraints<O>>) {
         let Layout { chain, cost, scale, .. } = &self.layout;
         let top = O - 1;
         let h = chain.step;
@@ -233,16 +235,18 @@ impl<const O: usize> ConicSolver<O> {
                 }
             }
         }
-        let balls = problem.constraints.stages();
-        for (slots, Balls { state, .. }) in self.state_slots.iter().zip(&balls[1..]) {
-            write_ball(&mut self.program, slots, &state.by_state, &state.value, scale);
+        let stages = problem.constraints.stages();
+        for (slots, StageConstraints { state, .. }) in self.state_slots.iter().zip(&stages[1..]) {
+            write_constraint(&mut self.program, slots, &state.by_state, &state.value, scale);
         }
-        for (k, (slots, Balls { input, .. })) in self.input_slots.iter().zip(balls).enumerate() {
+        for (k, (slots, StageConstraints { input, .. })) in
+            self.input_slots.iter().zip(stages).enumerate()
+        {
             let by_difference = input.by_input / h;
             let mut by_state = input.by_state;
             by_state[top] -= by_difference;
             let value = input.value - by_difference * problem.affine[k][top];
-            write_ball(&mut self.program, slots, &by_state, &value, scale);
+            write_constraint(&mut self.program, slots, &by_state, &value, scale);
             for (i, places) in slots.next.iter().flatten().enumerate() {
                 for (j, &place) in places.iter().enumerate() {
                     self.program.matrix[place] = -by_difference[(i, j)] * scale[top];
@@ -255,14 +259,14 @@ impl<const O: usize> ConicSolver<O> {
     }
 }
 
-fn write_ball<const O: usize>(
+fn write_constraint<const O: usize>(
     program: &mut ConicProgram,
     slots: &Slots<O>,
     by_state: &[Matrix3<f64>; O],
     value: &Vector3<f64>,
     scale: &[f64; O],
 ) {
-    for (component, places) in slots.here.iter().enumerate() {
+    for (component, places) in slots.state.iter().enumerate() {
         for (i, places) in places.iter().enumerate() {
             for (axis, &place) in places.iter().enumerate() {
                 program.matrix[place] = -by_state[i][(component, axis)] * scale[i];
@@ -310,8 +314,9 @@ fn add_chain<const O: usize>(layout: &Layout<O>, a: &mut Triplets) -> usize {
                 let by_end = -by_input * scale[top] / scale[i];
                 a.push(row, column::<O>(k + 1, top, axis), by_end);
                 for j in i..O {
-                    let own = if j == top { chain.a[(i, j)] - by_input } else { chain.a[(i, j)] };
-                    a.push(row, column::<O>(k, j, axis), -own * scale[j] / scale[i]);
+                    let by_state =
+                        if j == top { chain.a[(i, j)] - by_input } else { chain.a[(i, j)] };
+                    a.push(row, column::<O>(k, j, axis), -by_state * scale[j] / scale[i]);
                 }
                 row += 1;
             }

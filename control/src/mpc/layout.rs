@@ -1,6 +1,6 @@
-//! Structure of an optimisation problem: what does not change between samples.
+//! Structure of an optimisation problem, which does not change between samples.
 
-use super::problem::{Chain, Cost, Motion};
+use super::problem::{Chain, Cost, ErrorTrajectory};
 use nalgebra::SVector;
 use std::ops::Range;
 
@@ -13,9 +13,9 @@ pub struct Layout<const O: usize> {
     pub cost: Cost<O>,
     /// Number of intervals of the horizon.
     pub horizon: usize,
-    /// Whether the states have balls of their own.
-    pub state_balls: bool,
-    /// Whether the last state must lie in a terminal ball.
+    /// Whether the states have norm constraints.
+    pub constrains_states: bool,
+    /// Whether there is a terminal constraint.
     pub terminal: bool,
     /// Normals of the set of admissible initial states; `None` if the initial state is given.
     pub start: Option<[Vec<SVector<f64, O>>; 3]>,
@@ -30,13 +30,17 @@ pub struct Layout<const O: usize> {
 
 /// Smallest number of intervals that a window adds before and after the violated ones.
 pub(super) const MARGIN: usize = 3;
-/// Relative tolerance in the check of the terminal ball, for rounding.
+/// Relative tolerance in the check of the terminal constraint, for rounding.
 const CHECK_SLACK: f64 = 1e-9;
 
 impl<const O: usize> Layout<O> {
-    /// Returns `radius` if the motion ends outside the terminal ball.
-    pub(super) fn ends_outside(&self, motion: &Motion<O>, radius: Option<f64>) -> Option<f64> {
-        let square = self.cost.end_square(&motion.states[self.horizon]);
+    /// Returns `radius` if the trajectory violates the terminal constraint.
+    pub(super) fn ends_outside(
+        &self,
+        trajectory: &ErrorTrajectory<O>,
+        radius: Option<f64>,
+    ) -> Option<f64> {
+        let square = self.cost.end_square(&trajectory.states[self.horizon]);
         radius.filter(|radius| square > radius * radius * (1.0 + CHECK_SLACK))
     }
 

@@ -1,7 +1,9 @@
-//! Finite-horizon linear-quadratic optimum: the problem without balls. Gains and weights depend on
+//! Finite-horizon linear-quadratic optimum: the unconstrained problem. Gains and weights depend on
 //! the cost alone and are computed once; the affine terms cost one sweep per sample.
 
-use super::problem::{Chain, Cost, Motion, PerAxis, State, apply, of_axis, per_axis, zero_state};
+use super::problem::{
+    Chain, Cost, ErrorTrajectory, PerAxis, State, apply, of_axis, per_axis, zero_state,
+};
 use nalgebra::{SMatrix, Vector3};
 
 /// One stage of the backward recursion, v = K E − M⁻¹Bᵀ(P⁺d + p⁺).
@@ -22,7 +24,7 @@ struct Gain<const O: usize> {
 /// cost as a measurement of E = 0 with information W.
 #[derive(Clone, Copy, Debug)]
 struct Arrival<const O: usize> {
-    /// Factor in Ē⁺ = discount·Ē, which includes the stage's own cost.
+    /// Factor in Ē⁺ = discount·Ē, which includes the cost of the stage.
     discount: PerAxis<O>,
     /// Gain of the smoother, E_k = Ē_k⁺ + smoother·(E_{k+1} − Ē_{k+1}).
     smoother: PerAxis<O>,
@@ -30,8 +32,9 @@ struct Arrival<const O: usize> {
     next_weight: PerAxis<O>,
 }
 
-/// The optimum without balls, or with the terminal ball alone. It also solves for a part of the
-/// horizon so that the part agrees with the optimum of the whole.
+/// The solver for the unconstrained optimum, and for the optimum with the terminal constraint
+/// alone. It also solves for a part of the horizon so that the part agrees with the optimum of the
+/// whole.
 #[derive(Clone, Debug)]
 pub struct Unconstrained<const O: usize> {
     chain: Chain<O>,
@@ -122,22 +125,27 @@ impl<const O: usize> Unconstrained<O> {
         self.gains.first().map_or_else(zero_state, |gain| gain.feedback)
     }
 
-    /// Writes the optimum from `start` into `motion`.
-    pub fn solve(&mut self, start: &State<O>, affine: &[State<O>], motion: &mut Motion<O>) {
+    /// Writes the optimum from `start` into `trajectory`.
+    pub fn solve(
+        &mut self,
+        start: &State<O>,
+        affine: &[State<O>],
+        trajectory: &mut ErrorTrajectory<O>,
+    ) {
         for (k, gain) in self.gains.iter().enumerate().rev() {
             let costate = costate(gain, &self.slopes[k + 1], &affine[k]);
             self.slopes[k] = apply(&gain.closed_loop_transposed, &costate);
         }
-        motion.states[0] = *start;
-        self.follow(0, affine, motion);
+        trajectory.states[0] = *start;
+        self.follow(0, affine, trajectory);
     }
 
-    /// Continues `motion` with the optimum from stage `first` on, for the affine terms of the last
-    /// [`Self::solve`].
-    pub fn follow(&self, first: usize, affine: &[State<O>], motion: &mut Motion<O>) {
+    /// Continues `trajectory` with the optimum from stage `first` on, for the affine terms of the
+    /// last [`Self::solve`].
+    pub fn follow(&self, first: usize, affine: &[State<O>], trajectory: &mut ErrorTrajectory<O>) {
         for (k, gain) in self.gains.iter().enumerate().skip(first) {
-            let state = motion.states[k];
-            (motion.inputs[k], motion.states[k + 1]) =
+            let state = trajectory.states[k];
+            (trajectory.inputs[k], trajectory.states[k + 1]) =
                 self.advance(gain, &self.slopes[k + 1], &state, &affine[k]);
         }
     }
@@ -171,16 +179,21 @@ impl<const O: usize> Unconstrained<O> {
         (v, std::array::from_fn(|i| next[i] + affine[i]))
     }
 
-    /// Lets `motion` follow `plan` with the gains of the optimum, from its own first state on.
-    pub fn track(&self, plan: &Motion<O>, affine: &[State<O>], motion: &mut Motion<O>) {
+    /// Lets `trajectory` follow `plan` with the gains of the optimum, from its first state on.
+    pub fn track(
+        &self,
+        plan: &ErrorTrajectory<O>,
+        affine: &[State<O>],
+        trajectory: &mut ErrorTrajectory<O>,
+    ) {
         for (k, gain) in self.gains.iter().enumerate() {
-            let (state, planned) = (motion.states[k], plan.states[k]);
+            let (state, planned) = (trajectory.states[k], plan.states[k]);
             let v = (0..O).fold(plan.inputs[k], |sum, i| {
                 sum + gain.feedback[i].component_mul(&(state[i] - planned[i]))
             });
-            motion.inputs[k] = v;
+            trajectory.inputs[k] = v;
             let next = self.chain.advance(&state, &v);
-            motion.states[k + 1] = std::array::from_fn(|i| next[i] + affine[k][i]);
+            trajectory.states[k + 1] = std::array::from_fn(|i| next[i] + affine[k][i]);
         }
     }
 
@@ -206,19 +219,20 @@ impl<const O: usize> Unconstrained<O> {
         (&self.arrivals[k - 1].next_weight, self.means[k])
     }
 
-    /// Computes the optimum from the start of [`Self::arrive`] to the state of `motion` at stage
-    /// `k`. The inputs are those that lead the last derivative exactly through the states.
-    pub fn trace_back(&self, k: usize, affine: &[State<O>], motion: &mut Motion<O>) {
+    /// Computes the optimum from the start of [`Self::arrive`] to the state of `trajectory` at
+    /// stage `k`. The inputs are those that lead the last derivative exactly through the states.
+    pub fn trace_back(&self, k: usize, affine: &[State<O>], trajectory: &mut ErrorTrajectory<O>) {
         for (j, Arrival { discount, smoother, .. }) in self.arrivals[..k].iter().enumerate().rev() {
-            let (counted, after) = (apply(discount, &self.means[j]), motion.states[j + 1]);
+            let (counted, after) = (apply(discount, &self.means[j]), trajectory.states[j + 1]);
             let deviation =
                 apply(smoother, &std::array::from_fn(|i| after[i] - self.means[j + 1][i]));
-            motion.states[j] = std::array::from_fn(|i| counted[i] + deviation[i]);
+            trajectory.states[j] = std::array::from_fn(|i| counted[i] + deviation[i]);
         }
-        motion.states[0] = self.means[0];
+        trajectory.states[0] = self.means[0];
         for j in 0..k {
-            let moved = motion.states[j + 1][O - 1] - motion.states[j][O - 1] - affine[j][O - 1];
-            motion.inputs[j] = moved / self.chain.step;
+            let moved =
+                trajectory.states[j + 1][O - 1] - trajectory.states[j][O - 1] - affine[j][O - 1];
+            trajectory.inputs[j] = moved / self.chain.step;
         }
     }
 }
@@ -267,39 +281,39 @@ pub(super) mod tests {
             .collect()
     }
 
-    pub(in crate::mpc) fn optimum<const O: usize>() -> (Unconstrained<O>, Motion<O>) {
+    pub(in crate::mpc) fn optimum<const O: usize>() -> (Unconstrained<O>, ErrorTrajectory<O>) {
         let mut lq = Unconstrained::new(N, &chain(), &cost());
-        let mut motion = Motion::new(N);
-        lq.solve(&start(), &affine(), &mut motion);
-        (lq, motion)
+        let mut trajectory = ErrorTrajectory::new(N);
+        lq.solve(&start(), &affine(), &mut trajectory);
+        (lq, trajectory)
     }
 
-    /// Slope of the cost in every input, by differences of the cost of the resulting motion. They
-    /// are exact for a quadratic.
+    /// Slope of the cost in every input, by differences of the cost of the resulting trajectory.
+    /// They are exact for a quadratic.
     pub(in crate::mpc) fn slopes<const O: usize>(
-        motion: &Motion<O>,
+        trajectory: &ErrorTrajectory<O>,
         terminal: f64,
     ) -> SVector<f64, INPUTS> {
         let (chain, affine) = (chain(), affine());
         let mut cost = cost::<O>();
-        let value = |cost: &Cost<O>, motion: &Motion<O>, i: usize, change: f64| {
-            let mut changed = motion.clone();
+        let value = |cost: &Cost<O>, trajectory: &ErrorTrajectory<O>, i: usize, change: f64| {
+            let mut changed = trajectory.clone();
             changed.inputs[i / 3][i % 3] += change;
             changed.roll_out(&chain, &affine);
-            cost.of(&changed)
+            cost.total(&changed)
         };
         cost.end = cost.end.map(|row| row.map(|block| block * (1.0 + terminal)));
         SVector::from_fn(|i, _| {
-            (value(&cost, motion, i, 0.5) - value(&cost, motion, i, -0.5)) / 1.0
+            (value(&cost, trajectory, i, 0.5) - value(&cost, trajectory, i, -0.5)) / 1.0
         })
     }
 
     fn assert_stationary<const O: usize>() {
-        let (_, motion) = optimum::<O>();
-        let mut still = motion.clone();
+        let (_, trajectory) = optimum::<O>();
+        let mut still = trajectory.clone();
         still.inputs.fill(Vector3::zeros());
         let largest = slopes(&still, 0.0).amax();
-        assert!(slopes(&motion, 0.0).amax() < 1e-11 * largest);
+        assert!(slopes(&trajectory, 0.0).amax() < 1e-11 * largest);
         // Newton's step from any point leads to the optimum: these are the normal equations.
         let slope = slopes(&still, 0.0);
         let columns: Vec<_> = (0..INPUTS)
@@ -314,7 +328,7 @@ pub(super) mod tests {
             .unwrap()
             .solve(&-slope);
         for (i, value) in solution.iter().enumerate() {
-            assert!((motion.inputs[i / 3][i % 3] - value).abs() < 1e-10, "{i}");
+            assert!((trajectory.inputs[i / 3][i % 3] - value).abs() < 1e-10, "{i}");
         }
     }
 
@@ -325,31 +339,35 @@ pub(super) mod tests {
     }
 
     fn assert_parts_give_the_whole<const O: usize>() {
-        let (mut lq, motion) = optimum::<O>();
+        let (mut lq, trajectory) = optimum::<O>();
         lq.arrive(&start(), &affine());
         for k in [O, O + 1, 7, 13, 14, N] {
-            // The stationary point of arrival cost plus cost-to-go lies on the optimal motion, and
-            // both directions lead back to that motion.
+            // The stationary point of arrival cost plus cost-to-go lies on the optimal trajectory,
+            // and both directions lead back to that trajectory.
             let ((weight, mean), (to_go, slope)) = (lq.arrival(k), lq.to_go(k));
             for axis in 0..3 {
                 let (weight, to_go): (SMatrix<f64, O, O>, _) =
                     (of_axis(weight, axis), of_axis(to_go, axis));
-                let of = |state: &State<O>| SVector::<f64, O>::from_fn(|i, _| state[i][axis]);
+                let part = |state: &State<O>| SVector::<f64, O>::from_fn(|i, _| state[i][axis]);
                 let joint =
-                    (weight + to_go).try_inverse().unwrap() * (weight * of(&mean) - of(&slope));
-                assert!((joint - of(&motion.states[k])).amax() < 1e-10, "stage {k}");
+                    (weight + to_go).try_inverse().unwrap() * (weight * part(&mean) - part(&slope));
+                assert!((joint - part(&trajectory.states[k])).amax() < 1e-10, "stage {k}");
             }
-            let mut again = Motion::new(N);
-            again.states[k] = motion.states[k];
+            let mut again = ErrorTrajectory::new(N);
+            again.states[k] = trajectory.states[k];
             lq.trace_back(k, &affine(), &mut again);
             lq.follow(k, &affine(), &mut again);
-            assert!(again.distance(&motion) < 1e-10, "stage {k}: {}", again.distance(&motion));
+            assert!(
+                again.distance(&trajectory) < 1e-10,
+                "stage {k}: {}",
+                again.distance(&trajectory)
+            );
         }
         // Tracking the optimum from another start gives the optimum from that start.
         let elsewhere: State<O> = std::array::from_fn(|i| start::<O>()[i] * 1.5);
-        let (mut tracked, mut optimum) = (motion.clone(), motion.clone());
+        let (mut tracked, mut optimum) = (trajectory.clone(), trajectory.clone());
         tracked.states[0] = elsewhere;
-        lq.track(&motion, &affine(), &mut tracked);
+        lq.track(&trajectory, &affine(), &mut tracked);
         lq.solve(&elsewhere, &affine(), &mut optimum);
         assert!(tracked.distance(&optimum) < 1e-12);
     }

@@ -1,11 +1,11 @@
-//! Model predictive control of chains of integrators within balls.
+//! Model predictive control of chains of integrators under norm constraints.
 //!
 //! | | |
 //! |---|---|
-//! | [`problem`], [`balls`], [`bounds`] | problem, balls, and their bounds as a function of the motion |
-//! | `optimise`, `shortcuts`, `passes` | one optimisation, its cheaper ways to the optimum, its passes |
+//! | [`problem`], [`constraints`], [`bounds`] | problem, norm constraints, and their bounds as a function of the trajectory |
+//! | `optimise`, `shortcuts`, `passes` | one optimisation, its shortcuts, its passes |
 //! | [`optimiser`] | the solvers of one controller with their memory |
-//! | [`lq`] | the problem without balls |
+//! | [`lq`] | the unconstrained problem |
 //! | [`riccati`] | the interior point method |
 //! | [`conic`] | the cone solver behind it |
 //! | [`certificate`] | the proof of optimality |
@@ -15,11 +15,11 @@
 // Loops over axes and blocks are written with indices, as in the equations.
 #![allow(clippy::needless_range_loop)]
 
-pub mod balls;
 pub mod bounds;
 pub mod budget;
 pub mod certificate;
 pub mod conic;
+pub mod constraints;
 pub mod layout;
 pub mod lq;
 mod optimise;
@@ -31,11 +31,11 @@ mod search;
 mod settings;
 mod shortcuts;
 
-pub use balls::{Ball, Balls, Constraints};
 pub use bounds::{Bounded, Bounds};
 pub use budget::Budget;
 pub use certificate::Certificate;
+pub use constraints::{Constraints, NormConstraint, StageConstraints};
 pub use layout::Layout;
-pub use optimiser::{Optimiser, Report};
-pub use problem::{Chain, Cost, Motion, State, per_axis};
+pub use optimiser::{Optimiser, OptimiserReport};
+pub use problem::{Chain, Cost, ErrorTrajectory, State, per_axis};
 pub use settings::{Method, Nonlinearity, SolverSettings};

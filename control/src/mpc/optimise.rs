@@ -3,26 +3,27 @@
 
 use super::bounds::Bounded;
 use super::certificate::Certificate;
-use super::optimiser::{Optimiser, Report, Sample};
-use super::problem::{Motion, State};
+use super::optimiser::{Optimiser, OptimiserReport, Sample};
+use super::problem::{ErrorTrajectory, State};
 use super::search::Search;
 use super::shortcuts;
-use crate::report::Status;
+use crate::report::SolverStatus;
 
 impl<const O: usize> Optimiser<O> {
     /// Solves one optimisation from `start`. `previous` holds the earlier plan from the present
-    /// time on, with its multipliers. Without it, the bounds and the linearised balls are set about
-    /// each solution again until the solution stops changing.
+    /// time on, with its multipliers. Without it, the bounds and the linearised constraints are
+    /// computed about each solution in turn until the solution stops changing.
     pub fn optimise(
         &mut self,
         bounded: &dyn Bounded<O>,
         start: &State<O>,
         affine: &[State<O>],
-        previous: Option<(&Motion<O>, &[[f64; 2]])>,
-    ) -> Report {
+        previous: Option<(&ErrorTrajectory<O>, &[[f64; 2]])>,
+    ) -> OptimiserReport {
         let sample = Sample { bounded, start, affine, previous };
         self.without_constraints(start, affine);
-        let outside = self.layout.ends_outside(&self.solution.motion, bounded.terminal_radius());
+        let outside =
+            self.layout.ends_outside(&self.solution.trajectory, bounded.terminal_radius());
         let mut search = Search { outside, ..Search::default() };
         let shortcuts = self.settings.shortcuts && self.layout.start.is_none();
         let status = shortcuts::in_order()
@@ -30,27 +31,32 @@ impl<const O: usize> Optimiser<O> {
             .filter(|_| shortcuts)
             .find_map(|shortcut| shortcut.optimum(self, &sample, &mut search))
             .unwrap_or_else(|| self.over_whole_horizon(&sample, &mut search));
-        // The laws follow another plan in a fallback.
-        let found = status != Status::Fallback;
+        // In a fallback the laws follow another plan.
+        let is_optimum = status != SolverStatus::Fallback;
         let certificate =
-            if found { self.certificate(&sample, true) } else { Certificate::default() };
-        Report { status, iterations: search.iterations, certificate, settled: search.settled }
+            if is_optimum { self.certificate(&sample, true) } else { Certificate::default() };
+        OptimiserReport {
+            status,
+            iterations: search.iterations,
+            certificate,
+            settled: search.settled,
+        }
     }
 
     /// Finds the optimum by the solvers for the whole horizon.
-    fn over_whole_horizon(&mut self, sample: &Sample<O>, search: &mut Search) -> Status {
+    fn over_whole_horizon(&mut self, sample: &Sample<O>, search: &mut Search) -> SolverStatus {
         self.prepare(sample, search);
         if sample.previous.is_none() && self.settings.is_exact_riccati() {
             if let Some(status) = self.settle(sample, search, Self::by_riccati) {
                 return status;
             }
-            // From here on the bounds are those about the motion that the search has left.
-            self.about.clone_from(&self.solution.motion);
+            // From here on the bounds are those about the trajectory that the search has left.
+            self.linearisation_point.clone_from(&self.solution.trajectory);
             (search.follows, search.pass) = (false, 0);
         }
         let by_any = |this: &mut Self, sample: &Sample<O>, search: &mut Search| {
             this.by_riccati(sample, search).or_else(|| this.by_cone(sample, search))
         };
-        self.settle(sample, search, by_any).unwrap_or(Status::Fallback)
+        self.settle(sample, search, by_any).unwrap_or(SolverStatus::Fallback)
     }
 }

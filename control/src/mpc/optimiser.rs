@@ -1,33 +1,34 @@
 //! The solvers of one controller with their scratch memory. The bounds are computed about the
-//! optimum and the problem is solved again until the optimum satisfies the bounds about itself.
+//! optimum, and the problem is solved again, until the optimum satisfies the bounds computed about
+//! it.
 
-use super::balls::Frozen;
 use super::bounds::{Bounded, Bounds, Within};
 use super::budget::Budget;
 use super::certificate::Certificate;
 use super::conic::ConicSolver;
+use super::constraints::LinearisedConstraints;
 use super::layout::Layout;
 use super::lq::Unconstrained;
 use super::problem::{
-    End, Motion, Multipliers, Outcome, Problem, Solution, Start, State, zero_state,
+    End, ErrorTrajectory, Multipliers, Outcome, Problem, Solution, Start, State, zero_state,
 };
 use super::riccati::{Rest, Riccati};
 use super::search::Search;
 use super::settings::{Method, Nonlinearity, SolverSettings};
-use crate::report::Status;
+use crate::report::SolverStatus;
 use std::mem::replace;
 use std::ops::Range;
 
-/// Result of an optimisation apart from its motion.
+/// Result of an optimisation apart from its trajectory.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Report {
-    /// The way that led to the optimum; [`Status::Fallback`] if none did.
-    pub status: Status,
+pub struct OptimiserReport {
+    /// How the optimum was found; [`SolverStatus::Fallback`] if none was.
+    pub status: SolverStatus,
     /// Number of iterations over all passes and solvers.
     pub iterations: u32,
     /// Residuals that prove the optimum.
     pub certificate: Certificate,
-    /// Whether the motion is known to satisfy the bounds about itself.
+    /// Whether the trajectory is known to satisfy the bounds computed about it.
     pub settled: bool,
 }
 
@@ -37,7 +38,7 @@ pub(super) struct Sample<'a, const O: usize> {
     pub start: &'a State<O>,
     pub affine: &'a [State<O>],
     /// Earlier plan from the present time on, with its multipliers.
-    pub previous: Option<(&'a Motion<O>, &'a [[f64; 2]])>,
+    pub previous: Option<(&'a ErrorTrajectory<O>, &'a [[f64; 2]])>,
 }
 
 /// All solvers of one controller with their scratch memory.
@@ -48,12 +49,12 @@ pub struct Optimiser<const O: usize> {
     pub(super) unconstrained: Unconstrained<O>,
     pub(super) riccati: Riccati<O>,
     cone: ConicSolver<O>,
-    frozen: Frozen<O>,
-    /// Motion about which the bounds are computed and the balls linearised.
-    pub(super) about: Motion<O>,
+    linearised: LinearisedConstraints<O>,
+    /// Trajectory about which the bounds are computed and the norm constraints are linearised.
+    pub(super) linearisation_point: ErrorTrajectory<O>,
     pub(super) bounds: Bounds,
-    /// Bounds of an optimum about itself, in the check of a pass.
-    pub(super) own: Bounds,
+    /// Bounds computed about an optimum, to check whether a pass was the last.
+    pub(super) checked_bounds: Bounds,
     pub(super) solution: Solution<O>,
 }
 
@@ -70,10 +71,10 @@ impl<const O: usize> Optimiser<O> {
             unconstrained: Unconstrained::new(n, chain, cost),
             riccati: Riccati::new(n, faces, settings.max_iterations),
             cone,
-            frozen: Frozen::new(n),
-            about: Motion::new(n),
+            linearised: LinearisedConstraints::new(n),
+            linearisation_point: ErrorTrajectory::new(n),
             bounds: Bounds::unlimited(n),
-            own: Bounds::unlimited(n),
+            checked_bounds: Bounds::unlimited(n),
             solution: Solution::new(n),
             budget: Budget::unlimited(),
             layout,
@@ -81,23 +82,23 @@ impl<const O: usize> Optimiser<O> {
         })
     }
 
-    /// Returns the optimum, or in a fallback the motion left by the last solver.
-    pub fn motion(&self) -> &Motion<O> {
-        &self.solution.motion
+    /// Returns the optimum, or in a fallback the trajectory left by the last solver.
+    pub fn trajectory(&self) -> &ErrorTrajectory<O> {
+        &self.solution.trajectory
     }
 
-    /// Returns the bounds of the last optimisation, if they depend on the motion.
+    /// Returns the bounds of the last optimisation, if they depend on the trajectory.
     pub fn bounds(&self) -> &Bounds {
         &self.bounds
     }
 
-    /// Returns K of the first stage of the optimum without constraints, negative.
+    /// Returns K of the first stage of the unconstrained optimum, negative.
     pub fn feedback(&self) -> State<O> {
         self.unconstrained.feedback()
     }
 
-    /// Returns for each interval the multipliers of the state ball at its end and of the ball on
-    /// its input.
+    /// Returns for each interval the multipliers of the state constraint at its end and of the norm
+    /// constraint on its input.
     pub fn multipliers(&self) -> impl Iterator<Item = [f64; 2]> {
         let Multipliers { state, input, .. } = &self.solution.multipliers;
         state.iter().zip(input).map(|(&state, &input)| [state, input])
@@ -115,7 +116,11 @@ impl<const O: usize> Optimiser<O> {
     }
 
     /// Finds the optimum with the present bounds by the Riccati method.
-    pub(super) fn by_riccati(&mut self, sample: &Sample<O>, search: &mut Search) -> Option<Status> {
+    pub(super) fn by_riccati(
+        &mut self,
+        sample: &Sample<O>,
+        search: &mut Search,
+    ) -> Option<SolverStatus> {
         if !self.may_iterate(search) {
             return None;
         }
@@ -125,7 +130,7 @@ impl<const O: usize> Optimiser<O> {
         }
         let outcome = self.interior_point(sample, search, 0..self.layout.horizon);
         if outcome.solved() {
-            return Some(Status::Constrained);
+            return Some(SolverStatus::Constrained);
         }
         if search.warm && !self.is_exhausted() {
             // The first guess was misleading.
@@ -136,21 +141,29 @@ impl<const O: usize> Optimiser<O> {
         None
     }
 
-    /// Finds the optimum with the present bounds and linearised balls by the cone solver. It would
-    /// not find a motion within the balls in a hopeless search either.
-    pub(super) fn by_cone(&mut self, sample: &Sample<O>, search: &mut Search) -> Option<Status> {
+    /// Finds the optimum with the present bounds and linearised constraints by the cone solver. In
+    /// a hopeless search it would find none either.
+    pub(super) fn by_cone(
+        &mut self,
+        sample: &Sample<O>,
+        search: &mut Search,
+    ) -> Option<SolverStatus> {
         if search.hopeless {
             return None;
         }
         let limits = self.budget.of_the_cone()?;
         search.window = None;
-        sample.bounded.bounds_about(&self.about, 0..self.layout.horizon, &mut self.bounds);
-        self.frozen.set(&within(sample, &mut self.bounds), &self.about, 0);
-        let problem = problem(&self.layout, sample, &self.frozen);
+        sample.bounded.bounds_about(
+            &self.linearisation_point,
+            0..self.layout.horizon,
+            &mut self.bounds,
+        );
+        self.linearised.set(&within(sample, &mut self.bounds), &self.linearisation_point, 0);
+        let problem = problem(&self.layout, sample, &self.linearised);
         let outcome = self.cone.solve(&problem, &mut self.solution, limits);
         search.iterations += outcome.iterations();
         self.budget.spend(outcome.iterations());
-        outcome.solved().then_some(Status::Cone)
+        outcome.solved().then_some(SolverStatus::Cone)
     }
 
     /// Returns whether the Riccati method may begin.
@@ -159,7 +172,7 @@ impl<const O: usize> Optimiser<O> {
     }
 
     /// Runs the Riccati method on the intervals `range`, with the present bounds. The rest of the
-    /// horizon is replaced by its arrival cost and its cost-to-go without balls.
+    /// horizon is replaced by its arrival cost and its unconstrained cost-to-go.
     pub(super) fn interior_point(
         &mut self,
         sample: &Sample<O>,
@@ -167,10 +180,18 @@ impl<const O: usize> Optimiser<O> {
         range: Range<usize>,
     ) -> Outcome {
         let Self {
-            layout, budget, unconstrained, riccati, frozen, about, bounds, solution, ..
+            layout,
+            budget,
+            unconstrained,
+            riccati,
+            linearised,
+            linearisation_point,
+            bounds,
+            solution,
+            ..
         } = self;
         let (bounded, first) = (sample.bounded, range.start);
-        bounded.bounds_about(about, range.clone(), bounds);
+        bounded.bounds_about(linearisation_point, range.clone(), bounds);
         let within = Within { bounded, bounds: bounds.cells(), follows: search.follows, first };
         let (weight, slope) = unconstrained.to_go(range.end);
         let radius = bounded.terminal_radius().filter(|_| range.end == layout.horizon);
@@ -182,29 +203,31 @@ impl<const O: usize> Optimiser<O> {
         problem.affine = &sample.affine[range];
         problem.end = End { weight, slope, radius };
         let outcome = if self.settings.nonlinearity == Nonlinearity::Exact {
-            // A warm search knows its window; bounds about a motion rarely hold beyond it.
-            let extends = !search.warm || !bounded.depends_on_motion();
+            // A warm search knows its window; bounds that depend on the trajectory rarely hold
+            // beyond it.
+            let extends = !search.warm || !bounded.depends_on_trajectory();
             let rest = Rest { unconstrained: &*unconstrained, affine: sample.affine };
             let rest = Some(&rest).filter(|_| extends && radius.is_none());
             riccati.solve(&problem, solution, first, search.warm, budget, rest)
         } else {
-            frozen.set(&within, about, first);
-            riccati.solve(&problem.with(&*frozen), solution, first, search.warm, budget, None)
+            linearised.set(&within, linearisation_point, first);
+            riccati.solve(&problem.with(&*linearised), solution, first, search.warm, budget, None)
         };
         search.iterations += outcome.iterations();
         outcome
     }
 
-    /// Returns the range from the first to the last interval that the present motion violates with
-    /// the bounds about itself. The intervals in `skip` and the terminal ball are not checked.
+    /// Returns the range from the first to the last interval in which the present trajectory
+    /// violates the bounds computed about it. The intervals in `skip` and the terminal constraint
+    /// are not checked.
     pub(super) fn violated(
         &mut self,
         sample: &Sample<O>,
         skip: &Range<usize>,
     ) -> Option<Range<usize>> {
-        let Self { bounds, solution: Solution { motion, .. }, .. } = self;
-        let before = sample.bounded.violated(motion, 0..skip.start, bounds);
-        let after = sample.bounded.violated(motion, skip.end..self.layout.horizon, bounds);
+        let Self { bounds, solution: Solution { trajectory, .. }, .. } = self;
+        let before = sample.bounded.violated(trajectory, 0..skip.start, bounds);
+        let after = sample.bounded.violated(trajectory, skip.end..self.layout.horizon, bounds);
         match (before, after) {
             (Some(before), Some(after)) => Some(before.start..after.end),
             (before, after) => before.or(after),
@@ -218,42 +241,42 @@ impl<const O: usize> Optimiser<O> {
         }
     }
 
-    /// Leaves the optimum without constraints in [`Self::motion`].
+    /// Leaves the unconstrained optimum in [`Self::trajectory`].
     pub fn without_constraints(&mut self, start: &State<O>, affine: &[State<O>]) {
-        let Solution { motion, multipliers } = &mut self.solution;
-        self.unconstrained.solve(start, affine, motion);
+        let Solution { trajectory, multipliers } = &mut self.solution;
+        self.unconstrained.solve(start, affine, trajectory);
         multipliers.clear();
     }
 
-    /// Moves [`Self::motion`] half of the way to `plan`.
-    pub fn halve_the_way_to(&mut self, plan: &Motion<O>) {
-        self.solution.motion.halve_the_way_to(plan);
+    /// Moves [`Self::trajectory`] half of the way to `plan`.
+    pub fn halve_the_way_to(&mut self, plan: &ErrorTrajectory<O>) {
+        self.solution.trajectory.halve_the_way_to(plan);
     }
 
-    /// Returns the report of a plan that is followed instead of an optimum, with the bounds about
-    /// the plan.
+    /// Returns the report of a plan that is followed instead of an optimum, with the bounds
+    /// computed about the plan.
     pub fn fall_back(
         &mut self,
         bounded: &dyn Bounded<O>,
         start: &State<O>,
         affine: &[State<O>],
-        plan: &Motion<O>,
-        (status, iterations): (Status, u32),
-    ) -> Report {
-        self.solution.motion.clone_from(plan);
+        plan: &ErrorTrajectory<O>,
+        (status, iterations): (SolverStatus, u32),
+    ) -> OptimiserReport {
+        self.solution.trajectory.clone_from(plan);
         self.solution.multipliers.clear();
         bounded.bounds_about(plan, 0..self.layout.horizon, &mut self.bounds);
         let sample = Sample { bounded, start, affine, previous: None };
         let certificate = self.certificate(&sample, false);
-        Report { status, iterations, certificate, settled: false }
+        OptimiserReport { status, iterations, certificate, settled: false }
     }
 
-    /// Returns the residuals of the present motion. `is_checked` says that the intervals without
-    /// multipliers are known to satisfy their constraints.
+    /// Returns the residuals of the present trajectory. `is_checked` says that the intervals
+    /// without multipliers are known to satisfy their constraints.
     pub(super) fn certificate(&mut self, sample: &Sample<O>, is_checked: bool) -> Certificate {
         let Self { layout, bounds, solution, .. } = self;
         let within = within(sample, bounds);
-        Certificate::of(&problem(layout, sample, &within), solution, is_checked)
+        Certificate::new(&problem(layout, sample, &within), solution, is_checked)
     }
 }
 

@@ -1,28 +1,29 @@
-//! Passes of an optimisation. Each begins with the bounds (and linearised balls) about a motion:
-//! first about the first guess, then about the optimum of the last pass.
+//! Passes of an optimisation. For each pass the bounds (and the linearised constraints) are
+//! computed about a trajectory: first about the first guess, then about the optimum of the last
+//! pass.
 
 use super::layout::MARGIN;
 use super::optimiser::{Optimiser, Sample};
 use super::problem::Solution;
 use super::search::Search;
 use super::settings::{Method, Nonlinearity};
-use crate::report::Status;
+use crate::report::SolverStatus;
 use std::mem::replace;
 
 /// A multiplier counts as active above this share of the largest one.
 const ACTIVE: f64 = 1e-3;
-/// The previous plan is no guess if the optimum without balls violates intervals this far beyond
+/// The previous plan is no guess if the unconstrained optimum violates intervals this far beyond
 /// the last active one. A jump of the reference has then entered the horizon. Bounds that do not
-/// depend on the motion need no such rule: the search then recovers faster than it begins anew.
+/// depend on the trajectory need no such rule: the search then recovers faster than it begins anew.
 const NEWS: usize = 10;
-/// Largest number of passes until an optimum satisfies the bounds about itself.
+/// Largest number of passes until an optimum satisfies the bounds computed about it.
 const SETTLING_PASSES: usize = 8;
-/// Largest number of passes until a first optimisation with linearised balls stands still.
+/// Largest number of passes until a first optimisation with linearised constraints stands still.
 const FIRST_PASSES: usize = 20;
 
 impl<const O: usize> Optimiser<O> {
-    /// Chooses the first guess and the motion about which the first bounds are computed. This is
-    /// done once, by the first way that iterates.
+    /// Chooses the first guess and the trajectory about which the first bounds are computed. This
+    /// is done once, by the first solver that iterates.
     pub(super) fn prepare(&mut self, sample: &Sample<O>, search: &mut Search) {
         if replace(&mut search.begun, true) {
             return;
@@ -34,17 +35,17 @@ impl<const O: usize> Optimiser<O> {
         }
         self.begin_cold(sample, search);
         let Some((previous, active)) = sample.previous else {
-            self.about.clone_from(&self.solution.motion);
+            self.linearisation_point.clone_from(&self.solution.trajectory);
             return;
         };
-        self.about.states[0] = *sample.start;
+        self.linearisation_point.states[0] = *sample.start;
         if is_given {
-            self.unconstrained.track(previous, sample.affine, &mut self.about);
+            self.unconstrained.track(previous, sample.affine, &mut self.linearisation_point);
         } else {
-            self.about.clone_from(previous);
-            self.about.states[0] = *sample.start;
+            self.linearisation_point.clone_from(previous);
+            self.linearisation_point.states[0] = *sample.start;
         }
-        // Where the terminal ball is active, each sample has one more stage to reach it, and
+        // Where the terminal constraint is active, each sample has one more stage to reach it, and
         // successive plans differ too much for a warm start.
         if self.settings.method == Method::Riccati && is_given && search.outside.is_none() {
             self.start_warm(sample, active, search);
@@ -65,7 +66,7 @@ impl<const O: usize> Optimiser<O> {
         let is_active = more_than(ACTIVE * largest);
         let last = active.iter().rposition(&is_active).unwrap_or(0);
         let is_news = search.violated.as_ref().is_some_and(|range| range.end > last + NEWS);
-        if is_news && sample.bounded.depends_on_motion() {
+        if is_news && sample.bounded.depends_on_trajectory() {
             return;
         }
         while let Some(last) =
@@ -80,8 +81,8 @@ impl<const O: usize> Optimiser<O> {
             search.window = None;
             range = 0..n;
         }
-        let Solution { motion, multipliers } = &mut self.solution;
-        motion.clone_from(&self.about);
+        let Solution { trajectory, multipliers } = &mut self.solution;
+        trajectory.clone_from(&self.linearisation_point);
         for k in range {
             [multipliers.state[k], multipliers.input[k]] = active[k];
         }
@@ -89,25 +90,25 @@ impl<const O: usize> Optimiser<O> {
     }
 
     /// Lets the next search begin without the multipliers of a similar problem. Its guess may be
-    /// far away, so that bounds that depend on the motion follow the iterates.
+    /// far away, so that bounds that depend on the trajectory follow the iterates.
     pub(super) fn begin_cold(&self, sample: &Sample<O>, search: &mut Search) {
         let follows = match sample.previous {
             None => sample.bounded.follows_at_first(),
-            Some(_) => sample.bounded.depends_on_motion(),
+            Some(_) => sample.bounded.depends_on_trajectory(),
         };
         (search.warm, search.follows) = (false, follows && self.settings.is_exact_riccati());
     }
 
-    /// Repeats `way` with the bounds (and linearised balls) about its last optimum until one is
-    /// final. Returns `None` as soon as `way` finds none.
+    /// Repeats `solve_pass` with the bounds (and linearised constraints) computed about its last
+    /// optimum until one is final. Returns `None` as soon as a pass finds none.
     pub(super) fn settle(
         &mut self,
         sample: &Sample<O>,
         search: &mut Search,
-        way: impl Fn(&mut Self, &Sample<O>, &mut Search) -> Option<Status>,
-    ) -> Option<Status> {
+        solve_pass: impl Fn(&mut Self, &Sample<O>, &mut Search) -> Option<SolverStatus>,
+    ) -> Option<SolverStatus> {
         loop {
-            let status = way(self, sample, search)?;
+            let status = solve_pass(self, sample, search)?;
             search.pass += 1;
             if self.is_final(sample, search) {
                 return Some(status);
@@ -116,34 +117,37 @@ impl<const O: usize> Optimiser<O> {
         }
     }
 
-    /// Returns whether the optimum of a pass is final; otherwise `about` is set for the next pass.
+    /// Returns whether the optimum of a pass is final; otherwise the linearisation point is set for
+    /// the next pass.
     fn is_final(&mut self, sample: &Sample<O>, search: &mut Search) -> bool {
-        let Self { layout, settings, about, bounds, own, solution, .. } = self;
-        let motion = &solution.motion;
+        let Self {
+            layout, settings, linearisation_point, bounds, checked_bounds, solution, ..
+        } = self;
+        let trajectory = &solution.trajectory;
         if sample.previous.is_some() && settings.nonlinearity == Nonlinearity::Frozen {
             return true;
         }
         if sample.previous.is_none() && !settings.is_exact_riccati() {
-            let moved = about.distance(motion);
-            about.clone_from(motion);
+            let moved = linearisation_point.distance(trajectory);
+            linearisation_point.clone_from(trajectory);
             return moved < layout.standstill || search.pass == FIRST_PASSES;
         }
         if replace(&mut search.follows, false) {
-            sample.bounded.bounds_about(motion, 0..layout.horizon, bounds);
+            sample.bounded.bounds_about(trajectory, 0..layout.horizon, bounds);
         }
         // The intervals outside a window have already been checked.
         let solved = search.window.clone().unwrap_or(0..layout.horizon);
-        search.settled = !sample.bounded.depends_on_motion()
-            || sample.bounded.violated(motion, solved, own).is_none();
+        search.settled = !sample.bounded.depends_on_trajectory()
+            || sample.bounded.violated(trajectory, solved, checked_bounds).is_none();
         if search.settled || search.pass == SETTLING_PASSES {
             return true;
         }
         if search.pass == 1 {
-            about.clone_from(motion);
+            linearisation_point.clone_from(trajectory);
         } else {
-            // Where the bounds change more than the motion, whole steps would alternate between two
-            // motions.
-            about.halve_the_way_to(motion);
+            // Where the bounds change more than the trajectory, whole steps would alternate between
+            // two of them.
+            linearisation_point.halve_the_way_to(trajectory);
         }
         false
     }

@@ -1,5 +1,5 @@
 //! The structured problem: chains of integrators, quadratic cost, and the conditions on both ends.
-//! Its balls are in [`super::balls`].
+//! Its norm constraints are in [`super::constraints`].
 
 use nalgebra::{SMatrix, SVector, Vector3};
 
@@ -102,14 +102,14 @@ impl<const O: usize> Cost<O> {
         std::array::from_fn(|i| self.state[i].component_mul(&state[i]))
     }
 
-    /// Returns the cost of a motion.
-    pub fn of(&self, motion: &Motion<O>) -> f64 {
+    /// Returns the total cost of a trajectory.
+    pub fn total(&self, trajectory: &ErrorTrajectory<O>) -> f64 {
         let state = |e: &State<O>| dot(e, &self.slope(e));
         let input = |v: &Vector3<f64>| v.component_mul(v).dot(&self.input);
-        let n = motion.inputs.len();
-        motion.states[..n].iter().map(state).sum::<f64>()
-            + motion.inputs.iter().map(input).sum::<f64>()
-            + self.end_square(&motion.states[n])
+        let n = trajectory.inputs.len();
+        trajectory.states[..n].iter().map(state).sum::<f64>()
+            + trajectory.inputs.iter().map(input).sum::<f64>()
+            + self.end_square(&trajectory.states[n])
     }
 }
 
@@ -118,7 +118,7 @@ pub(super) fn dot<const O: usize>(a: &State<O>, b: &State<O>) -> f64 {
     a.iter().zip(b).map(|(a, b)| a.dot(b)).sum()
 }
 
-/// Condition on the first state of the motion.
+/// Condition on the first state of the trajectory.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Start<'a, const O: usize> {
     /// The first state E_0 is given.
@@ -130,14 +130,14 @@ pub enum Start<'a, const O: usize> {
     Arrival(&'a PerAxis<O>, State<O>),
 }
 
-/// Cost EᵀP E + 2 pᵀE of the last state, and the ball in which it must lie.
+/// Cost EᵀP E + 2 pᵀE of the last state, and the terminal constraint.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct End<'a, const O: usize> {
     /// Weight P of the last state.
     pub weight: &'a PerAxis<O>,
     /// Linear part p of the cost.
     pub slope: State<O>,
-    /// Radius ε of the terminal ball ‖E_N‖_G ≤ ε, if there is one; P is then G.
+    /// Radius ε of the terminal constraint ‖E_N‖_G ≤ ε, if there is one; P is then G.
     pub radius: Option<f64>,
 }
 
@@ -148,7 +148,8 @@ impl<const O: usize> End<'_, O> {
     }
 }
 
-/// The problem: minimise the cost of a motion E_{k+1} = A E_k + B v_k + d_k within the balls.
+/// The problem: minimise the cost of a trajectory E_{k+1} = A E_k + B v_k + d_k under the norm
+/// constraints.
 #[derive(Clone, Copy, Debug)]
 pub struct Problem<'a, const O: usize, C> {
     /// Chain of integrators with its matrices A and B.
@@ -160,30 +161,30 @@ pub struct Problem<'a, const O: usize, C> {
     /// Affine terms d_0 … d_{N−1}: the part of the reference that the chain cannot reproduce,
     /// including its jumps.
     pub affine: &'a [State<O>],
-    /// Balls on states and inputs.
+    /// Norm constraints on states and inputs.
     pub constraints: &'a C,
-    /// Cost of the last state E_N, with its terminal ball.
+    /// Cost of the last state E_N, with its terminal constraint.
     pub end: End<'a, O>,
 }
 
 impl<'a, const O: usize, C> Problem<'a, O, C> {
-    /// Returns the problem with other balls.
+    /// Returns the problem with other norm constraints.
     pub(super) fn with<D>(&self, constraints: &'a D) -> Problem<'a, O, D> {
         let Self { chain, cost, start, affine, end, .. } = *self;
         Problem { chain, cost, start, affine, constraints, end }
     }
 }
 
-/// A motion of the tracking error over the horizon.
+/// A trajectory of the tracking error over the horizon.
 #[derive(Debug, PartialEq)]
-pub struct Motion<const O: usize> {
+pub struct ErrorTrajectory<const O: usize> {
     /// States E_0 … E_N at the stages.
     pub states: Vec<State<O>>,
     /// Inputs v_0 … v_{N−1}, each held over one interval.
     pub inputs: Vec<Vector3<f64>>,
 }
 
-impl<const O: usize> Clone for Motion<O> {
+impl<const O: usize> Clone for ErrorTrajectory<O> {
     fn clone(&self) -> Self {
         Self { states: self.states.clone(), inputs: self.inputs.clone() }
     }
@@ -195,18 +196,18 @@ impl<const O: usize> Clone for Motion<O> {
     }
 }
 
-impl<const O: usize> Motion<O> {
-    /// Returns a motion without error over `horizon` intervals.
+impl<const O: usize> ErrorTrajectory<O> {
+    /// Returns a trajectory without error over `horizon` intervals.
     pub fn new(horizon: usize) -> Self {
         Self { states: vec![zero_state(); horizon + 1], inputs: vec![Vector3::zeros(); horizon] }
     }
 
-    /// Moves this motion half of the way to `other`.
+    /// Moves this trajectory half of the way to `other`.
     pub fn halve_the_way_to(&mut self, other: &Self) {
-        let here = self.states.iter_mut().flatten().chain(&mut self.inputs);
-        let there = other.states.iter().flatten().chain(&other.inputs);
-        for (here, there) in here.zip(there) {
-            *here = (*here + there) * 0.5;
+        let values = self.states.iter_mut().flatten().chain(&mut self.inputs);
+        let others = other.states.iter().flatten().chain(&other.inputs);
+        for (value, other) in values.zip(others) {
+            *value = (*value + other) * 0.5;
         }
     }
 
@@ -225,15 +226,15 @@ impl<const O: usize> Motion<O> {
     }
 }
 
-/// Multipliers for half the cost, of the balls written as ½(‖y‖² − 1) ≤ 0 and of the faces of the
-/// initial set.
+/// Multipliers for half the cost, of the norm constraints written as ½(‖y‖² − 1) ≤ 0 and of the
+/// faces of the initial set.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Multipliers<const O: usize> {
-    /// Multipliers of the state balls of stages 1..=N, at position k − 1.
+    /// Multipliers of the state constraints of stages 1..=N, at position k − 1.
     pub state: Vec<f64>,
-    /// Multipliers of the input balls.
+    /// Multipliers of the input constraints.
     pub input: Vec<f64>,
-    /// Multiplier of the terminal ball.
+    /// Multiplier of the terminal constraint.
     pub terminal: f64,
     /// Signed sum Σ λ n over the faces of the initial set: their slope in E_0.
     pub start: State<O>,
@@ -263,31 +264,31 @@ impl<const O: usize> Multipliers<O> {
     }
 }
 
-/// A motion with the multipliers that prove it to be the optimum.
+/// A trajectory with the multipliers that prove it to be the optimum.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Solution<const O: usize> {
-    /// Motion of the tracking error.
-    pub motion: Motion<O>,
-    /// Multipliers of the constraints for this motion.
+    /// Trajectory of the tracking error.
+    pub trajectory: ErrorTrajectory<O>,
+    /// Multipliers of the constraints for this trajectory.
     pub multipliers: Multipliers<O>,
 }
 
 impl<const O: usize> Solution<O> {
     /// Allocates a solution for `horizon` intervals.
     pub fn new(horizon: usize) -> Self {
-        Self { motion: Motion::new(horizon), multipliers: Multipliers::new(horizon) }
+        Self { trajectory: ErrorTrajectory::new(horizon), multipliers: Multipliers::new(horizon) }
     }
 }
 
-/// The way in which a solver ended.
+/// How a solver ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Outcome {
     /// The optimum was found after this number of iterations.
     Solved(u32),
     /// No optimum was found after this number of iterations.
     Failed(u32),
-    /// No optimum was found, and the last iterate was far outside the balls: probably no motion
-    /// satisfies them.
+    /// No optimum was found, and the last iterate violated the norm constraints by far: probably no
+    /// trajectory satisfies them.
     Hopeless(u32),
 }
 
@@ -301,7 +302,7 @@ impl Outcome {
         }
     }
 
-    /// Returns whether probably no motion satisfies the balls.
+    /// Returns whether probably no trajectory satisfies the norm constraints.
     pub fn hopeless(self) -> bool {
         matches!(self, Self::Hopeless(_))
     }

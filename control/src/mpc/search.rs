@@ -6,9 +6,10 @@ use std::ops::Range;
 #[allow(clippy::struct_excessive_bools)] // They do not exclude each other.
 #[derive(Default)]
 pub(super) struct Search {
-    /// Radius of the terminal ball, if the optimum without balls ends outside it.
+    /// Radius of the terminal constraint, if the unconstrained optimum violates it.
     pub outside: Option<f64>,
-    /// Range from the first to the last interval that the optimum without balls violates.
+    /// Range from the first to the last interval in which the unconstrained optimum violates a
+    /// constraint.
     pub violated: Option<Range<usize>>,
     /// Window of the horizon to solve for, if it is not the whole horizon.
     pub window: Option<Range<usize>>,
@@ -24,8 +25,8 @@ pub(super) struct Search {
     pub warm: bool,
     /// Number of iterations over all passes and solvers.
     pub iterations: u32,
-    /// Whether the last solver concluded that no motion satisfies the balls.
+    /// Whether the last solver concluded that no trajectory satisfies the norm constraints.
     pub hopeless: bool,
-    /// Whether the optimum satisfies the bounds about itself.
+    /// Whether the optimum satisfies the bounds computed about it.
     pub settled: bool,
 }

@@ -13,14 +13,15 @@ pub enum Method {
     Cone,
 }
 
-/// The form of the balls for the Riccati method; the cone solver always receives linearised balls.
+/// The form of the norm constraints for the Riccati method; the cone solver always receives
+/// linearised constraints.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "camelCase")]
 pub enum Nonlinearity {
-    /// The balls are functions of the motion.
+    /// The norm constraints are functions of the trajectory.
     #[default]
     Exact,
-    /// The balls are linearised about the previous plan.
+    /// The norm constraints are linearised about the previous plan.
     Frozen,
 }
 
@@ -29,11 +30,11 @@ pub enum Nonlinearity {
 pub struct SolverSettings {
     /// Solver that is tried first.
     pub method: Method,
-    /// Form of the balls that it receives.
+    /// Form of the norm constraints that it receives.
     pub nonlinearity: Nonlinearity,
     /// Largest number of iterations of each solver in each pass.
     pub max_iterations: u32,
-    /// Whether the shortcuts, cheaper ways to the optimum, are tried first.
+    /// Whether the shortcuts, cheaper exact ways to the optimum, are tried first.
     pub shortcuts: bool,
     /// Wall-clock time after which no further iteration or solver is started, s; 0 for no limit.
     /// Runs with a time budget are not reproducible.
@@ -55,8 +56,8 @@ impl SolverSettings {
         }
     }
 
-    /// Returns whether the Riccati method is tried first, with the balls as functions of the
-    /// motion.
+    /// Returns whether the Riccati method is tried first, with the norm constraints as functions of
+    /// the trajectory.
     pub(super) fn is_exact_riccati(&self) -> bool {
         (self.method, self.nonlinearity) == (Method::Riccati, Nonlinearity::Exact)
     }

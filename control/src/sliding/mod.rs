@@ -53,7 +53,7 @@ pub type Btvsmc = Tvsmc<BoundaryLayer>;
 /// The law SOTVSMC/DO, (45).
 pub type SotvsmcDo = Tvsmc<SecondOrder>;
 
-/// A commanded moment, with the data that tell how far the actuators fell short of it.
+/// A commanded moment, with the data from which the shortfall of the actuators follows.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Commanded {
     /// Commanded moment M, N m.
@@ -65,12 +65,12 @@ pub struct Commanded {
 }
 
 impl Commanded {
-    /// Returns the command of `moment` (N m), of which no limit has taken anything.
+    /// Returns the command of `moment` (N m), which no limit has reduced.
     pub(crate) fn new(measured: &Measurement, moment: Vector3<f64>) -> Self {
         Self { moment, angles: measured.angles, cut: Vector3::zeros() }
     }
 
-    /// Takes `applied` (N m) for the command, and the rest for lost.
+    /// Replaces the command by `applied` (N m) and records the rest as the loss.
     pub(crate) fn limit(&mut self, body: &RigidBody, applied: &Vector3<f64>) {
         self.cut = gain(body, &self.angles, applied - self.moment);
         self.moment = *applied;
@@ -201,11 +201,11 @@ impl<R: Reaching> Controller for Tvsmc<R> {
         let b = surface.equivalent(&memory.anchor, time, &error, &reference.accelerations);
         // Wu 2015, (27) and (15).
         let v = b - memory.estimate.disturbance + reaching.sliding_rate(&memory.integral, &s);
-        let wanted = linearise::moment(body, &measured.angles, &angle_rates, &v);
+        let moment = linearise::moment(body, &measured.angles, &angle_rates, &v);
         memory.sliding = s;
         memory.drive = v - b;
-        memory.commanded = Commanded::new(measured, wanted);
-        wanted
+        memory.commanded = Commanded::new(measured, moment);
+        moment
     }
 
     fn limited(&mut self, memory: &mut Self::Memory, applied: &Vector3<f64>) {

@@ -5,7 +5,7 @@
 use super::flight::Random;
 use super::{FEEDBACK, Optimising};
 use control::Measurement;
-use control::report::Report;
+use control::report::SolverReport;
 use nalgebra::Vector3;
 use vehicle::kinematics;
 use vehicle::profile::Profile;
@@ -32,7 +32,7 @@ fn degrees(values: [f64; 3]) -> Vector3<f64> {
 
 impl Case {
     /// Returns the case that these numbers define, with errors scaled by `size`.
-    pub fn of(x: &[f64], size: f64) -> Self {
+    pub fn from_numbers(x: &[f64], size: f64) -> Self {
         let at = |i: usize| x[i].clamp(-1.0, 1.0);
         let three = |i: usize| Vector3::new(at(i), at(i + 1), at(i + 2));
         let mean = degrees([10.0, 0.0, -30.0]) + three(2).component_mul(&degrees([5.0, 3.0, 20.0]));
@@ -65,12 +65,12 @@ impl Case {
     pub fn random(seed: u64, size: f64) -> Self {
         let random = &mut Random::new(seed);
         let x: Vec<f64> = (0..UNKNOWNS).map(|_| random.between(-1.0, 1.0)).collect();
-        Self::of(&x, size)
+        Self::from_numbers(&x, size)
     }
 
     /// Returns the reports of three optimisations, each with its shortest time: the first one
     /// (cold), the one after the kick, and the one that follows.
-    pub fn optimise<C: Optimising>(&self, law: &mut C, repetitions: usize) -> [Report; 3] {
+    pub fn optimise<C: Optimising>(&self, law: &mut C, repetitions: usize) -> [SolverReport; 3] {
         let (period, ratio) = (FEEDBACK, law.ratio());
         let mut memory = law.memory();
         let begin = (self.time / period).round() as u64 / ratio * ratio;
@@ -98,9 +98,9 @@ impl Case {
             for tick in tick + 1..tick + ratio {
                 law.update(&mut memory, tick, tick as f64 * period, &measured(state), &reference);
             }
-            // This is about the motion until the next optimisation.
+            // This is about how far the vehicle moves until the next optimisation.
             state.0 += state.1 * (ratio as f64 * period);
-            Report { time: best, ..C::report(&memory) }
+            SolverReport { time: best, ..C::report(&memory) }
         })
     }
 }

@@ -1,5 +1,5 @@
 //! Flights of CRMPC under the robust set that test its guarantee, with bounded disturbances of any
-//! course, delayed moments, measurement errors or an estimator in the loop, any start and any
+//! waveform, delayed moments, measurement errors or an estimator in the loop, any start and any
 //! reference.
 #![allow(dead_code, unreachable_pub)] // Each user needs a part of it.
 
@@ -70,10 +70,10 @@ impl Random {
     }
 }
 
-/// A course of a vector in the box [−1, 1]³ over time, for the disturbance or the errors relative
+/// A waveform of a vector in the box [−1, 1]³ over time, for the disturbance or the errors relative
 /// to their bounds.
 #[derive(Clone, Debug)]
-pub enum Course {
+pub enum Waveform {
     /// The vector is constant over time.
     Constant(Vector3<f64>),
     /// The vector is drawn again at each request.
@@ -91,8 +91,8 @@ pub enum Course {
     Segments(Vec<(f64, Vector3<f64>)>),
 }
 
-impl Course {
-    /// Draws any course except segments.
+impl Waveform {
+    /// Draws any waveform except segments.
     pub fn random(random: &mut Random) -> Self {
         let sign = if random.below(2) == 0 { 1.0 } else { -1.0 };
         let period = 10.0_f64.powf(random.between(-1.1, 1.4));
@@ -109,19 +109,19 @@ impl Course {
     }
 }
 
-/// A course in progress over time.
+/// A waveform in progress over time.
 #[derive(Clone, Debug)]
 struct Progress {
-    course: Course,
+    waveform: Waveform,
     random: Random,
     now: Vector3<f64>,
     until: f64,
 }
 
 impl Progress {
-    fn new(course: &Course, seed: u64) -> Self {
+    fn new(waveform: &Waveform, seed: u64) -> Self {
         Self {
-            course: course.clone(),
+            waveform: waveform.clone(),
             random: Random::new(seed),
             now: Vector3::zeros(),
             until: 0.0,
@@ -131,25 +131,25 @@ impl Progress {
     /// Returns the value at `time` (s), which must not decrease.
     fn at(&mut self, time: f64, vehicle: &Vehicle) -> Vector3<f64> {
         let r = kinematics::r(&vehicle.angles());
-        match &self.course {
-            Course::Constant(value) => *value,
-            Course::White => self.random.vector(),
-            Course::Square(period, value) => {
+        match &self.waveform {
+            Waveform::Constant(value) => *value,
+            Waveform::White => self.random.vector(),
+            Waveform::Square(period, value) => {
                 let half = (2.0 * (time + 1e-9) / period).floor() as i64;
                 if half % 2 == 0 { *value } else { -*value }
             }
-            Course::Switching(longest) => {
+            Waveform::Switching(longest) => {
                 if time >= self.until {
                     self.now = self.random.corner();
                     self.until = time + self.random.between(0.0, *longest);
                 }
                 self.now
             }
-            Course::AlongRate(sign) => signs(&(r * vehicle.rates())) * *sign,
-            Course::AlongMoment(sign) => {
+            Waveform::AlongRate(sign) => signs(&(r * vehicle.rates())) * *sign,
+            Waveform::AlongMoment(sign) => {
                 signs(&(r * vehicle.body.inverse * vehicle.moment(time))) * *sign
             }
-            Course::Segments(segments) => {
+            Waveform::Segments(segments) => {
                 let current = segments.iter().find(|(until, _)| time < *until).or(segments.last());
                 current.map_or_else(Vector3::zeros, |(_, value)| *value)
             }
@@ -166,8 +166,8 @@ fn signs(vector: &Vector3<f64>) -> Vector3<f64> {
 pub enum Sight {
     /// The controller receives the true state.
     Exact,
-    /// The angles and x_ω have errors that follow this course within the bounds of the settings.
-    Errors(Course),
+    /// The angles and x_ω have errors that follow this waveform within the bounds of the settings.
+    Errors(Waveform),
     /// The estimator evaluates the typical MEMS sensors with noise of this seed.
     Estimator(u64),
 }
@@ -191,8 +191,8 @@ pub struct Flight {
     pub reference: Profile,
     /// Time of the reference at the start, s.
     pub reference_start: f64,
-    /// Course of Δ relative to its bound.
-    pub disturbance: Course,
+    /// Waveform of Δ relative to its bound.
+    pub disturbance: Waveform,
     /// Time over which Δ is held, s; a whole multiple of [`CHECK`].
     pub hold: f64,
     /// Source of the controller's measurements.
@@ -263,7 +263,7 @@ impl Flight {
             rates: scenario.initial_rates,
             reference: scenario.reference,
             reference_start: 0.0,
-            disturbance: Course::Constant(Vector3::zeros()),
+            disturbance: Waveform::Constant(Vector3::zeros()),
             hold: 0.04,
             sight: Sight::Exact,
             age: 0.0,
@@ -273,7 +273,7 @@ impl Flight {
         }
     }
 
-    /// Draws disturbance, inertia, start and reference, and the course of the errors if the
+    /// Draws disturbance, inertia, start and reference, and the waveform of the errors if the
     /// settings have any.
     pub fn random(settings: &Settings, seed: u64) -> Self {
         let random = &mut Random::new(seed);
@@ -292,7 +292,7 @@ impl Flight {
         if settings.tensor_error > 0.0 {
             flight.tensor_error = Self::tensor_of(settings.tensor_error, random);
         }
-        flight.disturbance = Course::random(random);
+        flight.disturbance = Waveform::random(random);
         flight.hold = if random.below(2) == 0 { 0.04 } else { 0.01 };
         match random.below(3) {
             0 => flight.reference_start = random.between(0.0, 50.0),
@@ -313,7 +313,7 @@ impl Flight {
             flight.rates = random.direction(length);
         }
         if settings.rate_error > 0.0 || settings.angle_error > 0.0 {
-            flight.sight = Sight::Errors(Course::random(random));
+            flight.sight = Sight::Errors(Waveform::random(random));
         }
         flight
     }
@@ -373,8 +373,8 @@ impl Flight {
         let mut outwards = random.corner();
         outwards.y = flight.angles.y.signum();
         match random.below(4) {
-            0 => flight.disturbance = Course::Constant(outwards),
-            1 => flight.disturbance = Course::Constant(Vector3::zeros()),
+            0 => flight.disturbance = Waveform::Constant(outwards),
+            1 => flight.disturbance = Waveform::Constant(Vector3::zeros()),
             _ => {}
         }
         Some(flight)
@@ -548,7 +548,7 @@ impl Vehicle {
     }
 }
 
-/// The source of the measurements of the motion.
+/// The source of the measurements.
 struct Eyes {
     errors: Option<Progress>,
     /// Bounds on the errors of angles (rad) and rates (rad/s).
@@ -564,7 +564,9 @@ impl Eyes {
     fn new(flight: &Flight) -> Self {
         let Settings { angle_error, rate_error, .. } = flight.settings;
         let errors = match &flight.sight {
-            Sight::Errors(course) => Some(Progress::new(course, flight.seed.wrapping_add(1 << 32))),
+            Sight::Errors(waveform) => {
+                Some(Progress::new(waveform, flight.seed.wrapping_add(1 << 32)))
+            }
             Sight::Exact | Sight::Estimator(_) => None,
         };
         let estimation = match flight.sight {

@@ -8,12 +8,12 @@ pub mod platform;
 
 pub use control::closed_loop::CHECK;
 use control::closed_loop::{Summary, fly};
-use control::crmpc::{Constraints, Memory, Settings, Standing, Status};
+use control::crmpc::{Constraints, Memory, Settings, SolverStatus, Standing};
 use control::lqr::LqrSettings;
-use control::report::Report;
+use control::report::SolverReport;
 use control::{Controller, Crmpc, Delayed, Dlmpc, Lqr, Measurement, dlmpc};
 use nalgebra::Vector3;
-use vehicle::disturbance::{Disturbance, Kind};
+use vehicle::disturbance::{Disturbance, DisturbanceKind};
 use vehicle::scenario::Scenario;
 
 /// Time between two evaluations of every controller here, that of Chai 2022, section 5.1, s.
@@ -33,14 +33,14 @@ pub fn lqr() -> Lqr {
 /// A controller that optimises at some of its ticks.
 pub trait Optimising: Controller {
     /// Returns the report of the last optimisation.
-    fn report(memory: &Self::Memory) -> Report;
+    fn report(memory: &Self::Memory) -> SolverReport;
     /// Returns the number of ticks per optimisation.
     fn ratio(&self) -> u64;
 }
 
 impl Optimising for Crmpc {
     /// Returns the report of the last optimisation.
-    fn report(memory: &Memory) -> Report {
+    fn report(memory: &Memory) -> SolverReport {
         memory.report
     }
     fn ratio(&self) -> u64 {
@@ -50,7 +50,7 @@ impl Optimising for Crmpc {
 
 impl Optimising for Delayed<Crmpc> {
     /// Returns the report of the last optimisation.
-    fn report(memory: &Self::Memory) -> Report {
+    fn report(memory: &Self::Memory) -> SolverReport {
         memory.inner.report
     }
     fn ratio(&self) -> u64 {
@@ -60,7 +60,7 @@ impl Optimising for Delayed<Crmpc> {
 
 impl Optimising for Dlmpc {
     /// Returns the report of the last optimisation.
-    fn report(memory: &dlmpc::Memory) -> Report {
+    fn report(memory: &dlmpc::Memory) -> SolverReport {
         memory.report
     }
     fn ratio(&self) -> u64 {
@@ -69,7 +69,7 @@ impl Optimising for Dlmpc {
 }
 
 /// Returns the disturbance of the scenario with another kind.
-pub fn disturbance(kind: Kind) -> Disturbance {
+pub fn disturbance(kind: DisturbanceKind) -> Disturbance {
     Disturbance { kind, ..Scenario::crmpc2022().disturbance }
 }
 
@@ -97,7 +97,7 @@ pub struct Kept {
     /// Whether ‖ω‖ or |β| exceeded its bound at a tick before which the guarantee was in force.
     pub broken: bool,
     /// Number of times that the guarantee was withdrawn. If the assumptions were true, each time is
-    /// a broken promise.
+    /// a failure of the guarantee.
     pub withdrawn: u32,
 }
 
@@ -137,7 +137,7 @@ pub fn run(settings: &Settings, inertia_scale: f64, disturbance: Disturbance) ->
         inertia_scale,
         disturbance,
         |memory, _, measured| {
-            assert_ne!(memory.report.status, Status::None);
+            assert_ne!(memory.report.status, SolverStatus::None);
             let now = memory.standing == Standing::InForce;
             ticks += 1;
             in_force += u32::from(now);
@@ -181,7 +181,7 @@ pub fn cases(disturbances: impl IntoIterator<Item = (String, Disturbance)>) -> V
 /// Returns the cases of white noise with these seeds.
 pub fn white(seeds: std::ops::RangeInclusive<u64>, period: f64) -> Vec<Case> {
     cases(seeds.map(|seed| {
-        let disturbance = Disturbance { seed, period, ..disturbance(Kind::White) };
+        let disturbance = Disturbance { seed, period, ..disturbance(DisturbanceKind::White) };
         (format!("white noise every {period} s, seed {seed}"), disturbance)
     }))
 }
@@ -192,7 +192,7 @@ pub fn constant() -> Vec<Case> {
     cases((0..8).map(|i| {
         let direction = Vector3::from(signs(i));
         let name = format!("constant along {:?}", signs(i));
-        (name, Disturbance { direction, ..disturbance(Kind::Constant) })
+        (name, Disturbance { direction, ..disturbance(DisturbanceKind::Constant) })
     }))
 }
 
@@ -200,18 +200,18 @@ pub fn constant() -> Vec<Case> {
 /// periods.
 pub fn square(periods: &[f64]) -> Vec<Case> {
     let directions = [(1.0, 1.0), (-1.0, 1.0), (1.0, -1.0), (-1.0, -1.0)];
-    let all = periods
+    let waves = periods
         .iter()
         .flat_map(|&period| directions.map(|(y, z)| (period, Vector3::new(1.0, y, z))));
-    cases(all.map(|(square_period, direction)| {
+    cases(waves.map(|(square_period, direction)| {
         let name = format!("square wave of {square_period} s along {:?}", direction.as_slice());
-        (name, Disturbance { square_period, direction, ..disturbance(Kind::Square) })
+        (name, Disturbance { square_period, direction, ..disturbance(DisturbanceKind::Square) })
     }))
 }
 
-/// Returns the cases of disturbances that depend on the motion and are chosen again every `period`.
+/// Returns the cases of disturbances that depend on the state and are chosen again every `period`.
 pub fn adversaries(period: f64) -> Vec<Case> {
-    let kinds = [Kind::AlongRate, Kind::AgainstMoment];
+    let kinds = [DisturbanceKind::AlongRate, DisturbanceKind::AgainstMoment];
     cases(kinds.map(|kind| {
         (format!("{kind:?} every {period} s"), Disturbance { period, ..disturbance(kind) })
     }))
@@ -234,11 +234,11 @@ pub fn in_parallel<T: Sync, R: Send>(items: &[T], work: impl Fn(&T) -> R + Sync)
 /// Measurements that no controller may remember after the tick is evaluated again.
 pub fn garbage() -> [Measurement; 4] {
     let measured = |angles, rates| Measurement { angles, rates, ..Measurement::default() };
-    let all = Vector3::repeat;
+    let uniform = Vector3::repeat;
     [
         measured(Vector3::new(0.5, -0.4, 1.0), Vector3::new(0.2, -0.3, 0.1)),
-        measured(all(f64::NAN), all(f64::NAN)),
-        measured(all(1.0), all(f64::INFINITY)),
-        measured(all(1e300), all(-1e300)),
+        measured(uniform(f64::NAN), uniform(f64::NAN)),
+        measured(uniform(1.0), uniform(f64::INFINITY)),
+        measured(uniform(1e300), uniform(-1e300)),
     ]
 }

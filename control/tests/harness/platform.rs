@@ -26,7 +26,7 @@ pub const CALIBRATION_DURATION: f64 = 120.0;
 /// Seed of the calibration flight.
 pub const CALIBRATION_SEED: u64 = 100;
 
-/// True motion of the platform at a tick.
+/// True state of the platform at a tick.
 #[derive(Clone, Copy, Debug)]
 pub struct Truth {
     /// Time of the tick, s.
@@ -41,13 +41,13 @@ fn times(duration: f64) -> impl Iterator<Item = f64> {
     (0..(duration / PERIOD).round() as u32).map(|k| f64::from(k) * PERIOD)
 }
 
-/// Returns the motion at rest in the scenario's initial attitude.
+/// Returns the true states at rest in the scenario's initial attitude.
 pub fn rest(duration: f64) -> Vec<Truth> {
     let angles = Scenario::crmpc2022().initial_angles;
     times(duration).map(|time| Truth { time, angles, rates: Vector3::zeros() }).collect()
 }
 
-/// Returns the motion under CRMPC with exact measurements and the noise of this seed.
+/// Returns the true states under CRMPC with exact measurements and the noise of this seed.
 pub fn scenario(seed: u64) -> Vec<Truth> {
     let scenario = Scenario::crmpc2022();
     let mut config = scenario.config(PERIOD);
@@ -74,18 +74,18 @@ pub fn scenario(seed: u64) -> Vec<Truth> {
         .collect()
 }
 
-/// Returns the motion of the calibration sequence.
+/// Returns the true states along the calibration sequence.
 pub fn calibration(duration: f64) -> Vec<Truth> {
     let start = Scenario::crmpc2022().initial_angles;
     let sequence = SensorData::embedded().calibration;
     let at = |time: f64| {
-        let (state, _) = sequence.motion(Kinematics::Printed, &start, time);
+        let (state, _) = sequence.state_at(Kinematics::Printed, &start, time);
         Truth { time, angles: angles(&state), rates: rates(&state) }
     };
     times(duration).map(at).collect()
 }
 
-/// Returns the readings of sensors without errors in this motion.
+/// Returns the readings of sensors without errors in this state.
 pub fn felt(truth: &Truth) -> Readings {
     let pose = Pose {
         kinematics: Kinematics::Printed,
@@ -98,14 +98,14 @@ pub fn felt(truth: &Truth) -> Readings {
 }
 
 /// Returns the output of the line at each tick.
-pub fn lines(motion: &[Truth], config: &Config) -> Vec<estimation::Line> {
+pub fn lines(trajectory: &[Truth], config: &Config) -> Vec<estimation::Line> {
     let mut sensors = Sensors::new(config, 0.0).unwrap();
     let show = |truth: &Truth| {
         sensors.take(truth.time, &felt(truth));
         let sample = sensors.arrived();
         estimation::Line { sample: sample.number, time: sample.time, readings: sample.readings }
     };
-    motion.iter().map(show).collect()
+    trajectory.iter().map(show).collect()
 }
 
 /// Returns sensors on the line of the data file.
@@ -147,8 +147,8 @@ fn regression(felt: &[Vector3<f64>], readings: &[Vector3<f64>]) -> Correction {
 /// Calibrates all sensors from one flight of the sequence: gyroscope and accelerometer against the
 /// platform's own angles, the magnetometer by the estimator's ellipsoid.
 pub fn calibrated(config: &Config, duration: f64) -> Settings {
-    let motion = calibration(duration + 2.0 * PERIOD);
-    let lines = lines(&motion, config);
+    let trajectory = calibration(duration + 2.0 * PERIOD);
+    let lines = lines(&trajectory, config);
     let fit = Settings {
         calibration: CalibrationMode::Fit,
         calibration_duration: duration - PERIOD,
@@ -156,7 +156,7 @@ pub fn calibrated(config: &Config, duration: f64) -> Settings {
     };
     let estimator = Estimator::new(fit).unwrap();
     let mut memory = estimator.memory();
-    for (truth, line) in motion.iter().zip(&lines) {
+    for (truth, line) in trajectory.iter().zip(&lines) {
         estimator.update(&mut memory, truth.time, line);
     }
     assert_eq!(memory.calibration.status, CalibrationStatus::Fitted);
@@ -165,7 +165,7 @@ pub fn calibrated(config: &Config, duration: f64) -> Settings {
     let corrections = [0, 1].map(|i| {
         let felt: Vec<_> = arrived
             .iter()
-            .map(|line| felt(&motion[usize::try_from(line.sample - 1).unwrap()])[i])
+            .map(|line| felt(&trajectory[usize::try_from(line.sample - 1).unwrap()])[i])
             .collect();
         let readings: Vec<_> = arrived.iter().map(|line| line.readings[i]).collect();
         regression(&felt, &readings)
@@ -185,8 +185,8 @@ pub fn rms(from: f64, errors: impl Iterator<Item = (f64, Vector3<f64>)>) -> Vect
 }
 
 /// Returns the root mean square errors of angles and rates.
-pub fn errors(motion: &[Truth], estimates: &[Estimate], from: f64) -> [Vector3<f64>; 2] {
-    let pairs = || motion.iter().zip(estimates);
+pub fn errors(trajectory: &[Truth], estimates: &[Estimate], from: f64) -> [Vector3<f64>; 2] {
+    let pairs = || trajectory.iter().zip(estimates);
     [
         rms(from, pairs().map(|(truth, estimate)| (truth.time, estimate.angles - truth.angles))),
         rms(from, pairs().map(|(truth, estimate)| (truth.time, estimate.rates - truth.rates))),

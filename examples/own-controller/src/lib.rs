@@ -43,7 +43,7 @@ impl Law for Pd {
         0.04 // s
     }
 
-    fn declare(table: Table<ControllerFmu<Self>>) -> Table<ControllerFmu<Self>> {
+    fn declare(table: VariableTable<ControllerFmu<Self>>) -> VariableTable<ControllerFmu<Self>> {
         let p = parameter("gain.p", "Gain on the tracking error of the angles").real();
         let d = parameter("gain.d", "Gain on the derivative of the tracking error").real();
         table.real(p.min(0.0), |m| &mut m.law.gains.0).real(d.min(0.0), |m| &mut m.law.gains.1)

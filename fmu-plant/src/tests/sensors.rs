@@ -4,7 +4,7 @@ use super::{Constant, assert_same_motion, exchange, integrate, outputs, started,
 use crate::plant::ReentryPlant;
 use fmi2_export::{Failure, Model};
 use nalgebra::Vector3;
-use vehicle::disturbance::Kind;
+use vehicle::disturbance::DisturbanceKind;
 use vehicle::kinematics::{Kinematics, r_inverse};
 use vehicle::sensors::Sample;
 use vehicle::triad::Window;
@@ -13,7 +13,7 @@ use vehicle::triad::Window;
 /// numbers.
 fn mems(instance: &mut ReentryPlant) {
     let p = &mut instance.parameters;
-    p.kind = Kind::None;
+    p.kind = DisturbanceKind::None;
     p.step = 1.0 / 128.0;
     p.sensor_set = 2;
     p.line.period = 1.0 / 64.0;
@@ -44,7 +44,7 @@ fn stepped(instance: &mut ReentryPlant, length: f64) -> Vec<Sample> {
 #[test]
 fn without_sensors_what_they_would_feel_is_shown_at_all_times() {
     let mut instance = started(|instance| {
-        instance.parameters.kind = Kind::None;
+        instance.parameters.kind = DisturbanceKind::None;
         instance.input.moment = Vector3::new(1e5, 2e5, -1e5);
     });
     step(&mut instance, 0.0, 0.37).unwrap();

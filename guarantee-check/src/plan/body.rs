@@ -76,18 +76,18 @@ impl Body {
     /// Returns the attitude with derivatives by coordinates 0 (α) and 1 (β).
     pub(super) fn sloped<const N: usize>(&self, [alpha, beta]: [Interval; 2]) -> Attitude<Dual<N>> {
         let ([u, p], (s, c)) = (self.turning(alpha), sin_cos(beta));
-        let of = |i: usize, value: Interval, first: Interval| {
-            let mut dual = Dual::known(value);
+        let jet = |i: usize, value: Interval, first: Interval| {
+            let mut dual = Dual::fixed(value);
             dual.slope[i] = first;
             dual
         };
         Attitude {
-            u: of(0, u, -(p + p)),
-            p: of(0, p, u + u),
-            sine: of(1, s, c),
-            cosine: of(1, c, -s),
-            mean: Dual::known(self.mean),
-            pitch: Dual::known(self.pitch),
+            u: jet(0, u, -(p + p)),
+            p: jet(0, p, u + u),
+            sine: jet(1, s, c),
+            cosine: jet(1, c, -s),
+            mean: Dual::fixed(self.mean),
+            pitch: Dual::fixed(self.pitch),
         }
     }
 
@@ -96,12 +96,12 @@ impl Body {
         let ([u, p], (s, c)) = (self.turning(alpha), sin_cos(beta));
         let four = Interval::from(-4.0);
         Attitude {
-            u: Jet::of(0, u, -(p + p), four * u),
-            p: Jet::of(0, p, u + u, four * p),
-            sine: Jet::of(1, s, c, -s),
-            cosine: Jet::of(1, c, -s, -c),
-            mean: Jet::known(self.mean),
-            pitch: Jet::known(self.pitch),
+            u: Jet::of_coordinate(0, u, -(p + p), four * u),
+            p: Jet::of_coordinate(0, p, u + u, four * p),
+            sine: Jet::of_coordinate(1, s, c, -s),
+            cosine: Jet::of_coordinate(1, c, -s, -c),
+            mean: Jet::fixed(self.mean),
+            pitch: Jet::fixed(self.pitch),
         }
     }
 }

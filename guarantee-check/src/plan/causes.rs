@@ -1,5 +1,5 @@
-//! What drives the vehicle off a nominal motion: Δ, the inertia error, the errors of measurement,
-//! and the change of F between where the law evaluates it and where the vehicle is.
+//! What drives the vehicle off a nominal trajectory: Δ, the inertia error, the errors of
+//! measurement, and the change of F between where the law evaluates it and where the vehicle is.
 
 use super::body::{Body, sin_cos};
 use super::smoothness::Smoothness;
@@ -28,8 +28,8 @@ pub(super) struct Causes {
     /// Bound on ‖ν‖, rad/s².
     pub(super) inertia: Interval,
     pub(super) later: Mismatch,
-    /// Mismatch while a part of the prediction lies before the nominal motion, where the rates may
-    /// exceed their limit, and the number of such ticks.
+    /// Mismatch while a part of the prediction lies before the nominal trajectory, where the rates
+    /// may exceed their limit, and the number of such ticks.
     pub(super) first: (Mismatch, usize),
     pub(super) smoothness: Smoothness,
     /// Difference of F at the predicted middle of the period from the intended acceleration,
@@ -48,9 +48,9 @@ fn upper(value: Interval) -> Interval {
     Interval::point(value.high)
 }
 
-/// Bounds how F differs along the true and the predicted motion. The distance z of the rates grows
-/// by what drives them apart and by the difference f of F itself, for which a constant is found
-/// that is not exceeded.
+/// Bounds how F differs along the true and the predicted trajectory. The distance z of the rates
+/// grows by what drives them apart and by the difference f of F itself, for which the function
+/// finds an upper bound.
 fn mismatch(s: &Settings, bounds: &Smoothness, inertia: Interval) -> Option<Mismatch> {
     let (d, tau, half) = (number(s.delay), number(s.period_feedback), number(0.5));
     let (root2, root3) = (number(2.0).sqrt(), number(3.0).sqrt());
@@ -90,7 +90,7 @@ fn mismatch(s: &Settings, bounds: &Smoothness, inertia: Interval) -> Option<Mism
 }
 
 impl Causes {
-    /// Finds bounds that hold in a domain which contains the predicted motions, too.
+    /// Finds bounds that hold in a domain which contains the predicted trajectories, too.
     pub(super) fn new(s: &Settings) -> Option<Self> {
         let (d, tau) = (number(s.delay), number(s.period_feedback));
         let body = Body::new(s)?;
@@ -134,12 +134,12 @@ impl Causes {
     }
 }
 
-/// The law evaluates F at the middle of a parabola, from which the predicted motion differs by what
-/// the change of F does within half a period, and by the difference at the middle itself.
+/// The law evaluates F at the middle of a parabola, from which the predicted trajectory differs by
+/// the effect of the change of F within half a period, and by the difference at the middle itself.
 fn middle(bounds: &Smoothness, tau: Interval) -> Interval {
     let Smoothness { by_rates, by_angles, slope, .. } = *bounds;
     let (eighth, square) = (number(0.125), tau.square());
     let change = by_rates * eighth * square + by_angles * square * tau / number(24.0);
-    let itself = number(0.5) * by_rates * tau + eighth * by_angles * square;
-    slope * change / (Interval::ONE - itself)
+    let at_middle = number(0.5) * by_rates * tau + eighth * by_angles * square;
+    slope * change / (Interval::ONE - at_middle)
 }

@@ -25,13 +25,18 @@ const fn place(i: usize, j: usize) -> usize {
 
 impl Jet {
     /// Makes a value that does not depend on the coordinates.
-    pub(super) const fn known(value: Interval) -> Self {
+    pub(super) const fn fixed(value: Interval) -> Self {
         Self { value, slope: [Interval::ZERO; COORDINATES], bend: [Interval::ZERO; PAIRS] }
     }
 
     /// Makes a function of coordinate `i` alone, from its value and derivatives.
-    pub(super) fn of(i: usize, value: Interval, first: Interval, second: Interval) -> Self {
-        let mut jet = Self::known(value);
+    pub(super) fn of_coordinate(
+        i: usize,
+        value: Interval,
+        first: Interval,
+        second: Interval,
+    ) -> Self {
+        let mut jet = Self::fixed(value);
         jet.slope[i] = first;
         jet.bend[place(i, i)] = second;
         jet
@@ -53,7 +58,7 @@ impl Jet {
 
 impl Number for Jet {
     fn constant(value: f64) -> Self {
-        Self::known(Interval::point(value))
+        Self::fixed(Interval::point(value))
     }
     fn squared(self) -> Self {
         self * self
@@ -110,7 +115,7 @@ impl Div for Jet {
     fn div(self, other: Self) -> Self {
         let depends = other.slope.iter().chain(&other.bend).any(|&slope| slope != Interval::ZERO);
         let by = if depends { Interval::ALL } else { Interval::ONE / other.value };
-        self * Self::known(by)
+        self * Self::fixed(by)
     }
 }
 
@@ -121,8 +126,9 @@ mod tests {
     #[test]
     fn oracle_second_derivatives_of_a_product() {
         // f = x² y at (3, 2): f_xx = 2 y, f_xy = 2 x, f_yy = 0.
-        let variable =
-            |i: usize, value: f64| Jet::of(i, value.into(), Interval::ONE, Interval::ZERO);
+        let variable = |i: usize, value: f64| {
+            Jet::of_coordinate(i, value.into(), Interval::ONE, Interval::ZERO)
+        };
         let (x, y) = (variable(0, 3.0), variable(3, 2.0));
         let f = x.squared() * y;
         assert!(f.value.contains(18.0) && f.slope[0].contains(12.0) && f.slope[3].contains(9.0));

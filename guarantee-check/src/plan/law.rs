@@ -18,8 +18,8 @@ pub(super) struct Range {
     pub(super) centre: [Interval; COORDINATES],
     /// Half widths about the middle.
     pub(super) radii: [Interval; COORDINATES],
-    /// Norms of further deviations of the angles (rad) and of the rates (rad/s).
-    pub(super) balls: [Interval; 2],
+    /// Bounds on the norms of further deviations of the angles (rad) and of the rates (rad/s).
+    pub(super) norms: [Interval; 2],
     /// Acceleration in the middle, rad/s², and half widths about it.
     pub(super) acceleration: Vector,
     pub(super) feedback: Vector,
@@ -28,7 +28,7 @@ pub(super) struct Range {
 impl Range {
     /// Largest deviation of each coordinate.
     fn reach(&self) -> [Interval; COORDINATES] {
-        std::array::from_fn(|i| self.radii[i] + self.balls[usize::from(i >= 2)])
+        std::array::from_fn(|i| self.radii[i] + self.norms[usize::from(i >= 2)])
     }
 
     /// Smallest range with the coordinates of both.
@@ -37,7 +37,7 @@ impl Range {
         Self {
             centre: std::array::from_fn(|i| self.centre[i].hull(other.centre[i])),
             radii: std::array::from_fn(|i| wider(self.radii[i], other.radii[i])),
-            balls: std::array::from_fn(|i| wider(self.balls[i], other.balls[i])),
+            norms: std::array::from_fn(|i| wider(self.norms[i], other.norms[i])),
             acceleration: std::array::from_fn(|i| self.acceleration[i].hull(other.acceleration[i])),
             feedback: std::array::from_fn(|i| wider(self.feedback[i], other.feedback[i])),
         }
@@ -57,15 +57,15 @@ fn square(a: &Vector) -> Interval {
     a[0].square() + a[1].square() + a[2].square()
 }
 
-/// Upper bound of the norm of what the first-order expansion leaves out, N m.
+/// Upper bound of the remainder of the first-order expansion, as a norm, N m.
 pub(super) fn remainder(body: &Body, range: &Range) -> Interval {
     let reach = range.reach();
     let [alpha, beta] = [0, 1].map(|i| range.centre[i] + about_zero(reach[i]));
     let rate = |i: usize| {
         let value = range.centre[2 + i] + about_zero(reach[2 + i]);
-        Jet::of(2 + i, value, Interval::ONE, Interval::ZERO)
+        Jet::of_coordinate(2 + i, value, Interval::ONE, Interval::ZERO)
     };
-    let acceleration = |i: usize| Jet::known(range.acceleration[i] + about_zero(range.feedback[i]));
+    let acceleration = |i: usize| Jet::fixed(range.acceleration[i] + about_zero(range.feedback[i]));
     let at = body.bent([alpha, beta]);
     let moment = at.moment(&std::array::from_fn(rate), &std::array::from_fn(acceleration));
     let parts = moment.map(|component| component.remainder(&reach));
@@ -79,11 +79,11 @@ impl Range {
         let reach = self.reach();
         let wider = usize::from(reach[1].high > reach[0].high);
         let half = reach[wider] * Interval::from(0.5);
-        let mut all = *self;
-        (all.radii[0], all.radii[1], all.balls[0]) = (reach[0], reach[1], Interval::ZERO);
-        all.radii[wider] = half;
+        let mut whole = *self;
+        (whole.radii[0], whole.radii[1], whole.norms[0]) = (reach[0], reach[1], Interval::ZERO);
+        whole.radii[wider] = half;
         [-half, half].map(|shift| {
-            let mut part = all;
+            let mut part = whole;
             part.centre[wider] = part.centre[wider] + shift;
             part
         })
@@ -111,8 +111,8 @@ pub(super) fn divided(body: &Body, range: &Range, limit: f64, halvings: u32) -> 
 struct Expansion {
     value: Vector,
     slopes: [Vector; COORDINATES],
-    /// Change by the half width of each component of the acceleration, and its own changes by the
-    /// angles.
+    /// Change by the half width of each component of the acceleration, and the derivatives of this
+    /// change by the angles.
     columns: [Vector; 3],
     column_slopes: [[Vector; 2]; 3],
 }
@@ -121,7 +121,7 @@ impl Expansion {
     fn new(body: &Body, range: &Range) -> Self {
         let at: Attitude<Dual<COORDINATES>> = body.sloped([range.centre[0], range.centre[1]]);
         let rates = std::array::from_fn(|i| Dual::coordinate(2 + i, range.centre[2 + i]));
-        let moment = at.moment(&rates, &range.acceleration.map(Dual::known));
+        let moment = at.moment(&rates, &range.acceleration.map(Dual::fixed));
         let column = |i: usize| at.column(i).map(|entry| entry.value * range.feedback[i]);
         let slope = |i: usize, j: usize| at.column(i).map(|e| e.slope[j] * range.feedback[i]);
         Self {
@@ -167,18 +167,18 @@ fn farthest(value: &Vector, slopes: &[Vector; COORDINATES], range: &Range) -> f6
     }
     let unit = value.map(|component| component / size);
     let (mut along, mut across) = (zero, zero);
-    let mut balls = [[zero; 2]; 2];
+    let mut squares = [[zero; 2]; 2];
     for (i, slope) in slopes.iter().enumerate() {
         let part = dot(&unit, slope).abs();
         let rest = (square(slope) - part.square()).max(zero);
         along = along + part * range.radii[i];
         across = across + rest.sqrt() * range.radii[i];
-        let ball = &mut balls[usize::from(i >= 2)];
-        *ball = [ball[0] + part.square(), ball[1] + rest];
+        let sums = &mut squares[usize::from(i >= 2)];
+        *sums = [sums[0] + part.square(), sums[1] + rest];
     }
-    for (ball, size) in balls.iter().zip(&range.balls) {
-        along = along + ball[0].sqrt() * *size;
-        across = across + ball[1].sqrt() * *size;
+    for (sums, size) in squares.iter().zip(&range.norms) {
+        along = along + sums[0].sqrt() * *size;
+        across = across + sums[1].sqrt() * *size;
     }
     ((size + along).square() + across.square()).sqrt().high
 }
@@ -187,7 +187,7 @@ fn farthest(value: &Vector, slopes: &[Vector; COORDINATES], range: &Range) -> f6
 fn far(size: Interval, slopes: &[Vector; COORDINATES], range: &Range) -> f64 {
     let lengths = slopes.map(|slope| square(&slope));
     let boxed = (0..COORDINATES).map(|i| lengths[i].sqrt() * range.radii[i]);
-    let angles = (lengths[0] + lengths[1]).sqrt() * range.balls[0];
-    let rates = (lengths[2] + lengths[3] + lengths[4]).sqrt() * range.balls[1];
+    let angles = (lengths[0] + lengths[1]).sqrt() * range.norms[0];
+    let rates = (lengths[2] + lengths[3] + lengths[4]).sqrt() * range.norms[1];
     boxed.fold(size + angles + rates, |sum, part| sum + part).high
 }

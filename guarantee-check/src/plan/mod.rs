@@ -21,15 +21,15 @@ use law::Range;
 use nalgebra::Vector6;
 use reach::{Deviation, Reach};
 
-/// The least that a plan leaves of each limit, as shares of the limits; negative where the check
-/// does not confirm the limit.
+/// Smallest shares of the limits that a plan leaves unused; negative where the check does not
+/// confirm the limit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Left {
-    /// Share left of the sideslip angle's domain.
+    /// Unused share of the sideslip angle's domain.
     pub sideslip: f64,
-    /// Share left of the limit on ‖ω‖.
+    /// Unused share of the limit on ‖ω‖.
     pub rate: f64,
-    /// Share left of the limit on ‖m‖.
+    /// Unused share of the limit on ‖m‖.
     pub moment: f64,
 }
 
@@ -55,10 +55,10 @@ impl Left {
 /// Result of the check of a plan.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Verdict {
-    /// The least that is left of each limit.
+    /// Smallest unused share of each limit.
     pub left: Left,
-    /// Time from the beginning of the plan at which each least value occurs, s; infinite beyond the
-    /// horizon.
+    /// Time from the beginning of the plan at which each smallest share occurs, s; infinite beyond
+    /// the horizon.
     pub at: [f64; 3],
     /// Whether the states of the plan follow from its accelerations.
     pub consistent: bool,
@@ -127,7 +127,7 @@ impl PlanCheck {
         Ok(Self { settings: *settings, body, reach, ratio, start })
     }
 
-    /// Checks a plan whose nominal motion began `age` feedback ticks before the plan.
+    /// Checks a plan whose nominal trajectory began `age` feedback ticks before the plan.
     pub fn check(&self, plan: &Plan, age: usize) -> Verdict {
         let mut verdict =
             Verdict { left: Left::ALL, at: [0.0; 3], consistent: self.is_consistent(plan) };
@@ -137,8 +137,8 @@ impl PlanCheck {
             let of_moment = self.moment(&stage, tick);
             for j in 0..self.ratio {
                 let time = (k * self.ratio + j) as f64 * self.settings.period_feedback;
-                let motion = self.motion(&stage, j, tick + j);
-                verdict.record(time, &Left { moment: of_moment, ..motion });
+                let left = self.sideslip_and_rates(&stage, j, tick + j);
+                verdict.record(time, &Left { moment: of_moment, ..left });
             }
         }
         verdict.record(f64::INFINITY, &self.rest(plan));
@@ -146,7 +146,7 @@ impl PlanCheck {
     }
 
     /// Whether a deviation of the predicted state from the plan's first state lies in the set in
-    /// which `tube` lets a nominal motion begin. It is always true otherwise.
+    /// which `tube` lets a nominal trajectory begin. It is always true otherwise.
     pub fn may_begin(&self, deviation: &Vector6<f64>) -> bool {
         let Some((set, size)) = &self.start else { return true };
         let inside = |axis: usize| {
@@ -172,10 +172,10 @@ impl PlanCheck {
     }
 
     /// Bounds sideslip and body rates from feedback tick `j` of a stage until the next.
-    fn motion(&self, stage: &Stage, j: usize, tick: usize) -> Left {
+    fn sideslip_and_rates(&self, stage: &Stage, j: usize, tick: usize) -> Left {
         let ends = [0, 1].map(|i| (stage.at((j + i) as f64), self.reach.at(tick + i)));
-        let here = ends[0].1.angle.max(ends[1].1.angle);
-        let off = here.component() + self.reach.bulge.component();
+        let angle = ends[0].1.angle.max(ends[1].1.angle);
+        let off = angle.component() + self.reach.bulge.component();
         let swept = stage.sideslip(j).abs();
         // The plan's rates are straight lines, and the deviation is convex but for the swing, so
         // that ‖ω‖ is largest at an end.
@@ -184,7 +184,7 @@ impl PlanCheck {
         let rate = ends.map(|(state, deviation)| {
             let size = |i: usize| state[3 + i].abs() + deviation.rate.half;
             let squares = (cosine * size(0)).square() + size(1).square() + size(2).square();
-            squares.sqrt() + deviation.rate.ball + self.reach.swing
+            squares.sqrt() + deviation.rate.norm + self.reach.swing
         });
         let size = swept + off;
         let Settings { sideslip_domain, limit_rate, .. } = self.settings;
@@ -195,11 +195,11 @@ impl PlanCheck {
         }
     }
 
-    /// Bounds the commands of a stage; the result is the least share left of the limit.
+    /// Bounds the commands of a stage; the result is the smallest unused share of the limit.
     fn moment(&self, stage: &Stage, tick: usize) -> f64 {
         let ranges = (0..self.ratio).map(|j| Self::range(stage, j, self.reach.at(tick + j)));
-        let Some(all) = ranges.clone().reduce(|a, b| a.hull(&b)) else { return f64::NAN };
-        let remainder = law::remainder(&self.body, &all);
+        let Some(hull) = ranges.clone().reduce(|a, b| a.hull(&b)) else { return f64::NAN };
+        let remainder = law::remainder(&self.body, &hull);
         let limit = self.settings.limit_moment;
         let largest = ranges.enumerate().map(|(j, range)| {
             let added = self.added(self.reach.at(tick + j));
@@ -217,10 +217,10 @@ impl PlanCheck {
         (self.settings.limit_moment - moment) / self.settings.limit_moment
     }
 
-    /// Moment by the parts of K ô that are not in a box, N m: ‖I W k‖ ≤ λ_max(I) ‖k‖.
+    /// Moment by the parts of K ô that are bounded in norm, N m: ‖I W k‖ ≤ λ_max(I) ‖k‖.
     fn added(&self, deviation: &Deviation) -> Interval {
         let [x, z, y] = self.body.principal();
-        x.max(y).max(z) * deviation.feedback.ball + deviation.inertia
+        x.max(y).max(z) * deviation.feedback.norm + deviation.inertia
     }
 
     /// Range in which the law evaluates the moment of feedback tick `j` of a stage.
@@ -231,7 +231,7 @@ impl PlanCheck {
         Range {
             centre: [state[0], state[1], state[3], state[4], state[5]],
             radii: std::array::from_fn(radius),
-            balls: [law_angle.ball, law_rate.ball],
+            norms: [law_angle.norm, law_rate.norm],
             acceleration: stage.acceleration,
             feedback: [feedback.half; 3],
         }
@@ -242,7 +242,7 @@ impl PlanCheck {
 /// constraint of the optimisation, and is no bound.
 fn start_set(settings: &Settings) -> Result<(InvariantSet, f64), String> {
     let design = Design::new(settings).map_err(|error| error.to_string())?;
-    let set = design.invariant.ok_or("no set exists in which a nominal motion may begin")?;
+    let set = design.invariant.ok_or("no set exists in which a nominal trajectory may begin")?;
     Ok((set, (design.counted * settings.disturbance_bound).max(1e-5)))
 }
 
@@ -278,13 +278,13 @@ impl Stage {
     /// All sideslip angles from feedback tick `j` until the next, with the vertex of the parabola.
     fn sideslip(&self, j: usize) -> Interval {
         let [from, to] = [j, j + 1].map(|j| self.at(j as f64));
-        let mut all = from[1].hull(to[1]);
+        let mut range = from[1].hull(to[1]);
         let (rate, a) = (from[4], self.acceleration[1]);
         if (rate * to[4]).low <= 0.0 && !a.contains(0.0) {
             let vertex = from[1] - Interval::from(0.5) * rate.square() / a;
-            all = all.hull(vertex);
+            range = range.hull(vertex);
         }
-        all
+        range
     }
 }
 

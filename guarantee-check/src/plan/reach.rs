@@ -1,15 +1,15 @@
-//! How far the vehicle can be from a nominal motion, tick by tick.
+//! How far the vehicle can be from a nominal trajectory, tick by tick.
 //!
 //! Let the command of tick k act over [T_k, T_k + τ), computed from a measurement of t_k = T_k − d.
-//! o is the vehicle's deviation from the nominal motion, ô that of the predicted state, and
-//! ô_k = o(T_k) − q_k, where q_k is the error of the prediction. With Φ = A + Γ K
+//! o is the vehicle's deviation from the nominal trajectory, ô that of the predicted state, and ô_k
+//! = o(T_k) − q_k, where q_k is the error of the prediction. With Φ = A + Γ K
 //!
 //! o(T_k+1) = Φ o(T_k) − Γ K q_k + ∫ [T_k+1 − v; 1] w(v) dv,
 //!
 //! w = Δ + ν + F(x, m) − F(mid-period, m): disturbance, the effect ν of the inertia error, and the
 //! mismatch. q_k holds what Δ and ν did since t_k, −A_d e_k for the measurement's error e_k, and a
-//! part φ_k because F differs along the two motions. The linear parts are summed exactly; mismatch
-//! and φ are bounded as vectors.
+//! part φ_k because F differs along the two trajectories. The linear parts are summed exactly;
+//! mismatch and φ are bounded as vectors.
 
 use super::body::Body;
 use super::causes::{Causes, Mismatch};
@@ -21,28 +21,28 @@ use control::error_dynamics::InvariantSet;
 use nalgebra::Vector2;
 use std::collections::VecDeque;
 
-/// Bound on a vector with three components: its part in a box of this half width, and the norm of
-/// the remaining part.
+/// Bound on a vector with three components: the half width of the box that contains one part of it,
+/// and the norm of the other part.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Extent {
     pub(super) half: Interval,
-    pub(super) ball: Interval,
+    pub(super) norm: Interval,
 }
 
 impl Extent {
-    const NONE: Self = Self { half: Interval::ZERO, ball: Interval::ZERO };
+    const NONE: Self = Self { half: Interval::ZERO, norm: Interval::ZERO };
 
     pub(super) fn max(self, other: Self) -> Self {
-        Self { half: self.half.max(other.half), ball: self.ball.max(other.ball) }
+        Self { half: self.half.max(other.half), norm: self.norm.max(other.norm) }
     }
 
-    fn more(self, half: Interval, ball: Interval) -> Self {
-        Self { half: upper(self.half + half), ball: upper(self.ball + ball) }
+    fn more(self, half: Interval, norm: Interval) -> Self {
+        Self { half: upper(self.half + half), norm: upper(self.norm + norm) }
     }
 
     /// Bound on one component.
     pub(super) fn component(self) -> Interval {
-        self.half + self.ball
+        self.half + self.norm
     }
 }
 
@@ -85,7 +85,7 @@ fn number(value: f64) -> Interval {
 }
 
 /// Sums over the responses of one row r to everything that drives the deviation, by the number of
-/// periods since the nominal motion began.
+/// periods since the nominal trajectory began.
 struct Response {
     /// ∫ |r Φⁱ [u; 1]| du over all unit pulses that have been seen.
     seen: Vec<Interval>,
@@ -95,13 +95,13 @@ struct Response {
     mismatched: Vec<Interval>,
     /// Part by the mismatch, if it is summed along the predictions.
     revised: Vec<Interval>,
-    /// Part by φ of the first tick, which is the vehicle's own deviation there.
+    /// Part by φ of the first tick, which is the deviation of the vehicle there.
     begun: Vec<Interval>,
     /// Part by the moment of the inertia error, relative to its bound.
     inertia: Vec<Interval>,
 }
 
-/// The tube of deviations around any nominal motion of one set of settings.
+/// The tube of deviations around any nominal trajectory for one set of settings.
 pub(super) struct Reach {
     deviations: Vec<Deviation>,
     forever: Deviation,
@@ -135,7 +135,7 @@ impl Reach {
         Builder::new(s)?.build(start)
     }
 
-    /// Returns the deviations `tick` feedback ticks after the nominal motion began.
+    /// Returns the deviations `tick` feedback ticks after the nominal trajectory began.
     pub(super) fn at(&self, tick: usize) -> &Deviation {
         self.deviations.get(tick).unwrap_or(&self.forever)
     }
@@ -164,7 +164,7 @@ impl<'a> Builder<'a> {
     }
 
     /// Growth of a compensated moment while the vehicle turns for `age`, faster than its limit
-    /// before the nominal motion began, and the angles are measured with errors.
+    /// before the nominal trajectory began, and the angles are measured with errors.
     fn grown(&self, age: Interval) -> Interval {
         let early = self.causes.smoothness.turning * number(self.s.delay).square();
         let jump = number(2.0).sqrt() * self.causes.errors[0] + early;
@@ -175,7 +175,7 @@ impl<'a> Builder<'a> {
     fn respond(&self, row: Pair) -> Response {
         let (zero, tau, d) = (Interval::ZERO, number(self.s.period_feedback), number(self.s.delay));
         let mut sums = [zero; 4];
-        let mut all = Response {
+        let mut response = Response {
             seen: vec![zero],
             erred: vec![zero],
             mismatched: vec![zero],
@@ -195,42 +195,42 @@ impl<'a> Builder<'a> {
                 excess.pop_front();
             }
             let age = number(i as f64) * tau + d + tau + number(0.5) * tau;
-            all.begun.push(self.unseen(&reached));
+            response.begun.push(self.unseen(&reached));
             let inertia = wave * self.grown(age);
             sums = [sums[0] + wave, sums[1] + small[0], sums[2] + inertia, sums[3] + small[1]];
-            all.seen.push(sums[0]);
+            response.seen.push(sums[0]);
             let more = |j: usize| excess.iter().fold(zero, |sum, part| sum + part[j]);
-            all.mismatched.push(sums[1] + more(0));
-            all.revised.push(sums[3] + more(1));
-            all.inertia.push(sums[2]);
-            all.erred.push(earlier + self.erred(&reached, 1));
+            response.mismatched.push(sums[1] + more(0));
+            response.revised.push(sums[3] + more(1));
+            response.inertia.push(sums[2]);
+            response.erred.push(earlier + self.erred(&reached, 1));
             earlier = earlier + self.erred(&reached, 0);
         }
         let tail = self.axis.tails(self.steps).0 * (row[0].abs() + row[1].abs());
-        self.end(&mut all, tail, earlier);
-        all
+        self.end(&mut response, tail, earlier);
+        response
     }
 
     /// Adds what follows when every response has faded, bounded by the sum `tail` of its size.
-    fn end(&self, all: &mut Response, tail: Interval, earlier: Interval) {
+    fn end(&self, response: &mut Response, tail: Interval, earlier: Interval) {
         let tau = number(self.s.period_feedback);
         let end = number(self.s.delay) + tau;
         let last = |values: &[Interval]| values.last().copied().unwrap_or(Interval::ALL);
         let one = [Interval::ONE, Interval::ONE];
         let more = tail * end.max(Interval::ONE);
-        let seen = last(&all.seen) + more * tau;
+        let seen = last(&response.seen) + more * tau;
         let small = self.mismatched(&one, &self.causes.first.0);
-        let revised = last(&all.revised) + more * small[1];
-        let small = last(&all.mismatched) + more * small[0];
-        let inertia = last(&all.inertia) + more * tau * self.grown(number(1e9));
+        let revised = last(&response.revised) + more * small[1];
+        let small = last(&response.mismatched) + more * small[0];
+        let inertia = last(&response.inertia) + more * tau * self.grown(number(1e9));
         let erred = earlier + more * (self.erred(&one, 0) + self.erred(&one, 1));
-        all.seen.push(seen);
-        all.mismatched.push(small);
-        all.revised.push(revised);
-        all.inertia.push(inertia);
-        all.erred.push(erred);
+        response.seen.push(seen);
+        response.mismatched.push(small);
+        response.revised.push(revised);
+        response.inertia.push(inertia);
+        response.erred.push(erred);
         let begun = tail * self.unseen(&one);
-        all.begun.extend([begun, begun]);
+        response.begun.extend([begun, begun]);
     }
 
     /// Effect of the errors through one of the matrices.
@@ -240,9 +240,9 @@ impl<'a> Builder<'a> {
         by(0) + by(1)
     }
 
-    /// Effect of the mismatch of one tick, summed along the true motion with φ, and along the
+    /// Effect of the mismatch of one tick, summed along the true trajectory with φ, and along the
     /// predictions. The part of F that is odd about the middle of the period shifts the angle only.
-    fn mismatched(&self, row: &Pair, of: &Mismatch) -> [Interval; 2] {
+    fn mismatched(&self, row: &Pair, mismatch: &Mismatch) -> [Interval; 2] {
         let tau = number(self.s.period_feedback);
         let Causes { smoothness, middle, .. } = &self.causes;
         let cube = tau.square() * tau;
@@ -252,11 +252,11 @@ impl<'a> Builder<'a> {
         let half = number(0.5) * tau;
         let k = [self.s.feedback.k1, self.s.feedback.k2].map(|k| number(k).abs());
         let fed = (row[0] * half * tau + row[1] * tau).abs()
-            * (k[0] * of.unseen[0] + k[1] * of.unseen[1]);
+            * (k[0] * mismatch.unseen[0] + k[1] * mismatch.unseen[1]);
         let swing = most * smoothness.bend * cube / number(24.0)
             + at(half) * tau * *middle
             + row[0].abs() * smoothness.slope * cube / number(12.0);
-        [most * of.drifted + fed + swing, late * of.revised + swing]
+        [most * mismatch.drifted + fed + swing, late * mismatch.revised + swing]
     }
 
     fn build(&self, start: Option<(&InvariantSet, f64)>) -> Option<Reach> {
@@ -279,11 +279,11 @@ impl<'a> Builder<'a> {
         let accelerated = forever.feedback.more(zero, self.causes.inertia * last(&responses[4]));
         let bulge = Extent::NONE.more(
             eighth * tau.square() * accelerated.half,
-            eighth * tau.square() * accelerated.ball,
+            eighth * tau.square() * accelerated.norm,
         );
         let Smoothness { slope, bend, .. } = self.causes.smoothness;
         let swing = eighth * tau.square() * (slope + bend * tau);
-        forever.rate.ball.high.is_finite().then_some(Reach { deviations, forever, bulge, swing })
+        forever.rate.norm.high.is_finite().then_some(Reach { deviations, forever, bulge, swing })
     }
 
     /// Support of the start set along r Φⁿ for each n.
@@ -296,11 +296,11 @@ impl<'a> Builder<'a> {
             number(along * size * (1.0 + 1e-9) + 1e-15)
         };
         let powers = self.axis.transitions(self.steps + 1);
-        let mut all: Vec<Interval> = powers.map(|power| support(&power)).collect();
+        let mut supports: Vec<Interval> = powers.map(|power| support(&power)).collect();
         let largest = set.support(&Vector2::x()).max(set.support(&Vector2::y()));
         let tail = self.axis.tails(self.steps).0 * (row[0].abs() + row[1].abs());
-        all.push(tail * number(largest * size));
-        all
+        supports.push(tail * number(largest * size));
+        supports
     }
 
     fn deviation(
@@ -316,14 +316,14 @@ impl<'a> Builder<'a> {
             let Response { seen, erred, .. } = &responses[i];
             *disturbance * seen[n] + erred[n] + starts[i][n]
         };
-        let own = |i: usize| {
+        let vehicle = |i: usize| {
             let Response { seen, mismatched, revised, begun, .. } = &responses[i];
             let erred = if n == 0 { self.erred(&rows[i], 2) } else { Interval::ZERO };
             let along = mismatched[n] + begun[n];
             let small = along.min(revised[n] + self.unseen(&rows[i]));
             let pulses = seen[n] + unseen[i];
             let half = half(i) + *disturbance * unseen[i] + erred;
-            Extent { half: upper(half), ball: upper(*inertia * pulses + small) }
+            Extent { half: upper(half), norm: upper(*inertia * pulses + small) }
         };
         let law = |i: usize, compensated: bool| {
             let Response { seen, mismatched, revised, begun, .. } = &responses[i];
@@ -334,13 +334,13 @@ impl<'a> Builder<'a> {
                 small = (mismatched[n] + begun[n] + self.unseen(&rows[i])).min(revised[n]);
             }
             let inertia = if compensated { *inertia * seen[n] } else { Interval::ZERO };
-            Extent { half: upper(half), ball: upper(inertia + small) }
+            Extent { half: upper(half), norm: upper(inertia + small) }
         };
         let moment = number(self.s.inertia_error) / (Interval::ONE - number(self.s.inertia_error))
             * number(self.s.limit_moment);
         Deviation {
-            angle: own(0),
-            rate: own(1),
+            angle: vehicle(0),
+            rate: vehicle(1),
             law_angle: law(2, true),
             law_rate: law(3, true),
             feedback: law(4, false),

@@ -25,7 +25,7 @@ fn down_to_zero(value: f64) -> Interval {
 }
 
 impl PlanCheck {
-    /// Bounds everything after the horizon.
+    /// Bounds what happens after the horizon.
     pub(super) fn rest(&self, plan: &Plan) -> Left {
         let nothing = Left { sideslip: f64::NAN, rate: f64::NAN, moment: f64::NAN };
         let Some(last) = plan.states.last() else { return nothing };
@@ -42,18 +42,18 @@ impl PlanCheck {
         };
         let angles = [travelled(0), travelled(1)];
         let rates: [f64; 3] = std::array::from_fn(|i| last[3 + i]);
-        let left = self.motion_at_rest(angles[1], &rates);
+        let left = self.sideslip_and_rates_at_rest(angles[1], &rates);
         Left { moment: self.moment_at_rest(angles, &rates, &braking), ..left }
     }
 
-    fn motion_at_rest(&self, sideslip: Interval, rates: &[f64; 3]) -> Left {
+    fn sideslip_and_rates_at_rest(&self, sideslip: Interval, rates: &[f64; 3]) -> Left {
         let forever = self.reach.forever();
         let off = forever.angle.component() + self.reach.bulge.component();
         let near = (sideslip.abs() - off).low.max(0.0);
         let cosine = super::body::sin_cos(Interval::from(near)).1;
         let size = |i: usize| Interval::from(rates[i].abs()) + forever.rate.half;
         let squares = (cosine * size(0)).square() + size(1).square() + size(2).square();
-        let rate = squares.sqrt() + forever.rate.ball + self.reach.swing;
+        let rate = squares.sqrt() + forever.rate.norm + self.reach.swing;
         let (domain, limit) = (self.settings.sideslip_domain, self.settings.limit_rate);
         Left {
             sideslip: (domain - (sideslip.abs() + off).high) / domain,
@@ -62,7 +62,7 @@ impl PlanCheck {
         }
     }
 
-    /// Least share of the moment that is left at any of the `angles`.
+    /// Smallest unused share of the moment limit at any of the `angles`.
     fn moment_at_rest(
         &self,
         angles: [Interval; 2],
@@ -71,7 +71,7 @@ impl PlanCheck {
     ) -> f64 {
         // The law evaluates the moment at the predicted attitude, which deviates from the plan's.
         let off = self.reach.forever().law_angle.component().high;
-        let mut boxes = divided(angles.map(|all| all + Interval::new(-off, off)));
+        let mut boxes = divided(angles.map(|angle| angle + Interval::new(-off, off)));
         let mut least = 1.0_f64;
         while let Some(angles) = boxes.pop() {
             let range = self.at_rest(angles, rates, braking);
@@ -96,8 +96,8 @@ impl PlanCheck {
     fn at_rest(&self, angles: [Interval; 2], rates: &[f64; 3], braking: &[Interval; 3]) -> Range {
         let half = Interval::from(0.5);
         let Deviation { law_rate, feedback, .. } = *self.reach.forever();
-        let middle = |all: Interval| Interval::from(all.middle());
-        let radius = |all: Interval| (all - middle(all)).abs();
+        let middle = |side: Interval| Interval::from(side.middle());
+        let radius = |side: Interval| (side - middle(side)).abs();
         let rates = rates.map(down_to_zero);
         let sides = [angles[0], angles[1], rates[0], rates[1], rates[2]];
         let deviation = |i: usize| if i < 2 { Interval::ZERO } else { law_rate.half };
@@ -105,7 +105,7 @@ impl PlanCheck {
         Range {
             centre: sides.map(middle),
             radii: std::array::from_fn(|i| Interval::from((radius(sides[i]) + deviation(i)).high)),
-            balls: [Interval::ZERO, law_rate.ball],
+            norms: [Interval::ZERO, law_rate.norm],
             acceleration: std::array::from_fn(|i| -(braking[i] * middle(rates[i]))),
             feedback: std::array::from_fn(|i| Interval::from((feedback.half + largest(i)).high)),
         }
@@ -115,12 +115,12 @@ impl PlanCheck {
 /// Divides a box of angles into boxes of at most [`WIDTH`]. The moment has the period 2π in α.
 fn divided(angles: [Interval; 2]) -> Vec<[Interval; 2]> {
     let turn = 2.0 * std::f64::consts::PI.next_up();
-    let once = |all: Interval| Interval::new(all.low, all.high.min(all.low + turn));
-    let parts = |all: Interval| {
-        let count = (all.width() / WIDTH).ceil().clamp(1.0, 1e4) as usize;
-        let at = move |i: usize| all.low + (all.high - all.low) * (i as f64 / count as f64);
+    let once = |angle: Interval| Interval::new(angle.low, angle.high.min(angle.low + turn));
+    let parts = |angle: Interval| {
+        let count = (angle.width() / WIDTH).ceil().clamp(1.0, 1e4) as usize;
+        let at = move |i: usize| angle.low + (angle.high - angle.low) * (i as f64 / count as f64);
         (0..count)
-            .map(move |i| Interval::new(at(i), if i + 1 == count { all.high } else { at(i + 1) }))
+            .map(move |i| Interval::new(at(i), if i + 1 == count { angle.high } else { at(i + 1) }))
     };
     let beside = |alpha: Interval| parts(angles[1]).map(move |beta| [alpha, beta]);
     parts(once(angles[0])).flat_map(beside).collect()

@@ -5,9 +5,9 @@
 //!
 //! F = h + R γ,  h = [x₂ (2 s x₁ + x₃)/c, −c x₁ (s x₁ + x₃), 0],  c² x₁² + x₂² + x₃² = ‖ω‖².
 //!
-//! Along a motion with m held, F′ = R″ ω + 2 R′ γ + R γ′ and F″ = R‴ ω + 3 R″ γ + 3 R′ γ′ + R γ″,
-//! as ẋ = (R ω)′. The derivatives of R are those of V⁻¹ [p, t, q] = [t − p tan β, q, −(c p + s t)]
-//! by β, and by α those of T, which has the norm 1.
+//! Along a trajectory with m held, F′ = R″ ω + 2 R′ γ + R γ′ and F″ = R‴ ω + 3 R″ γ + 3 R′ γ′ + R
+//! γ″, as ẋ = (R ω)′. The derivatives of R are those of V⁻¹ [p, t, q] = [t − p tan β, q, −(c p + s
+//! t)] by β, and by α those of T, which has the norm 1.
 
 use super::body::{Body, sin_cos};
 use crate::interval::Interval;
@@ -21,9 +21,9 @@ pub(super) struct Smoothness {
     pub(super) by_rates: Interval,
     /// Bound on ‖∂F/∂(α, β)‖, 1/s².
     pub(super) by_angles: Interval,
-    /// Bound on ‖F′‖ along a motion with m held, rad/s³.
+    /// Bound on ‖F′‖ along a trajectory with m held, rad/s³.
     pub(super) slope: Interval,
-    /// Bound on ‖F″‖ along a motion with m held, rad/s⁴.
+    /// Bound on ‖F″‖ along a trajectory with m held, rad/s⁴.
     pub(super) bend: Interval,
     /// Bound on ‖ω̇‖, rad/s².
     pub(super) turning: Interval,
@@ -40,15 +40,16 @@ fn hypot(values: &[Interval]) -> Interval {
 }
 
 /// Divides the interval into `count` parts.
-fn parts(all: Interval, count: u32) -> impl Iterator<Item = Interval> + Clone {
-    let at = move |i: u32| all.low + (all.high - all.low) * f64::from(i) / f64::from(count);
+fn parts(range: Interval, count: u32) -> impl Iterator<Item = Interval> + Clone {
+    let at = move |i: u32| range.low + (range.high - range.low) * f64::from(i) / f64::from(count);
     (0..count).map(move |i| {
-        let high = if i + 1 == count { all.high } else { at(i + 1) };
+        let high = if i + 1 == count { range.high } else { at(i + 1) };
         Interval::new(at(i), high)
     })
 }
 
-/// Largest sizes of the derivatives of R by angles, for |β| up to the one with this sine and cosine.
+/// Largest sizes of the derivatives of R by angles, for |β| up to the one with this sine and
+/// cosine.
 struct Kinematics {
     /// Bounds on ‖R‖ and on its first, second and third derivative along a unit vector.
     turns: [Interval; 4],

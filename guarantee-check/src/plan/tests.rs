@@ -1,4 +1,4 @@
-//! Hand-made plans, and motions that are driven as far from a plan as possible.
+//! Hand-made plans, and trajectories that are driven as far from a plan as possible.
 
 use super::*;
 use control::linearise;
@@ -70,7 +70,7 @@ fn corrupted_plans_are_refuted() {
     let fast = |rate: f64| planned([10.0, 0.0, -30.0, 0.0, rate, 0.0], &[0.0, 0.0, -5.0 * rate]);
     let good = fast(4.3);
     assert!(check.check(&good, 0).left.rate >= 0.0);
-    // The same plan is too fast for a motion that began earlier.
+    // The same plan is too fast for a trajectory that began earlier.
     assert!(check.check(&good, 25).left.rate < 0.0);
     // Rates that are scaled lead to other states, or exceed the limit.
     assert!(check.check(&fast(4.3 * 1.4), 0).left.rate < 0.0);
@@ -142,17 +142,17 @@ fn oracle_no_adversary_exceeds_the_deviation_and_the_worst_one_comes_near() {
         let bounds = [deviation.angle, deviation.rate, deviation.feedback];
         for inertia in [1.0 - s.inertia_error, 1.0, 1.0 + s.inertia_error] {
             for (i, row) in rows.into_iter().enumerate() {
-                let found = attained(&s, inertia, row, ticks);
-                for (j, found) in found.into_iter().enumerate() {
-                    // K o compensates the inertia error, too, which has a bound of its own.
+                let deviations = attained(&s, inertia, row, ticks);
+                for (j, deviation) in deviations.into_iter().enumerate() {
+                    // K o compensates the inertia error, too, which has a separate bound.
                     let more = if j == 2 { 0.2 * bounds[2].half.high } else { 0.0 };
                     assert!(
-                        found <= bounds[j].component().high + more,
+                        deviation <= bounds[j].component().high + more,
                         "{ticks} {inertia} {i} {j}"
                     );
                 }
                 if inertia == 1.0 {
-                    let share = found[i] / bounds[i].half.high;
+                    let share = deviations[i] / bounds[i].half.high;
                     assert!(share > 0.97 && share < 1.03, "{ticks} {i}: {share}");
                 }
             }

@@ -46,7 +46,7 @@ pub(crate) fn correlation(
         let mut pair = [0; 2];
         for (place, name) in pair.iter_mut().zip(correlation.between.get_ref()) {
             let names = varied.iter().map(|(name, _)| *name);
-            source.known(
+            source.check_names(
                 [&Spanned::new(span.clone(), name.clone())],
                 "parameter that varies",
                 names,

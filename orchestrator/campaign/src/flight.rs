@@ -167,7 +167,7 @@ impl<'a> Flight<'a> {
                 let outcome = master.run(&mut observers);
                 let Watch { broken, time, .. } = watch;
                 // An instance that failed is not used again.
-                if !matches!(outcome, Err(Error::Unit { .. })) {
+                if !matches!(outcome, Err(Error::Call { .. })) {
                     self.master = Some(master);
                 }
                 (outcome, broken, time)
@@ -181,8 +181,8 @@ impl<'a> Flight<'a> {
                 (CaseStatus::Ended, format!("limit {} broken", limit.unwrap_or_default()))
             }
             Err(error @ Error::Lost { .. }) => (CaseStatus::Lost, error.to_string()),
-            Err(error @ Error::EndedByUnit { .. }) => (CaseStatus::Ended, error.to_string()),
-            Err(error @ (Error::Unit { .. } | Error::Import(Import::Fmu { .. }))) => {
+            Err(error @ Error::EndedByInstance { .. }) => (CaseStatus::Ended, error.to_string()),
+            Err(error @ (Error::Call { .. } | Error::Import(Import::Fmu { .. }))) => {
                 (CaseStatus::Failed, error.to_string())
             }
             Err(error) => return Err(error),

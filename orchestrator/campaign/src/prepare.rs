@@ -90,7 +90,7 @@ pub(crate) fn observe(campaign: &Campaign, experiment: &Observe) -> Result<Obser
     signals.extend(campaign.signals.clone());
     let names = Metrics::names(experiment);
     let names = || names.iter().map(String::as_str).filter(|name| !OF_THE_MACHINE.contains(name));
-    source.known(&campaign.metrics, "metric of the experiment", names())?;
+    source.check_names(&campaign.metrics, "metric of the experiment", names())?;
     let mut metrics = BTreeMap::new();
     for name in &campaign.metrics {
         let Some(measure) = experiment.metrics.get(name.get_ref()) else { continue };

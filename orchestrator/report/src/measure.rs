@@ -176,7 +176,7 @@ impl Gauge {
             let least = self.measure.bound.unwrap_or(0.0);
             self.rises += u64::from(rise.is_some_and(|rise| rise > least));
         }
-        if self.measure.kind == Kind::RmsAbove {
+        if self.measure.kind == MeasureKind::RmsAbove {
             self.spectrum_samples.extend(values);
         }
         // By the trapezoidal rule. At the first sample, the values before it are zero and no time

@@ -1,4 +1,5 @@
-//! Disturbance as a table: every row has a time and a direction, which holds until the next row.
+//! Disturbance as a lookup table: every row has a time and a direction, which holds until the next
+//! row.
 
 use crate::error::Error;
 use crate::time::tolerance;
@@ -8,11 +9,11 @@ use serde::{Deserialize, Serialize};
 /// Shortest period with which a table repeats, s.
 const SHORTEST_PERIOD: f64 = 1e-3;
 
-/// Table of a piecewise constant disturbance. A row that holds for no longer than the tolerance of
-/// times is passed over.
+/// Lookup table of a piecewise constant disturbance. A row that holds for no longer than the
+/// tolerance of times is passed over.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Table {
+pub struct DisturbanceTable {
     /// Time after which the table repeats, with the time before the first row, s. A table with
     /// period 0 does not repeat, and its last row holds.
     #[serde(default)]
@@ -32,7 +33,7 @@ pub struct Row {
     pub direction: Vector3<f64>,
 }
 
-impl Table {
+impl DisturbanceTable {
     /// Refuses values that the definitions of the fields do not allow.
     ///
     /// # Errors
@@ -42,11 +43,11 @@ impl Table {
         let repeats = self.period >= SHORTEST_PERIOD && self.period.is_finite();
         if !(repeats || self.period == 0.0) {
             let problem = format!("= {} s must be 0 or at least {SHORTEST_PERIOD} s", self.period);
-            return Err(Error::of("disturbance.table.period", problem));
+            return Err(Error::parameter("disturbance.table.period", problem));
         }
         let mut before: Option<f64> = None;
         for (i, Row { time, direction }) in self.rows.iter().enumerate() {
-            let refuse = |problem: String| Err(Error::of(name(i, "time"), problem));
+            let refuse = |problem: String| Err(Error::parameter(name(i, "time"), problem));
             if !(*time >= 0.0 && time.is_finite()) {
                 return refuse(format!("= {time} s must be finite and not negative"));
             }
@@ -63,7 +64,7 @@ impl Table {
             for (axis, factor) in ["x", "y", "z"].into_iter().zip(direction) {
                 if !(-1.0..=1.0).contains(factor) {
                     let problem = format!("= {factor} must lie between -1 and 1");
-                    return Err(Error::of(name(i, &format!("direction.{axis}")), problem));
+                    return Err(Error::parameter(name(i, &format!("direction.{axis}")), problem));
                 }
             }
             before = Some(*time);
@@ -110,7 +111,7 @@ impl Table {
             None if self.rows.is_empty() || self.period == 0.0 => return None,
             None => self.begin(start, repetition + 1.0),
         };
-        // Far from its start a table cannot be told apart from its next repetition.
+        // Far from its start, rounding makes a table and its next repetition indistinguishable.
         (next > time).then_some(next)
     }
 

@@ -40,8 +40,8 @@ impl Plant {
         self.pose(time, input).felt(&self.surroundings)
     }
 
-    /// What sampled sensors feel at `time` (s) without their errors: on the turntable, if there is
-    /// one, and what happens at their next sample.
+    /// Readings without errors that the sampled sensors take at `time` (s): in the pose of the
+    /// turntable, if there is one and a sample is due.
     fn felt_by(&self, sensors: &Sensors, time: f64, input: &Input) -> Readings {
         let vehicle = self.pose(time, input);
         let pose = match (&self.turntable, sensors.due(time)) {

@@ -5,7 +5,7 @@ use super::{Interval, RESERVE, Robust, norm_of_columns};
 use crate::crmpc::guarantee::{self, Dynamics, Onset};
 use crate::crmpc::settings::Settings;
 use crate::crmpc::stages::Point;
-use crate::mpc::Motion;
+use crate::mpc::ErrorTrajectory;
 use serde::{Deserialize, Serialize};
 
 /// Margins that the first interval of a plan leaves to the limits, beyond the reserve for
@@ -31,7 +31,7 @@ impl Robust {
     /// theorem (docs/guarantee.md), which require the whole tightening.
     ///
     /// `checked` says that [`crate::mpc::Bounded::violated`] has already found no violation in it.
-    pub(super) fn certify(&self, motion: &Motion<2>, checked: bool) -> Option<Certified> {
+    pub(super) fn certify(&self, motion: &ErrorTrajectory<2>, checked: bool) -> Option<Certified> {
         let Self { settings, dynamics, design, stages, .. } = self;
         let n = motion.inputs.len();
         if design.counted < 1.0
@@ -123,7 +123,7 @@ impl Robust {
     }
 
     /// Returns the margins of a trajectory.
-    pub(super) fn margins(&self, motion: &Motion<2>) -> Margins {
+    pub(super) fn margins(&self, motion: &ErrorTrajectory<2>) -> Margins {
         self.carry(motion);
         self.margins_of_first(&self.stages.point(motion, 0), &self.stages.point(motion, 1))
     }

@@ -15,7 +15,7 @@ use super::guarantee::{self, Carried, Dynamics, End, Held, MomentLoss, Onset, Sw
 use super::settings::Settings;
 use super::stages::{Point, Stages};
 use crate::linearise::Linear;
-use crate::mpc::Motion;
+use crate::mpc::ErrorTrajectory;
 use nalgebra::{Matrix3, Vector3};
 use std::cell::RefCell;
 use vehicle::math::cos;
@@ -92,7 +92,7 @@ impl Robust {
     }
 
     /// Carries along what the changes of acceleration of a trajectory leave.
-    pub(super) fn carry(&self, motion: &Motion<2>) {
+    pub(super) fn carry(&self, motion: &ErrorTrajectory<2>) {
         let Some(switching) = &self.design.tightening.switching else { return };
         let mut carried_at_stages = self.carried.borrow_mut();
         carried_at_stages.clear();

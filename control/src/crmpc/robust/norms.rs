@@ -2,12 +2,12 @@
 //! about a trajectory.
 
 use super::{Interval, Robust};
-use crate::crmpc::set::{ROUNDING, ball};
+use crate::crmpc::set::{ROUNDING, norm_constraint};
 use crate::crmpc::settings::Settings;
 use crate::crmpc::stages::Point;
 use crate::linearise::InverseKinematics;
-use crate::mpc::balls::At;
-use crate::mpc::{self, Balls, Bounded, Motion, State};
+use crate::mpc::constraints::StagePoint;
+use crate::mpc::{self, Bounded, ErrorTrajectory, StageConstraints, State};
 use nalgebra::Vector3;
 use std::ops::Range;
 use vehicle::math::cos;
@@ -17,7 +17,7 @@ impl Robust {
     /// violates with the bounds about itself or smaller ones. `keep` receives the bounds.
     pub(super) fn first_and_last(
         &self,
-        motion: &Motion<2>,
+        motion: &ErrorTrajectory<2>,
         intervals: Range<usize>,
         mut keep: impl FnMut(usize, (f64, f64)),
     ) -> Option<Range<usize>> {
@@ -32,21 +32,24 @@ impl Robust {
 }
 
 impl Bounded<2> for Robust {
-    fn has_state_balls(&self) -> bool {
+    fn constrains_states(&self) -> bool {
         true
     }
 
-    fn balls(
+    fn norm_constraints(
         &self,
         k: usize,
         state: &State<2>,
         input: &Vector3<f64>,
         bounds: (f64, f64),
-    ) -> Balls<2> {
+    ) -> StageConstraints<2> {
         let [angles, rates, a] = self.stages.nominal(k, state, input);
         let at = InverseKinematics::at(&angles).linearise(&self.stages.body, &rates, &a);
         let (rate, moment) = self.nonempty(bounds);
-        Balls { state: ball(&at.rates, rate), input: ball(&at.moment, moment) }
+        StageConstraints {
+            state: norm_constraint(&at.rates, rate),
+            input: norm_constraint(&at.moment, moment),
+        }
     }
 
     fn squares(
@@ -66,14 +69,19 @@ impl Bounded<2> for Robust {
 
     fn violated(
         &self,
-        motion: &Motion<2>,
+        motion: &ErrorTrajectory<2>,
         intervals: Range<usize>,
         bounds: &mut mpc::Bounds,
     ) -> Option<Range<usize>> {
         self.first_and_last(motion, intervals, |k, about| bounds.set(k, about))
     }
 
-    fn bounds_about(&self, motion: &Motion<2>, intervals: Range<usize>, bounds: &mut mpc::Bounds) {
+    fn bounds_about(
+        &self,
+        motion: &ErrorTrajectory<2>,
+        intervals: Range<usize>,
+        bounds: &mut mpc::Bounds,
+    ) {
         self.carry(motion);
         let mut here = self.stages.point(motion, intervals.start);
         for k in intervals {
@@ -84,8 +92,13 @@ impl Bounded<2> for Robust {
         }
     }
 
-    fn bounds_between(&self, k: usize, here: At<2>, next: At<2>) -> Option<(f64, f64)> {
-        let point = |k: usize, (state, input): At<2>| {
+    fn bounds_between(
+        &self,
+        k: usize,
+        here: StagePoint<2>,
+        next: StagePoint<2>,
+    ) -> Option<(f64, f64)> {
+        let point = |k: usize, (state, input): StagePoint<2>| {
             let [angles, rates, a] = self.stages.nominal(k, state, input);
             let last = k == self.settings.horizon;
             Point::new(angles, rates, if last { Vector3::zeros() } else { a })
@@ -94,7 +107,7 @@ impl Bounded<2> for Robust {
         Some((interval.rate_bound, interval.moment_bound))
     }
 
-    fn depends_on_motion(&self) -> bool {
+    fn depends_on_trajectory(&self) -> bool {
         true
     }
 

@@ -14,7 +14,7 @@ use crate::crmpc::stages::Stages;
 use crate::crmpc::{split, terminal};
 use crate::linearise;
 use crate::mpc::{self, Nonlinearity};
-use crate::report::Status;
+use crate::report::SolverStatus;
 use nalgebra::{Vector3, Vector6};
 use vehicle::reference::Reference;
 
@@ -78,7 +78,7 @@ impl Robust {
         memory: &mut Memory,
         measured: &Vector6<f64>,
         anew: bool,
-    ) -> mpc::Report {
+    ) -> mpc::OptimiserReport {
         let assured = memory.assured();
         if !self.credible(memory) {
             return self.violate_least(planner, memory, measured, 0);
@@ -95,7 +95,7 @@ impl Robust {
             self.begin(age as usize, 1.0, &onset);
             let (report, certified) = self.certified(planner, memory, &start, anew);
             iterations += report.iterations;
-            let solved = report.status != Status::Fallback;
+            let solved = report.status != SolverStatus::Fallback;
             // Linearised constraints serve for comparison, so their optimum is accepted without
             // guarantee.
             let taken = !assured || self.settings.solver.nonlinearity == Nonlinearity::Frozen;
@@ -103,12 +103,12 @@ impl Robust {
                 planner.follow_optimum(&self.stages, memory, &start);
                 (memory.age, memory.plan.onset) = (age, onset);
                 self.take_over(planner, memory, certified);
-                return mpc::Report { iterations, ..report };
+                return mpc::OptimiserReport { iterations, ..report };
             }
         }
         if assured {
             self.go_towards_the_optimum(planner, memory);
-            let report = planner.keep(self, memory, measured, (Status::Kept, iterations));
+            let report = planner.keep(self, memory, measured, (SolverStatus::Kept, iterations));
             memory.margins = self.margins(&planner.previous);
             return report;
         }
@@ -123,18 +123,18 @@ impl Robust {
         memory: &Memory,
         start: &Vector6<f64>,
         first: bool,
-    ) -> (mpc::Report, Option<Certified>) {
+    ) -> (mpc::OptimiserReport, Option<Certified>) {
         let report = planner.solve(self, memory, start, first);
-        if report.status == Status::Fallback {
+        if report.status == SolverStatus::Fallback {
             return (report, None);
         }
-        (report, self.certify(planner.optimiser.motion(), report.settled))
+        (report, self.certify(planner.optimiser.trajectory(), report.settled))
     }
 
     /// Follows the trajectory that has just become the plan, under guarantee if it is certified.
     fn take_over(&self, planner: &Planner, memory: &mut Memory, certified: Option<Certified>) {
         let Some(Certified { margins, braking }) = certified else {
-            memory.margins = self.margins(planner.optimiser.motion());
+            memory.margins = self.margins(planner.optimiser.trajectory());
             memory.standing = self.without_guarantee(memory);
             return;
         };
@@ -152,7 +152,7 @@ impl Robust {
         planner.solve_without_constraints(&self.stages, &memory.plan);
         for _ in 0..HALVINGS {
             planner.optimiser.halve_the_way_to(&planner.previous);
-            if let Some(certified) = self.certify(planner.optimiser.motion(), false) {
+            if let Some(certified) = self.certify(planner.optimiser.trajectory(), false) {
                 let start = memory.plan.states[0];
                 planner.follow_optimum(&self.stages, memory, &start);
                 self.take_over(planner, memory, Some(certified));
@@ -169,7 +169,7 @@ impl Robust {
         memory: &mut Memory,
         measured: &Vector6<f64>,
         tried: u32,
-    ) -> mpc::Report {
+    ) -> mpc::OptimiserReport {
         memory.standing = self.without_guarantee(memory);
         let onset = self.onset_anew(memory, measured);
         (memory.age, memory.plan.onset) = (0, onset);
@@ -181,14 +181,14 @@ impl Robust {
             self.begin(0, share, &onset);
             let report = planner.solve(self, memory, measured, true);
             iterations += report.iterations;
-            if report.status != Status::Fallback {
+            if report.status != SolverStatus::Fallback {
                 planner.follow_optimum(&self.stages, memory, measured);
-                memory.margins = self.margins(planner.optimiser.motion());
-                return mpc::Report { iterations, ..report };
+                memory.margins = self.margins(planner.optimiser.trajectory());
+                return mpc::OptimiserReport { iterations, ..report };
             }
         }
         follow_terminal_law(self, &mut memory.plan, *measured);
-        let report = planner.keep(self, memory, measured, (Status::Fallback, iterations));
+        let report = planner.keep(self, memory, measured, (SolverStatus::Fallback, iterations));
         memory.margins = self.margins(&planner.previous);
         report
     }

@@ -5,7 +5,7 @@ use super::pair::Pair;
 use super::residuals::{GAP, Residuals};
 use super::stage::add;
 use super::sweep::minimiser;
-use crate::mpc::balls::Constraints;
+use crate::mpc::constraints::Constraints;
 use crate::mpc::problem::{Problem, Start, dot, zero_state};
 use nalgebra::Vector3;
 use vehicle::math::powi;
@@ -53,7 +53,7 @@ impl<const O: usize> Riccati<O> {
 
     /// Centring (10): returns Mehrotra's σ for a predictor of this length, with a lower bound.
     /// Smaller targets are below the tolerance, and the scaling would grow without bound while the
-    /// motion still changes.
+    /// trajectory still changes.
     fn centring<C: Constraints<O>>(
         &mut self,
         problem: &Problem<O, C>,
@@ -79,7 +79,7 @@ impl<const O: usize> Riccati<O> {
     }
 
     /// Computes Newton's direction with the present factors: the feedforward (8) backwards, then
-    /// the motion and the pairs (9) forwards.
+    /// the trajectory and the pairs (9) forwards.
     fn newton<C: Constraints<O>>(&mut self, problem: &Problem<O, C>) {
         let last = self.horizon;
         let mut p = self.end_slope(problem, &Pair::effective);
@@ -102,20 +102,22 @@ impl<const O: usize> Riccati<O> {
         for (k, stage) in self.stages[..=last].iter_mut().enumerate() {
             stage.d_state = change;
             if stage.state_pair.watched {
-                let ball = &stage.balls.state;
-                let y = ball
+                let constraint = &stage.constraints.state;
+                let y = constraint
                     .by_state
                     .iter()
                     .zip(&change)
                     .fold(Vector3::zeros(), |sum, (by, e)| sum + by * e);
-                stage.state_pair.set_direction(ball.value.dot(&y), 0.5 * y.norm_squared());
+                stage.state_pair.set_direction(constraint.value.dot(&y), 0.5 * y.norm_squared());
             }
             if k < last {
                 stage.d_input = stage.gain.input(&change, &stage.feedforward);
                 if stage.input_pair.watched {
-                    let ball = &stage.balls.input;
-                    let y = ball.change(&change, &stage.d_input);
-                    stage.input_pair.set_direction(ball.value.dot(&y), 0.5 * y.norm_squared());
+                    let constraint = &stage.constraints.input;
+                    let y = constraint.change(&change, &stage.d_input);
+                    stage
+                        .input_pair
+                        .set_direction(constraint.value.dot(&y), 0.5 * y.norm_squared());
                 }
                 change = problem.chain.advance(&change, &stage.d_input);
             }

@@ -7,9 +7,9 @@ use crate::mpc::lq::Unconstrained;
 use crate::mpc::problem::{State, zero_state};
 use nalgebra::Matrix3;
 
-/// The optimum without balls that continues the motion after the last stage.
+/// The unconstrained optimum that continues the trajectory after the last stage.
 pub struct Rest<'a, const O: usize> {
-    /// Solved optimum without balls over the whole horizon.
+    /// Solved unconstrained optimum over the whole horizon.
     pub unconstrained: &'a Unconstrained<O>,
     /// Affine terms d of the whole horizon.
     pub affine: &'a [State<O>],

@@ -1,12 +1,12 @@
 //! Primal-dual interior point method on the Riccati recursion. The numbers of equations are those
 //! of docs/solver.md.
 //!
-//! Balls are written c = ½(‖y‖² − 1) ≤ 0 with one slack s and one multiplier λ each. Every iterate
-//! satisfies the chain of integrators exactly, so that Newton's method is left with three
-//! residuals: stationarity of the inputs, c + s, and sλ. The Hessian contains the curvature of
-//! ½‖y‖² exactly; the curvature of y itself is left out (Gauss-Newton). Balls are left out while
-//! the motion stays well inside them. Every iterate is checked, and a ball enters the problem as
-//! soon as an iterate comes near it.
+//! Norm constraints are written c = ½(‖y‖² − 1) ≤ 0 with one slack s and one multiplier λ each.
+//! Every iterate satisfies the chain of integrators exactly, so that Newton's method is left with
+//! three residuals: stationarity of the inputs, c + s, and sλ. The Hessian contains the curvature
+//! of ½‖y‖² exactly; the curvature of y itself is left out (Gauss-Newton). Norm constraints are
+//! left out while the trajectory satisfies them with a wide margin. Every iterate is checked, and a
+//! norm constraint enters the problem as soon as an iterate comes near it.
 
 mod direction;
 mod iterate;
@@ -21,17 +21,17 @@ mod sweep;
 
 pub use iterate::{Rest, Riccati};
 
-use super::balls::Constraints;
 use super::budget::Budget;
+use super::constraints::Constraints;
 use super::problem::{Outcome, Problem, Solution, Start};
 use direction::Direction;
 use pair::Pair;
 use progress::{Progress, give_up};
 
 impl<const O: usize> Riccati<O> {
-    /// Solves `problem`, which covers the stages of `solution` from `first` on. Their motion is the
-    /// first guess, which must satisfy the chain; it is replaced if the optimum is found. With a
-    /// `rest`, stages beyond the end that an iterate nearly violates are included in the problem.
+    /// Solves `problem`, which covers the stages of `solution` from `first` on. Their trajectory is
+    /// the first guess, which must satisfy the chain; it is replaced if the optimum is found. With
+    /// a `rest`, stages beyond the end that an iterate nearly violates are included in the problem.
     pub fn solve<C: Constraints<O>>(
         &mut self,
         problem: &Problem<O, C>,
@@ -77,16 +77,16 @@ impl<const O: usize> Riccati<O> {
         solution: &mut Solution<O>,
         first: usize,
     ) {
-        let Solution { motion, multipliers } = solution;
-        let state_balls = problem.constraints.has_state_balls();
+        let Solution { trajectory, multipliers } = solution;
+        let constrains_states = problem.constraints.constrains_states();
         for (k, stage) in self.stages[..=self.horizon].iter().enumerate() {
             let multiplier = |pair: &Pair| if pair.watched { pair.multiplier } else { 0.0 };
-            motion.states[first + k] = stage.state;
-            if k > 0 && state_balls {
+            trajectory.states[first + k] = stage.state;
+            if k > 0 && constrains_states {
                 multipliers.state[first + k - 1] = multiplier(&stage.state_pair);
             }
             if k < self.horizon {
-                motion.inputs[first + k] = stage.input;
+                trajectory.inputs[first + k] = stage.input;
                 multipliers.input[first + k] = multiplier(&stage.input_pair);
             }
         }

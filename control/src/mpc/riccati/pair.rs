@@ -25,14 +25,14 @@ pub(super) struct Pair {
 
 impl Pair {
     /// Includes the inequality. The slack is −c but at least `smallest`; sλ is `mean`, unless the
-    /// `known` multiplier is larger.
-    pub(super) fn begin(&mut self, smallest: f64, mean: f64, known: f64) {
+    /// multiplier `guess` is larger.
+    pub(super) fn begin(&mut self, smallest: f64, mean: f64, guess: f64) {
         self.watched = true;
         self.slack = (-self.c).max(smallest);
-        self.multiplier = (mean / self.slack).max(known);
+        self.multiplier = (mean / self.slack).max(guess);
     }
 
-    /// Evaluates c of a ball at y.
+    /// Evaluates c of a norm constraint at y.
     pub(super) fn evaluate(&mut self, y: &Vector3<f64>) {
         self.c = 0.5 * (y.norm_squared() - 1.0);
     }
@@ -55,8 +55,8 @@ impl Pair {
     }
 
     /// Prepares the corrector (11) to sλ = `centre`. The pair gives the shares of the predictor's
-    /// second-order terms to include: the products Δs Δλ, and the ball's curvature along the
-    /// predictor.
+    /// second-order terms to include: the products Δs Δλ, and the curvature of the constraint along
+    /// the predictor.
     pub(super) fn correct(&mut self, centre: f64, (products, curvature): (f64, f64)) {
         self.infeasibility = self.c + self.slack + curvature * self.curvature;
         self.target = centre - products * self.d_slack * self.d_multiplier;

@@ -3,33 +3,34 @@
 use super::residuals::Residuals;
 use crate::mpc::problem::Outcome;
 
-/// Residual of the balls below which a motion counts as the optimum.
+/// Residual of the norm constraints below which a trajectory counts as the optimum.
 const FEASIBILITY: f64 = 1e-7;
-/// Feasibility tolerance for bounds that follow the motion. As their derivatives are left out, the
-/// residual then only shrinks by a constant factor per iteration.
+/// Feasibility tolerance for bounds that follow the trajectory. As their derivatives are left out,
+/// the residual then only shrinks by a constant factor per iteration.
 const FEASIBILITY_FOLLOWING: f64 = 1e-5;
 /// A search has stalled when `STALLED_STEPS` successive steps were shorter than `STALLED`.
 const STALLED: f64 = 1e-5;
 const STALLED_STEPS: u32 = 4;
 /// A search has also stalled when its residual has not been halved in the first number of
 /// iterations. The count restarts when the residual exceeds the least one by the second number,
-/// because the iterate has then met balls that were left out. `PATIENCE` is for given bounds, which
-/// may have any size, `PATIENCE_FOLLOWING` for bounds that follow the motion.
+/// because the iterate has then come near norm constraints that were left out. `PATIENCE` is for
+/// given bounds, which may have any size, `PATIENCE_FOLLOWING` for bounds that follow the
+/// trajectory.
 const PATIENCE: (u32, f64) = (30, 1e3);
 const PATIENCE_FOLLOWING: (u32, f64) = (16, f64::INFINITY);
 /// A search runs in a cycle when its residual has not been halved in `CIRCLING` iterations; its
 /// steps are then multiplied by `DAMPING`.
 const CIRCLING: u32 = 8;
 const DAMPING: f64 = 0.5;
-/// A first guess is misleading when the residual of the balls exceeds the least one so far by this
-/// factor; least values below 1 count as 1.
+/// A first guess is misleading when the residual of the norm constraints exceeds the least one so
+/// far by this factor; least values below 1 count as 1.
 const ASTRAY: f64 = 1e3;
-/// A search that fails while the residual of the balls is above this value is hopeless.
+/// A search that fails while the residual of the norm constraints is above this value is hopeless.
 const FAR_FROM_FEASIBLE: f64 = 1e-3;
 
 /// The rules by which a search is damped or ended.
 pub(super) struct Progress {
-    /// Tolerance of the residual of the balls.
+    /// Tolerance of the residual of the norm constraints.
     pub feasibility: f64,
     /// Number of iterations in which the residual must halve, and the growth that restarts the
     /// count.
@@ -39,7 +40,7 @@ pub(super) struct Progress {
     short_steps: u32,
     /// Least residual so far that was half of the one before, and its iteration.
     best: (f64, u32),
-    /// Least residual of the balls so far, at least 1.
+    /// Least residual of the norm constraints so far, at least 1.
     least_outside: f64,
 }
 

@@ -3,11 +3,11 @@
 use super::iterate::Riccati;
 use super::pair::Pair;
 use super::stage::add;
-use crate::mpc::balls::Constraints;
+use crate::mpc::constraints::Constraints;
 use crate::mpc::problem::{Chain, Problem, Start, State, apply, dot, zero_state};
 use nalgebra::Vector3;
 
-/// Relative residuals below which a motion counts as the optimum.
+/// Relative residuals below which a trajectory counts as the optimum.
 const STATIONARITY: f64 = 1e-6;
 pub(super) const GAP: f64 = 1e-9;
 
@@ -41,13 +41,14 @@ impl Residuals {
 
 impl<const O: usize> Riccati<O> {
     /// Computes the residuals of the optimality conditions at the iterate: (4), and (3) with the
-    /// costates (2) of the motion.
+    /// costates (2) of the trajectory.
     pub(super) fn residuals<C: Constraints<O>>(&mut self, problem: &Problem<O, C>) -> Residuals {
         let (mut feasibility, mut gap, mut count) = (0.0_f64, 0.0, 0.0_f64);
         self.each_pair(problem, |pair| {
-            let own = (pair.c + pair.slack).abs();
+            let excess = (pair.c + pair.slack).abs();
             // A value that is not a number must stay visible.
-            feasibility = if own.is_nan() || own > feasibility { own } else { feasibility };
+            feasibility =
+                if excess.is_nan() || excess > feasibility { excess } else { feasibility };
             gap += pair.slack * pair.multiplier;
             count += 1.0;
         });
@@ -55,9 +56,9 @@ impl<const O: usize> Riccati<O> {
         self.adjoint(
             problem,
             |pair| pair.multiplier,
-            |own, future| {
-                largest = largest.max((own + future).amax());
-                scale = scale.max(own.amax()).max(future.amax());
+            |present, future| {
+                largest = largest.max((present + future).amax());
+                scale = scale.max(present.amax()).max(future.amax());
             },
         );
         match problem.start {

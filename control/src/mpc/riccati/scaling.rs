@@ -1,20 +1,20 @@
-//! Scaling (5) of the balls, and factorisation (7) of the Newton system.
+//! Scaling (5) of the norm constraints, and factorisation (7) of the Newton system.
 
 use super::iterate::Riccati;
 use super::stage::Stage;
 use super::sweep::{Blocks, Gain, Quadratic};
-use crate::mpc::balls::Constraints;
+use crate::mpc::constraints::Constraints;
 use crate::mpc::problem::{Problem, Start, zero_state};
 use nalgebra::{Matrix3, Vector3};
 use vehicle::math::powi;
 
 impl<const O: usize> Stage<O> {
-    /// Adds the balls to the Hessian of the stage, (5).
-    fn add_balls(&self, quadratic: &mut Quadratic<O>) {
-        let Stage { balls, slopes, state_pair, input_pair, .. } = self;
+    /// Adds the norm constraints to the Hessian of the stage, (5).
+    fn add_constraints(&self, quadratic: &mut Quadratic<O>) {
+        let Stage { constraints, slopes, state_pair, input_pair, .. } = self;
         if input_pair.watched {
-            quadratic.add_ball(
-                &balls.input,
+            quadratic.add_constraint(
+                &constraints.input,
                 &slopes.input,
                 input_pair.multiplier,
                 input_pair.scaling(),
@@ -22,7 +22,7 @@ impl<const O: usize> Stage<O> {
         }
         if state_pair.watched {
             let (multiplier, scaling) = (state_pair.multiplier, state_pair.scaling());
-            quadratic.add_state_ball(&balls.state, &slopes.state, multiplier, scaling);
+            quadratic.add_state_constraint(&constraints.state, &slopes.state, multiplier, scaling);
         }
     }
 }
@@ -35,7 +35,7 @@ impl<const O: usize> Riccati<O> {
         let mut p = self.end_weight(problem);
         for stage in self.stages[..last].iter_mut().rev() {
             let mut quadratic = Quadratic::diagonal(&problem.cost.state, &problem.cost.input);
-            stage.add_balls(&mut quadratic);
+            stage.add_constraints(&mut quadratic);
             stage.gain = Gain::factor(&quadratic, problem.chain, &mut p)?;
         }
         self.add_start_weight(problem, &mut p);
@@ -43,7 +43,7 @@ impl<const O: usize> Riccati<O> {
         Some(())
     }
 
-    /// Returns the weight P_N of the last stage, with its balls.
+    /// Returns the weight P_N of the last stage, with its norm constraints.
     fn end_weight<C: Constraints<O>>(&self, problem: &Problem<O, C>) -> Blocks<O> {
         let stage = &self.stages[self.horizon];
         let mut quadratic = Quadratic::diagonal(&zero_state(), &Vector3::zeros());
@@ -61,8 +61,8 @@ impl<const O: usize> Riccati<O> {
         }
         let pair = &stage.state_pair;
         if pair.watched {
-            quadratic.add_state_ball(
-                &stage.balls.state,
+            quadratic.add_state_constraint(
+                &stage.constraints.state,
                 &stage.slopes.state,
                 pair.multiplier,
                 pair.scaling(),

@@ -1,17 +1,17 @@
-//! The iterate, stage by stage, with its balls and the direction of the present step.
+//! The iterate, stage by stage, with its norm constraints and the direction of the present step.
 
 use super::pair::Pair;
 use super::sweep::Gain;
-use crate::mpc::balls::{Balls, Constraints};
+use crate::mpc::constraints::{Constraints, StageConstraints};
 use crate::mpc::problem::{Problem, State, zero_state};
 use nalgebra::{SVector, Vector3};
 
-/// One stage of the horizon: the iterate, its balls and the direction.
+/// One stage of the horizon: the iterate, its norm constraints and the direction.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Stage<const O: usize> {
     pub state: State<O>,
     pub input: Vector3<f64>,
-    pub balls: Balls<O>,
+    pub constraints: StageConstraints<O>,
     pub slopes: Slopes<O>,
     pub state_pair: Pair,
     pub input_pair: Pair,
@@ -21,7 +21,8 @@ pub(super) struct Stage<const O: usize> {
     pub d_input: Vector3<f64>,
 }
 
-/// Gradients ∇c of a stage's balls: first of the state ball, then of the input ball.
+/// Gradients ∇c of a stage's norm constraints: first of the state constraint, then of the input
+/// constraint.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Slopes<const O: usize> {
     pub state: State<O>,
@@ -42,7 +43,7 @@ impl<const O: usize> Stage<O> {
         Self {
             state: zero_state(),
             input: Vector3::zeros(),
-            balls: Balls::default(),
+            constraints: StageConstraints::default(),
             slopes: Slopes { state: zero_state(), input: (zero_state(), Vector3::zeros()) },
             state_pair: Pair::default(),
             input_pair: Pair::default(),
@@ -53,15 +54,15 @@ impl<const O: usize> Stage<O> {
         }
     }
 
-    /// Returns whether any ball of the stage is included in the problem.
+    /// Returns whether any norm constraint of the stage is included in the problem.
     pub(super) fn watched(&self) -> bool {
         self.state_pair.watched || self.input_pair.watched
     }
 
-    /// Evaluates the balls, c and its slopes at the iterate.
+    /// Evaluates the norm constraints, c and its slopes at the iterate.
     pub(super) fn evaluate(&mut self, constraints: &impl Constraints<O>, k: usize) {
-        self.balls = constraints.balls(k, &self.state, &self.input);
-        let Balls { state, input } = &self.balls;
+        self.constraints = constraints.norm_constraints(k, &self.state, &self.input);
+        let StageConstraints { state, input } = &self.constraints;
         self.slopes = Slopes {
             state: state.by_state.map(|by| by.tr_mul(&state.value)),
             input: (
@@ -73,8 +74,8 @@ impl<const O: usize> Stage<O> {
         self.input_pair.evaluate(&input.value);
     }
 
-    /// Returns ∂/∂E and ∂/∂v of the stage's cost and of its balls, weighted by their multipliers:
-    /// the stage's part of (2) and (3), or of (6).
+    /// Returns ∂/∂E and ∂/∂v of the stage's cost and of its norm constraints, weighted by their
+    /// multipliers: the stage's part of (2) and (3), or of (6).
     pub(super) fn slope<C: Constraints<O>>(
         &self,
         problem: &Problem<O, C>,

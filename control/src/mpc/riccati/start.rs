@@ -1,25 +1,26 @@
-//! First iterate, and the balls that the iterates come near.
+//! First iterate, and the norm constraints that the iterates come near.
 
 use super::iterate::Riccati;
 use super::pair::Pair;
 use super::residuals::Residuals;
 use super::stage::{Face, Stage};
-use crate::mpc::balls::Constraints;
+use crate::mpc::constraints::Constraints;
 use crate::mpc::problem::{Multipliers, Problem, Solution, Start, dot};
 use nalgebra::Vector3;
 
-/// A ball is near when ‖y‖² exceeds this value.
+/// A norm constraint is near when ‖y‖² exceeds this value.
 const NEAR: f64 = 0.5;
 /// Cold start: smallest slack, and Σ sλ relative to half the cost.
 const COLD: (f64, f64) = (0.03, 0.03);
-/// Smallest initial slack of a ball that an iterate comes near.
+/// Smallest initial slack of a norm constraint that an iterate comes near.
 const NEWLY: f64 = 0.3;
 /// Warm start, with the multipliers of a similar problem: smallest slack, and Σ sλ relative to half
 /// the cost.
 const WARM: (f64, f64) = (3e-4, 1e-6);
-/// First guess that violates a ball by far: smallest slack, and Σ sλ relative to half the cost.
+/// First guess that violates a norm constraint by far: smallest slack, and Σ sλ relative to half
+/// the cost.
 const FAR: (f64, f64) = (3.0, 10.0);
-/// A first guess violates a ball by far when c exceeds this value.
+/// A first guess violates a norm constraint by far when c exceeds this value.
 const FAR_OUTSIDE: f64 = 1.5;
 
 impl<const O: usize> Riccati<O> {
@@ -32,17 +33,21 @@ impl<const O: usize> Riccati<O> {
         warm: bool,
     ) {
         (self.before, self.horizon) = (first, problem.affine.len());
-        let Solution { motion, multipliers } = solution;
-        for (stage, state) in self.stages[..=self.horizon].iter_mut().zip(&motion.states[first..]) {
+        let Solution { trajectory, multipliers } = solution;
+        for (stage, state) in
+            self.stages[..=self.horizon].iter_mut().zip(&trajectory.states[first..])
+        {
             stage.state = *state;
             (stage.state_pair.watched, stage.input_pair.watched) = (false, false);
         }
-        for (stage, input) in self.stages[..self.horizon].iter_mut().zip(&motion.inputs[first..]) {
+        for (stage, input) in
+            self.stages[..self.horizon].iter_mut().zip(&trajectory.inputs[first..])
+        {
             stage.input = *input;
         }
         // The bounds on the last state may depend on the input that follows it.
         let last = &mut self.stages[self.horizon];
-        last.input = motion.inputs.get(first + self.horizon).copied().unwrap_or_default();
+        last.input = trajectory.inputs.get(first + self.horizon).copied().unwrap_or_default();
         last.d_input = Vector3::zeros();
         self.faces.clear();
         if let Start::Within(_, normals) = problem.start {
@@ -56,8 +61,8 @@ impl<const O: usize> Riccati<O> {
         self.evaluate(problem);
         let cost = self.cost(problem);
         let (smallest, gap) = if warm { WARM } else { COLD };
-        let balls = if problem.constraints.has_state_balls() { 2 } else { 1 };
-        let share = cost / (balls * self.horizon + self.faces.len() + 1) as f64;
+        let per_stage = if problem.constraints.constrains_states() { 2 } else { 1 };
+        let share = cost / (per_stage * self.horizon + self.faces.len() + 1) as f64;
         let mean = gap * share;
         let Multipliers { state, input, terminal, .. } = multipliers;
         self.terminal.begin(smallest, mean, if warm { *terminal } else { 0.0 });
@@ -66,8 +71,8 @@ impl<const O: usize> Riccati<O> {
         }
         self.watch(problem, smallest, mean, |k| {
             let before = (first + k).checked_sub(1);
-            let known = [before.and_then(|k| state.get(k)), input.get(first + k)];
-            known.map(|known| known.copied().filter(|_| warm).unwrap_or_default())
+            let given = [before.and_then(|k| state.get(k)), input.get(first + k)];
+            given.map(|multiplier| multiplier.copied().filter(|_| warm).unwrap_or_default())
         });
         let pairs = self.stages[..=self.horizon]
             .iter()
@@ -77,7 +82,7 @@ impl<const O: usize> Riccati<O> {
         }
     }
 
-    /// Includes the balls that a step to sλ = `centre` has come near.
+    /// Includes the norm constraints that a step to sλ = `centre` has come near.
     pub(super) fn include_near<C: Constraints<O>>(
         &mut self,
         problem: &Problem<O, C>,
@@ -88,21 +93,21 @@ impl<const O: usize> Riccati<O> {
         self.watch(problem, NEWLY, mean, |_| [0.0; 2]);
     }
 
-    /// Includes the balls that the iterate has come near. `known` gives the multipliers of a stage,
-    /// state ball first.
+    /// Includes the norm constraints that the iterate has come near. `guess` gives the multipliers
+    /// with which a stage begins, state constraint first.
     fn watch<C: Constraints<O>>(
         &mut self,
         problem: &Problem<O, C>,
         smallest: f64,
         mean: f64,
-        known: impl Fn(usize) -> [f64; 2],
+        guess: impl Fn(usize) -> [f64; 2],
     ) {
         let end = self.horizon;
-        let state_balls = problem.constraints.has_state_balls();
+        let constrains_states = problem.constraints.constrains_states();
         // A value that is not a number must not go unnoticed.
         let near = |square: f64| square.is_nan() || square > NEAR;
         for (k, stage) in self.stages[..=end].iter_mut().enumerate() {
-            let (has_state, has_input) = (k > 0 && state_balls, k < end);
+            let (has_state, has_input) = (k > 0 && constrains_states, k < end);
             if !stage.watched() {
                 let (state, input) = problem.constraints.squares(k, &stage.state, &stage.input);
                 if !(has_state && near(state) || has_input && near(input)) {
@@ -110,13 +115,13 @@ impl<const O: usize> Riccati<O> {
                 }
                 stage.evaluate(problem.constraints, k);
             }
-            let known = known(k);
+            let guess = guess(k);
             let Stage { state_pair, input_pair, .. } = stage;
-            for (pair, exists, known) in
-                [(state_pair, has_state, known[0]), (input_pair, has_input, known[1])]
+            for (pair, exists, multiplier) in
+                [(state_pair, has_state, guess[0]), (input_pair, has_input, guess[1])]
             {
                 if exists && !pair.watched && near(2.0 * pair.c + 1.0) {
-                    pair.begin(smallest, mean, known);
+                    pair.begin(smallest, mean, multiplier);
                 }
             }
         }

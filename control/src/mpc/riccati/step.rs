@@ -1,7 +1,7 @@
 //! Step (12) along a direction, and the stages that it comes near.
 
 use super::iterate::{Rest, Riccati};
-use crate::mpc::balls::Constraints;
+use crate::mpc::constraints::Constraints;
 use crate::mpc::problem::{End, Problem};
 use nalgebra::Vector3;
 
@@ -33,7 +33,7 @@ impl<const O: usize> Riccati<O> {
         gap / count
     }
 
-    /// Takes the step (12), the same for motion and multipliers.
+    /// Takes the step (12), the same for trajectory and multipliers.
     pub(super) fn step<C: Constraints<O>>(&mut self, problem: &Problem<O, C>, alpha: f64) {
         for stage in &mut self.stages[..=self.horizon] {
             stage.state = std::array::from_fn(|i| stage.state[i] + stage.d_state[i] * alpha);
@@ -45,17 +45,18 @@ impl<const O: usize> Riccati<O> {
         });
         if problem.constraints.follows() {
             for (k, pair) in self.stages[..=self.horizon].windows(2).enumerate() {
-                let [here, next] = pair else { continue };
-                if here.input_pair.watched || next.state_pair.watched {
-                    let (here, next) = ((&here.state, &here.input), (&next.state, &next.input));
-                    problem.constraints.renew(k, here, next);
+                let [stage, next] = pair else { continue };
+                if stage.input_pair.watched || next.state_pair.watched {
+                    let (stage, next) = ((&stage.state, &stage.input), (&next.state, &next.input));
+                    problem.constraints.renew(k, stage, next);
                 }
             }
         }
         self.evaluate(problem);
     }
 
-    /// Extends the problem by the next stages if one of them is nearly outside a ball.
+    /// Extends the problem by the next stages if one of them is close to violating a norm
+    /// constraint.
     #[inline(never)]
     pub(super) fn extend<'a, C: Constraints<O>>(
         &mut self,
@@ -67,14 +68,14 @@ impl<const O: usize> Riccati<O> {
         loop {
             let end = self.horizon;
             let until = (end + AHEAD).min(last);
-            let state_balls = problem.constraints.has_state_balls();
+            let constrains_states = problem.constraints.constrains_states();
             let mut is_near = false;
             for k in end..until {
                 let state = self.stages[k].state;
                 let (input, next) = rest.unconstrained.go_on(first + k, &state, rest.affine);
                 let (of_state, of_input) = problem.constraints.squares(k, &state, &input);
                 is_near |= of_input > NEARLY_OUTSIDE
-                    || state_balls && k > end && of_state > NEARLY_OUTSIDE;
+                    || constrains_states && k > end && of_state > NEARLY_OUTSIDE;
                 self.stages[k].input = input;
                 let stage = &mut self.stages[k + 1];
                 stage.state = next;

@@ -1,6 +1,6 @@
 //! One stage of the Riccati recursion of a chain of integrators, in 3×3 blocks.
 
-use crate::mpc::balls::Ball;
+use crate::mpc::constraints::NormConstraint;
 use crate::mpc::problem::{Chain, State, zero_state};
 use nalgebra::{Matrix3, Vector3};
 
@@ -26,37 +26,37 @@ impl<const O: usize> Quadratic<O> {
         Self { q, s: [Matrix3::zeros(); O], r: Matrix3::from_diagonal(input) }
     }
 
-    /// Adds the part of a ball: λ JᵀJ, the curvature of ½‖y‖², and (λ/s) ∇c ∇cᵀ, where `slope` is
-    /// ∇c = Jᵀy.
-    pub(super) fn add_ball(
+    /// Adds the part of a norm constraint: λ JᵀJ, the curvature of ½‖y‖², and (λ/s) ∇c ∇cᵀ, where
+    /// `slope` is ∇c = Jᵀy.
+    pub(super) fn add_constraint(
         &mut self,
-        ball: &Ball<O>,
+        constraint: &NormConstraint<O>,
         slope: &(State<O>, Vector3<f64>),
         multiplier: f64,
         scaling: f64,
     ) {
-        self.add_state_ball(ball, &slope.0, multiplier, scaling);
-        let by_input = ball.by_input.transpose() * multiplier;
+        self.add_state_constraint(constraint, &slope.0, multiplier, scaling);
+        let by_input = constraint.by_input.transpose() * multiplier;
         let weighted = slope.1 * scaling;
         for i in 0..O {
-            self.s[i] += by_input * ball.by_state[i] + weighted * slope.0[i].transpose();
+            self.s[i] += by_input * constraint.by_state[i] + weighted * slope.0[i].transpose();
         }
-        self.r += by_input * ball.by_input + weighted * slope.1.transpose();
+        self.r += by_input * constraint.by_input + weighted * slope.1.transpose();
     }
 
-    /// Adds the part of a ball that does not depend on the input.
-    pub(super) fn add_state_ball(
+    /// Adds the part of a norm constraint that does not depend on the input.
+    pub(super) fn add_state_constraint(
         &mut self,
-        ball: &Ball<O>,
+        constraint: &NormConstraint<O>,
         slope: &State<O>,
         multiplier: f64,
         scaling: f64,
     ) {
         for i in 0..O {
-            let by_state = ball.by_state[i].transpose() * multiplier;
+            let by_state = constraint.by_state[i].transpose() * multiplier;
             let weighted = slope[i] * scaling;
             for j in i..O {
-                self.q[i][j] += by_state * ball.by_state[j] + weighted * slope[j].transpose();
+                self.q[i][j] += by_state * constraint.by_state[j] + weighted * slope[j].transpose();
             }
         }
     }
@@ -139,8 +139,8 @@ pub(super) fn minimiser<const O: usize>(p: &Blocks<O>, slope: &State<O>) -> Opti
     }
     let mut solution = zero_state();
     for j in (0..O).rev() {
-        let known = (j + 1..O).fold(rest[j], |sum, l| sum + p[j][l] * solution[l]);
-        solution[j] = -pivots[j].solve(&known);
+        let right_side = (j + 1..O).fold(rest[j], |sum, l| sum + p[j][l] * solution[l]);
+        solution[j] = -pivots[j].solve(&right_side);
     }
     Some(solution)
 }

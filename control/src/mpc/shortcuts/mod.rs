@@ -1,32 +1,36 @@
-//! Cheaper ways to the optimum, cheapest first. Each leaves constraints out, solves the rest, and
-//! checks what it has left out. If the result satisfies that too, it is the optimum of the whole
-//! problem, so that no way loses accuracy.
+//! Shortcuts: cheaper exact ways to the optimum, cheapest first. Each leaves constraints out,
+//! solves the rest, and checks what it has left out. If the result satisfies that too, it is the
+//! optimum of the whole problem, so that no shortcut loses accuracy.
 //!
 //! The gains in the files' heads are the times of `cargo bench -p reentry-control --bench
-//! optimisation` (250 samples of 50 s) without and with the shortcut, in the same run. The checks
-//! have a shortcut of their own, `few_stages` of CRMPC.
+//! optimisation` (250 samples of 50 s) without and with the shortcut, in the same run. The check of
+//! the constraints has a shortcut, too: `few_stages` of CRMPC.
 
-mod terminal_ball;
+mod terminal_constraint;
+mod unconstrained;
 mod windows;
-mod without_balls;
 
 use super::optimiser::{Optimiser, Sample};
 use super::search::Search;
-use crate::report::Status;
+use crate::report::SolverStatus;
 
-/// A cheaper way to the optimum.
+/// A cheaper exact way to the optimum.
 pub(super) trait Shortcut<const O: usize> {
     /// Leaves the optimum in the optimiser's solution and returns its status, or returns `None` and
-    /// leaves in `search` what the next way must solve for.
+    /// leaves in `search` what the next shortcut must solve for.
     fn optimum(
         &self,
         optimiser: &mut Optimiser<O>,
         sample: &Sample<O>,
         search: &mut Search,
-    ) -> Option<Status>;
+    ) -> Option<SolverStatus>;
 }
 
 /// Returns the shortcuts in the order in which they are tried.
 pub(super) fn in_order<const O: usize>() -> [&'static dyn Shortcut<O>; 3] {
-    [&without_balls::WithoutBalls, &terminal_ball::TerminalBallAlone, &windows::Windows]
+    [
+        &unconstrained::Unconstrained,
+        &terminal_constraint::TerminalConstraintAlone,
+        &windows::Windows,
+    ]
 }

@@ -4,7 +4,7 @@
 //! Gain: mean time 0.078 → 0.031 ms, longest 0.476 → 0.232 (CRMPC robust); 0.011 → 0.009, 0.152 →
 //! 0.039 (paper); 0.020 → 0.011, 0.102 → 0.033 (DLMPC).
 
-use super::{Optimiser, Sample, Search, Shortcut, Status};
+use super::{Optimiser, Sample, Search, Shortcut, SolverStatus};
 
 pub(super) struct Windows;
 
@@ -17,7 +17,7 @@ impl<const O: usize> Shortcut<O> for Windows {
         optimiser: &mut Optimiser<O>,
         sample: &Sample<O>,
         search: &mut Search,
-    ) -> Option<Status> {
+    ) -> Option<SolverStatus> {
         optimiser.prepare(sample, search);
         optimiser.settle(sample, search, in_windows)
     }
@@ -28,7 +28,7 @@ fn in_windows<const O: usize>(
     optimiser: &mut Optimiser<O>,
     sample: &Sample<O>,
     search: &mut Search,
-) -> Option<Status> {
+) -> Option<SolverStatus> {
     if !optimiser.may_iterate(search) {
         return None;
     }
@@ -39,23 +39,23 @@ fn in_windows<const O: usize>(
         let is_held = window.end == optimiser.layout.horizon;
         let outcome = optimiser.interior_point(sample, search, window.clone());
         if !outcome.solved() {
-            // If no motion satisfies the balls within the window, none does over the horizon,
-            // unless the first guess was misleading.
+            // If no trajectory satisfies the norm constraints within the window, none does over the
+            // horizon, unless the first guess was misleading.
             search.hopeless = outcome.hopeless() && !search.warm;
             optimiser.begin_cold(sample, search);
             return None;
         }
         window.end = window.start + optimiser.riccati.horizon();
         let Optimiser { layout, unconstrained, solution, .. } = optimiser;
-        unconstrained.trace_back(window.start, sample.affine, &mut solution.motion);
-        unconstrained.follow(window.end, sample.affine, &mut solution.motion);
-        // A window that grew to the end was solved without the terminal ball.
+        unconstrained.trace_back(window.start, sample.affine, &mut solution.trajectory);
+        unconstrained.follow(window.end, sample.affine, &mut solution.trajectory);
+        // A window that grew to the end was solved without the terminal constraint.
         let unheld = sample.bounded.terminal_radius().filter(|_| !is_held);
-        let outside = layout.ends_outside(&solution.motion, unheld).is_some();
+        let outside = layout.ends_outside(&solution.trajectory, unheld).is_some();
         let violated = optimiser.violated(sample, &window);
         let more = optimiser.layout.window(violated, outside);
         search.window = Some(window.clone());
-        let Some(more) = more else { return Some(Status::Constrained) };
+        let Some(more) = more else { return Some(SolverStatus::Constrained) };
         search.warm = true;
         search.window = Some(window.start.min(more.start)..window.end.max(more.end));
     }

@@ -123,7 +123,7 @@ impl Reader<'_> {
                 ))
             };
         }
-        if !matches!(kind, Kind::Real { .. }) {
+        if !matches!(kind, VariableKind::Real { .. }) {
             return Err(format!("uniform is for numbers, not for {}: use a list", kind.name()));
         }
         let (low, high) = (self.number(low)?, self.number(high)?);

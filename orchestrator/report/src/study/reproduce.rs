@@ -348,7 +348,7 @@ impl Work<'_> {
                                 // An FMU that failed does not concern the other runs, which are
                                 // kept.
                                 let is_of_fmu =
-                                    matches!(error, Error::Run { source: Single::Unit { .. }, .. });
+                                    matches!(error, Error::Run { source: Single::Call { .. }, .. });
                                 if !is_of_fmu {
                                     queue.lock().clear();
                                 }

@@ -30,7 +30,7 @@ fn panel(
     let signal = |place: usize| Resolved { factor, ..Resolved::variable(place) };
     let curve = |axis: usize| Curve {
         name: names[axis].into(),
-        signal: minus.filter(|_| name == "error").map_or(signal(of[axis]), |minus| Resolved {
+        signal: minus.filter(|_| name == "error").map_or(signal(places[axis]), |minus| Resolved {
             factor,
             ..Resolved::difference(places[axis], minus[axis])
         }),

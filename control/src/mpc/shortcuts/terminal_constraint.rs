@@ -1,27 +1,27 @@
-//! The optimum with the terminal ball as the only constraint.
+//! The optimum with the terminal constraint as the only constraint.
 //!
 //! Gain: none in the mean (0.009 ms, CRMPC paper) or in the longest time. It is kept because
 //! `solver.status` tells it apart, and because a window would change the last digits of the
 //! results.
 
-use super::{Optimiser, Sample, Search, Shortcut, Status};
+use super::{Optimiser, Sample, Search, Shortcut, SolverStatus};
 use crate::mpc::lq::Unconstrained;
-use crate::mpc::problem::{Chain, Cost, Motion, State, apply, of_axis, zero_state};
+use crate::mpc::problem::{Chain, Cost, ErrorTrajectory, State, apply, of_axis, zero_state};
 use nalgebra::{SMatrix, SVector};
 
-pub(super) struct TerminalBallAlone;
+pub(super) struct TerminalConstraintAlone;
 
 /// Limits of the secant search for λ.
 const SECANT_STEPS: usize = 30;
 const SECANT_TOLERANCE: f64 = 1e-12;
 
-impl<const O: usize> Shortcut<O> for TerminalBallAlone {
+impl<const O: usize> Shortcut<O> for TerminalConstraintAlone {
     fn optimum(
         &self,
         optimiser: &mut Optimiser<O>,
         sample: &Sample<O>,
         search: &mut Search,
-    ) -> Option<Status> {
+    ) -> Option<SolverStatus> {
         let radius = search.outside?;
         optimiser.arrive(sample, search);
         let Optimiser { layout, unconstrained, solution, .. } = optimiser;
@@ -31,32 +31,32 @@ impl<const O: usize> Shortcut<O> for TerminalBallAlone {
             &layout.cost,
             sample.affine,
             radius,
-            &mut solution.motion,
+            &mut solution.trajectory,
         );
         let violated = optimiser.violated(sample, &(0..0));
         search.settled = multiplier.is_some() && violated.is_none();
         if search.settled {
             optimiser.solution.multipliers.terminal = multiplier?;
-            return Some(Status::TerminalBall);
+            return Some(SolverStatus::TerminalConstraint);
         }
         search.window = optimiser.layout.window(violated, true);
         None
     }
 }
 
-/// Writes the optimum from the start of the arrival costs with ‖E_N‖_G = `radius` into `motion` and
-/// returns its multiplier for half the cost. It applies to a start whose optimum without balls ends
-/// outside; the result is `None` if no solution is found.
+/// Writes the optimum from the start of the arrival costs with ‖E_N‖_G = `radius` into `trajectory`
+/// and returns its multiplier for half the cost. It applies to a start whose unconstrained optimum
+/// violates the terminal constraint; the result is `None` if no solution is found.
 ///
-/// The end minimises (E − Ē)ᵀΠ⁻¹(E − Ē) + EᵀG E, so that (Π⁻¹ + (1 + λ)G) E = Π⁻¹Ē. As 1/‖E‖_G
-/// is nearly linear in λ, a secant method finds λ in a few steps.
+/// The end minimises (E − Ē)ᵀΠ⁻¹(E − Ē) + EᵀG E, so that (Π⁻¹ + (1 + λ)G) E = Π⁻¹Ē. As 1/‖E‖_G is
+/// nearly linear in λ, a secant method finds λ in a few steps.
 fn solve<const O: usize>(
     unconstrained: &Unconstrained<O>,
     chain: &Chain<O>,
     cost: &Cost<O>,
     affine: &[State<O>],
     radius: f64,
-    motion: &mut Motion<O>,
+    trajectory: &mut ErrorTrajectory<O>,
 ) -> Option<f64> {
     let n = affine.len();
     if n < O {
@@ -83,9 +83,9 @@ fn solve<const O: usize>(
     for _ in 0..SECANT_STEPS {
         let (end, left) = end_of(next)?;
         if left.abs() <= SECANT_TOLERANCE {
-            motion.states[n] = end;
-            unconstrained.trace_back(n, affine, motion);
-            motion.roll_out(chain, affine);
+            trajectory.states[n] = end;
+            unconstrained.trace_back(n, affine, trajectory);
+            trajectory.roll_out(chain, affine);
             return Some(next * radius * radius);
         }
         let slope = (left - excess) / (next - lambda);
@@ -101,13 +101,13 @@ mod tests {
     use crate::mpc::lq::tests::{N, affine, chain, cost, optimum, slopes, start};
 
     #[test]
-    fn oracle_the_terminal_ball_adds_its_multiplier_to_the_end() {
-        let (mut lq, motion) = optimum::<2>();
+    fn oracle_the_terminal_constraint_adds_its_multiplier_to_the_end() {
+        let (mut lq, trajectory) = optimum::<2>();
         lq.arrive(&start(), &affine());
-        let norm = cost().end_square(&motion.states[N]).sqrt();
+        let norm = cost().end_square(&trajectory.states[N]).sqrt();
         for share in [0.99, 0.5, 0.01] {
             let radius = share * norm;
-            let mut onto = Motion::new(N);
+            let mut onto = ErrorTrajectory::new(N);
             let multiplier = solve(&lq, &chain(), &cost(), &affine(), radius, &mut onto).unwrap();
             assert!(multiplier > 0.0);
             assert!((cost().end_square(&onto.states[N]).sqrt() - radius).abs() < 1e-9 * radius);

@@ -1,4 +1,4 @@
-//! The state of the motion: attitude angles and body rates.
+//! The state of the vehicle: attitude angles and body rates.
 
 use nalgebra::{Vector3, Vector6};
 

@@ -1,8 +1,8 @@
-//! Balls with the same bounds at all stages, for problems that test the solvers alone.
+//! Norm constraints with the same bounds at all stages, for problems that test the solvers alone.
 #![allow(unreachable_pub)]
 
 use control::linearise::{InverseKinematics, Linear};
-use control::mpc::{Ball, Balls, Constraints, State};
+use control::mpc::{Constraints, NormConstraint, StageConstraints, State};
 use nalgebra::{Matrix3, Vector3};
 use vehicle::dynamics::RigidBody;
 
@@ -18,32 +18,40 @@ pub struct Sets {
 }
 
 impl Constraints<2> for Sets {
-    fn has_state_balls(&self) -> bool {
+    fn constrains_states(&self) -> bool {
         true
     }
 
-    fn balls(&self, _: usize, state: &State<2>, input: &Vector3<f64>) -> Balls<2> {
+    fn norm_constraints(
+        &self,
+        _: usize,
+        state: &State<2>,
+        input: &Vector3<f64>,
+    ) -> StageConstraints<2> {
         let kinematics = InverseKinematics::at(&state[0]);
         let at = kinematics.linearise(&self.body, &state[1], input);
-        let of = |y: &Linear, bound: f64| {
+        let constraint = |y: &Linear, bound: f64| {
             let mut by_angles = Matrix3::zeros();
             by_angles.fixed_view_mut::<3, 2>(0, 0).copy_from(&y.by_angles);
-            Ball {
+            NormConstraint {
                 value: y.value / bound,
                 by_state: [by_angles / bound, y.by_rates / bound],
                 by_input: y.by_acceleration / bound,
             }
         };
         if self.printed {
-            let rates = Ball {
+            let rates = NormConstraint {
                 value: state[1] / self.bounds.0,
                 by_state: [Matrix3::zeros(), Matrix3::identity() / self.bounds.0],
                 by_input: Matrix3::zeros(),
             };
             let u = kinematics.input_of_moment(&self.body, &at.moment);
-            Balls { state: rates, input: of(&u, self.bounds.1) }
+            StageConstraints { state: rates, input: constraint(&u, self.bounds.1) }
         } else {
-            Balls { state: of(&at.rates, self.bounds.0), input: of(&at.moment, self.bounds.1) }
+            StageConstraints {
+                state: constraint(&at.rates, self.bounds.0),
+                input: constraint(&at.moment, self.bounds.1),
+            }
         }
     }
 }
