@@ -36,9 +36,9 @@ pub struct Deviation {
     pub middle_angle: f64,
     /// Deviation of the rates in that state, rad/s.
     pub middle_rate: f64,
-    /// Half width of the box part of K ô, rad/s²; the norm_constraint part below is added to it.
+    /// Half width of the box part of K ô, rad/s²; the ball part below is added to it.
     pub feedback: f64,
-    /// Radius of the norm_constraint part of K ô, rad/s².
+    /// Radius of the ball part of K ô, rad/s².
     pub feedback_norm: f64,
     /// Moment that K ô requires to compensate for the inertia error, N m.
     pub feedback_moment: f64,
@@ -924,38 +924,36 @@ impl Parts {
         let errors = reach.of_errors(s);
         let Mismatch { peak, unseen_rate, .. } = self.mismatch;
         let Drive { all, of_two, .. } = self.drive;
-        let norm_constraint = self.mismatched(reach);
+        let of_mismatch = self.mismatched(reach);
         let early_feedback = reach.early_feedback;
         let reach = &reach.disturbance;
         let tau = s.period_feedback;
         // Between two ticks an angle departs from the straight line by no more than this.
-        let accelerated = all * (1.0 + reach.feedback)
-            + root3 * errors.feedback
-            + norm_constraint.feedback
-            + peak;
+        let accelerated =
+            all * (1.0 + reach.feedback) + root3 * errors.feedback + of_mismatch.feedback + peak;
         Deviation {
             angle: reach.angle * of_two
                 + SQRT_2 * errors.angle
-                + norm_constraint.angle
+                + of_mismatch.angle
                 + unseen_rate * s.delay
                 + tau * tau / 8.0 * accelerated,
             rate: reach.rate * all
                 + root3 * errors.rate
-                + norm_constraint.rate
+                + of_mismatch.rate
                 + unseen_rate
                 + self.between,
             seen_angle: reach.seen_angle * of_two
                 + SQRT_2 * errors.seen_angle
-                + norm_constraint.seen_angle,
-            seen_rate: reach.seen_rate * all + root3 * errors.seen_rate + norm_constraint.seen_rate,
+                + of_mismatch.seen_angle,
+            seen_rate: reach.seen_rate * all + root3 * errors.seen_rate + of_mismatch.seen_rate,
             middle_angle: reach.middle_angle * of_two
                 + SQRT_2 * errors.middle_angle
-                + norm_constraint.middle_angle,
+                + of_mismatch.middle_angle,
             middle_rate: reach.middle_rate * all
                 + root3 * errors.middle_rate
-                + norm_constraint.middle_rate,
+                + of_mismatch.middle_rate,
             feedback: reach.feedback * s.disturbance_bound + errors.feedback,
-            feedback_norm: norm_constraint.feedback,
+            feedback_norm: of_mismatch.feedback,
             feedback_moment: (self.along_moment + self.root_condition * self.any_moment)
                 * reach.feedback
                 + (self.along_moment + self.any_moment)
@@ -1008,10 +1006,10 @@ impl Parts {
             / (1.0 - again * self.pulse_common);
         // The parts that do not keep to the axes are added as norms.
         let besides = (all - self.pulse_common) * root3 * of_box + all * self.turn;
-        let norm_constraint = reach.change * self.drive.of_inertia
+        let by_inertia = reach.change * self.drive.of_inertia
             + self.mismatched(reaches).change
             + again * besides;
-        let of_ball = norm_constraint / (1.0 - again * all);
+        let of_ball = by_inertia / (1.0 - again * all);
         Pulse {
             of_box: s.delay_error * self.pulse_common * of_box,
             of_ball: s.delay_error * (all * of_ball + besides),

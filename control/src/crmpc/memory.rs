@@ -3,8 +3,7 @@
 use super::commands::Commands;
 use super::observer::Observed;
 use super::plan::Plan;
-use super::robust::Margins;
-use super::supervision::Supervision;
+use super::supervision::{Standing, Supervision};
 use crate::report::SolverReport;
 use nalgebra::Vector6;
 use serde::{Deserialize, Serialize};
@@ -38,35 +37,6 @@ pub struct Memory {
     pub observed: Observed,
     /// Recent changes of the command, if the delay is not exact.
     pub commands: Commands,
-}
-
-/// Status of the guarantee of the robust set at a tick. While it is in force, ‖ω‖ and ‖m‖ keep
-/// their limits for as long as the assumptions hold.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Standing {
-    /// No optimisation has been run yet, or the sets guarantee nothing.
-    #[default]
-    None,
-    /// A plan is certified, and the guarantee comes into force once the delay has passed; until
-    /// then moments act that were commanded without it.
-    Pending,
-    /// The limits are guaranteed from this tick on.
-    InForce,
-    /// The design does not hold for the settings, so that the controller works on best effort.
-    Refused,
-    /// No plan has been found that satisfies the conditions of the theorem.
-    Uncertified,
-    /// The vehicle is further from the plan than the assumptions explain, or something else
-    /// contradicts them.
-    Exceeded,
-    /// The inputs were set before the tick.
-    Stale,
-}
-
-impl Standing {
-    pub(super) fn is_assured(self) -> bool {
-        matches!(self, Self::Pending | Self::InForce)
-    }
 }
 
 impl Memory {
@@ -113,4 +83,14 @@ impl Clone for Memory {
         self.observed = *observed;
         self.commands.clone_from(commands);
     }
+}
+
+/// Margins that the first interval of a plan leaves to the limits, beyond the reserve for
+/// deviations from the plan, as shares of the limits.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Margins {
+    /// Margin to the rate limit at the interval's end.
+    pub rate: f64,
+    /// Margin to the moment limit in the interval.
+    pub moment: f64,
 }

@@ -14,6 +14,7 @@ mod robust;
 mod set;
 mod settings;
 mod stages;
+mod state;
 mod supervision;
 mod terminal;
 
@@ -25,24 +26,24 @@ pub use design::{
 #[doc(hidden)]
 pub use guarantee::Lemmas;
 pub use guarantee::{Assessment, Carried, Deviation, Geometry, Onset, Switching, Tightening};
-pub use memory::{Memory, Standing};
+pub use memory::{Margins, Memory};
 pub use observer::Observed;
 pub use plan::Plan;
 pub use published::Published;
-pub use robust::Margins;
 pub use set::Bounds;
 pub use settings::{Constraints, Guarantee, InitialState, ObserverSettings, Settings};
-pub use supervision::{Contradiction, Supervision};
+pub use supervision::{Contradiction, Standing, Supervision};
 
 use crate::controller::{Controller, Explained, Measurement, ReferenceAt};
 use crate::error::DesignError;
-use crate::mpc::State;
 use nalgebra::{Vector3, Vector6};
+use paper::Paper;
 use planner::Planner;
+use robust::Robust;
 use set::{Command, ConstraintSet, Planned, Tick};
+use state::{join, split};
 use std::time::Instant;
 use vehicle::kinematics;
-use vehicle::reference::Reference;
 
 /// The controller: settings, offline design, solvers and scratch memory. All state that later ticks
 /// depend on is in [`Memory`].
@@ -78,8 +79,12 @@ impl Crmpc {
     /// Returns an error that names the setting at fault.
     pub fn new(settings: Settings) -> Result<Self, DesignError> {
         let design = Design::new(&settings)?;
-        let set = set::new(&settings, &design)?;
-        let planner = Planner::new(&settings, &design, &*set)?;
+        let set: Box<dyn ConstraintSet> = match settings.constraints {
+            Constraints::Robust => Box::new(Robust::new(&settings, &design)),
+            Constraints::Paper => Box::new(Paper::new(&settings, &design)?),
+        };
+        let windows = (set.terminal_radius().is_some(), set.window_margin());
+        let planner = Planner::new(&settings, &design, windows)?;
         Ok(Self { settings, design, set, planner })
     }
 
@@ -188,18 +193,4 @@ impl Controller for Crmpc {
     fn limited(&mut self, memory: &mut Memory, applied: &Vector3<f64>) {
         memory.observed.limit(&self.settings.body, applied);
     }
-}
-
-/// Returns the tracking error E = x̃ − x_r.
-fn error(state: &Vector6<f64>, reference: &Reference) -> State<2> {
-    let (angles, rates) = split(state);
-    [angles - reference.angles, rates - reference.rates]
-}
-
-fn join(angles: &Vector3<f64>, rates: &Vector3<f64>) -> Vector6<f64> {
-    Vector6::new(angles.x, angles.y, angles.z, rates.x, rates.y, rates.z)
-}
-
-fn split(state: &Vector6<f64>) -> (Vector3<f64>, Vector3<f64>) {
-    (state.fixed_rows::<3>(0).into_owned(), state.fixed_rows::<3>(3).into_owned())
 }

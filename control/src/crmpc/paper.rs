@@ -3,7 +3,7 @@
 use super::design::Design;
 use super::memory::Memory;
 use super::plan::Plan;
-use super::planner::{Planner, follow_terminal_law};
+use super::planner::Planner;
 use super::set::{Bounds, ConstraintSet, Planned, ROUNDING, Tick, norm_constraint};
 use super::settings::{InitialState, Settings};
 use super::stages::{Point, Stages};
@@ -58,13 +58,14 @@ impl Paper {
             inertia_ratio: design.inertia_ratio,
         })
     }
+
+    /// Returns the acceleration under the terminal law (14), rad/s².
+    fn terminal_law(&self, state: &Vector6<f64>, reference: &Reference) -> Vector3<f64> {
+        terminal::acceleration(&self.settings, state, reference)
+    }
 }
 
 impl ConstraintSet for Paper {
-    fn stages(&self) -> &Stages {
-        &self.stages
-    }
-
     fn stages_mut(&mut self) -> &mut Stages {
         &mut self.stages
     }
@@ -104,26 +105,27 @@ impl ConstraintSet for Paper {
             InitialState::Nominal if !first => memory.plan.states[0],
             _ => *measured,
         };
-        let report = planner.solve(self, memory, &start, first);
+        let report = planner.solve((self, &self.stages), memory, &start, first);
         if report.status != SolverStatus::Fallback {
             planner.follow_optimum(&self.stages, memory, &start);
             return Planned { report, left_behind: false };
         }
         if first {
-            follow_terminal_law(self, &mut memory.plan, start);
+            let law = |state: &_, reference: &_| self.terminal_law(state, reference);
+            memory.plan.roll_out(start, &self.stages, law);
         }
-        let report =
-            planner.keep(self, memory, &start, (SolverStatus::Fallback, report.iterations));
+        let report = planner.keep(
+            (self, &self.stages),
+            memory,
+            &start,
+            (SolverStatus::Fallback, report.iterations),
+        );
         Planned { report, left_behind: false }
     }
 
     fn beyond_the_horizon(&self, plan: &Plan) -> Vector3<f64> {
         let n = self.stages.horizon();
         self.terminal_law(&plan.states[n], &self.stages.references[n - 1])
-    }
-
-    fn terminal_law(&self, state: &Vector6<f64>, reference: &Reference) -> Vector3<f64> {
-        terminal::acceleration(&self.settings, state, reference)
     }
 
     fn compensation(&self, _memory: &Memory) -> Vector3<f64> {

@@ -1,20 +1,22 @@
-//! The plan: a nominal motion over the horizon.
+//! The plan: a nominal trajectory over the horizon.
 
 use super::guarantee::{Carried, Onset, Switching};
+use super::stages::Stages;
+use super::state::{error, join};
 use crate::mpc::ErrorTrajectory;
 use nalgebra::{Vector3, Vector6};
 use serde::{Deserialize, Serialize};
 use vehicle::reference::Reference;
 
-/// Nominal motion: states x̃_0 … x̃_N and the accelerations a_0 … a_{N−1} held between them.
+/// Nominal trajectory: states x̃_0 … x̃_N and the accelerations a_0 … a_{N−1} held between them.
 #[derive(Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Plan {
     /// Nominal states (Θ̃, x̃_ω), N + 1 of them.
     pub states: Vec<Vector6<f64>>,
     /// Nominal accelerations a = ẋ̃_ω, N of them, rad/s².
     pub accelerations: Vec<Vector3<f64>>,
-    /// Multipliers of the state norm_constraint at each interval's end and of the norm_constraint on its input, from
-    /// which the next optimisation starts.
+    /// Multipliers of the norm constraints on the state at each interval's end and on its input,
+    /// from which the next optimisation starts.
     pub multipliers: Vec<[f64; 2]>,
     /// Braking rate κ of β̈ = −κ β̇ beyond the horizon, 1/s; used with the robust set.
     pub braking: f64,
@@ -89,12 +91,27 @@ impl Plan {
         self.states[n] = advance(&last, a, h);
     }
 
+    /// Fills the plan with the trajectory from `start` under an acceleration that depends on state
+    /// and reference.
+    pub(super) fn roll_out(
+        &mut self,
+        start: Vector6<f64>,
+        stages: &Stages,
+        law: impl Fn(&Vector6<f64>, &Reference) -> Vector3<f64>,
+    ) {
+        self.states[0] = start;
+        for (k, reference) in stages.references.iter().take(self.accelerations.len()).enumerate() {
+            self.accelerations[k] = law(&self.states[k], reference);
+            self.states[k + 1] = advance(&self.states[k], &self.accelerations[k], stages.step);
+        }
+    }
+
     /// Computes the errors E = x̃ − x_r and v = a − Θ̈_r of the plan.
     pub(super) fn errors(&self, references: &[Reference], motion: &mut ErrorTrajectory<2>) {
         for ((error, state), reference) in
             motion.states.iter_mut().zip(&self.states).zip(references)
         {
-            *error = super::error(state, reference);
+            *error = error(state, reference);
         }
         for ((v, a), reference) in motion.inputs.iter_mut().zip(&self.accelerations).zip(references)
         {
@@ -113,7 +130,7 @@ impl Plan {
     ) {
         self.states[0] = start.unwrap_or_else(|| {
             let [angles, rates] = motion.states[0];
-            super::join(&(angles + references[0].angles), &(rates + references[0].rates))
+            join(&(angles + references[0].angles), &(rates + references[0].rates))
         });
         for (k, (v, reference)) in motion.inputs.iter().zip(references).enumerate() {
             self.accelerations[k] = v + reference.accelerations;

@@ -6,14 +6,14 @@
 
 use super::design::Design;
 use super::memory::Memory;
-use super::plan::{self, Plan};
-use super::set::ConstraintSet;
+use super::plan::Plan;
 use super::settings::{InitialState, Settings};
 use super::stages::Stages;
+use super::state::error;
 use crate::controller::ReferenceAt;
 use crate::error::DesignError;
 use crate::error_dynamics::InvariantSet;
-use crate::mpc::{self, Chain, Cost, ErrorTrajectory, Layout, Optimiser, State, per_axis};
+use crate::mpc::{self, Bounded, Chain, Cost, ErrorTrajectory, Layout, Optimiser, State, per_axis};
 use crate::report::SolverStatus;
 use nalgebra::{Vector3, Vector6};
 
@@ -39,14 +39,16 @@ pub(super) struct Planner {
 }
 
 impl Planner {
-    /// Sets up the optimisation (10) within a constraint set.
+    /// Sets up the optimisation (10). `terminal` says whether there is a terminal set, and `margin`
+    /// is the share by which a window of the horizon is wider than the violated intervals, at each
+    /// end.
     ///
     /// # Errors
     /// Returns the solver's message if it refuses the data.
     pub(super) fn new(
         settings: &Settings,
         design: &Design,
-        set: &dyn ConstraintSet,
+        (terminal, margin): (bool, f64),
     ) -> Result<Self, DesignError> {
         let Settings { horizon: n, period_optimisation: h, p, q, .. } = *settings;
         let start = (settings.initial_state == InitialState::Tube).then(|| {
@@ -66,9 +68,9 @@ impl Planner {
             cost,
             horizon: n,
             constrains_states: true,
-            terminal: set.terminal_radius().is_some(),
+            terminal,
             start,
-            margin: set.window_margin(),
+            margin,
             scale: [ANGLE_SCALE, settings.limit_rate],
             standstill: STANDSTILL,
         };
@@ -108,13 +110,13 @@ impl Planner {
     /// there is none (`first`).
     pub(super) fn solve(
         &mut self,
-        set: &dyn ConstraintSet,
+        (set, stages): (&dyn Bounded<2>, &Stages),
         memory: &Memory,
         start: &Vector6<f64>,
         first: bool,
     ) -> mpc::OptimiserReport {
-        let references = &set.stages().references;
-        let error = super::error(start, &references[0]);
+        let references = &stages.references;
+        let error = error(start, &references[0]);
         let previous = (!first).then(|| {
             memory.plan.errors(references, &mut self.previous);
             // The optimum moves with the shifted reference.
@@ -148,24 +150,14 @@ impl Planner {
     /// Keeps the present plan and returns a report on it.
     pub(super) fn keep(
         &mut self,
-        set: &dyn ConstraintSet,
+        (set, stages): (&dyn Bounded<2>, &Stages),
         memory: &Memory,
         start: &Vector6<f64>,
         ended: (SolverStatus, u32),
     ) -> mpc::OptimiserReport {
-        let references = &set.stages().references;
-        let error = super::error(start, &references[0]);
+        let references = &stages.references;
+        let error = error(start, &references[0]);
         memory.plan.errors(references, &mut self.previous);
         self.optimiser.fall_back(set, &error, &self.affine, &self.previous, ended)
-    }
-}
-
-/// Fills a plan with the trajectory from `start` under the terminal law of a constraint set.
-pub(super) fn follow_terminal_law(set: &dyn ConstraintSet, plan: &mut Plan, start: Vector6<f64>) {
-    let Stages { references, step, .. } = set.stages();
-    plan.states[0] = start;
-    for (k, reference) in references.iter().take(plan.accelerations.len()).enumerate() {
-        plan.accelerations[k] = set.terminal_law(&plan.states[k], reference);
-        plan.states[k + 1] = plan::advance(&plan.states[k], &plan.accelerations[k], *step);
     }
 }

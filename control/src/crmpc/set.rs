@@ -1,19 +1,13 @@
 //! What the two constraint sets, `robust` and `paper`, have in common.
 
-use super::design::Design;
 use super::memory::Memory;
-use super::paper::Paper;
 use super::plan::Plan;
 use super::planner::Planner;
-use super::robust::Robust;
-use super::settings::{Constraints, Settings};
 use super::stages::Stages;
 use crate::controller::{Explained, Measurement};
-use crate::error::DesignError;
 use crate::linearise::Linear;
 use crate::mpc::{self, Bounded, NormConstraint};
 use nalgebra::{Matrix3, Vector3, Vector6};
-use vehicle::reference::Reference;
 
 /// Relative tolerance in checks of constraints, for rounding.
 pub(super) const ROUNDING: f64 = 1e-9;
@@ -21,8 +15,7 @@ pub(super) const ROUNDING: f64 = 1e-9;
 /// The sets of the nominal trajectory, and all that depends on their choice: how a plan is found,
 /// how it goes on beyond the horizon, and how the command is limited and supervised.
 pub(super) trait ConstraintSet: Bounded<2> + Send {
-    fn stages(&self) -> &Stages;
-
+    /// Stages of the horizon, into which the preview writes the references.
     fn stages_mut(&mut self) -> &mut Stages;
 
     /// Share by which a window of the horizon is wider than the violated intervals, at each end.
@@ -57,9 +50,6 @@ pub(super) trait ConstraintSet: Bounded<2> + Send {
 
     /// Prepares what the plan follows on for its next interval.
     fn move_on(&self, _plan: &mut Plan) {}
-
-    /// Returns the acceleration under the terminal law, rad/s².
-    fn terminal_law(&self, state: &Vector6<f64>, reference: &Reference) -> Vector3<f64>;
 
     /// Returns the acceleration that is commanded against the estimated disturbance, rad/s².
     fn compensation(&self, memory: &Memory) -> Vector3<f64>;
@@ -112,21 +102,6 @@ pub(super) struct Command {
     pub commanded: Vector3<f64>,
     /// Commanded moment before its limit, N m.
     pub moment: Vector3<f64>,
-}
-
-/// Makes the constraint set of the settings.
-///
-/// # Errors
-/// Returns an error that names the empty set of the paper, or the gain whose eigenvalues are not
-/// real as the paper's constants require.
-pub(super) fn new(
-    settings: &Settings,
-    design: &Design,
-) -> Result<Box<dyn ConstraintSet>, DesignError> {
-    Ok(match settings.constraints {
-        Constraints::Robust => Box::new(Robust::new(settings, design)),
-        Constraints::Paper => Box::new(Paper::new(settings, design)?),
-    })
 }
 
 /// The bounds of an optimisation, for benchmarks and tests that solve the same problem by other

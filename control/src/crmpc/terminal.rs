@@ -1,7 +1,7 @@
 //! The terminal law (14), ũ^f = −f + K̃ Ẽ + Θ̈_r, hence a = K̃ Ẽ + Θ̈_r.
 
 use super::settings::Settings;
-use super::split;
+use super::state::split;
 use crate::linearise;
 use nalgebra::{Vector3, Vector6};
 use vehicle::reference::Reference;

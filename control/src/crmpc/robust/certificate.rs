@@ -3,20 +3,10 @@
 
 use super::{Interval, RESERVE, Robust, norm_of_columns};
 use crate::crmpc::guarantee::{self, Dynamics, Onset};
+use crate::crmpc::memory::Margins;
 use crate::crmpc::settings::Settings;
 use crate::crmpc::stages::Point;
 use crate::mpc::ErrorTrajectory;
-use serde::{Deserialize, Serialize};
-
-/// Margins that the first interval of a plan leaves to the limits, beyond the reserve for
-/// deviations from the plan, as shares of the limits.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Margins {
-    /// Margin to the rate limit at the interval's end.
-    pub rate: f64,
-    /// Margin to the moment limit in the interval.
-    pub moment: f64,
-}
 
 /// Properties of a plan that satisfies the conditions of the theorem.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -3,12 +3,11 @@
 
 mod certificate;
 mod few_stages;
+mod judging;
 mod norms;
 mod planning;
 #[cfg(test)]
 mod tests;
-
-pub use certificate::Margins;
 
 use super::design::Design;
 use super::guarantee::{self, Carried, Dynamics, End, Held, MomentLoss, Onset, Switching};

@@ -5,18 +5,19 @@ use super::Robust;
 use super::certificate::Certified;
 use crate::controller::Explained;
 use crate::crmpc::guarantee::{self, Onset};
-use crate::crmpc::memory::{Memory, Standing};
+use crate::crmpc::memory::Memory;
 use crate::crmpc::plan::Plan;
-use crate::crmpc::planner::{Planner, follow_terminal_law};
+use crate::crmpc::planner::Planner;
 use crate::crmpc::set::{Bounds, ConstraintSet, Planned, Tick};
 use crate::crmpc::settings::InitialState;
 use crate::crmpc::stages::Stages;
-use crate::crmpc::{split, terminal};
+use crate::crmpc::state::split;
+use crate::crmpc::supervision::Standing;
+use crate::crmpc::terminal;
 use crate::linearise;
 use crate::mpc::{self, Nonlinearity};
 use crate::report::SolverStatus;
 use nalgebra::{Vector3, Vector6};
-use vehicle::reference::Reference;
 
 /// Shares of the tightening that are tried if no plan is certified.
 const LESS: [f64; 2] = [0.5, 0.0];
@@ -108,7 +109,12 @@ impl Robust {
         }
         if assured {
             self.go_towards_the_optimum(planner, memory);
-            let report = planner.keep(self, memory, measured, (SolverStatus::Kept, iterations));
+            let report = planner.keep(
+                (self, &self.stages),
+                memory,
+                measured,
+                (SolverStatus::Kept, iterations),
+            );
             memory.margins = self.margins(&planner.previous);
             return report;
         }
@@ -124,7 +130,7 @@ impl Robust {
         start: &Vector6<f64>,
         first: bool,
     ) -> (mpc::OptimiserReport, Option<Certified>) {
-        let report = planner.solve(self, memory, start, first);
+        let report = planner.solve((self, &self.stages), memory, start, first);
         if report.status == SolverStatus::Fallback {
             return (report, None);
         }
@@ -179,7 +185,7 @@ impl Robust {
                 break;
             }
             self.begin(0, share, &onset);
-            let report = planner.solve(self, memory, measured, true);
+            let report = planner.solve((self, &self.stages), memory, measured, true);
             iterations += report.iterations;
             if report.status != SolverStatus::Fallback {
                 planner.follow_optimum(&self.stages, memory, measured);
@@ -187,8 +193,16 @@ impl Robust {
                 return mpc::OptimiserReport { iterations, ..report };
             }
         }
-        follow_terminal_law(self, &mut memory.plan, *measured);
-        let report = planner.keep(self, memory, measured, (SolverStatus::Fallback, iterations));
+        let law = |state: &_, reference: &_| {
+            terminal::acceleration_within_limits(&self.settings, state, reference)
+        };
+        memory.plan.roll_out(*measured, &self.stages, law);
+        let report = planner.keep(
+            (self, &self.stages),
+            memory,
+            measured,
+            (SolverStatus::Fallback, iterations),
+        );
         memory.margins = self.margins(&planner.previous);
         report
     }
@@ -206,10 +220,6 @@ impl Robust {
 }
 
 impl ConstraintSet for Robust {
-    fn stages(&self) -> &Stages {
-        &self.stages
-    }
-
     fn stages_mut(&mut self) -> &mut Stages {
         &mut self.stages
     }
@@ -267,10 +277,6 @@ impl ConstraintSet for Robust {
             plan.onset.carried = switching.next(&plan.begins_with(switching));
             plan.onset.before = plan.accelerations[0];
         }
-    }
-
-    fn terminal_law(&self, state: &Vector6<f64>, reference: &Reference) -> Vector3<f64> {
-        terminal::acceleration_within_limits(&self.settings, state, reference)
     }
 
     /// Without guarantee the command compensates for the disturbance at once, because no plan

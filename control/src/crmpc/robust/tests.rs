@@ -131,8 +131,8 @@ impl Random {
         vector.try_normalize(0.1).unwrap_or_else(|| self.direction())
     }
 
-    /// Draws a vector in the norm_constraint of this radius, often on its surface.
-    fn norm_constraint(&mut self, radius: f64) -> Vector3<f64> {
+    /// Draws a vector in the ball of this radius, often on its surface.
+    fn within_ball(&mut self, radius: f64) -> Vector3<f64> {
         self.direction() * radius * self.between(0.0, 2.0).min(1.0)
     }
 }
@@ -212,12 +212,12 @@ fn needs(robust: &Robust, stage: &Stage, samples: usize, random: &mut Random) ->
         note(0, moment / limit_moment);
         // A deviation within these bounds, and the moment that the law commands there.
         let box_part = random.direction().map(|x| x.signum() * now.feedback);
-        let turn = random.norm_constraint(angle);
+        let turn = random.within_ball(angle);
         let commanded = linearise::moment(
             &body,
             &(angles + Vector3::new(turn.x, turn.y, 0.0)),
-            &(rates + random.norm_constraint(rate)),
-            &(a + box_part + random.norm_constraint(now.feedback_norm)),
+            &(rates + random.within_ball(rate)),
+            &(a + box_part + random.within_ball(now.feedback_norm)),
         );
         note(3, (commanded.norm() + now.feedback_moment) / limit_moment);
         for sample in 0..=samples {
@@ -256,9 +256,9 @@ fn worst_of_random_stages(count: usize, samples: usize, period: f64) -> ([f64; 4
                 settings.sideslip_domain * random.between(-1.2, 1.2).clamp(-1.0, 1.0),
                 0.0,
             ),
-            rates: random.norm_constraint(1.5 * settings.limit_rate),
+            rates: random.within_ball(1.5 * settings.limit_rate),
             acceleration: random
-                .norm_constraint(2.0 * settings.limit_moment / robust.design.largest_inertia),
+                .within_ball(2.0 * settings.limit_moment / robust.design.largest_inertia),
         };
         let mut stage = begin();
         while !stage.scaled(0.0).is_certified(&robust) {
