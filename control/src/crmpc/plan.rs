@@ -2,7 +2,7 @@
 
 use super::guarantee::{Carried, Onset, Switching};
 use super::stages::Stages;
-use super::state::{error, join};
+use super::state::{self, join};
 use crate::mpc::ErrorTrajectory;
 use nalgebra::{Vector3, Vector6};
 use serde::{Deserialize, Serialize};
@@ -111,7 +111,7 @@ impl Plan {
         for ((error, state), reference) in
             motion.states.iter_mut().zip(&self.states).zip(references)
         {
-            *error = error(state, reference);
+            *error = state::error(state, reference);
         }
         for ((v, a), reference) in motion.inputs.iter_mut().zip(&self.accelerations).zip(references)
         {

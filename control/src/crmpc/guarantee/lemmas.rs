@@ -1,11 +1,13 @@
 //! The numbers on which the guarantee rests, for its machine check.
 
-use super::super::settings::Settings;
-use super::{
-    BRAKING, CURVATURE, DRIFT_BY_ANGLES_TWICE, DRIFT_MIXED, Dynamics, FOURTH, Parts, TURN,
-    TURN_OF_RATES, bearing, gyroscopic,
-};
+use super::dynamics::Dynamics;
+use super::geometry::{BRAKING, CURVATURE, DRIFT_BY_ANGLES_TWICE, DRIFT_MIXED, FOURTH, TURN};
+use super::losses::bearing;
+use super::mismatch::gyroscopic;
+use super::parts::Parts;
+use crate::crmpc::settings::Settings;
 use crate::error_dynamics::Early;
+use crate::linearise::TURN_BY_ANGLES as TURN_OF_RATES;
 
 /// Every bound that the proof uses, as this crate computes it. The lines that compute the bounds
 /// explain them.

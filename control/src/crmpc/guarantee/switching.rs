@@ -7,7 +7,8 @@
 //! acceleration are known. What they leave is carried along from stage to stage here, since a bound
 //! on all of them would take too much of the limits.
 
-use super::{Deviation, Parts};
+use super::deviation::Deviation;
+use super::parts::Parts;
 use crate::crmpc::settings::Settings;
 use crate::delay::ticks;
 use crate::error::DesignError;

@@ -1,0 +1,325 @@
+//! Bounds on the dynamics in the part of the state space that the vehicle does not leave.
+
+use super::geometry::{
+    CURVATURE, DOMAINS, DRIFT_BY_ANGLES_TWICE, DRIFT_MIXED, Domain, FOURTH, Geometry,
+    LARGEST_IN_TURN, TURN, WIDEST,
+};
+use super::mismatch::{Drive, Mismatch, gyroscopic};
+use crate::crmpc::settings::Settings;
+use std::f64::consts::SQRT_2;
+use vehicle::math::{exp, powi};
+
+/// Bounds on the dynamics ẋ_ω = F(Θ, x_ω, m) = R (I⁻¹ (m − ω × I ω) − Ẇ x_ω) in the domain, with
+/// ‖m‖ ≤ M̄. The domain contains the vehicle's states, and their predictions.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(in crate::crmpc) struct Dynamics {
+    /// States of the vehicle itself.
+    pub(super) vehicle: Domain,
+    pub domain: Domain,
+    pub geometry: Geometry,
+    /// Largest and smallest moment of inertia, kg m².
+    pub largest: f64,
+    pub smallest: f64,
+    /// Factor in the bound ‖∂(ω × I ω)/∂ω‖ ≤ `gyroscopic` ‖ω‖ (Frobenius), kg m².
+    pub gyroscopic: f64,
+    /// Bound on ‖x_ω‖ in the domain, rad/s.
+    pub rate: f64,
+    /// Bound on ‖F‖ in the domain, rad/s².
+    pub(super) acceleration: f64,
+    /// Bound on ‖∂F/∂x_ω‖ in the domain, 1/s.
+    pub(super) by_rates: f64,
+    /// Bound on ‖∂F/∂(α, β)‖ in the domain, 1/s².
+    pub(super) by_angles: f64,
+    /// Bound on ‖dF/dt‖ along the predicted motion with m held, rad/s³.
+    pub(super) slope: f64,
+    /// Bound on ‖d²F/dt²‖ along the predicted motion with m held, rad/s⁴.
+    pub(super) jerk: f64,
+    /// Coefficients of ‖a‖², ‖x_ω‖² ‖a‖ and ‖x_ω‖⁴ in [`Self::moment_curvature`].
+    pub(super) curvature: [f64; 3],
+    /// Coefficients of the same powers in the curvature of ∂m/∂(α, β), see
+    /// [`Self::slope_curvatures`].
+    pub(super) curvature_by_angles: [f64; 3],
+    /// Coefficients of ‖x_ω‖ ‖a‖ and ‖x_ω‖³ in the curvature of ∂m/∂x_ω.
+    pub(super) curvature_by_rates: [f64; 2],
+    /// Coefficients of ‖a‖ and ‖x_ω‖² in the curvature of the largest ‖I W s‖.
+    pub(super) curvature_of_bearing: [f64; 2],
+}
+
+impl Dynamics {
+    /// Returns everything that drives the trajectory off its prediction but for the mismatch.
+    pub(super) fn drive(&self, s: &Settings) -> Drive {
+        Drive::new(s, &self.vehicle, (self.smallest, self.largest))
+    }
+
+    /// Computes the bounds for all states within the limits.
+    pub(in crate::crmpc) fn new(s: &Settings) -> Self {
+        Self::around(s, Domain { rate: s.limit_rate, sideslip: s.sideslip_domain })
+    }
+
+    /// Returns the bounds for the delay before the nominal motion began. From then on the limits
+    /// hold; before, rates and sideslip exceeded them by no more than they change over the delay.
+    pub(super) fn before(&self, s: &Settings) -> Self {
+        let Self { smallest, largest, .. } = *self;
+        let mut vehicle = Domain { rate: s.limit_rate, sideslip: s.sideslip_domain };
+        for _ in 0..DOMAINS {
+            let dynamics = Self::around(s, vehicle);
+            let spin = s.limit_moment / smallest
+                + 0.5 * (largest - smallest) / smallest * powi(vehicle.rate, 2);
+            let rate = s.limit_rate + (spin + dynamics.drive(s).all) * s.delay;
+            let sideslip = s.sideslip_domain + vehicle.rate * s.delay;
+            if rate <= vehicle.rate && sideslip <= vehicle.sideslip || !dynamics.is_bounded() {
+                return dynamics;
+            }
+            vehicle = Domain { rate: rate * (1.0 + 1e-4), sideslip: sideslip * (1.0 + 1e-4) };
+        }
+        self.unbounded()
+    }
+
+    /// Computes the bounds in the smallest domain that contains `vehicle` and the predictions of
+    /// its states.
+    pub(super) fn around(s: &Settings, vehicle: Domain) -> Self {
+        let mut domain = vehicle;
+        for _ in 0..DOMAINS {
+            let dynamics = Self { vehicle, ..Self::within(s, domain) };
+            let needed = dynamics.predicted(s);
+            if needed.rate <= domain.rate && needed.sideslip <= domain.sideslip {
+                return dynamics;
+            }
+            // A little more than needed is found sooner.
+            let more = |value: f64, least: f64| least + (1.0 + 1e-3) * (value - least);
+            domain = Domain {
+                rate: more(needed.rate, vehicle.rate),
+                sideslip: more(needed.sideslip, vehicle.sideslip),
+            };
+            if domain.sideslip.is_nan() || domain.sideslip > WIDEST {
+                break;
+            }
+        }
+        Self::within(s, vehicle).unbounded()
+    }
+
+    pub(super) fn unbounded(self) -> Self {
+        Self { by_rates: f64::INFINITY, ..self }
+    }
+
+    pub(super) fn is_bounded(&self) -> bool {
+        self.by_rates.is_finite()
+    }
+
+    /// Returns the domain of the states of `vehicle`, of their predictions, and of the states that
+    /// the law computes for the middle of the period.
+    pub(super) fn predicted(&self, s: &Settings) -> Domain {
+        let vehicle = self.vehicle;
+        let end = s.delay + s.period_feedback;
+        let drive = self.drive(s);
+        // The moment that acts is the assumed one, shifted by up to the error of the delay. The
+        // integrals of both over any time therefore differ by no more than this much at both ends,
+        // and R changes little in the meantime.
+        let turned = 1.0 + TURN * self.geometry.r * self.rate * end;
+        let jumps = 2.0 * s.delay_error * s.limit_moment * self.geometry.r * turned
+            / ((1.0 - s.inertia_error) * (1.0 - s.tensor_error) * self.smallest);
+        let by_jumps = (self.by_rates + self.by_angles * end) * jumps;
+        let f = (self.apart(&drive, end) + by_jumps) * self.growth(end);
+        let beside = 0.25 * self.slope * powi(s.period_feedback, 2);
+        let rates = drive.rate_error + (drive.all + f) * end + beside + jumps;
+        let angles = drive.angle_error
+            + (drive.rate_error_of_two + (0.5 * drive.of_two + 0.5 * f) * end) * end
+            + beside * s.period_feedback
+            + jumps * end;
+        Domain {
+            rate: vehicle.rate + rates + TURN * angles * self.geometry.r * vehicle.rate,
+            sideslip: vehicle.sideslip + angles,
+        }
+    }
+
+    pub(super) fn within(s: &Settings, domain: Domain) -> Self {
+        let eigenvalues = s.body.inertia.symmetric_eigenvalues();
+        let (smallest, largest) = (eigenvalues.min(), eigenvalues.max());
+        let geometry = Geometry::new(domain.sideslip);
+        let Geometry { drift, drift_by_rates, r } = geometry;
+        let spread = (largest - smallest) / smallest;
+        let rate = r * domain.rate;
+        let (gyroscopic, spinning) = gyroscopic(s);
+        // Gyroscopic term: ‖ω × I ω‖ ≤ ½ (I_max − I_min) ‖ω‖².
+        let spin = s.limit_moment / smallest + 0.5 * spread * powi(domain.rate, 2);
+        let acceleration = r * (spin + drift * rate * rate);
+        let by_rates = r * (drift_by_rates * rate + spinning * domain.rate);
+        // The derivative of R is ∂R = −R ∂W R; that of Ẇ x by the angles takes second derivatives
+        // of W.
+        let of_r = TURN * r * r;
+        let by_angles = of_r * (spin + drift * rate * rate)
+            + r * (CURVATURE * rate * rate + spinning * domain.rate * TURN * rate);
+        // F_xx [a, a] + 2 F_xθ [a, x] + F_θθ [x, x] + F_θ a + F_x ȧ with a = F and ȧ = F_x a + F_θ
+        // x. The second derivatives follow from the first ones with one more derivative of R or W.
+        let second = 2.0 * (by_rates / rate);
+        let mixed = of_r * by_rates + r * (DRIFT_MIXED + 4.0 * spread) * rate;
+        let angles_twice = 2.0 * of_r * by_angles
+            + (CURVATURE * r * r + 2.0 * of_r * of_r) * (spin + drift * rate * rate)
+            + r * (DRIFT_BY_ANGLES_TWICE + 12.0 * spread) * rate * rate;
+        let jerk = second * acceleration * acceleration
+            + 2.0 * mixed * acceleration * rate
+            + angles_twice * rate * rate
+            + by_angles * acceleration
+            + by_rates * (by_rates * acceleration + by_angles * rate);
+        let slope = by_rates * acceleration + by_angles * rate;
+        // I Ẅ a gives ∂²W [x, x] a + ∂W [a] a. The rest is as in `MomentLoss`, with ẋ_ω = a and
+        // Θ̈ = a.
+        let twisted = largest - smallest;
+        let curvature = [
+            largest * TURN + 2.0 * (largest * drift + 0.5 * twisted),
+            2.0 * largest * CURVATURE
+                + 2.0 * (largest * DRIFT_MIXED + 4.0 * twisted)
+                + TURN * SQRT_2 * twisted,
+            largest * DRIFT_BY_ANGLES_TWICE + 12.0 * twisted,
+        ];
+        // With P = ∂W[o] x and the symmetric bilinear form B(ω, ω) = 2 ω × I ω, ∂m/∂(α, β) [o] is
+        // I (∂W[o] a + ∂²W[x, o] x) + B(ω, P). Here ‖P‖ ≤ t x, ‖Ṗ‖ ≤ c x² + t a and ‖P̈‖ ≤ d x³ +
+        // 3 c x a with the bounds t, c and d on the first three derivatives of W; ‖ω̇‖ ≤ t x² + a,
+        // and ω̈ is that of `rate_curvature`. Likewise ∂m/∂x_ω [v] is I (∂W[v] x + ∂W[x] v) +
+        // B(ω, W v). Two and three columns make the norm one of Frobenius.
+        let root3 = 3.0_f64.sqrt();
+        let curvature_by_angles = [
+            SQRT_2 * (3.0 * largest * CURVATURE + 2.0 * twisted * TURN),
+            SQRT_2
+                * (6.0 * largest * DRIFT_BY_ANGLES_TWICE
+                    + 5.0 * twisted * (TURN * TURN + CURVATURE)),
+            SQRT_2
+                * (largest * FOURTH + twisted * (3.0 * TURN * CURVATURE + DRIFT_BY_ANGLES_TWICE)),
+        ];
+        let curvature_by_rates = [
+            root3 * (6.0 * largest * CURVATURE + 6.0 * twisted * TURN),
+            root3
+                * (2.0 * largest * DRIFT_BY_ANGLES_TWICE
+                    + 2.0 * twisted * (CURVATURE + TURN * TURN)),
+        ];
+        let curvature_of_bearing = [root3 * largest * TURN, root3 * largest * CURVATURE];
+        Self {
+            vehicle: domain,
+            domain,
+            geometry,
+            largest,
+            smallest,
+            gyroscopic,
+            rate,
+            acceleration,
+            by_rates,
+            by_angles,
+            slope,
+            jerk,
+            curvature,
+            curvature_by_angles,
+            curvature_by_rates,
+            curvature_of_bearing,
+        }
+    }
+
+    /// Returns the largest difference of F along a motion and its prediction a time t (s) after the
+    /// measurement, relative to [`Self::growth`], rad/s².
+    pub(super) fn apart(&self, drive: &Drive, t: f64) -> f64 {
+        self.by_rates * (drive.all * t + drive.rate_error)
+            + self.by_angles
+                * (0.5 * drive.of_two * t * t + drive.angle_error + drive.rate_error_of_two * t)
+    }
+
+    /// Returns how F differs from the acceleration that the law intended, see [`Mismatch`].
+    pub(super) fn mismatch(&self, s: &Settings, drive: &Drive) -> Mismatch {
+        let (d, tau) = (s.delay, s.period_feedback);
+        let end = d + tau;
+        let growth = self.growth(end);
+        if !self.is_bounded() {
+            return Mismatch::UNBOUNDED;
+        }
+        let Drive { all, of_two, rate_error, rate_error_of_two, angle_error, .. } = *drive;
+        let Self { by_rates, by_angles, .. } = *self;
+        // The drive takes the motion away from its prediction until the next measurement, and from
+        // then on that prediction from the next one. The distances grow with time, so that on
+        // average over time, and over the straight line between two motions, the domain exceeds
+        // that of the vehicle by half as much. The bound on ∂F/∂x_ω is proportional to that on ‖ω‖.
+        // The jumps by commands that begin early or late come at any time.
+        let halfway = if s.delay_error > 0.0 {
+            1.0
+        } else {
+            0.5 + 0.5 * self.vehicle.rate / self.domain.rate
+        };
+        let revised = halfway * by_rates * all * (d + 0.5 * tau)
+            + by_angles * of_two * (tau * tau / 6.0 + 0.5 * d * end);
+        let erred =
+            by_rates * rate_error + by_angles * (angle_error + rate_error_of_two * (d + 0.5 * tau));
+        let itself = self.jerk * tau * tau / 24.0 + self.middle(tau) * growth;
+        let peak = self.apart(drive, end) * growth
+            + self.middle(tau) * growth
+            + self.jerk * tau * tau / 8.0
+            + 0.5 * self.slope * tau;
+        Mismatch {
+            mean: (revised + erred) * growth + itself,
+            peak,
+            unseen_rate: (0.5 * by_rates * all * d * d + by_angles * of_two * d * d * d / 6.0)
+                * growth,
+            mispredicted: (by_rates * rate_error
+                + by_angles * (angle_error + 0.5 * rate_error_of_two * d))
+                * d
+                * growth,
+        }
+    }
+
+    /// The law predicts the middle of the period with a constant acceleration. As F changes until
+    /// then, the motion is elsewhere in the middle: its rates by up to τ²/8 ‖dF/dt‖, its angles by
+    /// up to τ³/24 ‖dF/dt‖. Returns the part of F there that the law does not cancel, rad/s². It
+    /// drives the motion off in turn, by no more than [`Self::growth`] if that is not large.
+    pub(super) fn middle(&self, tau: f64) -> f64 {
+        let in_turn = (self.by_rates + 0.25 * self.by_angles * tau) * 0.5 * tau;
+        if in_turn > LARGEST_IN_TURN {
+            return f64::INFINITY;
+        }
+        let square = tau * tau;
+        self.slope * (self.by_rates * square / 8.0 + self.by_angles * square * tau / 24.0)
+    }
+
+    /// Returns by how much the change of acceleration from one command to the next, at any instant
+    /// within the error of the delay about the tick, differs from the change that the law intends:
+    /// an amount (rad/s²), and a share of the change.
+    ///
+    /// The law gives the accelerations a′ = F(y, m) at the states y that it predicts for the
+    /// middles of two periods. F with the older moment differs between these two states, which lie
+    /// one period of the motion apart, and by what the newer measurement adds. The attitude at the
+    /// instant differs from the predicted one.
+    pub(super) fn between_commands(&self, s: &Settings, drive: &Drive) -> (f64, f64) {
+        let (tau, error) = (s.period_feedback, s.delay_error);
+        let end = s.delay + tau + error;
+        let growth = self.growth(end);
+        let Drive { all, of_two, rate_error, rate_error_of_two, angle_error, .. } = *drive;
+        let rates = self.acceleration * tau
+            + 0.25 * self.slope * tau * tau
+            + (all * tau + 2.0 * rate_error) * growth;
+        let angles = self.rate * tau
+            + 0.25 * self.acceleration * tau * tau
+            + (of_two * tau * end + 2.0 * angle_error + 2.0 * rate_error_of_two * end) * growth;
+        let apart = self.rate * (0.5 * tau + error)
+            + (angle_error + (rate_error_of_two + 0.5 * of_two * end) * end) * growth;
+        (
+            self.by_rates * rates + self.by_angles * angles,
+            TURN * self.geometry.r * self.geometry.r * apart,
+        )
+    }
+
+    /// Returns the ratio of the distance of two motions after a time (s) to the distance that the
+    /// drive alone would cause. The mismatch itself also drives them apart (Gronwall's inequality).
+    pub(super) fn growth(&self, elapsed: f64) -> f64 {
+        exp((self.by_rates + self.by_angles * elapsed) * elapsed)
+    }
+
+    /// The law cancels f at the predicted middle of the interval in which its moment acts. The
+    /// change of F of first order in time therefore cancels in the rate over the interval, and
+    /// shifts the angle by τ³ ‖dF/dt‖/12. Returns this shift over τ, rad/s.
+    pub(super) fn swing(&self, s: &Settings) -> f64 {
+        self.slope * powi(s.period_feedback, 2) / 12.0
+    }
+
+    /// Returns the largest amount by which the mismatch moves the rates, between two ticks, beyond
+    /// the straight line of its mean, rad/s: τ²/8 ‖dF/dt‖ by the change of first order in time, and
+    /// τ³/(36 √12) ‖d²F/dt²‖ by that of second order.
+    pub(super) fn between(&self, s: &Settings) -> f64 {
+        let tau = s.period_feedback;
+        self.slope * tau * tau / 8.0 + self.jerk * powi(tau, 3) / 120.0
+    }
+}

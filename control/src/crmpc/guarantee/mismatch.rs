@@ -1,0 +1,95 @@
+//! What drives the trajectory off its prediction.
+
+use super::geometry::Domain;
+use crate::crmpc::settings::Settings;
+use std::f64::consts::SQRT_2;
+use vehicle::math::{cos, powi};
+
+/// Everything that drives the motion off its prediction but for the mismatch.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Drive {
+    /// Bound on the norm of Δ and the effect of the inertia error, rad/s², and on that of two axes.
+    pub(super) all: f64,
+    pub(super) of_two: f64,
+    /// Bound on the norm of the effect of the inertia error, rad/s².
+    pub(super) of_inertia: f64,
+    /// Bounds on the norm of the error of the measured rates, rad/s, and of two of them.
+    pub(super) rate_error: f64,
+    pub(super) rate_error_of_two: f64,
+    /// Bound on the norm of the error of two measured angles, rad.
+    pub(super) angle_error: f64,
+}
+
+impl Drive {
+    /// `principal` are the smallest and the largest moment of inertia, kg m².
+    pub(super) fn new(s: &Settings, vehicle: &Domain, principal: (f64, f64)) -> Self {
+        let root3 = 3.0_f64.sqrt();
+        let (along, any) = inertia_moments(s, vehicle, principal);
+        // ‖R‖ = sec β at the vehicle's own attitude.
+        let of_inertia = (along + any) / (cos(vehicle.sideslip) * principal.0);
+        Self {
+            of_inertia,
+            all: root3 * s.disturbance_bound + of_inertia,
+            of_two: SQRT_2 * s.disturbance_bound + of_inertia,
+            rate_error: root3 * s.rate_error,
+            rate_error_of_two: SQRT_2 * s.rate_error,
+            angle_error: SQRT_2 * s.angle_error,
+        }
+    }
+}
+
+/// How F differs from the acceleration that the law intended, besides [`super::dynamics::Dynamics::swing`].
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Mismatch {
+    /// Sum of all differences that belong to one tick, per period, rad/s².
+    pub(super) mean: f64,
+    /// Largest difference at any time, rad/s².
+    pub(super) peak: f64,
+    /// Change of the rates by it between a measurement and its tick, rad/s.
+    pub(super) unseen_rate: f64,
+    /// Change of the predicted rates by it because of errors of the measurement, rad/s.
+    pub(super) mispredicted: f64,
+}
+
+impl Mismatch {
+    pub(super) const UNBOUNDED: Self = Self {
+        mean: f64::INFINITY,
+        peak: f64::INFINITY,
+        unseen_rate: f64::INFINITY,
+        mispredicted: f64::INFINITY,
+    };
+}
+
+/// Returns the moments that the inertia error amounts to while the largest moment acts, N m: along
+/// that moment, and in any direction.
+///
+/// The inertia is I_v = (1 + c) I^½ (1 + E) I^½. With D = 1 − (1 + E)⁻¹, I_v⁻¹ (m − ω × I_v ω)
+/// differs from I⁻¹ (m − ω × I ω) by −c/(1 + c) I⁻¹ m, by I^−½ D I^−½ (ω × I ω − m/(1 + c)), and by
+/// I^−½ (1 + E)⁻¹ I^−½ (ω × I^½ E I^½ ω). For the last one, ‖ω × S ω‖ is at most half the range of
+/// the eigenvalues of S.
+pub(super) fn inertia_moments(
+    s: &Settings,
+    vehicle: &Domain,
+    (smallest, largest): (f64, f64),
+) -> (f64, f64) {
+    let common = s.inertia_error / (1.0 - s.inertia_error);
+    let tensor = s.tensor_error / (1.0 - s.tensor_error);
+    let gyroscopic = (0.5 * (largest - smallest) + largest) * powi(vehicle.rate, 2);
+    (common * s.limit_moment, tensor * (s.limit_moment / (1.0 - s.inertia_error) + gyroscopic))
+}
+
+/// Returns bounds on ‖∂(ω × I ω)/∂ω‖ / ‖ω‖ and on the same ratio for I⁻¹ (ω × I ω). In principal
+/// axes the rows hold a_i ω_j and a_i ω_k with a = [I₃ − I₂, I₁ − I₃, I₂ − I₁], so that each ω²
+/// meets two of the squares a_i².
+pub(super) fn gyroscopic(s: &Settings) -> (f64, f64) {
+    let mut inertia: [f64; 3] = s.body.inertia.symmetric_eigenvalues().into();
+    inertia.sort_by(f64::total_cmp);
+    let [first, second, third] = inertia;
+    let rows = [third - second, third - first, second - first];
+    let of_two = |values: [f64; 3]| {
+        let squares = values.map(|value| value * value);
+        let smallest = squares.into_iter().fold(f64::INFINITY, f64::min);
+        (squares.iter().sum::<f64>() - smallest).sqrt()
+    };
+    (of_two(rows), of_two([rows[0] / first, rows[1] / second, rows[2] / third]))
+}
