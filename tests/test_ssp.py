@@ -275,4 +275,4 @@ def test_values_that_cannot_be_meant_are_refused_in_one_line(old, new, culprit, 
 def test_what_is_no_archive_is_refused(tmp_path):
     shutil.copy(archive("LQR"), tmp_path / "x.ssp")
     finished = run(tmp_path / "x.ssp", tmp_path / "out")
-    assert finished.returncode == 2 and "no SSP archive" in finished.stderr
+    assert finished.returncode == 2 and "is not an SSP archive" in finished.stderr

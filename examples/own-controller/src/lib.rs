@@ -12,8 +12,7 @@ use vehicle::{dynamics::RigidBody, kinematics::r};
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Pd {
     body: RigidBody,
-    /// Gains on the angles (1/s²) and on their rates (1/s).
-    gains: (f64, f64),
+    gains: (f64, f64), // on the angles, 1/s², and on their rates, 1/s
 }
 
 impl Default for Pd {
