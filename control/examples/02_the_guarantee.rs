@@ -6,7 +6,7 @@
 //! ```
 
 use control::closed_loop::fly;
-use control::crmpc::{Constraints, Settings, Standing};
+use control::crmpc::{Constraints, GuaranteeStatus, Settings};
 use control::{Controller, Crmpc};
 use vehicle::Scenario;
 
@@ -29,7 +29,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut memory = law.memory();
     let (mut in_force, mut least) = (0, f64::INFINITY);
     fly(&mut law, &mut memory, settings.period_feedback, &scenario, |sample| {
-        in_force += u32::from(sample.memory.standing == Standing::InForce);
+        in_force += u32::from(sample.memory.guarantee == GuaranteeStatus::InForce);
         least = least.min(sample.memory.margins.moment);
     })?;
     println!(

@@ -18,7 +18,7 @@
 mod harness;
 
 use control::Crmpc;
-use control::crmpc::{Constraints, Memory, Settings, SolverStatus, Standing};
+use control::crmpc::{Constraints, GuaranteeStatus, Memory, Settings, SolverStatus};
 use control::error_dynamics::Gain;
 use harness::flight::{Flight, optimised_every};
 use harness::{Case, constant, in_parallel, settings, simulate, white};
@@ -111,7 +111,7 @@ fn add(cost: &mut Cost, settings: &Settings, case: &Case) {
         case.disturbance.clone(),
         |memory, tick, _| {
             ticks += 1;
-            in_force += u32::from(memory.standing == Standing::InForce);
+            in_force += u32::from(memory.guarantee == GuaranteeStatus::InForce);
             if tick % ratio == 0 {
                 cost.times.push(memory.report.time);
                 cost.iterations += u64::from(memory.report.iterations);

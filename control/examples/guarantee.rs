@@ -57,7 +57,7 @@ fn print(settings: &Settings, error_deg: f64) {
     let design = |disturbance_bound: f64| Design::new(&Settings { disturbance_bound, ..*settings });
     let left =
         design(settings.disturbance_bound).map_or(f64::NAN, |design| design.assessment.moment_left);
-    let holds = |bound: f64| design(bound).is_ok_and(|design| design.counted >= 1.0);
+    let holds = |bound: f64| design(bound).is_ok_and(|design| design.accepted_share >= 1.0);
     let (mut low, mut high) = (0.0, 0.1);
     for _ in 0..30 {
         let middle = 0.5 * (low + high);

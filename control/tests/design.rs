@@ -400,7 +400,7 @@ fn oracle_errors_of_the_rate_ask_for_moment_at_once() {
         Settings { rate_error, guarantee: Guarantee::BestEffort, disturbance_bound: 0.0, ..exact };
     let exact = Settings { disturbance_bound: 0.0, ..exact };
     let [exact, noisy] = [exact, noisy].map(|settings| Design::new(&settings).unwrap());
-    assert_eq!(noisy.counted, 1.0);
+    assert_eq!(noisy.accepted_share, 1.0);
     let more = noisy.tightening.at(1).feedback - exact.tightening.at(1).feedback;
     let expected = rate_error * (5.0 + 5.2);
     assert!((more - expected).abs() < 1e-9 * expected, "{more} {expected}");
@@ -444,9 +444,13 @@ fn a_disturbance_that_cannot_be_borne_is_refused_with_the_largest_that_can() {
     assert!(moment_left < 0.0 && error.to_string().contains("`disturbance_bound`"), "{error}");
     Design::new(&Settings { disturbance_bound: largest, ..settings }).unwrap();
     Design::new(&Settings { disturbance_bound: 1.01 * largest, ..settings }).unwrap_err();
-    let counted =
-        Design::new(&Settings { guarantee: Guarantee::BestEffort, ..settings }).unwrap().counted;
-    assert!((counted * settings.disturbance_bound / largest - 1.0).abs() < 1e-6, "{counted}");
+    let accepted_share = Design::new(&Settings { guarantee: Guarantee::BestEffort, ..settings })
+        .unwrap()
+        .accepted_share;
+    assert!(
+        (accepted_share * settings.disturbance_bound / largest - 1.0).abs() < 1e-6,
+        "{accepted_share}"
+    );
 }
 
 #[test]

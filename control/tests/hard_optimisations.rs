@@ -3,7 +3,7 @@
 
 mod harness;
 
-use control::crmpc::{Constraints, Memory, Settings, SolverReport, SolverStatus, Standing};
+use control::crmpc::{Constraints, GuaranteeStatus, Memory, Settings, SolverReport, SolverStatus};
 use control::linearise::InverseKinematics;
 use control::mpc::SolverSettings;
 use control::{Controller, Crmpc, Dlmpc, Measurement, dlmpc};
@@ -149,7 +149,7 @@ fn budgeted(budget: u32, kind: DisturbanceKind) -> (harness::Outcome, Memory, u3
         simulate(&mut controller, &mut memory, 1.05, disturbance(kind), |memory, _, measured| {
             most = most.max(memory.report.iterations);
             broken |= before && measured.rates.norm() > settings.limit_rate;
-            before = memory.standing == Standing::InForce;
+            before = memory.guarantee == GuaranteeStatus::InForce;
         });
     (outcome, memory, most, broken)
 }

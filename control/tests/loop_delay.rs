@@ -1,7 +1,7 @@
 //! Tests of the estimate of the delay of a loop.
 
 use control::controller::{Controller, Measurement};
-use control::crmpc::{Constraints, Contradiction, Crmpc, Guarantee, Settings, Standing};
+use control::crmpc::{Constraints, Contradiction, Crmpc, Guarantee, GuaranteeStatus, Settings};
 use control::delay::{Delayed, Latency};
 use vehicle::Scenario;
 use vehicle::disturbance::DisturbanceKind;
@@ -16,7 +16,7 @@ struct Flight {
     /// Estimated delay at the end, s.
     estimate: f64,
     contradiction: Contradiction,
-    status: Standing,
+    status: GuaranteeStatus,
 }
 
 fn fly(kind: DisturbanceKind, seed: u64, (told, truly): (f64, f64), scale: f64) -> Flight {
@@ -60,7 +60,7 @@ fn oracle_a_delay_that_was_not_told_is_found_and_ends_the_guarantee() {
             assert!(is_found, "{kind:?} {told} {truly} {:?}", flight.found_at);
             assert!((flight.estimate - truly).abs() <= 0.25 * PERIOD + 1e-9, "{}", flight.estimate);
             assert_eq!(flight.contradiction, Contradiction::Delay);
-            assert_eq!(flight.status, Standing::Exceeded);
+            assert_eq!(flight.status, GuaranteeStatus::Exceeded);
         }
     }
 }

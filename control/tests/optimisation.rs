@@ -5,7 +5,7 @@ mod harness;
 
 use control::controller::Preview;
 use control::crmpc::{
-    Constraints, InitialState, Memory, Plan, Settings, SolverReport, SolverStatus, Standing,
+    Constraints, GuaranteeStatus, InitialState, Memory, Plan, Settings, SolverReport, SolverStatus,
 };
 use control::mpc::{Method, Nonlinearity, SolverSettings};
 use control::schedule::Sampled;
@@ -404,7 +404,7 @@ fn the_robust_plan_is_kept_where_no_optimum_is_found() {
             moved += 1;
             assert_eq!(after.plan.states[0], before.states[1]);
         }
-        assert_eq!(after.standing, Standing::InForce, "tick {}", sample.tick);
+        assert_eq!(after.guarantee, GuaranteeStatus::InForce, "tick {}", sample.tick);
         assert_eq!(after.age, sample.before.age + 5);
         assert!(after.margins.rate >= 0.0 && after.margins.moment >= 0.0, "{:?}", after.margins);
     }

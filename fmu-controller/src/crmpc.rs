@@ -2,8 +2,8 @@
 
 use crate::solver;
 use control::crmpc::{
-    Constraints, Contradiction, Crmpc, Guarantee, InitialState, Margins, Memory, Settings,
-    Standing, Supervision,
+    Constraints, Contradiction, Crmpc, Guarantee, GuaranteeStatus, InitialState, Margins, Memory,
+    Settings, Supervision,
 };
 use control::error::DesignError;
 use control::error_dynamics::Gain;
@@ -85,34 +85,42 @@ static POLICIES: Enumeration<Guarantee> = Enumeration {
         (Guarantee::BestEffort, "bestEffort", "the controller runs without a guarantee"),
     ],
 };
-static GUARANTEE_STATUSES: Enumeration<Standing> = Enumeration {
+static GUARANTEE_STATUSES: Enumeration<GuaranteeStatus> = Enumeration {
     name: "GuaranteeStatus",
     description: "Status of the guarantee of the robust set at the last tick",
     items: &[
-        (Standing::None, "none", "no optimisation yet, or constraint sets that give no guarantee"),
         (
-            Standing::Pending,
+            GuaranteeStatus::None,
+            "none",
+            "no optimisation yet, or constraint sets that give no guarantee",
+        ),
+        (
+            GuaranteeStatus::Pending,
             "pending",
             "a plan is certified, but its first command does not act yet",
         ),
-        (Standing::InForce, "inForce", "the limits are kept as long as the assumptions hold"),
         (
-            Standing::Refused,
+            GuaranteeStatus::InForce,
+            "inForce",
+            "the limits are kept as long as the assumptions hold",
+        ),
+        (
+            GuaranteeStatus::Refused,
             "refused",
             "no guarantee is possible with these settings; the controller runs as best effort",
         ),
         (
-            Standing::Uncertified,
+            GuaranteeStatus::Uncertified,
             "uncertified",
             "no plan was found that satisfies the conditions of the guarantee",
         ),
         (
-            Standing::Exceeded,
+            GuaranteeStatus::Exceeded,
             "exceeded",
             "an assumption was contradicted within the last second; guarantee.contradiction shows which",
         ),
         (
-            Standing::Stale,
+            GuaranteeStatus::Stale,
             "stale",
             "a tick within the last second used inputs that had been set before it; step with period.feedback or a whole fraction of it",
         ),
@@ -206,7 +214,7 @@ impl Law for CrmpcLaw {
         self.shown = Shown {
             angles: shown_vector(&memory.nominal.fixed_rows::<3>(0).into()),
             rates: shown_vector(&memory.nominal.fixed_rows::<3>(3).into()),
-            in_force: memory.supervision.status == Standing::InForce,
+            in_force: memory.supervision.status == GuaranteeStatus::InForce,
             supervision: memory.supervision,
             margins: Margins {
                 rate: shown(memory.margins.rate),
@@ -241,17 +249,17 @@ impl Law for CrmpcLaw {
             });
         }
         match (earlier.status, now.status) {
-            (Standing::None, Standing::Uncertified) => Some(
+            (GuaranteeStatus::None, GuaranteeStatus::Uncertified) => Some(
                 "the guarantee is not in force: no plan from the present state satisfies its conditions",
             ),
-            (Standing::None, Standing::Pending | Standing::InForce)
+            (GuaranteeStatus::None, GuaranteeStatus::Pending | GuaranteeStatus::InForce)
                 if after.moment_left < LITTLE_MOMENT =>
             {
                 Some(
                     "the settings leave less than a tenth of limit.moment to the plan (see guarantee.momentLeft), so optimisations take several times as long; a smaller disturbance.bound or delay leaves more",
                 )
             }
-            (Standing::None, Standing::Refused) => Some(
+            (GuaranteeStatus::None, GuaranteeStatus::Refused) => Some(
                 "constraints = robust cannot be guaranteed with these settings; the controller runs as best effort",
             ),
             _ => solver::warning(&before.report, &after.report),

@@ -14,7 +14,7 @@ pub fn accepted(seed: u64) -> Option<Settings> {
     let mut settings = drawn(seed % KINDS, random);
     for _ in 0..3 {
         match Design::new(&settings) {
-            Ok(design) if design.counted >= 1.0 => return Some(settings),
+            Ok(design) if design.accepted_share >= 1.0 => return Some(settings),
             Err(DesignError::NoGuarantee { disturbance: Some(bound), .. }) => {
                 // Near the largest value little of the moment is left, and previous plans are kept
                 // more often.

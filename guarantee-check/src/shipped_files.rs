@@ -54,7 +54,7 @@ impl ShippedFiles {
     /// Checks the plans of settings whose guarantee can be in force, and of no others.
     fn check(&self, settings: &Settings) -> Result<Option<Tally>, String> {
         let given = settings.constraints == Constraints::Robust
-            && Design::new(settings).is_ok_and(|design| design.counted >= 1.0);
+            && Design::new(settings).is_ok_and(|design| design.accepted_share >= 1.0);
         given.then(|| check_flights(settings, 0..self.flights, self.duration)).transpose()
     }
 }

@@ -109,7 +109,7 @@ pub struct Design {
     pub assessment: Assessment,
     /// Share of the disturbance bound and the errors that the tightening includes; 1 if the
     /// guarantee is given.
-    pub counted: f64,
+    pub accepted_share: f64,
     /// Feedback ticks per optimisation.
     pub ratio: usize,
     /// Number of feedback ticks that begin before the command of the first of them acts.
@@ -165,7 +165,7 @@ impl Design {
         let eigenvalues = s.body.inertia.symmetric_eigenvalues();
         let (smallest_inertia, largest_inertia) = (eigenvalues.min(), eigenvalues.max());
 
-        let (counted, tightening, assessment) = robust(s)?;
+        let (accepted_share, tightening, assessment) = robust(s)?;
         let invariant = error.invariant_set(guarantee::lateral(s));
         Ok(Self {
             paper: paper_constants(s, smallest_inertia, largest_inertia),
@@ -174,7 +174,7 @@ impl Design {
             invariant,
             tightening,
             assessment,
-            counted,
+            accepted_share,
             ratio,
             delay_ticks: delay::ticks(s.delay, s.period_feedback) as u32,
             largest_inertia,
@@ -194,9 +194,13 @@ fn robust(s: &Settings) -> Result<(f64, Tightening, Assessment), DesignError> {
     if s.guarantee == Guarantee::Required {
         return Err(guarantee::refusal(s, &assessment));
     }
-    let counted = guarantee::largest_share(s).unwrap_or(0.0);
-    let (tightening, within) = guarantee::tighten(&guarantee::counting(s, counted))?;
-    Ok((counted, tightening, Assessment { terminal_rate: within.terminal_rate, ..assessment }))
+    let accepted_share = guarantee::largest_share(s).unwrap_or(0.0);
+    let (tightening, within) = guarantee::tighten(&guarantee::with_share(s, accepted_share))?;
+    Ok((
+        accepted_share,
+        tightening,
+        Assessment { terminal_rate: within.terminal_rate, ..assessment },
+    ))
 }
 
 fn ratio(s: &Settings) -> Result<usize, DesignError> {

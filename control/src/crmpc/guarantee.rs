@@ -26,5 +26,5 @@ pub use lemmas::Lemmas;
 pub(super) use losses::{End, Held, MomentLoss};
 pub(super) use switching::unseen;
 pub use switching::{Carried, Onset, Switching};
-pub(super) use tighten::{counting, largest_share, lateral, refusal, tighten};
+pub(super) use tighten::{largest_share, lateral, refusal, tighten, with_share};
 pub use tightening::Tightening;

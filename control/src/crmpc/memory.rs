@@ -3,7 +3,7 @@
 use super::commands::Commands;
 use super::observer::Observed;
 use super::plan::Plan;
-use super::supervision::{Standing, Supervision};
+use super::supervision::{GuaranteeStatus, Supervision};
 use crate::report::SolverReport;
 use nalgebra::Vector6;
 use serde::{Deserialize, Serialize};
@@ -20,7 +20,7 @@ pub struct Memory {
     /// Nominal state (Θ̃, x̃_ω) at the last tick.
     pub nominal: Vector6<f64>,
     /// Whether the plan in force gives the guarantee, or the reason why not.
-    pub standing: Standing,
+    pub guarantee: GuaranteeStatus,
     /// What is said of the guarantee, which takes into account what contradicts its assumptions.
     pub supervision: Supervision,
     /// Margins to the limits that the plan in force leaves in its first interval.
@@ -43,7 +43,7 @@ impl Memory {
     /// Returns whether the plan in force is certified and the vehicle no further from it than the
     /// assumptions explain.
     pub fn assured(&self) -> bool {
-        self.standing.is_assured()
+        self.guarantee.is_assured()
     }
 }
 
@@ -61,7 +61,7 @@ impl Clone for Memory {
             started,
             report,
             nominal,
-            standing,
+            guarantee,
             margins,
             moment_left,
             age,
@@ -74,7 +74,7 @@ impl Clone for Memory {
         self.started = *started;
         self.report = *report;
         self.nominal = *nominal;
-        self.standing = *standing;
+        self.guarantee = *guarantee;
         self.margins = *margins;
         self.moment_left = *moment_left;
         self.age = *age;

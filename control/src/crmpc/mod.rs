@@ -32,7 +32,7 @@ pub use plan::Plan;
 pub use published::Published;
 pub use set::Bounds;
 pub use settings::{Constraints, Guarantee, InitialState, ObserverSettings, Settings};
-pub use supervision::{Contradiction, Standing, Supervision};
+pub use supervision::{Contradiction, GuaranteeStatus, Supervision};
 
 use crate::controller::{Controller, Explained, Measurement, ReferenceAt};
 use crate::error::DesignError;
@@ -49,7 +49,7 @@ use vehicle::kinematics;
 /// depend on is in [`Memory`].
 ///
 /// ```
-/// use control::crmpc::{Constraints, Settings, Standing};
+/// use control::crmpc::{Constraints, Settings, GuaranteeStatus};
 /// use control::closed_loop::fly;
 /// use control::{Controller, Crmpc};
 /// use vehicle::Scenario;
@@ -60,7 +60,7 @@ use vehicle::kinematics;
 /// let mut memory = law.memory();
 /// fly(&mut law, &mut memory, settings.period_feedback, &scenario, |sample| {
 ///     // The limits are guaranteed from the first tick on.
-///     assert_eq!(sample.memory.standing, Standing::InForce);
+///     assert_eq!(sample.memory.guarantee, GuaranteeStatus::InForce);
 /// })?;
 /// assert_eq!(memory.report.fallbacks, 0);
 /// # Ok::<(), Box<dyn std::error::Error>>(())

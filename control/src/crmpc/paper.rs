@@ -143,7 +143,7 @@ impl ConstraintSet for Paper {
 
     fn supervise(&self, memory: &mut Memory, _tick: &Tick) {
         let period = self.settings.period_feedback;
-        memory.supervision.judge(memory.standing, Contradiction::None, period);
+        memory.supervision.judge(memory.guarantee, Contradiction::None, period);
     }
 
     /// The limit is left to the optimisation, unless it has no solution.

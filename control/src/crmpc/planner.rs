@@ -53,7 +53,8 @@ impl Planner {
         let Settings { horizon: n, period_optimisation: h, p, q, .. } = *settings;
         let start = (settings.initial_state == InitialState::Tube).then(|| {
             let normals = design.invariant.as_ref().map(InvariantSet::normals).unwrap_or_default();
-            let size = (design.counted * settings.disturbance_bound).max(SMALLEST_DISTURBANCE);
+            let size =
+                (design.accepted_share * settings.disturbance_bound).max(SMALLEST_DISTURBANCE);
             std::array::from_fn(|_| normals.iter().map(|n| n / size).collect())
         });
         let chain = Chain::new(h);

@@ -12,7 +12,7 @@ const PROBATION: f64 = 1.0;
 /// Status of the guarantee of the robust set at a tick. While it is in force, ‖ω‖ and ‖m‖ keep
 /// their limits for as long as the assumptions hold.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Standing {
+pub enum GuaranteeStatus {
     /// No optimisation has been run yet, or the sets guarantee nothing.
     #[default]
     None,
@@ -32,7 +32,7 @@ pub enum Standing {
     Stale,
 }
 
-impl Standing {
+impl GuaranteeStatus {
     pub(super) fn is_assured(self) -> bool {
         matches!(self, Self::Pending | Self::InForce)
     }
@@ -62,7 +62,7 @@ pub enum Contradiction {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Supervision {
     /// Status of the guarantee at the last tick.
-    pub status: Standing,
+    pub status: GuaranteeStatus,
     /// Last contradiction, until the assumptions are believed again.
     pub contradiction: Contradiction,
     /// Ticks left until they are.
@@ -72,23 +72,30 @@ pub struct Supervision {
 }
 
 impl Supervision {
-    /// Takes the `standing` of the plan and what contradicts the assumptions at a tick, one
+    /// Takes the status of the plan and what contradicts the assumptions at a tick, one
     /// `period` (s) after the last.
-    pub(super) fn judge(&mut self, standing: Standing, found: Contradiction, period: f64) {
+    pub(super) fn judge(
+        &mut self,
+        plan: GuaranteeStatus,
+        contradiction: Contradiction,
+        period: f64,
+    ) {
         let was_assured = self.status.is_assured();
-        if found == Contradiction::None {
+        if contradiction == Contradiction::None {
             self.probation = self.probation.saturating_sub(1);
             if self.probation == 0 {
                 self.contradiction = Contradiction::None;
             }
         } else {
-            self.contradiction = found;
+            self.contradiction = contradiction;
             self.probation = (PROBATION / period).ceil() as u32;
         }
-        self.status = match (standing, self.contradiction) {
-            (Standing::None | Standing::Refused, _) | (_, Contradiction::None) => standing,
-            (_, Contradiction::Step) => Standing::Stale,
-            _ => Standing::Exceeded,
+        self.status = match (plan, self.contradiction) {
+            (GuaranteeStatus::None | GuaranteeStatus::Refused, _) | (_, Contradiction::None) => {
+                plan
+            }
+            (_, Contradiction::Step) => GuaranteeStatus::Stale,
+            _ => GuaranteeStatus::Exceeded,
         };
         self.ended = self.ended.saturating_add(u32::from(was_assured && !self.status.is_assured()));
     }

@@ -4,7 +4,7 @@
 #![allow(dead_code, unreachable_pub)] // Each user needs a part of it.
 
 use super::{CHECK, platform};
-use control::crmpc::{Constraints, Crmpc, InitialState, Memory, Settings, Standing};
+use control::crmpc::{Constraints, Crmpc, GuaranteeStatus, InitialState, Memory, Settings};
 use control::delay::{Delayed, Latency};
 use control::error::DesignError;
 use control::error_dynamics::Gain;
@@ -444,7 +444,7 @@ impl Flight {
             let moment = controller.update(&mut memory, tick, time, &measured, &reference);
             vehicle.command(time, moment);
             observe(&memory.inner, tick, &measured, &reference(time));
-            let now = memory.inner.standing == Standing::InForce;
+            let now = memory.inner.guarantee == GuaranteeStatus::InForce;
             if before && !now && shown.withdrawn.is_none() {
                 shown.withdrawn = Some(time);
             }

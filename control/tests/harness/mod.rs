@@ -8,7 +8,7 @@ pub mod platform;
 
 pub use control::closed_loop::CHECK;
 use control::closed_loop::{Summary, fly};
-use control::crmpc::{Constraints, Memory, Settings, SolverStatus, Standing};
+use control::crmpc::{Constraints, GuaranteeStatus, Memory, Settings, SolverStatus};
 use control::lqr::LqrSettings;
 use control::report::SolverReport;
 use control::{Controller, Crmpc, Delayed, Dlmpc, Lqr, Measurement, dlmpc};
@@ -138,7 +138,7 @@ pub fn run(settings: &Settings, inertia_scale: f64, disturbance: Disturbance) ->
         disturbance,
         |memory, _, measured| {
             assert_ne!(memory.report.status, SolverStatus::None);
-            let now = memory.standing == Standing::InForce;
+            let now = memory.guarantee == GuaranteeStatus::InForce;
             ticks += 1;
             in_force += u32::from(now);
             broken |= before

@@ -243,7 +243,7 @@ impl PlanCheck {
 fn start_set(settings: &Settings) -> Result<(InvariantSet, f64), String> {
     let design = Design::new(settings).map_err(|error| error.to_string())?;
     let set = design.invariant.ok_or("no set exists in which a nominal trajectory may begin")?;
-    Ok((set, (design.counted * settings.disturbance_bound).max(1e-5)))
+    Ok((set, (design.accepted_share * settings.disturbance_bound).max(1e-5)))
 }
 
 /// One interval of the plan, with its acceleration held.

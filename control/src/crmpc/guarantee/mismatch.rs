@@ -38,7 +38,8 @@ impl Drive {
     }
 }
 
-/// How F differs from the acceleration that the law intended, besides [`super::dynamics::Dynamics::swing`].
+/// How F differs from the acceleration that the law intended, besides
+/// [`super::dynamics::Dynamics::swing`].
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Mismatch {
     /// Sum of all differences that belong to one tick, per period, rad/s².

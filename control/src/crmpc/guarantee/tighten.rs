@@ -157,7 +157,7 @@ pub(in crate::crmpc) fn lateral(s: &Settings) -> f64 {
 }
 
 /// Returns these settings with the given share of the disturbance bound and the errors.
-pub(in crate::crmpc) fn counting(s: &Settings, share: f64) -> Settings {
+pub(in crate::crmpc) fn with_share(s: &Settings, share: f64) -> Settings {
     Settings {
         disturbance_bound: share * s.disturbance_bound,
         angle_error: share * s.angle_error,
@@ -184,7 +184,7 @@ pub(super) fn largest(tried: f64, with: impl Fn(f64) -> Settings) -> Option<f64>
 
 /// Returns the largest share, at most 1, of Δ̄ and the errors together for which the design holds.
 pub(in crate::crmpc) fn largest_share(s: &Settings) -> Option<f64> {
-    largest(1.0, |share| counting(s, share))
+    largest(1.0, |share| with_share(s, share))
 }
 
 /// Returns the error that says why the guarantee cannot be given, and which values would be

@@ -24,7 +24,7 @@ impl Robust {
     pub(super) fn certify(&self, motion: &ErrorTrajectory<2>, checked: bool) -> Option<Certified> {
         let Self { settings, dynamics, design, stages, .. } = self;
         let n = motion.inputs.len();
-        if design.counted < 1.0
+        if design.accepted_share < 1.0
             || self.share < 1.0
             || !checked && self.first_and_last(motion, 0..n, |_, _| ()).is_some()
         {

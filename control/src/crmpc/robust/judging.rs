@@ -6,7 +6,7 @@ use crate::crmpc::guarantee::{Carried, Deviation, Switching, Tightening};
 use crate::crmpc::memory::Memory;
 use crate::crmpc::set::{ROUNDING, Tick};
 use crate::crmpc::settings::Settings;
-use crate::crmpc::supervision::{Contradiction, Standing};
+use crate::crmpc::supervision::{Contradiction, GuaranteeStatus};
 use crate::linearise;
 use nalgebra::Vector3;
 use vehicle::math::cos;
@@ -21,16 +21,16 @@ impl Robust {
         let feedback = command.commanded - command.nominal;
         let explained = self.explains(memory, tick.within, angles, rates, &feedback);
         if memory.assured() && !(explained && self.credible(memory) && limits_kept) {
-            memory.standing = Standing::Exceeded;
+            memory.guarantee = GuaranteeStatus::Exceeded;
         }
         let contradiction =
             self.contradiction(memory, measured, explained && !tick.left_behind, limits_kept);
-        if memory.standing == Standing::Pending && memory.pending == 0 {
-            memory.standing = Standing::InForce;
+        if memory.guarantee == GuaranteeStatus::Pending && memory.pending == 0 {
+            memory.guarantee = GuaranteeStatus::InForce;
         }
         memory.observed.remember([&measured.angles, angle_rates], &command.commanded);
         let period = self.settings.period_feedback;
-        memory.supervision.judge(memory.standing, contradiction, period);
+        memory.supervision.judge(memory.guarantee, contradiction, period);
     }
 
     /// Returns whether the assumptions explain the observed disturbance.

@@ -12,7 +12,7 @@ use crate::crmpc::set::{Bounds, ConstraintSet, Planned, Tick};
 use crate::crmpc::settings::InitialState;
 use crate::crmpc::stages::Stages;
 use crate::crmpc::state::split;
-use crate::crmpc::supervision::Standing;
+use crate::crmpc::supervision::GuaranteeStatus;
 use crate::crmpc::terminal;
 use crate::linearise;
 use crate::mpc::{self, Nonlinearity};
@@ -36,10 +36,10 @@ impl Robust {
     fn is_left_behind(&self, memory: &mut Memory, measured: &Vector6<f64>) -> bool {
         let (angles, rates) = split(&(measured - memory.plan.states[0]));
         let gain = self.settings.feedback;
-        let left = self.design.counted >= 1.0
+        let left = self.design.accepted_share >= 1.0
             && !self.explains(memory, 0, &angles, &rates, &(angles * gain.k1 + rates * gain.k2));
         if memory.assured() && left {
-            memory.standing = Standing::Exceeded;
+            memory.guarantee = GuaranteeStatus::Exceeded;
         }
         left
     }
@@ -141,12 +141,12 @@ impl Robust {
     fn take_over(&self, planner: &Planner, memory: &mut Memory, certified: Option<Certified>) {
         let Some(Certified { margins, braking }) = certified else {
             memory.margins = self.margins(planner.optimiser.trajectory());
-            memory.standing = self.without_guarantee(memory);
+            memory.guarantee = self.without_guarantee(memory);
             return;
         };
         (memory.margins, memory.plan.braking) = (margins, braking);
         if !memory.assured() {
-            memory.standing = Standing::Pending;
+            memory.guarantee = GuaranteeStatus::Pending;
             memory.pending = self.design.delay_ticks;
         }
     }
@@ -176,7 +176,7 @@ impl Robust {
         measured: &Vector6<f64>,
         tried: u32,
     ) -> mpc::OptimiserReport {
-        memory.standing = self.without_guarantee(memory);
+        memory.guarantee = self.without_guarantee(memory);
         let onset = self.onset_anew(memory, measured);
         (memory.age, memory.plan.onset) = (0, onset);
         let mut iterations = tried;
@@ -208,13 +208,13 @@ impl Robust {
     }
 
     /// Returns the reason why a plan is not certified.
-    fn without_guarantee(&self, memory: &Memory) -> Standing {
-        if self.design.counted < 1.0 {
-            Standing::Refused
+    fn without_guarantee(&self, memory: &Memory) -> GuaranteeStatus {
+        if self.design.accepted_share < 1.0 {
+            GuaranteeStatus::Refused
         } else if self.credible(memory) {
-            Standing::Uncertified
+            GuaranteeStatus::Uncertified
         } else {
-            Standing::Exceeded
+            GuaranteeStatus::Exceeded
         }
     }
 }
