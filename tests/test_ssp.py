@@ -27,7 +27,7 @@ TIMES = ("solver.time", "innerLaw.time")
 
 
 def pack(experiment, path, *arguments):
-    command = [program("orchestrator"), "pack", experiment, "--ssp", "--out", path, "--fmu-dir", TARGET / "fmu", *arguments]
+    command = [program("orchestrator"), "pack", experiment, "--out", path, "--fmu-dir", TARGET / "fmu", *arguments]
     finished = subprocess.run(command, capture_output=True, text=True, timeout=60)
     assert finished.returncode == 0, finished.stderr
     return finished.stdout

@@ -32,8 +32,10 @@
 //!         0.04
 //!     }
 //!
-//! fn declare(table: Table<ControllerFmu<Self>>) -> Table<ControllerFmu<Self>> {
-//! table.real(parameter("weight", "Weight on the tracking error").real().min(0.0), |m| &mut m.law.weight) }
+//!     fn declare(table: VariableTable<ControllerFmu<Self>>) -> VariableTable<ControllerFmu<Self>> {
+//!         let weight = parameter("weight", "Weight on the tracking error").real();
+//!         table.real(weight.min(0.0), |m| &mut m.law.weight)
+//!     }
 //!
 //!     fn settings(&self, vehicle: &Vehicle) -> LqrSettings {
 //!         let Vehicle { body, period, .. } = *vehicle;

@@ -136,9 +136,6 @@ enum Command {
     Pack {
         /// Experiment to pack: a file, or the name of an experiment that `list` shows.
         experiment: PathBuf,
-        /// Write an SSP archive. This is the only format so far, and the option is required.
-        #[arg(long)]
-        ssp: bool,
         /// Path of the archive [default: EXPERIMENT.ssp].
         #[arg(long, value_name = "FILE")]
         out: Option<PathBuf>,
@@ -307,19 +304,7 @@ fn execute(command: Command, out: &mut impl Write, interrupt: &Interrupt) -> Res
         }
         Command::Campaign(asked) => fly(asked, out, interrupt),
         Command::Falsify(asked) => campaign::falsify(&asked, out, interrupt),
-        Command::Pack { ssp: false, .. } => {
-            let message = "pack needs the format of the archive: add --ssp, the only format so far";
-            Err(Error::experiment(message).into())
-        }
-        Command::Pack {
-            experiment,
-            out: archive,
-            fmu_dir,
-            overrides,
-            no_enumerations,
-            force,
-            ..
-        } => {
+        Command::Pack { experiment, out: archive, fmu_dir, overrides, no_enumerations, force } => {
             let archive = pack::Archive { path: archive, enumerations: !no_enumerations, force };
             pack::pack(&experiment, &overrides, &fmu_dir, archive, out, interrupt)
         }

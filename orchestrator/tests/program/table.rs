@@ -138,7 +138,7 @@ fn a_table_can_be_looked_at_but_not_packed_for_other_tools() {
     assert_eq!((code, errors.as_str()), (0, ""));
     assert!(text.starts_with("drive\n") && text.contains("table of 3 rows"), "{text}");
     assert_eq!(bench.call(&["inspect", "--check", "drive.csv"]), (0, String::new(), String::new()));
-    let (code, _, errors) = bench.call(&["pack", "loop.toml", "--ssp"]);
+    let (code, _, errors) = bench.call(&["pack", "loop.toml"]);
     assert_eq!(code, 2);
     assert!(errors.contains("[components.drive] is a lookup table"), "{errors}");
 }

@@ -194,8 +194,7 @@ fn results_of_an_earlier_run_are_replaced_only_if_that_is_asked_for() {
     let (code, _, errors) = run(&["--out", "loop.toml"]);
     assert!(code == 2 && errors.contains("--out loop.toml is a file"), "{errors}");
 
-    let pack =
-        |arguments: &[&str]| bench.call(&[&["pack", "loop.toml", "--ssp"], arguments].concat());
+    let pack = |arguments: &[&str]| bench.call(&[&["pack", "loop.toml"], arguments].concat());
     assert_eq!(pack(&[]).0, 0);
     let (code, _, errors) = pack(&[]);
     assert!(
@@ -223,7 +222,7 @@ fn an_archive_that_cannot_be_written_leaves_nothing_behind() {
     }
     zip.finish().unwrap();
     // Files may not grow beyond 100 blocks, of 512 or 1024 bytes, as if the disk were full.
-    let script = "trap '' XFSZ; ulimit -f 100; exec \"$0\" pack loop.toml --ssp";
+    let script = "trap '' XFSZ; ulimit -f 100; exec \"$0\" pack loop.toml";
     let output = Command::new("sh")
         .args(["-c", script, env!("CARGO_BIN_EXE_orchestrator")])
         .current_dir(bench.folder.path())

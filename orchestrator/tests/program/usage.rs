@@ -62,8 +62,6 @@ fn usage_that_is_nearly_right_is_told_what_it_lacks() {
     assert!(
         bench.refusal(&["--stop", "-1"]).contains("stop = -1 s must be at least one step of 1 s")
     );
-    let (code, _, errors) = bench.call(&["pack", "loop.toml"]);
-    assert!(code == 2 && errors.contains("--ssp"), "{errors}");
     let (code, _, errors) = bench.call(&["reproduce", "loop", "--members", "0"]);
     assert!(code == 2 && errors.contains("--members"), "{errors}");
     // The pattern leaves all inputs of this component unconnected, however many there are.
@@ -370,8 +368,7 @@ fn an_experiment_that_extends_another_is_all_of_them() {
     fs::write(bench.path("whole.toml"), shown).unwrap();
     let (code, _, errors) = bench.call(&["run", "whole.toml", "--quiet"]);
     assert!(code == 0 && results("whole") == results("longer"), "{errors}");
-    let (code, _, errors) =
-        bench.call(&["pack", "more/longer.toml", "--ssp", "--out", "longer.ssp"]);
+    let (code, _, errors) = bench.call(&["pack", "more/longer.toml", "--out", "longer.ssp"]);
     assert_eq!(code, 0, "{errors}");
     let (code, _, errors) = bench.call(&["run", "longer.ssp", "--quiet", "--out", "out/packed"]);
     assert_eq!(code, 0, "{errors}");
