@@ -32,7 +32,9 @@
 //!         0.04
 //!     }
 //!
-//!     fn declare(table: VariableTable<ControllerFmu<Self>>) -> VariableTable<ControllerFmu<Self>> {
+//!     fn declare(
+//!         table: VariableTable<ControllerFmu<Self>>,
+//!     ) -> VariableTable<ControllerFmu<Self>> {
 //!         let weight = parameter("weight", "Weight on the tracking error").real();
 //!         table.real(weight.min(0.0), |m| &mut m.law.weight)
 //!     }
