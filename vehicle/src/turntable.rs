@@ -33,8 +33,8 @@ struct Standing {
     at: Instant,
     /// Commanded angles Θ_c, rad.
     command: Vector3<f64>,
-    /// Angles θ, rad.
-    angles: Vector3<f64>,
+    /// How far the angles θ are behind the command, Θ_c − θ, rad.
+    error: Vector3<f64>,
 }
 
 /// Turntable with its state.
@@ -77,7 +77,7 @@ impl Turntable {
         let latest = if failed { f64::MAX } else { time + tolerance(time) };
         self.before.iter().chain(&self.last).all(|standing| {
             standing.at.time <= latest
-                && standing.command.iter().chain(&standing.angles).all(|value| value.is_finite())
+                && standing.command.iter().chain(&standing.error).all(|value| value.is_finite())
         })
     }
 
@@ -92,8 +92,8 @@ impl Turntable {
     /// Pose of the turntable at a sample at which the vehicle has this pose and its trajectory
     /// turns with `turn_rate` (rad/s).
     pub fn pose(&self, at: Instant, vehicle: &Pose, turn_rate: &Vector3<f64>) -> Pose {
-        let Standing { command, angles, .. } = self.standing(at, vehicle);
-        let rates = (command - angles).map(|error| self.rate(error));
+        let Standing { command, error, .. } = self.standing(at, vehicle);
+        let (angles, rates) = (command - error, error.map(|error| self.rate(error)));
         // The table turns with the axes of the trajectory, as the vehicle does.
         let turn = Kinematics::Exact.turn(&angles) * turn_rate;
         Pose {
@@ -115,14 +115,12 @@ impl Turntable {
             0.0 => angle,
             step => (angle / step).round() * step,
         });
-        let angles = self.base(at).map_or(command, |base| {
+        let error = self.base(at).map_or_else(Vector3::zeros, |base| {
             let elapsed = at.time - base.at.time;
             let slope = (command - base.command) / elapsed;
-            let error = (base.command - base.angles)
-                .zip_map(&slope, |error, slope| self.error_after(elapsed, error, slope));
-            command - error
+            base.error.zip_map(&slope, |error, slope| self.error_after(elapsed, error, slope))
         });
-        Standing { at, command, angles }
+        Standing { at, command, error }
     }
 
     /// Rate of an angle (rad/s) that is behind its command by `error` (rad).

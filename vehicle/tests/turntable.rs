@@ -97,6 +97,18 @@ fn oracle_a_ramp_is_followed_at_its_rate_a_time_constant_behind() {
 }
 
 #[test]
+fn oracle_a_fast_servo_stands_where_the_vehicle_does() {
+    let rates = Vector3::new(0.2, -0.1, 0.3);
+    let samples: Vec<_> = (0..200).map(|k| rates * (PERIOD * f64::from(k))).collect();
+    for bandwidth in [1e4, 1e8, 1e12, 1e200] {
+        let pose = followed(Config { bandwidth, rate: 0.0, resolution: 0.0 }, &samples);
+        assert!((pose.angles - samples[199]).amax() < 1e-5, "{bandwidth} Hz: {pose:?}");
+        let angle_rates = Kinematics::Exact.r(&pose.angles) * pose.rates;
+        assert!((angle_rates - rates).amax() < 1e-12, "{bandwidth} Hz: {angle_rates}");
+    }
+}
+
+#[test]
 fn oracle_a_jump_is_followed_at_the_rate_limit() {
     let mut samples = vec![Vector3::zeros(); 2];
     samples.extend([Vector3::new(0.5, 0.0, -0.5); 21]);

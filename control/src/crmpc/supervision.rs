@@ -1,8 +1,8 @@
 //! Supervision of the guarantee: what a controller says of it, tick by tick.
 //!
-//! The theorem needs a certified plan and true assumptions. The plan is judged where it is made.
-//! The assumptions are judged here, by what contradicts them: once one has been contradicted, the
-//! guarantee is in force again only after nothing has contradicted them for a while.
+//! The theorem needs a certified plan and true assumptions. The plan is certified where it is made,
+//! and `robust/judging.rs` finds what contradicts the assumptions. Once one has been contradicted,
+//! the guarantee is in force again only after nothing has contradicted them for a while.
 
 use serde::{Deserialize, Serialize};
 

@@ -11,10 +11,10 @@ impl Plant {
     /// Takes the sample that is due at `time` (s), if there is one.
     pub(super) fn sense(&mut self, time: f64, input: &Input) {
         let Some(mut sensors) = self.sensors.take() else { return };
-        sensors.take(time, &self.felt_by(&sensors, time, input));
-        if let (Some(mut turntable), Some(at)) = (self.turntable, sensors.due(time)) {
-            turntable.follow(at, &self.pose(time, input));
-            self.turntable = Some(turntable);
+        let vehicle = self.pose(time, input);
+        sensors.take(time, &self.felt_by(&sensors, time, input, &vehicle));
+        if let (Some(turntable), Some(at)) = (&mut self.turntable, sensors.due(time)) {
+            turntable.follow(at, &vehicle);
         }
         self.sensors = Some(sensors);
     }
@@ -42,11 +42,10 @@ impl Plant {
 
     /// Readings without errors that the sampled sensors take at `time` (s): in the pose of the
     /// turntable, if there is one and a sample is due.
-    fn felt_by(&self, sensors: &Sensors, time: f64, input: &Input) -> Readings {
-        let vehicle = self.pose(time, input);
+    fn felt_by(&self, sensors: &Sensors, time: f64, input: &Input, vehicle: &Pose) -> Readings {
         let pose = match (&self.turntable, sensors.due(time)) {
-            (Some(turntable), Some(at)) => turntable.pose(at, &vehicle, &self.turn_rate(input)),
-            _ => vehicle,
+            (Some(turntable), Some(at)) => turntable.pose(at, vehicle, &self.turn_rate(input)),
+            _ => *vehicle,
         };
         pose.felt(&self.surroundings)
     }
@@ -54,9 +53,10 @@ impl Plant {
     /// Newest sample that the sensors output at `time` (s), including one that is due then but not
     /// yet taken. Without sampled sensors it holds the readings of ideal ones and the number 0.
     pub fn measured(&self, time: f64, input: &Input) -> Sample {
+        let vehicle = self.pose(time, input);
         match &self.sensors {
-            Some(sensors) => sensors.shown(time, &self.felt_by(sensors, time, input)),
-            None => Sample { number: 0, time, readings: self.felt(time, input) },
+            Some(sensors) => sensors.shown(time, &self.felt_by(sensors, time, input, &vehicle)),
+            None => Sample { number: 0, time, readings: vehicle.felt(&self.surroundings) },
         }
     }
 
