@@ -169,7 +169,7 @@ enum Command {
     },
     /// Print an experiment or a study with all that it extends, templates and lists expanded.
     Show {
-        /// Experiment or study to print: a file, or a name that `list` shows.
+        /// What to print: a file, or the name of an experiment or a study.
         name: PathBuf,
     },
     /// Print the JSON Schema of a kind of file, by which editors complete and check such files.
