@@ -1,5 +1,6 @@
 //! The commands `campaign` and `falsify`.
 
+use crate::arguments;
 use crate::failure::Failure;
 use campaign::bundle;
 use campaign::changes::Changes;
@@ -28,7 +29,7 @@ pub(crate) struct Common {
     #[arg(long, value_name = "EXPERIMENT")]
     experiment: Option<PathBuf>,
     #[command(flatten)]
-    overrides: Overrides,
+    overrides: arguments::Overrides,
     /// Folder for the results [default: out/CAMPAIGN].
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
@@ -94,8 +95,8 @@ fn range(text: &str) -> Result<Range<u64>, String> {
 
 fn prepare(common: &Common) -> Result<Plan, Error> {
     let campaign = Campaign::load(&prepare::find(&common.campaign)?)?;
-    let changes =
-        Changes { experiment: common.experiment.clone(), overrides: common.overrides.clone() };
+    let overrides = common.overrides.clone().into();
+    let changes = Changes { experiment: common.experiment.clone(), overrides };
     Plan::new(campaign, &changes, &common.fmu_dir)
 }
 
@@ -119,9 +120,8 @@ pub(crate) fn fly(
     let plan = prepare(&asked.common)?;
     let folder = run::folder(&plan, asked.common.out.as_deref());
     if let Some(folder) = &asked.bundle {
-        if asked.common.overrides
-            != (Overrides { fmu: asked.common.overrides.fmu.clone(), ..Overrides::default() })
-        {
+        let overrides = Overrides::from(asked.common.overrides.clone());
+        if overrides != (Overrides { fmu: overrides.fmu.clone(), ..Overrides::default() }) {
             let message = "--bundle cannot be combined with changes on the command line: put them into [set] of the campaign";
             return Err(Error::experiment(message).into());
         }

@@ -1,6 +1,7 @@
 //! The command line of the orchestrator.
 
 use clap::{CommandFactory, Parser, Subcommand};
+mod arguments;
 mod campaign;
 mod catalogue;
 mod failure;
@@ -12,6 +13,7 @@ mod pack;
 mod run;
 mod schema;
 
+use arguments::choice;
 use catalogue::Filter;
 use cosim::check::check;
 use cosim::error::Error;
@@ -65,7 +67,7 @@ enum Command {
         #[arg(long, value_name = "DIR")]
         fmu_dir: Vec<PathBuf>,
         #[command(flatten)]
-        overrides: Overrides,
+        overrides: arguments::Overrides,
         /// Show neither progress nor summary.
         #[arg(long)]
         quiet: bool,
@@ -76,7 +78,7 @@ enum Command {
         /// Choose what happens after a missed deadline, that is, if the values that a component
         /// computes at one of its communication points are not ready at its next one. All missed
         /// deadlines are counted and reported.
-        #[arg(long, value_enum, default_value_t, requires = "real_time")]
+        #[arg(long, value_parser = choice::<OnMiss>(&[]), default_value = "catch-up", requires = "real_time")]
         on_miss: OnMiss,
         /// Ask for real-time scheduling (SCHED_FIFO with this priority, 1 to 99; 50 if it is left
         /// out) and for memory that is never swapped out. If the system refuses either, the refusal
@@ -144,7 +146,7 @@ enum Command {
         #[arg(long, value_name = "DIR")]
         fmu_dir: Vec<PathBuf>,
         #[command(flatten)]
-        overrides: Overrides,
+        overrides: arguments::Overrides,
         /// Write no connectors for outputs that are enumerations, because libcosim aborts if there
         /// is one.
         #[arg(long)]
@@ -263,7 +265,7 @@ fn execute(command: Command, out: &mut impl Write, interrupt: &Interrupt) -> Res
             force,
         } => {
             let experiment = search::experiment(&experiment)?;
-            let (mut system, entries) = system(&experiment, &overrides, &fmu_dir)?;
+            let (mut system, entries) = system(&experiment, &overrides.into(), &fmu_dir)?;
             let real_time = real_time.map(|factor| pacing::Settings { factor, on_miss, priority });
             let options = Options {
                 out: folder,
@@ -306,7 +308,7 @@ fn execute(command: Command, out: &mut impl Write, interrupt: &Interrupt) -> Res
         Command::Falsify(asked) => campaign::falsify(&asked, out, interrupt),
         Command::Pack { experiment, out: archive, fmu_dir, overrides, no_enumerations, force } => {
             let archive = pack::Archive { path: archive, enumerations: !no_enumerations, force };
-            pack::pack(&experiment, &overrides, &fmu_dir, archive, out, interrupt)
+            pack::pack(&experiment, &overrides.into(), &fmu_dir, archive, out, interrupt)
         }
         Command::Inspect { fmu, check: true, .. } => inspect::check(&fmu, out),
         Command::Inspect { fmu, filter, json, check: false } => {
@@ -331,7 +333,7 @@ fn fly(asked: campaign::Fly, out: &mut impl Write, interrupt: &Interrupt) -> Res
         experiment,
         out: Some(folder),
         fmu_dir: asked.common.fmu_dir,
-        overrides: Overrides::default(),
+        overrides: arguments::Overrides::default(),
         quiet: asked.common.quiet,
         real_time: None,
         on_miss: OnMiss::default(),

@@ -1,6 +1,7 @@
 //! Runs an experiment and writes its results. Observers of the system record, measure, draw and
 //! show it.
 
+use crate::arguments::choice;
 use crate::failure::Failure;
 use crate::live::{self, Live, scene::Scene};
 use cosim::doubts::doubts;
@@ -33,7 +34,7 @@ pub(crate) struct Files {
     #[arg(long)]
     no_csv: bool,
     /// Choose the format of the file of recorded variables.
-    #[arg(long, value_enum, value_name = "FORMAT", default_value_t, conflicts_with = "no_csv")]
+    #[arg(long, value_parser = choice::<Format>(&[]), value_name = "FORMAT", default_value = "csv", conflicts_with = "no_csv")]
     format: Format,
     /// Draw no plot.svg.
     #[arg(long)]

@@ -1,9 +1,8 @@
 //! Changes that the command line makes to a campaign.
 
 use crate::definition::Campaign;
-use clap::ValueEnum;
-use clap::builder::PossibleValue;
 use cosim::experiment::Overrides;
+use serde::Serialize;
 use std::path::PathBuf;
 
 /// Changes that the command line makes to a campaign.
@@ -22,16 +21,13 @@ impl Changes {
         // A case is the same in whichever process its instances run.
         let Overrides { set, fmu, stop, step, coupling, on_invalid, isolation: _ } =
             &self.overrides;
-        let name = |value: Option<PossibleValue>| value.map(|value| value.get_name().to_string());
         let experiment = self.experiment.as_ref().map(|path| path.display().to_string());
-        let coupling = coupling.as_ref().and_then(|value| name(value.to_possible_value()));
-        let on_invalid = on_invalid.as_ref().and_then(|value| name(value.to_possible_value()));
         let single = [
             ("experiment", experiment),
             ("stop", stop.map(|value| value.to_string())),
             ("step", step.map(|value| value.to_string())),
-            ("coupling", coupling),
-            ("on-invalid", on_invalid),
+            ("coupling", coupling.and_then(name)),
+            ("on-invalid", on_invalid.and_then(name)),
         ];
         let several = set.iter().map(|value| ("set", Some(value.clone())));
         let several = several.chain(fmu.iter().map(|value| ("fmu", Some(value.clone()))));
@@ -44,4 +40,9 @@ impl Changes {
         };
         words.into_iter().map(quoted).collect::<Vec<_>>().join(" ")
     }
+}
+
+/// Returns the name of an item in files and on the command line.
+fn name(item: impl Serialize) -> Option<String> {
+    serde_json::to_value(item).ok()?.as_str().map(str::to_string)
 }

@@ -11,9 +11,7 @@ use serde::{Deserialize, Serialize};
 use std::rc::Rc;
 
 /// Action taken if an instance gives an invalid value.
-#[derive(
-    Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema, Serialize, clap::ValueEnum,
-)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum OnInvalid {
     /// The value ends the run with an error.

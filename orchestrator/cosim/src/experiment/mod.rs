@@ -85,9 +85,7 @@ pub struct Simulation {
 }
 
 /// Way in which components are stepped and values are passed on.
-#[derive(
-    Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema, Serialize, clap::ValueEnum,
-)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Coupling {
     /// One after the other, each component gets its inputs, is stepped, and passes its outputs on:
@@ -95,7 +93,6 @@ pub enum Coupling {
     /// "gauss-seidel".
     #[default]
     #[serde(alias = "gauss-seidel")]
-    #[value(alias = "gauss-seidel")]
     Sequential,
     /// All components get their inputs, and then all are stepped: each receives the outputs of the
     /// others after their last step.

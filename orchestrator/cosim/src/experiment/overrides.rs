@@ -9,32 +9,21 @@ use std::path::Path;
 use toml::{Spanned, Value};
 
 /// Settings of an experiment that the command line may change.
-#[derive(Clone, Debug, Default, PartialEq, clap::Args)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Overrides {
-    /// Set a parameter: `plant.disturbance.seed=7`, `controller.constraints=paper`,
-    /// `plant.disturbance.bound="1 deg/s2"`.
-    #[arg(long = "set", value_name = "COMPONENT.PARAMETER=VALUE")]
+    /// Values of parameters, as `component.parameter=value`.
     pub set: Vec<String>,
-    /// Replace the FMU of a component: `controller=MyLaw.fmu`, as a file or by its name. Settings,
-    /// recorded variables and unconnected inputs of the experiment that the new FMU does not have
-    /// are left out.
-    #[arg(long = "fmu", value_name = "COMPONENT=FMU")]
+    /// FMUs in place of those of components, as `component=file`.
     pub fmu: Vec<String>,
     /// Stop time of the simulation, s.
-    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
     pub stop: Option<f64>,
     /// Length of the communication step, s.
-    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
     pub step: Option<f64>,
-    /// Choose how components are stepped and values are passed on.
-    #[arg(long, value_enum)]
+    /// Way in which components are stepped and values are passed on.
     pub coupling: Option<Coupling>,
-    /// Choose what happens if an instance gives a value that is not finite, or not valid for its
-    /// type.
-    #[arg(long, value_enum)]
+    /// Action taken if an instance gives a value that is not finite, or not valid for its type.
     pub on_invalid: Option<OnInvalid>,
     /// Processes of instances and their limits.
-    #[command(flatten)]
     pub isolation: Protection,
 }
 

@@ -8,28 +8,23 @@ use serde::{Deserialize, Serialize};
 use std::time::Duration;
 
 /// Processes of instances and their limits. Keys that are left out keep their defaults.
-#[derive(Clone, Debug, Default, PartialEq, Deserialize, JsonSchema, Serialize, clap::Args)]
+#[derive(Clone, Debug, Default, PartialEq, Deserialize, JsonSchema, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Protection {
     /// Run every instance in a process of its own (true), or all of them in this process (false).
     /// By default the instances of FMUs that this project's fmu-pack did not make get processes of
     /// their own.
-    #[arg(long, value_name = "BOOL", num_args = 0..=1, default_missing_value = "true", require_equals = true)]
     pub isolate: Option<bool>,
     /// Time within which an instance in a process of its own must answer each call, s [default:
     /// 60].
-    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
     pub call_timeout: Option<f64>,
     /// Memory that an instance in a process of its own may write, MiB; 0 means no limit [default:
     /// 4096].
-    #[arg(long = "unit-memory", value_name = "MIB")]
     pub memory: Option<u64>,
     /// Processor time that an instance in a process of its own may take, s [default: no limit].
-    #[arg(long = "unit-cpu", value_name = "SECONDS", value_parser = clap::value_parser!(u64).range(1..))]
     pub cpu: Option<u64>,
     /// Let instances in processes of their own write only to the folder of their archive, and keep
     /// them from the network. This works on Linux only; a warning tells if the system cannot do it.
-    #[arg(long, value_name = "BOOL", num_args = 0..=1, default_missing_value = "true", require_equals = true)]
     pub sandbox: Option<bool>,
 }
 

@@ -13,6 +13,7 @@ pub mod priority;
 pub mod report;
 pub mod timer;
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::str::FromStr;
 
@@ -56,7 +57,7 @@ impl FromStr for Factor {
 }
 
 /// Action taken on a missed deadline, which is counted and reported in any case.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum OnMiss {
     /// Continue at once, without waiting, until the run is back in step with the original time

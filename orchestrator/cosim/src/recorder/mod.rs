@@ -9,11 +9,14 @@ use crate::error::Error;
 use crate::master::{Observer, Sample};
 pub use column::Column;
 use columnar::Columnar;
+use schemars::JsonSchema;
+use serde::Deserialize;
 use std::path::Path;
 use text::Text;
 
 /// Format of the file of recorded variables.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
 pub enum Format {
     /// Write results.csv: comma-separated text with enough digits to read back the same bits.
     #[default]
