@@ -51,7 +51,7 @@ pub(crate) fn pack(
 
 /// Prints the components in a packed archive, and which setting the standard cannot store.
 fn packed(system: &System, archive: &Path, out: &mut impl Write) -> std::io::Result<()> {
-    writeln!(out, "{}: {}", archive.display(), system.order.join(", "))?;
+    writeln!(out, "{}: {}", archive.display(), system.names().join(", "))?;
     let step = system.experiment.simulation.step;
     writeln!(
         out,

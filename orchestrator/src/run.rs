@@ -128,7 +128,8 @@ pub(crate) fn run(system: &mut System, options: &Options) -> Result<RunReport, F
     // Requested after the drawing threads have started, because later threads would inherit the
     // scheduling.
     let scheduling = Scheduling::request(options.real_time.and_then(|settings| settings.priority));
-    let isolated = system.isolated();
+    let isolated = system.components.iter().filter(|component| component.is_isolated);
+    let isolated: Vec<&str> = isolated.map(|component| component.name.as_str()).collect();
     if matches!(scheduling.priority, Priority::Fifo { .. }) && !isolated.is_empty() {
         tracing::warn!(
             "--priority: the processes of {} keep the usual priority; --isolate=false runs these instances in this process",

@@ -3,6 +3,7 @@
 use crate::plan::Plan;
 use cosim::error::Error;
 use cosim::files;
+use cosim::system::CheckedComponent;
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
@@ -23,7 +24,7 @@ pub fn write(plan: &Plan, folder: &Path) -> Result<(), Error> {
     // Components that share an FMU share its copy.
     let mut copies: BTreeMap<&Path, String> = BTreeMap::new();
     let mut fmus = Table::new();
-    for (component, fmu) in system.order.iter().zip(&system.fmus) {
+    for CheckedComponent { name, fmu, .. } in &system.components {
         let number = copies.len();
         if !copies.contains_key(fmu.path.as_path()) {
             let file = fmu.path.file_name().unwrap_or_default().to_string_lossy();
@@ -32,7 +33,7 @@ pub fn write(plan: &Plan, folder: &Path) -> Result<(), Error> {
             keep(&copy, &fs::read(&fmu.path).map_err(Error::file(&fmu.path))?)?;
             copies.insert(&fmu.path, copy);
         }
-        fmus.insert(component.clone(), copies[fmu.path.as_path()].clone().into());
+        fmus.insert(name.clone(), copies[fmu.path.as_path()].clone().into());
     }
     let source = &plan.campaign.source;
     let fault = |error: String| source.error(&(0..0), error);

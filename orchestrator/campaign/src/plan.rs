@@ -94,20 +94,15 @@ impl Plan {
         let keys = keys(&campaign, changes, &system)?;
         let span = [system.clock.start(), system.clock.stop()];
         let command = changes.command(&campaign);
-        let single = system.order.iter().zip(&system.fmus).find(|(name, fmu)| {
-            let interface = fmu.description.co_simulation.as_ref();
+        let single = system.components.iter().find(|component| {
+            let interface = component.fmu.description.co_simulation.as_ref();
             interface.is_some_and(|interface| interface.has("canBeInstantiatedOnlyOncePerProcess"))
-                && !experiment.isolation.isolates(&experiment.components[*name], fmu)
+                && !component.is_isolated
         });
-        let single = single.map(|(_, fmu)| fmu.path.clone());
+        let single = single.map(|component| component.fmu.path.clone());
         let plan = Self {
             command,
-            archives: system
-                .order
-                .iter()
-                .cloned()
-                .zip(system.fmus.iter().map(|fmu| fmu.path.clone()))
-                .collect(),
+            archives: system.components.into_iter().map(|c| (c.name, c.fmu.path.clone())).collect(),
             replaced: changes.experiment.clone(),
             campaign,
             varied,

@@ -9,7 +9,7 @@ use cosim::error::Error;
 use cosim::experiment::{self, Experiment, Observe, Overrides, Protection};
 use cosim::files;
 use cosim::search;
-use cosim::system::System;
+use cosim::system::{CheckedComponent, System};
 use cosim::variation::Target;
 use cosim_report::metrics::{Meters, Metrics};
 use fmu_import::description::VariableKind as Type;
@@ -241,7 +241,7 @@ pub(crate) fn keys(
         ("experiment".to_string(), files::digest(system.experiment.source.whole())),
         ("program".to_string(), format!("{} {FORMAT}", env!("CARGO_PKG_VERSION"))),
     ]);
-    for (name, fmu) in system.order.iter().zip(&system.fmus) {
+    for CheckedComponent { name, fmu, .. } in &system.components {
         let bytes = fs::read(&fmu.path).map_err(Error::file(&fmu.path))?;
         keys.insert(format!("FMU of {name}"), files::digest(bytes));
     }

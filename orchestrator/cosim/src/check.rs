@@ -7,7 +7,7 @@ use crate::error::Error;
 use crate::experiment::{Coupling, Experiment};
 use crate::search;
 use crate::settings;
-use crate::system::{Opened, System, parts, periods};
+use crate::system::{CheckedComponent, Opened, System, parts};
 use crate::wiring::{self, Part};
 use fmu_import::faults;
 use fmu_import::fmu::Fmu;
@@ -31,19 +31,21 @@ pub fn check(
     let simulation = &experiment.simulation;
     let clock = Clock::new(simulation.start, simulation.stop, simulation.step)
         .map_err(|message| experiment.source.error(&(0..0), format!("[simulation] {message}")))?;
-    let order = order(&experiment)?;
 
-    let mut fmus = Vec::new();
-    for name in &order {
-        let path = find_fmu(&experiment, name, fmu_dirs)?;
+    let mut components = Vec::new();
+    for name in order(&experiment)? {
+        let path = find_fmu(&experiment, &name, fmu_dirs)?;
         let fmu = match opened.get(&path) {
             Some(fmu) => Rc::clone(fmu),
             None => Rc::new(open(&path)?),
         };
         opened.insert(path, Rc::clone(&fmu));
-        fmus.push(fmu);
+        let component = &experiment.components[&name];
+        let is_isolated = experiment.isolation.isolates(component, &fmu);
+        let (every, settings) = (component.every, Vec::new());
+        components.push(CheckedComponent { name, fmu, every, is_isolated, settings });
     }
-    let parts = parts(&order, &fmus);
+    let parts = parts(&components);
     if let Some(target) = experiment.unplaced.first() {
         return Err(Error::experiment(format!("--set {target}: {}", whereabouts(target, &parts))));
     }
@@ -51,7 +53,7 @@ pub fn check(
         .isolation
         .check()
         .map_err(|problem| experiment.source.error(&(0..0), format!("[isolation] {problem}")))?;
-    check_single_instances(&experiment, &order, &fmus)?;
+    check_single_instances(&experiment, &components)?;
 
     let wires = wiring::wires(&experiment, &parts)?;
     let settings = (0..parts.len())
@@ -67,10 +69,13 @@ pub fn check(
         );
         return Err(experiment.source.error(&(0..0), message));
     }
-    let every = periods(&experiment, &order);
+    let every: Vec<u32> = components.iter().map(|component| component.every).collect();
     let loops = delay::feedback_loops(&parts, &every, &wires, simulation.coupling);
     let probes = columns.iter().map(|column| column.port).collect();
-    Ok(System { experiment, clock, order, fmus, loops, settings, wires, columns, probes })
+    for (component, settings) in components.iter_mut().zip(settings) {
+        component.settings = settings;
+    }
+    Ok(System { experiment, clock, components, loops, wires, columns, probes })
 }
 
 /// Opens an archive, and warns if its description has a fault.
@@ -143,23 +148,21 @@ fn check_size(experiment: &Experiment, clock: &Clock, columns: usize) -> Result<
 /// Checks that an FMU that can be instantiated only once per process is used by one component only.
 fn check_single_instances(
     experiment: &Experiment,
-    order: &[String],
-    fmus: &[Rc<Fmu>],
+    components: &[CheckedComponent],
 ) -> Result<(), Error> {
-    for (index, fmu) in fmus.iter().enumerate() {
+    for (index, CheckedComponent { name, fmu, is_isolated, .. }) in components.iter().enumerate() {
         let only_once = fmu
             .description
             .co_simulation
             .as_ref()
             .is_some_and(|interface| interface.has("canBeInstantiatedOnlyOncePerProcess"));
         if only_once
-            && !experiment.isolation.isolates(&experiment.components[&order[index]], fmu)
-            && let Some(other) = fmus[..index].iter().position(|other| Rc::ptr_eq(other, fmu))
+            && !is_isolated
+            && let Some(other) = components[..index].iter().find(|o| Rc::ptr_eq(&o.fmu, fmu))
         {
             let message = format!(
-                "\"{}\" and \"{}\" both use {}, which can be instantiated only once per process: give one of them isolate = true",
-                order[other],
-                order[index],
+                "\"{}\" and \"{name}\" both use {}, which can be instantiated only once per process: give one of them isolate = true",
+                other.name,
                 fmu.path.display()
             );
             return Err(experiment.source.error(&(0..0), message));

@@ -16,7 +16,7 @@ use tracing::subscriber::{NoSubscriber, with_default};
 /// Returns an error if the run was asked to end.
 pub fn doubts(system: &System, interrupt: &Interrupt) -> Result<Vec<String>, Error> {
     let mut doubts =
-        delay::warnings(&system.parts(), &system.settings, &system.loops, system.clock.step());
+        delay::warnings(&system.parts(), &system.settings(), &system.loops, system.clock.step());
     for seed in without_effect(system, interrupt)? {
         doubts
             .push(format!("--set {seed}: this seed has no effect, another one gives the same run"));
@@ -32,14 +32,14 @@ pub fn doubts(system: &System, interrupt: &Interrupt) -> Result<Vec<String>, Err
 /// Returns an error if the comparison was ended from outside.
 fn without_effect(system: &System, interrupt: &Interrupt) -> Result<Vec<String>, Error> {
     let mut idle = Vec::new();
-    for (component, settings) in system.settings.iter().enumerate() {
-        for (index, setting) in settings.iter().enumerate() {
-            let path = format!("{}.{}", system.order[component], setting.name);
+    for (component, checked) in system.components.iter().enumerate() {
+        for (index, setting) in checked.settings.iter().enumerate() {
+            let path = format!("{}.{}", checked.name, setting.name);
             let SettingValue::Integer(seed) = setting.value else { continue };
             if !is_seed(&path) || !system.experiment.assigned.contains(&path) {
                 continue;
             }
-            let mut other = system.settings.clone();
+            let mut other = system.settings();
             other[component][index].value =
                 SettingValue::Integer(if seed > 0 { seed - 1 } else { seed + 1 });
             // Messages of the instances are hidden here, because they appear again in the run

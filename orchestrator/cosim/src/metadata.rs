@@ -4,7 +4,7 @@
 use crate::error::Error;
 use crate::files::digest;
 use crate::pacing;
-use crate::system::{Parameters, System};
+use crate::system::{CheckedComponent, Parameters, System};
 use fmu_import::description::VariableKind;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
@@ -74,13 +74,13 @@ pub fn metadata(
         .loops
         .iter()
         .map(|l| {
-            let components: Vec<&String> = l.components.iter().map(|&index| &system.order[index]).collect();
+            let components: Vec<&str> = l.components.iter().map(|&index| parts[index].name).collect();
             json!({ "components": components, "delay_steps": l.ticks, "delay_s": l.ticks as f64 * system.clock.step() })
         })
         .collect();
     let mut components = serde_json::Map::new();
-    for (index, name) in system.order.iter().enumerate() {
-        components.insert(name.clone(), component(system, index, name, parameters));
+    for checked in &system.components {
+        components.insert(checked.name.clone(), component(checked, parameters));
     }
     json!({
         "title": experiment.title,
@@ -88,7 +88,7 @@ pub fn metadata(
         "orchestrator": env!("CARGO_PKG_VERSION"),
         "simulation": {
             "start": simulation.start, "stop": simulation.stop, "step": simulation.step,
-            "steps": system.clock.ticks(), "coupling": simulation.coupling, "order": system.order,
+            "steps": system.clock.ticks(), "coupling": simulation.coupling, "order": system.names(),
         },
         "real_time": real_time.map(|s| json!({ "factor": s.factor, "on_miss": s.on_miss, "priority": s.priority })),
         "components": components,
@@ -119,10 +119,10 @@ fn status(failure: Option<&Error>) -> String {
     }
 }
 
-fn component(system: &System, index: usize, name: &str, parameters: &Parameters) -> Value {
-    let fmu = &system.fmus[index];
+fn component(component: &CheckedComponent, parameters: &Parameters) -> Value {
+    let CheckedComponent { name, fmu, every, settings, .. } = component;
     let set: BTreeMap<&str, Value> =
-        system.settings[index].iter().map(|s| (s.name.as_str(), s.value.to_json())).collect();
+        settings.iter().map(|s| (s.name.as_str(), s.value.to_json())).collect();
     json!({
         "fmu": fmu.path.file_name().map(|name| name.to_string_lossy()),
         "sha256": std::fs::read(&fmu.path).ok().map(digest),
@@ -130,7 +130,7 @@ fn component(system: &System, index: usize, name: &str, parameters: &Parameters)
         "model": fmu.description.model_name,
         "version": fmu.description.version,
         "generation_tool": fmu.description.generation_tool,
-        "every": system.experiment.components[name].every,
+        "every": every,
         "set": set,
         "parameters": parameters.get(name),
     })

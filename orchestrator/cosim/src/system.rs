@@ -32,18 +32,27 @@ pub struct System {
     pub experiment: Experiment,
     /// Start time, stop time and communication step.
     pub clock: Clock,
-    /// Names of the components, in the order in which they are stepped.
-    pub order: Vec<String>,
-    /// FMU of each component, in the same order.
-    pub fmus: Vec<Rc<Fmu>>,
+    /// The components, in the order in which they are stepped.
+    pub components: Vec<CheckedComponent>,
     /// Feedback loops with their delays, in ticks.
     pub loops: Vec<FeedbackLoop>,
-    /// Settings of each component, in the same order.
-    pub(crate) settings: Vec<Vec<Setting>>,
     pub(crate) wires: Vec<Wire>,
     pub(crate) columns: Vec<Column>,
     /// Variables that the observers see, in the order of a sample's values.
     pub(crate) probes: Vec<Port>,
+}
+
+/// A component of an experiment whose FMU is opened and whose names are looked up.
+pub struct CheckedComponent {
+    /// Name of the component in the experiment.
+    pub name: String,
+    /// FMU of the component.
+    pub fmu: Rc<Fmu>,
+    /// Period of the component, in communication steps.
+    pub every: u32,
+    /// Whether the instance has a process of its own.
+    pub is_isolated: bool,
+    pub(crate) settings: Vec<Setting>,
 }
 
 /// A variable that is seen at every communication point.
@@ -62,7 +71,7 @@ pub struct Probed {
 impl System {
     /// Returns the names and model descriptions of the components.
     pub(crate) fn parts(&self) -> Vec<Part<'_>> {
-        parts(&self.order, &self.fmus)
+        parts(&self.components)
     }
 
     fn find(&self, path: &str) -> Option<Port> {
@@ -83,18 +92,14 @@ impl System {
         Some(ticks as f64 * self.clock.step())
     }
 
-    /// Returns the names of the components whose instances have processes of their own.
-    pub fn isolated(&self) -> Vec<&str> {
-        let components = self.order.iter().enumerate();
-        components
-            .filter(|(index, _)| self.isolates(*index))
-            .map(|(_, name)| name.as_str())
-            .collect()
+    /// Returns the names of the components, in the order in which they are stepped.
+    pub fn names(&self) -> Vec<&str> {
+        self.components.iter().map(|component| component.name.as_str()).collect()
     }
 
-    fn isolates(&self, index: usize) -> bool {
-        let component = &self.experiment.components[&self.order[index]];
-        self.experiment.isolation.isolates(component, &self.fmus[index])
+    /// Returns the settings of the components, in the order in which they are stepped.
+    pub(crate) fn settings(&self) -> Vec<Vec<Setting>> {
+        self.components.iter().map(|component| component.settings.clone()).collect()
     }
 
     /// Returns the full names of the recorded variables.
@@ -213,7 +218,7 @@ impl System {
     }
 
     fn kind(&self, port: Port) -> &VariableKind {
-        &self.fmus[port.component].description.variables[port.variable].kind
+        &self.components[port.component].fmu.description.variables[port.variable].kind
     }
 
     fn items(&self, port: Port) -> Vec<(String, i32)> {
@@ -229,7 +234,7 @@ impl System {
         let VariableKind::Real { unit: Some(unit), display_unit, .. } = self.kind(port) else {
             return (1.0, String::new());
         };
-        let units = &self.fmus[port.component].description.units;
+        let units = &self.components[port.component].fmu.description.units;
         units
             .iter()
             .find(|defined| defined.name == *unit)
@@ -260,7 +265,7 @@ impl System {
     /// # Errors
     /// Returns an error if an instance cannot be made or initialized.
     pub fn start(&self, interrupt: &Interrupt) -> Result<Master, Error> {
-        self.start_with(&self.settings, interrupt)
+        self.start_with(&self.settings(), interrupt)
     }
 
     /// Creates and initializes the instances with `settings` in place of the system's own.
@@ -269,20 +274,20 @@ impl System {
         settings: &[Vec<Setting>],
         interrupt: &Interrupt,
     ) -> Result<Master, Error> {
-        let every = periods(&self.experiment, &self.order);
         let mut members = Vec::new();
-        for (index, name) in self.order.iter().enumerate() {
-            let fmu = &self.fmus[index];
-            let isolates = self.isolates(index);
-            let limits = isolates.then(|| self.experiment.isolation.limits());
+        for (component, settings) in self.components.iter().zip(settings) {
+            let CheckedComponent { name, fmu, every, is_isolated, .. } = component;
+            let limits = is_isolated.then(|| self.experiment.isolation.limits());
             let instance = fmu.instantiate(name, limits.as_ref())?;
             let on_invalid = self.experiment.simulation.on_invalid;
             let mut instance = Watched::around(instance, name, fmu, on_invalid);
-            settings::apply(&settings[index], instance.as_mut()).map_err(|failure| {
-                Error::Call { component: name.clone(), time: self.clock.start(), failure }
+            settings::apply(settings, instance.as_mut()).map_err(|failure| Error::Call {
+                component: name.clone(),
+                time: self.clock.start(),
+                failure,
             })?;
-            let (name, every) = (name.clone(), every[index]);
-            members.push(Member { name, every, ahead: isolates, instance });
+            let (name, every, ahead) = (name.clone(), *every, *is_isolated);
+            members.push(Member { name, every, ahead, instance });
         }
         let coupling = self.experiment.simulation.coupling;
         let parts = self.parts();
@@ -339,12 +344,9 @@ impl System {
     }
 }
 
-pub(crate) fn parts<'a>(order: &'a [String], fmus: &'a [Rc<Fmu>]) -> Vec<Part<'a>> {
-    order.iter().zip(fmus).map(|(name, fmu)| Part { name, description: &fmu.description }).collect()
-}
-
-pub(crate) fn periods(experiment: &Experiment, order: &[String]) -> Vec<u32> {
-    order.iter().map(|name| experiment.components[name].every).collect()
+pub(crate) fn parts(components: &[CheckedComponent]) -> Vec<Part<'_>> {
+    let components = components.iter();
+    components.map(|c| Part { name: &c.name, description: &c.fmu.description }).collect()
 }
 
 fn plain_value(description: &ModelDescription, port: Port, value: f64) -> Value {

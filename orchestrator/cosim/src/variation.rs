@@ -29,8 +29,8 @@ impl System {
         let parts = self.parts();
         let (name, rest) = names::split(path)
             .ok_or_else(|| format!("\"{path}\" is not of the form component.parameter"))?;
-        let component = self.order.iter().position(|other| other == name).ok_or_else(|| {
-            let hint = names::hint(name, self.order.iter().map(String::as_str));
+        let component = parts.iter().position(|part| part.name == name).ok_or_else(|| {
+            let hint = names::hint(name, parts.iter().map(|part| part.name));
             format!("there is no component \"{name}\"{hint}")
         })?;
         let variable = settings::position(rest, component, parts[component], &self.wires, true)?;
@@ -39,7 +39,7 @@ impl System {
 
     /// Returns the variable of a target.
     pub fn variable(&self, target: Target) -> &Variable {
-        &self.fmus[target.component].description.variables[target.variable]
+        &self.components[target.component].fmu.description.variables[target.variable]
     }
 
     /// Converts a value to the type and the unit of a target.
@@ -56,7 +56,7 @@ impl System {
     /// Real.
     pub fn nominal(&self, target: Target) -> Option<f64> {
         let variable = self.variable(target);
-        let mut settings = self.settings[target.component].iter();
+        let mut settings = self.components[target.component].settings.iter();
         let setting = settings.find(|setting| setting.name == variable.name);
         match setting.map(|setting| &setting.value) {
             Some(SettingValue::Real(value)) => Some(*value),
@@ -95,7 +95,7 @@ impl System {
 
     /// Returns the settings of all components with the changes made to them.
     fn varied(&self, changes: &[(Target, SettingValue)]) -> Vec<Vec<Setting>> {
-        let mut settings = self.settings.clone();
+        let mut settings = self.settings();
         for (target, value) in changes {
             let variable = self.variable(*target);
             let of_component = &mut settings[target.component];

@@ -29,7 +29,8 @@ pub struct RunReport {
 /// # Errors
 /// Returns an error if the text cannot be written.
 pub fn summary(system: &System, report: &RunReport, out: &mut impl Write) -> io::Result<()> {
-    let (System { clock, experiment, order, loops, .. }, metrics) = (system, &report.metrics);
+    let (System { clock, experiment, loops, .. }, metrics) = (system, &report.metrics);
+    let names = system.names();
     let coupling = match experiment.simulation.coupling {
         Coupling::Sequential => "sequential",
         Coupling::Jacobi => "Jacobi",
@@ -42,7 +43,7 @@ pub fn summary(system: &System, report: &RunReport, out: &mut impl Write) -> io:
         rounded(clock.stop()),
         clock.ticks(),
         clock.step(),
-        order.join(", ")
+        names.join(", ")
     )?;
     let mut line = |label: &str, text: String| writeln!(out, "  {label:<17} {text}");
     for (label, text) in metric_lines(&experiment.observe, metrics) {
@@ -58,11 +59,11 @@ pub fn summary(system: &System, report: &RunReport, out: &mut impl Write) -> io:
         line("loop delay", "no feedback loop".into())?;
     }
     for feedback in loops {
-        let names: Vec<&str> = feedback
+        let around: Vec<&str> = feedback
             .components
             .iter()
             .chain(feedback.components.first())
-            .map(|&index| order[index].as_str())
+            .map(|&index| names[index])
             .collect();
         let steps = match feedback.ticks {
             0 => "none".to_string(),
@@ -76,8 +77,7 @@ pub fn summary(system: &System, report: &RunReport, out: &mut impl Write) -> io:
                 ", from the order: a component is stepped before one whose response it receives"
             }
         };
-        let undeclared: Vec<&str> =
-            feedback.undeclared.iter().map(|&index| order[index].as_str()).collect();
+        let undeclared: Vec<&str> = feedback.undeclared.iter().map(|&index| names[index]).collect();
         let assumed = if undeclared.is_empty() {
             String::new()
         } else {
@@ -86,7 +86,7 @@ pub fn summary(system: &System, report: &RunReport, out: &mut impl Write) -> io:
                 undeclared.join(", ")
             )
         };
-        line("loop delay", format!("{steps} ({}){reason}{assumed}", names.join(" -> ")))?;
+        line("loop delay", format!("{steps} ({}){reason}{assumed}", around.join(" -> ")))?;
     }
     if let Some(factor) = metrics.real_time_factor {
         line("real-time factor", format!("{factor:.1} ({:.3} s elapsed)", metrics.wall_s))?;
@@ -95,7 +95,7 @@ pub fn summary(system: &System, report: &RunReport, out: &mut impl Write) -> io:
         line("ended early", ended.to_string())?;
     }
     if let Some(real_time) = &metrics.real_time {
-        real_time.print(order, out)?;
+        real_time.print(&names, out)?;
     }
     let mut line = |label: &str, text: String| writeln!(out, "  {label:<17} {text}");
     line("results", format!("{}: {}", report.out.display(), report.files.join(", ")))

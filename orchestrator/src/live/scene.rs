@@ -75,7 +75,7 @@ impl Scene {
             title: system.experiment.title.clone(),
             span: [system.clock.start(), system.clock.stop()],
             factor,
-            components: system.order.clone(),
+            components: system.names().into_iter().map(String::from).collect(),
             panels,
             readings,
             guarantee: guarantee.transpose().map_err(Error::experiment)?.flatten(),

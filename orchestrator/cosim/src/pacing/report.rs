@@ -132,7 +132,7 @@ impl RealTime {
     ///
     /// # Errors
     /// Returns an error if the text cannot be written.
-    pub fn print(&self, order: &[String], out: &mut impl Write) -> io::Result<()> {
+    pub fn print(&self, names: &[&str], out: &mut impl Write) -> io::Result<()> {
         let mut line = |label: &str, text: String| writeln!(out, "  {label:<17} {text}");
         line(
             "real time",
@@ -144,7 +144,8 @@ impl RealTime {
                 self.elapsed_s
             ),
         )?;
-        let width = order.iter().map(String::len).max().unwrap_or(0).max("orchestrator".len());
+        let width =
+            names.iter().map(|name| name.len()).max().unwrap_or(0).max("orchestrator".len());
         let groups = format!(
             "{:width$} {:>8} |{:>32} |{:>16} |{:>24} |",
             "", "", "step time", "response", "wake-up jitter"
@@ -181,7 +182,7 @@ impl RealTime {
                 "missed",
             ]),
         )?;
-        for name in order {
+        for &name in names {
             let Some(component) = self.components.get(name) else { continue };
             let ComponentTiming { step_ms: step, response_ms: response, wake_up_ms: woken, .. } =
                 component;

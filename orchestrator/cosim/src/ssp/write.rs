@@ -7,7 +7,8 @@ use crate::experiment::Coupling;
 use crate::files;
 use crate::interrupt::Interrupt;
 use crate::settings::SettingValue;
-use crate::system::System;
+use crate::system::{CheckedComponent, System};
+use crate::wiring::Port;
 use fmu_import::description::{Variable, VariableKind};
 use fmu_import::quantity::Scaling;
 use quick_xml::Writer;
@@ -56,15 +57,14 @@ pub fn pack(
     interrupt: &Interrupt,
 ) -> Result<(), Error> {
     let goes_on = || interrupt.asked().map_or(Ok(()), |request| Err(Error::Ended(request)));
-    if let Some((name, _)) =
-        system.order.iter().zip(&system.fmus).find(|(_, fmu)| fmu.is_lookup_table())
-    {
+    if let Some(table) = system.components.iter().find(|c| c.fmu.is_lookup_table()) {
+        let name = &table.name;
         let message =
             format!("[components.{name}] is a lookup table, which other importers cannot run");
         return Err(system.experiment.source.error(&(0..0), message));
     }
     let mut entries: BTreeMap<String, Vec<u8>> = BTreeMap::new();
-    for fmu in &system.fmus {
+    for CheckedComponent { fmu, .. } in &system.components {
         entries.insert(resource(&fmu.path), fs::read(&fmu.path).map_err(Error::file(&fmu.path))?);
     }
     let structure = structure(&Source { system, enumerations }).map_err(Error::file(path))?;
@@ -101,7 +101,7 @@ fn structure(system: &Source) -> io::Result<Vec<u8>> {
     element(&mut xml, "ssd:SystemStructureDescription", &attributes, |xml| {
         element(xml, "ssd:System", &[("name", "system".into())], |xml| {
             element(xml, "ssd:Elements", &[], |xml| {
-                (0..system.order.len()).try_for_each(|i| component(xml, system, i))
+                (0..system.components.len()).try_for_each(|i| component(xml, system, i))
             })?;
             if !system.wires.is_empty() {
                 element(xml, "ssd:Connections", &[], |xml| connections(xml, system))?;
@@ -169,9 +169,9 @@ fn run_settings(xml: &mut Xml, system: &Source) -> io::Result<()> {
         ("recordEvery", experiment.record.every.to_string()),
     ];
     element(xml, "run:Experiment", &attributes, |xml| {
-        for name in &system.order {
-            let every = experiment.components[name].every.to_string();
-            leaf(xml, "run:Component", &[("name", name.clone()), ("every", every)])?;
+        for CheckedComponent { name, every, .. } in &system.components {
+            let attributes = [("name", name.clone()), ("every", every.to_string())];
+            leaf(xml, "run:Component", &attributes)?;
         }
         for column in &system.columns {
             leaf(xml, "run:Record", &[("variable", column.name.clone())])?;
@@ -183,9 +183,9 @@ fn run_settings(xml: &mut Xml, system: &Source) -> io::Result<()> {
 
 fn component(xml: &mut Xml, system: &Source, index: usize) -> io::Result<()> {
     let attributes = [
-        ("name", system.order[index].clone()),
+        ("name", system.components[index].name.clone()),
         ("type", FMU.into()),
-        ("source", resource(&system.fmus[index].path)),
+        ("source", resource(&system.components[index].fmu.path)),
         ("implementation", "CoSimulation".into()),
     ];
     element(xml, "ssd:Component", &attributes, |xml| {
@@ -199,7 +199,7 @@ fn component(xml: &mut Xml, system: &Source, index: usize) -> io::Result<()> {
 /// Returns the variables that become connectors: the connected inputs, and all outputs of a type
 /// that a connector can have.
 fn connectors<'a>(system: &'a Source, index: usize) -> impl Iterator<Item = &'a Variable> {
-    let variables = &system.fmus[index].description.variables;
+    let variables = &system.components[index].fmu.description.variables;
     let is_connected = move |position| {
         system.wires.iter().any(|w| w.to.component == index && w.to.variable == position)
     };
@@ -220,7 +220,7 @@ fn connectors<'a>(system: &'a Source, index: usize) -> impl Iterator<Item = &'a 
 /// of that type.
 fn kinds<'a>(system: &'a Source) -> Vec<(String, &'a [(String, i32)])> {
     let mut kinds: Vec<(String, &'a [(String, i32)])> = Vec::new();
-    for (index, fmu) in system.fmus.iter().enumerate() {
+    for (index, CheckedComponent { fmu, .. }) in system.components.iter().enumerate() {
         for variable in connectors(system, index) {
             if let VariableKind::Enumeration { items } = &variable.kind
                 && !kinds.iter().any(|(_, listed)| *listed == items.as_slice())
@@ -266,7 +266,8 @@ fn connector(xml: &mut Xml, system: &Source, variable: &Variable) -> io::Result<
 }
 
 fn parameters(xml: &mut Xml, system: &Source, index: usize) -> io::Result<()> {
-    let description = &system.fmus[index].description;
+    let CheckedComponent { name, fmu, settings, .. } = &system.components[index];
+    let description = &fmu.description;
     let start_of =
         |name: &str| description.find(name).and_then(|(_, variable)| variable.start.as_deref());
     let differs = |name: &str, value: &SettingValue| match value {
@@ -281,15 +282,14 @@ fn parameters(xml: &mut Xml, system: &Source, index: usize) -> io::Result<()> {
         }
         SettingValue::Text(value) => start_of(name) != Some(value),
     };
-    let set: Vec<_> =
-        system.settings[index].iter().filter(|s| differs(&s.name, &s.value)).collect();
+    let set: Vec<_> = settings.iter().filter(|s| differs(&s.name, &s.value)).collect();
     if set.is_empty() {
         return Ok(());
     }
     element(xml, "ssd:ParameterBindings", &[], |xml| {
         element(xml, "ssd:ParameterBinding", &[], |xml| {
             element(xml, "ssd:ParameterValues", &[], |xml| {
-                let name = identifier(&format!("{}_values", system.order[index]));
+                let name = identifier(&format!("{name}_values"));
                 element(
                     xml,
                     "ssv:ParameterSet",
@@ -326,15 +326,18 @@ fn typed(value: &SettingValue) -> (&'static str, String) {
 }
 
 fn connections(xml: &mut Xml, system: &Source) -> io::Result<()> {
-    let name = |component: usize, variable: usize| {
-        system.fmus[component].description.variables[variable].name.clone()
-    };
+    let parts = system.parts();
     system.wires.iter().try_for_each(|wire| {
+        let names = |port: &Port| {
+            let part = parts[port.component];
+            (part.name.to_string(), part.description.variables[port.variable].name.clone())
+        };
+        let ((start, from), (end, to)) = (names(&wire.from), names(&wire.to));
         let mut attributes = vec![
-            ("startElement", system.order[wire.from.component].clone()),
-            ("startConnector", name(wire.from.component, wire.from.variable)),
-            ("endElement", system.order[wire.to.component].clone()),
-            ("endConnector", name(wire.to.component, wire.to.variable)),
+            ("startElement", start),
+            ("startConnector", from),
+            ("endElement", end),
+            ("endConnector", to),
         ];
         if wire.scaling == Scaling::default() {
             return leaf(xml, "ssd:Connection", &attributes);
@@ -352,7 +355,7 @@ fn connections(xml: &mut Xml, system: &Source) -> io::Result<()> {
 /// Writes the definitions of the units that connectors have.
 fn units(xml: &mut Xml, system: &Source) -> io::Result<()> {
     let mut units = BTreeMap::new();
-    for (index, fmu) in system.fmus.iter().enumerate() {
+    for (index, CheckedComponent { fmu, .. }) in system.components.iter().enumerate() {
         for variable in connectors(system, index) {
             let VariableKind::Real { unit: Some(unit), .. } = &variable.kind else { continue };
             if let Some(defined) =

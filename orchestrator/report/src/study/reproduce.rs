@@ -18,7 +18,7 @@ use cosim::error::Error as Single;
 use cosim::files;
 use cosim::interrupt::Interrupt;
 use cosim::search;
-use cosim::system::Opened;
+use cosim::system::{CheckedComponent, Opened};
 use parking_lot::Mutex;
 use serde_json::{Value, json};
 use std::collections::{BTreeMap, VecDeque};
@@ -276,7 +276,7 @@ fn keys(
     for (run, preparation) in study.runs.iter().zip(preparations) {
         let system = preparation.system(0, opened)?;
         let mut fmus = BTreeMap::new();
-        for (name, fmu) in system.order.iter().zip(&system.fmus) {
+        for CheckedComponent { name, fmu, .. } in &system.components {
             if !archives.contains_key(&fmu.path) {
                 archives.insert(fmu.path.clone(), digest(&fmu.path)?);
             }
