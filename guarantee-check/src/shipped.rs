@@ -2,10 +2,12 @@
 
 use campaign::definition::{Campaign, Vary};
 use control::crmpc::{Constraints, Guarantee, InitialState, Settings};
+use cosim::document::Source;
+use cosim::error::Error;
 use cosim::experiment::{Component, Experiment};
 use cosim_report::study::definition::Study;
 use std::path::{Path, PathBuf};
-use toml::Value;
+use toml::{Table, Value};
 use vehicle::dynamics::Inertia;
 
 /// Settings of one CRMPC in one file.
@@ -26,7 +28,8 @@ pub struct Scan {
     pub shipped: Vec<Shipped>,
     /// Number of experiments, studies and campaigns that were read.
     pub read: [usize; 3],
-    /// Files that are none of these, or only a part of one that others extend, with the reason.
+    /// Files that are none of these, or have no title because they only serve to be extended, with
+    /// the reason.
     pub left_out: Vec<(PathBuf, String)>,
 }
 
@@ -37,7 +40,8 @@ impl Scan {
     /// Reads every TOML file below `folder`.
     ///
     /// # Errors
-    /// Names the file and what is wrong with it, or with a parameter of CRMPC in it.
+    /// Names the file that cannot be read, and what is wrong with it or with a parameter of CRMPC in
+    /// it.
     pub fn new(folder: &Path) -> Result<Self, String> {
         let mut scan = Self::default();
         for file in files(folder)? {
@@ -51,32 +55,27 @@ impl Scan {
         let text = std::fs::read_to_string(file).map_err(|error| error.to_string())?;
         let kind = text.lines().next().and_then(|line| line.strip_prefix("#:schema "));
         let kind = kind.and_then(|schema| schema.rsplit('/').next()).unwrap_or("no schema");
-        let part = |error: String| (file.to_path_buf(), error);
-        match kind {
-            "experiment.json" => match Experiment::load(file) {
-                Ok(experiment) => {
-                    self.read[0] += 1;
-                    self.experiment(file, "", &experiment)?;
-                }
-                Err(error) => self.left_out.push(part(error.to_string())),
-            },
-            "study.json" => match Study::load(file) {
-                Ok(study) => {
-                    self.read[1] += 1;
-                    self.study(file, &study)?;
-                }
-                Err(error) => self.left_out.push(part(error.to_string())),
-            },
-            "campaign.json" => match Campaign::load(file) {
-                Ok(campaign) => {
-                    self.read[2] += 1;
-                    self.campaign(file, &campaign)?;
-                }
-                Err(error) => self.left_out.push(part(error.to_string())),
-            },
-            other => self.left_out.push(part(other.into())),
+        let place = match kind {
+            "experiment.json" => 0,
+            "study.json" => 1,
+            "campaign.json" => 2,
+            other => {
+                self.left_out.push((file.to_path_buf(), other.into()));
+                return Ok(());
+            }
+        };
+        let fault = |error: Error| error.to_string();
+        let whole: Table = Source::load(file).and_then(|source| source.read()).map_err(fault)?;
+        if !whole.contains_key("title") {
+            self.left_out.push((file.to_path_buf(), "no title, only for other files".into()));
+            return Ok(());
         }
-        Ok(())
+        self.read[place] += 1;
+        match place {
+            0 => self.experiment(file, "", &Experiment::load(file).map_err(fault)?),
+            1 => self.study(file, &Study::load(file).map_err(|error| error.to_string())?),
+            _ => self.campaign(file, &Campaign::load(file).map_err(fault)?),
+        }
     }
 
     fn experiment(

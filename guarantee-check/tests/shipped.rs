@@ -35,3 +35,19 @@ fn plans_of_all_shipped_settings_are_confirmed() {
     }
     assert!(done.len() >= 5 && confirmed >= 5, "{} settings, {confirmed} plans", done.len());
 }
+
+#[test]
+fn a_study_that_cannot_be_read_is_an_error() {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("faulty");
+    std::fs::create_dir_all(&folder).unwrap();
+    let file = folder.join("study.toml");
+    let told = |text: &str| {
+        std::fs::write(&file, format!("#:schema study.json\n{text}")).unwrap();
+        Scan::new(&folder)
+    };
+    assert_eq!(told("[lists]\n").unwrap().left_out.len(), 1);
+    for text in ["title = \"x\"\nno_key = 1\n", "title = "] {
+        let message = told(text).unwrap_err();
+        assert!(message.contains("study.toml"), "{message}");
+    }
+}

@@ -10,7 +10,7 @@ use serde::de::value::Error;
 use serde_json::Value;
 
 /// Settings of an experiment that the command line may change.
-#[derive(Clone, Default, Args)]
+#[derive(Clone, Args)]
 pub(crate) struct Overrides {
     /// Set a parameter: `plant.disturbance.seed=7`, `controller.constraints=paper`,
     /// `plant.disturbance.bound="1 deg/s2"`.
@@ -39,7 +39,7 @@ pub(crate) struct Overrides {
 }
 
 /// Processes of instances and their limits. The texts are those of the section `[isolation]`.
-#[derive(Clone, Default, Args)]
+#[derive(Clone, Args)]
 struct Protection {
     #[arg(long, help = key("isolate"), value_name = "BOOL", num_args = 0..=1, default_missing_value = "true", require_equals = true)]
     isolate: Option<bool>,

@@ -36,20 +36,20 @@ pub(crate) struct Common {
     /// Also look for FMUs in this folder, besides the folder of the experiment and target/fmu. The
     /// option may be given several times.
     #[arg(long, value_name = "DIR")]
-    pub(crate) fmu_dir: Vec<PathBuf>,
+    fmu_dir: Vec<PathBuf>,
     /// Number of threads [default: one for each core].
     #[arg(long, value_name = "N", default_value_t = 0, hide_default_value = true)]
     jobs: usize,
     /// Show neither progress nor summary.
     #[arg(long)]
-    pub(crate) quiet: bool,
+    quiet: bool,
 }
 
 /// Options of `campaign`.
 #[derive(Args)]
 pub(crate) struct Fly {
     #[command(flatten)]
-    pub(crate) common: Common,
+    common: Common,
     /// Write the experiment of one case to a file that `orchestrator run` takes, and run it with
     /// everything recorded.
     #[arg(long, value_name = "K", conflicts_with_all = ["cases", "work", "fresh", "csv"])]
@@ -100,14 +100,6 @@ fn prepare(common: &Common) -> Result<Plan, Error> {
     Plan::new(campaign, &changes, &common.fmu_dir)
 }
 
-/// What the program does after a command.
-pub(crate) enum Next {
-    /// Nothing is left.
-    Done,
-    /// This experiment is to be run, with results in this folder.
-    Run(PathBuf, PathBuf),
-}
-
 /// Flies a campaign, a part of it, or one case.
 ///
 /// # Errors
@@ -116,7 +108,7 @@ pub(crate) fn fly(
     asked: &Fly,
     out: &mut impl Write,
     interrupt: &Interrupt,
-) -> Result<Next, Failure> {
+) -> Result<(), Failure> {
     let plan = prepare(&asked.common)?;
     let folder = run::folder(&plan, asked.common.out.as_deref());
     if let Some(folder) = &asked.bundle {
@@ -126,13 +118,13 @@ pub(crate) fn fly(
             return Err(Error::experiment(message).into());
         }
         bundle::write(&plan, folder)?;
-        return Ok(Next::Done);
+        return Ok(());
     }
     if asked.work {
         let work =
             serde_json::to_string(&run::work(&plan, &folder)).map_err(std::io::Error::from)?;
         writeln!(out, "{work}")?;
-        return Ok(Next::Done);
+        return Ok(());
     }
     if let Some(case) = asked.case {
         if case >= plan.cases() {
@@ -144,7 +136,16 @@ pub(crate) fn fly(
             Some(folder) => folder.clone(),
             None => folder.join("cases").join(case.to_string()),
         };
-        return Ok(Next::Run(write_case(&plan, case, &folder)?, folder));
+        let experiment = write_case(&plan, case, &folder)?;
+        let options = crate::run::Options {
+            out: Some(folder),
+            quiet: asked.common.quiet,
+            force: true,
+            interrupt: interrupt.clone(),
+            ..Default::default()
+        };
+        let fmu_dirs = &asked.common.fmu_dir;
+        return crate::run::run(&experiment, &Overrides::default(), fmu_dirs, &options, out);
     }
     let options = Options {
         out: asked.common.out.clone(),
@@ -159,13 +160,13 @@ pub(crate) fn fly(
         if !asked.common.quiet {
             writeln!(out, "{flown} cases flown, kept in {}", folder.join("parts").display())?;
         }
-        return Ok(Next::Done);
+        return Ok(());
     }
     let report = run::fly(&plan, &options)?;
     if !asked.common.quiet {
         summary(&report, out)?;
     }
-    Ok(Next::Done)
+    Ok(())
 }
 
 /// Writes the experiment of a case.

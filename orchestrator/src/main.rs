@@ -12,6 +12,7 @@ mod live;
 mod pack;
 mod run;
 mod schema;
+mod show;
 
 use arguments::choice;
 use catalogue::Filter;
@@ -169,9 +170,10 @@ enum Command {
         #[arg(long, conflicts_with_all = ["json", "pattern", "causality"])]
         check: bool,
     },
-    /// Print an experiment or a study with all that it extends, templates and lists expanded.
+    /// Print an experiment, a study or a campaign with all that it extends, templates and lists
+    /// expanded.
     Show {
-        /// What to print: a file, or the name of an experiment or a study.
+        /// What to print: a file, or the name of an experiment, a study or a campaign.
         name: PathBuf,
     },
     /// Print the JSON Schema of a kind of file, by which editors complete and check such files.
@@ -264,8 +266,6 @@ fn execute(command: Command, out: &mut impl Write, interrupt: &Interrupt) -> Res
             files,
             force,
         } => {
-            let experiment = search::experiment(&experiment)?;
-            let (mut system, entries) = system(&experiment, &overrides.into(), &fmu_dir)?;
             let real_time = real_time.map(|factor| pacing::Settings { factor, on_miss, priority });
             let options = Options {
                 out: folder,
@@ -276,16 +276,8 @@ fn execute(command: Command, out: &mut impl Write, interrupt: &Interrupt) -> Res
                 force,
                 interrupt: interrupt.clone(),
             };
-            let report =
-                run::run(&mut system, &options).map_err(|error| match (error, &entries) {
-                    (Failure::Single(error), Some(entries)) => entries.named(error).into(),
-                    (error, _) => error,
-                })?;
-            if !quiet {
-                summary::summary(&system, &report, out)?;
-                out.flush()?;
-            }
-            ended(report.ended, quiet)
+            let experiment = search::experiment(&experiment)?;
+            run::run(&experiment, &overrides.into(), &fmu_dir, &options, out)
         }
         Command::Reproduce { study, out: folder, fmu_dir, jobs, members, fresh, quiet } => {
             let study = Study::load_with(&reproduce::find(&study)?, members)?;
@@ -304,7 +296,7 @@ fn execute(command: Command, out: &mut impl Write, interrupt: &Interrupt) -> Res
             }
             Ok(())
         }
-        Command::Campaign(asked) => fly(asked, out, interrupt),
+        Command::Campaign(asked) => campaign::fly(&asked, out, interrupt),
         Command::Falsify(asked) => campaign::falsify(&asked, out, interrupt),
         Command::Pack { experiment, out: archive, fmu_dir, overrides, no_enumerations, force } => {
             let archive = pack::Archive { path: archive, enumerations: !no_enumerations, force };
@@ -314,7 +306,7 @@ fn execute(command: Command, out: &mut impl Write, interrupt: &Interrupt) -> Res
         Command::Inspect { fmu, filter, json, check: false } => {
             inspect::inspect(&fmu, &filter, json, out)
         }
-        Command::Show { name } => show(&name, out),
+        Command::Show { name } => show::show(&name, out),
         Command::Schema { kind } => Ok(out.write_all(schema::text(kind).as_bytes())?),
         Command::Completions { shell } => {
             clap_complete::generate(shell, &mut Arguments::command(), "orchestrator", out);
@@ -322,66 +314,4 @@ fn execute(command: Command, out: &mut impl Write, interrupt: &Interrupt) -> Res
         }
         Command::List { folder } => list::list(folder.as_deref(), out),
     }
-}
-
-/// Flies a campaign, or runs one of its cases with everything recorded.
-fn fly(asked: campaign::Fly, out: &mut impl Write, interrupt: &Interrupt) -> Result<(), Failure> {
-    let campaign::Next::Run(experiment, folder) = campaign::fly(&asked, out, interrupt)? else {
-        return Ok(());
-    };
-    let run = Command::Run {
-        experiment,
-        out: Some(folder),
-        fmu_dir: asked.common.fmu_dir,
-        overrides: arguments::Overrides::default(),
-        quiet: asked.common.quiet,
-        real_time: None,
-        on_miss: OnMiss::default(),
-        priority: None,
-        live: false,
-        files: Files::default(),
-        force: true,
-    };
-    execute(run, out, interrupt)
-}
-
-/// Checks an experiment or the system of an SSP archive. The entries of an archive are needed for
-/// the names of its FMUs in errors.
-fn system(
-    path: &Path,
-    overrides: &Overrides,
-    fmu_dirs: &[PathBuf],
-) -> Result<(System, Option<ssp::Entries>), Failure> {
-    if path.extension().is_some_and(|extension| extension == "ssp") {
-        let ssp::Loaded { experiment, mut opened, entries } = ssp::load(path, overrides)?;
-        let system = check(experiment, fmu_dirs, &mut opened);
-        return Ok((system.map_err(|error| entries.named(error))?, Some(entries)));
-    }
-    let mut experiment = Experiment::load(path)?;
-    experiment.apply(overrides)?;
-    Ok((check(experiment, fmu_dirs, &mut Opened::default())?, None))
-}
-
-/// Returns an error if a run ended early for a reason that is a failure.
-fn ended(reason: Option<Error>, quiet: bool) -> Result<(), Failure> {
-    match reason {
-        None | Some(Error::Interrupted { request: Request::Quit, .. }) => Ok(()),
-        Some(error @ Error::EndedByInstance { .. }) => {
-            // The summary has already said so.
-            if quiet {
-                tracing::warn!("{error}");
-            }
-            Ok(())
-        }
-        Some(error) => Err(error.into()),
-    }
-}
-
-/// Prints an experiment or a study with everything that it extends.
-fn show(name: &Path, out: &mut impl Write) -> Result<(), Failure> {
-    let text = match reproduce::find(name) {
-        Ok(path) if path.ends_with("study.toml") => Study::spelled_out(&path)?,
-        _ => Experiment::load(&search::experiment(name)?)?.source.whole().into(),
-    };
-    Ok(out.write_all(text.as_bytes())?)
 }

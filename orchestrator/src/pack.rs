@@ -1,7 +1,7 @@
 //! The command `pack`, which writes an experiment as an SSP archive.
 
 use crate::failure::Failure;
-use crate::system;
+use crate::run::system;
 use cosim::error::Error;
 use cosim::experiment::Overrides;
 use cosim::interrupt::Interrupt;

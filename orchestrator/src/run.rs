@@ -4,10 +4,12 @@
 use crate::arguments::choice;
 use crate::failure::Failure;
 use crate::live::{self, Live, scene::Scene};
+use cosim::check::check;
 use cosim::doubts::doubts;
 use cosim::error::Error;
+use cosim::experiment::{Experiment, Overrides};
 use cosim::files;
-use cosim::interrupt::Interrupt;
+use cosim::interrupt::{Interrupt, Request};
 use cosim::master::Observer;
 use cosim::metadata;
 use cosim::pacing;
@@ -15,14 +17,16 @@ use cosim::pacing::priority::{Priority, Scheduling};
 use cosim::pacing::report::RealTime;
 use cosim::pacing::timer::{self, Monotonic};
 use cosim::recorder::Format;
-use cosim::system::System;
+use cosim::ssp;
+use cosim::system::{Opened, System};
 use cosim_report::folder::Folder;
 use cosim_report::metrics::{Meters, Metrics};
 use cosim_report::panels::Panel;
 use cosim_report::plot::Curves;
 use cosim_report::progress::Progress;
-use cosim_report::summary::RunReport;
+use cosim_report::summary::{self, RunReport};
 use fmu_import::warnings;
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
 use std::time::Instant;
@@ -76,12 +80,71 @@ pub(crate) struct Options {
     pub(crate) interrupt: Interrupt,
 }
 
+/// Runs an experiment, or the system of an SSP archive, and prints the summary.
+///
+/// # Errors
+/// Returns an error if the experiment is faulty, if an instance fails, or if a file cannot be
+/// written.
+pub(crate) fn run(
+    path: &Path,
+    overrides: &Overrides,
+    fmu_dirs: &[PathBuf],
+    options: &Options,
+    out: &mut impl Write,
+) -> Result<(), Failure> {
+    let (mut system, entries) = system(path, overrides, fmu_dirs)?;
+    let report = record(&mut system, options).map_err(|error| match (error, &entries) {
+        (Failure::Single(error), Some(entries)) => entries.named(error).into(),
+        (error, _) => error,
+    })?;
+    if !options.quiet {
+        summary::summary(&system, &report, out)?;
+        out.flush()?;
+    }
+    ended(report.ended, options.quiet)
+}
+
+/// Checks an experiment or the system of an SSP archive. The entries of an archive are needed for
+/// the names of its FMUs in errors.
+///
+/// # Errors
+/// Returns an error if anything is wrong with the experiment or the archive.
+pub(crate) fn system(
+    path: &Path,
+    overrides: &Overrides,
+    fmu_dirs: &[PathBuf],
+) -> Result<(System, Option<ssp::Entries>), Failure> {
+    if path.extension().is_some_and(|extension| extension == "ssp") {
+        let ssp::Loaded { experiment, mut opened, entries } = ssp::load(path, overrides)?;
+        let system = check(experiment, fmu_dirs, &mut opened);
+        return Ok((system.map_err(|error| entries.named(error))?, Some(entries)));
+    }
+    let mut experiment = Experiment::load(path)?;
+    experiment.apply(overrides)?;
+    Ok((check(experiment, fmu_dirs, &mut Opened::default())?, None))
+}
+
+/// Returns an error if a run ended early for a reason that is a failure.
+fn ended(reason: Option<Error>, quiet: bool) -> Result<(), Failure> {
+    match reason {
+        None | Some(Error::Interrupted { request: Request::Quit, .. }) => Ok(()),
+        Some(error @ Error::EndedByInstance { .. }) => {
+            // The summary has already said so.
+            if quiet {
+                tracing::warn!("{error}");
+            }
+            Ok(())
+        }
+        Some(error) => Err(error.into()),
+    }
+}
+
 /// Runs a system and writes its results. If an instance fails or the run is ended early, the
 /// results up to then are written as well.
 ///
 /// # Errors
 /// Returns an error if a unit fails, or if a file cannot be written.
-pub(crate) fn run(system: &mut System, options: &Options) -> Result<RunReport, Failure> {
+fn record(system: &mut System, options: &Options) -> Result<RunReport, Failure> {
     if options.live {
         live::check_terminal()?;
     }
