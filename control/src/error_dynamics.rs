@@ -7,15 +7,18 @@
 
 use nalgebra::{Matrix2, RowVector2, Vector2};
 use serde::{Deserialize, Serialize};
+use settings::Declared;
 use vehicle::math::ln;
 
 /// Feedback gain of one axis with the paper's signs: u = k1 · angle + k2 · rate, both negative
 /// (1/s², 1/s).
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Declared)]
 pub struct Gain {
-    /// Gain on the angle, 1/s².
+    /// Factor on the angle; negative.
+    #[setting(part, unit = "1/s2", max = 0.0, nominal = 5.0)]
     pub k1: f64,
-    /// Gain on the rate, 1/s.
+    /// Factor on the rate; negative.
+    #[setting(part, unit = "1/s", max = 0.0, nominal = 5.0)]
     pub k2: f64,
 }
 

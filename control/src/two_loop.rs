@@ -9,11 +9,14 @@
 //! our order, and gains are those of α, β, σ.
 
 use crate::controller::{Controller, Measurement, ReferenceAt};
-use crate::error::DesignError;
-use crate::sliding::{Commanded, FiniteTimeLayer, all_positive, sampled_decay};
+use crate::error::{DesignError, invalid};
+use crate::sliding::{Commanded, FiniteTimeLayer, sampled_decay};
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
+use settings::{Choice, Declared};
 use std::sync::LazyLock;
+use toml::Table;
+use vehicle::axes::{NUMBERED_ANGLES, NUMBERED_AXES, NUMBERED_RATES};
 use vehicle::data;
 use vehicle::dynamics::RigidBody;
 use vehicle::kinematics;
@@ -22,112 +25,112 @@ use vehicle::reference::Reference;
 use vehicle::scenario::Scenario;
 
 /// One loop with s = e + K ∫e dt and the reaching law ṡ = −ρ f SAT(s/ε).
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Declared)]
 pub struct Loop {
-    /// Diagonal of the integral gain K, 1/s.
+    /// Gain K on the integral of the error, diagonal.
+    #[setting(part, unit = "1/s", above = 0.0)]
     pub k: [f64; 3],
     /// Reaching law; its ρ is in rad/s (outer) or rad/s² (inner).
+    #[setting(name = "", text = "")]
     pub layer: FiniteTimeLayer,
 }
 
-/// Choice of the signs of the reaching terms.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+/// Signs of the reaching terms.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Choice)]
+#[setting(name = "ReachingForm")]
 pub enum Form {
+    /// Signs with which both loops reach their sliding surfaces.
+    ///
     /// The sign is + ρ f SAT in both loops, f > 0: ṡ = −ρ f SAT(s/ε).
+    #[default]
     Corrected,
-    /// The sign is − I ρ f SAT(s_n/ε) in the inner loop, as in (10): ṡ_n = +ρ f SAT(s_n/ε).
+    /// Opposite sign of I rho SIGN(s_n) in the inner loop, as printed in (10).
+    ///
+    /// The sign is − I ρ f SAT(s_n/ε) in the inner loop: ṡ_n = +ρ f SAT(s_n/ε).
     PrintedSign,
-    /// The signs are those of (7) and (11) with the minus sign that f is printed with: ṡ_w = +ρ f
-    /// SAT(s_w/ε). In the inner loop two minus signs cancel.
+    /// Factor f of (7) and (11) with its minus sign, as printed.
+    ///
+    /// ṡ_w = +ρ f SAT(s_w/ε). In the inner loop two minus signs cancel.
     PrintedFactor,
 }
 
-/// Choice of the matrix R in the outer loop.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+/// Matrix R that the outer loop uses.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Choice)]
 pub enum OuterKinematics {
-    /// The matrix is R (2) of Chai 2022.
+    /// Matrix with consistent order and axes.
+    ///
+    /// This is R (2) of Chai 2022.
+    #[default]
     Corrected,
-    /// The matrix is (3) as printed: rows of α, β, γ against φ = [γ, β, α], for axes with y up.
+    /// Matrix (3) as printed.
+    ///
+    /// Its rows are those of α, β, γ against φ = [γ, β, α], for axes with y up.
     Printed,
 }
 
 /// Settings of the controller. Units SI, angles rad.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Declared)]
 pub struct TwoLoopSettings {
-    /// Choice of the signs of the reaching terms.
-    pub form: Form,
-    /// Choice of the matrix R in the outer loop.
-    pub kinematics: OuterKinematics,
     /// Model of the vehicle that the controller uses.
+    #[setting(skip)]
     pub body: RigidBody,
-    /// Time between ticks, s.
+    /// Sampling period of the control law.
+    #[setting(name = "period.feedback", unit = "s", min = 1e-4, max = 10.0, nominal = 0.01)]
     pub period: f64,
-    /// Frequency of the critically damped filter of the command, rad/s; 0 for none.
-    pub filter: f64,
-    /// Outer loop, of the angles α, β, σ.
+    /// Outer loop.
+    ///
+    /// It has the angles α, β, σ.
+    #[setting(unit = "rad", each = NUMBERED_ANGLES)]
     pub outer: Loop,
-    /// Inner loop, of the body rates p, q, r.
+    /// Inner loop.
+    ///
+    /// It has the body rates p, q, r.
+    #[setting(unit = "rad/s", each = NUMBERED_RATES)]
     pub inner: Loop,
-    /// Bound on each component of M_d, N m.
+    /// Bound on the disturbance moment that the inner loop must overcome.
+    ///
+    /// It bounds each component of M_d.
+    #[setting(name = "disturbanceMoment.bound", each = NUMBERED_AXES, unit = "N.m", min = 0.0, nominal = 1e5)]
     pub disturbance: [f64; 3],
+    /// Whether the inputs achievedMoment are connected; otherwise the law assumes that the
+    /// commanded moment acts.
+    #[setting(name = "achievedMoment.used")]
+    pub achieved_moment_used: bool,
+    /// Natural frequency of the critically damped filter on the reference; 0 for no filter.
+    #[setting(name = "commandFilter.frequency", unit = "1/s", min = 0.0)]
+    pub filter: f64,
     /// Whether the integrals are held while the actuators saturate.
     pub anti_windup: bool,
-    /// Value of ‖R I⁻¹ (M_achieved − M)‖ above which the actuators count as saturated, rad/s².
+    /// Norm of the missing angular acceleration above which the actuators count as saturated.
+    ///
+    /// It is that of ‖R I⁻¹ (M_achieved − M)‖.
+    #[setting(name = "antiWindupThreshold", unit = "rad/s2", above = 0.0, nominal = 0.01)]
     pub threshold: f64,
+    #[allow(missing_docs)] // Its type says what it is.
+    pub form: Form,
+    #[allow(missing_docs)]
+    pub kinematics: OuterKinematics,
 }
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct File {
-    period: f64,
-    command_filter: CommandFilter,
-    outer: Loop,
-    inner: Loop,
-    disturbance: DisturbanceBound,
-    anti_windup: AntiWindup,
+    settings: Table,
 }
 
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct CommandFilter {
-    frequency: f64,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct DisturbanceBound {
-    moment: [f64; 3],
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct AntiWindup {
-    threshold: f64,
-}
+const FILE: &str = "two-loop-smc.toml";
 
 impl TwoLoopSettings {
     /// Returns our gains for the scenario of section V; the paper prints none.
     #[allow(clippy::missing_panics_doc)]
     pub fn ours() -> Self {
-        static READ: LazyLock<File> = LazyLock::new(|| {
-            data::embedded("two-loop-smc.toml", include_str!("../data/two-loop-smc.toml"))
-        });
-        let file = &*READ;
+        static READ: LazyLock<File> =
+            LazyLock::new(|| data::embedded(FILE, include_str!("../data/two-loop-smc.toml")));
         // This cannot fail, as the tests that use it show: the scenario is embedded.
         let body = Scenario::two_loop().inertia.body(1.0).unwrap_or_else(|error| panic!("{error}"));
-        Self {
-            form: Form::Corrected,
-            kinematics: OuterKinematics::Corrected,
-            body,
-            period: file.period,
-            filter: file.command_filter.frequency,
-            outer: file.outer,
-            inner: file.inner,
-            disturbance: file.disturbance.moment,
-            anti_windup: true,
-            threshold: file.anti_windup.threshold,
-        }
+        let mut settings = Self { body, ..Self::default() };
+        data::set(&mut settings, FILE, &READ.settings);
+        settings
     }
 
     /// Returns the bound on each component of |I⁻¹ M_d|, rad/s².
@@ -144,27 +147,14 @@ impl TwoLoopSettings {
     }
 
     fn check(&self) -> Result<(), DesignError> {
-        let Self { period, filter, outer, inner, disturbance, threshold, .. } = self;
-        all_positive("period", &[*period])?;
-        all_positive("threshold", &[*threshold])?;
-        if !(0.0..1.0 / period).contains(filter) {
-            let high = 1.0 / period;
-            return Err(DesignError::OutOfRange { name: "filter", value: *filter, low: 0.0, high });
+        settings::check(self)?;
+        let Self { period, filter, outer, inner, .. } = self;
+        if *filter >= 1.0 / period {
+            let problem = format!("must be below {}, the frequency of the ticks", 1.0 / period);
+            return Err(invalid("commandFilter.frequency", *filter, problem));
         }
-        if let Some(&value) =
-            disturbance.iter().find(|value| !(0.0..f64::INFINITY).contains(*value))
-        {
-            return Err(DesignError::OutOfRange {
-                name: "disturbance",
-                value,
-                low: 0.0,
-                high: f64::INFINITY,
-            });
-        }
-        let names = ["outer.k", "outer.layer.rho", "outer.layer.epsilon", "outer.layer.b"];
-        outer.check(names, *period)?;
-        let names = ["inner.k", "inner.layer.rho", "inner.layer.epsilon", "inner.layer.b"];
-        inner.check(names, *period)?;
+        outer.check("outer", *period)?;
+        inner.check("inner", *period)?;
         let (acceleration, needed) = (self.disturbance_acceleration(), self.needed_reaching());
         for axis in 0..3 {
             let FiniteTimeLayer { rho, b, .. } = inner.layer;
@@ -225,17 +215,10 @@ impl OuterKinematics {
 }
 
 impl Loop {
-    fn check(&self, names: [&'static str; 4], period: f64) -> Result<(), DesignError> {
-        let FiniteTimeLayer { rho, epsilon, b } = &self.layer;
-        for (name, values) in names.iter().zip([&self.k, rho, epsilon, b]) {
-            all_positive(name, values)?;
-        }
-        if let Some(&value) = b.iter().find(|b| **b >= 1.0) {
-            return Err(DesignError::OutOfRange { name: names[3], value, low: 0.0, high: 1.0 });
-        }
+    fn check(&self, name: &str, period: f64) -> Result<(), DesignError> {
         let k = self.k.iter().copied().fold(0.0, f64::max);
-        sampled_decay(names[0], k, period)?;
-        sampled_decay(names[1], self.layer.steepest(), period)
+        sampled_decay(&format!("{name}.k"), k, period)?;
+        sampled_decay(&format!("{name}.rho"), self.layer.steepest(), period)
     }
 
     /// Returns the sliding variable s, in the units of the loop.
@@ -363,6 +346,7 @@ impl Controller for TwoLoopSmc {
             period,
             outer,
             inner,
+            achieved_moment_used,
             anti_windup,
             threshold,
             ..
@@ -375,8 +359,8 @@ impl Controller for TwoLoopSmc {
                 memory.outer_integral += memory.angle_error * *period;
                 memory.inner_integral += memory.rate_error * *period;
             }
-            memory.saturated =
-                memory.commanded.shortfall(body, measured.achieved_moment).norm() > *threshold;
+            let achieved = measured.achieved_moment.filter(|_| *achieved_moment_used);
+            memory.saturated = memory.commanded.shortfall(body, achieved).norm() > *threshold;
         }
         let Measurement { angles, rates, .. } = measured;
         let inverse = kinematics.r_inverse(angles);

@@ -448,7 +448,11 @@ fn the_cone_solver_takes_over_where_the_riccati_method_fails() {
     let previous = ErrorTrajectory::new(horizon);
     // The spoilt sets are valid again when the cone solver asks.
     for (computed, status) in [(0, SolverStatus::Cone), (1, SolverStatus::Constrained)] {
-        let solver = SolverSettings { shortcuts: false, ..SolverSettings::new(MAX_ITERATIONS) };
+        let solver = SolverSettings {
+            shortcuts: false,
+            max_iterations: MAX_ITERATIONS,
+            ..SolverSettings::default()
+        };
         let mut optimiser = Optimiser::new(layout.clone(), solver).unwrap();
         let sets = Sets { body, printed: false, bounds: (0.0873, 1.356e5) };
         let spoilt = Spoilt { sets, computed: Cell::new(computed) };
@@ -465,7 +469,8 @@ fn the_cone_solver_takes_over_where_the_riccati_method_fails() {
     let solver = SolverSettings {
         shortcuts: false,
         time_budget: 1e-9,
-        ..SolverSettings::new(MAX_ITERATIONS)
+        max_iterations: MAX_ITERATIONS,
+        ..SolverSettings::default()
     };
     let mut optimiser = Optimiser::new(layout, solver).unwrap();
     let sets = Sets { body, printed: false, bounds: (0.0873, 1.356e5) };

@@ -7,7 +7,6 @@ use crate::table;
 use control::controller::{Controller, Measurement};
 use control::delay::{Delayed, Latency};
 use control::schedule::ControllerInput;
-use fmi2_export::fields::by_variable;
 use fmi2_export::{Context, Description, Failure};
 use nalgebra::Vector3;
 use vehicle::Scenario;
@@ -22,14 +21,14 @@ pub struct Designed<L: Law> {
 impl<L: Law> ControllerInstance<L> {
     /// Returns the failure for refused settings.
     fn refusal(error: &impl ToString) -> Failure {
-        Failure::Error(by_variable(error, &[table::FIELDS, L::FIELDS].concat()))
+        Failure::Error(error.to_string())
     }
 
     fn vehicle(&self) -> Result<Vehicle, Failure> {
-        let Parameters { inertia, limit_rate, limit_moment, saturation, period, latency, .. } =
+        let Parameters { inertia, limit_rate, limit_moment, saturation, latency, .. } =
             self.parameters;
         let body = inertia.body(1.0).map_err(|error| Self::refusal(&error))?;
-        Ok(Vehicle { body, limit_rate, limit_moment, saturation, period, latency })
+        Ok(Vehicle { body, limit_rate, limit_moment, saturation, latency })
     }
 }
 
@@ -41,9 +40,9 @@ impl<L: Law> ControllerInstance<L> {
         ticks: &mut Ticks<Self>,
         stale: bool,
     ) -> Result<(), Failure> {
-        let Self { parameters, input, source, .. } = self;
+        let Self { settings, input, source, .. } = self;
         let controller = &mut device.controller;
-        let achieved_moment = parameters.achieved_moment_used.then_some(input.achieved_moment);
+        let achieved_moment = L::uses_achieved_moment(settings).then_some(input.achieved_moment);
         let measured = Measurement { achieved_moment, stale, ..input.measured };
         let now = ticks.next_time();
         // The future of an external reference is unknown; the law uses its present value for the
@@ -78,10 +77,9 @@ impl<L: Law> SampledInstance for ControllerInstance<L> {
                 limit_rate: scenario.limit_rate,
                 limit_moment: scenario.limit_moment,
                 saturation: false,
-                period: L::period(),
                 latency: Latency::default(),
-                achieved_moment_used: false,
             },
+            settings: L::settings(),
             input: Input {
                 measured: Measurement {
                     angles: scenario.initial_angles,
@@ -104,23 +102,23 @@ impl<L: Law> SampledInstance for ControllerInstance<L> {
 
     fn design(&self) -> Result<Designed<L>, Failure> {
         let vehicle = self.vehicle()?;
-        let controller = L::design(self.law.settings(&vehicle))
+        let settings = self.settings.clone();
+        let controller = L::design(settings.clone(), &vehicle)
             .and_then(|law| {
-                let limit = vehicle.saturates_at();
-                Delayed::new(law, vehicle.body, vehicle.period, vehicle.latency, limit)
+                let (period, limit) = (L::period(&settings), vehicle.saturates_at());
+                Delayed::new(law, vehicle.body, period, vehicle.latency, limit)
             })
             .map_err(|error| Self::refusal(&error))?;
-        Ok(Designed { settings: self.law.settings(&vehicle), vehicle, controller })
+        Ok(Designed { settings, vehicle, controller })
     }
 
     fn is_designed(&self, device: &Designed<L>) -> bool {
-        self.vehicle().is_ok_and(|vehicle| {
-            device.vehicle == vehicle && device.settings == self.law.settings(&vehicle)
-        })
+        device.settings == self.settings
+            && self.vehicle().is_ok_and(|vehicle| device.vehicle == vehicle)
     }
 
     fn period(device: &Designed<L>) -> f64 {
-        device.vehicle.period
+        L::period(&device.settings)
     }
 
     fn memory(device: &Designed<L>) -> Self::Memory {
@@ -160,7 +158,7 @@ impl<L: Law> SampledInstance for ControllerInstance<L> {
         device: &Designed<L>,
         (moment, memory): (Vector3<f64>, &Self::Memory),
     ) {
-        self.law.show(&memory.inner);
+        self.law.show(&self.settings, &memory.inner);
         self.output = Output {
             moment,
             reference: self.source.preview(time, &self.input.reference).at(time),

@@ -7,9 +7,9 @@ use control::controller::Measurement;
 use control::delay::Latency;
 use control::error::DesignError;
 use fmi2_export::VariableTable;
-use fmi2_export::fields::Fields;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
+use settings::Declared;
 use vehicle::dynamics::{Inertia, RigidBody};
 use vehicle::reference::Reference;
 
@@ -24,8 +24,6 @@ pub struct Vehicle {
     pub limit_moment: f64,
     /// Whether the commanded moment is scaled into its limit.
     pub saturation: bool,
-    /// Time between two evaluations of the law, s.
-    pub period: f64,
     /// Time from the instant of a measurement until the resulting moment acts. The law receives the
     /// state predicted over this time.
     pub latency: Latency,
@@ -51,31 +49,31 @@ pub struct ControllerInstance<L: Law> {
     pub input: Input,
     /// Outputs that every controller has.
     pub output: Output,
-    /// Parameters and outputs of the law alone.
+    /// Parameters of the law alone.
+    pub settings: L::Settings,
+    /// Outputs of the law alone.
     pub law: L,
     pub(crate) source: Source,
 }
 
 /// Parameters that every controller has.
-#[derive(Clone, Debug, Serialize, Deserialize)]
+#[derive(Clone, Debug, Serialize, Deserialize, Declared)]
 pub struct Parameters {
     /// Parameters of the reference.
     pub reference: reference::Parameters,
-    /// Inertia that the controller uses, kg m².
+    /// Inertia that the controller assumes.
     pub inertia: Inertia,
-    /// Limit on ‖ω‖, rad/s.
+    /// Upper limit on the norm of the body rates.
+    #[setting(name = "limit.rate", unit = "rad/s", min = 1e-6, nominal = 0.1)]
     pub limit_rate: f64,
-    /// Limit on ‖m‖, N m.
+    /// Upper limit on the norm of the control moment.
+    #[setting(name = "limit.moment", unit = "N.m", min = 1e-3, nominal = 1e5)]
     pub limit_moment: f64,
-    /// Whether the commanded moment is scaled into its limit.
+    /// Whether the commanded moment is scaled down to a norm of at most limit.moment.
     pub saturation: bool,
-    /// Time between two evaluations of the law, s; only laws that let it be set declare it.
-    pub period: f64,
     /// Delays over which the law predicts the state.
+    #[setting(name = "")]
     pub latency: Latency,
-    /// Whether the input `achieved_moment` is connected; only laws that use it declare this
-    /// parameter.
-    pub achieved_moment_used: bool,
 }
 
 /// Inputs that every controller has.
@@ -102,13 +100,12 @@ pub struct Output {
     pub has_other_delay: bool,
 }
 
-/// A control law with the variables that only it has. The value holds those variables; its default
-/// holds their start values.
+/// A control law as an FMU. The value holds the outputs that only this law has.
 pub trait Law: Default + Serialize + DeserializeOwned + Send + 'static {
     /// Sampled controller of the law.
     type Controller: Controller + Send;
-    /// All settings from which the controller is built.
-    type Settings: PartialEq + Send;
+    /// Settings of the law, which become parameters of the FMU.
+    type Settings: Declared + Clone + PartialEq + Serialize + DeserializeOwned + Send;
 
     /// Name of the FMU.
     const NAME: &'static str;
@@ -116,32 +113,39 @@ pub trait Law: Default + Serialize + DeserializeOwned + Send + 'static {
     const DESCRIPTION: &'static str;
     /// Description of the computation, as an HTML fragment.
     const DOCUMENTATION: &'static str = "";
-    /// Names of the variables that hold fields of the settings, where they differ from the fields'
-    /// names and are not in [`table::FIELDS`](crate::table::FIELDS).
-    const FIELDS: &'static Fields = &[];
     /// Version of the FMU.
     const VERSION: &'static str = env!("CARGO_PKG_VERSION");
 
-    /// Returns the start value of the time between two evaluations, s. A law whose period can be
-    /// set declares it by [`table::period`](crate::table::period).
-    fn period() -> f64;
+    /// Returns the start values of the settings.
+    fn settings() -> Self::Settings;
 
-    /// Adds the variables of the law to the table.
-    fn declare(table: VariableTable<ControllerFmu<Self>>) -> VariableTable<ControllerFmu<Self>> {
+    /// Returns the time between two evaluations of the law, s.
+    fn period(settings: &Self::Settings) -> f64;
+
+    /// Returns whether the law receives the moment of the actuators.
+    fn uses_achieved_moment(_settings: &Self::Settings) -> bool {
+        false
+    }
+
+    /// Builds the controller for a vehicle.
+    ///
+    /// # Errors
+    /// Returns an error that names the setting at fault.
+    fn design(settings: Self::Settings, vehicle: &Vehicle)
+    -> Result<Self::Controller, DesignError>;
+
+    /// Adds the outputs of the law to the table.
+    fn outputs(table: VariableTable<ControllerFmu<Self>>) -> VariableTable<ControllerFmu<Self>> {
         table
     }
 
-    /// Returns the settings that follow from the parameters.
-    fn settings(&self, vehicle: &Vehicle) -> Self::Settings;
-
-    /// Builds the controller from its settings.
-    ///
-    /// # Errors
-    /// Returns an error that names the field of the settings at fault.
-    fn design(settings: Self::Settings) -> Result<Self::Controller, DesignError>;
-
     /// Copies the outputs of the law from the memory in force.
-    fn show(&mut self, _memory: &<Self::Controller as Controller>::Memory) {}
+    fn show(
+        &mut self,
+        _settings: &Self::Settings,
+        _memory: &<Self::Controller as Controller>::Memory,
+    ) {
+    }
 
     /// Returns a warning for the log if something went wrong between two ticks.
     fn warning(

@@ -5,47 +5,42 @@
 //! replace another without rewiring:
 //!
 //! ```
+//! use control::error::DesignError;
 //! use control::lqr::{Lqr, LqrSettings};
 //! use controller_export::{ControllerFmu, Law, Vehicle};
-//! use fmi2_export::{VariableTable, describe, table::parameter};
+//! use fmi2_export::describe;
 //! use serde::{Deserialize, Serialize};
+//! use settings::Declared;
 //!
-//! /// A regulator with one weight; the value holds the parameters and outputs of the law.
-//! #[derive(Serialize, Deserialize)]
-//! struct Soft {
+//! /// A regulator with one weight.
+//! #[derive(Clone, PartialEq, Serialize, Deserialize, Declared)]
+//! struct Weight {
+//!     /// Weight on the tracking error.
+//!     #[setting(above = 0.0)]
 //!     weight: f64,
 //! }
 //!
-//! impl Default for Soft {
-//!     fn default() -> Self {
-//!         Self { weight: 10.0 }
-//!     }
-//! }
+//! /// The regulator has no outputs of its own.
+//! #[derive(Default, Serialize, Deserialize)]
+//! struct Soft;
 //!
 //! impl Law for Soft {
 //!     type Controller = Lqr;
-//!     type Settings = LqrSettings;
+//!     type Settings = Weight;
 //!     const NAME: &'static str = "Soft";
 //!     const DESCRIPTION: &'static str = "Linear-quadratic regulator with one weight";
 //!
-//!     fn period() -> f64 {
+//!     fn settings() -> Weight {
+//!         Weight { weight: 10.0 }
+//!     }
+//!
+//!     fn period(_settings: &Weight) -> f64 {
 //!         0.04
 //!     }
 //!
-//!     fn declare(
-//!         table: VariableTable<ControllerFmu<Self>>,
-//!     ) -> VariableTable<ControllerFmu<Self>> {
-//!         let weight = parameter("weight", "Weight on the tracking error").real();
-//!         table.real(weight.min(0.0), |m| &mut m.law.weight)
-//!     }
-//!
-//!     fn settings(&self, vehicle: &Vehicle) -> LqrSettings {
-//!         let Vehicle { body, period, .. } = *vehicle;
-//!         LqrSettings { body, p: [self.weight; 6], q: [10.0; 3], period }
-//!     }
-//!
-//!     fn design(settings: LqrSettings) -> Result<Lqr, control::error::DesignError> {
-//!         Lqr::new(settings)
+//!     fn design(settings: Weight, vehicle: &Vehicle) -> Result<Lqr, DesignError> {
+//!         let p = [settings.weight; 6];
+//!         Lqr::new(LqrSettings { body: vehicle.body, p, q: [10.0; 3], period: 0.04 })
 //!     }
 //! }
 //!

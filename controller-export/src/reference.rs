@@ -2,71 +2,58 @@
 //! or the external inputs.
 
 use control::controller::Preview;
-use fmi2_export::fields::by_variable;
-use fmi2_export::{Context, Enumeration, Failure};
+use fmi2_export::{Context, Failure};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
+use settings::Declared;
 use std::path::Path;
 use vehicle::Scenario;
+use vehicle::axes;
 use vehicle::profile::Profile;
 use vehicle::reference::Reference;
 use vehicle::table::LookupTable;
 
-/// Choice of the source of the reference attitude.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[allow(missing_docs)] // Each item is described in [`PROFILES`].
+/// Source of the reference attitude.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, settings::Choice)]
+#[setting(name = "ReferenceProfile")]
 pub enum Choice {
+    /// Profile of Chai 2022, section 5.1, with its jump at 25 s.
     #[default]
     Crmpc2022,
+    /// Profile of Wu 2015, section 6.
     Tvsmc2015,
+    /// Step of Jia, Zhou and Zhou, section V.
     TwoLoop,
+    /// Constant angles reference.angle.
     Constant,
+    /// Term reference.angle plus a sine with reference.amplitude, reference.frequency and
+    /// reference.phase.
     Sine,
+    /// Values interpolated from the file reference.file.
     Table,
+    /// Inputs reference.external; predictions hold their angles constant.
     External,
 }
 
-/// The choices of the parameter `reference.profile`.
-pub static PROFILES: Enumeration<Choice> = Enumeration {
-    name: "ReferenceProfile",
-    description: "Source of the reference attitude",
-    items: &[
-        (
-            Choice::Crmpc2022,
-            "crmpc2022",
-            "profile of Chai 2022, section 5.1, with its jump at 25 s",
-        ),
-        (Choice::Tvsmc2015, "tvsmc2015", "profile of Wu 2015, section 6"),
-        (Choice::TwoLoop, "twoLoop", "step of Jia, Zhou and Zhou, section V"),
-        (Choice::Constant, "constant", "constant angles reference.angle"),
-        (
-            Choice::Sine,
-            "sine",
-            "reference.angle plus a sine with reference.amplitude, reference.frequency and reference.phase",
-        ),
-        (Choice::Table, "table", "values interpolated from the file reference.file"),
-        (
-            Choice::External,
-            "external",
-            "inputs reference.external; predictions hold their angles constant",
-        ),
-    ],
-};
-
 /// Parameters of the reference.
-#[derive(Clone, Debug, Serialize, Deserialize)]
+#[derive(Clone, Debug, Serialize, Deserialize, Declared)]
 pub struct Parameters {
-    /// Choice of the source.
+    #[allow(missing_docs)] // Its type says what it is.
     pub profile: Choice,
-    /// Path of the CSV file of the table.
+    /// Path of a CSV file with time and angles, or name of a file in the resources of the FMU;
+    /// used with reference.profile = table.
     pub file: String,
-    /// Constant part of the angles, rad.
+    /// Constant part of the reference; used with reference.profile = constant or sine.
+    #[setting(each = axes::ANGLES, unit = "rad", nominal = 0.1)]
     pub angle: Vector3<f64>,
-    /// Amplitude of the sine, rad.
+    /// Amplitude of the sine in the reference; used with reference.profile = sine.
+    #[setting(each = axes::ANGLES, unit = "rad", nominal = 0.1)]
     pub amplitude: Vector3<f64>,
-    /// Angular frequency of the sine, rad/s.
+    /// Angular frequency of the reference sine; used with reference.profile = sine.
+    #[setting(unit = "rad/s", min = 0.0, nominal = 1.0)]
     pub frequency: f64,
-    /// Phase of the sine at t = 0, rad.
+    /// Phase of the reference sine at t = 0; used with reference.profile = sine.
+    #[setting(unit = "rad")]
     pub phase: f64,
 }
 
@@ -138,6 +125,6 @@ fn table(file: &str, context: &Context) -> Result<LookupTable, Failure> {
     let inside =
         context.resources.map(|folder| folder.join(path)).filter(|inside| inside.is_file());
     let path = if path.is_file() { path.into() } else { inside.unwrap_or_else(|| path.into()) };
-    let problem = |error| format!("reference.file: {}", by_variable(&error, &[]));
-    LookupTable::from_csv_file(&path).map_err(|error| Failure::Error(problem(error)))
+    LookupTable::from_csv_file(&path)
+        .map_err(|error| Failure::Error(format!("reference.file: {error}")))
 }

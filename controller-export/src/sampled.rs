@@ -1,7 +1,6 @@
 //! An instance that works at ticks: its steps from tick to tick, and its restoration.
 
 use control::schedule::Sampled;
-use fmi2_export::fields::by_variable;
 use fmi2_export::{Context, Description, Failure, Inputs, LastEvent, Model, Restoration};
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use std::ops::{Deref, DerefMut};
@@ -159,7 +158,7 @@ impl<I: SampledInstance> Model for SampledFmu<I> {
         let same = |device: &mut I::Device| self.instance.is_designed(device);
         let device = self.device.take_if(same).map_or_else(|| self.instance.design(), Ok)?;
         vehicle::time::check_resolution(context.start_time, I::period(&device))
-            .map_err(|error| Failure::Error(by_variable(&error, &[])))?;
+            .map_err(|error| Failure::Error(error.to_string()))?;
         self.ticks = Some(Sampled::new(context.start_time, I::period(&device), I::memory(&device)));
         self.device = Some(device);
         Ok(())

@@ -10,6 +10,7 @@ use model_description::unit::Unit;
 use model_description::variable::{
     Causality, EnumerationType, Variability, Variable, VariableKind,
 };
+use settings::{Choice, Declared, Path, Place, Setting};
 
 type Lens<M, T> = Box<dyn Fn(&mut M) -> &mut T + Send + Sync>;
 type Setter<M, T> = Box<dyn Fn(&mut M, T) + Send + Sync>;
@@ -28,6 +29,31 @@ pub(crate) struct Integer<M> {
     pub(crate) get: Box<dyn Fn(&mut M) -> i32 + Send + Sync>,
     /// Setter that is called only with values that the declaration allows.
     pub(crate) set: Setter<M, i32>,
+}
+
+impl<M: 'static> Integer<M> {
+    /// Makes the access of a setting, whose values FMI numbers from `first` on where these number
+    /// them from 0.
+    fn new(setting: settings::Integer<M>, first: i32) -> Self {
+        let settings::Integer { get, set } = setting;
+        Self {
+            get: Box::new(move |model| {
+                i32::try_from(get(model)).map_or(i32::MAX, |value| value.saturating_add(first))
+            }),
+            set: Box::new(move |model, value| {
+                set(model, i64::from(value) - i64::from(first));
+            }),
+        }
+    }
+}
+
+fn described(items: &settings::Items) -> EnumerationType {
+    let listed = items.items.iter().map(|(name, text)| ((*name).into(), (*text).into()));
+    EnumerationType {
+        name: items.name.into(),
+        description: items.text.into(),
+        items: listed.collect(),
+    }
 }
 
 /// An enumeration type: the values of a Rust type, each with its FMI name and a description. FMI
@@ -164,6 +190,74 @@ impl<M: 'static> VariableTable<M> {
         self
     }
 
+    /// Adds the declared settings of a part of the model as parameters.
+    #[must_use]
+    pub fn settings<S: Declared>(
+        mut self,
+        part: impl Fn(&mut M) -> &mut S + Send + Sync + 'static,
+    ) -> Self {
+        let mut list = Vec::new();
+        S::declare(&Place::default(), Path::new(part), &mut list);
+        for setting in list {
+            self.push_setting(setting);
+        }
+        self
+    }
+
+    #[inline(never)]
+    fn push_setting(&mut self, Setting { place, access }: Setting<M>) {
+        let common = parameter(&place.name, &place.text);
+        let (min, max) = (place.min.or(place.above), place.max.or(place.below));
+        match access {
+            settings::Access::Real(path) => {
+                let declaration = Real { min, max, nominal: place.nominal, ..common.real() };
+                let declaration = declaration.unit(&place.unit);
+                self.push_real(declaration, Box::new(move |model| path.field(model)));
+            }
+            settings::Access::Integer(integer, is_signed) => {
+                let min = min.or((!is_signed).then_some(0.0)).map(|min| min as i32);
+                let kind =
+                    VariableKind::Integer { min, max: max.map(|max| max as i32), start: None };
+                self.push(common, kind, Access::Integer(Integer::new(integer, 0)));
+            }
+            settings::Access::Boolean(path) => {
+                self.push(
+                    common,
+                    VariableKind::Boolean { start: None },
+                    Access::Boolean(Box::new(move |model| path.field(model))),
+                );
+            }
+            settings::Access::Choice(integer, items) => {
+                let kind =
+                    VariableKind::Enumeration { enumeration_type: described(&items), start: None };
+                self.push(common, kind, Access::Integer(Integer::new(integer, 1)));
+            }
+            settings::Access::Text(path) => {
+                self.push(
+                    common,
+                    VariableKind::String { start: None },
+                    Access::String(Box::new(move |model| path.field(model))),
+                );
+            }
+        }
+    }
+
+    /// Adds a variable whose field is a [`Choice`].
+    #[must_use]
+    pub fn choice<T: Choice>(
+        mut self,
+        common: Common,
+        field: impl Fn(&mut M) -> &mut T + Send + Sync + 'static,
+    ) -> Self {
+        let setting = Setting::choice(&Place::default(), Path::new(field));
+        if let settings::Access::Choice(integer, items) = setting.access {
+            let kind =
+                VariableKind::Enumeration { enumeration_type: described(&items), start: None };
+            self.push(common, kind, Access::Integer(Integer::new(integer, 1)));
+        }
+        self
+    }
+
     /// Adds an enumeration variable, whose field has the enumerated type.
     #[must_use]
     pub fn enumeration<T: Copy + PartialEq + Send + Sync>(
@@ -292,11 +386,11 @@ pub struct Real {
 }
 
 impl Real {
-    /// Declares the unit of measure of the variable.
+    /// Declares the unit of measure of the variable by its name, as [`Unit::new`] has it.
     #[must_use]
     #[inline(never)]
-    pub fn unit(mut self, unit: Unit) -> Self {
-        self.unit = Some(unit);
+    pub fn unit(mut self, name: &str) -> Self {
+        self.unit = (!name.is_empty()).then(|| Unit::new(name));
         self
     }
     /// Declares the smallest allowed value.

@@ -141,7 +141,7 @@ fn moments_are_held_between_ticks() {
 }
 
 fn set_feedback(instance: &mut Crmpc, k: f64, period: f64) {
-    (instance.law.settings.feedback, instance.parameters.period) = (Gain { k1: k, k2: k }, period);
+    (instance.settings.feedback, instance.parameters.period) = (Gain { k1: k, k2: k }, period);
 }
 
 #[test]
@@ -282,10 +282,10 @@ fn a_delay_out_of_range_is_refused_by_name() {
 fn a_time_budget_of_any_length_is_accepted() {
     for budget in [1e9, 1e19, 1e300, f64::MAX] {
         let mut crmpc: Crmpc =
-            ready(|instance: &mut Crmpc| instance.law.settings.solver.time_budget = budget);
+            ready(|instance: &mut Crmpc| instance.settings.solver.time_budget = budget);
         crmpc.calculate(0.0, LastEvent::InputSet).unwrap();
         let mut dlmpc: Dlmpc =
-            ready(|instance: &mut Dlmpc| instance.law.settings.solver.time_budget = budget);
+            ready(|instance: &mut Dlmpc| instance.settings.solver.time_budget = budget);
         dlmpc.calculate(0.0, LastEvent::InputSet).unwrap();
         assert!(crmpc.output.moment.norm() > 0.0 && dlmpc.output.moment.norm() > 0.0, "{budget} s");
     }

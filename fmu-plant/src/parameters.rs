@@ -3,6 +3,7 @@
 use fmi2_export::Enumeration;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
+use settings::Choice;
 use vehicle::Scenario;
 use vehicle::actuators::{self, JetMode};
 use vehicle::atmosphere::Flight;
@@ -27,84 +28,18 @@ const STEP: f64 = 0.01;
 /// can read.
 const NEVER: f64 = 1e15;
 
-/// Kinds of disturbance as an FMI enumeration.
-pub(crate) static KINDS: Enumeration<DisturbanceKind> = Enumeration {
-    name: "DisturbanceKind",
-    description: "Waveform of the disturbance",
-    items: &[
-        (DisturbanceKind::None, "none", "no disturbance"),
-        (
-            DisturbanceKind::White,
-            "white",
-            "each component is drawn uniformly within disturbance.bound every disturbance.period",
-        ),
-        (DisturbanceKind::Constant, "constant", "disturbance.bound times disturbance.direction"),
-        (DisturbanceKind::Sine, "sine", "a moment that is an offset plus two sinusoids"),
-        (
-            DisturbanceKind::Square,
-            "square",
-            "disturbance.bound times disturbance.direction, with the sign changing every half disturbance.square.period",
-        ),
-        (
-            DisturbanceKind::AlongRate,
-            "alongRate",
-            "each component is plus or minus disturbance.bound, chosen every disturbance.period so that the angular rate grows fastest",
-        ),
-        (
-            DisturbanceKind::AgainstMoment,
-            "againstMoment",
-            "each component is plus or minus disturbance.bound, chosen every disturbance.period to oppose the control moment",
-        ),
-        (
-            DisturbanceKind::Table,
-            "table",
-            "disturbance.bound times the factors in the current row of a lookup table over time",
-        ),
-    ],
-};
-
 /// Number of rows of the disturbance's lookup table for which there are variables.
 pub(crate) const TABLE_ROWS: usize = 8;
 
 /// Source of the control moment.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Choice)]
 pub(crate) enum Actuation {
+    /// The input moment acts, delayed by actuation.delay and rounded to actuation.resolution.
     #[default]
     Moment,
+    /// The inputs surface and jet command eight aerodynamic surfaces and ten jets.
     SurfacesAndJets,
 }
-
-/// Sources of the control moment as an FMI enumeration.
-pub(crate) static ACTUATIONS: Enumeration<Actuation> = Enumeration {
-    name: "Actuation",
-    description: "Source of the control moment",
-    items: &[
-        (
-            Actuation::Moment,
-            "moment",
-            "the input moment acts, delayed by actuation.delay and rounded to actuation.resolution",
-        ),
-        (
-            Actuation::SurfacesAndJets,
-            "surfacesAndJets",
-            "the inputs surface and jet command eight aerodynamic surfaces and ten jets",
-        ),
-    ],
-};
-
-/// Forms of the attitude kinematics as an FMI enumeration.
-pub(crate) static KINEMATICS: Enumeration<Kinematics> = Enumeration {
-    name: "Kinematics",
-    description: "Form of the matrix R in the attitude kinematics",
-    items: &[
-        (Kinematics::Printed, "printed", "R is as printed in (2) of Chai 2022 and (4) of Wu 2015"),
-        (
-            Kinematics::Exact,
-            "exact",
-            "R includes the derivative of alpha times sin beta in the row of the bank angle, as in (1) of Wu 2015",
-        ),
-    ],
-};
 
 /// Value of `sensor.set` without sampling: the FMU outputs the readings of ideal sensors.
 pub(crate) const NO_SENSORS: i32 = 0;

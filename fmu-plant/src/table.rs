@@ -10,7 +10,6 @@ use fmi2_export::table::{
     Description, Real, discrete_input, discrete_output, input, output, parameter,
 };
 use model_description::DefaultExperiment;
-use model_description::unit;
 use nalgebra::Vector3;
 use std::sync::LazyLock;
 use vehicle::Scenario;
@@ -64,9 +63,7 @@ fn all_variables() -> PlantVariables {
         "Maximum step size of the Runge-Kutta integration in co-simulation",
     );
     let variables = variables
-        .real(step.real().unit(unit::time()).min(1e-5).max(1.0).nominal(0.01), |m| {
-            &mut m.parameters.step
-        });
+        .real(step.real().unit("s").min(1e-5).max(1.0).nominal(0.01), |m| &mut m.parameters.step);
     standard_pressure(disturbance_table(converted(sensors::sensor_variables(kinematics(
         actuation(variables),
     )))))
@@ -122,14 +119,11 @@ fn outputs(variables: PlantVariables) -> PlantVariables {
     let deflections: Vec<String> = (1..=SURFACES).map(|i| format!("deflection[{i}]")).collect();
     let actuators: Vec<&str> = jets.iter().chain(&deflections).map(String::as_str).collect();
     let angle = |axis: &str, meaning: &str| {
-        output(&format!("attitude.{axis}"), &sentence(meaning))
-            .real()
-            .unit(unit::angle())
-            .nominal(0.1)
+        output(&format!("attitude.{axis}"), &sentence(meaning)).real().unit("rad").nominal(0.1)
     };
     let rate = |axis: &str, meaning: &str| {
         let text = format!("Body {meaning} rate");
-        output(&format!("rate.{axis}"), &text).real().unit(unit::angular_rate()).nominal(0.05)
+        output(&format!("rate.{axis}"), &text).real().unit("rad/s").nominal(0.05)
     };
     let angle_rate = |axis: &str, meaning: &str| {
         // The rates of the angles follow Wu 2015 (1); they depend on sigma through the trajectory.
@@ -142,7 +136,7 @@ fn outputs(variables: PlantVariables) -> PlantVariables {
             output(&format!("attitudeRate.{axis}"), &format!("Time derivative of the {meaning}"))
                 .depends_on(["attitude.sigma"])
                 .depends_on(TRAJECTORY_INPUTS.map(|(name, ..)| name));
-        let real = common.depends_on(depends).real().unit(unit::angular_rate()).nominal(0.05);
+        let real = common.depends_on(depends).real().unit("rad/s").nominal(0.05);
         real.derivative_of(&format!("attitude.{axis}"))
     };
     let acceleration = |axis: &str, meaning: &str| {
@@ -154,14 +148,14 @@ fn outputs(variables: PlantVariables) -> PlantVariables {
             .depends_on(external)
             .depends_on(actuators.clone())
             .real();
-        real.unit(unit::angular_acceleration()).nominal(0.05).derivative_of(&format!("rate.{axis}"))
+        real.unit("rad/s2").nominal(0.05).derivative_of(&format!("rate.{axis}"))
     };
     let applied = |axis: &str, meaning: &str| {
         let text = format!("Control moment that acts on the vehicle about the {meaning} axis");
         let common = output(&format!("appliedMoment.{axis}"), &text);
         let common =
             common.depends_on([format!("moment.{axis}").as_str()]).depends_on(actuators.clone());
-        common.real().unit(unit::moment()).nominal(1e5)
+        common.real().unit("N.m").nominal(1e5)
     };
     let delta = |axis: &str, meaning: &str| {
         let text = format!("Disturbance that acts on the second time derivative of the {meaning}");
@@ -169,7 +163,7 @@ fn outputs(variables: PlantVariables) -> PlantVariables {
             .depends_on(motion)
             .depends_on(moment)
             .depends_on(actuators.clone());
-        common.real().unit(unit::angular_acceleration()).nominal(0.03)
+        common.real().unit("rad/s2").nominal(0.03)
     };
     let disturbing = |axis: &str, meaning: &str| {
         let text = format!("Disturbance moment about the {meaning} axis: external input plus sine");
@@ -177,7 +171,7 @@ fn outputs(variables: PlantVariables) -> PlantVariables {
         common
             .depends_on([format!("disturbanceMoment.{axis}").as_str()])
             .real()
-            .unit(unit::moment())
+            .unit("N.m")
             .nominal(1e4)
     };
     let variables = vector(variables, ANGLES, angle, Role::state, |m| &mut m.output.angles);
@@ -220,14 +214,14 @@ fn inputs(variables: PlantVariables) -> PlantVariables {
             &format!("moment.{axis}"),
             &format!("Control moment about the {meaning} axis, used if actuation = moment"),
         );
-        common.real().unit(unit::moment()).nominal(1e5)
+        common.real().unit("N.m").nominal(1e5)
     };
     let external = |axis: &str, meaning: &str| {
         let common = input(
             &format!("disturbanceMoment.{axis}"),
             &format!("External disturbance moment about the {meaning} axis"),
         );
-        common.real().unit(unit::moment()).nominal(1e4)
+        common.real().unit("N.m").nominal(1e4)
     };
     let variables =
         vector(variables, AXES, control, |i| Known::Moment(i).into(), |m| &mut m.input.moment);
@@ -247,16 +241,14 @@ fn actuated(mut variables: PlantVariables) -> PlantVariables {
             &format!("deflection[{}]", i + 1),
             &format!("Deflection of the {name}, trailing edge down positive"),
         );
-        let real = common.real().unit(unit::angle()).nominal(0.1);
+        let real = common.real().unit("rad").nominal(0.1);
         let role = Role::state(MOTION + i);
         variables = variables.real(real, move |m| &mut m.output.deflections[i]).role(role);
     }
     let pressure =
         output("flight.dynamicPressure", "Actual dynamic pressure, with density.scale applied");
     variables
-        .real(pressure.real().unit(unit::pressure()).nominal(1e3), |m| {
-            &mut m.output.dynamic_pressure
-        })
+        .real(pressure.real().unit("Pa").nominal(1e3), |m| &mut m.output.dynamic_pressure)
         .role(Unknown::DynamicPressure)
 }
 
@@ -267,9 +259,7 @@ fn standard_pressure(variables: PlantVariables) -> PlantVariables {
         "Dynamic pressure in the standard atmosphere, without density.scale",
     );
     variables
-        .real(pressure.real().unit(unit::pressure()).nominal(1e3), |m| {
-            &mut m.output.standard_pressure
-        })
+        .real(pressure.real().unit("Pa").nominal(1e3), |m| &mut m.output.standard_pressure)
         .role(Unknown::DynamicPressure)
 }
 
@@ -277,7 +267,7 @@ fn commands(mut variables: PlantVariables) -> PlantVariables {
     for (i, name) in Effectors::published().names.iter().enumerate() {
         let text = format!("Commanded deflection of the {name}, trailing edge down positive");
         let common = discrete_input(&format!("surface[{}]", i + 1), &text);
-        let real = common.real().unit(unit::angle()).nominal(0.1);
+        let real = common.real().unit("rad").nominal(0.1);
         variables =
             variables.real(real, move |m| &mut m.command.surfaces[i]).role(Known::Surface(i));
     }
@@ -298,7 +288,7 @@ fn deflection_rates(mut variables: PlantVariables) -> PlantVariables {
         );
         let common = output(&format!("deflectionRate[{}]", i + 1), &text)
             .depends_on([command.as_str(), deflection.as_str()]);
-        let real = common.real().unit(unit::angular_rate()).nominal(0.1).derivative_of(&deflection);
+        let real = common.real().unit("rad/s").nominal(0.1).derivative_of(&deflection);
         let role = Unknown::Derivative(MOTION + i);
         variables = variables.real(real, move |m| &mut m.output.deflection_rates[i]).role(role);
     }
@@ -334,11 +324,8 @@ const TRAJECTORY_INPUTS: [TrajectoryInput; 7] = [
 fn trajectory(mut variables: PlantVariables) -> PlantVariables {
     for (i, (name, meaning, is_rate, field)) in TRAJECTORY_INPUTS.into_iter().enumerate() {
         let real = input(name, meaning).real();
-        let real = if is_rate {
-            real.unit(unit::angular_rate()).nominal(1e-3)
-        } else {
-            real.unit(unit::angle()).nominal(0.1)
-        };
+        let real =
+            if is_rate { real.unit("rad/s").nominal(1e-3) } else { real.unit("rad").nominal(0.1) };
         variables = variables
             .real(real, move |m| field(&mut m.input.trajectory))
             .role(Known::Trajectory(i));
@@ -352,10 +339,8 @@ fn kinematics(variables: PlantVariables) -> PlantVariables {
         "Angular rate of the Earth: 7.2921e-5 rad/s, or 0 to neglect the rotation",
     );
     variables
-        .enumeration(parameter("kinematics", KINEMATICS.description), &KINEMATICS, |m| {
-            &mut m.parameters.kinematics
-        })
-        .real(earth.real().unit(unit::angular_rate()).min(0.0).max(1.0).nominal(1e-4), |m| {
+        .choice(parameter("kinematics", KINEMATICS.description), |m| &mut m.parameters.kinematics)
+        .real(earth.real().unit("rad/s").min(0.0).max(1.0).nominal(1e-4), |m| {
             &mut m.parameters.earth_rate
         })
 }
@@ -383,13 +368,12 @@ fn actuation(variables: PlantVariables) -> PlantVariables {
         "If true, jet 4 mirrors jet 8; if false, it is as printed in (64) of Wu 2015, which is not symmetric",
     );
     variables
-        .enumeration(parameter("actuation", ACTUATIONS.description), &ACTUATIONS, |m| {
+        .choice(parameter("actuation", ACTUATIONS.description), &ACTUATIONS, |m| {
             &mut m.parameters.actuation
         })
-        .real(
-            altitude.real().unit(unit::length()).min(0.0).max(atmosphere::TOP).nominal(1e4),
-            |m| &mut m.parameters.flight.altitude,
-        )
+        .real(altitude.real().unit("m").min(0.0).max(atmosphere::TOP).nominal(1e4), |m| {
+            &mut m.parameters.flight.altitude
+        })
         .real(mach.real().min(0.0).max(100.0).nominal(10.0), |m| &mut m.parameters.flight.mach)
         .real(density.real().min(0.0).max(10.0).nominal(1.0), |m| &mut m.parameters.density_scale)
         .real(aerodynamics.real().min(0.0).max(10.0).nominal(1.0), |m| {
@@ -401,9 +385,9 @@ fn actuation(variables: PlantVariables) -> PlantVariables {
 
 fn converted(variables: PlantVariables) -> PlantVariables {
     let text = "Delay of the input moment, which is then held over each communication step; only for co-simulation with actuation = moment";
-    let delay = parameter("actuation.delay", text).real().unit(unit::time());
+    let delay = parameter("actuation.delay", text).real().unit("s");
     let text = "Quantization step of the input moment, which is then held over each communication step; 0 for none; only for co-simulation with actuation = moment";
-    let resolution = parameter("actuation.resolution", text).real().unit(unit::moment());
+    let resolution = parameter("actuation.resolution", text).real().unit("N.m");
     variables
         .real(delay.min(0.0).max(transport::LONGEST).nominal(0.1), |m| {
             &mut m.parameters.moment_delay
@@ -413,7 +397,7 @@ fn converted(variables: PlantVariables) -> PlantVariables {
 
 fn inertia(variables: PlantVariables) -> PlantVariables {
     let entry = |name: &str, text: &str| {
-        parameter(&format!("inertia.{name}"), text).real().unit(unit::inertia()).nominal(1e6)
+        parameter(&format!("inertia.{name}"), text).real().unit("kg.m2").nominal(1e6)
     };
     let scale = parameter(
         "inertia.scale",
@@ -443,11 +427,11 @@ fn initial(variables: PlantVariables) -> PlantVariables {
     let angle = |axis: &str, meaning: &str| {
         let limit = if axis == "beta" { BETA_LIMIT } else { 2.0 * std::f64::consts::PI };
         let common = parameter(&format!("initial.{axis}"), &format!("Initial {meaning}"));
-        common.real().unit(unit::angle()).min(-limit).max(limit).nominal(0.1)
+        common.real().unit("rad").min(-limit).max(limit).nominal(0.1)
     };
     let rate = |axis: &str, meaning: &str| {
         let common = parameter(&format!("initial.{axis}"), &format!("Initial body {meaning} rate"));
-        common.real().unit(unit::angular_rate()).min(-10.0).max(10.0).nominal(0.05)
+        common.real().unit("rad/s").min(-10.0).max(10.0).nominal(0.05)
     };
     let variables = vector(variables, ANGLES, angle, none, |m| &mut m.parameters.initial_angles);
     vector(variables, RATES, rate, none, |m| &mut m.parameters.initial_rates)
@@ -482,23 +466,17 @@ fn disturbance(variables: PlantVariables) -> PlantVariables {
     );
     let offset = |axis: &str, meaning: &str| {
         let text = format!("Constant part of the sine disturbance moment about the {meaning} axis");
-        parameter(&format!("disturbance.sine.offset.{axis}"), &text)
-            .real()
-            .unit(unit::moment())
-            .nominal(1e4)
+        parameter(&format!("disturbance.sine.offset.{axis}"), &text).real().unit("N.m").nominal(1e4)
     };
     let start = parameter("disturbance.start", "Time at which the disturbance starts");
     let end = parameter("disturbance.end", "Time at which the disturbance ends");
-    let time = |common: fmi2_export::table::Common| common.real().unit(unit::time());
+    let time = |common: fmi2_export::table::Common| common.real().unit("s");
 
     let variables = variables
-        .enumeration(parameter("disturbance.kind", KINDS.description), &KINDS, |m| {
-            &mut m.parameters.kind
+        .enumeration(parameter("disturbance.kind", KINDS.description), |m| &mut m.parameters.kind)
+        .real(bound.real().unit("rad/s2").min(0.0).max(10.0).nominal(0.03), |m| {
+            &mut m.parameters.bound
         })
-        .real(
-            bound.real().unit(unit::angular_acceleration()).min(0.0).max(10.0).nominal(0.03),
-            |m| &mut m.parameters.bound,
-        )
         .real(time(period).min(1e-4).nominal(0.04), |m| &mut m.parameters.period)
         .integer(seed, (Some(0), None), |m| &mut m.parameters.seed);
     let variables = vector(variables, ANGLES, direction, none, |m| &mut m.parameters.direction)
@@ -523,13 +501,11 @@ fn disturbance_table(variables: PlantVariables) -> PlantVariables {
     );
     let mut variables = variables
         .integer(rows, (Some(0), i32::try_from(TABLE_ROWS).ok()), |m| &mut m.parameters.table_rows)
-        .real(period.real().unit(unit::time()).min(0.0).nominal(10.0), |m| {
-            &mut m.parameters.table_period
-        });
+        .real(period.real().unit("s").min(0.0).nominal(10.0), |m| &mut m.parameters.table_period);
     for i in 0..TABLE_ROWS {
         let name = format!("disturbance.table.time[{}]", i + 1);
         let text = format!("Time after disturbance.start at which row {} takes effect", i + 1);
-        let real = parameter(&name, &text).real().unit(unit::time()).min(0.0).nominal(10.0);
+        let real = parameter(&name, &text).real().unit("s").min(0.0).nominal(10.0);
         variables = variables.real(real, move |m| &mut m.parameters.table[i].time);
     }
     for (component, (axis, meaning)) in ANGLES.into_iter().enumerate() {
@@ -548,10 +524,7 @@ fn sine(variables: PlantVariables, which: &'static str, i: usize) -> PlantVariab
     let name = |part: &str| format!("disturbance.sine.{which}.{part}");
     let amplitude = |axis: &str, meaning: &str| {
         let text = format!("Amplitude of the {which} sinusoidal moment about the {meaning} axis");
-        parameter(&name(&format!("amplitude.{axis}")), &text)
-            .real()
-            .unit(unit::moment())
-            .nominal(1e4)
+        parameter(&name(&format!("amplitude.{axis}")), &text).real().unit("N.m").nominal(1e4)
     };
     let frequency = parameter(
         &name("frequency"),
@@ -560,12 +533,10 @@ fn sine(variables: PlantVariables, which: &'static str, i: usize) -> PlantVariab
     let phase =
         parameter(&name("phase"), &format!("Phase of the {which} sinusoidal moment at time 0"));
     vector(variables, AXES, amplitude, none, move |m| &mut m.parameters.waves[i].amplitude)
-        .real(frequency.real().unit(unit::angular_rate()).min(0.0).nominal(1.0), move |m| {
+        .real(frequency.real().unit("rad/s").min(0.0).nominal(1.0), move |m| {
             &mut m.parameters.waves[i].frequency
         })
-        .real(phase.real().unit(unit::angle()).nominal(1.0), move |m| {
-            &mut m.parameters.waves[i].phase
-        })
+        .real(phase.real().unit("rad").nominal(1.0), move |m| &mut m.parameters.waves[i].phase)
 }
 
 /// Returns the text with a capital letter at its beginning.

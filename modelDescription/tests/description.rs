@@ -2,7 +2,7 @@
 
 use model_description::library_file::LibraryFile;
 use model_description::pack::{Extras, pack};
-use model_description::unit::{angle, angular_rate};
+use model_description::unit::Unit;
 use model_description::variable::{
     Causality, EnumerationType, Variability, Variable, VariableKind,
 };
@@ -29,7 +29,7 @@ fn variable(
 
 fn real(start: Option<f64>) -> VariableKind {
     VariableKind::Real {
-        unit: Some(angle()),
+        unit: Some(Unit::new("rad")),
         min: None,
         max: None,
         nominal: None,
@@ -49,7 +49,7 @@ fn fmu() -> ModelDescription {
         items: vec![("flat".into(), "Nothing".into()), ("steep".into(), "Much".into())],
     };
     let rate = VariableKind::Real {
-        unit: Some(angular_rate()),
+        unit: Some(Unit::new("rad/s")),
         min: None,
         max: None,
         nominal: None,

@@ -11,30 +11,32 @@ use crate::noise::{Stream, uniform};
 use crate::time::{tick, tick_time, tolerance};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
+use settings::Choice;
 pub use table::{DisturbanceTable, Row};
 
-/// Kind of disturbance, which determines its waveform.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+/// Waveform of the disturbance.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Choice)]
 #[serde(rename_all = "camelCase")]
 pub enum DisturbanceKind {
-    /// No disturbance acts on the vehicle.
+    /// No disturbance.
     #[default]
     None,
-    /// Each component of Δ is uniform in [−bound, bound] and is drawn anew at every tick.
+    /// Each component is drawn uniformly within disturbance.bound every disturbance.period.
     White,
-    /// Δ = bound · direction holds all the time.
+    /// disturbance.bound times disturbance.direction.
     Constant,
-    /// A moment offset + Σ amplitude · sin(frequency · t + phase) acts, and Δ is zero.
+    /// a moment that is an offset plus two sinusoids.
     Sine,
-    /// Δ = ± bound · direction; it begins with + and changes sign every half square period.
+    /// disturbance.bound times disturbance.direction, with the sign changing every half
+    /// disturbance.square.period.
     Square,
-    /// Each component of Δ is ± bound, with the sign that increases ‖ω‖ fastest, chosen at every
-    /// tick.
+    /// Each component is plus or minus disturbance.bound, chosen every disturbance.period so that
+    /// the angular rate grows fastest.
     AlongRate,
-    /// Each component of Δ is ± bound, opposite in sign to the control acceleration R I⁻¹ m, chosen
-    /// at every tick.
+    /// Each component is plus or minus disturbance.bound, chosen every disturbance.period to
+    /// oppose the control moment.
     AgainstMoment,
-    /// Δ = bound · direction of the table's row in force, and zero before the first row.
+    /// disturbance.bound times the factors in the current row of a lookup table over time.
     Table,
 }
 

@@ -1,7 +1,7 @@
 //! Pulse-width pulse-frequency modulation of the jets (Wu 2015, Figure 2): a low-pass filter and a
 //! Schmitt trigger in a loop.
 
-use crate::error::DesignError;
+use crate::error::{DesignError, invalid, positive};
 use serde::{Deserialize, Serialize};
 use vehicle::math::exp;
 
@@ -36,22 +36,15 @@ impl Pwpf {
     /// # Errors
     /// Returns an error that names the constant at fault.
     pub fn check(&self) -> Result<(), DesignError> {
-        let positive = [
-            ("pwpf.gain", self.gain),
-            ("pwpf.time_constant", self.time_constant),
-            ("pwpf.period", self.period),
-        ];
-        for (name, value) in positive {
-            if !(value > 0.0 && value.is_finite()) {
-                return Err(DesignError::NotPositive { name, value });
-            }
-        }
+        positive("pwpf.gain", self.gain)?;
+        positive("pwpf.timeConstant", self.time_constant)?;
+        positive("pwpf.period", self.period)?;
         // A jet with full command must switch on, and a jet without command must switch off.
         for (name, value, low, high) in
             [("pwpf.on", self.on, 0.0, self.gain), ("pwpf.off", self.off, 0.0, self.on)]
         {
             if !(value > low && value < high) {
-                return Err(DesignError::OutOfRange { name, value, low, high });
+                return Err(invalid(name, value, format!("must be above {low} and below {high}")));
             }
         }
         Ok(())

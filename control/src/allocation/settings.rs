@@ -1,28 +1,31 @@
 //! Settings of the allocator, with the published ones from `data/allocation.toml`.
 
 use super::pwpf::Pwpf;
-use crate::error::DesignError;
+use crate::error::{DesignError, invalid, positive};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
+use settings::Choice;
 use std::sync::LazyLock;
 use vehicle::data;
 use vehicle::effectors::{Effectors, SURFACES, Surfaces};
 
-/// Choice of the method that divides the moment among the effectors.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+/// Method that divides the moment among the effectors.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Choice)]
+#[setting(name = "AllocationMethod")]
 pub enum Method {
-    /// Optimum (60) of Wu 2015 over surfaces and jets together.
+    /// Minimises the moment error and the use of the jets over all effectors together.
     Optimal,
-    /// Blending of Jia et al., section IV: surfaces first, the remainder to the jets.
+    /// The surfaces come first, within their limits and above threshold.dynamicPressure; the jets
+    /// give the remainder.
     Blending,
 }
 
-/// Choice of the commands to the jets.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+/// Form of the commands to the jets.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Choice)]
 pub enum JetCommand {
-    /// On and off, by pulse-width pulse-frequency modulation.
+    /// 1 for on and 0 for off, by pulse-width pulse-frequency modulation.
     Pwpf,
-    /// The duty cycle, without modulation.
+    /// Duty cycle from 0 to 1, without modulation.
     Duty,
 }
 
@@ -113,34 +116,26 @@ impl Settings {
     /// # Errors
     /// Returns an error that names the setting at fault.
     pub(super) fn ratio(&self) -> Result<u64, DesignError> {
-        let positive = [
-            ("period", self.period),
-            ("effectors.reference_pressure", self.effectors.reference_pressure),
-            ("weight_moment.x", self.weight_moment.x),
-            ("weight_moment.y", self.weight_moment.y),
-            ("weight_moment.z", self.weight_moment.z),
-        ];
-        for (name, value) in positive {
-            if !(value > 0.0 && value.is_finite()) {
-                return Err(DesignError::NotPositive { name, value });
-            }
-        }
+        positive("period", self.period)?;
+        positive("dynamicPressure.reference", self.effectors.reference_pressure)?;
+        positive("weight.moment[1]", self.weight_moment.x)?;
+        positive("weight.moment[2]", self.weight_moment.y)?;
+        positive("weight.moment[3]", self.weight_moment.z)?;
         let not_negative = [
-            ("weight_jet", self.weight_jet),
-            ("weight_surface", self.weight_surface),
-            ("threshold", self.threshold),
+            ("weight.jet", self.weight_jet),
+            ("weight.surface", self.weight_surface),
+            ("threshold.dynamicPressure", self.threshold),
         ];
         for (name, value) in not_negative {
             if !(0.0..f64::INFINITY).contains(&value) {
-                return Err(DesignError::OutOfRange { name, value, low: 0.0, high: f64::INFINITY });
+                return Err(invalid(name, value, "must be finite and not negative"));
             }
         }
         let Effectors { effectiveness, jet_moments, min, max, rate, .. } = &self.effectors;
         if let Some(&value) =
             effectiveness.iter().chain(jet_moments).find(|value| !value.is_finite())
         {
-            let (name, low, high) = ("effectors.effectiveness", f64::NEG_INFINITY, f64::INFINITY);
-            return Err(DesignError::OutOfRange { name, value, low, high });
+            return Err(invalid("surfaceMoment, jetMoment", value, "must be finite"));
         }
         for i in 0..SURFACES {
             let (min, max, rate) = (min[i], max[i], rate[i]);

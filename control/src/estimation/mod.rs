@@ -10,12 +10,13 @@ pub mod ellipsoid;
 pub mod fusion;
 pub mod lowpass;
 
-use crate::error::DesignError;
+use crate::error::{DesignError, invalid, positive};
 use ellipsoid::{Correction, Scatter};
 use fusion::{Fusion, Gains, triad};
 use lowpass::LowPass;
 use nalgebra::{Matrix3, Rotation3, SVector, Vector3};
 use serde::{Deserialize, Serialize};
+use settings::Choice;
 use std::sync::LazyLock;
 use vehicle::data;
 use vehicle::kinematics::{self, Kinematics};
@@ -25,21 +26,22 @@ use vehicle::scenario::Scenario;
 use vehicle::sensor_data::SensorData;
 use vehicle::time::tick_tolerance;
 
-/// Choice of the source of the magnetometer's calibration.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+/// Source of the magnetometer's calibration.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Choice)]
 pub enum CalibrationMode {
-    /// The calibration is taken from the settings.
+    /// Parameters magnetometer.matrix and magnetometer.bias.
     Given,
-    /// The calibration is a fit to the readings of the first seconds, while the platform turns.
+    /// Ellipsoid fitted to the readings of the first calibration.duration.
     Fit,
 }
 
-/// Choice of the source of the initial attitude.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+/// Source of the initial attitude.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Choice)]
 pub enum Alignment {
-    /// The first samples give the initial attitude.
+    /// First samples.
     Measured,
-    /// The settings give the initial attitude, in which the platform was placed.
+    /// initial.alpha, initial.beta and initial.sigma, the attitude in which the platform was
+    /// placed.
     Given,
 }
 
@@ -208,38 +210,40 @@ pub struct Line {
 }
 
 /// Health of the estimate: how far it can be trusted.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Choice)]
+#[setting(name = "EstimatorHealth")]
 pub enum Health {
     /// No sample has arrived yet.
     #[default]
     Waiting,
-    /// The estimate is based on a current sample of all sensors.
+    /// The estimate uses a current sample of all sensors.
     Ok,
-    /// A sample is missing; the last rate is held.
+    /// a sample is missing, and the last rate is held.
     Bridging,
-    /// A sensor repeats its value and is left out.
+    /// a sensor repeats its value and is ignored.
     Frozen,
-    /// Samples have been missing or frozen for too long.
+    /// No usable sample has arrived for longer than lost.after.
     Lost,
-    /// Readings are being collected for the calibration.
+    /// Readings for the calibration are collected.
     Calibrating,
-    /// The fit was refused; the given calibration is in use.
+    /// The fit of the calibration was rejected.
     Uncalibrated,
-    /// A reading of the newest sample, or the sample as a whole, was rejected and is left out.
+    /// a reading of the newest sample is implausible and is ignored.
+    #[setting(name = "sampleRejected")]
     Rejected,
 }
 
-/// State of the magnetometer's calibration.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+/// Source of the magnetometer's calibration in force.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Choice)]
 pub enum CalibrationStatus {
-    /// The calibration of the settings is in use.
+    /// Parameters magnetometer.matrix and magnetometer.bias.
     #[default]
     Given,
-    /// Readings are being collected for a fit.
+    /// Parameters, while readings for a fit are collected.
     Collecting,
-    /// The calibration of the fit is in use.
+    /// Fitted ellipsoid.
     Fitted,
-    /// The fit was refused; the calibration of the settings is in use.
+    /// Parameters, because the readings do not determine an ellipsoid.
     Refused,
 }
 
@@ -354,6 +358,9 @@ pub fn angles(rotation: &Rotation3<f64>) -> Vector3<f64> {
     Vector3::new(atan2(c[(2, 0)], c[(0, 0)]), beta, atan2(-c[(1, 2)], c[(1, 1)]))
 }
 
+/// Names of the sensors.
+const SENSORS: [&str; 3] = ["gyroscope", "accelerometer", "magnetometer"];
+
 impl Estimator {
     /// Checks the settings and sets up the filter.
     ///
@@ -361,41 +368,35 @@ impl Estimator {
     /// Returns an error that names the setting at fault.
     pub fn new(settings: Settings) -> Result<Self, DesignError> {
         let s = &settings;
-        let positive = [
-            ("period", s.period),
-            ("lost_after", s.lost_after),
-            ("calibration_duration", s.calibration_duration),
-        ];
-        for (name, value) in positive {
-            if !(value > 0.0 && value.is_finite()) {
-                return Err(DesignError::NotPositive { name, value });
-            }
-        }
+        positive("period", s.period)?;
+        positive("lost.after", s.lost_after)?;
+        positive("calibration.duration", s.calibration_duration)?;
         let nyquist = 0.5 / s.period;
         let limits = [
-            ("cutoff", s.cutoff, nyquist),
-            ("gains.proportional", s.gains.proportional, 1.0 / s.period),
-            ("gains.integral", s.gains.integral, 1.0 / (s.period * s.period)),
-            ("sensor_delay", s.sensor_delay, 1.0),
-            ("rest_duration", s.rest_duration, f64::MAX),
+            ("filter.cutoff", s.cutoff, nyquist),
+            ("fusion.proportional", s.gains.proportional, 1.0 / s.period),
+            ("fusion.integral", s.gains.integral, 1.0 / (s.period * s.period)),
+            ("sensor.delay", s.sensor_delay, 1.0),
+            ("rest.duration", s.rest_duration, f64::MAX),
         ];
         for (i, gate) in s.gates.iter().enumerate() {
             for (what, value) in [("range", gate.range), ("jump", gate.jump)] {
                 if !(value > 0.0 && value <= LARGEST_RANGE) {
-                    let name = format!("gates[{i}].{what}");
-                    return Err(DesignError::Setting { name, value });
+                    let name = format!("{}.{what}", SENSORS[i]);
+                    let problem = format!("must be positive and at most {LARGEST_RANGE}");
+                    return Err(invalid(&name, value, problem));
                 }
             }
         }
         for (name, value, high) in limits {
             if !(0.0..high).contains(&value) {
-                return Err(DesignError::OutOfRange { name, value, low: 0.0, high });
+                return Err(invalid(name, value, format!("must be at least 0 and below {high}")));
             }
         }
         for (i, correction) in s.corrections.iter().enumerate() {
             let determinant = correction.matrix.determinant();
             if !(determinant.abs() > 0.0 && determinant.is_finite()) {
-                return Err(DesignError::Singular { name: format!("corrections[{i}].matrix") });
+                return Err(DesignError::Singular { name: format!("{}.matrix", SENSORS[i]) });
             }
         }
         Ok(Self { settings, filter: LowPass::new(s.cutoff, s.period) })

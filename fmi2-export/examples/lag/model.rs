@@ -6,7 +6,6 @@ use fmi2_export::{
     Context, Description, Enumeration, EventInfo, Failure, Inputs, LastEvent, Model, VariableTable,
 };
 use model_description::DefaultExperiment;
-use model_description::unit;
 use serde::{Deserialize, Serialize};
 
 /// Number of Runge–Kutta steps in a communication step.
@@ -86,22 +85,15 @@ impl Model for Lag {
     fn description() -> Description<Self> {
         let table = VariableTable::new()
             .real(
-                parameter("timeConstant", "Time constant T")
-                    .real()
-                    .unit(unit::time())
-                    .min(1e-3)
-                    .max(1e3),
+                parameter("timeConstant", "Time constant T").real().unit("s").min(1e-3).max(1e3),
                 |m: &mut Self| &mut m.time_constant,
             )
             .real(parameter("gain.early", "Gain k before the switch").real(), |m| &mut m.gain)
             .real(parameter("gain.late", "Gain k after the switch").real(), |m| &mut m.late_gain)
-            .real(
-                parameter("switchTime", "Time at which the gain changes").real().unit(unit::time()),
-                |m| &mut m.switch_time,
-            )
-            .real(parameter("initial.x", "Initial state").real().unit(unit::angle()), |m| {
-                &mut m.initial
+            .real(parameter("switchTime", "Time at which the gain changes").real().unit("s"), |m| {
+                &mut m.switch_time
             })
+            .real(parameter("initial.x", "Initial state").real().unit("rad"), |m| &mut m.initial)
             .integer(
                 parameter("order", "Order of the lag; only 1 is supported"),
                 (Some(1), Some(2)),
@@ -115,15 +107,13 @@ impl Model for Lag {
                 parameter("label", "Text that is passed on; \"boom\" makes the FMU panic"),
                 |m| &mut m.label,
             )
-            .real(input("u", "Input").real().unit(unit::angle()).min(-100.0).max(100.0), |m| {
-                &mut m.u
-            })
-            .real(output("x", "State").real().unit(unit::angle()).nominal(2.0), |m| &mut m.x)
+            .real(input("u", "Input").real().unit("rad").min(-100.0).max(100.0), |m| &mut m.u)
+            .real(output("x", "State").real().unit("rad").nominal(2.0), |m| &mut m.x)
             .real(
                 local("der(x)", "Derivative of the state")
                     .depends_on(["u", "x"])
                     .real()
-                    .unit(unit::angular_rate())
+                    .unit("rad/s")
                     .derivative_of("x"),
                 |m| &mut m.derivative,
             )
@@ -131,7 +121,7 @@ impl Model for Lag {
                 output("y", "Sum of state, input and offset, after the limiter")
                     .depends_on(["u", "x", "offset"])
                     .real()
-                    .unit(unit::angle()),
+                    .unit("rad"),
                 |m| &mut m.y,
             )
             .real(discrete_output("gain.now", "Current gain k").real(), |m| &mut m.gain_now)
@@ -140,9 +130,7 @@ impl Model for Lag {
             })
             .string(discrete_output("text", "Label as passed on"), |m| &mut m.description)
             .real(
-                discrete_input("offset", "Offset that is added to the output")
-                    .real()
-                    .unit(unit::angle()),
+                discrete_input("offset", "Offset that is added to the output").real().unit("rad"),
                 |m| &mut m.offset,
             );
         Description {

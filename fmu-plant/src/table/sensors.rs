@@ -4,7 +4,6 @@ use super::{AXES, PlantVariables, RATES, TRAJECTORY_INPUTS, none, vector};
 use crate::parameters::{MEMS_SENSORS, NO_SENSORS};
 use crate::roles::Unknown;
 use fmi2_export::table::{Common, Real, discrete_output, output, parameter};
-use model_description::unit::{self, Unit};
 
 struct Sensor {
     name: &'static str,
@@ -12,9 +11,9 @@ struct Sensor {
     quantity: &'static str,
     /// Whether the quantity is measured about or along an axis.
     along: &'static str,
-    unit: fn() -> Unit,
+    unit: &'static str,
     /// Unit of the quantity's rate of change.
-    rate_unit: fn() -> Unit,
+    rate_unit: &'static str,
     nominal: f64,
     /// Effects that the sensor's matrix contains, as text for the description.
     matrix: &'static str,
@@ -27,8 +26,8 @@ const SENSORS: [Sensor; 3] = [
         name: "gyroscope",
         quantity: "angular rate",
         along: "about",
-        unit: unit::angular_rate,
-        rate_unit: unit::angular_acceleration,
+        unit: "rad/s",
+        rate_unit: "rad/s2",
         nominal: 0.05,
         matrix: "scale and misalignment",
         bias_part: "",
@@ -37,8 +36,8 @@ const SENSORS: [Sensor; 3] = [
         name: "accelerometer",
         quantity: "specific force",
         along: "along",
-        unit: unit::acceleration,
-        rate_unit: unit::acceleration_rate,
+        unit: "m/s2",
+        rate_unit: "m/s3",
         nominal: 10.0,
         matrix: "scale and misalignment",
         bias_part: "",
@@ -47,8 +46,8 @@ const SENSORS: [Sensor; 3] = [
         name: "magnetometer",
         quantity: "magnetic field",
         along: "along",
-        unit: unit::flux_density,
-        rate_unit: unit::flux_density_rate,
+        unit: "T",
+        rate_unit: "T/s",
         nominal: 5e-5,
         matrix: "scale, misalignment and soft iron",
         bias_part: ", including hard iron",
@@ -82,7 +81,7 @@ fn measured(mut variables: PlantVariables) -> PlantVariables {
             } else {
                 common.depends_on(["trajectory.flightPathAngle", "trajectory.heading"])
             };
-            common.real().unit((sensor.unit)()).nominal(sensor.nominal)
+            common.real().unit(sensor.unit).nominal(sensor.nominal)
         };
         let axes =
             if i == 0 { AXES } else { [("x", "forward"), ("y", "right"), ("z", "downward")] };
@@ -102,7 +101,7 @@ fn measured(mut variables: PlantVariables) -> PlantVariables {
 }
 
 fn seconds(common: Common) -> Real {
-    common.real().unit(unit::time()).nominal(1.0)
+    common.real().unit("s").nominal(1.0)
 }
 
 fn line(variables: PlantVariables) -> PlantVariables {
@@ -138,7 +137,7 @@ fn errors(mut variables: PlantVariables, i: usize, sensor: &Sensor) -> PlantVari
     let name = |part: &str| format!("sensor.{}.{part}", sensor.name);
     let declare = |part: &str, text: &str| parameter(&name(part), &super::sentence(text));
     let in_sensor_unit = |part: &str, text: &str| {
-        declare(part, text).real().unit((sensor.unit)()).nominal(sensor.nominal)
+        declare(part, text).real().unit(sensor.unit).nominal(sensor.nominal)
     };
     let device = sensor.name;
     for (row, (axis, _)) in AXES.into_iter().enumerate() {
@@ -162,7 +161,7 @@ fn errors(mut variables: PlantVariables, i: usize, sensor: &Sensor) -> PlantVari
     let drift = |axis: &str, _: &str| {
         let text = format!("rate of change of the {device} bias of axis {axis}");
         let real = declare(&format!("drift.{axis}"), &text).real();
-        real.unit((sensor.rate_unit)()).nominal(1e-3 * sensor.nominal)
+        real.unit(sensor.rate_unit).nominal(1e-3 * sensor.nominal)
     };
     let noise = in_sensor_unit(
         "noise",
@@ -194,7 +193,7 @@ fn errors(mut variables: PlantVariables, i: usize, sensor: &Sensor) -> PlantVari
     let variables = vector(variables, AXES, bias, none, move |m| &mut m.parameters.triads[i].bias);
     vector(variables, AXES, drift, none, move |m| &mut m.parameters.triads[i].drift)
         .real(noise.min(0.0), move |m| &mut m.parameters.triads[i].noise)
-        .real(bandwidth.unit(unit::frequency()).min(0.0).nominal(50.0), move |m| {
+        .real(bandwidth.unit("Hz").min(0.0).nominal(50.0), move |m| {
             &mut m.parameters.triads[i].bandwidth
         })
         .real(range.min(0.0), move |m| &mut m.parameters.triads[i].range)
@@ -210,21 +209,16 @@ fn surroundings(variables: PlantVariables) -> PlantVariables {
     );
     let field = |axis: &str, meaning: &str| {
         let text = format!("{meaning} component of the Earth's magnetic field at the magnetometer");
-        parameter(&format!("sensor.field.{axis}"), &text)
-            .real()
-            .unit(unit::flux_density())
-            .nominal(5e-5)
+        parameter(&format!("sensor.field.{axis}"), &text).real().unit("T").nominal(5e-5)
     };
     let axes = [("north", "North"), ("east", "East"), ("down", "Downward")];
-    let gravity = gravity.real().unit(unit::acceleration()).min(0.0).nominal(10.0);
+    let gravity = gravity.real().unit("m/s2").min(0.0).nominal(10.0);
     let variables = variables.real(gravity, |m| &mut m.parameters.surroundings.gravity);
     vector(variables, axes, field, none, |m| &mut m.parameters.surroundings.field)
 }
 
 fn calibration(variables: PlantVariables) -> PlantVariables {
-    let rate = |name: &str, text: &str| {
-        parameter(name, text).real().unit(unit::angular_rate()).nominal(0.1)
-    };
+    let rate = |name: &str, text: &str| parameter(name, text).real().unit("rad/s").nominal(0.1);
     let active = parameter(
         "calibration.active",
         "If true, the attitude follows a prescribed calibration sequence instead of the dynamics",
@@ -246,7 +240,7 @@ fn calibration(variables: PlantVariables) -> PlantVariables {
             rate("calibration.rate.sigma", "Rate of the bank angle in the calibration sequence"),
             |m| &mut m.parameters.sequence.sigma_rate,
         )
-        .real(amplitude.real().unit(unit::angle()).min(0.0).nominal(0.5), |m| {
+        .real(amplitude.real().unit("rad").min(0.0).nominal(0.5), |m| {
             &mut m.parameters.sequence.beta_amplitude
         })
         .real(
@@ -270,13 +264,11 @@ fn turntable(variables: PlantVariables) -> PlantVariables {
         "Quantization step of the angles commanded to the turntable; 0 for none",
     );
     variables
-        .real(bandwidth.real().unit(unit::frequency()).min(0.0).nominal(10.0), |m| {
+        .real(bandwidth.real().unit("Hz").min(0.0).nominal(10.0), |m| {
             &mut m.parameters.turntable.bandwidth
         })
-        .real(rate.real().unit(unit::angular_rate()).min(0.0).nominal(1.0), |m| {
-            &mut m.parameters.turntable.rate
-        })
-        .real(resolution.real().unit(unit::angle()).min(0.0).nominal(1e-3), |m| {
+        .real(rate.real().unit("rad/s").min(0.0).nominal(1.0), |m| &mut m.parameters.turntable.rate)
+        .real(resolution.real().unit("rad").min(0.0).nominal(1e-3), |m| {
             &mut m.parameters.turntable.resolution
         })
 }
