@@ -2,10 +2,9 @@
 
 mod sensors;
 
-use crate::parameters::{ACTUATIONS, KINDS, KINEMATICS, TABLE_ROWS};
+use crate::parameters::TABLE_ROWS;
 use crate::plant::{MOTION, ReentryPlant};
 use crate::roles::{Known, Role, Unknown, Variables};
-use fmi2_export::fields::Fields;
 use fmi2_export::table::{
     Description, Real, discrete_input, discrete_output, input, output, parameter,
 };
@@ -13,39 +12,13 @@ use model_description::DefaultExperiment;
 use nalgebra::Vector3;
 use std::sync::LazyLock;
 use vehicle::Scenario;
-use vehicle::atmosphere;
 use vehicle::effectors::{Effectors, JETS, SURFACES};
 use vehicle::kinematics::Trajectory;
-use vehicle::plant::BETA_LIMIT;
-use vehicle::transport;
 
 const ANGLES: [(&str, &str); 3] =
     [("alpha", "angle of attack"), ("beta", "sideslip angle"), ("sigma", "bank angle")];
 const RATES: [(&str, &str); 3] = [("p", "roll"), ("q", "pitch"), ("r", "yaw")];
 const AXES: [(&str, &str); 3] = [("x", "roll"), ("y", "pitch"), ("z", "yaw")];
-
-/// Names of the variables that hold fields of the plant's configuration, for messages.
-pub(crate) const FIELDS: &Fields = &[
-    ("inertia_scale", "inertia.scale"),
-    ("initial[1]", "initial.beta"),
-    ("step", "integrator.step"),
-    ("earth_rate", "trajectory.earthRate"),
-    ("moment_delay", "actuation.delay"),
-    ("moment_resolution", "actuation.resolution"),
-    ("actuators.aerodynamics_scale", "aerodynamics.scale"),
-    ("disturbance.square_period", "disturbance.square.period"),
-    ("disturbance.table.rows[].time", "disturbance.table.time[]"),
-    ("disturbance.table.rows[].direction.x", "disturbance.table.alpha[]"),
-    ("disturbance.table.rows[].direction.y", "disturbance.table.beta[]"),
-    ("disturbance.table.rows[].direction.z", "disturbance.table.sigma[]"),
-    ("surroundings", "sensor"),
-    ("calibration.beta_amplitude", "calibration.beta.amplitude"),
-    ("sensors.line", "sensor"),
-    ("sensors.line.drop_probability", "sensor.drop.probability"),
-    ("sensors.triads[0]", "sensor.gyroscope"),
-    ("sensors.triads[1]", "sensor.accelerometer"),
-    ("sensors.triads[2]", "sensor.magnetometer"),
-];
 
 /// Returns the role of the variable at a position in the variable table.
 pub(crate) fn role(position: usize) -> Role {
@@ -57,16 +30,11 @@ pub(crate) fn role(position: usize) -> Role {
 fn all_variables() -> PlantVariables {
     let variables =
         trajectory(deflection_rates(commands(actuated(inputs(outputs(PlantVariables::new()))))));
-    let variables = disturbance(initial(inertia(variables)));
-    let step = parameter(
-        "integrator.step",
-        "Maximum step size of the Runge-Kutta integration in co-simulation",
-    );
-    let variables = variables
-        .real(step.real().unit("s").min(1e-5).max(1.0).nominal(0.01), |m| &mut m.parameters.step);
-    standard_pressure(disturbance_table(converted(sensors::sensor_variables(kinematics(
-        actuation(variables),
-    )))))
+    let variables = sensors::measured(variables.settings(|m| &mut m.parameters))
+        .settings(|m| &mut m.parameters.sensing)
+        .settings(|m| &mut m.parameters.converter)
+        .settings(|m| &mut m.parameters.table);
+    standard_pressure(disturbance_rows(variables))
 }
 
 /// Returns the description of the FMU.
@@ -104,11 +72,6 @@ fn vector(
         variables = variables.real(declare(axis, meaning), move |m| &mut field(m)[i]).role(role(i));
     }
     variables
-}
-
-/// The role of a parameter.
-fn none(_: usize) -> Role {
-    Role::default()
 }
 
 fn outputs(variables: PlantVariables) -> PlantVariables {
@@ -333,180 +296,14 @@ fn trajectory(mut variables: PlantVariables) -> PlantVariables {
     variables
 }
 
-fn kinematics(variables: PlantVariables) -> PlantVariables {
-    let earth = parameter(
-        "trajectory.earthRate",
-        "Angular rate of the Earth: 7.2921e-5 rad/s, or 0 to neglect the rotation",
-    );
-    variables
-        .choice(parameter("kinematics", KINEMATICS.description), |m| &mut m.parameters.kinematics)
-        .real(earth.real().unit("rad/s").min(0.0).max(1.0).nominal(1e-4), |m| {
-            &mut m.parameters.earth_rate
-        })
-}
-
-fn actuation(variables: PlantVariables) -> PlantVariables {
-    let altitude = parameter(
-        "flight.altitude",
-        "Geometric altitude, which determines air density and speed of sound",
-    );
-    let mach = parameter("flight.mach", "Mach number");
-    let density = parameter(
-        "density.scale",
-        "Ratio of the actual air density to that of the standard atmosphere: 0.9 means 10 % less",
-    );
-    let aerodynamics = parameter(
-        "aerodynamics.scale",
-        "Ratio of the actual to the nominal effectiveness of the surfaces: 0.9 means 10 % less",
-    );
-    let duty = parameter(
-        "jets.duty",
-        "If true, jets give any thrust from 0 to 1; if false, they are fully on from a command of 0.5",
-    );
-    let symmetric = parameter(
-        "jets.symmetric",
-        "If true, jet 4 mirrors jet 8; if false, it is as printed in (64) of Wu 2015, which is not symmetric",
-    );
-    variables
-        .choice(parameter("actuation", ACTUATIONS.description), &ACTUATIONS, |m| {
-            &mut m.parameters.actuation
-        })
-        .real(altitude.real().unit("m").min(0.0).max(atmosphere::TOP).nominal(1e4), |m| {
-            &mut m.parameters.flight.altitude
-        })
-        .real(mach.real().min(0.0).max(100.0).nominal(10.0), |m| &mut m.parameters.flight.mach)
-        .real(density.real().min(0.0).max(10.0).nominal(1.0), |m| &mut m.parameters.density_scale)
-        .real(aerodynamics.real().min(0.0).max(10.0).nominal(1.0), |m| {
-            &mut m.parameters.aerodynamics_scale
-        })
-        .boolean(duty, |m| &mut m.parameters.jet_duty)
-        .boolean(symmetric, |m| &mut m.parameters.jet_symmetric)
-}
-
-fn converted(variables: PlantVariables) -> PlantVariables {
-    let text = "Delay of the input moment, which is then held over each communication step; only for co-simulation with actuation = moment";
-    let delay = parameter("actuation.delay", text).real().unit("s");
-    let text = "Quantization step of the input moment, which is then held over each communication step; 0 for none; only for co-simulation with actuation = moment";
-    let resolution = parameter("actuation.resolution", text).real().unit("N.m");
-    variables
-        .real(delay.min(0.0).max(transport::LONGEST).nominal(0.1), |m| {
-            &mut m.parameters.moment_delay
-        })
-        .real(resolution.min(0.0).nominal(10.0), |m| &mut m.parameters.moment_resolution)
-}
-
-fn inertia(variables: PlantVariables) -> PlantVariables {
-    let entry = |name: &str, text: &str| {
-        parameter(&format!("inertia.{name}"), text).real().unit("kg.m2").nominal(1e6)
-    };
-    let scale = parameter(
-        "inertia.scale",
-        "Ratio of the actual to the nominal inertia: 1.05 means 5 % more",
-    );
-    variables
-        .real(entry("Ixx", "Nominal moment of inertia about the roll axis").min(0.0), |m| {
-            &mut m.parameters.inertia.Ixx
-        })
-        .real(entry("Iyy", "Nominal moment of inertia about the pitch axis").min(0.0), |m| {
-            &mut m.parameters.inertia.Iyy
-        })
-        .real(entry("Izz", "Nominal moment of inertia about the yaw axis").min(0.0), |m| {
-            &mut m.parameters.inertia.Izz
-        })
-        .real(
-            entry(
-                "Ixz",
-                "Nominal product of inertia of the roll and yaw axes; the inertia tensor contains -Ixz",
-            ),
-            |m| &mut m.parameters.inertia.Ixz,
-        )
-        .real(scale.real().min(0.01).max(100.0).nominal(1.0), |m| &mut m.parameters.inertia_scale)
-}
-
-fn initial(variables: PlantVariables) -> PlantVariables {
-    let angle = |axis: &str, meaning: &str| {
-        let limit = if axis == "beta" { BETA_LIMIT } else { 2.0 * std::f64::consts::PI };
-        let common = parameter(&format!("initial.{axis}"), &format!("Initial {meaning}"));
-        common.real().unit("rad").min(-limit).max(limit).nominal(0.1)
-    };
-    let rate = |axis: &str, meaning: &str| {
-        let common = parameter(&format!("initial.{axis}"), &format!("Initial body {meaning} rate"));
-        common.real().unit("rad/s").min(-10.0).max(10.0).nominal(0.05)
-    };
-    let variables = vector(variables, ANGLES, angle, none, |m| &mut m.parameters.initial_angles);
-    vector(variables, RATES, rate, none, |m| &mut m.parameters.initial_rates)
-}
-
-fn disturbance(variables: PlantVariables) -> PlantVariables {
-    let bound = parameter(
-        "disturbance.bound",
-        "Bound on the disturbance of the second time derivative of each attitude angle",
-    );
-    let period = parameter(
-        "disturbance.period",
-        "Time for which disturbances of the kinds white, alongRate and againstMoment are held",
-    );
-    let seed = parameter(
-        "disturbance.seed",
-        "Seed of the white noise; the same seed gives the same noise",
-    );
-    let direction = |axis: &str, meaning: &str| {
-        let text = format!(
-            "Factor on disturbance.bound for the {meaning}, used by the kinds constant and square"
-        );
-        parameter(&format!("disturbance.direction.{axis}"), &text)
-            .real()
-            .min(-1.0)
-            .max(1.0)
-            .nominal(1.0)
-    };
-    let square = parameter(
-        "disturbance.square.period",
-        "Period of the square wave, which starts with its positive half at disturbance.start",
-    );
-    let offset = |axis: &str, meaning: &str| {
-        let text = format!("Constant part of the sine disturbance moment about the {meaning} axis");
-        parameter(&format!("disturbance.sine.offset.{axis}"), &text).real().unit("N.m").nominal(1e4)
-    };
-    let start = parameter("disturbance.start", "Time at which the disturbance starts");
-    let end = parameter("disturbance.end", "Time at which the disturbance ends");
-    let time = |common: fmi2_export::table::Common| common.real().unit("s");
-
-    let variables = variables
-        .enumeration(parameter("disturbance.kind", KINDS.description), |m| &mut m.parameters.kind)
-        .real(bound.real().unit("rad/s2").min(0.0).max(10.0).nominal(0.03), |m| {
-            &mut m.parameters.bound
-        })
-        .real(time(period).min(1e-4).nominal(0.04), |m| &mut m.parameters.period)
-        .integer(seed, (Some(0), None), |m| &mut m.parameters.seed);
-    let variables = vector(variables, ANGLES, direction, none, |m| &mut m.parameters.direction)
-        .real(time(square).min(1e-3).nominal(10.0), |m| &mut m.parameters.square_period);
-    let variables = vector(variables, AXES, offset, none, |m| &mut m.parameters.sine_offset);
-    let variables = sine(sine(variables, "first", 0), "second", 1);
-    variables
-        .real(time(start), |m| &mut m.parameters.start)
-        .real(time(end), |m| &mut m.parameters.end)
-}
-
-/// Adds the lookup table of the disturbance column by column, as FMI wants the elements of an array
-/// one after the other.
-fn disturbance_table(variables: PlantVariables) -> PlantVariables {
-    let rows = parameter(
-        "disturbance.table.rows",
-        "Number of rows of the disturbance's lookup table that are used; the rows after them are ignored",
-    );
-    let period = parameter(
-        "disturbance.table.period",
-        "Period with which the lookup table repeats from disturbance.start on; 0 holds the last row instead",
-    );
-    let mut variables = variables
-        .integer(rows, (Some(0), i32::try_from(TABLE_ROWS).ok()), |m| &mut m.parameters.table_rows)
-        .real(period.real().unit("s").min(0.0).nominal(10.0), |m| &mut m.parameters.table_period);
+/// Adds the rows of the disturbance's lookup table column by column, as FMI wants the elements of
+/// an array one after the other.
+fn disturbance_rows(mut variables: PlantVariables) -> PlantVariables {
     for i in 0..TABLE_ROWS {
         let name = format!("disturbance.table.time[{}]", i + 1);
         let text = format!("Time after disturbance.start at which row {} takes effect", i + 1);
         let real = parameter(&name, &text).real().unit("s").min(0.0).nominal(10.0);
-        variables = variables.real(real, move |m| &mut m.parameters.table[i].time);
+        variables = variables.real(real, move |m| &mut m.parameters.table.rows[i].time);
     }
     for (component, (axis, meaning)) in ANGLES.into_iter().enumerate() {
         for i in 0..TABLE_ROWS {
@@ -514,29 +311,10 @@ fn disturbance_table(variables: PlantVariables) -> PlantVariables {
             let text = format!("Factor on disturbance.bound for the {meaning} in row {}", i + 1);
             let real = parameter(&name, &text).real().min(-1.0).max(1.0).nominal(1.0);
             variables =
-                variables.real(real, move |m| &mut m.parameters.table[i].direction[component]);
+                variables.real(real, move |m| &mut m.parameters.table.rows[i].direction[component]);
         }
     }
     variables
-}
-
-fn sine(variables: PlantVariables, which: &'static str, i: usize) -> PlantVariables {
-    let name = |part: &str| format!("disturbance.sine.{which}.{part}");
-    let amplitude = |axis: &str, meaning: &str| {
-        let text = format!("Amplitude of the {which} sinusoidal moment about the {meaning} axis");
-        parameter(&name(&format!("amplitude.{axis}")), &text).real().unit("N.m").nominal(1e4)
-    };
-    let frequency = parameter(
-        &name("frequency"),
-        &format!("Angular frequency of the {which} sinusoidal moment"),
-    );
-    let phase =
-        parameter(&name("phase"), &format!("Phase of the {which} sinusoidal moment at time 0"));
-    vector(variables, AXES, amplitude, none, move |m| &mut m.parameters.waves[i].amplitude)
-        .real(frequency.real().unit("rad/s").min(0.0).nominal(1.0), move |m| {
-            &mut m.parameters.waves[i].frequency
-        })
-        .real(phase.real().unit("rad").nominal(1.0), move |m| &mut m.parameters.waves[i].phase)
 }
 
 /// Returns the text with a capital letter at its beginning.

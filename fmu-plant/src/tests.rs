@@ -2,13 +2,14 @@
 
 mod sensors;
 
-use crate::parameters::{Actuation, KINDS};
+use crate::parameters::{Actuation, Initial};
 use crate::plant::{Output, ReentryPlant};
 use crate::roles::{Known, Unknown};
 use crate::table::role;
 use fmi2_export::{Context, Failure, Inputs, LastEvent, Model, describe};
 use model_description::variable::{Causality, Variability, VariableKind};
 use nalgebra::Vector3;
+use settings::Choice;
 use vehicle::Scenario;
 use vehicle::disturbance::{DisturbanceKind, Row};
 use vehicle::effectors::{Jets, Surfaces};
@@ -202,7 +203,7 @@ const STATES: [f64; 14] =
 
 /// Iterates over all kinds of disturbance.
 fn all_kinds() -> impl Iterator<Item = DisturbanceKind> {
-    KINDS.items.iter().map(|(kind, ..)| *kind)
+    DisturbanceKind::ITEMS.iter().map(|(kind, ..)| *kind)
 }
 
 /// Returns an instance in model exchange after the first event, in a general attitude, with a
@@ -517,9 +518,9 @@ const TABLE: [(f64, [f64; 3]); 3] =
 
 /// Sets the rows of the disturbance's table, and its period in s.
 fn tabulate(instance: &mut ReentryPlant, period: f64, rows: &[(f64, [f64; 3])]) {
-    instance.parameters.table_period = period;
-    instance.parameters.table_rows = rows.len();
-    for (row, &(time, direction)) in instance.parameters.table.iter_mut().zip(rows) {
+    instance.parameters.table.period = period;
+    instance.parameters.table.used = rows.len();
+    for (row, &(time, direction)) in instance.parameters.table.rows.iter_mut().zip(rows) {
         *row = Row { time, direction: direction.into() };
     }
 }
@@ -553,7 +554,7 @@ fn a_table_has_its_time_events_at_its_rows_and_shows_the_row_in_force() {
 #[test]
 fn rows_of_the_table_that_are_not_used_are_ignored() {
     let [mut plain, mut other] = [0, 1].map(|_| tabulated());
-    other.parameters.table[3] = Row { time: -1.0, direction: Vector3::repeat(f64::NAN) };
+    other.parameters.table.rows[3] = Row { time: -1.0, direction: Vector3::repeat(f64::NAN) };
     other.initialize(&CONTEXT).unwrap();
     for instance in [&mut plain, &mut other] {
         step(instance, 0.0, 2.0).unwrap();
@@ -837,7 +838,8 @@ fn oracle_input_derivatives_are_integrated() {
     // At beta = 0 a pitch moment k t alone gives q = k t² / 2 Iyy.
     let mut instance = started(|instance| {
         instance.parameters.kind = DisturbanceKind::None;
-        instance.parameters.initial_angles = Vector3::new(0.1, 0.0, 0.2);
+        instance.parameters.initial =
+            Initial::new(Vector3::new(0.1, 0.0, 0.2), instance.parameters.initial.rates);
     });
     instance.step(0.0, 2.0, &Ramp(1e4), &mut |_| {}).unwrap();
     let exact = 1e4 * 2.0 * 2.0 / 2.0 / (1303212.0 * 1.05);
@@ -851,19 +853,19 @@ fn refusals_name_variables() {
         |instance| instance.parameters.inertia.Ixz = 2e6,
         |instance| instance.parameters.inertia.Iyy = 1e7,
         |instance| instance.parameters.inertia_scale = 0.0,
-        |instance| instance.parameters.initial_angles.x = f64::NAN,
-        |instance| instance.parameters.initial_angles.y = 1.6,
+        |instance| instance.parameters.initial.alpha = f64::NAN,
+        |instance| instance.parameters.initial.beta = 1.6,
         |instance| instance.parameters.step = 0.0,
         |instance| instance.parameters.earth_rate = f64::NAN,
-        |instance| instance.parameters.moment_delay = -1.0,
+        |instance| instance.parameters.converter.delay = -1.0,
         |instance| {
             instance.parameters.actuation = Actuation::SurfacesAndJets;
-            instance.parameters.moment_delay = 0.1;
+            instance.parameters.converter.delay = 0.1;
         },
-        |instance| instance.parameters.moment_resolution = -1.0,
+        |instance| instance.parameters.converter.resolution = -1.0,
         |instance| {
             instance.parameters.actuation = Actuation::SurfacesAndJets;
-            instance.parameters.moment_resolution = 8.0;
+            instance.parameters.converter.resolution = 8.0;
         },
         |instance| {
             instance.parameters.actuation = Actuation::SurfacesAndJets;
@@ -877,44 +879,44 @@ fn refusals_name_variables() {
         |instance| instance.parameters.direction.x = 2.0,
         |instance| instance.parameters.end = -1.0,
         |instance| instance.parameters.waves[0].phase = f64::NAN,
-        |instance| instance.parameters.table_rows = 9,
-        |instance| instance.parameters.table_period = -1.0,
+        |instance| instance.parameters.table.used = 9,
+        |instance| instance.parameters.table.period = -1.0,
         |instance| tabulate(instance, 0.0, &[(-1.0, [0.0; 3])]),
         |instance| tabulate(instance, 0.0, &[(1.0, [0.0; 3]), (1.0, [0.0; 3])]),
         |instance| tabulate(instance, 2.0, &[(0.0, [0.0; 3]), (1.0, [0.0; 3]), (2.0, [0.0; 3])]),
         |instance| tabulate(instance, 0.0, &[(0.0, [0.0; 3]), (1.0, [2.0, 0.0, 0.0])]),
         |instance| tabulate(instance, 0.0, &[(0.0, [0.0, -2.0, 0.0])]),
         |instance| tabulate(instance, 0.0, &[(0.0, [0.0, 0.0, f64::NAN])]),
-        |instance| instance.parameters.surroundings.gravity = -1.0,
-        |instance| instance.parameters.surroundings.field.x = f64::NAN,
+        |instance| instance.parameters.sensing.surroundings.gravity = -1.0,
+        |instance| instance.parameters.sensing.surroundings.field.x = f64::NAN,
         |instance| {
-            instance.parameters.calibrates = true;
-            instance.parameters.sequence.beta_amplitude = 1.5;
+            instance.parameters.sensing.calibrates = true;
+            instance.parameters.sensing.sequence.beta_amplitude = 1.5;
         },
         |instance| {
-            instance.parameters.calibrates = true;
-            instance.parameters.sequence.alpha_rate = f64::NAN;
+            instance.parameters.sensing.calibrates = true;
+            instance.parameters.sensing.sequence.alpha_rate = f64::NAN;
         },
-        |instance| instance.parameters.line.period = 0.0,
-        |instance| instance.parameters.line.delay = 1e3,
-        |instance| instance.parameters.line.drop_probability = 2.0,
-        |instance| instance.parameters.triads[0].noise = -1.0,
-        |instance| instance.parameters.triads[1].bandwidth = -1.0,
-        |instance| instance.parameters.triads[2].range = -1.0,
-        |instance| instance.parameters.triads[2].resolution = -1.0,
-        |instance| instance.parameters.triads[0].matrix.fill(f64::NAN),
-        |instance| instance.parameters.triads[1].bias.fill(f64::NAN),
-        |instance| instance.parameters.triads[1].drift.fill(f64::NAN),
-        |instance| instance.parameters.turntable.bandwidth = -1.0,
-        |instance| instance.parameters.turntable.rate = -1.0,
+        |instance| instance.parameters.sensing.line.period = 0.0,
+        |instance| instance.parameters.sensing.line.delay = 1e3,
+        |instance| instance.parameters.sensing.line.drop_probability = 2.0,
+        |instance| instance.parameters.sensing.gyroscope.noise = -1.0,
+        |instance| instance.parameters.sensing.accelerometer.bandwidth = -1.0,
+        |instance| instance.parameters.sensing.magnetometer.range = -1.0,
+        |instance| instance.parameters.sensing.magnetometer.resolution = -1.0,
+        |instance| instance.parameters.sensing.gyroscope.matrix.fill(f64::NAN),
+        |instance| instance.parameters.sensing.accelerometer.bias.fill(f64::NAN),
+        |instance| instance.parameters.sensing.accelerometer.drift.fill(f64::NAN),
+        |instance| instance.parameters.sensing.turntable.bandwidth = -1.0,
+        |instance| instance.parameters.sensing.turntable.rate = -1.0,
         |instance| {
-            instance.parameters.sensor_set = 0;
-            instance.parameters.turntable.bandwidth = 10.0;
+            instance.parameters.sensing.sensor_set = 0;
+            instance.parameters.sensing.turntable.bandwidth = 10.0;
         },
     ];
     let refusal = |set: &fn(&mut ReentryPlant)| {
         let mut instance = ReentryPlant::new();
-        instance.parameters.sensor_set = 2;
+        instance.parameters.sensing.sensor_set = 2;
         set(&mut instance);
         instance.initialize(&CONTEXT).unwrap_err().to_string()
     };
@@ -958,8 +960,9 @@ fn a_singular_attitude_is_an_error_in_co_simulation_and_discarded_in_model_excha
     let mut instance = started(|instance| {
         instance.parameters.kind = DisturbanceKind::None;
         instance.parameters.inertia.Ixz = 0.0;
-        instance.parameters.initial_angles = Vector3::new(0.0, 1.5, 0.0);
-        instance.parameters.initial_rates = Vector3::new(0.0, 0.0, -0.5);
+        instance.parameters.initial =
+            Initial::new(Vector3::new(0.0, 1.5, 0.0), instance.parameters.initial.rates);
+        instance.parameters.initial.rates = Vector3::new(0.0, 0.0, -0.5);
     });
     assert!(
         matches!(step(&mut instance, 0.0, 1.0), Err(Failure::Error(text)) if text.contains("beta"))
@@ -1025,7 +1028,7 @@ fn outputs_need_no_start_and_inputs_have_one() {
 }
 
 fn delayed(delay: f64) -> ReentryPlant {
-    started(|instance| instance.parameters.moment_delay = delay)
+    started(|instance| instance.parameters.converter.delay = delay)
 }
 
 #[test]
@@ -1071,11 +1074,11 @@ fn a_delay_is_refused_by_name_where_it_cannot_work() {
     assert!(delayed(0.0).new_discrete_states(0.0).is_ok());
     let ramp = text(delayed(0.1).step(0.0, 0.04, &Ramp(1e5), &mut |_| {}).unwrap_err());
     assert!(ramp.contains("actuation.delay") && ramp.contains("derivatives"), "{ramp}");
-    let mut converted = started(|instance| instance.parameters.moment_resolution = 8.0);
+    let mut converted = started(|instance| instance.parameters.converter.resolution = 8.0);
     let in_model_exchange = text(converted.new_discrete_states(0.0).unwrap_err());
     assert!(in_model_exchange.contains("actuation.resolution = 8 N m"), "{in_model_exchange}");
     let mut actuated = ReentryPlant::new();
-    actuated.parameters.moment_delay = 0.1;
+    actuated.parameters.converter.delay = 0.1;
     actuate(&mut actuated);
     let actuated = text(actuated.initialize(&CONTEXT).unwrap_err());
     assert!(actuated.contains("actuation.delay"), "{actuated}");

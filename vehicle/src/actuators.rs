@@ -92,7 +92,7 @@ impl Actuators {
         let scale = config.aerodynamics_scale;
         if !(scale >= 0.0 && scale.is_finite()) {
             let problem = format!("= {scale} must not be negative");
-            return Err(Error::parameter("actuators.aerodynamics_scale", problem));
+            return Err(Error::parameter("aerodynamics.scale", problem));
         }
         let Effectors { min, max, rate, jet_moments, .. } = config.effectors;
         Ok(Self {

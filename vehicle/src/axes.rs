@@ -9,9 +9,14 @@ pub const ANGLES: [Entry; 3] =
 /// Components of Θ by number.
 pub const NUMBERED_ANGLES: [Entry; 3] =
     [("[1]", "angle of attack"), ("[2]", "sideslip angle"), ("[3]", "bank angle")];
+/// Components of ω by name.
+pub const RATES: [Entry; 3] = [(".p", "roll rate"), (".q", "pitch rate"), (".r", "yaw rate")];
 /// Components of ω by number.
 pub const NUMBERED_RATES: [Entry; 3] =
     [("[1]", "roll rate"), ("[2]", "pitch rate"), ("[3]", "yaw rate")];
+/// Level axes by name.
+pub const LEVEL: [Entry; 3] =
+    [(".north", "to the north"), (".east", "to the east"), (".down", "downward")];
 /// Body axes by number.
 pub const NUMBERED_AXES: [Entry; 3] =
     [("[1]", "roll axis"), ("[2]", "pitch axis"), ("[3]", "yaw axis")];

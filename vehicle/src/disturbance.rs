@@ -3,6 +3,7 @@
 
 mod table;
 
+use crate::axes::AXES;
 use crate::dynamics::RigidBody;
 use crate::error::Error;
 use crate::kinematics::Kinematics;
@@ -11,7 +12,7 @@ use crate::noise::{Stream, uniform};
 use crate::time::{tick, tick_time, tolerance};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
-use settings::Choice;
+use settings::{Choice, Declared};
 pub use table::{DisturbanceTable, Row};
 
 /// Waveform of the disturbance.
@@ -79,15 +80,18 @@ pub struct SineMoment {
 }
 
 /// One sinusoid of the disturbance moment.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Declared)]
 #[serde(deny_unknown_fields)]
 pub struct MomentWave {
-    /// Amplitude about each body axis, N m.
+    /// Amplitude.
+    #[setting(part, each = AXES, unit = "N.m", nominal = 1e4)]
     pub amplitude: Vector3<f64>,
-    /// Angular frequency of the sinusoid, rad/s.
+    /// Angular frequency.
+    #[setting(part, unit = "rad/s", min = 0.0, nominal = 1.0)]
     pub frequency: f64,
-    /// Phase of the sinusoid at t = 0, rad.
+    /// Phase at time 0.
     #[serde(default)]
+    #[setting(part, unit = "rad", nominal = 1.0)]
     pub phase: f64,
 }
 
@@ -146,7 +150,7 @@ impl Disturbance {
         }
         if !(self.square_period > 0.0 && self.square_period.is_finite()) {
             return refuse(
-                "disturbance.square_period",
+                "disturbance.square.period",
                 format!("= {} s must be positive", self.square_period),
             );
         }
@@ -156,7 +160,7 @@ impl Disturbance {
         if !(self.start.is_finite() && self.end > self.start) {
             return refuse(
                 "disturbance.end",
-                format!("= {} s must come after `disturbance.start` = {} s", self.end, self.start),
+                format!("= {} s must come after disturbance.start = {} s", self.end, self.start),
             );
         }
         let sine = &self.sine;

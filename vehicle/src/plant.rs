@@ -96,9 +96,9 @@ impl Plant {
         input: &mut impl FnMut(f64) -> Input,
     ) -> Result<(), Error> {
         let (name, done) = if let Some(transport) = &self.transport {
-            ("moment_delay", format!("{} s delays", transport.delay()))
+            ("actuation.delay", format!("{} s delays", transport.delay()))
         } else if self.moment_resolution > 0.0 {
-            ("moment_resolution", format!("{} N m rounds", self.moment_resolution))
+            ("actuation.resolution", format!("{} N m rounds", self.moment_resolution))
         } else {
             return Ok(());
         };

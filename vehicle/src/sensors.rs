@@ -12,6 +12,7 @@ use crate::time::{check_resolution, tick, tick_time, tick_tolerance};
 use crate::triad::{Memory, Triad, Window};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
+use settings::Declared;
 
 /// Largest number of samples that may be on their way at a time.
 pub const IN_FLIGHT: usize = 1000;
@@ -28,15 +29,21 @@ pub struct Config {
 }
 
 /// Serial line: when samples are taken, when they arrive, and which are dropped.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Declared)]
 pub struct Line {
-    /// Time between two samples, s.
+    /// Sampling period of the sensors.
+    #[setting(unit = "s", min = 1e-4, nominal = 0.01)]
     pub period: f64,
-    /// Time from taking a sample to its arrival, s.
+    /// Delay between taking a sample and receiving it.
+    #[setting(unit = "s", min = 0.0, max = 10.0, nominal = 0.01)]
     pub delay: f64,
-    /// Probability that a sample is dropped if it is taken within `drop_window`.
+    /// Probability that a sample is dropped in transmission.
+    ///
+    /// It is dropped if it is taken within `drop_window`.
+    #[setting(name = "drop.probability", min = 0.0, max = 1.0, nominal = 1.0)]
     pub drop_probability: f64,
-    /// Window of the sampling times at which samples can be dropped.
+    /// Time window in which samples can be dropped.
+    #[setting(name = "drop")]
     pub drop_window: Window,
 }
 
@@ -95,20 +102,19 @@ impl Config {
         let refuse = |name: &'static str, problem: String| Err(Error::parameter(name, problem));
         let Line { period, delay, drop_probability, .. } = self.line;
         if !(period > 0.0 && period.is_finite()) {
-            return refuse("sensors.line.period", format!("= {period} s must be positive"));
+            return refuse("sensor.period", format!("= {period} s must be positive"));
         }
         if !(delay >= 0.0 && delay / period <= IN_FLIGHT as f64) {
-            let problem = format!(
-                "= {delay} s must lie between 0 and {IN_FLIGHT} times `sensors.line.period`"
-            );
-            return refuse("sensors.line.delay", problem);
+            let problem =
+                format!("= {delay} s must lie between 0 and {IN_FLIGHT} times sensor.period");
+            return refuse("sensor.delay", problem);
         }
         if !(0.0..=1.0).contains(&drop_probability) {
             let problem = format!("= {drop_probability} must lie between 0 and 1");
-            return refuse("sensors.line.drop_probability", problem);
+            return refuse("sensor.drop.probability", problem);
         }
-        let check = |(i, triad): (usize, &Triad)| triad.check(&format!("sensors.triads[{i}]"));
-        self.triads.iter().enumerate().try_for_each(check)
+        let names = ["sensor.gyroscope", "sensor.accelerometer", "sensor.magnetometer"];
+        names.into_iter().zip(&self.triads).try_for_each(|(name, triad)| triad.check(name))
     }
 
     /// Draws the normal noise of the three sensors at a tick, and a random number in [0, 1) that

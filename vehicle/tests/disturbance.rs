@@ -328,7 +328,7 @@ fn values_out_of_range_are_refused_by_name() {
         (Disturbance { bound: -1.0, ..good.clone() }, "disturbance.bound"),
         (Disturbance { bound: f64::NAN, ..good.clone() }, "disturbance.bound"),
         (Disturbance { period: 0.0, ..good.clone() }, "disturbance.period"),
-        (Disturbance { square_period: f64::INFINITY, ..good.clone() }, "disturbance.square_period"),
+        (Disturbance { square_period: f64::INFINITY, ..good.clone() }, "disturbance.square.period"),
         (Disturbance { direction: Vector3::repeat(1.5), ..good.clone() }, "disturbance.direction"),
         (Disturbance { start: 3.0, end: 2.0, ..good.clone() }, "disturbance.end"),
     ] {

@@ -362,11 +362,11 @@ fn a_sample_whose_tick_was_missed_is_taken_late_and_says_so() {
 fn impossible_sensors_are_refused_by_name() {
     type Change = fn(&mut Config);
     let refused: [(&str, Change); 12] = [
-        ("sensors.line.period", |config| config.line.period = 0.0),
-        ("sensors.line.period", |config| config.line.period = f64::NAN),
-        ("sensors.line.delay", |config| config.line.delay = -1e-3),
-        ("sensors.line.delay", |config| config.line.delay = (IN_FLIGHT as f64 + 1.0) * PERIOD),
-        ("sensors.line.drop_probability", |config| config.line.drop_probability = 1.5),
+        ("sensor.period", |config| config.line.period = 0.0),
+        ("sensor.period", |config| config.line.period = f64::NAN),
+        ("sensor.delay", |config| config.line.delay = -1e-3),
+        ("sensor.delay", |config| config.line.delay = (IN_FLIGHT as f64 + 1.0) * PERIOD),
+        ("sensor.drop.probability", |config| config.line.drop_probability = 1.5),
         ("sensors.triads[0].range", |config| config.triads[0].range = -1.0),
         ("sensors.triads[1].noise", |config| config.triads[1].noise = f64::INFINITY),
         ("sensors.triads[2].resolution", |config| config.triads[2].resolution = -1e-9),

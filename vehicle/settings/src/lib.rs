@@ -64,7 +64,7 @@ pub use place::{About, Place};
 pub use read::{Misread, change, read};
 pub use settings_derive::{Choice, Declared};
 
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 
 /// A value whose settings are declared. Structures and enumerations derive it.
 pub trait Declared: Sized + 'static {
@@ -125,6 +125,15 @@ impl Declared for Vector3<f64> {
     fn declare<S: 'static>(place: &Place, path: Path<S, Self>, list: &mut Vec<Setting<S>>) {
         for i in 0..3 {
             f64::declare(&place.entry(i), path.to(move |vector: &mut Self| &mut vector[i]), list);
+        }
+    }
+}
+
+impl Declared for Matrix3<f64> {
+    fn declare<S: 'static>(place: &Place, path: Path<S, Self>, list: &mut Vec<Setting<S>>) {
+        for (row, column) in (0..3).flat_map(|row| (0..3).map(move |column| (row, column))) {
+            let entry = path.to(move |matrix: &mut Self| &mut matrix[(row, column)]);
+            f64::declare(&place.cell(row, column), entry, list);
         }
     }
 }

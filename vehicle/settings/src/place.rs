@@ -91,6 +91,16 @@ impl Place {
         }
     }
 
+    /// Returns the place of a cell of the matrix at this place; row and column count from 0.
+    pub fn cell(&self, row: usize, column: usize) -> Self {
+        let (row, column) = (row + 1, column + 1);
+        Self {
+            name: format!("{}[{row},{column}]", self.name),
+            text: format!("{} (row {row}, column {column})", self.text),
+            ..self.clone()
+        }
+    }
+
     fn continued(&self, text: &str) -> String {
         let mut letters = text.chars();
         let first = letters.next().into_iter().flat_map(char::to_lowercase);

@@ -194,5 +194,5 @@ fn a_negative_scale_is_refused_by_name() {
         aerodynamics_scale: -1.0,
     };
     let text = Actuators::new(&config).unwrap_err().to_string();
-    assert!(text.contains("`actuators.aerodynamics_scale`"));
+    assert!(text.contains("aerodynamics.scale"));
 }

@@ -68,7 +68,7 @@ impl Plant {
     pub fn new(config: &Config, start_time: f64) -> Result<Self, Error> {
         let refuse = |name: &'static str, problem: String| Err(Error::parameter(name, problem));
         if !(config.inertia_scale > 0.0 && config.inertia_scale.is_finite()) {
-            return refuse("inertia_scale", format!("= {} must be positive", config.inertia_scale));
+            return refuse("inertia.scale", format!("= {} must be positive", config.inertia_scale));
         }
         let body = config.inertia.body(config.inertia_scale)?;
         if !config.initial.iter().all(|value| value.is_finite()) {
@@ -76,15 +76,15 @@ impl Plant {
         }
         if config.initial[1].abs() >= BETA_LIMIT {
             return refuse(
-                "initial[1]",
+                "initial.beta",
                 format!("= {} deg must lie within 90 deg", config.initial[1].to_degrees()),
             );
         }
         if !(config.step > 0.0 && config.step.is_finite()) {
-            return refuse("step", format!("= {} s must be positive", config.step));
+            return refuse("integrator.step", format!("= {} s must be positive", config.step));
         }
         if !config.earth_rate.is_finite() {
-            return refuse("earth_rate", "is not finite".into());
+            return refuse("trajectory.earthRate", "is not finite".into());
         }
         let transport = Transport::new(config.moment_delay)?;
         if config.actuators.is_some() && transport.is_some() {
@@ -92,17 +92,20 @@ impl Plant {
                 "= {} s delays an input moment, and there is none with actuators",
                 config.moment_delay
             );
-            return refuse("moment_delay", problem);
+            return refuse("actuation.delay", problem);
         }
         let resolution = config.moment_resolution;
         if !(resolution >= 0.0 && resolution.is_finite()) {
-            return refuse("moment_resolution", format!("= {resolution} N m must not be negative"));
+            return refuse(
+                "actuation.resolution",
+                format!("= {resolution} N m must not be negative"),
+            );
         }
         if config.actuators.is_some() && resolution > 0.0 {
             let problem = format!(
                 "= {resolution} N m rounds an input moment, and there is none with actuators"
             );
-            return refuse("moment_resolution", problem);
+            return refuse("actuation.resolution", problem);
         }
         let turntable = Turntable::new(&config.turntable)?;
         if turntable.is_some() && config.sensors.is_none() {
