@@ -4,7 +4,6 @@
 //! | module | content |
 //! |---|---|
 //! | [`model`], [`table`] | the interface that a model must implement, and its variable table |
-//! | [`fields`] | errors of fields, reported as errors of variables |
 //! | `model_instance` | a model bound to its variable table, without its type |
 //! | `instance` | one instance: checks, laziness, saved states; no pointers |
 //! | `call` | the table of calls allowed in each state |
@@ -19,7 +18,6 @@
 
 mod call;
 mod export;
-pub mod fields;
 mod instance;
 #[doc(hidden)]
 pub mod interface;
@@ -39,4 +37,4 @@ pub mod types;
 pub use export::sources;
 pub use model::{Context, EventInfo, Failure, Inputs, LastEvent, Model, Restoration};
 pub use model_instance::{Export, MAX_INPUT_DERIVATIVE_ORDER, describe};
-pub use table::{Description, Enumeration, VariableTable};
+pub use table::{Description, VariableTable};

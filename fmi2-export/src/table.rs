@@ -56,32 +56,6 @@ fn described(items: &settings::Items) -> EnumerationType {
     }
 }
 
-/// An enumeration type: the values of a Rust type, each with its FMI name and a description. FMI
-/// numbers the items from 1 in this order. Every value that a model can hold must be listed.
-#[derive(Debug)]
-pub struct Enumeration<T: 'static> {
-    /// Name of the enumeration type.
-    pub name: &'static str,
-    /// Purpose of the type, in one line.
-    pub description: &'static str,
-    /// Items of the type, each with value, name and description.
-    pub items: &'static [(T, &'static str, &'static str)],
-}
-
-impl<T: PartialEq> Enumeration<T> {
-    /// Returns the item number of `value`, or 0 if it is not listed: the check of descriptions
-    /// refuses 0 as a start value, and the shell does not give it out.
-    pub(crate) fn number(&self, value: &T) -> i32 {
-        (1..).zip(self.items).find(|(_, item)| item.0 == *value).map_or(0, |(number, _)| number)
-    }
-
-    fn described(&self) -> EnumerationType {
-        let items =
-            self.items.iter().map(|(_, name, text)| ((*name).into(), (*text).into())).collect();
-        EnumerationType { name: self.name.into(), description: self.description.into(), items }
-    }
-}
-
 /// A declared variable together with its field.
 pub struct Entry<M> {
     pub(crate) variable: Variable,
@@ -255,31 +229,6 @@ impl<M: 'static> VariableTable<M> {
                 VariableKind::Enumeration { enumeration_type: described(&items), start: None };
             self.push(common, kind, Access::Integer(Integer::new(integer, 1)));
         }
-        self
-    }
-
-    /// Adds an enumeration variable, whose field has the enumerated type.
-    #[must_use]
-    pub fn enumeration<T: Copy + PartialEq + Send + Sync>(
-        mut self,
-        common: Common,
-        enumeration: &'static Enumeration<T>,
-        field: impl Fn(&mut M) -> &mut T + Copy + Send + Sync + 'static,
-    ) -> Self {
-        let access = Integer {
-            get: Box::new(move |model| enumeration.number(field(model))),
-            set: Box::new(move |model, number| {
-                let item = usize::try_from(number - 1).ok().and_then(|i| enumeration.items.get(i));
-                if let Some((value, ..)) = item {
-                    *field(model) = *value;
-                }
-            }),
-        };
-        self.push(
-            common,
-            VariableKind::Enumeration { enumeration_type: enumeration.described(), start: None },
-            Access::Integer(access),
-        );
         self
     }
 

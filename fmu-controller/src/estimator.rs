@@ -26,7 +26,6 @@ pub struct EstimatorInstance {
     pub(crate) settings: Settings,
     /// Sensor set as in the plant: 0, 1 for sensors without errors, [`MEMS_SENSORS`] for those with
     /// errors.
-    pub(crate) sensor_set: i32,
     line: Line,
     output: Output,
 }
@@ -60,30 +59,27 @@ impl SampledInstance for EstimatorInstance {
                 start: 0.0,
                 stop: Scenario::crmpc2022().duration,
                 tolerance: 1e-6,
-                step: Settings::default().period,
+                step: Settings::ours().period,
             },
-            table: corrections(calibration(gates(stages(start(outputs(inputs(
-                VariableTable::new(),
-            ))))))),
+            table: outputs(inputs(VariableTable::new()))
+                .settings(|m: &mut AttitudeEstimator| &mut m.settings),
         }
     }
 
     fn new() -> Self {
         Self {
-            settings: Settings { corrections: mems_corrections(), ..Settings::default() },
-            sensor_set: 0,
+            settings: Settings {
+                sensor_set: 0,
+                corrections: mems_corrections(),
+                ..Settings::ours()
+            },
             line: at_rest(),
             output: Output::default(),
         }
     }
 
     fn design(&self) -> Result<Estimator, Failure> {
-        let mut settings = self.settings;
-        if self.sensor_set < MEMS_SENSORS {
-            settings.corrections = Default::default();
-            settings.sensor_delay = 0.0;
-        }
-        Estimator::new(settings).map_err(|error| Failure::Error(error.to_string()))
+        Estimator::new(self.settings).map_err(|error| Failure::Error(error.to_string()))
     }
 
     fn period(estimator: &Estimator) -> f64 {
@@ -306,134 +302,3 @@ fn outputs(table: Variables) -> Variables {
     table
 }
 
-fn start(table: Variables) -> Variables {
-    let alignment = parameter("alignment", Alignment::TEXT);
-    let angle = |axis: &str, meaning: &str| {
-        let text = format!(
-            "{} before the first sample; with alignment = given also at the first sample",
-            capital(meaning)
-        );
-        let common = parameter(&format!("initial.{axis}"), &text);
-        common.real().unit("rad").nominal(0.1)
-    };
-    let kinematics = parameter("kinematics", Kinematics::TEXT);
-    let declination = parameter(
-        "field.declination",
-        "Direction of the horizontal magnetic field relative to the velocity, positive to the east",
-    );
-    let rest = parameter(
-        "rest.duration",
-        "Time from the first sample during which the platform rests and the gyroscope's bias is measured; 0 for none",
-    );
-    let table = table.choice(alignment, |m| &mut m.settings.alignment);
-    vector(table, ANGLES, angle, |m| &mut m.settings.initial)
-        .choice(kinematics, |m| &mut m.settings.kinematics)
-        .real(declination.real().unit("rad").nominal(0.1), |m| &mut m.settings.declination)
-        .real(seconds(rest).min(0.0).nominal(1.0), |m| &mut m.settings.rest_duration)
-}
-
-fn stages(table: Variables) -> Variables {
-    let period = parameter("period", "Sampling period of the estimator and of the sensors");
-    let cutoff = parameter(
-        "filter.cutoff",
-        "Cut-off frequency of the low-pass filter on all readings; 0 for no filter",
-    );
-    let prediction = parameter(
-        "prediction",
-        "Whether the estimate is predicted forward over the delays of sensors, transmission and filter",
-    );
-    let delay = parameter(
-        "sensor.delay",
-        "Delay of the sensors' filters at low frequencies; used with sensor.set = 2",
-    );
-    let proportional = parameter(
-        "fusion.proportional",
-        "Proportional gain of the sensor fusion, the rate at which attitude errors decay",
-    );
-    let integral = parameter(
-        "fusion.integral",
-        "Integral gain of the sensor fusion, which learns the gyroscope's bias; 0 for no learning",
-    );
-    let lost = parameter(
-        "lost.after",
-        "Time without a usable sample after which the attitude counts as lost",
-    );
-    let frozen = parameter(
-        "frozen.samples",
-        "Number of equal readings in a row from which a sensor counts as frozen; 0 for never, as needed for sensors without noise",
-    );
-    table
-        .real(seconds(period).min(1e-4).max(10.0).nominal(0.01), |m| &mut m.settings.period)
-        .real(cutoff.real().unit("Hz").min(0.0).nominal(10.0), |m| &mut m.settings.cutoff)
-        .boolean(prediction, |m| &mut m.settings.prediction)
-        .real(seconds(delay).min(0.0).nominal(0.01), |m| &mut m.settings.sensor_delay)
-        .real(proportional.real().unit("1/s").min(0.0).nominal(1.0), |m| {
-            &mut m.settings.gains.proportional
-        })
-        .real(integral.real().unit("1/s2").min(0.0).nominal(0.1), |m| {
-            &mut m.settings.gains.integral
-        })
-        .real(seconds(lost).min(0.0).nominal(0.5), |m| &mut m.settings.lost_after)
-        .integer(frozen, (Some(0), None), |m| &mut m.settings.frozen_samples)
-}
-
-fn gates(mut table: Variables) -> Variables {
-    for (i, sensor) in SENSORS.iter().enumerate() {
-        let range = parameter(
-            &format!("{}.range", sensor.name),
-            &format!(
-                "Largest plausible reading of the {} along an axis; a larger one is ignored",
-                sensor.name
-            ),
-        );
-        let jump = parameter(
-            &format!("{}.jump", sensor.name),
-            &format!(
-                "Largest plausible change of the {}'s reading between two samples; a reading beyond it is ignored until the next one confirms it",
-                sensor.name
-            ),
-        );
-        let real = |common: Common| {
-            common.real().unit(sensor.unit).min(0.0).max(LARGEST_RANGE).nominal(sensor.nominal)
-        };
-        table = table
-            .real(real(range), move |m| &mut m.settings.gates[i].range)
-            .real(real(jump), move |m| &mut m.settings.gates[i].jump);
-    }
-    table
-}
-
-fn calibration(table: Variables) -> Variables {
-    let set = parameter(
-        "sensor.set",
-        "Sensor set, the same as in the plant: 0 and 1 are sensors without errors; 2 uses sensor.delay and the correction matrices and biases, by default those of the MEMS set",
-    );
-    let mode = parameter("calibration.mode", CalibrationMode::TEXT);
-    let duration =
-        parameter("calibration.duration", "Time during which readings are collected for the fit");
-    table
-        .integer(set, (Some(0), Some(MEMS_SENSORS)), |m| &mut m.sensor_set)
-        .choice(mode, |m| &mut m.settings.calibration)
-        .real(seconds(duration).min(0.0).nominal(10.0), |m| &mut m.settings.calibration_duration)
-}
-
-fn corrections(mut table: Variables) -> Variables {
-    for (i, sensor) in SENSORS.iter().enumerate() {
-        for (row, column) in (0..3).flat_map(|row| (0..3).map(move |column| (row, column))) {
-            let name = format!("{}.matrix[{},{}]", sensor.name, row + 1, column + 1);
-            let text = format!(
-                "Correction matrix of the {} ({}), entry ({}, {})",
-                sensor.name, sensor.correction, AXES[row].0, AXES[column].0
-            );
-            let real = parameter(&name, &text).real().nominal(1.0);
-            table = table.real(real, move |m| &mut m.settings.corrections[i].matrix[(row, column)]);
-        }
-        let bias = |axis: &str, _: &str| {
-            let text = format!("Bias of the {}, component {axis}", sensor.name);
-            let common = parameter(&format!("{}.bias.{axis}", sensor.name), &text);
-            common.real().unit(sensor.unit).nominal(sensor.nominal)
-        };
-        table = vector(table, AXES, bias, move |m| &mut m.settings.corrections[i].bias);
-    }
-    table
-}

@@ -18,7 +18,7 @@ use vehicle::kinematics::Kinematics;
 use vehicle::plant::{BETA_LIMIT, Config, state};
 use vehicle::platform::Surroundings;
 use vehicle::sensor_data::SensorData;
-use vehicle::sensors::{self, Line};
+use vehicle::sensors::{self, Line, PerSensor};
 use vehicle::transport;
 use vehicle::triad::Triad;
 use vehicle::turntable;
@@ -164,15 +164,8 @@ pub(crate) struct Sensing {
     /// Seed of sensor noise and dropped samples; the same seed gives the same samples.
     #[setting(name = "sensor.seed", min = 0)]
     pub(crate) sensor_seed: u64,
-    /// Gyroscope.
-    #[setting(name = "sensor.gyroscope", unit = "rad/s", nominal = 0.05)]
-    pub(crate) gyroscope: Triad,
-    /// Accelerometer.
-    #[setting(name = "sensor.accelerometer", unit = "m/s2", nominal = 10.0)]
-    pub(crate) accelerometer: Triad,
-    /// Magnetometer.
-    #[setting(name = "sensor.magnetometer", unit = "T", nominal = 5e-5)]
-    pub(crate) magnetometer: Triad,
+    #[setting(name = "sensor")]
+    pub(crate) triads: PerSensor<Triad>,
     #[setting(name = "sensor")]
     pub(crate) surroundings: Surroundings,
     /// If true, the attitude follows a prescribed calibration sequence instead of the dynamics.
@@ -181,13 +174,6 @@ pub(crate) struct Sensing {
     #[setting(name = "calibration")]
     pub(crate) sequence: Sequence,
     pub(crate) turntable: turntable::Config,
-}
-
-impl Sensing {
-    /// Returns gyroscope, accelerometer and magnetometer.
-    pub(crate) fn triads(&self) -> [Triad; 3] {
-        [self.gyroscope, self.accelerometer, self.magnetometer]
-    }
 }
 
 /// Parameters of the converter of the input moment.
@@ -257,9 +243,7 @@ impl Default for Parameters {
                 sensor_set: NO_SENSORS,
                 line,
                 sensor_seed: 1,
-                gyroscope: sensors.mems[0],
-                accelerometer: sensors.mems[1],
-                magnetometer: sensors.mems[2],
+                triads: PerSensor(sensors.mems),
                 surroundings: sensors.surroundings,
                 calibrates: false,
                 sequence: sensors.calibration,
@@ -308,13 +292,13 @@ impl Parameters {
     /// sensors.
     fn sensors(&self) -> Option<sensors::Config> {
         let Sensing { sensor_set, line, sensor_seed: seed, .. } = self.sensing;
-        let errors = self.sensing.triads();
+        let errors = self.sensing.triads;
         let triads = match sensor_set {
             NO_SENSORS => return None,
             IDEAL_SENSORS => {
                 let ideal = SensorData::embedded().ideal;
                 // Freezing is not an error of the sensor set, so the ideal set keeps it.
-                std::array::from_fn(|i| Triad { freeze: errors[i].freeze, ..ideal[i] })
+                PerSensor(std::array::from_fn(|i| Triad { freeze: errors[i].freeze, ..ideal[i] }))
             }
             _ => errors,
         };

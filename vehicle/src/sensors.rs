@@ -12,16 +12,57 @@ use crate::time::{check_resolution, tick, tick_time, tick_tolerance};
 use crate::triad::{Memory, Triad, Window};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
-use settings::Declared;
+use settings::{About, Declared, Path, Place, Setting};
+use std::ops::{Deref, DerefMut};
 
 /// Largest number of samples that may be on their way at a time.
 pub const IN_FLIGHT: usize = 1000;
+
+/// One value for each sensor: gyroscope, accelerometer, magnetometer.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct PerSensor<T>(pub [T; 3]);
+
+/// Name, sentence, unit and typical magnitude of what each sensor measures.
+const SENSORS: [(&str, &str, &str, f64); 3] = [
+    ("gyroscope", "Gyroscope", "rad/s", 0.05),
+    ("accelerometer", "Accelerometer", "m/s2", 10.0),
+    ("magnetometer", "Magnetometer", "T", 5e-5),
+];
+
+impl<T> PerSensor<T> {
+    /// Returns the values, each with the name of its sensor.
+    pub fn named(&self) -> impl Iterator<Item = (&'static str, &T)> {
+        SENSORS.iter().map(|sensor| sensor.0).zip(&self.0)
+    }
+}
+
+impl<T> Deref for PerSensor<T> {
+    type Target = [T; 3];
+    fn deref(&self) -> &[T; 3] {
+        &self.0
+    }
+}
+
+impl<T> DerefMut for PerSensor<T> {
+    fn deref_mut(&mut self) -> &mut [T; 3] {
+        &mut self.0
+    }
+}
+
+impl<T: Declared> Declared for PerSensor<T> {
+    fn declare<S: 'static>(place: &Place, path: Path<S, Self>, list: &mut Vec<Setting<S>>) {
+        for (i, (name, text, unit, nominal)) in SENSORS.into_iter().enumerate() {
+            let about = About { name, text, unit, nominal: Some(nominal), ..About::default() };
+            T::declare(&place.at(&about), path.to(move |each: &mut Self| &mut each.0[i]), list);
+        }
+    }
+}
 
 /// Configuration of the three sensors and their line.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Config {
     /// Errors of gyroscope (rad/s), accelerometer (m/s²) and magnetometer (T).
-    pub triads: [Triad; 3],
+    pub triads: PerSensor<Triad>,
     /// Timing and drops of the serial line.
     pub line: Line,
     /// Seed of the random noise and drops.
@@ -113,8 +154,8 @@ impl Config {
             let problem = format!("= {drop_probability} must lie between 0 and 1");
             return refuse("sensor.drop.probability", problem);
         }
-        let names = ["sensor.gyroscope", "sensor.accelerometer", "sensor.magnetometer"];
-        names.into_iter().zip(&self.triads).try_for_each(|(name, triad)| triad.check(name))
+        let check = |(name, triad): (&str, &Triad)| triad.check(&format!("sensor.{name}"));
+        self.triads.named().try_for_each(check)
     }
 
     /// Draws the normal noise of the three sensors at a tick, and a random number in [0, 1) that

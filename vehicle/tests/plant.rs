@@ -379,7 +379,7 @@ fn impossible_configurations_are_refused_by_name() {
         (change(|c| c.inertia_scale = 0.0), "inertia.scale"),
         (change(|c| c.initial[1] = 1.6), "initial.beta"),
         (change(|c| c.initial[3] = f64::NAN), "initial"),
-        (change(|c| c.step = 0.0), "`step`"),
+        (change(|c| c.step = 0.0), "integrator.step"),
         (change(|c| c.earth_rate = f64::NAN), "trajectory.earthRate"),
         (change(|c| c.disturbance.period = -1.0), "disturbance.period"),
     ] {
@@ -761,5 +761,5 @@ fn samples_on_a_turntable_do_not_depend_on_the_communication_step() {
 fn a_turntable_needs_sampled_sensors() {
     let config = Config { sensors: None, ..on_a_turntable() };
     let text = Plant::new(&config, 0.0).unwrap_err().to_string();
-    assert!(text.contains("`turntable.bandwidth` = 2 Hz"), "{text}");
+    assert!(text.contains("turntable.bandwidth = 2 Hz"), "{text}");
 }

@@ -10,35 +10,40 @@ pub mod ellipsoid;
 pub mod fusion;
 pub mod lowpass;
 
-use crate::error::{DesignError, invalid, positive};
+use crate::error::{DesignError, invalid};
 use ellipsoid::{Correction, Scatter};
 use fusion::{Fusion, Gains, triad};
 use lowpass::LowPass;
 use nalgebra::{Matrix3, Rotation3, SVector, Vector3};
 use serde::{Deserialize, Serialize};
-use settings::Choice;
+use settings::{Choice, Declared};
 use std::sync::LazyLock;
+use toml::Table;
+use vehicle::axes::ANGLES;
 use vehicle::data;
 use vehicle::kinematics::{self, Kinematics};
 use vehicle::math::{asin, atan2};
 use vehicle::platform::body_from_velocity;
 use vehicle::scenario::Scenario;
 use vehicle::sensor_data::SensorData;
+use vehicle::sensors::PerSensor;
 use vehicle::time::tick_tolerance;
 
 /// Source of the magnetometer's calibration.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Choice)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Choice)]
 pub enum CalibrationMode {
     /// Parameters magnetometer.matrix and magnetometer.bias.
+    #[default]
     Given,
     /// Ellipsoid fitted to the readings of the first calibration.duration.
     Fit,
 }
 
 /// Source of the initial attitude.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Choice)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Choice)]
 pub enum Alignment {
     /// First samples.
+    #[default]
     Measured,
     /// initial.alpha, initial.beta and initial.sigma, the attitude in which the platform was
     /// placed.
@@ -46,51 +51,75 @@ pub enum Alignment {
 }
 
 /// All settings of the estimator. Units are SI, angles in rad.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Declared)]
 pub struct Settings {
-    /// Time between samples and between ticks, s.
-    pub period: f64,
-    /// Cut-off frequency of the low-pass filter, Hz; 0 for none.
-    pub cutoff: f64,
-    /// Gains of the nine-axis fusion.
-    pub gains: Gains,
-    /// Whether the estimate is predicted forward over the delays of sensors, line and filter.
-    pub prediction: bool,
-    /// Delay of the sensors' own filters, s.
-    pub sensor_delay: f64,
-    /// Kinematics to which the estimated body rates refer.
-    pub kinematics: Kinematics,
-    /// Direction of the magnetic field's horizontal part from north, east positive, rad.
-    pub declination: f64,
-    /// Source of the initial attitude.
+    #[allow(missing_docs)] // Its type says what it is.
     pub alignment: Alignment,
-    /// Angles Θ before the first sample, and at it with [`Alignment::Given`].
+    /// Angle before the first sample; with alignment = given also at the first sample.
+    #[setting(each = ANGLES, unit = "rad", nominal = 0.1)]
     pub initial: Vector3<f64>,
-    /// Corrections of gyroscope, accelerometer and magnetometer.
-    pub corrections: [Correction; 3],
-    /// Source of the magnetometer's calibration.
-    pub calibration: CalibrationMode,
-    /// Time during which readings are collected for a fit, s.
-    pub calibration_duration: f64,
-    /// Time during which the platform rests at the beginning, so that the gyroscope shows its bias,
-    /// s.
+    #[allow(missing_docs)]
+    pub kinematics: Kinematics,
+    /// Direction of the horizontal magnetic field relative to the velocity, positive to the east.
+    #[setting(name = "field.declination", unit = "rad", nominal = 0.1)]
+    pub declination: f64,
+    /// Time from the first sample during which the platform rests and the gyroscope's bias is
+    /// measured; 0 for none.
+    #[setting(name = "rest.duration", unit = "s", min = 0.0, nominal = 1.0)]
     pub rest_duration: f64,
-    /// Time without a usable sample after which the attitude counts as lost, s.
+    /// Sampling period of the estimator and of the sensors.
+    #[setting(unit = "s", min = 1e-4, max = 10.0, nominal = 0.01)]
+    pub period: f64,
+    /// Cut-off frequency of the low-pass filter on all readings; 0 for no filter.
+    #[setting(name = "filter.cutoff", unit = "Hz", min = 0.0, nominal = 10.0)]
+    pub cutoff: f64,
+    /// Whether the estimate is predicted forward over the delays of sensors, transmission and
+    /// filter.
+    pub prediction: bool,
+    /// Delay of the sensors' filters at low frequencies; used with sensor.set = 2.
+    #[setting(name = "sensor.delay", unit = "s", min = 0.0, nominal = 0.01)]
+    pub sensor_delay: f64,
+    /// Gains of the nine-axis fusion.
+    #[setting(name = "fusion")]
+    pub gains: Gains,
+    /// Time without a usable sample after which the attitude counts as lost.
+    #[setting(name = "lost.after", unit = "s", above = 0.0, nominal = 0.5)]
     pub lost_after: f64,
-    /// Number of equal samples in a row from which a sensor counts as frozen; 0 for never.
+    /// Number of equal readings in a row from which a sensor counts as frozen; 0 for never, as
+    /// needed for sensors without noise.
+    #[setting(name = "frozen.samples", min = 0)]
     pub frozen_samples: u32,
-    /// Gates for the readings of gyroscope (rad/s), accelerometer (m/s²) and magnetometer (T).
-    pub gates: [Gate; 3],
+    /// Gates for the readings.
+    #[setting(name = "")]
+    pub gates: PerSensor<Gate>,
+    /// Sensor set, the same as in the plant: 0 and 1 are sensors without errors; 2 uses
+    /// sensor.delay and the correction matrices and biases, by default those of the MEMS set.
+    #[setting(name = "sensor.set", min = 0, max = MEMS_SENSORS)]
+    pub sensor_set: i32,
+    #[allow(missing_docs)]
+    #[setting(name = "calibration.mode")]
+    pub calibration: CalibrationMode,
+    /// Time during which readings are collected for the fit.
+    #[setting(name = "calibration.duration", unit = "s", above = 0.0, nominal = 10.0)]
+    pub calibration_duration: f64,
+    /// Corrections of the readings.
+    #[setting(name = "")]
+    pub corrections: PerSensor<Correction>,
 }
+
+/// Value of `sensor_set` for sensors with errors.
+pub const MEMS_SENSORS: i32 = 2;
 
 /// Condition for accepting the readings of a sensor. Readings outside the sensor's range, and
 /// changes that no rotation of the vehicle can cause, are left out.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Declared)]
 pub struct Gate {
-    /// Largest reading along an axis, in either direction.
+    /// Largest plausible reading along an axis; a larger one is ignored.
+    #[setting(part, above = 0.0, max = LARGEST_RANGE)]
     pub range: f64,
-    /// Largest change from one sample to the next, as a norm. Readings that lie further away are
-    /// accepted when a second one confirms them.
+    /// Largest plausible change of the reading between two samples; a reading beyond it is ignored
+    /// until the next one confirms it.
+    #[setting(part, above = 0.0, max = LARGEST_RANGE)]
     pub jump: f64,
 }
 
@@ -125,48 +154,27 @@ enum Verdict {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct File {
-    period: f64,
-    cutoff: f64,
-    sensor_delay: f64,
-    proportional: f64,
-    integral: f64,
-    lost_after: f64,
-    frozen_samples: u32,
-    calibration_duration: f64,
-    jump_gyroscope: f64,
-    jump_accelerometer: f64,
-    jump_magnetometer: f64,
+    settings: Table,
 }
 
-impl Default for Settings {
+const FILE: &str = "estimator.toml";
+
+impl Settings {
     /// Returns the settings of `data/estimator.toml`, for the start of Chai 2022 and sensors
     /// without errors in the field of the vehicle's data.
-    fn default() -> Self {
-        static READ: LazyLock<File> = LazyLock::new(|| {
-            data::embedded("estimator.toml", include_str!("../../data/estimator.toml"))
-        });
-        let file = &*READ;
+    pub fn ours() -> Self {
+        static READ: LazyLock<File> =
+            LazyLock::new(|| data::embedded(FILE, include_str!("../../data/estimator.toml")));
         let SensorData { surroundings, mems, .. } = SensorData::embedded();
         let field = surroundings.field;
-        let jumps = [file.jump_gyroscope, file.jump_accelerometer, file.jump_magnetometer];
-        Self {
-            period: file.period,
-            cutoff: file.cutoff,
-            gains: Gains { proportional: file.proportional, integral: file.integral },
-            prediction: true,
-            sensor_delay: file.sensor_delay,
-            kinematics: Kinematics::Printed,
+        let mut settings = Self {
             declination: atan2(field.y, field.x),
-            alignment: Alignment::Measured,
             initial: Scenario::crmpc2022().initial_angles,
-            corrections: [Correction::default(); 3],
-            calibration: CalibrationMode::Given,
-            calibration_duration: file.calibration_duration,
-            rest_duration: 0.0,
-            lost_after: file.lost_after,
-            frozen_samples: file.frozen_samples,
-            gates: std::array::from_fn(|i| Gate { range: mems[i].range, jump: jumps[i] }),
-        }
+            gates: PerSensor(mems.map(|triad| Gate { range: triad.range, jump: 0.0 })),
+            ..Self::default()
+        };
+        data::set(&mut settings, FILE, &READ.settings);
+        settings
     }
 }
 
@@ -187,15 +195,17 @@ struct CorrectionFile {
 
 /// Returns the corrections of gyroscope, accelerometer and magnetometer of the MEMS set, from
 /// `data/sensor-calibration.toml`.
-pub fn mems_corrections() -> [Correction; 3] {
+pub fn mems_corrections() -> PerSensor<Correction> {
     static READ: LazyLock<CalibrationFile> = LazyLock::new(|| {
         data::embedded(
             "sensor-calibration.toml",
             include_str!("../../data/sensor-calibration.toml"),
         )
     });
-    [&READ.gyroscope, &READ.accelerometer, &READ.magnetometer]
-        .map(|each| Correction { matrix: Matrix3::from(each.matrix).transpose(), bias: each.bias })
+    PerSensor([&READ.gyroscope, &READ.accelerometer, &READ.magnetometer].map(|each| Correction {
+        matrix: Matrix3::from(each.matrix).transpose(),
+        bias: each.bias,
+    }))
 }
 
 /// The newest sample on the line from the sensors.
@@ -358,45 +368,33 @@ pub fn angles(rotation: &Rotation3<f64>) -> Vector3<f64> {
     Vector3::new(atan2(c[(2, 0)], c[(0, 0)]), beta, atan2(-c[(1, 2)], c[(1, 1)]))
 }
 
-/// Names of the sensors.
-const SENSORS: [&str; 3] = ["gyroscope", "accelerometer", "magnetometer"];
-
 impl Estimator {
     /// Checks the settings and sets up the filter.
     ///
     /// # Errors
     /// Returns an error that names the setting at fault.
     pub fn new(settings: Settings) -> Result<Self, DesignError> {
+        settings::check(&settings)?;
+        let mut settings = settings;
+        if settings.sensor_set < MEMS_SENSORS {
+            (settings.corrections, settings.sensor_delay) = (PerSensor::default(), 0.0);
+        }
         let s = &settings;
-        positive("period", s.period)?;
-        positive("lost.after", s.lost_after)?;
-        positive("calibration.duration", s.calibration_duration)?;
-        let nyquist = 0.5 / s.period;
         let limits = [
-            ("filter.cutoff", s.cutoff, nyquist),
+            ("filter.cutoff", s.cutoff, 0.5 / s.period),
             ("fusion.proportional", s.gains.proportional, 1.0 / s.period),
             ("fusion.integral", s.gains.integral, 1.0 / (s.period * s.period)),
             ("sensor.delay", s.sensor_delay, 1.0),
-            ("rest.duration", s.rest_duration, f64::MAX),
         ];
-        for (i, gate) in s.gates.iter().enumerate() {
-            for (what, value) in [("range", gate.range), ("jump", gate.jump)] {
-                if !(value > 0.0 && value <= LARGEST_RANGE) {
-                    let name = format!("{}.{what}", SENSORS[i]);
-                    let problem = format!("must be positive and at most {LARGEST_RANGE}");
-                    return Err(invalid(&name, value, problem));
-                }
-            }
-        }
         for (name, value, high) in limits {
-            if !(0.0..high).contains(&value) {
-                return Err(invalid(name, value, format!("must be at least 0 and below {high}")));
+            if value >= high {
+                return Err(invalid(name, value, format!("must be below {high}")));
             }
         }
-        for (i, correction) in s.corrections.iter().enumerate() {
+        for (name, correction) in s.corrections.named() {
             let determinant = correction.matrix.determinant();
             if !(determinant.abs() > 0.0 && determinant.is_finite()) {
-                return Err(DesignError::Singular { name: format!("{}.matrix", SENSORS[i]) });
+                return Err(DesignError::Singular { name: format!("{name}.matrix") });
             }
         }
         Ok(Self { settings, filter: LowPass::new(s.cutoff, s.period) })

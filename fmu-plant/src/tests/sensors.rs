@@ -19,7 +19,7 @@ fn mems(instance: &mut ReentryPlant) {
     p.sensing.line.period = 1.0 / 64.0;
     p.sensing.line.delay = 2.5 / 64.0;
     p.sensing.line.drop_probability = 0.2;
-    p.sensing.accelerometer.freeze = Window { start: 0.5, end: 0.75 };
+    p.sensing.triads[1].freeze = Window { start: 0.5, end: 0.75 };
     instance.input.moment = Vector3::new(2e4, -1e4, 1e4);
 }
 
@@ -68,7 +68,7 @@ fn ideal_sensors_show_the_truth_of_their_ticks_and_leave_the_line_as_it_is() {
         mems(instance);
         instance.parameters.sensing.sensor_set = 1;
         instance.parameters.sensing.line.drop_probability = 0.0;
-        instance.parameters.sensing.accelerometer.freeze = Window::default();
+        instance.parameters.sensing.triads[1].freeze = Window::default();
     });
     let mut truth = started(|instance| {
         mems(instance);
@@ -113,7 +113,7 @@ fn samples_are_the_same_bits_whatever_the_communication_step() {
     let [actual, expected] = [sample(&mut instance, 2.0), *expected.last().unwrap()];
     assert_eq!((actual.number, actual.time), (expected.number, expected.time));
     for (i, step) in
-        instance.parameters.sensing.triads().map(|triad| triad.resolution).into_iter().enumerate()
+        instance.parameters.sensing.triads.map(|triad| triad.resolution).into_iter().enumerate()
     {
         assert!(
             (actual.readings[i] - expected.readings[i]).amax() < 1.5 * step,
@@ -286,7 +286,7 @@ fn impossible_sensors_and_sequences_are_refused_by_name() {
         ),
         (|instance| instance.parameters.sensing.line.period = 0.0, "sensor.period"),
         (
-            |instance| instance.parameters.sensing.magnetometer.range = -1.0,
+            |instance| instance.parameters.sensing.triads[2].range = -1.0,
             "sensor.magnetometer.range",
         ),
         (
