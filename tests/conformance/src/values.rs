@@ -1,6 +1,6 @@
 //! Values of an instance's variables.
 
-use crate::interface::{OK, Status};
+use crate::interface::{OK, Status, Text};
 use crate::{Instance, c};
 use model_description::variable::VariableKind;
 use std::ffi::{CStr, c_int};
@@ -47,55 +47,36 @@ impl Instance {
     pub fn bits(&self, references: &[u32]) -> Bits {
         let variables = &self.fmu.description.variables;
         let mut bits = vec![0; references.len()];
-        let places_of = |is_chosen: fn(&VariableKind) -> bool| -> (Vec<usize>, Vec<u32>) {
-            let numbered = references.iter().copied().enumerate();
-            numbered
-                .filter(|&(_, reference)| is_chosen(&variables[reference as usize].kind))
-                .unzip()
-        };
-        let (places, list) = places_of(|kind| matches!(kind, VariableKind::Real { .. }));
-        let mut reals = vec![0.0; list.len()];
-        self.ok(c!(
-            self,
-            fmi2GetReal(self.component, list.as_ptr(), list.len(), reals.as_mut_ptr())
-        ));
-        for (&place, value) in places.iter().zip(reals) {
-            bits[place] = value.to_bits();
+        macro_rules! read {
+            ($kind:pat, $get:ident, $empty:expr, $bits_of:expr) => {
+                let numbered = references.iter().copied().enumerate();
+                let (places, list): (Vec<usize>, Vec<u32>) = numbered
+                    .filter(|&(_, reference)| matches!(variables[reference as usize].kind, $kind))
+                    .unzip();
+                let mut values = vec![$empty; list.len()];
+                let room = values.as_mut_ptr();
+                self.ok(c!(self, $get(self.component, list.as_ptr(), list.len(), room)));
+                for (place, value) in places.into_iter().zip(values) {
+                    bits[place] = $bits_of(value);
+                }
+            };
         }
-        let (places, list) = places_of(|kind| {
-            matches!(kind, VariableKind::Integer { .. } | VariableKind::Enumeration { .. })
-        });
-        let mut integers = vec![0; list.len()];
-        self.ok(c!(
-            self,
-            fmi2GetInteger(self.component, list.as_ptr(), list.len(), integers.as_mut_ptr())
-        ));
-        for (&place, value) in places.iter().zip(integers) {
-            bits[place] = value as u64;
-        }
-        let (places, list) = places_of(|kind| matches!(kind, VariableKind::Boolean { .. }));
-        let mut booleans = vec![0; list.len()];
-        self.ok(c!(
-            self,
-            fmi2GetBoolean(self.component, list.as_ptr(), list.len(), booleans.as_mut_ptr())
-        ));
-        for (&place, value) in places.iter().zip(booleans) {
-            bits[place] = value as u64;
-        }
-        let (places, list) = places_of(|kind| matches!(kind, VariableKind::String { .. }));
-        let mut texts = vec![null(); list.len()];
-        self.ok(c!(
-            self,
-            fmi2GetString(self.component, list.as_ptr(), list.len(), texts.as_mut_ptr())
-        ));
-        for (&place, text) in places.iter().zip(texts) {
+        let whole = |value: c_int| value as u64;
+        let text = |text: Text| {
             // SAFETY: the call succeeded, so the text is NUL-terminated and lives until the next
             // fmi2GetString.
-            bits[place] = unsafe { CStr::from_ptr(text) }
-                .to_bytes()
-                .iter()
-                .fold(7, |sum: u64, &byte| sum.wrapping_mul(257).wrapping_add(u64::from(byte)));
-        }
+            let bytes = unsafe { CStr::from_ptr(text) }.to_bytes().iter();
+            bytes.fold(7, |sum: u64, &byte| sum.wrapping_mul(257).wrapping_add(u64::from(byte)))
+        };
+        read!(VariableKind::Real { .. }, fmi2GetReal, 0.0, f64::to_bits);
+        read!(
+            VariableKind::Integer { .. } | VariableKind::Enumeration { .. },
+            fmi2GetInteger,
+            0,
+            whole
+        );
+        read!(VariableKind::Boolean { .. }, fmi2GetBoolean, 0, whole);
+        read!(VariableKind::String { .. }, fmi2GetString, null(), text);
         bits
     }
 
