@@ -301,4 +301,3 @@ fn outputs(table: Variables) -> Variables {
     }
     table
 }
-

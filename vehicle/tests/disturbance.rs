@@ -292,16 +292,29 @@ fn tables_out_of_range_are_refused_by_name() {
     let (first, second) = ("disturbance.table.rows[0]", "disturbance.table.rows[1]");
     let period = "disturbance.table.period";
     for (refusal, text) in [
-        (refusal(0.0, [row(-0.1, 1.0), row(1.0, 1.0)]), format!("disturbance.table.time[1] = -0.1 s")),
-        (refusal(0.0, [row(f64::NAN, 1.0), row(1.0, 1.0)]), format!("disturbance.table.time[1] = NaN s")),
-        (refusal(0.0, [row(0.1, 1.0), row(f64::INFINITY, 1.0)]), format!("disturbance.table.time[2] = inf")),
+        (
+            refusal(0.0, [row(-0.1, 1.0), row(1.0, 1.0)]),
+            format!("disturbance.table.time[1] = -0.1 s"),
+        ),
+        (
+            refusal(0.0, [row(f64::NAN, 1.0), row(1.0, 1.0)]),
+            format!("disturbance.table.time[1] = NaN s"),
+        ),
+        (
+            refusal(0.0, [row(0.1, 1.0), row(f64::INFINITY, 1.0)]),
+            format!("disturbance.table.time[2] = inf"),
+        ),
         (
             refusal(0.0, [row(1.0, 1.0), row(1.0, 1.0)]),
-            format!("disturbance.table.time[2] = 1 s must come after disturbance.table.time[1] = 1 s"),
+            format!(
+                "disturbance.table.time[2] = 1 s must come after disturbance.table.time[1] = 1 s"
+            ),
         ),
         (
             refusal(1.0, [row(0.0, 1.0), row(1.0, 1.0)]),
-            format!("disturbance.table.time[2] = 1 s must come before disturbance.table.period = 1 s"),
+            format!(
+                "disturbance.table.time[2] = 1 s must come before disturbance.table.period = 1 s"
+            ),
         ),
         (
             refusal(0.0, [row(0.0, 1.0), row(1.0, -1.5)]),
@@ -311,9 +324,18 @@ fn tables_out_of_range_are_refused_by_name() {
             refusal(0.0, [row(0.0, f64::NAN), row(1.0, 1.0)]),
             format!("disturbance.table.alpha[1] = NaN must lie"),
         ),
-        (refusal(-1.0, [row(0.0, 1.0), row(1.0, 1.0)]), format!("disturbance.table.period = -1 s must be 0")),
-        (refusal(1e-4, [row(0.0, 1.0), row(1e-5, 1.0)]), format!("disturbance.table.period = 0.0001 s")),
-        (refusal(f64::INFINITY, [row(0.0, 1.0), row(1.0, 1.0)]), format!("disturbance.table.period = inf s")),
+        (
+            refusal(-1.0, [row(0.0, 1.0), row(1.0, 1.0)]),
+            format!("disturbance.table.period = -1 s must be 0"),
+        ),
+        (
+            refusal(1e-4, [row(0.0, 1.0), row(1e-5, 1.0)]),
+            format!("disturbance.table.period = 0.0001 s"),
+        ),
+        (
+            refusal(f64::INFINITY, [row(0.0, 1.0), row(1.0, 1.0)]),
+            format!("disturbance.table.period = inf s"),
+        ),
     ] {
         let message = refusal.unwrap_err();
         assert!(message.starts_with(&text), "{message}");

@@ -29,8 +29,8 @@ pub struct Reach {
 }
 
 impl Reach {
-    /// Returns the bounds of a response on which the law acts, from the sizes of its angle and rate,
-    /// of both in the middle of the period, and of the feedback.
+    /// Returns the bounds of a response on which the law acts, from the sizes of its angle and
+    /// rate, of both in the middle of the period, and of the feedback.
     pub(super) fn seen(sizes: [f64; 5]) -> Self {
         let [angle, rate, middle_angle, middle_rate, feedback] = sizes;
         Self {

@@ -202,10 +202,12 @@ pub fn mems_corrections() -> PerSensor<Correction> {
             include_str!("../../data/sensor-calibration.toml"),
         )
     });
-    PerSensor([&READ.gyroscope, &READ.accelerometer, &READ.magnetometer].map(|each| Correction {
-        matrix: Matrix3::from(each.matrix).transpose(),
-        bias: each.bias,
-    }))
+    PerSensor(
+        [&READ.gyroscope, &READ.accelerometer, &READ.magnetometer].map(|each| Correction {
+            matrix: Matrix3::from(each.matrix).transpose(),
+            bias: each.bias,
+        }),
+    )
 }
 
 /// The newest sample on the line from the sensors.
@@ -347,7 +349,7 @@ impl Running {
 /// ```
 /// use control::estimation::{Estimator, Health, Line, Settings};
 ///
-/// let mut estimator = Estimator::new(Settings::default())?;
+/// let mut estimator = Estimator::new(Settings::ours())?;
 /// let mut memory = estimator.memory();
 /// // Nothing has arrived on the line yet.
 /// estimator.update(&mut memory, 0.0, &Line::default());
@@ -494,7 +496,7 @@ impl Estimator {
     /// Returns corrected angular rate (rad/s), specific force and field. The rate still contains
     /// the bias that only the fusion knows.
     fn corrected(&self, memory: &Memory, filtered: &Nine) -> [Vector3<f64>; 3] {
-        let [rate, force, _] = self.settings.corrections;
+        let PerSensor([rate, force, _]) = self.settings.corrections;
         let corrections = [rate, force, memory.calibration.correction];
         std::array::from_fn(|i| corrections[i].apply(&filtered.fixed_rows::<3>(3 * i).into()))
     }

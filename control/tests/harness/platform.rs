@@ -152,7 +152,7 @@ pub fn calibrated(config: &Config, duration: f64) -> Settings {
     let fit = Settings {
         calibration: CalibrationMode::Fit,
         calibration_duration: duration - PERIOD,
-        ..Settings::default()
+        ..Settings::ours()
     };
     let estimator = Estimator::new(fit).unwrap();
     let mut memory = estimator.memory();
@@ -173,7 +173,7 @@ pub fn calibrated(config: &Config, duration: f64) -> Settings {
     let [gyroscope, accelerometer] = corrections;
     Settings {
         corrections: [gyroscope, accelerometer, memory.calibration.correction],
-        ..Settings::default()
+        ..Settings::ours()
     }
 }
 

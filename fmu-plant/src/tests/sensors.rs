@@ -1,6 +1,7 @@
 //! Tests of the sensors and the calibration sequence through the instance's interface.
 
-use super::{Constant, assert_same_motion, exchange, integrate, outputs, started, step};
+use super::model_exchange::{assert_same_motion, exchange, integrate};
+use super::{Constant, outputs, started, step};
 use crate::plant::ReentryPlant;
 use fmi2_export::{Failure, Model};
 use nalgebra::Vector3;

@@ -1,5 +1,5 @@
-//! Equations of motion: Θ̇ = R ω, plus the effect of a turning trajectory, and ω̇ = I⁻¹(m − ω × I ω)
-//! + R⁻¹ Δ, with their partial derivatives.
+//! Equations of motion: Θ̇ = R ω, plus the effect of a turning trajectory, and
+//! ω̇ = I⁻¹(m − ω × I ω) + R⁻¹ Δ, with their partial derivatives.
 
 use crate::dynamics::RigidBody;
 use crate::error::Error;
