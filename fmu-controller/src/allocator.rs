@@ -1,7 +1,7 @@
 //! `ControlAllocator` divides the commanded moment among surfaces and jets.
 
 use control::allocation::{
-    AllocationReport, AllocationStatus, Allocator, Command, JetCommand, Memory, Method, Settings,
+    AllocationReport, AllocationStatus, Allocator, Command, Memory, Settings,
 };
 use controller_export::sampled::{SampledFmu, SampledInstance, Ticks};
 use controller_export::table::{AXES, capital};
@@ -73,7 +73,11 @@ impl SampledInstance for AllocatorInstance {
                 tolerance: 1e-6,
                 step: Settings::published().period,
             },
-            table: pwpf(effectors(schedule(outputs(inputs(VariableTable::new()))))),
+            table: effectors(
+                outputs(inputs(VariableTable::new()))
+                    .settings(|m: &mut ControlAllocator| &mut m.settings),
+            )
+            .settings(|m| &mut m.settings.pwpf),
         }
     }
 
@@ -210,40 +214,6 @@ fn moment(
     table
 }
 
-fn schedule(table: Variables) -> Variables {
-    let method = parameter("method", Method::TEXT);
-    let jets = parameter("jets", JetCommand::TEXT);
-    let period = parameter(
-        "period",
-        "Sampling period of the allocation; with jets = pwpf a whole multiple of pwpf.period",
-    );
-    let threshold = parameter(
-        "threshold.dynamicPressure",
-        "Dynamic pressure above which method = blending uses the surfaces",
-    );
-    let iterations =
-        parameter("solver.maxIterations", "Maximum number of iterations of the cone solver");
-    let mut table = table
-        .choice(method, |m| &mut m.settings.method)
-        .choice(jets, |m| &mut m.settings.jets)
-        .real(period.real().unit("s").min(1e-4).max(10.0).nominal(0.01), |m| &mut m.settings.period)
-        .real(threshold.real().unit("Pa").min(0.0).nominal(1e3), |m| &mut m.settings.threshold)
-        .integer(iterations, (Some(1), Some(1000)), |m| &mut m.settings.max_iterations);
-    for (i, (_, meaning)) in AXES.into_iter().enumerate() {
-        let text = format!("Weight W1 on the missing {meaning} moment, in 1/(N m)");
-        let weight = parameter(&format!("weight.moment[{}]", i + 1), &text).real().min(0.0);
-        table = table.real(weight, move |m| &mut m.settings.weight_moment[i]);
-    }
-    let jet = parameter("weight.jet", "Weight W2 on the duty cycle of each jet");
-    let surface = parameter(
-        "weight.surface",
-        "Weight on half the squared ratio of each deflection to its range; 0 gives the cost function as printed, whose optimum is not unique",
-    );
-    table
-        .real(jet.real().min(0.0), |m| &mut m.settings.weight_jet)
-        .real(surface.real().min(0.0), |m| &mut m.settings.weight_surface)
-}
-
 fn effectors(mut table: Variables) -> Variables {
     let names = Effectors::published().names;
     let limit = |name: &str, i: usize, text: &str| {
@@ -304,19 +274,4 @@ fn effectors(mut table: Variables) -> Variables {
         }
     }
     table
-}
-
-fn pwpf(table: Variables) -> Variables {
-    let gain = parameter("pwpf.gain", "Gain K_m of the modulator's filter");
-    let time = parameter("pwpf.timeConstant", "Time constant T_m of the modulator's filter");
-    let on = parameter("pwpf.on", "Filter output u_on at which a jet switches on");
-    let off = parameter("pwpf.off", "Filter output u_off at which a jet switches off");
-    let period = parameter("pwpf.period", "Sampling period of the modulator");
-    let seconds = |common: Common| common.real().unit("s").min(1e-5).max(10.0);
-    table
-        .real(gain.real().min(0.0), |m| &mut m.settings.pwpf.gain)
-        .real(seconds(time).nominal(0.1), |m| &mut m.settings.pwpf.time_constant)
-        .real(on.real().min(0.0), |m| &mut m.settings.pwpf.on)
-        .real(off.real().min(0.0), |m| &mut m.settings.pwpf.off)
-        .real(seconds(period).nominal(1e-3), |m| &mut m.settings.pwpf.period)
 }

@@ -1,12 +1,12 @@
 //! `AttitudeEstimator`: attitude and rates from gyroscope, accelerometer and magnetometer.
 
 use control::estimation::{
-    Alignment, Calibration, CalibrationMode, CalibrationStatus, Estimate, Estimator, Health,
-    LARGEST_RANGE, Line, Memory, Settings, mems_corrections,
+    Calibration, CalibrationStatus, Estimate, Estimator, Health, Line, Memory, Settings,
+    mems_corrections,
 };
 use controller_export::sampled::{SampledFmu, SampledInstance, Ticks};
-use controller_export::table::{ANGLES, AXES, RATES, capital, vector};
-use fmi2_export::table::{Common, Real, discrete_input, discrete_output, input, parameter};
+use controller_export::table::{ANGLES, AXES, RATES, vector};
+use fmi2_export::table::{Common, Real, discrete_input, discrete_output, input};
 use fmi2_export::{Description, Failure, VariableTable};
 use model_description::DefaultExperiment;
 use nalgebra::Vector3;
@@ -29,9 +29,6 @@ pub struct EstimatorInstance {
     line: Line,
     output: Output,
 }
-
-/// Sensor set for which the corrections are used.
-const MEMS_SENSORS: i32 = 2;
 
 /// Outputs of the estimator.
 #[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
@@ -164,32 +161,12 @@ struct Sensor {
     quantity: &'static str,
     unit: &'static str,
     nominal: f64,
-    /// Meaning of its correction matrix.
-    correction: &'static str,
 }
 
 const SENSORS: [Sensor; 3] = [
-    Sensor {
-        name: "gyroscope",
-        quantity: "Angular rate about",
-        unit: "rad/s",
-        nominal: 0.05,
-        correction: "inverse of scale and misalignment",
-    },
-    Sensor {
-        name: "accelerometer",
-        quantity: "Specific force along",
-        unit: "m/s2",
-        nominal: 10.0,
-        correction: "inverse of scale and misalignment, up to a factor",
-    },
-    Sensor {
-        name: "magnetometer",
-        quantity: "Magnetic field along",
-        unit: "T",
-        nominal: 5e-5,
-        correction: "inverse of scale, misalignment and soft iron, up to a factor",
-    },
+    Sensor { name: "gyroscope", quantity: "Angular rate about", unit: "rad/s", nominal: 0.05 },
+    Sensor { name: "accelerometer", quantity: "Specific force along", unit: "m/s2", nominal: 10.0 },
+    Sensor { name: "magnetometer", quantity: "Magnetic field along", unit: "T", nominal: 5e-5 },
 ];
 
 const MEASURED: [&str; 11] = [

@@ -15,7 +15,7 @@ use vehicle::plant::{Plant, angles, rates};
 use vehicle::platform::{Pose, Readings};
 use vehicle::scenario::Scenario;
 use vehicle::sensor_data::SensorData;
-use vehicle::sensors::{Config, Sensors};
+use vehicle::sensors::{Config, PerSensor, Sensors};
 use vehicle::triad::Triad;
 
 /// Time between samples and ticks, s.
@@ -110,7 +110,7 @@ pub fn lines(trajectory: &[Truth], config: &Config) -> Vec<estimation::Line> {
 
 /// Returns sensors on the line of the data file.
 pub fn config(triads: &[Triad; 3], seed: u64) -> Config {
-    Config { triads: *triads, line: SensorData::embedded().line, seed }
+    Config { triads: PerSensor(*triads), line: SensorData::embedded().line, seed }
 }
 
 /// Returns the typical MEMS set.
@@ -172,7 +172,7 @@ pub fn calibrated(config: &Config, duration: f64) -> Settings {
     });
     let [gyroscope, accelerometer] = corrections;
     Settings {
-        corrections: [gyroscope, accelerometer, memory.calibration.correction],
+        corrections: PerSensor([gyroscope, accelerometer, memory.calibration.correction]),
         ..Settings::ours()
     }
 }

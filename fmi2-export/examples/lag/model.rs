@@ -3,28 +3,22 @@
 
 use fmi2_export::table::{discrete_input, discrete_output, input, local, output, parameter};
 use fmi2_export::{
-    Context, Description, Enumeration, EventInfo, Failure, Inputs, LastEvent, Model, VariableTable,
+    Context, Description, EventInfo, Failure, Inputs, LastEvent, Model, VariableTable,
 };
 use model_description::DefaultExperiment;
 use serde::{Deserialize, Serialize};
+use settings::Choice;
 
 /// Number of Runge–Kutta steps in a communication step.
 const SUBSTEPS: i32 = 4;
-/// Limiter at the output of the lag.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+/// Limiter at the output.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Choice)]
 enum Shape {
+    /// No limiter.
     Linear,
+    /// Output limited to between -1 and 1.
     Saturated,
 }
-
-static SHAPES: Enumeration<Shape> = Enumeration {
-    name: "Shape",
-    description: "Limiter at the output",
-    items: &[
-        (Shape::Linear, "linear", "No limiter"),
-        (Shape::Saturated, "saturated", "Output limited to between -1 and 1"),
-    ],
-};
 
 /// Model of the lag: its parameters, input, state and outputs.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -102,7 +96,7 @@ impl Model for Lag {
             .boolean(parameter("inverted", "If true, the sign of the gain is inverted"), |m| {
                 &mut m.inverted
             })
-            .enumeration(parameter("shape", SHAPES.description), &SHAPES, |m| &mut m.shape)
+            .choice(parameter("shape", Shape::TEXT), |m| &mut m.shape)
             .string(
                 parameter("label", "Text that is passed on; \"boom\" makes the FMU panic"),
                 |m| &mut m.label,

@@ -140,14 +140,14 @@ fn refusals() -> Vec<String> {
             |instance| instance.settings.gains.proportional = 1e3,
             |instance| instance.settings.gains.integral = 1e9,
             |instance| {
-                instance.sensor_set = 2;
+                instance.settings.sensor_set = 2;
                 instance.settings.sensor_delay = 2.0;
             },
             |instance| instance.settings.rest_duration = -1.0,
             |instance| instance.settings.gates[0].range = 0.0,
             |instance| instance.settings.gates[2].jump = 0.0,
             |instance| {
-                instance.sensor_set = 2;
+                instance.settings.sensor_set = 2;
                 instance.settings.corrections[1].matrix.fill(0.0);
             },
         ]),
