@@ -2,11 +2,10 @@
 //! panic can start.
 
 use fmi2_export::table::{discrete_output, input, parameter};
-use fmi2_export::{
-    Context, Description, Enumeration, Failure, Inputs, LastEvent, Model, VariableTable,
-};
+use fmi2_export::{Context, Description, Failure, Inputs, LastEvent, Model, VariableTable};
 use model_description::DefaultExperiment;
 use serde::{Deserialize, Serialize};
+use settings::Choice;
 use std::path::Path;
 
 /// Whether the count is even. The enumeration below leaves one out, as an FMU's author might.
@@ -16,11 +15,11 @@ enum Parity {
     Odd,
 }
 
-static PARITIES: Enumeration<Parity> = Enumeration {
-    name: "Parity",
-    description: "Parity of the count",
-    items: &[(Parity::Even, "even", "")],
-};
+impl Choice for Parity {
+    const NAME: &'static str = "Parity";
+    const TEXT: &'static str = "Parity of the count";
+    const ITEMS: &'static [(Self, &'static str, &'static str)] = &[(Self::Even, "even", "")];
+}
 
 /// Model that counts its steps.
 #[derive(Serialize, Deserialize)]
@@ -60,9 +59,7 @@ impl Model for Counter {
                 .real(input("increment", "What a step adds").real(), |m| &mut m.increment)
                 .real(discrete_output("count", "Sum of the increments").real(), |m| &mut m.seen)
                 .string(discrete_output("resources", "The resource folder"), |m| &mut m.resources)
-                .enumeration(discrete_output("parity", PARITIES.description), &PARITIES, |m| {
-                    &mut m.parity
-                })
+                .choice(discrete_output("parity", Parity::TEXT), |m| &mut m.parity)
                 .integer(discrete_output("resets", "Resets of this model"), (None, None), |m| {
                     &mut m.resets
                 }),

@@ -89,12 +89,13 @@ impl<S: 'static> Setting<S> {
     /// Makes a setting whose field is a choice. Without a sentence it has that of its type.
     pub fn choice<C: Choice>(place: &Place, path: Path<S, C>) -> Self {
         let writing = path.clone();
-        let number =
-            |value: &C| C::ITEMS.iter().position(|item| item.0 == *value).unwrap_or(usize::MAX);
+        // A value that a hand-written list leaves out has no number.
+        let number = |value: &C| {
+            let place = C::ITEMS.iter().position(|item| item.0 == *value);
+            place.and_then(|place| i64::try_from(place).ok()).unwrap_or(-1)
+        };
         let access = Integer {
-            get: Box::new(move |settings| {
-                i64::try_from(number(path.field(settings))).unwrap_or(i64::MAX)
-            }),
+            get: Box::new(move |settings| number(path.field(settings))),
             set: Box::new(move |settings, number| {
                 let item = usize::try_from(number).ok().and_then(|i| C::ITEMS.get(i));
                 item.map(|item| *writing.field(settings) = item.0).is_some()
