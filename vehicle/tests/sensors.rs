@@ -4,7 +4,7 @@
 use nalgebra::{Matrix3, Vector3};
 use vehicle::platform::Readings;
 use vehicle::sensor_data::SensorData;
-use vehicle::sensors::{Config, IN_FLIGHT, Line, Sample, Sensors};
+use vehicle::sensors::{Config, IN_FLIGHT, Line, PerSensor, Sample, Sensors};
 use vehicle::triad::{Triad, Window};
 
 const PERIOD: f64 = 1.0 / 128.0;
@@ -12,7 +12,7 @@ const PERIOD: f64 = 1.0 / 128.0;
 /// Configuration of sensors without errors on a line without delay.
 fn ideal() -> Config {
     Config {
-        triads: [Triad::default(); 3],
+        triads: PerSensor::default(),
         line: Line {
             period: PERIOD,
             delay: 0.0,
@@ -50,7 +50,7 @@ fn the_embedded_data_can_be_used_and_ideal_sensors_have_no_errors() {
     let data = SensorData::embedded();
     assert_eq!(data.ideal, [Triad::default(); 3]);
     data.surroundings.check().unwrap();
-    let config = Config { triads: data.mems, line: data.line, seed: 1 };
+    let config = Config { triads: PerSensor(data.mems), line: data.line, seed: 1 };
     Sensors::new(&config, 0.0).unwrap();
 }
 
