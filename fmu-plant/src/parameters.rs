@@ -243,7 +243,7 @@ impl Default for Parameters {
                 sensor_set: NO_SENSORS,
                 line,
                 sensor_seed: 1,
-                triads: PerSensor(sensors.mems),
+                triads: sensors.mems,
                 surroundings: sensors.surroundings,
                 calibrates: false,
                 sequence: sensors.calibration,

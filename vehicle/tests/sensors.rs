@@ -50,7 +50,7 @@ fn the_embedded_data_can_be_used_and_ideal_sensors_have_no_errors() {
     let data = SensorData::embedded();
     assert_eq!(data.ideal, [Triad::default(); 3]);
     data.surroundings.check().unwrap();
-    let config = Config { triads: PerSensor(data.mems), line: data.line, seed: 1 };
+    let config = Config { triads: data.mems, line: data.line, seed: 1 };
     Sensors::new(&config, 0.0).unwrap();
 }
 

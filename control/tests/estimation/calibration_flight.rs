@@ -8,14 +8,16 @@ use control::estimation::{CalibrationMode, CalibrationStatus, Estimator, Health,
 use nalgebra::{Matrix3, Rotation3};
 use vehicle::platform::body_from_velocity;
 use vehicle::sensor_data::SensorData;
+use vehicle::sensors::PerSensor;
 
 /// Required is ‖W A − I‖ ≤ 5e-3 at a noise of 0.5 %. The noise of the set is 0.6 %, without the
 /// steps of its converter.
 #[test]
 fn oracle_the_calibration_flight_finds_the_magnetometers_errors() {
     for seed in 1..=5 {
-        let Settings { corrections: [_, _, found], .. } = calibrated(&mems(seed), 120.0);
-        let SensorData { mems: [_, _, magnetometer], surroundings, .. } = SensorData::embedded();
+        let found = calibrated(&mems(seed), 120.0).corrections[2];
+        let SensorData { mems: PerSensor([_, _, magnetometer]), surroundings, .. } =
+            SensorData::embedded();
         let size = surroundings.field.norm();
         let left = found.matrix * size * magnetometer.matrix - Matrix3::identity();
         let error = left.singular_values().max();
@@ -28,7 +30,7 @@ fn oracle_the_calibration_flight_finds_the_magnetometers_errors() {
 #[test]
 fn regress_the_corrections_in_the_data_file_are_those_of_the_flight() {
     let corrections = calibrated(&mems(CALIBRATION_SEED), CALIBRATION_DURATION).corrections;
-    for (correction, file) in corrections.iter().zip(&CALIBRATED.corrections) {
+    for (correction, file) in corrections.iter().zip(CALIBRATED.corrections.iter()) {
         let size = file.matrix.norm();
         assert!(
             (correction.matrix - file.matrix).norm() < 1e-9 * size,

@@ -17,6 +17,7 @@ use vehicle::kinematics::Kinematics;
 use vehicle::platform::body_from_velocity;
 use vehicle::sensor_data::SensorData;
 use vehicle::sensors::Config;
+use vehicle::sensors::PerSensor;
 
 /// Settings for the MEMS set, with the corrections of the data file.
 static CALIBRATED: LazyLock<Settings> =
@@ -158,16 +159,19 @@ fn settings_that_cannot_work_are_refused_by_name() {
         ("period", Settings { period: 0.0, ..s }),
         ("cutoff", Settings { cutoff: 50.0, ..s }),
         ("cutoff", Settings { cutoff: f64::NAN, ..s }),
-        ("sensor_delay", Settings { sensor_delay: -0.1, ..s }),
-        ("lost_after", Settings { lost_after: 0.0, ..s }),
-        ("calibration_duration", Settings { calibration_duration: f64::INFINITY, ..s }),
+        ("sensor.delay", Settings { sensor_delay: -0.1, ..s }),
+        ("lost.after", Settings { lost_after: 0.0, ..s }),
+        ("calibration.duration", Settings { calibration_duration: f64::INFINITY, ..s }),
         (
-            "corrections[0].matrix",
-            Settings { corrections: [singular, s.corrections[1], s.corrections[2]], ..s },
+            "gyroscope.matrix",
+            Settings {
+                corrections: PerSensor([singular, s.corrections[1], s.corrections[2]]),
+                ..s
+            },
         ),
         (
-            "corrections[2].matrix",
-            Settings { corrections: [s.corrections[0], s.corrections[1], nan], ..s },
+            "magnetometer.matrix",
+            Settings { corrections: PerSensor([s.corrections[0], s.corrections[1], nan]), ..s },
         ),
     ] {
         let text = Estimator::new(settings).unwrap_err().to_string();

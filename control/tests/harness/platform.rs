@@ -109,8 +109,8 @@ pub fn lines(trajectory: &[Truth], config: &Config) -> Vec<estimation::Line> {
 }
 
 /// Returns sensors on the line of the data file.
-pub fn config(triads: &[Triad; 3], seed: u64) -> Config {
-    Config { triads: PerSensor(*triads), line: SensorData::embedded().line, seed }
+pub fn config(triads: &PerSensor<Triad>, seed: u64) -> Config {
+    Config { triads: *triads, line: SensorData::embedded().line, seed }
 }
 
 /// Returns the typical MEMS set.
