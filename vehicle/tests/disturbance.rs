@@ -289,56 +289,38 @@ fn tables_out_of_range_are_refused_by_name() {
     };
     assert_eq!(refusal(0.0, [row(0.0, 1.0), row(1e9, -1.0)]), Ok(()));
     assert_eq!(refusal(1.5, [row(0.5, 1.0), row(1.0, -1.0)]), Ok(()));
-    let (first, second) = ("disturbance.table.rows[0]", "disturbance.table.rows[1]");
-    let period = "disturbance.table.period";
     for (refusal, text) in [
-        (
-            refusal(0.0, [row(-0.1, 1.0), row(1.0, 1.0)]),
-            format!("disturbance.table.time[1] = -0.1 s"),
-        ),
-        (
-            refusal(0.0, [row(f64::NAN, 1.0), row(1.0, 1.0)]),
-            format!("disturbance.table.time[1] = NaN s"),
-        ),
-        (
-            refusal(0.0, [row(0.1, 1.0), row(f64::INFINITY, 1.0)]),
-            format!("disturbance.table.time[2] = inf"),
-        ),
+        (refusal(0.0, [row(-0.1, 1.0), row(1.0, 1.0)]), "disturbance.table.time[1] = -0.1 s"),
+        (refusal(0.0, [row(f64::NAN, 1.0), row(1.0, 1.0)]), "disturbance.table.time[1] = NaN s"),
+        (refusal(0.0, [row(0.1, 1.0), row(f64::INFINITY, 1.0)]), "disturbance.table.time[2] = inf"),
         (
             refusal(0.0, [row(1.0, 1.0), row(1.0, 1.0)]),
-            format!(
-                "disturbance.table.time[2] = 1 s must come after disturbance.table.time[1] = 1 s"
-            ),
+            "disturbance.table.time[2] = 1 s must come after disturbance.table.time[1] = 1 s",
         ),
         (
             refusal(1.0, [row(0.0, 1.0), row(1.0, 1.0)]),
-            format!(
-                "disturbance.table.time[2] = 1 s must come before disturbance.table.period = 1 s"
-            ),
+            "disturbance.table.time[2] = 1 s must come before disturbance.table.period = 1 s",
         ),
         (
             refusal(0.0, [row(0.0, 1.0), row(1.0, -1.5)]),
-            format!("disturbance.table.alpha[2] = -1.5 must lie between -1 and 1"),
+            "disturbance.table.alpha[2] = -1.5 must lie between -1 and 1",
         ),
         (
             refusal(0.0, [row(0.0, f64::NAN), row(1.0, 1.0)]),
-            format!("disturbance.table.alpha[1] = NaN must lie"),
+            "disturbance.table.alpha[1] = NaN must lie",
         ),
         (
             refusal(-1.0, [row(0.0, 1.0), row(1.0, 1.0)]),
-            format!("disturbance.table.period = -1 s must be 0"),
+            "disturbance.table.period = -1 s must be 0",
         ),
-        (
-            refusal(1e-4, [row(0.0, 1.0), row(1e-5, 1.0)]),
-            format!("disturbance.table.period = 0.0001 s"),
-        ),
+        (refusal(1e-4, [row(0.0, 1.0), row(1e-5, 1.0)]), "disturbance.table.period = 0.0001 s"),
         (
             refusal(f64::INFINITY, [row(0.0, 1.0), row(1.0, 1.0)]),
-            format!("disturbance.table.period = inf s"),
+            "disturbance.table.period = inf s",
         ),
     ] {
         let message = refusal.unwrap_err();
-        assert!(message.starts_with(&text), "{message}");
+        assert!(message.starts_with(text), "{message}");
     }
 }
 

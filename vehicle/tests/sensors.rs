@@ -48,7 +48,7 @@ fn run(sensors: &mut Sensors, count: u32, signal: impl Fn(f64) -> Readings) -> V
 #[test]
 fn the_embedded_data_can_be_used_and_ideal_sensors_have_no_errors() {
     let data = SensorData::embedded();
-    assert_eq!(data.ideal, [Triad::default(); 3]);
+    assert_eq!(data.ideal, PerSensor::default());
     data.surroundings.check().unwrap();
     let config = Config { triads: data.mems, line: data.line, seed: 1 };
     Sensors::new(&config, 0.0).unwrap();
@@ -71,7 +71,7 @@ fn oracle_the_bias_drifts_linearly_from_the_start() {
 fn published_data_sheet_values_of_the_mems_set() {
     // InvenSense DS-000189 1.3, sections 3.1 to 3.3
     let data = SensorData::embedded();
-    let [gyroscope, accelerometer, magnetometer] = data.mems;
+    let PerSensor([gyroscope, accelerometer, magnetometer]) = data.mems;
     let near = |value: f64, expected: f64| {
         assert!((value / expected - 1.0).abs() < 5e-3, "{value} {expected}");
     };
