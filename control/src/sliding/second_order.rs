@@ -137,8 +137,8 @@ mod tests {
         let law = SecondOrder { k2: [0.2, 0.5, 0.2], ..LAW };
         let text = law.check(0.01).unwrap_err().to_string();
         assert!(text.contains("(46)") && text.contains("axis 2"), "{text}");
-        let text = SecondOrder { m: 2.0, ..LAW }.check(0.01).unwrap_err().to_string();
-        assert!(text.contains("`reaching.m` = 2"), "{text}");
+        let text = settings::check(&SecondOrder { m: 2.0, ..LAW }).unwrap_err().to_string();
+        assert_eq!(text, "reaching.m = 2 must be above 2");
     }
 
     #[test]

@@ -93,7 +93,7 @@ fn a_disturbance_that_cannot_be_borne_is_refused_with_the_largest_that_can() {
     let DesignError::NoGuarantee { moment_left, disturbance: Some(largest), .. } = error else {
         panic!("{error}")
     };
-    assert!(moment_left < 0.0 && error.to_string().contains("`disturbance_bound`"), "{error}");
+    assert!(moment_left < 0.0 && error.to_string().contains("disturbance.bound"), "{error}");
     Design::new(&Settings { disturbance_bound: largest, ..settings }).unwrap();
     Design::new(&Settings { disturbance_bound: 1.01 * largest, ..settings }).unwrap_err();
     let accepted_share = Design::new(&Settings { guarantee: Guarantee::BestEffort, ..settings })
@@ -109,8 +109,8 @@ fn a_disturbance_that_cannot_be_borne_is_refused_with_the_largest_that_can() {
 fn errors_of_measurement_out_of_range_are_refused_by_name() {
     let base = settings();
     for (name, settings) in [
-        ("`angle_error`", Settings { angle_error: -1e-3, ..base }),
-        ("`rate_error`", Settings { rate_error: f64::NAN, ..base }),
+        ("estimation.angleError", Settings { angle_error: -1e-3, ..base }),
+        ("estimation.rateError", Settings { rate_error: f64::NAN, ..base }),
     ] {
         let text = Design::new(&settings).unwrap_err().to_string();
         assert!(text.contains(name), "{text}");

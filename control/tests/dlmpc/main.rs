@@ -100,16 +100,16 @@ fn settings_that_cannot_work_are_refused_by_name() {
     };
     let cases = [
         (Settings { horizon: 0, ..published }, "horizon"),
-        (Settings { limit_rate: f64::NAN, ..published }, "limit_rate"),
-        (Settings { limit_moment: 0.0, ..published }, "limit_moment"),
-        (Settings { period_feedback: 0.03, ..published }, "period_feedback"),
-        (Settings { q: [1.0, 0.0, 1.0], ..published }, "`q`[2]"),
-        (Settings { p: [1.0, 1.0, -1.0], ..published }, "`p`[3]"),
-        (sliding(|gains| gains.q = 50.0), "sliding_mode.q"),
-        (sliding(|gains| gains.p = -1.0), "sliding_mode.p"),
-        (sliding(|gains| gains.gamma = f64::NAN), "sliding_mode.gamma"),
-        (sliding(|gains| gains.rho = 0.0), "sliding_mode.rho"),
-        (sliding(|gains| gains.rho = 1.0), "sliding_mode.rho"),
+        (Settings { limit_rate: f64::NAN, ..published }, "limit.rate"),
+        (Settings { limit_moment: 0.0, ..published }, "limit.moment"),
+        (Settings { period_feedback: 0.03, ..published }, "period.feedback"),
+        (Settings { q: [1.0, 0.0, 1.0], ..published }, "weight.Q[2]"),
+        (Settings { p: [1.0, 1.0, -1.0], ..published }, "weight.P[3]"),
+        (sliding(|gains| gains.q = 50.0), "slidingMode.q"),
+        (sliding(|gains| gains.p = -1.0), "slidingMode.p"),
+        (sliding(|gains| gains.gamma = f64::NAN), "slidingMode.gamma"),
+        (sliding(|gains| gains.rho = 0.0), "slidingMode.rho"),
+        (sliding(|gains| gains.rho = 1.0), "slidingMode.rho"),
     ];
     for (settings, name) in cases {
         let refused: Option<DesignError> = Dlmpc::new(settings).err();

@@ -65,18 +65,18 @@ fn a_command_that_is_no_number_is_an_error() {
 fn a_delay_that_cannot_work_is_refused_by_name() {
     for moment_delay in [-0.1, 1.1, f64::NAN] {
         let text = Plant::new(&Config { moment_delay, ..config() }, 0.0).unwrap_err().to_string();
-        assert!(text.contains("moment_delay"), "{text}");
+        assert!(text.contains("actuation.delay"), "{text}");
     }
     let with_actuators = Config { moment_delay: 0.1, ..actuated(State::zeros(), JetMode::OnOff) };
     let text = Plant::new(&with_actuators, 0.0).unwrap_err().to_string();
-    assert!(text.contains("moment_delay") && text.contains("actuators"), "{text}");
+    assert!(text.contains("actuation.delay") && text.contains("actuators"), "{text}");
     let mut plant = Plant::new(&Config { moment_delay: 0.1, ..config() }, 0.0).unwrap();
     let profiles: [fn(f64) -> f64; 2] = [|t| t, |t| t * (t - 0.04)];
     for profile in profiles {
         let input = |time: f64| Vector3::new(0.0, 1e4 * profile(time), 0.0).into();
         let text =
             plant.advance_with(0.0, 0.04, &Command::default(), input).unwrap_err().to_string();
-        assert!(text.contains("moment_delay") && text.contains("derivatives"), "{text}");
+        assert!(text.contains("actuation.delay") && text.contains("derivatives"), "{text}");
     }
     let error = plant.advance(0.0, 0.04, Vector3::repeat(f64::NAN)).unwrap_err();
     assert!(matches!(error, Error::NotFinite { what: "moment", .. }), "{error}");
@@ -87,16 +87,16 @@ fn a_converter_that_cannot_work_is_refused_by_name() {
     for moment_resolution in [-1.0, f64::NAN] {
         let text =
             Plant::new(&Config { moment_resolution, ..config() }, 0.0).unwrap_err().to_string();
-        assert!(text.contains("moment_resolution"), "{text}");
+        assert!(text.contains("actuation.resolution"), "{text}");
     }
     let with_actuators =
         Config { moment_resolution: 1.0, ..actuated(State::zeros(), JetMode::OnOff) };
     let text = Plant::new(&with_actuators, 0.0).unwrap_err().to_string();
-    assert!(text.contains("moment_resolution") && text.contains("actuators"), "{text}");
+    assert!(text.contains("actuation.resolution") && text.contains("actuators"), "{text}");
     let mut plant = Plant::new(&Config { moment_resolution: 1.0, ..config() }, 0.0).unwrap();
     let ramp = |time: f64| Vector3::new(0.0, 1e4 * time, 0.0).into();
     let text = plant.advance_with(0.0, 0.04, &Command::default(), ramp).unwrap_err().to_string();
-    assert!(text.contains("moment_resolution") && text.contains("derivatives"), "{text}");
+    assert!(text.contains("actuation.resolution") && text.contains("derivatives"), "{text}");
     let error = plant.advance(0.0, 0.04, Vector3::repeat(f64::NAN)).unwrap_err();
     assert!(matches!(error, Error::NotFinite { what: "moment", .. }), "{error}");
 }
