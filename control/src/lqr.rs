@@ -13,7 +13,7 @@ use vehicle::dynamics::RigidBody;
 use vehicle::kinematics;
 
 /// Settings of the regulator. Units SI, angles rad.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Declared)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Declared)]
 pub struct LqrSettings {
     /// Model of the vehicle that the controller uses.
     #[setting(skip)]

@@ -105,7 +105,7 @@ pub trait Law: Default + Serialize + DeserializeOwned + Send + 'static {
     /// Sampled controller of the law.
     type Controller: Controller + Send;
     /// Settings of the law, which become parameters of the FMU.
-    type Settings: Declared + Clone + PartialEq + Serialize + DeserializeOwned + Send;
+    type Settings: Declared + Default + Clone + PartialEq + Serialize + DeserializeOwned + Send;
 
     /// Name of the FMU.
     const NAME: &'static str;
@@ -116,11 +116,16 @@ pub trait Law: Default + Serialize + DeserializeOwned + Send + 'static {
     /// Version of the FMU.
     const VERSION: &'static str = env!("CARGO_PKG_VERSION");
 
-    /// Returns the start values of the settings.
-    fn settings() -> Self::Settings;
+    /// Returns the start values of the settings, by default those that are declared.
+    fn settings() -> Self::Settings {
+        settings::start()
+    }
 
-    /// Returns the time between two evaluations of the law, s.
-    fn period(settings: &Self::Settings) -> f64;
+    /// Returns the time between two evaluations of the law, s. By default it is the 0.04 s of the
+    /// laws of Chai 2022.
+    fn period(_settings: &Self::Settings) -> f64 {
+        0.04
+    }
 
     /// Returns whether the law receives the moment of the actuators.
     fn uses_achieved_moment(_settings: &Self::Settings) -> bool {

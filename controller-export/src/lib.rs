@@ -5,18 +5,14 @@
 //! replace another without rewiring:
 //!
 //! ```
-//! use control::error::DesignError;
 //! use control::lqr::{Lqr, LqrSettings};
-//! use controller_export::{ControllerFmu, Law, Vehicle};
-//! use fmi2_export::describe;
-//! use serde::{Deserialize, Serialize};
-//! use settings::Declared;
+//! use controller_export::prelude::*;
 //!
 //! /// A regulator with one weight.
-//! #[derive(Clone, PartialEq, Serialize, Deserialize, Declared)]
+//! #[derive(Clone, Default, PartialEq, Serialize, Deserialize, Declared)]
 //! struct Weight {
 //!     /// Weight on the tracking error.
-//!     #[setting(above = 0.0)]
+//!     #[setting(above = 0.0, start = 10.0)]
 //!     weight: f64,
 //! }
 //!
@@ -30,14 +26,6 @@
 //!     const NAME: &'static str = "Soft";
 //!     const DESCRIPTION: &'static str = "Linear-quadratic regulator with one weight";
 //!
-//!     fn settings() -> Weight {
-//!         Weight { weight: 10.0 }
-//!     }
-//!
-//!     fn period(_settings: &Weight) -> f64 {
-//!         0.04
-//!     }
-//!
 //!     fn design(settings: Weight, vehicle: &Vehicle) -> Result<Lqr, DesignError> {
 //!         let p = [settings.weight; 6];
 //!         Lqr::new(LqrSettings { body: vehicle.body, p, q: [10.0; 3], period: 0.04 })
@@ -45,7 +33,7 @@
 //! }
 //!
 //! // In the crate of the FMU: fmi2_export::export_fmus!(ControllerFmu<Soft>);
-//! let description = describe::<ControllerFmu<Soft>>();
+//! let description = fmi2_export::describe::<ControllerFmu<Soft>>();
 //! assert!(description.variables.iter().any(|variable| variable.name == "moment.x"));
 //! ```
 //!
@@ -66,3 +54,14 @@ pub mod table;
 
 pub use law::{ControllerFmu, ControllerInstance, Law, Vehicle};
 pub use sampled::{SampledFmu, SampledInstance};
+
+/// What the crate of a law needs, besides dependencies on `serde` and `settings`.
+pub mod prelude {
+    pub use crate::{ControllerFmu, Law, Vehicle};
+    pub use control::controller::{Controller, Measurement, ReferenceAt};
+    pub use control::error::DesignError;
+    pub use nalgebra::Vector3;
+    pub use serde::{Deserialize, Serialize};
+    pub use settings::{Choice, Declared};
+    pub use vehicle::dynamics::RigidBody;
+}

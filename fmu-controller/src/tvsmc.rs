@@ -29,7 +29,9 @@ pub trait Variant: Sized + Send + Sync + 'static {
 }
 
 /// Settings of a variant, with or without an observer.
-pub trait Complete<R>: Declared + Clone + PartialEq + Serialize + DeserializeOwned + Send {
+pub trait Complete<R>:
+    Declared + Default + Clone + PartialEq + Serialize + DeserializeOwned + Send
+{
     /// Returns the settings without the observer.
     fn law(&self) -> &Settings<R>;
 
@@ -39,7 +41,7 @@ pub trait Complete<R>: Declared + Clone + PartialEq + Serialize + DeserializeOwn
 
 impl<R> Complete<R> for Settings<R>
 where
-    R: Declared + Copy + PartialEq + Serialize + DeserializeOwned + Send,
+    R: Declared + Default + Copy + PartialEq + Serialize + DeserializeOwned + Send,
 {
     fn law(&self) -> &Self {
         self
@@ -51,7 +53,7 @@ where
 }
 
 /// Settings of a variant with a disturbance observer.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Declared)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Declared)]
 pub struct Observing<R> {
     /// Settings without the observer.
     #[setting(name = "")]
@@ -68,7 +70,7 @@ impl<R: Default> From<Settings<R>> for Observing<R> {
 
 impl<R> Complete<R> for Observing<R>
 where
-    R: Declared + Copy + PartialEq + Serialize + DeserializeOwned + Send,
+    R: Declared + Default + Copy + PartialEq + Serialize + DeserializeOwned + Send,
 {
     fn law(&self) -> &Settings<R> {
         &self.law

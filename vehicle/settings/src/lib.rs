@@ -44,6 +44,7 @@
 //! | `rate` | the unit is that of the rate of what has the unit of the field that holds the structure |
 //! | `min`, `max`, `above`, `below` | ends of the range; the last two are not allowed themselves |
 //! | `nominal` | typical magnitude |
+//! | `start` | value at the start, where no file has it, for [`start`] |
 //! | `each` | for arrays and vectors: a constant with the ending of each name, and what the entry is for |
 //! | `part` | the sentence continues that of the field that holds the structure |
 //! | `text` | sentence for users, where it has to differ from the documentation comment |
@@ -78,6 +79,21 @@ pub fn settings<S: Declared>() -> Vec<Setting<S>> {
     let mut list = Vec::new();
     S::declare(&Place::default(), Path::new(|settings: &mut S| settings), &mut list);
     list
+}
+
+/// Returns the default value of a type with the declared start values.
+pub fn start<S: Declared + Default>() -> S {
+    let mut value = S::default();
+    for setting in settings::<S>() {
+        match (&setting.access, setting.place.start) {
+            (Access::Real(path), Some(start)) => *path.field(&mut value) = start,
+            (Access::Integer(integer, _), Some(start)) => {
+                (integer.set)(&mut value, start as i64);
+            }
+            _ => {}
+        }
+    }
+    value
 }
 
 impl Declared for f64 {

@@ -27,6 +27,8 @@ pub struct About {
     pub below: Option<f64>,
     /// Typical magnitude.
     pub nominal: Option<f64>,
+    /// Value at the start, if no file has it.
+    pub start: Option<f64>,
 }
 
 /// The place of a value among the settings.
@@ -48,6 +50,8 @@ pub struct Place {
     pub below: Option<f64>,
     /// Typical magnitude.
     pub nominal: Option<f64>,
+    /// Value at the start, if no file has it.
+    pub start: Option<f64>,
     each: &'static [(&'static str, &'static str)],
 }
 
@@ -74,6 +78,7 @@ impl Place {
             above: about.above.or(self.above),
             below: about.below.or(self.below),
             nominal: about.nominal.or(self.nominal),
+            start: about.start.or(self.start),
             each: if about.each.is_empty() { self.each } else { about.each },
         }
     }

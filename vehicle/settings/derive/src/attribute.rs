@@ -22,6 +22,7 @@ pub(crate) struct Keys {
     above: Option<Expr>,
     below: Option<Expr>,
     nominal: Option<Expr>,
+    start: Option<Expr>,
     each: Option<Expr>,
 }
 
@@ -44,6 +45,7 @@ impl Keys {
                     "above" => keys.above = Some(meta.value()?.parse()?),
                     "below" => keys.below = Some(meta.value()?.parse()?),
                     "nominal" => keys.nominal = Some(meta.value()?.parse()?),
+                    "start" => keys.start = Some(meta.value()?.parse()?),
                     "each" => keys.each = Some(meta.value()?.parse()?),
                     _ => return Err(meta.error("no key of #[setting(…)]")),
                 }
@@ -66,8 +68,9 @@ impl Keys {
             Some(value) => quote!(::core::option::Option::Some((#value) as f64)),
             None => quote!(::core::option::Option::None),
         };
-        let [min, max, above, below, nominal] =
-            [&self.min, &self.max, &self.above, &self.below, &self.nominal].map(number);
+        let [min, max, above, below, nominal, start] =
+            [&self.min, &self.max, &self.above, &self.below, &self.nominal, &self.start]
+                .map(number);
         let unit = self.unit.iter();
         let (part, rate, each) = (self.part, self.rate, self.each.iter());
         quote! {
@@ -83,6 +86,7 @@ impl Keys {
                 above: #above,
                 below: #below,
                 nominal: #nominal,
+                start: #start,
                 ..::settings::About::default()
             }
         }
