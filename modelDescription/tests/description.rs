@@ -348,3 +348,25 @@ fn files_that_are_no_library_of_fmus_are_refused() {
     let missing = pack(&fmu(), &[nothing], folder.path(), &Extras::default()).unwrap_err();
     assert!(missing.to_string().contains("nothing"));
 }
+
+#[test]
+fn units_have_the_dimensions_of_their_symbols() {
+    for (name, [kg, m, s, ampere, rad]) in [
+        ("rad/s2", [0, 0, -2, 0, 1]),
+        ("N.m", [1, 2, -2, 0, 0]),
+        ("N.m/rad", [1, 2, -2, 0, -1]),
+        ("kg.m2", [1, 2, 0, 0, 0]),
+        ("Pa", [1, -1, -2, 0, 0]),
+        ("1/s", [0, 0, -1, 0, 0]),
+        ("T/s", [1, 0, -3, -1, 0]),
+        ("Hz", [0, 0, -1, 0, 0]),
+    ] {
+        let unit = Unit::new(name);
+        assert!(unit.is_known(), "{name}");
+        let dimension = [unit.kg, unit.m, unit.s, unit.ampere, unit.rad];
+        assert_eq!(dimension, [kg, m, s, ampere, rad], "{name}");
+    }
+    for name in ["furlong", "rad/", "m^2", ""] {
+        assert!(!Unit::new(name).is_known(), "{name}");
+    }
+}
