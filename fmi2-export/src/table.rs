@@ -10,9 +10,12 @@ use model_description::unit::Unit;
 use model_description::variable::{
     Causality, EnumerationType, Variability, Variable, VariableKind,
 };
-use settings::{Choice, Declared, Path, Place, Setting};
+use settings::{Choice, Declared, Field, Numbered, Setting};
+use std::sync::Arc;
 
 type Lens<M, T> = Box<dyn Fn(&mut M) -> &mut T + Send + Sync>;
+/// A part of the model with declared settings.
+type Part<M> = Arc<dyn Fn(&mut M) -> &mut (dyn Declared + 'static) + Send + Sync>;
 type Setter<M, T> = Box<dyn Fn(&mut M, T) + Send + Sync>;
 
 /// Access to the field that holds a variable's value.
@@ -31,29 +34,39 @@ pub(crate) struct Integer<M> {
     pub(crate) set: Setter<M, i32>,
 }
 
-impl<M: 'static> Integer<M> {
-    /// Makes the access of a setting, whose values FMI numbers from `first` on where these number
-    /// them from 0.
-    fn new(setting: settings::Integer<M>, first: i32) -> Self {
-        let settings::Integer { get, set } = setting;
-        Self {
-            get: Box::new(move |model| {
-                i32::try_from(get(model)).map_or(i32::MAX, |value| value.saturating_add(first))
-            }),
-            set: Box::new(move |model, value| {
-                set(model, i64::from(value) - i64::from(first));
-            }),
+/// Says why a setting has no field, which cannot happen: its declaration and its field have the
+/// same source.
+const NO_FIELD: &str = "a setting has a field of its declared type";
+
+/// Returns access to a setting with numbered values, which FMI numbers from `first` on where the
+/// setting numbers them from 0. A value without a number is 0 or less.
+fn numbered<M: 'static>(part: Part<M>, index: usize, first: i32) -> Access<M> {
+    let other = Arc::clone(&part);
+    let get = move |model: &mut M| match part(model).field(index) {
+        Ok(Field::Integer(field) | Field::Choice(field)) => fmi_number(field, first),
+        _ => unreachable!("{NO_FIELD}"),
+    };
+    let set = move |model: &mut M, value: i32| match other(model).field(index) {
+        Ok(Field::Integer(field) | Field::Choice(field)) => {
+            field.set_number(i64::from(value) - i64::from(first));
         }
-    }
+        _ => unreachable!("{NO_FIELD}"),
+    };
+    Access::Integer(Integer { get: Box::new(get), set: Box::new(set) })
 }
 
-fn described(items: &settings::Items) -> EnumerationType {
+fn fmi_number(value: &dyn Numbered, first: i32) -> i32 {
+    i32::try_from(value.number()).map_or(i32::MAX, |number| number.saturating_add(first))
+}
+
+fn described(items: &settings::Items) -> VariableKind {
     let listed = items.items.iter().map(|(name, text)| ((*name).into(), (*text).into()));
-    EnumerationType {
+    let enumeration_type = EnumerationType {
         name: items.name.into(),
         description: items.text.into(),
         items: listed.collect(),
-    }
+    };
+    VariableKind::Enumeration { enumeration_type, start: None }
 }
 
 /// A declared variable together with its field.
@@ -166,52 +179,55 @@ impl<M: 'static> VariableTable<M> {
 
     /// Adds the declared settings of a part of the model as parameters.
     #[must_use]
-    pub fn settings<S: Declared>(
+    pub fn settings<S: Declared + 'static>(
         mut self,
         part: impl Fn(&mut M) -> &mut S + Send + Sync + 'static,
     ) -> Self {
-        let mut list = Vec::new();
-        S::declare(&Place::default(), Path::new(part), &mut list);
-        for setting in list {
-            self.push_setting(setting);
+        let part: Part<M> = Arc::new(move |model| part(model));
+        for (index, setting) in settings::settings::<S>().into_iter().enumerate() {
+            self.push_setting(setting, index, Arc::clone(&part));
         }
         self
     }
 
     #[inline(never)]
-    fn push_setting(&mut self, Setting { place, access }: Setting<M>) {
+    fn push_setting(&mut self, Setting { place, kind }: Setting, index: usize, part: Part<M>) {
         let common = parameter(&place.name, &place.text);
         let (min, max) = (place.min.or(place.above), place.max.or(place.below));
-        match access {
-            settings::Access::Real(path) => {
-                let declaration = Real { min, max, nominal: place.nominal, ..common.real() };
-                let declaration = declaration.unit(&place.unit);
-                self.push_real(declaration, Box::new(move |model| path.field(model)));
+        match kind {
+            settings::Kind::Real => {
+                let real = Real { min, max, nominal: place.nominal, ..common.real() };
+                let field: Lens<M, f64> = Box::new(move |model| match part(model).field(index) {
+                    Ok(Field::Real(field)) => field,
+                    _ => unreachable!("{NO_FIELD}"),
+                });
+                self.push_real(real.unit(&place.unit), field);
             }
-            settings::Access::Integer(integer, is_signed) => {
+            settings::Kind::Integer(is_signed) => {
                 let min = min.or((!is_signed).then_some(0.0)).map(|min| min as i32);
-                let kind =
-                    VariableKind::Integer { min, max: max.map(|max| max as i32), start: None };
-                self.push(common, kind, Access::Integer(Integer::new(integer, 0)));
+                let max = max.map(|max| max as i32);
+                let kind = VariableKind::Integer { min, max, start: None };
+                self.push(common, kind, numbered(part, index, 0));
             }
-            settings::Access::Boolean(path) => {
-                self.push(
-                    common,
-                    VariableKind::Boolean { start: None },
-                    Access::Boolean(Box::new(move |model| path.field(model))),
-                );
+            settings::Kind::Boolean => {
+                let field: Lens<M, bool> = Box::new(move |model| match part(model).field(index) {
+                    Ok(Field::Boolean(field)) => field,
+                    _ => unreachable!("{NO_FIELD}"),
+                });
+                let kind = VariableKind::Boolean { start: None };
+                self.push(common, kind, Access::Boolean(field));
             }
-            settings::Access::Choice(integer, items) => {
-                let kind =
-                    VariableKind::Enumeration { enumeration_type: described(&items), start: None };
-                self.push(common, kind, Access::Integer(Integer::new(integer, 1)));
+            settings::Kind::Choice(items) => {
+                self.push(common, described(&items), numbered(part, index, 1));
             }
-            settings::Access::Text(path) => {
-                self.push(
-                    common,
-                    VariableKind::String { start: None },
-                    Access::String(Box::new(move |model| path.field(model))),
-                );
+            settings::Kind::Text => {
+                let field: Lens<M, String> =
+                    Box::new(move |model| match part(model).field(index) {
+                        Ok(Field::Text(field)) => field,
+                        _ => unreachable!("{NO_FIELD}"),
+                    });
+                let kind = VariableKind::String { start: None };
+                self.push(common, kind, Access::String(field));
             }
         }
     }
@@ -223,12 +239,15 @@ impl<M: 'static> VariableTable<M> {
         common: Common,
         field: impl Fn(&mut M) -> &mut T + Send + Sync + 'static,
     ) -> Self {
-        let setting = Setting::choice(&Place::default(), Path::new(field));
-        if let settings::Access::Choice(integer, items) = setting.access {
-            let kind =
-                VariableKind::Enumeration { enumeration_type: described(&items), start: None };
-            self.push(common, kind, Access::Integer(Integer::new(integer, 1)));
-        }
+        let field = Arc::new(field);
+        let other = Arc::clone(&field);
+        let access = Integer {
+            get: Box::new(move |model| fmi_number(field(model), 1)),
+            set: Box::new(move |model, value| {
+                other(model).set_number(i64::from(value) - 1);
+            }),
+        };
+        self.push(common, described(&T::items()), Access::Integer(access));
         self
     }
 

@@ -99,7 +99,7 @@ impl<M: 'static> Variables<M> {
     }
 
     /// Adds the declared settings of a part of the model, which have no role.
-    pub(crate) fn settings<S: Declared>(
+    pub(crate) fn settings<S: Declared + 'static>(
         self,
         part: impl Fn(&mut M) -> &mut S + Send + Sync + 'static,
     ) -> Self {

@@ -13,13 +13,13 @@ use settings::Declared;
 #[allow(non_snake_case)]
 pub struct Inertia {
     /// Moment about the roll axis.
-    #[setting(name = "Ixx", part, unit = "kg.m2", above = 0.0, nominal = 1e6)]
+    #[setting(name = "Ixx", part, unit = "kg.m2", min = 1.0, nominal = 1e6)]
     pub Ixx: f64,
     /// Moment about the pitch axis.
-    #[setting(name = "Iyy", part, unit = "kg.m2", above = 0.0, nominal = 1e6)]
+    #[setting(name = "Iyy", part, unit = "kg.m2", min = 1.0, nominal = 1e6)]
     pub Iyy: f64,
     /// Moment about the yaw axis.
-    #[setting(name = "Izz", part, unit = "kg.m2", above = 0.0, nominal = 1e6)]
+    #[setting(name = "Izz", part, unit = "kg.m2", min = 1.0, nominal = 1e6)]
     pub Izz: f64,
     /// Product of the roll and yaw axes; the inertia tensor contains -Ixz.
     #[setting(name = "Ixz", part, unit = "kg.m2", nominal = 1e6)]

@@ -12,7 +12,7 @@ use crate::time::{check_resolution, tick, tick_time, tick_tolerance};
 use crate::triad::{Memory, Triad, Window};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
-use settings::{About, Declared, Path, Place, Setting};
+use settings::{About, Declared, Field, Place, Setting};
 use std::ops::{Deref, DerefMut};
 
 /// Largest number of samples that may be on their way at a time.
@@ -50,11 +50,15 @@ impl<T> DerefMut for PerSensor<T> {
 }
 
 impl<T: Declared> Declared for PerSensor<T> {
-    fn declare<S: 'static>(place: &Place, path: Path<S, Self>, list: &mut Vec<Setting<S>>) {
-        for (i, (name, text, unit, nominal)) in SENSORS.into_iter().enumerate() {
+    fn declare(place: &Place, list: &mut Vec<Setting>) {
+        for (name, text, unit, nominal) in SENSORS {
             let about = About { name, text, unit, nominal: Some(nominal), ..About::default() };
-            T::declare(&place.at(&about), path.to(move |each: &mut Self| &mut each.0[i]), list);
+            T::declare(&place.at(&about), list);
         }
+    }
+
+    fn field(&mut self, index: usize) -> Result<Field<'_>, usize> {
+        self.0.field(index)
     }
 }
 

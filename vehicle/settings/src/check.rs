@@ -1,7 +1,6 @@
 //! Range checks.
 
-use crate::access::Access;
-use crate::{Declared, settings};
+use crate::{Declared, Field, Setting, settings};
 
 /// A setting with a value that is not allowed.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -21,14 +20,14 @@ pub struct Invalid {
 /// Returns the first setting that is not.
 pub fn check<S: Declared + Clone>(value: &S) -> Result<(), Invalid> {
     let mut value = value.clone();
-    for setting in settings::<S>() {
-        let number = match &setting.access {
-            Access::Real(path) => *path.field(&mut value),
-            Access::Integer(integer, _) => (integer.get)(&mut value) as f64,
-            Access::Boolean(_) | Access::Choice(..) | Access::Text(_) => continue,
+    for (index, Setting { place, .. }) in settings::<S>().into_iter().enumerate() {
+        let number = match value.field(index) {
+            Ok(Field::Real(field)) => *field,
+            Ok(Field::Integer(field)) => field.number() as f64,
+            _ => continue,
         };
-        if let Some(problem) = setting.place.problem(number) {
-            return Err(Invalid { name: setting.place.name, value: number, problem });
+        if let Some(problem) = place.problem(number) {
+            return Err(Invalid { name: place.name, value: number, problem });
         }
     }
     Ok(())

@@ -1,5 +1,7 @@
 //! Enumerations whose variants are the values of a setting.
 
+use crate::{Kind, Place, Setting};
+
 /// An enumeration without fields. Derived, its names are those of the variants in camel case, and
 /// the sentences are the documentation comments.
 pub trait Choice: Copy + PartialEq + Send + Sync + 'static {
@@ -14,6 +16,15 @@ pub trait Choice: Copy + PartialEq + Send + Sync + 'static {
     fn items() -> Items {
         let items = Self::ITEMS.iter().map(|(_, name, text)| (*name, *text)).collect();
         Items { name: Self::NAME, text: Self::TEXT, items }
+    }
+
+    /// Returns the setting at a place. Without a sentence it has that of the enumeration.
+    fn setting(place: &Place) -> Setting {
+        let mut place = place.clone();
+        if place.text.is_empty() {
+            place.text = Self::TEXT.to_owned();
+        }
+        Setting { place, kind: Kind::Choice(Self::items()) }
     }
 }
 

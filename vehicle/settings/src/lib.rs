@@ -58,7 +58,7 @@ mod choice;
 mod place;
 mod read;
 
-pub use access::{Access, Integer, Path, Setting};
+pub use access::{Field, Numbered};
 pub use check::{Invalid, check, names};
 pub use choice::{Choice, Items};
 pub use place::{About, Place};
@@ -68,27 +68,59 @@ pub use settings_derive::{Choice, Declared};
 use nalgebra::{Matrix3, Vector3};
 
 /// A value whose settings are declared. Structures and enumerations derive it.
-pub trait Declared: Sized + 'static {
-    /// Adds the settings of this value to the list. `place` is where the value lies among the
-    /// settings of `S`, and `path` leads to it.
-    fn declare<S: 'static>(place: &Place, path: Path<S, Self>, list: &mut Vec<Setting<S>>);
+pub trait Declared {
+    /// Adds the settings of a value of this type, which lies at `place`, in the order of its fields.
+    fn declare(place: &Place, list: &mut Vec<Setting>)
+    where
+        Self: Sized;
+
+    /// Returns the field of the setting with this index, or the index less the number of settings
+    /// if there are not so many.
+    ///
+    /// # Errors
+    /// Returns that difference.
+    fn field(&mut self, index: usize) -> Result<Field<'_>, usize>;
+}
+
+/// A setting: what its user has to know.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Setting {
+    /// Name, and everything else that is declared.
+    pub place: Place,
+    /// Type of its values.
+    pub kind: Kind,
+}
+
+/// Type of a setting's values.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Kind {
+    /// Numbers.
+    Real,
+    /// Integers, and whether there are negative ones.
+    Integer(bool),
+    /// Truth values.
+    Boolean,
+    /// Items of an enumeration.
+    Choice(Items),
+    /// Texts.
+    Text,
 }
 
 /// Returns the settings of a type, in the order of its fields.
-pub fn settings<S: Declared>() -> Vec<Setting<S>> {
+pub fn settings<S: Declared>() -> Vec<Setting> {
     let mut list = Vec::new();
-    S::declare(&Place::default(), Path::new(|settings: &mut S| settings), &mut list);
+    S::declare(&Place::default(), &mut list);
     list
 }
 
 /// Returns the default value of a type with the declared start values.
 pub fn start<S: Declared + Default>() -> S {
     let mut value = S::default();
-    for setting in settings::<S>() {
-        match (&setting.access, setting.place.start) {
-            (Access::Real(path), Some(start)) => *path.field(&mut value) = start,
-            (Access::Integer(integer, _), Some(start)) => {
-                (integer.set)(&mut value, start as i64);
+    for (index, setting) in settings::<S>().into_iter().enumerate() {
+        match (value.field(index), setting.place.start) {
+            (Ok(Field::Real(field)), Some(start)) => *field = start,
+            (Ok(Field::Integer(field)), Some(start)) => {
+                field.set_number(start as i64);
             }
             _ => {}
         }
@@ -96,60 +128,65 @@ pub fn start<S: Declared + Default>() -> S {
     value
 }
 
-impl Declared for f64 {
-    fn declare<S: 'static>(place: &Place, path: Path<S, Self>, list: &mut Vec<Setting<S>>) {
-        list.push(Setting::new(place, Access::Real(path)));
-    }
-}
+macro_rules! declared {
+    ($($type:ty: $field:ident, $kind:expr;)*) => {$(
+        impl Declared for $type {
+            fn declare(place: &Place, list: &mut Vec<Setting>) {
+                list.push(Setting { place: place.clone(), kind: $kind });
+            }
 
-impl Declared for bool {
-    fn declare<S: 'static>(place: &Place, path: Path<S, Self>, list: &mut Vec<Setting<S>>) {
-        list.push(Setting::new(place, Access::Boolean(path)));
-    }
-}
-
-impl Declared for String {
-    fn declare<S: 'static>(place: &Place, path: Path<S, Self>, list: &mut Vec<Setting<S>>) {
-        list.push(Setting::new(place, Access::Text(path)));
-    }
-}
-
-macro_rules! declared_integer {
-    ($($kind:ty),*) => {$(
-        impl Declared for $kind {
-            fn declare<S: 'static>(
-                place: &Place,
-                path: Path<S, Self>,
-                list: &mut Vec<Setting<S>>,
-            ) {
-                list.push(Setting::integer(place, path));
+            fn field(&mut self, index: usize) -> Result<Field<'_>, usize> {
+                index.checked_sub(1).map_or(Ok(Field::$field(self)), Err)
             }
         }
     )*};
 }
-declared_integer!(i32, u32, u64, usize);
+declared! {
+    f64: Real, Kind::Real;
+    bool: Boolean, Kind::Boolean;
+    String: Text, Kind::Text;
+    i32: Integer, Kind::Integer(true);
+    u32: Integer, Kind::Integer(false);
+    u64: Integer, Kind::Integer(false);
+    usize: Integer, Kind::Integer(false);
+}
 
 impl<T: Declared, const N: usize> Declared for [T; N] {
-    fn declare<S: 'static>(place: &Place, path: Path<S, Self>, list: &mut Vec<Setting<S>>) {
+    fn declare(place: &Place, list: &mut Vec<Setting>) {
         for i in 0..N {
-            T::declare(&place.entry(i), path.to(move |array: &mut Self| &mut array[i]), list);
+            T::declare(&place.entry(i), list);
         }
+    }
+
+    fn field(&mut self, mut index: usize) -> Result<Field<'_>, usize> {
+        for entry in self {
+            match entry.field(index) {
+                Ok(field) => return Ok(field),
+                Err(rest) => index = rest,
+            }
+        }
+        Err(index)
     }
 }
 
 impl Declared for Vector3<f64> {
-    fn declare<S: 'static>(place: &Place, path: Path<S, Self>, list: &mut Vec<Setting<S>>) {
-        for i in 0..3 {
-            f64::declare(&place.entry(i), path.to(move |vector: &mut Self| &mut vector[i]), list);
-        }
+    fn declare(place: &Place, list: &mut Vec<Setting>) {
+        <[f64; 3]>::declare(place, list);
+    }
+
+    fn field(&mut self, index: usize) -> Result<Field<'_>, usize> {
+        self.get_mut(index).map(Field::Real).ok_or(index.wrapping_sub(3))
     }
 }
 
 impl Declared for Matrix3<f64> {
-    fn declare<S: 'static>(place: &Place, path: Path<S, Self>, list: &mut Vec<Setting<S>>) {
+    fn declare(place: &Place, list: &mut Vec<Setting>) {
         for (row, column) in (0..3).flat_map(|row| (0..3).map(move |column| (row, column))) {
-            let entry = path.to(move |matrix: &mut Self| &mut matrix[(row, column)]);
-            f64::declare(&place.cell(row, column), entry, list);
+            f64::declare(&place.cell(row, column), list);
         }
+    }
+
+    fn field(&mut self, index: usize) -> Result<Field<'_>, usize> {
+        self.get_mut((index / 3, index % 3)).map(Field::Real).ok_or(index.wrapping_sub(9))
     }
 }

@@ -127,5 +127,9 @@ impl Place {
 
 /// Returns the unit of the rate of a quantity with this unit.
 fn rate(unit: &str) -> String {
-    unit.strip_suffix("/s").map_or_else(|| format!("{unit}/s"), |unit| format!("{unit}/s2"))
+    match unit.rsplit_once("/s") {
+        Some((quantity, "")) => format!("{quantity}/s2"),
+        Some((quantity, "2")) => format!("{quantity}/s3"),
+        _ => format!("{unit}/s"),
+    }
 }

@@ -1,7 +1,6 @@
 //! Values from files.
 
-use crate::access::{Access, Setting};
-use crate::{Declared, settings};
+use crate::{Declared, Field, Kind, Setting, settings};
 use toml::{Table, Value};
 
 /// A value of a file that cannot be that of a setting.
@@ -56,43 +55,42 @@ fn flatten(structure: &str, table: &Table, entries: &mut Vec<(String, Value)>) {
     }
 }
 
-fn set<S>(settings: &mut S, list: &[Setting<S>], name: &str, entry: &Value) -> Result<(), String>
-where
-    S: 'static,
-{
-    let setting = list.iter().find(|setting| setting.place.name == name);
-    let Some(Setting { place, access }) = setting else {
-        return Err("there is no such setting".into());
-    };
-    let not = |kind: &str| format!("{entry} is not {kind}");
-    match (access, entry) {
-        (Access::Real(path), Value::String(text)) => {
-            *path.field(settings) = quantity(text, &place.unit)?
+fn set<S: Declared>(
+    value: &mut S,
+    list: &[Setting],
+    name: &str,
+    entry: &Value,
+) -> Result<(), String> {
+    let index = list.iter().position(|setting| setting.place.name == name);
+    let index = index.ok_or("there is no such setting")?;
+    let field = value.field(index).map_err(|_| "its field cannot be reached")?;
+    let not = |kind: &str| Err(format!("{entry} is not {kind}"));
+    match (field, entry) {
+        (Field::Real(field), Value::String(text)) => {
+            *field = quantity(text, &list[index].place.unit)?;
         }
-        (Access::Real(path), Value::Integer(number)) => *path.field(settings) = *number as f64,
-        (Access::Real(path), Value::Float(number)) => *path.field(settings) = *number,
-        (Access::Real(_), _) => return Err(not("a number")),
-        (Access::Integer(integer, _), Value::Integer(number)) => {
-            if !(integer.set)(settings, *number) {
-                return Err(not("a number that it can hold"));
+        (Field::Real(field), Value::Integer(number)) => *field = *number as f64,
+        (Field::Real(field), Value::Float(number)) => *field = *number,
+        (Field::Real(_), _) => return not("a number"),
+        (Field::Integer(field), Value::Integer(number)) => {
+            if !field.set_number(*number) {
+                return not("a number that it can hold");
             }
         }
-        (Access::Integer(..), _) => return Err(not("an integer")),
-        (Access::Boolean(path), Value::Boolean(value)) => *path.field(settings) = *value,
-        (Access::Boolean(_), _) => return Err(not("true or false")),
-        (Access::Choice(integer, items), Value::String(text)) => {
+        (Field::Integer(_), _) => return not("an integer"),
+        (Field::Boolean(field), Value::Boolean(value)) => *field = *value,
+        (Field::Boolean(_), _) => return not("true or false"),
+        (Field::Choice(field), Value::String(text)) => {
+            let Kind::Choice(items) = &list[index].kind else { return not("a choice") };
             let number = items.items.iter().position(|item| item.0 == text);
             let number = number.and_then(|number| i64::try_from(number).ok());
-            if !number.is_some_and(|number| (integer.set)(settings, number)) {
+            if !number.is_some_and(|number| field.set_number(number)) {
                 let names: Vec<&str> = items.items.iter().map(|item| item.0).collect();
-                return Err(not(&format!("one of {}", names.join(", "))));
+                return not(&format!("one of {}", names.join(", ")));
             }
         }
-        (Access::Choice(..) | Access::Text(_), entry) if !entry.is_str() => {
-            return Err(not("a text"));
-        }
-        (Access::Text(path), Value::String(text)) => path.field(settings).clone_from(text),
-        (Access::Choice(..) | Access::Text(_), _) => {}
+        (Field::Text(field), Value::String(text)) => field.clone_from(text),
+        (Field::Choice(_) | Field::Text(_), _) => return not("a text"),
     }
     Ok(())
 }

@@ -1,7 +1,7 @@
 //! Declarations of nested structures, arrays and choices.
 
 use nalgebra::{Matrix3, Vector3};
-use settings::{Access, Choice, Declared, change, check, names, read, settings, start};
+use settings::{Choice, Declared, Kind, change, check, names, read, settings, start};
 use toml::{Table, Value};
 
 const AXES: [(&str, &str); 3] = [(".x", "roll axis"), (".y", "pitch axis"), (".z", "yaw axis")];
@@ -86,7 +86,7 @@ fn names_texts_and_units_follow_from_the_fields() {
     assert_eq!(shown[12], ("matrix[1,1]", "Matrix of the sensor (row 1, column 1)", ""));
     let last = ["weight.P[1]", "weight.P[2]", "file", "isOn"];
     assert_eq!(names::<Law>()[21..], last);
-    let Access::Choice(_, items) = &list[0].access else { panic!("a choice") };
+    let Kind::Choice(items) = &list[0].kind else { panic!("a choice") };
     assert_eq!(items.items, [("off", "no action"), ("full", "R is used as it is")]);
 }
 

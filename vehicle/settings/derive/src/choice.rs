@@ -34,12 +34,23 @@ pub(crate) fn expand(input: &DeriveInput) -> Result<TokenStream> {
 
         #[automatically_derived]
         impl ::settings::Declared for #ident {
-            fn declare<S: 'static>(
+            fn declare(
                 place: &::settings::Place,
-                path: ::settings::Path<S, Self>,
-                list: &mut ::std::vec::Vec<::settings::Setting<S>>,
+                list: &mut ::std::vec::Vec<::settings::Setting>,
             ) {
-                list.push(::settings::Setting::choice(place, path));
+                list.push(<Self as ::settings::Choice>::setting(place));
+            }
+
+            fn field(
+                &mut self,
+                index: usize,
+            ) -> ::core::result::Result<::settings::Field<'_>, usize> {
+                match index.checked_sub(1) {
+                    ::core::option::Option::None => {
+                        ::core::result::Result::Ok(::settings::Field::Choice(self))
+                    }
+                    ::core::option::Option::Some(rest) => ::core::result::Result::Err(rest),
+                }
             }
         }
     })

@@ -14,7 +14,7 @@ pub(crate) fn expand(input: &DeriveInput) -> Result<TokenStream> {
         let ident = &parameter.ident;
         generics.make_where_clause().predicates.push(parse_quote!(#ident: ::settings::Declared));
     }
-    let mut fields = Vec::new();
+    let (mut declarations, mut fields) = (Vec::new(), Vec::new());
     for field in &data.fields {
         let Some(ident) = &field.ident else {
             return Err(Error::new_spanned(field, "the fields of settings have names"));
@@ -25,12 +25,16 @@ pub(crate) fn expand(input: &DeriveInput) -> Result<TokenStream> {
         }
         let about = keys.about(&ident.to_string(), &field.attrs);
         let kind = &field.ty;
+        declarations.push(quote! {
+            <#kind as ::settings::Declared>::declare(&place.at(&#about), list);
+        });
         fields.push(quote! {
-            <#kind as ::settings::Declared>::declare(
-                &place.at(&#about),
-                path.to(|settings: &mut Self| &mut settings.#ident),
-                list,
-            );
+            let index = match ::settings::Declared::field(&mut self.#ident, index) {
+                ::core::result::Result::Ok(field) => {
+                    return ::core::result::Result::Ok(field);
+                }
+                ::core::result::Result::Err(rest) => rest,
+            };
         });
     }
     let name = &input.ident;
@@ -38,12 +42,19 @@ pub(crate) fn expand(input: &DeriveInput) -> Result<TokenStream> {
     Ok(quote! {
         #[automatically_derived]
         impl #parameters ::settings::Declared for #name #arguments #conditions {
-            fn declare<S: 'static>(
+            fn declare(
                 place: &::settings::Place,
-                path: ::settings::Path<S, Self>,
-                list: &mut ::std::vec::Vec<::settings::Setting<S>>,
+                list: &mut ::std::vec::Vec<::settings::Setting>,
             ) {
+                #(#declarations)*
+            }
+
+            fn field(
+                &mut self,
+                index: usize,
+            ) -> ::core::result::Result<::settings::Field<'_>, usize> {
                 #(#fields)*
+                ::core::result::Result::Err(index)
             }
         }
     })
