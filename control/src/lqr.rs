@@ -39,7 +39,7 @@ pub struct LqrSettings {
 ///
 /// // P and Q of the comparison are those of CRMPC.
 /// let Settings { body, p, q, period_feedback: period, .. } = Settings::new(Constraints::Robust);
-/// let mut law = Lqr::new(LqrSettings { body, p, q, period })?;
+/// let mut law = Lqr::new(LqrSettings { body, period, p, q })?;
 /// let summary = fly(&mut law, &mut (), period, &Scenario::crmpc2022(), |_| ())?;
 /// assert!(summary.error_rms.to_degrees() < 3.0);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
@@ -120,7 +120,7 @@ mod tests {
         // Under the commanded moment Θ̈ = Θ̈_r + k₁ e + k₂ ė, also where the reference moves.
         let Settings { body, p, q, period_feedback: period, .. } =
             Settings::new(Constraints::Paper);
-        let settings = LqrSettings { body, p, q, period };
+        let settings = LqrSettings { body, period, p, q };
         let mut law = Lqr::new(settings).unwrap();
         let reference = Reference {
             angles: Vector3::new(0.2, 0.01, -0.5),

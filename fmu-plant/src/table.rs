@@ -301,14 +301,15 @@ fn trajectory(mut variables: PlantVariables) -> PlantVariables {
 fn disturbance_rows(mut variables: PlantVariables) -> PlantVariables {
     for i in 0..TABLE_ROWS {
         let name = format!("disturbance.table.time[{}]", i + 1);
-        let text = format!("Time after disturbance.start at which row {} takes effect", i + 1);
+        let text =
+            format!("Time after disturbance.start at which a row takes effect (row {})", i + 1);
         let real = parameter(&name, &text).real().unit("s").min(0.0).nominal(10.0);
         variables = variables.real(real, move |m| &mut m.parameters.table.rows[i].time);
     }
     for (component, (axis, meaning)) in ANGLES.into_iter().enumerate() {
         for i in 0..TABLE_ROWS {
             let name = format!("disturbance.table.{axis}[{}]", i + 1);
-            let text = format!("Factor on disturbance.bound for the {meaning} in row {}", i + 1);
+            let text = format!("Factor on disturbance.bound for the {meaning} (row {})", i + 1);
             let real = parameter(&name, &text).real().min(-1.0).max(1.0).nominal(1.0);
             variables =
                 variables.real(real, move |m| &mut m.parameters.table.rows[i].direction[component]);

@@ -13,10 +13,10 @@ use std::f64::consts::TAU;
 /// Errors of one sensor, in the unit of the quantity that it measures.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Declared)]
 pub struct Triad {
-    /// Matrix of scale and misalignment, for a magnetometer with soft iron.
+    /// Matrix of scale and misalignment; for the magnetometer with soft iron.
     #[setting(part, unit = "1", nominal = 1.0)]
     pub matrix: Matrix3<f64>,
-    /// Bias, for a magnetometer with hard iron.
+    /// Bias; for the magnetometer with hard iron.
     #[setting(part, each = AXES)]
     pub bias: Vector3<f64>,
     /// Rate of change of the bias.

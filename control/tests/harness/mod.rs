@@ -28,7 +28,7 @@ pub fn settings(constraints: Constraints) -> Settings {
 /// Returns the regulator of the comparison, with the weights of CRMPC.
 pub fn lqr() -> Lqr {
     let Settings { body, p, q, period_feedback: period, .. } = settings(Constraints::Robust);
-    Lqr::new(LqrSettings { body, p, q, period }).unwrap()
+    Lqr::new(LqrSettings { body, period, p, q }).unwrap()
 }
 
 /// A controller that optimises at some of its ticks.

@@ -22,7 +22,7 @@ pub trait Choice: Copy + PartialEq + Send + Sync + 'static {
     fn setting(place: &Place) -> Setting {
         let mut place = place.clone();
         if place.text.is_empty() {
-            place.text = Self::TEXT.to_owned();
+            Self::TEXT.clone_into(&mut place.text);
         }
         Setting { place, kind: Kind::Choice(Self::items()) }
     }

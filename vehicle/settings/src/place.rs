@@ -57,10 +57,10 @@ pub struct Place {
 
 impl Place {
     /// Returns the place of a field of the value at this place.
+    #[must_use]
     pub fn at(&self, about: &About) -> Self {
         let name = match (self.name.as_str(), about.name) {
-            ("", name) => name.to_owned(),
-            (name, "") => name.to_owned(),
+            ("", name) | (name, "") => name.to_owned(),
             (structure, name) => format!("{structure}.{name}"),
         };
         let text = if about.is_part { self.continued(about.text) } else { about.text.to_owned() };
@@ -85,6 +85,7 @@ impl Place {
 
     /// Returns the place of an entry of the array or vector at this place, from 0. Entries without
     /// a declared ending are numbered from 1.
+    #[must_use]
     pub fn entry(&self, index: usize) -> Self {
         match self.each.get(index) {
             Some((ending, purpose)) => Self {
@@ -97,6 +98,7 @@ impl Place {
     }
 
     /// Returns the place of a cell of the matrix at this place; row and column count from 0.
+    #[must_use]
     pub fn cell(&self, row: usize, column: usize) -> Self {
         let (row, column) = (row + 1, column + 1);
         Self {

@@ -64,21 +64,23 @@ impl Keys {
     /// Returns an expression for the `settings::About` of a field.
     pub(crate) fn about(&self, ident: &str, attributes: &[Attribute]) -> TokenStream {
         let (name, text) = self.name_and_text(ident, attributes);
-        let number = |value: &Option<Expr>| match value {
-            Some(value) => quote!(::core::option::Option::Some((#value) as f64)),
-            None => quote!(::core::option::Option::None),
+        let number = |value: &Option<Expr>| {
+            let none = quote!(::core::option::Option::None);
+            let some = |value| quote!(::core::option::Option::Some((#value) as f64));
+            value.as_ref().map_or(none, some)
         };
         let [min, max, above, below, nominal, start] =
             [&self.min, &self.max, &self.above, &self.below, &self.nominal, &self.start]
                 .map(number);
-        let unit = self.unit.iter();
-        let (part, rate, each) = (self.part, self.rate, self.each.iter());
+        let unit = self.unit.as_ref().map(LitStr::value).unwrap_or_default();
+        let (part, rate) = (self.part, self.rate);
+        let each = self.each.as_ref().map_or(quote!([]), |each| quote!(#each));
         quote! {
             ::settings::About {
                 name: #name,
                 text: #text,
-                #(unit: #unit,)*
-                #(each: &#each,)*
+                unit: #unit,
+                each: &#each,
                 is_part: #part,
                 is_rate: #rate,
                 min: #min,
@@ -87,7 +89,6 @@ impl Keys {
                 below: #below,
                 nominal: #nominal,
                 start: #start,
-                ..::settings::About::default()
             }
         }
     }
