@@ -4,7 +4,7 @@
 //! | module | content |
 //! |---|---|
 //! | `equations` | the equations of motion and their partial derivatives |
-//! | `config` | the configuration of a plant |
+//! | `config`, `making` | the configuration of a plant, and the plant that is made from it |
 //! | `loads` | the inputs, and the moments and derivatives that follow from them |
 //! | `holding` | what is held from one event to the next |
 //! | `sensing` | what the sensors measure |
@@ -13,6 +13,7 @@ mod config;
 mod equations;
 mod holding;
 mod loads;
+mod making;
 mod sensing;
 
 use crate::actuators::{Actuators, Command};

@@ -93,7 +93,7 @@ pub struct Settings {
     #[allow(missing_docs)]
     pub initial_state: InitialState,
     /// Number of prediction steps.
-    #[setting(min = 1, max = 1000)]
+    #[setting(min = 2, max = 1000)]
     pub horizon: usize,
     /// Sampling period of the optimisation and length of a prediction step; a whole multiple of
     /// period.feedback.

@@ -69,7 +69,8 @@ use nalgebra::{Matrix3, Vector3};
 
 /// A value whose settings are declared. Structures and enumerations derive it.
 pub trait Declared {
-    /// Adds the settings of a value of this type, which lies at `place`, in the order of its fields.
+    /// Adds the settings of a value of this type, which lies at `place`, in the order of its
+    /// fields.
     fn declare(place: &Place, list: &mut Vec<Setting>)
     where
         Self: Sized;

@@ -34,8 +34,8 @@ pub(crate) fn camel(name: &str) -> String {
     camel
 }
 
-/// Returns a sentence as the meaning of an item: with a small first letter, unless it is a symbol or
-/// an abbreviation.
+/// Returns a sentence as the meaning of an item: with a small first letter, unless it is a symbol
+/// or an abbreviation.
 pub(crate) fn meaning(sentence: &str) -> String {
     let mut letters = sentence.chars();
     match (letters.next(), sentence.chars().nth(1)) {
