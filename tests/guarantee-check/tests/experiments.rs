@@ -40,7 +40,7 @@ fn parameters(file: &Path) -> Table {
 /// The settings of the component `controller`.
 fn settings(experiment: &str) -> Settings {
     let folder =
-        Path::new(env!("CARGO_MANIFEST_DIR")).join("../orchestrator/experiments/crmpc-2022");
+        Path::new(env!("CARGO_MANIFEST_DIR")).join("../../orchestrator/experiments/crmpc-2022");
     let parameters = parameters(&folder.join(experiment));
     assert_eq!(parameters["limit.moment"].as_float(), Some(1.356e5), "a value of the base");
     let mut s = Settings::new(Constraints::Robust);

@@ -9,7 +9,7 @@ use std::path::Path;
 
 #[test]
 fn plans_of_all_shipped_settings_are_confirmed() {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../orchestrator/experiments");
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../orchestrator/experiments");
     let scan = Scan::new(&folder).unwrap();
     assert!(scan.read.iter().all(|&count| count > 0), "{:?}", scan.read);
     // Only parts that other files extend, and files of values, are not experiments.
