@@ -10,135 +10,27 @@ pub mod ellipsoid;
 pub mod fusion;
 pub mod lowpass;
 
+mod estimate;
+mod settings;
+
+pub use estimate::{Calibration, CalibrationStatus, Estimate, Health, Line, Memory};
+pub use settings::{
+    Alignment, CalibrationMode, Gate, LARGEST_RANGE, MEMS_SENSORS, Settings, mems_corrections,
+};
+
 use crate::error::{DesignError, invalid};
-use ellipsoid::{Correction, Scatter};
-use fusion::{Fusion, Gains, triad};
+use estimate::{Nine, Running};
+use fusion::{Fusion, triad};
 use lowpass::LowPass;
-use nalgebra::{Matrix3, Rotation3, SVector, Vector3};
-use serde::{Deserialize, Serialize};
-use settings::{Choice, Declared};
-use std::sync::LazyLock;
-use toml::Table;
-use vehicle::axes::ANGLES;
-use vehicle::data;
+use nalgebra::{Rotation3, Vector3};
 use vehicle::kinematics::{self, Kinematics};
 use vehicle::math::{asin, atan2};
 use vehicle::platform::body_from_velocity;
-use vehicle::scenario::Scenario;
-use vehicle::sensor_data::SensorData;
 use vehicle::sensors::PerSensor;
 use vehicle::time::tick_tolerance;
 
-/// Source of the magnetometer's calibration.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Choice)]
-pub enum CalibrationMode {
-    /// Parameters magnetometer.matrix and magnetometer.bias.
-    #[default]
-    Given,
-    /// Ellipsoid fitted to the readings of the first calibration.duration.
-    Fit,
-}
-
-/// Source of the initial attitude.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Choice)]
-pub enum Alignment {
-    /// First samples.
-    #[default]
-    Measured,
-    /// initial.alpha, initial.beta and initial.sigma, the attitude in which the platform was
-    /// placed.
-    Given,
-}
-
-/// All settings of the estimator. Units are SI, angles in rad.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Declared)]
-pub struct Settings {
-    #[allow(missing_docs)] // Its type says what it is.
-    pub alignment: Alignment,
-    /// Angle before the first sample; with alignment = given also at the first sample.
-    #[setting(each = ANGLES, unit = "rad", nominal = 0.1)]
-    pub initial: Vector3<f64>,
-    #[allow(missing_docs)]
-    pub kinematics: Kinematics,
-    /// Direction of the horizontal magnetic field relative to the velocity, positive to the east.
-    #[setting(name = "field.declination", unit = "rad", nominal = 0.1)]
-    pub declination: f64,
-    /// Time from the first sample during which the platform rests and the gyroscope's bias is
-    /// measured; 0 for none.
-    #[setting(name = "rest.duration", unit = "s", min = 0.0, nominal = 1.0)]
-    pub rest_duration: f64,
-    /// Sampling period of the estimator and of the sensors.
-    #[setting(unit = "s", min = 1e-4, max = 10.0, nominal = 0.01)]
-    pub period: f64,
-    /// Cut-off frequency of the low-pass filter on all readings; 0 for no filter.
-    #[setting(name = "filter.cutoff", unit = "Hz", min = 0.0, nominal = 10.0)]
-    pub cutoff: f64,
-    /// Whether the estimate is predicted forward over the delays of sensors, transmission and
-    /// filter.
-    pub prediction: bool,
-    /// Delay of the sensors' filters at low frequencies; used with sensor.set = 2.
-    #[setting(name = "sensor.delay", unit = "s", min = 0.0, nominal = 0.01)]
-    pub sensor_delay: f64,
-    /// Gains of the nine-axis fusion.
-    #[setting(name = "fusion")]
-    pub gains: Gains,
-    /// Time without a usable sample after which the attitude counts as lost.
-    #[setting(name = "lost.after", unit = "s", above = 0.0, nominal = 0.5)]
-    pub lost_after: f64,
-    /// Number of equal readings in a row from which a sensor counts as frozen; 0 for never, as
-    /// needed for sensors without noise.
-    #[setting(name = "frozen.samples", min = 0)]
-    pub frozen_samples: u32,
-    /// Gates for the readings.
-    #[setting(name = "")]
-    pub gates: PerSensor<Gate>,
-    /// Sensor set, the same as in the plant: 0 and 1 are sensors without errors; 2 uses
-    /// sensor.delay and the correction matrices and biases, by default those of the MEMS set.
-    #[setting(name = "sensor.set", min = 0, max = MEMS_SENSORS)]
-    pub sensor_set: i32,
-    #[allow(missing_docs)]
-    #[setting(name = "calibration.mode")]
-    pub calibration: CalibrationMode,
-    /// Time during which readings are collected for the fit.
-    #[setting(name = "calibration.duration", unit = "s", above = 0.0, nominal = 10.0)]
-    pub calibration_duration: f64,
-    /// Corrections of the readings.
-    #[setting(name = "")]
-    pub corrections: PerSensor<Correction>,
-}
-
-/// Value of `sensor_set` for sensors with errors.
-pub const MEMS_SENSORS: i32 = 2;
-
-/// Condition for accepting the readings of a sensor. Readings outside the sensor's range, and
-/// changes that no rotation of the vehicle can cause, are left out.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Declared)]
-pub struct Gate {
-    /// Largest plausible reading along an axis; a larger one is ignored.
-    #[setting(part, above = 0.0, max = LARGEST_RANGE)]
-    pub range: f64,
-    /// Largest plausible change of the reading between two samples; a reading beyond it is ignored
-    /// until the next one confirms it.
-    #[setting(part, above = 0.0, max = LARGEST_RANGE)]
-    pub jump: f64,
-}
-
-/// Largest range that can be set; squares and products of readings within it are far from overflow.
-pub const LARGEST_RANGE: f64 = 1e9;
-
-impl Gate {
-    /// Relative excess over the range that is tolerated, as the rounding of a converter may exceed
-    /// it by part of a step.
-    const ROUNDING: f64 = 1e-3;
-
-    fn shows(&self, reading: &Vector3<f64>) -> bool {
-        reading.iter().all(|value| value.abs() <= self.range * (1.0 + Self::ROUNDING))
-    }
-
-    fn holds(&self, reading: &Vector3<f64>, before: &Vector3<f64>) -> bool {
-        (reading - before).norm() <= self.jump
-    }
-}
+/// Largest number of steps that are interpolated between two samples that arrived.
+const MOST_STEPS: f64 = 1000.0;
 
 /// Verdict on a sensor's reading.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -149,199 +41,6 @@ enum Verdict {
     Confirmed,
     /// The reading is left out; the last accepted one is held in its place.
     Rejected,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct File {
-    settings: Table,
-}
-
-const FILE: &str = "estimator.toml";
-
-impl Settings {
-    /// Returns the settings of `data/estimator.toml`, for the start of Chai 2022 and sensors
-    /// without errors in the field of the vehicle's data.
-    pub fn ours() -> Self {
-        static READ: LazyLock<File> =
-            LazyLock::new(|| data::embedded(FILE, include_str!("../../data/estimator.toml")));
-        let SensorData { surroundings, mems, .. } = SensorData::embedded();
-        let field = surroundings.field;
-        let mut settings = Self {
-            declination: atan2(field.y, field.x),
-            initial: Scenario::crmpc2022().initial_angles,
-            gates: PerSensor(mems.map(|triad| Gate { range: triad.range, jump: 0.0 })),
-            ..Self::default()
-        };
-        data::set(&mut settings, FILE, &READ.settings);
-        settings
-    }
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct CalibrationFile {
-    gyroscope: CorrectionFile,
-    accelerometer: CorrectionFile,
-    magnetometer: CorrectionFile,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct CorrectionFile {
-    matrix: [[f64; 3]; 3],
-    bias: Vector3<f64>,
-}
-
-/// Returns the corrections of gyroscope, accelerometer and magnetometer of the MEMS set, from
-/// `data/sensor-calibration.toml`.
-pub fn mems_corrections() -> PerSensor<Correction> {
-    static READ: LazyLock<CalibrationFile> = LazyLock::new(|| {
-        data::embedded(
-            "sensor-calibration.toml",
-            include_str!("../../data/sensor-calibration.toml"),
-        )
-    });
-    PerSensor(
-        [&READ.gyroscope, &READ.accelerometer, &READ.magnetometer].map(|each| Correction {
-            matrix: Matrix3::from(each.matrix).transpose(),
-            bias: each.bias,
-        }),
-    )
-}
-
-/// The newest sample on the line from the sensors.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Line {
-    /// Number of the sample, from 1; 0 before the first. A line without numbers shows 0 throughout.
-    pub sample: i32,
-    /// Time at which the sample was taken, s.
-    pub time: f64,
-    /// Readings of gyroscope (rad/s), accelerometer (specific force, m/s²) and magnetometer (T).
-    pub readings: [Vector3<f64>; 3],
-}
-
-/// Health of the estimate: how far it can be trusted.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Choice)]
-#[setting(name = "EstimatorHealth")]
-pub enum Health {
-    /// No sample has arrived yet.
-    #[default]
-    Waiting,
-    /// The estimate uses a current sample of all sensors.
-    Ok,
-    /// a sample is missing, and the last rate is held.
-    Bridging,
-    /// a sensor repeats its value and is ignored.
-    Frozen,
-    /// No usable sample has arrived for longer than lost.after.
-    Lost,
-    /// Readings for the calibration are collected.
-    Calibrating,
-    /// The fit of the calibration was rejected.
-    Uncalibrated,
-    /// a reading of the newest sample is implausible and is ignored.
-    #[setting(name = "sampleRejected")]
-    Rejected,
-}
-
-/// Source of the magnetometer's calibration in force.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Choice)]
-pub enum CalibrationStatus {
-    /// Parameters magnetometer.matrix and magnetometer.bias.
-    #[default]
-    Given,
-    /// Parameters, while readings for a fit are collected.
-    Collecting,
-    /// Fitted ellipsoid.
-    Fitted,
-    /// Parameters, because the readings do not determine an ellipsoid.
-    Refused,
-}
-
-/// The calibration of the magnetometer with its origin.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Calibration {
-    /// Origin and state of the calibration.
-    pub status: CalibrationStatus,
-    /// Correction that is in force.
-    pub correction: Correction,
-    /// Residual of the fit, see [`ellipsoid::Fit`].
-    pub residual: f64,
-    /// Condition number of the fit, see [`ellipsoid::Fit`].
-    pub condition: f64,
-}
-
-/// The estimate at a tick.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Estimate {
-    /// Estimated angles Θ, rad.
-    pub angles: Vector3<f64>,
-    /// Estimated body rates ω with the kinematics of the settings, rad/s.
-    pub rates: Vector3<f64>,
-    /// Health of the estimate: how far it can be trusted.
-    pub health: Health,
-    /// Time since the newest sample was taken, s.
-    pub age: f64,
-    /// Number of samples so far that never arrived.
-    pub dropped: i32,
-    /// Number of samples so far that were left out as a whole or in part.
-    pub rejected: i32,
-    /// Bias of the gyroscope, rad/s: the sum of the given one, the one found at rest and the
-    /// learned one.
-    pub gyroscope_bias: Vector3<f64>,
-}
-
-type Nine = SVector<f64, 9>;
-
-/// Largest number of steps that are interpolated between two samples that arrived.
-const MOST_STEPS: f64 = 1000.0;
-
-/// The state that the estimator carries from tick to tick.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Memory {
-    /// Estimate at the last tick.
-    pub estimate: Estimate,
-    /// Calibration of the magnetometer.
-    pub calibration: Calibration,
-    scatter: Scatter,
-    running: Option<Running>,
-    /// Number of the last sample that was left out as a whole; 0 for none.
-    refused: i32,
-}
-
-/// State from the first sample on.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-struct Running {
-    /// Time at which the first sample was taken, s.
-    start: f64,
-    /// The last sample, with the readings that were last accepted.
-    last: Line,
-    /// Readings of the last sample as they arrived.
-    raw: [Vector3<f64>; 3],
-    /// Whether a reading of the last sample was left out.
-    rejected: bool,
-    /// Whether a second sample has confirmed the first.
-    confirmed: bool,
-    /// Time at which the last sample arrived, s.
-    arrived: f64,
-    filter: lowpass::State<9>,
-    /// Readings after the low-pass filter.
-    filtered: Nine,
-    fusion: Fusion,
-    /// Sum and number of the rates at rest.
-    rest: (Vector3<f64>, f64),
-    /// Number of equal readings in a row, for each sensor.
-    equal: [u32; 3],
-    /// Time at which the last sample with all sensors alive was taken, s.
-    alive: f64,
-}
-
-impl Running {
-    /// Returns the bias found at rest, rad/s.
-    fn rest_bias(&self) -> Vector3<f64> {
-        self.rest.0 / self.rest.1.max(1.0)
-    }
 }
 
 /// The attitude estimator: settings and low-pass filter.
@@ -376,7 +75,7 @@ impl Estimator {
     /// # Errors
     /// Returns an error that names the setting at fault.
     pub fn new(settings: Settings) -> Result<Self, DesignError> {
-        settings::check(&settings)?;
+        ::settings::check(&settings)?;
         let mut settings = settings;
         if settings.sensor_set < MEMS_SENSORS {
             (settings.corrections, settings.sensor_delay) = (PerSensor::default(), 0.0);
