@@ -104,11 +104,7 @@ fn prepare(common: &Common) -> Result<Plan, Error> {
 ///
 /// # Errors
 /// Returns an error if the campaign is faulty, or if a file cannot be written.
-pub(crate) fn fly(
-    asked: &Fly,
-    out: &mut impl Write,
-    interrupt: &Interrupt,
-) -> Result<(), Failure> {
+pub(crate) fn fly(asked: &Fly, out: &mut impl Write, interrupt: &Interrupt) -> Result<(), Failure> {
     let plan = prepare(&asked.common)?;
     let folder = run::folder(&plan, asked.common.out.as_deref());
     if let Some(folder) = &asked.bundle {

@@ -16,13 +16,9 @@ mod show;
 
 use arguments::choice;
 use catalogue::Filter;
-use cosim::check::check;
-use cosim::error::Error;
-use cosim::experiment::{Experiment, Overrides};
-use cosim::interrupt::{Interrupt, Request};
+use cosim::interrupt::Interrupt;
 use cosim::pacing::{self, Factor, OnMiss};
-use cosim::system::{Opened, System};
-use cosim::{search, ssp};
+use cosim::search;
 use cosim_report::study::definition::Study;
 use cosim_report::study::reproduce;
 use cosim_report::summary;
@@ -30,7 +26,7 @@ use failure::Failure;
 use live::log::Messages;
 use run::{Files, Options};
 use std::io::{BufWriter, IsTerminal, Write, stderr, stdout};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process::ExitCode;
 use tracing_subscriber::EnvFilter;
 
