@@ -35,6 +35,12 @@ def test_the_page_is_up_to_date():
     assert checked.returncode == 0, checked.stderr
 
 
+def test_the_tables_of_parameters_are_up_to_date():
+    command = [sys.executable, ROOT / "scripts" / "pages" / "parameters.py", "--check"]
+    checked = subprocess.run(command, capture_output=True, text=True)
+    assert checked.returncode == 0, checked.stderr
+
+
 @pytest.mark.parametrize("name", PAPERS)
 def test_everything_that_a_paper_numbers_has_a_row(name):
     paper = PAPERS[name]

@@ -309,10 +309,11 @@ def test_published_data_of_the_vehicles():
 
 def test_published_settings_of_the_controllers():
     crmpc, dlmpc, wu = (data(f"control/data/{name}.toml") for name in ("crmpc-2022", "dlmpc-2022", "tvsmc-2015"))
-    assert crmpc["weights"] == {"p": [50.0] * 6, "q": [10.0] * 3}
-    assert crmpc["gains"]["feedback"] == crmpc["gains"]["terminal"] == {"k1": -5.0, "k2": -5.0}
-    assert crmpc["schedule"]["horizon"] * crmpc["schedule"]["period_optimisation"] == pytest.approx(20.0)
-    assert dlmpc["outer"]["horizon"] * dlmpc["outer"]["period"] == pytest.approx(20.0)
-    assert (dlmpc["outer"]["period"], dlmpc["inner"]["period"]) == (0.2, 0.04)
-    assert dlmpc["inner"]["published"] == {"q": 5.0, "p": 5.0, "gamma": 0.15, "rho": 0.7}
-    assert wu["period"] == 0.01
+    paper, settings, double = crmpc["paper"], crmpc["settings"], dlmpc["settings"]
+    assert settings["weight"] == {"P": [50.0] * 6, "Q": [10.0] * 3}
+    assert paper["feedback"] == settings["terminal"] == {"k1": -5.0, "k2": -5.0}
+    assert settings["horizon"] * settings["period"]["optimisation"] == pytest.approx(20.0)
+    assert double["horizon"] * double["period"]["optimisation"] == pytest.approx(20.0)
+    assert double["period"] == {"optimisation": 0.2, "feedback": 0.04}
+    assert double["slidingMode"] == {"q": 5.0, "p": 5.0, "gamma": 0.15, "rho": 0.7}
+    assert wu["sliding_modes"]["period"]["feedback"] == wu["feedback_linearisation"]["period"]["feedback"] == 0.01

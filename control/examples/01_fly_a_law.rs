@@ -13,7 +13,7 @@ use vehicle::Scenario;
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let scenario = Scenario::crmpc2022();
     let Settings { body, p, q, period_feedback: period, .. } = Settings::new(Constraints::Robust);
-    let mut law = Lqr::new(LqrSettings { body, p, q, period })?;
+    let mut law = Lqr::new(LqrSettings { body, period, p, q })?;
 
     println!("   time    error   ‖ω‖      ‖m‖");
     let summary = fly(&mut law, &mut (), period, &scenario, |sample| {

@@ -19,9 +19,7 @@ fn main() {
          # magnetometer by an ellipsoid. Written by the example calibrate_sensors."
     );
     let Settings { corrections, .. } = calibrated(&mems(CALIBRATION_SEED), CALIBRATION_DURATION);
-    for (name, correction) in
-        ["gyroscope", "accelerometer", "magnetometer"].iter().zip(&corrections)
-    {
+    for (name, correction) in corrections.named() {
         println!("\n[{name}]\nmatrix = [");
         for row in correction.matrix.row_iter() {
             println!("    [{:?}, {:?}, {:?}],", row[0], row[1], row[2]);

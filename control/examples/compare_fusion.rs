@@ -238,7 +238,7 @@ fn main() {
         );
     }
 
-    let settings = Settings { corrections, ..Settings::default() };
+    let settings = Settings { corrections, ..Settings::ours() };
     let whole = |name: &str, trajectory: &dyn Fn(usize) -> Vec<Truth>| {
         let mut squares = [Vector3::<f64>::zeros(); 2];
         for seed in seeds.clone() {

@@ -14,10 +14,11 @@
 //! Control 27 (1982), with the nonlinear equations of motion in place of the linear ones.
 
 use crate::controller::{Controller, Measurement, ReferenceAt};
-use crate::error::DesignError;
+use crate::error::{DesignError, invalid};
 use crate::loop_delay::{LoopDelay, LoopDelaySettings};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
+use settings::Declared;
 use vehicle::dynamics::RigidBody;
 use vehicle::integrator::{equal_steps, rk4};
 use vehicle::kinematics::Kinematics;
@@ -32,12 +33,16 @@ pub const UNDER_WAY: usize = 10_000;
 const STEP: f64 = 0.01;
 
 /// The parts of the time from the instant of a measurement to the moment that results from it.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Declared)]
 pub struct Latency {
-    /// Age of a measurement when it reaches the law, s.
-    pub measurement: f64,
-    /// Time from the tick until its command acts, s.
+    /// Time from a tick until the resulting moment acts on the vehicle; the law uses the state
+    /// predicted over this time.
+    #[setting(name = "delay", unit = "s", min = 0.0, max = LONGEST, nominal = 0.1)]
     pub action: f64,
+    /// Age of a measurement when it arrives, for example because of an estimator's filter; the law
+    /// uses the state predicted over this time.
+    #[setting(name = "measurement.age", unit = "s", min = 0.0, max = LONGEST, nominal = 0.1)]
+    pub measurement: f64,
 }
 
 impl Latency {
@@ -174,17 +179,12 @@ impl<C: Controller> Delayed<C> {
         moment_limit: f64,
     ) -> Result<Self, DesignError> {
         if moment_limit.is_nan() || moment_limit <= 0.0 {
-            return Err(DesignError::NotPositive { name: "limit_moment", value: moment_limit });
+            return Err(invalid("limit.moment", moment_limit, "must be positive"));
         }
         let Latency { measurement, action } = latency;
         if !(0.0..=LONGEST).contains(&measurement) {
-            let name = "latency.measurement";
-            return Err(DesignError::OutOfRange {
-                name,
-                value: measurement,
-                low: 0.0,
-                high: LONGEST,
-            });
+            let problem = format!("must be at least 0 and at most {LONGEST}");
+            return Err(invalid("measurement.age", measurement, problem));
         }
         if !(0.0..=LONGEST).contains(&action) {
             return Err(DesignError::Delay { value: action, longest: LONGEST });

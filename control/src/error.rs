@@ -1,16 +1,18 @@
-//! Errors in the settings of a controller. Their texts name fields of the settings in backticks, so
-//! that an FMU can replace them by the names of its parameters.
+//! Errors in the settings of a controller. They name settings as these are declared.
 
-/// A setting that the design refuses. Each `name` is the path of a field from the settings on.
+use settings::Invalid;
+
+/// A setting that the design refuses, by its declared name.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum DesignError {
+    /// A number is outside its range.
+    #[error(transparent)]
+    Invalid(#[from] Invalid),
     /// The feedback gain does not stabilise the sampled error dynamics.
     #[error(
-        "feedback gain K = [{k1}, {k2}] sampled every {period} s is not stable: spectral radius {radius:.6} is not below 1; use a smaller gain or a shorter `{name}`"
+        "feedback gain K = [{k1}, {k2}] sampled every {period} s is not stable: spectral radius {radius:.6} is not below 1; use a smaller gain or a shorter period.feedback"
     )]
     Unstable {
-        /// Name of the period.
-        name: &'static str,
         /// Gain on the angle, 1/s².
         k1: f64,
         /// Gain on the rate, 1/s.
@@ -23,7 +25,7 @@ pub enum DesignError {
     /// The terminal gain does not stabilise the nominal trajectory when its command is held between
     /// two optimisations.
     #[error(
-        "terminal gain K~ = [{k1}, {k2}] held for {period} s is not stable: spectral radius {radius:.6} is not below 1; use a smaller gain or a shorter `period_optimisation`"
+        "terminal gain K~ = [{k1}, {k2}] held for {period} s is not stable: spectral radius {radius:.6} is not below 1; use a smaller gain or a shorter period.optimisation"
     )]
     UnstableTerminal {
         /// Gain on the angle, 1/s².
@@ -36,7 +38,7 @@ pub enum DesignError {
         radius: f64,
     },
     /// The limits leave too little room for a guarantee.
-    #[error("`constraints` = robust cannot be guaranteed: {}", no_guarantee(self))]
+    #[error("constraints = robust cannot be guaranteed: {}", no_guarantee(self))]
     NoGuarantee {
         /// Unused share of the moment limit; negative if the limit is exceeded.
         moment_left: f64,
@@ -46,7 +48,7 @@ pub enum DesignError {
         limit_moment: f64,
         /// Limit on the rate, rad/s.
         limit_rate: f64,
-        /// Largest accepted `disturbance_bound` with the other settings unchanged, rad/s²; `None`
+        /// Largest accepted disturbance.bound with the other settings unchanged, rad/s²; `None`
         /// if not even 0 is accepted.
         disturbance: Option<f64>,
         /// Largest accepted errors of angles (rad) and rates (rad/s) in the given proportion.
@@ -58,7 +60,7 @@ pub enum DesignError {
     },
     /// The delay could be negative, or a command could begin to act after the next one should.
     #[error(
-        "`delay_error` = {value} s must be at most {largest} s, the smaller of the delay and the period of the feedback law"
+        "delayError = {value} s must be at most {largest} s, the smaller of the delay and the period of the feedback law"
     )]
     DelayError {
         /// Value of the setting, s.
@@ -67,51 +69,18 @@ pub enum DesignError {
         largest: f64,
     },
     /// Changes of the plan's acceleration are carried along from a measured state only.
-    #[error("`initial_state` = tube needs an exact delay, `delay_error` = 0")]
+    #[error("initialState = tube needs an exact delay, delayError = 0")]
     DelayErrorWithTube,
     /// A gain violates Lemma 2 or 3 of Chai 2022.
     #[error(
-        "`{name}.k1` and `{name}.k2` need k1 < 0, k2 < 0 and k2² + 4 k1 > 0 (real, distinct, stable eigenvalues)"
+        "{name}.k1 and {name}.k2 need k1 < 0, k2 < 0 and k2² + 4 k1 > 0 (real, distinct, stable eigenvalues)"
     )]
     NotReal {
         /// Name of the gain.
         name: &'static str,
     },
-    /// A quantity must be positive and finite.
-    #[error("`{name}` = {value} must be positive and finite")]
-    NotPositive {
-        /// Name of the setting.
-        name: &'static str,
-        /// Value of the setting.
-        value: f64,
-    },
-    /// A weight must not be negative, and weights on the input must be positive.
-    #[error(
-        "`{name}`[{index}] = {value} is not allowed: P must not be negative, Q must be positive"
-    )]
-    Weight {
-        /// Name of the weight, p or q.
-        name: &'static str,
-        /// Position on the diagonal, from 1.
-        index: usize,
-        /// Value of the weight.
-        value: f64,
-    },
-    /// A quantity is outside its range.
-    #[error("`{name}` = {value} must be at least {low} and {}", end(*high))]
-    OutOfRange {
-        /// Name of the setting.
-        name: &'static str,
-        /// Value of the setting.
-        value: f64,
-        /// Smallest value that is allowed.
-        low: f64,
-        /// Upper end of the range; it is not allowed itself. The largest number and infinity stand
-        /// for a range without end.
-        high: f64,
-    },
     /// The delay that a prediction compensates for is out of its range.
-    #[error("`delay` = {value} s must lie between 0 and {longest} s")]
+    #[error("delay = {value} s must lie between 0 and {longest} s")]
     Delay {
         /// Value of the delay, s.
         value: f64,
@@ -120,7 +89,7 @@ pub enum DesignError {
     },
     /// The two periods do not fit together.
     #[error(
-        "`period_optimisation` = {optimisation} s must be a whole multiple of `period_feedback` = {feedback} s"
+        "period.optimisation = {optimisation} s must be a whole multiple of period.feedback = {feedback} s"
     )]
     Periods {
         /// Optimisation period, s.
@@ -130,7 +99,7 @@ pub enum DesignError {
     },
     /// The limits of a control surface are inconsistent.
     #[error(
-        "surface {index}: the limits `effectors.min` = {min} and `effectors.max` = {max} must be finite and hold zero, and `effectors.rate` = {rate} must be finite and not negative"
+        "surface {index}: the limits limit.surfaceMin = {min} and limit.surfaceMax = {max} must be finite and hold zero, and limit.surfaceRate = {rate} must be finite and not negative"
     )]
     Surface {
         /// Number of the surface, from 1.
@@ -143,7 +112,7 @@ pub enum DesignError {
         rate: f64,
     },
     /// The period of the allocation is not a multiple of the modulator's.
-    #[error("`period` = {period} s must be a whole multiple of `pwpf.period` = {pwpf} s")]
+    #[error("period = {period} s must be a whole multiple of pwpf.period = {pwpf} s")]
     Modulation {
         /// Period of the allocation, s.
         period: f64,
@@ -152,7 +121,7 @@ pub enum DesignError {
     },
     /// One of the paper's sets is empty after tightening.
     #[error(
-        "the paper's set is empty after tightening: {name} = {value:.4}; lower `disturbance_bound` or the reference bounds, or raise the limits"
+        "the paper's set is empty after tightening: {name} = {value:.4}; lower disturbance.bound or the reference bounds, or raise the limits"
     )]
     EmptySet {
         /// Symbol of the set's size.
@@ -160,29 +129,11 @@ pub enum DesignError {
         /// Value of the set's size.
         value: f64,
     },
-    /// A gain, given by its name, must be positive and finite.
-    #[error("`{name}` must be positive and finite throughout, not {value}")]
-    Setting {
-        /// Name of the setting.
-        name: String,
-        /// Value of the setting.
-        value: f64,
-    },
     /// A matrix must have an inverse.
-    #[error("`{name}` must be finite and have an inverse")]
+    #[error("{name} must be finite and have an inverse")]
     Singular {
         /// Name of the matrix.
         name: String,
-    },
-    /// A quantity must exceed a bound.
-    #[error("`{name}` = {value} must be finite and above {bound}")]
-    NotAbove {
-        /// Name of the setting.
-        name: &'static str,
-        /// Value of the setting.
-        value: f64,
-        /// Bound that the value must exceed.
-        bound: f64,
     },
     /// Condition (46) of Wu 2015 does not hold.
     #[error(
@@ -196,7 +147,7 @@ pub enum DesignError {
     },
     /// The reaching law of Jia et al. is weaker than the disturbance at the edge of its layer.
     #[error(
-        "`inner.layer.rho`[{index}] = {rho} must exceed {needed:.4} rad/s², which is 2^((b+1)/2) |I⁻¹ M_d| with b = {b} and |I⁻¹ M_d| = {acceleration:.4} rad/s²; raise it, or lower `inner.layer.b` or `disturbance`"
+        "inner.rho[{index}] = {rho} must exceed {needed:.4} rad/s², which is 2^((b+1)/2) |I⁻¹ M_d| with b = {b} and |I⁻¹ M_d| = {acceleration:.4} rad/s²; raise it, or lower inner.b or disturbanceMoment.bound"
     )]
     WeakReaching {
         /// Axis, from 1: roll, pitch, yaw.
@@ -232,8 +183,8 @@ fn no_guarantee(error: &DesignError) -> String {
     };
     let mut reasons = Vec::new();
     for (what, left, limit) in [
-        ("moment", *moment_left, format!("`limit_moment` = {limit_moment} N m")),
-        ("rate", *rate_left, format!("`limit_rate` = {:.4} deg/s", limit_rate.to_degrees())),
+        ("moment", *moment_left, format!("limit.moment = {limit_moment} N m")),
+        ("rate", *rate_left, format!("limit.rate = {:.4} deg/s", limit_rate.to_degrees())),
     ] {
         if left <= 0.0 {
             reasons.push(format!(
@@ -253,39 +204,50 @@ fn no_guarantee(error: &DesignError) -> String {
     match disturbance {
         Some(bound) => {
             accepted.push(format!(
-                "at most `disturbance_bound` = {:.4} deg/s2",
+                "at most disturbance.bound = {:.4} deg/s2",
                 down(bound.to_degrees())
             ));
         }
-        None => accepted.push("no `disturbance_bound`".into()),
+        None => accepted.push("no disturbance.bound".into()),
     }
     if let Some((angle, rate)) = errors {
         accepted.push(format!(
-            "at most `angle_error` = {:.4} deg with `rate_error` = {:.4} deg/s",
+            "at most estimation.angleError = {:.4} deg with estimation.rateError = {:.4} deg/s",
             down(angle.to_degrees()),
             down(rate.to_degrees())
         ));
     }
     if let Some(delay) = delay {
-        accepted.push(format!("at most `delay` = {:.4} s", down(*delay)));
+        accepted.push(format!("at most delay = {:.4} s", down(*delay)));
     }
     if let Some(error) = delay_error {
-        accepted.push(format!("at most `delay_error` = {:.4} s", down(*error)));
+        accepted.push(format!("at most delayError = {:.4} s", down(*error)));
     }
     format!(
-        "{}; accepted with the other settings unchanged: {}; `guarantee` = bestEffort runs without a guarantee",
+        "{}; accepted with the other settings unchanged: {}; guarantee.policy = bestEffort runs without a guarantee",
         reasons.join(" and "),
         accepted.join(", or ")
     )
-}
-
-/// Describes the upper end of a range, which is not part of it.
-fn end(high: f64) -> String {
-    if high < f64::MAX { format!("below {high}") } else { "finite".into() }
 }
 
 /// Returns the value rounded down to four digits after the point, so that the printed number is
 /// accepted.
 fn down(value: f64) -> f64 {
     (value * 1e4).floor() / 1e4
+}
+
+/// Checks a limit that is no declared setting: it must be positive and finite.
+///
+/// # Errors
+/// Returns an error that names the setting.
+pub(crate) fn positive(name: &str, value: f64) -> Result<(), DesignError> {
+    if value > 0.0 && value.is_finite() {
+        return Ok(());
+    }
+    Err(invalid(name, value, "must be positive and finite"))
+}
+
+/// Returns the error for a setting whose value must satisfy something.
+pub(crate) fn invalid(name: &str, value: f64, problem: impl Into<String>) -> DesignError {
+    Invalid { name: name.into(), value, problem: problem.into() }.into()
 }

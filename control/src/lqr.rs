@@ -2,25 +2,31 @@
 //! version of MPC" with the same P and Q.
 
 use crate::controller::{Controller, Measurement, ReferenceAt};
-use crate::error::DesignError;
+use crate::error::{DesignError, positive};
 use crate::error_dynamics::{Gain, SampledError};
 use crate::linearise;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
+use settings::Declared;
+use vehicle::axes::{NUMBERED_ANGLES, NUMBERED_STATE};
 use vehicle::dynamics::RigidBody;
 use vehicle::kinematics;
 
 /// Settings of the regulator. Units SI, angles rad.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Declared)]
 pub struct LqrSettings {
     /// Model of the vehicle that the controller uses.
+    #[setting(skip)]
     pub body: RigidBody,
-    /// Diagonal of the weight P: angles, then rates.
-    pub p: [f64; 6],
-    /// Diagonal of the weight Q on the input.
-    pub q: [f64; 3],
-    /// Time between ticks, s.
+    /// Sampling period of the control law.
+    #[setting(name = "period.feedback", unit = "s", min = 1e-4, max = 10.0, nominal = 0.04)]
     pub period: f64,
+    /// Weight P on the tracking error and on its derivative, diagonal.
+    #[setting(name = "weight.P", each = NUMBERED_STATE, min = 0.0, nominal = 50.0)]
+    pub p: [f64; 6],
+    /// Weight Q on the second derivative of the tracking error, diagonal.
+    #[setting(name = "weight.Q", each = NUMBERED_ANGLES, above = 0.0, nominal = 10.0)]
+    pub q: [f64; 3],
 }
 
 /// Linear feedback on E = x − x_r with cancellation of the drift f: u = −f + Θ̈_r + K E.
@@ -33,7 +39,7 @@ pub struct LqrSettings {
 ///
 /// // P and Q of the comparison are those of CRMPC.
 /// let Settings { body, p, q, period_feedback: period, .. } = Settings::new(Constraints::Robust);
-/// let mut law = Lqr::new(LqrSettings { body, p, q, period })?;
+/// let mut law = Lqr::new(LqrSettings { body, period, p, q })?;
 /// let summary = fly(&mut law, &mut (), period, &Scenario::crmpc2022(), |_| ())?;
 /// assert!(summary.error_rms.to_degrees() < 3.0);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
@@ -58,28 +64,17 @@ impl Lqr {
     /// Returns an error that names the weight or period at fault, or the spectral radius of gains
     /// that the sampling makes unstable.
     pub fn new(settings: LqrSettings) -> Result<Self, DesignError> {
-        if !(settings.period > 0.0 && settings.period.is_finite()) {
-            return Err(DesignError::NotPositive { name: "period", value: settings.period });
-        }
-        let weights = settings
-            .p
-            .iter()
-            .enumerate()
-            .map(|(i, &value)| ("p", i, value, i >= 3 && value >= 0.0));
-        let weights =
-            weights.chain(settings.q.iter().enumerate().map(|(i, &value)| ("q", i, value, false)));
-        for (name, i, value, zero_allowed) in weights {
-            if !(value.is_finite() && (value > 0.0 || zero_allowed)) {
-                return Err(DesignError::Weight { name, index: i + 1, value });
-            }
+        settings::check(&settings)?;
+        // Without a weight on an angle there is no gain on it.
+        for (i, weight) in settings.p[..3].iter().enumerate() {
+            positive(&format!("weight.P[{}]", i + 1), *weight)?;
         }
         let gains =
             std::array::from_fn(|i| riccati_gain(settings.p[i], settings.p[i + 3], settings.q[i]));
         for Gain { k1, k2 } in gains {
             let radius = SampledError::new(Gain { k1, k2 }, settings.period).spectral_radius();
             if radius >= 1.0 {
-                let (name, period) = ("period", settings.period);
-                return Err(DesignError::Unstable { name, k1, k2, period, radius });
+                return Err(DesignError::Unstable { k1, k2, period: settings.period, radius });
             }
         }
         Ok(Self { settings, gains })
@@ -125,7 +120,7 @@ mod tests {
         // Under the commanded moment Θ̈ = Θ̈_r + k₁ e + k₂ ė, also where the reference moves.
         let Settings { body, p, q, period_feedback: period, .. } =
             Settings::new(Constraints::Paper);
-        let settings = LqrSettings { body, p, q, period };
+        let settings = LqrSettings { body, period, p, q };
         let mut law = Lqr::new(settings).unwrap();
         let reference = Reference {
             angles: Vector3::new(0.2, 0.01, -0.5),

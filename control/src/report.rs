@@ -2,29 +2,29 @@
 
 use crate::mpc;
 use serde::{Deserialize, Serialize};
+use settings::Choice;
 use std::time::Instant;
 
-/// How the plan in force came about.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+/// Origin of the plan in force.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Choice)]
 pub enum SolverStatus {
-    /// No optimisation has been run yet.
+    /// No optimisation yet.
     #[default]
     None,
-    /// The unconstrained optimum satisfies every constraint exactly, so it is the optimum.
+    /// Optimum without constraints, checked to satisfy every constraint.
     Unconstrained,
-    /// The optimum with the terminal constraint alone satisfies every other constraint exactly, so
-    /// it is the optimum.
+    /// Optimum with the terminal constraint only, checked to satisfy every other constraint.
     #[serde(rename = "TerminalBall")]
+    #[setting(name = "terminalBall")]
     TerminalConstraint,
-    /// The Riccati method found the optimum.
+    /// Optimum found by the Riccati method.
     Constrained,
-    /// The cone solver found the optimum.
+    /// Optimum found by the cone solver.
     Cone,
-    /// No solver succeeded; the shifted previous plan is followed and continued with the terminal
-    /// law.
+    /// Shifted previous plan, continued with the terminal law.
     Fallback,
-    /// No optimum was found that satisfies the conditions of the guarantee; the previous plan,
-    /// which satisfies them, is followed.
+    /// Previous plan, which satisfies the conditions of the guarantee; no optimum that does was
+    /// found.
     Kept,
 }
 

@@ -262,13 +262,13 @@ fn settings_that_cannot_work_are_refused_by_name() {
     let cases: [(Change, &str); 9] = [
         (&|s| s.period = 0.0, "period"),
         (&|s| s.period = 0.0105, "pwpf.period"),
-        (&|s| s.weight_moment.y = 0.0, "weight_moment.y"),
-        (&|s| s.weight_jet = -1.0, "weight_jet"),
-        (&|s| s.weight_surface = f64::NAN, "weight_surface"),
+        (&|s| s.weight_moment.y = 0.0, "weight.moment[2]"),
+        (&|s| s.weight_jet = -1.0, "weight.jet"),
+        (&|s| s.weight_surface = f64::NAN, "weight.surface"),
         (&|s| s.pwpf.off = 0.45, "pwpf.off"),
         (&|s| s.pwpf.on = 4.5, "pwpf.on"),
         (&|s| s.effectors.min[2] = 0.1, "surface 3"),
-        (&|s| s.effectors.jet_moments[(0, 0)] = f64::NAN, "effectiveness"),
+        (&|s| s.effectors.jet_moments[(0, 0)] = f64::NAN, "jetMoment"),
     ];
     for (change, name) in cases {
         let text = refusal(change);

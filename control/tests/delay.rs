@@ -11,6 +11,7 @@ use control::schedule::Sampled;
 use control::{Controller, Crmpc, Delayed, DesignError, Lqr, Measurement};
 use harness::{FEEDBACK, disturbance, garbage, lqr, settings};
 use nalgebra::Vector3;
+use settings::Invalid;
 use vehicle::Error;
 use vehicle::disturbance::{Disturbance, DisturbanceKind};
 use vehicle::plant::{Plant, State, state};
@@ -352,8 +353,8 @@ fn what_cannot_work_is_refused() {
     }
     let latency = Latency { measurement: -0.01, action: 0.1 };
     let old = Delayed::new(lqr(), body, FEEDBACK, latency, f64::INFINITY).map(|_| ());
-    let Err(DesignError::OutOfRange { name, .. }) = old else { panic!("{old:?}") };
-    assert_eq!(name, "latency.measurement");
+    let Err(DesignError::Invalid(Invalid { name, .. })) = old else { panic!("{old:?}") };
+    assert_eq!(name, "measurement.age");
     assert!(Predictor::new(body, 0.9, 1e-4).is_ok() && Predictor::new(body, 0.9, 1e-5).is_err());
     for limit in [0.0, -1.0, f64::NAN] {
         assert!(limited(lqr(), FEEDBACK, 0.1, limit).is_err(), "{limit}");

@@ -35,11 +35,11 @@ fn published_a_longer_horizon_enlarges_the_region_of_attraction() {
     // With the paper's sets a plan must reach the terminal set within the horizon. Those of the
     // robust sets end in braking, so that a second is enough.
     for (constraints, counts) in [
-        (Constraints::Paper, [0, 0, 0, 1, 1, 5, 117, 399, 399]),
-        (Constraints::Robust, [321, 377, 400, 400, 400, 400, 400, 400, 400]),
+        (Constraints::Paper, [0, 0, 1, 1, 5, 117, 399, 399]),
+        (Constraints::Robust, [377, 400, 400, 400, 400, 400, 400, 400]),
     ] {
         let mut shorter = vec![false; STARTS];
-        for (horizon, expected) in [1, 2, 5, 10, 15, 25, 50, 100, 200].into_iter().zip(counts) {
+        for (horizon, expected) in [2, 5, 10, 15, 25, 50, 100, 200].into_iter().zip(counts) {
             let longer = feasible(constraints, horizon);
             let lost = shorter.iter().zip(&longer).filter(|(before, now)| **before && !**now);
             assert_eq!(lost.count(), 0, "{constraints:?}, {horizon} steps");

@@ -1,61 +1,18 @@
 //! `ControlAllocator` divides the commanded moment among surfaces and jets.
 
 use control::allocation::{
-    AllocationReport, AllocationStatus, Allocator, Command, JetCommand, Memory, Method, Settings,
+    AllocationReport, AllocationStatus, Allocator, Command, Memory, Settings,
 };
 use controller_export::sampled::{SampledFmu, SampledInstance, Ticks};
 use controller_export::table::{AXES, capital};
-use fmi2_export::fields::{Fields, by_variable};
 use fmi2_export::table::{Common, discrete_output, input, parameter};
-use fmi2_export::{Description, Enumeration, Failure, VariableTable};
+use fmi2_export::{Description, Failure, VariableTable};
 use model_description::DefaultExperiment;
-use model_description::unit;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
+use settings::Choice;
 use vehicle::Scenario;
 use vehicle::effectors::{Effectors, JETS, Jets, SURFACES, Surfaces};
-
-static METHODS: Enumeration<Method> = Enumeration {
-    name: "AllocationMethod",
-    description: "Method that divides the moment among the effectors",
-    items: &[
-        (
-            Method::Optimal,
-            "optimal",
-            "minimises the moment error and the use of the jets over all effectors together",
-        ),
-        (
-            Method::Blending,
-            "blending",
-            "the surfaces come first, within their limits and above threshold.dynamicPressure; the jets give the remainder",
-        ),
-    ],
-};
-static JET_COMMANDS: Enumeration<JetCommand> = Enumeration {
-    name: "JetCommand",
-    description: "Form of the commands to the jets",
-    items: &[
-        (
-            JetCommand::Pwpf,
-            "pwpf",
-            "1 for on and 0 for off, by pulse-width pulse-frequency modulation",
-        ),
-        (JetCommand::Duty, "duty", "duty cycle from 0 to 1, without modulation"),
-    ],
-};
-static STATUSES: Enumeration<AllocationStatus> = Enumeration {
-    name: "AllocationStatus",
-    description: "Origin of the allocation in force",
-    items: &[
-        (AllocationStatus::None, "none", "no allocation yet"),
-        (AllocationStatus::Optimal, "optimal", "optimum"),
-        (
-            AllocationStatus::Fallback,
-            "fallback",
-            "previous allocation within the limits, because the optimisation failed",
-        ),
-    ],
-};
 
 /// The allocator as an FMU.
 pub type ControlAllocator = SampledFmu<AllocatorInstance>;
@@ -116,7 +73,11 @@ impl SampledInstance for AllocatorInstance {
                 tolerance: 1e-6,
                 step: Settings::published().period,
             },
-            table: pwpf(effectors(schedule(outputs(inputs(VariableTable::new()))))),
+            table: effectors(
+                outputs(inputs(VariableTable::new()))
+                    .settings(|m: &mut ControlAllocator| &mut m.settings),
+            )
+            .settings(|m| &mut m.settings.pwpf),
         }
     }
 
@@ -132,7 +93,7 @@ impl SampledInstance for AllocatorInstance {
 
     fn design(&self) -> Result<Allocator, Failure> {
         let allocator = Allocator::new(self.settings.clone());
-        allocator.map_err(|error| Failure::Error(by_variable(&error, FIELDS)))
+        allocator.map_err(|error| Failure::Error(error.to_string()))
     }
 
     fn is_designed(&self, allocator: &Allocator) -> bool {
@@ -165,22 +126,6 @@ impl SampledInstance for AllocatorInstance {
     }
 }
 
-/// Names of the variables that hold fields of the settings, for messages.
-const FIELDS: &Fields = &[
-    ("effectors.reference_pressure", "dynamicPressure.reference"),
-    ("effectors.effectiveness", "effectiveness"),
-    ("effectors.min", "limit.surfaceMin"),
-    ("effectors.max", "limit.surfaceMax"),
-    ("effectors.rate", "limit.surfaceRate"),
-    ("weight_moment.x", "weight.moment[1]"),
-    ("weight_moment.y", "weight.moment[2]"),
-    ("weight_moment.z", "weight.moment[3]"),
-    ("weight_jet", "weight.jet"),
-    ("weight_surface", "weight.surface"),
-    ("threshold", "threshold.dynamicPressure"),
-    ("pwpf.time_constant", "pwpf.timeConstant"),
-];
-
 type Variables = VariableTable<ControlAllocator>;
 
 const INPUTS: [&str; 4] = ["moment.x", "moment.y", "moment.z", "dynamicPressure"];
@@ -188,17 +133,15 @@ const INPUTS: [&str; 4] = ["moment.x", "moment.y", "moment.z", "dynamicPressure"
 fn inputs(mut table: Variables) -> Variables {
     for (i, (axis, meaning)) in AXES.into_iter().enumerate() {
         let common = input(&format!("moment.{axis}"), &format!("Commanded {meaning} moment"));
-        table = table.real(common.real().unit(unit::moment()).nominal(1e5), move |m| {
-            &mut m.command.moment[i]
-        });
+        table =
+            table.real(common.real().unit("N.m").nominal(1e5), move |m| &mut m.command.moment[i]);
     }
     let pressure = input(
         "dynamicPressure",
         "Dynamic pressure, to which the moments of the surfaces are proportional",
     );
-    table.real(pressure.real().unit(unit::pressure()).min(0.0).nominal(1e3), |m| {
-        &mut m.command.dynamic_pressure
-    })
+    table
+        .real(pressure.real().unit("Pa").min(0.0).nominal(1e3), |m| &mut m.command.dynamic_pressure)
 }
 
 fn sampled(name: &str, text: &str) -> Common {
@@ -209,9 +152,8 @@ fn outputs(mut table: Variables) -> Variables {
     for (i, name) in Effectors::published().names.iter().enumerate() {
         let common =
             sampled(&format!("surface[{}]", i + 1), &format!("Commanded deflection of the {name}"));
-        table = table.real(common.real().unit(unit::angle()).nominal(0.1), move |m| {
-            &mut m.output.surfaces[i]
-        });
+        table =
+            table.real(common.real().unit("rad").nominal(0.1), move |m| &mut m.output.surfaces[i]);
     }
     for i in 0..JETS {
         let text = format!(
@@ -248,15 +190,15 @@ fn outputs(mut table: Variables) -> Variables {
         moment(table, "momentBySurfaces", "moment of the surfaces in the last allocation", |m| {
             &mut m.output.by_surfaces
         });
-    let status = sampled("solver.status", STATUSES.description);
+    let status = sampled("solver.status", AllocationStatus::TEXT);
     let iterations = sampled("solver.iterations", "Number of iterations in the last allocation");
     let fallbacks = sampled("solver.fallbacks", "Number of allocations so far that failed");
     let time = sampled("solver.time", "Wall-clock time of the last allocation; not reproducible");
     table
-        .enumeration(status, &STATUSES, |m| &mut m.output.report.status)
+        .choice(status, |m| &mut m.output.report.status)
         .integer(iterations, (None, None), |m| &mut m.output.report.iterations)
         .integer(fallbacks, (None, None), |m| &mut m.output.report.fallbacks)
-        .real(time.real().unit(unit::time()).nominal(1e-4), |m| &mut m.output.report.time)
+        .real(time.real().unit("s").nominal(1e-4), |m| &mut m.output.report.time)
 }
 
 fn moment(
@@ -267,48 +209,9 @@ fn moment(
 ) -> Variables {
     for (i, (axis, meaning)) in AXES.into_iter().enumerate() {
         let common = sampled(&format!("{name}.{axis}"), &format!("{} {text}", capital(meaning)));
-        table =
-            table.real(common.real().unit(unit::moment()).nominal(1e5), move |m| &mut field(m)[i]);
+        table = table.real(common.real().unit("N.m").nominal(1e5), move |m| &mut field(m)[i]);
     }
     table
-}
-
-fn schedule(table: Variables) -> Variables {
-    let method = parameter("method", METHODS.description);
-    let jets = parameter("jets", JET_COMMANDS.description);
-    let period = parameter(
-        "period",
-        "Sampling period of the allocation; with jets = pwpf a whole multiple of pwpf.period",
-    );
-    let threshold = parameter(
-        "threshold.dynamicPressure",
-        "Dynamic pressure above which method = blending uses the surfaces",
-    );
-    let iterations =
-        parameter("solver.maxIterations", "Maximum number of iterations of the cone solver");
-    let mut table = table
-        .enumeration(method, &METHODS, |m| &mut m.settings.method)
-        .enumeration(jets, &JET_COMMANDS, |m| &mut m.settings.jets)
-        .real(period.real().unit(unit::time()).min(1e-4).max(10.0).nominal(0.01), |m| {
-            &mut m.settings.period
-        })
-        .real(threshold.real().unit(unit::pressure()).min(0.0).nominal(1e3), |m| {
-            &mut m.settings.threshold
-        })
-        .integer(iterations, (Some(1), Some(1000)), |m| &mut m.settings.max_iterations);
-    for (i, (_, meaning)) in AXES.into_iter().enumerate() {
-        let text = format!("Weight W1 on the missing {meaning} moment, in 1/(N m)");
-        let weight = parameter(&format!("weight.moment[{}]", i + 1), &text).real().min(0.0);
-        table = table.real(weight, move |m| &mut m.settings.weight_moment[i]);
-    }
-    let jet = parameter("weight.jet", "Weight W2 on the duty cycle of each jet");
-    let surface = parameter(
-        "weight.surface",
-        "Weight on half the squared ratio of each deflection to its range; 0 gives the cost function as printed, whose optimum is not unique",
-    );
-    table
-        .real(jet.real().min(0.0), |m| &mut m.settings.weight_jet)
-        .real(surface.real().min(0.0), |m| &mut m.settings.weight_surface)
 }
 
 fn effectors(mut table: Variables) -> Variables {
@@ -319,14 +222,14 @@ fn effectors(mut table: Variables) -> Variables {
     };
     for i in 0..SURFACES {
         let declaration = limit("surfaceMin", i, "Lower limit on the deflection")
-            .unit(unit::angle())
+            .unit("rad")
             .max(0.0)
             .nominal(0.1);
         table = table.real(declaration, move |m| &mut m.settings.effectors.min[i]);
     }
     for i in 0..SURFACES {
         let declaration = limit("surfaceMax", i, "Upper limit on the deflection")
-            .unit(unit::angle())
+            .unit("rad")
             .min(0.0)
             .nominal(0.1);
         table = table.real(declaration, move |m| &mut m.settings.effectors.max[i]);
@@ -334,7 +237,7 @@ fn effectors(mut table: Variables) -> Variables {
     for i in 0..SURFACES {
         let declaration =
             limit("surfaceRate", i, "Upper limit on the magnitude of the deflection rate");
-        let declaration = declaration.unit(unit::angular_rate()).min(0.0).nominal(0.1);
+        let declaration = declaration.unit("rad/s").min(0.0).nominal(0.1);
         table = table.real(declaration, move |m| &mut m.settings.effectors.rate[i]);
     }
     for (i, name) in names.iter().enumerate() {
@@ -344,7 +247,7 @@ fn effectors(mut table: Variables) -> Variables {
     }
     let pressure =
         parameter("dynamicPressure.reference", "Dynamic pressure for which surfaceMoment is given");
-    table = table.real(pressure.real().unit(unit::pressure()).min(0.0).nominal(1e3), |m| {
+    table = table.real(pressure.real().unit("Pa").min(0.0).nominal(1e3), |m| {
         &mut m.settings.effectors.reference_pressure
     });
     for (i, (_, meaning)) in AXES.into_iter().enumerate() {
@@ -352,10 +255,9 @@ fn effectors(mut table: Variables) -> Variables {
             let text =
                 format!("{} moment per deflection of the {name} (matrix D_A)", capital(meaning));
             let common = parameter(&format!("surfaceMoment[{},{}]", i + 1, j + 1), &text);
-            table = table
-                .real(common.real().unit(unit::moment_by_angle()).nominal(1e5), move |m| {
-                    &mut m.settings.effectors.effectiveness[(i, j)]
-                });
+            table = table.real(common.real().unit("N.m/rad").nominal(1e5), move |m| {
+                &mut m.settings.effectors.effectiveness[(i, j)]
+            });
         }
     }
     for (i, (_, meaning)) in AXES.into_iter().enumerate() {
@@ -366,25 +268,10 @@ fn effectors(mut table: Variables) -> Variables {
                 j + 1
             );
             let common = parameter(&format!("jetMoment[{},{}]", i + 1, j + 1), &text);
-            table = table.real(common.real().unit(unit::moment()).nominal(1e4), move |m| {
+            table = table.real(common.real().unit("N.m").nominal(1e4), move |m| {
                 &mut m.settings.effectors.jet_moments[(i, j)]
             });
         }
     }
     table
-}
-
-fn pwpf(table: Variables) -> Variables {
-    let gain = parameter("pwpf.gain", "Gain K_m of the modulator's filter");
-    let time = parameter("pwpf.timeConstant", "Time constant T_m of the modulator's filter");
-    let on = parameter("pwpf.on", "Filter output u_on at which a jet switches on");
-    let off = parameter("pwpf.off", "Filter output u_off at which a jet switches off");
-    let period = parameter("pwpf.period", "Sampling period of the modulator");
-    let seconds = |common: Common| common.real().unit(unit::time()).min(1e-5).max(10.0);
-    table
-        .real(gain.real().min(0.0), |m| &mut m.settings.pwpf.gain)
-        .real(seconds(time).nominal(0.1), |m| &mut m.settings.pwpf.time_constant)
-        .real(on.real().min(0.0), |m| &mut m.settings.pwpf.on)
-        .real(off.real().min(0.0), |m| &mut m.settings.pwpf.off)
-        .real(seconds(period).nominal(1e-3), |m| &mut m.settings.pwpf.period)
 }

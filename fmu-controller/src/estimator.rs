@@ -1,95 +1,21 @@
 //! `AttitudeEstimator`: attitude and rates from gyroscope, accelerometer and magnetometer.
 
 use control::estimation::{
-    Alignment, Calibration, CalibrationMode, CalibrationStatus, Estimate, Estimator, Health,
-    LARGEST_RANGE, Line, Memory, Settings, mems_corrections,
+    Calibration, CalibrationStatus, Estimate, Estimator, Health, Line, Memory, Settings,
+    mems_corrections,
 };
 use controller_export::sampled::{SampledFmu, SampledInstance, Ticks};
-use controller_export::table::{ANGLES, AXES, RATES, capital, vector};
-use fmi2_export::fields::{Fields, by_variable};
-use fmi2_export::table::{Common, Real, discrete_input, discrete_output, input, parameter};
-use fmi2_export::{Description, Enumeration, Failure, VariableTable};
+use controller_export::table::{ANGLES, AXES, RATES, vector};
+use fmi2_export::table::{Common, Real, discrete_input, discrete_output, input};
+use fmi2_export::{Description, Failure, VariableTable};
 use model_description::DefaultExperiment;
-use model_description::unit::{self, Unit};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
+use settings::Choice;
 use vehicle::Scenario;
 use vehicle::kinematics::{Kinematics, Trajectory};
 use vehicle::platform::Pose;
 use vehicle::sensor_data::SensorData;
-
-static KINEMATICS: Enumeration<Kinematics> = Enumeration {
-    name: "EstimatorKinematics",
-    description: "Definition of the estimated body rates; the same as in the plant",
-    items: &[
-        (
-            Kinematics::Printed,
-            "printed",
-            "rates that the matrix R, as printed, turns into the derivatives of the angles",
-        ),
-        (Kinematics::Exact, "exact", "true body rates of the platform"),
-    ],
-};
-static ALIGNMENTS: Enumeration<Alignment> = Enumeration {
-    name: "Alignment",
-    description: "Source of the initial attitude",
-    items: &[
-        (Alignment::Measured, "measured", "first samples"),
-        (
-            Alignment::Given,
-            "given",
-            "initial.alpha, initial.beta and initial.sigma, the attitude in which the platform was placed",
-        ),
-    ],
-};
-static MODES: Enumeration<CalibrationMode> = Enumeration {
-    name: "CalibrationMode",
-    description: "Source of the magnetometer's calibration",
-    items: &[
-        (CalibrationMode::Given, "given", "parameters magnetometer.matrix and magnetometer.bias"),
-        (
-            CalibrationMode::Fit,
-            "fit",
-            "ellipsoid fitted to the readings of the first calibration.duration",
-        ),
-    ],
-};
-static STATUSES: Enumeration<CalibrationStatus> = Enumeration {
-    name: "CalibrationStatus",
-    description: "Source of the magnetometer's calibration in force",
-    items: &[
-        (CalibrationStatus::Given, "given", "parameters magnetometer.matrix and magnetometer.bias"),
-        (
-            CalibrationStatus::Collecting,
-            "collecting",
-            "parameters, while readings for a fit are collected",
-        ),
-        (CalibrationStatus::Fitted, "fitted", "fitted ellipsoid"),
-        (
-            CalibrationStatus::Refused,
-            "refused",
-            "parameters, because the readings do not determine an ellipsoid",
-        ),
-    ],
-};
-static HEALTH: Enumeration<Health> = Enumeration {
-    name: "EstimatorHealth",
-    description: "Health of the estimate: how far it can be trusted",
-    items: &[
-        (Health::Waiting, "waiting", "no sample has arrived yet"),
-        (Health::Ok, "ok", "the estimate uses a current sample of all sensors"),
-        (Health::Bridging, "bridging", "a sample is missing, and the last rate is held"),
-        (Health::Frozen, "frozen", "a sensor repeats its value and is ignored"),
-        (Health::Lost, "lost", "no usable sample has arrived for longer than lost.after"),
-        (Health::Calibrating, "calibrating", "readings for the calibration are collected"),
-        (Health::Uncalibrated, "uncalibrated", "the fit of the calibration was rejected"),
-        (
-            Health::Rejected,
-            "sampleRejected",
-            "a reading of the newest sample is implausible and is ignored",
-        ),
-    ],
-};
 
 /// The estimator as an FMU.
 pub type AttitudeEstimator = SampledFmu<EstimatorInstance>;
@@ -100,13 +26,9 @@ pub struct EstimatorInstance {
     pub(crate) settings: Settings,
     /// Sensor set as in the plant: 0, 1 for sensors without errors, [`MEMS_SENSORS`] for those with
     /// errors.
-    pub(crate) sensor_set: i32,
     line: Line,
     output: Output,
 }
-
-/// Sensor set for which the corrections are used.
-const MEMS_SENSORS: i32 = 2;
 
 /// Outputs of the estimator.
 #[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
@@ -134,30 +56,27 @@ impl SampledInstance for EstimatorInstance {
                 start: 0.0,
                 stop: Scenario::crmpc2022().duration,
                 tolerance: 1e-6,
-                step: Settings::default().period,
+                step: Settings::ours().period,
             },
-            table: corrections(calibration(gates(stages(start(outputs(inputs(
-                VariableTable::new(),
-            ))))))),
+            table: outputs(inputs(VariableTable::new()))
+                .settings(|m: &mut AttitudeEstimator| &mut m.settings),
         }
     }
 
     fn new() -> Self {
         Self {
-            settings: Settings { corrections: mems_corrections(), ..Settings::default() },
-            sensor_set: 0,
+            settings: Settings {
+                sensor_set: 0,
+                corrections: mems_corrections(),
+                ..Settings::ours()
+            },
             line: at_rest(),
             output: Output::default(),
         }
     }
 
     fn design(&self) -> Result<Estimator, Failure> {
-        let mut settings = self.settings;
-        if self.sensor_set < MEMS_SENSORS {
-            settings.corrections = Default::default();
-            settings.sensor_delay = 0.0;
-        }
-        Estimator::new(settings).map_err(|error| Failure::Error(by_variable(&error, FIELDS)))
+        Estimator::new(self.settings).map_err(|error| Failure::Error(error.to_string()))
     }
 
     fn period(estimator: &Estimator) -> f64 {
@@ -235,55 +154,19 @@ fn warning(before: &Memory, after: &Memory) -> Option<&'static str> {
     }
 }
 
-/// Names of the variables that hold fields of the settings, for messages.
-const FIELDS: &Fields = &[
-    ("lost_after", "lost.after"),
-    ("calibration_duration", "calibration.duration"),
-    ("cutoff", "filter.cutoff"),
-    ("gains", "fusion"),
-    ("sensor_delay", "sensor.delay"),
-    ("rest_duration", "rest.duration"),
-    ("gates[0]", "gyroscope"),
-    ("corrections[0]", "gyroscope"),
-    ("gates[1]", "accelerometer"),
-    ("corrections[1]", "accelerometer"),
-    ("gates[2]", "magnetometer"),
-    ("corrections[2]", "magnetometer"),
-];
-
 type Variables = VariableTable<AttitudeEstimator>;
 
 struct Sensor {
     name: &'static str,
     quantity: &'static str,
-    unit: fn() -> Unit,
+    unit: &'static str,
     nominal: f64,
-    /// Meaning of its correction matrix.
-    correction: &'static str,
 }
 
 const SENSORS: [Sensor; 3] = [
-    Sensor {
-        name: "gyroscope",
-        quantity: "Angular rate about",
-        unit: unit::angular_rate,
-        nominal: 0.05,
-        correction: "inverse of scale and misalignment",
-    },
-    Sensor {
-        name: "accelerometer",
-        quantity: "Specific force along",
-        unit: unit::acceleration,
-        nominal: 10.0,
-        correction: "inverse of scale and misalignment, up to a factor",
-    },
-    Sensor {
-        name: "magnetometer",
-        quantity: "Magnetic field along",
-        unit: unit::flux_density,
-        nominal: 5e-5,
-        correction: "inverse of scale, misalignment and soft iron, up to a factor",
-    },
+    Sensor { name: "gyroscope", quantity: "Angular rate about", unit: "rad/s", nominal: 0.05 },
+    Sensor { name: "accelerometer", quantity: "Specific force along", unit: "m/s2", nominal: 10.0 },
+    Sensor { name: "magnetometer", quantity: "Magnetic field along", unit: "T", nominal: 5e-5 },
 ];
 
 const MEASURED: [&str; 11] = [
@@ -301,7 +184,7 @@ const MEASURED: [&str; 11] = [
 ];
 
 fn seconds(common: Common) -> Real {
-    common.real().unit(unit::time())
+    common.real().unit("s")
 }
 
 fn inputs(mut table: Variables) -> Variables {
@@ -309,7 +192,7 @@ fn inputs(mut table: Variables) -> Variables {
         let declare = |axis: &str, _: &str| {
             let text = format!("{} {axis}, measured by the {}", sensor.quantity, sensor.name);
             let common = input(&format!("measured.{}.{axis}", sensor.name), &text);
-            common.real().unit((sensor.unit)()).nominal(sensor.nominal)
+            common.real().unit(sensor.unit).nominal(sensor.nominal)
         };
         table = vector(table, AXES, declare, move |m| &mut m.line.readings[i]);
     }
@@ -332,27 +215,27 @@ fn sampled(name: &str, text: &str) -> Common {
 fn outputs(table: Variables) -> Variables {
     let angle = |axis: &str, meaning: &str| {
         let common = sampled(&format!("attitude.{axis}"), &format!("Estimated {meaning}"));
-        common.real().unit(unit::angle()).nominal(0.1)
+        common.real().unit("rad").nominal(0.1)
     };
     let rate = |axis: &str, meaning: &str| {
         let common = sampled(&format!("rate.{axis}"), &format!("Estimated body {meaning} rate"));
-        common.real().unit(unit::angular_rate()).nominal(0.05)
+        common.real().unit("rad/s").nominal(0.05)
     };
     let bias = |axis: &str, _: &str| {
         let text = format!(
             "Estimated gyroscope bias about {axis}: sum of the given bias, the one measured at rest and the learned one"
         );
         let common = sampled(&format!("estimatedBias.{axis}"), &text);
-        common.real().unit(unit::angular_rate()).nominal(0.01)
+        common.real().unit("rad/s").nominal(0.01)
     };
     let hard_iron = |axis: &str, _: &str| {
         let text = format!("Magnetometer bias along {axis} in force, including hard iron");
         let common = sampled(&format!("calibration.bias.{axis}"), &text);
-        common.real().unit(unit::flux_density()).nominal(5e-5)
+        common.real().unit("T").nominal(5e-5)
     };
     let table = vector(table, ANGLES, angle, |m| &mut m.output.estimate.angles);
     let table = vector(table, RATES, rate, |m| &mut m.output.estimate.rates);
-    let health = sampled("health", HEALTH.description);
+    let health = sampled("health", Health::TEXT);
     let age = sampled("age", "Time since the newest sample was taken");
     let dropped = sampled("droppedSamples", "Number of samples so far that never arrived");
     let rejected = sampled(
@@ -363,7 +246,7 @@ fn outputs(table: Variables) -> Variables {
         "filter.delay",
         "Phase delay of the sensors and the low-pass filter at low frequencies",
     );
-    let status = sampled("calibration.status", STATUSES.description);
+    let status = sampled("calibration.status", CalibrationStatus::TEXT);
     let residual = sampled(
         "calibration.residual",
         "Root mean square distance of the readings from the fitted ellipsoid, relative to its size",
@@ -373,13 +256,13 @@ fn outputs(table: Variables) -> Variables {
         "Condition number of the ellipsoid fit; 16 for uniform coverage, above 1000 rejected",
     );
     let table = table
-        .enumeration(health, &HEALTH, |m| &mut m.output.estimate.health)
+        .choice(health, |m| &mut m.output.estimate.health)
         .real(seconds(age).nominal(0.01), |m| &mut m.output.estimate.age)
         .integer(dropped, (None, None), |m| &mut m.output.estimate.dropped)
         .integer(rejected, (None, None), |m| &mut m.output.estimate.rejected)
         .real(seconds(delay).nominal(0.01), |m| &mut m.output.filter_delay);
     let table = vector(table, AXES, bias, |m| &mut m.output.estimate.gyroscope_bias)
-        .enumeration(status, &STATUSES, |m| &mut m.output.calibration.status)
+        .choice(status, |m| &mut m.output.calibration.status)
         .real(residual.real(), |m| &mut m.output.calibration.residual)
         .real(condition.real(), |m| &mut m.output.calibration.condition);
     let mut table = vector(table, AXES, hard_iron, |m| &mut m.output.calibration.correction.bias);
@@ -392,140 +275,6 @@ fn outputs(table: Variables) -> Variables {
         table = table.real(sampled(&name, &text).real(), move |m| {
             &mut m.output.calibration.correction.matrix[(row, column)]
         });
-    }
-    table
-}
-
-fn start(table: Variables) -> Variables {
-    let alignment = parameter("alignment", ALIGNMENTS.description);
-    let angle = |axis: &str, meaning: &str| {
-        let text = format!(
-            "{} before the first sample; with alignment = given also at the first sample",
-            capital(meaning)
-        );
-        let common = parameter(&format!("initial.{axis}"), &text);
-        common.real().unit(unit::angle()).nominal(0.1)
-    };
-    let kinematics = parameter("kinematics", KINEMATICS.description);
-    let declination = parameter(
-        "field.declination",
-        "Direction of the horizontal magnetic field relative to the velocity, positive to the east",
-    );
-    let rest = parameter(
-        "rest.duration",
-        "Time from the first sample during which the platform rests and the gyroscope's bias is measured; 0 for none",
-    );
-    let table = table.enumeration(alignment, &ALIGNMENTS, |m| &mut m.settings.alignment);
-    vector(table, ANGLES, angle, |m| &mut m.settings.initial)
-        .enumeration(kinematics, &KINEMATICS, |m| &mut m.settings.kinematics)
-        .real(declination.real().unit(unit::angle()).nominal(0.1), |m| &mut m.settings.declination)
-        .real(seconds(rest).min(0.0).nominal(1.0), |m| &mut m.settings.rest_duration)
-}
-
-fn stages(table: Variables) -> Variables {
-    let period = parameter("period", "Sampling period of the estimator and of the sensors");
-    let cutoff = parameter(
-        "filter.cutoff",
-        "Cut-off frequency of the low-pass filter on all readings; 0 for no filter",
-    );
-    let prediction = parameter(
-        "prediction",
-        "Whether the estimate is predicted forward over the delays of sensors, transmission and filter",
-    );
-    let delay = parameter(
-        "sensor.delay",
-        "Delay of the sensors' filters at low frequencies; used with sensor.set = 2",
-    );
-    let proportional = parameter(
-        "fusion.proportional",
-        "Proportional gain of the sensor fusion, the rate at which attitude errors decay",
-    );
-    let integral = parameter(
-        "fusion.integral",
-        "Integral gain of the sensor fusion, which learns the gyroscope's bias; 0 for no learning",
-    );
-    let lost = parameter(
-        "lost.after",
-        "Time without a usable sample after which the attitude counts as lost",
-    );
-    let frozen = parameter(
-        "frozen.samples",
-        "Number of equal readings in a row from which a sensor counts as frozen; 0 for never, as needed for sensors without noise",
-    );
-    table
-        .real(seconds(period).min(1e-4).max(10.0).nominal(0.01), |m| &mut m.settings.period)
-        .real(cutoff.real().unit(unit::frequency()).min(0.0).nominal(10.0), |m| {
-            &mut m.settings.cutoff
-        })
-        .boolean(prediction, |m| &mut m.settings.prediction)
-        .real(seconds(delay).min(0.0).nominal(0.01), |m| &mut m.settings.sensor_delay)
-        .real(proportional.real().unit(unit::gain_rate()).min(0.0).nominal(1.0), |m| {
-            &mut m.settings.gains.proportional
-        })
-        .real(integral.real().unit(unit::gain_angle()).min(0.0).nominal(0.1), |m| {
-            &mut m.settings.gains.integral
-        })
-        .real(seconds(lost).min(0.0).nominal(0.5), |m| &mut m.settings.lost_after)
-        .integer(frozen, (Some(0), None), |m| &mut m.settings.frozen_samples)
-}
-
-fn gates(mut table: Variables) -> Variables {
-    for (i, sensor) in SENSORS.iter().enumerate() {
-        let range = parameter(
-            &format!("{}.range", sensor.name),
-            &format!(
-                "Largest plausible reading of the {} along an axis; a larger one is ignored",
-                sensor.name
-            ),
-        );
-        let jump = parameter(
-            &format!("{}.jump", sensor.name),
-            &format!(
-                "Largest plausible change of the {}'s reading between two samples; a reading beyond it is ignored until the next one confirms it",
-                sensor.name
-            ),
-        );
-        let real = |common: Common| {
-            common.real().unit((sensor.unit)()).min(0.0).max(LARGEST_RANGE).nominal(sensor.nominal)
-        };
-        table = table
-            .real(real(range), move |m| &mut m.settings.gates[i].range)
-            .real(real(jump), move |m| &mut m.settings.gates[i].jump);
-    }
-    table
-}
-
-fn calibration(table: Variables) -> Variables {
-    let set = parameter(
-        "sensor.set",
-        "Sensor set, the same as in the plant: 0 and 1 are sensors without errors; 2 uses sensor.delay and the correction matrices and biases, by default those of the MEMS set",
-    );
-    let mode = parameter("calibration.mode", MODES.description);
-    let duration =
-        parameter("calibration.duration", "Time during which readings are collected for the fit");
-    table
-        .integer(set, (Some(0), Some(MEMS_SENSORS)), |m| &mut m.sensor_set)
-        .enumeration(mode, &MODES, |m| &mut m.settings.calibration)
-        .real(seconds(duration).min(0.0).nominal(10.0), |m| &mut m.settings.calibration_duration)
-}
-
-fn corrections(mut table: Variables) -> Variables {
-    for (i, sensor) in SENSORS.iter().enumerate() {
-        for (row, column) in (0..3).flat_map(|row| (0..3).map(move |column| (row, column))) {
-            let name = format!("{}.matrix[{},{}]", sensor.name, row + 1, column + 1);
-            let text = format!(
-                "Correction matrix of the {} ({}), entry ({}, {})",
-                sensor.name, sensor.correction, AXES[row].0, AXES[column].0
-            );
-            let real = parameter(&name, &text).real().nominal(1.0);
-            table = table.real(real, move |m| &mut m.settings.corrections[i].matrix[(row, column)]);
-        }
-        let bias = |axis: &str, _: &str| {
-            let text = format!("Bias of the {}, component {axis}", sensor.name);
-            let common = parameter(&format!("{}.bias.{axis}", sensor.name), &text);
-            common.real().unit((sensor.unit)()).nominal(sensor.nominal)
-        };
-        table = vector(table, AXES, bias, move |m| &mut m.settings.corrections[i].bias);
     }
     table
 }

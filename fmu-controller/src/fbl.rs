@@ -1,25 +1,13 @@
-//! Parameters of `FBL`.
+//! `FBL` as an FMU.
 
 use control::error::DesignError;
 use control::sliding::{Fbl, FblSettings};
-use controller_export::{ControllerFmu, Law, Vehicle, table};
-use fmi2_export::VariableTable;
-use fmi2_export::fields::Fields;
-use fmi2_export::table::parameter;
-use model_description::unit;
+use controller_export::{Law, Vehicle};
 use serde::{Deserialize, Serialize};
 
-/// Parameters of the feedback linearisation.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct FblLaw {
-    pub(crate) settings: FblSettings,
-}
-
-impl Default for FblLaw {
-    fn default() -> Self {
-        Self { settings: FblSettings::published() }
-    }
-}
+/// The feedback linearisation, which has no outputs of its own.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+pub struct FblLaw;
 
 impl Law for FblLaw {
     type Controller = Fbl;
@@ -29,27 +17,16 @@ impl Law for FblLaw {
     const DESCRIPTION: &'static str =
         "Feedback linearisation of the attitude, a comparison law of Wu et al. (2015)";
     const DOCUMENTATION: &'static str = include_str!("fbl.html");
-    const FIELDS: &'static Fields = &[("kp", "gain.p"), ("kd", "gain.d")];
 
-    fn period() -> f64 {
-        FblSettings::published().period
+    fn settings() -> FblSettings {
+        FblSettings::published()
     }
 
-    fn declare(table: VariableTable<ControllerFmu<Self>>) -> VariableTable<ControllerFmu<Self>> {
-        let p = parameter("gain.p", "Gain on the tracking error of the angles").real().min(0.0);
-        let d = parameter("gain.d", "Gain on the derivative of the tracking error of the angles")
-            .real()
-            .min(0.0);
-        table::period(table, "control law")
-            .real(p.unit(unit::gain_angle()), |m| &mut m.law.settings.kp)
-            .real(d.unit(unit::gain_rate()), |m| &mut m.law.settings.kd)
+    fn period(settings: &FblSettings) -> f64 {
+        settings.period
     }
 
-    fn settings(&self, vehicle: &Vehicle) -> Self::Settings {
-        FblSettings { body: vehicle.body, period: vehicle.period, ..self.settings }
-    }
-
-    fn design(settings: Self::Settings) -> Result<Self::Controller, DesignError> {
-        Fbl::new(settings)
+    fn design(settings: FblSettings, vehicle: &Vehicle) -> Result<Fbl, DesignError> {
+        Fbl::new(FblSettings { body: vehicle.body, ..settings })
     }
 }

@@ -4,6 +4,7 @@ mod messages;
 
 use crate::crmpc::CrmpcLaw;
 use crate::dlmpc::DlmpcLaw;
+use crate::tvsmc::Complete;
 use crate::tvsmc::{self, TvsmcLaw};
 use crate::{Btvsmc, BtvsmcDo, Crmpc, Dlmpc, Fbl, Lqr, SotvsmcDo};
 use control::error_dynamics::Gain;
@@ -141,7 +142,8 @@ fn moments_are_held_between_ticks() {
 }
 
 fn set_feedback(instance: &mut Crmpc, k: f64, period: f64) {
-    (instance.law.settings.feedback, instance.parameters.period) = (Gain { k1: k, k2: k }, period);
+    (instance.settings.feedback, instance.settings.period_feedback) =
+        (Gain { k1: k, k2: k }, period);
 }
 
 #[test]
@@ -200,7 +202,7 @@ fn a_singular_attitude_is_an_error_not_a_number() {
 fn the_achieved_moment_counts_only_if_it_is_used() {
     let after = |used: bool, achieved: f64| {
         let mut instance: BtvsmcDo = ready(|instance: &mut BtvsmcDo| {
-            instance.parameters.achieved_moment_used = used;
+            instance.settings.law.achieved_moment_used = used;
             instance.input.achieved_moment = Vector3::repeat(achieved);
         });
         instance.calculate(0.0, LastEvent::InputSet).unwrap();
@@ -282,10 +284,10 @@ fn a_delay_out_of_range_is_refused_by_name() {
 fn a_time_budget_of_any_length_is_accepted() {
     for budget in [1e9, 1e19, 1e300, f64::MAX] {
         let mut crmpc: Crmpc =
-            ready(|instance: &mut Crmpc| instance.law.settings.solver.time_budget = budget);
+            ready(|instance: &mut Crmpc| instance.settings.solver.time_budget = budget);
         crmpc.calculate(0.0, LastEvent::InputSet).unwrap();
         let mut dlmpc: Dlmpc =
-            ready(|instance: &mut Dlmpc| instance.law.settings.solver.time_budget = budget);
+            ready(|instance: &mut Dlmpc| instance.settings.solver.time_budget = budget);
         dlmpc.calculate(0.0, LastEvent::InputSet).unwrap();
         assert!(crmpc.output.moment.norm() > 0.0 && dlmpc.output.moment.norm() > 0.0, "{budget} s");
     }
@@ -294,7 +296,7 @@ fn a_time_budget_of_any_length_is_accepted() {
 #[test]
 fn variants_have_an_observer_if_their_published_settings_have_one() {
     fn agrees<V: tvsmc::Variant>() -> bool {
-        V::published().observer.is_some() == V::OBSERVER
+        V::published().complete().observer.is_some() == V::OBSERVER
     }
     assert!(
         agrees::<tvsmc::Btvsmc>() && agrees::<tvsmc::BtvsmcDo>() && agrees::<tvsmc::SotvsmcDo>()

@@ -4,7 +4,6 @@ use crate::parameters::Parameters;
 use crate::plant::{MOTION, Output, ReentryPlant};
 use crate::roles::{Known, Unknown};
 use crate::table;
-use fmi2_export::fields::by_variable;
 use fmi2_export::{
     Context, Description, EventInfo, Failure, Inputs, LastEvent, Model, Restoration,
 };
@@ -20,7 +19,7 @@ impl ReentryPlant {
     /// discard, as the state may be an integrator's trial that the importer can take back.
     fn check(&self, state: &State, time: f64) -> Result<(), Failure> {
         let failure = if self.event_driven { Failure::Discard } else { Failure::Error };
-        check(state, time).map_err(|error| failure(by_variable(&error, table::FIELDS)))
+        check(state, time).map_err(|error| failure(error.to_string()))
     }
 }
 impl Model for ReentryPlant {
@@ -42,7 +41,7 @@ impl Model for ReentryPlant {
     }
 
     fn initialize(&mut self, context: &Context) -> Result<(), Failure> {
-        let failed = |error: vehicle::Error| Failure::Error(by_variable(&error, table::FIELDS));
+        let failed = |error: vehicle::Error| Failure::Error(error.to_string());
         self.dynamic_pressure = self.parameters.dynamic_pressure().map_err(failed)?;
         self.standard_pressure = self.parameters.flight.dynamic_pressure().map_err(failed)?;
         let config = self.parameters.config().map_err(failed)?;
@@ -104,7 +103,7 @@ impl Model for ReentryPlant {
             self.input
         });
         self.plant = Some(plant);
-        result.map_err(|error| Failure::Error(by_variable(&error, table::FIELDS)))
+        result.map_err(|error| Failure::Error(error.to_string()))
     }
 
     /// Checks the restored plant instead of trusting it. Everything that follows from the
@@ -112,7 +111,7 @@ impl Model for ReentryPlant {
     /// parameters, and otherwise with a new one.
     fn restored(&mut self, from: Restoration<'_, Self>) -> Result<(), Failure> {
         let Some(plant) = self.plant.as_ref().filter(|_| from.initialized) else { return Ok(()) };
-        let failed = |error: vehicle::Error| Failure::Error(by_variable(&error, table::FIELDS));
+        let failed = |error: vehicle::Error| Failure::Error(error.to_string());
         let before = from.before.plant.as_ref().filter(|before| {
             before.start_time() == from.start_time && from.before.parameters == self.parameters
         });
@@ -161,8 +160,8 @@ impl Model for ReentryPlant {
         self.ready()?;
         let parameters = &self.parameters;
         for (name, value, unit) in [
-            ("delay", parameters.moment_delay, "s"),
-            ("resolution", parameters.moment_resolution, "N m"),
+            ("delay", parameters.converter.delay, "s"),
+            ("resolution", parameters.converter.resolution, "N m"),
         ] {
             if value > 0.0 {
                 return Err(Failure::Error(format!(

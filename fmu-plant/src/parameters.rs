@@ -1,11 +1,12 @@
 //! Parameters of the FMU. Their defaults are the scenario of Chai 2022.
 
-use fmi2_export::Enumeration;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
+use settings::{Choice, Declared};
 use vehicle::Scenario;
 use vehicle::actuators::{self, JetMode};
 use vehicle::atmosphere::Flight;
+use vehicle::axes::{ANGLES, AXES, Entry, RATES};
 use vehicle::calibration::Sequence;
 use vehicle::disturbance::{
     Disturbance, DisturbanceKind, DisturbanceTable, MomentWave, Row, SineMoment,
@@ -14,10 +15,11 @@ use vehicle::dynamics::Inertia;
 use vehicle::effectors::Effectors;
 use vehicle::error::Error;
 use vehicle::kinematics::Kinematics;
-use vehicle::plant::{Config, state};
+use vehicle::plant::{BETA_LIMIT, Config, state};
 use vehicle::platform::Surroundings;
 use vehicle::sensor_data::SensorData;
-use vehicle::sensors::{self, Line};
+use vehicle::sensors::{self, Line, PerSensor};
+use vehicle::transport;
 use vehicle::triad::Triad;
 use vehicle::turntable;
 
@@ -27,84 +29,18 @@ const STEP: f64 = 0.01;
 /// can read.
 const NEVER: f64 = 1e15;
 
-/// Kinds of disturbance as an FMI enumeration.
-pub(crate) static KINDS: Enumeration<DisturbanceKind> = Enumeration {
-    name: "DisturbanceKind",
-    description: "Waveform of the disturbance",
-    items: &[
-        (DisturbanceKind::None, "none", "no disturbance"),
-        (
-            DisturbanceKind::White,
-            "white",
-            "each component is drawn uniformly within disturbance.bound every disturbance.period",
-        ),
-        (DisturbanceKind::Constant, "constant", "disturbance.bound times disturbance.direction"),
-        (DisturbanceKind::Sine, "sine", "a moment that is an offset plus two sinusoids"),
-        (
-            DisturbanceKind::Square,
-            "square",
-            "disturbance.bound times disturbance.direction, with the sign changing every half disturbance.square.period",
-        ),
-        (
-            DisturbanceKind::AlongRate,
-            "alongRate",
-            "each component is plus or minus disturbance.bound, chosen every disturbance.period so that the angular rate grows fastest",
-        ),
-        (
-            DisturbanceKind::AgainstMoment,
-            "againstMoment",
-            "each component is plus or minus disturbance.bound, chosen every disturbance.period to oppose the control moment",
-        ),
-        (
-            DisturbanceKind::Table,
-            "table",
-            "disturbance.bound times the factors in the current row of a lookup table over time",
-        ),
-    ],
-};
-
 /// Number of rows of the disturbance's lookup table for which there are variables.
 pub(crate) const TABLE_ROWS: usize = 8;
 
 /// Source of the control moment.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Choice)]
 pub(crate) enum Actuation {
+    /// The input moment acts, delayed by actuation.delay and rounded to actuation.resolution.
     #[default]
     Moment,
+    /// The inputs surface and jet command eight aerodynamic surfaces and ten jets.
     SurfacesAndJets,
 }
-
-/// Sources of the control moment as an FMI enumeration.
-pub(crate) static ACTUATIONS: Enumeration<Actuation> = Enumeration {
-    name: "Actuation",
-    description: "Source of the control moment",
-    items: &[
-        (
-            Actuation::Moment,
-            "moment",
-            "the input moment acts, delayed by actuation.delay and rounded to actuation.resolution",
-        ),
-        (
-            Actuation::SurfacesAndJets,
-            "surfacesAndJets",
-            "the inputs surface and jet command eight aerodynamic surfaces and ten jets",
-        ),
-    ],
-};
-
-/// Forms of the attitude kinematics as an FMI enumeration.
-pub(crate) static KINEMATICS: Enumeration<Kinematics> = Enumeration {
-    name: "Kinematics",
-    description: "Form of the matrix R in the attitude kinematics",
-    items: &[
-        (Kinematics::Printed, "printed", "R is as printed in (2) of Chai 2022 and (4) of Wu 2015"),
-        (
-            Kinematics::Exact,
-            "exact",
-            "R includes the derivative of alpha times sin beta in the row of the bank angle, as in (1) of Wu 2015",
-        ),
-    ],
-};
 
 /// Value of `sensor.set` without sampling: the FMU outputs the readings of ideal sensors.
 pub(crate) const NO_SENSORS: i32 = 0;
@@ -113,46 +49,160 @@ const IDEAL_SENSORS: i32 = 1;
 /// Value of `sensor.set` for sampled sensors with the errors given by the parameters.
 pub(crate) const MEMS_SENSORS: i32 = 2;
 
-/// Parameters that a user sets before the simulation, named as in the variable table.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+/// Parameters that a user sets before the simulation, in the order of the variable table.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Declared)]
 pub(crate) struct Parameters {
+    /// Nominal inertia.
     pub(crate) inertia: Inertia,
+    /// Ratio of the actual to the nominal inertia: 1.05 means 5 % more.
+    #[setting(name = "inertia.scale", min = 0.01, max = 100.0, nominal = 1.0)]
     pub(crate) inertia_scale: f64,
-    pub(crate) initial_angles: Vector3<f64>,
-    pub(crate) initial_rates: Vector3<f64>,
+    pub(crate) initial: Initial,
+    #[setting(name = "disturbance.kind")]
     pub(crate) kind: DisturbanceKind,
+    /// Bound on the disturbance of the second time derivative of each attitude angle.
+    #[setting(name = "disturbance.bound", unit = "rad/s2", min = 0.0, max = 10.0, nominal = 0.03)]
     pub(crate) bound: f64,
+    /// Time for which disturbances of the kinds white, alongRate and againstMoment are held.
+    #[setting(name = "disturbance.period", unit = "s", min = 1e-4, nominal = 0.04)]
     pub(crate) period: f64,
+    /// Seed of the white noise; the same seed gives the same noise.
+    #[setting(name = "disturbance.seed", min = 0)]
     pub(crate) seed: u64,
+    /// Factor on disturbance.bound, used by the kinds constant and square.
+    #[setting(name = "disturbance.direction", each = ANGLES, min = -1, max = 1, nominal = 1)]
     pub(crate) direction: Vector3<f64>,
+    /// Period of the square wave, which starts with its positive half at disturbance.start.
+    #[setting(name = "disturbance.square.period", unit = "s", min = 1e-3, nominal = 10.0)]
     pub(crate) square_period: f64,
+    /// Constant part of the sine disturbance moment.
+    #[setting(name = "disturbance.sine.offset", each = AXES, unit = "N.m", nominal = 1e4)]
     pub(crate) sine_offset: Vector3<f64>,
+    /// Sinusoidal part of the sine disturbance moment.
+    #[setting(name = "disturbance.sine", each = WAVES)]
     pub(crate) waves: [MomentWave; 2],
-    /// Number of rows of the lookup table that are used.
-    pub(crate) table_rows: usize,
-    pub(crate) table_period: f64,
-    pub(crate) table: [Row; TABLE_ROWS],
+    /// Time at which the disturbance starts.
+    #[setting(name = "disturbance.start", unit = "s")]
     pub(crate) start: f64,
+    /// Time at which the disturbance ends.
+    #[setting(name = "disturbance.end", unit = "s")]
     pub(crate) end: f64,
+    /// Maximum step size of the Runge-Kutta integration in co-simulation.
+    #[setting(name = "integrator.step", unit = "s", min = 1e-5, max = 1.0, nominal = 0.01)]
     pub(crate) step: f64,
-    pub(crate) kinematics: Kinematics,
-    pub(crate) earth_rate: f64,
     pub(crate) actuation: Actuation,
-    pub(crate) moment_delay: f64,
-    pub(crate) moment_resolution: f64,
     pub(crate) flight: Flight,
+    /// Ratio of the actual air density to that of the standard atmosphere: 0.9 means 10 % less.
+    #[setting(name = "density.scale", min = 0.0, max = 10.0, nominal = 1.0)]
     pub(crate) density_scale: f64,
+    /// Ratio of the actual to the nominal effectiveness of the surfaces: 0.9 means 10 % less.
+    #[setting(name = "aerodynamics.scale", min = 0.0, max = 10.0, nominal = 1.0)]
     pub(crate) aerodynamics_scale: f64,
+    /// If true, jets give any thrust from 0 to 1; if false, they are fully on from a command of
+    /// 0.5.
+    #[setting(name = "jets.duty")]
     pub(crate) jet_duty: bool,
+    /// If true, jet 4 mirrors jet 8; if false, it is as printed in (64) of Wu 2015, which is not
+    /// symmetric.
+    #[setting(name = "jets.symmetric")]
     pub(crate) jet_symmetric: bool,
+    pub(crate) kinematics: Kinematics,
+    /// Angular rate of the Earth: 7.2921e-5 rad/s, or 0 to neglect the rotation.
+    #[setting(name = "trajectory.earthRate", unit = "rad/s", min = 0.0, max = 1.0, nominal = 1e-4)]
+    pub(crate) earth_rate: f64,
+    #[setting(skip)]
+    pub(crate) sensing: Sensing,
+    #[setting(skip)]
+    pub(crate) converter: Converter,
+    #[setting(skip)]
+    pub(crate) table: Table,
+}
+
+/// Names of the two sinusoids of the disturbance moment.
+const WAVES: [Entry; 2] = [(".first", "first"), (".second", "second")];
+
+/// Largest initial angle of attack and bank angle, rad.
+const TURN: f64 = 2.0 * std::f64::consts::PI;
+
+/// Initial state of the vehicle.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Declared)]
+pub(crate) struct Initial {
+    /// Initial angle of attack.
+    #[setting(unit = "rad", min = -TURN, max = TURN, nominal = 0.1)]
+    pub(crate) alpha: f64,
+    /// Initial sideslip angle.
+    #[setting(unit = "rad", min = -BETA_LIMIT, max = BETA_LIMIT, nominal = 0.1)]
+    pub(crate) beta: f64,
+    /// Initial bank angle.
+    #[setting(unit = "rad", min = -TURN, max = TURN, nominal = 0.1)]
+    pub(crate) sigma: f64,
+    /// Initial body rate.
+    #[setting(name = "", each = RATES, unit = "rad/s", min = -10.0, max = 10.0, nominal = 0.05)]
+    pub(crate) rates: Vector3<f64>,
+}
+
+impl Initial {
+    pub(crate) fn new(angles: Vector3<f64>, rates: Vector3<f64>) -> Self {
+        Self { alpha: angles.x, beta: angles.y, sigma: angles.z, rates }
+    }
+
+    /// Returns the initial angles Θ, rad.
+    pub(crate) fn angles(&self) -> Vector3<f64> {
+        Vector3::new(self.alpha, self.beta, self.sigma)
+    }
+}
+
+/// Parameters of the sensors and of their surroundings.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Declared)]
+pub(crate) struct Sensing {
+    /// Sensor set: 0 for ideal continuous readings, 1 for samples without errors, 2 for samples
+    /// with errors, which are those of a typical MEMS set by default.
+    #[setting(name = "sensor.set", min = NO_SENSORS, max = MEMS_SENSORS)]
     pub(crate) sensor_set: i32,
-    pub(crate) triads: [Triad; 3],
+    #[setting(name = "sensor")]
     pub(crate) line: Line,
+    /// Seed of sensor noise and dropped samples; the same seed gives the same samples.
+    #[setting(name = "sensor.seed", min = 0)]
     pub(crate) sensor_seed: u64,
-    pub(crate) turntable: turntable::Config,
+    #[setting(name = "sensor")]
+    pub(crate) triads: PerSensor<Triad>,
+    #[setting(name = "sensor")]
     pub(crate) surroundings: Surroundings,
+    /// If true, the attitude follows a prescribed calibration sequence instead of the dynamics.
+    #[setting(name = "calibration.active")]
     pub(crate) calibrates: bool,
+    #[setting(name = "calibration")]
     pub(crate) sequence: Sequence,
+    pub(crate) turntable: turntable::Config,
+}
+
+/// Parameters of the converter of the input moment.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Declared)]
+pub(crate) struct Converter {
+    /// Delay of the input moment, which is then held over each communication step; only for
+    /// co-simulation with actuation = moment.
+    #[setting(name = "actuation.delay", unit = "s", min = 0.0, max = transport::LONGEST, nominal = 0.1)]
+    pub(crate) delay: f64,
+    /// Quantization step of the input moment, which is then held over each communication step; 0
+    /// for none; only for co-simulation with actuation = moment.
+    #[setting(name = "actuation.resolution", unit = "N.m", min = 0.0, nominal = 10.0)]
+    pub(crate) resolution: f64,
+}
+
+/// Lookup table of the disturbance.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Declared)]
+pub(crate) struct Table {
+    /// Number of rows of the disturbance's lookup table that are used; the rows after them are
+    /// ignored.
+    #[setting(name = "disturbance.table.rows", min = 0, max = TABLE_ROWS)]
+    pub(crate) used: usize,
+    /// Period with which the lookup table repeats from disturbance.start on; 0 holds the last row
+    /// instead.
+    #[setting(name = "disturbance.table.period", unit = "s", min = 0.0, nominal = 10.0)]
+    pub(crate) period: f64,
+    /// The rows, whose variables are declared column by column.
+    #[setting(skip)]
+    pub(crate) rows: [Row; TABLE_ROWS],
 }
 
 impl Default for Parameters {
@@ -169,8 +219,7 @@ impl Default for Parameters {
         Self {
             inertia: scenario.inertia,
             inertia_scale: scenario.inertia_scale,
-            initial_angles: scenario.initial_angles,
-            initial_rates: scenario.initial_rates,
+            initial: Initial::new(scenario.initial_angles, scenario.initial_rates),
             kind,
             bound,
             period,
@@ -179,30 +228,29 @@ impl Default for Parameters {
             square_period,
             sine_offset: sine.offset,
             waves: [wave(0), wave(1)],
-            table_rows: 0,
-            table_period: 0.0,
-            table: [Row::default(); TABLE_ROWS],
             start,
             end: end.min(NEVER),
             step: STEP,
             kinematics: Kinematics::Printed,
             earth_rate: 0.0,
             actuation: Actuation::default(),
-            moment_delay: 0.0,
-            moment_resolution: 0.0,
             flight: tvsmc.flight.unwrap_or(Flight { altitude: 0.0, mach: 0.0 }),
             density_scale: 1.0,
             aerodynamics_scale: 1.0,
             jet_duty: false,
             jet_symmetric: false,
-            sensor_set: NO_SENSORS,
-            triads: sensors.mems,
-            line,
-            sensor_seed: 1,
-            turntable: turntable::Config::default(),
-            surroundings: sensors.surroundings,
-            calibrates: false,
-            sequence: sensors.calibration,
+            sensing: Sensing {
+                sensor_set: NO_SENSORS,
+                line,
+                sensor_seed: 1,
+                triads: sensors.mems,
+                surroundings: sensors.surroundings,
+                calibrates: false,
+                sequence: sensors.calibration,
+                turntable: turntable::Config::default(),
+            },
+            converter: Converter::default(),
+            table: Table::default(),
         }
     }
 }
@@ -218,11 +266,12 @@ impl Parameters {
 
     /// Lookup table of the disturbance, with the rows that are used.
     fn table(&self) -> Result<DisturbanceTable, Error> {
-        let rows = self.table.get(..self.table_rows).ok_or_else(|| Error::Parameter {
+        let Table { used, period, rows } = &self.table;
+        let rows = rows.get(..*used).ok_or_else(|| Error::Parameter {
             name: "disturbance.table.rows".into(),
-            problem: format!("= {} must lie between 0 and {TABLE_ROWS}", self.table_rows),
+            problem: format!("= {used} must lie between 0 and {TABLE_ROWS}"),
         })?;
-        Ok(DisturbanceTable { period: self.table_period, rows: rows.to_vec() })
+        Ok(DisturbanceTable { period: *period, rows: rows.to_vec() })
     }
 
     /// Configuration of the actuators, or `None` if the control moment is an input.
@@ -242,16 +291,18 @@ impl Parameters {
     /// Configuration of the sampled sensors, or `None` if the FMU outputs the readings of ideal
     /// sensors.
     fn sensors(&self) -> Option<sensors::Config> {
-        let triads = match self.sensor_set {
+        let Sensing { sensor_set, line, sensor_seed: seed, .. } = self.sensing;
+        let errors = self.sensing.triads;
+        let triads = match sensor_set {
             NO_SENSORS => return None,
             IDEAL_SENSORS => {
                 let ideal = SensorData::embedded().ideal;
                 // Freezing is not an error of the sensor set, so the ideal set keeps it.
-                std::array::from_fn(|i| Triad { freeze: self.triads[i].freeze, ..ideal[i] })
+                PerSensor(std::array::from_fn(|i| Triad { freeze: errors[i].freeze, ..ideal[i] }))
             }
-            _ => self.triads,
+            _ => errors,
         };
-        Some(sensors::Config { triads, line: self.line, seed: self.sensor_seed })
+        Some(sensors::Config { triads, line, seed })
     }
 
     /// Configuration of the plant that these parameters describe.
@@ -262,7 +313,7 @@ impl Parameters {
         Ok(Config {
             inertia: self.inertia,
             inertia_scale: self.inertia_scale,
-            initial: state(&self.initial_angles, &self.initial_rates),
+            initial: state(&self.initial.angles(), &self.initial.rates),
             disturbance: Disturbance {
                 kind: self.kind,
                 bound: self.bound,
@@ -278,12 +329,12 @@ impl Parameters {
             kinematics: self.kinematics,
             earth_rate: self.earth_rate,
             actuators: self.actuators()?,
-            moment_delay: self.moment_delay,
-            moment_resolution: self.moment_resolution,
-            calibration: self.calibrates.then_some(self.sequence),
-            surroundings: self.surroundings,
+            moment_delay: self.converter.delay,
+            moment_resolution: self.converter.resolution,
+            calibration: self.sensing.calibrates.then_some(self.sensing.sequence),
+            surroundings: self.sensing.surroundings,
             sensors: self.sensors(),
-            turntable: self.turntable,
+            turntable: self.sensing.turntable,
             step: self.step,
         })
     }

@@ -1,8 +1,9 @@
 //! Roles of the variables in the equations, so that nothing depends on their positions in the
 //! variable table.
 
+use fmi2_export::VariableTable;
 use fmi2_export::table::{Common, Real};
-use fmi2_export::{Enumeration, VariableTable};
+use settings::Declared;
 
 /// Role of a calculated variable. States and derivatives are counted in the order attitude, rates,
 /// deflections.
@@ -97,20 +98,13 @@ impl<M: 'static> Variables<M> {
         self.add(|table| table.integer(common, limits, field))
     }
 
-    pub(crate) fn boolean(
+    /// Adds the declared settings of a part of the model, which have no role.
+    pub(crate) fn settings<S: Declared + 'static>(
         self,
-        common: Common,
-        field: impl Fn(&mut M) -> &mut bool + Send + Sync + 'static,
+        part: impl Fn(&mut M) -> &mut S + Send + Sync + 'static,
     ) -> Self {
-        self.add(|table| table.boolean(common, field))
-    }
-
-    pub(crate) fn enumeration<T: Copy + PartialEq + Send + Sync>(
-        self,
-        common: Common,
-        items: &'static Enumeration<T>,
-        field: impl Fn(&mut M) -> &mut T + Copy + Send + Sync + 'static,
-    ) -> Self {
-        self.add(|table| table.enumeration(common, items, field))
+        let mut roles = self.roles;
+        roles.extend(settings::names::<S>().iter().map(|_| Role::default()));
+        Self { table: self.table.settings(part), roles }
     }
 }

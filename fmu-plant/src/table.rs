@@ -2,51 +2,23 @@
 
 mod sensors;
 
-use crate::parameters::{ACTUATIONS, KINDS, KINEMATICS, TABLE_ROWS};
+use crate::parameters::TABLE_ROWS;
 use crate::plant::{MOTION, ReentryPlant};
 use crate::roles::{Known, Role, Unknown, Variables};
-use fmi2_export::fields::Fields;
 use fmi2_export::table::{
     Description, Real, discrete_input, discrete_output, input, output, parameter,
 };
 use model_description::DefaultExperiment;
-use model_description::unit;
 use nalgebra::Vector3;
 use std::sync::LazyLock;
 use vehicle::Scenario;
-use vehicle::atmosphere;
 use vehicle::effectors::{Effectors, JETS, SURFACES};
 use vehicle::kinematics::Trajectory;
-use vehicle::plant::BETA_LIMIT;
-use vehicle::transport;
 
 const ANGLES: [(&str, &str); 3] =
     [("alpha", "angle of attack"), ("beta", "sideslip angle"), ("sigma", "bank angle")];
 const RATES: [(&str, &str); 3] = [("p", "roll"), ("q", "pitch"), ("r", "yaw")];
 const AXES: [(&str, &str); 3] = [("x", "roll"), ("y", "pitch"), ("z", "yaw")];
-
-/// Names of the variables that hold fields of the plant's configuration, for messages.
-pub(crate) const FIELDS: &Fields = &[
-    ("inertia_scale", "inertia.scale"),
-    ("initial[1]", "initial.beta"),
-    ("step", "integrator.step"),
-    ("earth_rate", "trajectory.earthRate"),
-    ("moment_delay", "actuation.delay"),
-    ("moment_resolution", "actuation.resolution"),
-    ("actuators.aerodynamics_scale", "aerodynamics.scale"),
-    ("disturbance.square_period", "disturbance.square.period"),
-    ("disturbance.table.rows[].time", "disturbance.table.time[]"),
-    ("disturbance.table.rows[].direction.x", "disturbance.table.alpha[]"),
-    ("disturbance.table.rows[].direction.y", "disturbance.table.beta[]"),
-    ("disturbance.table.rows[].direction.z", "disturbance.table.sigma[]"),
-    ("surroundings", "sensor"),
-    ("calibration.beta_amplitude", "calibration.beta.amplitude"),
-    ("sensors.line", "sensor"),
-    ("sensors.line.drop_probability", "sensor.drop.probability"),
-    ("sensors.triads[0]", "sensor.gyroscope"),
-    ("sensors.triads[1]", "sensor.accelerometer"),
-    ("sensors.triads[2]", "sensor.magnetometer"),
-];
 
 /// Returns the role of the variable at a position in the variable table.
 pub(crate) fn role(position: usize) -> Role {
@@ -58,18 +30,11 @@ pub(crate) fn role(position: usize) -> Role {
 fn all_variables() -> PlantVariables {
     let variables =
         trajectory(deflection_rates(commands(actuated(inputs(outputs(PlantVariables::new()))))));
-    let variables = disturbance(initial(inertia(variables)));
-    let step = parameter(
-        "integrator.step",
-        "Maximum step size of the Runge-Kutta integration in co-simulation",
-    );
-    let variables = variables
-        .real(step.real().unit(unit::time()).min(1e-5).max(1.0).nominal(0.01), |m| {
-            &mut m.parameters.step
-        });
-    standard_pressure(disturbance_table(converted(sensors::sensor_variables(kinematics(
-        actuation(variables),
-    )))))
+    let variables = sensors::measured(variables.settings(|m| &mut m.parameters))
+        .settings(|m| &mut m.parameters.sensing)
+        .settings(|m| &mut m.parameters.converter)
+        .settings(|m| &mut m.parameters.table);
+    standard_pressure(disturbance_rows(variables))
 }
 
 /// Returns the description of the FMU.
@@ -109,11 +74,6 @@ fn vector(
     variables
 }
 
-/// The role of a parameter.
-fn none(_: usize) -> Role {
-    Role::default()
-}
-
 fn outputs(variables: PlantVariables) -> PlantVariables {
     let motion = ["attitude.alpha", "attitude.beta", "rate.p", "rate.q", "rate.r"];
     let moment = ["moment.x", "moment.y", "moment.z"];
@@ -122,14 +82,11 @@ fn outputs(variables: PlantVariables) -> PlantVariables {
     let deflections: Vec<String> = (1..=SURFACES).map(|i| format!("deflection[{i}]")).collect();
     let actuators: Vec<&str> = jets.iter().chain(&deflections).map(String::as_str).collect();
     let angle = |axis: &str, meaning: &str| {
-        output(&format!("attitude.{axis}"), &sentence(meaning))
-            .real()
-            .unit(unit::angle())
-            .nominal(0.1)
+        output(&format!("attitude.{axis}"), &sentence(meaning)).real().unit("rad").nominal(0.1)
     };
     let rate = |axis: &str, meaning: &str| {
         let text = format!("Body {meaning} rate");
-        output(&format!("rate.{axis}"), &text).real().unit(unit::angular_rate()).nominal(0.05)
+        output(&format!("rate.{axis}"), &text).real().unit("rad/s").nominal(0.05)
     };
     let angle_rate = |axis: &str, meaning: &str| {
         // The rates of the angles follow Wu 2015 (1); they depend on sigma through the trajectory.
@@ -142,7 +99,7 @@ fn outputs(variables: PlantVariables) -> PlantVariables {
             output(&format!("attitudeRate.{axis}"), &format!("Time derivative of the {meaning}"))
                 .depends_on(["attitude.sigma"])
                 .depends_on(TRAJECTORY_INPUTS.map(|(name, ..)| name));
-        let real = common.depends_on(depends).real().unit(unit::angular_rate()).nominal(0.05);
+        let real = common.depends_on(depends).real().unit("rad/s").nominal(0.05);
         real.derivative_of(&format!("attitude.{axis}"))
     };
     let acceleration = |axis: &str, meaning: &str| {
@@ -154,14 +111,14 @@ fn outputs(variables: PlantVariables) -> PlantVariables {
             .depends_on(external)
             .depends_on(actuators.clone())
             .real();
-        real.unit(unit::angular_acceleration()).nominal(0.05).derivative_of(&format!("rate.{axis}"))
+        real.unit("rad/s2").nominal(0.05).derivative_of(&format!("rate.{axis}"))
     };
     let applied = |axis: &str, meaning: &str| {
         let text = format!("Control moment that acts on the vehicle about the {meaning} axis");
         let common = output(&format!("appliedMoment.{axis}"), &text);
         let common =
             common.depends_on([format!("moment.{axis}").as_str()]).depends_on(actuators.clone());
-        common.real().unit(unit::moment()).nominal(1e5)
+        common.real().unit("N.m").nominal(1e5)
     };
     let delta = |axis: &str, meaning: &str| {
         let text = format!("Disturbance that acts on the second time derivative of the {meaning}");
@@ -169,7 +126,7 @@ fn outputs(variables: PlantVariables) -> PlantVariables {
             .depends_on(motion)
             .depends_on(moment)
             .depends_on(actuators.clone());
-        common.real().unit(unit::angular_acceleration()).nominal(0.03)
+        common.real().unit("rad/s2").nominal(0.03)
     };
     let disturbing = |axis: &str, meaning: &str| {
         let text = format!("Disturbance moment about the {meaning} axis: external input plus sine");
@@ -177,7 +134,7 @@ fn outputs(variables: PlantVariables) -> PlantVariables {
         common
             .depends_on([format!("disturbanceMoment.{axis}").as_str()])
             .real()
-            .unit(unit::moment())
+            .unit("N.m")
             .nominal(1e4)
     };
     let variables = vector(variables, ANGLES, angle, Role::state, |m| &mut m.output.angles);
@@ -220,14 +177,14 @@ fn inputs(variables: PlantVariables) -> PlantVariables {
             &format!("moment.{axis}"),
             &format!("Control moment about the {meaning} axis, used if actuation = moment"),
         );
-        common.real().unit(unit::moment()).nominal(1e5)
+        common.real().unit("N.m").nominal(1e5)
     };
     let external = |axis: &str, meaning: &str| {
         let common = input(
             &format!("disturbanceMoment.{axis}"),
             &format!("External disturbance moment about the {meaning} axis"),
         );
-        common.real().unit(unit::moment()).nominal(1e4)
+        common.real().unit("N.m").nominal(1e4)
     };
     let variables =
         vector(variables, AXES, control, |i| Known::Moment(i).into(), |m| &mut m.input.moment);
@@ -247,16 +204,14 @@ fn actuated(mut variables: PlantVariables) -> PlantVariables {
             &format!("deflection[{}]", i + 1),
             &format!("Deflection of the {name}, trailing edge down positive"),
         );
-        let real = common.real().unit(unit::angle()).nominal(0.1);
+        let real = common.real().unit("rad").nominal(0.1);
         let role = Role::state(MOTION + i);
         variables = variables.real(real, move |m| &mut m.output.deflections[i]).role(role);
     }
     let pressure =
         output("flight.dynamicPressure", "Actual dynamic pressure, with density.scale applied");
     variables
-        .real(pressure.real().unit(unit::pressure()).nominal(1e3), |m| {
-            &mut m.output.dynamic_pressure
-        })
+        .real(pressure.real().unit("Pa").nominal(1e3), |m| &mut m.output.dynamic_pressure)
         .role(Unknown::DynamicPressure)
 }
 
@@ -267,9 +222,7 @@ fn standard_pressure(variables: PlantVariables) -> PlantVariables {
         "Dynamic pressure in the standard atmosphere, without density.scale",
     );
     variables
-        .real(pressure.real().unit(unit::pressure()).nominal(1e3), |m| {
-            &mut m.output.standard_pressure
-        })
+        .real(pressure.real().unit("Pa").nominal(1e3), |m| &mut m.output.standard_pressure)
         .role(Unknown::DynamicPressure)
 }
 
@@ -277,7 +230,7 @@ fn commands(mut variables: PlantVariables) -> PlantVariables {
     for (i, name) in Effectors::published().names.iter().enumerate() {
         let text = format!("Commanded deflection of the {name}, trailing edge down positive");
         let common = discrete_input(&format!("surface[{}]", i + 1), &text);
-        let real = common.real().unit(unit::angle()).nominal(0.1);
+        let real = common.real().unit("rad").nominal(0.1);
         variables =
             variables.real(real, move |m| &mut m.command.surfaces[i]).role(Known::Surface(i));
     }
@@ -298,7 +251,7 @@ fn deflection_rates(mut variables: PlantVariables) -> PlantVariables {
         );
         let common = output(&format!("deflectionRate[{}]", i + 1), &text)
             .depends_on([command.as_str(), deflection.as_str()]);
-        let real = common.real().unit(unit::angular_rate()).nominal(0.1).derivative_of(&deflection);
+        let real = common.real().unit("rad/s").nominal(0.1).derivative_of(&deflection);
         let role = Unknown::Derivative(MOTION + i);
         variables = variables.real(real, move |m| &mut m.output.deflection_rates[i]).role(role);
     }
@@ -334,11 +287,8 @@ const TRAJECTORY_INPUTS: [TrajectoryInput; 7] = [
 fn trajectory(mut variables: PlantVariables) -> PlantVariables {
     for (i, (name, meaning, is_rate, field)) in TRAJECTORY_INPUTS.into_iter().enumerate() {
         let real = input(name, meaning).real();
-        let real = if is_rate {
-            real.unit(unit::angular_rate()).nominal(1e-3)
-        } else {
-            real.unit(unit::angle()).nominal(0.1)
-        };
+        let real =
+            if is_rate { real.unit("rad/s").nominal(1e-3) } else { real.unit("rad").nominal(0.1) };
         variables = variables
             .real(real, move |m| field(&mut m.input.trajectory))
             .role(Known::Trajectory(i));
@@ -346,226 +296,26 @@ fn trajectory(mut variables: PlantVariables) -> PlantVariables {
     variables
 }
 
-fn kinematics(variables: PlantVariables) -> PlantVariables {
-    let earth = parameter(
-        "trajectory.earthRate",
-        "Angular rate of the Earth: 7.2921e-5 rad/s, or 0 to neglect the rotation",
-    );
-    variables
-        .enumeration(parameter("kinematics", KINEMATICS.description), &KINEMATICS, |m| {
-            &mut m.parameters.kinematics
-        })
-        .real(earth.real().unit(unit::angular_rate()).min(0.0).max(1.0).nominal(1e-4), |m| {
-            &mut m.parameters.earth_rate
-        })
-}
-
-fn actuation(variables: PlantVariables) -> PlantVariables {
-    let altitude = parameter(
-        "flight.altitude",
-        "Geometric altitude, which determines air density and speed of sound",
-    );
-    let mach = parameter("flight.mach", "Mach number");
-    let density = parameter(
-        "density.scale",
-        "Ratio of the actual air density to that of the standard atmosphere: 0.9 means 10 % less",
-    );
-    let aerodynamics = parameter(
-        "aerodynamics.scale",
-        "Ratio of the actual to the nominal effectiveness of the surfaces: 0.9 means 10 % less",
-    );
-    let duty = parameter(
-        "jets.duty",
-        "If true, jets give any thrust from 0 to 1; if false, they are fully on from a command of 0.5",
-    );
-    let symmetric = parameter(
-        "jets.symmetric",
-        "If true, jet 4 mirrors jet 8; if false, it is as printed in (64) of Wu 2015, which is not symmetric",
-    );
-    variables
-        .enumeration(parameter("actuation", ACTUATIONS.description), &ACTUATIONS, |m| {
-            &mut m.parameters.actuation
-        })
-        .real(
-            altitude.real().unit(unit::length()).min(0.0).max(atmosphere::TOP).nominal(1e4),
-            |m| &mut m.parameters.flight.altitude,
-        )
-        .real(mach.real().min(0.0).max(100.0).nominal(10.0), |m| &mut m.parameters.flight.mach)
-        .real(density.real().min(0.0).max(10.0).nominal(1.0), |m| &mut m.parameters.density_scale)
-        .real(aerodynamics.real().min(0.0).max(10.0).nominal(1.0), |m| {
-            &mut m.parameters.aerodynamics_scale
-        })
-        .boolean(duty, |m| &mut m.parameters.jet_duty)
-        .boolean(symmetric, |m| &mut m.parameters.jet_symmetric)
-}
-
-fn converted(variables: PlantVariables) -> PlantVariables {
-    let text = "Delay of the input moment, which is then held over each communication step; only for co-simulation with actuation = moment";
-    let delay = parameter("actuation.delay", text).real().unit(unit::time());
-    let text = "Quantization step of the input moment, which is then held over each communication step; 0 for none; only for co-simulation with actuation = moment";
-    let resolution = parameter("actuation.resolution", text).real().unit(unit::moment());
-    variables
-        .real(delay.min(0.0).max(transport::LONGEST).nominal(0.1), |m| {
-            &mut m.parameters.moment_delay
-        })
-        .real(resolution.min(0.0).nominal(10.0), |m| &mut m.parameters.moment_resolution)
-}
-
-fn inertia(variables: PlantVariables) -> PlantVariables {
-    let entry = |name: &str, text: &str| {
-        parameter(&format!("inertia.{name}"), text).real().unit(unit::inertia()).nominal(1e6)
-    };
-    let scale = parameter(
-        "inertia.scale",
-        "Ratio of the actual to the nominal inertia: 1.05 means 5 % more",
-    );
-    variables
-        .real(entry("Ixx", "Nominal moment of inertia about the roll axis").min(0.0), |m| {
-            &mut m.parameters.inertia.Ixx
-        })
-        .real(entry("Iyy", "Nominal moment of inertia about the pitch axis").min(0.0), |m| {
-            &mut m.parameters.inertia.Iyy
-        })
-        .real(entry("Izz", "Nominal moment of inertia about the yaw axis").min(0.0), |m| {
-            &mut m.parameters.inertia.Izz
-        })
-        .real(
-            entry(
-                "Ixz",
-                "Nominal product of inertia of the roll and yaw axes; the inertia tensor contains -Ixz",
-            ),
-            |m| &mut m.parameters.inertia.Ixz,
-        )
-        .real(scale.real().min(0.01).max(100.0).nominal(1.0), |m| &mut m.parameters.inertia_scale)
-}
-
-fn initial(variables: PlantVariables) -> PlantVariables {
-    let angle = |axis: &str, meaning: &str| {
-        let limit = if axis == "beta" { BETA_LIMIT } else { 2.0 * std::f64::consts::PI };
-        let common = parameter(&format!("initial.{axis}"), &format!("Initial {meaning}"));
-        common.real().unit(unit::angle()).min(-limit).max(limit).nominal(0.1)
-    };
-    let rate = |axis: &str, meaning: &str| {
-        let common = parameter(&format!("initial.{axis}"), &format!("Initial body {meaning} rate"));
-        common.real().unit(unit::angular_rate()).min(-10.0).max(10.0).nominal(0.05)
-    };
-    let variables = vector(variables, ANGLES, angle, none, |m| &mut m.parameters.initial_angles);
-    vector(variables, RATES, rate, none, |m| &mut m.parameters.initial_rates)
-}
-
-fn disturbance(variables: PlantVariables) -> PlantVariables {
-    let bound = parameter(
-        "disturbance.bound",
-        "Bound on the disturbance of the second time derivative of each attitude angle",
-    );
-    let period = parameter(
-        "disturbance.period",
-        "Time for which disturbances of the kinds white, alongRate and againstMoment are held",
-    );
-    let seed = parameter(
-        "disturbance.seed",
-        "Seed of the white noise; the same seed gives the same noise",
-    );
-    let direction = |axis: &str, meaning: &str| {
-        let text = format!(
-            "Factor on disturbance.bound for the {meaning}, used by the kinds constant and square"
-        );
-        parameter(&format!("disturbance.direction.{axis}"), &text)
-            .real()
-            .min(-1.0)
-            .max(1.0)
-            .nominal(1.0)
-    };
-    let square = parameter(
-        "disturbance.square.period",
-        "Period of the square wave, which starts with its positive half at disturbance.start",
-    );
-    let offset = |axis: &str, meaning: &str| {
-        let text = format!("Constant part of the sine disturbance moment about the {meaning} axis");
-        parameter(&format!("disturbance.sine.offset.{axis}"), &text)
-            .real()
-            .unit(unit::moment())
-            .nominal(1e4)
-    };
-    let start = parameter("disturbance.start", "Time at which the disturbance starts");
-    let end = parameter("disturbance.end", "Time at which the disturbance ends");
-    let time = |common: fmi2_export::table::Common| common.real().unit(unit::time());
-
-    let variables = variables
-        .enumeration(parameter("disturbance.kind", KINDS.description), &KINDS, |m| {
-            &mut m.parameters.kind
-        })
-        .real(
-            bound.real().unit(unit::angular_acceleration()).min(0.0).max(10.0).nominal(0.03),
-            |m| &mut m.parameters.bound,
-        )
-        .real(time(period).min(1e-4).nominal(0.04), |m| &mut m.parameters.period)
-        .integer(seed, (Some(0), None), |m| &mut m.parameters.seed);
-    let variables = vector(variables, ANGLES, direction, none, |m| &mut m.parameters.direction)
-        .real(time(square).min(1e-3).nominal(10.0), |m| &mut m.parameters.square_period);
-    let variables = vector(variables, AXES, offset, none, |m| &mut m.parameters.sine_offset);
-    let variables = sine(sine(variables, "first", 0), "second", 1);
-    variables
-        .real(time(start), |m| &mut m.parameters.start)
-        .real(time(end), |m| &mut m.parameters.end)
-}
-
-/// Adds the lookup table of the disturbance column by column, as FMI wants the elements of an array
-/// one after the other.
-fn disturbance_table(variables: PlantVariables) -> PlantVariables {
-    let rows = parameter(
-        "disturbance.table.rows",
-        "Number of rows of the disturbance's lookup table that are used; the rows after them are ignored",
-    );
-    let period = parameter(
-        "disturbance.table.period",
-        "Period with which the lookup table repeats from disturbance.start on; 0 holds the last row instead",
-    );
-    let mut variables = variables
-        .integer(rows, (Some(0), i32::try_from(TABLE_ROWS).ok()), |m| &mut m.parameters.table_rows)
-        .real(period.real().unit(unit::time()).min(0.0).nominal(10.0), |m| {
-            &mut m.parameters.table_period
-        });
+/// Adds the rows of the disturbance's lookup table column by column, as FMI wants the elements of
+/// an array one after the other.
+fn disturbance_rows(mut variables: PlantVariables) -> PlantVariables {
     for i in 0..TABLE_ROWS {
         let name = format!("disturbance.table.time[{}]", i + 1);
-        let text = format!("Time after disturbance.start at which row {} takes effect", i + 1);
-        let real = parameter(&name, &text).real().unit(unit::time()).min(0.0).nominal(10.0);
-        variables = variables.real(real, move |m| &mut m.parameters.table[i].time);
+        let text =
+            format!("Time after disturbance.start at which a row takes effect (row {})", i + 1);
+        let real = parameter(&name, &text).real().unit("s").min(0.0).nominal(10.0);
+        variables = variables.real(real, move |m| &mut m.parameters.table.rows[i].time);
     }
     for (component, (axis, meaning)) in ANGLES.into_iter().enumerate() {
         for i in 0..TABLE_ROWS {
             let name = format!("disturbance.table.{axis}[{}]", i + 1);
-            let text = format!("Factor on disturbance.bound for the {meaning} in row {}", i + 1);
+            let text = format!("Factor on disturbance.bound for the {meaning} (row {})", i + 1);
             let real = parameter(&name, &text).real().min(-1.0).max(1.0).nominal(1.0);
             variables =
-                variables.real(real, move |m| &mut m.parameters.table[i].direction[component]);
+                variables.real(real, move |m| &mut m.parameters.table.rows[i].direction[component]);
         }
     }
     variables
-}
-
-fn sine(variables: PlantVariables, which: &'static str, i: usize) -> PlantVariables {
-    let name = |part: &str| format!("disturbance.sine.{which}.{part}");
-    let amplitude = |axis: &str, meaning: &str| {
-        let text = format!("Amplitude of the {which} sinusoidal moment about the {meaning} axis");
-        parameter(&name(&format!("amplitude.{axis}")), &text)
-            .real()
-            .unit(unit::moment())
-            .nominal(1e4)
-    };
-    let frequency = parameter(
-        &name("frequency"),
-        &format!("Angular frequency of the {which} sinusoidal moment"),
-    );
-    let phase =
-        parameter(&name("phase"), &format!("Phase of the {which} sinusoidal moment at time 0"));
-    vector(variables, AXES, amplitude, none, move |m| &mut m.parameters.waves[i].amplitude)
-        .real(frequency.real().unit(unit::angular_rate()).min(0.0).nominal(1.0), move |m| {
-            &mut m.parameters.waves[i].frequency
-        })
-        .real(phase.real().unit(unit::angle()).nominal(1.0), move |m| {
-            &mut m.parameters.waves[i].phase
-        })
 }
 
 /// Returns the text with a capital letter at its beginning.

@@ -59,6 +59,9 @@ impl ModelDescription {
                 return Some(format!("'{state}' has a second derivative, '{name}'"));
             }
             match &variable.kind {
+                VariableKind::Real { unit: Some(unit), .. } if !unit.is_known() => {
+                    return Some(format!("'{name}' has the unknown unit '{}'", unit.name));
+                }
                 VariableKind::Real { unit: Some(unit), .. }
                     if *units.entry(&unit.name).or_insert(unit) != unit =>
                 {

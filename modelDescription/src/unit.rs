@@ -33,74 +33,59 @@ pub struct Unit {
     pub display: Option<DisplayUnit>,
 }
 
-#[inline(never)]
-fn unit(name: &str, [kg, m, s, rad]: [i32; 4], display: Option<&str>) -> Unit {
-    let display =
-        display.map(|name| DisplayUnit { name: name.into(), factor: 180.0 / std::f64::consts::PI });
-    Unit { name: name.into(), kg, m, s, ampere: 0, kelvin: 0, rad, display }
+/// Dimension of a named unit: its symbol, and the exponents of kg, m, s, A, K and rad.
+const SYMBOLS: [(&str, [i32; 6]); 11] = [
+    ("kg", [1, 0, 0, 0, 0, 0]),
+    ("m", [0, 1, 0, 0, 0, 0]),
+    ("s", [0, 0, 1, 0, 0, 0]),
+    ("A", [0, 0, 0, 1, 0, 0]),
+    ("K", [0, 0, 0, 0, 1, 0]),
+    ("rad", [0, 0, 0, 0, 0, 1]),
+    ("Hz", [0, 0, -1, 0, 0, 0]),
+    ("N", [1, 1, -2, 0, 0, 0]),
+    ("Pa", [1, -1, -2, 0, 0, 0]),
+    ("T", [1, 0, -2, -1, 0, 0]),
+    ("1", [0; 6]),
+];
+
+impl Unit {
+    /// Returns the unit with this name, a product of symbols with exponents, such as `kg.m2` or
+    /// `rad/s2`. A slash stands before a divisor. Angles are displayed in degrees. A unit with an
+    /// unknown symbol has no dimension; the check of descriptions refuses it.
+    pub fn new(name: &str) -> Self {
+        let [kg, m, s, ampere, kelvin, rad] = dimension(name).unwrap_or_default();
+        let display = name.strip_prefix("rad").map(|rest| DisplayUnit {
+            name: format!("deg{rest}"),
+            factor: 180.0 / std::f64::consts::PI,
+        });
+        Self { name: name.into(), kg, m, s, ampere, kelvin, rad, display }
+    }
+
+    /// Returns whether all symbols in the name are known.
+    pub fn is_known(&self) -> bool {
+        dimension(&self.name).is_some()
+    }
 }
 
-/// Unit of an angle, rad, displayed in degrees.
-pub fn angle() -> Unit {
-    unit("rad", [0, 0, 0, 1], Some("deg"))
-}
-/// Unit of an angular rate, rad/s, displayed in degrees per second.
-pub fn angular_rate() -> Unit {
-    unit("rad/s", [0, 0, -1, 1], Some("deg/s"))
-}
-/// Unit of an angular acceleration, rad/s², displayed in degrees per second squared.
-pub fn angular_acceleration() -> Unit {
-    unit("rad/s2", [0, 0, -2, 1], Some("deg/s2"))
-}
-/// Unit of a moment of force, N m.
-pub fn moment() -> Unit {
-    unit("N.m", [1, 2, -2, 0], None)
-}
-/// Unit of a moment of inertia, kg m².
-pub fn inertia() -> Unit {
-    unit("kg.m2", [1, 2, 0, 0], None)
-}
-/// Unit of a length, m.
-pub fn length() -> Unit {
-    unit("m", [0, 1, 0, 0], None)
-}
-/// Unit of an acceleration or specific force, m/s².
-pub fn acceleration() -> Unit {
-    unit("m/s2", [0, 1, -2, 0], None)
-}
-/// Unit of the rate of an acceleration, m/s³.
-pub fn acceleration_rate() -> Unit {
-    unit("m/s3", [0, 1, -3, 0], None)
-}
-/// Unit of a magnetic flux density, T.
-pub fn flux_density() -> Unit {
-    Unit { ampere: -1, ..unit("T", [1, 0, -2, 0], None) }
-}
-/// Unit of the rate of a magnetic flux density, T/s.
-pub fn flux_density_rate() -> Unit {
-    Unit { ampere: -1, ..unit("T/s", [1, 0, -3, 0], None) }
-}
-/// Unit of a time, s.
-pub fn time() -> Unit {
-    unit("s", [0, 0, 1, 0], None)
-}
-/// Unit of a frequency in cycles per second, Hz.
-pub fn frequency() -> Unit {
-    unit("Hz", [0, 0, -1, 0], None)
-}
-/// Unit of a gain from an angle to its second derivative, 1/s².
-pub fn gain_angle() -> Unit {
-    unit("1/s2", [0, 0, -2, 0], None)
-}
-/// Unit of a gain from a rate to its derivative, 1/s.
-pub fn gain_rate() -> Unit {
-    unit("1/s", [0, 0, -1, 0], None)
-}
-/// Unit of a pressure, Pa.
-pub fn pressure() -> Unit {
-    unit("Pa", [1, -1, -2, 0], None)
-}
-/// Unit of a moment of force per angle, N m/rad.
-pub fn moment_by_angle() -> Unit {
-    unit("N.m/rad", [1, 2, -2, -1], None)
+/// Returns the exponents of kg, m, s, A, K and rad in a unit, if all its symbols are known.
+fn dimension(name: &str) -> Option<[i32; 6]> {
+    let mut sum = [0; 6];
+    let mut rest = name;
+    let mut sign = 1;
+    loop {
+        let end = rest.find(['.', '/']).unwrap_or(rest.len());
+        let factor = &rest[..end];
+        let digits = factor.find(|letter: char| letter.is_ascii_digit()).filter(|i| *i > 0);
+        let (symbol, exponent) = factor.split_at(digits.unwrap_or(factor.len()));
+        let exponent = if exponent.is_empty() { 1 } else { exponent.parse::<i32>().ok()? };
+        let (_, exponents) = SYMBOLS.iter().find(|(known, _)| *known == symbol)?;
+        for (total, each) in sum.iter_mut().zip(exponents) {
+            *total += sign * exponent * each;
+        }
+        if end == rest.len() {
+            return Some(sum);
+        }
+        sign = if rest.as_bytes()[end] == b'/' { -1 } else { 1 };
+        rest = &rest[end + 1..];
+    }
 }

@@ -2,7 +2,7 @@
 
 use model_description::library_file::LibraryFile;
 use model_description::pack::{Extras, pack};
-use model_description::unit::{angle, angular_rate};
+use model_description::unit::Unit;
 use model_description::variable::{
     Causality, EnumerationType, Variability, Variable, VariableKind,
 };
@@ -29,7 +29,7 @@ fn variable(
 
 fn real(start: Option<f64>) -> VariableKind {
     VariableKind::Real {
-        unit: Some(angle()),
+        unit: Some(Unit::new("rad")),
         min: None,
         max: None,
         nominal: None,
@@ -49,7 +49,7 @@ fn fmu() -> ModelDescription {
         items: vec![("flat".into(), "Nothing".into()), ("steep".into(), "Much".into())],
     };
     let rate = VariableKind::Real {
-        unit: Some(angular_rate()),
+        unit: Some(Unit::new("rad/s")),
         min: None,
         max: None,
         nominal: None,
@@ -347,4 +347,26 @@ fn files_that_are_no_library_of_fmus_are_refused() {
     let nothing = library_file(&folder.path().join("nothing"));
     let missing = pack(&fmu(), &[nothing], folder.path(), &Extras::default()).unwrap_err();
     assert!(missing.to_string().contains("nothing"));
+}
+
+#[test]
+fn units_have_the_dimensions_of_their_symbols() {
+    for (name, [kg, m, s, ampere, rad]) in [
+        ("rad/s2", [0, 0, -2, 0, 1]),
+        ("N.m", [1, 2, -2, 0, 0]),
+        ("N.m/rad", [1, 2, -2, 0, -1]),
+        ("kg.m2", [1, 2, 0, 0, 0]),
+        ("Pa", [1, -1, -2, 0, 0]),
+        ("1/s", [0, 0, -1, 0, 0]),
+        ("T/s", [1, 0, -3, -1, 0]),
+        ("Hz", [0, 0, -1, 0, 0]),
+    ] {
+        let unit = Unit::new(name);
+        assert!(unit.is_known(), "{name}");
+        let dimension = [unit.kg, unit.m, unit.s, unit.ampere, unit.rad];
+        assert_eq!(dimension, [kg, m, s, ampere, rad], "{name}");
+    }
+    for name in ["furlong", "rad/", "m^2", ""] {
+        assert!(!Unit::new(name).is_known(), "{name}");
+    }
 }

@@ -3,6 +3,7 @@
 use crate::error::Error;
 use crate::math::{exp, powf, powi};
 use serde::{Deserialize, Serialize};
+use settings::Declared;
 
 // U.S. Standard Atmosphere, 1976 (NOAA, NASA, USAF), tables 1 to 4.
 const GRAVITY: f64 = 9.80665; // m/s²
@@ -69,12 +70,14 @@ pub fn air(altitude: f64) -> Result<Air, Error> {
 }
 
 /// Flight condition of the vehicle: altitude and Mach number.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Declared)]
 #[serde(deny_unknown_fields)]
 pub struct Flight {
-    /// Geometric altitude of the vehicle, m.
+    /// Geometric altitude, which determines air density and speed of sound.
+    #[setting(unit = "m", min = 0.0, max = TOP, nominal = 1e4)]
     pub altitude: f64,
-    /// Mach number of the vehicle, dimensionless.
+    /// Mach number.
+    #[setting(min = 0.0, max = 100.0, nominal = 10.0)]
     pub mach: f64,
 }
 

@@ -7,19 +7,24 @@ use crate::math::sin_cos;
 use crate::state::{BETA_LIMIT, State, state};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
+use settings::Declared;
 
 /// Calibration sequence: α and σ turn at constant rates, and β swings as β₀ + amplitude ·
 /// sin(frequency · t).
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Declared)]
 #[serde(deny_unknown_fields)]
 pub struct Sequence {
-    /// Constant rate of α, rad/s.
+    /// Rate of the angle of attack in the calibration sequence.
+    #[setting(name = "rate.alpha", unit = "rad/s", nominal = 0.1)]
     pub alpha_rate: f64,
-    /// Constant rate of σ, rad/s.
+    /// Rate of the bank angle in the calibration sequence.
+    #[setting(name = "rate.sigma", unit = "rad/s", nominal = 0.1)]
     pub sigma_rate: f64,
-    /// Amplitude of the swing of β, rad.
+    /// Amplitude of the sideslip angle in the calibration sequence.
+    #[setting(name = "beta.amplitude", unit = "rad", min = 0.0, nominal = 0.5)]
     pub beta_amplitude: f64,
-    /// Angular frequency of the swing of β, rad/s.
+    /// Angular frequency of the sideslip angle in the calibration sequence.
+    #[setting(name = "beta.frequency", unit = "rad/s", nominal = 0.1)]
     pub beta_frequency: f64,
 }
 
@@ -37,11 +42,11 @@ impl Sequence {
         let reach = initial.y.abs() + self.beta_amplitude.abs();
         if reach >= BETA_LIMIT {
             let problem = format!(
-                "= {} deg: with `initial[1]` beta comes to {} deg, it must stay within 90 deg",
+                "= {} deg: with initial.beta beta comes to {} deg, it must stay within 90 deg",
                 self.beta_amplitude.to_degrees(),
                 reach.to_degrees()
             );
-            return Err(Error::parameter("calibration.beta_amplitude", problem));
+            return Err(Error::parameter("calibration.beta.amplitude", problem));
         }
         Ok(())
     }

@@ -1,6 +1,7 @@
 //! Files that are part of the program: the papers' numbers.
 
 use serde::de::DeserializeOwned;
+use settings::Declared;
 use toml::Table;
 
 /// Reads the text of a TOML file that is part of the program; `file` is its name.
@@ -17,4 +18,12 @@ pub fn embedded<T: DeserializeOwned>(file: &str, text: &str) -> T {
 #[inline(never)]
 fn parsed(file: &str, text: &str) -> Table {
     toml::from_str(text).unwrap_or_else(|error| panic!("{file}: {error}"))
+}
+
+/// Sets the settings that a table of such a file names; `file` is its name.
+///
+/// # Panics
+/// Panics if the table names no setting, or a value that the setting cannot have.
+pub fn set<S: Declared>(settings: &mut S, file: &str, values: &Table) {
+    settings::read(settings, values).unwrap_or_else(|error| panic!("{file}: {error}"));
 }

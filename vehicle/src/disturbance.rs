@@ -3,6 +3,7 @@
 
 mod table;
 
+use crate::axes::AXES;
 use crate::dynamics::RigidBody;
 use crate::error::Error;
 use crate::kinematics::Kinematics;
@@ -11,30 +12,32 @@ use crate::noise::{Stream, uniform};
 use crate::time::{tick, tick_time, tolerance};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
+use settings::{Choice, Declared};
 pub use table::{DisturbanceTable, Row};
 
-/// Kind of disturbance, which determines its waveform.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+/// Waveform of the disturbance.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Choice)]
 #[serde(rename_all = "camelCase")]
 pub enum DisturbanceKind {
-    /// No disturbance acts on the vehicle.
+    /// No disturbance.
     #[default]
     None,
-    /// Each component of Δ is uniform in [−bound, bound] and is drawn anew at every tick.
+    /// Each component is drawn uniformly within disturbance.bound every disturbance.period.
     White,
-    /// Δ = bound · direction holds all the time.
+    /// disturbance.bound times disturbance.direction.
     Constant,
-    /// A moment offset + Σ amplitude · sin(frequency · t + phase) acts, and Δ is zero.
+    /// a moment that is an offset plus two sinusoids.
     Sine,
-    /// Δ = ± bound · direction; it begins with + and changes sign every half square period.
+    /// disturbance.bound times disturbance.direction, with the sign changing every half
+    /// disturbance.square.period.
     Square,
-    /// Each component of Δ is ± bound, with the sign that increases ‖ω‖ fastest, chosen at every
-    /// tick.
+    /// Each component is plus or minus disturbance.bound, chosen every disturbance.period so that
+    /// the angular rate grows fastest.
     AlongRate,
-    /// Each component of Δ is ± bound, opposite in sign to the control acceleration R I⁻¹ m, chosen
-    /// at every tick.
+    /// Each component is plus or minus disturbance.bound, chosen every disturbance.period to
+    /// oppose the control moment.
     AgainstMoment,
-    /// Δ = bound · direction of the table's row in force, and zero before the first row.
+    /// disturbance.bound times the factors in the current row of a lookup table over time.
     Table,
 }
 
@@ -77,15 +80,18 @@ pub struct SineMoment {
 }
 
 /// One sinusoid of the disturbance moment.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Declared)]
 #[serde(deny_unknown_fields)]
 pub struct MomentWave {
-    /// Amplitude about each body axis, N m.
+    /// Amplitude.
+    #[setting(part, each = AXES, unit = "N.m", nominal = 1e4)]
     pub amplitude: Vector3<f64>,
-    /// Angular frequency of the sinusoid, rad/s.
+    /// Angular frequency.
+    #[setting(part, unit = "rad/s", min = 0.0, nominal = 1.0)]
     pub frequency: f64,
-    /// Phase of the sinusoid at t = 0, rad.
+    /// Phase at time 0.
     #[serde(default)]
+    #[setting(part, unit = "rad", nominal = 1.0)]
     pub phase: f64,
 }
 
@@ -144,7 +150,7 @@ impl Disturbance {
         }
         if !(self.square_period > 0.0 && self.square_period.is_finite()) {
             return refuse(
-                "disturbance.square_period",
+                "disturbance.square.period",
                 format!("= {} s must be positive", self.square_period),
             );
         }
@@ -154,7 +160,7 @@ impl Disturbance {
         if !(self.start.is_finite() && self.end > self.start) {
             return refuse(
                 "disturbance.end",
-                format!("= {} s must come after `disturbance.start` = {} s", self.end, self.start),
+                format!("= {} s must come after disturbance.start = {} s", self.end, self.start),
             );
         }
         let sine = &self.sine;

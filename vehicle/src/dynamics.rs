@@ -4,20 +4,25 @@ use crate::error::Error;
 use crate::kinematics;
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
+use settings::Declared;
 
 /// Moments and products of inertia in the sign convention of Chai 2022 (3): the off-diagonal
 /// entries of the tensor are −I_ij.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Declared)]
 #[serde(deny_unknown_fields)]
 #[allow(non_snake_case)]
 pub struct Inertia {
-    /// Moment of inertia about the roll axis, kg m².
+    /// Moment about the roll axis.
+    #[setting(name = "Ixx", part, unit = "kg.m2", min = 1.0, nominal = 1e6)]
     pub Ixx: f64,
-    /// Moment of inertia about the pitch axis, kg m².
+    /// Moment about the pitch axis.
+    #[setting(name = "Iyy", part, unit = "kg.m2", min = 1.0, nominal = 1e6)]
     pub Iyy: f64,
-    /// Moment of inertia about the yaw axis, kg m².
+    /// Moment about the yaw axis.
+    #[setting(name = "Izz", part, unit = "kg.m2", min = 1.0, nominal = 1e6)]
     pub Izz: f64,
-    /// Product of inertia of the roll and yaw axes, kg m².
+    /// Product of the roll and yaw axes; the inertia tensor contains -Ixz.
+    #[setting(name = "Ixz", part, unit = "kg.m2", nominal = 1e6)]
     pub Ixz: f64,
 }
 
@@ -52,10 +57,7 @@ impl Inertia {
         let principal = self.matrix().symmetric_eigenvalues();
         if 2.0 * principal.max() > principal.sum() {
             let problem = "violate the triangle inequality: no principal moment may exceed the sum of the others";
-            return refuse(
-                "inertia.Ixx`, `inertia.Iyy`, `inertia.Izz`, `inertia.Ixz",
-                problem.into(),
-            );
+            return refuse("inertia.Ixx, inertia.Iyy, inertia.Izz, inertia.Ixz", problem.into());
         }
         Ok(body)
     }
@@ -68,6 +70,13 @@ pub struct RigidBody {
     pub inertia: Matrix3<f64>,
     /// Inverse I⁻¹ of the inertia tensor, 1/(kg m²).
     pub inverse: Matrix3<f64>,
+}
+
+impl Default for RigidBody {
+    /// Returns a body with moments of inertia of 1 kg m².
+    fn default() -> Self {
+        Self { inertia: Matrix3::identity(), inverse: Matrix3::identity() }
+    }
 }
 
 impl RigidBody {

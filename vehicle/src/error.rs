@@ -34,10 +34,9 @@ pub enum Error {
         problem: String,
     },
     /// A configuration value lies outside the range that the equations allow.
-    #[error("`{name}` {problem}")]
+    #[error("{name} {problem}")]
     Parameter {
-        /// Path of the field that holds the value. Errors name fields in backticks, so that an FMU
-        /// can replace them by the names of its parameters.
+        /// Name of the setting that holds the value, as it is declared.
         name: Cow<'static, str>,
         /// Description of the fault in the value.
         problem: String,
@@ -65,7 +64,7 @@ pub enum Error {
 }
 
 impl Error {
-    /// Returns the error for a configuration value, with the path of its field.
+    /// Returns the error for a configuration value, with the name of its setting.
     pub(crate) fn parameter(
         name: impl Into<Cow<'static, str>>,
         problem: impl Into<String>,

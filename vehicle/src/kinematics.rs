@@ -9,6 +9,7 @@
 use crate::math::{cos, sin, sin_cos};
 use nalgebra::{Matrix3, SMatrix, Vector3};
 use serde::{Deserialize, Serialize};
+use settings::Choice;
 
 /// Matrix R(Θ) of Chai 2022 (2), with which Θ̇ = R ω. It is singular at β = ±π/2.
 pub fn r(angles: &Vector3<f64>) -> Matrix3<f64> {
@@ -99,14 +100,15 @@ pub fn r_beta_beta(angles: &Vector3<f64>) -> Matrix3<f64> {
     )
 }
 
-/// Form of the attitude kinematics, which differ in the bank rate.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+/// Form of the matrix R in the attitude kinematics.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Choice)]
 #[serde(rename_all = "lowercase")]
 pub enum Kinematics {
-    /// R of Chai 2022 (2) and Wu 2015 (4), which lacks the term α̇ sin β in the bank row.
+    /// R is as printed in (2) of Chai 2022 and (4) of Wu 2015.
     #[default]
     Printed,
-    /// R with the term + α̇ sin β in the bank row, as in Wu 2015 (1).
+    /// R includes the derivative of alpha times sin beta in the row of the bank angle, as in (1)
+    /// of Wu 2015.
     Exact,
 }
 

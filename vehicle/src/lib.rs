@@ -5,6 +5,7 @@
 
 pub mod actuators;
 pub mod atmosphere;
+pub mod axes;
 pub mod calibration;
 pub mod data;
 pub mod disturbance;

@@ -5,21 +5,25 @@
 //! trajectory's axes; sideslip, angle of attack and bank angle lead on to the body axes. The bank
 //! angle grows *against* the right-hand rule about the velocity, as the signs of R require.
 
+use crate::axes::LEVEL;
 use crate::error::Error;
 use crate::kinematics::{Kinematics, TRAJECTORY, Trajectory};
 use crate::math::sin_cos;
 use nalgebra::{Matrix3, SMatrix, Vector3};
 use serde::{Deserialize, Serialize};
+use settings::Declared;
 
 /// Readings of the three sensors: angular rate (rad/s), specific force (m/s²), magnetic field (T).
 pub type Readings = [Vector3<f64>; 3];
 
 /// Gravity and magnetic field around the platform.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Declared)]
 pub struct Surroundings {
-    /// Acceleration of gravity, which points down, m/s².
+    /// Gravitational acceleration at the accelerometer, directed down.
+    #[setting(unit = "m/s2", min = 0.0, nominal = 10.0)]
     pub gravity: f64,
-    /// Magnetic field to the north, to the east and down, T.
+    /// Earth's magnetic field at the magnetometer.
+    #[setting(each = LEVEL, unit = "T", nominal = 5e-5)]
     pub field: Vector3<f64>,
 }
 
@@ -32,12 +36,12 @@ impl Surroundings {
         let refuse = |name: &'static str, problem: String| Err(Error::parameter(name, problem));
         if !(self.gravity >= 0.0 && self.gravity.is_finite()) {
             return refuse(
-                "surroundings.gravity",
+                "sensor.gravity",
                 format!("= {} m/s2 must not be negative", self.gravity),
             );
         }
         if !self.field.iter().all(|value| value.is_finite()) {
-            return refuse("surroundings.field", "holds a value that is not finite".into());
+            return refuse("sensor.field", "holds a value that is not finite".into());
         }
         Ok(())
     }

@@ -4,7 +4,7 @@
 use crate::calibration::Sequence;
 use crate::data;
 use crate::platform::Surroundings;
-use crate::sensors::Line;
+use crate::sensors::{Line, PerSensor};
 use crate::triad::{Triad, Window};
 use nalgebra::{Matrix3, Vector3};
 use serde::Deserialize;
@@ -20,9 +20,9 @@ pub struct SensorData {
     /// Sample period and transport delay of a line that drops no samples.
     pub line: Line,
     /// Typical MEMS set of gyroscope, accelerometer and magnetometer.
-    pub mems: [Triad; 3],
+    pub mems: PerSensor<Triad>,
     /// Sensor set without any errors.
-    pub ideal: [Triad; 3],
+    pub ideal: PerSensor<Triad>,
     /// Rotation sequence for calibrating the sensors.
     pub calibration: Sequence,
 }
@@ -108,8 +108,8 @@ struct Set {
 }
 
 impl Set {
-    fn triads(&self) -> [Triad; 3] {
-        [&self.gyroscope, &self.accelerometer, &self.magnetometer].map(Sensor::triad)
+    fn triads(&self) -> PerSensor<Triad> {
+        PerSensor([&self.gyroscope, &self.accelerometer, &self.magnetometer].map(Sensor::triad))
     }
 }
 

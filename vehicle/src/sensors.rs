@@ -12,15 +12,61 @@ use crate::time::{check_resolution, tick, tick_time, tick_tolerance};
 use crate::triad::{Memory, Triad, Window};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
+use settings::{About, Declared, Field, Place, Setting};
+use std::ops::{Deref, DerefMut};
 
 /// Largest number of samples that may be on their way at a time.
 pub const IN_FLIGHT: usize = 1000;
+
+/// One value for each sensor: gyroscope, accelerometer, magnetometer.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct PerSensor<T>(pub [T; 3]);
+
+/// Name, sentence, unit and typical magnitude of what each sensor measures.
+const SENSORS: [(&str, &str, &str, f64); 3] = [
+    ("gyroscope", "Gyroscope", "rad/s", 0.05),
+    ("accelerometer", "Accelerometer", "m/s2", 10.0),
+    ("magnetometer", "Magnetometer", "T", 5e-5),
+];
+
+impl<T> PerSensor<T> {
+    /// Returns the values, each with the name of its sensor.
+    pub fn named(&self) -> impl Iterator<Item = (&'static str, &T)> {
+        SENSORS.iter().map(|sensor| sensor.0).zip(&self.0)
+    }
+}
+
+impl<T> Deref for PerSensor<T> {
+    type Target = [T; 3];
+    fn deref(&self) -> &[T; 3] {
+        &self.0
+    }
+}
+
+impl<T> DerefMut for PerSensor<T> {
+    fn deref_mut(&mut self) -> &mut [T; 3] {
+        &mut self.0
+    }
+}
+
+impl<T: Declared> Declared for PerSensor<T> {
+    fn declare(place: &Place, list: &mut Vec<Setting>) {
+        for (name, text, unit, nominal) in SENSORS {
+            let about = About { name, text, unit, nominal: Some(nominal), ..About::default() };
+            T::declare(&place.at(&about), list);
+        }
+    }
+
+    fn field(&mut self, index: usize) -> Result<Field<'_>, usize> {
+        self.0.field(index)
+    }
+}
 
 /// Configuration of the three sensors and their line.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Config {
     /// Errors of gyroscope (rad/s), accelerometer (m/s²) and magnetometer (T).
-    pub triads: [Triad; 3],
+    pub triads: PerSensor<Triad>,
     /// Timing and drops of the serial line.
     pub line: Line,
     /// Seed of the random noise and drops.
@@ -28,15 +74,21 @@ pub struct Config {
 }
 
 /// Serial line: when samples are taken, when they arrive, and which are dropped.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Declared)]
 pub struct Line {
-    /// Time between two samples, s.
+    /// Sampling period of the sensors.
+    #[setting(unit = "s", min = 1e-4, nominal = 0.01)]
     pub period: f64,
-    /// Time from taking a sample to its arrival, s.
+    /// Delay between taking a sample and receiving it.
+    #[setting(unit = "s", min = 0.0, max = 10.0, nominal = 0.01)]
     pub delay: f64,
-    /// Probability that a sample is dropped if it is taken within `drop_window`.
+    /// Probability that a sample is dropped in transmission.
+    ///
+    /// It is dropped if it is taken within `drop_window`.
+    #[setting(name = "drop.probability", min = 0.0, max = 1.0, nominal = 1.0)]
     pub drop_probability: f64,
-    /// Window of the sampling times at which samples can be dropped.
+    /// Time window in which samples can be dropped.
+    #[setting(name = "drop")]
     pub drop_window: Window,
 }
 
@@ -95,20 +147,19 @@ impl Config {
         let refuse = |name: &'static str, problem: String| Err(Error::parameter(name, problem));
         let Line { period, delay, drop_probability, .. } = self.line;
         if !(period > 0.0 && period.is_finite()) {
-            return refuse("sensors.line.period", format!("= {period} s must be positive"));
+            return refuse("sensor.period", format!("= {period} s must be positive"));
         }
         if !(delay >= 0.0 && delay / period <= IN_FLIGHT as f64) {
-            let problem = format!(
-                "= {delay} s must lie between 0 and {IN_FLIGHT} times `sensors.line.period`"
-            );
-            return refuse("sensors.line.delay", problem);
+            let problem =
+                format!("= {delay} s must lie between 0 and {IN_FLIGHT} times sensor.period");
+            return refuse("sensor.delay", problem);
         }
         if !(0.0..=1.0).contains(&drop_probability) {
             let problem = format!("= {drop_probability} must lie between 0 and 1");
-            return refuse("sensors.line.drop_probability", problem);
+            return refuse("sensor.drop.probability", problem);
         }
-        let check = |(i, triad): (usize, &Triad)| triad.check(&format!("sensors.triads[{i}]"));
-        self.triads.iter().enumerate().try_for_each(check)
+        let check = |(name, triad): (&str, &Triad)| triad.check(&format!("sensor.{name}"));
+        self.triads.named().try_for_each(check)
     }
 
     /// Draws the normal noise of the three sensors at a tick, and a random number in [0, 1) that

@@ -12,7 +12,7 @@ pub const LONGEST: f64 = 1.0;
 /// Largest number of changes of the command that can be under way at a time.
 pub const UNDER_WAY: usize = 10_000;
 /// Name of the delay in error messages.
-const NAME: &str = "moment_delay";
+const NAME: &str = "actuation.delay";
 
 /// Commanded moment that differs from the one before it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -195,11 +195,11 @@ mod tests {
             count += 1;
         }
         let text = last.unwrap_err().to_string();
-        assert!(text.contains("`moment_delay`") && text.contains("10000"), "{text}");
+        assert!(text.contains("actuation.delay") && text.contains("10000"), "{text}");
         // The first moment is zero, which is no change.
         assert_eq!(count as usize, UNDER_WAY + 2);
         for delay in [-0.1, 1.1, f64::NAN] {
-            assert!(Transport::new(delay).unwrap_err().to_string().contains("`moment_delay`"));
+            assert!(Transport::new(delay).unwrap_err().to_string().contains("actuation.delay"));
         }
         assert_eq!(Transport::new(0.0).unwrap(), None);
     }

@@ -2,40 +2,51 @@
 //! quantity: scale, misalignment and bias, which may drift; bandwidth; white noise; range;
 //! resolution of the converter.
 
+use crate::axes::AXES;
 use crate::error::Error;
 use crate::math::exp;
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
+use settings::Declared;
 use std::f64::consts::TAU;
 
 /// Errors of one sensor, in the unit of the quantity that it measures.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Declared)]
 pub struct Triad {
-    /// Matrix with scale on the diagonal and misalignment beside it; for a magnetometer it includes
-    /// soft iron.
+    /// Matrix of scale and misalignment; for the magnetometer with soft iron.
+    #[setting(part, unit = "1", nominal = 1.0)]
     pub matrix: Matrix3<f64>,
-    /// Bias of each axis; for a magnetometer it includes hard iron.
+    /// Bias; for the magnetometer with hard iron.
+    #[setting(part, each = AXES)]
     pub bias: Vector3<f64>,
-    /// Change of the bias in a second, per axis.
+    /// Rate of change of the bias.
+    #[setting(part, rate, each = AXES)]
     pub drift: Vector3<f64>,
-    /// Standard deviation of the white noise on each sample.
+    /// Standard deviation of the white noise on the samples.
+    #[setting(part, min = 0.0)]
     pub noise: f64,
-    /// Frequency at which a first-order low-pass filter attenuates by 3 dB, Hz; 0 for no filter.
+    /// Bandwidth (3 dB) of the first-order low-pass filter; 0 for no filter.
+    #[setting(part, unit = "Hz", min = 0.0, nominal = 50.0)]
     pub bandwidth: f64,
-    /// Largest magnitude of a value; 0 for no limit.
+    /// Largest magnitude of a reading; 0 for no limit.
+    #[setting(part, min = 0.0)]
     pub range: f64,
-    /// Step of the converter; 0 for no quantization.
+    /// Quantization step of the reading; 0 for none.
+    #[setting(part, min = 0.0)]
     pub resolution: f64,
-    /// Window in which the sensor repeats its last value.
+    /// Time window in which the sensor repeats its last value.
+    #[setting(part)]
     pub freeze: Window,
 }
 
 /// Time window start ≤ t < end, s.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Declared)]
 pub struct Window {
-    /// Start of the window, included, s.
+    /// Start, included.
+    #[setting(part, unit = "s", nominal = 1.0)]
     pub start: f64,
-    /// End of the window, excluded, s.
+    /// End, excluded.
+    #[setting(part, unit = "s", nominal = 1.0)]
     pub end: f64,
 }
 

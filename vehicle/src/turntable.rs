@@ -14,16 +14,21 @@ use crate::sensors::Instant;
 use crate::time::tolerance;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
+use settings::Declared;
 use std::f64::consts::TAU;
 
 /// Servo of the turntable, the same in each axis.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Declared)]
 pub struct Config {
-    /// Frequency at which the servo attenuates by 3 dB, Hz; 0 for sensors on the vehicle itself.
+    /// Bandwidth of the first-order servo of a turntable that carries the sampled sensors; 0 for
+    /// sensors on the vehicle.
+    #[setting(unit = "Hz", min = 0.0, nominal = 10.0)]
     pub bandwidth: f64,
-    /// Largest rate of an angle, rad/s; 0 for no limit.
+    /// Maximum rate of the turntable's angles; 0 for no limit.
+    #[setting(unit = "rad/s", min = 0.0, nominal = 1.0)]
     pub rate: f64,
-    /// Step of the converter that commands the angles, rad; 0 for none.
+    /// Quantization step of the angles commanded to the turntable; 0 for none.
+    #[setting(unit = "rad", min = 0.0, nominal = 1e-3)]
     pub resolution: f64,
 }
 

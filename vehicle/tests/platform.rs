@@ -187,12 +187,12 @@ fn a_calibration_sequence_that_comes_to_the_singular_sideslip_is_refused_by_name
         Some(Sequence { beta_amplitude: BETA_LIMIT - config.initial[1], ..sequence });
     let message = Plant::new(&config, 0.0).unwrap_err().to_string();
     assert!(
-        message.contains("calibration.beta_amplitude") && message.contains("90 deg"),
+        message.contains("calibration.beta.amplitude") && message.contains("90 deg"),
         "{message}"
     );
     config.calibration = Some(Sequence { alpha_rate: f64::NAN, ..sequence });
     assert!(Plant::new(&config, 0.0).unwrap_err().to_string().contains("calibration"));
     config.calibration = None;
     config.surroundings.gravity = -1.0;
-    assert!(Plant::new(&config, 0.0).unwrap_err().to_string().contains("surroundings.gravity"));
+    assert!(Plant::new(&config, 0.0).unwrap_err().to_string().contains("sensor.gravity"));
 }

@@ -8,6 +8,7 @@ mod settings;
 pub use settings::{JetCommand, Method, Settings};
 
 use crate::error::DesignError;
+use ::settings::Choice;
 use nalgebra::{SMatrix, Vector3};
 use optimum::{OptimalAllocation, Weights};
 use pwpf::Modulator;
@@ -27,15 +28,15 @@ pub struct Command {
     pub dynamic_pressure: f64,
 }
 
-/// How the allocation in force came about.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+/// Origin of the allocation in force.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Choice)]
 pub enum AllocationStatus {
-    /// No allocation has been computed yet.
+    /// No allocation yet.
     #[default]
     None,
-    /// The solver found the optimum.
+    /// Optimum.
     Optimal,
-    /// The solver did not succeed; the previous allocation is kept within the limits.
+    /// Previous allocation within the limits, because the optimisation failed.
     Fallback,
 }
 

@@ -1,23 +1,28 @@
 //! Pulse-width pulse-frequency modulation of the jets (Wu 2015, Figure 2): a low-pass filter and a
 //! Schmitt trigger in a loop.
 
-use crate::error::DesignError;
+use crate::error::{DesignError, invalid};
 use serde::{Deserialize, Serialize};
+use settings::Declared;
 use vehicle::math::exp;
 
 /// Constants of the modulator.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Declared)]
 pub struct Pwpf {
-    /// Gain K_m of the filter.
+    /// Gain K_m of the modulator's filter.
+    #[setting(name = "pwpf.gain", above = 0.0)]
     pub gain: f64,
-    /// Time constant T_m of the filter, s.
+    /// Time constant T_m of the modulator's filter.
+    #[setting(name = "pwpf.timeConstant", unit = "s", min = 1e-5, max = 10.0, nominal = 0.1)]
     pub time_constant: f64,
-    /// Level u_on at which the trigger switches on.
+    /// Filter output u_on at which a jet switches on.
+    #[setting(name = "pwpf.on", above = 0.0)]
     pub on: f64,
-    /// Level u_off at which the trigger switches off.
+    /// Filter output u_off at which a jet switches off.
+    #[setting(name = "pwpf.off", above = 0.0)]
     pub off: f64,
-    /// Time between two evaluations of the trigger, s.
+    /// Sampling period of the modulator.
+    #[setting(name = "pwpf.period", unit = "s", min = 1e-5, max = 10.0, nominal = 1e-3)]
     pub period: f64,
 }
 
@@ -36,22 +41,13 @@ impl Pwpf {
     /// # Errors
     /// Returns an error that names the constant at fault.
     pub fn check(&self) -> Result<(), DesignError> {
-        let positive = [
-            ("pwpf.gain", self.gain),
-            ("pwpf.time_constant", self.time_constant),
-            ("pwpf.period", self.period),
-        ];
-        for (name, value) in positive {
-            if !(value > 0.0 && value.is_finite()) {
-                return Err(DesignError::NotPositive { name, value });
-            }
-        }
+        settings::check(self)?;
         // A jet with full command must switch on, and a jet without command must switch off.
-        for (name, value, low, high) in
-            [("pwpf.on", self.on, 0.0, self.gain), ("pwpf.off", self.off, 0.0, self.on)]
+        for (name, value, high) in
+            [("pwpf.on", self.on, self.gain), ("pwpf.off", self.off, self.on)]
         {
-            if !(value > low && value < high) {
-                return Err(DesignError::OutOfRange { name, value, low, high });
+            if value >= high {
+                return Err(invalid(name, value, format!("must be below {high}")));
             }
         }
         Ok(())

@@ -1,103 +1,102 @@
 //! Settings of the allocator, with the published ones from `data/allocation.toml`.
 
 use super::pwpf::Pwpf;
-use crate::error::DesignError;
+use crate::error::{DesignError, invalid, positive};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
+use settings::{Choice, Declared};
 use std::sync::LazyLock;
+use toml::Table;
+use vehicle::axes::NUMBERED_AXES;
 use vehicle::data;
 use vehicle::effectors::{Effectors, SURFACES, Surfaces};
 
-/// Choice of the method that divides the moment among the effectors.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+/// Method that divides the moment among the effectors.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Choice)]
+#[setting(name = "AllocationMethod")]
 pub enum Method {
-    /// Optimum (60) of Wu 2015 over surfaces and jets together.
+    /// Minimises the moment error and the use of the jets over all effectors together.
+    #[default]
     Optimal,
-    /// Blending of Jia et al., section IV: surfaces first, the remainder to the jets.
+    /// The surfaces come first, within their limits and above threshold.dynamicPressure; the jets
+    /// give the remainder.
     Blending,
 }
 
-/// Choice of the commands to the jets.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+/// Form of the commands to the jets.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Choice)]
 pub enum JetCommand {
-    /// On and off, by pulse-width pulse-frequency modulation.
+    /// 1 for on and 0 for off, by pulse-width pulse-frequency modulation.
+    #[default]
     Pwpf,
-    /// The duty cycle, without modulation.
+    /// Duty cycle from 0 to 1, without modulation.
     Duty,
 }
 
 /// Settings of the allocator. Units SI, angles rad.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Declared)]
 pub struct Settings {
-    /// Model of surfaces and jets and of their limits that the allocator uses.
-    pub effectors: Effectors,
-    /// Method of division among the effectors.
+    #[allow(missing_docs)] // Its type says what it is.
     pub method: Method,
-    /// Form of the commands to the jets.
+    #[allow(missing_docs)]
     pub jets: JetCommand,
-    /// Time between allocations, s.
+    /// Sampling period of the allocation; with jets = pwpf a whole multiple of pwpf.period.
+    #[setting(unit = "s", min = 1e-4, max = 10.0, nominal = 0.01)]
     pub period: f64,
-    /// Weight W₁ of (60), 1/(N m).
-    pub weight_moment: Vector3<f64>,
-    /// Value of each entry of W₂.
-    pub weight_jet: f64,
-    /// Weight of ½ (deflection/range)², a term that (60) does not have.
-    pub weight_surface: f64,
-    /// Dynamic pressure above which blending uses the surfaces, Pa.
+    /// Dynamic pressure above which method = blending uses the surfaces.
+    #[setting(name = "threshold.dynamicPressure", unit = "Pa", min = 0.0, nominal = 1e3)]
     pub threshold: f64,
-    /// Modulator of the jets.
-    pub pwpf: Pwpf,
-    /// Largest number of iterations of the cone solver.
+    /// Maximum number of iterations of the cone solver.
+    #[setting(name = "solver.maxIterations", min = 1, max = 1000)]
     pub max_iterations: u32,
+    /// Weight W1 on the missing moment, diagonal, in 1/(N m).
+    #[setting(name = "weight.moment", each = NUMBERED_AXES, above = 0.0)]
+    pub weight_moment: Vector3<f64>,
+    /// Weight W2 on the duty cycle of each jet.
+    #[setting(name = "weight.jet", min = 0.0)]
+    pub weight_jet: f64,
+    /// Weight on half the squared ratio of each deflection to its range; 0 gives the cost function
+    /// as printed, whose optimum is not unique.
+    #[setting(name = "weight.surface", min = 0.0)]
+    pub weight_surface: f64,
+    /// Model of surfaces and jets and of their limits that the allocator uses.
+    #[setting(skip)]
+    pub effectors: Effectors,
+    /// Modulator of the jets, whose settings are declared after those of the effectors.
+    #[setting(skip)]
+    pub pwpf: Pwpf,
 }
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct File {
-    period: f64,
-    weight: Weight,
-    pwpf: Pwpf,
-    blending: Blending,
-    solver: Solver,
+    settings: Table,
+    modulator: Table,
 }
 
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Weight {
-    moment: Vector3<f64>,
-    jet: f64,
-    surface: f64,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Blending {
-    threshold: f64,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Solver {
-    max_iterations: u32,
-}
+const FILE: &str = "allocation.toml";
 
 impl Settings {
     /// Returns the settings of Wu 2015, sections 5 and 6. Blending and all other values of ours are
     /// as in `data/allocation.toml`.
     pub fn published() -> Self {
-        let &File { period, ref weight, pwpf, ref blending, ref solver } = embedded();
-        Self {
+        static READ: LazyLock<File> =
+            LazyLock::new(|| data::embedded(FILE, include_str!("../../data/allocation.toml")));
+        let mut settings = Self {
+            method: Method::default(),
+            jets: JetCommand::default(),
+            period: 0.0,
+            threshold: 0.0,
+            max_iterations: 0,
+            weight_moment: Vector3::zeros(),
+            weight_jet: 0.0,
+            weight_surface: 0.0,
             effectors: Effectors::published(),
-            method: Method::Optimal,
-            jets: JetCommand::Pwpf,
-            period,
-            weight_moment: weight.moment,
-            weight_jet: weight.jet,
-            weight_surface: weight.surface,
-            threshold: blending.threshold,
-            pwpf,
-            max_iterations: solver.max_iterations,
-        }
+            pwpf: Pwpf::default(),
+        };
+        data::set(&mut settings, FILE, &READ.settings);
+        data::set(&mut settings.pwpf, FILE, &READ.modulator);
+        settings
     }
 
     /// Returns the smallest and largest deflections, rad: (63) and (65).
@@ -113,34 +112,13 @@ impl Settings {
     /// # Errors
     /// Returns an error that names the setting at fault.
     pub(super) fn ratio(&self) -> Result<u64, DesignError> {
-        let positive = [
-            ("period", self.period),
-            ("effectors.reference_pressure", self.effectors.reference_pressure),
-            ("weight_moment.x", self.weight_moment.x),
-            ("weight_moment.y", self.weight_moment.y),
-            ("weight_moment.z", self.weight_moment.z),
-        ];
-        for (name, value) in positive {
-            if !(value > 0.0 && value.is_finite()) {
-                return Err(DesignError::NotPositive { name, value });
-            }
-        }
-        let not_negative = [
-            ("weight_jet", self.weight_jet),
-            ("weight_surface", self.weight_surface),
-            ("threshold", self.threshold),
-        ];
-        for (name, value) in not_negative {
-            if !(0.0..f64::INFINITY).contains(&value) {
-                return Err(DesignError::OutOfRange { name, value, low: 0.0, high: f64::INFINITY });
-            }
-        }
+        settings::check(self)?;
+        positive("dynamicPressure.reference", self.effectors.reference_pressure)?;
         let Effectors { effectiveness, jet_moments, min, max, rate, .. } = &self.effectors;
         if let Some(&value) =
             effectiveness.iter().chain(jet_moments).find(|value| !value.is_finite())
         {
-            let (name, low, high) = ("effectors.effectiveness", f64::NEG_INFINITY, f64::INFINITY);
-            return Err(DesignError::OutOfRange { name, value, low, high });
+            return Err(invalid("surfaceMoment, jetMoment", value, "must be finite"));
         }
         for i in 0..SURFACES {
             let (min, max, rate) = (min[i], max[i], rate[i]);
@@ -160,11 +138,4 @@ impl Settings {
         }
         Ok(ratio as u64)
     }
-}
-
-fn embedded() -> &'static File {
-    static READ: LazyLock<File> = LazyLock::new(|| {
-        data::embedded("allocation.toml", include_str!("../../data/allocation.toml"))
-    });
-    &READ
 }

@@ -4,7 +4,7 @@
 use super::guarantee::{self, Assessment, Tightening};
 use super::settings::{Constraints, Guarantee, InitialState, Settings};
 use crate::delay;
-use crate::error::DesignError;
+use crate::error::{DesignError, positive};
 use crate::error_dynamics::{Gain, InvariantSet, Reach, SampledError};
 use nalgebra::{Matrix2, Vector2};
 use serde::{Deserialize, Serialize};
@@ -137,7 +137,6 @@ impl Design {
         }
         let error = SampledError::delayed(s.feedback, s.period_feedback, s.delay);
         let reach = error.reach_forever().ok_or(DesignError::Unstable {
-            name: "period_feedback",
             k1: s.feedback.k1,
             k2: s.feedback.k2,
             period: s.period_feedback,
@@ -204,46 +203,11 @@ fn robust(s: &Settings) -> Result<(f64, Tightening, Assessment), DesignError> {
 }
 
 fn ratio(s: &Settings) -> Result<usize, DesignError> {
-    let positive = [
-        ("period_feedback", s.period_feedback),
-        ("period_optimisation", s.period_optimisation),
-        ("limit_rate", s.limit_rate),
-        ("limit_moment", s.limit_moment),
-        ("observer.time_constant", s.observer.time_constant),
-        ("observer.stiffness", s.observer.stiffness),
-    ];
-    for (name, value) in positive {
-        if !(value > 0.0 && value.is_finite()) {
-            return Err(DesignError::NotPositive { name, value });
-        }
-    }
-    for (i, &value) in s.p.iter().enumerate() {
-        if !(value >= 0.0 && value.is_finite()) {
-            return Err(DesignError::Weight { name: "p", index: i + 1, value });
-        }
-    }
-    for (i, &value) in s.q.iter().enumerate() {
-        if !(value > 0.0 && value.is_finite()) {
-            return Err(DesignError::Weight { name: "q", index: i + 1, value });
-        }
-    }
-    if s.horizon == 0 {
-        return Err(DesignError::NotPositive { name: "horizon", value: 0.0 });
-    }
-    let ranges = [
-        ("inertia_error", s.inertia_error, 1.0),
-        ("tensor_error", s.tensor_error, 1.0),
-        ("angle_error", s.angle_error, 1.0),
-        ("rate_error", s.rate_error, 1.0),
-        ("delay", s.delay, 1.0),
-        ("delay_error", s.delay_error, 1.0),
-        ("sideslip_domain", s.sideslip_domain, 0.8),
-        ("disturbance_bound", s.disturbance_bound, f64::MAX),
-    ];
-    for (name, value, high) in ranges {
-        if !(0.0..high).contains(&value) {
-            return Err(DesignError::OutOfRange { name, value, low: 0.0, high });
-        }
+    settings::check(s)?;
+    positive("limit.rate", s.limit_rate)?;
+    positive("limit.moment", s.limit_moment)?;
+    if !(0.0..=delay::LONGEST).contains(&s.delay) {
+        return Err(DesignError::Delay { value: s.delay, longest: delay::LONGEST });
     }
     if s.delay_error > 0.0 && s.initial_state == InitialState::Tube {
         return Err(DesignError::DelayErrorWithTube);

@@ -9,7 +9,6 @@ mod observer;
 mod paper;
 mod plan;
 mod planner;
-mod published;
 mod robust;
 mod set;
 mod settings;
@@ -29,8 +28,8 @@ pub use guarantee::{Assessment, Carried, Deviation, Geometry, Onset, Switching, 
 pub use memory::{Margins, Memory};
 pub use observer::Observed;
 pub use plan::Plan;
-pub use published::Published;
 pub use set::Bounds;
+pub use settings::Published;
 pub use settings::{Constraints, Guarantee, InitialState, ObserverSettings, Settings};
 pub use supervision::{Contradiction, GuaranteeStatus, Supervision};
 

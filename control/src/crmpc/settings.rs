@@ -1,120 +1,242 @@
-//! Settings of CRMPC.
+//! Settings of CRMPC, with the published ones from `data/crmpc-2022.toml`.
 
 use crate::error_dynamics::Gain;
 use crate::mpc::SolverSettings;
 use serde::{Deserialize, Serialize};
+use settings::{Choice, Declared};
+use std::sync::LazyLock;
+use toml::Table;
+use vehicle::axes::{NUMBERED_ANGLES, NUMBERED_STATE};
+use vehicle::data;
 use vehicle::dynamics::RigidBody;
+use vehicle::scenario::Scenario;
 
-/// Choice of the sets within which the optimisation keeps the nominal motion.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+/// Constraint sets of the optimisation for the nominal trajectory.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Choice)]
 #[serde(rename_all = "camelCase")]
 pub enum Constraints {
-    /// Bounds on ‖ω‖ and ‖m‖ themselves, tightened stage by stage by what the sampled error
-    /// dynamics can reach.
+    /// Limits limit.rate and limit.moment, tightened by the largest possible deviations from the
+    /// nominal trajectory.
+    #[default]
     Robust,
-    /// Bounds ‖x_ω‖ ≤ x̄_tube and ‖u‖ ≤ ū_tube as printed.
+    /// Sets as printed in the paper, which do not imply the limits.
+    ///
+    /// These are ‖x_ω‖ ≤ x̄_tube and ‖u‖ ≤ ū_tube of (21).
     Paper,
 }
 
-/// Choice of the state from which the nominal motion starts at a sample.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+/// Initial state of the nominal trajectory at each optimisation.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Choice)]
 #[serde(rename_all = "camelCase")]
 pub enum InitialState {
-    /// The nominal motion starts at the measured state.
+    /// Measured state.
+    #[default]
     Measured,
-    /// The nominal motion starts anywhere with the measured state inside an invariant set around
-    /// it.
+    /// State in an invariant set around the measured state, chosen by the optimisation.
     Tube,
-    /// The nominal motion starts where the previous plan predicted it, the first time at the
-    /// measured state. It then never depends on a disturbance, and the deviation obeys the error
-    /// dynamics (22) alone.
+    /// State predicted by the previous plan; at the first optimisation the measured state.
+    ///
+    /// The nominal trajectory then never depends on a disturbance, and the deviation obeys the
+    /// error dynamics (22) alone.
     Nominal,
 }
 
-/// Reaction to settings for which the design of the robust set does not hold.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+/// Reaction to settings for which the robust set gives no guarantee.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Choice)]
 #[serde(rename_all = "camelCase")]
+#[setting(name = "GuaranteePolicy")]
 pub enum Guarantee {
-    /// The settings are refused with an error.
+    /// The settings are refused at initialization.
     #[default]
     Required,
-    /// The controller runs, tightened as far as there is room, and reports that nothing is
-    /// guaranteed.
+    /// The controller runs without a guarantee.
+    ///
+    /// The constraints are tightened as far as there is room.
     BestEffort,
 }
 
-/// Settings of the disturbance observer, which shifts the reference of the nominal motion so that
-/// the vehicle comes to rest on the reference.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+/// Settings of the disturbance observer, which shifts the reference of the nominal trajectory so
+/// that the vehicle comes to rest on the reference.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Declared)]
 pub struct ObserverSettings {
-    /// Whether the reference is shifted.
+    /// Whether the reference is shifted to cancel the steady deviation that the observed
+    /// disturbance causes; only with constraints = robust.
     pub active: bool,
-    /// Time constant of the observer's filter, s.
+    /// Time constant of the disturbance observer's filter.
+    #[setting(unit = "s", min = 1e-3, max = 100.0, nominal = 0.2)]
     pub time_constant: f64,
-    /// Stiffness k in the shift −Δ̂/k of the reference's angles, 1/s².
+    /// Ratio of the estimated disturbance to the resulting shift of the reference angles.
+    ///
+    /// This is k in the shift −Δ̂/k.
+    #[setting(unit = "1/s2", min = 1e-3, max = 1e3, nominal = 2.5)]
     pub stiffness: f64,
 }
 
 /// All settings of CRMPC. Units are SI, angles in rad.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Declared)]
 pub struct Settings {
     /// Model of the vehicle that the controller uses.
+    #[setting(skip)]
     pub body: RigidBody,
     /// Limit on ‖ω‖, rad/s.
+    #[setting(skip)]
     pub limit_rate: f64,
     /// Limit on ‖m‖, N m.
+    #[setting(skip)]
     pub limit_moment: f64,
-    /// Choice of the constraint sets.
+    /// Time from a measurement until the resulting moment acts, s. The law receives the state
+    /// predicted for that instant.
+    #[setting(skip)]
+    pub delay: f64,
+    #[allow(missing_docs)] // Its type says what it is.
     pub constraints: Constraints,
-    /// Choice of the initial state of the nominal motion.
+    #[allow(missing_docs)]
     pub initial_state: InitialState,
-    /// Number of prediction steps N.
+    /// Number of prediction steps.
+    #[setting(min = 2, max = 1000)]
     pub horizon: usize,
-    /// Optimisation period h, s; a whole multiple of the feedback period.
+    /// Sampling period of the optimisation and length of a prediction step; a whole multiple of
+    /// period.feedback.
+    #[setting(name = "period.optimisation", unit = "s", min = 1e-3, max = 10.0, nominal = 0.2)]
     pub period_optimisation: f64,
-    /// Period of the feedback law, s.
+    /// Sampling period of the feedback law.
+    #[setting(name = "period.feedback", unit = "s", min = 1e-4, max = 10.0, nominal = 0.04)]
     pub period_feedback: f64,
-    /// Diagonal of the weight P: angles, then rates.
+    #[allow(missing_docs)]
+    pub solver: SolverSettings,
+    /// Weight P on the tracking error and on its derivative, diagonal.
+    #[setting(name = "weight.P", each = NUMBERED_STATE, min = 0.0, nominal = 50.0)]
     pub p: [f64; 6],
-    /// Diagonal of the weight Q on the input.
+    /// Weight Q on the second derivative of the tracking error, diagonal.
+    #[setting(name = "weight.Q", each = NUMBERED_ANGLES, above = 0.0, nominal = 10.0)]
     pub q: [f64; 3],
     /// Gain K of the feedback law (20).
     pub feedback: Gain,
-    /// Gain K̃ of the terminal law (14).
+    /// Gain K~ of the terminal law (14).
     pub terminal: Gain,
-    /// Gain with which the paper's c̄ is computed.
+    /// Gain for the paper's tube constant in (21).
     pub tube: Gain,
-    /// Disturbance bound Δ̄ per component of x_ω, rad/s².
+    /// Bound on each component of the disturbance of the angles' second derivatives; the
+    /// constraint sets are tightened for it.
+    #[setting(name = "disturbance.bound", unit = "rad/s2", min = 0.0, nominal = 0.03)]
     pub disturbance_bound: f64,
-    /// Relative inertia error that the robust set tolerates if it is a common factor of the tensor.
+    /// Bound on the relative error of the inertia as a common factor of the tensor; the robust set
+    /// is tightened for it.
+    #[setting(name = "inertia.error", min = 0.0, max = 0.9, nominal = 0.05)]
     pub inertia_error: f64,
-    /// Bound on ‖I^−½ (I_v − I) I^−½‖, the relative error of the tensor of inertia in all six
-    /// entries that the robust set tolerates besides the common factor.
+    /// Bound on the relative error of the inertia tensor in all six entries, besides the common
+    /// factor; the robust set is tightened for it.
+    ///
+    /// It bounds ‖I^−½ (I_v − I) I^−½‖.
+    #[setting(name = "inertia.tensorError", min = 0.0, max = 0.9, nominal = 0.05)]
     pub tensor_error: f64,
-    /// Bound on the error of each measured angle, rad. The error may take any value within it at
-    /// each tick.
-    pub angle_error: f64,
-    /// Bound on the error of each measured component of x_ω, rad/s. The error may take any value
-    /// within it at each tick.
-    pub rate_error: f64,
-    /// Time from a measurement until the resulting moment acts, s. The law receives the state
-    /// predicted for that instant.
-    pub delay: f64,
-    /// Largest amount by which the true delay, a constant that nobody knows, differs from `delay`,
-    /// s; the robust set is tightened for it.
+    /// Bound on the difference between the loop delay, which must be constant, and delay +
+    /// measurement.age; the robust set is tightened for it.
+    #[setting(unit = "s", min = 0.0, max = 1.0, nominal = 0.01)]
     pub delay_error: f64,
-    /// Largest |β| for which the robust set gives its guarantee, rad.
-    pub sideslip_domain: f64,
-    /// Reaction to settings for which the design of the robust set does not hold.
-    pub guarantee: Guarantee,
-    /// Observer of the disturbance; used by the robust set only.
-    pub observer: ObserverSettings,
-    /// Largest |β| for which the paper's bounds of Lemma 1 are computed, rad.
+    /// Largest magnitude of the sideslip angle for which the bounds of the paper's design hold.
+    #[setting(name = "bound.sideslip", unit = "rad", min = 0.0, max = 1.5, nominal = 0.2)]
     pub sideslip_bound: f64,
-    /// Bound Θ̄₁ on ‖Θ̇_r‖, rad/s.
+    /// Bound on the norm of the reference's first derivative in the paper's terminal set (13).
+    #[setting(name = "bound.referenceRate", unit = "rad/s", min = 0.0, nominal = 0.05)]
     pub reference_rate: f64,
-    /// Bound Θ̄₂ on ‖Θ̈_r‖, rad/s².
+    /// Bound on the norm of the reference's second derivative in the paper's terminal set (13).
+    #[setting(name = "bound.referenceAcceleration", unit = "rad/s2", min = 0.0, nominal = 0.02)]
     pub reference_acceleration: f64,
-    /// Settings of the solvers of the optimisation.
-    pub solver: SolverSettings,
+    /// Bound on the measurement error of each angle, which may change arbitrarily from tick to
+    /// tick; the robust set is tightened for it.
+    #[setting(
+        name = "estimation.angleError",
+        unit = "rad",
+        min = 0.0,
+        below = 1.0,
+        nominal = 0.003
+    )]
+    pub angle_error: f64,
+    /// Bound on the error of each angle's derivative as computed from the measurements, which may
+    /// change arbitrarily from tick to tick; the robust set is tightened for it.
+    #[setting(
+        name = "estimation.rateError",
+        unit = "rad/s",
+        min = 0.0,
+        below = 1.0,
+        nominal = 0.005
+    )]
+    pub rate_error: f64,
+    #[allow(missing_docs)]
+    #[setting(name = "guarantee.policy")]
+    pub guarantee: Guarantee,
+    /// Largest magnitude of the sideslip angle for which the guarantee is given.
+    #[setting(name = "guarantee.sideslip", unit = "rad", min = 0.0, max = 0.8, nominal = 0.3)]
+    pub sideslip_domain: f64,
+    #[allow(missing_docs)]
+    pub observer: ObserverSettings,
+}
+
+/// The constants that Chai 2022, section 5.1 prints for its own design.
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Published {
+    /// Terminal weight G per axis: G11, G12, G22.
+    pub g: [f64; 3],
+    /// Bound r̄₀ as printed.
+    pub r0: f64,
+    /// Bound r̄₁ as printed.
+    pub r1: f64,
+    /// Bound Ω̄ as printed.
+    pub omega: f64,
+    /// Condition number Ī·Ī′ as printed.
+    pub condition: f64,
+    /// Peak c̄ of the step response as printed.
+    pub c: f64,
+    /// Terminal radius ε₁ as printed.
+    pub epsilon1: f64,
+    /// Terminal radius ε₂ as printed.
+    pub epsilon2: f64,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct File {
+    settings: Table,
+    paper: Table,
+    published: Published,
+}
+
+const FILE: &str = "crmpc-2022.toml";
+
+fn embedded() -> &'static File {
+    static READ: LazyLock<File> =
+        LazyLock::new(|| data::embedded(FILE, include_str!("../../data/crmpc-2022.toml")));
+    &READ
+}
+
+impl Settings {
+    /// Returns the settings of Chai 2022, section 5.1, with its vehicle at the nominal inertia and
+    /// measured initial state. With the robust set, K is ours.
+    #[allow(clippy::missing_panics_doc)]
+    pub fn new(constraints: Constraints) -> Self {
+        let scenario = Scenario::crmpc2022();
+        let mut settings = Self {
+            // This cannot fail: the scenario's own tests read its inertia.
+            body: scenario.inertia.body(1.0).unwrap_or_else(|error| panic!("{error}")),
+            limit_rate: scenario.limit_rate,
+            limit_moment: scenario.limit_moment,
+            disturbance_bound: scenario.disturbance.bound,
+            ..Self::default()
+        };
+        let file = embedded();
+        data::set(&mut settings, FILE, &file.settings);
+        if constraints == Constraints::Paper {
+            data::set(&mut settings, FILE, &file.paper);
+        }
+        settings
+    }
+}
+
+impl Published {
+    /// Returns the printed constants.
+    pub fn crmpc2022() -> Self {
+        embedded().published
+    }
 }

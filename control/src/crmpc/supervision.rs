@@ -5,30 +5,29 @@
 //! the guarantee is in force again only after nothing has contradicted them for a while.
 
 use serde::{Deserialize, Serialize};
+use settings::Choice;
 
 /// Time without contradiction after which the assumptions are believed again, s.
 const PROBATION: f64 = 1.0;
 
-/// Status of the guarantee of the robust set at a tick. While it is in force, ‖ω‖ and ‖m‖ keep
-/// their limits for as long as the assumptions hold.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+/// Status of the guarantee of the robust set at the last tick.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Choice)]
 pub enum GuaranteeStatus {
-    /// No optimisation has been run yet, or the sets guarantee nothing.
+    /// No optimisation yet, or constraint sets that give no guarantee.
     #[default]
     None,
-    /// A plan is certified, and the guarantee comes into force once the delay has passed; until
-    /// then moments act that were commanded without it.
+    /// a plan is certified, but its first command does not act yet.
     Pending,
-    /// The limits are guaranteed from this tick on.
+    /// The limits are kept as long as the assumptions hold.
     InForce,
-    /// The design does not hold for the settings, so that the controller works on best effort.
+    /// No guarantee is possible with these settings; the controller runs as best effort.
     Refused,
-    /// No plan has been found that satisfies the conditions of the theorem.
+    /// No plan was found that satisfies the conditions of the guarantee.
     Uncertified,
-    /// The vehicle is further from the plan than the assumptions explain, or something else
-    /// contradicts them.
+    /// An assumption was contradicted within the last second; guarantee.contradiction shows which.
     Exceeded,
-    /// The inputs were set before the tick.
+    /// a tick within the last second used inputs that had been set before it; step with
+    /// period.feedback or a whole fraction of it.
     Stale,
 }
 
@@ -38,23 +37,23 @@ impl GuaranteeStatus {
     }
 }
 
-/// What contradicts the assumptions of the theorem.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+/// Contradiction of an assumption of the guarantee within the last second.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Choice)]
 pub enum Contradiction {
-    /// Nothing does.
+    /// No contradiction.
     #[default]
     None,
-    /// The inputs were set before the tick, because the communication step is longer than the
-    /// period of the feedback law, or no part of it.
+    /// a tick used inputs that had been set before it, because of the communication step.
     Step,
-    /// The motion shows another delay of the loop than the one that was told.
+    /// loopDelay.estimate differs from delay + measurement.age by more than delayError.
     Delay,
-    /// The observed disturbance, or the acceleration over a period, is larger than the bounds of
-    /// disturbance, inertia and measurement errors explain with the delay that was told.
+    /// The observed disturbance is larger than disturbance.bound, inertia.error and
+    /// estimation.rateError allow.
     Disturbance,
-    /// The vehicle is further from the plan than all assumptions together explain.
+    /// The deviation from the plan is larger than the assumed disturbance, inertia, measurement
+    /// errors and delay allow.
     Deviation,
-    /// A limit is exceeded, or the moment that the law asks for exceeds it.
+    /// a limit is exceeded, or the law requires a moment beyond limit.moment.
     Limit,
 }
 

@@ -6,94 +6,24 @@
 //! bound is on the body rates R⁻¹(Θ) v, which are linearised along the previous prediction and
 //! exact at present.
 
+mod plan;
+mod rate_limit;
 mod settings;
 
 pub use crate::report::{SolverReport, SolverStatus};
+pub use plan::Plan;
 pub use settings::{Settings, SlidingMode};
 
 use crate::controller::{Controller, Measurement, ReferenceAt};
 use crate::error::DesignError;
-use crate::linearise::{self, InverseKinematics};
-use crate::mpc::{
-    self, Bounded, Chain, Cost, ErrorTrajectory, Layout, NormConstraint, Optimiser,
-    StageConstraints, State,
-};
-use nalgebra::{Matrix3, Vector3};
+use crate::mpc::{Chain, Cost, ErrorTrajectory, Layout, Optimiser, State};
+use nalgebra::Vector3;
+use rate_limit::RateLimit;
 use serde::{Deserialize, Serialize};
-use std::ops::Range;
 use std::time::Instant;
 use vehicle::kinematics;
-use vehicle::math::{powf, powi};
+use vehicle::math::powf;
 use vehicle::reference::Reference;
-
-/// A trajectory of the angles over the horizon.
-#[derive(Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Plan {
-    /// Angles Θ_0 … Θ_N, rad.
-    pub angles: Vec<Vector3<f64>>,
-    /// Commanded rates v_0 … v_{N−1}, each held over one interval, rad/s.
-    pub commands: Vec<Vector3<f64>>,
-    /// Multipliers of the constraint, from which the next optimisation starts. The first of each
-    /// pair is zero, as the angles have no constraint.
-    pub multipliers: Vec<[f64; 2]>,
-}
-
-impl Clone for Plan {
-    fn clone(&self) -> Self {
-        Self {
-            angles: self.angles.clone(),
-            commands: self.commands.clone(),
-            multipliers: self.multipliers.clone(),
-        }
-    }
-
-    // This keeps the allocated memory.
-    fn clone_from(&mut self, source: &Self) {
-        self.angles.clone_from(&source.angles);
-        self.commands.clone_from(&source.commands);
-        self.multipliers.clone_from(&source.multipliers);
-    }
-}
-
-impl Plan {
-    /// Returns a plan of `horizon` intervals at rest at the origin.
-    pub fn new(horizon: usize) -> Self {
-        Self {
-            angles: vec![Vector3::zeros(); horizon + 1],
-            commands: vec![Vector3::zeros(); horizon],
-            multipliers: vec![[0.0; 2]; horizon],
-        }
-    }
-
-    /// Computes the errors Θ − Θ_r and v − Θ̇_r of the plan.
-    fn errors(&self, references: &[Reference], trajectory: &mut ErrorTrajectory<1>) {
-        for ((error, angles), reference) in
-            trajectory.states.iter_mut().zip(&self.angles).zip(references)
-        {
-            *error = [angles - reference.angles];
-        }
-        for ((w, v), reference) in trajectory.inputs.iter_mut().zip(&self.commands).zip(references)
-        {
-            *w = v - reference.rates;
-        }
-    }
-
-    /// Sets the plan from a trajectory of the errors, rolled out from `start` so that it is an
-    /// exact trajectory of the model.
-    fn follow(
-        &mut self,
-        trajectory: &ErrorTrajectory<1>,
-        start: Vector3<f64>,
-        references: &[Reference],
-        h: f64,
-    ) {
-        self.angles[0] = start;
-        for (k, (w, reference)) in trajectory.inputs.iter().zip(references).enumerate() {
-            self.commands[k] = w + reference.rates;
-            self.angles[k + 1] = self.angles[k] + self.commands[k] * h;
-        }
-    }
-}
 
 /// The state that DLMPC carries from tick to tick.
 #[derive(Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -162,81 +92,12 @@ pub struct Dlmpc {
     previous: ErrorTrajectory<1>,
 }
 
-/// The limit on ‖R⁻¹(Θ) v‖ as a function of the errors from these references.
-#[derive(Clone, Debug)]
-struct RateLimit {
-    limit: f64,
-    references: Vec<Reference>,
-}
-
 /// Largest change of any angle (rad) between passes at which the first optimisation has converged.
 const STANDSTILL: f64 = 1e-7;
-/// Relative tolerance in the check of the exact constraint, for rounding.
-const CHECK_SLACK: f64 = 1e-9;
 /// Share by which a window of the horizon is wider than the violated intervals, at each end.
 const MARGIN: f64 = 0.5;
 /// Typical angle error, by which the cone solver's unknowns are scaled, rad.
 const ANGLE_SCALE: f64 = 0.1;
-
-impl RateLimit {
-    /// Returns ‖R⁻¹(Θ) v‖², relative to the limit.
-    fn square(&self, k: usize, state: &State<1>, input: &Vector3<f64>) -> f64 {
-        let reference = &self.references[k];
-        let rates =
-            linearise::body_rates(&(reference.angles + state[0]), &(reference.rates + input));
-        rates.norm_squared() / (self.limit * self.limit)
-    }
-}
-
-impl Bounded<1> for RateLimit {
-    fn constrains_states(&self) -> bool {
-        false
-    }
-
-    fn norm_constraints(
-        &self,
-        k: usize,
-        state: &State<1>,
-        input: &Vector3<f64>,
-        _: (f64, f64),
-    ) -> StageConstraints<1> {
-        let reference = &self.references[k];
-        let command = reference.rates + input;
-        let kinematics = InverseKinematics::at(&(reference.angles + state[0]));
-        let (rates, [by_alpha, by_beta]) = kinematics.body_rates(&command);
-        let by_state = Matrix3::from_columns(&[by_alpha, by_beta, Vector3::zeros()]) / self.limit;
-        let input = NormConstraint {
-            value: rates / self.limit,
-            by_state: [by_state],
-            by_input: kinematics.matrix() / self.limit,
-        };
-        StageConstraints { state: NormConstraint::default(), input }
-    }
-
-    fn squares(
-        &self,
-        k: usize,
-        state: &State<1>,
-        input: &Vector3<f64>,
-        _: (f64, f64),
-    ) -> (f64, f64) {
-        (0.0, self.square(k, state, input))
-    }
-
-    fn violated(
-        &self,
-        trajectory: &ErrorTrajectory<1>,
-        mut intervals: Range<usize>,
-        _: &mut mpc::Bounds,
-    ) -> Option<Range<usize>> {
-        let bound = powi(1.0 + CHECK_SLACK, 2);
-        let violates =
-            |k: usize| self.square(k, &trajectory.states[k], &trajectory.inputs[k]) > bound;
-        let first = intervals.find(|&k| violates(k))?;
-        let last = intervals.rev().find(|&k| violates(k)).unwrap_or(first);
-        Some(first..last + 1)
-    }
-}
 
 impl Dlmpc {
     /// Checks the settings and sets up the solvers.

@@ -1,83 +1,80 @@
 //! Settings of DLMPC, with the published and the tuned ones from `data/dlmpc-2022.toml`.
 
-use crate::error::DesignError;
+use crate::error::{DesignError, invalid, positive};
 use crate::mpc::SolverSettings;
 use serde::{Deserialize, Serialize};
+use settings::Declared;
 use std::sync::LazyLock;
+use toml::Table;
+use vehicle::axes::NUMBERED_ANGLES;
 use vehicle::data;
 use vehicle::dynamics::RigidBody;
 use vehicle::scenario::Scenario;
 
 /// Gains of the inner layer's terminal sliding mode. Units with rad and s.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Declared)]
 pub struct SlidingMode {
-    /// Linear reaching gain q, 1/s.
+    /// Gain of the linear term in the reaching law of the inner layer; below 2/period.feedback.
+    #[setting(unit = "1/s", min = 0.0, nominal = 5.0)]
     pub q: f64,
-    /// Reaching gain p of the power ρ.
+    /// Gain of the term with exponent rho in the reaching law of the inner layer.
+    #[setting(min = 0.0, nominal = 5.0)]
     pub p: f64,
-    /// Gain Γ of the manifold.
+    /// Gain Gamma of the integral term in the sliding variable of the inner layer.
+    #[setting(min = 0.0, nominal = 0.1)]
     pub gamma: f64,
-    /// Power ρ of the manifold and of the reaching law, between 0 and 1.
+    /// Exponent rho in the integral term and in the reaching law of the inner layer.
+    #[setting(above = 0.0, below = 1.0)]
     pub rho: f64,
 }
 
 /// Settings of the controller. Units SI, angles rad.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Declared)]
 pub struct Settings {
     /// Model of the vehicle that the controller uses.
+    #[setting(skip)]
     pub body: RigidBody,
     /// Limit on ‖ω‖, rad/s.
+    #[setting(skip)]
     pub limit_rate: f64,
     /// Limit on ‖m‖, N m.
+    #[setting(skip)]
     pub limit_moment: f64,
     /// Number of prediction steps of the outer layer.
+    #[setting(min = 2, max = 1000)]
     pub horizon: usize,
-    /// Period of the outer layer and its prediction step, s.
+    /// Sampling period of the outer layer and length of a prediction step; a whole multiple of
+    /// period.feedback.
+    #[setting(name = "period.optimisation", unit = "s", min = 1e-3, max = 10.0, nominal = 0.2)]
     pub period_optimisation: f64,
-    /// Period of the inner layer, s.
+    /// Sampling period of the inner layer.
+    #[setting(name = "period.feedback", unit = "s", min = 1e-4, max = 10.0, nominal = 0.04)]
     pub period_feedback: f64,
-    /// Diagonal of the weight P on the angles.
+    /// Settings of the solvers of the outer optimisation.
+    pub solver: SolverSettings,
+    /// Weight P on the tracking error, diagonal.
+    #[setting(name = "weight.P", each = NUMBERED_ANGLES, min = 0.0, nominal = 50.0)]
     pub p: [f64; 3],
-    /// Diagonal of the weight Q on the rates.
+    /// Weight Q on the derivative of the tracking error, diagonal.
+    #[setting(name = "weight.Q", each = NUMBERED_ANGLES, above = 0.0, nominal = 10.0)]
     pub q: [f64; 3],
     /// Gains of the inner layer.
     pub sliding_mode: SlidingMode,
-    /// Settings of the solvers of the outer optimisation.
-    pub solver: SolverSettings,
 }
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct File {
-    outer: Outer,
-    inner: Inner,
-    solver: Solver,
+    settings: Table,
+    tuned: Table,
 }
 
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Outer {
-    horizon: usize,
-    period: f64,
-    p: [f64; 3],
-    q: [f64; 3],
-}
+const FILE: &str = "dlmpc-2022.toml";
 
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Inner {
-    period: f64,
-    #[serde(rename = "prediction_horizon")]
-    _prediction_horizon: f64,
-    published: SlidingMode,
-    tuned: SlidingMode,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Solver {
-    max_iterations: u32,
+fn embedded() -> &'static File {
+    static READ: LazyLock<File> =
+        LazyLock::new(|| data::embedded(FILE, include_str!("../../data/dlmpc-2022.toml")));
+    &READ
 }
 
 impl Settings {
@@ -85,26 +82,22 @@ impl Settings {
     #[allow(clippy::missing_panics_doc)]
     pub fn published() -> Self {
         let scenario = Scenario::crmpc2022();
-        // This cannot fail, as the tests that use it show: the files are embedded.
-        let body = scenario.inertia.body(1.0).unwrap_or_else(|error| panic!("{error}"));
-        let File { outer, inner, solver } = embedded();
-        Self {
-            body,
+        let mut settings = Self {
+            // This cannot fail, as the tests that use it show: the files are embedded.
+            body: scenario.inertia.body(1.0).unwrap_or_else(|error| panic!("{error}")),
             limit_rate: scenario.limit_rate,
             limit_moment: scenario.limit_moment,
-            horizon: outer.horizon,
-            period_optimisation: outer.period,
-            period_feedback: inner.period,
-            p: outer.p,
-            q: outer.q,
-            sliding_mode: inner.published,
-            solver: SolverSettings::new(solver.max_iterations),
-        }
+            ..Self::default()
+        };
+        data::set(&mut settings, FILE, &embedded().settings);
+        settings
     }
 
     /// Returns the published settings with the gains that `examples/tune_dlmpc.rs` found.
     pub fn tuned() -> Self {
-        Self { sliding_mode: embedded().inner.tuned, ..Self::published() }
+        let mut settings = Self::published();
+        data::set(&mut settings, FILE, &embedded().tuned);
+        settings
     }
 
     /// Checks all settings and returns the number of inner ticks per optimisation.
@@ -112,38 +105,13 @@ impl Settings {
     /// # Errors
     /// Returns an error that names the setting at fault.
     pub(super) fn ratio(&self) -> Result<u64, DesignError> {
-        let SlidingMode { q, p, gamma, rho } = self.sliding_mode;
-        let positive = [
-            ("limit_rate", self.limit_rate),
-            ("limit_moment", self.limit_moment),
-            ("period_optimisation", self.period_optimisation),
-            ("period_feedback", self.period_feedback),
-            ("horizon", self.horizon as f64),
-            ("sliding_mode.rho", rho),
-        ];
-        for (name, value) in positive {
-            if !(value > 0.0 && value.is_finite()) {
-                return Err(DesignError::NotPositive { name, value });
-            }
-        }
-        for (name, weights) in [("p", self.p), ("q", self.q)] {
-            for (i, value) in weights.into_iter().enumerate() {
-                if !(value.is_finite() && (value > 0.0 || (name == "p" && value == 0.0))) {
-                    return Err(DesignError::Weight { name, index: i + 1, value });
-                }
-            }
-        }
+        settings::check(self)?;
+        positive("limit.rate", self.limit_rate)?;
+        positive("limit.moment", self.limit_moment)?;
         // Far from the manifold s⁺ = (1 − q T) s, which must not grow.
-        let ranges = [
-            ("sliding_mode.q", q, 2.0 / self.period_feedback),
-            ("sliding_mode.p", p, f64::INFINITY),
-            ("sliding_mode.gamma", gamma, f64::INFINITY),
-            ("sliding_mode.rho", rho, 1.0),
-        ];
-        for (name, value, high) in ranges {
-            if !(0.0..high).contains(&value) {
-                return Err(DesignError::OutOfRange { name, value, low: 0.0, high });
-            }
+        let (q, high) = (self.sliding_mode.q, 2.0 / self.period_feedback);
+        if q >= high {
+            return Err(invalid("slidingMode.q", q, format!("must be below {high}")));
         }
         let (optimisation, feedback) = (self.period_optimisation, self.period_feedback);
         let ratio = (optimisation / feedback).round();
@@ -152,11 +120,4 @@ impl Settings {
         }
         Ok(ratio as u64)
     }
-}
-
-fn embedded() -> &'static File {
-    static READ: LazyLock<File> = LazyLock::new(|| {
-        data::embedded("dlmpc-2022.toml", include_str!("../../data/dlmpc-2022.toml"))
-    });
-    &READ
 }

@@ -10,13 +10,18 @@ use nalgebra::{
     Matrix3, Matrix3x4, Matrix4, Matrix6, RowVector4, SMatrix, SVector, Vector3, Vector4, Vector6,
 };
 use serde::{Deserialize, Serialize};
+use settings::Declared;
+use vehicle::axes::AXES;
 
 /// Correction of a sensor: the field is `matrix` (reading − `bias`).
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Declared)]
 pub struct Correction {
-    /// Matrix W, per unit of the reading.
+    /// Correction matrix, the inverse of scale, misalignment and soft iron, of accelerometer and
+    /// magnetometer up to a factor.
+    #[setting(part, unit = "1", nominal = 1.0)]
     pub matrix: Matrix3<f64>,
-    /// Bias b, in the unit of the reading.
+    /// Bias.
+    #[setting(part, each = AXES)]
     pub bias: Vector3<f64>,
 }
 

@@ -7,13 +7,16 @@
 use ahrs::{Ahrs, Mahony};
 use nalgebra::{Matrix3, Quaternion, Rotation3, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
+use settings::Declared;
 
 /// Gains of the filter.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Declared)]
 pub struct Gains {
-    /// Proportional gain, 1/s: the attitude error decays with this rate.
+    /// Proportional gain of the sensor fusion, the rate at which attitude errors decay.
+    #[setting(unit = "1/s", min = 0.0, nominal = 1.0)]
     pub proportional: f64,
-    /// Integral gain, 1/s², by which the gyroscope's bias is learned.
+    /// Integral gain of the sensor fusion, which learns the gyroscope's bias; 0 for no learning.
+    #[setting(unit = "1/s2", min = 0.0, nominal = 0.1)]
     pub integral: f64,
 }
 

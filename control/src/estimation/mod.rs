@@ -10,104 +10,27 @@ pub mod ellipsoid;
 pub mod fusion;
 pub mod lowpass;
 
-use crate::error::DesignError;
-use ellipsoid::{Correction, Scatter};
-use fusion::{Fusion, Gains, triad};
+mod estimate;
+mod settings;
+
+pub use estimate::{Calibration, CalibrationStatus, Estimate, Health, Line, Memory};
+pub use settings::{
+    Alignment, CalibrationMode, Gate, LARGEST_RANGE, MEMS_SENSORS, Settings, mems_corrections,
+};
+
+use crate::error::{DesignError, invalid};
+use estimate::{Nine, Running};
+use fusion::{Fusion, triad};
 use lowpass::LowPass;
-use nalgebra::{Matrix3, Rotation3, SVector, Vector3};
-use serde::{Deserialize, Serialize};
-use std::sync::LazyLock;
-use vehicle::data;
+use nalgebra::{Rotation3, Vector3};
 use vehicle::kinematics::{self, Kinematics};
 use vehicle::math::{asin, atan2};
 use vehicle::platform::body_from_velocity;
-use vehicle::scenario::Scenario;
-use vehicle::sensor_data::SensorData;
+use vehicle::sensors::PerSensor;
 use vehicle::time::tick_tolerance;
 
-/// Choice of the source of the magnetometer's calibration.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub enum CalibrationMode {
-    /// The calibration is taken from the settings.
-    Given,
-    /// The calibration is a fit to the readings of the first seconds, while the platform turns.
-    Fit,
-}
-
-/// Choice of the source of the initial attitude.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Alignment {
-    /// The first samples give the initial attitude.
-    Measured,
-    /// The settings give the initial attitude, in which the platform was placed.
-    Given,
-}
-
-/// All settings of the estimator. Units are SI, angles in rad.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Settings {
-    /// Time between samples and between ticks, s.
-    pub period: f64,
-    /// Cut-off frequency of the low-pass filter, Hz; 0 for none.
-    pub cutoff: f64,
-    /// Gains of the nine-axis fusion.
-    pub gains: Gains,
-    /// Whether the estimate is predicted forward over the delays of sensors, line and filter.
-    pub prediction: bool,
-    /// Delay of the sensors' own filters, s.
-    pub sensor_delay: f64,
-    /// Kinematics to which the estimated body rates refer.
-    pub kinematics: Kinematics,
-    /// Direction of the magnetic field's horizontal part from north, east positive, rad.
-    pub declination: f64,
-    /// Source of the initial attitude.
-    pub alignment: Alignment,
-    /// Angles Θ before the first sample, and at it with [`Alignment::Given`].
-    pub initial: Vector3<f64>,
-    /// Corrections of gyroscope, accelerometer and magnetometer.
-    pub corrections: [Correction; 3],
-    /// Source of the magnetometer's calibration.
-    pub calibration: CalibrationMode,
-    /// Time during which readings are collected for a fit, s.
-    pub calibration_duration: f64,
-    /// Time during which the platform rests at the beginning, so that the gyroscope shows its bias,
-    /// s.
-    pub rest_duration: f64,
-    /// Time without a usable sample after which the attitude counts as lost, s.
-    pub lost_after: f64,
-    /// Number of equal samples in a row from which a sensor counts as frozen; 0 for never.
-    pub frozen_samples: u32,
-    /// Gates for the readings of gyroscope (rad/s), accelerometer (m/s²) and magnetometer (T).
-    pub gates: [Gate; 3],
-}
-
-/// Condition for accepting the readings of a sensor. Readings outside the sensor's range, and
-/// changes that no rotation of the vehicle can cause, are left out.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Gate {
-    /// Largest reading along an axis, in either direction.
-    pub range: f64,
-    /// Largest change from one sample to the next, as a norm. Readings that lie further away are
-    /// accepted when a second one confirms them.
-    pub jump: f64,
-}
-
-/// Largest range that can be set; squares and products of readings within it are far from overflow.
-pub const LARGEST_RANGE: f64 = 1e9;
-
-impl Gate {
-    /// Relative excess over the range that is tolerated, as the rounding of a converter may exceed
-    /// it by part of a step.
-    const ROUNDING: f64 = 1e-3;
-
-    fn shows(&self, reading: &Vector3<f64>) -> bool {
-        reading.iter().all(|value| value.abs() <= self.range * (1.0 + Self::ROUNDING))
-    }
-
-    fn holds(&self, reading: &Vector3<f64>, before: &Vector3<f64>) -> bool {
-        (reading - before).norm() <= self.jump
-    }
-}
+/// Largest number of steps that are interpolated between two samples that arrived.
+const MOST_STEPS: f64 = 1000.0;
 
 /// Verdict on a sensor's reading.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -120,220 +43,12 @@ enum Verdict {
     Rejected,
 }
 
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct File {
-    period: f64,
-    cutoff: f64,
-    sensor_delay: f64,
-    proportional: f64,
-    integral: f64,
-    lost_after: f64,
-    frozen_samples: u32,
-    calibration_duration: f64,
-    jump_gyroscope: f64,
-    jump_accelerometer: f64,
-    jump_magnetometer: f64,
-}
-
-impl Default for Settings {
-    /// Returns the settings of `data/estimator.toml`, for the start of Chai 2022 and sensors
-    /// without errors in the field of the vehicle's data.
-    fn default() -> Self {
-        static READ: LazyLock<File> = LazyLock::new(|| {
-            data::embedded("estimator.toml", include_str!("../../data/estimator.toml"))
-        });
-        let file = &*READ;
-        let SensorData { surroundings, mems, .. } = SensorData::embedded();
-        let field = surroundings.field;
-        let jumps = [file.jump_gyroscope, file.jump_accelerometer, file.jump_magnetometer];
-        Self {
-            period: file.period,
-            cutoff: file.cutoff,
-            gains: Gains { proportional: file.proportional, integral: file.integral },
-            prediction: true,
-            sensor_delay: file.sensor_delay,
-            kinematics: Kinematics::Printed,
-            declination: atan2(field.y, field.x),
-            alignment: Alignment::Measured,
-            initial: Scenario::crmpc2022().initial_angles,
-            corrections: [Correction::default(); 3],
-            calibration: CalibrationMode::Given,
-            calibration_duration: file.calibration_duration,
-            rest_duration: 0.0,
-            lost_after: file.lost_after,
-            frozen_samples: file.frozen_samples,
-            gates: std::array::from_fn(|i| Gate { range: mems[i].range, jump: jumps[i] }),
-        }
-    }
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct CalibrationFile {
-    gyroscope: CorrectionFile,
-    accelerometer: CorrectionFile,
-    magnetometer: CorrectionFile,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct CorrectionFile {
-    matrix: [[f64; 3]; 3],
-    bias: Vector3<f64>,
-}
-
-/// Returns the corrections of gyroscope, accelerometer and magnetometer of the MEMS set, from
-/// `data/sensor-calibration.toml`.
-pub fn mems_corrections() -> [Correction; 3] {
-    static READ: LazyLock<CalibrationFile> = LazyLock::new(|| {
-        data::embedded(
-            "sensor-calibration.toml",
-            include_str!("../../data/sensor-calibration.toml"),
-        )
-    });
-    [&READ.gyroscope, &READ.accelerometer, &READ.magnetometer]
-        .map(|each| Correction { matrix: Matrix3::from(each.matrix).transpose(), bias: each.bias })
-}
-
-/// The newest sample on the line from the sensors.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Line {
-    /// Number of the sample, from 1; 0 before the first. A line without numbers shows 0 throughout.
-    pub sample: i32,
-    /// Time at which the sample was taken, s.
-    pub time: f64,
-    /// Readings of gyroscope (rad/s), accelerometer (specific force, m/s²) and magnetometer (T).
-    pub readings: [Vector3<f64>; 3],
-}
-
-/// Health of the estimate: how far it can be trusted.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Health {
-    /// No sample has arrived yet.
-    #[default]
-    Waiting,
-    /// The estimate is based on a current sample of all sensors.
-    Ok,
-    /// A sample is missing; the last rate is held.
-    Bridging,
-    /// A sensor repeats its value and is left out.
-    Frozen,
-    /// Samples have been missing or frozen for too long.
-    Lost,
-    /// Readings are being collected for the calibration.
-    Calibrating,
-    /// The fit was refused; the given calibration is in use.
-    Uncalibrated,
-    /// A reading of the newest sample, or the sample as a whole, was rejected and is left out.
-    Rejected,
-}
-
-/// State of the magnetometer's calibration.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub enum CalibrationStatus {
-    /// The calibration of the settings is in use.
-    #[default]
-    Given,
-    /// Readings are being collected for a fit.
-    Collecting,
-    /// The calibration of the fit is in use.
-    Fitted,
-    /// The fit was refused; the calibration of the settings is in use.
-    Refused,
-}
-
-/// The calibration of the magnetometer with its origin.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Calibration {
-    /// Origin and state of the calibration.
-    pub status: CalibrationStatus,
-    /// Correction that is in force.
-    pub correction: Correction,
-    /// Residual of the fit, see [`ellipsoid::Fit`].
-    pub residual: f64,
-    /// Condition number of the fit, see [`ellipsoid::Fit`].
-    pub condition: f64,
-}
-
-/// The estimate at a tick.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Estimate {
-    /// Estimated angles Θ, rad.
-    pub angles: Vector3<f64>,
-    /// Estimated body rates ω with the kinematics of the settings, rad/s.
-    pub rates: Vector3<f64>,
-    /// Health of the estimate: how far it can be trusted.
-    pub health: Health,
-    /// Time since the newest sample was taken, s.
-    pub age: f64,
-    /// Number of samples so far that never arrived.
-    pub dropped: i32,
-    /// Number of samples so far that were left out as a whole or in part.
-    pub rejected: i32,
-    /// Bias of the gyroscope, rad/s: the sum of the given one, the one found at rest and the
-    /// learned one.
-    pub gyroscope_bias: Vector3<f64>,
-}
-
-type Nine = SVector<f64, 9>;
-
-/// Largest number of steps that are interpolated between two samples that arrived.
-const MOST_STEPS: f64 = 1000.0;
-
-/// The state that the estimator carries from tick to tick.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Memory {
-    /// Estimate at the last tick.
-    pub estimate: Estimate,
-    /// Calibration of the magnetometer.
-    pub calibration: Calibration,
-    scatter: Scatter,
-    running: Option<Running>,
-    /// Number of the last sample that was left out as a whole; 0 for none.
-    refused: i32,
-}
-
-/// State from the first sample on.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-struct Running {
-    /// Time at which the first sample was taken, s.
-    start: f64,
-    /// The last sample, with the readings that were last accepted.
-    last: Line,
-    /// Readings of the last sample as they arrived.
-    raw: [Vector3<f64>; 3],
-    /// Whether a reading of the last sample was left out.
-    rejected: bool,
-    /// Whether a second sample has confirmed the first.
-    confirmed: bool,
-    /// Time at which the last sample arrived, s.
-    arrived: f64,
-    filter: lowpass::State<9>,
-    /// Readings after the low-pass filter.
-    filtered: Nine,
-    fusion: Fusion,
-    /// Sum and number of the rates at rest.
-    rest: (Vector3<f64>, f64),
-    /// Number of equal readings in a row, for each sensor.
-    equal: [u32; 3],
-    /// Time at which the last sample with all sensors alive was taken, s.
-    alive: f64,
-}
-
-impl Running {
-    /// Returns the bias found at rest, rad/s.
-    fn rest_bias(&self) -> Vector3<f64> {
-        self.rest.0 / self.rest.1.max(1.0)
-    }
-}
-
 /// The attitude estimator: settings and low-pass filter.
 ///
 /// ```
 /// use control::estimation::{Estimator, Health, Line, Settings};
 ///
-/// let mut estimator = Estimator::new(Settings::default())?;
+/// let mut estimator = Estimator::new(Settings::ours())?;
 /// let mut memory = estimator.memory();
 /// // Nothing has arrived on the line yet.
 /// estimator.update(&mut memory, 0.0, &Line::default());
@@ -360,42 +75,27 @@ impl Estimator {
     /// # Errors
     /// Returns an error that names the setting at fault.
     pub fn new(settings: Settings) -> Result<Self, DesignError> {
+        ::settings::check(&settings)?;
+        let mut settings = settings;
+        if settings.sensor_set < MEMS_SENSORS {
+            (settings.corrections, settings.sensor_delay) = (PerSensor::default(), 0.0);
+        }
         let s = &settings;
-        let positive = [
-            ("period", s.period),
-            ("lost_after", s.lost_after),
-            ("calibration_duration", s.calibration_duration),
-        ];
-        for (name, value) in positive {
-            if !(value > 0.0 && value.is_finite()) {
-                return Err(DesignError::NotPositive { name, value });
-            }
-        }
-        let nyquist = 0.5 / s.period;
         let limits = [
-            ("cutoff", s.cutoff, nyquist),
-            ("gains.proportional", s.gains.proportional, 1.0 / s.period),
-            ("gains.integral", s.gains.integral, 1.0 / (s.period * s.period)),
-            ("sensor_delay", s.sensor_delay, 1.0),
-            ("rest_duration", s.rest_duration, f64::MAX),
+            ("filter.cutoff", s.cutoff, 0.5 / s.period),
+            ("fusion.proportional", s.gains.proportional, 1.0 / s.period),
+            ("fusion.integral", s.gains.integral, 1.0 / (s.period * s.period)),
+            ("sensor.delay", s.sensor_delay, 1.0),
         ];
-        for (i, gate) in s.gates.iter().enumerate() {
-            for (what, value) in [("range", gate.range), ("jump", gate.jump)] {
-                if !(value > 0.0 && value <= LARGEST_RANGE) {
-                    let name = format!("gates[{i}].{what}");
-                    return Err(DesignError::Setting { name, value });
-                }
-            }
-        }
         for (name, value, high) in limits {
-            if !(0.0..high).contains(&value) {
-                return Err(DesignError::OutOfRange { name, value, low: 0.0, high });
+            if value >= high {
+                return Err(invalid(name, value, format!("must be below {high}")));
             }
         }
-        for (i, correction) in s.corrections.iter().enumerate() {
+        for (name, correction) in s.corrections.named() {
             let determinant = correction.matrix.determinant();
             if !(determinant.abs() > 0.0 && determinant.is_finite()) {
-                return Err(DesignError::Singular { name: format!("corrections[{i}].matrix") });
+                return Err(DesignError::Singular { name: format!("{name}.matrix") });
             }
         }
         Ok(Self { settings, filter: LowPass::new(s.cutoff, s.period) })
@@ -495,7 +195,7 @@ impl Estimator {
     /// Returns corrected angular rate (rad/s), specific force and field. The rate still contains
     /// the bias that only the fusion knows.
     fn corrected(&self, memory: &Memory, filtered: &Nine) -> [Vector3<f64>; 3] {
-        let [rate, force, _] = self.settings.corrections;
+        let PerSensor([rate, force, _]) = self.settings.corrections;
         let corrections = [rate, force, memory.calibration.correction];
         std::array::from_fn(|i| corrections[i].apply(&filtered.fixed_rows::<3>(3 * i).into()))
     }

@@ -1,61 +1,71 @@
 //! Settings of an optimisation.
 
 use serde::{Deserialize, Serialize};
+use settings::{Choice, Declared};
 
-/// The solver that is tried first if the shortcuts do not lead to the optimum.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+/// Solver of the optimisation, used where the shortcuts do not find the optimum.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Choice)]
 #[serde(rename_all = "camelCase")]
+#[setting(name = "Solver")]
 pub enum Method {
-    /// The interior point method on the Riccati recursion, with the cone solver where it fails.
+    /// Interior-point method on the Riccati recursion; the cone solver where this method fails.
     #[default]
     Riccati,
-    /// The cone solver alone, without the Riccati method.
+    /// Cone solver Clarabel.
     Cone,
 }
 
-/// The form of the norm constraints for the Riccati method; the cone solver always receives
-/// linearised constraints.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+/// Form of the constraints for the Riccati method; the cone solver always uses linearised ones.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Choice)]
 #[serde(rename_all = "camelCase")]
 pub enum Nonlinearity {
-    /// The norm constraints are functions of the trajectory.
+    /// Constraints as nonlinear functions of the plan.
     #[default]
     Exact,
-    /// The norm constraints are linearised about the previous plan.
+    /// Constraints linearised at the previous plan.
     Frozen,
 }
 
 /// Settings that choose and limit the solvers of an optimisation.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Declared)]
 pub struct SolverSettings {
-    /// Solver that is tried first.
+    #[allow(missing_docs)] // Its type says what it is.
+    #[setting(name = "")]
     pub method: Method,
-    /// Form of the norm constraints that it receives.
+    #[allow(missing_docs)]
     pub nonlinearity: Nonlinearity,
-    /// Largest number of iterations of each solver in each pass.
+    /// Maximum number of iterations of each solver in each pass.
+    #[setting(min = 1, max = 1000)]
     pub max_iterations: u32,
-    /// Whether the shortcuts, cheaper exact ways to the optimum, are tried first.
+    /// Whether shortcuts to the same optimum are tried first: without constraints, with the
+    /// terminal constraint only, then on windows of the horizon.
+    #[setting(name = "exits")]
     pub shortcuts: bool,
-    /// Wall-clock time after which no further iteration or solver is started, s; 0 for no limit.
-    /// Runs with a time budget are not reproducible.
+    /// Wall-clock time after which an optimisation starts no further iteration or solver; 0 for no
+    /// limit; runs with a time budget are not reproducible.
+    #[setting(unit = "s", min = 0.0, nominal = 1e-3)]
     pub time_budget: f64,
-    /// Iterations of all solvers together after which no further one is started; 0 for no limit.
+    /// Number of iterations, summed over all solvers and passes, after which an optimisation starts
+    /// no further one; 0 for no limit; runs remain reproducible.
+    #[setting(min = 0, max = 100_000)]
     pub iteration_budget: u32,
 }
 
-impl SolverSettings {
-    /// Returns the default settings with the given limit on iterations.
-    pub fn new(max_iterations: u32) -> Self {
+impl Default for SolverSettings {
+    /// Returns settings without limits, with the shortcuts and the Riccati method first.
+    fn default() -> Self {
         Self {
             method: Method::default(),
             nonlinearity: Nonlinearity::default(),
-            max_iterations,
+            max_iterations: 1000,
             shortcuts: true,
             time_budget: 0.0,
             iteration_budget: 0,
         }
     }
+}
 
+impl SolverSettings {
     /// Returns whether the Riccati method is tried first, with the norm constraints as functions of
     /// the trajectory.
     pub(super) fn is_exact_riccati(&self) -> bool {

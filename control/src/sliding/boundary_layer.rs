@@ -5,6 +5,8 @@ use crate::error::DesignError;
 use crate::sliding::Reaching;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
+use settings::Declared;
+use vehicle::axes::NUMBERED_ANGLES;
 use vehicle::math::{exp2, powf};
 
 /// Returns sat(s) of Wu 2015, (35): s/h within the layer |s| ≤ h, sgn(s) outside.
@@ -14,12 +16,13 @@ pub fn saturated(s: f64, h: f64) -> f64 {
 
 /// The reaching law ṡ = −η sat(s) of Wu 2015, (34) and (35). The finite time that (42) promises
 /// holds up to the layer only; within, s decays as exp(−η t/h).
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Declared)]
 pub struct BoundaryLayer {
-    /// Diagonal of the gain η, rad/s².
+    /// Reaching gain eta, diagonal.
+    #[setting(name = "reaching.eta", each = NUMBERED_ANGLES, unit = "rad/s2", above = 0.0)]
     pub eta: [f64; 3],
-    /// Thickness h of the layer, rad/s.
+    /// Thickness h of the boundary layer.
+    #[setting(name = "boundaryLayer.h", each = NUMBERED_ANGLES, unit = "rad/s", above = 0.0)]
     pub h: [f64; 3],
 }
 
@@ -27,10 +30,8 @@ impl Reaching for BoundaryLayer {
     type Memory = ();
 
     fn check(&self, period: f64) -> Result<(), DesignError> {
-        super::all_positive("reaching.eta", &self.eta)?;
-        super::all_positive("reaching.h", &self.h)?;
         let steepest = self.eta.iter().zip(&self.h).map(|(eta, h)| eta / h).fold(0.0, f64::max);
-        super::sampled_decay("reaching.eta / reaching.h", steepest, period)
+        super::sampled_decay("reaching.eta / boundaryLayer.h", steepest, period)
     }
 
     fn sliding_rate(&self, (): &(), s: &Vector3<f64>) -> Vector3<f64> {
@@ -42,14 +43,18 @@ impl Reaching for BoundaryLayer {
 
 /// The continuous finite-time replacement of ρ SIGN(s) by Jia et al., (7): ρ f(|s/ε|) SAT(s/ε) with
 /// f = 2^(−(b+1)/2) |s/ε|^b.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+///
+/// The thickness has the unit of the sliding variable, and the gain that of its rate.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Declared)]
 pub struct FiniteTimeLayer {
-    /// Gain ρ per axis.
+    /// Reaching gain rho.
+    #[setting(part, rate, above = 0.0)]
     pub rho: [f64; 3],
-    /// Thickness ε of the layer per axis.
+    /// Thickness epsilon of the boundary layer.
+    #[setting(part, above = 0.0)]
     pub epsilon: [f64; 3],
-    /// Exponent b per axis, between 0 and 1.
+    /// Exponent b of the finite-time factor.
+    #[setting(part, unit = "1", above = 0.0, below = 1.0)]
     pub b: [f64; 3],
 }
 

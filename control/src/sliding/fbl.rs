@@ -4,21 +4,26 @@ use crate::controller::{Controller, Measurement, ReferenceAt};
 use crate::error::DesignError;
 use crate::error_dynamics::{Gain, SampledError};
 use crate::linearise;
-use crate::sliding::{all_positive, tracking_error};
+use crate::sliding::tracking_error;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
+use settings::Declared;
 use vehicle::dynamics::RigidBody;
 
 /// Settings of the controller. Units SI, angles rad.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Declared)]
 pub struct FblSettings {
     /// Model of the vehicle that the controller uses.
+    #[setting(skip)]
     pub body: RigidBody,
-    /// Time between ticks, s.
+    /// Sampling period of the control law.
+    #[setting(name = "period.feedback", unit = "s", min = 1e-4, max = 10.0, nominal = 0.01)]
     pub period: f64,
-    /// Proportional gain k_p, 1/s².
+    /// Gain k_p on the tracking error of the angles.
+    #[setting(name = "gain.p", unit = "1/s2", above = 0.0)]
     pub kp: f64,
-    /// Derivative gain k_d, 1/s.
+    /// Gain k_d on the derivative of the tracking error of the angles.
+    #[setting(name = "gain.d", unit = "1/s", above = 0.0)]
     pub kd: f64,
 }
 
@@ -47,14 +52,12 @@ impl Fbl {
     /// Returns an error that names the setting at fault, or the gains that the sampling makes
     /// unstable.
     pub fn new(settings: FblSettings) -> Result<Self, DesignError> {
+        settings::check(&settings)?;
         let FblSettings { period, kp, kd, .. } = settings;
-        for (name, value) in [("period", period), ("kp", kp), ("kd", kd)] {
-            all_positive(name, &[value])?;
-        }
         let (k1, k2) = (-kp, -kd);
         let radius = SampledError::new(Gain { k1, k2 }, period).spectral_radius();
         if radius >= 1.0 {
-            return Err(DesignError::Unstable { name: "period", k1, k2, period, radius });
+            return Err(DesignError::Unstable { k1, k2, period, radius });
         }
         Ok(Self { settings })
     }

@@ -21,8 +21,9 @@ pub use settings::Settings;
 pub use surface::{Anchor, Surface, TrackingError};
 
 use crate::controller::{Controller, Measurement, ReferenceAt};
-use crate::error::DesignError;
+use crate::error::{DesignError, invalid};
 use crate::linearise;
+use ::settings::{Declared, Invalid};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use vehicle::dynamics::RigidBody;
@@ -31,7 +32,7 @@ use vehicle::math::powf;
 use vehicle::reference::Reference;
 
 /// A reaching law, which drives the sliding variable to zero.
-pub trait Reaching: Copy {
+pub trait Reaching: Copy + Declared {
     /// The integral state of the law.
     type Memory: Copy + Default + Serialize + DeserializeOwned + Send;
 
@@ -143,12 +144,12 @@ impl<R: Reaching> Tvsmc<R> {
     /// # Errors
     /// Returns an error that names the setting at fault.
     pub fn new(settings: Settings<R>) -> Result<Self, DesignError> {
-        let Settings { period, surface, reaching, observer, threshold, .. } = &settings;
-        all_positive("period", &[*period])?;
-        all_positive("threshold", &[*threshold])?;
-        surface.check()?;
-        reaching.check(*period)?;
-        observer.as_ref().map_or(Ok(()), Observer::check)?;
+        ::settings::check(&settings)?;
+        if let Some(observer) = &settings.observer {
+            ::settings::check(observer)
+                .map_err(|error| Invalid { name: format!("observer.{}", error.name), ..error })?;
+        }
+        settings.reaching.check(settings.period)?;
         Ok(Self { settings })
     }
 
@@ -186,7 +187,10 @@ impl<R: Reaching> Controller for Tvsmc<R> {
         let (error, angle_rates) = tracking_error(measured, &reference);
         let re_anchor = *anti_windup && memory.saturated;
         if memory.started {
-            self.integrate(memory, measured.achieved_moment);
+            self.integrate(
+                memory,
+                measured.achieved_moment.filter(|_| self.settings.achieved_moment_used),
+            );
         }
         if !memory.started || re_anchor {
             if memory.started {
@@ -236,21 +240,13 @@ fn power(x: f64, a: f64) -> f64 {
     powf(x.abs(), a) * sign(x)
 }
 
-/// Returns an error for a value that is not positive and finite.
-pub(crate) fn all_positive(name: &str, values: &[f64]) -> Result<(), DesignError> {
-    match values.iter().find(|value| !(**value > 0.0 && value.is_finite())) {
-        Some(&value) => Err(DesignError::Setting { name: name.into(), value }),
-        None => Ok(()),
-    }
-}
-
 /// Returns an error for a rate of decay (1/s) that becomes growth with ticks of `period` (s):
 /// 1 − rate·period must exceed −1.
-pub(crate) fn sampled_decay(name: &'static str, rate: f64, period: f64) -> Result<(), DesignError> {
+pub(crate) fn sampled_decay(name: &str, rate: f64, period: f64) -> Result<(), DesignError> {
     let high = 2.0 / period;
     if rate < high {
         Ok(())
     } else {
-        Err(DesignError::OutOfRange { name, value: rate, low: 0.0, high })
+        Err(invalid(name, rate, format!("must be below {high}, twice the frequency of the ticks")))
     }
 }

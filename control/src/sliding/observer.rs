@@ -1,21 +1,30 @@
 //! The disturbance observer of Wu 2015, (24): a robust exact differentiator of second order on the
 //! sliding variable.
 
-use crate::error::DesignError;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
+use settings::Declared;
+use vehicle::axes::{Entry, NUMBERED_ANGLES};
 use vehicle::math::cbrt;
 
 /// Gains of the observer.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Declared)]
 pub struct Observer {
-    /// Gains λ₀, λ₁, λ₂, which are γ₁, γ₂, γ₃ in Table 1.
+    /// Gain lambda of the disturbance observer.
+    ///
+    /// The gains λ₀, λ₁, λ₂ are γ₁, γ₂, γ₃ in Table 1.
+    #[setting(each = LAMBDAS, above = 0.0)]
     pub lambda: [f64; 3],
-    /// Diagonal of L: bounds on the second derivative of the lumped uncertainty, rad/s⁴. The
-    /// estimates can follow up to λ₂ L, and those of Table 1 need to.
+    /// Gain L of the disturbance observer, a bound on the second derivative of the disturbance in
+    /// rad/s4.
+    ///
+    /// The estimates can follow up to λ₂ L, and those of Table 1 need to.
+    #[setting(name = "L", each = NUMBERED_ANGLES, above = 0.0)]
     pub l: [f64; 3],
 }
+
+/// Endings of the names of the gains λ, which are numbered from 0 as in the paper.
+const LAMBDAS: [Entry; 3] = [("0", "of s"), ("1", "of its rate"), ("2", "of the disturbance")];
 
 /// State of the observer: its three estimates.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -29,12 +38,6 @@ pub struct Estimate {
 }
 
 impl Observer {
-    /// Returns an error for gains that are not positive.
-    pub(super) fn check(&self) -> Result<(), DesignError> {
-        super::all_positive("observer.lambda", &self.lambda)?;
-        super::all_positive("observer.l", &self.l)
-    }
-
     /// Returns the state (24) after `period` (s) by Euler's rule, with ṡ = `drive` + Δv,
     /// `drive` = v − b, and s = `sliding` at the beginning. A change of `drive` affects z₀ first,
     /// and z₁ one step later.

@@ -4,14 +4,21 @@ use crate::error::DesignError;
 use crate::sliding::Reaching;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
+use settings::{Choice, Declared};
+use vehicle::axes::NUMBERED_ANGLES;
 use vehicle::math::{powf, powi};
 
-/// Choice of the signs of the reaching law.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+/// Signs of the second-order reaching law.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Choice)]
 pub enum SecondOrderForm {
+    /// Signs with which the sliding variables converge to zero.
+    ///
     /// τ̇ = −k₃ sig^((m−2)/m)(s) − k₄ s, and sgn once, inside sig (44).
     #[default]
     Corrected,
+    /// Opposite sign of the term with k3 and a second sgn, as printed in (43) and (45); the sliding
+    /// variables do not converge.
+    ///
     /// τ̇ = +k₃ sig^((m−2)/m)(s) sgn(s) − k₄ s, and the term of k₁ with a second sgn too, as (43)
     /// and (45) are printed: the powers are even functions of s, which does not come to rest
     /// at zero.
@@ -20,22 +27,26 @@ pub enum SecondOrderForm {
 
 /// The reaching law ṡ = −k₁ sig^((m−1)/m)(s) − k₂ s + τ, τ̇ = −k₃ sig^((m−2)/m)(s) − k₄ s, with
 /// sig^a(s) = |s|^a sgn(s).
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Declared)]
 pub struct SecondOrder {
-    /// Choice of the signs.
-    #[serde(default)]
-    pub form: SecondOrderForm,
-    /// Gain k₁ per axis.
+    /// Reaching gain k1.
+    #[setting(name = "reaching.k1", each = NUMBERED_ANGLES, above = 0.0)]
     pub k1: [f64; 3],
-    /// Gain k₂ per axis, 1/s.
+    /// Reaching gain k2.
+    #[setting(name = "reaching.k2", each = NUMBERED_ANGLES, unit = "1/s", above = 0.0)]
     pub k2: [f64; 3],
-    /// Gain k₃ per axis.
+    /// Reaching gain k3.
+    #[setting(name = "reaching.k3", each = NUMBERED_ANGLES, above = 0.0)]
     pub k3: [f64; 3],
-    /// Gain k₄ per axis, 1/s².
+    /// Reaching gain k4.
+    #[setting(name = "reaching.k4", each = NUMBERED_ANGLES, unit = "1/s2", above = 0.0)]
     pub k4: [f64; 3],
-    /// Parameter m of the exponents, m > 2.
+    /// Exponent m of the reaching law.
+    #[setting(name = "reaching.m", above = 2.0)]
     pub m: f64,
+    #[allow(missing_docs)] // Its type says what it is.
+    #[setting(name = "reaching.form")]
+    pub form: SecondOrderForm,
 }
 
 impl SecondOrder {
@@ -62,21 +73,13 @@ impl Reaching for SecondOrder {
     type Memory = Vector3<f64>;
 
     fn check(&self, period: f64) -> Result<(), DesignError> {
-        let Self { k1, k2, k3, k4, m, .. } = self;
-        let gains = [("k1", k1), ("k2", k2), ("k3", k3), ("k4", k4)];
-        for (name, gain) in gains.map(|(name, gain)| (["reaching.", name].concat(), gain)) {
-            super::all_positive(&name, gain)?;
-        }
-        if !(*m > 2.0 && m.is_finite()) {
-            return Err(DesignError::NotAbove { name: "reaching.m", value: *m, bound: 2.0 });
-        }
         for axis in 0..3 {
             let value = self.condition_46(axis);
             if value.is_nan() || value <= 0.0 {
                 return Err(DesignError::Condition46 { index: axis + 1, value });
             }
         }
-        super::sampled_decay("reaching.k2", k2.iter().copied().fold(0.0, f64::max), period)
+        super::sampled_decay("reaching.k2", self.k2.iter().copied().fold(0.0, f64::max), period)
     }
 
     fn sliding_rate(&self, tau: &Vector3<f64>, s: &Vector3<f64>) -> Vector3<f64> {
@@ -134,8 +137,8 @@ mod tests {
         let law = SecondOrder { k2: [0.2, 0.5, 0.2], ..LAW };
         let text = law.check(0.01).unwrap_err().to_string();
         assert!(text.contains("(46)") && text.contains("axis 2"), "{text}");
-        let text = SecondOrder { m: 2.0, ..LAW }.check(0.01).unwrap_err().to_string();
-        assert!(text.contains("`reaching.m` = 2"), "{text}");
+        let text = settings::check(&SecondOrder { m: 2.0, ..LAW }).unwrap_err().to_string();
+        assert_eq!(text, "reaching.m = 2 must be above 2");
     }
 
     #[test]

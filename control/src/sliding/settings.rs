@@ -2,60 +2,59 @@
 
 use crate::sliding::{BoundaryLayer, FblSettings, Observer, SecondOrder, Surface};
 use serde::{Deserialize, Serialize};
+use settings::Declared;
 use std::sync::LazyLock;
+use toml::Table;
 use vehicle::data;
 use vehicle::dynamics::RigidBody;
 use vehicle::scenario::Scenario;
 
 /// Settings of a time-varying sliding mode. Units SI, angles rad.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Declared)]
 pub struct Settings<R> {
     /// Model of the vehicle that the controller uses.
+    #[setting(skip)]
     pub body: RigidBody,
-    /// Time between ticks, s.
+    /// Sampling period of the control law.
+    #[setting(name = "period.feedback", unit = "s", min = 1e-4, max = 10.0, nominal = 0.01)]
     pub period: f64,
     /// Gains of the sliding surface.
     pub surface: Surface,
     /// Reaching law with its gains.
+    #[setting(name = "")]
     pub reaching: R,
-    /// Disturbance observer, if there is one.
-    pub observer: Option<Observer>,
-    /// Whether, while the actuators saturate, the surface is placed again through the state and the
-    /// reaching law's integral is cleared.
+    /// Whether the inputs achievedMoment are connected; otherwise the law assumes that the
+    /// commanded moment acts.
+    #[setting(name = "achievedMoment.used")]
+    pub achieved_moment_used: bool,
+    /// Whether the sliding surface is placed again through the state while the actuators saturate;
+    /// false in the paper.
+    ///
+    /// The reaching law's integral is then cleared as well.
     pub anti_windup: bool,
-    /// Value of ‖v_achieved − v‖ above which the actuators count as saturated, rad/s².
+    /// Norm of the missing angular acceleration above which the actuators count as saturated.
+    #[setting(name = "antiWindupThreshold", unit = "rad/s2", above = 0.0, nominal = 0.01)]
     pub threshold: f64,
+    /// Disturbance observer, if there is one.
+    #[setting(skip)]
+    pub observer: Option<Observer>,
 }
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct File {
-    period: f64,
-    feedback_linearisation: FeedbackLinearisation,
-    surface: Surface,
-    boundary_layer: BoundaryLayer,
-    second_order: SecondOrder,
-    observer: Observer,
-    anti_windup: AntiWindup,
+    feedback_linearisation: Table,
+    sliding_modes: Table,
+    boundary_layer: Table,
+    second_order: Table,
+    observer: Table,
 }
 
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct FeedbackLinearisation {
-    kp: f64,
-    kd: f64,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct AntiWindup {
-    threshold: f64,
-}
+const FILE: &str = "tvsmc-2015.toml";
 
 fn embedded() -> &'static File {
-    static READ: LazyLock<File> = LazyLock::new(|| {
-        data::embedded("tvsmc-2015.toml", include_str!("../../data/tvsmc-2015.toml"))
-    });
+    static READ: LazyLock<File> =
+        LazyLock::new(|| data::embedded(FILE, include_str!("../../data/tvsmc-2015.toml")));
     &READ
 }
 
@@ -67,44 +66,41 @@ fn body() -> RigidBody {
 impl FblSettings {
     /// Returns the settings of Wu 2015, section 6, with its vehicle at the nominal inertia.
     pub fn published() -> Self {
-        let &File { period, feedback_linearisation: FeedbackLinearisation { kp, kd }, .. } =
-            embedded();
-        Self { body: body(), period, kp, kd }
+        let mut settings = Self { body: body(), ..Self::default() };
+        data::set(&mut settings, FILE, &embedded().feedback_linearisation);
+        settings
     }
 }
 
-impl<R> Settings<R> {
-    fn published(file: &File, reaching: R, observer: Option<Observer>) -> Self {
-        Self {
-            body: body(),
-            period: file.period,
-            surface: file.surface,
-            reaching,
-            observer,
-            anti_windup: true,
-            threshold: file.anti_windup.threshold,
-        }
+impl<R: Declared + Default> Settings<R> {
+    fn published(reaching: &Table, observer: Option<&Table>) -> Self {
+        let read = |table| {
+            let mut observer = Observer::default();
+            data::set(&mut observer, FILE, table);
+            observer
+        };
+        let mut settings = Self { body: body(), observer: observer.map(read), ..Self::default() };
+        data::set(&mut settings, FILE, &embedded().sliding_modes);
+        data::set(&mut settings, FILE, reaching);
+        settings
     }
 }
 
 impl Settings<BoundaryLayer> {
     /// Returns the settings of BTVSMC in Wu 2015, Table 1.
     pub fn btvsmc() -> Self {
-        let file = embedded();
-        Self::published(file, file.boundary_layer, None)
+        Self::published(&embedded().boundary_layer, None)
     }
 
     /// Returns the settings of BTVSMC/DO in Wu 2015, Table 1.
     pub fn btvsmc_do() -> Self {
-        let file = embedded();
-        Self::published(file, file.boundary_layer, Some(file.observer))
+        Self::published(&embedded().boundary_layer, Some(&embedded().observer))
     }
 }
 
 impl Settings<SecondOrder> {
     /// Returns the settings of SOTVSMC/DO in Wu 2015, Table 1.
     pub fn sotvsmc_do() -> Self {
-        let file = embedded();
-        Self::published(file, file.second_order, Some(file.observer))
+        Self::published(&embedded().second_order, Some(&embedded().observer))
     }
 }

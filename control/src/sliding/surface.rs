@@ -1,17 +1,19 @@
 //! The time-varying sliding surface of Wu 2015, (17) and (18).
 
-use crate::error::DesignError;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
+use settings::Declared;
+use vehicle::axes::NUMBERED_ANGLES;
 use vehicle::math::exp;
 
 /// Gains of the surface s = ė + c e + a exp(−λ(t − t₀)).
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Declared)]
 pub struct Surface {
-    /// Diagonal of the gain c, 1/s.
+    /// Gain c of the sliding surface, diagonal.
+    #[setting(each = NUMBERED_ANGLES, unit = "1/s", above = 0.0)]
     pub c: [f64; 3],
-    /// Rate λ of the decay, 1/s.
+    /// Rate lambda at which the offset of the sliding surface decays.
+    #[setting(unit = "1/s", above = 0.0)]
     pub lambda: f64,
 }
 
@@ -34,12 +36,6 @@ pub struct Anchor {
 }
 
 impl Surface {
-    /// Returns an error for gains that are not positive.
-    pub(super) fn check(&self) -> Result<(), DesignError> {
-        super::all_positive("surface.c", &self.c)?;
-        super::all_positive("surface.lambda", &[self.lambda])
-    }
-
     /// Returns the surface through the state at `time` (s): a = −ė − c e, (18).
     pub fn anchor(&self, time: f64, error: &TrackingError) -> Anchor {
         Anchor { time, a: -error.rates - self.c().component_mul(&error.angles) }

@@ -1,10 +1,11 @@
 //! A closed loop of the scenario of Chai 2022 in one process, for tests, the campaign example and
 //! the benchmark.
-#![allow(dead_code, unreachable_pub)] // Each user needs a part of it.
+#![allow(dead_code, unreachable_pub, unused_imports)] // Each user needs a part of it.
 
 pub mod draws;
 pub mod flight;
 pub mod platform;
+pub mod recording;
 
 pub use control::closed_loop::CHECK;
 use control::closed_loop::{Summary, fly};
@@ -27,7 +28,7 @@ pub fn settings(constraints: Constraints) -> Settings {
 /// Returns the regulator of the comparison, with the weights of CRMPC.
 pub fn lqr() -> Lqr {
     let Settings { body, p, q, period_feedback: period, .. } = settings(Constraints::Robust);
-    Lqr::new(LqrSettings { body, p, q, period }).unwrap()
+    Lqr::new(LqrSettings { body, period, p, q }).unwrap()
 }
 
 /// A controller that optimises at some of its ticks.

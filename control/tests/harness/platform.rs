@@ -15,7 +15,7 @@ use vehicle::plant::{Plant, angles, rates};
 use vehicle::platform::{Pose, Readings};
 use vehicle::scenario::Scenario;
 use vehicle::sensor_data::SensorData;
-use vehicle::sensors::{Config, Sensors};
+use vehicle::sensors::{Config, PerSensor, Sensors};
 use vehicle::triad::Triad;
 
 /// Time between samples and ticks, s.
@@ -109,7 +109,7 @@ pub fn lines(trajectory: &[Truth], config: &Config) -> Vec<estimation::Line> {
 }
 
 /// Returns sensors on the line of the data file.
-pub fn config(triads: &[Triad; 3], seed: u64) -> Config {
+pub fn config(triads: &PerSensor<Triad>, seed: u64) -> Config {
     Config { triads: *triads, line: SensorData::embedded().line, seed }
 }
 
@@ -152,7 +152,7 @@ pub fn calibrated(config: &Config, duration: f64) -> Settings {
     let fit = Settings {
         calibration: CalibrationMode::Fit,
         calibration_duration: duration - PERIOD,
-        ..Settings::default()
+        ..Settings::ours()
     };
     let estimator = Estimator::new(fit).unwrap();
     let mut memory = estimator.memory();
@@ -172,8 +172,8 @@ pub fn calibrated(config: &Config, duration: f64) -> Settings {
     });
     let [gyroscope, accelerometer] = corrections;
     Settings {
-        corrections: [gyroscope, accelerometer, memory.calibration.correction],
-        ..Settings::default()
+        corrections: PerSensor([gyroscope, accelerometer, memory.calibration.correction]),
+        ..Settings::ours()
     }
 }
 

@@ -1,33 +1,26 @@
 //! A control law as an FMU: proportional and derivative action, with nonlinear terms cancelled.
+use controller_export::prelude::{ReferenceAt as At, *};
+use vehicle::kinematics::r;
 
-use control::crmpc::{Constraints, Settings};
-use control::{Controller, DesignError, Measurement, controller::ReferenceAt as At};
-use controller_export::{ControllerFmu, Law, Vehicle};
-use fmi2_export::{VariableTable, table::parameter};
-use nalgebra::Vector3;
-use serde::{Deserialize, Serialize};
-use vehicle::{dynamics::RigidBody, kinematics::r};
-
-/// The law and its parameters; `body` is that of the vehicle.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+/// The law with its settings and with the body of the vehicle.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Declared)]
 pub struct Pd {
+    #[setting(skip)]
     body: RigidBody,
-    gains: (f64, f64), // on the angles, 1/s², and on their rates, 1/s
-}
-
-impl Default for Pd {
-    fn default() -> Self {
-        Self { body: Settings::new(Constraints::Robust).body, gains: (0.5, 1.5) }
-    }
+    /// Gain on the tracking error of the angles.
+    #[setting(name = "gain.p", unit = "1/s2", min = 0.0, start = 0.5)]
+    p: f64,
+    /// Gain on the derivative of the tracking error.
+    #[setting(name = "gain.d", unit = "1/s", min = 0.0, start = 1.5)]
+    d: f64,
 }
 
 impl Controller for Pd {
     type Memory = ();
-
     fn command(&mut self, (): &mut (), _: u64, t: f64, x: &Measurement, at: At) -> Vector3<f64> {
         let (rates, reference) = (r(&x.angles) * x.rates, at(t));
         let (error, error_rate) = (x.angles - reference.angles, rates - reference.rates);
-        let a = reference.accelerations - error * self.gains.0 - error_rate * self.gains.1;
+        let a = reference.accelerations - error * self.p - error_rate * self.d;
         control::linearise::moment(&self.body, &x.angles, &rates, &a)
     }
 }
@@ -37,23 +30,8 @@ impl Law for Pd {
     type Settings = Self;
     const NAME: &'static str = "PD";
     const DESCRIPTION: &'static str = "Proportional and derivative attitude control";
-
-    fn period() -> f64 {
-        0.04 // s
-    }
-
-    fn declare(table: VariableTable<ControllerFmu<Self>>) -> VariableTable<ControllerFmu<Self>> {
-        let p = parameter("gain.p", "Gain on the tracking error of the angles").real();
-        let d = parameter("gain.d", "Gain on the derivative of the tracking error").real();
-        table.real(p.min(0.0), |m| &mut m.law.gains.0).real(d.min(0.0), |m| &mut m.law.gains.1)
-    }
-
-    fn settings(&self, vehicle: &Vehicle) -> Self {
-        Self { body: vehicle.body, ..*self }
-    }
-
-    fn design(settings: Self) -> Result<Self, DesignError> {
-        Ok(settings)
+    fn design(settings: Self, vehicle: &Vehicle) -> Result<Self, DesignError> {
+        Ok(Self { body: vehicle.body, ..settings })
     }
 }
 

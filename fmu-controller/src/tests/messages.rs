@@ -16,8 +16,8 @@ fn refusals() -> Vec<String> {
     }
     [
         messages::<Crmpc>(&[
-            |instance| instance.parameters.period = 0.0,
-            |instance| instance.parameters.period = 0.03,
+            |instance| instance.settings.period_feedback = 0.0,
+            |instance| instance.settings.period_feedback = 0.03,
             |instance| instance.parameters.limit_rate = 0.0,
             |instance| instance.parameters.limit_moment = 0.0,
             |instance| instance.parameters.limit_moment = 1e4,
@@ -26,55 +26,55 @@ fn refusals() -> Vec<String> {
             |instance| instance.parameters.latency.measurement = -0.1,
             |instance| instance.parameters.inertia.Ixx = 0.0,
             |instance| instance.parameters.inertia.Ixz = 2e6,
-            |instance| instance.law.settings.period_optimisation = 0.0,
-            |instance| instance.law.settings.observer.time_constant = 0.0,
-            |instance| instance.law.settings.observer.stiffness = 0.0,
-            |instance| instance.law.settings.p[4] = -1.0,
-            |instance| instance.law.settings.q[1] = 0.0,
-            |instance| instance.law.settings.horizon = 0,
-            |instance| instance.law.settings.inertia_error = 1.0,
-            |instance| instance.law.settings.angle_error = 1.0,
-            |instance| instance.law.settings.rate_error = 1.0,
-            |instance| instance.law.settings.rate_error = 0.01,
-            |instance| instance.law.settings.delay_error = -0.01,
-            |instance| instance.law.settings.delay_error = 0.01,
+            |instance| instance.settings.period_optimisation = 0.0,
+            |instance| instance.settings.observer.time_constant = 0.0,
+            |instance| instance.settings.observer.stiffness = 0.0,
+            |instance| instance.settings.p[4] = -1.0,
+            |instance| instance.settings.q[1] = 0.0,
+            |instance| instance.settings.horizon = 0,
+            |instance| instance.settings.inertia_error = 1.0,
+            |instance| instance.settings.angle_error = 1.0,
+            |instance| instance.settings.rate_error = 1.0,
+            |instance| instance.settings.rate_error = 0.01,
+            |instance| instance.settings.delay_error = -0.01,
+            |instance| instance.settings.delay_error = 0.01,
             |instance| {
                 instance.parameters.latency.action = 0.04;
-                instance.law.settings.delay_error = 0.03;
+                instance.settings.delay_error = 0.03;
             },
             |instance| {
                 instance.parameters.latency.action = 0.04;
-                instance.law.settings.delay_error = 0.01;
-                instance.law.settings.initial_state = InitialState::Tube;
+                instance.settings.delay_error = 0.01;
+                instance.settings.initial_state = InitialState::Tube;
             },
-            |instance| instance.law.settings.sideslip_domain = 0.9,
-            |instance| instance.law.settings.disturbance_bound = -1.0,
-            |instance| instance.law.settings.feedback = Gain { k1: -700.0, k2: -50.0 },
-            |instance| instance.law.settings.terminal = Gain { k1: -1.0, k2: -1.0 },
-            |instance| instance.law.settings.terminal = Gain { k1: -20.0, k2: -11.0 },
-            |instance| instance.law.settings.tube = Gain { k1: -1.0, k2: -1.0 },
+            |instance| instance.settings.sideslip_domain = 0.9,
+            |instance| instance.settings.disturbance_bound = -1.0,
+            |instance| instance.settings.feedback = Gain { k1: -700.0, k2: -50.0 },
+            |instance| instance.settings.terminal = Gain { k1: -1.0, k2: -1.0 },
+            |instance| instance.settings.terminal = Gain { k1: -20.0, k2: -11.0 },
+            |instance| instance.settings.tube = Gain { k1: -1.0, k2: -1.0 },
             |instance| {
-                instance.law.settings.initial_state = InitialState::Tube;
-                instance.law.settings.feedback = Gain { k1: -5.0, k2: -2.0 };
+                instance.settings.initial_state = InitialState::Tube;
+                instance.settings.feedback = Gain { k1: -5.0, k2: -2.0 };
             },
             |instance| {
-                instance.law.settings.constraints = Constraints::Paper;
-                instance.law.settings.disturbance_bound = 1.0;
+                instance.settings.constraints = Constraints::Paper;
+                instance.settings.disturbance_bound = 1.0;
             },
         ]),
         messages::<Dlmpc>(&[
-            |instance| instance.parameters.period = 0.03,
-            |instance| instance.law.settings.p[1] = -1.0,
-            |instance| instance.law.settings.sliding_mode.q = 60.0,
-            |instance| instance.law.settings.sliding_mode.gamma = -1.0,
-            |instance| instance.law.settings.sliding_mode.rho = 0.0,
+            |instance| instance.settings.period_feedback = 0.03,
+            |instance| instance.settings.p[1] = -1.0,
+            |instance| instance.settings.sliding_mode.q = 60.0,
+            |instance| instance.settings.sliding_mode.gamma = -1.0,
+            |instance| instance.settings.sliding_mode.rho = 0.0,
             |instance| instance.parameters.limit_rate = 0.0,
         ]),
         messages::<Lqr>(&[
-            |instance| instance.parameters.period = -1.0,
-            |instance| instance.parameters.period = 2.0,
-            |instance| instance.law.settings.p[2] = -1.0,
-            |instance| instance.law.settings.q[2] = 0.0,
+            |instance| instance.settings.period = -1.0,
+            |instance| instance.settings.period = 2.0,
+            |instance| instance.settings.p[2] = -1.0,
+            |instance| instance.settings.q[2] = 0.0,
             |instance| instance.parameters.latency.action = 1.5,
             |instance| instance.parameters.latency.measurement = -0.1,
             |instance| {
@@ -83,40 +83,40 @@ fn refusals() -> Vec<String> {
             },
         ]),
         messages::<Fbl>(&[
-            |instance| instance.law.settings.kp = 0.0,
-            |instance| instance.law.settings.kd = 0.0,
-            |instance| instance.parameters.period = 1.0,
+            |instance| instance.settings.kp = 0.0,
+            |instance| instance.settings.kd = 0.0,
+            |instance| instance.settings.period = 1.0,
         ]),
         messages::<Btvsmc>(&[
-            |instance| instance.parameters.period = 0.5,
-            |instance| instance.law.settings.threshold = 0.0,
-            |instance| instance.law.settings.surface.c[1] = 0.0,
-            |instance| instance.law.settings.surface.lambda = 0.0,
-            |instance| instance.law.settings.reaching.eta[0] = 0.0,
-            |instance| instance.law.settings.reaching.h[0] = 0.0,
+            |instance| instance.settings.period = 0.5,
+            |instance| instance.settings.threshold = 0.0,
+            |instance| instance.settings.surface.c[1] = 0.0,
+            |instance| instance.settings.surface.lambda = 0.0,
+            |instance| instance.settings.reaching.eta[0] = 0.0,
+            |instance| instance.settings.reaching.h[0] = 0.0,
         ]),
         messages::<BtvsmcDo>(&[
-            |instance| instance.law.observer.lambda[0] = 0.0,
-            |instance| instance.law.observer.l[0] = 0.0,
+            |instance| instance.settings.observer.lambda[0] = 0.0,
+            |instance| instance.settings.observer.l[0] = 0.0,
         ]),
         messages::<SotvsmcDo>(&[
-            |instance| instance.law.settings.reaching.k3[0] = 0.0,
-            |instance| instance.law.settings.reaching.m = 2.0,
-            |instance| instance.law.settings.reaching.k2[1] = 0.5,
-            |instance| instance.parameters.period = 11.0,
+            |instance| instance.settings.law.reaching.k3[0] = 0.0,
+            |instance| instance.settings.law.reaching.m = 2.0,
+            |instance| instance.settings.law.reaching.k2[1] = 0.5,
+            |instance| instance.settings.law.period = 11.0,
         ]),
         messages::<TwoLoopSmc>(&[
-            |instance| instance.parameters.period = 0.1,
-            |instance| instance.law.settings.threshold = 0.0,
-            |instance| instance.law.settings.filter = -1.0,
-            |instance| instance.law.settings.disturbance[1] = -1.0,
-            |instance| instance.law.settings.outer.k[0] = 0.0,
-            |instance| instance.law.settings.outer.k[0] = 300.0,
-            |instance| instance.law.settings.outer.layer.epsilon[0] = 0.0,
-            |instance| instance.law.settings.outer.layer.b[1] = 1.0,
-            |instance| instance.law.settings.inner.layer.rho[0] = 0.0,
-            |instance| instance.law.settings.inner.layer.rho[0] = 0.01,
-            |instance| instance.law.settings.inner.layer.rho[0] = 90.0,
+            |instance| instance.settings.period = 0.1,
+            |instance| instance.settings.threshold = 0.0,
+            |instance| instance.settings.filter = -1.0,
+            |instance| instance.settings.disturbance[1] = -1.0,
+            |instance| instance.settings.outer.k[0] = 0.0,
+            |instance| instance.settings.outer.k[0] = 300.0,
+            |instance| instance.settings.outer.layer.epsilon[0] = 0.0,
+            |instance| instance.settings.outer.layer.b[1] = 1.0,
+            |instance| instance.settings.inner.layer.rho[0] = 0.0,
+            |instance| instance.settings.inner.layer.rho[0] = 0.01,
+            |instance| instance.settings.inner.layer.rho[0] = 90.0,
         ]),
         messages::<ControlAllocator>(&[
             |instance| instance.settings.period = 0.0,
@@ -140,14 +140,14 @@ fn refusals() -> Vec<String> {
             |instance| instance.settings.gains.proportional = 1e3,
             |instance| instance.settings.gains.integral = 1e9,
             |instance| {
-                instance.sensor_set = 2;
+                instance.settings.sensor_set = 2;
                 instance.settings.sensor_delay = 2.0;
             },
             |instance| instance.settings.rest_duration = -1.0,
             |instance| instance.settings.gates[0].range = 0.0,
             |instance| instance.settings.gates[2].jump = 0.0,
             |instance| {
-                instance.sensor_set = 2;
+                instance.settings.sensor_set = 2;
                 instance.settings.corrections[1].matrix.fill(0.0);
             },
         ]),

@@ -1,6 +1,7 @@
 //! Tests of the sensors and the calibration sequence through the instance's interface.
 
-use super::{Constant, assert_same_motion, exchange, integrate, outputs, started, step};
+use super::model_exchange::{assert_same_motion, exchange, integrate};
+use super::{Constant, outputs, started, step};
 use crate::plant::ReentryPlant;
 use fmi2_export::{Failure, Model};
 use nalgebra::Vector3;
@@ -15,11 +16,11 @@ fn mems(instance: &mut ReentryPlant) {
     let p = &mut instance.parameters;
     p.kind = DisturbanceKind::None;
     p.step = 1.0 / 128.0;
-    p.sensor_set = 2;
-    p.line.period = 1.0 / 64.0;
-    p.line.delay = 2.5 / 64.0;
-    p.line.drop_probability = 0.2;
-    p.triads[1].freeze = Window { start: 0.5, end: 0.75 };
+    p.sensing.sensor_set = 2;
+    p.sensing.line.period = 1.0 / 64.0;
+    p.sensing.line.delay = 2.5 / 64.0;
+    p.sensing.line.drop_probability = 0.2;
+    p.sensing.triads[1].freeze = Window { start: 0.5, end: 0.75 };
     instance.input.moment = Vector3::new(2e4, -1e4, 1e4);
 }
 
@@ -66,13 +67,13 @@ fn without_sensors_what_they_would_feel_is_shown_at_all_times() {
 fn ideal_sensors_show_the_truth_of_their_ticks_and_leave_the_line_as_it_is() {
     let mut instance = started(|instance| {
         mems(instance);
-        instance.parameters.sensor_set = 1;
-        instance.parameters.line.drop_probability = 0.0;
-        instance.parameters.triads[1].freeze = Window::default();
+        instance.parameters.sensing.sensor_set = 1;
+        instance.parameters.sensing.line.drop_probability = 0.0;
+        instance.parameters.sensing.triads[1].freeze = Window::default();
     });
     let mut truth = started(|instance| {
         mems(instance);
-        instance.parameters.sensor_set = 0;
+        instance.parameters.sensing.sensor_set = 0;
     });
     let mut felt = vec![sample(&mut truth, 0.0)];
     for k in 0..40 {
@@ -113,7 +114,7 @@ fn samples_are_the_same_bits_whatever_the_communication_step() {
     let [actual, expected] = [sample(&mut instance, 2.0), *expected.last().unwrap()];
     assert_eq!((actual.number, actual.time), (expected.number, expected.time));
     for (i, step) in
-        instance.parameters.triads.map(|triad| triad.resolution).into_iter().enumerate()
+        instance.parameters.sensing.triads.map(|triad| triad.resolution).into_iter().enumerate()
     {
         assert!(
             (actual.readings[i] - expected.readings[i]).amax() < 1.5 * step,
@@ -174,7 +175,7 @@ fn oracle_model_exchange_takes_the_samples_of_co_simulation_at_time_events() {
 fn in_model_exchange_what_is_shown_changes_at_events_only() {
     let mut instance = started(|instance| {
         mems(instance);
-        instance.parameters.line.delay = 0.0;
+        instance.parameters.sensing.line.delay = 0.0;
     });
     instance.new_discrete_states(0.0).unwrap();
     let first = sample(&mut instance, 0.0);
@@ -220,7 +221,7 @@ fn initializing_again_starts_the_samples_again() {
 #[test]
 fn the_calibration_sequence_is_flown_in_both_interfaces_whatever_the_moment() {
     let set = |instance: &mut ReentryPlant| {
-        instance.parameters.calibrates = true;
+        instance.parameters.sensing.calibrates = true;
         instance.input.moment = Vector3::new(1e6, -1e6, 1e6);
         instance.input.disturbance_moment = Vector3::new(1e6, 0.0, 0.0);
         instance.input.trajectory.heading_rate = 0.1;
@@ -243,7 +244,7 @@ fn the_calibration_sequence_is_flown_in_both_interfaces_whatever_the_moment() {
 
 #[test]
 fn oracle_in_the_calibration_sequence_nothing_but_what_is_felt_depends_on_the_state() {
-    let mut instance = started(|instance| instance.parameters.calibrates = true);
+    let mut instance = started(|instance| instance.parameters.sensing.calibrates = true);
     step(&mut instance, 0.0, 1.0).unwrap();
     for unknown in 6..12 {
         for known_position in (0..6).chain(21..24).chain(62..69) {
@@ -279,22 +280,26 @@ fn impossible_sensors_and_sequences_are_refused_by_name() {
     for (set, name) in [
         (
             (|instance| {
-                instance.parameters.line.delay = 20.0 * instance.parameters.line.period * 1e3;
+                instance.parameters.sensing.line.delay =
+                    20.0 * instance.parameters.sensing.line.period * 1e3;
             }) as fn(&mut ReentryPlant),
             "sensor.delay",
         ),
-        (|instance| instance.parameters.line.period = 0.0, "sensor.period"),
-        (|instance| instance.parameters.triads[2].range = -1.0, "sensor.magnetometer.range"),
+        (|instance| instance.parameters.sensing.line.period = 0.0, "sensor.period"),
+        (
+            |instance| instance.parameters.sensing.triads[2].range = -1.0,
+            "sensor.magnetometer.range",
+        ),
         (
             |instance| {
-                instance.parameters.calibrates = true;
-                instance.parameters.sequence.beta_amplitude = 1.5;
+                instance.parameters.sensing.calibrates = true;
+                instance.parameters.sensing.sequence.beta_amplitude = 1.5;
             },
             "calibration.beta.amplitude",
         ),
     ] {
         let mut instance = ReentryPlant::new();
-        instance.parameters.sensor_set = 2;
+        instance.parameters.sensing.sensor_set = 2;
         set(&mut instance);
         let Err(Failure::Error(message)) = instance.initialize(&super::CONTEXT) else {
             panic!("{name}")

@@ -39,7 +39,7 @@ impl DisturbanceTable {
     /// # Errors
     /// Names the value at fault by its path in the configuration of the plant.
     pub(super) fn check(&self) -> Result<(), Error> {
-        let name = |i: usize, field: &str| format!("disturbance.table.rows[{i}].{field}");
+        let name = |i: usize, column: &str| format!("disturbance.table.{column}[{}]", i + 1);
         let repeats = self.period >= SHORTEST_PERIOD && self.period.is_finite();
         if !(repeats || self.period == 0.0) {
             let problem = format!("= {} s must be 0 or at least {SHORTEST_PERIOD} s", self.period);
@@ -53,18 +53,18 @@ impl DisturbanceTable {
             }
             if let Some(before) = before.filter(|before| before >= time) {
                 let last = name(i - 1, "time");
-                return refuse(format!("= {time} s must come after `{last}` = {before} s"));
+                return refuse(format!("= {time} s must come after {last} = {before} s"));
             }
             if repeats && *time >= self.period {
                 let period = self.period;
                 return refuse(format!(
-                    "= {time} s must come before `disturbance.table.period` = {period} s"
+                    "= {time} s must come before disturbance.table.period = {period} s"
                 ));
             }
-            for (axis, factor) in ["x", "y", "z"].into_iter().zip(direction) {
+            for (axis, factor) in ["alpha", "beta", "sigma"].into_iter().zip(direction) {
                 if !(-1.0..=1.0).contains(factor) {
                     let problem = format!("= {factor} must lie between -1 and 1");
-                    return Err(Error::parameter(name(i, &format!("direction.{axis}")), problem));
+                    return Err(Error::parameter(name(i, axis), problem));
                 }
             }
             before = Some(*time);

@@ -1,7 +1,8 @@
 //! Measurements of the plant: the readings of ideal sensors and the samples that the sensors
 //! output.
 
-use super::{Held, Input, Load, Plant, angle_rates, angles};
+use super::equations::angle_rates;
+use super::{Held, Input, Load, Plant, angles};
 use crate::kinematics::TRAJECTORY;
 use crate::platform::{Pose, Readings};
 use crate::sensors::{Sample, Sensors};

@@ -20,7 +20,6 @@ use crate::error_dynamics::SampledError;
 pub(in crate::crmpc) fn tighten(s: &Settings) -> Result<(Tightening, Assessment), DesignError> {
     let error = SampledError::delayed(s.feedback, s.period_feedback, s.delay);
     let unstable = || DesignError::Unstable {
-        name: "period_feedback",
         k1: s.feedback.k1,
         k2: s.feedback.k2,
         period: s.period_feedback,

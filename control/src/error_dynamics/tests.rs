@@ -1,0 +1,221 @@
+//! Tests of the sampled error dynamics against simulations of what may have acted.
+
+use super::invariant_set::EXPLICIT;
+use super::*;
+
+#[test]
+fn oracle_no_step_leads_out_of_the_invariant_set() {
+    // Condition on the support function h: h(Φᵀn) + |nᵀΓ| ≤ h(n) for every facet of the set.
+    for (k, period) in [(-5.0, 0.04), (-5.0, 0.2), (-10.0, 0.04), (-4.5, 0.1)] {
+        let error = SampledError::new(Gain { k1: k, k2: k }, period);
+        let lateral = 0.25 * period * period;
+        let set = error.invariant_set(lateral).unwrap();
+        let normals = set.normals();
+        assert!(normals.len() > EXPLICIT);
+        for normal in normals {
+            assert!((set.support(&normal) - 1.0).abs() < 1e-12);
+            let driven = normal.dot(&error.gamma).abs() + lateral * normal.x.abs();
+            let after = set.support(&(error.phi.transpose() * normal)) + driven;
+            assert!(after <= 1.0 + 1e-12, "K = {k} at {period} s: {after}");
+        }
+        // Without shifts the set is that of held disturbances, which reach no further than
+        // disturbances that change at any time.
+        let (set, held) = (set.reach(), error.invariant_set(0.0).unwrap().reach());
+        let reach = error.reach_forever().unwrap();
+        for (outer, held, exact) in [
+            (set.angle, held.angle, reach.angle),
+            (set.rate, held.rate, reach.rate),
+            (set.feedback, held.feedback, reach.feedback),
+        ] {
+            assert!(
+                outer >= exact * (1.0 - 1e-12) && held < 1.25 * exact,
+                "{outer} {held} {exact}"
+            );
+        }
+    }
+}
+
+/// Largest |angle|, |rate| and |K ô| at each tick over all signs of the sources' responses
+/// (`respond`): by superposition this is the sum over the sources.
+fn superposed(
+    steps: usize,
+    sources: usize,
+    respond: impl Fn(usize) -> Vec<[f64; 7]>,
+) -> Vec<[f64; 7]> {
+    let mut sums = vec![[0.0; 7]; steps + 1];
+    for source in 0..sources {
+        for (sum, value) in sums.iter_mut().zip(respond(source)) {
+            for (sum, value) in sum.iter_mut().zip(value) {
+                *sum += value.abs();
+            }
+        }
+    }
+    sums
+}
+
+/// Deviation half a period after the law has seen `deviation`, with its feedback held.
+fn in_the_middle(error: &SampledError, deviation: &Vector2<f64>) -> Vector2<f64> {
+    let half = 0.5 * error.period;
+    transition(half) * deviation + response(half) * (error.gain.row() * deviation).x
+}
+
+fn assert_agree(computed: &[Reach], expected: &[[f64; 7]], tolerance: f64) {
+    for (n, (reach, expected)) in computed.iter().zip(expected).enumerate() {
+        let Reach { angle, rate, seen_angle, seen_rate, middle_angle, middle_rate, .. } = *reach;
+        let values =
+            [angle, rate, seen_angle, seen_rate, middle_angle, middle_rate, reach.feedback];
+        for (value, expected) in values.iter().zip(expected) {
+            assert!(
+                (value - expected).abs() <= tolerance * (1.0 + expected),
+                "tick {n}: {value} {expected}"
+            );
+        }
+    }
+}
+
+#[test]
+fn oracle_errors_of_measurement_add_up_as_in_a_simulation() {
+    for (component, latency) in [(0, 0.0), (0, 0.05), (1, 0.0), (1, 0.05)] {
+        let error = SampledError::delayed(Gain { k1: -5.0, k2: -4.0 }, 0.04, latency);
+        let steps = 12;
+        let expected = superposed(steps, steps + 1, |at| {
+            let error_of_state = [Vector2::x(), Vector2::new(latency, 1.0)][component];
+            let off = |n: usize| error_of_state * if n == at { 1.0 } else { 0.0 };
+            let mut deviation = -off(0);
+            (0..=steps)
+                .map(|n| {
+                    let seen = deviation + off(n);
+                    let feedback = (error.gain.row() * seen).x;
+                    let middle = in_the_middle(&error, &seen);
+                    let values =
+                        [deviation.x, deviation.y, seen.x, seen.y, middle.x, middle.y, feedback];
+                    deviation = transition(error.period) * deviation + error.gamma * feedback;
+                    values
+                })
+                .collect()
+        });
+        assert_agree(&error.errors(steps)[component], &expected, 1e-12);
+    }
+}
+
+#[test]
+fn oracle_pulses_add_up_as_in_a_simulation() {
+    // Each pulse lasts a thousandth of a period. It is seen by the first measurement after it,
+    // `latency` before the tick of the resulting command.
+    let (period, fine) = (0.04, 1000);
+    let pulse = period / f64::from(fine);
+    for late in [0, 1000, 2925] {
+        let latency = f64::from(late) * pulse;
+        let error = SampledError::delayed(Gain { k1: -5.0, k2: -5.0 }, period, latency);
+        let steps = 8_u32;
+        let sources = usize::try_from(late + steps.cast_signed() * fine).unwrap();
+        // Source i acts from −latency + i·pulse on.
+        let expected = superposed(steps as usize, sources, |source| {
+            let begins = (source as f64 + 0.5) * pulse - latency;
+            let mut seen = Vector2::zeros();
+            (0..=steps)
+                .map(|n| {
+                    let time = f64::from(n) * period;
+                    let free = (time - begins).max(0.0);
+                    // Before a measurement has seen the pulse, the vehicle moves freely.
+                    let fresh = if free > 0.0 && free < latency {
+                        Vector2::new(free, 1.0)
+                    } else {
+                        Vector2::zeros()
+                    };
+                    if n > 0 {
+                        seen = error.phi * seen;
+                        if free > 0.0 && (latency..latency + period).contains(&free) {
+                            seen = Vector2::new(free, 1.0);
+                        }
+                    }
+                    let actual = seen + fresh;
+                    let middle = in_the_middle(&error, &seen);
+                    let feedback = (error.gain.row() * seen).x;
+                    [actual.x, actual.y, seen.x, seen.y, middle.x, middle.y, feedback]
+                        .map(|value| value * pulse)
+                })
+                .collect()
+        });
+        assert_agree(&error.reach(steps as usize), &expected, 2e-4);
+    }
+}
+
+#[test]
+fn oracle_changes_and_mispredictions_add_up_as_in_a_simulation() {
+    let error = SampledError::delayed(Gain { k1: -2.0, k2: -4.0 }, 0.04, 0.117);
+    let (steps, tau) = (12_usize, error.period);
+    for ticks in [0, 1, 3] {
+        let early = Early { ticks, excess: 0.3 };
+        let weight = |j: usize| if j < ticks { 1.3 } else { 1.0 };
+        let sized = |actual: Vector2<f64>, seen: Vector2<f64>| {
+            let (middle, k) = (in_the_middle(&error, &seen), error.gain.row());
+            [actual.x, actual.y, seen.x, seen.y, middle.x, middle.y, (k * seen).x]
+        };
+        // Source j is a change before tick j + 1.
+        let [old, new] = [0.117 + tau, 0.0].map(|u| {
+            superposed(steps, steps, |j| {
+                let mut seen = Vector2::zeros();
+                (0..=steps)
+                    .map(|n| {
+                        seen = error.phi * seen;
+                        if n == j + 1 {
+                            seen = Vector2::new(u, 1.0) * tau * weight(j);
+                        }
+                        sized(seen, seen)
+                    })
+                    .collect()
+            })
+        });
+        let changes = early.count(&error.changes(steps));
+        for n in 0..=steps {
+            for (component, value) in [(1, changes[n].rate), (6, changes[n].feedback)] {
+                let (old, new) = (old[n][component], new[n][component]);
+                let (low, high) = (old.max(new) - 1e-12, old + new + 1e-12);
+                assert!(low <= value && value <= high, "{n}: {old} {new} {value}");
+            }
+        }
+        // Source j is the part of the prediction of tick j that is wrong.
+        let [old, new] = [0.117, 0.0].map(|u| {
+            superposed(steps, steps + 1, |j| {
+                let off = |n: usize| Vector2::new(u, 1.0) * if n == j { weight(j) } else { 0.0 };
+                let mut deviation = -off(0);
+                (0..=steps)
+                    .map(|n| {
+                        let seen = deviation + off(n);
+                        let values = sized(deviation, seen);
+                        deviation = transition(tau) * deviation + error.gamma * values[6];
+                        values
+                    })
+                    .collect()
+            })
+        });
+        let largest: Vec<[f64; 7]> = old
+            .iter()
+            .zip(&new)
+            .map(|(a, b)| std::array::from_fn(|i| f64::max(a[i], b[i])))
+            .collect();
+        assert_agree(&error.mispredictions(steps, early), &largest, 1e-12);
+    }
+}
+
+#[test]
+fn oracle_a_held_disturbance_reaches_as_far_as_one_that_changes_within_the_period() {
+    // Here the response does not change its sign within a period. (26) is for constant
+    // disturbances.
+    let reach = SampledError::new(Gain { k1: -5.0, k2: -5.0 }, 0.04).reach_forever().unwrap();
+    assert!(
+        (reach.angle - 0.2).abs() < 1e-4 && (reach.feedback - 1.2473).abs() < 1e-4,
+        "{reach:?}"
+    );
+}
+
+#[test]
+fn the_papers_box_is_not_invariant() {
+    // The start is the corner (1/|k1|, 0) of (26), where the rate may still be c̄: the angle
+    // leaves the box within one tick.
+    let error = SampledError::new(Gain { k1: -5.0, k2: -5.0 }, 0.04);
+    let (angle, rate) = (0.2, 0.1525);
+    let next = error.advance(&Vector2::new(angle, rate), 1.0);
+    assert!(next.x > angle);
+}

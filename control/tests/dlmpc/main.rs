@@ -1,0 +1,119 @@
+//! Tests of DLMPC: the optimum of its outer layer, the sliding mode of its inner layer, and the
+//! loop of both.
+
+#[path = "../harness/mod.rs"]
+mod harness;
+mod inner_layer;
+mod outer_layer;
+
+use control::dlmpc::{Memory, Settings, SlidingMode, SolverReport};
+use control::{DesignError, Dlmpc};
+use harness::recording::{
+    assert_a_saved_memory_continues, assert_another_evaluation_leaves_no_trace,
+};
+use harness::{in_parallel, simulate, white};
+
+fn dlmpc() -> Dlmpc {
+    Dlmpc::new(Settings::published()).unwrap()
+}
+
+/// Returns the memory without values from a clock.
+fn timeless(memory: &Memory) -> Memory {
+    Memory {
+        report: SolverReport { time: 0.0, ..memory.report },
+        inner_time: 0.0,
+        ..memory.clone()
+    }
+}
+
+#[test]
+fn the_loop_tracks_and_never_exceeds_the_moment() {
+    for settings in [Settings::published(), Settings::tuned()] {
+        let cases = white(1..=4, 0.04);
+        let outcomes = in_parallel(&cases, |case| {
+            let mut memory = Memory::default();
+            let mut largest_command = 0.0f64;
+            let outcome = simulate(
+                &mut Dlmpc::new(settings).unwrap(),
+                &mut memory,
+                case.inertia_scale,
+                case.disturbance.clone(),
+                |memory, _, _| largest_command = largest_command.max(memory.rate_command.norm()),
+            );
+            (outcome, memory.report.fallbacks, largest_command / settings.limit_rate)
+        });
+        for (case, (outcome, fallbacks, command)) in cases.iter().zip(outcomes) {
+            let name = &case.name;
+            assert!(outcome.ems_deg < 1.9, "{name}: {outcome:?}");
+            assert!(outcome.moment <= 1.0, "{name}: {outcome:?}");
+            // DLMPC reserves nothing for disturbances: the command keeps its limit, and the rate
+            // exceeds its limit slightly.
+            assert!(command <= 1.0 + 1e-6 && command > 0.999, "{name}: {command}");
+            assert!(outcome.rate <= 1.05, "{name}: {outcome:?}");
+            assert_eq!(fallbacks, 0, "{name}");
+        }
+    }
+}
+
+#[test]
+fn tuned_gains_spend_less_moment_at_no_larger_error() {
+    let mean = |settings: Settings| {
+        let cases: Vec<_> =
+            white(21..=26, 0.04).into_iter().filter(|case| case.inertia_scale > 1.0).collect();
+        let outcomes = in_parallel(&cases, |case| {
+            let (scale, noise) = (case.inertia_scale, case.disturbance.clone());
+            simulate(
+                &mut Dlmpc::new(settings).unwrap(),
+                &mut Memory::default(),
+                scale,
+                noise,
+                |_, _, _| {},
+            )
+        });
+        let n = outcomes.len() as f64;
+        let ems_deg = outcomes.iter().map(|outcome| outcome.ems_deg).sum::<f64>() / n;
+        (ems_deg, outcomes.iter().map(|outcome| outcome.cms).sum::<f64>() / n)
+    };
+    let (published, tuned) = (mean(Settings::published()), mean(Settings::tuned()));
+    // These seeds were not used in the search; the results are equal up to noise.
+    assert!(tuned.0 <= published.0 * 1.002, "{tuned:?} {published:?}");
+    assert!(tuned.1 < 0.6 * published.1, "{tuned:?} {published:?}");
+}
+
+#[test]
+fn another_evaluation_of_a_tick_leaves_no_trace() {
+    assert_another_evaluation_leaves_no_trace(dlmpc, timeless);
+}
+
+#[test]
+fn a_saved_memory_continues_bit_for_bit_in_a_new_controller() {
+    assert_a_saved_memory_continues(dlmpc, 1.05, timeless);
+}
+
+#[test]
+fn settings_that_cannot_work_are_refused_by_name() {
+    let published = Settings::published();
+    let sliding = |change: fn(&mut SlidingMode)| {
+        let mut settings = published;
+        change(&mut settings.sliding_mode);
+        settings
+    };
+    let cases = [
+        (Settings { horizon: 0, ..published }, "horizon"),
+        (Settings { limit_rate: f64::NAN, ..published }, "limit.rate"),
+        (Settings { limit_moment: 0.0, ..published }, "limit.moment"),
+        (Settings { period_feedback: 0.03, ..published }, "period.feedback"),
+        (Settings { q: [1.0, 0.0, 1.0], ..published }, "weight.Q[2]"),
+        (Settings { p: [1.0, 1.0, -1.0], ..published }, "weight.P[3]"),
+        (sliding(|gains| gains.q = 50.0), "slidingMode.q"),
+        (sliding(|gains| gains.p = -1.0), "slidingMode.p"),
+        (sliding(|gains| gains.gamma = f64::NAN), "slidingMode.gamma"),
+        (sliding(|gains| gains.rho = 0.0), "slidingMode.rho"),
+        (sliding(|gains| gains.rho = 1.0), "slidingMode.rho"),
+    ];
+    for (settings, name) in cases {
+        let refused: Option<DesignError> = Dlmpc::new(settings).err();
+        let text = refused.map_or_else(String::new, |error| error.to_string());
+        assert!(text.contains(name), "{name}: {text:?}");
+    }
+}

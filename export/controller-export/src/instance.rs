@@ -1,0 +1,178 @@
+//! How the instance of a controller works at its ticks.
+
+use crate::law::{ControllerFmu, ControllerInstance, Input, Law, Output, Parameters, Vehicle};
+use crate::reference::{self, Source};
+use crate::sampled::{SampledInstance, Ticks};
+use crate::table;
+use control::controller::{Controller, Measurement};
+use control::delay::{Delayed, Latency};
+use control::schedule::ControllerInput;
+use fmi2_export::{Context, Description, Failure};
+use nalgebra::Vector3;
+use vehicle::Scenario;
+
+/// A controller with the settings and the vehicle for which it was designed.
+pub struct Designed<L: Law> {
+    settings: L::Settings,
+    vehicle: Vehicle,
+    controller: Delayed<L::Controller>,
+}
+
+impl<L: Law> ControllerInstance<L> {
+    /// Returns the failure for refused settings.
+    fn refusal(error: &impl ToString) -> Failure {
+        Failure::Error(error.to_string())
+    }
+
+    fn vehicle(&self) -> Result<Vehicle, Failure> {
+        let Parameters { inertia, limit_rate, limit_moment, saturation, latency, .. } =
+            self.parameters;
+        let body = inertia.body(1.0).map_err(|error| Self::refusal(&error))?;
+        Ok(Vehicle { body, limit_rate, limit_moment, saturation, latency })
+    }
+}
+
+impl<L: Law> ControllerInstance<L> {
+    /// Evaluates the first uncommitted tick. Its inputs are `stale` if they were set before it.
+    fn evaluate_with(
+        &self,
+        device: &mut Designed<L>,
+        ticks: &mut Ticks<Self>,
+        stale: bool,
+    ) -> Result<(), Failure> {
+        let Self { settings, input, source, .. } = self;
+        let controller = &mut device.controller;
+        let achieved_moment = L::uses_achieved_moment(settings).then_some(input.achieved_moment);
+        let measured = Measurement { achieved_moment, stale, ..input.measured };
+        let now = ticks.next_time();
+        // The future of an external reference is unknown; the law uses its present value for the
+        // time at which its moment acts.
+        let acts_at = now + controller.acts_after();
+        ticks.evaluate(controller, &measured, &source.preview(acts_at, &input.reference));
+        if ticks.in_force().0.iter().all(|value| value.is_finite()) {
+            return Ok(());
+        }
+        Err(Failure::Error(format!(
+            "the control moment at t = {now} s is not finite; the attitude may be singular (sideslip angle near 90 deg)"
+        )))
+    }
+}
+
+impl<L: Law> SampledInstance for ControllerInstance<L> {
+    type Device = Designed<L>;
+    type Memory = <Delayed<L::Controller> as Controller>::Memory;
+    type Input = ControllerInput;
+    type Output = Vector3<f64>;
+
+    fn description() -> Description<ControllerFmu<L>> {
+        table::description()
+    }
+
+    fn new() -> Self {
+        let scenario = Scenario::crmpc2022();
+        Self {
+            parameters: Parameters {
+                reference: reference::Parameters::default(),
+                inertia: scenario.inertia,
+                limit_rate: scenario.limit_rate,
+                limit_moment: scenario.limit_moment,
+                saturation: false,
+                latency: Latency::default(),
+            },
+            settings: L::settings(),
+            input: Input {
+                measured: Measurement {
+                    angles: scenario.initial_angles,
+                    rates: scenario.initial_rates,
+                    ..Measurement::default()
+                },
+                reference: scenario.reference.at(0.0),
+                ..Input::default()
+            },
+            output: Output::default(),
+            law: L::default(),
+            source: Source::Profile(scenario.reference),
+        }
+    }
+
+    fn load(&mut self, context: &Context) -> Result<(), Failure> {
+        self.source = Source::new(&self.parameters.reference, context)?;
+        Ok(())
+    }
+
+    fn design(&self) -> Result<Designed<L>, Failure> {
+        let vehicle = self.vehicle()?;
+        let settings = self.settings.clone();
+        let controller = L::design(settings.clone(), &vehicle)
+            .and_then(|law| {
+                let (period, limit) = (L::period(&settings), vehicle.saturates_at());
+                Delayed::new(law, vehicle.body, period, vehicle.latency, limit)
+            })
+            .map_err(|error| Self::refusal(&error))?;
+        Ok(Designed { settings, vehicle, controller })
+    }
+
+    fn is_designed(&self, device: &Designed<L>) -> bool {
+        device.settings == self.settings
+            && self.vehicle().is_ok_and(|vehicle| device.vehicle == vehicle)
+    }
+
+    fn period(device: &Designed<L>) -> f64 {
+        L::period(&device.settings)
+    }
+
+    fn memory(device: &Designed<L>) -> Self::Memory {
+        device.controller.memory()
+    }
+
+    fn evaluate(&self, device: &mut Designed<L>, ticks: &mut Ticks<Self>) -> Result<(), Failure> {
+        self.evaluate_with(device, ticks, false)
+    }
+
+    fn evaluate_stale(
+        &self,
+        device: &mut Designed<L>,
+        ticks: &mut Ticks<Self>,
+    ) -> Result<(), Failure> {
+        self.evaluate_with(device, ticks, true)
+    }
+
+    /// With a delay no command acts at the start. The law takes the moment as zero until its first
+    /// command acts.
+    fn output_before_the_first(device: &Designed<L>) -> Option<Vector3<f64>> {
+        (device.controller.acts_after() > 0.0).then(Vector3::zeros)
+    }
+
+    fn warning(before: &Self::Memory, after: &Self::Memory) -> Option<&'static str> {
+        if after.loop_delay.is_other && !before.loop_delay.is_other {
+            return Some(
+                "the response of the vehicle shows another loop delay than delay + measurement.age; see loopDelay.estimate",
+            );
+        }
+        L::warning(&before.inner, &after.inner)
+    }
+
+    fn show(
+        &mut self,
+        time: f64,
+        device: &Designed<L>,
+        (moment, memory): (Vector3<f64>, &Self::Memory),
+    ) {
+        self.law.show(&self.settings, &memory.inner);
+        self.output = Output {
+            moment,
+            reference: self.source.preview(time, &self.input.reference).at(time),
+            loop_delay: device.controller.estimated_delay(memory),
+            has_other_delay: memory.loop_delay.is_other,
+        };
+    }
+
+    fn fits(device: &Designed<L>, memory: &Self::Memory) -> bool {
+        device.controller.fits(memory)
+    }
+
+    fn problem(&self, before: &Self) -> Option<&'static str> {
+        let fits = self.source == before.source || self.source.fits(&self.parameters.reference);
+        (!fits).then_some("its reference does not match its parameters")
+    }
+}

@@ -1,0 +1,162 @@
+//! The part of an FMU that a single control law adds, and the data that all controllers share.
+
+use crate::reference::{self, Source};
+use crate::sampled::SampledFmu;
+use control::Controller;
+use control::controller::Measurement;
+use control::delay::Latency;
+use control::error::DesignError;
+use fmi2_export::VariableTable;
+use nalgebra::Vector3;
+use serde::{Deserialize, Serialize, de::DeserializeOwned};
+use settings::Declared;
+use vehicle::dynamics::{Inertia, RigidBody};
+use vehicle::reference::Reference;
+
+/// Data that every controller receives: its vehicle, limits and schedule.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Vehicle {
+    /// Rigid body of the vehicle that the controller uses.
+    pub body: RigidBody,
+    /// Limit on ‖ω‖, rad/s.
+    pub limit_rate: f64,
+    /// Limit on ‖m‖, N m.
+    pub limit_moment: f64,
+    /// Whether the commanded moment is scaled into its limit.
+    pub saturation: bool,
+    /// Time from the instant of a measurement until the resulting moment acts. The law receives the
+    /// state predicted over this time.
+    pub latency: Latency,
+}
+
+impl Vehicle {
+    /// Returns the limit into which a command is scaled, N m; infinite for none.
+    pub(crate) fn saturates_at(&self) -> f64 {
+        if self.saturation { self.limit_moment } else { f64::INFINITY }
+    }
+}
+
+/// A controller as an FMU, to be handed to [`fmi2_export::export_fmus!`].
+pub type ControllerFmu<L> = SampledFmu<ControllerInstance<L>>;
+
+/// An instance of a controller: its parameters, inputs and outputs.
+#[derive(Serialize, Deserialize)]
+#[serde(bound = "")]
+pub struct ControllerInstance<L: Law> {
+    /// Parameters that every controller has.
+    pub parameters: Parameters,
+    /// Inputs that every controller has.
+    pub input: Input,
+    /// Outputs that every controller has.
+    pub output: Output,
+    /// Parameters of the law alone.
+    pub settings: L::Settings,
+    /// Outputs of the law alone.
+    pub law: L,
+    pub(crate) source: Source,
+}
+
+/// Parameters that every controller has.
+#[derive(Clone, Debug, Serialize, Deserialize, Declared)]
+pub struct Parameters {
+    /// Parameters of the reference.
+    pub reference: reference::Parameters,
+    /// Inertia that the controller assumes.
+    pub inertia: Inertia,
+    /// Upper limit on the norm of the body rates.
+    #[setting(name = "limit.rate", unit = "rad/s", min = 1e-6, nominal = 0.1)]
+    pub limit_rate: f64,
+    /// Upper limit on the norm of the control moment.
+    #[setting(name = "limit.moment", unit = "N.m", min = 1e-3, nominal = 1e5)]
+    pub limit_moment: f64,
+    /// Whether the commanded moment is scaled down to a norm of at most limit.moment.
+    pub saturation: bool,
+    /// Delays over which the law predicts the state.
+    #[setting(name = "")]
+    pub latency: Latency,
+}
+
+/// Inputs that every controller has.
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
+pub struct Input {
+    /// Measured angles and rates.
+    pub measured: Measurement,
+    /// Moment that the actuators give, N m.
+    pub achieved_moment: Vector3<f64>,
+    /// Reference from outside the FMU.
+    pub reference: Reference,
+}
+
+/// Outputs that every controller has.
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
+pub struct Output {
+    /// Commanded moment of the controller, N m.
+    pub moment: Vector3<f64>,
+    /// Reference that is in force.
+    pub reference: Reference,
+    /// Estimated delay of the loop, s.
+    pub loop_delay: f64,
+    /// Whether it differs from the given delay by more than half a period.
+    pub has_other_delay: bool,
+}
+
+/// A control law as an FMU. The value holds the outputs that only this law has.
+pub trait Law: Default + Serialize + DeserializeOwned + Send + 'static {
+    /// Sampled controller of the law.
+    type Controller: Controller + Send;
+    /// Settings of the law, which become parameters of the FMU.
+    type Settings: Declared + Default + Clone + PartialEq + Serialize + DeserializeOwned + Send;
+
+    /// Name of the FMU.
+    const NAME: &'static str;
+    /// Description of the FMU in one line.
+    const DESCRIPTION: &'static str;
+    /// Description of the computation, as an HTML fragment.
+    const DOCUMENTATION: &'static str = "";
+    /// Version of the FMU.
+    const VERSION: &'static str = env!("CARGO_PKG_VERSION");
+
+    /// Returns the start values of the settings, by default those that are declared.
+    fn settings() -> Self::Settings {
+        settings::start()
+    }
+
+    /// Returns the time between two evaluations of the law, s. By default it is the 0.04 s of the
+    /// laws of Chai 2022.
+    fn period(_settings: &Self::Settings) -> f64 {
+        0.04
+    }
+
+    /// Returns whether the law receives the moment of the actuators.
+    fn uses_achieved_moment(_settings: &Self::Settings) -> bool {
+        false
+    }
+
+    /// Builds the controller for a vehicle.
+    ///
+    /// # Errors
+    /// Returns an error that names the setting at fault.
+    fn design(settings: Self::Settings, vehicle: &Vehicle)
+    -> Result<Self::Controller, DesignError>;
+
+    /// Adds the outputs of the law to the table.
+    fn outputs(table: VariableTable<ControllerFmu<Self>>) -> VariableTable<ControllerFmu<Self>> {
+        table
+    }
+
+    /// Copies the outputs of the law from the memory in force.
+    fn show(
+        &mut self,
+        _settings: &Self::Settings,
+        _memory: &<Self::Controller as Controller>::Memory,
+    ) {
+    }
+
+    /// Returns a warning for the log if something went wrong between two ticks.
+    fn warning(
+        _before: &<Self::Controller as Controller>::Memory,
+        _after: &<Self::Controller as Controller>::Memory,
+    ) -> Option<&'static str> {
+        None
+    }
+}

@@ -1,0 +1,130 @@
+//! The reference that a controller follows: a paper's profile, a constant, a sine, a lookup table,
+//! or the external inputs.
+
+use control::controller::Preview;
+use fmi2_export::{Context, Failure};
+use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
+use settings::Declared;
+use std::path::Path;
+use vehicle::Scenario;
+use vehicle::axes;
+use vehicle::profile::Profile;
+use vehicle::reference::Reference;
+use vehicle::table::LookupTable;
+
+/// Source of the reference attitude.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, settings::Choice)]
+#[setting(name = "ReferenceProfile")]
+pub enum Choice {
+    /// Profile of Chai 2022, section 5.1, with its jump at 25 s.
+    #[default]
+    Crmpc2022,
+    /// Profile of Wu 2015, section 6.
+    Tvsmc2015,
+    /// Step of Jia, Zhou and Zhou, section V.
+    TwoLoop,
+    /// Constant angles reference.angle.
+    Constant,
+    /// Term reference.angle plus a sine with reference.amplitude, reference.frequency and
+    /// reference.phase.
+    Sine,
+    /// Values interpolated from the file reference.file.
+    Table,
+    /// Inputs reference.external; predictions hold their angles constant.
+    External,
+}
+
+/// Parameters of the reference.
+#[derive(Clone, Debug, Serialize, Deserialize, Declared)]
+pub struct Parameters {
+    #[allow(missing_docs)] // Its type says what it is.
+    pub profile: Choice,
+    /// Path of a CSV file with time and angles, or name of a file in the resources of the FMU;
+    /// used with reference.profile = table.
+    pub file: String,
+    /// Constant part of the reference; used with reference.profile = constant or sine.
+    #[setting(each = axes::ANGLES, unit = "rad", nominal = 0.1)]
+    pub angle: Vector3<f64>,
+    /// Amplitude of the sine in the reference; used with reference.profile = sine.
+    #[setting(each = axes::ANGLES, unit = "rad", nominal = 0.1)]
+    pub amplitude: Vector3<f64>,
+    /// Angular frequency of the reference sine; used with reference.profile = sine.
+    #[setting(unit = "rad/s", min = 0.0, nominal = 1.0)]
+    pub frequency: f64,
+    /// Phase of the reference sine at t = 0; used with reference.profile = sine.
+    #[setting(unit = "rad")]
+    pub phase: f64,
+}
+
+impl Default for Parameters {
+    fn default() -> Self {
+        let angle = Scenario::crmpc2022().reference.at(0.0).angles;
+        Self {
+            profile: Choice::default(),
+            file: String::new(),
+            angle,
+            amplitude: Vector3::zeros(),
+            frequency: 1.0,
+            phase: 0.0,
+        }
+    }
+}
+
+/// Source of the reference with its data.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(crate) enum Source {
+    Profile(Profile),
+    External,
+}
+
+impl Source {
+    pub(crate) fn new(parameters: &Parameters, context: &Context) -> Result<Self, Failure> {
+        let Parameters { file, angle, amplitude, frequency, phase, .. } = parameters;
+        Ok(match parameters.profile {
+            Choice::Crmpc2022 => Self::Profile(Scenario::crmpc2022().reference),
+            Choice::Tvsmc2015 => Self::Profile(Scenario::tvsmc2015().reference),
+            Choice::TwoLoop => Self::Profile(Scenario::two_loop().reference),
+            Choice::Constant => Self::Profile(Profile::constant(*angle)),
+            Choice::Sine => Self::Profile(Profile::sine(*angle, *amplitude, *frequency, *phase)),
+            Choice::Table => Self::Profile(Profile::Table(table(file, context)?)),
+            Choice::External => Self::External,
+        })
+    }
+
+    /// Returns whether these parameters lead to this source. The file of a table is not read again.
+    pub(crate) fn fits(&self, parameters: &Parameters) -> bool {
+        let wants_table = parameters.profile == Choice::Table;
+        match self {
+            Self::Profile(Profile::Table(table)) => wants_table && table.check().is_ok(),
+            _ if wants_table => false,
+            _ => {
+                let context = Context { start_time: 0.0, stop_time: None, resources: None };
+                Self::new(parameters, &context).is_ok_and(|source| source == *self)
+            }
+        }
+    }
+
+    /// Returns the preview of the reference. An external reference is valid until `valid_until`
+    /// (s).
+    pub(crate) fn preview(&self, valid_until: f64, external: &Reference) -> Preview<'_> {
+        match self {
+            Self::Profile(profile) => Preview::Profile(profile),
+            Self::External => Preview::External(*external, valid_until),
+        }
+    }
+}
+
+/// Reads the lookup table from the file name as given, or from the resources of the FMU.
+fn table(file: &str, context: &Context) -> Result<LookupTable, Failure> {
+    if file.is_empty() {
+        let text = "reference.profile = table, but reference.file is empty; set it to the path of a CSV file";
+        return Err(Failure::Error(text.into()));
+    }
+    let path = Path::new(file);
+    let inside =
+        context.resources.map(|folder| folder.join(path)).filter(|inside| inside.is_file());
+    let path = if path.is_file() { path.into() } else { inside.unwrap_or_else(|| path.into()) };
+    LookupTable::from_csv_file(&path)
+        .map_err(|error| Failure::Error(format!("reference.file: {error}")))
+}

@@ -1,0 +1,227 @@
+//! An instance that works at ticks: its steps from tick to tick, and its restoration.
+
+use control::schedule::Sampled;
+use fmi2_export::{Context, Description, Failure, Inputs, LastEvent, Model, Restoration};
+use serde::{Deserialize, Serialize, de::DeserializeOwned};
+use std::ops::{Deref, DerefMut};
+
+/// The ticks of an instance with their memory.
+pub type Ticks<I> = Sampled<
+    <I as SampledInstance>::Memory,
+    <I as SampledInstance>::Input,
+    <I as SampledInstance>::Output,
+>;
+
+/// An instance that works at ticks: its parameters, inputs and outputs, and the device that is
+/// built from them.
+pub trait SampledInstance: Serialize + DeserializeOwned + Send + Sized + 'static {
+    /// Device that computes at the ticks. Apart from the memory it keeps nothing that a later tick
+    /// could notice.
+    type Device: Send;
+    /// State that is carried from tick to tick.
+    type Memory: Clone + Default + Serialize + DeserializeOwned + Send;
+    /// Input on which a tick depends, besides the memory.
+    type Input: Clone + Default + PartialEq + Serialize + DeserializeOwned + Send;
+    /// Output that a tick computes, besides the memory.
+    type Output: Copy + Default + Serialize + DeserializeOwned + Send;
+
+    /// Returns the description of the FMU, see [`Model::description`].
+    fn description() -> Description<SampledFmu<Self>>;
+
+    /// Returns the instance with its start values, see [`Model::new`].
+    fn new() -> Self;
+
+    /// Loads the files that the parameters name.
+    ///
+    /// # Errors
+    /// Returns an error that names the parameter at fault.
+    fn load(&mut self, _context: &Context) -> Result<(), Failure> {
+        Ok(())
+    }
+
+    /// Builds the device from the parameters.
+    ///
+    /// # Errors
+    /// Returns an error that names the parameter at fault.
+    fn design(&self) -> Result<Self::Device, Failure>;
+
+    /// Returns whether [`Self::design`] would build the same device again.
+    fn is_designed(&self, _device: &Self::Device) -> bool {
+        false
+    }
+
+    /// Returns the time between two ticks (s), with which the schedule is built.
+    fn period(device: &Self::Device) -> f64;
+
+    /// Returns the memory for the first tick.
+    fn memory(_device: &Self::Device) -> Self::Memory {
+        Self::Memory::default()
+    }
+
+    /// Evaluates the first uncommitted tick with the present inputs.
+    ///
+    /// # Errors
+    /// Returns an error that names the input at fault.
+    fn evaluate(&self, device: &mut Self::Device, ticks: &mut Ticks<Self>) -> Result<(), Failure>;
+
+    /// Evaluates the first uncommitted tick with inputs that were set at an earlier instant.
+    ///
+    /// # Errors
+    /// Returns an error that names the input at fault.
+    fn evaluate_stale(
+        &self,
+        device: &mut Self::Device,
+        ticks: &mut Ticks<Self>,
+    ) -> Result<(), Failure> {
+        self.evaluate(device, ticks)
+    }
+
+    /// Returns the output that is shown at the start time, if it is not that of the first tick
+    /// because this tick's output acts later.
+    fn output_before_the_first(_device: &Self::Device) -> Option<Self::Output> {
+        None
+    }
+
+    /// Returns a warning for the log if something went wrong between two ticks.
+    fn warning(_before: &Self::Memory, _after: &Self::Memory) -> Option<&'static str> {
+        None
+    }
+
+    /// Sets the outputs at `time` (s) from the output and memory in force.
+    fn show(&mut self, time: f64, device: &Self::Device, in_force: (Self::Output, &Self::Memory));
+
+    /// Returns whether the shape of a restored memory fits this device.
+    fn fits(_device: &Self::Device, _memory: &Self::Memory) -> bool {
+        true
+    }
+
+    /// Returns what is wrong with a restored instance, apart from its ticks.
+    fn problem(&self, _before: &Self) -> Option<&'static str> {
+        None
+    }
+}
+
+/// An instance that works at ticks, in the form that FMI requires.
+#[derive(Serialize, Deserialize)]
+#[serde(bound = "")]
+pub struct SampledFmu<I: SampledInstance> {
+    instance: I,
+    /// Ticks of the instance; present from initialization on.
+    ticks: Option<Ticks<I>>,
+    #[serde(skip)]
+    device: Option<I::Device>,
+}
+
+impl<I: SampledInstance> Deref for SampledFmu<I> {
+    type Target = I;
+    fn deref(&self) -> &I {
+        &self.instance
+    }
+}
+
+impl<I: SampledInstance> DerefMut for SampledFmu<I> {
+    fn deref_mut(&mut self) -> &mut I {
+        &mut self.instance
+    }
+}
+
+/// Returns the error for a saved state that no instance can have been in.
+fn misfit(problem: &str) -> Result<(), Failure> {
+    Err(Failure::Error(format!("the saved state does not fit: {problem}")))
+}
+
+impl<I: SampledInstance> SampledFmu<I> {
+    /// Returns instance, device and ticks, which are present from initialization on.
+    fn parts(&mut self) -> Result<(&I, &mut I::Device, &mut Ticks<I>), Failure> {
+        match (&mut self.device, &mut self.ticks) {
+            (Some(device), Some(ticks)) => Ok((&self.instance, device, ticks)),
+            _ => Err(Failure::Error("the instance is not initialized".into())),
+        }
+    }
+}
+
+impl<I: SampledInstance> Model for SampledFmu<I> {
+    fn description() -> Description<Self> {
+        I::description()
+    }
+
+    fn new() -> Self {
+        Self { instance: I::new(), ticks: None, device: None }
+    }
+
+    fn reset(&mut self) {
+        *self = Self { device: self.device.take(), ..Self::new() };
+    }
+
+    fn initialize(&mut self, context: &Context) -> Result<(), Failure> {
+        self.instance.load(context)?;
+        let same = |device: &mut I::Device| self.instance.is_designed(device);
+        let device = self.device.take_if(same).map_or_else(|| self.instance.design(), Ok)?;
+        vehicle::time::check_resolution(context.start_time, I::period(&device))
+            .map_err(|error| Failure::Error(error.to_string()))?;
+        self.ticks = Some(Sampled::new(context.start_time, I::period(&device), I::memory(&device)));
+        self.device = Some(device);
+        Ok(())
+    }
+
+    /// A due tick is evaluated, except after a step: the outputs are then those of the tick that
+    /// was committed, which acted over that step.
+    fn calculate(&mut self, time: f64, last: LastEvent) -> Result<(), Failure> {
+        let (instance, device, ticks) = self.parts()?;
+        let holds = last == LastEvent::Step && ticks.has_committed();
+        if !holds && ticks.is_due(time) {
+            instance.evaluate(device, ticks)?;
+        }
+        if let (Some(device), Some(ticks)) = (&self.device, &self.ticks) {
+            let (output, memory) = ticks.in_force();
+            let before = (last == LastEvent::Initialization)
+                .then(|| I::output_before_the_first(device))
+                .flatten();
+            self.instance.show(time, device, (before.unwrap_or(output), memory));
+        }
+        Ok(())
+    }
+
+    /// Evaluates and commits every tick from `from` up to, but not at, `to`, with the inputs at
+    /// that time. At a tick after `from` they are stale, unless they are extrapolated.
+    fn step(
+        &mut self,
+        from: f64,
+        to: f64,
+        inputs: &dyn Inputs<Self>,
+        log: &mut dyn FnMut(&str),
+    ) -> Result<(), Failure> {
+        loop {
+            let (_, _, ticks) = self.parts()?;
+            let Some(tick) = ticks.next_before(to) else { return Ok(()) };
+            inputs.advance(self, tick.max(from));
+            let (instance, device, ticks) = self.parts()?;
+            if ticks.is_due(from) || inputs.are_extrapolated() {
+                instance.evaluate(device, ticks)?;
+            } else {
+                instance.evaluate_stale(device, ticks)?;
+            }
+            ticks.commit();
+            if let Some(text) = ticks.last_change(I::warning) {
+                log(text);
+            }
+        }
+    }
+
+    fn restored(&mut self, from: Restoration<'_, Self>) -> Result<(), Failure> {
+        let Some(ticks) = self.ticks.as_ref().filter(|_| from.initialized) else { return Ok(()) };
+        if let Some(problem) = self.instance.problem(&from.before.instance) {
+            return misfit(problem);
+        }
+        let same = |device: &mut I::Device| self.instance.is_designed(device);
+        let device = from.before.device.take_if(same).map_or_else(|| self.instance.design(), Ok)?;
+        let times = (from.start_time, from.time);
+        if ticks.fits(times, I::period(&device), from.failed, |memory| I::fits(&device, memory)) {
+            self.device = Some(device);
+            return Ok(());
+        }
+        // The other instance gets back the device that was taken from it.
+        from.before.device.get_or_insert(device);
+        misfit("its ticks do not match its time, or its memory has another shape")
+    }
+}

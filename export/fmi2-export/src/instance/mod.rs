@@ -1,0 +1,150 @@
+//! One instance of an FMU: the part of the shell that handles no pointers.
+//!
+//! This file makes the instance and runs its calls: the states of the standard, failures, panics.
+//! Its children do the work of the calls, each for one part of the standard.
+
+mod co_simulation;
+mod life_cycle;
+mod model_exchange;
+mod saved_states;
+mod variables;
+
+use crate::call::{Call, Outcome, State, error};
+use crate::logger::{Category, Logger};
+use crate::model::Failure;
+use crate::model_instance::{Export, ModelInstance, Progress};
+use crate::types::{FmiStatus, Interface};
+use model_description::ModelDescription;
+use std::any::Any;
+use std::ffi::CString;
+use std::mem;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::PathBuf;
+use std::sync::Arc;
+
+pub(crate) use saved_states::Saved;
+pub(crate) use variables::Typed;
+
+/// One instance of an FMU with everything that the shell keeps for it.
+pub(crate) struct Instance {
+    model: Box<dyn ModelInstance>,
+    description: Arc<ModelDescription>,
+    /// Value references of each state and its derivative.
+    states: Vec<(usize, usize)>,
+    guid: String,
+    interface: Interface,
+    logger: Logger,
+    resources: Option<PathBuf>,
+    /// Progress of the simulation. Its list of extrapolations has room for every variable, so
+    /// nothing is allocated between steps.
+    progress: Progress,
+    /// Whether calculated variables are older than the state, the inputs or the time.
+    stale: bool,
+    last_step: FmiStatus,
+    /// Saved states handed out by fmi2GetFMUstate; the importer holds their addresses.
+    #[expect(clippy::vec_box, reason = "the address is the importer's handle and must not move")]
+    saved: Vec<Box<Saved>>,
+    /// Texts handed out by the last fmi2GetString.
+    strings: Vec<CString>,
+}
+
+/// Arguments of fmi2Instantiate, apart from the choice of the FMU.
+pub(crate) struct Setting {
+    pub(crate) guid: String,
+    pub(crate) interface: Interface,
+    pub(crate) logger: Logger,
+    pub(crate) resources: Option<PathBuf>,
+}
+
+impl Instance {
+    pub(crate) fn new(
+        export: &Export,
+        description: Arc<ModelDescription>,
+        setting: Setting,
+    ) -> Self {
+        let Setting { guid, interface, logger, resources } = setting;
+        let states = description.states();
+        let mut progress = Progress::default();
+        progress.extrapolations.reserve(description.variables.len());
+        Self {
+            model: (export.create)(),
+            states,
+            description,
+            guid,
+            interface,
+            logger,
+            resources,
+            progress,
+            stale: true,
+            last_step: FmiStatus::Ok,
+            saved: Vec::new(),
+            strings: Vec::new(),
+        }
+    }
+
+    /// Runs the body of a call: it refuses a call in a wrong state, reports failures, and stops
+    /// every panic here.
+    pub(crate) fn run(
+        &mut self,
+        call: &Call,
+        body: impl FnOnce(&mut Self) -> Outcome,
+    ) -> FmiStatus {
+        if self.progress.state == State::Fatal {
+            return FmiStatus::Fatal;
+        }
+        let outcome = catch_unwind(AssertUnwindSafe(|| {
+            self.permit(call)?;
+            body(self)
+        }));
+        match outcome {
+            Ok(Ok(())) => FmiStatus::Ok,
+            Ok(Err(Failure::Discard(problem))) => {
+                self.logger.log(Category::Discard, &format!("{}: {problem}", call.name));
+                FmiStatus::Discard
+            }
+            Ok(Err(Failure::Error(problem))) => {
+                if !call.leaves_state {
+                    self.progress.state = State::Error;
+                }
+                self.logger.log(Category::Error, &format!("{}: {problem}", call.name));
+                FmiStatus::Error
+            }
+            Err(panic) => {
+                self.progress.state = State::Fatal;
+                let text =
+                    format!("{}: defect in the FMU: {}", call.name, panic_text(panic.as_ref()));
+                self.logger.log(Category::Fatal, &text);
+                // Dropping the panic's payload could run code of the model again.
+                mem::forget(panic);
+                FmiStatus::Fatal
+            }
+        }
+    }
+
+    fn permit(&self, call: &Call) -> Outcome {
+        if call.interface.is_some_and(|interface| interface != self.interface) {
+            let interface = match self.interface {
+                Interface::ModelExchange => "model exchange",
+                Interface::CoSimulation => "co-simulation",
+            };
+            return error(format!("not available, because this instance was made for {interface}"));
+        }
+        if call.allowed_in(self.progress.state) {
+            return Ok(());
+        }
+        error(format!("not allowed in state {}", self.progress.state.name()))
+    }
+
+    pub(crate) fn logger(&mut self) -> &mut Logger {
+        &mut self.logger
+    }
+
+    pub(crate) fn warn(&self, text: &str) {
+        self.logger.log(Category::Warning, text);
+    }
+}
+
+fn panic_text(panic: &(dyn Any + Send)) -> &str {
+    let text = panic.downcast_ref::<&str>().copied();
+    text.or_else(|| panic.downcast_ref::<String>().map(String::as_str)).unwrap_or("no message")
+}

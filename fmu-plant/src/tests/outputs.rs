@@ -1,0 +1,122 @@
+//! Outputs between steps and events.
+
+use super::{Ramp, delayed, in_model_exchange, outputs, started, step};
+use crate::parameters::Initial;
+use crate::plant::ReentryPlant;
+use fmi2_export::Model;
+use nalgebra::Vector3;
+use vehicle::Scenario;
+use vehicle::disturbance::DisturbanceKind;
+
+#[test]
+fn outputs_are_right_from_initialization_on() {
+    let mut instance = started(|_| {});
+    let scenario = Scenario::crmpc2022();
+    let output = outputs(&mut instance, 0.0);
+    assert_eq!((output.angles, output.rates), (scenario.initial_angles, scenario.initial_rates));
+    assert!(output.delta.amax() > 0.0 && output.delta.amax() <= scenario.disturbance.bound);
+    // At rest ω̇ = R⁻¹ Δ holds.
+    let expected = vehicle::kinematics::r_inverse(&output.angles) * output.delta;
+    assert!((output.angular_acceleration - expected).amax() < 1e-15);
+}
+
+#[test]
+fn at_a_tick_the_outputs_show_the_disturbance_of_the_step_to_come() {
+    for kind in [DisturbanceKind::White, DisturbanceKind::AlongRate, DisturbanceKind::AgainstMoment]
+    {
+        let mut instance = started(|instance| instance.parameters.kind = kind);
+        instance.input.moment = Vector3::new(1e4, -1e4, 1e4);
+        step(&mut instance, 0.0, 0.04).unwrap();
+        instance.input.moment *= -1.0;
+        let announced = outputs(&mut instance, 0.04).delta;
+        step(&mut instance, 0.04, 0.08 - 1e-6).unwrap();
+        assert_eq!(outputs(&mut instance, 0.08 - 1e-6).delta, announced, "kind {kind:?}");
+    }
+}
+
+#[test]
+fn looking_changes_nothing() {
+    let [mut looked_at, mut left_alone] = [0, 1]
+        .map(|_| started(|instance| instance.parameters.kind = DisturbanceKind::AgainstMoment));
+    for k in 0..50 {
+        let [from, to] = [0.04 * f64::from(k), 0.04 * f64::from(k + 1)];
+        looked_at.input.moment = Vector3::repeat(-1e4);
+        outputs(&mut looked_at, from);
+        let moment = Vector3::new(1e4 * from.sin(), 0.0, 1e4);
+        looked_at.input.moment = moment;
+        left_alone.input.moment = moment;
+        step(&mut looked_at, from, to).unwrap();
+        step(&mut left_alone, from, to).unwrap();
+    }
+    assert_eq!(outputs(&mut looked_at, 2.0), outputs(&mut left_alone, 2.0));
+}
+
+#[test]
+fn between_events_the_disturbance_is_held_even_beyond_a_tick() {
+    let mut instance = in_model_exchange(DisturbanceKind::White);
+    let held = outputs(&mut instance, 0.0).delta;
+    for time in [0.01, 0.04, 0.041] {
+        assert_eq!(outputs(&mut instance, time).delta, held);
+    }
+    assert_eq!(instance.new_discrete_states(0.04).unwrap().next_event_time, Some(0.08));
+    assert_ne!(outputs(&mut instance, 0.04).delta, held);
+}
+
+#[test]
+fn an_event_iteration_sees_the_latest_moment() {
+    let mut instance =
+        started(|instance| instance.parameters.kind = DisturbanceKind::AgainstMoment);
+    instance.new_discrete_states(0.0).unwrap();
+    let before = outputs(&mut instance, 0.0).delta;
+    instance.input.moment = vehicle::kinematics::r_inverse(&instance.output.angles) * before * 1e7;
+    instance.new_discrete_states(0.0).unwrap();
+    assert_ne!(outputs(&mut instance, 0.0).delta, before);
+    instance.input.moment = Vector3::zeros();
+    instance.new_discrete_states(0.02).unwrap();
+    assert_ne!(outputs(&mut instance, 0.02).delta, before, "between ticks the value is kept");
+}
+
+#[test]
+fn oracle_input_derivatives_are_integrated() {
+    // At beta = 0 a pitch moment k t alone gives q = k t² / 2 Iyy.
+    let mut instance = started(|instance| {
+        instance.parameters.kind = DisturbanceKind::None;
+        instance.parameters.initial =
+            Initial::new(Vector3::new(0.1, 0.0, 0.2), instance.parameters.initial.rates);
+    });
+    instance.step(0.0, 2.0, &Ramp(1e4), &mut |_| {}).unwrap();
+    let exact = 1e4 * 2.0 * 2.0 / 2.0 / (1303212.0 * 1.05);
+    assert!((outputs(&mut instance, 2.0).rates.y - exact).abs() < 1e-15);
+}
+
+#[test]
+fn oracle_a_delayed_moment_is_shown_when_it_acts() {
+    let mut instance = delayed(0.1);
+    let pitch = |k: u32| Vector3::new(0.0, 1e4 * f64::from(k + 1), 0.0);
+    for k in 0..20_u32 {
+        let time = 0.04 * f64::from(k);
+        instance.input.moment = pitch(k);
+        // The delay of 0.1 s is two and a half steps.
+        let acts = if k < 3 { Vector3::zeros() } else { pitch(k - 3) };
+        assert_eq!(outputs(&mut instance, time).applied_moment, acts, "{k}");
+        step(&mut instance, time, time + 0.04).unwrap();
+    }
+}
+
+#[test]
+fn moments_under_way_are_part_of_the_saved_state() {
+    let mut instance = delayed(0.117);
+    let mut restored: Option<ReentryPlant> = None;
+    for k in 0..20_u32 {
+        let time = 0.04 * f64::from(k);
+        for instance in std::iter::once(&mut instance).chain(restored.as_mut()) {
+            instance.input.moment = Vector3::new(1e4 * time.sin(), -1e4 * time.cos(), 5e3);
+            step(instance, time, time + 0.04).unwrap();
+        }
+        if k == 7 {
+            restored =
+                Some(serde_json::from_str(&serde_json::to_string(&instance).unwrap()).unwrap());
+        }
+    }
+    assert_eq!(outputs(&mut instance, 0.8), outputs(&mut restored.unwrap(), 0.8));
+}

@@ -1,0 +1,111 @@
+"""Writes the tables of parameters in docs/ from the committed descriptions of the FMUs, between the lines
+`<!-- parameters of NAME … -->` and `<!-- end -->`. The descriptions follow from the declarations in Rust.
+
+    python scripts/pages/parameters.py            # writes the tables
+    python scripts/pages/parameters.py --check    # fails if one is not up to date
+"""
+
+import math
+import re
+import sys
+from pathlib import Path
+from xml.etree import ElementTree
+
+ROOT = Path(__file__).resolve().parents[2]
+HEAD = "| parameter | start | range | meaning |\n|---|---|---|---|"
+# What all controllers have is described once, on the page of CRMPC.
+COMMON = re.compile(r"reference\.|inertia\.I|limit\.|saturation$|delay$|measurement\.age$")
+BLOCK = re.compile(r"(<!-- parameters of ([\w ]+?)( without common)? -->\n).*?(<!-- end -->)", re.S)
+AXES = [["alpha", "beta", "sigma"], ["p", "q", "r"], ["x", "y", "z"], ["north", "east", "down"]]
+
+
+def description(name):
+    [file] = ROOT.glob(f"*/generated/{name}.xml")
+    return ElementTree.parse(file).getroot()
+
+
+def number(text, unit):
+    value = float(text) * (180 / math.pi if unit.startswith("rad") else 1)
+    return f"{value:.7g}".replace("-", "−")
+
+
+def rows(root):
+    """Yields name, start, range and meaning of each parameter."""
+    types = {item.get("name"): item for item in root.iter("SimpleType")}
+    for variable in root.iter("ScalarVariable"):
+        if variable.get("causality") != "parameter":
+            continue
+        [kind] = list(variable)
+        unit, text = kind.get("unit", ""), variable.get("description")
+        ends = [kind.get("min"), kind.get("max")]
+        shown = unit.replace("rad", "deg", 1) if unit.startswith("rad") else unit
+        if kind.tag == "Enumeration":
+            items = types[kind.get("declaredType")].findall("Enumeration/Item")
+            start = f"`{items[int(kind.get('start')) - 1].get('name')}`"
+            text += ". " + "; ".join(f"`{item.get('name')}`: {item.get('description')}" for item in items)
+            ends = [None, None]
+        elif kind.tag in ("Boolean", "String"):
+            start = kind.get("start") or "empty"
+        else:
+            start = number(kind.get("start"), unit) if kind.tag == "Real" else kind.get("start")
+            ends = [end and (number(end, unit) if kind.tag == "Real" else end) for end in ends]
+        low, high = ends
+        span = f"{low} to {high}" if low and high else f"from {low}" if low else f"up to {high}" if high else ""
+        yield variable.get("name"), start, span, shown, text.replace("|", "\\|")
+
+
+def pattern(name):
+    """Returns the name without what distinguishes the entries of a vector, and this ending."""
+    if match := re.fullmatch(r"(.*?)(\[[\d,]+\])", name):
+        return match.group(1), match.group(2)
+    stem, _, last = name.rpartition(".")
+    return (stem, last) if any(last in axes for axes in AXES) else (name, "")
+
+
+def table(root, leaves_out_common):
+    groups = []
+    for name, start, span, unit, text in rows(root):
+        if leaves_out_common and COMMON.match(name):
+            continue
+        stem, ending = pattern(name)
+        meaning = re.sub(r" \([^()]*\)$", "", text) if ending else text
+        key = (stem, span, unit, meaning, bool(ending))
+        if ending and groups and groups[-1][0] == key:
+            groups[-1][1].append((ending, start))
+        else:
+            groups.append((key, [(ending, start)]))
+    lines = [HEAD]
+    for (stem, span, unit, meaning, _), entries in groups:
+        endings, starts = zip(*entries)
+        if not endings[0].startswith("[") and endings[0]:
+            name = f"`{stem}.{'/'.join(endings)}`"
+        else:
+            name = f"`{stem}{endings[0]}`" + (f"…`{endings[-1]}`" if len(endings) > 1 else "")
+        start = starts[0] if len(set(starts)) == 1 else ", ".join(starts) if len(starts) <= 10 else "various"
+        start += f" {unit}" if unit and start != "various" else ""
+        span += f" {unit}" if unit and span else ""
+        lines.append(f"| {name} | {start} | {span} | {meaning} |")
+    return "\n".join(lines)
+
+
+def main():
+    stale = []
+    for page in sorted((ROOT / "docs").glob("*.md")):
+        before = page.read_text()
+
+        def block(match):
+            tables = [table(description(name), match.group(3)) for name in match.group(2).split()]
+            lines = dict.fromkeys(line for one in tables for line in one.splitlines())
+            return f"{match.group(1)}{chr(10).join(lines)}\n{match.group(4)}"
+
+        after = BLOCK.sub(block, before)
+        if after != before:
+            stale.append(page.name)
+            if "--check" not in sys.argv:
+                page.write_text(after)
+    if "--check" in sys.argv and stale:
+        sys.exit(f"docs/{', docs/'.join(stale)}: tables of parameters are not up to date; run scripts/pages/parameters.py")
+
+
+if __name__ == "__main__":
+    main()

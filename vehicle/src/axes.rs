@@ -1,0 +1,33 @@
+//! Endings of the names of vectors' entries, each with what the entry is for.
+
+/// Ending of a name, and what the entry is for.
+pub type Entry = (&'static str, &'static str);
+
+/// Components of Θ by name.
+pub const ANGLES: [Entry; 3] =
+    [(".alpha", "angle of attack"), (".beta", "sideslip angle"), (".sigma", "bank angle")];
+/// Components of Θ by number.
+pub const NUMBERED_ANGLES: [Entry; 3] =
+    [("[1]", "angle of attack"), ("[2]", "sideslip angle"), ("[3]", "bank angle")];
+/// Components of ω by name.
+pub const RATES: [Entry; 3] = [(".p", "roll rate"), (".q", "pitch rate"), (".r", "yaw rate")];
+/// Components of ω by number.
+pub const NUMBERED_RATES: [Entry; 3] =
+    [("[1]", "roll rate"), ("[2]", "pitch rate"), ("[3]", "yaw rate")];
+/// Level axes by name.
+pub const LEVEL: [Entry; 3] =
+    [(".north", "to the north"), (".east", "to the east"), (".down", "downward")];
+/// Body axes by number.
+pub const NUMBERED_AXES: [Entry; 3] =
+    [("[1]", "roll axis"), ("[2]", "pitch axis"), ("[3]", "yaw axis")];
+/// Body axes by name.
+pub const AXES: [Entry; 3] = [(".x", "roll axis"), (".y", "pitch axis"), (".z", "yaw axis")];
+/// Components of (Θ, Θ̇) by number.
+pub const NUMBERED_STATE: [Entry; 6] = [
+    ("[1]", "angle of attack"),
+    ("[2]", "sideslip angle"),
+    ("[3]", "bank angle"),
+    ("[4]", "derivative of the angle of attack"),
+    ("[5]", "derivative of the sideslip angle"),
+    ("[6]", "derivative of the bank angle"),
+];

@@ -1,0 +1,159 @@
+//! Inputs of the plant, and the moments and derivatives that follow from them.
+
+use super::config::Calibration;
+use super::equations::{self, Load, Partials};
+use super::{Held, Plant};
+use crate::actuators::{Command, Drive};
+use crate::effectors::{JETS, SURFACES, Surfaces};
+use crate::kinematics::{TRAJECTORY, Trajectory};
+use crate::state::State;
+use nalgebra::{Matrix3, SMatrix, Vector3};
+use serde::{Deserialize, Serialize};
+
+/// Continuous inputs of the plant. Commands to the actuators are taken at instants and are
+/// therefore not among them.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Input {
+    /// Control moment about the body axes, N m. It acts at once unless there are actuators or a
+    /// transport delay.
+    pub moment: Vector3<f64>,
+    /// Further moment about the body axes, N m.
+    pub disturbance_moment: Vector3<f64>,
+    /// Trajectory of the vehicle, which turns the axes from which the angles are counted.
+    pub trajectory: Trajectory,
+}
+
+impl Input {
+    /// Returns the name of the input that holds a value that is not finite.
+    pub(super) fn fault(&self) -> Option<&'static str> {
+        let broken = |values: &[f64]| values.iter().any(|value| !value.is_finite());
+        if broken(self.moment.as_slice()) || broken(self.disturbance_moment.as_slice()) {
+            return Some("moment");
+        }
+        broken(&self.trajectory.values()).then_some("trajectory")
+    }
+}
+
+impl From<Vector3<f64>> for Input {
+    /// Returns an input with this control moment (N m) and nothing else.
+    fn from(moment: Vector3<f64>) -> Self {
+        Self { moment, ..Self::default() }
+    }
+}
+
+impl Plant {
+    /// Disturbing moment (N m) at `time` (s): the sum of the external moment and that of the
+    /// disturbance.
+    pub fn disturbance_moment(&self, time: f64, input: &Input, held: &Held) -> Vector3<f64> {
+        let disturbance_moment =
+            if held.acts { self.disturbance.moment(time) } else { Vector3::zeros() };
+        input.disturbance_moment + disturbance_moment
+    }
+
+    /// Control moment (N m) at the time `elapsed` (s) after the present one, provided that the
+    /// drive does not change until then.
+    pub(super) fn control_moment(
+        &self,
+        input: &Input,
+        delayed: Option<Vector3<f64>>,
+        drive: &Drive,
+        elapsed: f64,
+    ) -> Vector3<f64> {
+        self.actuators.as_ref().map_or_else(
+            || self.converted(&delayed.unwrap_or(input.moment)),
+            |actuators| {
+                actuators.moment(drive, &(self.deflections + actuators.rates(drive) * elapsed))
+            },
+        )
+    }
+
+    /// Moment (N m) behind the converter.
+    pub(super) fn converted(&self, moment: &Vector3<f64>) -> Vector3<f64> {
+        match self.moment_resolution {
+            0.0 => *moment,
+            step => moment.map(|component| (component / step).round() * step),
+        }
+    }
+
+    /// Control moment (N m) that acts at present.
+    pub fn applied_moment(&self, input: &Input, held: &Held) -> Vector3<f64> {
+        self.control_moment(input, held.delayed, &held.drive, 0.0)
+    }
+
+    /// Rate of each deflection, rad/s: plus or minus the rate limit, or zero.
+    pub fn deflection_rates(&self, held: &Held) -> Surfaces {
+        self.actuators
+            .as_ref()
+            .map_or_else(Surfaces::zeros, |actuators| actuators.rates(&held.drive))
+    }
+
+    /// Partial derivatives of [`Plant::applied_moment`] with respect to the input moment (3 × 3)
+    /// and the deflections (3 × 8).
+    pub fn applied_moment_by_moment_and_deflections(
+        &self,
+    ) -> (Matrix3<f64>, SMatrix<f64, 3, SURFACES>) {
+        let held = self.transport.is_some() || self.moment_resolution > 0.0;
+        let at_once = if held { Matrix3::zeros() } else { Matrix3::identity() };
+        self.actuators.as_ref().map_or((at_once, SMatrix::zeros()), |actuators| {
+            (Matrix3::zeros(), *actuators.moment_by_deflections())
+        })
+    }
+
+    /// Partial derivative of the applied moment with respect to the jet commands at the instant at
+    /// which they are taken (3 × 10).
+    pub fn applied_moment_by_jets(&self, command: &Command) -> SMatrix<f64, 3, JETS> {
+        self.actuators
+            .as_ref()
+            .map_or_else(SMatrix::zeros, |actuators| actuators.moment_by_jets(command))
+    }
+
+    /// Turn rate (rad/s) of the trajectory, which is zero during the calibration sequence.
+    pub(super) fn turn_rate(&self, input: &Input) -> Vector3<f64> {
+        if self.calibration.is_some() {
+            return Vector3::zeros();
+        }
+        input.trajectory.turn_rate(self.earth_rate)
+    }
+
+    /// Returns the loads at `time` (s), which is `elapsed` (s) after the time of the deflections.
+    pub(super) fn load(&self, time: f64, input: &Input, held: &Held, elapsed: f64) -> Load {
+        Load {
+            moment: self.control_moment(input, held.delayed, &held.drive, elapsed)
+                + self.disturbance_moment(time, input, held),
+            delta: held.delta(),
+            turn_rate: self.turn_rate(input),
+        }
+    }
+
+    /// State derivative at `time` (s) for a given state.
+    pub(super) fn derivative_at(&self, time: f64, state: &State, load: &Load) -> State {
+        match &self.calibration {
+            None => equations::derivative(&self.body, self.kinematics, state, load),
+            Some(Calibration { sequence, initial }) => {
+                sequence.state_at(self.kinematics, initial, time - self.start_time).1
+            }
+        }
+    }
+
+    /// State derivative at `time` (s) for the present state.
+    pub fn derivative(&self, time: f64, input: &Input, held: &Held) -> State {
+        self.derivative_at(time, &self.state, &self.load(time, input, held, 0.0))
+    }
+
+    /// Partial derivatives of [`Plant::derivative`], and those of the turn rate with respect to the
+    /// trajectory (3 × 7).
+    pub fn partial_derivatives(
+        &self,
+        time: f64,
+        input: &Input,
+        held: &Held,
+    ) -> (Partials, SMatrix<f64, 3, TRAJECTORY>) {
+        let load = self.load(time, input, held, 0.0);
+        let mut partials =
+            equations::partial_derivatives(&self.body, self.kinematics, &self.state, &load);
+        if self.calibration.is_some() {
+            partials = Partials::default();
+        }
+        (partials, input.trajectory.turn_rate_by_fields(self.earth_rate))
+    }
+}

@@ -1,0 +1,147 @@
+//! Makes a plant from its configuration, and checks that.
+
+use super::Plant;
+use super::config::{Calibration, Config};
+use crate::actuators::Actuators;
+use crate::effectors::Surfaces;
+use crate::error::Error;
+use crate::sensors::Sensors;
+use crate::state::{BETA_LIMIT, angles};
+use crate::time::check_resolution;
+use crate::transport::Transport;
+use crate::turntable::Turntable;
+
+impl Plant {
+    /// Makes a plant in the initial state at `start_time` (s).
+    ///
+    /// # Errors
+    /// Names the value of the configuration that is out of range.
+    pub fn new(config: &Config, start_time: f64) -> Result<Self, Error> {
+        let refuse = |name: &'static str, problem: String| Err(Error::parameter(name, problem));
+        if !(config.inertia_scale > 0.0 && config.inertia_scale.is_finite()) {
+            return refuse("inertia.scale", format!("= {} must be positive", config.inertia_scale));
+        }
+        let body = config.inertia.body(config.inertia_scale)?;
+        if !config.initial.iter().all(|value| value.is_finite()) {
+            return refuse("initial", "holds a value that is not finite".into());
+        }
+        if config.initial[1].abs() >= BETA_LIMIT {
+            return refuse(
+                "initial.beta",
+                format!("= {} deg must lie within 90 deg", config.initial[1].to_degrees()),
+            );
+        }
+        if !(config.step > 0.0 && config.step.is_finite()) {
+            return refuse("integrator.step", format!("= {} s must be positive", config.step));
+        }
+        if !config.earth_rate.is_finite() {
+            return refuse("trajectory.earthRate", "is not finite".into());
+        }
+        let transport = Transport::new(config.moment_delay)?;
+        if config.actuators.is_some() && transport.is_some() {
+            let problem = format!(
+                "= {} s delays an input moment, and there is none with actuators",
+                config.moment_delay
+            );
+            return refuse("actuation.delay", problem);
+        }
+        let resolution = config.moment_resolution;
+        if !(resolution >= 0.0 && resolution.is_finite()) {
+            return refuse(
+                "actuation.resolution",
+                format!("= {resolution} N m must not be negative"),
+            );
+        }
+        if config.actuators.is_some() && resolution > 0.0 {
+            let problem = format!(
+                "= {resolution} N m rounds an input moment, and there is none with actuators"
+            );
+            return refuse("actuation.resolution", problem);
+        }
+        let turntable = Turntable::new(&config.turntable)?;
+        if turntable.is_some() && config.sensors.is_none() {
+            let problem = format!(
+                "= {} Hz carries sampled sensors, and there are none",
+                config.turntable.bandwidth
+            );
+            return refuse("turntable.bandwidth", problem);
+        }
+        config.disturbance.check()?;
+        let held = config.disturbance.intervals(start_time).map(|(_, length)| length);
+        for period in held.into_iter().chain([config.step]) {
+            check_resolution(start_time, period)?;
+        }
+        config.surroundings.check()?;
+        let initial = angles(&config.initial);
+        let mut state = config.initial;
+        if let Some(sequence) = &config.calibration {
+            sequence.check(&initial)?;
+            (state, _) = sequence.state_at(config.kinematics, &initial, 0.0);
+        }
+        Ok(Self {
+            body,
+            kinematics: config.kinematics,
+            earth_rate: config.earth_rate,
+            disturbance: config.disturbance.clone(),
+            actuators: config.actuators.as_ref().map(Actuators::new).transpose()?,
+            transport,
+            moment_resolution: resolution,
+            calibration: config.calibration.map(|sequence| Calibration { sequence, initial }),
+            surroundings: config.surroundings,
+            sensors: config
+                .sensors
+                .as_ref()
+                .map(|sensors| Sensors::new(sensors, start_time))
+                .transpose()?,
+            turntable,
+            step: config.step,
+            start_time,
+            held: None,
+            noise: None,
+            state,
+            deflections: Surfaces::zeros(),
+        })
+    }
+
+    /// Whether this plant can be a later state, at `time` (s), of `built`, which has the same
+    /// configuration and start time. A restored plant is checked in this way because its data may
+    /// be corrupt. A step that has `failed` may have gone beyond `time`.
+    pub fn fits(&self, built: &Self, time: f64, failed: bool) -> bool {
+        let held = self.held.as_ref().is_none_or(|held| {
+            held.since.is_finite() && (self.actuators.is_none() || Actuators::fits(&held.drive))
+        });
+        let period =
+            self.disturbance.intervals(self.start_time).map_or(self.step, |(_, length)| length);
+        held && check_resolution(time, period).is_ok()
+            && self.state.iter().chain(&self.deflections).all(|value| value.is_finite())
+            && self.same_configuration(built)
+            && self.sensors.as_ref().is_none_or(|sensors| sensors.fits(time, failed))
+            && self.transport.as_ref().is_none_or(|transport| transport.fits(time, failed))
+            && self.turntable.as_ref().is_none_or(|turntable| turntable.fits(time, failed))
+    }
+
+    fn same_configuration(&self, other: &Self) -> bool {
+        let sensors = match (&self.sensors, &other.sensors) {
+            (Some(one), Some(other)) => one.same_configuration(other),
+            (one, other) => one.is_none() && other.is_none(),
+        };
+        let turntables = match (&self.turntable, &other.turntable) {
+            (Some(one), Some(other)) => one.same_configuration(other),
+            (one, other) => one.is_none() && other.is_none(),
+        };
+        let transport = self.transport.as_ref().map(Transport::delay);
+        sensors
+            && turntables
+            && transport == other.transport.as_ref().map(Transport::delay)
+            && self.body == other.body
+            && self.kinematics == other.kinematics
+            && self.earth_rate == other.earth_rate
+            && self.disturbance == other.disturbance
+            && self.actuators == other.actuators
+            && self.moment_resolution == other.moment_resolution
+            && self.calibration == other.calibration
+            && self.surroundings == other.surroundings
+            && self.step == other.step
+            && self.start_time == other.start_time
+    }
+}
