@@ -27,23 +27,24 @@ need_rust() {
         fail "no C compiler was found (cc, gcc or clang): Rust needs one for linking"
 }
 
-# Makes the virtual environment $1 from the requirements file $2 unless it is up to date. Sets $python to its interpreter.
+# Makes the virtual environment $1 from the requirements file $2 unless it is up to date. Sets $python
+# to its interpreter.
 need_venv() {
-    local system venv="$1" requirements="$2" stamp wanted
+    local system venv="$1" requirements="$2" stamp version
     system="$(command -v python3 || true)"
     [[ -n $system ]] || fail "python3 was not found: install Python 3.10 or later"
     "$system" -c 'import sys; sys.exit(sys.version_info < (3, 10))' ||
         fail "$("$system" --version) is too old: Python 3.10 or later is needed"
     python="$venv/bin/python"
     stamp="$venv/installed"
-    wanted="$("$system" --version) $(cksum <"$requirements")"
-    if [[ ! -x $python || ! -f $stamp || $(<"$stamp") != "$wanted" ]]; then
+    version="$("$system" --version) $(cksum <"$requirements")"
+    if [[ ! -x $python || ! -f $stamp || $(<"$stamp") != "$version" ]]; then
         say "Installing the Python packages of $requirements into ${venv#"$root/"}"
         "$system" -m venv --clear "$venv" ||
             fail "python3 -m venv failed: on Debian and Ubuntu install the package python3-venv"
         "$python" -m pip install --quiet --disable-pip-version-check --requirement "$requirements" ||
             fail "pip could not install $requirements: see its message above"
-        printf '%s' "$wanted" >"$stamp"
+        printf '%s' "$version" >"$stamp"
     fi
 }
 
@@ -52,14 +53,15 @@ need_python() {
     need_venv "$root/.venv" tests/requirements.txt
 }
 
-# Installs fmi-sim, an importer written in Rust, into the folder $1 unless this very version is there.
+# Installs fmi-sim, an importer written in Rust, into the folder $1 unless this version is there.
 fmi_sim=0.7.0
 install_fmi_sim() {
     need_rust
     need_python
     if grep --quiet --no-messages "\"fmi-sim $fmi_sim " "$1/.crates.toml"; then return; fi
     say "Installing fmi-sim $fmi_sim into $1"
-    # Its build reads C headers with libclang: the one of tests/requirements.txt, which has no headers of its own.
+    # Its build reads C headers with libclang: the one of tests/requirements.txt, which has no headers of
+    # its own.
     LIBCLANG_PATH="$("$python" -c 'import clang, os; print(os.path.join(clang.__path__[0], "native"))')" \
         BINDGEN_EXTRA_CLANG_ARGS="-I$(cc -print-file-name=include)" \
         cargo install fmi-sim --version "$fmi_sim" --locked --root "$1" --target-dir "$1/build"
@@ -70,17 +72,6 @@ install_fmi_sim() {
 tools="$target/tools"
 install_tools() {
     CARGO_PROFILE_RELEASE_OPT_LEVEL=0 install_fmi_sim "$tools"
-}
-
-# Installs cargo-audit, which knows whether an advisory concerns a crate, into $tools unless this very
-# version is there. Not optimised it takes three minutes to build, and one second to run.
-cargo_audit=0.22.2
-install_cargo_audit() {
-    if grep --quiet --no-messages "\"cargo-audit $cargo_audit " "$tools/.crates.toml"; then return; fi
-    say "Installing cargo-audit $cargo_audit into $tools"
-    CARGO_PROFILE_RELEASE_OPT_LEVEL=0 cargo install cargo-audit --version "$cargo_audit" --locked \
-        --root "$tools" --target-dir "$tools/build"
-    rm -rf "$tools/build"
 }
 
 # The built library of a crate in a folder, whatever the platform calls it.
@@ -96,29 +87,29 @@ library() {
 }
 
 # The libraries that are packed as FMUs.
-unit_libraries=(fmu_plant fmu_optimising fmu_feedback)
+fmu_libraries=(fmu_plant fmu_optimising fmu_feedback)
 
-# The folder with the icons and the generated descriptions of the units in the library $1.
-unit_folder() {
+# The folder with the icons and the generated descriptions of the FMUs in the library $1.
+fmu_folder() {
     if [[ $1 == fmu_plant ]]; then echo fmu-plant; else echo fmu-controller; fi
 }
 
 # Packs every FMU of the libraries in the folder $1 into the folder $2, together with their builds for
 # other platforms in the folders $also, if that is set. Further arguments go to fmu-pack, which runs in
-# the folder of the units: paths among them are relative to that folder.
+# the folder with the icons: paths among them are relative to that folder.
 pack_fmus() {
     say "Packing the FMUs"
     local name library licence folder others licences=()
     for licence in "$root"/LICENSE-*; do
         if [[ -f $licence ]]; then licences+=(--license "$licence"); fi
     done
-    for name in "${unit_libraries[@]}"; do
+    for name in "${fmu_libraries[@]}"; do
         library="$(library "$name" "$1")"
         others=()
         for folder in "${also[@]+"${also[@]}"}"; do
             others+=(--also "$(library "$name" "$folder")")
         done
-        (cd "$(unit_folder "$name")" && "$programs/fmu-pack" "$library" "${others[@]+"${others[@]}"}" \
+        (cd "$(fmu_folder "$name")" && "$programs/fmu-pack" "$library" "${others[@]+"${others[@]}"}" \
             --output "$2" --icons icons "${licences[@]+"${licences[@]}"}" "${@:3}")
     done
 }
@@ -141,7 +132,7 @@ build() {
 # Builds the programs and the FMU libraries, and packs every FMU into $fmus. Arguments go to fmu-pack.
 build_fmus() {
     need_rust
-    say "Building the programs and the units"
+    say "Building the programs and the FMUs"
     build --lib --bin orchestrator --bin fmu-pack
     pack_fmus "$programs" "$fmus" "$@"
 }

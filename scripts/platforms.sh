@@ -1,4 +1,4 @@
-# Cross building of the units and the orchestrator on Linux x86-64. Sourced after environment.sh.
+# Cross building of the FMUs and the orchestrator on Linux x86-64. Sourced after environment.sh.
 
 # The platforms, by the names of their folders below $dist. Those of a single processor of macOS are
 # for the wheels: one for both is larger than a wheel may be.
@@ -96,7 +96,7 @@ cross_build() (
         need_macos_sdk
         # Without a name of its own, a library is named by the path that it was built at.
         set_flags -Clinker="$apple_linker" -Clinker-flavor=ld64.lld -Clink-arg=-dead_strip_dylibs \
-            -Clink-arg=-install_name -Clink-arg=@rpath/unit.dylib
+            -Clink-arg=-install_name -Clink-arg=@rpath/fmu.dylib
         # Dependencies in C are compiled by zig.
         local cc="$target/zig/cc-$triple"
         printf '#!/bin/sh\nPATH="%s:$PATH" exec cargo-zigbuild zig cc -- -target %s "$@"\n' \
@@ -123,24 +123,24 @@ cross_build() (
 need_cross() {
     need_rust
     fetch
-    need_venv "$target/zig" scripts/package-requirements.txt
+    need_venv "$target/zig" scripts/requirements/package.txt
 }
 
 # The folder with the built libraries of the platform $1.
 built() {
-    local all
-    read -ra all <<<"$(triples "$1")"
-    if [[ ${#all[@]} -gt 1 ]]; then echo "$target/$1/release"; else echo "$target/${all[0]}/release"; fi
+    local names
+    read -ra names <<<"$(triples "$1")"
+    if [[ ${#names[@]} -gt 1 ]]; then echo "$target/$1/release"; else echo "$target/${names[0]}/release"; fi
 }
 
-# Builds the unit libraries for the platform $1.
-build_units() {
-    say "Building the units for $1"
+# Builds the FMU libraries for the platform $1.
+build_libraries() {
+    say "Building the FMUs for $1"
     local triple name packages=()
-    for name in "${unit_libraries[@]}"; do packages+=(--package "reentry-${name//_/-}"); done
+    for name in "${fmu_libraries[@]}"; do packages+=(--package "reentry-${name//_/-}"); done
     for triple in $(triples "$1"); do cross_build "$triple" --release "${packages[@]}"; done
     if [[ $1 != macos-universal ]]; then return; fi
-    for name in "${unit_libraries[@]}"; do join "lib$name.dylib" release; done
+    for name in "${fmu_libraries[@]}"; do join "lib$name.dylib" release; done
 }
 
 # Builds the orchestrator for the platform $1 and puts it into the platform's folder.
@@ -160,24 +160,24 @@ build_program() {
 join() {
     local triple inputs=()
     for triple in $(triples macos-universal); do inputs+=("$target/$triple/$2/$1"); done
-    "$python" scripts/universal.py "$target/macos-universal/$2/$1" "${inputs[@]}"
+    "$python" scripts/packaging/universal.py "$target/macos-universal/$2/$1" "${inputs[@]}"
 }
 
-# Builds and packs the units for the given platforms, each by itself; those for Linux, Windows and
+# Builds and packs the FMUs for the given platforms, each by itself; those for Linux, Windows and
 # macOS also together, as FMI 2.0 has a name for each of these.
-package_units() {
+package_fmus() {
     local platform also host
     host="$(built linux-x86_64)"
     need_cross
     # The descriptions come from the library that this machine can open.
-    build_units linux-x86_64
+    build_libraries linux-x86_64
     build --bin fmu-pack
     for platform in "$@"; do
         if [[ $platform == linux-x86_64 ]]; then
             also=()
             pack_fmus "$host" "$dist/$platform/fmu"
         else
-            build_units "$platform"
+            build_libraries "$platform"
             also=("$(built "$platform")")
             pack_fmus "$host" "$dist/$platform/fmu" --only-also
         fi

@@ -5,13 +5,11 @@ import re
 import subprocess
 import sys
 
+import claims
 import pytest
 
 import named
 from conftest import ROOT
-
-sys.path.append(str(ROOT / "scripts"))
-import claims
 
 PAPERS = claims.papers()
 ITEMS = [(name, item) for name, paper in PAPERS.items() for item in claims.items(paper)]
@@ -32,7 +30,13 @@ def numbers(paper: dict, kind: str) -> set[int]:
 
 
 def test_the_page_is_up_to_date():
-    command = [sys.executable, ROOT / "scripts" / "claims.py", "--check"]
+    command = [sys.executable, ROOT / "scripts" / "pages" / "claims.py", "--check"]
+    checked = subprocess.run(command, capture_output=True, text=True)
+    assert checked.returncode == 0, checked.stderr
+
+
+def test_the_tables_of_parameters_are_up_to_date():
+    command = [sys.executable, ROOT / "scripts" / "pages" / "parameters.py", "--check"]
     checked = subprocess.run(command, capture_output=True, text=True)
     assert checked.returncode == 0, checked.stderr
 

@@ -2,7 +2,6 @@
 and stepping it. Two orders of calls remain for a loop, and what is promised holds in both."""
 
 import math
-import sys
 
 import fmpy.fmi2
 import numpy as np
@@ -11,7 +10,6 @@ import pytest
 from conftest import ROOT
 from fmi import ANGLES, MOMENT, RATES, Loop, Unit, of_step
 
-sys.path.insert(0, str(ROOT / "scripts" / "examples"))
 STEP = 0.04
 CONTROLLERS = ["CRMPC", "DLMPC", "LQR", "FBL", "BTVSMC", "BTVSMC_DO", "SOTVSMC_DO", "TwoLoopSMC"]
 SIXTY_SECONDS = 60.0

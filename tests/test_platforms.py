@@ -219,7 +219,7 @@ def compiled(platform: str, source: str | Path, to: Path, *arguments: str) -> Pa
 def wine(tmp_path_factory):
     """Command and environment that run a program for Windows."""
     if not shutil.which("wine"):
-        pytest.skip("wine is not installed: scripts/install-emulators")
+        pytest.skip("wine is not installed: scripts/install-tools emulators")
     environment = os.environ | {
         "WINEPREFIX": str(tmp_path_factory.mktemp("wine")),
         "WINEDEBUG": "-all",
@@ -239,7 +239,7 @@ def wine(tmp_path_factory):
 def qemu():
     """Command and environment that run a program for Linux on aarch64."""
     if not shutil.which("qemu-aarch64"):
-        pytest.skip("qemu-aarch64 is not installed: scripts/install-emulators")
+        pytest.skip("qemu-aarch64 is not installed: scripts/install-tools emulators")
     return ["qemu-aarch64", "-L", "/usr/aarch64-linux-gnu"], dict(os.environ)
 
 

@@ -7,16 +7,13 @@ import re
 import shutil
 import signal
 import subprocess
-import sys
 import time
 import tomllib
 
 import pytest
+import results as pages
 
 from conftest import EXPERIMENTS, ROOT, TARGET, merged, program
-
-sys.path.append(str(ROOT / "scripts"))
-import results as pages
 
 MEMBERS = 2
 

@@ -1,15 +1,13 @@
-"""scripts/results.py, which writes the tables of docs/results.md. That the page agrees with the runs is
+"""scripts/pages/results.py, which writes the tables of docs/results.md. That the page agrees with the runs is
 tested in test_reproduce.py."""
 
 import re
-import sys
 
+import cells
 import pytest
+import results as pages
 
 from conftest import ROOT
-
-sys.path.append(str(ROOT / "scripts"))
-import results as pages
 
 PAGE = "docs/results.md"
 TEXT = (ROOT / PAGE).read_text(encoding="utf-8")
@@ -18,13 +16,13 @@ TEXT = (ROOT / PAGE).read_text(encoding="utf-8")
 BY_HAND = ["cargo bench -p reentry-control --bench optimisation", "--example worst_time", "--example loop_times"]
 
 
-def study(members: dict[str, list[dict]], expected: dict[str, int], claims=()) -> pages.Study:
+def study(members: dict[str, list[dict]], expected: dict[str, int], claims=()) -> cells.Study:
     runs = {run: {"members": [{"metrics": metrics} for metrics in each]} for run, each in members.items()}
-    return pages.Study({"runs": runs, "values": [], "claims": list(claims)}, expected)
+    return cells.Study({"runs": runs, "values": [], "claims": list(claims)}, expected)
 
 
-def hole(ems: list, expected: int, **spec) -> pages.Hole:
-    return pages.Hole(study({"lqr": [{"ems_deg": value} for value in ems]}, {"lqr": expected}), {"of": "lqr.ems_deg", **spec})
+def hole(ems: list, expected: int, **spec) -> cells.Hole:
+    return cells.Hole(study({"lqr": [{"ems_deg": value} for value in ems]}, {"lqr": expected}), {"of": "lqr.ems_deg", **spec})
 
 
 def test_the_page_and_its_data_name_the_same_tables_and_campaigns():
@@ -65,8 +63,8 @@ def test_a_sentence_is_compared_however_its_lines_are_broken():
     [(7.18e-5, 2, "7.2·10⁻⁵"), (0.0098, 2, "0.0098"), (0.00098, 2, "9.8·10⁻⁴"), (33.64, 2, "34"), (0.01, 2, "0.010"), (1.02, 2, "1.0")],
 )
 def test_significant_digits(number, digits, text):
-    assert pages.significant(number, digits) == text
-    assert pages.number_of(text) == pytest.approx(number, rel=0.06)
+    assert cells.significant(number, digits) == text
+    assert cells.number_of(text) == pytest.approx(number, rel=0.06)
 
 
 def test_all_members_must_agree_to_the_digit():
@@ -99,12 +97,12 @@ def test_verdicts_count_the_checks_that_hold():
     check = lambda held: {"held": held, "of": 1}
     partly = {"verdict": "holds-partly", "checks": [check(1), check(0)]}
     whole, fewer = study({"lqr": [{}]}, {}), study({"lqr": [{}]}, {"lqr": 20})
-    assert pages.Verdict(whole, partly).text == "in part (1 of 2 checks)"
-    assert pages.Verdict(whole, partly).differences("in part (2 of 2 checks)")
-    assert not pages.Verdict(fewer, partly).differences("in part (2 of 2 checks)")
-    said = pages.Verdict(fewer, partly).differences("holds")
+    assert cells.Verdict(whole, partly).text == "in part (1 of 2 checks)"
+    assert cells.Verdict(whole, partly).differences("in part (2 of 2 checks)")
+    assert not cells.Verdict(fewer, partly).differences("in part (2 of 2 checks)")
+    said = cells.Verdict(fewer, partly).differences("holds")
     assert said == ["'holds', the runs give 'in part (1 of 2 checks)'"]
-    assert not pages.Verdict(whole, partly, time=True).differences("holds")
+    assert not cells.Verdict(whole, partly, time=True).differences("holds")
 
 
 def test_a_page_is_not_written_from_fewer_members():

@@ -12,7 +12,7 @@ import fmpy
 import numpy as np
 import pandas as pd
 import pytest
-from reentry_fmus import OrchestratorError, OrchestratorWarning, experiment, experiments, fmu, units
+from reentry_fmus import OrchestratorError, OrchestratorWarning, experiment, experiments, fmu, fmus
 
 COMMAND = Path(sysconfig.get_path("scripts"), "orchestrator" + (".exe" if os.name == "nt" else ""))
 ALPHA = "plant.attitude.alpha"
@@ -20,8 +20,8 @@ ALPHA = "plant.attitude.alpha"
 
 def test_every_fmu_is_there_and_simulates():
     names = "AttitudeEstimator BTVSMC BTVSMC_DO ControlAllocator CRMPC DLMPC FBL LQR ReentryPlant"
-    assert units() == [*names.split(), "SOTVSMC_DO", "TwoLoopSMC"]
-    for name in units():
+    assert fmus() == [*names.split(), "SOTVSMC_DO", "TwoLoopSMC"]
+    for name in fmus():
         assert fmpy.read_model_description(str(fmu(name))).modelName == name
         result = fmpy.simulate_fmu(str(fmu(name)), stop_time=0.2, output_interval=0.04)
         assert len(result) == 6
@@ -253,13 +253,13 @@ import numpy as np
 import pandas as pd
 from typing_extensions import assert_type
 from reentry_fmus import ClosedLoop, Flown, Run, State
-from reentry_fmus import campaign, experiment, experiments, fmu, units
+from reentry_fmus import campaign, experiment, experiments, fmu, fmus
 
 def law(state: State) -> list[float]:
     return [0.0, 1e3 * float(state.rate[0]), 0.0]
 
 assert_type(fmu("CRMPC"), Path)
-assert_type(units(), list[str])
+assert_type(fmus(), list[str])
 assert_type(experiments(), dict[str, str])
 run = experiment(Path("x.toml"), set={"a.b": 1, "a.c": "white"}, fmu={"a": Path("b")}, units="deg")
 assert_type(run, Run)

@@ -5,7 +5,7 @@ import warnings
 
 import numpy as np
 import pytest
-from reentry_fmus import ClosedLoop, UnitError, UnitWarning, experiment, fmu
+from reentry_fmus import ClosedLoop, InstanceError, InstanceWarning, experiment, fmu
 
 ATTITUDE = [f"plant.attitude.{axis}" for axis in ("alpha", "beta", "sigma")]
 RATE = [f"plant.rate.{axis}" for axis in "pqr"]
@@ -167,7 +167,7 @@ def test_nothing_is_left_behind(temporary):
         {"parameters": {"plant.disturbance.bound": -1.0}},
         {"controller": "CRMPC", "parameters": {"controller.disturbance.bound": 1.0}},
     ]:
-        with pytest.raises((ValueError, UnitError)):
+        with pytest.raises((ValueError, InstanceError)):
             ClosedLoop(**arguments)
         assert not list(temporary.iterdir()), arguments
     loop.close()
@@ -208,7 +208,7 @@ def test_nothing_is_left_behind(temporary):
     ],
 )
 def test_what_cannot_be_made_is_refused(arguments, message):
-    with pytest.raises((ValueError, TypeError, OSError, UnitError)) as caught:
+    with pytest.raises((ValueError, TypeError, OSError, InstanceError)) as caught:
         ClosedLoop(**arguments)
     assert message in str(caught.value)
 
@@ -269,10 +269,10 @@ def test_an_fmu_that_fails_says_why_and_can_be_reset():
 
     with ClosedLoop() as loop:
         start = loop.state
-        with pytest.raises(UnitError, match="the attitude angles are singular") as caught:
+        with pytest.raises(InstanceError, match="the attitude angles are singular") as caught:
             spin(loop)
         assert (caught.value.unit, caught.value.call) == ("ReentryPlant", "fmi2DoStep")
-        with pytest.raises(UnitError, match="ReentryPlant: the loop ended.*reset the loop"):
+        with pytest.raises(InstanceError, match="ReentryPlant: the loop ended.*reset the loop"):
             loop.step([0.0, 0.0, 0.0])
         assert np.array_equal(loop.reset().attitude, start.attitude)
         assert loop.step([0.0, 0.0, 0.0]).time == 0.04
@@ -281,7 +281,7 @@ def test_an_fmu_that_fails_says_why_and_can_be_reset():
 def test_warnings_of_fmus_are_warnings():
     # The plant is lighter than the controller is told by far, which no guarantee covers.
     with ClosedLoop(controller="CRMPC", parameters={"plant.inertia.scale": 0.5}) as loop:
-        with pytest.warns(UnitWarning, match="CRMPC: the guarantee is no longer in force"):
+        with pytest.warns(InstanceWarning, match="CRMPC: the guarantee is no longer in force"):
             loop.run(50.0)
     with warnings.catch_warnings(), ClosedLoop(controller="CRMPC") as loop:
         warnings.simplefilter("error")

@@ -8,9 +8,9 @@ selects degrees.
 """
 
 from ._campaign import Campaign, Flown, Search, campaign, falsify
-from ._data import experiments, fmu, units
+from ._data import experiments, fmu, fmus
 from ._experiment import Figure, OrchestratorError, OrchestratorWarning, Run, experiment
-from ._instance import UnitError, UnitWarning
+from ._instance import InstanceError, InstanceWarning
 from ._loop import ClosedLoop, State
 
 __all__ = [
@@ -18,17 +18,17 @@ __all__ = [
     "ClosedLoop",
     "Figure",
     "Flown",
+    "InstanceError",
+    "InstanceWarning",
     "OrchestratorError",
     "OrchestratorWarning",
     "Run",
     "Search",
     "State",
-    "UnitError",
-    "UnitWarning",
     "campaign",
     "experiment",
     "experiments",
     "falsify",
     "fmu",
-    "units",
+    "fmus",
 ]

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
-from ._data import FMUS
+from ._data import FMUS, need
 from ._experiment import Figure, OrchestratorError, Run, orchestrate, recorded
 from ._table import Units, check_units, convert
 
@@ -123,7 +123,7 @@ class Campaign:
         if client is not None:
             from . import cluster
 
-            cluster.fly(self, client, folder, os.fspath(out) if out and is_address else None)
+            cluster.fly(self.call, client, folder, os.fspath(out) if out and is_address else None)
         else:
             threads = [] if jobs is None else ["--jobs", str(jobs)]
             self.call("--out", str(folder), *threads)
@@ -211,17 +211,6 @@ def falsify(
         figure=Figure((folder / "history.svg").read_text("utf-8")),
         folder=folder.absolute(),
     )
-
-
-def need(module: str, extra: str) -> None:
-    """Raises an error if an optional package is not installed."""
-    try:
-        __import__(module)
-    except ModuleNotFoundError as error:
-        if error.name is None or error.name.partition(".")[0] != module:
-            raise
-        message = f'{module} is not installed: pip install "reentry-fmus[{extra}]"'
-        raise ModuleNotFoundError(message, name=module) from None
 
 
 def read_cases(path: Path, units: Units) -> pd.DataFrame:

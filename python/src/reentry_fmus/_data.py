@@ -28,10 +28,10 @@ def hint(wrong: str, right: Iterable[str]) -> str:
     return f"; there are: {listed}"
 
 
-def units() -> list[str]:
+def fmus() -> list[str]:
     """Returns the names of the FMUs, in alphabetical order.
 
-    >>> units()[:3]
+    >>> fmus()[:3]
     ['AttitudeEstimator', 'BTVSMC', 'BTVSMC_DO']
     """
     return sorted((path.stem for path in FMUS.glob("*.fmu")), key=str.lower)
@@ -50,7 +50,7 @@ def fmu(name: str) -> Path:
     Raises:
         ValueError: there is no FMU of this name. The message gives the nearest one.
     """
-    names = units()
+    names = fmus()
     if name not in names:
         raise ValueError(f'there is no FMU "{name}"{hint(name, names)}')
     return FMUS / f"{name}.fmu"
@@ -104,3 +104,14 @@ def experiment_path(experiment: str | os.PathLike[str]) -> str:
         if path.as_posix().endswith(f"/{file}") and path.name != "study.toml"
     ]
     return str(paths[0]) if len(paths) == 1 else os.fspath(experiment)
+
+
+def need(module: str, extra: str) -> None:
+    """Raises an error if an optional package is not installed."""
+    try:
+        __import__(module)
+    except ModuleNotFoundError as error:
+        if error.name is None or error.name.partition(".")[0] != module:
+            raise
+        message = f'{module} is not installed: pip install "reentry-fmus[{extra}]"'
+        raise ModuleNotFoundError(message, name=module) from None

@@ -19,7 +19,7 @@ Value = bool | int | float | str
 enumeration's item."""
 
 
-class UnitError(RuntimeError):
+class InstanceError(RuntimeError):
     """An FMU refused a call. The text is the FMU's message."""
 
     def __init__(self, unit: str, call: str, message: str) -> None:
@@ -30,7 +30,7 @@ class UnitError(RuntimeError):
         """Function of FMI 2.0 that was refused."""
 
 
-class UnitWarning(UserWarning):
+class InstanceWarning(UserWarning):
     """A warning of an FMU."""
 
 
@@ -63,7 +63,7 @@ class Instance:
                 instance.instantiate(callbacks=callbacks, loggingOn=True)
             except Exception as error:
                 instance.freeLibrary()
-                raise UnitError(self.name, "fmi2Instantiate", self._errors(str(error))) from error
+                raise InstanceError(self.name, "fmi2Instantiate", self._errors(str(error))) from error
             self._fmpy = instance
             self.set(parameters, "parameter")
         except BaseException:
@@ -96,10 +96,10 @@ class Instance:
         try:
             result = function(*arguments, **named)
         except FMICallException as error:
-            raise UnitError(self.name, error.function, self._errors(str(error))) from None
+            raise InstanceError(self.name, error.function, self._errors(str(error))) from None
         for status, message in self._messages:
             if status == fmi2.fmi2Warning:
-                warnings.warn(f"{self.name}: {message}", UnitWarning, stacklevel=4)
+                warnings.warn(f"{self.name}: {message}", InstanceWarning, stacklevel=4)
         return result
 
     # Variables

@@ -12,7 +12,7 @@ import numpy.typing as npt
 import pandas as pd
 
 from ._data import fmu_path, hint
-from ._instance import Instance, UnitError, Value
+from ._instance import Instance, InstanceError, Value
 from ._table import Units, check_units, convert
 
 Vector = npt.NDArray[np.float64]
@@ -93,7 +93,7 @@ class ClosedLoop:
 
     Raises:
         ValueError: There is no such FMU, variable or item.
-        UnitError: An FMU refused a parameter.
+        InstanceError: An FMU refused a parameter.
     """
 
     def __init__(
@@ -108,7 +108,7 @@ class ClosedLoop:
         by_component = split(parameters or {}, has_controller=controller is not None)
         self._step = float(step)
         self._is_open = True
-        self._failure: UnitError | None = None
+        self._failure: InstanceError | None = None
         self._has_controller = controller is not None
         self._parameters = by_component
         self._plant = Instance(fmu_path(plant), by_component["plant"])
@@ -180,12 +180,12 @@ class ClosedLoop:
         Raises:
             ValueError: The moment is not three finite numbers, or the loop is closed.
             TypeError: A moment is missing, or is given although there is a controller.
-            UnitError: An FMU refused the moment or the step. `reset` makes the loop usable again.
+            InstanceError: An FMU refused the moment or the step. `reset` makes the loop usable again.
         """
         self._check_open()
         if self._failure is not None:
             name, call = self._failure.unit, self._failure.call
-            raise UnitError(name, call, "the loop ended when this FMU failed: reset the loop")
+            raise InstanceError(name, call, "the loop ended when this FMU failed: reset the loop")
         if moment is None and not self._has_controller:
             raise TypeError("step needs a moment, because the loop has no controller")
         if moment is not None:
@@ -194,7 +194,7 @@ class ClosedLoop:
             self._moment = vector(moment).tolist()
         try:
             self._advance()
-        except UnitError as failure:
+        except InstanceError as failure:
             # The instances are at different times now.
             self._failure = failure
             raise

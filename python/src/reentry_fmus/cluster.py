@@ -19,13 +19,12 @@ import time
 import uuid
 import zipfile
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from importlib.metadata import version
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from ._campaign import need
-from ._data import program
+from ._data import need, program
 
 need("distributed", "cluster")
 
@@ -41,10 +40,10 @@ from distributed import (  # noqa: E402
     wait,
 )
 
-if TYPE_CHECKING:
-    from ._campaign import Campaign
-
 __all__ = ["ClusterError", "fly"]
+
+Command = Callable[..., str]
+"""Runs `orchestrator campaign` for a campaign with further arguments, and returns what it prints."""
 
 TASK = 10.0
 """Intended duration of a task, s: long compared with the start of the program (about 0.1 s), and
@@ -86,14 +85,14 @@ def place(worker: Worker, name: str) -> Path:
     return Path(worker.local_directory) / name
 
 
-def fly(campaign: Campaign, client: Client, folder: Path, address: str | None = None) -> None:
+def fly(campaign: Command, client: Client, folder: Path, address: str | None = None) -> None:
     """Flies the missing parts of a campaign on the workers of a client, and merges all parts.
 
     Parts come back through Dask and are stored in the folder at once. With an address the workers
     store them there, and they are fetched from there.
 
     Args:
-        campaign: The campaign.
+        campaign: Command of the campaign.
         client: Client of a Dask cluster; not an asynchronous one.
         folder: Folder of the results on this machine.
         address: Address of a folder that all workers and this machine reach, as fsspec takes it.
@@ -131,22 +130,22 @@ def fly(campaign: Campaign, client: Client, folder: Path, address: str | None = 
     finally:
         if is_sent and client.status == "running":
             client.unregister_worker_plugin(bundle.name)
-    campaign.call("--out", str(folder))
+    campaign("--out", str(folder))
     if store is not None:
         for name in ("cases.parquet", "summary.json", "report.html"):
             store.keep(folder / name, name)
 
 
-def work(campaign: Campaign, folder: Path) -> list[tuple[int, int]]:
+def work(campaign: Command, folder: Path) -> list[tuple[int, int]]:
     """Returns the parts that are missing, each with its first case and the one after its last."""
-    left: dict[str, Any] = json.loads(campaign.call("--work", "--out", str(folder)))
+    left: dict[str, Any] = json.loads(campaign("--work", "--out", str(folder)))
     return [(first, last) for first, last in left["missing"]]
 
 
-def pack(campaign: Campaign) -> Bundle:
+def pack(campaign: Command) -> Bundle:
     """Packs campaign, experiment and FMUs, with all that they extend."""
     with tempfile.TemporaryDirectory(prefix="reentry-") as temporary:
-        campaign.call("--bundle", temporary)
+        campaign("--bundle", temporary)
         content = io.BytesIO()
         with zipfile.ZipFile(content, "w", zipfile.ZIP_STORED) as archive:
             for path in sorted(Path(temporary).iterdir()):

@@ -1,6 +1,6 @@
 """Plants each fault of tests/mutations.toml in a copy of the sources, and checks that a test fails.
 
-    scripts/mutate [N ...]      all faults, or those with these numbers, from 1 on
+    python scripts/mutate.py [N …]      all faults, or those with these numbers, from 1 on
 
 The exit code is 1 if a fault survives. The copy and its build are in target/mutations.
 """
@@ -23,7 +23,8 @@ BUILD = ROOT / "target" / "mutations" / "target"
 
 
 def copy_sources() -> None:
-    """Brings the copy up to date; files that are the same keep their times, so that they are not compiled again."""
+    """Brings the copy up to date; files that are the same keep their times, so that they are not
+    compiled again."""
     listed = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, check=True, capture_output=True, text=True)
     for name in filter(None, listed.stdout.split("\0")):
         source, target = ROOT / name, COPY / name
@@ -33,7 +34,8 @@ def copy_sources() -> None:
 
 
 def failing(package: str, tests: list[str]) -> str | None:
-    """Returns what fails in the unit tests of a package and in these of its other tests, or None if all of them pass."""
+    """Returns what fails in the tests within a package and in these of its other tests, or None if
+    all of them pass."""
     chosen = [part for name in tests for part in ("--test", name)]
     command = ["cargo", "test", "--locked", "--target-dir", BUILD, "-p", package, "--lib", *chosen]
     tested = subprocess.run(command, cwd=COPY, capture_output=True, text=True)

@@ -29,7 +29,7 @@ if sys.version_info >= (3, 11):
 else:
     import tomli as tomllib
 
-ROOT = Path(__file__).resolve().parent.parent
+ROOT = Path(__file__).resolve().parents[2]
 DATA = ROOT / "docs" / "claims"
 PAGE = ROOT / "docs" / "claims.md"
 STUDIES = ROOT / "orchestrator" / "experiments"
@@ -54,7 +54,7 @@ KEYS = {"place", "says", "setup", "verdict", "number", "shown", "study", "page",
 HEAD = """\
 # Every item of the papers, and its verdict
 
-<!-- Written by scripts/claims.py from docs/claims: change that, not this page. -->
+<!-- Written by scripts/pages/claims.py from docs/claims: change that, not this page. -->
 
 This page has a row for each numbered equation, assumption, definition, lemma, theorem, remark,
 figure and table of the three papers, and for each claim of their text. A row has the place, the
@@ -197,7 +197,7 @@ def main() -> int:
     if "--check" in sys.argv[1:]:
         if PAGE.read_text(encoding="utf-8") == written:
             return 0
-        print("docs/claims.md is out of date: run scripts/claims.py", file=sys.stderr)
+        print("docs/claims.md is out of date: run scripts/pages/claims.py", file=sys.stderr)
         return 1
     PAGE.write_text(written, encoding="utf-8")
     return 0

@@ -1,8 +1,8 @@
 """Writes the tables of parameters in docs/ from the committed descriptions of the FMUs, between the lines
 `<!-- parameters of NAME … -->` and `<!-- end -->`. The descriptions follow from the declarations in Rust.
 
-    python scripts/parameters.py            # writes the tables
-    python scripts/parameters.py --check    # fails if one is not up to date
+    python scripts/pages/parameters.py            # writes the tables
+    python scripts/pages/parameters.py --check    # fails if one is not up to date
 """
 
 import math
@@ -11,7 +11,7 @@ import sys
 from pathlib import Path
 from xml.etree import ElementTree
 
-ROOT = Path(__file__).resolve().parent.parent
+ROOT = Path(__file__).resolve().parents[2]
 HEAD = "| parameter | start | range | meaning |\n|---|---|---|---|"
 # What all controllers have is described once, on the page of CRMPC.
 COMMON = re.compile(r"reference\.|inertia\.I|limit\.|saturation$|delay$|measurement\.age$")
@@ -104,7 +104,7 @@ def main():
             if "--check" not in sys.argv:
                 page.write_text(after)
     if "--check" in sys.argv and stale:
-        sys.exit(f"docs/{', docs/'.join(stale)}: tables of parameters are not up to date; run scripts/parameters.py")
+        sys.exit(f"docs/{', docs/'.join(stale)}: tables of parameters are not up to date; run scripts/pages/parameters.py")
 
 
 if __name__ == "__main__":

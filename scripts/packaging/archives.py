@@ -22,7 +22,7 @@ import zipfile
 from collections.abc import Iterator
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parent.parent
+ROOT = Path(__file__).resolve().parents[2]
 # The operating systems in words, by the platforms of the orchestrator's archives.
 PLATFORMS = {
     "linux-x86_64": "Linux on x86-64, glibc 2.17 or later",
@@ -80,7 +80,7 @@ class Fault(Exception):
     """A fault of the files that a release needs."""
 
 
-def fmus_of(dist: Path, platform: str) -> Iterator[Entry]:
+def packed_fmus(dist: Path, platform: str) -> Iterator[Entry]:
     for path in (dist / platform / "fmu").glob("*.fmu"):
         yield path.name, path.read_bytes(), 0o644
 
@@ -90,8 +90,8 @@ def check(dist: Path) -> None:
     described = {path.stem: path.read_bytes() for path in ROOT.glob("fmu-*/generated/*.xml")}
     platforms = (*PLATFORMS, *IN_WHEELS)
     # Wheels may have FMUs of their own.
-    of_wheels = [folder for each in platforms if (folder := dist / each / "fmu-wheel").is_dir()]
-    for folder in [*(dist / each / "fmu" for each in ("all", *platforms)), *of_wheels]:
+    wheel_folders = [folder for each in platforms if (folder := dist / each / "fmu-wheel").is_dir()]
+    for folder in [*(dist / each / "fmu" for each in ("all", *platforms)), *wheel_folders]:
         for name, description in sorted(described.items()):
             path = folder / f"{name}.fmu"
             if not path.is_file():
@@ -113,7 +113,7 @@ def program(dist: Path, platform: str) -> Path:
     )
 
 
-def licences(output: Path) -> Iterator[Entry]:
+def licence_files(output: Path) -> Iterator[Entry]:
     for path in [*(ROOT / name for name in LICENCES), *(output / name for name in NOTICES)]:
         yield path.name, path.read_bytes(), 0o644
 
@@ -156,31 +156,31 @@ def write_fmus(dist: Path, output: Path, version: str, epoch: int) -> None:
         ("all", "", "Linux and Windows on x86-64 and for macOS"),
         ("linux-aarch64", "-linux-aarch64", PLATFORMS["linux-aarch64"]),
     ):
-        said = readme(FMUS_README, version=version, systems=systems)
-        entries = [*fmus_of(dist, platform), *licences(output), said]
+        page = readme(FMUS_README, version=version, systems=systems)
+        entries = [*packed_fmus(dist, platform), *licence_files(output), page]
         write(output / f"reentry-fmus-{version}{suffix}.zip", entries, epoch)
 
 
 def write_programs(dist: Path, output: Path, version: str, epoch: int) -> None:
     """Writes the archives of the orchestrator, with all that it finds beside itself."""
-    shown = []
+    experiments = []
     source = ROOT / "orchestrator"
     # Editors find the schema by the first line of each experiment.
     for folder in ("experiments", "schema"):
         for path in (source / folder).rglob("*"):
             if path.suffix in (".toml", ".csv", ".json"):
-                shown.append((path.relative_to(source).as_posix(), path.read_bytes(), 0o644))
+                experiments.append((path.relative_to(source).as_posix(), path.read_bytes(), 0o644))
     for platform, systems in PLATFORMS.items():
         binary = program(dist, platform)
         name = binary.stem if binary.suffix else f"./{binary.name}"
-        said = readme(PROGRAM_README, version=version, systems=systems, program=name)
-        fmus = [(f"fmu/{name}", content, mode) for name, content, mode in fmus_of(dist, platform)]
+        page = readme(PROGRAM_README, version=version, systems=systems, program=name)
+        fmus = [(f"fmu/{name}", content, mode) for name, content, mode in packed_fmus(dist, platform)]
         entries = [
             (binary.name, binary.read_bytes(), 0o755),
-            *shown,
+            *experiments,
             *fmus,
-            *licences(output),
-            said,
+            *licence_files(output),
+            page,
         ]
         suffix = "zip" if platform.startswith("windows") else "tar.gz"
         write(output / f"orchestrator-{version}-{platform}.{suffix}", entries, epoch)

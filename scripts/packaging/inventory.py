@@ -63,7 +63,7 @@ class Fault(Exception):
     """A licence that keeps the release from being made, or a failure of cargo."""
 
 
-def said(*command: str) -> str:
+def output_of(*command: str) -> str:
     """Returns what a command prints."""
     done = subprocess.run(command, capture_output=True, text=True)
     if done.returncode != 0:
@@ -79,13 +79,13 @@ def linked(triples: list[str]) -> list[dict[str, Any]]:
         packages = [argument for root in ROOTS for argument in ("--package", root)]
         # Procedural macros, and what builds need, are not in the binaries.
         edges = ["--edges", "normal,no-proc-macro", "--prefix", "none", "--format", "{p}"]
-        for line in said(
+        for line in output_of(
             "cargo", "tree", "--locked", "--target", triple, *packages, *edges
         ).splitlines():
             if line.strip():
                 name, version = line.split()[:2]
                 linked_versions.add((name, version.removeprefix("v")))
-    metadata = json.loads(said("cargo", "metadata", "--locked", "--format-version", "1"))
+    metadata = json.loads(output_of("cargo", "metadata", "--locked", "--format-version", "1"))
     described = [
         each
         for each in metadata["packages"]
@@ -155,11 +155,11 @@ def texts(package: dict[str, Any], sysroot: Path) -> list[str]:
     if package["source"] is None:
         files = set(Path().glob("LICENSE-*"))
     ordered = sorted(path for path in files if path.is_file() and path.suffix != ".rs")
-    own_texts = [
+    licence_texts = [
         path.read_text("utf-8", "replace").replace("\r\n", "\n").strip() for path in ordered
     ]
-    if own_texts:
-        return own_texts
+    if licence_texts:
+        return licence_texts
     # The Rust distribution has the texts of SPDX for what its own sources use.
     folder = sysroot / "share" / "doc" / "rust" / "licenses"
     symbols = [str(symbol) for symbol in expression(package).get_symbols()]
@@ -175,7 +175,7 @@ def texts(package: dict[str, Any], sysroot: Path) -> list[str]:
 def licences(packages: list[dict[str, Any]], others: dict[str, Path]) -> str:
     """Returns the page with the licences of the packages and of what else is linked in, which is
     given with its texts."""
-    sysroot = Path(said("rustc", "--print", "sysroot").strip())
+    sysroot = Path(output_of("rustc", "--print", "sysroot").strip())
     # Texts that differ in their line breaks alone are one.
     users: dict[str, tuple[str, list[str]]] = {}
     lines = [
@@ -242,7 +242,7 @@ def bill(packages: list[dict[str, Any]], version: str, epoch: int) -> str:
         bom_ref="release",
         licenses=[LicenseExpression("MIT OR Apache-2.0")],
     )
-    compiler = said("rustc", "--version").split()[1]
+    compiler = output_of("rustc", "--version").split()[1]
     standard = Component(type=ComponentType.LIBRARY, name="std", version=compiler, bom_ref="std")
     components = {package["id"]: component(package, sums) for package in packages}
     bom.components.update([standard, *components.values()])
@@ -261,7 +261,7 @@ def bill(packages: list[dict[str, Any]], version: str, epoch: int) -> str:
     return text
 
 
-def of_the_compiler(zig: Path) -> dict[str, Path]:
+def compiler_licences(zig: Path) -> dict[str, Path]:
     """Returns what the cross compiler links in beside the packages, with the licence texts."""
     licence_files = {
         "Zig's start-up code and compiler-rt": zig / "LICENSE",
@@ -279,7 +279,7 @@ def main(output: str, zig: str, *triples: str) -> None:
     packages = linked(list(triples))
     check(packages)
     (version,) = {package["version"] for package in packages if package["name"] == "orchestrator"}
-    page = licences(packages, of_the_compiler(Path(zig)))
+    page = licences(packages, compiler_licences(Path(zig)))
     Path(output, "LICENSES.txt").write_text(page, "utf-8", newline="\n")
     Path(output, "sbom.cdx.json").write_text(bill(packages, version, epoch), "utf-8", newline="\n")
     print(f"{len(packages)} packages are linked in; their licences are allowed")
