@@ -118,7 +118,7 @@ pub(crate) fn fly(asked: &Fly, out: &mut impl Write, interrupt: &Interrupt) -> R
     }
     if asked.work {
         let work =
-            serde_json::to_string(&run::work(&plan, &folder)).map_err(std::io::Error::from)?;
+            serde_json::to_string(&run::remaining(&plan, &folder)).map_err(std::io::Error::from)?;
         writeln!(out, "{work}")?;
         return Ok(());
     }

@@ -13,14 +13,12 @@ use cosim::files;
 use cosim::interrupt::Interrupt;
 use cosim_report::folder::Folder;
 use cosim_report::progress::Parts;
-use parking_lot::Mutex;
-use rayon::ThreadPoolBuilder;
+use cosim_report::work::{self, Worked};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fs;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 
 /// Names of the files of a campaign's results.
@@ -175,7 +173,7 @@ impl<'a> State<'a> {
 }
 
 /// Returns the remaining work of a campaign.
-pub fn work(plan: &Plan, out: &Path) -> Work {
+pub fn remaining(plan: &Plan, out: &Path) -> Work {
     let (cases, missing, _) = State::new(plan, out).needed();
     Work { cases, missing: missing.into_iter().map(|part| [part.start, part.end]).collect() }
 }
@@ -278,31 +276,16 @@ fn fly_parts(
     let done = state.broken_counts.keys().count() as u64 * parts::LENGTH;
     let done = done.min(plan.cases().saturating_sub(left));
     let progress = Parts::new("cases", &plan.campaign.title, done + left, done, options.quiet);
-    let next = AtomicUsize::new(0);
-    let broken_counts = Mutex::new(BTreeMap::new());
-    let failure: Mutex<Option<Single>> = Mutex::new(None);
-    let pool = ThreadPoolBuilder::new()
-        .num_threads(threads(plan, options.jobs).min(missing.len()))
-        .build()
-        .map_err(|error| Single::experiment(error.to_string()))?;
-    let work = || -> Result<(), Single> {
-        // Each thread has instances of its own, from an archive that it unpacks itself.
-        let mut flight = Flight::new(plan, resets, interrupt)?;
-        while failure.lock().is_none() {
-            let Some(part) = missing.get(next.fetch_add(1, Ordering::Relaxed)) else { break };
-            let broken = parts::fly(plan, out, part, &mut flight, |_| progress.advance(1))?;
-            broken_counts.lock().insert(part.start, broken);
-        }
-        Ok(())
-    };
-    pool.broadcast(|_| {
-        if let Err(error) = work() {
-            failure.lock().get_or_insert(error);
-        }
-    });
+    let Worked { results, failures } = work::on_parts(
+        missing,
+        threads(plan, options.jobs),
+        || Flight::new(plan, resets, interrupt),
+        |flight, part| parts::fly(plan, out, part, flight, |_| progress.advance(1)),
+        |_| false,
+    );
     progress.finish();
-    state.broken_counts.append(&mut broken_counts.lock());
-    match failure.into_inner() {
+    state.broken_counts.extend(results.into_iter().map(|(at, broken)| (missing[at].start, broken)));
+    match failures.into_values().next() {
         None => Ok(()),
         Some(Single::Interrupted { request, .. }) => {
             let done = (state.broken_counts.len() as u64 * parts::LENGTH).min(plan.cases());
@@ -321,10 +304,7 @@ pub(crate) fn threads(plan: &Plan, jobs: usize) -> usize {
         );
         return 1;
     }
-    match jobs {
-        0 => std::thread::available_parallelism().map_or(1, std::num::NonZero::get),
-        jobs => jobs,
-    }
+    work::threads(jobs)
 }
 
 /// Merges the parts of the first `cases` cases into one table.

@@ -13,3 +13,4 @@ pub mod plot;
 pub mod progress;
 pub mod study;
 pub mod summary;
+pub mod work;

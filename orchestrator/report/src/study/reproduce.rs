@@ -14,14 +14,14 @@ use super::stored::{self, StoredOutcome};
 use crate::error::Error;
 use crate::folder::Folder;
 use crate::progress::Parts;
+use crate::work::{self, Worked};
 use cosim::error::Error as Single;
 use cosim::files;
 use cosim::interrupt::Interrupt;
 use cosim::search;
 use cosim::system::{CheckedComponent, Opened};
-use parking_lot::Mutex;
 use serde_json::{Value, json};
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -152,7 +152,7 @@ pub fn reproduce(study: &Study, options: &Options) -> Result<StudyReport, Error>
     }
 
     let interrupt = &options.interrupt;
-    let work = Work {
+    let all_work = Work {
         study,
         preparations: &preparations,
         keys: &keys,
@@ -162,14 +162,11 @@ pub fn reproduce(study: &Study, options: &Options) -> Result<StudyReport, Error>
     };
     let is_timed = |part: &Part| study.runs[part.run].timed && part.range.start == 0;
     let (timed, others): (Vec<Part>, Vec<Part>) = missing.iter().cloned().partition(is_timed);
-    let threads = match options.jobs {
-        0 => std::thread::available_parallelism().map_or(1, std::num::NonZero::get),
-        jobs => jobs,
-    };
+    let threads = work::threads(options.jobs);
     let computed = (timed.len() + others.len(), done.len());
     // Timed parts have the machine for themselves.
     for (parts, threads) in [(timed, 1), (others, threads)] {
-        done.extend(work.run(parts, threads)?);
+        done.extend(all_work.run(&parts, threads)?);
         if let Some(request) = interrupt.asked() {
             progress.finish();
             return Err(Error::Unfinished {
@@ -324,48 +321,29 @@ struct Work<'a> {
 type Done = BTreeMap<(usize, u32), Outcome>;
 
 impl Work<'_> {
-    fn run(&self, parts: Vec<Part>, threads: usize) -> Result<Done, Error> {
-        let queue = Mutex::new(VecDeque::from(parts));
-        let done = Mutex::new(Done::new());
-        let failed: Mutex<BTreeMap<(usize, u32), Error>> = Mutex::default();
-        std::thread::scope(|scope| {
-            for _ in 0..threads.max(1) {
-                scope.spawn(|| {
-                    // An archive is opened by each thread for itself, because its instances
-                    // stay in that thread.
-                    let mut opened = Opened::default();
-                    loop {
-                        let Some(part) = queue.lock().pop_front() else { break };
-                        let place = (part.run, part.range.start);
-                        match self.part(&part, &mut opened) {
-                            Ok(outcome) => {
-                                done.lock().insert(place, outcome);
-                            }
-                            // The work was asked to end; parts that the other threads finish are
-                            // kept.
-                            Err(Error::Single(Single::Interrupted { .. })) => queue.lock().clear(),
-                            Err(error) => {
-                                // An FMU that failed does not concern the other runs, which are
-                                // kept.
-                                let is_of_fmu =
-                                    matches!(error, Error::Run { source: Single::Call { .. }, .. });
-                                if !is_of_fmu {
-                                    queue.lock().clear();
-                                }
-                                failed.lock().insert(place, error);
-                            }
-                        }
-                    }
-                });
-            }
-        });
-        let mut failed = failed.into_inner().into_values();
-        let Some(first) = failed.next() else { return Ok(done.into_inner()) };
-        for error in failed.by_ref().take(FAILURES_REPORTED) {
+    fn run(&self, parts: &[Part], threads: usize) -> Result<Done, Error> {
+        let is_of_fmu = |error: &Error| {
+            // An FMU that failed does not concern the other runs, which are kept.
+            matches!(error, Error::Run { source: Single::Call { .. }, .. })
+        };
+        let Worked { results, mut failures } = work::on_parts(
+            parts,
+            threads,
+            || Ok(Opened::default()),
+            |opened, part| self.part(part, opened),
+            is_of_fmu,
+        );
+        failures.retain(|_, error| !matches!(error, Error::Single(Single::Interrupted { .. })));
+        let mut failures = failures.into_values();
+        let Some(first) = failures.next() else {
+            let place = |place: usize| (parts[place].run, parts[place].range.start);
+            return Ok(results.into_iter().map(|(at, outcome)| (place(at), outcome)).collect());
+        };
+        for error in failures.by_ref().take(FAILURES_REPORTED) {
             tracing::error!("{error}");
         }
-        if failed.len() > 0 {
-            tracing::error!("{} further parts failed", failed.len());
+        if failures.len() > 0 {
+            tracing::error!("{} further parts failed", failures.len());
         }
         Err(first)
     }
