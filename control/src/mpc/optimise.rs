@@ -24,7 +24,7 @@ impl<const O: usize> Optimiser<O> {
         self.without_constraints(start, affine);
         let outside =
             self.layout.ends_outside(&self.solution.trajectory, bounded.terminal_radius());
-        let mut search = Search { outside, ..Search::default() };
+        let mut search = Search::new(outside);
         let shortcuts = self.settings.shortcuts && self.layout.start.is_none();
         let status = shortcuts::in_order()
             .into_iter()
@@ -52,7 +52,7 @@ impl<const O: usize> Optimiser<O> {
             }
             // From here on the bounds are those about the trajectory that the search has left.
             self.linearisation_point.clone_from(&self.solution.trajectory);
-            (search.follows, search.pass) = (false, 0);
+            search.restart_passes();
         }
         let by_any = |this: &mut Self, sample: &Sample<O>, search: &mut Search| {
             this.by_riccati(sample, search).or_else(|| this.by_cone(sample, search))

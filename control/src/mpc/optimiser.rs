@@ -125,19 +125,21 @@ impl<const O: usize> Optimiser<O> {
             return None;
         }
         search.window = None;
-        if !search.warm {
+        if !search.is_warm() {
             self.without_constraints(sample.start, sample.affine);
         }
         let outcome = self.interior_point(sample, search, 0..self.layout.horizon);
         if outcome.solved() {
             return Some(SolverStatus::Constrained);
         }
-        if search.warm && !self.is_exhausted() {
+        if search.is_warm() && !self.is_exhausted() {
             // The first guess was misleading.
             self.begin_cold(sample, search);
             return self.by_riccati(sample, search);
         }
-        search.hopeless = outcome.hopeless() && !search.warm;
+        if outcome.hopeless() && !search.is_warm() {
+            search.give_up();
+        }
         None
     }
 
@@ -148,7 +150,7 @@ impl<const O: usize> Optimiser<O> {
         sample: &Sample<O>,
         search: &mut Search,
     ) -> Option<SolverStatus> {
-        if search.hopeless {
+        if search.is_hopeless() {
             return None;
         }
         let limits = self.budget.of_the_cone()?;
@@ -168,7 +170,7 @@ impl<const O: usize> Optimiser<O> {
 
     /// Returns whether the Riccati method may begin.
     pub(super) fn may_iterate(&self, search: &Search) -> bool {
-        self.settings.method == Method::Riccati && !search.hopeless && !self.is_exhausted()
+        self.settings.method == Method::Riccati && !search.is_hopeless() && !self.is_exhausted()
     }
 
     /// Runs the Riccati method on the intervals `range`, with the present bounds. The rest of the
@@ -205,13 +207,20 @@ impl<const O: usize> Optimiser<O> {
         let outcome = if self.settings.nonlinearity == Nonlinearity::Exact {
             // A warm search knows its window; bounds that depend on the trajectory rarely hold
             // beyond it.
-            let extends = !search.warm || !bounded.depends_on_trajectory();
+            let extends = !search.is_warm() || !bounded.depends_on_trajectory();
             let rest = Rest { unconstrained: &*unconstrained, affine: sample.affine };
             let rest = Some(&rest).filter(|_| extends && radius.is_none());
-            riccati.solve(&problem, solution, first, search.warm, budget, rest)
+            riccati.solve(&problem, solution, first, search.is_warm(), budget, rest)
         } else {
             linearised.set(&within, linearisation_point, first);
-            riccati.solve(&problem.with(&*linearised), solution, first, search.warm, budget, None)
+            riccati.solve(
+                &problem.with(&*linearised),
+                solution,
+                first,
+                search.is_warm(),
+                budget,
+                None,
+            )
         };
         search.iterations += outcome.iterations();
         outcome

@@ -25,12 +25,12 @@ impl<const O: usize> Optimiser<O> {
     /// Chooses the first guess and the trajectory about which the first bounds are computed. This
     /// is done once, by the first solver that iterates.
     pub(super) fn prepare(&mut self, sample: &Sample<O>, search: &mut Search) {
-        if replace(&mut search.begun, true) {
+        if search.has_begun() {
             return;
         }
         let is_given = self.layout.start.is_none();
-        search.hopeless = is_given && sample.bounded.out_of_reach(sample.start);
-        if search.hopeless {
+        if is_given && sample.bounded.out_of_reach(sample.start) {
+            search.give_up();
             return;
         }
         self.begin_cold(sample, search);
@@ -86,7 +86,7 @@ impl<const O: usize> Optimiser<O> {
         for k in range {
             [multipliers.state[k], multipliers.input[k]] = active[k];
         }
-        (search.warm, search.follows) = (true, false);
+        search.begin_warm();
     }
 
     /// Lets the next search begin without the multipliers of a similar problem. Its guess may be
@@ -96,7 +96,7 @@ impl<const O: usize> Optimiser<O> {
             None => sample.bounded.follows_at_first(),
             Some(_) => sample.bounded.depends_on_trajectory(),
         };
-        (search.warm, search.follows) = (false, follows && self.settings.is_exact_riccati());
+        search.begin_cold(follows && self.settings.is_exact_riccati());
     }
 
     /// Repeats `solve_pass` with the bounds (and linearised constraints) computed about its last
@@ -113,7 +113,7 @@ impl<const O: usize> Optimiser<O> {
             if self.is_final(sample, search) {
                 return Some(status);
             }
-            search.warm = true;
+            search.go_on();
         }
     }
 

@@ -41,8 +41,11 @@ fn in_windows<const O: usize>(
         if !outcome.solved() {
             // If no trajectory satisfies the norm constraints within the window, none does over the
             // horizon, unless the first guess was misleading.
-            search.hopeless = outcome.hopeless() && !search.warm;
+            let is_hopeless = outcome.hopeless() && !search.is_warm();
             optimiser.begin_cold(sample, search);
+            if is_hopeless {
+                search.give_up();
+            }
             return None;
         }
         window.end = window.start + optimiser.riccati.horizon();
@@ -56,7 +59,7 @@ fn in_windows<const O: usize>(
         let more = optimiser.layout.window(violated, outside);
         search.window = Some(window.clone());
         let Some(more) = more else { return Some(SolverStatus::Constrained) };
-        search.warm = true;
+        search.go_on();
         search.window = Some(window.start.min(more.start)..window.end.max(more.end));
     }
     None
