@@ -63,9 +63,9 @@ pub struct Calibration {
     pub status: CalibrationStatus,
     /// Correction that is in force.
     pub correction: Correction,
-    /// Residual of the fit, see [`ellipsoid::Fit`].
+    /// Residual of the fit, see [`super::ellipsoid::Fit`].
     pub residual: f64,
-    /// Condition number of the fit, see [`ellipsoid::Fit`].
+    /// Condition number of the fit, see [`super::ellipsoid::Fit`].
     pub condition: f64,
 }
 

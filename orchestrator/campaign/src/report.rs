@@ -89,6 +89,7 @@ fn page(
     ranked: Option<&(String, Vec<u64>)>,
 ) -> String {
     let campaign = &plan.campaign;
+    let design = serde_json::json!(campaign.design);
     let ended = |name: &str| findings.status.get(name).copied().unwrap_or(0);
     let markup = html! {
         (DOCTYPE)
@@ -164,7 +165,7 @@ fn page(
                             } }
                         }
                         p.note {
-                            "Design: " (format!("{:?}", campaign.design)) ", seed " (campaign.seed)
+                            "Design: " (design.as_str().unwrap_or_default()) ", seed " (campaign.seed)
                             ". A case depends on the seed and its number alone. "
                             code { "cases.parquet" } " holds all cases, and " code { "summary.json" } " the numbers of this page. "
                             "Written by orchestrator " (env!("CARGO_PKG_VERSION")) "."
