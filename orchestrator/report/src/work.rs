@@ -23,9 +23,9 @@ pub fn threads(jobs: usize) -> usize {
     }
 }
 
-/// Works on parts in their order. Each thread begins with a state of its own, because instances stay
-/// in the thread that made them. After a failure that does not `go_on` no further part is begun;
-/// parts that other threads are working on are finished.
+/// Works on parts in their order. Each thread begins with a state of its own, because instances
+/// stay in the thread that made them. After a failure that does not `go_on` no further part is
+/// begun; parts that other threads are working on are finished.
 pub fn on_parts<P: Sync, S, R: Send, E: Send>(
     parts: &[P],
     threads: usize,

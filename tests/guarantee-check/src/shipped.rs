@@ -40,8 +40,8 @@ impl Scan {
     /// Reads every TOML file below `folder`.
     ///
     /// # Errors
-    /// Names the file that cannot be read, and what is wrong with it or with a parameter of CRMPC in
-    /// it.
+    /// Names the file that cannot be read, and what is wrong with it or with a parameter of CRMPC
+    /// in it.
     pub fn new(folder: &Path) -> Result<Self, String> {
         let mut scan = Self::default();
         for file in files(folder)? {
