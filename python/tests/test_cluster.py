@@ -318,7 +318,7 @@ def test_another_version_on_a_worker_is_refused(file, client, tmp_path, monkeypa
 def test_what_the_program_says_on_a_worker_comes_back(file, client, tmp_path, monkeypatch):
     other = file.with_name("other.toml")
     other.write_text(file.read_text().replace(f"cases = {CASES}", "cases = 100"))
-    bundle = cluster.pack(campaign(other))
+    bundle = cluster.pack(campaign(other).call)
     monkeypatch.setattr(cluster, "pack", lambda campaign: bundle)
     with pytest.raises(ClusterError, match=r"cases \d+ to \d+: tcp://.*within 0\.\.100"):
         campaign(file).run(client, out=tmp_path / "out")
