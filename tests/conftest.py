@@ -74,7 +74,7 @@ def example(name: str) -> Path:
 
 @pytest.fixture(scope="session")
 def tool():
-    """Path of a tool that came with a Python package."""
+    """Path of a program that came with a Python package."""
 
     def path(name: str) -> Path:
         found = Path(sys.executable).parent / (name + (".exe" if os.name == "nt" else ""))
@@ -86,7 +86,7 @@ def tool():
 
 @pytest.fixture(scope="session")
 def libpython() -> str:
-    """Path of Python's shared library. Units by PythonFMU expect the importer to have it in the
+    """Path of Python's shared library. FMUs by PythonFMU expect the importer to have it in the
     process."""
     name, folder, platform = (sysconfig.get_config_var(key) or "" for key in ("INSTSONAME", "LIBDIR", "MULTIARCH"))
     found = [path for path in (Path(folder, name), Path(folder, platform, name)) if ".so" in name and path.is_file()]
@@ -168,7 +168,7 @@ def pytest_addoption(parser):
 def pytest_configure(config):
     config.addinivalue_line(
         "markers",
-        "importer(tool, use, unit, plant, within, to): a row of docs/importers.md. The unit is that of the parameter `name`, unless "
+        "importer(importer, use, fmu, plant, within, to): a row of docs/importers.md. The FMU is that of the parameter `name`, unless "
         "it is given, and with `plant` ReentryPlant too. Results are `within` a share of the largest value `to` a reference.",
     )
     config.addinivalue_line("markers", "everything: needs what only `scripts/test --all` builds")

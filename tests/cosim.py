@@ -1,5 +1,5 @@
 """FMUs run by libcosim: one alone, or several wired by an SSP or OSP system structure. libcosim
-steps all units, then passes values on (Jacobi)."""
+steps all instances, then passes values on (Jacobi)."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ def nanoseconds(step: float) -> int:
 
 def alone(path: Path, step: float, steps: int, names: list[str]) -> np.ndarray:
     execution = CosimExecution.from_step_size(nanoseconds(step))
-    execution.add_local_slave(CosimLocalSlave(str(path), "unit"))
-    return observed(execution, steps, [("unit", name) for name in names])
+    execution.add_local_slave(CosimLocalSlave(str(path), "instance"))
+    return observed(execution, steps, [("instance", name) for name in names])
 
 
 def archive(folder: Path, step: float, steps: int, names: list[tuple[str, str]]) -> np.ndarray:
@@ -37,14 +37,14 @@ def structure(folder: Path, steps: int, names: list[tuple[str, str]]) -> np.ndar
     return observed(CosimExecution.from_osp_config_file(str(folder)), steps, names)
 
 
-def write_structure(folder: Path, step: float, units: dict, connections: list[tuple[str, str, str]]) -> None:
-    """Writes OspSystemStructure.xml. Units are given as name: (archive, parameters that are
+def write_structure(folder: Path, step: float, components: dict, connections: list[tuple[str, str, str]]) -> None:
+    """Writes OspSystemStructure.xml. Components are given as name: (archive, parameters that are
     numbers), connections as (from, to, variable)."""
     simulators = "".join(
         f'<Simulator name="{name}" source={quoteattr(path.as_uri())} stepSize="{step}"><InitialValues>'
         + "".join(f'<InitialValue variable="{key}"><{kind(value)} value="{value}"/></InitialValue>' for key, value in values.items())
         + "</InitialValues></Simulator>"
-        for name, (path, values) in units.items()
+        for name, (path, values) in components.items()
     )
     wires = "".join(
         f'<VariableConnection><Variable simulator="{source}" name="{name}"/><Variable simulator="{sink}" name="{name}"/></VariableConnection>'
@@ -65,10 +65,10 @@ def observed(execution: CosimExecution, steps: int, names: list[tuple[str, str]]
     """Returns the values of Real variables after each step."""
     observer = CosimObserver.create_last_value()
     assert execution.add_observer(observer)
-    indices = {unit: execution.slave_index_from_instance_name(unit) for unit, _ in names}
+    indices = {component: execution.slave_index_from_instance_name(component) for component, _ in names}
     known = {
-        (unit, variable.name.decode()): variable.reference
-        for unit, index in indices.items()
+        (component, variable.name.decode()): variable.reference
+        for component, index in indices.items()
         for variable in execution.slave_variables(index)
         if variable.type == CosimVariableType.REAL.value
     }
@@ -76,8 +76,8 @@ def observed(execution: CosimExecution, steps: int, names: list[tuple[str, str]]
     for _ in range(steps):
         assert execution.step(), "libcosim could not do a step"
         row = {}
-        for unit, index in indices.items():
-            own = [name for name in names if name[0] == unit]
+        for component, index in indices.items():
+            own = [name for name in names if name[0] == component]
             row.update(zip(own, observer.last_real_values(index, [known[name] for name in own])))
         rows.append([row[name] for name in names])
     return np.array(rows)

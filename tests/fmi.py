@@ -1,4 +1,4 @@
-"""FMI 2.0 units driven by hand through FMPy, with variables by name and log messages kept."""
+"""FMUs driven by hand through FMPy, with variables by name and log messages kept."""
 
 from __future__ import annotations
 
@@ -52,18 +52,18 @@ class Fmu:
         return dict(guid=self.description.guid, unzipDirectory=str(self.folder), modelIdentifier=identifier)
 
 
-class Unit:
+class Instance:
     """A co-simulation instance. Parameters are set by name, and enumerations by their item's
     name."""
 
-    def __init__(self, fmu: Fmu, parameters: dict | None = None, instance: str = "unit", guid: str | None = None):
+    def __init__(self, fmu: Fmu, parameters: dict | None = None, name: str = "instance", guid: str | None = None):
         self.fmu = fmu
         # Each call of the logger adds status, category and message.
         self.log: list[tuple[int, str, str]] = []
         arguments = fmu.arguments()
         if guid is not None:
             arguments["guid"] = guid
-        self.slave = fmi2.FMU2Slave(instanceName=instance, **arguments)
+        self.slave = fmi2.FMU2Slave(instanceName=name, **arguments)
         callbacks = fmi2.fmi2CallbackFunctions()
         callbacks.logger = fmi2.fmi2CallbackLoggerTYPE(self._logged)
         callbacks.allocateMemory = fmi2.defaultCallbacks.allocateMemory
@@ -132,7 +132,7 @@ class Unit:
     def exit(self) -> None:
         self.slave.exitInitializationMode()
 
-    def start(self, start: float = 0.0, inputs: dict | None = None) -> Unit:
+    def start(self, start: float = 0.0, inputs: dict | None = None) -> Instance:
         self.enter(start)
         self.set(inputs or {})
         self.exit()
@@ -161,7 +161,7 @@ class Unit:
     def close(self) -> None:
         self.slave.freeInstance()
 
-    def __enter__(self) -> Unit:
+    def __enter__(self) -> Instance:
         return self
 
     def __exit__(self, *_) -> None:
@@ -186,7 +186,7 @@ class Loop:
     that round differently.
     """
 
-    def __init__(self, controller: Unit, plant: Unit, step: float, jacobi: bool = False, clock: Callable | None = None):
+    def __init__(self, controller: Instance, plant: Instance, step: float, jacobi: bool = False, clock: Callable | None = None):
         self.controller, self.plant, self.jacobi = controller, plant, jacobi
         self.clock = clock or (lambda tick: (tick * step, step))
         self.tick = 0

@@ -13,9 +13,9 @@ ROOT = Path(__file__).resolve().parent.parent
 PAGE = ROOT / "docs" / "importers.md"
 BEGIN, END = "<!-- From here on: scripts/update-generated -->\n", "<!-- Up to here: scripts/update-generated -->\n"
 FINDINGS = pytest.StashKey()
-# Tools in the order of the table, by the name that the marks use: the tool's title, and the source
+# Importers in the order of the table, by the name that the marks use: the title, and the source
 # of its version.
-TOOLS = {
+IMPORTERS = {
     "orchestrator": ("orchestrator", None),
     "FMPy": ("FMPy", "fmpy"),
     "libcosimpy": ("libcosim (libcosimpy)", "libcosimpy"),
@@ -27,9 +27,9 @@ VERSIONS = {"fmi-sim": r"^fmi_sim=(\S+)$", "fmi-rs": r'^name = "fmi-rs"\nversion
 
 
 class Findings:
-    def __init__(self, units: list[str]):
-        self.units = units
-        # Marks and units of each test, by the test's identifier.
+    def __init__(self, fmus: list[str]):
+        self.fmus = fmus
+        # Marks and FMUs of each test, by the test's identifier.
         self.expected: dict[str, tuple[pytest.Mark, list[str]]] = {}
         self.outcomes: dict[str, str] = {}
         self.files: set[Path] = set()
@@ -39,7 +39,7 @@ class Findings:
             self.files.add(item.path)
             mark = item.get_closest_marker("importer")
             if mark:
-                name = mark.kwargs.get("unit") or item.callspec.params["name"]
+                name = mark.kwargs.get("fmu") or item.callspec.params["name"]
                 self.expected[item.nodeid] = mark, [name] + ["ReentryPlant"] * mark.kwargs.get("plant", False)
 
     def note(self, item, outcome: str) -> None:
@@ -58,15 +58,15 @@ class Findings:
 
     def table(self) -> str:
         rows: dict[tuple[str, str], tuple[pytest.Mark, dict[str, bool]]] = {}
-        for test, (mark, units) in self.expected.items():
+        for test, (mark, fmus) in self.expected.items():
             _, cells = rows.setdefault(mark.args, (mark, {}))
-            for unit in units:
-                cells[unit] = cells.get(unit, True) and self.outcomes[test] == "passed"
-        lines = ["| tool | use | " + " | ".join(f"`{unit}`" for unit in self.units) + " | found | compared with |", "|---" * (len(self.units) + 4) + "|"]
-        for tool in TOOLS:
-            for (_, use), (mark, cells) in ((key, row) for key, row in rows.items() if key[0] == tool):
-                marks = [{True: "✓", False: "**fails**"}.get(cells.get(unit), "–") for unit in self.units]
-                lines.append(f"| {title(tool)} | {use} | {' | '.join(marks)} | {found(mark)} |")
+            for fmu in fmus:
+                cells[fmu] = cells.get(fmu, True) and self.outcomes[test] == "passed"
+        lines = ["| importer | use | " + " | ".join(f"`{fmu}`" for fmu in self.fmus) + " | found | compared with |", "|---" * (len(self.fmus) + 4) + "|"]
+        for importer in IMPORTERS:
+            for (_, use), (mark, cells) in ((key, row) for key, row in rows.items() if key[0] == importer):
+                marks = [{True: "✓", False: "**fails**"}.get(cells.get(fmu), "–") for fmu in self.fmus]
+                lines.append(f"| {title(importer)} | {use} | {' | '.join(marks)} | {found(mark)} |")
         return "\n".join(lines) + "\n"
 
     def write(self) -> None:
@@ -89,13 +89,13 @@ def split() -> tuple[str, str, str]:
     return before, table.strip() + "\n", after
 
 
-def title(tool: str) -> str:
-    name, source = TOOLS[tool]
+def title(importer: str) -> str:
+    name, source = IMPORTERS[importer]
     if source is None:
         return name
     if isinstance(source, str):
         return f"{name} {importlib.metadata.version(source)}"
-    return f"{name} {re.search(VERSIONS[tool], source.read_text(), re.MULTILINE)[1]}"
+    return f"{name} {re.search(VERSIONS[importer], source.read_text(), re.MULTILINE)[1]}"
 
 
 def found(mark: pytest.Mark) -> str:

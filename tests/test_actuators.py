@@ -8,7 +8,7 @@ import pytest
 from fmpy import simulate_fmu
 from fmpy.fmi2 import FMU2Model
 
-from fmi import ANGLES, RATES, Unit
+from fmi import ANGLES, RATES, Instance
 
 SURFACE = [f"surface[{i}]" for i in range(1, 9)]
 SURFACE_RATE = [f"deflectionRate[{i}]" for i in range(1, 9)]
@@ -41,15 +41,15 @@ QUIET = {"disturbance.kind": "none", "initial.alpha": 0.1, "initial.beta": 0.0, 
 ACTUATED = {"actuation": "surfacesAndJets", **QUIET}
 
 
-def started(fmu, parameters=None) -> Unit:
-    return Unit(fmu("ReentryPlant"), {**ACTUATED, **(parameters or {})}).start()
+def started(fmu, parameters=None) -> Instance:
+    return Instance(fmu("ReentryPlant"), {**ACTUATED, **(parameters or {})}).start()
 
 
 def surfaces(degrees) -> dict:
     return dict(zip(SURFACE, np.radians(degrees)))
 
 
-def deflections(plant: Unit) -> np.ndarray:
+def deflections(plant: Instance) -> np.ndarray:
     return np.degrees(plant.get(DEFLECTION))
 
 
@@ -152,7 +152,7 @@ def commands(tick: int) -> dict:
 def co_simulated(fmu, parameters: dict, at, ticks: int) -> np.ndarray:
     """Returns angles, rates and deflections at every tick of co-simulation."""
     rows = []
-    with Unit(fmu, parameters).start(inputs=at(0)) as plant:
+    with Instance(fmu, parameters).start(inputs=at(0)) as plant:
         for tick in range(ticks + 1):
             plant.set(at(tick))
             rows.append(plant.get(ANGLES + RATES + DEFLECTION))
@@ -187,29 +187,29 @@ def columns(result) -> np.ndarray:
 @pytest.mark.parametrize("duty", [False, True])
 @pytest.mark.parametrize("kind", ["none", "square", "againstMoment"])
 def test_oracle_cvode_agrees_with_co_simulation(fmu, duty, kind):
-    unit = fmu("ReentryPlant")
+    plant = fmu("ReentryPlant")
     parameters = {**ACTUATED, "jets.duty": duty, "disturbance.kind": kind}
 
     def at(tick):
         scale = 0.7 if duty else 1.0
         return {name: value * (scale if name in JET else 1.0) for name, value in commands(tick).items()}
 
-    expected = co_simulated(unit, parameters, at, 25)
+    expected = co_simulated(plant, parameters, at, 25)
     assert np.ptp(expected[:, :3], axis=0).min() > 0.02
     options = dict(solver="CVode", relative_tolerance=1e-10, output_interval=0.2, record_events=False)
-    found = columns(exchanged(unit, parameters, at, 25, **options))
+    found = columns(exchanged(plant, parameters, at, 25, **options))
     assert np.abs(found[:, :6] - expected[:, :6]).max() < 3e-7
     assert np.abs(found[:, 6:] - expected[:, 6:]).max() < 1e-9
 
 
 def test_oracle_euler_comes_to_co_simulation_with_order_one(fmu):
-    unit = fmu("ReentryPlant")
-    expected = co_simulated(unit, ACTUATED, commands, 25)
+    plant = fmu("ReentryPlant")
+    expected = co_simulated(plant, ACTUATED, commands, 25)
 
     def error(step: float) -> float:
         # FMPy's Euler method integrates in steps of the output interval and looks at the event
         # indicators after each, so a deflection moves on for up to a step.
-        result = exchanged(unit, ACTUATED, commands, 25, solver="Euler", step_size=step, output_interval=step)
+        result = exchanged(plant, ACTUATED, commands, 25, solver="Euler", step_size=step, output_interval=step)
         at_ticks = np.isclose(result["time"] / 0.2, np.round(result["time"] / 0.2))
         last = {round(row["time"] / 0.2): row for row in result[at_ticks]}
         found = np.array([list(last[tick])[1:] for tick in range(26)])
@@ -239,15 +239,15 @@ def test_published_arrivals_are_located_by_cvode(fmu):
 
 
 def test_a_saved_state_continues_a_moving_surface_in_model_exchange(fmu):
-    unit = fmu("ReentryPlant")
+    plant = fmu("ReentryPlant")
 
     def reference(names):
-        return [unit.variables[name].valueReference for name in names]
+        return [plant.variables[name].valueReference for name in names]
 
-    model = FMU2Model(instanceName="model", **unit.arguments("modelExchange"))
+    model = FMU2Model(instanceName="model", **plant.arguments("modelExchange"))
     model.instantiate()
     model.setupExperiment()
-    model.setInteger(reference(["actuation"]), [unit.item("actuation", "surfacesAndJets")])
+    model.setInteger(reference(["actuation"]), [plant.item("actuation", "surfacesAndJets")])
     model.enterInitializationMode()
     model.setReal(reference(["surface[5]"]), [0.1])
     model.exitInitializationMode()

@@ -1,10 +1,10 @@
-"""The control allocator as a unit: its optimum against scipy, its limits, its jets."""
+"""The control allocator as an FMU: its optimum against scipy, its limits, its jets."""
 
 import numpy as np
 import pytest
 from scipy.optimize import minimize
 
-from fmi import MOMENT, Unit
+from fmi import MOMENT, Instance
 
 SURFACE = [f"surface[{i}]" for i in range(1, 9)]
 JET = [f"jet[{i}]" for i in range(1, 11)]
@@ -106,13 +106,13 @@ def inputs(moment, pressure):
 def test_oracle_allocations_are_optimal(fmu):
     compared, reachable = 0, 0
     for moment, pressure in commands(60):
-        with Unit(fmu("ControlAllocator"), {"jets": "duty"}).start(inputs=inputs(moment, pressure)) as unit:
+        with Instance(fmu("ControlAllocator"), {"jets": "duty"}).start(inputs=inputs(moment, pressure)) as instance:
             # The comparison starts from deflections that were reached after some samples.
             for k in range(30):
-                held = np.array(unit.get(SURFACE))[:6]
-                unit.step(k * PERIOD, PERIOD)
-            surfaces, jets = np.array(unit.get(SURFACE))[:6], np.array(unit.get(JET))
-            assert unit.get(["solver.status"])[0] == unit.fmu.item("solver.status", "optimal")
+                held = np.array(instance.get(SURFACE))[:6]
+                instance.step(k * PERIOD, PERIOD)
+            surfaces, jets = np.array(instance.get(SURFACE))[:6], np.array(instance.get(JET))
+            assert instance.get(["solver.status"])[0] == instance.fmu.item("solver.status", "optimal")
         found, z = optimum(moment, pressure, held)
         ours, theirs = cost(moment, pressure, surfaces, jets), cost(moment, pressure, z[:6], z[6:])
         # A cost below that of scipy is no fault.
@@ -127,27 +127,27 @@ def test_oracle_allocations_are_optimal(fmu):
 def test_published_limits_hold(fmu):
     for moment, pressure in commands(20):
         for method in ("optimal", "blending"):
-            with Unit(fmu("ControlAllocator"), {"method": method}).start(inputs=inputs(moment, pressure)) as unit:
+            with Instance(fmu("ControlAllocator"), {"method": method}).start(inputs=inputs(moment, pressure)) as instance:
                 before = np.zeros(8)
                 for k in range(40):
                     if k == 20:
-                        unit.set(inputs(-moment, pressure))
-                    unit.step(k * PERIOD, PERIOD)
-                    surfaces, jets = np.array(unit.get(SURFACE)), np.array(unit.get(JET))
-                    duty = np.array(unit.get(DUTY))
+                        instance.set(inputs(-moment, pressure))
+                    instance.step(k * PERIOD, PERIOD)
+                    surfaces, jets = np.array(instance.get(SURFACE)), np.array(instance.get(JET))
+                    duty = np.array(instance.get(DUTY))
                     assert np.all(surfaces >= MIN - 1e-15) and np.all(surfaces <= MAX + 1e-15)
                     assert np.abs(surfaces - before).max() <= RATE * PERIOD + 1e-15
                     assert set(jets) <= {0.0, 1.0} and duty.min() >= 0 and duty.max() <= 1
-                    total = np.array(unit.get(ACHIEVED)) + unit.get(RESIDUAL)
+                    total = np.array(instance.get(ACHIEVED)) + instance.get(RESIDUAL)
                     assert total == pytest.approx(moment if k < 20 else -moment, rel=1e-9, abs=1e-6)
                     before = surfaces
 
 
-def pulses(unit, step: float, seconds: float) -> np.ndarray:
+def pulses(instance, step: float, seconds: float) -> np.ndarray:
     seen = []
     for k in range(round(seconds / step)):
-        seen.append(unit.get(JET))
-        unit.step(k * step, step)
+        seen.append(instance.get(JET))
+        instance.step(k * step, step)
     return np.array(seen)
 
 
@@ -155,9 +155,9 @@ def test_jets_switch_every_millisecond_whatever_the_step(fmu):
     """The jets are the same at common instants; their pulses between them show only in steps of 1
     ms."""
     given = inputs([2e3, -4e3, 1.2e4], 0.0)
-    with Unit(fmu("ControlAllocator")).start(inputs=given) as fine:
+    with Instance(fmu("ControlAllocator")).start(inputs=given) as fine:
         each = pulses(fine, 1e-3, 2.0)
-    with Unit(fmu("ControlAllocator")).start(inputs=given) as coarse:
+    with Instance(fmu("ControlAllocator")).start(inputs=given) as coarse:
         tenth = pulses(coarse, 1e-2, 2.0)
     assert np.array_equal(each[::10], tenth)
     switched = np.abs(np.diff(each, axis=0)).sum(axis=1).nonzero()[0] + 1

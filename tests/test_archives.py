@@ -11,12 +11,12 @@ from fmpy.validation import validate_fmu
 
 from conftest import NAMES, ROOT, TARGET, archive, library, newest, program
 
-# The libraries by the folder with their units' descriptions.
+# The libraries by the folder with their FMUs' descriptions.
 LIBRARIES = {"fmu-plant": ["fmu_plant"], "fmu-controller": ["fmu_optimising", "fmu_feedback"]}
 
 
-def pack(folder, *arguments, units=LIBRARIES):
-    libraries = [library(name) for each in units for name in LIBRARIES[each]]
+def pack(folder, *arguments, folders=LIBRARIES):
+    libraries = [library(name) for each in folders for name in LIBRARIES[each]]
     subprocess.run([program("fmu-pack"), *libraries, "--output", folder, *arguments], check=True, capture_output=True)
 
 
@@ -26,7 +26,7 @@ def test_fmpy_finds_no_problem(name):
     assert validate_fmu(str(archive(name))) == []
 
 
-def test_every_unit_was_packed_and_tested():
+def test_every_fmu_was_packed_and_tested():
     assert sorted(path.stem for path in archive("LQR").parent.glob("*.fmu")) == sorted(NAMES)
 
 
@@ -65,8 +65,8 @@ def test_description_says_what_tools_rely_on(fmu, name):
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_fmpy_simulates_a_unit_as_it_is(fmu, name):
-    """A unit that a tool opens and starts flies the paper's scenario with the tool's default
+def test_fmpy_simulates_an_fmu_as_it_is(fmu, name):
+    """An FMU that an importer opens and starts flies the paper's scenario with its default
     values."""
     result = simulate_fmu(str(archive(name)), output=fmu(name).names("output"), stop_time=10.0, output_interval=0.04)
     assert len(result) == 251
@@ -91,12 +91,12 @@ def test_packing_twice_gives_the_same_bytes(tmp_path):
         assert first == second, name
 
 
-@pytest.mark.parametrize("units", LIBRARIES)
-def test_committed_snapshots_are_what_the_libraries_say(units, tmp_path):
-    pack(tmp_path / "fmu", "--xml-snapshot", tmp_path / "generated", units=[units])
+@pytest.mark.parametrize("folder", LIBRARIES)
+def test_committed_snapshots_are_what_the_libraries_say(folder, tmp_path):
+    pack(tmp_path / "fmu", "--xml-snapshot", tmp_path / "generated", folders=[folder])
     generated = {path.name: path.read_text() for path in (tmp_path / "generated").glob("*.xml")}
-    committed = {path.name: path.read_text() for path in (ROOT / units / "generated").glob("*.xml")}
+    committed = {path.name: path.read_text() for path in (ROOT / folder / "generated").glob("*.xml")}
     differing = sorted(
         name for name in generated.keys() | committed.keys() if generated.get(name) != committed.get(name)
     )
-    assert not differing, f"{differing} in {units}/generated are out of date: run scripts/update-generated"
+    assert not differing, f"{differing} in {folder}/generated are out of date: run scripts/update-generated"

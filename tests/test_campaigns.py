@@ -1,4 +1,4 @@
-"""The campaigns of orchestrator/experiments/campaigns with the units, each with every controller that they are for."""
+"""The campaigns of orchestrator/experiments/campaigns, each with every controller that it is for."""
 
 import json
 import subprocess
@@ -12,7 +12,7 @@ CONTROLLERS = ["crmpc-robust", "crmpc-paper", "dlmpc-tuned", "lqr"]
 # Campaigns that name an experiment in which any controller can fly.
 FOR_ANY = sorted(path.stem for path in CAMPAIGNS.glob("*.toml") if "experiment =" in path.read_text("utf-8"))
 FOR_CHAI = sorted({path.stem for path in CAMPAIGNS.glob("*.toml")} - set(FOR_ANY))
-UNITS = ["CRMPC", "DLMPC", "LQR", "FBL", "BTVSMC", "BTVSMC_DO", "SOTVSMC_DO", "TwoLoopSMC"]
+FMUS = ["CRMPC", "DLMPC", "LQR", "FBL", "BTVSMC", "BTVSMC_DO", "SOTVSMC_DO", "TwoLoopSMC"]
 
 
 def orchestrator(*arguments, folder) -> str:
@@ -36,15 +36,15 @@ def test_every_campaign_fits_every_controller(campaign, controller, tmp_path):
     check(campaign, ["--experiment", controller], tmp_path)
 
 
-@pytest.mark.parametrize("unit", UNITS)
+@pytest.mark.parametrize("name", FMUS)
 @pytest.mark.parametrize("campaign", FOR_ANY)
-def test_every_campaign_of_any_controller_fits_every_unit(campaign, unit, tmp_path):
-    check(campaign, ["--fmu", f"controller={unit}.fmu"], tmp_path)
+def test_every_campaign_of_any_controller_fits_every_fmu(campaign, name, tmp_path):
+    check(campaign, ["--fmu", f"controller={name}.fmu"], tmp_path)
 
 
 @pytest.mark.parametrize("controller", CONTROLLERS)
 def test_a_case_by_itself_is_the_case_of_the_campaign(controller, tmp_path):
-    """All cases but the first are flown by units that were reset, whose controllers keep their design."""
+    """All cases but the first are flown by instances that were reset and keep their design."""
     path = CAMPAIGNS / "adversaries.toml"
     told = ["campaign", path, "--experiment", controller, "--out", tmp_path / "out"]
     said = orchestrator(*told, "--csv", folder=tmp_path)

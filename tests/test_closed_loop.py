@@ -8,7 +8,7 @@ import sys
 import pytest
 
 from conftest import EXPERIMENTS, merged
-from fmi import Loop, Unit, number
+from fmi import Instance, Loop, number
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -26,24 +26,24 @@ def compare(fmu, text: str, results, jacobi: bool = False) -> None:
     """Steps the components of an experiment by hand and compares them with the orchestrator's
     results."""
     written = tomllib.loads(text)["components"]
-    units = {}
+    instances = {}
     for component in ("controller", "plant"):
         settings = {key: number(value) for key, value in written[component]["parameters"].items()}
-        units[component] = Unit(fmu(written[component]["fmu"].removesuffix(".fmu")), settings, component)
+        instances[component] = Instance(fmu(written[component]["fmu"].removesuffix(".fmu")), settings, component)
     with open(results / "results.csv", newline="") as file:
         rows = list(csv.DictReader(file))
     assert len(rows) == 1251
 
-    loop = Loop(units["controller"], units["plant"], STEP, jacobi)
+    loop = Loop(instances["controller"], instances["plant"], STEP, jacobi)
     loop.start()
     largest = {}
     difference = {}
     for tick, row in enumerate(rows):
         assert float(row["time"]) == pytest.approx(tick * STEP, abs=1e-12)
-        values = {name: value for unit, names in COLUMNS.items() for name, value in zip(names, units[unit].get(names))}
+        values = {name: value for component, names in COLUMNS.items() for name, value in zip(names, instances[component].get(names))}
         if tick + 1 < len(rows):
             loop.advance()
-            values |= zip(COLUMNS["controller"][:3], units["controller"].get(COLUMNS["controller"][:3]))
+            values |= zip(COLUMNS["controller"][:3], instances["controller"].get(COLUMNS["controller"][:3]))
         for component, names in COLUMNS.items():
             for column in names:
                 value = values[column]
@@ -53,9 +53,9 @@ def compare(fmu, text: str, results, jacobi: bool = False) -> None:
     for column, error in difference.items():
         assert error <= 1e-12 * largest[column], f"{column}: {error}"
     assert largest["moment.x"] > 1e3
-    for unit in units.values():
-        assert unit.messages() == ""
-        unit.close()
+    for instance in instances.values():
+        assert instance.messages() == ""
+        instance.close()
 
 
 @pytest.mark.parametrize("name", ["crmpc-robust", "crmpc-paper", "lqr"])

@@ -1,4 +1,4 @@
-"""DLMPC as a unit: its outer optimum against IPOPT, and its two rates against the communication
+"""DLMPC as an FMU: its outer optimum against IPOPT, and its two rates against the communication
 step."""
 
 import csv
@@ -9,7 +9,7 @@ import pytest
 
 import nlp
 from conftest import EXPERIMENTS
-from fmi import ANGLES, MOMENT, NOT_REPRODUCIBLE, RATES, Unit
+from fmi import ANGLES, MOMENT, NOT_REPRODUCIBLE, RATES, Instance
 
 COMMAND = [f"rateCommand.{axis}" for axis in ("p", "q", "r")]
 SLIDING = [f"slidingVariable.{axis}" for axis in ("p", "q", "r")]
@@ -63,7 +63,7 @@ def test_oracle_first_optimisation_is_the_nonlinear_optimum(fmu, start, time, ac
     cost, command = outer_optimum(start, time)
     # If the first command is at its bound, the bound determines it.
     assert (np.linalg.norm(command) == pytest.approx(nlp.RATE_LIMIT, rel=1e-6)) == active
-    dlmpc = Unit(fmu("DLMPC"))
+    dlmpc = Instance(fmu("DLMPC"))
     with dlmpc.start(start=time, inputs=dict(zip(ANGLES + RATES, [*start, 0.0, 0.0, 0.0]))):
         status, found = dlmpc.get(["solver.status", "solver.cost"])
         assert status == dlmpc.fmu.item("solver.status", "constrained")
@@ -76,7 +76,7 @@ def test_oracle_inner_law_at_the_first_tick(fmu):
     """The moment follows the equation of docs/DLMPC.md with z = 0, at rates near the command."""
     q, p, gamma, rho = 5.0, 5.0, 0.15, 0.7
     angles = nlp.reference(0.0)[0]
-    with Unit(fmu("DLMPC")).start(inputs=dict(zip(ANGLES + RATES, [*angles, 0.0, 0.0, 0.0]))) as dlmpc:
+    with Instance(fmu("DLMPC")).start(inputs=dict(zip(ANGLES + RATES, [*angles, 0.0, 0.0, 0.0]))) as dlmpc:
         command = np.array(dlmpc.get(COMMAND))
         rates = command + np.array([2e-3, -1e-3, 5e-4])
         dlmpc.set(dict(zip(RATES, rates)))
@@ -122,13 +122,13 @@ def driven(fmu, hold: float, division: list[float]) -> list[list[str]]:
     assert sum(division) == pytest.approx(hold)
     names = [n for n in fmu.names("output") if n not in NOT_REPRODUCIBLE and not n.startswith("reference")]
     rows = []
-    with Unit(fmu).start(inputs=course(0.0)) as unit:
+    with Instance(fmu).start(inputs=course(0.0)) as instance:
         for k in range(round(TICKS * FEEDBACK / hold)):
             begin = k * hold
-            unit.set(course(begin))
-            rows.append([float(value).hex() for value in unit.get(names)])
+            instance.set(course(begin))
+            rows.append([float(value).hex() for value in instance.get(names)])
             for step in division:
-                unit.step(begin, step)
+                instance.step(begin, step)
                 begin += step
     return rows
 
@@ -151,12 +151,12 @@ def test_steps_inputs_of_the_inner_layer(fmu, division):
 
 
 def test_the_outer_layer_runs_at_every_fifth_tick(fmu):
-    with Unit(fmu("DLMPC")).start(inputs=course(0.0)) as unit:
+    with Instance(fmu("DLMPC")).start(inputs=course(0.0)) as instance:
         seen = []
         for tick in range(25):
-            unit.set(course(tick * FEEDBACK))
-            seen.append((unit.get(["solver.solves"])[0], tuple(unit.get(COMMAND)), tuple(unit.get(MOMENT))))
-            unit.step(tick * FEEDBACK, FEEDBACK)
+            instance.set(course(tick * FEEDBACK))
+            seen.append((instance.get(["solver.solves"])[0], tuple(instance.get(COMMAND)), tuple(instance.get(MOMENT))))
+            instance.step(tick * FEEDBACK, FEEDBACK)
     assert [solves for solves, _, _ in seen] == [1 + tick // 5 for tick in range(25)]
     commands = [command for _, command, _ in seen]
     assert all((commands[k] == commands[k - 1]) == (k % 5 != 0) for k in range(1, 25))

@@ -4,7 +4,7 @@ accuracy, lost and frozen samples."""
 import numpy as np
 import pytest
 
-from fmi import ANGLES, RATES, Unit
+from fmi import ANGLES, RATES, Instance
 
 PERIOD = 0.01
 MEMS = {"sensor.set": 2, "disturbance.kind": "none"}
@@ -15,15 +15,15 @@ MEASURED += ["measured.time", "measured.sample"]
 def flown(fmu, plant: dict, estimator: dict, steps: int, names: list[str], truth: list[str] = ANGLES) -> tuple:
     """Returns the outputs of the estimator and of the plant at each tick."""
     found, true = [], []
-    with Unit(fmu("ReentryPlant"), MEMS | plant) as vehicle, Unit(fmu("AttitudeEstimator"), estimator) as unit:
+    with Instance(fmu("ReentryPlant"), MEMS | plant) as vehicle, Instance(fmu("AttitudeEstimator"), estimator) as instance:
         vehicle.start()
-        unit.start(inputs=dict(zip(MEASURED, vehicle.get(MEASURED))))
+        instance.start(inputs=dict(zip(MEASURED, vehicle.get(MEASURED))))
         for tick in range(steps + 1):
-            unit.set(dict(zip(MEASURED, vehicle.get(MEASURED))))
-            found.append(unit.get(names))
+            instance.set(dict(zip(MEASURED, vehicle.get(MEASURED))))
+            found.append(instance.get(names))
             true.append(vehicle.get(truth))
             vehicle.step(tick * PERIOD, PERIOD)
-            unit.step(tick * PERIOD, PERIOD)
+            instance.step(tick * PERIOD, PERIOD)
     return np.array(found), np.array(true)
 
 
@@ -41,7 +41,7 @@ def test_oracle_a_calibration_flight_finds_soft_and_hard_iron(fmu):
     status = fmu("AttitudeEstimator").item
     assert found[3000, 0] == status("calibration.status", "collecting")
     assert found[-1, 0] == status("calibration.status", "fitted")
-    with Unit(fmu("ReentryPlant"), MEMS).start() as plant:
+    with Instance(fmu("ReentryPlant"), MEMS).start() as plant:
         names = [f"sensor.magnetometer.matrix[{i},{j}]" for i in (1, 2, 3) for j in (1, 2, 3)]
         iron = np.reshape(plant.get(names), (3, 3))
         hard = np.array(plant.get([f"sensor.magnetometer.bias.{axis}" for axis in "xyz"]))
@@ -64,9 +64,9 @@ def test_oracle_attitude_and_rates_at_rest(fmu):
 def test_ideal_sensors_unplugged_and_plugged_in(fmu):
     """Without a line, the start values of the inputs give the scenario's start; with the plant's
     true readings the estimate is the truth."""
-    with Unit(fmu("AttitudeEstimator")).start() as unit:
-        assert np.degrees(unit.get(ANGLES)) == pytest.approx([7.5, 10.0, -30.0], abs=1e-9)
-        assert unit.get(["health"]) == [health(fmu, "ok")]
+    with Instance(fmu("AttitudeEstimator")).start() as instance:
+        assert np.degrees(instance.get(ANGLES)) == pytest.approx([7.5, 10.0, -30.0], abs=1e-9)
+        assert instance.get(["health"]) == [health(fmu, "ok")]
     found, true = flown(fmu, {"sensor.set": 0, "initial.q": 0.02}, {"filter.cutoff": 0.0}, 500, ANGLES)
     assert np.degrees(np.abs(found - true)).max() < 0.01
 

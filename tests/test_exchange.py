@@ -8,7 +8,7 @@ import pytest
 from fmpy import simulate_fmu
 from fmpy.fmi2 import FMU2Model
 
-from fmi import ANGLES, MOMENT, RATES, Unit
+from fmi import ANGLES, MOMENT, RATES, Instance
 
 STOP = 20.0
 STEP = 0.04
@@ -49,7 +49,7 @@ def settings(request):
 
 def co_simulated(fmu, settings) -> np.ndarray:
     rows = []
-    with Unit(fmu, settings).start(inputs=dict(zip(MOMENT, moment(0)))) as plant:
+    with Instance(fmu, settings).start(inputs=dict(zip(MOMENT, moment(0)))) as plant:
         for tick in range(round(STOP / STEP) + 1):
             plant.set(dict(zip(MOMENT, moment(tick))))
             rows.append(plant.get(ANGLES + RATES))
@@ -86,7 +86,7 @@ def exchanged(fmu, settings) -> np.ndarray:
     return np.array([result[name] for name in ANGLES + RATES]).T
 
 
-@pytest.mark.importer("FMPy", "model exchange, CVode", unit="ReentryPlant", within=BOUND, to="our co-simulation")
+@pytest.mark.importer("FMPy", "model exchange, CVode", fmu="ReentryPlant", within=BOUND, to="our co-simulation")
 def test_oracle_cvode_agrees_with_co_simulation(fmu, settings):
     plant = fmu("ReentryPlant")
     expected = co_simulated(plant, settings)
@@ -139,11 +139,11 @@ def test_oracle_directional_derivatives_are_central_differences(fmu, kinematics)
     model.freeInstance()
 
 
-@pytest.mark.importer("FMPy", "model exchange, Euler", unit="ReentryPlant", within="error of order one", to="our co-simulation")
+@pytest.mark.importer("FMPy", "model exchange, Euler", fmu="ReentryPlant", within="error of order one", to="our co-simulation")
 def test_oracle_euler_converges_to_co_simulation_with_order_one(fmu):
     vehicle = fmu("ReentryPlant")
     start = {"initial.p": 0.05, "initial.q": 0.03}
-    with Unit(vehicle, {"disturbance.kind": "none", **start}).start() as plant:
+    with Instance(vehicle, {"disturbance.kind": "none", **start}).start() as plant:
         for tick in range(100):
             plant.step(tick * STEP, STEP)
         expected = np.array(plant.get(ANGLES + RATES))

@@ -19,7 +19,7 @@ from fmpy.ssp.simulation import simulate_ssp
 from fmpy.validation import validate_fmu
 
 from conftest import NAMES, ROOT, TARGET, archive, example, program
-from fmi import ANGLES, MOMENT, NOT_REPRODUCIBLE, RATES, Fmu, Loop, Unit, of_step
+from fmi import ANGLES, MOMENT, NOT_REPRODUCIBLE, RATES, Fmu, Instance, Loop, of_step
 
 STEP = 0.04
 STEPS = 250
@@ -28,7 +28,7 @@ CONTROLLERS = [name for name in NAMES if name not in ("ReentryPlant", "ControlAl
 LINUX = sys.platform == "linux" and os.uname().machine == "x86_64"
 only_linux = pytest.mark.skipif(not LINUX, reason="what this needs has no binaries for every platform: tried on Linux on x86-64")
 
-each_unit = pytest.mark.parametrize("name", NAMES)
+each_fmu = pytest.mark.parametrize("name", NAMES)
 each_controller = pytest.mark.parametrize("name", CONTROLLERS)
 
 
@@ -50,24 +50,24 @@ def nanoseconds(tick):
     return now, then - now
 
 
-def reals(unit) -> list[str]:
+def reals(fmu) -> list[str]:
     """Names of the outputs that are Real and no wall-clock time."""
-    names = unit.names("output")
-    return [name for name in names if unit.variables[name].type == "Real" and name not in NOT_REPRODUCIBLE]
+    names = fmu.names("output")
+    return [name for name in names if fmu.variables[name].type == "Real" and name not in NOT_REPRODUCIBLE]
 
 
 @pytest.fixture(scope="module")
 def by_hand(fmu):
-    """Outputs of a unit with its start values at each communication point."""
+    """Outputs of an instance with its start values at each communication point."""
     done = {}
 
     def run(name, clock=exact):
         if (name, clock) not in done:
-            with Unit(fmu(name)).start() as unit:
-                rows = [unit.get(reals(fmu(name)))]
+            with Instance(fmu(name)).start() as instance:
+                rows = [instance.get(reals(fmu(name)))]
                 for tick in range(STEPS):
-                    unit.step(*clock(tick))
-                    rows.append(unit.get(reals(fmu(name))))
+                    instance.step(*clock(tick))
+                    rows.append(instance.get(reals(fmu(name))))
             done[name, clock] = np.array(rows)
             assert (np.ptp(done[name, clock], axis=0) > 0.0).any()
         return done[name, clock]
@@ -84,7 +84,7 @@ def loop(fmu):
     def run(name, jacobi, clock=exact, parameters=True, shifted=False):
         key = (name, jacobi, clock, parameters)
         if key not in done:
-            with Unit(fmu(name)) as controller, Unit(fmu("ReentryPlant"), PARAMETERS if parameters else None) as plant:
+            with Instance(fmu(name)) as controller, Instance(fmu("ReentryPlant"), PARAMETERS if parameters else None) as plant:
                 done[key] = Loop(controller, plant, STEP, jacobi, clock).fly(STEPS)
             # The loop must move: by degrees, and with a moment that changes.
             assert np.ptp(np.array(done[key])[:, 0]) > 0.01 and np.ptp(np.array(done[key])[:, 6]) > 1e3
@@ -173,47 +173,47 @@ def packed(tmp_path):
     return pack
 
 
-# Each unit alone
+# Each FMU alone
 
 
-@each_unit
+@each_fmu
 @pytest.mark.importer("FMPy", "co-simulation", within=0.0)
-def test_oracle_fmpy_steps_a_unit(fmu, by_hand, agree, name):
+def test_oracle_fmpy_steps_an_fmu(fmu, by_hand, agree, name):
     found = simulate_fmu(str(archive(name)), stop_time=STOP, step_size=STEP, output_interval=STEP, output=reals(fmu(name)))
     agree(np.array([found[column] for column in reals(fmu(name))]).T, by_hand(name, differences))
 
 
-@each_unit
+@each_fmu
 @pytest.mark.importer("orchestrator", "co-simulation", within=0.0)
-def test_oracle_the_orchestrator_steps_a_unit(fmu, by_hand, agree, tmp_path, name):
-    text = f'title = "alone"\n[simulation]\nstop = {STOP}\nstep = {STEP}\n[components.unit]\nfmu = "{name}.fmu"\nunconnected = ["*"]\n'
-    found = orchestrate(tmp_path, text + '[record]\nvariables = ["unit.*"]\n')
-    agree(np.array([found[f"unit.{column}"] for column in reals(fmu(name))]).T, by_hand(name))
+def test_oracle_the_orchestrator_steps_an_fmu(fmu, by_hand, agree, tmp_path, name):
+    text = f'title = "alone"\n[simulation]\nstop = {STOP}\nstep = {STEP}\n[components.instance]\nfmu = "{name}.fmu"\nunconnected = ["*"]\n'
+    found = orchestrate(tmp_path, text + '[record]\nvariables = ["instance.*"]\n')
+    agree(np.array([found[f"instance.{column}"] for column in reals(fmu(name))]).T, by_hand(name))
 
 
-@each_unit
+@each_fmu
 @only_linux
 @pytest.mark.importer("libcosimpy", "co-simulation", within=0.0)
-def test_oracle_libcosim_steps_a_unit(cosim, fmu, by_hand, agree, name):
+def test_oracle_libcosim_steps_an_fmu(cosim, fmu, by_hand, agree, name):
     agree(cosim.alone(archive(name), STEP, STEPS, reals(fmu(name))), by_hand(name, nanoseconds)[1:])
 
 
-@each_unit
+@each_fmu
 @pytest.mark.importer("fmi-rs", "co-simulation", within=0.0)
-def test_oracle_fmi_rs_steps_a_unit(fmu, by_hand, agree, tmp_path, name):
+def test_oracle_fmi_rs_steps_an_fmu(fmu, by_hand, agree, tmp_path, name):
     found = fmi_rs(tmp_path, "cs", archive(name))
     agree(np.array([found[column] for column in reals(fmu(name))]).T, by_hand(name, differences))
 
 
-@each_unit
+@each_fmu
 @pytest.mark.everything
 @pytest.mark.importer("fmi-sim", "co-simulation", within=0.0)
-def test_oracle_fmi_sim_steps_a_unit(fmu, by_hand, agree, tmp_path, name):
+def test_oracle_fmi_sim_steps_an_fmu(fmu, by_hand, agree, tmp_path, name):
     found = fmi_sim(tmp_path, "co-simulation", archive(name))
     agree(np.array([found[column] for column in reals(fmu(name))]).T, by_hand(name))
 
 
-@each_unit
+@each_fmu
 @pytest.mark.importer("fmu-manipulation-toolbox", "`fmutool -check`")
 def test_oracle_fmutool_finds_no_problem(tool, name):
     done = subprocess.run([tool("fmutool"), "-input", archive(name), "-check"], capture_output=True, text=True, timeout=60)
@@ -252,14 +252,14 @@ def euler(fmu):
 
 
 # fmi-rs accumulates time and step in another order than FMPy, so the last bits differ.
-@pytest.mark.importer("fmi-rs", "model exchange, Euler", unit="ReentryPlant", within=1e-12, to="FMPy's Euler")
+@pytest.mark.importer("fmi-rs", "model exchange, Euler", fmu="ReentryPlant", within=1e-12, to="FMPy's Euler")
 def test_oracle_fmi_rs_integrates_the_plant(euler, agree, tmp_path):
     found = fmi_rs(tmp_path, "me", archive("ReentryPlant"))
     agree(np.array([found[name] for name in ANGLES + RATES]).T, euler)
 
 
 @pytest.mark.everything
-@pytest.mark.importer("fmi-sim", "model exchange, Euler", unit="ReentryPlant", within=0.0, to="FMPy's Euler")
+@pytest.mark.importer("fmi-sim", "model exchange, Euler", fmu="ReentryPlant", within=0.0, to="FMPy's Euler")
 def test_oracle_fmi_sim_integrates_the_plant(euler, agree, tmp_path):
     found = fmi_sim(tmp_path, "model-exchange", archive("ReentryPlant"))
     agree(np.array([found[name] for name in ANGLES + RATES]).T, euler)
@@ -272,7 +272,7 @@ def test_oracle_fmi_sim_integrates_the_plant(euler, agree, tmp_path):
 @pytest.mark.importer("orchestrator", "closed loop, sequential", plant=True, within=0.0)
 def test_oracle_the_orchestrator_closes_the_loop(loop, agree, tmp_path, name):
     found = orchestrate(tmp_path, EXPERIMENT.format(name, STOP, STEP))
-    agree(np.array([found[f"{unit}.{signal}"] for unit, signal in SIGNALS]).T, loop(name, jacobi=False, shifted=True))
+    agree(np.array([found[f"{component}.{signal}"] for component, signal in SIGNALS]).T, loop(name, jacobi=False, shifted=True))
 
 
 @each_controller
@@ -280,7 +280,7 @@ def test_oracle_the_orchestrator_closes_the_loop(loop, agree, tmp_path, name):
 def test_oracle_the_orchestrator_closes_the_loop_with_a_delay(loop, agree, tmp_path, name):
     text = EXPERIMENT.format(name, STOP, STEP).replace("order =", 'coupling = "jacobi"\norder =')
     found = orchestrate(tmp_path, text)
-    agree(np.array([found[f"{unit}.{signal}"] for unit, signal in SIGNALS]).T, loop(name, jacobi=True, shifted=True))
+    agree(np.array([found[f"{component}.{signal}"] for component, signal in SIGNALS]).T, loop(name, jacobi=True, shifted=True))
 
 
 @each_controller
@@ -293,11 +293,11 @@ def test_oracle_fmi_rs_closes_the_loop(loop, agree, tmp_path, name):
 @each_controller
 @pytest.mark.importer("FMPy", "closed loop, SSP archive", plant=True, within=0.0, to="stepping its way by hand")
 def test_oracle_fmpy_closes_the_loop_of_an_archive(fmu, agree, packed, name):
-    """FMPy sets zeros at the first step, steps all units, and passes values on afterwards. Each row
-    bears the time at which its step starts. FMPy ignores the archive's values."""
+    """FMPy sets zeros at the first step, steps all instances, and passes values on afterwards. Each
+    row bears the time at which its step starts. FMPy ignores the archive's values."""
     found = simulate_ssp(str(packed(name)), stop_time=STOP, step_size=STEP)
     expected = []
-    with Unit(fmu(name)).start() as controller, Unit(fmu("ReentryPlant")).start() as plant:
+    with Instance(fmu(name)).start() as controller, Instance(fmu("ReentryPlant")).start() as plant:
         state, moment, time = [0.0] * 6, [0.0] * 3, 0.0
         for _ in range(len(found)):
             controller.set(dict(zip(ANGLES + RATES, state)))
@@ -308,7 +308,7 @@ def test_oracle_fmpy_closes_the_loop_of_an_archive(fmu, agree, packed, name):
             expected.append([time, *state, *moment])
             time += STEP
     assert len(found) >= STEPS
-    columns = ["time", *(f"{unit}.{signal}" for unit, signal in SIGNALS)]
+    columns = ["time", *(f"{component}.{signal}" for component, signal in SIGNALS)]
     agree(np.array([found[column] for column in columns]).T, np.array(expected))
 
 
@@ -324,8 +324,8 @@ def test_oracle_libcosim_closes_the_loop_of_an_archive(cosim, loop, agree, packe
 @only_linux
 @pytest.mark.importer("libcosimpy", "closed loop, OSP system structure", plant=True, within=0.0, to="Jacobi by hand")
 def test_oracle_libcosim_closes_the_loop_of_a_system_structure(cosim, loop, agree, tmp_path, name):
-    units = {"controller": (archive(name), {}), "plant": (archive("ReentryPlant"), PARAMETERS)}
-    cosim.write_structure(tmp_path, STEP, units, WIRES)
+    components = {"controller": (archive(name), {}), "plant": (archive("ReentryPlant"), PARAMETERS)}
+    cosim.write_structure(tmp_path, STEP, components, WIRES)
     agree(cosim.structure(tmp_path, STEPS, SIGNALS), loop(name, jacobi=True, clock=nanoseconds)[1:])
 
 
@@ -341,7 +341,7 @@ def test_oracle_a_container_holds_the_closed_loop(loop, agree, packed, tool, tmp
     container = tmp_path / "loop.fmu"
     assert validate_fmu(str(container)) == []
     prefix = {"plant": "reentryplant", "controller": name.lower()}
-    signals = [f"{prefix[unit]}.{signal}" for unit, signal in SIGNALS]
+    signals = [f"{prefix[component]}.{signal}" for component, signal in SIGNALS]
     found = simulate_fmu(str(container), stop_time=STOP, step_size=STEP, output_interval=STEP, output=signals)
     agree(np.array([found[signal] for signal in signals]).T, loop(name, jacobi=True, parameters=False))
 
@@ -369,7 +369,7 @@ def expected(fmu):
 
     controller = PdController(instance_name="controller")
     rows = []
-    with Unit(fmu("ReentryPlant"), PARAMETERS).start() as plant:
+    with Instance(fmu("ReentryPlant"), PARAMETERS).start() as plant:
         for tick in range(round(SECONDS / STEP) + 1):
             state = plant.get(ANGLES + TURNS)
             rows.append(state + [controller.outputs[name] for name in MOMENT])
@@ -384,7 +384,7 @@ def expected(fmu):
 
 
 @only_linux
-@pytest.mark.importer("orchestrator", "closed loop, controller by PythonFMU", unit="ReentryPlant", within=0.0)
+@pytest.mark.importer("orchestrator", "closed loop, controller by PythonFMU", fmu="ReentryPlant", within=0.0)
 def test_oracle_the_orchestrator_steps_a_controller_by_pythonfmu(foreign, expected, agree, libpython, tmp_path, monkeypatch):
     monkeypatch.setenv("LD_PRELOAD", libpython)
     shutil.copy(foreign, tmp_path)
@@ -395,10 +395,10 @@ def test_oracle_the_orchestrator_steps_a_controller_by_pythonfmu(foreign, expect
 
 
 @only_linux
-@pytest.mark.importer("FMPy", "closed loop, controller by PythonFMU", unit="ReentryPlant", within=0.0)
+@pytest.mark.importer("FMPy", "closed loop, controller by PythonFMU", fmu="ReentryPlant", within=0.0)
 def test_oracle_fmpy_steps_a_controller_by_pythonfmu(fmu, foreign, expected, agree, tmp_path):
     rows = []
-    with Unit(Fmu.open(foreign, tmp_path)).start() as controller, Unit(fmu("ReentryPlant"), PARAMETERS).start() as plant:
+    with Instance(Fmu.open(foreign, tmp_path)).start() as controller, Instance(fmu("ReentryPlant"), PARAMETERS).start() as plant:
         for tick in range(len(expected)):
             state = plant.get(ANGLES + TURNS)
             rows.append(state + controller.get(MOMENT))

@@ -1,5 +1,5 @@
 """Bad input gives an FMI error that names the culprit in the log; the process stays alive, and the
-unit is usable again after a reset."""
+instance is usable again after a reset."""
 
 import math
 from ctypes import c_double, c_uint
@@ -8,32 +8,32 @@ import pytest
 from fmpy.fmi1 import FMICallException
 
 from conftest import NAMES
-from fmi import ANGLES, RATES, Unit
+from fmi import ANGLES, RATES, Instance
 
 STEP = 0.04
 INPUT = {"ReentryPlant": "moment.x", "CRMPC": "rate.p", "DLMPC": "rate.q", "LQR": "attitude.beta", "ControlAllocator": "moment.y", "AttitudeEstimator": "measured.gyroscope.y"}
 INPUT |= {name: "rate.p" for name in NAMES if name not in INPUT}
 
 
-def drive(unit: Unit, ticks: int = 12) -> list:
+def drive(instance: Instance, ticks: int = 12) -> list:
     rows = []
     for tick in range(ticks):
-        unit.set({INPUT[unit.fmu.name]: 1e-3 * tick})
-        rows.append(unit.outputs())
-        unit.step(tick * STEP, STEP)
+        instance.set({INPUT[instance.fmu.name]: 1e-3 * tick})
+        rows.append(instance.outputs())
+        instance.step(tick * STEP, STEP)
     return rows
 
 
-def refuses(unit: Unit, *words: str):
+def refuses(instance: Instance, *words: str):
     """The call inside must fail, and the log must tell why."""
 
     class Expectation:
         def __enter__(self):
-            unit.log.clear()
+            instance.log.clear()
 
         def __exit__(self, kind, error, _):
-            assert kind is not None and issubclass(kind, FMICallException), f"no error, log: {unit.log}"
-            messages = unit.messages()
+            assert kind is not None and issubclass(kind, FMICallException), f"no error, log: {instance.log}"
+            messages = instance.messages()
             assert "not allowed in state error" not in messages, "an earlier call has failed, this one was not looked at"
             for word in words:
                 assert word in messages, f"{word!r} is not in {messages!r}"
@@ -43,33 +43,33 @@ def refuses(unit: Unit, *words: str):
 
 
 @pytest.fixture(params=NAMES)
-def unit(request, fmu):
-    """A unit that misuse must not break: after a reset it behaves as a new one."""
-    with Unit(fmu(request.param)) as fresh:
+def instance(request, fmu):
+    """An instance that misuse must not break: after a reset it behaves as a new one."""
+    with Instance(fmu(request.param)) as fresh:
         expected = drive(fresh.start())
-    with Unit(fmu(request.param)) as unit:
-        yield unit
-        unit.reset()
-        assert drive(unit.start()) == expected
+    with Instance(fmu(request.param)) as instance:
+        yield instance
+        instance.reset()
+        assert drive(instance.start()) == expected
 
 
 @pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
-def test_inputs_that_are_no_numbers(unit, value):
-    name = INPUT[unit.fmu.name]
-    unit.start()
-    drive(unit, 3)
-    with refuses(unit, name, "not a finite number"):
-        unit.set({name: value})
+def test_inputs_that_are_no_numbers(instance, value):
+    name = INPUT[instance.fmu.name]
+    instance.start()
+    drive(instance, 3)
+    with refuses(instance, name, "not a finite number"):
+        instance.set({name: value})
 
 
-def test_value_references_that_do_not_exist(unit):
-    unit.start()
-    with refuses(unit, "123456"):
-        unit.slave.getReal([123456])
-    unit.reset()
-    unit.start()
-    with refuses(unit, "123456"):
-        unit.slave.setReal([123456], [1.0])
+def test_value_references_that_do_not_exist(instance):
+    instance.start()
+    with refuses(instance, "123456"):
+        instance.slave.getReal([123456])
+    instance.reset()
+    instance.start()
+    with refuses(instance, "123456"):
+        instance.slave.setReal([123456], [1.0])
 
 
 @pytest.mark.parametrize(
@@ -93,11 +93,11 @@ def test_value_references_that_do_not_exist(unit):
     ],
 )
 def test_parameters_out_of_range_are_refused_when_set(fmu, name, variable, value):
-    with Unit(fmu(name)) as unit:
-        with refuses(unit, variable):
-            unit.set({variable: value})
-        unit.reset()
-        drive(unit.start())
+    with Instance(fmu(name)) as instance:
+        with refuses(instance, variable):
+            instance.set({variable: value})
+        instance.reset()
+        drive(instance.start())
 
 
 @pytest.mark.parametrize(
@@ -122,23 +122,23 @@ def test_parameters_out_of_range_are_refused_when_set(fmu, name, variable, value
     ],
 )
 def test_designs_that_cannot_work_are_refused_at_initialization(fmu, name, settings, words):
-    with Unit(fmu(name), settings) as unit:
-        with refuses(unit, *words):
-            unit.start()
-        unit.reset()
-        drive(unit.start())
+    with Instance(fmu(name), settings) as instance:
+        with refuses(instance, *words):
+            instance.start()
+        instance.reset()
+        drive(instance.start())
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_another_guid(fmu, name):
     with pytest.raises(RuntimeError, match="GUID"):
-        Unit(fmu(name), guid="{00000000-0000-0000-0000-000000000000}")
+        Instance(fmu(name), guid="{00000000-0000-0000-0000-000000000000}")
 
 
-def test_saved_states_that_do_not_fit(unit, fmu):
-    unit.start()
-    drive(unit, 3)
-    saved = unit.save()
+def test_saved_states_that_do_not_fit(instance, fmu):
+    instance.start()
+    drive(instance, 3)
+    saved = instance.save()
     damaged = bytearray(saved)
     damaged[-20] ^= 0x10
     for bad, word in (
@@ -149,43 +149,43 @@ def test_saved_states_that_do_not_fit(unit, fmu):
         (bytes(damaged), "checksum"),
         (b"\x00" * len(saved), "not a saved state"),
     ):
-        with refuses(unit, word):
-            unit.restore(bad)
-    other = "LQR" if unit.fmu.name != "LQR" else "CRMPC"
-    with Unit(fmu(other)).start() as stranger:
-        with refuses(unit, "GUID"):
-            unit.restore(stranger.save())
+        with refuses(instance, word):
+            instance.restore(bad)
+    other = "LQR" if instance.fmu.name != "LQR" else "CRMPC"
+    with Instance(fmu(other)).start() as stranger:
+        with refuses(instance, "GUID"):
+            instance.restore(stranger.save())
     # None of these refusals left a trace.
-    assert unit.save() == saved
+    assert instance.save() == saved
 
 
-def test_calls_in_the_wrong_state(unit):
-    with refuses(unit, "fmi2DoStep"):
-        unit.step(0.0, STEP)
-    unit.reset()
-    with refuses(unit, "fmi2ExitInitializationMode"):
-        unit.exit()
-    unit.reset()
-    with refuses(unit, "fmi2Terminate"):
-        unit.slave.terminate()
-    unit.reset()
-    unit.start()
-    with refuses(unit, "fmi2EnterInitializationMode"):
-        unit.slave.enterInitializationMode()
+def test_calls_in_the_wrong_state(instance):
+    with refuses(instance, "fmi2DoStep"):
+        instance.step(0.0, STEP)
+    instance.reset()
+    with refuses(instance, "fmi2ExitInitializationMode"):
+        instance.exit()
+    instance.reset()
+    with refuses(instance, "fmi2Terminate"):
+        instance.slave.terminate()
+    instance.reset()
+    instance.start()
+    with refuses(instance, "fmi2EnterInitializationMode"):
+        instance.slave.enterInitializationMode()
 
 
-def test_parameters_are_fixed_once_the_simulation_runs(unit):
-    name = {"ControlAllocator": "weight.jet", "AttitudeEstimator": "field.declination"}.get(unit.fmu.name, "inertia.Ixx")
-    unit.start()
-    with refuses(unit, name):
-        unit.set({name: 6e5})
+def test_parameters_are_fixed_once_the_simulation_runs(instance):
+    name = {"ControlAllocator": "weight.jet", "AttitudeEstimator": "field.declination"}.get(instance.fmu.name, "inertia.Ixx")
+    instance.start()
+    with refuses(instance, name):
+        instance.set({name: 6e5})
 
 
 @pytest.mark.parametrize("time, step", [(1.0, STEP), (0.0, -STEP), (0.0, math.nan), (math.nan, STEP), (0.0, math.inf)])
-def test_steps_that_do_not_join(unit, time, step):
-    unit.start()
-    with refuses(unit, "fmi2DoStep"):
-        unit.step(time, step)
+def test_steps_that_do_not_join(instance, time, step):
+    instance.start()
+    with refuses(instance, "fmi2DoStep"):
+        instance.step(time, step)
 
 
 ONE = (c_uint * 1)(0)
@@ -212,22 +212,22 @@ VALUE = (c_double * 1)(0.0)
         ("fmi2GetRealStatus", [2, None]),
     ],
 )
-def test_null_pointers(unit, function, arguments):
-    unit.start()
-    with refuses(unit, function):
-        getattr(unit.slave, function)(unit.slave.component, *arguments)
+def test_null_pointers(instance, function, arguments):
+    instance.start()
+    with refuses(instance, function):
+        getattr(instance.slave, function)(instance.slave.component, *arguments)
 
 
-def test_no_instance(unit):
+def test_no_instance(instance):
     # Without an instance there is no log.
     with pytest.raises(FMICallException):
-        unit.slave.fmi2DoStep(None, 0.0, STEP, 0)
+        instance.slave.fmi2DoStep(None, 0.0, STEP, 0)
     with pytest.raises(FMICallException):
-        unit.slave.fmi2GetReal(None, ONE, 1, VALUE)
+        instance.slave.fmi2GetReal(None, ONE, 1, VALUE)
 
 
 def test_a_plant_at_a_singular_attitude_says_so(fmu):
-    with Unit(fmu("ReentryPlant"), {"disturbance.kind": "none", "initial.alpha": math.pi / 2, "initial.beta": 1.5, "initial.p": 0.5}) as plant:
+    with Instance(fmu("ReentryPlant"), {"disturbance.kind": "none", "initial.alpha": math.pi / 2, "initial.beta": 1.5, "initial.p": 0.5}) as plant:
         with refuses(plant, "beta"):
             plant.start()
             for tick in range(50):
@@ -239,15 +239,15 @@ def test_a_plant_at_a_singular_attitude_says_so(fmu):
 def test_measurements_without_sense_do_not_end_a_controller(fmu):
     """At a state far from anything feasible the controller counts a fallback with a finite moment,
     and recovers."""
-    with Unit(fmu("CRMPC")).start() as unit:
+    with Instance(fmu("CRMPC")).start() as instance:
         for tick in range(5):
-            unit.step(tick * STEP, STEP)
-        unit.set(dict(zip(ANGLES + RATES, [0.13, 0.17, -0.5, 0.5, -0.5, 0.5])))
-        fallbacks, status = unit.get(["solver.fallbacks", "solver.status"])
-        assert fallbacks == 1 and status == unit.fmu.item("solver.status", "fallback")
-        assert all(math.isfinite(value) for value in unit.outputs())
+            instance.step(tick * STEP, STEP)
+        instance.set(dict(zip(ANGLES + RATES, [0.13, 0.17, -0.5, 0.5, -0.5, 0.5])))
+        fallbacks, status = instance.get(["solver.fallbacks", "solver.status"])
+        assert fallbacks == 1 and status == instance.fmu.item("solver.status", "fallback")
+        assert all(math.isfinite(value) for value in instance.outputs())
         for tick in range(5, 10):
-            unit.step(tick * STEP, STEP)
-        unit.set(dict(zip(ANGLES + RATES, [0.13, 0.17, -0.5, 0.0, 0.0, 0.0])))
-        fallbacks, status = unit.get(["solver.fallbacks", "solver.status"])
-        assert fallbacks == 1 and status != unit.fmu.item("solver.status", "fallback")
+            instance.step(tick * STEP, STEP)
+        instance.set(dict(zip(ANGLES + RATES, [0.13, 0.17, -0.5, 0.0, 0.0, 0.0])))
+        fallbacks, status = instance.get(["solver.fallbacks", "solver.status"])
+        assert fallbacks == 1 and status != instance.fmu.item("solver.status", "fallback")

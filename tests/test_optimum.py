@@ -1,4 +1,4 @@
-"""The controllers' results at t = 0 against other tools: IPOPT for CRMPC, the Riccati solver of
+"""The controllers' results at t = 0 against other programs: IPOPT for CRMPC, the Riccati solver of
 scipy for LQR."""
 
 import casadi as ca
@@ -7,7 +7,7 @@ import pytest
 from scipy.linalg import solve_continuous_are
 
 import nlp
-from fmi import ANGLES, MOMENT, RATES, Unit
+from fmi import ANGLES, MOMENT, RATES, Instance
 
 
 @pytest.fixture(scope="module")
@@ -30,7 +30,7 @@ def test_oracle_first_optimisation_is_the_nonlinear_optimum(fmu, optimum):
     assert np.linalg.norm(optimum.inputs, axis=1).max() == pytest.approx(optimum.sets.u_tube, rel=1e-6)
 
     measured = dict(zip(ANGLES + RATES, [*nlp.INITIAL_ANGLES, 0.0, 0.0, 0.0]))
-    with Unit(fmu("CRMPC"), {"constraints": "paper"}).start(inputs=measured) as crmpc:
+    with Instance(fmu("CRMPC"), {"constraints": "paper"}).start(inputs=measured) as crmpc:
         status, cost = crmpc.get(["solver.status", "solver.cost"])
         assert status == crmpc.fmu.item("solver.status", "constrained")
         assert cost == pytest.approx(optimum.cost, rel=1e-5)
@@ -51,5 +51,5 @@ def test_oracle_lqr_is_the_riccati_feedback_with_the_drift_cancelled(fmu):
     drift = np.array(nlp.drift_function()(angles, angle_rates)).reshape(3)
     u = acceleration_r + gain[0] * (angles - theta_r) + gain[1] * (angle_rates - rate_r) - drift
     expected = nlp.INERTIA @ np.linalg.solve(r, u)
-    with Unit(fmu("LQR")).start(inputs=dict(zip(ANGLES + RATES, [*angles, *rates]))) as lqr:
+    with Instance(fmu("LQR")).start(inputs=dict(zip(ANGLES + RATES, [*angles, *rates]))) as lqr:
         np.testing.assert_allclose(lqr.get(MOMENT), expected, rtol=1e-10)

@@ -141,7 +141,7 @@ def test_a_bad_experiment_is_refused_with_the_culprit(orchestrate, tmp_path, old
     assert hint in finished.stderr
 
 
-def test_a_unit_that_fails_ends_the_run(orchestrate, tmp_path):
+def test_an_instance_that_fails_ends_the_run(orchestrate, tmp_path):
     path = changed(tmp_path, '"feedback.k1" = -1.5', '"feedback.k1" = -5000.0')
     finished, _ = orchestrate(path)
     assert finished.returncode == 1, finished.stderr
@@ -175,7 +175,7 @@ def test_inspect_shows_every_variable(fmu, name):
         assert re.search(rf"(?m)(^|\s){re.escape(variable)}(\s|$)", finished.stdout), variable
 
 
-def test_list_shows_experiments_and_units():
+def test_list_shows_experiments_and_fmus():
     finished = subprocess.run([program("orchestrator"), "list", EXPERIMENTS], capture_output=True, text=True)
     assert finished.returncode == 0, finished.stderr
     assert "crmpc-robust" in finished.stdout

@@ -1,5 +1,5 @@
-"""FMI 2.0.5, section 4.2.1: in co-simulation, nothing is read from a unit between setting its inputs
-and stepping it. Two orders of calls remain for a loop, and what is promised holds in both."""
+"""FMI 2.0.5, section 4.2.1: in co-simulation, nothing is read from an instance between setting its
+inputs and stepping it. Two orders of calls remain for a loop, and what is promised holds in both."""
 
 import math
 
@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from conftest import ROOT
-from fmi import ANGLES, MOMENT, RATES, Loop, Unit, of_step
+from fmi import ANGLES, MOMENT, RATES, Instance, Loop, of_step
 
 STEP = 0.04
 CONTROLLERS = ["CRMPC", "DLMPC", "LQR", "FBL", "BTVSMC", "BTVSMC_DO", "SOTVSMC_DO", "TwoLoopSMC"]
@@ -17,7 +17,7 @@ SIXTY_SECONDS = 60.0
 
 @pytest.fixture
 def strict(monkeypatch):
-    """Makes every unit that FMPy steps refuse the order of calls that the standard forbids."""
+    """Makes every instance that FMPy steps refuse the order of calls that the standard forbids."""
     is_set, runs = set(), set()
     slave = fmpy.fmi2.FMU2Slave
 
@@ -42,16 +42,16 @@ def strict(monkeypatch):
     wrapped("reset", lambda self: (runs.discard(id(self)), is_set.discard(id(self))))
 
 
-def test_the_strict_unit_refuses(strict, fmu):
-    with Unit(fmu("LQR")).start() as unit:
-        unit.set(dict.fromkeys(ANGLES, 0.1))
+def test_the_strict_instance_refuses(strict, fmu):
+    with Instance(fmu("LQR")).start() as instance:
+        instance.set(dict.fromkeys(ANGLES, 0.1))
         with pytest.raises(AssertionError, match="between setting and stepping"):
-            unit.get(MOMENT)
+            instance.get(MOMENT)
 
 
 @pytest.mark.parametrize("jacobi", [False, True])
 def test_loops_by_hand_keep_to_the_order(strict, fmu, jacobi):
-    with Unit(fmu("CRMPC")) as controller, Unit(fmu("ReentryPlant")) as plant:
+    with Instance(fmu("CRMPC")) as controller, Instance(fmu("ReentryPlant")) as plant:
         assert len(Loop(controller, plant, STEP, jacobi).fly(50)) == 51
 
 
@@ -63,7 +63,7 @@ def test_the_example_keeps_to_the_order(strict):
 
 def fly(fmu, settings=None, plant=None, jacobi=False, steps=1250, name="CRMPC", step=STEP):
     """Returns state and moment at each point, and what the guarantee's status is after each step."""
-    with Unit(fmu(name), settings) as controller, Unit(fmu("ReentryPlant"), plant) as vehicle:
+    with Instance(fmu(name), settings) as controller, Instance(fmu("ReentryPlant"), plant) as vehicle:
         loop = Loop(controller, vehicle, step, jacobi)
         loop.start()
         rows, in_force = [loop.read()], []
@@ -99,39 +99,39 @@ def test_oracle_read_set_step_has_exactly_one_step_of_delay(fmu, adversary):
 
 @pytest.mark.parametrize("name", CONTROLLERS)
 def test_with_a_delay_nothing_acts_before_the_first_command(fmu, name):
-    with Unit(fmu(name), {"delay": STEP}).start() as unit:
-        assert unit.get(MOMENT) == [0.0] * 3
-        unit.step(0.0, STEP)
-        assert np.abs(unit.get(MOMENT)).max() > 0.0
+    with Instance(fmu(name), {"delay": STEP}).start() as instance:
+        assert instance.get(MOMENT) == [0.0] * 3
+        instance.step(0.0, STEP)
+        assert np.abs(instance.get(MOMENT)).max() > 0.0
 
 
 @pytest.mark.parametrize("name", CONTROLLERS)
 def test_outputs_are_held_after_a_step_until_an_input_is_set(fmu, name):
     values = dict(zip(ANGLES + RATES, [0.13, 0.16, -0.5, 0.01, -0.02, 0.0]))
     later = dict(zip(ANGLES + RATES, [0.12, 0.15, -0.4, 0.02, -0.01, 0.01]))
-    with Unit(fmu(name)).start(inputs=values) as unit:
-        period = unit.get(["period.feedback"])[0] if "period.feedback" in unit.fmu.variables else STEP
-        first = unit.get(MOMENT)
-        unit.step(0.0, period)
-        assert unit.get(MOMENT) == first, "the moment that acted over the step"
-        saved = unit.save()
-        unit.set(values)
-        due = unit.get(MOMENT)
+    with Instance(fmu(name)).start(inputs=values) as instance:
+        period = instance.get(["period.feedback"])[0] if "period.feedback" in instance.fmu.variables else STEP
+        first = instance.get(MOMENT)
+        instance.step(0.0, period)
+        assert instance.get(MOMENT) == first, "the moment that acted over the step"
+        saved = instance.save()
+        instance.set(values)
+        due = instance.get(MOMENT)
         # The laws of these two give the same moment at the next tick for the same measurement.
         assert due != first or name in ("DLMPC", "FBL"), "an equal value counts as set, so that the next tick is due"
-        unit.set(later)
-        assert unit.get(MOMENT) != due
-        unit.restore(saved)
-        assert unit.get(MOMENT) == first, "the saved state knows that no input was set"
-        unit.set(later)
-        expected = unit.get(MOMENT)
-        unit.restore(saved)
-        unit.set(later)
-        unit.step(period, period)
-        assert unit.get(MOMENT) == expected, "what is read after the step is what was asked for before"
-        unit.reset()
-        unit.start(inputs=values)
-        assert unit.get(MOMENT) == first
+        instance.set(later)
+        assert instance.get(MOMENT) != due
+        instance.restore(saved)
+        assert instance.get(MOMENT) == first, "the saved state knows that no input was set"
+        instance.set(later)
+        expected = instance.get(MOMENT)
+        instance.restore(saved)
+        instance.set(later)
+        instance.step(period, period)
+        assert instance.get(MOMENT) == expected, "what is read after the step is what was asked for before"
+        instance.reset()
+        instance.start(inputs=values)
+        assert instance.get(MOMENT) == first
 
 
 def irregular(k: int) -> float:
@@ -144,7 +144,7 @@ STEPS = {f"{step} s": lambda k, step=step: step for step in (0.01, 0.02, 0.03, 0
 @pytest.mark.parametrize("step", [*STEPS, "irregular"])
 def test_a_guarantee_in_force_is_kept_with_any_communication_step(fmu, step):
     length = STEPS.get(step, irregular)
-    with Unit(fmu("CRMPC")) as controller, Unit(fmu("ReentryPlant")) as plant:
+    with Instance(fmu("CRMPC")) as controller, Instance(fmu("ReentryPlant")) as plant:
         loop = Loop(controller, plant, STEP)
         loop.start()
         time, k, withdrawals, was, statuses = 0.0, 0, 0, False, []
@@ -170,7 +170,7 @@ def test_a_guarantee_in_force_is_kept_with_any_communication_step(fmu, step):
 def test_a_delay_that_nobody_told_is_found(fmu, name):
     plant = {"disturbance.kind": "square", "disturbance.square.period": 3.0}
     for jacobi, told, delay in [(True, 0.0, STEP), (True, STEP, STEP), (False, 0.0, 0.0), (False, STEP, 0.0)]:
-        with Unit(fmu(name), {"delay": told}) as controller, Unit(fmu("ReentryPlant"), plant) as vehicle:
+        with Instance(fmu(name), {"delay": told}) as controller, Instance(fmu("ReentryPlant"), plant) as vehicle:
             Loop(controller, vehicle, STEP, jacobi).fly(250)
             estimate, differs = controller.get(["loopDelay.estimate", "loopDelay.differs"])
             assert estimate == pytest.approx(delay, abs=0.25 * STEP) and differs == (told != delay)
@@ -195,7 +195,7 @@ def test_a_delay_within_its_interval_ends_nothing(fmu, adversary, delay):
 
 def test_little_moment_is_said(fmu):
     for delay, little in [(0.04, False), (0.08, True)]:
-        with Unit(fmu("CRMPC"), {"delay": delay}).start() as controller:
+        with Instance(fmu("CRMPC"), {"delay": delay}).start() as controller:
             controller.step(0.0, STEP)
             (left,) = controller.get(["guarantee.momentLeft"])
             assert (0.0 < left < 0.1) == little and left < 0.2

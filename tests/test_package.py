@@ -10,7 +10,7 @@ from elftools.elf.elffile import ELFFile
 from elftools.elf.gnuversions import GNUVerNeedSection
 
 from conftest import NAMES, TARGET
-from fmi import Fmu, Unit
+from fmi import Fmu, Instance
 
 pytestmark = pytest.mark.skipif(
     (platform.system(), platform.machine()) != ("Linux", "x86_64"), reason="built on Linux x86_64 only"
@@ -59,13 +59,13 @@ def test_libraries_are_stripped_and_archives_small(library, packed):
     assert packed.stat().st_size <= 4e6
 
 
-def test_the_unit_is_the_same(packed, fmu, tmp_path):
+def test_the_fmu_is_the_same(packed, fmu, tmp_path):
     usual, old = fmu(packed.stem), Fmu.open(packed, tmp_path)
     assert (old.folder / "modelDescription.xml").read_bytes() == (usual.folder / "modelDescription.xml").read_bytes()
     shown = []
     for each in (usual, old):
-        with Unit(each).start() as unit:
+        with Instance(each).start() as instance:
             for tick in range(10):
-                unit.step(0.04 * tick, 0.04)
-            shown.append(unit.outputs())
+                instance.step(0.04 * tick, 0.04)
+            shown.append(instance.outputs())
     assert shown[0] == shown[1]

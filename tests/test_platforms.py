@@ -52,7 +52,7 @@ MACOS = {
 }
 MACOS_VERSION = [11, 0, 0]
 
-# An experiment with the unit of the orchestrator's own tests.
+# An experiment with the FMU of the orchestrator's own tests.
 ONE_COMPONENT = """
 title = "one component"
 simulation = { stop = 4.0, step = 1.0 }
@@ -61,7 +61,7 @@ record.variables = ["model.steps"]
 """
 
 pytestmark = pytest.mark.skipif(not DIST.is_dir(), reason="no packages: run scripts/package")
-# What runs under an emulator. scripts/package makes the programs, the tests of a change only units.
+# What runs under an emulator. scripts/package makes the programs, the tests of a change only FMUs.
 PROGRAMS = {"windows-x86_64": "orchestrator.exe", "linux-aarch64": "orchestrator"}
 
 
@@ -273,27 +273,27 @@ def driven(variable) -> str:
 
 @pytest.fixture(scope="session")
 def importer(tmp_path_factory):
-    """Command that runs a unit of a platform in the importer in C, without its emulator."""
+    """Command that runs an FMU of a platform in the importer in C, without its emulator."""
     folder = tmp_path_factory.mktemp("importer")
 
     def command(platform: str, name: str) -> list:
         program = folder / f"{platform}.exe"
         if not program.is_file():
             compiled(platform, "importer.c", program, *([] if platform.startswith("windows") else ["-ldl"]))
-        unit = Fmu.open(packed(platform, name), folder / platform / name)
-        [library] = unit.folder.glob("binaries/*64/*")
-        shown = [n for n in unit.names("output") if unit.variables[n].type == "Real" and n not in NOT_REPRODUCIBLE]
-        outputs = [unit.variables[n].valueReference for n in shown]
-        inputs = [driven(unit.variables[n]) for n in unit.names("input") if unit.variables[n].type == "Real"]
-        resources = (unit.folder / "resources").as_uri()
-        command = [program, library, unit.description.guid, resources, 250, *inputs, "--", *outputs]
+        fmu = Fmu.open(packed(platform, name), folder / platform / name)
+        [library] = fmu.folder.glob("binaries/*64/*")
+        shown = [n for n in fmu.names("output") if fmu.variables[n].type == "Real" and n not in NOT_REPRODUCIBLE]
+        outputs = [fmu.variables[n].valueReference for n in shown]
+        inputs = [driven(fmu.variables[n]) for n in fmu.names("input") if fmu.variables[n].type == "Real"]
+        resources = (fmu.folder / "resources").as_uri()
+        command = [program, library, fmu.description.guid, resources, 250, *inputs, "--", *outputs]
         return [str(part) for part in command]
 
     return command
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_oracle_every_unit_gives_the_same_bits_in_an_importer_in_c(foreign, importer, name):
+def test_oracle_every_fmu_gives_the_same_bits_in_an_importer_in_c(foreign, importer, name):
     platform, run = foreign
     here = subprocess.run(importer("linux-x86_64", name), capture_output=True, timeout=60)
     assert here.returncode == 0, here.stderr.decode()
@@ -312,8 +312,8 @@ def native(*arguments, **options):
 @pytest.mark.parametrize("experiment", EXPERIMENTS, ids=lambda path: f"{path.parent.name}/{path.stem}")
 def test_oracle_every_platform_computes_the_same_bits(foreign, experiment, tmp_path):
     """Times of computation are not recorded in results.csv; everything else is compared."""
-    units = DIST / "linux-x86_64" / "fmu"
-    here = native("run", experiment, "--out", tmp_path / "here", "--fmu-dir", units, "--quiet")
+    fmus = DIST / "linux-x86_64" / "fmu"
+    here = native("run", experiment, "--out", tmp_path / "here", "--fmu-dir", fmus, "--quiet")
     platform, run = foreign
     own = [orchestrator(platform), "run", experiment, "--fmu-dir", DIST / platform / "fmu"]
     there = run(*own, "--out", tmp_path / "there", "--quiet")
@@ -387,8 +387,8 @@ def test_ctrl_c_on_windows_ends_a_run_and_keeps_its_results(wine, tmp_path):
     compiled("windows-x86_64", "press_ctrl_c.c", tmp_path / "press.exe")
     own = orchestrator("windows-x86_64")
     experiment = ROOT / "orchestrator" / "experiments" / "crmpc-2022" / "lqr.toml"
-    units = DIST / "windows-x86_64" / "fmu"
-    run = f"Z:{own} run Z:{experiment} --fmu-dir Z:{units} --out Z:{tmp_path}/out --real-time --quiet"
+    fmus = DIST / "windows-x86_64" / "fmu"
+    run = f"Z:{own} run Z:{experiment} --fmu-dir Z:{fmus} --out Z:{tmp_path}/out --real-time --quiet"
     # A program for the console has one only if the test gives it a terminal.
     _, terminal = pty.openpty()
     command = [*emulator, tmp_path / "press.exe", run.replace("/", "\\")]

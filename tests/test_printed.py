@@ -1,5 +1,5 @@
 """Equations of Chai 2022 and Wu 2015 as printed, against closed forms and differences: steps of
-proofs and formulas that no unit computes. Angles are in rad, all other values in SI units.
+proofs and formulas that no FMU computes. Angles are in rad, all other values in SI units.
 """
 
 import sys

@@ -25,7 +25,7 @@ pytestmark = [
 VERSION = re.search(r'(?m)^version = "(.+)"', (ROOT / "Cargo.toml").read_text())[1]
 EPOCH = 1_700_000_000
 ELF = b"\x7fELF\x02\x01\x01" + bytes(9) + b"\x03\x00"
-# The first bytes of a library for each platform, and where it stands in a unit.
+# The first bytes of a library for each platform, and where it stands in an FMU.
 LIBRARIES = {
     "linux-x86_64": (ELF + b"\x3e\x00" + bytes(44), "binaries/linux64/{}.so"),
     "linux-aarch64": (ELF + b"\xb7\x00" + bytes(44), "binaries/linux64/{}.so"),
@@ -35,7 +35,7 @@ LIBRARIES = {
     "macos-aarch64": (b"\xcf\xfa\xed\xfe\x0c\0\0\1", "binaries/darwin64/{}.dylib"),
 }
 EVERYWHERE = ("linux-x86_64", "windows-x86_64", "macos-universal")
-# Tags of the wheels, and where their units come from.
+# Tags of the wheels, and where their FMUs come from.
 WHEELS = {
     "manylinux2014_x86_64": "linux-x86_64/fmu",
     "manylinux2014_aarch64": "linux-aarch64/fmu-wheel",
@@ -53,7 +53,7 @@ ARCHIVES = {
 }
 
 
-def unit(path: Path, platforms: tuple[str, ...]) -> None:
+def write_fmu(path: Path, platforms: tuple[str, ...]) -> None:
     [description] = ROOT.glob(f"fmu-*/generated/{path.stem}.xml")
     path.parent.mkdir(parents=True, exist_ok=True)
     with zipfile.ZipFile(path, "w") as archive:
@@ -66,12 +66,12 @@ def unit(path: Path, platforms: tuple[str, ...]) -> None:
 def packages(folder: Path, names: list[str]) -> Path:
     """Makes a folder like that of scripts/package, with files in the order of the names."""
     for name in names:
-        unit(folder / "all" / "fmu" / f"{name}.fmu", EVERYWHERE)
+        write_fmu(folder / "all" / "fmu" / f"{name}.fmu", EVERYWHERE)
         for each in LIBRARIES:
-            unit(folder / each / "fmu" / f"{name}.fmu", (each,))
-        # Where there is such a folder, its units go into the wheel.
+            write_fmu(folder / each / "fmu" / f"{name}.fmu", (each,))
+        # Where there is such a folder, its FMUs go into the wheel.
         others = ("linux-aarch64", "macos-x86_64")
-        unit(folder / "linux-aarch64" / "fmu-wheel" / f"{name}.fmu", others)
+        write_fmu(folder / "linux-aarch64" / "fmu-wheel" / f"{name}.fmu", others)
     for each, (content, _) in LIBRARIES.items():
         name = "orchestrator.exe" if each.startswith("windows") else "orchestrator"
         (folder / each / name).write_bytes(content + b"program")
@@ -137,7 +137,7 @@ def test_a_release_has_these_files(made):
     assert files == ARCHIVES | wheels | others
 
 
-def test_archives_hold_units_licences_and_experiments(content, dist):
+def test_archives_hold_fmus_licences_and_experiments(content, dist):
     name = content.pop("")
     licences = {"LICENSE-MIT", "LICENSE-APACHE", "LICENSES.txt", "LICENSES-rust-std.html"}
     assert {*licences, "README.md"} <= set(content)
@@ -197,7 +197,7 @@ def test_the_checksums_are_those_of_the_files(made):
     assert lines == [f"{sums[name]}  {name}" for name in sorted(sums)]
 
 
-def test_wheels_have_the_units_and_the_licences_of_what_is_linked_in(made, dist):
+def test_wheels_have_the_fmus_and_the_licences_of_what_is_linked_in(made, dist):
     for tag, folder in WHEELS.items():
         [wheel] = made.glob(f"*-{tag}.whl")
         with zipfile.ZipFile(wheel) as archive:
@@ -264,7 +264,7 @@ def test_the_bill_of_materials_fits_its_schema_and_the_lock_file(made):
 # What keeps a release from being made
 
 
-def test_missing_and_foreign_units_are_named(dist, tmp_path):
+def test_missing_and_foreign_fmus_are_named(dist, tmp_path):
     folder = tmp_path / "packages"
     shutil.copytree(dist, folder)
 

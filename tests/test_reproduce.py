@@ -186,7 +186,7 @@ def test_exits_change_the_time_and_not_the_motion(results):
 def test_parameters_are_shown_in_the_unit_of_their_heading(report):
     page = (report[1] / "report.html").read_text()
     row = page.split("Where the guarantee can be given")[1].split("errors 0.2 deg, 0.2 deg/s; disturbance 2.0 deg/s²")[1]
-    # The unit holds these 0.2 deg/s and 2 deg/s2 in rad.
+    # The FMU holds these 0.2 deg/s and 2 deg/s2 in rad.
     assert re.findall(r"<td[^>]*>([^<]*)</td>", row)[:2] == ["0.2", "2"]
 
 
@@ -478,7 +478,7 @@ def test_wu_2015_with_control_allocation(wu):
     assert max(blended[f"blending-{law}-do"] for law in ("btvsmc", "sotvsmc")) <= 0.02
 
 
-def test_published_parameters_of_wu_2015_are_those_of_the_units(wu):
+def test_published_parameters_of_wu_2015_are_those_of_the_fmus(wu):
     page = (wu[0] / "report.html").read_text()
     tables = re.findall(r"<h3>Table [12]:.*?</table>", page, re.DOTALL)
     rows = [re.findall(r"<td.*?>(.*?)</td>", row) for t in tables for row in t.split("<tr>")[2:]]

@@ -1,6 +1,6 @@
 """Sensors of ReentryPlant: their readings at rest, along the calibration sequence, through lost
 samples, in both interfaces. The errors are those of vehicle/data/sensors.toml, read back from the
-unit's parameters."""
+FMU's parameters."""
 
 import csv
 
@@ -9,7 +9,7 @@ import pytest
 from fmpy import simulate_fmu
 
 from conftest import EXPERIMENTS, merged
-from fmi import RATES, Unit
+from fmi import RATES, Instance
 
 SENSORS = ["gyroscope", "accelerometer", "magnetometer"]
 READINGS = {sensor: [f"measured.{sensor}.{axis}" for axis in "xyz"] for sensor in SENSORS}
@@ -23,18 +23,18 @@ def matrix(sensor: str) -> list[str]:
     return [f"sensor.{sensor}.matrix[{i},{j}]" for i in (1, 2, 3) for j in (1, 2, 3)]
 
 
-def errors(unit: Unit, sensor: str) -> tuple[np.ndarray, np.ndarray]:
+def errors(instance: Instance, sensor: str) -> tuple[np.ndarray, np.ndarray]:
     """Returns A and b of m = A h + b."""
-    bias = unit.get([f"sensor.{sensor}.bias.{axis}" for axis in "xyz"])
-    return np.reshape(unit.get(matrix(sensor)), (3, 3)), np.array(bias)
+    bias = instance.get([f"sensor.{sensor}.bias.{axis}" for axis in "xyz"])
+    return np.reshape(instance.get(matrix(sensor)), (3, 3)), np.array(bias)
 
 
 def flown(fmu, parameters: dict, steps: int, step: float, names=SAMPLE + ALL) -> np.ndarray:
     rows = []
-    with Unit(fmu("ReentryPlant"), REST | parameters).start() as unit:
+    with Instance(fmu("ReentryPlant"), REST | parameters).start() as instance:
         for tick in range(steps + 1):
-            rows.append(unit.get(names))
-            unit.step(tick * step, step)
+            rows.append(instance.get(names))
+            instance.step(tick * step, step)
     return np.array(rows)
 
 
@@ -52,14 +52,14 @@ def flown(fmu, parameters: dict, steps: int, step: float, names=SAMPLE + ALL) ->
 def test_oracle_readings_at_rest_by_hand(fmu, angles, force, field):
     level = {f"initial.{axis}": 0.0 for axis in ("alpha", "beta", "sigma")}
     parameters = REST | level | {name: np.radians(value) for name, value in angles.items()}
-    with Unit(fmu("ReentryPlant"), parameters).start() as unit:
-        gravity = unit.get(["sensor.gravity"])[0]
-        components = {name: unit.get([f"sensor.field.{name}"])[0] for name in ("north", "east", "down")}
+    with Instance(fmu("ReentryPlant"), parameters).start() as instance:
+        gravity = instance.get(["sensor.gravity"])[0]
+        components = {name: instance.get([f"sensor.field.{name}"])[0] for name in ("north", "east", "down")}
         expected = [-components[name[1:]] if name[0] == "-" else components[name] for name in field]
-        assert unit.get(READINGS["gyroscope"]) == [0.0] * 3
-        np.testing.assert_allclose(unit.get(READINGS["accelerometer"]), gravity * np.array(force), rtol=0, atol=1e-14)
-        np.testing.assert_allclose(unit.get(READINGS["magnetometer"]), expected, rtol=0, atol=1e-19)
-        assert unit.get(SAMPLE) == [0, 0.0]
+        assert instance.get(READINGS["gyroscope"]) == [0.0] * 3
+        np.testing.assert_allclose(instance.get(READINGS["accelerometer"]), gravity * np.array(force), rtol=0, atol=1e-14)
+        np.testing.assert_allclose(instance.get(READINGS["magnetometer"]), expected, rtol=0, atol=1e-19)
+        assert instance.get(SAMPLE) == [0, 0.0]
 
 
 def test_oracle_mean_and_deviation_at_rest_are_those_of_the_parameters(fmu):
@@ -69,11 +69,11 @@ def test_oracle_mean_and_deviation_at_rest_are_those_of_the_parameters(fmu):
     # arrived.
     assert rows[1:, 0].tolist() == list(range(1, count + 1))
     np.testing.assert_allclose(rows[1:, 1], 0.01 * np.arange(count), rtol=0, atol=1e-12)
-    with Unit(fmu("ReentryPlant"), REST).start() as unit:
+    with Instance(fmu("ReentryPlant"), REST).start() as instance:
         for i, sensor in enumerate(SENSORS):
-            a, b = errors(unit, sensor)
-            expected = a @ unit.get(READINGS[sensor]) + b
-            noise, step = unit.get([f"sensor.{sensor}.noise", f"sensor.{sensor}.resolution"])
+            a, b = errors(instance, sensor)
+            expected = a @ instance.get(READINGS[sensor]) + b
+            noise, step = instance.get([f"sensor.{sensor}.noise", f"sensor.{sensor}.resolution"])
             deviation = np.hypot(noise, step / np.sqrt(12))
             found = rows[1:, 2 + 3 * i : 5 + 3 * i]
             # The bounds are five standard deviations of each estimate.
@@ -138,13 +138,13 @@ def test_oracle_the_gyroscope_measures_the_change_of_orientation_whatever_the_ki
 
 
 def exchanged(fmu, parameters: dict, solver: str):
-    unit = fmu("ReentryPlant")
+    plant = fmu("ReentryPlant")
     parameters = REST | parameters
     values = {
-        name: unit.item(name, value) if isinstance(value, str) else value for name, value in parameters.items()
+        name: plant.item(name, value) if isinstance(value, str) else value for name, value in parameters.items()
     }
     return simulate_fmu(
-        str(unit.path),
+        str(plant.path),
         fmi_type="ModelExchange",
         solver=solver,
         start_values=values,
@@ -175,19 +175,19 @@ def test_oracle_model_exchange_takes_the_same_samples(fmu, solver):
 
 def test_a_restored_state_takes_the_same_samples(fmu):
     parameters = REST | {"sensor.set": MEMS, "sensor.delay": 0.05, "sensor.drop.probability": 0.2, "calibration.active": True}
-    with Unit(fmu("ReentryPlant"), parameters).start() as unit:
+    with Instance(fmu("ReentryPlant"), parameters).start() as instance:
 
         def drive(ticks):
             rows = []
             for tick in ticks:
-                rows.append([float(value).hex() for value in unit.get(SAMPLE + ALL)])
-                unit.step(0.013 * tick, 0.013)
+                rows.append([float(value).hex() for value in instance.get(SAMPLE + ALL)])
+                instance.step(0.013 * tick, 0.013)
             return rows
 
         drive(range(50))
-        saved = unit.save()
+        saved = instance.save()
         expected = drive(range(50, 120))
-        unit.restore(saved)
+        instance.restore(saved)
         assert drive(range(50, 120)) == expected
 
 
@@ -199,18 +199,18 @@ def test_a_restored_state_takes_the_same_samples(fmu):
     ],
 )
 def test_what_cannot_be_is_refused_by_name(fmu, parameters, name):
-    with Unit(fmu("ReentryPlant"), {"sensor.set": MEMS, **parameters}) as unit:
+    with Instance(fmu("ReentryPlant"), {"sensor.set": MEMS, **parameters}) as instance:
         with pytest.raises(Exception):
-            unit.start()
-        assert name in unit.messages()
+            instance.start()
+        assert name in instance.messages()
 
 
 @pytest.mark.parametrize("name, value", [("sensor.set", 3), ("sensor.gyroscope.range", -1.0), ("sensor.period", 0.0)])
 def test_what_is_out_of_its_limits_is_refused_when_it_is_set(fmu, name, value):
-    with Unit(fmu("ReentryPlant")) as unit:
+    with Instance(fmu("ReentryPlant")) as instance:
         with pytest.raises(Exception):
-            unit.set({name: value})
-        assert name in unit.messages()
+            instance.set({name: value})
+        assert name in instance.messages()
 
 
 def test_oracle_the_calibration_sequence_determines_hard_and_soft_iron(fmu):
@@ -224,9 +224,9 @@ def test_oracle_the_calibration_sequence_determines_hard_and_soft_iron(fmu):
     q = np.array([[v[0], v[3], v[4]], [v[3], v[1], v[5]], [v[4], v[5], v[2]]])
     center = -np.linalg.solve(q, v[6:])
     q = q / (1.0 + center @ q @ center)
-    with Unit(fmu("ReentryPlant"), REST).start() as unit:
-        a, b = errors(unit, "magnetometer")
-        strength = np.linalg.norm(unit.get([f"sensor.field.{axis}" for axis in ("north", "east", "down")]))
+    with Instance(fmu("ReentryPlant"), REST).start() as instance:
+        a, b = errors(instance, "magnetometer")
+        strength = np.linalg.norm(instance.get([f"sensor.field.{axis}" for axis in ("north", "east", "down")]))
     # The noise is 0.3 uT in 12000 samples; the fit's own bias is of the size of the squared noise
     # over the field.
     np.testing.assert_allclose(center * scale, b, rtol=0, atol=5e-8)

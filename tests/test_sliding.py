@@ -1,4 +1,4 @@
-"""The sliding-mode controllers as units: the scenario of Wu 2015 run by the orchestrator, and their
+"""The sliding-mode controllers as FMUs: the scenario of Wu 2015 run by the orchestrator, and their
 laws at the first tick."""
 
 import csv
@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from conftest import ROOT
-from fmi import ANGLES, MOMENT, RATES, Unit
+from fmi import ANGLES, MOMENT, RATES, Instance
 
 TVSMC = ROOT / "orchestrator" / "experiments" / "tvsmc-2015"
 DEG = np.pi / 180.0
@@ -79,8 +79,8 @@ def test_oracle_first_moment(fmu, name):
     """In the vehicle at rest at t = 0, s is 0, B is 0 and the observer rests: v = b = lambda a =
     -lambda c e, or -kp e."""
     parameters = BODY | {"reference.profile": "tvsmc2015"}
-    with Unit(fmu(name), parameters).start(inputs=START) as unit:
-        moment = np.array(unit.get(MOMENT))
+    with Instance(fmu(name), parameters).start(inputs=START) as instance:
+        moment = np.array(instance.get(MOMENT))
     error = np.array([2.0, 2.0, -2.0]) * DEG
     v = -(3.0 if name == "FBL" else 4.0) * error
     np.testing.assert_allclose(moment, INERTIA @ np.linalg.solve(kinematics(32 * DEG, 2 * DEG), v), rtol=1e-10)
@@ -89,15 +89,15 @@ def test_oracle_first_moment(fmu, name):
 @pytest.mark.parametrize("name", ["BTVSMC", "BTVSMC_DO", "SOTVSMC_DO"])
 def test_the_moment_does_not_depend_on_the_achieved_one_at_the_same_instant(fmu, name):
     """There is no algebraic loop with actuators that answer at once, and none is declared."""
-    unit = fmu(name)
-    outputs = {variable.name: variable for variable in unit.description.modelVariables}
+    controller = fmu(name)
+    outputs = {variable.name: variable for variable in controller.description.modelVariables}
     dependencies = {
         unknown.variable.name: [dependency.name for dependency in unknown.dependencies or []]
-        for unknown in unit.description.outputs
+        for unknown in controller.description.outputs
     }
     assert not any("achievedMoment" in other for name in MOMENT for other in dependencies[name])
     assert "achievedMoment.used" in outputs
-    with Unit(unit, BODY | {"reference.profile": "tvsmc2015", "achievedMoment.used": True}) as driven:
+    with Instance(controller, BODY | {"reference.profile": "tvsmc2015", "achievedMoment.used": True}) as driven:
         driven.start(inputs=START)
         driven.step(0.0, 0.01)
         driven.set(START)
@@ -112,11 +112,11 @@ def test_the_moment_does_not_depend_on_the_achieved_one_at_the_same_instant(fmu,
 
 
 def test_gains_against_condition_46_are_refused(fmu):
-    with Unit(fmu("SOTVSMC_DO"), {"reaching.k2[2]": 0.5}) as unit:
-        unit.enter()
+    with Instance(fmu("SOTVSMC_DO"), {"reaching.k2[2]": 0.5}) as instance:
+        instance.enter()
         with pytest.raises(Exception):
-            unit.exit()
-        assert "(46)" in unit.messages() and "axis 2" in unit.messages()
+            instance.exit()
+        assert "(46)" in instance.messages() and "axis 2" in instance.messages()
 
 
 def uncertainty(rates, angles, accelerations, moment) -> np.ndarray:

@@ -1,5 +1,5 @@
 """SSP archives: written from experiments, valid by the standard's schema, and run by the
-orchestrator, as are archives of others. Other tools run them in test_importers.py."""
+orchestrator, as are archives of others. Other importers run them in test_importers.py."""
 
 import csv
 import html
@@ -20,7 +20,7 @@ from conftest import EXPERIMENTS, TARGET, archive, program
 TABLES = {path: tomllib.loads(path.read_text()) for path in sorted(EXPERIMENTS.parent.rglob("*.toml"))}
 # A file without a title is there to be extended, one of a paper is a study, and in a campaign something varies.
 ALL = [path for path, table in TABLES.items() if "title" in table and "paper" not in table and "vary" not in table]
-# An archive cannot hold a table in place of a unit, which the orchestrator says.
+# An archive cannot hold a table in place of an FMU, which the orchestrator says.
 ALL = [path for path in ALL if ".csv" not in str(TABLES[path].get("components", ""))]
 # Wall-clock times differ from run to run.
 TIMES = ("solver.time", "innerLaw.time")
@@ -96,7 +96,7 @@ def test_an_archive_of_ours_is_the_same_run(name, tmp_path):
     assert ssp["ems_deg"] == toml["ems_deg"] and ssp["cms"] == toml["cms"]
     ssp, toml = (json.loads((tmp_path / kind / "results.json").read_text()) for kind in ("ssp", "toml"))
     assert ssp["simulation"] == toml["simulation"] and ssp["title"] == toml["title"]
-    assert [unit["sha256"] for unit in ssp["components"].values()] == [unit["sha256"] for unit in toml["components"].values()]
+    assert [component["sha256"] for component in ssp["components"].values()] == [component["sha256"] for component in toml["components"].values()]
 
 
 TABULATED = """
@@ -163,7 +163,7 @@ def test_a_step_by_another_tools_annotation_is_read(tmp_path):
     assert json.loads((tmp_path / "out" / "results.json").read_text())["simulation"]["step"] == 0.01
 
 
-def test_a_unit_that_fails_in_an_archive_is_named_by_archive_and_entry(tmp_path):
+def test_an_instance_that_fails_in_an_archive_is_named_by_archive_and_entry(tmp_path):
     path = foreign(tmp_path / "x.ssp")
     with zipfile.ZipFile(path) as old, zipfile.ZipFile(tmp_path / "y.ssp", "w") as new:
         for entry in old.namelist():

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from conftest import NAMES
-from fmi import ANGLES, MOMENT, RATES, Loop, Unit
+from fmi import ANGLES, MOMENT, RATES, Instance, Loop
 
 STEP = 0.04
 PLANT = {"inertia.scale": 1.05, "disturbance.kind": "white", "disturbance.seed": 3}
@@ -30,43 +30,43 @@ def inputs(name: str, tick: int) -> dict:
     return dict(zip(MOMENT, [1e4 * (-1) ** (tick // 10), 2e3 * tick, -3e4 + 1e3 * tick]))
 
 
-def drive(unit: Unit, ticks: range) -> list:
+def drive(instance: Instance, ticks: range) -> list:
     """Returns the exact outputs at each tick."""
     rows = []
     for tick in ticks:
-        unit.set(inputs(unit.fmu.name, tick))
-        rows.append([float(value).hex() for value in unit.outputs()])
-        unit.step(tick * STEP, STEP)
+        instance.set(inputs(instance.fmu.name, tick))
+        rows.append([float(value).hex() for value in instance.outputs()])
+        instance.step(tick * STEP, STEP)
     return rows
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_reset_equals_a_new_instance(fmu, name):
-    with Unit(fmu(name), SETTINGS[name]).start(inputs=inputs(name, 0)) as unit:
-        expected = drive(unit, range(60))
+    with Instance(fmu(name), SETTINGS[name]).start(inputs=inputs(name, 0)) as instance:
+        expected = drive(instance, range(60))
         assert len({tuple(row) for row in expected}) == 60, "the outputs must move for this test to mean anything"
-        unit.reset(SETTINGS[name])
-        unit.start(inputs=inputs(name, 0))
-        assert drive(unit, range(60)) == expected
+        instance.reset(SETTINGS[name])
+        instance.start(inputs=inputs(name, 0))
+        assert drive(instance, range(60)) == expected
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_a_restored_state_goes_on_bit_for_bit(fmu, name):
-    with Unit(fmu(name), SETTINGS[name]).start(inputs=inputs(name, 0)) as unit:
-        drive(unit, range(23))
-        saved = unit.save()
-        expected = drive(unit, range(23, 60))
-        unit.restore(saved)
-        assert drive(unit, range(23, 60)) == expected
-        assert unit.save() != saved
+    with Instance(fmu(name), SETTINGS[name]).start(inputs=inputs(name, 0)) as instance:
+        drive(instance, range(23))
+        saved = instance.save()
+        expected = drive(instance, range(23, 60))
+        instance.restore(saved)
+        assert drive(instance, range(23, 60)) == expected
+        assert instance.save() != saved
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_a_state_saved_to_a_file_goes_on_in_a_new_process(fmu, name, tmp_path):
-    with Unit(fmu(name), SETTINGS[name]).start(inputs=inputs(name, 0)) as unit:
-        drive(unit, range(23))
-        (tmp_path / "state").write_bytes(unit.save())
-        expected = drive(unit, range(23, 60))
+    with Instance(fmu(name), SETTINGS[name]).start(inputs=inputs(name, 0)) as instance:
+        drive(instance, range(23))
+        (tmp_path / "state").write_bytes(instance.save())
+        expected = drive(instance, range(23, 60))
     script = {"parameters": SETTINGS[name], "inputs": [inputs(name, tick) for tick in range(23, 60)]}
     (tmp_path / "script.json").write_text(json.dumps(script))
     program = Path(__file__).with_name("continue_elsewhere.py")
@@ -78,11 +78,11 @@ def test_a_state_saved_to_a_file_goes_on_in_a_new_process(fmu, name, tmp_path):
 
 @pytest.mark.parametrize("name", NAMES)
 def test_a_new_instance_takes_the_parameters_from_the_state(fmu, name):
-    with Unit(fmu(name), SETTINGS[name]).start(inputs=inputs(name, 0)) as unit:
-        drive(unit, range(7))
-        saved = unit.save()
-        expected = drive(unit, range(7, 30))
-    with Unit(fmu(name)).start() as other:
+    with Instance(fmu(name), SETTINGS[name]).start(inputs=inputs(name, 0)) as instance:
+        drive(instance, range(7))
+        saved = instance.save()
+        expected = drive(instance, range(7, 30))
+    with Instance(fmu(name)).start() as other:
         other.restore(saved)
         assert drive(other, range(7, 30)) == expected
 
@@ -101,21 +101,21 @@ def test_interleaved_instances_do_not_disturb_each_other(fmu, name):
     }.get(name, {"surface.lambda": 1.5})
     alone = []
     for settings in (SETTINGS[name], other_settings):
-        with Unit(fmu(name), settings).start(inputs=inputs(name, 0)) as unit:
-            alone.append(drive(unit, range(40)))
+        with Instance(fmu(name), settings).start(inputs=inputs(name, 0)) as instance:
+            alone.append(drive(instance, range(40)))
     assert alone[0] != alone[1]
-    both = [Unit(fmu(name), s).start(inputs=inputs(name, 0)) for s in (SETTINGS[name], other_settings)]
+    both = [Instance(fmu(name), s).start(inputs=inputs(name, 0)) for s in (SETTINGS[name], other_settings)]
     together = [[], []]
     for tick in range(40):
-        for unit, rows in zip(both, together):
-            rows += drive(unit, range(tick, tick + 1))
-    for unit in both:
-        unit.close()
+        for instance, rows in zip(both, together):
+            rows += drive(instance, range(tick, tick + 1))
+    for instance in both:
+        instance.close()
     assert together == alone
 
 
 def test_a_closed_loop_goes_on_from_saved_states(fmu):
-    loop = Loop(Unit(fmu("CRMPC"), SETTINGS["CRMPC"]), Unit(fmu("ReentryPlant"), PLANT), STEP)
+    loop = Loop(Instance(fmu("CRMPC"), SETTINGS["CRMPC"]), Instance(fmu("ReentryPlant"), PLANT), STEP)
     loop.start()
     for _ in range(62):
         loop.advance()

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fmi import ANGLES, MOMENT, RATES, REFERENCE, Unit
+from fmi import ANGLES, MOMENT, RATES, REFERENCE, Instance
 
 CONTROLLERS = ["CRMPC", "LQR"]
 # Time for which inputs are held, s.
@@ -23,25 +23,25 @@ def held(k: int) -> dict:
     return dict(zip(ANGLES + RATES, [0.13 + 2e-3 * k, 0.16 - 4e-3 * k, -0.5 + 1e-3 * k, 0.01, -0.02, 1e-3 * k]))
 
 
-def sampled(unit: Unit) -> list:
+def sampled(instance: Instance) -> list:
     """Returns the exact outputs that change at ticks only, and the reference, which depends on
     time."""
     # In a longer step some ticks have old inputs: the guarantee's status says so, and they tell
     # nothing of the loop's delay.
     other = ("reference", "guarantee", "loopDelay", "solver.time")
-    names = [n for n in unit.fmu.names("output") if not n.startswith(other)]
-    return unit.get(names), unit.get(REFERENCE)
+    names = [n for n in instance.fmu.names("output") if not n.startswith(other)]
+    return instance.get(names), instance.get(REFERENCE)
 
 
 def run(fmu, division) -> list:
     rows = []
-    with Unit(fmu).start(inputs=held(0)) as unit:
+    with Instance(fmu).start(inputs=held(0)) as instance:
         for k in range(HOLDS):
-            unit.set(held(k))
-            rows.append(sampled(unit))
+            instance.set(held(k))
+            rows.append(sampled(instance))
             begin = k * HOLD
             for step in division(k):
-                unit.step(begin, step)
+                instance.step(begin, step)
                 begin += step
     return rows
 
@@ -59,20 +59,20 @@ def test_any_communication_step_gives_the_same_outputs_at_common_ticks(fmu, name
 
 @pytest.mark.parametrize("name", CONTROLLERS)
 def test_outputs_are_held_between_ticks_and_follow_inputs_at_a_tick(fmu, name):
-    with Unit(fmu(name)).start(inputs=held(0)) as unit:
-        at_tick = unit.get(MOMENT)
-        unit.set(held(1))
-        changed = unit.get(MOMENT)
+    with Instance(fmu(name)).start(inputs=held(0)) as instance:
+        at_tick = instance.get(MOMENT)
+        instance.set(held(1))
+        changed = instance.get(MOMENT)
         assert changed != at_tick
-        unit.set(held(0))
-        assert unit.get(MOMENT) == at_tick, "the evaluation for other inputs must leave no trace"
-        unit.step(0.0, FEEDBACK / 2)
-        unit.set(held(1))
-        assert unit.get(MOMENT) == at_tick
-        unit.step(FEEDBACK / 2, FEEDBACK / 2)
-        assert unit.get(MOMENT) == at_tick, "the moment that acted over the step"
-        unit.set(held(1))
-        assert unit.get(MOMENT) != at_tick
+        instance.set(held(0))
+        assert instance.get(MOMENT) == at_tick, "the evaluation for other inputs must leave no trace"
+        instance.step(0.0, FEEDBACK / 2)
+        instance.set(held(1))
+        assert instance.get(MOMENT) == at_tick
+        instance.step(FEEDBACK / 2, FEEDBACK / 2)
+        assert instance.get(MOMENT) == at_tick, "the moment that acted over the step"
+        instance.set(held(1))
+        assert instance.get(MOMENT) != at_tick
 
 
 @pytest.mark.parametrize("name", CONTROLLERS)
@@ -85,13 +85,13 @@ def test_input_derivatives_give_the_inputs_between(fmu, name):
     def ramp(time: float) -> dict:
         return dict(zip(names, value + slope * time))
 
-    with Unit(fmu(name)).start(inputs=ramp(0.0)) as fine:
+    with Instance(fmu(name)).start(inputs=ramp(0.0)) as fine:
         for tick in range(25):
             fine.set(ramp(tick * FEEDBACK))
             fine.step(tick * FEEDBACK, FEEDBACK)
         fine.set(ramp(1.0))
         expected = fine.get(MOMENT)
-    with Unit(fmu(name)).start(inputs=ramp(0.0)) as coarse:
+    with Instance(fmu(name)).start(inputs=ramp(0.0)) as coarse:
         for k in range(5):
             coarse.set(ramp(k * HOLD))
             coarse.slave.setRealInputDerivatives(references, [1] * 6, slope)
@@ -111,12 +111,12 @@ def test_a_constant_external_reference_is_the_constant_profile(fmu, name):
     outcomes = []
     for profile, parameters, inputs in (("constant", constant, {}), ("external", {}, external)):
         settings = {"reference.profile": profile, **parameters}
-        with Unit(fmu(name), settings).start(inputs=held(0) | inputs) as unit:
+        with Instance(fmu(name), settings).start(inputs=held(0) | inputs) as instance:
             rows = []
             for tick in range(20):
-                unit.set(held(tick))
-                rows.append(unit.get(MOMENT + REFERENCE))
-                unit.step(tick * FEEDBACK, FEEDBACK)
+                instance.set(held(tick))
+                rows.append(instance.get(MOMENT + REFERENCE))
+                instance.step(tick * FEEDBACK, FEEDBACK)
             outcomes.append(rows)
     assert outcomes[0][0][3:] == angles
     assert outcomes[0] == outcomes[1]

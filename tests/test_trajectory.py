@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from conftest import EXPERIMENTS, merged
-from fmi import ANGLES, RATES, Unit
+from fmi import ANGLES, RATES, Instance
 
 ANGLE_RATES = [f"attitudeRate.{axis}" for axis in ("alpha", "beta", "sigma")]
 PLACE = ["trajectory.flightPathAngle", "trajectory.heading", "trajectory.latitude"]
@@ -50,7 +50,7 @@ def test_oracle_attitude_rates_are_those_of_the_rotations(fmu, kinematics, seed)
     east = random.uniform(-0.2, 0.2)
     start = dict(zip([f"initial.{axis}" for axis in ("alpha", "beta", "sigma", "p", "q", "r")], [*angles, *rates]))
     parameters = {"kinematics": kinematics, "trajectory.earthRate": EARTH, **start}
-    with Unit(fmu("ReentryPlant"), parameters).start() as plant:
+    with Instance(fmu("ReentryPlant"), parameters).start() as plant:
         plant.set(dict(zip(PLACE + CHANGE, [*place, *change])) | {"trajectory.longitudeRate": east})
         found = np.array(plant.get(ANGLE_RATES))
     if kinematics == "printed":
@@ -64,7 +64,7 @@ def test_oracle_an_inertial_attitude_at_rest_turns_against_the_earth(fmu):
     the Earth."""
     place, change, east = np.array([-0.02, 0.9, 0.3]), np.array([-1e-3, 2e-3, 4e-4]), 9e-4
     parameters = {"kinematics": "exact", "trajectory.earthRate": EARTH, "disturbance.kind": "none"}
-    with Unit(fmu("ReentryPlant"), parameters).start() as plant:
+    with Instance(fmu("ReentryPlant"), parameters).start() as plant:
         first = attitude(place, 0.0, plant.get(ANGLES))
         for tick in range(500):
             # Input derivatives let the angles grow within a step.

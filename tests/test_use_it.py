@@ -23,7 +23,7 @@ LOOPS = [
 
 @pytest.mark.skipif(
     sys.platform != "linux" or os.uname().machine != "x86_64" or sys.version_info < (3, 11),
-    reason="not every tool of the page is there for this platform or Python",
+    reason="not every importer of the page is there for this platform or Python",
 )
 def test_the_steps_of_the_page(pytestconfig, libpython, tmp_path):
     for name in ("orchestrator", "scripts", "docs"):

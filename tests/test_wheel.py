@@ -39,9 +39,9 @@ def interpreters() -> list[tuple[tuple[int, int], Path]]:
                 found[version] = Path(candidate)
     return sorted(found.items())
 
-# The packed units are smaller than those that the tests build for themselves.
+# The packed FMUs are smaller than those that the tests build for themselves.
 PACKED = TARGET / "dist" / "linux-x86_64" / "fmu"
-UNITS = PACKED if PACKED.is_dir() else TARGET / "fmu"
+FMUS = PACKED if PACKED.is_dir() else TARGET / "fmu"
 
 
 @functools.cache
@@ -57,7 +57,7 @@ def released() -> Path:
 
 
 def make(
-    units: Path,
+    fmus: Path,
     folder: Path,
     platform: str = "host",
     epoch: str | None = None,
@@ -65,12 +65,12 @@ def make(
 ) -> subprocess.CompletedProcess:
     environment = {**os.environ, **({"SOURCE_DATE_EPOCH": epoch} if epoch else {})}
     orchestrator = orchestrator or released()
-    command = [ROOT / "scripts" / "wheel", platform, units, orchestrator, folder]
+    command = [ROOT / "scripts" / "wheel", platform, fmus, orchestrator, folder]
     return subprocess.run(command, capture_output=True, text=True, env=environment)
 
 
-def made(units: Path, folder: Path, epoch: str | None = None) -> Path:
-    done = make(units, folder, epoch=epoch)
+def made(fmus: Path, folder: Path, epoch: str | None = None) -> Path:
+    done = make(fmus, folder, epoch=epoch)
     assert done.returncode == 0, done.stderr
     (wheel,) = folder.glob("*.whl")
     assert done.stdout.endswith(f"{wheel}\n")
@@ -79,7 +79,7 @@ def made(units: Path, folder: Path, epoch: str | None = None) -> Path:
 
 @pytest.fixture(scope="module")
 def wheel(tmp_path_factory) -> Path:
-    return made(UNITS, tmp_path_factory.mktemp("wheel"))
+    return made(FMUS, tmp_path_factory.mktemp("wheel"))
 
 
 # What is in the wheel
@@ -91,7 +91,7 @@ def test_the_wheel_holds_what_it_should(wheel):
     with zipfile.ZipFile(wheel) as content:
         names = content.namelist()
         for name in NAMES:
-            assert content.read(f"{PACKAGE}/data/fmu/{name}.fmu") == (UNITS / f"{name}.fmu").read_bytes()
+            assert content.read(f"{PACKAGE}/data/fmu/{name}.fmu") == (FMUS / f"{name}.fmu").read_bytes()
         stored = next(n for n in names if n.startswith(f"{PACKAGE}/data/orchestrator"))
         assert content.getinfo(stored).external_attr >> 16 & 0o111 == 0o111
         experiments = ROOT / "orchestrator" / "experiments"
@@ -113,18 +113,18 @@ def test_the_wheel_holds_what_it_should(wheel):
 
 
 def test_the_same_inputs_give_the_same_bytes(wheel, tmp_path):
-    units = tmp_path / "units"
-    units.mkdir()
+    fmus = tmp_path / "fmu"
+    fmus.mkdir()
     # Other times, and another order in the folder.
     for name in reversed(NAMES):
-        shutil.copyfile(UNITS / f"{name}.fmu", units / f"{name}.fmu")
-    assert made(units, tmp_path / "again").read_bytes() == wheel.read_bytes()
-    later = made(units, tmp_path / "later", epoch="1700000000")
+        shutil.copyfile(FMUS / f"{name}.fmu", fmus / f"{name}.fmu")
+    assert made(fmus, tmp_path / "again").read_bytes() == wheel.read_bytes()
+    later = made(fmus, tmp_path / "later", epoch="1700000000")
     with zipfile.ZipFile(later) as content:
         times = {entry.date_time for entry in content.infolist()}
     assert times == {(2023, 11, 14, 22, 13, 20)}
     assert (
-        later.read_bytes() == made(units, tmp_path / "later again", epoch="1700000000").read_bytes()
+        later.read_bytes() == made(fmus, tmp_path / "later again", epoch="1700000000").read_bytes()
     )
 
 
@@ -143,28 +143,28 @@ def test_what_is_not_for_the_platform_is_refused(tmp_path, platform, message):
     assert not list(tmp_path.glob("out/*"))
 
 
-def test_units_without_a_library_and_folders_without_units_are_refused(tmp_path):
-    units = tmp_path / "units"
-    units.mkdir()
-    assert "there are no FMUs (*.fmu)" in make(units, tmp_path / "out").stderr
+def test_fmus_without_a_library_and_folders_without_fmus_are_refused(tmp_path):
+    fmus = tmp_path / "fmu"
+    fmus.mkdir()
+    assert "there are no FMUs (*.fmu)" in make(fmus, tmp_path / "out").stderr
     assert "there is no folder" in make(tmp_path / "nowhere", tmp_path / "out").stderr
-    with zipfile.ZipFile(units / "Empty.fmu", "w") as empty:
+    with zipfile.ZipFile(fmus / "Empty.fmu", "w") as empty:
         empty.writestr("modelDescription.xml", "")
-    assert "Empty.fmu has []" in make(units, tmp_path / "out").stderr
+    assert "Empty.fmu has []" in make(fmus, tmp_path / "out").stderr
 
 
 def test_binaries_that_need_a_newer_glibc_than_the_tag_allows_are_refused(tmp_path):
     # The first bytes of an ELF file for x86_64, and the names of the symbols' versions.
     head = b"\x7fELF\x02\x01\x01" + bytes(9) + b"\x03\x00\x3e\x00" + bytes(44)
     old, new = head + b"\0GLIBC_2.2.5\0GLIBC_2.17\0", head + b"\0GLIBC_2.2.5\0GLIBC_2.34\0"
-    units, orchestrator = tmp_path / "units", tmp_path / "orchestrator"
-    units.mkdir()
+    fmus, orchestrator = tmp_path / "fmu", tmp_path / "orchestrator"
+    fmus.mkdir()
 
-    def said(of_unit: bytes, of_program: bytes) -> str:
-        with zipfile.ZipFile(units / "Some.fmu", "w") as unit:
-            unit.writestr("binaries/linux64/Some.so", of_unit)
+    def said(of_fmu: bytes, of_program: bytes) -> str:
+        with zipfile.ZipFile(fmus / "Some.fmu", "w") as fmu:
+            fmu.writestr("binaries/linux64/Some.so", of_fmu)
         orchestrator.write_bytes(of_program)
-        return make(units, tmp_path / "out", "linux-x86_64", orchestrator=orchestrator).stderr
+        return make(fmus, tmp_path / "out", "linux-x86_64", orchestrator=orchestrator).stderr
 
     assert "Some.fmu needs glibc 2.34, but manylinux2014_x86_64 allows 2.17" in said(new, old)
     assert "orchestrator needs glibc 2.34" in said(old, new)

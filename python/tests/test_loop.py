@@ -271,7 +271,7 @@ def test_an_fmu_that_fails_says_why_and_can_be_reset():
         start = loop.state
         with pytest.raises(InstanceError, match="the attitude angles are singular") as caught:
             spin(loop)
-        assert (caught.value.unit, caught.value.call) == ("ReentryPlant", "fmi2DoStep")
+        assert (caught.value.fmu, caught.value.call) == ("ReentryPlant", "fmi2DoStep")
         with pytest.raises(InstanceError, match="ReentryPlant: the loop ended.*reset the loop"):
             loop.step([0.0, 0.0, 0.0])
         assert np.array_equal(loop.reset().attitude, start.attitude)

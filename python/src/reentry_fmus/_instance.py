@@ -22,9 +22,9 @@ enumeration's item."""
 class InstanceError(RuntimeError):
     """An FMU refused a call. The text is the FMU's message."""
 
-    def __init__(self, unit: str, call: str, message: str) -> None:
-        super().__init__(f"{unit}: {message}")
-        self.unit = unit
+    def __init__(self, fmu: str, call: str, message: str) -> None:
+        super().__init__(f"{fmu}: {message}")
+        self.fmu = fmu
         """Name of the FMU."""
         self.call = call
         """Function of FMI 2.0 that was refused."""

@@ -184,7 +184,7 @@ class ClosedLoop:
         """
         self._check_open()
         if self._failure is not None:
-            name, call = self._failure.unit, self._failure.call
+            name, call = self._failure.fmu, self._failure.call
             raise InstanceError(name, call, "the loop ended when this FMU failed: reset the loop")
         if moment is None and not self._has_controller:
             raise TypeError("step needs a moment, because the loop has no controller")
