@@ -290,7 +290,8 @@ label = "LQR"
 color = "#000000"
 experiment = "lqr.toml"
 set = { "plant.disturbance.kind" = "constant" }
-vary = { parameter = "plant.disturbance.seed", first = 1, count = 3 }
+vary = [{ parameter = "plant.disturbance.seed", case = 1 }]
+cases = 3
 [[claim]]
 says = "LQR solves fast."
 source = "nowhere"
@@ -551,4 +552,4 @@ def test_the_page_says_how_many_members_the_runs_have(results):
     for run, result in results["runs"].items():
         assert len(result["members"]) == min(study.expected(run), MEMBERS), run
     text = (EXPERIMENTS / "study.toml").read_text()
-    assert {int(count) for count in re.findall(r"first = 1, count = (\d+)", text)} == set(study.members.values())
+    assert {int(count) for count in re.findall(r"\bcases = (\d+)", text)} == set(study.members.values())

@@ -9,7 +9,7 @@ use campaign::findings::Findings;
 use campaign::plan::Plan;
 use campaign::prepare;
 use campaign::run::{self, Options};
-use campaign::{search, statistics::CONFIDENCE};
+use campaign::search;
 use clap::Args;
 use cosim::error::Error;
 use cosim::experiment::Overrides;
@@ -19,6 +19,7 @@ use std::io::Write;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
+use sweep::statistics::CONFIDENCE;
 
 /// Options that the commands `campaign` and `falsify` share.
 #[derive(Args)]
@@ -123,9 +124,11 @@ pub(crate) fn fly(asked: &Fly, out: &mut impl Write, interrupt: &Interrupt) -> R
         return Ok(());
     }
     if let Some(case) = asked.case {
-        if case >= plan.cases() {
-            let message =
-                format!("--case {case}: the campaign has {} cases, counted from 0", plan.cases());
+        if case >= plan.sweep.cases() {
+            let message = format!(
+                "--case {case}: the campaign has {} cases, counted from 0",
+                plan.sweep.cases()
+            );
             return Err(Error::experiment(message).into());
         }
         let folder = match &asked.common.out {
@@ -168,7 +171,7 @@ pub(crate) fn fly(asked: &Fly, out: &mut impl Write, interrupt: &Interrupt) -> R
 /// Writes the experiment of a case.
 fn write_case(plan: &Plan, case: u64, folder: &Path) -> Result<PathBuf, Error> {
     let title = format!("{}, case {case}", plan.campaign.title);
-    let text = plan.experiment_of(&title, &plan.values(case)?)?;
+    let text = plan.sweep.experiment_of(&title, &plan.sweep.values(case)?)?;
     let path = folder.join("case.toml");
     files::write(&path, text)?;
     Ok(path)

@@ -2,9 +2,9 @@
 
 use campaign::error::Error as Campaign;
 use cosim::error::Error as Single;
-use cosim_report::error::Error as Study;
 use std::io;
 use std::path::PathBuf;
+use study::error::Error as Study;
 
 /// An error with which the program ends.
 #[derive(Debug, thiserror::Error)]

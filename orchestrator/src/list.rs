@@ -5,12 +5,12 @@ use campaign::definition::Campaign;
 use cosim::error::Error;
 use cosim::experiment::Experiment;
 use cosim::search::{self, files};
-use cosim_report::study::definition::Study;
 use fmu_import::fmu::Fmu;
 use std::collections::BTreeSet;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::{fs, iter};
+use study::definition::Study;
 
 /// Prints the experiments, studies and campaigns below a folder with their titles, and the FMUs
 /// below it. Without a folder it prints those below the current one, and all others that the

@@ -13,21 +13,21 @@ mod pack;
 mod run;
 mod schema;
 mod show;
+mod summary;
 
 use arguments::choice;
 use catalogue::Filter;
 use cosim::interrupt::Interrupt;
 use cosim::pacing::{self, Factor, OnMiss};
 use cosim::search;
-use cosim_report::study::definition::Study;
-use cosim_report::study::reproduce;
-use cosim_report::summary;
 use failure::Failure;
 use live::log::Messages;
 use run::{Files, Options};
 use std::io::{BufWriter, IsTerminal, Write, stderr, stdout};
 use std::path::PathBuf;
 use std::process::ExitCode;
+use study::definition::Study;
+use study::reproduce;
 use tracing_subscriber::EnvFilter;
 
 /// Runs FMI 2.0 co-simulation experiments.
@@ -112,9 +112,9 @@ enum Command {
         /// Number of threads [default: one for each core].
         #[arg(long, value_name = "N", default_value_t = 0, hide_default_value = true)]
         jobs: usize,
-        /// Run at most N values of each parameter that a run varies, for a quick look.
-        #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
-        members: Option<u32>,
+        /// Run at most N cases of each run, for a quick look.
+        #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
+        members: Option<u64>,
         /// Run everything again, including what is finished.
         #[arg(long)]
         fresh: bool,

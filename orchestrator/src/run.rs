@@ -4,6 +4,7 @@
 use crate::arguments::choice;
 use crate::failure::Failure;
 use crate::live::{self, Live, scene::Scene};
+use crate::summary::{self, RunReport};
 use cosim::check::check;
 use cosim::doubts::doubts;
 use cosim::error::Error;
@@ -24,7 +25,6 @@ use cosim_report::metrics::{Meters, Metrics};
 use cosim_report::panels::Panel;
 use cosim_report::plot::Curves;
 use cosim_report::progress::Progress;
-use cosim_report::summary::{self, RunReport};
 use fmu_import::warnings;
 use std::io::Write;
 use std::path::{Path, PathBuf};

@@ -7,11 +7,11 @@
 
 use campaign::definition::Campaign;
 use cosim::experiment::Experiment;
-use cosim_report::study::definition::Study;
 use schemars::generate::SchemaSettings;
 use schemars::transform::{RecursiveTransform, Transform};
 use schemars::{JsonSchema, Schema};
 use serde_json::{Map, Value, json};
+use study::definition::Study;
 
 /// FileKind of file that a schema describes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
@@ -132,8 +132,8 @@ mod tests {
     fn the_pages_explain_every_key() {
         let pages = [
             (FileKind::Experiment, &["experiments"][..]),
-            (FileKind::Study, &["studies"]),
-            // Signals and measures are those of studies.
+            // What varies is explained once, and so are signals and measures.
+            (FileKind::Study, &["studies", "campaigns"]),
             (FileKind::Campaign, &["campaigns", "studies"]),
         ];
         for (kind, names) in pages {

@@ -6,10 +6,10 @@ use campaign::prepare;
 use cosim::document::Source;
 use cosim::experiment::Experiment;
 use cosim::search;
-use cosim_report::study::definition::Study;
-use cosim_report::study::reproduce;
 use std::io::Write;
 use std::path::Path;
+use study::definition::Study;
+use study::reproduce;
 
 /// Prints an experiment, a study or a campaign with everything that it extends.
 ///

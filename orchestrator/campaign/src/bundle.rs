@@ -20,7 +20,7 @@ const EXPERIMENT: &str = "experiment.toml";
 /// Returns an error if a file cannot be written.
 pub fn write(plan: &Plan, folder: &Path) -> Result<(), Error> {
     let keep = |name: &str, content: &[u8]| files::write(&folder.join(name), content);
-    let system = plan.system(&mut BTreeMap::new())?;
+    let system = plan.sweep.system(&mut BTreeMap::new())?;
     // Components that share an FMU share its copy.
     let mut copies: BTreeMap<&Path, String> = BTreeMap::new();
     let mut fmus = Table::new();

@@ -3,10 +3,6 @@
 //! docs/campaigns.md explains all keys; `orchestrator/schema/campaign.json` describes them for
 //! editors.
 
-mod vary;
-
-pub use vary::{LogNormal, Normal, OneOrMore, Range, Vary};
-
 use cosim::document::Source;
 use cosim::error::Error;
 use cosim::experiment::Measure;
@@ -16,6 +12,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
+use sweep::vary::{Correlation, DesignKind, Vary};
 use toml::{Spanned, Value};
 
 /// A campaign: an experiment, the parameters that vary from case to case, and the limits that the
@@ -78,40 +75,6 @@ pub struct Campaign {
     /// The campaign file, together with the files that it extends. This is no key of the file.
     #[serde(skip)]
     pub source: Source,
-}
-
-/// Design that places the cases in the space of the varied parameters.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Deserialize, JsonSchema, Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum DesignKind {
-    /// Each case is drawn independently of all others.
-    #[default]
-    Random,
-    /// The range of each parameter is divided into as many strata of equal probability as there are
-    /// cases, and each stratum holds one case.
-    LatinHypercube,
-    /// Points of Sobol's sequence, scrambled by Owen's method.
-    Sobol,
-    /// All combinations of the levels of the varied parameters.
-    Factorial,
-    /// The corners of the parameter space, and random cases. If there are more corners than cases,
-    /// every other case is a corner that is chosen at random.
-    Corners,
-    /// Pairs of random points with exchanged coordinates, from which Sobol's indices are computed.
-    /// The number of cases is a multiple of the number of parameters plus two.
-    Sensitivity,
-}
-
-/// Correlation of two varied parameters. It is the correlation of the normal scores behind their
-/// distributions (a Gaussian copula).
-#[derive(Clone, Debug, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct Correlation {
-    /// The two parameters.
-    #[schemars(with = "[String; 2]")]
-    pub between: Spanned<[String; 2]>,
-    /// Coefficient of the correlation, above -1 and below 1.
-    pub coefficient: f64,
 }
 
 /// A limit on a measure, which each case keeps or breaks. A case that is lost, fails or ends early

@@ -4,11 +4,11 @@ use crate::definition::{Limit, Until};
 use crate::flight::{CaseStatus, kept_column};
 use crate::plan::Plan;
 use crate::sensitivity::{Sensitivity, sensitivities};
-use crate::statistics::{CONFIDENCE, Probability, Summary, summary};
-use crate::table::{Reader, Values};
 use cosim::error::Error;
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
+use sweep::statistics::{CONFIDENCE, Probability, Summary, summary};
+use sweep::table::{Reader, Values};
 
 /// Findings of a campaign, as `summary.json` holds them.
 #[derive(Clone, Debug, Serialize)]
@@ -91,6 +91,7 @@ pub(crate) fn findings(
         });
     }
     let columns = plan
+        .sweep
         .varied
         .iter()
         .map(|varied| Ok((varied.name.clone(), table.column(&varied.name)?.numbers())));

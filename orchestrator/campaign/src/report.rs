@@ -4,22 +4,22 @@
 mod cloud;
 mod figures;
 
-use crate::definition::DesignKind;
 use crate::findings::{Answer, Findings, LimitFinding, Measured, chosen, worst};
 use crate::flight::Flight;
 use crate::plan::Plan;
 use crate::sensitivity::Sensitivity;
-use crate::statistics::Probability;
-use crate::table::Reader;
-use crate::texts::{percent, short};
 use cosim::error::Error;
 use cosim::files;
 use cosim::interrupt::Interrupt;
 use cosim_report::figure::{Figure, svg};
-use cosim_report::study::head;
+use cosim_report::page::head;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 use std::collections::BTreeSet;
 use std::path::Path;
+use sweep::statistics::Probability;
+use sweep::table::Reader;
+use sweep::texts::{percent, short};
+use sweep::vary::DesignKind;
 
 /// Number of the worst cases that the page shows.
 const SHOWN: usize = 5;
@@ -73,8 +73,8 @@ fn keep(plan: &Plan, flight: &mut Flight, cases: &BTreeSet<u64>, out: &Path) -> 
     for case in cases {
         let folder = out.join("cases").join(case.to_string());
         let title = format!("{}, case {case}", plan.campaign.title);
-        let values = plan.values(*case)?;
-        let text = plan.experiment_of(&title, &values)?;
+        let values = plan.sweep.values(*case)?;
+        let text = plan.sweep.experiment_of(&title, &values)?;
         files::write(&folder.join("case.toml"), text)?;
         flight.keep(*case, values, &folder, &title)?;
     }
@@ -98,7 +98,7 @@ fn page(
             body {
                 header {
                     h1 { (campaign.title) }
-                    p.paper { (findings.cases) " cases of the experiment " (plan.experiment().title) }
+                    p.paper { (findings.cases) " cases of the experiment " (plan.sweep.experiment().title) }
                     nav {
                         a href="#limits" { "Limits" } " "
                         a href="#measures" { "Measures" } " "
@@ -160,7 +160,7 @@ fn page(
                         h2 { "Varied parameters" }
                         table {
                             thead { tr { th { "Parameter" } th { "Unit" } th { "Distribution" } } }
-                            tbody { @for varied in &plan.varied {
+                            tbody { @for varied in &plan.sweep.varied {
                                 tr { td { code { (varied.name) } } td { (varied.unit) } td { (varied.distribution.in_words()) } }
                             } }
                         }

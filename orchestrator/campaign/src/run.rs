@@ -2,24 +2,27 @@
 
 use crate::error::Error;
 use crate::findings::{Answer, Findings, findings};
-use crate::flight::{Flight, can_reset};
-use crate::parts::{self, PartState};
+use crate::flight::Flight;
+use crate::parts;
 use crate::plan::Plan;
 use crate::report;
-use crate::statistics::{Probability, looks};
-use crate::table::{CaseTable, Reader, Values, Writer};
 use cosim::error::Error as Single;
 use cosim::files;
 use cosim::interrupt::Interrupt;
+use cosim::system::Opened;
 use cosim_report::folder::Folder;
 use cosim_report::progress::Parts;
-use cosim_report::work::{self, Worked};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fs;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
+use sweep::flight::can_reset;
+use sweep::parts::{PartResult, PartState, Remarks};
+use sweep::statistics::{Probability, looks};
+use sweep::table::{CaseTable, Reader, Values, Writer};
+use sweep::work::{self, Worked};
 
 /// Names of the files of a campaign's results.
 pub const FILES: [&str; 4] = ["cases.parquet", "cases.csv", "summary.json", "report.html"];
@@ -88,31 +91,22 @@ impl<'a> State<'a> {
 
     /// Looks for the parts of the first `cases` cases, and returns those that are missing.
     fn missing(&mut self, cases: u64) -> Vec<Range<u64>> {
-        let (mut missing, mut damaged) = (Vec::new(), 0);
-        let mut others: BTreeMap<String, u64> = BTreeMap::new();
-        for part in parts::parts(self.plan.cases()).take_while(|part| part.start < cases) {
+        let (mut missing, mut remarks) = (Vec::new(), Remarks::default());
+        for part in parts::parts(self.plan.sweep.cases()).take_while(|part| part.start < cases) {
             if self.broken_counts.contains_key(&part.start) {
                 continue;
             }
             match parts::find(self.plan, self.out, &part) {
-                PartState::Whole(broken) => {
-                    self.broken_counts.insert(part.start, broken);
-                    continue;
+                PartState::Whole(PartResult { rows, .. }) => {
+                    self.broken_counts.insert(part.start, parts::broken(self.plan, &rows));
                 }
-                PartState::Missing => {}
-                PartState::Damaged => damaged += 1,
-                PartState::Other(names) => *others.entry(names.join(", ")).or_default() += 1,
+                state => {
+                    remarks.add(&state);
+                    missing.push(part);
+                }
             }
-            missing.push(part);
         }
-        if damaged > 0 {
-            self.notes
-                .push(format!("flown again because their files are damaged: {damaged} parts"));
-        }
-        for (what, count) in others {
-            self.notes
-                .push(format!("flown again because this has changed: {what} ({count} parts)"));
-        }
+        self.notes.extend(remarks.texts());
         missing
     }
 
@@ -125,7 +119,7 @@ impl<'a> State<'a> {
         if let Some(resets) = self.resets {
             return Ok(resets);
         }
-        let resets = can_reset(self.plan, interrupt)?;
+        let resets = can_reset(&self.plan.sweep, &mut Opened::default(), interrupt)?;
         if !resets {
             tracing::warn!(
                 "a case gave another result after fmi2Reset than with a new instance: each case gets new instances"
@@ -138,7 +132,7 @@ impl<'a> State<'a> {
     /// Returns the number of cases that are needed as far as the parts tell, and the answer to the
     /// campaign's question if it has one and the parts are all there.
     fn needed(&mut self) -> (u64, Vec<Range<u64>>, Option<Answer>) {
-        let total = self.plan.cases();
+        let total = self.plan.sweep.cases();
         let Some(until) = &self.plan.campaign.until else {
             return (total, self.missing(total), None);
         };
@@ -184,7 +178,7 @@ pub fn remaining(plan: &Plan, out: &Path) -> Work {
 /// # Errors
 /// Returns an error if the range does not consist of parts, or if a file cannot be written.
 pub fn fly_range(plan: &Plan, range: &Range<u64>, options: &Options) -> Result<u64, Error> {
-    let total = plan.cases();
+    let total = plan.sweep.cases();
     let is_edge = |case: u64| case.is_multiple_of(parts::LENGTH) || case == total;
     if range.start >= range.end || range.end > total || !is_edge(range.start) || !is_edge(range.end)
     {
@@ -274,11 +268,11 @@ fn fly_parts(
     let resets = state.resets(interrupt)?;
     let left: u64 = missing.iter().map(|part| part.end - part.start).sum();
     let done = state.broken_counts.keys().count() as u64 * parts::LENGTH;
-    let done = done.min(plan.cases().saturating_sub(left));
+    let done = done.min(plan.sweep.cases().saturating_sub(left));
     let progress = Parts::new("cases", &plan.campaign.title, done + left, done, options.quiet);
     let Worked { results, failures } = work::on_parts(
         missing,
-        threads(plan, options.jobs),
+        work::threads(options.jobs, [&plan.sweep]),
         || Flight::new(plan, resets, interrupt),
         |flight, part| parts::fly(plan, out, part, flight, |_| progress.advance(1)),
         |_| false,
@@ -288,23 +282,16 @@ fn fly_parts(
     match failures.into_values().next() {
         None => Ok(()),
         Some(Single::Interrupted { request, .. }) => {
-            let done = (state.broken_counts.len() as u64 * parts::LENGTH).min(plan.cases());
-            Err(Error::Unfinished { done, total: plan.cases(), out: out.to_path_buf(), request })
+            let done = (state.broken_counts.len() as u64 * parts::LENGTH).min(plan.sweep.cases());
+            Err(Error::Unfinished {
+                done,
+                total: plan.sweep.cases(),
+                out: out.to_path_buf(),
+                request,
+            })
         }
         Some(error) => Err(error.into()),
     }
-}
-
-/// Returns the number of threads: one, if an FMU can be instantiated only once in a process.
-pub(crate) fn threads(plan: &Plan, jobs: usize) -> usize {
-    if let Some(path) = &plan.single {
-        tracing::warn!(
-            "{} can be instantiated only once per process: one thread flies all cases",
-            path.display()
-        );
-        return 1;
-    }
-    work::threads(jobs)
 }
 
 /// Merges the parts of the first `cases` cases into one table.
@@ -316,7 +303,7 @@ fn merge(plan: &Plan, out: &Path, cases: u64, csv: bool) -> Result<(), Single> {
     let metadata = [("units", plan.units())];
     let mut writer = Writer::create(&out.join("cases.parquet"), &metadata)?;
     let mut is_first = true;
-    for part in parts::parts(plan.cases()).take_while(|part| part.start < cases) {
+    for part in parts::parts(plan.sweep.cases()).take_while(|part| part.start < cases) {
         let rows = parts::rows(out, &part)?;
         if let Some(text) = &mut text {
             if is_first {

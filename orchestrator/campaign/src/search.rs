@@ -2,12 +2,9 @@
 //! space of the varied parameters towards larger values of a measure.
 
 use crate::definition::Search;
-use crate::design::Place;
 use crate::error::Error;
 use crate::flight::{CaseStatus, Flight, Row, table};
 use crate::plan::Plan;
-use crate::run;
-use crate::table::Writer;
 use cmaes::{CMAESOptions, DVector};
 use cosim::error::Error as Single;
 use cosim::files;
@@ -24,6 +21,9 @@ use std::path::PathBuf;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::time::{Duration, Instant};
+use sweep::design::Place;
+use sweep::table::Writer;
+use sweep::work;
 
 /// Step size of a search at its beginning, as a share of the range of each parameter.
 const STEP: f64 = 0.3;
@@ -110,7 +110,7 @@ pub fn search(plan: &Plan, options: &Options) -> Result<SearchOutcome, Error> {
         .iter()
         .position(|recorded| recorded.name == *search.largest.get_ref())
         .unwrap_or_default();
-    for varied in &plan.varied {
+    for varied in &plan.sweep.varied {
         let problem = varied.distribution.check_ends().err();
         if let Some(problem) = problem {
             let message = format!("[[vary]] \"{}\": {problem}", varied.name);
@@ -130,7 +130,7 @@ pub fn search(plan: &Plan, options: &Options) -> Result<SearchOutcome, Error> {
     }
     let _folder = Folder::take(&out)?;
     let progress = Parts::new("cases", &plan.campaign.title, search.cases, 0, options.quiet);
-    let threads = run::threads(plan, options.jobs);
+    let threads = work::threads(options.jobs, [&plan.sweep]);
     let (orders, waiting) = channel::<Order>();
     let waiting = Mutex::new(waiting);
     let searched = Searched {
@@ -184,7 +184,7 @@ pub fn search(plan: &Plan, options: &Options) -> Result<SearchOutcome, Error> {
     };
     let path = out.join("worst.toml");
     let title = format!("{}, the worst case that a search found", plan.campaign.title);
-    let text = plan.experiment_of(&title, &worst.row.values)?;
+    let text = plan.sweep.experiment_of(&title, &worst.row.values)?;
     files::write(&path, text)?;
     let rows: Vec<Row> = tried.iter().map(|case| case.row.clone()).collect();
     let mut writer = Writer::create(&out.join("search.parquet"), &[("units", plan.units())])?;
@@ -207,7 +207,11 @@ fn serve(plan: &Plan, interrupt: &Interrupt, waiting: &Mutex<Receiver<Order>>) {
                 // A case that ends at its limit would hide how much worse it becomes.
                 None => Flight::new(plan, false, interrupt)?.without_ends(),
             };
-            flight.insert(current).fly_with(CASE, plan.values_at(&order.places, CASE)?, &mut [])
+            flight.insert(current).fly_with(
+                CASE,
+                plan.sweep.values_at(&order.places, CASE)?,
+                &mut [],
+            )
         })();
         // If nobody waits for the result any more, it is of no use.
         let _ = order.reply.send(result);
@@ -280,7 +284,7 @@ fn look(
     is_late: &dyn Fn() -> bool,
 ) -> Result<(u64, &'static str), Single> {
     let plan = searched.plan;
-    let dimensions = plan.varied.len();
+    let dimensions = plan.sweep.varied.len();
     let mut random = ChaCha8Rng::seed_from_u64(plan.campaign.seed);
     let mut unit = || (random.next_u64() >> 11) as f64 / 2.0_f64.powi(53);
     let usual = 4 + (3.0 * (dimensions as f64).ln()).floor() as usize;

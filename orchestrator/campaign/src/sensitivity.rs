@@ -1,8 +1,8 @@
 //! Sensitivity of a measure to each varied parameter.
 
-use crate::definition::DesignKind;
 use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, StudentsT};
+use sweep::vary::DesignKind;
 
 /// Sensitivity of a measure to a parameter.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -120,7 +120,7 @@ pub fn sensitivities(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::design::{Design, Place};
+    use sweep::design::{Design, Place};
 
     #[test]
     fn oracle_rank_correlation_by_hand() {

@@ -149,7 +149,7 @@ impl GuaranteeRecord {
 }
 
 /// Formats margins with their names as part of a sentence.
-pub(crate) fn margins_text<'a>(margins: impl Iterator<Item = (Option<f64>, &'a str)>) -> String {
+pub fn margins_text<'a>(margins: impl Iterator<Item = (Option<f64>, &'a str)>) -> String {
     let present = margins.filter_map(|(margin, name)| Some((margin?, name)));
     let texts: Vec<String> =
         present.map(|(margin, name)| format!("{:.1} % ({name})", margin * 100.0)).collect();

@@ -13,6 +13,9 @@ pub(crate) fn larger(a: f64, b: f64) -> f64 {
     if b > a || b.is_nan() { b } else { a }
 }
 
+/// Tolerance with which a bound counts as met, because of rounding.
+const ROUNDING: f64 = 1e-9;
+
 /// A measure of a run whose value is still being computed.
 pub(crate) struct Gauge {
     measure: Measure,
@@ -36,6 +39,8 @@ pub(crate) struct Gauge {
     began: f64,
     variation: f64,
     rises: u64,
+    /// Number of samples with all signals within the bound.
+    inside: u64,
     /// Time of the first sample after which all signals have stayed within the band.
     settled: Option<f64>,
     /// Time of the last sample.
@@ -92,6 +97,7 @@ impl Gauge {
             began: 0.0,
             variation: 0.0,
             rises: 0,
+            inside: 0,
             settled: None,
             last: 0.0,
             left: None,
@@ -129,6 +135,7 @@ impl Gauge {
             MeasureKind::Leaving => self.left,
             MeasureKind::Rises => Some(self.rises as f64),
             MeasureKind::Variation => Some(factor * self.variation),
+            MeasureKind::Share => Some(self.inside as f64 / count),
             MeasureKind::RmsAbove => {
                 let step = (self.last - self.began) / (count - 1.0);
                 let frequency = self.measure.frequency.unwrap_or(0.0);
@@ -143,6 +150,7 @@ impl Gauge {
     pub(crate) fn unit(&self) -> &str {
         match (self.measure.kind, &self.measure.unit) {
             (MeasureKind::Settling | MeasureKind::Leaving, _) => "s",
+            (MeasureKind::Share, _) => "",
             (_, Some(unit)) => &unit.name,
             _ => self.signals.first().map_or("", |signal| &signal.unit),
         }
@@ -206,6 +214,9 @@ impl Gauge {
         if self.measure.bound.is_some_and(|bound| values.iter().any(|value| value.abs() > bound)) {
             self.left = self.left.or(Some(time));
         }
+        let within = self.measure.bound.map(|bound| bound * (1.0 + ROUNDING));
+        let is_inside = within.is_some_and(|bound| values.iter().all(|value| value.abs() <= bound));
+        self.inside += u64::from(is_inside);
         let rises = values
             .iter()
             .zip(&self.before)
@@ -333,6 +344,8 @@ mod tests {
         assert!(fault("kind = \"leaving\"").unwrap().contains("bound"));
         assert!(fault("kind = \"largest\"\nbound = 1.0").unwrap().contains("bound"));
         assert_eq!(fault("kind = \"leaving\"\nbound = 1.0"), None);
+        assert!(fault("kind = \"share\"").unwrap().contains("bound"));
+        assert_eq!(fault("kind = \"share\"\nbound = 0.0"), None);
         assert_eq!(fault("kind = \"settling\"\nbound = 0.1"), None);
         assert!(fault("kind = \"settling\"\nbound = 0.1\nband = 0.1").unwrap().contains("either"));
         assert!(fault("kind = \"rms-above\"").unwrap().contains("frequency"));
@@ -367,6 +380,12 @@ mod tests {
         assert_eq!(taken("kind = \"last\"", &rows), Some(50.0));
         assert_eq!(taken("kind = \"largest\"", &rows), Some(100.0));
         assert_eq!(taken("kind = \"p99\"", &[[0.0, 0.0]; 0]), None);
+    }
+
+    #[test]
+    fn oracle_shares_by_hand() {
+        let rows = [[0.5, 0.0], [-2.0, 0.0], [3.0, 0.0], [f64::NAN, 0.0]];
+        assert_eq!(taken("kind = \"share\"\nbound = 2.0", &rows), Some(0.5));
     }
 
     #[test]

@@ -26,6 +26,18 @@ pub enum Value {
     Text(String),
 }
 
+impl Value {
+    /// Returns the value as a number, with 1 and 0 for yes and no; `None` if it is a text.
+    pub fn number(&self) -> Option<f64> {
+        match self {
+            Self::Count(count) => Some(*count as f64),
+            Self::Number(number) => Some(*number),
+            Self::Flag(is) => Some(f64::from(u8::from(*is))),
+            Self::Text(_) => None,
+        }
+    }
+}
+
 /// The metrics of a run. A metric is `None` (null) if the FMUs lack a variable that it needs.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Metrics {
@@ -63,6 +75,9 @@ pub struct Metrics {
 const ALWAYS: [&str; 6] =
     ["real_time_factor", "wall_s", "loop_delay_s", "samples", "completed", "lost_at"];
 
+/// Metrics of every run that depend on the machine.
+const OF_THE_MACHINE: [&str; 2] = ["real_time_factor", "wall_s"];
+
 /// Further names in `metrics.json`, which stand for more than one number.
 const GROUPS: [&str; 2] = ["step_us", "real_time"];
 
@@ -78,24 +93,35 @@ impl Metrics {
             .collect()
     }
 
+    /// Returns the names of the metrics that depend on the experiment alone and not on the machine.
+    pub fn reproducible_names(observe: &Observe) -> Vec<String> {
+        let mut names = Self::names(observe);
+        names.retain(|name| !OF_THE_MACHINE.contains(&name.as_str()));
+        names
+    }
+
     /// Returns a metric as a number, with 1 and 0 for yes and no; `None` if it has no value or is a
     /// text.
     pub fn number(&self, name: &str) -> Option<f64> {
-        let flag = |is: bool| Some(f64::from(u8::from(is)));
         match name {
             "real_time_factor" => self.real_time_factor,
             "wall_s" => Some(self.wall_s),
             "loop_delay_s" => self.loop_delay_s,
             "samples" => Some(self.samples as f64),
-            "completed" => flag(self.completed),
+            "completed" => Some(f64::from(u8::from(self.completed))),
             "lost_at" => self.lost_at,
-            _ => match self.asked.get(name)?.as_ref()? {
-                Value::Count(count) => Some(*count as f64),
-                Value::Number(number) => Some(*number),
-                Value::Flag(is) => flag(*is),
-                Value::Text(_) => None,
-            },
+            _ => self.asked.get(name)?.as_ref()?.number(),
         }
+    }
+
+    /// Returns the metrics without computing times, which differ from run to run.
+    #[must_use]
+    pub fn without_times(&self, observe: &Observe) -> Self {
+        let mut metrics = Self { step_us: BTreeMap::new(), ..self.clone() };
+        metrics
+            .asked
+            .retain(|name, _| observe.metrics.get(name).is_none_or(|measure| !measure.timing));
+        metrics
     }
 
     /// Returns a metric as a text; `None` if it is not a text.

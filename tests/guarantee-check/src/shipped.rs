@@ -1,12 +1,13 @@
 //! The settings with which CRMPC flies in the experiments, studies and campaigns of a folder.
 
-use campaign::definition::{Campaign, Vary};
+use campaign::definition::Campaign;
 use control::crmpc::{Constraints, Guarantee, InitialState, Settings};
 use cosim::document::Source;
 use cosim::error::Error;
 use cosim::experiment::{Component, Experiment};
-use cosim_report::study::definition::Study;
 use std::path::{Path, PathBuf};
+use study::definition::Study;
+use sweep::vary::Vary;
 use toml::{Table, Value};
 use vehicle::dynamics::Inertia;
 
@@ -98,7 +99,7 @@ impl Scan {
     fn study(&mut self, file: &Path, study: &Study) -> Result<(), String> {
         for run in &study.runs {
             let experiment = study.experiment(run).map_err(|error| error.to_string())?;
-            let varied = run.vary.iter().flat_map(|vary| vary.parameter.names());
+            let varied = run.varied();
             refuse_varied(&experiment, varied)?;
             self.experiment(file, run.id.get_ref(), &experiment)?;
         }
@@ -115,15 +116,10 @@ impl Scan {
         for (target, value) in &campaign.set {
             experiment.set(target, value.get_ref().clone())?;
         }
-        let varied = campaign.vary.iter().flat_map(names_of);
+        let varied = campaign.vary.iter().flat_map(Vary::names);
         refuse_varied(&experiment, varied)?;
         self.experiment(file, "", &experiment)
     }
-}
-
-fn names_of(vary: &Vary) -> Vec<&String> {
-    let named = vary.parameter.iter().flat_map(|names| names.get_ref().names());
-    vary.each.iter().map(toml::Spanned::get_ref).chain(named).collect()
 }
 
 /// Refuses a parameter of CRMPC that takes several values, as all of them would have to be checked.

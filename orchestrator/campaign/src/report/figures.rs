@@ -4,9 +4,9 @@ use crate::findings::Findings;
 use crate::flight::kept_column;
 use crate::plan::Plan;
 use crate::prepare::Recorded;
-use crate::table::Reader;
 use cosim::error::Error;
 use cosim_report::figure::{Color, Curve, Figure, Legend, Panel, Shape};
+use sweep::table::Reader;
 
 const BLUE: Color = Color(31, 119, 180);
 const RED: Color = Color(214, 39, 40);
@@ -111,7 +111,7 @@ pub(super) fn scatters(plan: &Plan, table: &Reader) -> Result<Vec<Figure>, Error
         bad.iter_mut().zip(flags).for_each(|(bad, is_kept)| *bad |= is_kept == 0.0);
     }
     let mut shown: Vec<(usize, Vec<f64>)> = Vec::new();
-    for (place, varied) in plan.varied.iter().enumerate() {
+    for (place, varied) in plan.sweep.varied.iter().enumerate() {
         if shown.len() == PARAMETERS {
             break;
         }
@@ -134,7 +134,7 @@ pub(super) fn scatters(plan: &Plan, table: &Reader) -> Result<Vec<Figure>, Error
             continue;
         }
         let panels = shown.iter().map(|(place, x)| {
-            let parameter = &plan.varied[*place];
+            let parameter = &plan.sweep.varied[*place];
             let x_label = if parameter.unit.is_empty() {
                 parameter.name.clone()
             } else {

@@ -88,6 +88,7 @@ pub struct Measure {
     pub hold: f64,
     /// For `leaving`, the magnitude that a signal must exceed. For `settling`, in place of `band`,
     /// the magnitude within which every signal must stay. For `rises`, the least rise that counts.
+    /// For `share`, the magnitude within which all signals must lie.
     #[serde(default)]
     pub bound: Option<f64>,
     /// For `rms-above`, the frequency above which the signals count, Hz.
@@ -127,6 +128,8 @@ pub enum MeasureKind {
     /// Root mean square of the signals' content above `frequency`, over all signals, by the
     /// discrete Fourier transform with a Hann window.
     RmsAbove,
+    /// Share of the communication points at which the magnitudes of all signals are within `bound`.
+    Share,
 }
 
 /// A unit that is a multiple of another unit.
@@ -253,6 +256,29 @@ impl Observe {
 }
 
 impl Measure {
+    /// Returns a measure of this kind over the whole run, without signals.
+    pub fn new(kind: MeasureKind) -> Self {
+        Self {
+            id: String::new(),
+            kind,
+            signals: Spanned::new(0..0, String::new()),
+            over: None,
+            each: None,
+            every: 1,
+            steps: false,
+            unit: None,
+            label: String::new(),
+            part: String::new(),
+            limit: None,
+            optional: false,
+            timing: false,
+            band: None,
+            hold: 0.0,
+            bound: None,
+            frequency: None,
+        }
+    }
+
     /// Describes what is wrong with the measure, or returns `None` if nothing is.
     pub fn fault(&self) -> Option<String> {
         let is = |kind| self.kind == kind;
@@ -262,12 +288,14 @@ impl Measure {
             "over must be [from, to] with from below to"
         } else if is(MeasureKind::Leaving) && !self.bound.is_some_and(|bound| bound > 0.0) {
             "leaving needs a bound above 0"
+        } else if is(MeasureKind::Share) && !self.bound.is_some_and(|bound| bound >= 0.0) {
+            "share needs a bound of at least 0"
         } else if !matches!(
             self.kind,
-            MeasureKind::Leaving | MeasureKind::Settling | MeasureKind::Rises
+            MeasureKind::Leaving | MeasureKind::Settling | MeasureKind::Rises | MeasureKind::Share
         ) && self.bound.is_some()
         {
-            "bound is for leaving, settling and rises only"
+            "bound is for leaving, settling, rises and share only"
         } else if is(MeasureKind::Settling)
             && !(self.band.xor(self.bound).is_some_and(|band| band > 0.0) && self.hold >= 0.0)
         {

@@ -1,0 +1,283 @@
+//! Prints the outcome of a run or of a study to standard output.
+
+use cosim::error::Error;
+use cosim::experiment::{Coupling, Observe};
+use cosim::system::System;
+use cosim_report::guarantee::margins_text;
+use cosim_report::metrics::{Metrics, Value};
+use fmu_import::quantity::rounded;
+use std::io::{self, Write};
+use std::path::PathBuf;
+use study::reproduce::StudyReport;
+
+/// Report on a run.
+#[derive(Debug)]
+pub(crate) struct RunReport {
+    /// Metrics of the run.
+    pub metrics: Metrics,
+    /// Folder that holds the results.
+    pub out: PathBuf,
+    /// Names of the files that were written to the folder.
+    pub files: Vec<&'static str>,
+    /// Reason why the run ended before its stop time, for example a request or a missed deadline;
+    /// `None` if it did not.
+    pub ended: Option<Error>,
+}
+
+/// Prints the summary of a run.
+///
+/// # Errors
+/// Returns an error if the text cannot be written.
+pub(crate) fn summary(system: &System, report: &RunReport, out: &mut impl Write) -> io::Result<()> {
+    let (System { clock, experiment, loops, .. }, metrics) = (system, &report.metrics);
+    let names = system.names();
+    let coupling = match experiment.simulation.coupling {
+        Coupling::Sequential => "sequential",
+        Coupling::Jacobi => "Jacobi",
+    };
+    writeln!(out, "{}", experiment.title)?;
+    writeln!(
+        out,
+        "  {} s to {} s in {} steps of {} s, {coupling}: {}",
+        rounded(clock.start()),
+        rounded(clock.stop()),
+        clock.ticks(),
+        clock.step(),
+        names.join(", ")
+    )?;
+    let mut line = |label: &str, text: String| writeln!(out, "  {label:<17} {text}");
+    for (label, text) in metric_lines(&experiment.observe, metrics) {
+        line(&label, text)?;
+    }
+    if experiment.observe.metrics.is_empty() {
+        line("metrics", "none: the experiment defines none ([observe.metrics])".into())?;
+    }
+    if let Some(guarantee) = guarantee(metrics) {
+        line("guarantee", guarantee)?;
+    }
+    if loops.is_empty() {
+        line("loop delay", "no feedback loop".into())?;
+    }
+    for feedback in loops {
+        let around: Vec<&str> = feedback
+            .components
+            .iter()
+            .chain(feedback.components.first())
+            .map(|&index| names[index])
+            .collect();
+        let steps = match feedback.ticks {
+            0 => "none".to_string(),
+            1 => format!("{} s, 1 step", clock.step()),
+            n => format!("{} s, {n} steps", rounded(n as f64 * clock.step())),
+        };
+        let reason = match (feedback.ticks, experiment.simulation.coupling) {
+            (0, _) => "",
+            (_, Coupling::Jacobi) => ", from the Jacobi coupling",
+            (_, Coupling::Sequential) => {
+                ", from the order: a component is stepped before one whose response it receives"
+            }
+        };
+        let undeclared: Vec<&str> = feedback.undeclared.iter().map(|&index| names[index]).collect();
+        let assumed = if undeclared.is_empty() {
+            String::new()
+        } else {
+            format!(
+                " (at most; the dependencies of the outputs are not declared: {})",
+                undeclared.join(", ")
+            )
+        };
+        line("loop delay", format!("{steps} ({}){reason}{assumed}", around.join(" -> ")))?;
+    }
+    if let Some(factor) = metrics.real_time_factor {
+        line("real-time factor", format!("{factor:.1} ({:.3} s elapsed)", metrics.wall_s))?;
+    }
+    if let Some(ended) = &report.ended {
+        line("ended early", ended.to_string())?;
+    }
+    if let Some(real_time) = &metrics.real_time {
+        real_time.print(&names, out)?;
+    }
+    let mut line = |label: &str, text: String| writeln!(out, "  {label:<17} {text}");
+    line("results", format!("{}: {}", report.out.display(), report.files.join(", ")))
+}
+
+/// Prints the outcome of a reproduction.
+///
+/// # Errors
+/// Returns an error if the text cannot be written.
+pub(crate) fn reproduction(report: &StudyReport, out: &mut impl Write) -> io::Result<()> {
+    let (run, stored) = report.parts;
+    writeln!(out, "{}", report.title)?;
+    writeln!(
+        out,
+        "  {} runs in {} parts: {run} run now, {stored} kept from before; {:.1} s elapsed",
+        report.runs,
+        run + stored,
+        report.elapsed
+    )?;
+    for note in &report.notes {
+        writeln!(out, "  note: {note}")?;
+    }
+    for (claim, verdict) in &report.verdicts {
+        writeln!(out, "  {:<14} {claim}", verdict.text())?;
+    }
+    writeln!(out, "  report: {}", report.page.display())?;
+    writeln!(out, "  in the same folder: {}", report.files[1..].join("; "))
+}
+
+/// Formats the ratio of a value to its limit.
+fn against(ratio: f64, limit: &str) -> String {
+    // A value that is not a number is not within a limit. A limit counts as met up to rounding.
+    let verdict = if ratio <= 1.0 + 1e-9 { "within" } else { "EXCEEDS" };
+    format!("   {verdict} its limit {limit}: {:.1} %", ratio * 100.0)
+}
+
+/// Describes how the controller's guarantee fared, if the controller gives one.
+fn guarantee(metrics: &Metrics) -> Option<String> {
+    let number = |name: &str| metrics.number(&format!("guarantee_{name}"));
+    let share = number("share")?;
+    let status =
+        metrics.text("guarantee_status").map_or(String::new(), |status| format!(" ({status})"));
+    let margins = metrics.asked.keys().filter_map(|name| {
+        let margin = name.strip_prefix("guarantee_")?.strip_suffix("_margin_min")?;
+        Some((metrics.number(name), margin))
+    });
+    let margins = margins_text(margins);
+    let text = match number("lost_at").map(rounded) {
+        _ if share == 0.0 => format!("never in force{status}"),
+        Some(time) => {
+            format!("in force at {:.1} % of the ticks, lost at t = {time} s{status}", share * 100.0)
+        }
+        None if share < 1.0 => {
+            format!("in force at {:.1} % of the ticks, never lost{margins}", share * 100.0)
+        }
+        None => format!("in force throughout{margins}"),
+    };
+    let broken = number("broken") == Some(1.0);
+    Some(text + if broken { "; DEFECT: a limit was EXCEEDED while it was in force" } else { "" })
+}
+
+/// Returns the lines for the metrics that the experiment lists in `summary`, as headings and texts.
+fn metric_lines(observe: &Observe, metrics: &Metrics) -> Vec<(String, String)> {
+    let mut lines: Vec<(String, String)> = Vec::new();
+    for name in &observe.summary {
+        let (Some(measure), Some(value)) = (observe.metrics.get(name), metrics.asked.get(name))
+        else {
+            continue;
+        };
+        let unit = metrics.units.get(name).filter(|unit| !unit.is_empty());
+        let unit = unit.map_or(String::new(), |unit| format!(" {unit}"));
+        let text = match value {
+            None => continue,
+            Some(Value::Count(count)) => count.to_string(),
+            Some(Value::Number(number)) => shown(*number),
+            Some(Value::Flag(is)) => is.to_string(),
+            Some(Value::Text(text)) => text.clone(),
+        };
+        let number = |name: &String| metrics.number(name);
+        let compared = match (number(name), measure.limit.as_ref().and_then(number)) {
+            (Some(value), Some(limit)) => {
+                against(value / limit, &format!("{}{unit}", shown(limit)))
+            }
+            _ => String::new(),
+        };
+        let part =
+            if measure.part.is_empty() { String::new() } else { format!("{} ", measure.part) };
+        let text = format!("{part}{text}{unit}{compared}");
+        match lines.last_mut().filter(|(label, _)| *label == measure.label) {
+            Some((_, line)) => line.extend([", ", &text]),
+            None => lines.push((measure.label.clone(), text)),
+        }
+    }
+    lines
+}
+
+/// Formats a number with four digits after the point, or with an exponent if it is large or small.
+fn shown(number: f64) -> String {
+    match number.abs() {
+        size if size >= 1e4 || size < 1e-3 && size > 0.0 => format!("{number:.4e}"),
+        _ => format!("{number:.4}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_limit_is_met_up_to_rounding() {
+        assert_eq!(against(1.0000000000000004, "1 N m"), "   within its limit 1 N m: 100.0 %");
+        assert_eq!(against(1.001, "1 N m"), "   EXCEEDS its limit 1 N m: 100.1 %");
+        assert!(against(f64::NAN, "1 N m").contains("EXCEEDS"));
+    }
+
+    #[test]
+    fn a_guarantee_is_told_in_one_line() {
+        assert_eq!(guarantee(&Metrics::default()), None);
+        let metrics = |asked: &[(&str, Value)]| {
+            let asked = asked
+                .iter()
+                .map(|(name, value)| (format!("guarantee_{name}"), Some(value.clone())));
+            Metrics { asked: asked.collect(), ..Metrics::default() }
+        };
+        let (number, text) = (Value::Number, |text: &str| Value::Text(text.into()));
+        let margins = [("moment_margin_min", number(0.012)), ("rate_margin_min", number(0.031))];
+        let told =
+            |asked: &[(&str, Value)]| guarantee(&metrics(&[asked, &margins].concat())).unwrap();
+        let throughout = [("share", number(1.0)), ("status", text("inForce"))];
+        assert_eq!(told(&throughout), "in force throughout, margins 1.2 % (moment), 3.1 % (rate)");
+        let broken = [("share", number(1.0)), ("broken", Value::Flag(true))];
+        assert_eq!(
+            told(&broken),
+            "in force throughout, margins 1.2 % (moment), 3.1 % (rate); \
+             DEFECT: a limit was EXCEEDED while it was in force"
+        );
+        let intact = [("share", number(0.972)), ("broken", Value::Flag(false))];
+        assert_eq!(
+            told(&intact),
+            "in force at 97.2 % of the ticks, never lost, margins 1.2 % (moment), 3.1 % (rate)"
+        );
+        let lost = [
+            ("share", number(0.972)),
+            ("lost_at", number(310.0 * 0.04 + 1e-14)),
+            ("status", text("exceeded")),
+        ];
+        assert_eq!(told(&lost), "in force at 97.2 % of the ticks, lost at t = 12.4 s (exceeded)");
+        let never = metrics(&[("share", number(0.0)), ("status", text("refused"))]);
+        assert_eq!(guarantee(&never).unwrap(), "never in force (refused)");
+        assert_eq!(guarantee(&metrics(&[("share", number(1.0))])).unwrap(), "in force throughout");
+    }
+
+    #[test]
+    fn metrics_of_one_heading_share_a_line_and_limits_are_told() {
+        let observe: Observe = toml::from_str(
+            r#"
+            summary = ["mean", "largest", "rate", "missing"]
+            [metrics]
+            mean = { label = "time", part = "mean", kind = "mean", signals = "x" }
+            largest = { label = "time", part = "max", kind = "largest", signals = "x" }
+            rate = { label = "largest rate", kind = "largest", signals = "y", limit = "limit" }
+            limit = { kind = "last", signals = "z" }
+            missing = { label = "count", kind = "last", signals = "z" }
+            "#,
+        )
+        .unwrap();
+        let values = [
+            ("mean", Some(0.0004)),
+            ("largest", Some(2.0)),
+            ("rate", Some(6.0)),
+            ("limit", Some(5.0)),
+            ("missing", None),
+        ];
+        let asked = values.map(|(name, value)| (name.to_string(), value.map(Value::Number)));
+        let units = ["mean", "largest"].map(|name| (name.to_string(), "ms".to_string()));
+        let metrics = Metrics { asked: asked.into(), units: units.into(), ..Metrics::default() };
+        assert_eq!(
+            metric_lines(&observe, &metrics),
+            [
+                ("time".to_string(), "mean 4.0000e-4 ms, max 2.0000 ms".to_string()),
+                ("largest rate".into(), "6.0000   EXCEEDS its limit 5.0000: 120.0 %".into()),
+            ]
+        );
+    }
+}

@@ -1,0 +1,176 @@
+//! The part of a study that describes its figures.
+
+use crate::values::Quantity;
+use cosim::experiment::Scaled;
+use cosim::signal::Signal;
+use cosim_report::figure::Color;
+use schemars::JsonSchema;
+use serde::Deserialize;
+use toml::Spanned;
+
+/// A figure with its panels.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Figure {
+    /// Id of the figure, which is also the name of its files.
+    pub id: String,
+    /// Title of the figure, in one line.
+    pub title: String,
+    /// Caption, which explains the figure.
+    #[serde(default)]
+    pub caption: String,
+    /// Number of panels in a row, side by side.
+    #[serde(default = "one")]
+    pub columns: usize,
+    /// Ids of the runs whose curves are drawn.
+    #[serde(default)]
+    #[schemars(with = "Vec<String>")]
+    pub runs: Vec<Spanned<String>>,
+    /// Panels of the figure, row by row.
+    #[serde(rename = "panel")]
+    pub panels: Vec<Panel>,
+}
+
+fn one() -> usize {
+    1
+}
+
+/// A panel of a figure. Exactly one of `signal`, `signals`, `histogram`, `scatter` and `across`
+/// selects the curves; a panel may also have `points` alone.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Panel {
+    /// Label of the vertical axis.
+    pub label: String,
+    /// Label of the horizontal axis, if it is not time.
+    pub x_label: Option<String>,
+    /// Heading above the panel.
+    #[serde(default)]
+    pub title: String,
+    /// Ids of the runs whose curves are drawn, in place of those of the figure.
+    #[schemars(with = "Option<Vec<String>>")]
+    pub runs: Option<Vec<Spanned<String>>>,
+    /// Signal that is drawn as one curve for each run.
+    pub signal: Option<Signal>,
+    /// Signals that are drawn as several curves for each run.
+    #[serde(default)]
+    pub signals: Vec<Curve>,
+    /// Signal that the curves are to follow. It is drawn once, for the first run.
+    pub reference: Option<Signal>,
+    /// Whether a band shows the range of the signal over all values of `vary`.
+    #[serde(default)]
+    pub spread: bool,
+    /// Metric of kind `p99` whose single values are shown as a histogram, with a logarithmic
+    /// horizontal axis.
+    pub histogram: Option<String>,
+    /// Two metrics that are drawn against each other, as one dot for each value of `vary`.
+    pub scatter: Option<Scatter>,
+    /// Two metrics that are drawn against each other, as lines through several runs.
+    pub across: Option<Across>,
+    /// Horizontal lines across the panel.
+    #[serde(default)]
+    pub bounds: Vec<Line>,
+    /// Vertical lines across the panel.
+    #[serde(default)]
+    pub marks: Vec<Line>,
+    /// Single points that are drawn in the panel.
+    #[serde(default)]
+    pub points: Vec<Point>,
+    /// Unit of the values, in place of the display unit of the FMU.
+    pub unit: Option<Scaled>,
+    /// Range of the horizontal axis to show, from and to.
+    pub x_range: Option<[f64; 2]>,
+}
+
+/// A curve with a name and a colour of its own.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Curve {
+    /// Signal that is drawn as the curve.
+    #[serde(rename = "of")]
+    pub signal: Signal,
+    /// Name of the curve in the legend.
+    pub label: String,
+    /// Colour of the curve.
+    pub color: Color,
+}
+
+/// Two metrics of a run that are drawn against each other.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Scatter {
+    /// Metric along the horizontal axis.
+    pub x: String,
+    /// Metric along the vertical axis.
+    pub y: String,
+}
+
+/// Two metrics that are drawn against each other, as lines through several runs.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Across {
+    /// Metric along the horizontal axis, with its factor.
+    pub x: Axis,
+    /// Metric along the vertical axis, with its factor.
+    pub y: Axis,
+    /// Lines that are drawn, each through runs of its own.
+    pub lines: Vec<Through>,
+}
+
+/// A metric along an axis, with its factor.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Axis {
+    /// Name of the metric along the axis.
+    #[serde(rename = "of")]
+    pub metric: String,
+    /// Factor by which the metric is multiplied to get the unit of the axis.
+    #[serde(default = "crate::values::unscaled")]
+    pub factor: f64,
+}
+
+/// A line through several runs. Each of its points is the mean of a run's metrics.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Through {
+    /// Name of the line in the legend.
+    pub label: String,
+    /// Colour of the line.
+    pub color: Color,
+    /// Ids of the runs that the line connects, in this order.
+    #[schemars(with = "Vec<String>")]
+    pub runs: Vec<Spanned<String>>,
+    /// Whether the line is dashed.
+    #[serde(default)]
+    pub dashed: bool,
+}
+
+/// A straight line across a panel.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Line {
+    /// Position of the line: a number, or the id of a value.
+    pub at: Quantity,
+    /// Name of the line in the legend.
+    pub label: String,
+    /// Colour of the line, which is red if it is left out.
+    #[serde(default)]
+    pub color: Option<Color>,
+    /// Whether a second line is drawn at the negative position.
+    #[serde(default)]
+    pub symmetric: bool,
+}
+
+/// A single point that is drawn in a panel.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Point {
+    /// Position along the horizontal axis: a number, or the id of a value.
+    pub x: Quantity,
+    /// Position along the vertical axis: a number, or the id of a value.
+    pub y: Quantity,
+    /// Name of the point in the legend.
+    pub label: String,
+    /// Colour of the point.
+    pub color: Color,
+}

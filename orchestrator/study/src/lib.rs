@@ -1,0 +1,25 @@
+//! A paper's comparison as data: which experiments are run and in which cases, what is drawn and
+//! tabulated, which numbers the paper prints, and what it claims. `orchestrator reproduce` runs a
+//! study and writes its report.
+//!
+//! docs/studies.md explains all keys; `orchestrator/schema/study.json` describes them for editors.
+
+pub mod claims;
+pub mod comparisons;
+pub mod curves;
+pub mod definition;
+pub mod drawings;
+pub mod error;
+mod figures;
+mod grid;
+mod load;
+mod output;
+mod page;
+mod part;
+pub mod reproduce;
+mod results;
+mod runs;
+mod table;
+mod template;
+mod texts;
+mod values;

@@ -1,0 +1,249 @@
+//! Reads a study and checks everything that can be checked without running anything.
+
+use crate::definition::Study;
+use crate::runs::Run;
+use crate::{grid, template};
+use cosim::document::Source;
+use cosim::error::Error;
+use cosim::experiment::{Experiment, Observe};
+use fmu_import::names;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// Replaces each `{runs:ID}` in a text by the number of runs; `None` if there is none to replace.
+fn counted(text: &str, runs: &[Run], cases: Option<u64>) -> Result<Option<String>, String> {
+    let mut parts = text.split("{runs:");
+    let mut counted = parts.next().unwrap_or_default().to_string();
+    for part in parts {
+        let (id, rest) = part.split_once('}').ok_or("\"{runs:\" is not closed by a brace")?;
+        let run = runs.iter().find(|run| run.id.get_ref() == id).ok_or_else(|| {
+            let hint = names::hint(id, runs.iter().map(|run| run.id.get_ref().as_str()));
+            format!("\"{{runs:{id}}}\": there is no [[run]] \"{id}\"{hint}")
+        })?;
+        counted += &limited(run, cases).to_string();
+        counted += rest;
+    }
+    Ok((counted != text).then_some(counted))
+}
+
+/// Returns the number of cases of a run if there may be at most this many, of which one always
+/// remains.
+fn limited(run: &Run, cases: Option<u64>) -> u64 {
+    cases.map_or(run.count(), |limit| run.count().min(limit.max(1)))
+}
+
+impl Study {
+    /// Reads a study and its files of values.
+    ///
+    /// # Errors
+    /// Returns an error if a file cannot be read, is not TOML, or names an item that does not
+    /// exist.
+    pub fn load(path: &Path) -> Result<Self, Error> {
+        Self::load_with(path, None)
+    }
+
+    /// Reads a study with at most `cases` cases of each run, and its files of values. The text
+    /// `{runs:ID}` becomes the number of cases of the run ID.
+    ///
+    /// # Errors
+    /// The errors are those of [`Self::load`].
+    pub fn load_with(path: &Path, cases: Option<u64>) -> Result<Self, Error> {
+        let source = Source::load(path)?;
+        let fault = |(span, message): template::Fault| source.error(&span, message);
+        let mut study: Self = source.read_with(|mut table| {
+            template::expand(table.get_mut()).map_err(fault)?;
+            let Self { runs, .. } = source.take(table.clone())?;
+            let counted = |text: &str| counted(text, &runs, cases);
+            let mut values = table.get_mut().iter_mut();
+            values.try_for_each(|(_, value)| template::rewrite(value, &counted)).map_err(fault)?;
+            source.take(table)
+        })?;
+        study.source = source;
+        for grid in std::mem::take(&mut study.grids) {
+            let runs = grid.runs(&study.source)?;
+            study.runs.extend(runs);
+        }
+        study.expand()?;
+        for file in &study.value_files {
+            study.values.load(&study.source.beside(file))?;
+        }
+        study.check()?;
+        for run in &mut study.runs {
+            run.cases = Some(limited(run, cases));
+        }
+        study.learn_metrics();
+        Ok(study)
+    }
+
+    /// Returns the text of a study with all that it extends, and with every template and list
+    /// spelled out.
+    ///
+    /// # Errors
+    /// Returns an error if a file cannot be read, is not TOML, or names a template or list that
+    /// does not exist.
+    pub fn spelled_out(path: &Path) -> Result<String, Error> {
+        let source = Source::load(path)?;
+        let study: toml::Table = source.read_with(|mut table| {
+            template::expand(table.get_mut())
+                .map_err(|(span, message)| source.error(&span, message))?;
+            source.take(table)
+        })?;
+        Ok(study.to_string())
+    }
+
+    /// Reads the metrics that the experiments define. An experiment that cannot be read is reported
+    /// later, when it is to be run.
+    fn learn_metrics(&mut self) {
+        let mut observed: BTreeMap<PathBuf, Observe> = BTreeMap::new();
+        for run in &mut self.runs {
+            let path = self.source.beside(&run.experiment);
+            let asked = observed.entry(path).or_insert_with_key(|path| {
+                Experiment::load(path).map(|read| read.observe).unwrap_or_default()
+            });
+            run.observe.clone_from(asked);
+        }
+    }
+
+    /// Replaces patterns by the ids of runs.
+    fn expand(&mut self) -> Result<(), Error> {
+        let ids: Vec<&str> = self.runs.iter().map(|run| run.id.get_ref().as_str()).collect();
+        let panels = self.figures.iter_mut().flat_map(|figure| {
+            let of_panels = figure.panels.iter_mut().flat_map(|panel| {
+                let lines = panel.across.iter_mut().flat_map(|across| &mut across.lines);
+                lines.map(|line| &mut line.runs).chain(&mut panel.runs)
+            });
+            of_panels.chain([&mut figure.runs])
+        });
+        for names in panels.chain(self.overviews.iter_mut().map(|overview| &mut overview.runs)) {
+            *names = grid::expand(names, &ids).map_err(|name| {
+                self.source.error(&name.span(), format!("no [[run]] fits \"{}\"", name.get_ref()))
+            })?;
+        }
+        Ok(())
+    }
+
+    /// Checks everything that can be wrong without running anything.
+    fn check(&self) -> Result<(), Error> {
+        let ids: Vec<&str> = self.runs.iter().map(|run| run.id.get_ref().as_str()).collect();
+        for (place, run) in self.runs.iter().enumerate() {
+            let id = run.id.get_ref();
+            let fault = |message: &str| {
+                Err(self.source.error(&run.id.span(), format!("[[run]] id = \"{id}\": {message}")))
+            };
+            if id.is_empty() || !id.chars().all(|c| c.is_ascii_alphanumeric() || c == '-') {
+                return fault("an id consists of letters, digits and -");
+            }
+            if ids[..place].contains(&id.as_str()) {
+                return fault("there is another run with this id");
+            }
+            match run.cases {
+                Some(0) => return fault("cases = 0, but it must be at least 1"),
+                Some(_) if run.vary.is_empty() => return fault("cases needs vary"),
+                None if !run.vary.is_empty() => return fault("vary needs cases, their number"),
+                _ => {}
+            }
+            self.source.check_names(
+                &run.within,
+                "[[within]]",
+                self.within.iter().map(|within| within.id.as_str()),
+            )?;
+            self.source.check_names(
+                &run.measures,
+                "[[measure]]",
+                self.measures.iter().map(|measure| measure.id.as_str()),
+            )?;
+        }
+        for within in &self.within {
+            self.number(&within.bound)?;
+        }
+        for (place, measure) in self.measures.iter().enumerate() {
+            let id = &measure.id;
+            let fault = match measure.fault() {
+                _ if id.is_empty() => Some("a measure of a study needs an id".into()),
+                _ if self.measures[..place].iter().any(|other| other.id == *id) => {
+                    Some("there is another measure with this id".into())
+                }
+                fault => fault,
+            };
+            if let Some(fault) = fault {
+                let fault = format!("[[measure]] id = \"{}\": {fault}", measure.id);
+                return Err(self.source.error(&(0..0), fault));
+            }
+        }
+        let bounded = self.within.iter().map(|within| &within.signals);
+        for list in bounded.chain(self.measures.iter().map(|measure| &measure.signals)) {
+            self.source.check_names(
+                [list],
+                "[signals]",
+                self.signals.keys().map(String::as_str),
+            )?;
+        }
+        for figure in &self.figures {
+            self.source.check_names(&figure.runs, "[[run]]", ids.iter().copied())?;
+            for panel in &figure.panels {
+                let through = panel
+                    .across
+                    .iter()
+                    .flat_map(|across| &across.lines)
+                    .flat_map(|line| &line.runs);
+                let named = panel.runs.iter().flatten().chain(through);
+                self.source.check_names(named, "[[run]]", ids.iter().copied())?;
+                let drawn = [
+                    panel.signal.is_some(),
+                    !panel.signals.is_empty(),
+                    panel.histogram.is_some(),
+                    panel.scatter.is_some(),
+                    panel.across.is_some(),
+                ];
+                let count = drawn.iter().filter(|is| **is).count();
+                if count != 1 && (count > 1 || panel.points.is_empty()) {
+                    return Err(self.source.error(
+                        &(0..0),
+                        format!(
+                            "[[figure]] id = \"{}\", panel \"{}\": a panel needs exactly one of signal, signals, histogram, scatter and across, or points alone",
+                            figure.id, panel.label
+                        ),
+                    ));
+                }
+                let lines = panel.bounds.iter().chain(&panel.marks).map(|line| &line.at);
+                let points = panel.points.iter().flat_map(|point| [&point.x, &point.y]);
+                for quantity in lines.chain(points) {
+                    self.number(quantity)?;
+                }
+            }
+        }
+        for overview in &self.overviews {
+            self.source.check_names(&overview.runs, "[[run]]", ids.iter().copied())?;
+        }
+        for quantity in
+            self.tables.iter().flat_map(|table| &table.rows).filter_map(|row| row.paper.as_ref())
+        {
+            self.number(quantity)?;
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn measures_of_a_study_have_ids_of_their_own() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("study.toml");
+        let head =
+            "title = \"\"\npaper = \"\"\nsummary = \"\"\nvalues = []\n[signals]\nx = [\"a.b\"]\n";
+        let loaded = |measures: &[&str]| {
+            let measure =
+                |id: &&str| format!("[[measure]]\n{id}\nkind = \"rms\"\nsignals = \"x\"\n");
+            let text = measures.iter().map(measure).fold(head.to_string(), |text, one| text + &one);
+            std::fs::write(&path, text).unwrap();
+            Study::load(&path).map_err(|error| error.to_string())
+        };
+        assert!(loaded(&["id = \"a\"", "id = \"b\""]).is_ok());
+        assert!(loaded(&[""]).unwrap_err().contains("needs an id"));
+        let twice = loaded(&["id = \"a\"", "id = \"a\""]).unwrap_err();
+        assert!(twice.contains("\"a\": there is another measure with this id"), "{twice}");
+    }
+}

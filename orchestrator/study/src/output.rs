@@ -1,0 +1,171 @@
+//! Writes the figures, the numbers and the page of a study.
+
+use crate::claims;
+use crate::definition::Study;
+use crate::results::{Metric, Results, RunResult};
+use crate::runs::Run;
+use crate::{figures, page};
+use cosim::error::Error;
+use cosim::files;
+use cosim_report::figure::{png, svg};
+use fmu_import::quantity::rounded;
+use serde_json::{Value, json};
+use std::collections::BTreeSet;
+use std::path::Path;
+use sweep::table::Column;
+
+/// A claim in our words, with its verdict.
+pub(crate) type Judgement = (String, claims::Verdict);
+
+/// Writes the figures, the numbers and the page. Returns the verdicts and the names of the files.
+pub(crate) fn write(results: &Results, out: &Path) -> Result<(Vec<Judgement>, Vec<String>), Error> {
+    let study = results.study;
+    let fault = |message: String| study.source.error(&(0..0), message);
+    let mut files = vec!["report.html".to_string(), "results.json".to_string()];
+    let mut drawn = Vec::new();
+    for figure in &study.figures {
+        let picture = figures::figure(figure, results).map_err(fault)?;
+        let path = out.join("figures").join(format!("{}.svg", figure.id));
+        let text = svg::text(&picture).map_err(Error::file(&path))?;
+        files::write(&path, &text)?;
+        png::write(&text, &path.with_extension("png"))?;
+        files.push(format!("figures/{}.svg, .png", figure.id));
+        drawn.push(picture);
+    }
+    let judged = study
+        .claims
+        .iter()
+        .map(|claim| claims::judge(claim, results))
+        .collect::<Result<Vec<_>, _>>()
+        .map_err(fault)?;
+    files::write(&out.join("results.json"), numbers(results, &judged))?;
+    let page = page::page(results, &judged, &drawn).map_err(fault)?;
+    files::write(&out.join("report.html"), page)?;
+    let verdicts =
+        study.claims.iter().zip(&judged).map(|(c, j)| (c.says.clone(), j.verdict)).collect();
+    Ok((verdicts, files))
+}
+
+/// Returns all numbers as JSON for other programs.
+fn numbers(results: &Results, judged: &[claims::Judged]) -> String {
+    let study = results.study;
+    let runs: serde_json::Map<String, Value> = study
+        .runs
+        .iter()
+        .zip(&results.runs)
+        .map(|(run, result)| {
+            let entry = json!({
+                "label": run.label,
+                "experiment": run.experiment,
+                "fmu": run.fmu,
+                "set": run.set,
+                "unset": run.unset,
+                "members": members(study, run, result),
+                "samples": result.series.samples,
+            });
+            (run.id.get_ref().clone(), entry)
+        })
+        .collect();
+    let claims: Vec<Value> = study
+        .claims
+        .iter()
+        .zip(judged)
+        .map(|(claim, judged)| {
+            let checks: Vec<Value> = claim
+                .checks
+                .iter()
+                .zip(&judged.checks)
+                .map(|(check, checked)| {
+                    json!({
+                        "label": check.label,
+                        "left": checked.left.0,
+                        "right": checked.right.0,
+                        "difference": checked.difference.0,
+                        "held": checked.held,
+                        "of": checked.pairs,
+                        "probability": checked.probability(),
+                    })
+                })
+                .collect();
+            json!({ "says": claim.says, "verdict": judged.verdict, "checks": checks })
+        })
+        .collect();
+    let document =
+        json!({ "title": study.title, "values": study.values.0, "runs": runs, "claims": claims });
+    let mut text = serde_json::to_string_pretty(&document).unwrap_or_default();
+    text.push('\n');
+    text
+}
+
+/// Returns the numbers of each case, by the names of the study's references.
+fn members(study: &Study, run: &Run, result: &RunResult) -> Vec<Value> {
+    let (mut members, mut first) = (Vec::new(), 0);
+    for part in &result.parts {
+        for row in 0..part.rows() {
+            let mut member = json!({ "values": {}, "metrics": {}, "within": {}, "measures": {} });
+            for Column { name, values } in &part.columns {
+                let value = values.json(row);
+                if name == "case" || run.varied().any(|varied| varied == name) {
+                    member["values"][name] = value;
+                } else if let Some(id) = name.strip_prefix("measure.") {
+                    member["measures"][id] = value;
+                } else if let Some((id, what)) =
+                    name.strip_prefix("within.").and_then(|name| name.rsplit_once('.'))
+                {
+                    member["within"][id][what] = value;
+                } else {
+                    member["metrics"][name] = value;
+                }
+            }
+            for (within, _) in study.bounds_of(run) {
+                let ratio = Metric::parse(&format!("within.{}.ratio", within.id), study, run);
+                let numbers = ratio.map(|metric| result.numbers(&metric)).unwrap_or_default();
+                member["within"][&within.id]["ratio"] = json!(numbers.get(first + row));
+            }
+            members.push(member);
+        }
+        first += part.rows();
+    }
+    members
+}
+
+/// Describes the runs that lose the attitude, and the runs that vary a parameter without any
+/// effect, for example the seed of a constant disturbance.
+pub(crate) fn notes(results: &Results) -> Vec<String> {
+    let mut notes = Vec::new();
+    for (run, result) in results.study.runs.iter().zip(&results.runs) {
+        let (id, count) = (run.id.get_ref(), result.cases());
+        let lost: Vec<f64> = result.column("lost_at").into_iter().flatten().collect();
+        if let Some(first) = lost.iter().copied().reduce(f64::min) {
+            let time = rounded(first);
+            let what = run.observe.loss.as_ref().map_or("run", |loss| &loss.what);
+            notes.push(format!(
+                "{id}: the {what} is lost in {} of {count} runs, at t = {time} s or later",
+                lost.len()
+            ));
+        }
+        if count > 1 && is_constant(run, result) {
+            let names: Vec<&str> = run.varied().map(String::as_str).collect();
+            let names = names.join(" and ");
+            notes.push(format!("{id}: {names} has no effect, all {count} runs are the same"));
+        }
+    }
+    notes
+}
+
+/// Returns whether all cases of a run have the same results, apart from computing times.
+fn is_constant(run: &Run, result: &RunResult) -> bool {
+    let is_result = |name: &str| {
+        let is_time = run.observe.metrics.get(name).is_some_and(|measure| measure.timing);
+        name != "case"
+            && !is_time
+            && !name.starts_with("step_us.")
+            && run.varied().all(|varied| varied != name)
+    };
+    let columns = result.parts.iter().flat_map(|part| &part.columns);
+    let names: BTreeSet<&str> = columns.map(|column| column.name.as_str()).collect();
+    names.into_iter().filter(|name| is_result(name)).all(|name| {
+        let numbers = result.column(name);
+        numbers.iter().all(|number| *number == numbers[0])
+    })
+}

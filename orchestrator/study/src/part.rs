@@ -1,0 +1,303 @@
+//! One part of the work of a study: some cases of a run, from its experiment to stored results.
+
+use crate::curves::{Curves, Watch, widen};
+use crate::definition::Study;
+use crate::error::Error;
+use crate::runs::Run;
+use crate::table::table;
+use cosim::error::Error as Single;
+use cosim::experiment::{Experiment, Measure, MeasureKind, Observe};
+use cosim::files;
+use cosim::interrupt::Interrupt;
+use cosim::master::Observer;
+use cosim::signal::Signal;
+use cosim::system::Opened;
+use cosim_report::metrics::{Meters, Metrics, Value};
+use serde_json::json;
+use std::collections::BTreeSet;
+use std::ops::Range;
+use std::path::PathBuf;
+use std::sync::OnceLock;
+use sweep::cases::Sweep;
+use sweep::flight::{Flight, Flown, can_reset};
+use sweep::parts::PartResult;
+use toml::Spanned;
+
+/// A part of a study's work: some cases of a run, counted from 0.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct Part {
+    /// Position of the run in the study.
+    pub run: usize,
+    /// Cases of the run that belong to this part.
+    pub range: Range<u64>,
+}
+
+/// Number of times that a timed case is run; the least of each computing time counts.
+const REPETITIONS: u32 = 5;
+/// Number of cases from which on it is worth trying whether instances can be reset.
+const WORTH_A_RESET: u64 = 10;
+
+/// Signals that the figures of a study need from a run.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct DrawnSignals {
+    /// Signals that are drawn as lines.
+    pub series: BTreeSet<Signal>,
+    /// Signals that are drawn as bands.
+    pub spread: BTreeSet<Signal>,
+}
+
+impl DrawnSignals {
+    /// Collects the signals of a run that the study's figures draw.
+    fn collect(study: &Study, run: &Run) -> Self {
+        let mut signals = Self::default();
+        for figure in &study.figures {
+            for panel in &figure.panels {
+                if !study.runs_of(figure, panel).any(|drawn| drawn.id == run.id) {
+                    continue;
+                }
+                let drawn =
+                    panel.signal.iter().chain(panel.signals.iter().map(|curve| &curve.signal));
+                let drawn: Vec<Signal> = drawn.cloned().collect();
+                if panel.spread {
+                    signals.spread.extend(drawn.iter().cloned());
+                }
+                signals.series.extend(drawn);
+                signals.series.extend(panel.reference.clone());
+            }
+        }
+        signals
+    }
+}
+
+/// A run of a study that has been prepared, so that any of its cases can be flown.
+pub(crate) struct Preparation<'a> {
+    study: &'a Study,
+    run: &'a Run,
+    /// Signals of the run that the figures draw.
+    drawn: DrawnSignals,
+    /// Cases of the run.
+    pub sweep: Sweep,
+    /// Whether instances can be reset, once this is known.
+    resets: OnceLock<bool>,
+}
+
+impl<'a> Preparation<'a> {
+    /// Reads the experiment of a run, and looks up all names that the study uses of it.
+    ///
+    /// # Errors
+    /// Returns an error if anything is wrong with the experiment, the FMUs, or what varies.
+    pub(crate) fn new(
+        study: &'a Study,
+        run: &'a Run,
+        fmu_dirs: &[PathBuf],
+        opened: &mut Opened,
+    ) -> Result<Self, Error> {
+        let failed = |source| Error::Run { run: run.id.get_ref().clone(), source };
+        let fault = |message: String| {
+            study.source.error(&run.id.span(), format!("[[run]] {}: {message}", run.id.get_ref()))
+        };
+        let mut experiment = study.experiment(run).map_err(failed)?;
+        let drawn = DrawnSignals::collect(study, run);
+        measure(study, run, &mut experiment)?;
+        let mut sweep = Sweep::new(experiment, &run.variation(), &study.source, fmu_dirs, opened)
+            .map_err(failed)?;
+        let mut system = sweep.system(opened).map_err(failed)?;
+        let bounded = study.bounds_of(run).flat_map(|(_, signals)| signals);
+        let measured = study.measures_of(run).filter(|(measure, _)| !measure.optional);
+        let measured = measured.flat_map(|(_, signals)| signals);
+        for signal in drawn.series.iter().chain(bounded).chain(measured) {
+            system.resolve(signal).map_err(fault)?;
+        }
+        Meters::new(&mut system).map_err(failed)?;
+        sweep.keys.insert("study".into(), key(run, &drawn, &sweep.experiment().observe));
+        Ok(Self { study, run, drawn, sweep, resets: OnceLock::new() })
+    }
+
+    /// Returns whether a part is measured, for which it has the machine for itself.
+    fn is_timed(&self, range: &Range<u64>) -> bool {
+        self.run.timed && range.start == 0
+    }
+
+    /// Returns the instances that fly the cases of a part.
+    fn instances(
+        &'a self,
+        range: &Range<u64>,
+        opened: &mut Opened,
+        interrupt: &'a Interrupt,
+    ) -> Result<Instances<'a>, Single> {
+        let is_timed = self.is_timed(range);
+        // A fault that shows here shows again where it can be reported.
+        let resets = !is_timed
+            && self.sweep.cases() >= WORTH_A_RESET
+            && *self
+                .resets
+                .get_or_init(|| can_reset(&self.sweep, opened, interrupt).unwrap_or(false));
+        let mut flight = Flight::new(&self.sweep, opened, resets, interrupt)?;
+        if is_timed {
+            flight.measure_times();
+        }
+        let resolved = self.drawn.series.iter().map(|signal| {
+            let resolved = flight.system().resolve(signal);
+            let id = &self.run.id;
+            let fault = |message| {
+                let message = format!("[[run]] {}: {message}", id.get_ref());
+                self.study.source.error(&id.span(), message)
+            };
+            Ok((signal.clone(), resolved.map_err(fault)?))
+        });
+        let resolved = resolved.collect::<Result<Vec<_>, Single>>()?;
+        let watch = Watch::new(resolved, flight.system().clock.ticks());
+        Ok(Instances { preparation: self, flight, watch })
+    }
+}
+
+/// Adds the measures and bounds of a run to the metrics of its experiment, under the names by which
+/// the study refers to them.
+fn measure(study: &Study, run: &Run, experiment: &mut Experiment) -> Result<(), Error> {
+    let observe = &mut experiment.observe;
+    let mut add = |name: String, measure: Measure, signals: &[Signal]| {
+        let list = format!("signals of {name}");
+        observe.signals.insert(list.clone(), signals.to_vec());
+        let signals = Spanned::new(0..0, list);
+        observe
+            .metrics
+            .insert(name, Measure { id: String::new(), limit: None, signals, ..measure });
+    };
+    for (measure, signals) in study.measures_of(run) {
+        add(format!("measure.{}", measure.id), measure.clone(), signals);
+    }
+    for (within, signals) in study.bounds_of(run) {
+        let bound = study.number(&within.bound)?;
+        let share = Measure::new(MeasureKind::Share);
+        let share = Measure { bound: Some(bound), ..share };
+        add(format!("within.{}.share", within.id), share, signals);
+        let largest = Measure::new(MeasureKind::Largest);
+        add(format!("within.{}.largest", within.id), largest, signals);
+    }
+    Ok(())
+}
+
+/// Hashes what the study says about the results of a run. Experiment and FMUs have their own
+/// hashes.
+fn key(run: &Run, drawn: &DrawnSignals, observe: &Observe) -> String {
+    let inputs = json!([
+        run.set,
+        run.unset,
+        run.vary,
+        run.correlations,
+        run.design,
+        run.seed,
+        run.timed,
+        observe,
+        drawn.series,
+        drawn.spread,
+    ]);
+    files::digest(inputs.to_string())
+}
+
+/// Instances of a run's FMUs in one thread.
+pub(crate) struct Instances<'a> {
+    preparation: &'a Preparation<'a>,
+    flight: Flight<'a>,
+    watch: Watch,
+}
+
+/// What a thread keeps from one part to the next: opened archives, and the instances of the run
+/// that it works on.
+#[derive(Default)]
+pub(crate) struct Bench<'a> {
+    opened: Opened,
+    instances: Option<(usize, Instances<'a>)>,
+}
+
+impl<'a> Bench<'a> {
+    /// Flies the cases of a part.
+    ///
+    /// # Errors
+    /// Returns an error if an FMU fails, or if the run was asked to end.
+    pub(crate) fn fly(
+        &mut self,
+        part: &Part,
+        preparation: &'a Preparation<'a>,
+        interrupt: &'a Interrupt,
+    ) -> Result<PartResult, Single> {
+        // A timed part is flown by instances of its own.
+        let kept = self.instances.take();
+        let kept = kept.filter(|(run, _)| *run == part.run && part.range.start > 0);
+        let mut instances = match kept {
+            Some((_, instances)) => instances,
+            None => preparation.instances(&part.range, &mut self.opened, interrupt)?,
+        };
+        let result = instances.fly(&part.range)?;
+        if !preparation.is_timed(&part.range) {
+            self.instances = Some((part.run, instances));
+        }
+        Ok(result)
+    }
+}
+
+impl Instances<'_> {
+    fn fly(&mut self, range: &Range<u64>) -> Result<PartResult, Single> {
+        let Preparation { study, sweep, drawn, .. } = self.preparation;
+        let (mut curves, mut cases) = (Curves::default(), Vec::new());
+        for case in range.clone() {
+            let mut flown = self.one(case)?;
+            let mut samples = self.flight.samples();
+            if self.preparation.is_timed(range) {
+                // Computing times are only meaningful if the run has the machine for itself, and
+                // what interrupts a run can only lengthen them.
+                for _ in 1..REPETITIONS {
+                    let again = self.one(case)?;
+                    keep_least_times(
+                        &mut flown.metrics,
+                        &again.metrics,
+                        &sweep.experiment().observe,
+                    );
+                    for (name, times) in &mut samples {
+                        let others = self.flight.samples().remove(name).unwrap_or_default();
+                        times.iter_mut().zip(others).for_each(|(time, o)| *time = time.min(o));
+                    }
+                }
+            }
+            widen(&mut curves.spread, self.watch.bands(|signal| drawn.spread.contains(signal)));
+            if case == 0 {
+                curves.parameters = self.flight.parameters()?;
+                samples.retain(|name, _| !name.starts_with("measure."));
+                curves.series = Some(self.watch.series(samples));
+            }
+            cases.push(flown);
+        }
+        let fault = |error: serde_json::Error| study.source.error(&(0..0), error.to_string());
+        let curves = serde_json::to_string(&curves).map_err(fault)?;
+        Ok(PartResult { rows: table(sweep, &cases), curves })
+    }
+
+    /// Flies one case, which the watch sees if something of it is drawn.
+    fn one(&mut self, case: u64) -> Result<Flown, Single> {
+        self.watch.clear();
+        let is_drawn = case == 0 || !self.preparation.drawn.spread.is_empty();
+        let watch: &mut dyn Observer = &mut self.watch;
+        let mut flown = if is_drawn {
+            self.flight.fly(case, &mut [watch])?
+        } else {
+            self.flight.fly(case, &mut [])?
+        };
+        std::mem::replace(&mut flown.outcome, Ok(()))?;
+        Ok(flown)
+    }
+}
+
+/// Replaces each computing time by the smaller one of two runs that are otherwise the same.
+fn keep_least_times(metrics: &mut Metrics, others: &Metrics, observe: &Observe) {
+    for (name, value) in &mut metrics.asked {
+        let is_timing = observe.metrics.get(name).is_some_and(|measure| measure.timing);
+        if let (true, Some(Value::Number(time)), Some(Some(Value::Number(other)))) =
+            (is_timing, value, others.asked.get(name))
+        {
+            *time = time.min(*other);
+        }
+    }
+    for (name, time) in &mut metrics.step_us {
+        *time = others.step_us.get(name).map_or(*time, |other| time.min(*other));
+    }
+}

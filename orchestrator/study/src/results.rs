@@ -1,0 +1,255 @@
+//! Results of a study's runs, and the references of the form `run.metric` to them.
+
+use crate::curves::{Curves, Series, Spread, widen};
+use crate::definition::Study;
+use crate::runs::Run;
+use crate::values::Quantity;
+use cosim::signal::Signal;
+use cosim::system::Parameters;
+use cosim_report::metrics::Metrics;
+use fmu_import::names;
+use std::collections::BTreeMap;
+use sweep::parts::PartResult;
+use sweep::table::CaseTable;
+use toml::Spanned;
+
+/// Results of one run of the study.
+#[derive(Clone, Debug, Default)]
+pub struct RunResult {
+    /// Tables of the run's parts in order, with a row for each case.
+    pub parts: Vec<CaseTable>,
+    /// Signals of the first case.
+    pub series: Series,
+    /// Parameters of all components in the first case.
+    pub parameters: Parameters,
+    /// Bands of signals over all cases, one for each signal that is drawn as a band.
+    pub spread: BTreeMap<Signal, Spread>,
+}
+
+impl RunResult {
+    /// Adds the results of the next part.
+    ///
+    /// # Errors
+    /// Returns an error if the curves are not what this program writes.
+    pub(crate) fn push(&mut self, part: PartResult) -> serde_json::Result<()> {
+        let Curves { series, parameters, spread } = serde_json::from_str(&part.curves)?;
+        self.parts.push(part.rows);
+        if let Some(series) = series {
+            (self.series, self.parameters) = (series, parameters);
+        }
+        widen(&mut self.spread, spread);
+        Ok(())
+    }
+
+    /// Returns the number of cases.
+    pub fn cases(&self) -> usize {
+        self.parts.iter().map(CaseTable::rows).sum()
+    }
+
+    /// Returns the column with this name: the number of each case, or `None` where it is missing.
+    pub fn column(&self, name: &str) -> Vec<Option<f64>> {
+        let of_part = |part: &CaseTable| {
+            let column = part.column(name);
+            let number = |row| column.and_then(|values| values.number(row));
+            (0..part.rows()).map(number).collect::<Vec<_>>()
+        };
+        self.parts.iter().flat_map(of_part).collect()
+    }
+}
+
+impl RunResult {
+    /// Returns the number of each case that a metric stands for, or all parameters that it names.
+    pub(crate) fn numbers(&self, metric: &Metric) -> Vec<Option<f64>> {
+        match metric {
+            Metric::Parameter(component, pattern) => {
+                let parameters = self.parameters.get(component).into_iter().flatten();
+                let fitting = parameters.filter(|(name, _)| names::matches(pattern, name));
+                fitting.filter_map(|(_, value)| value.as_f64()).map(Some).collect()
+            }
+            Metric::Column { name, bound, is_time } => {
+                let mut numbers = self.column(name);
+                if *is_time {
+                    numbers.truncate(1);
+                }
+                // A division by 1 changes no bit.
+                numbers.into_iter().map(|number| number.map(|number| number / bound)).collect()
+            }
+        }
+    }
+}
+
+/// A metric, which is a number for each case of a run.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum Metric {
+    /// A column of the run's table, divided by a bound.
+    Column {
+        /// Name of the column.
+        name: String,
+        /// Bound by which the numbers are divided.
+        bound: f64,
+        /// Whether it is a computing time, which differs from run to run and is taken from the
+        /// first case only.
+        is_time: bool,
+    },
+    /// Parameters of a component, in SI units, written as `parameter.COMPONENT.NAME`; a `*` at the
+    /// end stands for several parameters.
+    Parameter(String, String),
+}
+
+impl Metric {
+    /// Parses the name of a metric of a run: a key of `metrics.json`, `step_us.COMPONENT`,
+    /// `parameter.COMPONENT.NAME`, `measure.ID`, or `within.ID` with `share`, `largest` or `ratio`.
+    ///
+    /// # Errors
+    /// Returns an error if there is no such metric.
+    pub(crate) fn parse(text: &str, study: &Study, run: &Run) -> Result<Self, String> {
+        let id = run.id.get_ref();
+        let column =
+            |name: &str, bound, is_time| Self::Column { name: name.into(), bound, is_time };
+        let has = |what: &str, ids: &[Spanned<String>], name: &str| {
+            let mut ids = ids.iter().map(|id| id.get_ref().as_str());
+            let hint = names::hint(name, ids.clone());
+            let message = || format!("the run \"{id}\" has no {what} \"{name}\"{hint}");
+            ids.any(|other| other == name).then_some(()).ok_or_else(message)
+        };
+        if let Some((id, what)) =
+            text.strip_prefix("within.").and_then(|rest| rest.rsplit_once('.'))
+        {
+            has("within", &run.within, id)?;
+            return match what {
+                "share" | "largest" => Ok(column(text, 1.0, false)),
+                "ratio" => {
+                    let within = study.within.iter().find(|within| within.id == id);
+                    let bound = within.map(|within| study.values.number(&within.bound));
+                    let bound = bound.transpose()?.unwrap_or(f64::NAN);
+                    Ok(column(&format!("within.{id}.largest"), bound, false))
+                }
+                _ => {
+                    Err(format!("\"{text}\": within.{id} has the metrics share, largest and ratio"))
+                }
+            };
+        }
+        if let Some(id) = text.strip_prefix("measure.") {
+            has("measure", &run.measures, id)?;
+            return Ok(column(text, 1.0, false));
+        }
+        if let Some((component, name)) = text.strip_prefix("parameter.").and_then(names::split) {
+            return Ok(Self::Parameter(component.into(), name.into()));
+        }
+        if text.starts_with("step_us.") {
+            return if run.timed {
+                Ok(column(text, 1.0, true))
+            } else {
+                Err(format!("\"{text}\": the run \"{id}\" is not timed"))
+            };
+        }
+        let metrics = Metrics::reproducible_names(&run.observe);
+        let names: Vec<&str> = metrics.iter().map(String::as_str).collect();
+        if names.contains(&text) {
+            let is_time = run.observe.metrics.get(text).is_some_and(|measure| measure.timing);
+            return Ok(column(text, 1.0, is_time));
+        }
+        Err(format!("there is no metric \"{text}\"{}", names::hint(text, names.iter().copied())))
+    }
+}
+
+/// Numbers of the cases of a run, or a single number.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Numbers(pub Vec<f64>);
+
+impl Numbers {
+    /// Returns the arithmetic mean, which is not a number if there are no numbers.
+    pub fn mean(&self) -> f64 {
+        self.0.iter().sum::<f64>() / self.0.len() as f64
+    }
+
+    /// Returns the smallest and the largest of the numbers.
+    pub fn extent(&self) -> (f64, f64) {
+        self.0
+            .iter()
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &v| (low.min(v), high.max(v)))
+    }
+
+    /// Returns whether there are several numbers that differ.
+    pub fn vary(&self) -> bool {
+        self.0.iter().any(|value| *value != self.0[0])
+    }
+}
+
+/// Results of all runs, in the order of the study.
+pub struct Results<'a> {
+    /// The study that was run.
+    pub study: &'a Study,
+    /// Results of each run of the study.
+    pub runs: Vec<RunResult>,
+}
+
+/// Finds the run and the metric that `run.metric` refers to.
+///
+/// # Errors
+/// Returns an error that names the missing run or metric.
+pub(crate) fn resolve(study: &Study, reference: &str) -> Result<(usize, Metric), String> {
+    let (id, metric) = names::split(reference)
+        .ok_or_else(|| format!("\"{reference}\" does not have the form run.metric"))?;
+    let place = study.runs.iter().position(|run| run.id.get_ref() == id).ok_or_else(|| {
+        let hint = names::hint(id, study.runs.iter().map(|run| run.id.get_ref().as_str()));
+        format!("\"{reference}\": there is no run \"{id}\"{hint}")
+    })?;
+    Ok((place, Metric::parse(metric, study, &study.runs[place])?))
+}
+
+/// Returns whether a quantity refers to `run.metric` rather than to a value.
+pub(crate) fn is_reference(study: &Study, quantity: &Quantity) -> bool {
+    match quantity {
+        Quantity::Number(_) => false,
+        Quantity::Named(name) => {
+            study.values.find(name).is_none()
+                && names::split(name).is_some_and(|(id, _)| study.run(id).is_some())
+        }
+    }
+}
+
+impl Results<'_> {
+    /// Returns the results of the run with this id.
+    pub fn run(&self, id: &str) -> Option<&RunResult> {
+        self.study.runs.iter().position(|run| run.id.get_ref() == id).map(|place| &self.runs[place])
+    }
+
+    /// Returns the numbers that `run.metric` refers to. There are none if the run has no such
+    /// quantity.
+    ///
+    /// # Errors
+    /// Returns an error if there is no such run or metric.
+    pub fn numbers(&self, reference: &str) -> Result<Numbers, String> {
+        Ok(Numbers(self.case_numbers(reference)?.into_iter().flatten().collect()))
+    }
+
+    /// Returns the number of each case that `run.metric` refers to. It is `None` if a case has
+    /// no such quantity, for example a settling time if the error did not settle.
+    ///
+    /// # Errors
+    /// Returns an error if there is no such run or metric.
+    pub fn case_numbers(&self, reference: &str) -> Result<Vec<Option<f64>>, String> {
+        let (place, metric) = resolve(self.study, reference)?;
+        let result = &self.runs[place];
+        let numbers = result.numbers(&metric);
+        if let (Metric::Parameter(component, pattern), true) = (&metric, numbers.is_empty()) {
+            let parameters = result.parameters.get(component).into_iter().flatten();
+            let hint = names::hint(pattern, parameters.map(|(name, _)| name.as_str()));
+            return Err(format!("\"{reference}\": there is no such parameter{hint}"));
+        }
+        Ok(numbers)
+    }
+
+    /// Returns the number of each case that a reference stands for, or the single number of a
+    /// value.
+    ///
+    /// # Errors
+    /// Returns an error if the quantity refers to something that does not exist.
+    pub fn quantity(&self, quantity: &Quantity) -> Result<Vec<Option<f64>>, String> {
+        match quantity {
+            Quantity::Named(name) if is_reference(self.study, quantity) => self.case_numbers(name),
+            _ => self.study.values.number(quantity).map(|number| vec![Some(number)]),
+        }
+    }
+}

@@ -1,0 +1,132 @@
+//! The part of a study that describes its scenario and its runs.
+
+use crate::values::Quantity;
+use cosim::experiment::Observe;
+use cosim_report::figure::Color;
+use schemars::JsonSchema;
+use serde::Deserialize;
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use sweep::vary::{Correlation, DesignKind, Variation, Vary};
+use toml::{Spanned, Value};
+
+/// A line of the table that describes the scenario.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Fact {
+    /// Label of this scenario line, which names the quantity.
+    pub what: String,
+    /// Value of the quantity, with its unit.
+    pub value: String,
+    /// Source of the value, such as a page of the paper.
+    #[serde(default)]
+    pub source: String,
+}
+
+/// A gap in the paper, and the assumption that fills it here.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Assumption {
+    /// Question that the paper leaves open.
+    pub silent: String,
+    /// Assumption that is made in its place.
+    pub taken: String,
+}
+
+/// An experiment that is run once, or in several cases in which parameters vary.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Run {
+    /// Id by which the run is referred to.
+    #[schemars(with = "String")]
+    pub id: Spanned<String>,
+    /// Name of the run in legends and tables.
+    pub label: String,
+    /// Colour of the run's curves.
+    pub color: Color,
+    /// Heading of the run's rows in an overview. Without it there is no heading.
+    #[serde(default)]
+    pub group: String,
+    /// Path of the experiment file, relative to the study.
+    pub experiment: PathBuf,
+    /// FMUs that replace those of the experiment, by component.
+    #[serde(default)]
+    pub fmu: BTreeMap<String, String>,
+    /// Parameters that differ from those of the experiment, with their values.
+    #[serde(default)]
+    #[schemars(with = "BTreeMap<String, cosim::experiment::Scalar>")]
+    pub set: BTreeMap<String, Value>,
+    /// Parameters that the experiment sets, but that are left at the FMU's own value.
+    #[serde(default)]
+    pub unset: Vec<String>,
+    /// Parameters that vary from case to case, as in a campaign. Without them there is one case.
+    #[serde(default)]
+    pub vary: Vec<Vary>,
+    /// Correlations between varied parameters.
+    #[serde(default, rename = "correlation")]
+    pub correlations: Vec<Correlation>,
+    /// Number of cases of the run, which `vary` needs.
+    #[serde(default)]
+    pub cases: Option<u64>,
+    /// Design that places the cases in the space of the varied parameters.
+    #[serde(default)]
+    pub design: DesignKind,
+    /// Seed of all random numbers, by default 1. Case k depends on the seed and k alone.
+    #[serde(default = "one")]
+    pub seed: u64,
+    /// Whether the first case has the machine for itself, so that its computing times are
+    /// meaningful.
+    #[serde(default)]
+    pub timed: bool,
+    /// Ids of the bounds that the run is compared with.
+    #[serde(default)]
+    #[schemars(with = "Vec<String>")]
+    pub within: Vec<Spanned<String>>,
+    /// Ids of the measures that are computed for the run.
+    #[serde(default)]
+    #[schemars(with = "Vec<String>")]
+    pub measures: Vec<Spanned<String>>,
+    /// Metrics, panels and limits of the run's experiment. This is no key of a study file.
+    #[serde(skip)]
+    pub observe: Observe,
+}
+
+fn one() -> u64 {
+    1
+}
+
+impl Run {
+    /// Returns the number of cases.
+    pub fn count(&self) -> u64 {
+        self.cases.unwrap_or(1)
+    }
+
+    /// Returns what differs between the cases.
+    pub fn variation(&self) -> Variation<'_> {
+        Variation {
+            vary: &self.vary,
+            correlations: &self.correlations,
+            design: self.design,
+            seed: self.seed,
+            cases: Some(self.count()),
+        }
+    }
+
+    /// Returns the names of all parameters that vary.
+    pub fn varied(&self) -> impl Iterator<Item = &String> {
+        self.vary.iter().flat_map(Vary::names)
+    }
+}
+
+/// A bound on the magnitude of signals.
+#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Within {
+    /// Id by which the bound is referred to.
+    pub id: String,
+    /// Name of a list of signals. A sample counts if all of them are within the bound.
+    #[schemars(with = "String")]
+    pub signals: Spanned<String>,
+    /// Largest magnitude that counts as within the bound, in the unit of the signals.
+    pub bound: Quantity,
+}

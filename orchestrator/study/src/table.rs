@@ -1,0 +1,61 @@
+//! The numbers of a run as a table with a row for each case. The columns have the names by which a
+//! study refers to them.
+
+use cosim_report::metrics::Value;
+use std::collections::{BTreeMap, BTreeSet};
+use sweep::cases::Sweep;
+use sweep::flight::{Flown, columns};
+use sweep::table::{CaseTable, Column, Values};
+
+/// Makes the table of cases that were flown.
+pub(crate) fn table(sweep: &Sweep, cases: &[Flown]) -> CaseTable {
+    let numbered: Vec<_> =
+        cases.iter().map(|flown| (flown.case, flown.values.as_slice())).collect();
+    let mut columns = columns(sweep, &numbered);
+    let rows: Vec<BTreeMap<String, Option<Value>>> = cases.iter().map(row).collect();
+    let names: BTreeSet<&String> = rows.iter().flat_map(BTreeMap::keys).collect();
+    columns.extend(names.into_iter().map(|name| {
+        let cells: Vec<Option<&Value>> =
+            rows.iter().map(|row| row.get(name).and_then(Option::as_ref)).collect();
+        Column { name: name.clone(), values: values(&cells) }
+    }));
+    CaseTable { columns }
+}
+
+fn row(flown: &Flown) -> BTreeMap<String, Option<Value>> {
+    let metrics = &flown.metrics;
+    let mut row = metrics.asked.clone();
+    row.insert("samples".into(), Some(Value::Count(metrics.samples)));
+    row.insert("completed".into(), Some(Value::Flag(metrics.completed)));
+    row.insert("lost_at".into(), metrics.lost_at.map(Value::Number));
+    row.insert("loop_delay_s".into(), metrics.loop_delay_s.map(Value::Number));
+    let times = metrics.step_us.iter();
+    row.extend(times.map(|(name, time)| (format!("step_us.{name}"), Some(Value::Number(*time)))));
+    row
+}
+
+/// Returns the values of a column. If they are of different kinds, they become numbers.
+fn values(cells: &[Option<&Value>]) -> Values {
+    if cells.iter().any(|cell| matches!(cell, Some(Value::Text(_)))) {
+        let text = |cell: Option<&Value>| match cell {
+            Some(Value::Text(text)) => text.clone(),
+            _ => String::new(),
+        };
+        return Values::Text(cells.iter().copied().map(text).collect());
+    }
+    let flag = |cell: Option<&Value>| match cell {
+        Some(Value::Flag(is)) => Some(*is),
+        _ => None,
+    };
+    let count = |cell: Option<&Value>| match cell {
+        Some(Value::Count(count)) => i64::try_from(*count).ok(),
+        _ => None,
+    };
+    if let Some(flags) = cells.iter().copied().map(flag).collect() {
+        return Values::Flag(flags);
+    }
+    if let Some(counts) = cells.iter().copied().map(count).collect() {
+        return Values::Count(counts);
+    }
+    Values::Optional(cells.iter().map(|cell| cell.and_then(Value::number)).collect())
+}

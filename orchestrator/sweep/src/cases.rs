@@ -1,0 +1,259 @@
+//! A sweep that is ready to be flown: all names are looked up, and every parameter that varies has
+//! its distribution.
+
+use crate::correlation::{Correlated, correlation};
+use crate::design::{Design, Place};
+use crate::varied::{Varied, distributions};
+use crate::vary::{DesignKind, Variation};
+use cosim::check::check;
+use cosim::document::Source;
+use cosim::error::Error;
+use cosim::experiment::Experiment;
+use cosim::files;
+use cosim::search;
+use cosim::system::{CheckedComponent, Opened, System};
+use cosim::variation::{SettingValue, Target};
+use fmu_import::names;
+use serde_json::{Map, Value, json};
+use std::cmp::Ordering;
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::PathBuf;
+
+/// Version of the files of parts, which must be raised when their content changes.
+const FORMAT: u32 = 2;
+
+/// Cases of one experiment that differ in the values of parameters, ready to be flown.
+pub struct Sweep {
+    /// Varied parameters, in the order of the design's dimensions.
+    pub varied: Vec<Varied>,
+    /// Places of the cases.
+    pub design: Design,
+    /// Simulated time at which the cases start and stop, s.
+    pub span: [f64; 2],
+    /// Hashes of the program's version, the experiment and the FMUs, by their names. Whoever flies
+    /// the sweep adds what else the results depend on.
+    pub keys: BTreeMap<String, String>,
+    /// Archive of an FMU that can be instantiated only once per process, if there is one.
+    pub single: Option<PathBuf>,
+    experiment: Experiment,
+    /// File that describes the variation, for errors.
+    source: Source,
+    /// Paths of the archives, by component.
+    archives: BTreeMap<String, PathBuf>,
+    fmu_dirs: Vec<PathBuf>,
+    correlation: Option<Correlated>,
+}
+
+impl Sweep {
+    /// Prepares the cases of an experiment. Archives that are already in `opened` are not opened
+    /// again; `source` is the file that describes the variation.
+    ///
+    /// # Errors
+    /// Returns an error that names the key at fault, with its line and the nearest right name.
+    pub fn new(
+        experiment: Experiment,
+        variation: &Variation,
+        source: &Source,
+        fmu_dirs: &[PathBuf],
+        opened: &mut Opened,
+    ) -> Result<Self, Error> {
+        let system = check(experiment.clone(), fmu_dirs, opened)?;
+        let mut varied = Vec::new();
+        for vary in variation.vary {
+            varied.extend(distributions(vary, source, &system)?);
+        }
+        check_twice(&varied, source)?;
+        let by_name: Vec<_> =
+            varied.iter().map(|entry| (entry.name.as_str(), &entry.distribution)).collect();
+        let correlation = correlation(variation.correlations, source, &by_name)?;
+        let levels = varied.iter().map(|entry| {
+            let fault = |problem| {
+                source.error(&entry.span, format!("[[vary]] \"{}\": {problem}", entry.name))
+            };
+            match variation.design {
+                DesignKind::Factorial => entry.distribution.levels().map_err(fault),
+                DesignKind::Corners => entry.distribution.check_ends().map(|()| 0).map_err(fault),
+                _ => Ok(0),
+            }
+        });
+        let levels = levels.collect::<Result<Vec<_>, _>>()?;
+        let design = Design::new(variation.design, variation.seed, variation.cases, levels)
+            .map_err(|problem| source.error(&(0..0), problem))?;
+        let single = system.components.iter().find(|component| {
+            let interface = component.fmu.description.co_simulation.as_ref();
+            interface.is_some_and(|interface| interface.has("canBeInstantiatedOnlyOncePerProcess"))
+                && !component.is_isolated
+        });
+        Ok(Self {
+            design,
+            span: [system.clock.start(), system.clock.stop()],
+            keys: keys(&system)?,
+            single: single.map(|component| component.fmu.path.clone()),
+            varied,
+            source: source.clone(),
+            archives: system.components.into_iter().map(|c| (c.name, c.fmu.path.clone())).collect(),
+            experiment,
+            fmu_dirs: fmu_dirs.to_vec(),
+            correlation,
+        })
+    }
+
+    /// Returns the number of cases.
+    pub fn cases(&self) -> u64 {
+        self.design.cases()
+    }
+
+    /// Returns the experiment of all cases, in which nothing varies.
+    pub fn experiment(&self) -> &Experiment {
+        &self.experiment
+    }
+
+    /// Makes a system of the experiment. Archives that are already in `opened` are not opened
+    /// again.
+    ///
+    /// # Errors
+    /// Returns an error if the experiment or an archive is faulty.
+    pub fn system(&self, opened: &mut Opened) -> Result<System, Error> {
+        check(self.experiment.clone(), &self.fmu_dirs, opened)
+    }
+
+    /// Returns the values of a case, one for each entry of [`Self::varied`].
+    ///
+    /// # Errors
+    /// Returns an error if a value cannot be that of its parameter.
+    pub fn values(&self, case: u64) -> Result<Vec<SettingValue>, Error> {
+        self.values_at(&self.design.place(case), self.design.sample(case))
+    }
+
+    /// Returns the values at a place. Seeds that differ from case to case are those of this sample
+    /// of the design.
+    ///
+    /// # Errors
+    /// Returns an error if a value cannot be that of its parameter.
+    pub fn values_at(&self, places: &[Place], sample: u64) -> Result<Vec<SettingValue>, Error> {
+        let mut places = places.to_vec();
+        if let Some(correlated) = &self.correlation {
+            correlated.apply(&mut places);
+        }
+        let values = self.varied.iter().zip(places).map(|(varied, place)| {
+            varied.distribution.value(place, sample).map_err(|problem| {
+                let message = format!("[[vary]] \"{}\", sample {sample}: {problem}", varied.name);
+                self.source.error(&varied.span, message)
+            })
+        });
+        let mut values = values.collect::<Result<Vec<_>, _>>()?;
+        let groups = self.varied.iter().enumerate().filter(|(_, varied)| varied.sorted > 0);
+        for (first, varied) in groups {
+            values[first..first + varied.sorted].sort_by(|a, b| match (a, b) {
+                (SettingValue::Real(a), SettingValue::Real(b)) => a.total_cmp(b),
+                _ => Ordering::Equal,
+            });
+        }
+        Ok(values)
+    }
+
+    /// Returns the changes that these values make to the system.
+    pub fn changes(&self, values: &[SettingValue]) -> Vec<(Target, SettingValue)> {
+        let each = self.varied.iter().zip(values);
+        each.flat_map(|(varied, value)| {
+            varied.targets.iter().map(|target| (*target, value.clone()))
+        })
+        .collect()
+    }
+
+    /// Writes a case as the text of an experiment that extends the one of the campaign.
+    ///
+    /// # Errors
+    /// Returns an error if the text cannot be written as TOML.
+    pub fn experiment_of(&self, title: &str, values: &[SettingValue]) -> Result<String, Error> {
+        let mut table: toml::Table = toml::from_str(self.experiment.source.whole())
+            .map_err(|error| Error::experiment(error.to_string()))?;
+        table.remove("extends");
+        table.remove("unset");
+        table.insert("title".into(), title.into());
+        // The command line may have changed it.
+        let simulation = toml::Value::try_from(&self.experiment.simulation);
+        let simulation = simulation.map_err(|error| Error::experiment(error.to_string()))?;
+        table.insert("simulation".into(), simulation);
+        let components = table.entry("components").or_insert_with(|| toml::Table::new().into());
+        for (name, component) in &self.experiment.components {
+            let entry = components.as_table_mut().and_then(|table| table.get_mut(name));
+            let Some(entry) = entry.and_then(toml::Value::as_table_mut) else { continue };
+            entry.insert("fmu".into(), self.archive(name).into());
+            if component.is_exchanged {
+                entry.insert("exchanged".into(), true.into());
+            }
+            let parameters = component.parameters.iter();
+            let mut parameters: toml::Table =
+                parameters.map(|(name, value)| (name.clone(), value.get_ref().clone())).collect();
+            for (varied, value) in self.varied.iter().zip(values) {
+                for path in &varied.paths {
+                    if let Some((_, rest)) = names::split(path).filter(|(owner, _)| owner == name) {
+                        parameters.insert(rest.into(), written(value));
+                    }
+                }
+            }
+            entry.insert("parameters".into(), parameters.into());
+        }
+        toml::to_string(&table).map_err(|error| Error::experiment(error.to_string()))
+    }
+
+    /// Returns what an experiment in another folder calls the archive of a component: its file name
+    /// if it is found by that from any folder, and else its path.
+    fn archive(&self, component: &str) -> String {
+        let written = self.experiment.components[component].fmu.get_ref();
+        let is_there = |folder: &PathBuf| folder.join(written).is_file();
+        match self.archives.get(component).and_then(|path| std::path::absolute(path).ok()) {
+            Some(path) if !search::fmu_folders().iter().any(is_there) => path.display().to_string(),
+            _ => written.clone(),
+        }
+    }
+    /// Returns the units of the varied parameters and of other columns, as JSON for the metadata
+    /// of a table.
+    pub fn units<'a>(&'a self, others: impl Iterator<Item = (&'a String, &'a String)>) -> String {
+        let varied = self.varied.iter().map(|entry| (&entry.name, &entry.unit));
+        let units = varied.chain(others).filter(|(_, unit)| !unit.is_empty());
+        let mut units: Map<String, Value> =
+            units.map(|(name, unit)| (name.clone(), json!(unit))).collect();
+        units.insert("time".into(), json!("s"));
+        Value::Object(units).to_string()
+    }
+}
+
+/// Refuses a parameter that varies twice.
+fn check_twice(varied: &[Varied], source: &Source) -> Result<(), Error> {
+    for (i, entry) in varied.iter().enumerate() {
+        let twice = entry.paths.iter().find(|path| {
+            varied[..i].iter().any(|other| other.paths.contains(path))
+                || entry.paths.iter().filter(|other| other == path).count() > 1
+        });
+        if let Some(path) = twice {
+            return Err(source.error(&entry.span, format!("[[vary]] \"{path}\" varies twice")));
+        }
+    }
+    Ok(())
+}
+
+/// Hashes what all cases depend on.
+fn keys(system: &System) -> Result<BTreeMap<String, String>, Error> {
+    let mut keys = BTreeMap::from([
+        ("experiment".to_string(), files::digest(system.experiment.source.whole())),
+        ("program".to_string(), format!("{} {FORMAT}", env!("CARGO_PKG_VERSION"))),
+    ]);
+    for CheckedComponent { name, fmu, .. } in &system.components {
+        let bytes = fs::read(&fmu.path).map_err(Error::file(&fmu.path))?;
+        keys.insert(format!("FMU of {name}"), files::digest(bytes));
+    }
+    Ok(keys)
+}
+
+/// Converts a value to TOML.
+fn written(value: &SettingValue) -> toml::Value {
+    match value {
+        SettingValue::Real(value) => (*value).into(),
+        SettingValue::Integer(value) => (*value).into(),
+        SettingValue::Boolean(value) => (*value).into(),
+        SettingValue::Item(text, _) | SettingValue::Text(text) => text.as_str().into(),
+    }
+}

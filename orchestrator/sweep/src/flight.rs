@@ -1,0 +1,269 @@
+//! Flies cases one after the other with the same instances, which are reset between cases.
+
+use crate::cases::Sweep;
+use crate::table::{Column, Values};
+use cosim::error::Error;
+use cosim::interrupt::Interrupt;
+use cosim::master::{Master, Observer, Sample};
+use cosim::system::{Opened, Parameters, System};
+use cosim::variation::SettingValue;
+use cosim_report::metrics::{Meters, Metrics};
+use fmu_import::description::VariableKind as Type;
+use fmu_import::error::Error as Import;
+use std::collections::BTreeMap;
+
+/// Result of a case.
+#[derive(Debug)]
+pub struct Flown {
+    /// Number of the case.
+    pub case: u64,
+    /// Values of the varied parameters.
+    pub values: Vec<SettingValue>,
+    /// Metrics of the case.
+    pub metrics: Metrics,
+    /// How the case ended. An error is that of an instance, or the end of a case that was lost or
+    /// that broke a bound.
+    pub outcome: Result<(), Error>,
+    /// Position of the bound that ended the case.
+    pub broken: Option<usize>,
+    /// Simulated time that the case reached, s.
+    pub time: f64,
+}
+
+/// A metric and the largest value with which a case goes on.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Bound {
+    /// Name of the metric, whose value only grows.
+    pub metric: String,
+    /// Largest value with which a case goes on.
+    pub at_most: f64,
+}
+
+/// Instances that fly one case after the other.
+pub struct Flight<'a> {
+    sweep: &'a Sweep,
+    system: System,
+    meters: Meters,
+    master: Option<Master>,
+    interrupt: &'a Interrupt,
+    /// Whether instances are reset instead of created again.
+    resets: bool,
+    /// Whether computing times of components are measured.
+    times: bool,
+    bounds: Vec<Bound>,
+}
+
+impl<'a> Flight<'a> {
+    /// Prepares instances of the FMUs. Archives that are already in `opened` are not opened again.
+    /// If `resets` is false, each case gets new instances.
+    ///
+    /// # Errors
+    /// Returns an error if an archive cannot be opened.
+    pub fn new(
+        sweep: &'a Sweep,
+        opened: &mut Opened,
+        resets: bool,
+        interrupt: &'a Interrupt,
+    ) -> Result<Self, Error> {
+        let mut system = sweep.system(opened)?;
+        let meters = Meters::new(&mut system)?;
+        let (times, bounds, master) = (false, Vec::new(), None);
+        Ok(Self { sweep, system, meters, master, interrupt, resets, times, bounds })
+    }
+
+    /// Lets a case end as soon as it is lost, or exceeds one of these bounds.
+    #[must_use]
+    pub fn ending_at(mut self, bounds: Vec<Bound>) -> Self {
+        self.meters = self.meters.ending_when_lost();
+        self.bounds = bounds;
+        self
+    }
+
+    /// Measures the computing times of components.
+    pub fn measure_times(&mut self) {
+        self.times = true;
+    }
+
+    /// Replaces the bounds that end a case, and returns those before.
+    pub fn replace_bounds(&mut self, bounds: Vec<Bound>) -> Vec<Bound> {
+        std::mem::replace(&mut self.bounds, bounds)
+    }
+
+    /// Returns the system whose cases are flown. Signals that are probed now are seen by observers.
+    pub fn system(&mut self) -> &mut System {
+        &mut self.system
+    }
+
+    /// Returns the parameters of all components in the last case.
+    ///
+    /// # Errors
+    /// Returns an error if an instance does not give a value.
+    pub fn parameters(&mut self) -> Result<Parameters, Error> {
+        match &mut self.master {
+            Some(master) => self.system.parameters(master),
+            None => Ok(Parameters::default()),
+        }
+    }
+
+    /// Returns the single values of the metrics that keep them in the last case, by name.
+    pub fn samples(&self) -> BTreeMap<String, Vec<f64>> {
+        self.meters.samples()
+    }
+
+    /// Flies the case with this number, seen by further observers.
+    ///
+    /// # Errors
+    /// Returns an error if the work was asked to end, or if the values of the case cannot be set.
+    /// An FMU that fails is a result.
+    pub fn fly(&mut self, case: u64, others: &mut [&mut dyn Observer]) -> Result<Flown, Error> {
+        self.fly_with(case, self.sweep.values(case)?, others)
+    }
+
+    /// Flies a case with these values, seen by further observers.
+    ///
+    /// # Errors
+    /// The errors are those of [`Self::fly`].
+    pub fn fly_with(
+        &mut self,
+        case: u64,
+        values: Vec<SettingValue>,
+        others: &mut [&mut dyn Observer],
+    ) -> Result<Flown, Error> {
+        let changes = self.sweep.changes(&values);
+        self.meters.reset();
+        let started = match self.master.take().filter(|_| self.resets) {
+            Some(mut master) => self.system.restart(&mut master, &changes).map(|()| master),
+            None => self.system.start_varied(&changes, self.interrupt),
+        };
+        let mut watch = Watch {
+            meters: &mut self.meters,
+            bounds: &self.bounds,
+            broken: None,
+            time: self.sweep.span[0],
+        };
+        let mut step_us = Vec::new();
+        let outcome = started.and_then(|mut master| {
+            if self.times {
+                master.measure_time();
+            }
+            let mut observers: Vec<&mut dyn Observer> = Vec::with_capacity(1 + others.len());
+            for other in others.iter_mut() {
+                observers.push(&mut **other);
+            }
+            // The watch comes last, because it may end the case.
+            observers.push(&mut watch);
+            let outcome = master.run(&mut observers);
+            let times = master.step_seconds();
+            step_us = times.map(|(name, seconds)| (name.to_string(), seconds * 1e6)).collect();
+            // An instance that failed is not used again.
+            if !matches!(outcome, Err(Error::Call { .. })) {
+                self.master = Some(master);
+            }
+            outcome
+        });
+        let Watch { broken, time, .. } = watch;
+        let outcome = match outcome {
+            Err(error) if !is_of_case(&error) => return Err(error),
+            outcome => outcome,
+        };
+        let metrics = Metrics {
+            step_us: step_us.into_iter().collect(),
+            loop_delay_s: self.system.loop_delay(),
+            ..self.meters.metrics()
+        };
+        Ok(Flown { case, values, metrics, outcome, broken, time })
+    }
+}
+
+/// Returns whether an error is the end of one case, so that others can still be flown.
+fn is_of_case(error: &Error) -> bool {
+    matches!(
+        error,
+        Error::Lost { .. }
+            | Error::EndedByInstance { .. }
+            | Error::Call { .. }
+            | Error::Import(Import::Fmu { .. })
+    )
+}
+
+/// Measures a case, and ends it as soon as it exceeds a bound.
+struct Watch<'a> {
+    meters: &'a mut Meters,
+    bounds: &'a [Bound],
+    broken: Option<usize>,
+    time: f64,
+}
+
+impl Observer for Watch<'_> {
+    fn observe(&mut self, sample: &Sample) -> Result<(), Error> {
+        self.time = sample.time;
+        self.meters.observe(sample)?;
+        for (place, Bound { metric, at_most }) in self.bounds.iter().enumerate() {
+            // A value that is not a number is not within the bound.
+            let is_within = self.meters.number(metric).is_none_or(|number| number <= *at_most);
+            if !is_within {
+                self.broken = Some(place);
+                let (what, reason) = (metric.clone(), String::new());
+                return Err(Error::Lost { what, time: sample.time, reason });
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Returns the first columns of a table of cases: their numbers and the values that vary.
+pub fn columns(sweep: &Sweep, cases: &[(u64, &[SettingValue])]) -> Vec<Column> {
+    let mut columns = vec![Column {
+        name: "case".into(),
+        values: Values::Count(cases.iter().map(|(case, _)| case.cast_signed()).collect()),
+    }];
+    for (place, varied) in sweep.varied.iter().enumerate() {
+        let values = cases.iter().map(|(_, values)| &values[place]);
+        columns.push(Column { name: varied.name.clone(), values: typed(&varied.kind, values) });
+    }
+    columns
+}
+
+fn typed<'a>(kind: &Type, values: impl Iterator<Item = &'a SettingValue>) -> Values {
+    match kind {
+        Type::Real { .. } => Values::Real(
+            values
+                .map(|value| if let SettingValue::Real(value) = value { *value } else { f64::NAN })
+                .collect(),
+        ),
+        Type::Integer { .. } => Values::Integer(
+            values
+                .map(|value| if let SettingValue::Integer(value) = value { *value } else { 0 })
+                .collect(),
+        ),
+        Type::Boolean => {
+            Values::Flag(values.map(|value| matches!(value, SettingValue::Boolean(true))).collect())
+        }
+        Type::Enumeration { .. } | Type::String => Values::Text(
+            values
+                .map(|value| match value {
+                    SettingValue::Item(text, _) | SettingValue::Text(text) => text.clone(),
+                    _ => String::new(),
+                })
+                .collect(),
+        ),
+    }
+}
+
+/// Returns whether instances can be reset: a case that is flown with instances that were reset
+/// after another case gives the same result as with new ones.
+///
+/// # Errors
+/// The errors are those of [`Flight::fly`].
+pub fn can_reset(sweep: &Sweep, opened: &mut Opened, interrupt: &Interrupt) -> Result<bool, Error> {
+    let mut flight = Flight::new(sweep, opened, true, interrupt)?;
+    let mut result = |case| {
+        let flown = flight.fly(case, &mut [])?;
+        let reason = flown.outcome.err().map(|error| error.to_string());
+        let metrics = flown.metrics.without_times(&sweep.experiment().observe);
+        Ok::<_, Error>((reason, metrics, flown.time))
+    };
+    let first = result(0)?;
+    result(1.min(sweep.cases() - 1))?;
+    Ok(result(0)? == first)
+}

@@ -1,0 +1,186 @@
+//! Parts of a sweep: consecutive cases, whose results share a file. A part with a valid file is not
+//! flown again, whether this thread, an earlier run or another machine flew it.
+
+use crate::table::{CaseTable, Reader, Writer};
+use cosim::error::Error;
+use std::collections::BTreeMap;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+
+/// Returns the parts of the cases below `cases`, each of `length` cases but the last.
+pub fn parts(cases: u64, length: u64) -> impl Iterator<Item = Range<u64>> {
+    (0..cases.div_ceil(length)).map(move |i| i * length..cases.min((i + 1) * length))
+}
+
+/// Returns the path of a part's file in a folder.
+pub fn path(folder: &Path, part: &Range<u64>) -> PathBuf {
+    folder.join(format!("{:010}-{:010}.parquet", part.start, part.end))
+}
+
+/// Results of a part.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct PartResult {
+    /// A row for each case.
+    pub rows: CaseTable,
+    /// Curves and other results that are no rows, as JSON; an empty text if there are none.
+    pub curves: String,
+}
+
+/// State of a part's file in the folder of the results.
+#[derive(Clone, Debug, PartialEq)]
+pub enum PartState {
+    /// The file is valid.
+    Whole(PartResult),
+    /// There is no such file.
+    Missing,
+    /// The file is damaged.
+    Damaged,
+    /// The file was made from other inputs, whose names are given.
+    Other(Vec<String>),
+}
+
+/// Looks for a part that was made from inputs with these hashes.
+pub fn find(folder: &Path, keys: &BTreeMap<String, String>, part: &Range<u64>) -> PartState {
+    let path = path(folder, part);
+    if !path.exists() {
+        return PartState::Missing;
+    }
+    let Ok(reader) = Reader::open(&path) else { return PartState::Damaged };
+    let stored = reader.metadata("keys").map(serde_json::from_str::<BTreeMap<String, String>>);
+    let Some(Ok(stored)) = stored else { return PartState::Damaged };
+    let mut others: Vec<String> = keys
+        .iter()
+        .filter(|(name, key)| stored.get(*name) != Some(key))
+        .map(|(name, _)| name.clone())
+        .collect();
+    others.extend(stored.keys().filter(|name| !keys.contains_key(*name)).cloned());
+    if !others.is_empty() {
+        return PartState::Other(others);
+    }
+    whole(&reader, part).map_or(PartState::Damaged, PartState::Whole)
+}
+
+/// Reads a part that is whole.
+fn whole(reader: &Reader, part: &Range<u64>) -> Option<PartResult> {
+    if reader.rows() != part.end - part.start {
+        return None;
+    }
+    let curves = reader.metadata("curves").unwrap_or_default().to_string();
+    let result = PartResult { rows: reader.table().ok()?, curves };
+    let is_whole = reader.metadata("digest") == Some(&result.digest())
+        && result.rows.rows() as u64 == reader.rows();
+    is_whole.then_some(result)
+}
+
+/// Reads a part.
+///
+/// # Errors
+/// Returns an error if the file is missing or damaged.
+pub fn read(folder: &Path, part: &Range<u64>) -> Result<PartResult, Error> {
+    let path = path(folder, part);
+    whole(&Reader::open(&path)?, part).ok_or_else(|| {
+        Error::experiment(format!(
+            "{} is damaged: remove it, and its cases are flown again",
+            path.display()
+        ))
+    })
+}
+
+/// Keeps the results of a part, with the hashes of all its inputs and the units of its columns.
+///
+/// # Errors
+/// Returns an error if the file cannot be written.
+pub fn write(
+    folder: &Path,
+    keys: &BTreeMap<String, String>,
+    part: &Range<u64>,
+    units: String,
+    result: PartResult,
+) -> Result<(), Error> {
+    let keys = serde_json::to_string(keys).map_err(|error| Error::experiment(error.to_string()))?;
+    let mut metadata = vec![("units", units), ("digest", result.digest()), ("keys", keys)];
+    if !result.curves.is_empty() {
+        metadata.push(("curves", result.curves));
+    }
+    let mut writer = Writer::create(&path(folder, part), &metadata)?;
+    writer.add(result.rows)?;
+    writer.finish()
+}
+
+impl PartResult {
+    /// Returns a hash of everything, so that no number is used that was changed later.
+    fn digest(&self) -> String {
+        cosim::files::digest(self.rows.digest() + &self.curves)
+    }
+}
+
+/// Sorts what was found of the missing parts into remarks for the user.
+#[derive(Debug, Default)]
+pub struct Remarks {
+    damaged: u64,
+    others: BTreeMap<String, u64>,
+}
+
+impl Remarks {
+    /// Notes why the file of a part is of no use.
+    pub fn add(&mut self, state: &PartState) {
+        match state {
+            PartState::Whole(_) | PartState::Missing => {}
+            PartState::Damaged => self.damaged += 1,
+            PartState::Other(names) => *self.others.entry(names.join(", ")).or_default() += 1,
+        }
+    }
+
+    /// Returns the remarks in words.
+    pub fn texts(&self) -> Vec<String> {
+        let damaged = (self.damaged > 0).then(|| {
+            format!("flown again because their files are damaged: {} parts", self.damaged)
+        });
+        let others = self.others.iter().map(|(what, count)| {
+            format!("flown again because this has changed: {what} ({count} parts)")
+        });
+        damaged.into_iter().chain(others).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::table::{Column, Values};
+    use std::fs;
+
+    #[test]
+    fn no_changed_byte_goes_unseen() {
+        let columns = vec![
+            Column { name: "case".into(), values: Values::Count(vec![0, 1]) },
+            Column { name: "largest".into(), values: Values::Optional(vec![Some(0.1), None]) },
+            Column { name: "status".into(), values: Values::Text(vec!["x".into(), "y".into()]) },
+        ];
+        let result = PartResult { rows: CaseTable { columns }, curves: "{\"time\":[0.1]}".into() };
+        let keys = BTreeMap::from([("experiment".to_string(), "abc".to_string())]);
+        let folder = tempfile::tempdir().unwrap();
+        let part = 0..2;
+        write(folder.path(), &keys, &part, "{}".into(), result.clone()).unwrap();
+        let path = path(folder.path(), &part);
+        let sound = fs::read(&path).unwrap();
+        assert_eq!(find(folder.path(), &keys, &part), PartState::Whole(result.clone()));
+        let mut seen = 0;
+        for byte in 0..sound.len() {
+            let mut broken = sound.clone();
+            broken[byte] ^= 0x10;
+            fs::write(&path, &broken).unwrap();
+            match find(folder.path(), &keys, &part) {
+                PartState::Whole(read) => assert_eq!(read, result, "byte {byte}"),
+                _ => seen += 1,
+            }
+        }
+        // The others lie in what readers skip, such as the name of the program that wrote it.
+        assert!(2 * seen > sound.len(), "{seen} of {}", sound.len());
+        let other = BTreeMap::from([("experiment".to_string(), "abd".to_string())]);
+        fs::write(&path, &sound).unwrap();
+        assert_eq!(
+            find(folder.path(), &other, &part),
+            PartState::Other(vec!["experiment".to_string()])
+        );
+    }
+}

@@ -1,0 +1,186 @@
+//! The parameters that vary from case to case.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use toml::{Spanned, Value};
+
+/// A parameter that varies from case to case, or several, with the distribution of the values.
+/// Exactly one of the keys from `uniform` to `case` is given. A number may be a text with a unit
+/// (`"5 deg"`), or with a percent sign, which stands for percent of the value in the experiment.
+#[derive(Clone, Debug, Deserialize, JsonSchema, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct Vary {
+    /// Parameter, or input without a connection, as `component.parameter`. Several in a list all
+    /// get the same value.
+    #[serde(default)]
+    #[schemars(with = "Option<OneOrMore>")]
+    pub parameter: Option<Spanned<OneOrMore>>,
+    /// Parameters that each get a value of their own from the same distribution.
+    #[serde(default)]
+    #[schemars(with = "Vec<String>")]
+    pub each: Vec<Spanned<String>>,
+    /// Whether the values of `each` are sorted in ascending order, as switching times must be.
+    #[serde(default)]
+    pub sorted: bool,
+    /// Smallest and largest value of a uniform distribution. An integer parameter gets integers,
+    /// both ends included.
+    #[serde(default)]
+    #[schemars(with = "Option<[cosim::experiment::Scalar; 2]>")]
+    pub uniform: Option<Spanned<[Value; 2]>>,
+    /// Mean and standard deviation of a normal distribution.
+    #[serde(default)]
+    #[schemars(with = "Option<Normal>")]
+    pub normal: Option<Spanned<Normal>>,
+    /// Median and spread of a log-normal distribution.
+    #[serde(default)]
+    #[schemars(with = "Option<LogNormal>")]
+    pub log_normal: Option<Spanned<LogNormal>>,
+    /// Smallest, most likely and largest value of a triangular distribution.
+    #[serde(default)]
+    #[schemars(with = "Option<[cosim::experiment::Scalar; 3]>")]
+    pub triangular: Option<Spanned<[Value; 3]>>,
+    /// Values that are equally likely, unless `weights` are given: numbers, texts, items of an
+    /// enumeration or truth values.
+    #[serde(default)]
+    #[schemars(with = "Option<Vec<cosim::experiment::Scalar>>")]
+    pub list: Option<Spanned<Vec<Value>>>,
+    /// Equally spaced values, equally likely.
+    #[serde(default)]
+    #[schemars(with = "Option<Range>")]
+    pub range: Option<Spanned<Range>>,
+    /// Magnitude of a value whose sign is plus or minus.
+    #[serde(default)]
+    #[schemars(with = "Option<cosim::experiment::Scalar>")]
+    pub sign: Option<Spanned<Value>>,
+    /// First of consecutive integers: the parameter is this number plus that of the case, as for
+    /// seeds.
+    #[serde(default)]
+    #[schemars(with = "Option<i64>")]
+    pub case: Option<Spanned<i64>>,
+    /// Lower and upper bound at which a continuous distribution is truncated.
+    #[serde(default)]
+    #[schemars(with = "Option<[cosim::experiment::Scalar; 2]>")]
+    pub within: Option<Spanned<[Value; 2]>>,
+    /// Probabilities of the values of `list`, which are scaled to a sum of 1.
+    #[serde(default)]
+    #[schemars(with = "Option<Vec<f64>>")]
+    pub weights: Option<Spanned<Vec<f64>>>,
+    /// Number of levels of a continuous distribution in a factorial design, equally spaced in
+    /// probability, ends included.
+    #[serde(default)]
+    pub levels: Option<u32>,
+}
+
+impl Vary {
+    /// Returns the names of all parameters.
+    pub fn names(&self) -> impl Iterator<Item = &String> {
+        let shared = self.parameter.iter().flat_map(|names| names.get_ref().names());
+        self.each.iter().map(Spanned::get_ref).chain(shared)
+    }
+}
+
+/// A single name, or a list of names.
+#[derive(Clone, Debug, PartialEq, Eq, Deserialize, JsonSchema, Serialize)]
+#[serde(untagged)]
+pub enum OneOrMore {
+    /// A single name.
+    One(String),
+    /// Several names.
+    More(Vec<String>),
+}
+
+impl OneOrMore {
+    /// Returns the names.
+    pub fn names(&self) -> &[String] {
+        match self {
+            Self::One(name) => std::slice::from_ref(name),
+            Self::More(names) => names,
+        }
+    }
+}
+
+/// A normal distribution.
+#[derive(Clone, Debug, Deserialize, JsonSchema, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct Normal {
+    /// Mean of the distribution.
+    #[schemars(with = "cosim::experiment::Scalar")]
+    pub mean: Value,
+    /// Standard deviation of the distribution.
+    #[schemars(with = "cosim::experiment::Scalar")]
+    pub deviation: Value,
+}
+
+/// A log-normal distribution.
+#[derive(Clone, Debug, Deserialize, JsonSchema, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct LogNormal {
+    /// Median of the distribution.
+    #[schemars(with = "cosim::experiment::Scalar")]
+    pub median: Value,
+    /// Standard deviation of the natural logarithm.
+    pub sigma: f64,
+}
+
+/// Equally spaced values.
+#[derive(Clone, Debug, Deserialize, JsonSchema, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct Range {
+    /// First value.
+    #[schemars(with = "cosim::experiment::Scalar")]
+    pub from: Value,
+    /// Last value.
+    #[schemars(with = "cosim::experiment::Scalar")]
+    pub to: Value,
+    /// Number of values, at least 2.
+    pub count: u32,
+}
+
+/// Design that places the cases in the space of the varied parameters.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Deserialize, JsonSchema, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum DesignKind {
+    /// Each case is drawn independently of all others.
+    #[default]
+    Random,
+    /// The range of each parameter is divided into as many strata of equal probability as there are
+    /// cases, and each stratum holds one case.
+    LatinHypercube,
+    /// Points of Sobol's sequence, scrambled by Owen's method.
+    Sobol,
+    /// All combinations of the levels of the varied parameters.
+    Factorial,
+    /// The corners of the parameter space, and random cases. If there are more corners than cases,
+    /// every other case is a corner that is chosen at random.
+    Corners,
+    /// Pairs of random points with exchanged coordinates, from which Sobol's indices are computed.
+    /// The number of cases is a multiple of the number of parameters plus two.
+    Sensitivity,
+}
+
+/// Correlation of two varied parameters. It is the correlation of the normal scores behind their
+/// distributions (a Gaussian copula).
+#[derive(Clone, Debug, Deserialize, JsonSchema, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct Correlation {
+    /// The two parameters.
+    #[schemars(with = "[String; 2]")]
+    pub between: Spanned<[String; 2]>,
+    /// Coefficient of the correlation, above -1 and below 1.
+    pub coefficient: f64,
+}
+
+/// Everything that differs between the cases of a sweep, as a file describes it.
+#[derive(Clone, Copy, Debug)]
+pub struct Variation<'a> {
+    /// Parameters that vary.
+    pub vary: &'a [Vary],
+    /// Correlations between them.
+    pub correlations: &'a [Correlation],
+    /// Design that places the cases.
+    pub design: DesignKind,
+    /// Seed of all random numbers.
+    pub seed: u64,
+    /// Number of cases, which a factorial design may leave out.
+    pub cases: Option<u64>,
+}
