@@ -1,10 +1,9 @@
 //! Errors with which the program ends, and their exit codes.
 
-use campaign::error::Error as Campaign;
 use cosim::error::Error as Single;
 use std::io;
 use std::path::PathBuf;
-use study::error::Error as Study;
+use sweep::error::Error as Sweep;
 
 /// An error with which the program ends.
 #[derive(Debug, thiserror::Error)]
@@ -12,12 +11,9 @@ pub(crate) enum Failure {
     /// A run failed, or it could not start.
     #[error(transparent)]
     Single(#[from] Single),
-    /// A study failed, or it could not start.
+    /// A study or a campaign failed, or it could not start.
     #[error(transparent)]
-    Study(#[from] Study),
-    /// A campaign failed, or it could not start.
-    #[error(transparent)]
-    Campaign(#[from] Campaign),
+    Sweep(#[from] Sweep),
     /// An FMU cannot be used.
     #[error(transparent)]
     Import(#[from] fmu_import::error::Error),
@@ -41,8 +37,7 @@ impl Failure {
     pub(crate) fn exit_code(&self) -> u8 {
         match self {
             Self::Single(error) => error.exit_code(),
-            Self::Study(error) => error.exit_code(),
-            Self::Campaign(error) => error.exit_code(),
+            Self::Sweep(error) => error.exit_code(),
             Self::Import(_) => 2,
             Self::Faults { .. } | Self::Output(_) => 1,
         }

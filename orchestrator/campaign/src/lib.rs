@@ -8,7 +8,6 @@
 pub mod bundle;
 pub mod changes;
 pub mod definition;
-pub mod error;
 pub mod findings;
 pub mod flight;
 pub mod parts;

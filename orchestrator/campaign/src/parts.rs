@@ -63,7 +63,7 @@ pub fn fly(
     }
     let rows = table(plan, &rows);
     let broken = broken(plan, &rows);
-    let result = PartResult { rows, curves: String::new() };
-    parts::write(&folder(out), &plan.sweep.keys, part, plan.units(), result)?;
+    let result = PartResult { rows, units: plan.units(), curves: String::new() };
+    parts::write(&folder(out), &plan.sweep.keys, part, result)?;
     Ok(broken)
 }

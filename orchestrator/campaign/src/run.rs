@@ -1,6 +1,5 @@
 //! Flies a campaign on all cores, merges its parts, and writes tables and the report.
 
-use crate::error::Error;
 use crate::findings::{Answer, Findings, findings};
 use crate::flight::Flight;
 use crate::parts;
@@ -18,6 +17,7 @@ use std::fs;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
+use sweep::error::Error;
 use sweep::flight::can_reset;
 use sweep::parts::{PartResult, PartState, Remarks};
 use sweep::statistics::{Probability, looks};
@@ -283,12 +283,8 @@ fn fly_parts(
         None => Ok(()),
         Some(Single::Interrupted { request, .. }) => {
             let done = (state.broken_counts.len() as u64 * parts::LENGTH).min(plan.sweep.cases());
-            Err(Error::Unfinished {
-                done,
-                total: plan.sweep.cases(),
-                out: out.to_path_buf(),
-                request,
-            })
+            let (what, total) = ("cases are flown", plan.sweep.cases());
+            Err(Error::Unfinished { what, done, total, out: out.to_path_buf(), request })
         }
         Some(error) => Err(error.into()),
     }

@@ -2,7 +2,6 @@
 //! space of the varied parameters towards larger values of a measure.
 
 use crate::definition::Search;
-use crate::error::Error;
 use crate::flight::{CaseStatus, Flight, Row, table};
 use crate::plan::Plan;
 use cmaes::{CMAESOptions, DVector};
@@ -22,6 +21,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::time::{Duration, Instant};
 use sweep::design::Place;
+use sweep::error::Error;
 use sweep::table::Writer;
 use sweep::work;
 

@@ -9,7 +9,6 @@ pub mod comparisons;
 pub mod curves;
 pub mod definition;
 pub mod drawings;
-pub mod error;
 mod figures;
 mod grid;
 mod load;

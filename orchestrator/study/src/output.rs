@@ -113,6 +113,8 @@ fn members(study: &Study, run: &Run, result: &RunResult) -> Vec<Value> {
                     name.strip_prefix("within.").and_then(|name| name.rsplit_once('.'))
                 {
                     member["within"][id][what] = value;
+                } else if let Some(component) = name.strip_prefix("step_us.") {
+                    member["metrics"]["step_us"][component] = value;
                 } else {
                     member["metrics"][name] = value;
                 }

@@ -2,7 +2,6 @@
 
 use crate::curves::{Curves, Watch, widen};
 use crate::definition::Study;
-use crate::error::Error;
 use crate::runs::Run;
 use crate::table::table;
 use cosim::error::Error as Single;
@@ -19,6 +18,7 @@ use std::ops::Range;
 use std::path::PathBuf;
 use std::sync::OnceLock;
 use sweep::cases::Sweep;
+use sweep::error::Error;
 use sweep::flight::{Flight, Flown, can_reset};
 use sweep::parts::PartResult;
 use toml::Spanned;
@@ -269,7 +269,8 @@ impl Instances<'_> {
         }
         let fault = |error: serde_json::Error| study.source.error(&(0..0), error.to_string());
         let curves = serde_json::to_string(&curves).map_err(fault)?;
-        Ok(PartResult { rows: table(sweep, &cases), curves })
+        let units = cases.first().map(|flown| sweep.units(flown.metrics.units.iter()));
+        Ok(PartResult { rows: table(sweep, &cases), units: units.unwrap_or_default(), curves })
     }
 
     /// Flies one case, which the watch sees if something of it is drawn.

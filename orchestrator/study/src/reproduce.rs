@@ -6,7 +6,6 @@
 
 use crate::claims;
 use crate::definition::Study;
-use crate::error::Error;
 use crate::output::{Judgement, notes, write};
 use crate::part::{Bench, Part, Preparation};
 use crate::results::{Results, RunResult, resolve};
@@ -21,6 +20,7 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
+use sweep::error::Error;
 use sweep::parts::{self, PartResult, PartState, Remarks};
 use sweep::work::{self, Worked};
 
@@ -155,7 +155,9 @@ pub fn reproduce(study: &Study, options: &Options) -> Result<StudyReport, Error>
         done.extend(all_work.run(&parts, threads)?);
         if let Some(request) = interrupt.asked() {
             progress.finish();
-            return Err(Error::Unfinished { done: done.len(), total, out, request });
+            let (done, total) = (done.len() as u64, total as u64);
+            let what = "parts are finished";
+            return Err(Error::Unfinished { what, done, total, out, request });
         }
     }
     progress.finish();
@@ -285,9 +287,8 @@ impl<'a> Work<'a> {
             Single::Interrupted { .. } => Error::Single(error),
             source => Error::Run { run: run.id.get_ref().clone(), source },
         })?;
-        let units = preparation.sweep.units(std::iter::empty());
         let folder = (self.folder)(part);
-        parts::write(&folder, &preparation.sweep.keys, &part.range, units, result.clone())?;
+        parts::write(&folder, &preparation.sweep.keys, &part.range, result.clone())?;
         self.progress.finished(&run.label);
         Ok(result)
     }

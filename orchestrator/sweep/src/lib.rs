@@ -6,12 +6,13 @@
 //! [`flight`] flies one case after the other with the same instances, which are reset between
 //! cases. The cases are divided into [`parts`] on which several threads [`work`]; the results of a
 //! finished part are kept in a file ([`table`]) and not computed again. Campaigns and studies are
-//! built on this: a campaign asks how often limits are broken, a study compares sweeps with a paper.
+//! built on this: a campaign asks how often limits are broken, a study compares with a paper.
 
 pub mod cases;
 mod correlation;
 pub mod design;
 pub mod distribution;
+pub mod error;
 pub mod flight;
 pub mod parts;
 pub mod statistics;

@@ -3,6 +3,7 @@
 
 use crate::table::{CaseTable, Reader, Writer};
 use cosim::error::Error;
+use cosim::files;
 use std::collections::BTreeMap;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -22,6 +23,8 @@ pub fn path(folder: &Path, part: &Range<u64>) -> PathBuf {
 pub struct PartResult {
     /// A row for each case.
     pub rows: CaseTable,
+    /// Units by column, as JSON.
+    pub units: String,
     /// Curves and other results that are no rows, as JSON; an empty text if there are none.
     pub curves: String,
 }
@@ -65,8 +68,9 @@ fn whole(reader: &Reader, part: &Range<u64>) -> Option<PartResult> {
     if reader.rows() != part.end - part.start {
         return None;
     }
-    let curves = reader.metadata("curves").unwrap_or_default().to_string();
-    let result = PartResult { rows: reader.table().ok()?, curves };
+    let text = |key| reader.metadata(key).unwrap_or_default().to_string();
+    let (units, curves) = (text("units"), text("curves"));
+    let result = PartResult { rows: reader.table().ok()?, units, curves };
     let is_whole = reader.metadata("digest") == Some(&result.digest())
         && result.rows.rows() as u64 == reader.rows();
     is_whole.then_some(result)
@@ -86,7 +90,7 @@ pub fn read(folder: &Path, part: &Range<u64>) -> Result<PartResult, Error> {
     })
 }
 
-/// Keeps the results of a part, with the hashes of all its inputs and the units of its columns.
+/// Keeps the results of a part, with the hashes of all its inputs.
 ///
 /// # Errors
 /// Returns an error if the file cannot be written.
@@ -94,11 +98,10 @@ pub fn write(
     folder: &Path,
     keys: &BTreeMap<String, String>,
     part: &Range<u64>,
-    units: String,
     result: PartResult,
 ) -> Result<(), Error> {
     let keys = serde_json::to_string(keys).map_err(|error| Error::experiment(error.to_string()))?;
-    let mut metadata = vec![("units", units), ("digest", result.digest()), ("keys", keys)];
+    let mut metadata = vec![("digest", result.digest()), ("units", result.units), ("keys", keys)];
     if !result.curves.is_empty() {
         metadata.push(("curves", result.curves));
     }
@@ -110,7 +113,7 @@ pub fn write(
 impl PartResult {
     /// Returns a hash of everything, so that no number is used that was changed later.
     fn digest(&self) -> String {
-        cosim::files::digest(self.rows.digest() + &self.curves)
+        files::digest([&self.rows.digest(), &self.units, &self.curves].map(files::digest).concat())
     }
 }
 
@@ -133,11 +136,12 @@ impl Remarks {
 
     /// Returns the remarks in words.
     pub fn texts(&self) -> Vec<String> {
+        let parts = |count| format!("{count} part{}", if count == 1 { "" } else { "s" });
         let damaged = (self.damaged > 0).then(|| {
-            format!("flown again because their files are damaged: {} parts", self.damaged)
+            format!("flown again because their files are damaged: {}", parts(self.damaged))
         });
         let others = self.others.iter().map(|(what, count)| {
-            format!("flown again because this has changed: {what} ({count} parts)")
+            format!("flown again because this has changed: {what} ({})", parts(*count))
         });
         damaged.into_iter().chain(others).collect()
     }
@@ -156,11 +160,15 @@ mod tests {
             Column { name: "largest".into(), values: Values::Optional(vec![Some(0.1), None]) },
             Column { name: "status".into(), values: Values::Text(vec!["x".into(), "y".into()]) },
         ];
-        let result = PartResult { rows: CaseTable { columns }, curves: "{\"time\":[0.1]}".into() };
+        let result = PartResult {
+            rows: CaseTable { columns },
+            units: "{}".into(),
+            curves: "{\"time\":[0.1]}".into(),
+        };
         let keys = BTreeMap::from([("experiment".to_string(), "abc".to_string())]);
         let folder = tempfile::tempdir().unwrap();
         let part = 0..2;
-        write(folder.path(), &keys, &part, "{}".into(), result.clone()).unwrap();
+        write(folder.path(), &keys, &part, result.clone()).unwrap();
         let path = path(folder.path(), &part);
         let sound = fs::read(&path).unwrap();
         assert_eq!(find(folder.path(), &keys, &part), PartState::Whole(result.clone()));

@@ -3,8 +3,8 @@
 `fmu` gives the path of an FMU for FMPy or any other importer, `ClosedLoop` connects a controller in
 Python to the vehicle, and `experiment` runs a paper's experiment and returns its table. `campaign`
 flies thousands of cases of an experiment, on this machine or on a cluster (`reentry_fmus.cluster`),
-and `falsify` looks for the worst case. Quantities are in SI units and radians unless `units="deg"`
-selects degrees.
+and `falsify` looks for the worst case. `reproduce` runs a paper's comparison and judges its claims.
+Quantities are in SI units and radians unless `units="deg"` selects degrees.
 """
 
 from ._campaign import Campaign, Flown, Search, campaign, falsify
@@ -12,6 +12,7 @@ from ._data import experiments, fmu, fmus
 from ._experiment import Figure, OrchestratorError, OrchestratorWarning, Run, experiment
 from ._instance import InstanceError, InstanceWarning
 from ._loop import ClosedLoop, State
+from ._study import Study, reproduce
 
 __all__ = [
     "Campaign",
@@ -25,10 +26,12 @@ __all__ = [
     "Run",
     "Search",
     "State",
+    "Study",
     "campaign",
     "experiment",
     "experiments",
     "falsify",
     "fmu",
     "fmus",
+    "reproduce",
 ]

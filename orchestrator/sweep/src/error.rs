@@ -1,16 +1,16 @@
-//! Errors of a study, and their exit codes.
+//! Errors of work on many cases, and their exit codes.
 
 use cosim::error::Error as Single;
 use cosim::interrupt::Request;
 use std::path::PathBuf;
 
-/// An error that occurs between reading a study and writing its report.
+/// An error that occurs between reading a campaign or a study and writing its report.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
-    /// Something outside any run failed, or the study is faulty.
+    /// The file is faulty, or something outside any case failed.
     #[error(transparent)]
     Single(#[from] Single),
-    /// A run of the study failed.
+    /// A run of a study failed.
     #[error("run {run}: {source}")]
     Run {
         /// Id of the run in the study.
@@ -18,19 +18,21 @@ pub enum Error {
         /// The error of that run.
         source: Single,
     },
-    /// A study was asked to end before all of its runs were complete.
+    /// The work was asked to end before it was complete.
     #[error(
-        "ended by {request}: {done} of {total} parts are finished and kept in {}; the same command continues from there",
-        out.display()
+        "ended by {request}: {done} of {total} {} and kept in {}; the same command continues from there",
+        what, out.display()
     )]
     Unfinished {
-        /// Number of parts that are complete and kept.
-        done: usize,
-        /// Number of parts in the study.
-        total: usize,
-        /// Folder of the study's results.
+        /// What is counted, for example `cases are flown`.
+        what: &'static str,
+        /// Number that is complete and kept.
+        done: u64,
+        /// Number of all.
+        total: u64,
+        /// Folder of the results.
         out: PathBuf,
-        /// The request that ended the study.
+        /// The request that ended the work.
         request: Request,
     },
 }
