@@ -2,7 +2,6 @@
 
 use fmu_import::{crash, isolation};
 use std::io::{Write, stderr};
-use std::path::PathBuf;
 use std::process::ExitCode;
 
 /// Serves an instance if another process of this program has started this one for it, and returns
@@ -14,11 +13,10 @@ pub(crate) fn serve() -> Option<ExitCode> {
         crash::watch();
         return None;
     }
-    let memory = words.next().map(PathBuf::from).unwrap_or_default();
-    Some(match isolation::serve(&memory) {
+    Some(match isolation::serve(words) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            let _ = writeln!(stderr(), "error: {}: {error}", memory.display());
+            let _ = writeln!(stderr(), "error: {}: {error}", isolation::COMMAND);
             ExitCode::FAILURE
         }
     })

@@ -5,11 +5,18 @@
    setting and stepping, once it is initialized, as FMI 2.0.5, section 4.2.1, allows it to.
    What it does wrong is chosen by the compiler's flags: -DENDS: a discarded step ends the simulation; -DVERSION: its version; -DDIRECT(value),
    -DITEM(value), -DTRUTH(value): what becomes of output.direct, guarantee.status, guarantee.inForce after two steps; -DRESETS=0: fmi2Reset leaves
-   the state as it is; -DPLACE=STEP -DHOW=ABORT: fault.h. */
+   the state as it is; -DPLACE=STEP -DHOW=ABORT: fault.h; -DOUTSIDE="\"/folder\"": hostile.h. */
+#ifdef OUTSIDE
+#define _GNU_SOURCE
+#else
 #define _POSIX_C_SOURCE 199309L
+#endif
 #include <stddef.h>
 #include <time.h>
 #include "fault.h"
+#ifdef OUTSIDE
+#include "hostile.h"
+#endif
 
 #ifndef ENDS
 #define ENDS 0
@@ -101,6 +108,9 @@ int fmi2EnterInitializationMode(Model *model) {
 int fmi2ExitInitializationMode(Model *model) {
 #ifdef REACHES
     reach(REACHES, model->callbacks->logger, model->callbacks->environment);
+#endif
+#ifdef OUTSIDE
+    attempt(model->seed, model->callbacks->logger, model->callbacks->environment);
 #endif
     fault(INITIALIZE, model->callbacks->logger, model->callbacks->environment);
     model->runs = 1;

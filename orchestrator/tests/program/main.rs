@@ -3,6 +3,8 @@
 mod bench;
 mod campaign;
 mod foreign;
+#[cfg(target_os = "linux")]
+mod hostile;
 mod isolation;
 mod malformed;
 mod results;

@@ -38,6 +38,10 @@ impl Experiment {
         self.simulation.coupling = overrides.coupling.unwrap_or(self.simulation.coupling);
         self.simulation.on_invalid = overrides.on_invalid.unwrap_or(self.simulation.on_invalid);
         self.isolation.apply(&overrides.isolation);
+        if overrides.isolation.isolate.is_some() {
+            // The command line decides for components that decide for themselves, too.
+            self.components.values_mut().for_each(|component| component.isolate = None);
+        }
         for assignment in &overrides.fmu {
             let refuse =
                 |message: String| Error::experiment(format!("--fmu {assignment}: {message}"));

@@ -23,8 +23,9 @@ pub struct Protection {
     pub memory: Option<u64>,
     /// Processor time that an instance in a process of its own may take, s [default: no limit].
     pub cpu: Option<u64>,
-    /// Let instances in processes of their own write only to the folder of their archive, and keep
-    /// them from the network. This works on Linux only; a warning tells if the system cannot do it.
+    /// Run every instance in a closed process of its own, which can read the system's libraries and
+    /// write in the folder of its archive, and reach nothing else. This works on Linux only; other
+    /// systems refuse to run instances then.
     pub sandbox: Option<bool>,
 }
 
@@ -53,10 +54,13 @@ impl Protection {
 
     /// Returns whether a component gets a process of its own.
     pub fn isolates(&self, component: &Component, fmu: &Fmu) -> bool {
+        if fmu.is_lookup_table() {
+            return false;
+        }
         let asked = component.isolate.or(self.isolate);
-        isolation::is_enabled()
-            && !fmu.is_lookup_table()
-            && asked.unwrap_or_else(|| !fmu.is_made_by_fmu_pack())
+        // A sandbox is a process of its own. Where there can be none, the instance is refused.
+        self.sandbox == Some(true)
+            || isolation::is_enabled() && asked.unwrap_or_else(|| !fmu.is_made_by_fmu_pack())
     }
 
     /// Returns the limits that the process of an instance gets.

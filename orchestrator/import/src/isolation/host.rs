@@ -2,6 +2,7 @@
 
 use super::channel::{Channel, LARGEST, Slot};
 use super::limits;
+use super::memory;
 use super::protocol::{Action, InstanceArguments, List, Ready, Reply, Request, Set, Setup};
 use crate::description::Carrier;
 use crate::error::with_causes;
@@ -10,26 +11,23 @@ use crate::library::{FmuInstance, Functions};
 use crate::log::{Held, Log};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
-use std::fs::OpenOptions;
+use std::ffi::OsString;
 use std::io::{self, Read as _};
-use std::path::Path;
 use std::rc::Rc;
 use std::sync::Arc;
 use std::time::Duration;
 
-/// Serves one instance through the shared memory in this file, and ends when the instance is freed
-/// or the master has ended.
+/// Serves one instance through the memory that the master shares, and ends when the instance is
+/// freed or the master has ended.
 ///
 /// # Errors
-/// Returns an error if the file is not what the master makes, or if a message cannot be decoded.
-pub fn serve(memory: &Path) -> io::Result<()> {
-    let file = OpenOptions::new().read(true).write(true).open(memory)?;
-    let channel = Arc::new(Channel::open(&file)?);
-    // An instance must not find the file open: if it truncated the file, the master would crash.
-    drop(file);
+/// Returns an error if the memory is not what the master makes, or if a message cannot be decoded.
+pub fn serve(arguments: impl Iterator<Item = OsString>) -> io::Result<()> {
+    let channel = Arc::new(memory::inherited(arguments)?);
     // The master holds the other end of this pipe, which the system closes when the master ends.
     std::thread::spawn(|| {
         let _ = io::stdin().read(&mut [0]);
+        end_group();
         std::process::abort();
     });
     let mut host = Host { channel, number: 0, bytes: Vec::new() };
@@ -39,7 +37,10 @@ pub fn serve(memory: &Path) -> io::Result<()> {
     let log = |name: &str| {
         Log::held(name, Arc::clone(&held), move |text| words.put(Slot::LastMessage, 1, text))
     };
-    let without = limits::apply(&setup.limits);
+    let without = match limits::apply(&setup.limits) {
+        Ok(without) => without,
+        Err(reason) => return host.send(&Ready::Refused { reason, messages: Vec::new() }),
+    };
     let functions = match Functions::load(&setup.library) {
         Ok(functions) => functions,
         Err(error) => return host.send(&Ready::Unloadable(with_causes(&error))),
@@ -68,6 +69,17 @@ pub fn serve(memory: &Path) -> io::Result<()> {
         host.send_with(&Reply { messages: held.take(), ..reply }, &values)?;
     }
 }
+
+/// Ends this process with all processes that the instance has started.
+#[cfg(unix)]
+fn end_group() {
+    use rustix::process::{Signal, getpgrp, kill_process_group};
+    // A sandboxed instance has started none, and may not send this signal.
+    let _ = kill_process_group(getpgrp(), Signal::KILL);
+}
+
+#[cfg(not(unix))]
+fn end_group() {}
 
 /// The end of the channel at which requests arrive.
 struct Host {

@@ -1,20 +1,32 @@
 //! Limits that the process of an instance sets itself before it loads the library.
 
 use super::protocol::Limits;
-#[cfg(unix)]
+#[cfg(not(target_os = "linux"))]
 use std::path::Path;
 
 /// Sets the limits. Returns those that the system does not support, as a text.
+///
+/// # Errors
+/// Returns why the process cannot be closed, if it is to be. Then it must not load the library.
+pub(super) fn apply(limits: &Limits) -> Result<Option<String>, String> {
+    let mut without: Vec<&str> = Vec::new();
+    set(limits, &mut without);
+    if let Some(folder) = &limits.folder {
+        close(folder)
+            .map_err(|reason| format!("has no sandbox: this system cannot close {reason}"))?;
+    }
+    Ok((!without.is_empty()).then(|| without.join(", ")))
+}
+
 #[cfg(unix)]
-pub(super) fn apply(limits: &Limits) -> Option<String> {
+fn set(limits: &Limits, without: &mut Vec<&str>) {
     use rustix::process::{Resource, Rlimit, setrlimit};
     // The reason of a crash is reported; an image of the memory would be of little more use.
     let _ = setrlimit(Resource::Core, Rlimit { current: Some(0), maximum: Some(0) });
-    let mut without = Vec::new();
-    let mut limit = |resource, most: u64, name: &str| {
+    let mut limit = |resource, most: u64, name: &'static str| {
         let both = Rlimit { current: Some(most), maximum: Some(most) };
         if setrlimit(resource, both).is_err() {
-            without.push(name.to_string());
+            without.push(name);
         }
     };
     if let Some(bytes) = limits.memory {
@@ -23,30 +35,18 @@ pub(super) fn apply(limits: &Limits) -> Option<String> {
     if let Some(seconds) = limits.cpu {
         limit(Resource::Cpu, seconds, "processor time");
     }
-    if let Some(folder) = &limits.folder {
-        without.extend(closed(folder));
-    }
-    (!without.is_empty()).then(|| without.join(", "))
+}
+
+#[cfg(not(unix))]
+fn set(limits: &Limits, without: &mut Vec<&str>) {
+    without.extend(limits.memory.map(|_| "memory"));
+    without.extend(limits.cpu.map(|_| "processor time"));
 }
 
 #[cfg(target_os = "linux")]
-fn closed(folder: &Path) -> Vec<String> {
-    super::sandbox::close(folder)
-}
+use super::sandbox::close;
 
-#[cfg(all(unix, not(target_os = "linux")))]
-fn closed(_folder: &Path) -> Vec<String> {
-    vec!["files and network".into()]
-}
-
-/// Sets the limits. Returns those that the system does not support, as a text.
-#[cfg(not(unix))]
-pub(super) fn apply(limits: &Limits) -> Option<String> {
-    let without = [
-        limits.memory.map(|_| "memory"),
-        limits.cpu.map(|_| "processor time"),
-        limits.folder.as_ref().map(|_| "files and network"),
-    ];
-    let without: Vec<&str> = without.into_iter().flatten().collect();
-    (!without.is_empty()).then(|| without.join(", "))
+#[cfg(not(target_os = "linux"))]
+fn close(_folder: &Path) -> Result<(), String> {
+    Err("files and network".into())
 }

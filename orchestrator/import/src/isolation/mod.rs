@@ -4,7 +4,7 @@
 //!
 //! | module | content |
 //! |---|---|
-//! | `channel` | memory that both processes share |
+//! | `memory`, `channel` | memory that both processes share, and how it is used |
 //! | `protocol` | the messages in it |
 //! | `host` | the process of the instance, which makes the calls |
 //! | `process`, `remote` | the master's side: the process that is watched, and the instance in it |
@@ -13,6 +13,7 @@
 mod channel;
 mod host;
 mod limits;
+mod memory;
 mod process;
 mod protocol;
 mod remote;

@@ -1,6 +1,7 @@
 //! The process of an instance, as the master sees it: it is started, asked, watched, and ended.
 
 use super::channel::{Channel, LARGEST, Slot};
+use super::memory::Memory;
 use super::protocol::{Action, Ready, Reply, Request, Setup};
 use super::settings::{COMMAND, Isolation};
 use crate::fmi;
@@ -15,7 +16,6 @@ use std::process::{Child, Command, ExitStatus, Stdio};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
-use tempfile::NamedTempFile;
 
 /// Time within which an instance must be freed, and its process ended.
 const FREE_TIMEOUT: Duration = Duration::from_secs(10);
@@ -37,8 +37,8 @@ pub fn late_failures() -> Vec<String> {
 pub(super) struct Process {
     child: Child,
     channel: Channel,
-    /// File of the memory, until the process has opened it.
-    memory: Option<NamedTempFile>,
+    /// The memory, until the process has opened it.
+    memory: Option<Memory>,
     number: u32,
     /// The last message, and the position at which the values behind it begin.
     bytes: Vec<u8>,
@@ -69,19 +69,12 @@ enum NoAnswer {
 impl Process {
     /// Starts a process, which then waits for [`Self::set_up`].
     pub(super) fn start(program: &Path, name: &str, isolation: &Isolation) -> io::Result<Self> {
-        // Where the system offers it, the file is in memory and not on a disk.
-        let folder = Path::new("/dev/shm");
-        let prefix = format!("fmu-{}-", std::process::id());
-        let memory = if cfg!(target_os = "linux") && folder.is_dir() {
-            NamedTempFile::with_prefix_in(prefix, folder)
-        } else {
-            NamedTempFile::with_prefix(prefix)
-        }?;
-        let channel = Channel::create(memory.as_file())?;
+        let (memory, channel) = Memory::new()?;
         let (prints, pipe) = io::pipe()?;
         let mut command = Command::new(program);
-        command.arg(COMMAND).arg(memory.path()).stdin(Stdio::piped());
+        command.arg(COMMAND).stdin(Stdio::piped());
         command.stdout(pipe.try_clone()?).stderr(pipe);
+        memory.pass(&mut command)?;
         apart(&mut command);
         let child = command.spawn()?;
         // The command holds the writing end of the pipe, which must be closed when the process
@@ -109,7 +102,7 @@ impl Process {
     pub(super) fn set_up(&mut self, setup: &Setup) -> Result<Ready, CallFailure> {
         self.put("instantiate", setup)?;
         let mut ready = self.answer("instantiate")?;
-        // Both processes have opened the file. Systems that cannot remove a file in use remove it
+        // Both processes have opened the memory. Systems that cannot remove a file in use remove it
         // later.
         if cfg!(unix) {
             self.memory = None;
@@ -246,9 +239,10 @@ impl Process {
         [logged, printed].into_iter().find(|text| !text.is_empty())
     }
 
+    /// Ends the process, if it has not ended already, and all processes that it has started.
     fn kill(&mut self) {
-        // It may have ended already.
         let _ = self.child.kill();
+        end_group(&self.child);
         let _ = self.child.wait();
     }
 
@@ -308,12 +302,29 @@ impl Printed {
     }
 }
 
-/// Keeps Ctrl-C from the process: the master ends it in order.
+/// Gives the process a session of its own: it has no controlling terminal, so that Ctrl-C does not
+/// reach it, which the master ends in order, and it can write no command into the user's shell.
 #[cfg(unix)]
+#[allow(unsafe_code)]
 fn apart(command: &mut Command) {
     use std::os::unix::process::CommandExt;
-    command.process_group(0);
+    let session = || Ok(rustix::process::setsid().map(drop)?);
+    // SAFETY: the closure makes one system call, which may be made between fork and exec.
+    unsafe { command.pre_exec(session) };
 }
+
+/// Ends the processes of the group that this process leads.
+#[cfg(unix)]
+fn end_group(leader: &Child) {
+    use rustix::process::{Pid, Signal, kill_process_group};
+    // The system does not give the number to another group so soon after the leader has ended.
+    if let Some(group) = i32::try_from(leader.id()).ok().and_then(Pid::from_raw) {
+        let _ = kill_process_group(group, Signal::KILL);
+    }
+}
+
+#[cfg(not(unix))]
+fn end_group(_leader: &Child) {}
 
 /// Keeps Ctrl-C from the process: the master ends it in order.
 #[cfg(windows)]

@@ -2,8 +2,7 @@
 
 use std::time::Duration;
 
-/// Name of the program's command that [`serve`](super::serve)s an instance. Its argument is the
-/// path of the shared memory.
+/// Name of the program's command that [`serve`](super::serve)s an instance.
 pub const COMMAND: &str = "serve-instance";
 
 /// Limits that keep an instance from doing harm.
@@ -15,7 +14,8 @@ pub struct Isolation {
     pub memory: Option<u64>,
     /// Processor time that the process may take, s; `None` if it has no limit.
     pub cpu: Option<u64>,
-    /// Whether the process may write nowhere but in the folder of its archive, and has no network.
+    /// Whether the process is closed: it may read the system's libraries and write in the folder of
+    /// its archive, and reach nothing else. Where the system cannot do it, nothing is run.
     pub sandbox: bool,
 }
 
