@@ -3,13 +3,14 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/mman.h>
 #ifdef REACHES
 #include <sys/socket.h>
 #endif
 #include <unistd.h>
 
 enum { NOWHERE, LOAD, INSTANTIATE, INITIALIZE, GET, STEP, FREE, UNLOAD };
-enum { EXIT, QUICK_EXIT, ABORT, SEGFAULT, DIVISION, ENDLESS, OVERWRITE, MEMORY, FLOOD };
+enum { EXIT, QUICK_EXIT, ABORT, SEGFAULT, DIVISION, ENDLESS, OVERWRITE, MEMORY, FLOOD, CHILDREN, SHARED };
 
 #ifndef PLACE
 #define PLACE NOWHERE
@@ -45,6 +46,15 @@ static void fault(int place, Logger logger, void *environment) {
             if (!more) { fputs("no memory is left\n", stderr); abort(); }
             memset(more, 1, 1 << 20);
         }
+    case SHARED:
+        /* Memory that several processes may share is not counted by the limit of one. */
+        memset(mmap(NULL, 1 << 28, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0), 1, 1 << 28);
+        for (;;) pause();
+    case CHILDREN:
+        for (int i = 0; i < 20; i++)
+            if (fork() == 0)
+                for (;;) pause();
+        break;
     case FLOOD:
         for (int i = 0; i < 200000; i++) {
             if (logger) logger(environment, "model", i % 2 ? 3 : 1, "flood", "wave %d", i);

@@ -9,7 +9,7 @@
 #ifdef OUTSIDE
 #define _GNU_SOURCE
 #else
-#define _POSIX_C_SOURCE 199309L
+#define _DEFAULT_SOURCE
 #endif
 #include <stddef.h>
 #include <time.h>

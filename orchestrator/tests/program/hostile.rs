@@ -1,9 +1,12 @@
 //! Instances that try to reach what is not their own: tests/model/hostile.h.
 
 use crate::bench::{Bench, LOOP, Recipe};
+use crate::campaign::CAMPAIGN;
 use std::fs;
 use std::os::unix::fs::MetadataExt;
 use std::path::Path;
+use std::process::Command;
+use std::time::{Duration, Instant};
 
 /// A bench with a model that makes attempts on a folder outside.
 struct Hostile {
@@ -49,19 +52,18 @@ impl Hostile {
         assert_eq!(fs::read_dir(self.outside.path()).unwrap().count(), 1, "{what}");
         assert_eq!(fs::read_dir(self.bench.path("temporary")).unwrap().count(), 0, "{what}");
         assert!(!Path::new("/dev/shm/fresh-of-an-instance").exists(), "{what}");
-        assert_eq!(self.processes(), 0, "{what}");
+        assert_gone(&self.mark(), what);
     }
+}
 
-    /// Number of processes that are left of all runs.
-    fn processes(&self) -> usize {
-        let mark = self.mark();
-        let entries = fs::read_dir("/proc").into_iter().flatten().flatten();
-        let is_left = |folder: &Path| {
-            let environment = fs::read(folder.join("environ")).unwrap_or_default();
-            environment.windows(mark.len()).any(|text| text == mark.as_bytes())
-        };
-        entries.filter(|entry| is_left(&entry.path())).count()
-    }
+/// Number of processes with this text in their environment.
+fn processes(mark: &str) -> usize {
+    let entries = fs::read_dir("/proc").into_iter().flatten().flatten();
+    let has_mark = |folder: &Path| {
+        let environment = fs::read(folder.join("environ")).unwrap_or_default();
+        environment.windows(mark.len()).any(|text| text == mark.as_bytes())
+    };
+    entries.filter(|entry| has_mark(&entry.path())).count()
 }
 
 #[test]
@@ -124,7 +126,7 @@ fn the_attempts_get_through_without_a_sandbox() {
         through.push(name);
     }
     assert!(through.is_empty() || through.len() == harmless.len(), "{through:?}");
-    assert_eq!(hostile.processes(), 0);
+    assert_gone(&hostile.mark(), "attempts");
 }
 
 #[test]
@@ -148,4 +150,74 @@ fn a_sandbox_needs_no_other_option_and_no_trust() {
     let (_, errors) = foreign.attempt(1, &["--sandbox"]);
     assert!(errors.contains("write_file was refused") || errors.contains("no sandbox"), "{errors}");
     foreign.assert_untouched(&errors);
+}
+
+/// Asserts that no process of a mark is left, or only for a moment.
+fn assert_gone(mark: &str, what: &str) {
+    let begin = Instant::now();
+    while processes(mark) > 0 {
+        assert!(begin.elapsed() < Duration::from_secs(10), "{what}: {}", processes(mark));
+        std::thread::sleep(Duration::from_millis(10));
+    }
+}
+
+/// A bench with a model that starts 20 processes in this place, and the mark of its processes.
+fn with_children(place: &str) -> (Bench, String) {
+    let place = format!("-DPLACE={place}");
+    let flags = [place.as_str(), "-DHOW=CHILDREN", "-w"];
+    let bench = Bench::made(LOOP, &Recipe { flags: &flags, ..Recipe::default() });
+    let mark = bench.folder.path().display().to_string();
+    (bench, mark)
+}
+
+#[test]
+fn the_processes_of_an_instance_end_with_it() {
+    for place in ["LOAD", "INSTANTIATE", "INITIALIZE", "STEP", "FREE"] {
+        let (bench, mark) = with_children(place);
+        let mut command = bench.command(&["run", "loop.toml", "--quiet"]);
+        let output = command.env("HOSTILE", &mark).output().unwrap();
+        assert!(output.status.success(), "{place}: {}", String::from_utf8_lossy(&output.stderr));
+        assert_gone(&mark, place);
+    }
+}
+
+#[test]
+fn the_processes_of_an_instance_end_with_a_run_that_is_killed() {
+    let (bench, mark) = with_children("INITIALIZE");
+    let pause = ["run", "loop.toml", "--quiet", "--set", "gain.pause=30"];
+    let mut run = bench.command(&pause).env("HOSTILE", &mark).spawn().unwrap();
+    let begin = Instant::now();
+    // The run, two instances and their children.
+    while processes(&mark) < 43 {
+        assert!(begin.elapsed() < Duration::from_secs(20));
+        std::thread::sleep(Duration::from_millis(10));
+    }
+    run.kill().unwrap();
+    run.wait().unwrap();
+    assert_gone(&mark, "a run that was killed");
+}
+
+#[test]
+fn a_campaign_does_not_run_out_of_descriptors() {
+    let (bench, mark) = with_children("STEP");
+    // Every other case fails, after which there are new instances.
+    let gains = "[0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.1, 1.2, 1.3, 1.4, 1.5]";
+    let campaign = CAMPAIGN.replace("[0.5, 1.0, 2.0]", gains);
+    fs::write(bench.path("c.toml"), campaign).unwrap();
+    let program = env!("CARGO_BIN_EXE_orchestrator");
+    let script = format!("ulimit -n 128; exec {program} campaign c.toml --jobs 2 --quiet");
+    let mut command = Command::new("sh");
+    command.args(["-c", &script]).current_dir(bench.folder.path()).env("HOSTILE", &mark);
+    let output = command.output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    assert_gone(&mark, "a campaign");
+}
+
+#[test]
+fn shared_memory_counts_as_memory() {
+    let flags = ["-DPLACE=STEP", "-DHOW=SHARED", "-w"];
+    let bench = Bench::made(LOOP, &Recipe { flags: &flags, ..Recipe::default() });
+    let (code, _, errors) = bench.run(&["--quiet", "--unit-memory=64"]);
+    let says = "gain failed at t = 2 s in doStep: it uses more than 64 MiB of memory";
+    assert!(code == 1 && errors.contains(says), "{errors}");
 }

@@ -5,16 +5,17 @@
 use super::channel::Channel;
 use std::ffi::OsString;
 use std::io;
-use std::process::{Command, Stdio};
+use std::process::Command;
 
 #[cfg(unix)]
 pub(super) use unix::{Memory, inherited};
 
 #[cfg(unix)]
 mod unix {
-    use super::{Channel, Command, OsString, Stdio, io};
+    use super::{Channel, Command, OsString, io};
     use std::fs::File;
     use std::os::fd::AsFd;
+    use std::process::Stdio;
 
     /// The memory, as long as the process has not opened it.
     pub(in super::super) struct Memory(File);
@@ -75,7 +76,7 @@ pub(super) use named::{Memory, inherited};
 
 #[cfg(not(unix))]
 mod named {
-    use super::{Channel, Command, OsString, Stdio, io};
+    use super::{Channel, Command, OsString, io};
     use std::fs::OpenOptions;
     use tempfile::NamedTempFile;
 

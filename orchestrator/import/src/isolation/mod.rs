@@ -7,10 +7,11 @@
 //! | `memory`, `channel` | memory that both processes share, and how it is used |
 //! | `protocol` | the messages in it |
 //! | `host` | the process of the instance, which makes the calls |
-//! | `process`, `remote` | the master's side: the process that is watched, and the instance in it |
+//! | `process`, `ended`, `remote` | the master's side: the process that is watched, how it has ended, and the instance in it |
 //! | `settings`, `limits`, `sandbox` | resources that the process may use |
 
 mod channel;
+mod ended;
 mod host;
 mod limits;
 mod memory;

@@ -1,6 +1,7 @@
 //! The process of an instance, as the master sees it: it is started, asked, watched, and ended.
 
 use super::channel::{Channel, LARGEST, Slot};
+use super::ended::ended;
 use super::memory::Memory;
 use super::protocol::{Action, Ready, Reply, Request, Setup};
 use super::settings::{COMMAND, Isolation};
@@ -46,6 +47,8 @@ pub(super) struct Process {
     log: Log,
     printed: Arc<Printed>,
     timeout: Duration,
+    /// Number of bytes of memory that it may use.
+    memory_limit: Option<u64>,
     /// Call whose answer was not waited for yet.
     pending: Option<&'static str>,
     /// Reason why the process can no longer be called, if so.
@@ -63,6 +66,8 @@ struct Printed {
 enum NoAnswer {
     Ended(ExitStatus),
     Late,
+    /// It uses more memory than it may, in bytes.
+    Memory(u64),
     Fault(io::Error),
 }
 
@@ -93,6 +98,7 @@ impl Process {
             log: Log::new(name),
             printed,
             timeout: isolation.call_timeout,
+            memory_limit: isolation.memory,
             pending: None,
             gone: None,
         })
@@ -173,12 +179,15 @@ impl Process {
     }
 
     fn answer<T: DeserializeOwned>(&mut self, call: &'static str) -> Result<T, CallFailure> {
-        let (child, timeout) = (&mut self.child, self.timeout);
+        let (child, timeout, most) = (&mut self.child, self.timeout, self.memory_limit);
         let waited = self.channel.wait(Slot::Reply, self.number, |waited| match child.try_wait() {
             Ok(Some(status)) => Err(NoAnswer::Ended(status)),
             Err(error) => Err(NoAnswer::Fault(error)),
             Ok(None) if waited > timeout => Err(NoAnswer::Late),
-            Ok(None) => Ok(()),
+            Ok(None) => match most {
+                Some(most) if memory(child.id()) > most => Err(NoAnswer::Memory(most)),
+                _ => Ok(()),
+            },
         });
         // A process may end right after its last answer.
         if let Err(no_answer) = waited
@@ -214,6 +223,9 @@ impl Process {
             NoAnswer::Ended(status) => ended(*status),
             NoAnswer::Late => {
                 format!("no answer within {} s (call_timeout)", self.timeout.as_secs_f64())
+            }
+            NoAnswer::Memory(most) => {
+                format!("it uses more than {} MiB of memory (memory)", most >> 20)
             }
             NoAnswer::Fault(error) => format!("its process cannot be watched: {error}"),
         };
@@ -302,6 +314,18 @@ impl Printed {
     }
 }
 
+/// Returns how many bytes of memory a process has written, alone or together with others. The
+/// system's limit, which the process sets itself, does not count the latter.
+fn memory(process: u32) -> u64 {
+    // There is no such file where the system is another one, or when the process has ended.
+    let status = std::fs::read_to_string(format!("/proc/{process}/status")).unwrap_or_default();
+    let kib = |line: &str| {
+        let number = line.strip_prefix("RssAnon:").or_else(|| line.strip_prefix("RssShmem:"))?;
+        number.trim().strip_suffix("kB")?.trim().parse::<u64>().ok()
+    };
+    1024 * status.lines().filter_map(kib).sum::<u64>()
+}
+
 /// Gives the process a session of its own: it has no controlling terminal, so that Ctrl-C does not
 /// reach it, which the master ends in order, and it can write no command into the user's shell.
 #[cfg(unix)]
@@ -337,47 +361,3 @@ fn apart(command: &mut Command) {
 
 #[cfg(not(any(unix, windows)))]
 fn apart(_command: &mut Command) {}
-
-/// Describes how a process has ended.
-fn ended(status: ExitStatus) -> String {
-    #[cfg(unix)]
-    if let Some(signal) = std::os::unix::process::ExitStatusExt::signal(&status) {
-        let name = match signal {
-            4 => " (SIGILL, an illegal instruction)",
-            6 => " (SIGABRT, an abort)",
-            7 => " (SIGBUS, access to memory that is not there)",
-            8 => " (SIGFPE, a division by zero or the like)",
-            9 => " (SIGKILL)",
-            11 => " (SIGSEGV, access to memory that is not its own)",
-            15 => " (SIGTERM)",
-            24 => " (SIGXCPU, its processor time is used up)",
-            31 => " (SIGSYS, a call of the system that is not allowed)",
-            _ => "",
-        };
-        return format!("its process was killed by signal {signal}{name}");
-    }
-    let Some(code) = status.code() else { return "its process has ended".into() };
-    // Windows ends a process that crashes with the number of the exception.
-    #[cfg(windows)]
-    if let Some(name) = exception(code) {
-        return format!(
-            "its process was ended by exception {:#010x} ({name})",
-            code.cast_unsigned()
-        );
-    }
-    format!("it ended its process with exit code {code}")
-}
-
-/// Returns what an exception of Windows means.
-#[cfg(windows)]
-fn exception(code: i32) -> Option<&'static str> {
-    match code.cast_unsigned() {
-        0xc000_0005 => Some("access to memory that is not its own"),
-        0xc000_001d => Some("an illegal instruction"),
-        0xc000_008e | 0xc000_0094 => Some("a division by zero"),
-        0xc000_00fd => Some("its stack is used up"),
-        0xc000_0374 => Some("memory that it has overwritten"),
-        0xc000_0409 => Some("an abort"),
-        _ => None,
-    }
-}
