@@ -250,7 +250,7 @@ def test_a_signal_ends_it_and_keeps_what_is_finished(tmp_path):
     assert process.returncode == 143 and errors.count("\n") == 1, errors
     assert re.search(r"ended by a signal \(SIGTERM\): \d+ of \d+ parts are finished", errors)
     assert list(temporary.iterdir()) == [] and not (out / "report.html").exists()
-    assert not list(out.rglob("*.unfinished*"))
+    assert not list(out.rglob("*.part"))
 
 
 def test_a_part_in_which_a_bit_has_changed_is_run_again(report, tmp_path):

@@ -4,26 +4,85 @@ use crate::error::Error;
 use serde::Serialize;
 use sha2::{Digest, Sha256};
 use std::fmt::Write as _;
-use std::fs;
+use std::fs::{self, File};
+use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
-/// Writes a file, whose folder is made if it is missing. Nobody ever sees an incomplete one, and a
-/// file that was there stays if this fails.
+/// A file that is being written. It appears under its name when it is complete and on the disk; a
+/// file that was there stays until then.
+#[derive(Debug)]
+pub struct PartialFile {
+    path: PathBuf,
+    partial: PathBuf,
+    file: File,
+}
+
+impl PartialFile {
+    /// Begins a file, whose folder is made if it is missing. What processes that were killed have
+    /// left of this file is removed.
+    ///
+    /// # Errors
+    /// Returns an error if the file cannot be created.
+    pub fn create(path: &Path) -> Result<Self, Error> {
+        if let Some(folder) = path.parent() {
+            fs::create_dir_all(folder).map_err(Error::file(folder))?;
+        }
+        remove_abandoned(path);
+        let mut partial = path.as_os_str().to_owned();
+        partial.push(format!(".{}.part", std::process::id()));
+        let partial = PathBuf::from(partial);
+        let file = File::create(&partial).map_err(Error::file(path))?;
+        // Some network drives have no locks; there nothing is removed.
+        let _ = file.try_lock();
+        Ok(Self { path: path.to_path_buf(), partial, file })
+    }
+
+    /// Returns the file that is written.
+    pub fn file(&mut self) -> &mut File {
+        &mut self.file
+    }
+
+    /// Gives the complete file its name.
+    ///
+    /// # Errors
+    /// Returns an error if the content does not reach the disk, or if the name belongs to a folder.
+    pub fn finish(self) -> Result<(), Error> {
+        self.file.sync_all().map_err(Error::file(&self.path))?;
+        fs::rename(&self.partial, &self.path).map_err(Error::file(&self.path))
+    }
+}
+
+impl Drop for PartialFile {
+    fn drop(&mut self) {
+        // An incomplete file is of no use, and it may be what fills the disk. A complete one has
+        // another name by now.
+        let _ = fs::remove_file(&self.partial);
+    }
+}
+
+/// Removes incomplete files of this name that no process is writing any more.
+fn remove_abandoned(path: &Path) {
+    let (Some(folder), Some(name)) = (path.parent(), path.file_name()) else { return };
+    let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
+    let begin = format!("{}.", name.to_string_lossy());
+    for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
+        let other = entry.file_name().to_string_lossy().into_owned();
+        let number = other.strip_prefix(&begin).and_then(|rest| rest.strip_suffix(".part"));
+        let is_partial = number.is_some_and(|number| number.parse::<u32>().is_ok());
+        if is_partial && File::open(entry.path()).is_ok_and(|file| file.try_lock().is_ok()) {
+            let _ = fs::remove_file(entry.path());
+        }
+    }
+}
+
+/// Writes a file in the manner of [`PartialFile`].
 ///
 /// # Errors
 /// Returns an error if the file cannot be written.
 pub fn write(path: &Path, content: impl AsRef<[u8]>) -> Result<(), Error> {
-    if let Some(folder) = path.parent() {
-        fs::create_dir_all(folder).map_err(Error::file(folder))?;
-    }
-    let mut partial = path.as_os_str().to_owned();
-    partial.push(format!(".{}.part", std::process::id()));
-    let partial = PathBuf::from(partial);
-    fs::write(&partial, content).and_then(|()| fs::rename(&partial, path)).map_err(|error| {
-        // The incomplete file is of no use, and it may be what fills the disk.
-        let _ = fs::remove_file(&partial);
-        Error::file(path)(error)
-    })
+    let mut partial = PartialFile::create(path)?;
+    partial.file().write_all(content.as_ref()).map_err(Error::file(path))?;
+    partial.finish()
 }
 
 /// Writes a value as JSON, in the manner of [`write()`].
@@ -66,6 +125,27 @@ mod tests {
         let beside = |path: &Path| fs::read_dir(path).unwrap().count();
         assert_eq!((beside(folder.path()), beside(path.parent().unwrap())), (1, 1));
         assert_eq!(beside(&folder.path().join("made")), 1);
+    }
+
+    #[test]
+    fn what_a_killed_process_has_left_of_a_file_is_removed() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.txt");
+        let (left, other) =
+            (folder.path().join("a.txt.1.part"), folder.path().join("b.txt.1.part"));
+        fs::write(&left, "half").unwrap();
+        fs::write(&other, "half").unwrap();
+        let mut written = folder.path().join("a.txt.2.part");
+        fs::write(&written, "half").unwrap();
+        let held = File::open(&written).unwrap();
+        held.try_lock().unwrap();
+        write(&path, "whole").unwrap();
+        assert!(!left.exists() && other.exists() && written.exists());
+        drop(held);
+        write(&path, "whole").unwrap();
+        assert!(!written.exists());
+        written.pop();
+        assert_eq!(fs::read_dir(written).unwrap().count(), 2);
     }
 
     #[test]

@@ -8,10 +8,10 @@ use std::sync::Once;
 use std::time::{Duration, SystemTime};
 use tempfile::TempDir;
 
-/// Beginning of the names of these folders.
+/// Beginning of the names of these folders, which the number of the process follows.
 const PREFIX: &str = "unpacked-fmu-";
-/// Age from which a folder that nobody holds is removed, because a new one is not held for a
-/// moment.
+/// Age from which a folder that nobody holds is removed although its process may live, because a
+/// new one is not held for a moment.
 const AGE: Duration = Duration::from_secs(60);
 
 /// A temporary folder that is removed when this value is dropped.
@@ -29,7 +29,8 @@ impl TemporaryFolder {
     pub(crate) fn new() -> io::Result<Self> {
         static ONCE: Once = Once::new();
         ONCE.call_once(|| remove_orphans(&std::env::temp_dir(), AGE));
-        let folder = tempfile::Builder::new().prefix(PREFIX).tempdir()?;
+        let prefix = format!("{PREFIX}{}-", std::process::id());
+        let folder = tempfile::Builder::new().prefix(&prefix).tempdir()?;
         // Without a lock, another process may take the folder for an orphan once it is old enough.
         let hold = hold(folder.path()).ok().filter(|hold| hold.try_lock().is_ok());
         Ok(Self { _hold: hold, folder })
@@ -50,6 +51,16 @@ fn hold(folder: &Path) -> io::Result<File> {
     }
 }
 
+/// Returns whether the process that made a folder has ended, as far as this can be seen.
+fn is_of_the_dead(folder: &Path) -> bool {
+    let name = folder.file_name().unwrap_or_default().to_string_lossy();
+    let number = name.strip_prefix(PREFIX).and_then(|rest| rest.split('-').next());
+    let number = number.and_then(|number| number.parse::<u32>().ok());
+    let processes = Path::new("/proc");
+    processes.join("self").exists()
+        && number.is_some_and(|number| !processes.join(number.to_string()).exists())
+}
+
 /// Removes the folders of this kind that nobody holds.
 fn remove_orphans(within: &Path, age: Duration) {
     let is_old = |path: &PathBuf| {
@@ -59,7 +70,9 @@ fn remove_orphans(within: &Path, age: Duration) {
     };
     let entries = fs::read_dir(within).into_iter().flatten().flatten();
     let folders = entries.filter(|entry| entry.file_name().to_string_lossy().starts_with(PREFIX));
-    for path in folders.map(|entry| entry.path()).filter(is_old) {
+    for path in
+        folders.map(|entry| entry.path()).filter(|path| is_of_the_dead(path) || is_old(path))
+    {
         if hold(&path).is_ok_and(|hold| hold.try_lock().is_ok()) {
             // A folder of another user stays.
             let _ = fs::remove_dir_all(&path);
@@ -79,12 +92,16 @@ mod tests {
             fs::create_dir_all(path.join("binaries")).unwrap();
             path
         };
-        let (orphan, held) = (make("unpacked-fmu-1"), make("unpacked-fmu-2"));
+        let living = |name: &str| make(&format!("unpacked-fmu-{}-{name}", std::process::id()));
+        let (orphan, held) = (living("1"), living("2"));
+        // The numbers of processes do not become so large.
+        let dead = make("unpacked-fmu-4294967295-3");
         let other = make("somebody");
         let holds = hold(&held).unwrap();
         holds.try_lock().unwrap();
         remove_orphans(outer.path(), AGE);
         assert!(orphan.exists());
+        assert!(!dead.exists() || !Path::new("/proc/self").exists());
         remove_orphans(outer.path(), Duration::ZERO);
         assert!(!orphan.exists() && held.exists() && other.exists());
         drop(holds);

@@ -3,6 +3,7 @@
 use super::guard::guarded;
 use super::{CaseTable, Column, Values};
 use cosim::error::Error;
+use cosim::files::PartialFile;
 use parquet::basic::{LogicalType, Type as Physical};
 use parquet::column::reader::{ColumnReader, ColumnReaderImpl};
 use parquet::data_type::{ByteArray, DataType};
@@ -12,7 +13,7 @@ use parquet::file::properties::{EnabledStatistics, WriterProperties};
 use parquet::file::reader::{FileReader, SerializedFileReader};
 use parquet::file::writer::SerializedFileWriter;
 use parquet::schema::types::{ColumnPath, Type};
-use std::fs::{self, File};
+use std::fs::File;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -23,7 +24,7 @@ const GROUP: usize = 8192;
 /// A Parquet file that is being written. It appears under its name when it is complete.
 pub struct Writer {
     path: PathBuf,
-    unfinished: PathBuf,
+    partial: PartialFile,
     metadata: Vec<KeyValue>,
     file: Option<SerializedFileWriter<File>>,
     waiting: CaseTable,
@@ -35,16 +36,11 @@ impl Writer {
     /// # Errors
     /// Returns an error if the file's folder cannot be created.
     pub fn create(path: &Path, metadata: &[(&str, String)]) -> Result<Self, Error> {
-        if let Some(folder) = path.parent() {
-            fs::create_dir_all(folder).map_err(Error::file(folder))?;
-        }
         let metadata =
             metadata.iter().map(|(key, text)| KeyValue::new((*key).into(), text.clone()));
-        // Several processes may write the same part, with the same content.
-        let unfinished = path.with_extension(format!("unfinished-{}", std::process::id()));
         Ok(Self {
             path: path.to_path_buf(),
-            unfinished,
+            partial: PartialFile::create(path)?,
             metadata: metadata.collect(),
             file: None,
             waiting: CaseTable::default(),
@@ -56,7 +52,7 @@ impl Writer {
     /// # Errors
     /// Returns an error if the file cannot be written.
     pub fn add(&mut self, rows: CaseTable) -> Result<(), Error> {
-        self.waiting.append(rows).map_err(failed(&self.unfinished))?;
+        self.waiting.append(rows).map_err(failed(&self.path))?;
         while self.waiting.rows() >= GROUP {
             let group = self.waiting.take(GROUP);
             self.write(&group)?;
@@ -74,16 +70,16 @@ impl Writer {
             self.write(&rest)?;
         }
         if let Some(mut writer) = self.file.take() {
-            writer.finish().map_err(failed(&self.unfinished))?;
+            writer.finish().map_err(failed(&self.path))?;
         }
-        fs::rename(&self.unfinished, &self.path).map_err(Error::file(&self.path))
+        self.partial.finish()
     }
 
     fn write(&mut self, rows: &CaseTable) -> Result<(), Error> {
         let mut write = || {
             let writer = match &mut self.file {
                 Some(writer) => writer,
-                None => self.file.insert(begin(&self.unfinished, rows, &self.metadata)?),
+                None => self.file.insert(begin(self.partial.file(), rows, &self.metadata)?),
             };
             let mut group = writer.next_row_group()?;
             for column in &rows.columns {
@@ -93,25 +89,16 @@ impl Writer {
             }
             group.close().map(drop)
         };
-        write().map_err(failed(&self.unfinished))
-    }
-}
-
-impl Drop for Writer {
-    fn drop(&mut self) {
-        // An unfinished file is of no use. If it cannot be removed, the next run overwrites it.
-        if self.file.take().is_some() {
-            let _ = fs::remove_file(&self.unfinished);
-        }
+        write().map_err(failed(&self.path))
     }
 }
 
 fn begin(
-    path: &Path,
+    file: &File,
     table: &CaseTable,
     metadata: &[KeyValue],
 ) -> Result<SerializedFileWriter<File>, ParquetError> {
-    let file = File::create(path).map_err(|error| ParquetError::External(Box::new(error)))?;
+    let file = file.try_clone().map_err(|error| ParquetError::External(Box::new(error)))?;
     let mut properties = WriterProperties::builder()
         .set_dictionary_enabled(false)
         .set_statistics_enabled(EnabledStatistics::None)
