@@ -6,6 +6,8 @@ mod foreign;
 #[cfg(target_os = "linux")]
 mod hostile;
 mod isolation;
+#[cfg(target_os = "linux")]
+mod kills;
 mod malformed;
 mod results;
 mod search;
