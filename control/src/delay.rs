@@ -27,8 +27,9 @@ use vehicle::time::TOLERANCE;
 
 /// Longest delay that is accepted, s.
 pub const LONGEST: f64 = 1.0;
-/// Largest number of commands that can be under way at a time.
-pub const UNDER_WAY: usize = 10_000;
+/// Largest number of commands that can be under way at a time. Each is one step of the prediction
+/// (0.1 µs) at every tick, which takes half of the shortest period.
+pub const UNDER_WAY: usize = 500;
 /// Longest integration step of the prediction, s.
 const STEP: f64 = 0.01;
 

@@ -1,5 +1,6 @@
 //! Instances in processes of their own, on the side of the command line.
 
+use crate::plain::plain;
 use fmu_import::{crash, isolation};
 use std::io::{Write, stderr};
 use std::process::ExitCode;
@@ -26,7 +27,7 @@ pub(crate) fn serve() -> Option<ExitCode> {
 pub(crate) fn all_freed() -> bool {
     let late = isolation::late_failures();
     for failure in &late {
-        let _ = writeln!(stderr(), "error: {failure}");
+        let _ = writeln!(stderr(), "error: {}", plain(failure));
     }
     late.is_empty()
 }

@@ -10,6 +10,7 @@ mod isolated;
 mod list;
 mod live;
 mod pack;
+mod plain;
 mod run;
 mod schema;
 mod show;
@@ -22,6 +23,7 @@ use cosim::pacing::{self, Factor, OnMiss};
 use cosim::search;
 use failure::Failure;
 use live::log::Messages;
+use plain::{Plain, plain};
 use run::{Files, Options};
 use std::io::{BufWriter, IsTerminal, Write, stderr, stdout};
 use std::path::PathBuf;
@@ -33,9 +35,9 @@ use tracing_subscriber::EnvFilter;
 /// Runs FMI 2.0 co-simulation experiments.
 ///
 /// The exit code is 0 if all went well, 1 if a run failed, 2 for bad usage or a bad experiment, 3
-/// if the attitude was lost as the experiment defines it, and 130 or 143 if Ctrl-C or SIGTERM ended
-/// the run. Log messages go to standard error; the environment variable RUST_LOG chooses how many
-/// there are (error, warn, info, debug).
+/// if the attitude was lost as the experiment defines it, and 130, 143 or 129 if Ctrl-C, SIGTERM or
+/// SIGHUP ended the run. Log messages go to standard error; the environment variable RUST_LOG
+/// chooses how many there are (error, warn, info, debug).
 ///
 /// Experiments and FMUs are also looked for beside the program and in the folders of the
 /// environment variable ORCHESTRATOR_PATH.
@@ -51,7 +53,7 @@ enum Command {
     /// Run an experiment and write results.csv, results.json, metrics.json and plot.svg.
     ///
     /// With --real-time the run keeps in step with the wall clock; the summary, metrics.json and
-    /// realtime.svg show how well it did. Ctrl-C and SIGTERM end a run and keep its results.
+    /// realtime.svg show how well it did. Ctrl-C, SIGTERM and SIGHUP end a run and keep its results.
     Run {
         /// Experiment to run: a file, an SSP archive, or the name of an experiment that `list`
         /// shows.
@@ -213,7 +215,7 @@ fn main() -> ExitCode {
         .with_target(false)
         .init();
 
-    let mut out = BufWriter::new(stdout());
+    let mut out = Plain(BufWriter::new(stdout()));
     let interrupt = Interrupt::default();
     let outcome = execute(arguments.command, &mut out, &interrupt)
         .and_then(|()| out.flush().map_err(Failure::from));
@@ -225,12 +227,12 @@ fn main() -> ExitCode {
         Err(error) if error.is_broken_pipe() => {
             // Output that could not be written must not be written again when the writer is
             // dropped.
-            let _ = out.into_parts();
+            let _ = out.0.into_parts();
             ExitCode::SUCCESS
         }
         Err(error) => {
             // If standard error cannot be written either, there is nobody left to tell.
-            let _ = writeln!(stderr(), "error: {error}");
+            let _ = writeln!(stderr(), "error: {}", plain(&error.to_string()));
             ExitCode::from(error.exit_code())
         }
     }

@@ -8,6 +8,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 /// Numbers of the signals that end a run. On Windows, Ctrl-C counts as the first.
+const SIGHUP: i32 = 1;
 const SIGINT: i32 = 2;
 const SIGTERM: i32 = 15;
 
@@ -49,6 +50,7 @@ impl std::fmt::Display for Request {
     fn fmt(&self, out: &mut std::fmt::Formatter) -> std::fmt::Result {
         match self {
             Self::Quit => write!(out, "the user"),
+            Self::Signal(SIGHUP) => write!(out, "a signal (SIGHUP)"),
             Self::Signal(SIGINT) => write!(out, "a signal (SIGINT)"),
             Self::Signal(SIGTERM) => write!(out, "a signal (SIGTERM)"),
             Self::Signal(number) => write!(out, "a signal ({number})"),
@@ -56,14 +58,27 @@ impl std::fmt::Display for Request {
     }
 }
 
+/// Returns whether this process ignores SIGHUP, or whether it cannot be told.
+#[cfg(unix)]
+fn ignores_hangup() -> bool {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let ignored = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
+    let ignored = ignored.and_then(|set| u64::from_str_radix(set.trim(), 16).ok());
+    // Signal n is bit n - 1.
+    ignored.is_none_or(|set| set & 1 << (SIGHUP - 1) != 0)
+}
+
 impl Interrupt {
-    /// Treats SIGINT and SIGTERM as requests from now on. A second signal ends the process at once.
+    /// Treats SIGINT, SIGTERM and, under Linux, SIGHUP as requests from now on. A second signal ends
+    /// the process at once. SIGHUP, which comes when a connection drops, stays ignored if it is, as
+    /// `nohup` asks.
     ///
     /// # Errors
     /// Returns an error if the system does not accept the signal handlers.
     #[cfg(unix)]
     pub fn listen(&self) -> io::Result<()> {
-        for signal in [SIGINT, SIGTERM] {
+        let hangup = (!ignores_hangup()).then_some(SIGHUP);
+        for signal in [SIGINT, SIGTERM].into_iter().chain(hangup) {
             let again = || Arc::clone(&self.again);
             flag::register_conditional_shutdown(signal, 128 + signal, again())?;
             flag::register(signal, again())?;

@@ -3,7 +3,7 @@
    Output 1 = gain * input (direct), output 2 = integral of the input. It fails, and is slow, as its parameters say. It guarantees something as long
    as the input is at most the parameter "largest". The parameters "delay" and "actuation.delay" do nothing. It refuses to be read between
    setting and stepping, once it is initialized, as FMI 2.0.5, section 4.2.1, allows it to.
-   What it does wrong is chosen by the compiler's flags: -DENDS: a discarded step ends the simulation; -DVERSION: its version; -DDIRECT(value),
+   What it does wrong is chosen by the compiler's flags: -DENDS: a discarded step ends the simulation; -DVERSION: its version; -DTROUBLE: the text of its failure; -DDIRECT(value),
    -DITEM(value), -DTRUTH(value): what becomes of output.direct, guarantee.status, guarantee.inForce after two steps; -DRESETS=0: fmi2Reset leaves
    the state as it is; -DPLACE=STEP -DHOW=ABORT: fault.h; -DOUTSIDE="\"/folder\"": hostile.h. */
 #ifdef OUTSIDE
@@ -26,6 +26,9 @@
 #endif
 #ifndef VERSION
 #define VERSION "2.0"
+#endif
+#ifndef TROUBLE
+#define TROUBLE "out of propellant at"
 #endif
 #ifndef DIRECT
 #define DIRECT(value) (value)
@@ -214,7 +217,7 @@ int fmi2DoStep(Model *model, double time, double step, int no_set_state) {
     if (model->gain == 13.0) abort();
 #endif
     if (time >= 2.0 - 1e-9) fault(STEP, model->callbacks->logger, model->callbacks->environment);
-    if (time >= model->fail_time - 1e-9) return complain(model, model->fail_status, "out of propellant at", time);
+    if (time >= model->fail_time - 1e-9) return complain(model, model->fail_status, TROUBLE, time);
     if (model->flag) complain(model, WARNING, "runs hot at", 7.0);
     struct timespec pause = {(time_t)model->pause, (long)(1e9 * (model->pause - (double)(time_t)model->pause))};
     nanosleep(&pause, NULL);

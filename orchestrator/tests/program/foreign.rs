@@ -273,3 +273,21 @@ fn values_that_are_none_end_the_run() {
         assert_eq!((code, errors.contains(what)), (0, false), "{flag}");
     }
 }
+
+#[test]
+fn what_an_fmu_says_moves_no_cursor() {
+    let flags = ["-DTROUBLE=\"\\033[2Jout of propellant at\""];
+    let escape = |text: String| text.replace("gain and integrator", "gain \u{1b}[2J and \u{9b}1m");
+    let bench =
+        Bench::made(LOOP, &Recipe { flags: &flags, description: &escape, ..Recipe::default() });
+    for isolate in ["--isolate", "--isolate=false"] {
+        let (code, out, errors) = bench.run(&["--set", "gain.fail.time=1", isolate]);
+        assert_eq!(code, 1, "{errors}");
+        assert!(errors.contains("[2Jout of propellant"), "{errors}");
+        assert!(!(out + &errors).contains(['\u{1b}', '\u{9b}']), "{errors}");
+    }
+    for arguments in [&["inspect", "Model.fmu"][..], &["inspect", "--check", "Model.fmu"]] {
+        let (_, out, errors) = bench.call(arguments);
+        assert!(!(out + &errors).contains(['\u{1b}', '\u{9b}']));
+    }
+}

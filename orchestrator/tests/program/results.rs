@@ -324,3 +324,25 @@ fn results_can_be_left_out_or_labelled() {
     assert_eq!(columns[3]["items"]["1"], item, "{columns}");
     assert!(columns[0]["items"].is_null() && columns[0]["unit"] == "m");
 }
+
+#[test]
+#[cfg(target_os = "linux")]
+fn a_dropped_connection_ends_a_run_in_order_unless_it_is_ignored() {
+    use std::process::Command;
+    let bench = Bench::new();
+    for (trap, expected) in [("", 129), ("trap '' HUP;", 0)] {
+        let program = env!("CARGO_BIN_EXE_orchestrator");
+        let run = "run loop.toml --quiet --force --set gain.pause=0.3";
+        let mut child = Command::new("sh")
+            .args(["-c", &format!("{trap} exec {program} {run}")])
+            .current_dir(bench.folder.path())
+            .spawn()
+            .unwrap();
+        std::thread::sleep(std::time::Duration::from_millis(450));
+        let hangup = Command::new("kill").args(["-HUP", &child.id().to_string()]).status();
+        assert!(hangup.unwrap().success());
+        assert_eq!(child.wait().unwrap().code(), Some(expected));
+        let metrics = bench.json("out/loop/metrics.json");
+        assert_eq!(metrics["completed"], expected == 0);
+    }
+}

@@ -96,6 +96,14 @@ impl LookupTable {
     }
 
     fn parse(bytes: &[u8]) -> Result<Self, String> {
+        // The reader takes the rest of the file for the content of such quotation marks.
+        let is_open = |line: &[u8]| {
+            let pieces = line.split(|byte| *byte == b'"').count();
+            !line.starts_with(b"#") && pieces.is_multiple_of(2)
+        };
+        if let Some(place) = bytes.split(|byte| *byte == b'\n').position(is_open) {
+            return Err(format!("line {}: a quotation mark is not closed", place + 1));
+        }
         let mut reader = csv::ReaderBuilder::new()
             .comment(Some(b'#'))
             .trim(csv::Trim::All)

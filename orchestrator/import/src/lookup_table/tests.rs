@@ -118,6 +118,7 @@ fn faults_name_line_and_column() {
         ("time,shift\n0,1\n", "is a lookup table in which \"shift\" has two meanings"),
         ("time,x\n0,1\n1\n", "line 3 has 1 values for 2 columns"),
         ("time,x\n0,1\n1,2,3\n", "line 3 has 3 values for 2 columns"),
+        ("time,x\n0,1\n1,\"2\n", "line 3: a quotation mark is not closed"),
         ("time,x\nnow,1\n", "line 2: \"time\" is \"now\", it must be a finite number"),
         (
             "time,x\n1,1\n0,1\n",
