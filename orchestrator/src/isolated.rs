@@ -23,8 +23,10 @@ pub(crate) fn serve() -> Option<ExitCode> {
     })
 }
 
-/// Prints which instances could not be freed. Returns whether all were freed.
+/// Prints which instances could not be freed, and removes what killed processes have left. Returns
+/// whether all were freed.
 pub(crate) fn all_freed() -> bool {
+    fmu_import::folder::remove_left();
     let late = isolation::late_failures();
     for failure in &late {
         let _ = writeln!(stderr(), "error: {}", plain(failure));

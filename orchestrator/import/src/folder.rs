@@ -23,12 +23,19 @@ pub struct TemporaryFolder {
     folder: TempDir,
 }
 
+/// Removes the folders that killed processes have left. A process does so with its first folder; it
+/// may do so again at its end, because a process that was just starting another one when it was
+/// killed seems to hold its folders for a moment.
+pub fn remove_left() {
+    remove_orphans(&std::env::temp_dir(), AGE);
+}
+
 impl TemporaryFolder {
     /// Makes a folder. The first call of a process removes the folders that killed processes have
     /// left.
     pub(crate) fn new() -> io::Result<Self> {
         static ONCE: Once = Once::new();
-        ONCE.call_once(|| remove_orphans(&std::env::temp_dir(), AGE));
+        ONCE.call_once(remove_left);
         let prefix = format!("{PREFIX}{}-", std::process::id());
         let folder = tempfile::Builder::new().prefix(&prefix).tempdir()?;
         // Without a lock, another process may take the folder for an orphan once it is old enough.
