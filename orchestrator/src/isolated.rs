@@ -1,7 +1,7 @@
 //! Instances in processes of their own, on the side of the command line.
 
 use crate::plain::plain;
-use fmu_import::{crash, isolation};
+use fmu_import::isolation;
 use std::io::{Write, stderr};
 use std::process::ExitCode;
 
@@ -11,7 +11,6 @@ pub(crate) fn serve() -> Option<ExitCode> {
     let mut words = std::env::args_os().skip(1);
     if words.next().is_none_or(|word| word != isolation::COMMAND) {
         isolation::enable();
-        crash::watch();
         return None;
     }
     Some(match isolation::serve(words) {

@@ -22,6 +22,7 @@ use cosim::interrupt::Interrupt;
 use cosim::pacing::{self, Factor, OnMiss};
 use cosim::search;
 use failure::Failure;
+use fmu_import::crash;
 use live::log::Messages;
 use plain::{Plain, plain};
 use run::{Files, Options};
@@ -198,6 +199,7 @@ fn main() -> ExitCode {
     if let Some(code) = isolated::serve() {
         return code;
     }
+    let _watch = crash::watch();
     let arguments = Arguments::parse();
     // A study may have a thousand runs, and its report counts their warnings. The results table of
     // a campaign holds the messages of instances.

@@ -1,25 +1,30 @@
-//! Names the instance and the call when an instance ends the process that it runs in.
+//! Names the instance and the call, or the FMUs that were loaded, when an FMU ends the process of
+//! the program.
 
 #![allow(unsafe_code)]
 
+use crate::log::Log;
+use parking_lot::Mutex;
 use std::cell::Cell;
 use std::marker::PhantomData;
+use std::path::Path;
+use std::sync::atomic::{AtomicPtr, AtomicU32, Ordering};
 
 thread_local! {
-    /// Name of the instance that this thread calls, and name of the call; `None` between calls. A
+    /// Log of the instance that this thread calls, and name of the call; `None` between calls. A
     /// constant initialiser keeps the access free of locks and allocation, which a signal handler
     /// must not use.
-    static CURRENT: Cell<Option<(*const str, &'static str)>> = const { Cell::new(None) };
+    static CURRENT: Cell<Option<(*const Log, &'static str)>> = const { Cell::new(None) };
 }
 
 /// A call that is being made, until this value is dropped.
-pub(crate) struct Calling<'a>(PhantomData<&'a str>);
+pub(crate) struct Calling<'a>(PhantomData<&'a Log>);
 
 impl<'a> Calling<'a> {
-    /// Records that this thread makes this call of the instance with this name.
+    /// Records that this thread makes this call of the instance with this log.
     #[inline]
-    pub(crate) fn new(instance: &'a str, call: &'static str) -> Self {
-        CURRENT.set(Some((instance, call)));
+    pub(crate) fn new(log: &'a Log, call: &'static str) -> Self {
+        CURRENT.set(Some((log, call)));
         Self(PhantomData)
     }
 }
@@ -31,10 +36,72 @@ impl Drop for Calling<'_> {
     }
 }
 
-/// Watches for signals that end this process, and for calls of `exit`, from now on. If an instance
-/// was being called, one line on standard error names it.
+/// Hands the log of the instance that this thread calls to a function. Returns `None` if this
+/// thread calls none.
+pub(crate) fn with_called<T>(function: impl FnOnce(&Log) -> T) -> Option<T> {
+    // SAFETY: `Calling` borrows the log as long as the call lasts, which has not returned.
+    CURRENT.get().map(|(log, _)| function(unsafe { &*log }))
+}
+
+/// Names of the FMUs whose libraries were loaded into this process, newest first. A library that
+/// is unloaded may leave threads behind, so that no name is ever removed. A signal handler reads the
+/// list, which therefore needs no lock.
+static LOADED: AtomicPtr<Loaded> = AtomicPtr::new(std::ptr::null_mut());
+
+struct Loaded {
+    name: String,
+    next: Option<&'static Loaded>,
+}
+
+/// Returns the FMUs whose libraries were loaded into this process.
+fn loaded() -> impl Iterator<Item = &'static Loaded> {
+    // SAFETY: the pointer is null or one that `is_loaded` has leaked.
+    let newest = unsafe { LOADED.load(Ordering::Acquire).as_ref() };
+    std::iter::successors(newest, |fmu| fmu.next)
+}
+
+/// Records that the library of this FMU is about to be loaded into this process.
+pub(crate) fn is_loaded(fmu: &Path) {
+    static WRITES: Mutex<()> = Mutex::new(());
+    let _only = WRITES.lock();
+    let name = fmu.display().to_string();
+    if loaded().all(|other| other.name != name) {
+        let fmu = Box::leak(Box::new(Loaded { name, next: loaded().next() }));
+        LOADED.store(fmu, Ordering::Release);
+    }
+}
+
+/// Process that is watched, or 0. A process that an FMU has forked is not watched.
+static WATCHED: AtomicU32 = AtomicU32::new(0);
+
+/// A guard: this process is watched as long as the value lives.
+#[must_use]
+pub struct Watch(());
+
+impl Drop for Watch {
+    fn drop(&mut self) {
+        let Self(()) = self;
+        unwatch();
+    }
+}
+
+/// Ends the watch, before the program itself ends this process.
+pub fn unwatch() {
+    WATCHED.store(0, Ordering::SeqCst);
+}
+
+/// Watches from now on for signals that end this process, and for calls of `exit`; under Linux with
+/// the GNU C library also for those of `_exit`, `_Exit` and `quick_exit`. One line on standard error
+/// names the instance that was being called, or the FMUs that were loaded. An exit is then a
+/// failure, with code 1.
+pub fn watch() -> Watch {
+    WATCHED.store(std::process::id(), Ordering::SeqCst);
+    listen();
+    Watch(())
+}
+
 #[cfg(unix)]
-pub fn watch() {
+fn listen() {
     for (place, (signal, _)) in SIGNALS.iter().enumerate() {
         // SAFETY: all zeros is a valid `sigaction`, the pointers are valid for the calls, and the
         // handler does only what a handler may do. PREVIOUS is written here alone, before any
@@ -46,14 +113,17 @@ pub fn watch() {
             libc::sigaction(*signal, &raw const action, (&raw mut PREVIOUS[place]).cast());
         }
     }
-    // SAFETY: the function has the type that C wants and stays where it is.
-    unsafe { libc::atexit(on_exit) };
+    // SAFETY: the functions have the type that C wants and stay where they are.
+    unsafe {
+        libc::atexit(on_exit);
+        #[cfg(all(target_os = "linux", target_env = "gnu"))]
+        gnu::at_quick_exit(gnu::on_quick_exit);
+    }
 }
 
-/// Watches for crashes, which the C library passes on as signals, and for calls of `exit`, from now
-/// on. If an instance was being called, one line on standard error names it.
+/// The C library passes crashes on as signals.
 #[cfg(windows)]
-pub fn watch() {
+fn listen() {
     for (signal, _) in SIGNALS {
         // SAFETY: the handler has the type that C wants and stays where it is.
         unsafe { libc::signal(*signal, on_signal as extern "C" fn(libc::c_int) as usize) };
@@ -64,7 +134,7 @@ pub fn watch() {
 
 /// Does nothing, because such signals are not supported on this system.
 #[cfg(not(any(unix, windows)))]
-pub fn watch() {}
+fn listen() {}
 
 #[cfg(any(unix, windows))]
 const SIGNALS: &[(libc::c_int, &str)] = &[
@@ -120,33 +190,85 @@ extern "C" fn on_signal(
 
 #[cfg(any(unix, windows))]
 extern "C" fn on_exit() {
-    if tell("exit") {
-        // SAFETY: this ends the process at once. An instance that ends it must not pass for
-        // success.
+    refuse_exit("exit");
+}
+
+/// Ends the process with code 1 if it is not the program that ends it: an FMU that ends the process
+/// must not pass for success.
+#[cfg(any(unix, windows))]
+fn refuse_exit(what: &str) {
+    if tell(what) {
+        unwatch();
+        // SAFETY: this ends the process at once.
         unsafe { libc::_exit(1) };
     }
 }
 
-/// Writes which instance is being called, with system calls only. Returns whether one is being
-/// called.
+/// Functions of the GNU C library that end a process without the functions of `atexit`.
+#[cfg(all(target_os = "linux", target_env = "gnu"))]
+mod gnu {
+    use super::refuse_exit;
+    use std::ffi::c_int;
+
+    unsafe extern "C" {
+        pub(super) fn at_quick_exit(function: extern "C" fn()) -> c_int;
+    }
+
+    pub(super) extern "C" fn on_quick_exit() {
+        refuse_exit("quick_exit");
+    }
+
+    /// Takes the place of the C library's function for all libraries that are loaded, because the
+    /// linker exports from a program what a library of the system defines as well.
+    // SAFETY: the function has the name, the type and the effect of that in the C library.
+    #[unsafe(no_mangle)]
+    extern "C" fn _exit(code: c_int) -> ! {
+        end("_exit", code)
+    }
+
+    /// Takes the place of the C library's function, as [`_exit`] does.
+    // SAFETY: the function has the name, the type and the effect of that in the C library.
+    #[unsafe(no_mangle)]
+    extern "C" fn _Exit(code: c_int) -> ! {
+        end("_Exit", code)
+    }
+
+    fn end(what: &str, code: c_int) -> ! {
+        // The program itself ends with the number of a signal when that comes a second time.
+        if code < 128 {
+            refuse_exit(what);
+        }
+        loop {
+            // SAFETY: this ends the process at once.
+            unsafe { libc::syscall(libc::SYS_exit_group, code) };
+        }
+    }
+}
+
+/// Writes who ended the process, with system calls only. Returns whether it was an FMU, as far as
+/// this can be known.
 #[cfg(any(unix, windows))]
 fn tell(what: &str) -> bool {
-    let Some((instance, call)) = CURRENT.get() else { return false };
-    // SAFETY: `Calling` borrows the name as long as the call lasts, which has not returned.
-    let instance = unsafe { &*instance };
-    let parts = [
-        "error: ",
-        instance,
-        " ended this process in ",
-        call,
-        " (",
-        what,
-        "); with --isolate the run would end in order and keep its results\n",
-    ];
-    for part in parts {
-        // SAFETY: pointer and length are those of the text. There is nobody left to tell of a
-        // failure.
-        unsafe { libc::write(2, part.as_ptr().cast(), part.len() as _) };
+    if WATCHED.load(Ordering::SeqCst) != std::process::id() {
+        return false;
     }
+    let write = |parts: &[&str]| {
+        for part in parts {
+            // SAFETY: pointer and length are those of the text. There is nobody left to tell of a
+            // failure.
+            unsafe { libc::write(2, part.as_ptr().cast(), part.len() as _) };
+        }
+    };
+    let called = with_called(|log| write(&["error: ", &log.component]));
+    if let (Some(()), Some((_, call))) = (called, CURRENT.get()) {
+        write(&[" ended this process in ", call, " (", what, ")"]);
+    } else {
+        let mut names = loaded().map(|fmu| fmu.name.as_str());
+        let Some(newest) = names.next() else { return false };
+        write(&["error: this process ended outside the calls of instances (", what, ")"]);
+        write(&[", perhaps by a thread of an FMU that was loaded: ", newest]);
+        names.for_each(|name| write(&[", ", name]));
+    }
+    write(&["; with --isolate the run would end in order and keep its results\n"]);
     true
 }

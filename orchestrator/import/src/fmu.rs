@@ -2,6 +2,7 @@
 //! tables are opened like archives.
 
 use crate::archive;
+use crate::crash;
 use crate::description::ModelDescription;
 use crate::error::{Error, with_causes};
 use crate::faults;
@@ -87,7 +88,7 @@ impl Fmu {
         if let (Content::Archive(archive), Some(_)) =
             (&self.content, &self.description.co_simulation)
         {
-            match self.version_fault(archive) {
+            match self.try_instance(archive) {
                 Ok(fault) => faults.extend(fault),
                 Err(fault) => faults.push(fault),
             }
@@ -154,58 +155,62 @@ impl Fmu {
         name: &str,
         isolation: Option<&Isolation>,
     ) -> Result<Box<dyn Instance>, Error> {
-        let refuse = |message: String| Error::Fmu { path: self.path.clone(), message };
         let archive = match &self.content {
             Content::Archive(archive) => archive,
             Content::LookupTable(table) => {
                 return Ok(Box::new(LookupTableInstance::new(table.clone())));
             }
         };
-        let (file, entry) = self.library(archive).map_err(refuse)?;
-        let resources = Url::from_directory_path(archive.folder.path().join("resources"))
-            .map_err(|()| refuse("the temporary folder has no absolute path".into()))?;
-        let guid = &self.description.guid;
-        let (instance, fault) = if let Some(isolation) = isolation {
-            let library = Library { file, folder: archive.folder.path(), isolation };
-            match library.instantiate(name, guid, resources.as_str()) {
-                Loaded::Whole(instance, fault) => (instance, fault),
-                Loaded::Unloadable(reason) => {
-                    return Err(refuse(archive.not_loaded(&entry, &reason)));
-                }
-                Loaded::Refused(reason) => return Err(refuse(reason)),
-            }
-        } else {
-            let functions = Functions::load(&file)
-                .map_err(|error| refuse(archive.not_loaded(&entry, &with_causes(&error))))?;
-            let fault = functions.version_fault();
-            let (log, folder) = (Rc::new(Log::new(name)), Some(Rc::clone(&archive.folder)));
-            let instance = FmuInstance::new(functions, log, guid, resources.as_str(), folder)
-                .map_err(|reason| refuse(format!("the component \"{name}\" {reason}")))?;
-            (Box::new(instance) as Box<dyn Instance>, fault)
-        };
+        let of_component = format!("the component \"{name}\"");
+        let (instance, fault) = self
+            .made(archive, name, &of_component, isolation)
+            .map_err(|message| Error::Fmu { path: self.path.clone(), message })?;
         if let Some(fault) = fault {
             warnings::warn_once(format!("{}: {fault}", self.path.display()));
         }
         Ok(instance)
     }
 
-    /// Loads the library in a process of its own where that is possible, and returns what is wrong
-    /// with the version of FMI that it names.
-    fn version_fault(&self, archive: &Archive) -> Result<Option<String>, String> {
-        let (file, entry) = self.library(archive)?;
-        if !isolation::is_enabled() {
-            let functions = Functions::load(&file)
-                .map_err(|error| archive.not_loaded(&entry, &with_causes(&error)))?;
-            return Ok(functions.version_fault());
-        }
-        let isolation = Isolation::default();
+    /// Makes an instance, in a process of its own where that is possible, and frees it. Returns what
+    /// is wrong with the version of FMI that the library names.
+    fn try_instance(&self, archive: &Archive) -> Result<Option<String>, String> {
+        let isolation = isolation::is_enabled().then(Isolation::default);
         let name = self.path.file_name().unwrap_or_default().to_string_lossy();
-        match (Library { file, folder: archive.folder.path(), isolation: &isolation }).check(&name)
-        {
-            Loaded::Whole((), fault) => Ok(fault),
-            Loaded::Unloadable(reason) => Err(archive.not_loaded(&entry, &reason)),
-            Loaded::Refused(reason) => Err(format!("{entry}: {reason}")),
+        let (instance, fault) = self.made(archive, &name, "its instance", isolation.as_ref())?;
+        drop(instance);
+        let failure = isolation::late_failures().into_iter().next();
+        failure.map_or(Ok(fault), Err)
+    }
+
+    /// Makes an instance, which a refusal calls `title`. Returns it with what is wrong with the
+    /// version of FMI that the library names.
+    fn made(
+        &self,
+        archive: &Archive,
+        name: &str,
+        title: &str,
+        isolation: Option<&Isolation>,
+    ) -> Result<(Box<dyn Instance>, Option<String>), String> {
+        let (file, entry) = self.library(archive)?;
+        let resources = Url::from_directory_path(archive.folder.path().join("resources"))
+            .map_err(|()| "the temporary folder has no absolute path")?;
+        let guid = &self.description.guid;
+        if let Some(isolation) = isolation {
+            let library = Library { file, folder: archive.folder.path(), isolation };
+            return match library.instantiate(name, guid, resources.as_str()) {
+                Loaded::Whole(instance, fault) => Ok((instance, fault)),
+                Loaded::Unloadable(reason) => Err(archive.not_loaded(&entry, &reason)),
+                Loaded::Refused(reason) => Err(format!("{title} {reason}")),
+            };
         }
+        crash::is_loaded(&self.path);
+        let functions = Functions::load(&file)
+            .map_err(|error| archive.not_loaded(&entry, &with_causes(&error)))?;
+        let fault = functions.version_fault();
+        let (log, folder) = (Rc::new(Log::new(name)), Some(Rc::clone(&archive.folder)));
+        let instance = FmuInstance::new(functions, log, guid, resources.as_str(), folder)
+            .map_err(|reason| format!("{title} {reason}"))?;
+        Ok((Box::new(instance), fault))
     }
 }
 

@@ -15,6 +15,7 @@ pub mod instance;
 pub mod isolation;
 mod library;
 mod log;
+mod logs;
 pub mod lookup_table;
 pub mod names;
 pub mod quantity;

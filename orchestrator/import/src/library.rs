@@ -12,6 +12,7 @@ use crate::fmi::{self, Status};
 use crate::folder::TemporaryFolder;
 use crate::instance::{CallFailure, Instance, Outcome};
 use crate::log::Log;
+use crate::logs::{self, Listed};
 use libloading::Library;
 use std::ffi::{CStr, CString, c_int, c_void};
 use std::path::Path;
@@ -115,17 +116,17 @@ unsafe extern "C" fn receive_message(
     category: fmi::Text,
     message: fmi::Text,
 ) {
-    // SAFETY: the environment is the `Log` passed with the callbacks, which lives as long as the
-    // instance.
-    if let Some(log) = unsafe { environment.cast::<Log>().as_ref() } {
-        log.message(fmi::status(status), &text_of(category), &text_of(message));
-    }
+    let receive =
+        || logs::receive(environment, fmi::status(status), &text_of(category), &text_of(message));
+    // A panic must not reach the instance. It has been reported on standard error.
+    let _ = std::panic::catch_unwind(receive);
 }
 
 /// The data that must live as long as an instance.
 struct InstanceData {
     functions: Functions,
     _callbacks: Rc<fmi::Callbacks>,
+    _listed: Listed,
     log: Rc<Log>,
 }
 
@@ -165,8 +166,9 @@ impl FmuInstance {
         // only replaces the logger in it by one that expands the arguments.
         unsafe { add_logger_proxy(&raw mut callbacks) };
         let callbacks = Rc::new(callbacks);
+        let listed = Listed::new(&log);
 
-        let calling = Calling::new(&log.component, "instantiate");
+        let calling = Calling::new(&log, "instantiate");
         // SAFETY: FMI 2.0 gives the function this type; the texts outlive the call, and the
         // instance keeps callbacks and log alive as long as the instance, as FMI demands.
         let handle = unsafe {
@@ -187,7 +189,7 @@ impl FmuInstance {
             return Err(format!("could not be instantiated: {message}"));
         }
         log.is_instantiated();
-        let data = Rc::new(InstanceData { functions, _callbacks: callbacks, log });
+        let data = Rc::new(InstanceData { functions, _callbacks: callbacks, _listed: listed, log });
         Ok(Self { handle, data, fatal: false, _folder: folder })
     }
 
@@ -198,7 +200,7 @@ impl FmuInstance {
         call: &'static str,
         function: impl FnOnce(&Functions, fmi::Handle) -> c_int,
     ) -> Outcome {
-        let calling = Calling::new(&self.data.log.component, call);
+        let calling = Calling::new(&self.data.log, call);
         let status = function(&self.data.functions, self.handle);
         drop(calling);
         match fmi::status(status) {
@@ -233,7 +235,7 @@ impl FmuInstance {
     fn discarded(&mut self, message: Option<String>) -> CallFailure {
         let Functions { get_real_status, get_boolean_status, .. } = self.data.functions;
         let (mut time, mut terminated) = (f64::NAN, fmi::FALSE);
-        let calling = Calling::new(&self.data.log.component, "getStatus");
+        let calling = Calling::new(&self.data.log, "getStatus");
         // SAFETY: the instance is alive, both pointers are valid for the calls, and FMI allows
         // these calls after fmi2Discard.
         let statuses = unsafe {
@@ -266,7 +268,7 @@ impl Drop for FmuInstance {
             // so the instance is leaked.
             std::mem::forget(Rc::clone(&self.data));
         } else {
-            let _calling = Calling::new(&self.data.log.component, "freeInstance");
+            let _calling = Calling::new(&self.data.log, "freeInstance");
             // SAFETY: the instance is alive, is freed only here, and is not used afterwards.
             unsafe { (self.data.functions.free_instance)(self.handle) };
         }

@@ -4,10 +4,14 @@
 use cosim::error::Error;
 use std::fs::{self, File, TryLockError};
 use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
 
 /// Names of the files that a run may write.
 pub const RESULTS: [&str; 6] =
     ["results.csv", "results.parquet", "results.json", "metrics.json", "plot.svg", "realtime.svg"];
+
+/// Time for which a folder that is taken is waited for.
+const PATIENCE: Duration = Duration::from_millis(300);
 
 /// A folder that belongs to this process as long as this value lives.
 pub struct Folder {
@@ -44,15 +48,24 @@ impl Folder {
     pub fn take(path: &Path) -> Result<Self, Error> {
         fs::create_dir_all(path).map_err(Error::file(path))?;
         let lock = open(path).map_err(Error::file(path))?;
-        match lock.try_lock() {
-            // Some network drives have no locks; the folder is used without one then.
-            Ok(()) | Err(TryLockError::Error(_)) => {
-                Ok(Self { path: path.to_path_buf(), _lock: lock })
+        let begin = Instant::now();
+        loop {
+            match lock.try_lock() {
+                // Some network drives have no locks; the folder is used without one then.
+                Ok(()) | Err(TryLockError::Error(_)) => {
+                    return Ok(Self { path: path.to_path_buf(), _lock: lock });
+                }
+                // A process that was killed while it was starting another one holds it for a moment.
+                Err(TryLockError::WouldBlock) if begin.elapsed() < PATIENCE => {
+                    std::thread::sleep(Duration::from_millis(10));
+                }
+                Err(TryLockError::WouldBlock) => {
+                    return Err(Error::experiment(format!(
+                        "another process is writing its results to {}: wait for it, or take another folder by --out",
+                        path.display()
+                    )));
+                }
             }
-            Err(TryLockError::WouldBlock) => Err(Error::experiment(format!(
-                "another process is writing its results to {}: wait for it, or take another folder by --out",
-                path.display()
-            ))),
         }
     }
 

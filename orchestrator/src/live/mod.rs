@@ -14,6 +14,7 @@ use cosim::interrupt::{Interrupt, Request};
 use cosim::master::{Observer, Sample};
 use cosim::pacing::pacer::Tally;
 use cosim_report::guarantee::GuaranteeRecord;
+use fmu_import::crash;
 use ratatui::DefaultTerminal;
 use ratatui::crossterm::event::{self, Event, KeyCode, KeyEvent, KeyEventKind, KeyModifiers};
 use scene::{Scene, Snapshot};
@@ -141,6 +142,7 @@ fn show(
                 // The user asked a second time, because an instance does not return from a call.
                 ratatui::restore();
                 log::release();
+                crash::unwatch();
                 process::exit(130);
             }
             interrupt.ask(request);

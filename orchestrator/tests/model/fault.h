@@ -1,4 +1,5 @@
 /* Harm that a model does in the place PLACE, in the way HOW. */
+#include <pthread.h>
 #include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -10,7 +11,7 @@
 #include <unistd.h>
 
 enum { NOWHERE, LOAD, INSTANTIATE, INITIALIZE, GET, STEP, FREE, UNLOAD };
-enum { EXIT, QUICK_EXIT, ABORT, SEGFAULT, DIVISION, ENDLESS, OVERWRITE, MEMORY, FLOOD, CHILDREN, SHARED };
+enum { EXIT, QUICK_EXIT, ABORT, SEGFAULT, DIVISION, ENDLESS, OVERWRITE, MEMORY, FLOOD, CHILDREN, SHARED, THREAD_EXIT, THREAD_SEGFAULT, LOGS };
 
 #ifndef PLACE
 #define PLACE NOWHERE
@@ -20,6 +21,19 @@ enum { EXIT, QUICK_EXIT, ABORT, SEGFAULT, DIVISION, ENDLESS, OVERWRITE, MEMORY, 
 #endif
 
 typedef void (*Logger)(void *, const char *, int, const char *, const char *, ...);
+
+static void *exits(void *none) { exit(none != NULL); }
+static void *crashes(void *none) { *(volatile int *)16 = 1; return none; }
+static void in_thread(void *(*function)(void *)) {
+    pthread_t thread;
+    pthread_create(&thread, NULL, function, NULL);
+    pthread_join(thread, NULL);
+}
+static Logger thread_logger;
+static void *logs(void *none) {
+    thread_logger((void *)2, "model", 1, "odd", "from a thread");
+    return none;
+}
 
 static void fault(int place, Logger logger, void *environment) {
     if (place != PLACE) return;
@@ -50,6 +64,19 @@ static void fault(int place, Logger logger, void *environment) {
         /* Memory that several processes may share is not counted by the limit of one. */
         memset(mmap(NULL, 1 << 28, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0), 1, 1 << 28);
         for (;;) pause();
+    case THREAD_EXIT: in_thread(exits); break;
+    case THREAD_SEGFAULT: in_thread(crashes); break;
+    /* Some FMUs hand back no pointer to the environment, or their own. */
+    case LOGS: {
+        static int own;
+        if (!logger) break;
+        thread_logger = logger;
+        logger((void *)2, "model", 1, "odd", "two");
+        logger(NULL, "model", 1, "odd", "nothing");
+        logger(&own, "model", 1, "odd", "its own");
+        in_thread(logs);
+        break;
+    }
     case CHILDREN:
         for (int i = 0; i < 20; i++)
             if (fork() == 0)

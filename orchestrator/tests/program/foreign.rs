@@ -291,3 +291,12 @@ fn what_an_fmu_says_moves_no_cursor() {
         assert!(!(out + &errors).contains(['\u{1b}', '\u{9b}']));
     }
 }
+
+#[test]
+fn a_check_makes_an_instance() {
+    let other = |text: String| text.replace("{u-1}", "{u-2}");
+    let bench = Bench::made(LOOP, &Recipe { description: &other, ..Recipe::default() });
+    let (code, text, errors) = bench.call(&["inspect", "--check", "Model.fmu"]);
+    let says = "its instance could not be instantiated: it has another GUID than {u-2}";
+    assert!(code == 1 && text.contains(says), "{text}{errors}");
+}

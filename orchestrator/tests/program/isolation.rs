@@ -122,6 +122,7 @@ fn harm_after_a_run_keeps_the_results_but_is_no_success() {
 fn harm_in_the_same_process_names_the_component_and_the_call() {
     for (how, what) in [
         ("EXIT", "exit"),
+        ("QUICK_EXIT", "_exit"),
         ("ABORT", "SIGABRT"),
         ("SEGFAULT", "SIGSEGV"),
         ("DIVISION", "SIGFPE"),
@@ -139,8 +140,38 @@ fn harm_in_the_same_process_names_the_component_and_the_call() {
             let says = format!("{component} ended this process in {call} ({what})");
             assert!(errors.contains(&says), "{place} {how}: {errors}");
             // A process that a signal has killed has no exit code.
-            assert_eq!(output.status.code(), (how == "EXIT").then_some(1), "{place} {how}");
+            assert_eq!(output.status.code(), how.ends_with("EXIT").then_some(1), "{place} {how}");
         }
+    }
+}
+
+#[test]
+fn harm_by_a_thread_of_an_fmu_names_the_fmus_that_were_loaded() {
+    for (how, what, code) in
+        [("THREAD_EXIT", "exit", Some(1)), ("THREAD_SEGFAULT", "SIGSEGV", None)]
+    {
+        let bench = harmful("STEP", how);
+        let mut command = bench.command(&["run", "loop.toml", "--quiet", "--isolate=false"]);
+        let output = command.output().unwrap();
+        let errors = String::from_utf8(output.stderr).unwrap();
+        let says = format!("({what}), perhaps by a thread of an FMU that was loaded: ");
+        assert!(errors.contains(&says) && errors.contains("Model.fmu"), "{how}: {errors}");
+        assert_eq!(output.status.code(), code, "{how}: {errors}");
+    }
+}
+
+#[test]
+fn messages_with_any_pointer_reach_the_component_that_is_called() {
+    let bench = harmful("STEP", "LOGS");
+    for isolate in ["--isolate", "--isolate=false"] {
+        let (code, errors) = run(&bench, &[isolate]);
+        assert_eq!(code, 0, "{isolate}: {errors}");
+        for text in ["two", "nothing", "its own"] {
+            assert!(errors.contains(&format!("gain: [odd] {text}")), "{isolate}: {errors}");
+        }
+        // In a process of its own there is one instance; here there are two.
+        let name = if isolate == "--isolate" { "gain" } else { "an FMU" };
+        assert!(errors.contains(&format!("{name}: [odd] from a thread")), "{isolate}: {errors}");
     }
 }
 

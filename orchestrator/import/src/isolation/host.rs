@@ -46,12 +46,7 @@ pub fn serve(arguments: impl Iterator<Item = OsString>) -> io::Result<()> {
         Err(error) => return host.send(&Ready::Unloadable(with_causes(&error))),
     };
     let version_fault = functions.version_fault();
-    let Some(InstanceArguments { name, guid, resources }) = setup.instance else {
-        host.send(&Ready::Loaded { version_fault, without, messages: Vec::new() })?;
-        host.receive::<Request>()?;
-        drop(functions);
-        return host.send(&Reply::default());
-    };
+    let InstanceArguments { name, guid, resources } = setup.instance;
     let mut instance =
         match FmuInstance::new(functions, Rc::new(log(&name)), &guid, &resources, None) {
             Ok(instance) => instance,

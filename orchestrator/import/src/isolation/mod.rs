@@ -85,26 +85,16 @@ impl Library<'_> {
     ) -> Loaded<Box<dyn Instance>> {
         let (guid, resources) = (guid.into(), resources.into());
         let instance = InstanceArguments { name: name.into(), guid, resources };
-        let refused = |reason: &str| Loaded::Refused(format!("the component \"{name}\" {reason}"));
-        match self.load(name, Some(instance)) {
+        match self.load(name, instance) {
             Loaded::Whole(process, fault) => {
                 Loaded::Whole(Box::new(RemoteInstance::new(process)), fault)
             }
-            Loaded::Unloadable(reason) => Loaded::Unloadable(reason),
-            Loaded::Refused(reason) => refused(&reason),
-        }
-    }
-
-    /// Loads the library in a process of its own, and ends it.
-    pub(crate) fn check(self, name: &str) -> Loaded<()> {
-        match self.load(name, None) {
-            Loaded::Whole(_, fault) => Loaded::Whole((), fault),
             Loaded::Unloadable(reason) => Loaded::Unloadable(reason),
             Loaded::Refused(reason) => Loaded::Refused(reason),
         }
     }
 
-    fn load(self, name: &str, instance: Option<InstanceArguments>) -> Loaded<Process> {
+    fn load(self, name: &str, instance: InstanceArguments) -> Loaded<Process> {
         let Some(program) = PROGRAM.get() else {
             return Loaded::Refused(
                 "has no process of its own, because this program cannot start any".into(),

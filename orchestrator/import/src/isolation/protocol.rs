@@ -11,8 +11,7 @@ use std::path::PathBuf;
 pub(super) struct Setup {
     /// The instance's library.
     pub(super) library: PathBuf,
-    /// Arguments of the instance; `None` if the library is only loaded to see whether it can be.
-    pub(super) instance: Option<InstanceArguments>,
+    pub(super) instance: InstanceArguments,
     pub(super) limits: Limits,
 }
 
