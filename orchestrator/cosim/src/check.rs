@@ -41,7 +41,7 @@ pub fn check(
         };
         opened.insert(path, Rc::clone(&fmu));
         let component = &experiment.components[&name];
-        let is_isolated = experiment.isolation.isolates(component, &fmu);
+        let is_isolated = experiment.isolation.isolates(component, &fmu, fmu_dirs);
         let (every, settings) = (component.every, Vec::new());
         components.push(CheckedComponent { name, fmu, every, is_isolated, settings });
     }

@@ -51,6 +51,19 @@ pub fn fmu_folders() -> Vec<PathBuf> {
     existing(folders)
 }
 
+/// Returns whether an archive lies in one of these folders, or in one that belongs to this program:
+/// beside it, or named by the environment variable. Whoever can write there can also replace the
+/// program, or be trusted by the user.
+pub fn is_installed(archive: &Path, folders: &[PathBuf]) -> bool {
+    let canonical = |path: &Path| fs::canonicalize(path).ok();
+    let Some(folder) = canonical(archive).and_then(|path| path.parent().map(Path::to_path_buf))
+    else {
+        return false;
+    };
+    let own = by_variable().into_iter().chain(beside_program(&["fmu", "../fmu"]));
+    own.chain(folders.iter().cloned()).any(|other| canonical(&other).as_ref() == Some(&folder))
+}
+
 /// Lists the files with this extension below a folder. Hidden folders and build folders are
 /// skipped.
 pub fn files(folder: &Path, extension: &str) -> Vec<PathBuf> {

@@ -101,8 +101,7 @@ impl Fmu {
         self.description.is_lookup_table
     }
 
-    /// Returns whether this project's fmu-pack made the FMU, so that it is trusted in the process
-    /// of the program.
+    /// Returns whether this project's fmu-pack made the FMU, as it says.
     pub fn is_made_by_fmu_pack(&self) -> bool {
         self.description.generation_tool.starts_with("fmu-pack ")
     }

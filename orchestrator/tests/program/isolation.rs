@@ -254,6 +254,21 @@ fn a_component_says_for_itself_whether_it_is_isolated() {
 }
 
 #[test]
+fn what_an_archive_says_of_its_origin_is_not_trusted() {
+    let ours = |text: String| text.replace("generationTool=\"", "generationTool=\"fmu-pack ");
+    let flags = ["-DPLACE=STEP", "-DHOW=ABORT", "-w"];
+    let recipe = Recipe { flags: &flags, description: &ours, ..Recipe::default() };
+    let bench = Bench::made(LOOP, &recipe);
+    let (code, errors) = run(&bench, &[]);
+    assert!(code == 1 && errors.contains("its process was killed by signal 6"), "{errors}");
+    // Whoever names the folder trusts what lies in it.
+    let mut command = bench.command(&["run", "loop.toml", "--force", "--quiet", "--fmu-dir", "."]);
+    let output = command.output().unwrap();
+    let errors = String::from_utf8(output.stderr).unwrap();
+    assert!(errors.contains("gain ended this process in doStep (SIGABRT)"), "{errors}");
+}
+
+#[test]
 fn instances_that_may_be_in_a_process_only_once_have_processes_of_their_own() {
     let only_once = |text: String| {
         text.replace("<CoSimulation", "<CoSimulation canBeInstantiatedOnlyOncePerProcess=\"true\"")

@@ -1,10 +1,12 @@
 //! Protects an experiment from instances that crash, never answer, or take all memory.
 
 use super::Component;
+use crate::search;
 use fmu_import::fmu::Fmu;
 use fmu_import::isolation::{self, Isolation};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use std::path::PathBuf;
 use std::time::Duration;
 
 /// Processes of instances and their limits. Keys that are left out keep their defaults.
@@ -12,8 +14,8 @@ use std::time::Duration;
 #[serde(deny_unknown_fields)]
 pub struct Protection {
     /// Run every instance in a process of its own (true), or all of them in this process (false).
-    /// By default the instances of FMUs that this project's fmu-pack did not make get processes of
-    /// their own.
+    /// By default the instances of this project's FMUs that lie beside the program, or in a folder
+    /// that the command line names, share its process.
     pub isolate: Option<bool>,
     /// Time within which an instance in a process of its own must answer each call, s [default:
     /// 60].
@@ -52,15 +54,21 @@ impl Protection {
         }
     }
 
-    /// Returns whether a component gets a process of its own.
-    pub fn isolates(&self, component: &Component, fmu: &Fmu) -> bool {
+    /// Returns whether a component gets a process of its own. By default FMUs share the process of
+    /// the program if this project's fmu-pack made them, as they say, and if they lie in a folder of
+    /// the program or in one of `fmu_dirs`, which the command line names: what an archive says
+    /// proves nothing, and others do not write there.
+    pub fn isolates(&self, component: &Component, fmu: &Fmu, fmu_dirs: &[PathBuf]) -> bool {
         if fmu.is_lookup_table() {
             return false;
         }
         let asked = component.isolate.or(self.isolate);
         // A sandbox is a process of its own. Where there can be none, the instance is refused.
         self.sandbox == Some(true)
-            || isolation::is_enabled() && asked.unwrap_or_else(|| !fmu.is_made_by_fmu_pack())
+            || isolation::is_enabled()
+                && asked.unwrap_or_else(|| {
+                    !(fmu.is_made_by_fmu_pack() && search::is_installed(&fmu.path, fmu_dirs))
+                })
     }
 
     /// Returns the limits that the process of an instance gets.

@@ -83,6 +83,8 @@ pub(super) struct Columnar {
     values: Vec<Values>,
     places: Vec<usize>,
     rows: usize,
+    /// Whether a group could not be written, which has been reported.
+    is_broken: bool,
 }
 
 impl Columnar {
@@ -107,7 +109,8 @@ impl Columnar {
         let writer = schema(names.zip(&values))
             .and_then(|schema| SerializedFileWriter::new(file, schema, Arc::new(properties)))
             .map_err(failed(path))?;
-        Ok(Self { path: path.to_path_buf(), writer, values, places, rows: 0 })
+        let (path, rows, is_broken) = (path.to_path_buf(), 0, false);
+        Ok(Self { path, writer, values, places, rows, is_broken })
     }
 
     pub(super) fn row(&mut self, time: f64, values: &[f64]) -> Result<(), Error> {
@@ -131,10 +134,16 @@ impl Columnar {
             }
             group.close()
         };
-        write().map(drop).map_err(failed(&self.path))
+        let outcome = write();
+        self.is_broken = outcome.is_err();
+        outcome.map(drop).map_err(failed(&self.path))
     }
 
     pub(super) fn finish(&mut self) -> Result<(), Error> {
+        // The group that could not be written stays open, and the file cannot be completed.
+        if self.is_broken {
+            return Ok(());
+        }
         if self.rows > 0 {
             self.write()?;
         }

@@ -106,3 +106,20 @@ fn columnar_takes_more_rows_than_it_holds() {
         .sum();
     assert_eq!(sum, -((count * (count - 1)) as f64) / 2.0);
 }
+
+#[test]
+#[cfg(target_os = "linux")]
+fn a_full_disk_is_told_as_such() {
+    let folder = tempfile::tempdir().unwrap();
+    for (format, name) in [(Format::Csv, "a.csv"), (Format::Parquet, "a.parquet")] {
+        let path = folder.path().join(name);
+        std::os::unix::fs::symlink("/dev/full", &path).unwrap();
+        let mut recorder =
+            Recorder::create(&path, format, &[column("a.x", 0, Carrier::Real)], 1, false).unwrap();
+        let row = |tick: u64| Sample { tick, time: tick as f64, last: false, values: &[0.1; 4] };
+        let outcome = (0..100_000).try_for_each(|tick| recorder.observe(&row(tick)));
+        let told = outcome.and_then(|()| recorder.finish()).unwrap_err().to_string();
+        assert!(told.contains("No space left on device"), "{told}");
+        assert!(recorder.finish().is_ok(), "{name}");
+    }
+}
