@@ -54,7 +54,8 @@ enum Command {
     /// Run an experiment and write results.csv, results.json, metrics.json and plot.svg.
     ///
     /// With --real-time the run keeps in step with the wall clock; the summary, metrics.json and
-    /// realtime.svg show how well it did. Ctrl-C, SIGTERM and SIGHUP end a run and keep its results.
+    /// realtime.svg show how well it did. Ctrl-C, SIGTERM and SIGHUP end a run and keep its
+    /// results.
     Run {
         /// Experiment to run: a file, an SSP archive, or the name of an experiment that `list`
         /// shows.

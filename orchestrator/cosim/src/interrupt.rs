@@ -69,9 +69,9 @@ fn ignores_hangup() -> bool {
 }
 
 impl Interrupt {
-    /// Treats SIGINT, SIGTERM and, under Linux, SIGHUP as requests from now on. A second signal ends
-    /// the process at once. SIGHUP, which comes when a connection drops, stays ignored if it is, as
-    /// `nohup` asks.
+    /// Treats SIGINT, SIGTERM and, under Linux, SIGHUP as requests from now on. A second signal
+    /// ends the process at once. SIGHUP, which comes when a connection drops, stays ignored if it
+    /// is, as `nohup` asks.
     ///
     /// # Errors
     /// Returns an error if the system does not accept the signal handlers.

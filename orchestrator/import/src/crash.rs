@@ -44,8 +44,8 @@ pub(crate) fn with_called<T>(function: impl FnOnce(&Log) -> T) -> Option<T> {
 }
 
 /// Names of the FMUs whose libraries were loaded into this process, newest first. A library that
-/// is unloaded may leave threads behind, so that no name is ever removed. A signal handler reads the
-/// list, which therefore needs no lock.
+/// is unloaded may leave threads behind, so that no name is ever removed. A signal handler reads
+/// the list, which therefore needs no lock.
 static LOADED: AtomicPtr<Loaded> = AtomicPtr::new(std::ptr::null_mut());
 
 struct Loaded {
@@ -91,8 +91,8 @@ pub fn unwatch() {
 }
 
 /// Watches from now on for signals that end this process, and for calls of `exit`; under Linux with
-/// the GNU C library also for those of `_exit`, `_Exit` and `quick_exit`. One line on standard error
-/// names the instance that was being called, or the FMUs that were loaded. An exit is then a
+/// the GNU C library also for those of `_exit`, `_Exit` and `quick_exit`. One line on standard
+/// error names the instance that was being called, or the FMUs that were loaded. An exit is then a
 /// failure, with code 1.
 pub fn watch() -> Watch {
     WATCHED.store(std::process::id(), Ordering::SeqCst);

@@ -170,8 +170,8 @@ impl Fmu {
         Ok(instance)
     }
 
-    /// Makes an instance, in a process of its own where that is possible, and frees it. Returns what
-    /// is wrong with the version of FMI that the library names.
+    /// Makes an instance, in a process of its own where that is possible, and frees it. Returns
+    /// what is wrong with the version of FMI that the library names.
     fn try_instance(&self, archive: &Archive) -> Result<Option<String>, String> {
         let isolation = isolation::is_enabled().then(Isolation::default);
         let name = self.path.file_name().unwrap_or_default().to_string_lossy();

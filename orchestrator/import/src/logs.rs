@@ -1,5 +1,5 @@
-//! Finds the log that a message belongs to. FMI lets an FMU hand back the pointer to the environment
-//! that it was given, but some hand back another one, which must not be followed.
+//! Finds the log that a message belongs to. FMI lets an FMU hand back the pointer to the
+//! environment that it was given, but some hand back another one, which must not be followed.
 
 #![allow(unsafe_code)]
 

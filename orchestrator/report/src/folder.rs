@@ -55,7 +55,8 @@ impl Folder {
                 Ok(()) | Err(TryLockError::Error(_)) => {
                     return Ok(Self { path: path.to_path_buf(), _lock: lock });
                 }
-                // A process that was killed while it was starting another one holds it for a moment.
+                // A process that was killed while it was starting another one holds it for a
+                // moment.
                 Err(TryLockError::WouldBlock) if begin.elapsed() < PATIENCE => {
                     std::thread::sleep(Duration::from_millis(10));
                 }

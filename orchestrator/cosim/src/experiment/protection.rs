@@ -55,8 +55,8 @@ impl Protection {
     }
 
     /// Returns whether a component gets a process of its own. By default FMUs share the process of
-    /// the program if this project's fmu-pack made them, as they say, and if they lie in a folder of
-    /// the program or in one of `fmu_dirs`, which the command line names: what an archive says
+    /// the program if this project's fmu-pack made them, as they say, and if they lie in a folder
+    /// of the program or in one of `fmu_dirs`, which the command line names: what an archive says
     /// proves nothing, and others do not write there.
     pub fn isolates(&self, component: &Component, fmu: &Fmu, fmu_dirs: &[PathBuf]) -> bool {
         if fmu.is_lookup_table() {

@@ -18,10 +18,10 @@ mod unix {
     use std::process::Stdio;
 
     /// The memory, as long as the process has not opened it.
-    pub(in super::super) struct Memory(File);
+    pub(crate) struct Memory(File);
 
     impl Memory {
-        pub(in super::super) fn new() -> io::Result<(Self, Channel)> {
+        pub(crate) fn new() -> io::Result<(Self, Channel)> {
             let file = file()?;
             let channel = Channel::create(&file)?;
             seal(&file)?;
@@ -29,16 +29,14 @@ mod unix {
         }
 
         /// Lets the process of a command inherit the memory.
-        pub(in super::super) fn pass(&self, command: &mut Command) -> io::Result<()> {
+        pub(crate) fn pass(&self, command: &mut Command) -> io::Result<()> {
             command.stdout(Stdio::from(self.0.try_clone()?));
             Ok(())
         }
     }
 
     /// Opens the memory that this process has inherited.
-    pub(in super::super) fn inherited(
-        _arguments: impl Iterator<Item = OsString>,
-    ) -> io::Result<Channel> {
+    pub(crate) fn inherited(_arguments: impl Iterator<Item = OsString>) -> io::Result<Channel> {
         let file = File::from(rustix::stdio::stdout().try_clone_to_owned()?);
         let channel = Channel::open(&file)?;
         rustix::stdio::dup2_stdout(rustix::stdio::stderr().as_fd())?;
@@ -81,26 +79,24 @@ mod named {
     use tempfile::NamedTempFile;
 
     /// The memory, which is a file whose path is an argument of the process.
-    pub(in super::super) struct Memory(NamedTempFile);
+    pub(crate) struct Memory(NamedTempFile);
 
     impl Memory {
-        pub(in super::super) fn new() -> io::Result<(Self, Channel)> {
+        pub(crate) fn new() -> io::Result<(Self, Channel)> {
             let file = NamedTempFile::with_prefix(format!("fmu-{}-", std::process::id()))?;
             let channel = Channel::create(file.as_file())?;
             Ok((Self(file), channel))
         }
 
         /// Lets the process of a command find the memory.
-        pub(in super::super) fn pass(&self, command: &mut Command) -> io::Result<()> {
+        pub(crate) fn pass(&self, command: &mut Command) -> io::Result<()> {
             command.arg(self.0.path());
             Ok(())
         }
     }
 
     /// Opens the memory that the arguments name.
-    pub(in super::super) fn inherited(
-        mut arguments: impl Iterator<Item = OsString>,
-    ) -> io::Result<Channel> {
+    pub(crate) fn inherited(mut arguments: impl Iterator<Item = OsString>) -> io::Result<Channel> {
         let path = arguments.next().unwrap_or_default();
         let file = OpenOptions::new().read(true).write(true).open(path)?;
         // The file is closed, so that an instance does not find it open.

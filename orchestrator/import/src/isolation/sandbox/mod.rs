@@ -1,8 +1,8 @@
 //! Closes the process of an instance, under Linux, before it loads the library: it can read the
 //! system's libraries and its own folder, write in its own folder, and reach nothing else.
 //!
-//! Landlock guards the paths, a filter of system calls ([`calls`]) everything that has no path. What
-//! each version of the kernel holds is in SECURITY.md.
+//! Landlock guards the paths, a filter of system calls ([`calls`]) everything that has no path.
+//! What each version of the kernel holds is in SECURITY.md.
 
 mod calls;
 
