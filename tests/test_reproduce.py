@@ -11,6 +11,7 @@ import subprocess
 import time
 import tomllib
 
+import numpy as np
 import pytest
 import results as pages
 
@@ -505,6 +506,30 @@ def test_every_controller_flies_every_scenario(tmp_path):
     # In its own scenario the two-loop law leaves the smallest error.
     errors = {name: m["measures"]["rms-late"] for name, m in members.items() if re.match("jia-(?!alloc)", name)}
     assert min(errors, key=errors.get) == "jia-two-loop" and errors["jia-two-loop"] < 0.1
+
+
+def test_every_controller_turns_the_bank_angle(tmp_path):
+    results = reproduced("reversal", tmp_path)
+    assert len(results["runs"]) == 36
+    assert [claim["verdict"] for claim in results["claims"]] == [HOLDS, HOLDS, FAILS]
+    members = {name: run["members"][0] for name, run in results["runs"].items()}
+    # Nobody turns 120 deg faster than the rate allows without breaking its limit.
+    for name, member in members.items():
+        settling, rate = member["measures"]["settling"], member["metrics"]["max_rate_deg_s"]
+        assert name.startswith("shaped") or settling is None or settling > 24.0 - 2.0 / 5.0 or rate > 5.0, name
+    assert differences(tmp_path / "out") == []
+
+
+def test_oracle_the_shaped_reversal_is_the_integral_of_its_derivatives():
+    rows = np.genfromtxt(EXPERIMENTS.parent / "reversal" / "reversal.csv", delimiter=",", skip_header=1)
+    time, alpha, beta, sigma, rate, acceleration = rows.T
+    step = np.diff(time)
+    assert np.allclose(np.diff(sigma), step * (rate[1:] + rate[:-1]) / 2, atol=1e-6)
+    # The acceleration jumps where two rows have the same time.
+    assert np.allclose(np.diff(rate), step * (acceleration[1:] + acceleration[:-1]) / 2, atol=1e-6)
+    assert (sigma[0], sigma[-1], rate[0], rate[-1]) == (-60.0, 60.0, 0.0, 0.0)
+    assert rate.max() == 4.2 and abs(acceleration).max() == 1.0
+    assert (alpha == 35.0).all() and (beta == 0.0).all()
 
 
 @pytest.mark.parametrize(
