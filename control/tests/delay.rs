@@ -355,7 +355,7 @@ fn what_cannot_work_is_refused() {
     let old = Delayed::new(lqr(), body, FEEDBACK, latency, f64::INFINITY).map(|_| ());
     let Err(DesignError::Invalid(Invalid { name, .. })) = old else { panic!("{old:?}") };
     assert_eq!(name, "measurement.age");
-    assert!(Predictor::new(body, 0.9, 1e-4).is_ok() && Predictor::new(body, 0.9, 1e-5).is_err());
+    assert!(Predictor::new(body, 0.05, 1e-4).is_ok() && Predictor::new(body, 0.051, 1e-4).is_err());
     for limit in [0.0, -1.0, f64::NAN] {
         assert!(limited(lqr(), FEEDBACK, 0.1, limit).is_err(), "{limit}");
     }

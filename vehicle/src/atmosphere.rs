@@ -1,7 +1,7 @@
-//! US Standard Atmosphere 1976 from sea level to 86 km.
+//! US Standard Atmosphere 1976 from sea level to 120 km.
 
 use crate::error::Error;
-use crate::math::{exp, powf, powi};
+use crate::math::{exp, ln, powf, powi};
 use serde::{Deserialize, Serialize};
 use settings::Declared;
 
@@ -23,14 +23,28 @@ const LAYERS: [(f64, f64); 7] = [
     (71e3, -2e-3),
 ];
 
+/// Geometric altitude up to which the air is mixed and the temperature is linear in layers, m.
+const MIXED: f64 = 86e3;
+/// Above it: geometric altitude (m), pressure (Pa) and mean molar mass (kg/mol) of table 8 (part 4).
+const THIN: [(f64, f64, f64); 8] = [
+    (86e3, 0.373_38, 0.028_952_2),
+    (90e3, 0.183_59, 0.028_91),
+    (95e3, 7.5966e-2, 0.028_73),
+    (100e3, 3.2011e-2, 0.028_40),
+    (105e3, 1.4477e-2, 0.027_88),
+    (110e3, 7.1042e-3, 0.027_27),
+    (115e3, 4.0096e-3, 0.026_68),
+    (120e3, 2.5382e-3, 0.026_20),
+];
+
 /// Largest geometric altitude of the model, m.
-pub const TOP: f64 = 86e3;
+pub const TOP: f64 = 120e3;
 
 /// State of the air at one altitude.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Air {
-    /// Molecular-scale temperature, K: it equals the temperature up to 80 km and is 0.04 % above it
-    /// at 86 km.
+    /// Molecular-scale temperature, K: it equals the temperature up to 80 km, is 0.04 % above it at
+    /// 86 km and 11 % at 120 km, where the air is lighter.
     pub temperature: f64,
     /// Static pressure of the air, Pa.
     pub pressure: f64,
@@ -49,6 +63,14 @@ pub fn air(altitude: f64) -> Result<Air, Error> {
         let problem = format!("= {altitude} m must lie between 0 and {TOP} m");
         return Err(Error::parameter("flight.altitude", problem));
     }
+    let (temperature, pressure) = if altitude > MIXED { thin(altitude) } else { mixed(altitude) };
+    let specific = GAS_CONSTANT / MOLAR_MASS * temperature;
+    let density = pressure / specific;
+    Ok(Air { temperature, pressure, density, sound_speed: (HEAT_RATIO * specific).sqrt() })
+}
+
+/// Returns temperature (K) and pressure (Pa) up to [`MIXED`].
+fn mixed(altitude: f64) -> (f64, f64) {
     let height = EARTH_RADIUS * altitude / (EARTH_RADIUS + altitude); // geopotential
     let weight = GRAVITY * MOLAR_MASS / GAS_CONSTANT;
     let (mut temperature, mut pressure) = SEA_LEVEL;
@@ -64,9 +86,39 @@ pub fn air(altitude: f64) -> Result<Air, Error> {
         };
         temperature = above;
     }
-    let specific = GAS_CONSTANT / MOLAR_MASS * temperature;
-    let density = pressure / specific;
-    Ok(Air { temperature, pressure, density, sound_speed: (HEAT_RATIO * specific).sqrt() })
+    (temperature, pressure)
+}
+
+/// Returns molecular-scale temperature (K) and pressure (Pa) above [`MIXED`]. Between the altitudes
+/// of the table the logarithm of the pressure is the cubic that has the slope of hydrostatic
+/// equilibrium at both.
+fn thin(altitude: f64) -> (f64, f64) {
+    let next = THIN.partition_point(|(node, ..)| *node < altitude).clamp(1, THIN.len() - 1);
+    let [(from, low, m_low), (to, high, m_high)] = [THIN[next - 1], THIN[next]];
+    let (length, share) = (to - from, (altitude - from) / (to - from));
+    let slope = |node: f64, mass: f64| {
+        let gravity = GRAVITY * powi(EARTH_RADIUS / (EARTH_RADIUS + node), 2);
+        -gravity * mass / (GAS_CONSTANT * kinetic_temperature(node)) * length
+    };
+    let (begin, end) = (slope(from, m_low), slope(to, m_high));
+    let change = ln(high / low);
+    // Hermite's cubic from 0 to `change`.
+    let curve = share
+        * (begin
+            + share * (3.0 * change - 2.0 * begin - end + share * (begin + end - 2.0 * change)));
+    let mass = m_low + share * (m_high - m_low);
+    (kinetic_temperature(altitude) * MOLAR_MASS / mass, low * exp(curve))
+}
+
+/// Returns the kinetic temperature (K) above [`MIXED`], equations (25), (27) and (29).
+fn kinetic_temperature(altitude: f64) -> f64 {
+    if altitude <= 91e3 {
+        186.8673
+    } else if altitude <= 110e3 {
+        263.1905 - 76.3232 * (1.0 - powi((altitude - 91e3) / 19_942.9, 2)).sqrt()
+    } else {
+        240.0 + 12e-3 * (altitude - 110e3)
+    }
 }
 
 /// Flight condition of the vehicle: altitude and Mach number.
@@ -125,8 +177,8 @@ mod tests {
         }
         // The top of the last layer is at 86 km geometric, which is 84.852 km geopotential
         // altitude.
-        close(air(TOP).unwrap().pressure, 0.373_38, 2e-5);
-        close(air(TOP).unwrap().temperature, 186.946, 2e-6);
+        close(air(MIXED).unwrap().pressure, 0.373_38, 2e-5);
+        close(air(MIXED).unwrap().temperature, 186.946, 2e-6);
     }
 
     #[test]
@@ -144,6 +196,43 @@ mod tests {
             close(air.density, density, 3e-5);
         }
         close(air(0.0).unwrap().sound_speed, 340.294, 2e-6);
+    }
+
+    #[test]
+    fn oracle_tabulated_densities_above_86_km() {
+        for (altitude, density) in [
+            (90e3, 3.416e-6),
+            (95e3, 1.393e-6),
+            (100e3, 5.604e-7),
+            (105e3, 2.325e-7),
+            (110e3, 9.708e-8),
+            (115e3, 4.289e-8),
+            (120e3, 2.222e-8),
+        ] {
+            close(air(altitude).unwrap().density, density, 4e-4);
+        }
+    }
+
+    #[test]
+    fn oracle_above_86_km_the_air_carries_what_lies_above_it() {
+        // The pressure falls by the weight of the air in between, by Simpson's rule. The table itself
+        // departs from that by 1.1 % between 95 and 100 km, where its gases begin to separate.
+        for (from, to) in [(86e3, 92.5e3), (92.5e3, 101e3), (101e3, 113e3), (113e3, 120e3)] {
+            let weight = |z: f64| {
+                let gravity = GRAVITY * (EARTH_RADIUS / (EARTH_RADIUS + z)).powi(2);
+                air(z).unwrap().density * gravity
+            };
+            let steps = 200;
+            let h = (to - from) / f64::from(steps);
+            let at = |k: i32| weight(from + f64::from(k) * h);
+            let inner: f64 = (1..steps).map(|k| at(k) * if k % 2 == 1 { 4.0 } else { 2.0 }).sum();
+            let fallen = (at(0) + at(steps) + inner) * h / 3.0;
+            let pressure = |z: f64| air(z).unwrap().pressure;
+            close(pressure(from) - pressure(to), fallen, 1.2e-2);
+        }
+        let [below, above] = [MIXED, MIXED + 1e-6].map(|at| air(at).unwrap());
+        close(below.pressure, above.pressure, 2e-5);
+        close(below.temperature, above.temperature, 2e-6);
     }
 
     #[test]
@@ -165,7 +254,7 @@ mod tests {
             close(below.temperature, above.temperature, 1e-9);
         }
         let densities: Vec<f64> =
-            (0..=86).map(|km| air(f64::from(km) * 1e3).unwrap().density).collect();
+            (0..=120).map(|km| air(f64::from(km) * 1e3).unwrap().density).collect();
         assert!(densities.windows(2).all(|pair| pair[0] > pair[1]));
     }
 

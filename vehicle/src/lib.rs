@@ -4,6 +4,7 @@
 #![cfg_attr(not(test), deny(clippy::disallowed_methods))]
 
 pub mod actuators;
+pub mod aerodynamics;
 pub mod atmosphere;
 pub mod axes;
 pub mod calibration;
@@ -26,6 +27,7 @@ pub mod sensors;
 pub mod state;
 pub mod table;
 pub mod time;
+pub mod translation;
 pub mod transport;
 pub mod triad;
 pub mod turntable;
