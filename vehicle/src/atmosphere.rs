@@ -25,7 +25,7 @@ const LAYERS: [(f64, f64); 7] = [
 
 /// Geometric altitude up to which the air is mixed and the temperature is linear in layers, m.
 const MIXED: f64 = 86e3;
-/// Above it: geometric altitude (m), pressure (Pa) and mean molar mass (kg/mol) of table 8 (part 4).
+/// Above it: geometric altitude (m), pressure (Pa) and mean molar mass (kg/mol) of the main tables.
 const THIN: [(f64, f64, f64); 8] = [
     (86e3, 0.373_38, 0.028_952_2),
     (90e3, 0.183_59, 0.028_91),
@@ -215,8 +215,9 @@ mod tests {
 
     #[test]
     fn oracle_above_86_km_the_air_carries_what_lies_above_it() {
-        // The pressure falls by the weight of the air in between, by Simpson's rule. The table itself
-        // departs from that by 1.1 % between 95 and 100 km, where its gases begin to separate.
+        // The pressure falls by the weight of the air in between, by Simpson's rule. The table
+        // itself departs from that by 1.1 % between 95 and 100 km, where its gases begin to
+        // separate.
         for (from, to) in [(86e3, 92.5e3), (92.5e3, 101e3), (101e3, 113e3), (113e3, 120e3)] {
             let weight = |z: f64| {
                 let gravity = GRAVITY * (EARTH_RADIUS / (EARTH_RADIUS + z)).powi(2);

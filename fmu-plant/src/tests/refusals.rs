@@ -33,7 +33,7 @@ fn refusals_name_variables() {
             instance.parameters.actuation = Actuation::SurfacesAndJets;
             instance.parameters.aerodynamics_scale = -1.0;
         },
-        |instance| instance.parameters.flight.altitude = 1e5,
+        |instance| instance.parameters.flight.altitude = 2e5,
         |instance| instance.parameters.flight.mach = -1.0,
         |instance| instance.parameters.bound = -1.0,
         |instance| instance.parameters.period = 0.0,
@@ -99,7 +99,7 @@ fn impossible_parameters_are_refused_by_name() {
         (refusal(|instance| instance.parameters.inertia.Ixz = 2e6), "inertia.Ixz"),
         (refusal(|instance| instance.parameters.inertia.Iyy = 1e7), "inertia.Iyy"),
         (refusal(|instance| instance.parameters.end = -1.0), "disturbance.end"),
-        (refusal(|instance| instance.parameters.flight.altitude = 1e5), "flight.altitude"),
+        (refusal(|instance| instance.parameters.flight.altitude = 2e5), "flight.altitude"),
     ] {
         assert!(message.contains(name), "{message}");
     }
