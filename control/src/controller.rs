@@ -2,6 +2,7 @@
 
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
+use vehicle::kinematics::{Kinematics, r_inverse};
 use vehicle::profile::Profile;
 use vehicle::reference::Reference;
 
@@ -22,6 +23,21 @@ pub struct Measurement {
     pub has_other_delay: bool,
     /// Whether the acceleration over the last period is larger than [`Controller::explained`].
     pub is_unexplained: bool,
+}
+
+impl Measurement {
+    /// Returns the measurement with the rates relative to axes that turn with the trajectory, for a
+    /// law that takes Θ̇ = R ω to be true. While the trajectory turns Θ̇ = R ω + Δ_f, Chai 2022 (2),
+    /// with Δ_f by Wu 2015 (1); relative to it Θ̇ = R (ω + R⁻¹ Δ_f). `turn_rate` is that of
+    /// [`Trajectory::turn_rate`](vehicle::kinematics::Trajectory::turn_rate), rad/s.
+    ///
+    /// What this leaves for the law to bear as a disturbance is of second order: the change of
+    /// R⁻¹ Δ_f, and what the gyroscopic moment of the relative rates lacks.
+    #[must_use]
+    pub fn relative_to(self, turn_rate: &Vector3<f64>) -> Self {
+        let known = Kinematics::Printed.turn(&self.angles) * turn_rate;
+        Self { rates: self.rates + r_inverse(&self.angles) * known, ..self }
+    }
 }
 
 /// Largest angular acceleration that the assumptions of a law explain, beyond that of the moment

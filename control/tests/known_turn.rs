@@ -1,0 +1,100 @@
+//! Loops while the trajectory turns, of which the laws are told or not.
+
+use control::Crmpc;
+use control::controller::{Controller, Measurement};
+use control::crmpc::{Constraints, Guarantee, GuaranteeStatus, Settings};
+use control::lqr::{Lqr, LqrSettings};
+use vehicle::Scenario;
+use vehicle::actuators::Command;
+use vehicle::disturbance::DisturbanceKind;
+use vehicle::kinematics::Trajectory;
+use vehicle::plant::{Input, Plant};
+
+const PERIOD: f64 = 0.04;
+
+/// A heading that turns to both sides by at most this rate (deg/s), and a flight path angle that
+/// falls, as in a guided entry with its bank reversals.
+fn trajectory(turn: f64, time: f64) -> Trajectory {
+    Trajectory {
+        heading_rate: turn.to_radians() * (0.25 * time).cos(),
+        flight_path_angle_rate: -0.046_f64.to_radians(),
+        ..Trajectory::default()
+    }
+}
+
+/// Flies the scenario of Chai 2022. Calls `observe` with the memory and the plant at each tick.
+fn fly<C: Controller>(
+    law: &mut C,
+    scenario: &Scenario,
+    turn: f64,
+    is_known: bool,
+    mut observe: impl FnMut(&C::Memory, f64, &Plant),
+) {
+    let mut memory = law.memory();
+    let mut config = scenario.config(0.01);
+    config.earth_rate = 0.0;
+    let mut plant = Plant::new(&config, 0.0).unwrap();
+    for tick in 0..(scenario.duration / PERIOD).round() as u64 {
+        let time = tick as f64 * PERIOD;
+        let told = if is_known { trajectory(turn, time) } else { Trajectory::default() };
+        let (angles, rates) = (plant.angles(), plant.rates());
+        let measured = Measurement { angles, rates, ..Measurement::default() };
+        let measured = measured.relative_to(&told.turn_rate(0.0));
+        let reference = |time: f64| scenario.reference.at(time);
+        let moment = law.update(&mut memory, tick, time, &measured, &reference);
+        let input = |time| Input { moment, trajectory: trajectory(turn, time), ..Input::default() };
+        plant.advance_with(time, time + PERIOD, &Command::default(), input).unwrap();
+        observe(&memory, time, &plant);
+    }
+}
+
+#[test]
+fn oracle_a_turn_that_is_known_leaves_the_guarantee_in_force() {
+    for kind in [DisturbanceKind::White, DisturbanceKind::Constant, DisturbanceKind::Square] {
+        // A guided flight turns by 0.35 deg/s, with dispersions by 0.5.
+        for turn in [0.1, 0.35, 0.6] {
+            let mut scenario = Scenario::crmpc2022();
+            scenario.disturbance.kind = kind;
+            let share = |is_known| {
+                let settings = Settings {
+                    guarantee: Guarantee::BestEffort,
+                    ..Settings::new(Constraints::Robust)
+                };
+                let mut law = Crmpc::new(settings).unwrap();
+                let (mut in_force, mut ticks) = (0_u32, 0_u32);
+                fly(&mut law, &scenario, turn, is_known, |memory, _, plant| {
+                    in_force += u32::from(memory.guarantee == GuaranteeStatus::InForce);
+                    ticks += 1;
+                    let rate = plant.rates().norm() / scenario.limit_rate;
+                    assert!(!is_known || rate <= 1.0, "{kind:?} {turn}: {rate}");
+                });
+                f64::from(in_force) / f64::from(ticks)
+            };
+            assert!(share(true) >= 0.999, "{kind:?} {turn}: {}", share(true));
+            assert!(share(false) < 0.6, "{kind:?} {turn}: {}", share(false));
+        }
+    }
+}
+
+#[test]
+fn oracle_a_turn_that_is_known_leaves_little_of_the_error() {
+    let mut scenario = Scenario::crmpc2022();
+    scenario.disturbance.kind = DisturbanceKind::None;
+    scenario.inertia_scale = 1.0;
+    let largest = |turn, is_known| {
+        let Settings { body, p, q, period_feedback: period, .. } =
+            Settings::new(Constraints::Robust);
+        let mut law = Lqr::new(LqrSettings { body, period, p, q }).unwrap();
+        let mut largest = 0.0_f64;
+        fly(&mut law, &scenario, turn, is_known, |(), time, plant| {
+            let error = plant.angles() - scenario.reference.at(time + PERIOD).angles;
+            // From when the error of the start, and that of the jump at 25 s, is gone.
+            if (15.0..25.0).contains(&time) || time > 40.0 {
+                largest = largest.max(error.norm().to_degrees());
+            }
+        });
+        largest
+    };
+    let (calm, known, untold) = (largest(0.0, true), largest(0.35, true), largest(0.35, false));
+    assert!(known - calm < 0.1 * (untold - calm), "{calm} {known} {untold}");
+}
