@@ -27,9 +27,9 @@ pub struct Measurement {
 
 impl Measurement {
     /// Returns the measurement with the rates relative to axes that turn with the trajectory, for a
-    /// law that takes Θ̇ = R ω to be true. While the trajectory turns Θ̇ = R ω + Δ_f, Chai 2022 (2),
-    /// with Δ_f by Wu 2015 (1); relative to it Θ̇ = R (ω + R⁻¹ Δ_f). `turn_rate` is that of
-    /// [`Trajectory::turn_rate`](vehicle::kinematics::Trajectory::turn_rate), rad/s.
+    /// law that takes Θ̇ = R ω to be true. While the trajectory turns, Θ̇ = R ω + Δ_f by Chai 2022
+    /// (2), with Δ_f by Wu 2015 (1); relative to it, Θ̇ = R (ω + R⁻¹ Δ_f). `turn_rate` (rad/s)
+    /// comes from [`vehicle::kinematics::Trajectory::turn_rate`].
     ///
     /// What this leaves for the law to bear as a disturbance is of second order: the change of
     /// R⁻¹ Δ_f, and what the gyroscopic moment of the relative rates lacks.
