@@ -1,10 +1,12 @@
 /* Harm that a model does in the place PLACE, in the way HOW. */
-#include <pthread.h>
 #include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#ifndef _WIN32
+#include <pthread.h>
 #include <sys/mman.h>
+#endif
 #ifdef REACHES
 #include <sys/socket.h>
 #endif
@@ -22,6 +24,7 @@ enum { EXIT, QUICK_EXIT, ABORT, SEGFAULT, DIVISION, ENDLESS, OVERWRITE, MEMORY, 
 
 typedef void (*Logger)(void *, const char *, int, const char *, const char *, ...);
 
+#ifndef _WIN32
 static void *exits(void *none) { exit(none != NULL); }
 static void *crashes(void *none) { *(volatile int *)16 = 1; return none; }
 static void in_thread(void *(*function)(void *)) {
@@ -34,6 +37,7 @@ static void *logs(void *none) {
     thread_logger((void *)2, "model", 1, "odd", "from a thread");
     return none;
 }
+#endif
 
 static void fault(int place, Logger logger, void *environment) {
     if (place != PLACE) return;
@@ -64,6 +68,7 @@ static void fault(int place, Logger logger, void *environment) {
         /* Memory that several processes may share is not counted by the limit of one. */
         memset(mmap(NULL, 1 << 28, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0), 1, 1 << 28);
         for (;;) pause();
+#ifndef _WIN32
     case THREAD_EXIT: in_thread(exits); break;
     case THREAD_SEGFAULT: in_thread(crashes); break;
     /* Some FMUs hand back no pointer to the environment, or their own. */
@@ -82,6 +87,7 @@ static void fault(int place, Logger logger, void *environment) {
             if (fork() == 0)
                 for (;;) pause();
         break;
+#endif
     case FLOOD:
         for (int i = 0; i < 200000; i++) {
             if (logger) logger(environment, "model", i % 2 ? 3 : 1, "flood", "wave %d", i);

@@ -134,15 +134,18 @@ def recorded(
     return run
 
 
-def orchestrate(arguments: Sequence[str], stacklevel: int) -> tuple[int, str, str]:
+def orchestrate(
+    arguments: Sequence[str], stacklevel: int, level: str = "warn"
+) -> tuple[int, str, str]:
     """Runs the orchestrator. Returns its exit code, the text of its error, and what it printed.
-    Its warnings are Python warnings, as many levels of calls further up as `stacklevel` says."""
+    Its warnings are Python warnings, as many levels of calls further up as `stacklevel` says; with
+    the level "error" there are none."""
     done = subprocess.run(
         [str(program()), *arguments],
         capture_output=True,
         text=True,
         encoding="utf-8",
-        env={**os.environ, "RUST_LOG": "warn"},
+        env={**os.environ, "RUST_LOG": level},
         check=False,
     )
     messages, _, error = done.stderr.partition("error: ")

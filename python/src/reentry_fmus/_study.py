@@ -65,7 +65,8 @@ def reproduce(
     for option, number in (("--jobs", jobs), ("--members", members)):
         if number is not None:
             command += [option, str(number)]
-    exit_code, error, _ = orchestrate(command, stacklevel=3)
+    # A study may have a thousand runs, and its report counts their warnings.
+    exit_code, error, _ = orchestrate(command, stacklevel=3, level="error")
     if exit_code != 0:
         raise OrchestratorError(error, exit_code, None)
     results = json.loads((folder / "results.json").read_text("utf-8"))
