@@ -64,11 +64,11 @@ static void fault(int place, Logger logger, void *environment) {
             if (!more) { fputs("no memory is left\n", stderr); abort(); }
             memset(more, 1, 1 << 20);
         }
+#ifndef _WIN32
     case SHARED:
         /* Memory that several processes may share is not counted by the limit of one. */
         memset(mmap(NULL, 1 << 28, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0), 1, 1 << 28);
         for (;;) pause();
-#ifndef _WIN32
     case THREAD_EXIT: in_thread(exits); break;
     case THREAD_SEGFAULT: in_thread(crashes); break;
     /* Some FMUs hand back no pointer to the environment, or their own. */
