@@ -63,7 +63,7 @@ pub(crate) struct Fly {
     #[arg(long, conflicts_with_all = ["fresh", "csv"])]
     work: bool,
     /// Write the campaign and everything that its cases need into a folder, for another machine,
-    /// which then flies DIR/campaign.toml. No case is flown here.
+    /// which then flies DIR/campaign.toml with --fmu-dir DIR/fmu. No case is flown here.
     #[arg(long, value_name = "DIR", conflicts_with_all = ["case", "cases", "work", "fresh", "csv"])]
     bundle: Option<PathBuf>,
     /// Fly all cases again, including those that are finished.

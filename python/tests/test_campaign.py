@@ -125,7 +125,7 @@ def test_parts_do_not_depend_on_where_the_files_are(file, flown, tmp_path):
     here = tmp_path / "elsewhere"
     bundled = campaign(file)
     bundled.call("--bundle", str(here))
-    names = {path.name for path in here.iterdir()}
+    names = {path.name for path in here.rglob("*") if path.is_file()}
     assert {"campaign.toml", "experiment.toml"} < names and len(names) == 4
     taken = campaign(here / "campaign.toml")
     assert json.loads(taken.call("--work", "--out", str(flown.folder)))["missing"] == []

@@ -11,6 +11,9 @@ use toml::Table;
 
 /// Name of the campaign's file in the folder.
 pub const CAMPAIGN: &str = "campaign.toml";
+/// Folder of the FMUs that share the process of the program here. Where `--fmu-dir` names it, they
+/// do so as well.
+const TRUSTED: &str = "fmu";
 const EXPERIMENT: &str = "experiment.toml";
 
 /// Writes the campaign, its experiment and its FMUs into a folder. What the files extend is merged
@@ -24,12 +27,13 @@ pub fn write(plan: &Plan, folder: &Path) -> Result<(), Error> {
     // Components that share an FMU share its copy.
     let mut copies: BTreeMap<&Path, String> = BTreeMap::new();
     let mut fmus = Table::new();
-    for CheckedComponent { name, fmu, .. } in &system.components {
+    for CheckedComponent { name, fmu, is_isolated, .. } in &system.components {
         let number = copies.len();
         if !copies.contains_key(fmu.path.as_path()) {
             let file = fmu.path.file_name().unwrap_or_default().to_string_lossy();
             // FMUs of different folders may have the same name.
             let copy = format!("{number}-{file}");
+            let copy = if *is_isolated { copy } else { format!("{TRUSTED}/{copy}") };
             keep(&copy, &fs::read(&fmu.path).map_err(Error::file(&fmu.path))?)?;
             copies.insert(&fmu.path, copy);
         }

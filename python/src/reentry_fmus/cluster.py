@@ -148,8 +148,9 @@ def pack(campaign: Command) -> Bundle:
         campaign("--bundle", temporary)
         content = io.BytesIO()
         with zipfile.ZipFile(content, "w", zipfile.ZIP_STORED) as archive:
-            for path in sorted(Path(temporary).iterdir()):
-                archive.writestr(zipfile.ZipInfo(path.name), path.read_bytes())
+            for path in sorted(path for path in Path(temporary).rglob("*") if path.is_file()):
+                name = path.relative_to(temporary).as_posix()
+                archive.writestr(zipfile.ZipInfo(name), path.read_bytes())
     digest = hashlib.sha256(content.getvalue()).hexdigest()[:16]
     return Bundle(f"reentry-fmus-{digest}", content.getvalue())
 
@@ -276,7 +277,8 @@ def fly_cases(
     with tempfile.TemporaryDirectory(prefix="cases-", dir=worker.local_directory) as out:
         path = place(worker, bundle) / "campaign.toml"
         command = [str(program()), "campaign", str(path), "--out", out, "--quiet", "--jobs", "1"]
-        command += ["--cases", f"{first}..{last}"]
+        # FMUs that share the program's process here do so there.
+        command += ["--cases", f"{first}..{last}", "--fmu-dir", str(path.parent / "fmu")]
         done = subprocess.run(command, capture_output=True, text=True, encoding="utf-8")
         if done.returncode != 0:
             error = done.stderr.partition("error: ")[2].strip() or done.stderr.strip()
