@@ -1,25 +1,35 @@
 //! The calls of FMI to an instance.
 
 use crate::parameters::Parameters;
-use crate::plant::{MOTION, Output, ReentryPlant};
-use crate::roles::{Known, Unknown};
+use crate::plant::{ATTITUDE, Output, ReentryPlant};
+use crate::roles::Unknown;
 use crate::table;
 use fmi2_export::{
     Context, Description, EventInfo, Failure, Inputs, LastEvent, Model, Restoration,
 };
-use nalgebra::{SMatrix, Vector3};
 use vehicle::actuators::Command;
+use vehicle::effectors::SURFACES;
+use vehicle::entry::{End, Passage};
 use vehicle::plant::{Input, Plant, State, check};
-
-/// Event indicator (s) of a deflection that is at rest.
-const AT_REST: f64 = 1.0;
 
 impl ReentryPlant {
     /// Refuses a state at which the equations do not hold. In model exchange the refusal is only a
     /// discard, as the state may be an integrator's trial that the importer can take back.
-    fn check(&self, state: &State, time: f64) -> Result<(), Failure> {
+    pub(crate) fn check(&self, state: &State, time: f64) -> Result<(), Failure> {
         let failure = if self.event_driven { Failure::Discard } else { Failure::Error };
         check(state, time).map_err(|error| failure(error.to_string()))
+    }
+
+    /// Says why an entry flight ended at `time` (s).
+    fn reason_of_the_end(&self, time: f64) -> String {
+        let End { altitude, speed } = self.parameters.entry.end;
+        let margins = self.plant.as_ref().and_then(|plant| plant.margins());
+        match margins {
+            Some([above, _]) if above <= 0.0 => {
+                format!("the entry flight ended at t = {time} s at end.altitude = {altitude} m")
+            }
+            _ => format!("the entry flight ended at t = {time} s at end.speed = {speed} m/s"),
+        }
     }
 }
 impl Model for ReentryPlant {
@@ -34,16 +44,14 @@ impl Model for ReentryPlant {
             command: Command::default(),
             output: Output::default(),
             plant: None,
-            dynamic_pressure: 0.0,
-            standard_pressure: 0.0,
+            fixed: Passage::default(),
             event_driven: false,
         }
     }
 
     fn initialize(&mut self, context: &Context) -> Result<(), Failure> {
         let failed = |error: vehicle::Error| Failure::Error(error.to_string());
-        self.dynamic_pressure = self.parameters.dynamic_pressure().map_err(failed)?;
-        self.standard_pressure = self.parameters.flight.dynamic_pressure().map_err(failed)?;
+        self.fixed = self.parameters.fixed().map_err(failed)?.0;
         let config = self.parameters.config().map_err(failed)?;
         self.plant = Some(Box::new(Plant::new(&config, context.start_time).map_err(failed)?));
         self.event_driven = false;
@@ -58,33 +66,14 @@ impl Model for ReentryPlant {
             Some(held) if last == LastEvent::Step => held,
             _ => self.held(plant, time),
         };
-        let derivative = plant.derivative(time, &self.input, &held);
-        if !derivative.iter().all(|value| value.is_finite()) {
+        let output = self.output_at(plant, time, &held);
+        let moved = output.angle_rates.iter().chain(output.angular_acceleration.iter());
+        if !moved.chain(output.motion_rate.iter()).all(|value| value.is_finite()) {
             return Err(Failure::Error(format!(
-                "an input moment, command or trajectory is not a finite number at t = {time} s"
+                "an input moment, command, trajectory or prescribed attitude is not a finite number at t = {time} s"
             )));
         }
-        self.output = Output {
-            angles: plant.angles(),
-            rates: plant.rates(),
-            angle_rates: derivative.fixed_rows::<3>(0).into(),
-            angular_acceleration: derivative.fixed_rows::<3>(3).into(),
-            applied_moment: plant.applied_moment(&self.input, &held),
-            delta: held.delta(),
-            disturbance_moment: plant.disturbance_moment(time, &self.input, &held),
-            deflections: plant.deflections,
-            deflection_rates: plant.deflection_rates(&held),
-            indicators: plant
-                .time_left(&held)
-                .map(|left| if left.is_finite() { left } else { AT_REST }),
-            dynamic_pressure: self.dynamic_pressure,
-            standard_pressure: self.standard_pressure,
-            measured: if self.event_driven {
-                plant.measured_since_held(time, &self.input)
-            } else {
-                plant.measured(time, &self.input)
-            },
-        };
+        self.output = output;
         Ok(())
     }
 
@@ -102,8 +91,13 @@ impl Model for ReentryPlant {
             inputs.advance(self, time);
             self.input
         });
+        let ended = plant.ended();
         self.plant = Some(plant);
-        result.map_err(|error| Failure::Error(error.to_string()))
+        result.map_err(|error| Failure::Error(error.to_string()))?;
+        match ended {
+            None => Ok(()),
+            Some(time) => Err(Failure::Ended { time, reason: self.reason_of_the_end(time) }),
+        }
     }
 
     /// Checks the restored plant instead of trusting it. Everything that follows from the
@@ -135,23 +129,27 @@ impl Model for ReentryPlant {
 
     fn continuous_states(&self, states: &mut [f64]) {
         if let Some(plant) = &self.plant {
-            let (motion, deflections) = states.split_at_mut(MOTION);
-            motion.copy_from_slice(plant.state.as_slice());
+            let (attitude, rest) = states.split_at_mut(ATTITUDE);
+            let (deflections, motion) = rest.split_at_mut(SURFACES);
+            attitude.copy_from_slice(plant.state.as_slice());
             deflections.copy_from_slice(plant.deflections.as_slice());
+            motion.copy_from_slice(plant.motion.as_slice());
         }
     }
 
     fn set_continuous_states(&mut self, states: &[f64]) {
         if let Some(plant) = &mut self.plant {
-            let (motion, deflections) = states.split_at(MOTION);
-            plant.state.copy_from_slice(motion);
+            let (attitude, rest) = states.split_at(ATTITUDE);
+            let (deflections, motion) = rest.split_at(SURFACES);
+            plant.state.copy_from_slice(attitude);
             plant.deflections.copy_from_slice(deflections);
+            plant.motion.copy_from_slice(motion);
         }
     }
 
     /// Copies the indicators, one for each deflection: the time until it comes to rest, or one
     /// second while it is at rest. They are positive between events and fall through zero with
-    /// slope −1.
+    /// slope −1. Two more are how far an entry flight is from its end.
     fn event_indicators(&self, indicators: &mut [f64]) {
         indicators.copy_from_slice(self.output.indicators.as_slice());
     }
@@ -176,6 +174,7 @@ impl Model for ReentryPlant {
         Ok(EventInfo {
             next_event_time: plant.next_event(time),
             states_changed: plant.deflections != before,
+            terminates: plant.margins().is_some_and(|margins| margins.iter().any(|m| *m <= 0.0)),
         })
     }
 
@@ -185,63 +184,18 @@ impl Model for ReentryPlant {
         unknown_variable: usize,
         known_variable: usize,
     ) -> Result<f64, Failure> {
-        let plant = self.ready()?;
-        self.check(&plant.state, time)?;
-        let held = self.held(plant, time);
-        let (partials, turn_rate_by_trajectory) =
-            plant.partial_derivatives(time, &self.input, &held);
-        let (applied_by_moment, applied_by_deflections) =
-            plant.applied_moment_by_moment_and_deflections();
-        // In model exchange, commands are taken at events only.
-        let applied_by_jets = if self.event_driven {
-            SMatrix::zeros()
-        } else {
-            plant.applied_moment_by_jets(&self.command)
+        self.check(&self.ready()?.state, time)?;
+        let (unknown, known) =
+            (table::role(unknown_variable).as_unknown, table::role(known_variable).as_known);
+        let (Some(unknown), Some(known)) = (unknown, known) else {
+            let text = "derivatives exist only of outputs with respect to states and inputs";
+            return Err(Failure::Error(format!(
+                "variable {unknown_variable} by variable {known_variable}: {text}"
+            )));
         };
-        let by_applied = |column: Vector3<f64>, i: usize| (partials.by_moment * column)[i];
-        Ok(match (table::role(unknown_variable).as_unknown, table::role(known_variable).as_known) {
-            (Some(Unknown::Derivative(i @ 0..MOTION)), Some(Known::State(j @ 0..MOTION))) => {
-                partials.by_state[(i, j)]
-            }
-            (Some(Unknown::Derivative(i @ 0..MOTION)), Some(Known::State(j))) => {
-                by_applied(applied_by_deflections.column(j - MOTION).into(), i)
-            }
-            (Some(Unknown::Derivative(i @ 0..MOTION)), Some(Known::DisturbanceMoment(j))) => {
-                partials.by_moment[(i, j)]
-            }
-            (Some(Unknown::Derivative(i @ 0..MOTION)), Some(Known::Moment(j))) => {
-                by_applied(applied_by_moment.column(j).into(), i)
-            }
-            (Some(Unknown::Derivative(i @ 0..MOTION)), Some(Known::Jet(j))) => {
-                by_applied(applied_by_jets.column(j).into(), i)
-            }
-            (Some(Unknown::Derivative(i @ 0..MOTION)), Some(Known::Trajectory(j))) => {
-                (partials.by_turn_rate * turn_rate_by_trajectory.column(j))[i]
-            }
-            (Some(Unknown::AppliedMoment(i)), Some(Known::Moment(j))) => applied_by_moment[(i, j)],
-            (Some(Unknown::AppliedMoment(i)), Some(Known::Jet(j))) => applied_by_jets[(i, j)],
-            (Some(Unknown::AppliedMoment(i)), Some(Known::State(j @ MOTION..))) => {
-                applied_by_deflections[(i, j - MOTION)]
-            }
-            (Some(Unknown::Measured(i)), Some(Known::State(j @ 0..MOTION))) => {
-                plant.measured_by_state_and_trajectory(time, &self.input, &held).0[(i, j)]
-            }
-            (Some(Unknown::Measured(i)), Some(Known::Trajectory(j))) => {
-                plant.measured_by_state_and_trajectory(time, &self.input, &held).1[(i, j)]
-            }
-            (Some(Unknown::State(i)), Some(Known::State(j)))
-            | (Some(Unknown::DisturbanceMoment(i)), Some(Known::DisturbanceMoment(j)))
-                if i == j =>
-            {
-                1.0
-            }
-            (Some(_), Some(_)) => 0.0,
-            _ => {
-                let text = "derivatives exist only of outputs with respect to states and inputs";
-                return Err(Failure::Error(format!(
-                    "variable {unknown_variable} by variable {known_variable}: {text}"
-                )));
-            }
-        })
+        if self.parameters.entry.is_entry() || matches!(unknown, Unknown::Flight(_)) {
+            return self.difference(time, unknown, known);
+        }
+        self.given_derivative(time, unknown, known)
     }
 }

@@ -2,6 +2,8 @@
 //! a variable table.
 #![cfg_attr(not(test), deny(clippy::disallowed_methods))]
 
+mod derivatives;
+mod entry;
 mod instance;
 mod parameters;
 mod plant;

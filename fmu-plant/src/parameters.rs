@@ -1,11 +1,12 @@
 //! Parameters of the FMU. Their defaults are the scenario of Chai 2022.
 
+use crate::entry::EntryParameters;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 use settings::{Choice, Declared};
 use vehicle::Scenario;
 use vehicle::actuators::{self, JetMode};
-use vehicle::atmosphere::Flight;
+use vehicle::atmosphere::{Air, Flight, air};
 use vehicle::axes::{ANGLES, AXES, Entry, RATES};
 use vehicle::calibration::Sequence;
 use vehicle::disturbance::{
@@ -13,6 +14,7 @@ use vehicle::disturbance::{
 };
 use vehicle::dynamics::Inertia;
 use vehicle::effectors::Effectors;
+use vehicle::entry::{Motion, Passage};
 use vehicle::error::Error;
 use vehicle::kinematics::Kinematics;
 use vehicle::plant::{BETA_LIMIT, Config, state};
@@ -116,6 +118,8 @@ pub(crate) struct Parameters {
     pub(crate) converter: Converter,
     #[setting(skip)]
     pub(crate) table: Table,
+    #[setting(skip)]
+    pub(crate) entry: EntryParameters,
 }
 
 /// Names of the two sinusoids of the disturbance moment.
@@ -251,17 +255,38 @@ impl Default for Parameters {
             },
             converter: Converter::default(),
             table: Table::default(),
+            entry: EntryParameters::default(),
         }
     }
 }
 
 impl Parameters {
-    /// Dynamic pressure of the flight with the density scale, Pa.
+    /// Dynamic pressure of the fixed flight condition with the density scale, Pa.
     ///
     /// # Errors
     /// Names the parameter that is out of range.
-    pub(crate) fn dynamic_pressure(&self) -> Result<f64, Error> {
+    fn dynamic_pressure(&self) -> Result<f64, Error> {
         Ok(self.flight.dynamic_pressure()? * self.density_scale)
+    }
+
+    /// Fixed flight condition, without forces, and the motion that belongs to it.
+    ///
+    /// # Errors
+    /// Names the parameter that is out of range.
+    pub(crate) fn fixed(&self) -> Result<(Passage, Motion), Error> {
+        let Flight { altitude, mach } = self.flight;
+        let known_pressure = self.flight.dynamic_pressure()?;
+        let Air { density, sound_speed, .. } = air(altitude)?;
+        let airspeed = mach * sound_speed;
+        let passage = Passage {
+            density: density * self.density_scale,
+            known_pressure,
+            dynamic_pressure: self.dynamic_pressure()?,
+            mach,
+            airspeed,
+            ..Passage::default()
+        };
+        Ok((passage, Motion::new(altitude, 0.0, 0.0, airspeed, 0.0, 0.0)))
     }
 
     /// Lookup table of the disturbance, with the rows that are used.
@@ -326,6 +351,8 @@ impl Parameters {
                 start: self.start,
                 end: self.end,
             },
+            motion: if self.entry.is_entry() { self.entry.start.motion() } else { self.fixed()?.1 },
+            entry: self.entry.config(self.density_scale),
             kinematics: self.kinematics,
             earth_rate: self.earth_rate,
             actuators: self.actuators()?,

@@ -5,16 +5,35 @@ use fmi2_export::VariableTable;
 use fmi2_export::table::{Common, Real};
 use settings::Declared;
 
+/// Quantity of the flight.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Quantity {
+    DynamicPressure,
+    /// Dynamic pressure as an on-board computer knows it.
+    KnownPressure,
+    Mach,
+    Airspeed,
+    Density,
+    /// Angle of attack or sideslip relative to the air.
+    AirAngle(usize),
+    Lift,
+    Drag,
+    LoadFactor,
+    HeatFlux,
+    Range,
+    AirMoment(usize),
+}
+
 /// Role of a calculated variable. States and derivatives are counted in the order attitude, rates,
-/// deflections.
+/// deflections, motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Unknown {
     State(usize),
     Derivative(usize),
     AppliedMoment(usize),
-    Delta,
+    Delta(usize),
     DisturbanceMoment(usize),
-    DynamicPressure,
+    Flight(Quantity),
     Measured(usize),
     /// Time of the sample, which depends on nothing.
     MeasuredTime,
@@ -29,6 +48,9 @@ pub(crate) enum Known {
     Surface(usize),
     Jet(usize),
     Trajectory(usize),
+    /// Prescribed angles, and their rates.
+    Prescribed(usize),
+    Trim,
 }
 
 /// Role of a variable in the equations. Parameters have no role.

@@ -1,10 +1,11 @@
 //! Variable table of the FMU.
 
+mod entry;
 mod sensors;
 
 use crate::parameters::TABLE_ROWS;
-use crate::plant::{MOTION, ReentryPlant};
-use crate::roles::{Known, Role, Unknown, Variables};
+use crate::plant::{ATTITUDE, INDICATORS, ReentryPlant};
+use crate::roles::{Known, Quantity, Role, Unknown, Variables};
 use fmi2_export::table::{
     Description, Real, discrete_input, discrete_output, input, output, parameter,
 };
@@ -18,6 +19,7 @@ use vehicle::kinematics::Trajectory;
 const ANGLES: [(&str, &str); 3] =
     [("alpha", "angle of attack"), ("beta", "sideslip angle"), ("sigma", "bank angle")];
 const RATES: [(&str, &str); 3] = [("p", "roll"), ("q", "pitch"), ("r", "yaw")];
+const RATE_NAMES: [&str; 3] = ["rate.p", "rate.q", "rate.r"];
 const AXES: [(&str, &str); 3] = [("x", "roll"), ("y", "pitch"), ("z", "yaw")];
 
 /// Returns the role of the variable at a position in the variable table.
@@ -34,7 +36,7 @@ fn all_variables() -> PlantVariables {
         .settings(|m| &mut m.parameters.sensing)
         .settings(|m| &mut m.parameters.converter)
         .settings(|m| &mut m.parameters.table);
-    standard_pressure(disturbance_rows(variables))
+    entry::entry(standard_pressure(disturbance_rows(variables)))
 }
 
 /// Returns the description of the FMU.
@@ -46,7 +48,7 @@ pub(crate) fn description() -> Description<ReentryPlant> {
         documentation: include_str!("plant.html").into(),
         version: env!("CARGO_PKG_VERSION"),
         model_exchange: true,
-        event_indicators: SURFACES,
+        event_indicators: INDICATORS,
         default_experiment: DefaultExperiment {
             start: 0.0,
             stop: scenario.duration,
@@ -88,16 +90,19 @@ fn outputs(variables: PlantVariables) -> PlantVariables {
         let text = format!("Body {meaning} rate");
         output(&format!("rate.{axis}"), &text).real().unit("rad/s").nominal(0.05)
     };
+    // An entry flight computes the trajectory from the motion and from the air's forces, which
+    // depend on the attitude.
+    let turning = entry::MOTION_NAMES.into_iter().chain([
+        "attitude.alpha",
+        "attitude.beta",
+        "attitude.sigma",
+    ]);
     let angle_rate = |axis: &str, meaning: &str| {
         // The rates of the angles follow Wu 2015 (1); they depend on sigma through the trajectory.
-        let depends = if axis == "beta" {
-            vec!["attitude.alpha", "rate.p", "rate.r"]
-        } else {
-            motion.to_vec()
-        };
+        let depends = if axis == "beta" { vec!["rate.p", "rate.r"] } else { RATE_NAMES.to_vec() };
         let common =
             output(&format!("attitudeRate.{axis}"), &format!("Time derivative of the {meaning}"))
-                .depends_on(["attitude.sigma"])
+                .depends_on(turning.clone())
                 .depends_on(TRAJECTORY_INPUTS.map(|(name, ..)| name));
         let real = common.depends_on(depends).real().unit("rad/s").nominal(0.05);
         real.derivative_of(&format!("attitude.{axis}"))
@@ -110,6 +115,8 @@ fn outputs(variables: PlantVariables) -> PlantVariables {
             .depends_on(moment)
             .depends_on(external)
             .depends_on(actuators.clone())
+            .depends_on(turning.clone())
+            .depends_on(entry::INPUT_NAMES)
             .real();
         real.unit("rad/s2").nominal(0.05).derivative_of(&format!("rate.{axis}"))
     };
@@ -118,6 +125,7 @@ fn outputs(variables: PlantVariables) -> PlantVariables {
         let common = output(&format!("appliedMoment.{axis}"), &text);
         let common =
             common.depends_on([format!("moment.{axis}").as_str()]).depends_on(actuators.clone());
+        let common = common.depends_on(turning.clone());
         common.real().unit("N.m").nominal(1e5)
     };
     let delta = |axis: &str, meaning: &str| {
@@ -125,7 +133,8 @@ fn outputs(variables: PlantVariables) -> PlantVariables {
         let common = discrete_output(&format!("disturbance.delta.{axis}"), &text)
             .depends_on(motion)
             .depends_on(moment)
-            .depends_on(actuators.clone());
+            .depends_on(actuators.clone())
+            .depends_on(turning.clone());
         common.real().unit("rad/s2").nominal(0.03)
     };
     let disturbing = |axis: &str, meaning: &str| {
@@ -161,7 +170,7 @@ fn outputs(variables: PlantVariables) -> PlantVariables {
         |m| &mut m.output.applied_moment,
     );
     let variables =
-        vector(variables, ANGLES, delta, |_| Unknown::Delta.into(), |m| &mut m.output.delta);
+        vector(variables, ANGLES, delta, |i| Unknown::Delta(i).into(), |m| &mut m.output.delta);
     vector(
         variables,
         AXES,
@@ -205,25 +214,27 @@ fn actuated(mut variables: PlantVariables) -> PlantVariables {
             &format!("Deflection of the {name}, trailing edge down positive"),
         );
         let real = common.real().unit("rad").nominal(0.1);
-        let role = Role::state(MOTION + i);
+        let role = Role::state(ATTITUDE + i);
         variables = variables.real(real, move |m| &mut m.output.deflections[i]).role(role);
     }
     let pressure =
-        output("flight.dynamicPressure", "Actual dynamic pressure, with density.scale applied");
+        output("flight.dynamicPressure", "Actual dynamic pressure, with density.scale applied")
+            .depends_on(entry::MOTION_NAMES);
     variables
-        .real(pressure.real().unit("Pa").nominal(1e3), |m| &mut m.output.dynamic_pressure)
-        .role(Unknown::DynamicPressure)
+        .real(pressure.real().unit("Pa").nominal(1e3), |m| &mut m.output.passage.dynamic_pressure)
+        .role(Unknown::Flight(Quantity::DynamicPressure))
 }
 
 /// Adds the dynamic pressure that an on-board computer knows.
 fn standard_pressure(variables: PlantVariables) -> PlantVariables {
     let pressure = output(
         "flight.standardDynamicPressure",
-        "Dynamic pressure in the standard atmosphere, without density.scale",
-    );
+        "Dynamic pressure without density.scale, the air's profile and wind",
+    )
+    .depends_on(entry::MOTION_NAMES);
     variables
-        .real(pressure.real().unit("Pa").nominal(1e3), |m| &mut m.output.standard_pressure)
-        .role(Unknown::DynamicPressure)
+        .real(pressure.real().unit("Pa").nominal(1e3), |m| &mut m.output.passage.known_pressure)
+        .role(Unknown::Flight(Quantity::KnownPressure))
 }
 
 fn commands(mut variables: PlantVariables) -> PlantVariables {
@@ -252,7 +263,7 @@ fn deflection_rates(mut variables: PlantVariables) -> PlantVariables {
         let common = output(&format!("deflectionRate[{}]", i + 1), &text)
             .depends_on([command.as_str(), deflection.as_str()]);
         let real = common.real().unit("rad/s").nominal(0.1).derivative_of(&deflection);
-        let role = Unknown::Derivative(MOTION + i);
+        let role = Unknown::Derivative(ATTITUDE + i);
         variables = variables.real(real, move |m| &mut m.output.deflection_rates[i]).role(role);
     }
     variables

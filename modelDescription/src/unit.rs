@@ -34,7 +34,7 @@ pub struct Unit {
 }
 
 /// Dimension of a named unit: its symbol, and the exponents of kg, m, s, A, K and rad.
-const SYMBOLS: [(&str, [i32; 6]); 11] = [
+const SYMBOLS: [(&str, [i32; 6]); 12] = [
     ("kg", [1, 0, 0, 0, 0, 0]),
     ("m", [0, 1, 0, 0, 0, 0]),
     ("s", [0, 0, 1, 0, 0, 0]),
@@ -44,6 +44,7 @@ const SYMBOLS: [(&str, [i32; 6]); 11] = [
     ("Hz", [0, 0, -1, 0, 0, 0]),
     ("N", [1, 1, -2, 0, 0, 0]),
     ("Pa", [1, -1, -2, 0, 0, 0]),
+    ("W", [1, 2, -3, 0, 0, 0]),
     ("T", [1, 0, -2, -1, 0, 0]),
     ("1", [0; 6]),
 ];

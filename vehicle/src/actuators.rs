@@ -163,9 +163,15 @@ impl Actuators {
         }
     }
 
-    /// Control moment (N m) of the surfaces and jets.
-    pub fn moment(&self, drive: &Drive, deflections: &Surfaces) -> Vector3<f64> {
-        self.surface_moments * deflections + self.jet_moments * drive.thrust
+    /// Control moment (N m) of the surfaces and jets, with the effectiveness of the surfaces times
+    /// `pressure_ratio`.
+    pub fn moment(
+        &self,
+        drive: &Drive,
+        deflections: &Surfaces,
+        pressure_ratio: f64,
+    ) -> Vector3<f64> {
+        self.surface_moments * deflections * pressure_ratio + self.jet_moments * drive.thrust
     }
 
     /// Partial derivative of [`Actuators::moment`] with respect to the deflections, N m/rad.

@@ -4,6 +4,7 @@ use crate::error::Error;
 use crate::math::{exp, ln, powf, powi};
 use serde::{Deserialize, Serialize};
 use settings::Declared;
+use std::sync::LazyLock;
 
 // U.S. Standard Atmosphere, 1976 (NOAA, NASA, USAF), tables 1 to 4.
 const GRAVITY: f64 = 9.80665; // m/s²
@@ -63,30 +64,58 @@ pub fn air(altitude: f64) -> Result<Air, Error> {
         let problem = format!("= {altitude} m must lie between 0 and {TOP} m");
         return Err(Error::parameter("flight.altitude", problem));
     }
+    Ok(inside(altitude))
+}
+
+/// Returns the state of the air at any altitude (m): as [`air`] where that is defined, the air at
+/// sea level below, and above an atmosphere of the top's temperature, whose density falls
+/// exponentially.
+pub fn air_anywhere(altitude: f64) -> Air {
+    let mut air = inside(altitude.clamp(0.0, TOP));
+    if altitude > TOP {
+        let gravity = GRAVITY * powi(EARTH_RADIUS / (EARTH_RADIUS + TOP), 2);
+        let thinner = exp(-gravity * air.density / air.pressure * (altitude - TOP));
+        air.pressure *= thinner;
+        air.density *= thinner;
+    }
+    air
+}
+
+fn inside(altitude: f64) -> Air {
     let (temperature, pressure) = if altitude > MIXED { thin(altitude) } else { mixed(altitude) };
     let specific = GAS_CONSTANT / MOLAR_MASS * temperature;
     let density = pressure / specific;
-    Ok(Air { temperature, pressure, density, sound_speed: (HEAT_RATIO * specific).sqrt() })
+    Air { temperature, pressure, density, sound_speed: (HEAT_RATIO * specific).sqrt() }
 }
+
+/// Temperature (K) and pressure (Pa) at the base of each layer.
+static BASES: LazyLock<[(f64, f64); LAYERS.len()]> = LazyLock::new(|| {
+    let mut bases = [SEA_LEVEL; LAYERS.len()];
+    for i in 1..LAYERS.len() {
+        bases[i] = inside_layer(i - 1, bases[i - 1], LAYERS[i].0);
+    }
+    bases
+});
 
 /// Returns temperature (K) and pressure (Pa) up to [`MIXED`].
 fn mixed(altitude: f64) -> (f64, f64) {
     let height = EARTH_RADIUS * altitude / (EARTH_RADIUS + altitude); // geopotential
+    let layer = LAYERS.partition_point(|layer| layer.0 <= height).saturating_sub(1);
+    inside_layer(layer, BASES[layer], height)
+}
+
+/// Returns temperature (K) and pressure (Pa) at a geopotential `height` (m) of a layer, from those
+/// at its base.
+fn inside_layer(layer: usize, (temperature, pressure): (f64, f64), height: f64) -> (f64, f64) {
     let weight = GRAVITY * MOLAR_MASS / GAS_CONSTANT;
-    let (mut temperature, mut pressure) = SEA_LEVEL;
-    for (i, &(base, gradient)) in
-        LAYERS.iter().enumerate().take_while(|(_, layer)| layer.0 <= height)
-    {
-        let top = LAYERS.get(i + 1).map_or(height, |next| next.0.min(height));
-        let above = temperature + gradient * (top - base);
-        pressure *= if gradient == 0.0 {
-            exp(-weight * (top - base) / temperature)
-        } else {
-            powf(temperature / above, weight / gradient)
-        };
-        temperature = above;
-    }
-    (temperature, pressure)
+    let (base, gradient) = LAYERS[layer];
+    let above = temperature + gradient * (height - base);
+    let ratio = if gradient == 0.0 {
+        exp(-weight * (height - base) / temperature)
+    } else {
+        powf(temperature / above, weight / gradient)
+    };
+    (above, pressure * ratio)
 }
 
 /// Returns molecular-scale temperature (K) and pressure (Pa) above [`MIXED`]. Between the altitudes

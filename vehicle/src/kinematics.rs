@@ -270,9 +270,19 @@ impl Trajectory {
         if [around, climb, turn, north] == [0.0; 4] {
             return Vector3::zeros();
         }
-        let (sg, cg) = sin_cos(self.flight_path_angle);
-        let (sp, cp) = sin_cos(self.heading);
-        let (sl, cl) = sin_cos(self.latitude);
+        self.turn_rate_at(around, &self.sines())
+    }
+
+    /// Sines and cosines of flight path angle, heading and latitude.
+    pub(crate) fn sines(&self) -> [(f64, f64); 3] {
+        [self.flight_path_angle, self.heading, self.latitude].map(sin_cos)
+    }
+
+    /// Turn rate with the sum `around` of the rates of longitude and Earth, rad/s.
+    pub(crate) fn turn_rate_at(&self, around: f64, sines: &[(f64, f64); 3]) -> Vector3<f64> {
+        let (climb, turn, north) =
+            (self.flight_path_angle_rate, self.heading_rate, self.latitude_rate);
+        let [(sg, cg), (sp, cp), (sl, cl)] = *sines;
         Vector3::new(
             -turn * sg - north * sp * cg + around * (cl * cp * cg + sl * sg),
             climb - north * cp - around * cl * sp,

@@ -5,6 +5,7 @@
 
 pub mod actuators;
 pub mod aerodynamics;
+pub mod air;
 pub mod atmosphere;
 pub mod axes;
 pub mod calibration;
@@ -12,6 +13,7 @@ pub mod data;
 pub mod disturbance;
 pub mod dynamics;
 pub mod effectors;
+pub mod entry;
 pub mod error;
 pub mod integrator;
 pub mod kinematics;

@@ -5,12 +5,14 @@
 //! |---|---|
 //! | `equations` | the equations of motion and their partial derivatives |
 //! | `config`, `making` | the configuration of a plant, and the plant that is made from it |
+//! | `flight` | an entry flight |
 //! | `loads` | the inputs, and the moments and derivatives that follow from them |
 //! | `holding` | what is held from one event to the next |
 //! | `sensing` | what the sensors measure |
 
 mod config;
 mod equations;
+mod flight;
 mod holding;
 mod loads;
 mod making;
@@ -20,6 +22,7 @@ use crate::actuators::{Actuators, Command};
 use crate::disturbance::Disturbance;
 use crate::dynamics::RigidBody;
 use crate::effectors::Surfaces;
+use crate::entry;
 use crate::error::Error;
 use crate::integrator::{equal_steps, rk4};
 use crate::kinematics::Kinematics;
@@ -36,6 +39,7 @@ use serde::{Deserialize, Serialize};
 pub use crate::state::{BETA_LIMIT, State, angles, rates, state};
 pub use config::Config;
 pub use equations::{Load, Partials, check, derivative, partial_derivatives};
+pub use flight::Entering;
 pub use holding::Held;
 pub use loads::Input;
 
@@ -53,6 +57,11 @@ pub struct Plant {
     surroundings: Surroundings,
     sensors: Option<Sensors>,
     turntable: Option<Turntable>,
+    entry: Option<Box<entry::Config>>,
+    /// Longitude and latitude at the start, rad.
+    origin: [f64; 2],
+    /// Time at which the entry flight ended, s.
+    ended: Option<f64>,
     step: f64,
     start_time: f64,
     held: Option<Held>,
@@ -61,6 +70,8 @@ pub struct Plant {
     noise: Option<Stream<3>>,
     /// Present state of the vehicle, rad and rad/s.
     pub state: State,
+    /// Present motion of the centre of mass.
+    pub motion: entry::Motion,
     /// Present deflections of the surfaces, rad; zero without actuators.
     pub deflections: Surfaces,
 }
@@ -131,7 +142,8 @@ impl Plant {
     /// `command`, and a delayed moment, are taken at `from`. The interval is cut where the
     /// disturbance jumps, a deflection comes to rest or a delayed moment arrives. Every piece is
     /// integrated in equal steps, so the end is met exactly. Deflections are linear in time within
-    /// a piece.
+    /// a piece. An entry flight that ends within the interval leaves the plant at its end, see
+    /// [`Plant::ended`].
     ///
     /// # Errors
     /// Reports that the attitude becomes singular or a value is not finite; the state is then the
@@ -163,19 +175,30 @@ impl Plant {
             let end = cut.unwrap_or(to);
             let steps = equal_steps(end - time, self.step);
             let h = (end - time) / steps as f64;
+            let air = self.entry.as_ref().map(|_| self.air_ahead(end - time));
             for k in 0..steps {
                 let begin = time + k as f64 * h;
-                let mut f = |t: f64, state: &State| {
-                    let load = self.load(t, &input(t), &held, t - time);
-                    self.derivative_at(t, state, &load)
+                let (motion, next) = if let (Some(entry), Some(air)) = (&self.entry, &air) {
+                    self.moved(entry, (time, begin, h), air, &held, &mut input)
+                } else {
+                    let mut f = |t: f64, state: &State| {
+                        let load = self.load(t, &input(t), &held, t - time);
+                        self.derivative_at(t, state, &load)
+                    };
+                    (self.motion, rk4(&mut f, begin, &self.state, h))
                 };
-                let next = rk4(&mut f, begin, &self.state, h);
-                check(&next, begin + h).map_err(|error| {
-                    let fault = input(begin).fault().or_else(|| input(begin + h).fault());
-                    let fault = fault.or_else(|| command.fault());
-                    fault.map_or(error, |what| Error::NotFinite { time: begin, what })
-                })?;
-                self.state = next;
+                check(&next, begin + h)
+                    .and_then(|()| Self::check_motion(&motion, begin + h))
+                    .map_err(|error| {
+                        let fault = input(begin).fault().or_else(|| input(begin + h).fault());
+                        let fault = fault.or_else(|| command.fault());
+                        fault.map_or(error, |what| Error::NotFinite { time: begin, what })
+                    })?;
+                if let Some(air) = air.as_ref().filter(|_| self.has_ended_at(&motion)) {
+                    self.end((time, begin, h), air, &held, &mut input);
+                    return Ok(());
+                }
+                (self.motion, self.state) = (motion, next);
             }
             self.deflections += self.deflection_rates(&held) * (end - time);
             self.settle(end, &held);

@@ -81,13 +81,15 @@ pub struct Pose {
     pub alpha_rate: f64,
     /// Trajectory that gives the platform's direction of flight.
     pub trajectory: Trajectory,
+    /// Specific force along the trajectory's axes, m/s²; without it gravity alone gives one.
+    pub specific_force: Option<Vector3<f64>>,
 }
 
 impl Pose {
     /// Returns the readings of ideal sensors. The gyroscope measures the rate at which the
     /// orientation changes. Where the bank row of R lacks α̇ sin β, that rate is ω less α̇ sin β
-    /// about the bank axis. The platform's centre moves steadily, so gravity alone gives the
-    /// specific force.
+    /// about the bank axis. Unless a specific force is given, the platform's centre moves
+    /// steadily, so gravity alone gives one.
     pub fn felt(&self, surroundings: &Surroundings) -> Readings {
         let body_from_velocity = body_from_velocity(&self.angles);
         let mut rate = self.rates;
@@ -107,8 +109,11 @@ impl Pose {
         surroundings: &Surroundings,
     ) -> [Vector3<f64>; 2] {
         let body_from_level = body_from_velocity * velocity_from_level(&self.trajectory);
-        let lift = Vector3::new(0.0, 0.0, -surroundings.gravity);
-        [body_from_level * lift, body_from_level * surroundings.field]
+        let force = match &self.specific_force {
+            Some(force) => body_from_velocity * force,
+            None => body_from_level * Vector3::new(0.0, 0.0, -surroundings.gravity),
+        };
+        [force, body_from_level * surroundings.field]
     }
 
     /// Partial derivatives of [`Pose::felt`] with respect to the state (9 × 6) and the trajectory

@@ -5,6 +5,7 @@ use crate::atmosphere::Flight;
 use crate::data;
 use crate::disturbance::{Disturbance, DisturbanceKind, DisturbanceTable, SineMoment};
 use crate::dynamics::Inertia;
+use crate::entry::Motion;
 use crate::error::Error;
 use crate::kinematics::Kinematics;
 use crate::plant::{self, Config};
@@ -105,6 +106,8 @@ impl Scenario {
             actuators: None,
             moment_delay: 0.0,
             moment_resolution: 0.0,
+            motion: Motion::zeros(),
+            entry: None,
             calibration: None,
             surroundings: Surroundings::default(),
             sensors: None,

@@ -14,19 +14,25 @@
 //! assert!(Motion::from(rates).flight_path_angle < 0.0);
 //! ```
 
-use crate::math::{cos, sin_cos, tan};
-use nalgebra::SVector;
+use crate::math::sin_cos;
+use nalgebra::{SVector, Vector3};
+use serde::{Deserialize, Serialize};
+use settings::Declared;
 
 /// A planet that rotates about its axis.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Declared)]
 pub struct Planet {
-    /// Radius of its surface at the equator, m.
+    /// Radius of the planet, from which altitudes are counted.
+    #[setting(unit = "m", min = 1e3, nominal = 1e6)]
     pub radius: f64,
-    /// Gravitational parameter μ, m³/s².
+    /// Gravitational parameter of the planet.
+    #[setting(unit = "m3/s2", min = 0.0, nominal = 1e14)]
     pub gravitation: f64,
-    /// Second zonal harmonic J₂ of its gravity, which is 0 for a sphere.
+    /// Second zonal harmonic J2 of the planet's gravity; 0 for a sphere.
+    #[setting(min = 0.0, max = 0.1, nominal = 1e-3)]
     pub oblateness: f64,
-    /// Angular rate ω of its rotation, rad/s.
+    /// Angular rate of the planet's rotation.
+    #[setting(unit = "rad/s", min = 0.0, max = 1.0, nominal = 1e-4)]
     pub rate: f64,
 }
 
@@ -42,7 +48,10 @@ impl Planet {
     /// Returns the acceleration of gravity at a distance from the centre (m) and a latitude (rad):
     /// downward and to the north, m/s².
     pub fn gravity(&self, radius: f64, latitude: f64) -> [f64; 2] {
-        let (sine, cosine) = sin_cos(latitude);
+        self.gravity_at(radius, sin_cos(latitude))
+    }
+
+    fn gravity_at(&self, radius: f64, (sine, cosine): (f64, f64)) -> [f64; 2] {
         let sphere = self.gravitation / (radius * radius);
         let bulge = 1.5 * self.oblateness * (self.radius / radius) * (self.radius / radius);
         [sphere * (1.0 + bulge * (1.0 - 3.0 * sine * sine)), -2.0 * sphere * bulge * sine * cosine]
@@ -94,38 +103,59 @@ pub struct AirAcceleration {
     pub bank: f64,
 }
 
-/// Returns the time derivative of the motion (Vinh, Busemann, Culp 1980, chapter 2, with −σ and
-/// J₂). It is not finite at a speed of zero, in vertical flight and at the poles, where the angles
-/// have no meaning.
+impl AirAcceleration {
+    /// Returns the specific force along the trajectory's axes: x along the velocity, y to the right
+    /// in the horizontal plane, z down, m/s².
+    pub fn specific_force(&self) -> Vector3<f64> {
+        let (sine, cosine) = sin_cos(self.bank);
+        Vector3::new(-self.drag, -self.lift * sine, -self.lift * cosine)
+    }
+}
+
+/// Returns the time derivative of the motion under lift and drag.
 pub fn derivative(planet: &Planet, state: &State, air: &AirAcceleration) -> State {
-    let Motion { radius: r, latitude, speed: v, flight_path_angle, azimuth, .. } =
-        Motion::from(*state);
-    let (sin_latitude, cos_latitude) = sin_cos(latitude);
-    let (sin_path, cos_path) = sin_cos(flight_path_angle);
-    let (sin_azimuth, cos_azimuth) = sin_cos(azimuth);
-    let (sin_bank, cos_bank) = sin_cos(air.bank);
-    let [g, g_north] = planet.gravity(r, latitude);
+    derivative_under(planet, state, &air.specific_force())
+}
+
+/// Returns the time derivative of the motion under a specific force (m/s²) along the trajectory's
+/// axes (Vinh, Busemann, Culp 1980, chapter 2, with −σ and J₂). It is not finite at a speed of
+/// zero, in vertical flight and at the poles, where the angles have no meaning.
+pub fn derivative_under(planet: &Planet, state: &State, force: &Vector3<f64>) -> State {
+    let Motion { latitude, flight_path_angle, azimuth, .. } = Motion::from(*state);
+    derivative_at(planet, state, &[flight_path_angle, azimuth, latitude].map(sin_cos), force)
+}
+
+/// Returns the time derivative of [`derivative_under`], given the sines and cosines of flight path
+/// angle, azimuth and latitude.
+pub(crate) fn derivative_at(
+    planet: &Planet,
+    state: &State,
+    sines: &[(f64, f64); 3],
+    force: &Vector3<f64>,
+) -> State {
+    let Motion { radius: r, speed: v, .. } = Motion::from(*state);
+    let [(sin_path, cos_path), (sin_azimuth, cos_azimuth), (sin_latitude, cos_latitude)] = *sines;
+    let [g, g_north] = planet.gravity_at(r, (sin_latitude, cos_latitude));
     // Of the rotation: the centrifugal acceleration at the equator, and twice the rate.
     let (centrifugal, coriolis) = (planet.rate * planet.rate * r, 2.0 * planet.rate);
 
-    let speed_rate = -air.drag - g * sin_path
+    let speed_rate = force.x - g * sin_path
         + g_north * cos_path * cos_azimuth
         + centrifugal
             * cos_latitude
             * (sin_path * cos_latitude - cos_path * sin_latitude * cos_azimuth);
-    let turn_up = air.lift * cos_bank + (v * v / r - g) * cos_path
-        - g_north * sin_path * cos_azimuth
+    let turn_up = -force.z + (v * v / r - g) * cos_path - g_north * sin_path * cos_azimuth
         + coriolis * v * cos_latitude * sin_azimuth
         + centrifugal
             * cos_latitude
             * (cos_path * cos_latitude + sin_path * cos_azimuth * sin_latitude);
-    let turn_right = -(air.lift * sin_bank + g_north * sin_azimuth) / cos_path
-        + v * v / r * cos_path * sin_azimuth * tan(latitude)
-        - coriolis * v * (tan(flight_path_angle) * cos_azimuth * cos_latitude - sin_latitude)
+    let turn_right = (force.y - g_north * sin_azimuth) / cos_path
+        + v * v / r * cos_path * sin_azimuth * (sin_latitude / cos_latitude)
+        - coriolis * v * (sin_path / cos_path * cos_azimuth * cos_latitude - sin_latitude)
         + centrifugal / cos_path * sin_azimuth * sin_latitude * cos_latitude;
     Motion {
         radius: v * sin_path,
-        longitude: v * cos_path * sin_azimuth / (r * cos(latitude)),
+        longitude: v * cos_path * sin_azimuth / (r * cos_latitude),
         latitude: v * cos_path * cos_azimuth / r,
         speed: speed_rate,
         flight_path_angle: turn_up / v,

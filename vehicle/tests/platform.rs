@@ -18,6 +18,7 @@ const AROUND: Surroundings = Surroundings { gravity: G, field: FIELD };
 
 fn at_rest(degrees: [f64; 3]) -> Pose {
     Pose {
+        specific_force: None,
         kinematics: Kinematics::Printed,
         angles: Vector3::from(degrees.map(f64::to_radians)),
         rates: Vector3::zeros(),
@@ -104,7 +105,9 @@ proptest! {
             let rates = Vector3::from(rates);
             let turn_rate = trajectory.turn_rate(0.0);
             let angle_rates = kinematics.r(&angles) * rates + kinematics.turn(&angles) * turn_rate;
-            let pose = Pose { kinematics, angles, rates, alpha_rate: angle_rates.x, trajectory };
+            let alpha_rate = angle_rates.x;
+            let pose =
+                Pose { kinematics, angles, rates, alpha_rate, trajectory, specific_force: None };
             // Over an Earth that neither turns nor curves, the level axes are inertial.
             let expected = rate_of(|t| {
                 let later = Trajectory {

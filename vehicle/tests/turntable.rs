@@ -18,6 +18,7 @@ fn table(config: Config) -> Turntable {
 
 fn vehicle(angles: Vector3<f64>) -> Pose {
     Pose {
+        specific_force: None,
         kinematics: Kinematics::Printed,
         angles,
         rates: Vector3::zeros(),

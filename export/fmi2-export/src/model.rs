@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use std::path::Path;
 
 /// Reason why a call failed. Its text reaches the user through the FMI logger.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Failure {
     /// The call was refused, but the instance is unchanged and can continue (`fmi2Discard`).
     #[error("{0}")]
@@ -13,6 +13,16 @@ pub enum Failure {
     /// The simulation cannot continue, but the process and other instances can (`fmi2Error`).
     #[error("{0}")]
     Error(String),
+    /// A step came to the end of what the model simulates, before it reached its end. The outputs
+    /// are those at this time. The importer gets `fmi2Discard` and learns the rest from
+    /// `fmi2GetBooleanStatus` and `fmi2GetRealStatus` (2.0.5, section 4.2.3).
+    #[error("{reason}")]
+    Ended {
+        /// Time at which the simulation ends, s.
+        time: f64,
+        /// What ends it.
+        reason: String,
+    },
 }
 
 /// Data about the experiment that a model may use while it initializes.
@@ -60,6 +70,8 @@ pub struct EventInfo {
     pub next_event_time: Option<f64>,
     /// Whether the event changed continuous states.
     pub states_changed: bool,
+    /// Whether the simulation ends here.
+    pub terminates: bool,
 }
 
 /// Data about a saved state from which a model was restored.
@@ -119,7 +131,7 @@ pub trait Model: Serialize + DeserializeOwned + Send + Sized + 'static {
     /// but after a call of [`Model::calculate`]. `log` takes warnings.
     ///
     /// # Errors
-    /// Says why the step failed.
+    /// Says why the step failed, or why the simulation ends within it.
     fn step(
         &mut self,
         from: f64,

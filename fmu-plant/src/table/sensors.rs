@@ -57,6 +57,7 @@ pub(super) fn measured(mut variables: PlantVariables) -> PlantVariables {
             } else {
                 common.depends_on(["trajectory.flightPathAngle", "trajectory.heading"])
             };
+            let common = common.depends_on(super::entry::MOTION_NAMES);
             common.real().unit(sensor.unit).nominal(sensor.nominal)
         };
         let axes =

@@ -1,8 +1,8 @@
 //! Partial derivatives against differences and declared dependencies.
 
 use super::{
-    CONTEXT, MEASURED, STATES, actuate, all_kinds, delayed, in_model_exchange, outputs, started,
-    step,
+    CONTEXT, MEASURED, STATE_COUNT, STATES, actuate, all_kinds, delayed, in_model_exchange,
+    outputs, started, step,
 };
 use crate::plant::ReentryPlant;
 use crate::roles::Known;
@@ -24,7 +24,7 @@ fn calculated(instance: &mut ReentryPlant, time: f64) -> Vec<(usize, f64)> {
         o.delta,
         o.disturbance_moment,
     ];
-    let rest = o.deflections.iter().copied().chain([o.dynamic_pressure]);
+    let rest = o.deflections.iter().copied().chain([o.passage.dynamic_pressure]);
     let last = o.deflection_rates.iter().copied();
     let readings = o.measured.readings;
     let measured = readings.iter().flatten().copied().chain([o.measured.time]);
@@ -93,7 +93,7 @@ fn positions_of_knowns() -> impl Iterator<Item = usize> {
 fn nudge(instance: &mut ReentryPlant, known_position: usize, by: f64) {
     match role(known_position).as_known.unwrap() {
         Known::State(i) => {
-            let mut states = [0.0; 14];
+            let mut states = [0.0; STATE_COUNT];
             instance.continuous_states(&mut states);
             states[i] += by;
             instance.set_continuous_states(&states);
@@ -114,6 +114,7 @@ fn nudge(instance: &mut ReentryPlant, known_position: usize, by: f64) {
                 &mut t.latitude_rate,
             ][i] += by;
         }
+        Known::Prescribed(_) | Known::Trim => panic!("only an entry flight has these"),
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::MEASURED;
 use crate::plant::ReentryPlant;
-use crate::roles::{Known, Unknown};
+use crate::roles::{Known, Quantity, Unknown};
 use crate::table::role;
 use fmi2_export::describe;
 use model_description::variable::{Causality, Variability, VariableKind};
@@ -17,13 +17,15 @@ fn positions_and_names_agree() {
         let unknown = match role(position).as_unknown {
             Some(Unknown::State(0..3)) => "attitude",
             Some(Unknown::State(3..6)) => "rate",
-            Some(Unknown::State(_)) => "deflection",
+            Some(Unknown::State(6..14)) => "deflection",
             Some(Unknown::Derivative(0..3)) => "attitudeRate",
             Some(Unknown::Derivative(3..6)) => "angularAcceleration",
-            Some(Unknown::Derivative(_)) => "deflectionRate",
+            Some(Unknown::Derivative(6..14)) => "deflectionRate",
             Some(Unknown::AppliedMoment(_)) => "appliedMoment",
-            Some(Unknown::Delta | Unknown::DisturbanceMoment(_)) => "disturbance",
-            Some(Unknown::DynamicPressure) => "flight",
+            Some(Unknown::Delta(_) | Unknown::DisturbanceMoment(_)) => "disturbance",
+            Some(Unknown::Flight(Quantity::DynamicPressure | Quantity::KnownPressure)) => "flight",
+            Some(Unknown::State(_) | Unknown::Derivative(_)) => "motion",
+            Some(Unknown::Flight(_)) => continue,
             Some(Unknown::Measured(_) | Unknown::MeasuredTime) => "measured",
             None => match role(position).as_known {
                 Some(Known::Moment(_)) => "moment",
@@ -79,8 +81,11 @@ fn the_description_holds() {
     description.check().unwrap();
     let motion = (0..6).map(|i| (i, i + 6));
     let deflections = (27..35).map(|i| (i, i + 27));
-    assert_eq!(description.states(), motion.chain(deflections).collect::<Vec<_>>());
-    assert_eq!(description.event_indicators, 8);
+    let altitude = description.position("motion.altitude").unwrap();
+    let travel = (altitude..altitude + 6).map(|i| (i, i + 6));
+    let expected: Vec<_> = motion.chain(deflections).chain(travel).collect();
+    assert_eq!(description.states(), expected);
+    assert_eq!(description.event_indicators, 10);
     for variable in
         description.variables.iter().filter(|variable| variable.causality == Causality::Input)
     {
@@ -138,12 +143,24 @@ fn outputs_need_no_start_and_inputs_have_one() {
             "density.scale",
             "aerodynamics.scale",
             "sensor.drop.probability",
+            "flow.mach",
+            "load.factor",
+            "planet.oblateness",
+            "aerodynamics.lift.scale",
+            "aerodynamics.drag.scale",
+            "aerodynamics.moment.scale",
+            "aerodynamics.pitch.offset",
         ];
         let group = variable.name.split('[').next().unwrap();
-        let plain_group =
-            ["jet", "disturbance.table.alpha", "disturbance.table.beta", "disturbance.table.sigma"]
-                .contains(&group)
-                || group.ends_with(".matrix");
+        let plain_group = [
+            "jet",
+            "air.densityRatio",
+            "disturbance.table.alpha",
+            "disturbance.table.beta",
+            "disturbance.table.sigma",
+        ]
+        .contains(&group)
+            || group.ends_with(".matrix");
         assert_eq!(
             unit.is_none(),
             plain_group || plain.contains(&variable.name.as_str()),

@@ -3,6 +3,7 @@
 mod actuators;
 mod derivatives;
 mod description;
+mod entry;
 mod model_exchange;
 mod outputs;
 mod refusals;
@@ -60,8 +61,12 @@ fn outputs(instance: &mut ReentryPlant, time: f64) -> Output {
 }
 
 /// A general attitude with general rates, and surfaces slightly away from zero.
-const STATES: [f64; 14] =
-    [0.3, 0.2, -0.5, 0.08, -0.05, 0.06, -0.01, -0.02, -0.01, -0.01, 0.01, -0.01, 0.01, 0.01];
+const STATES: [f64; STATE_COUNT] = [
+    0.3, 0.2, -0.5, 0.08, -0.05, 0.06, -0.01, -0.02, -0.01, -0.01, 0.01, -0.01, 0.01, 0.01, 55e3,
+    0.2, -0.3, 3172.0, -0.02, 1.1,
+];
+/// Number of states: attitude, rates, deflections and motion.
+const STATE_COUNT: usize = 20;
 
 /// Iterates over all kinds of disturbance.
 fn all_kinds() -> impl Iterator<Item = DisturbanceKind> {

@@ -1,12 +1,12 @@
 //! Model exchange against co-simulation, with the disturbance's events.
 
-use super::{CONTEXT, actuate, all_kinds, outputs, started, step, tabulate};
-use crate::plant::{Output, ReentryPlant};
+use super::{CONTEXT, STATE_COUNT, actuate, all_kinds, outputs, started, step, tabulate};
+use crate::plant::{INDICATORS, Output, ReentryPlant};
 use fmi2_export::{LastEvent, Model};
 use nalgebra::Vector3;
 use vehicle::disturbance::{DisturbanceKind, Row};
 
-type States = nalgebra::SVector<f64, 14>;
+type States = nalgebra::SVector<f64, STATE_COUNT>;
 
 pub(super) fn states(instance: &ReentryPlant) -> States {
     let mut states = States::zeros();
@@ -14,9 +14,9 @@ pub(super) fn states(instance: &ReentryPlant) -> States {
     states
 }
 
-pub(super) fn indicators(instance: &mut ReentryPlant, time: f64) -> [f64; 8] {
+pub(super) fn indicators(instance: &mut ReentryPlant, time: f64) -> [f64; INDICATORS] {
     instance.calculate(time, LastEvent::InputSet).unwrap();
-    let mut indicators = [f64::NAN; 8];
+    let mut indicators = [f64::NAN; INDICATORS];
     instance.event_indicators(&mut indicators);
     indicators
 }
@@ -36,7 +36,8 @@ pub(super) fn integrate(instance: &mut ReentryPlant, begin: f64, end: f64) -> f6
                 instance.set_continuous_states(y.as_slice());
                 let o = outputs(instance, t);
                 let motion = o.angle_rates.iter().chain(o.angular_acceleration.iter());
-                States::from_iterator(motion.chain(o.deflection_rates.iter()).copied())
+                let motion = motion.chain(o.deflection_rates.iter());
+                States::from_iterator(motion.chain(o.motion_rate.iter()).copied())
             };
             let y = vehicle::integrator::rk4(&mut f, time, &y, h);
             instance.set_continuous_states(y.as_slice());

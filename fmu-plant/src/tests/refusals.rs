@@ -1,6 +1,8 @@
 //! What the instance refuses, and the names in its messages.
 
-use super::{CONTEXT, Ramp, actuate, delayed, in_model_exchange, started, step, tabulate};
+use super::{
+    CONTEXT, Ramp, STATE_COUNT, actuate, delayed, in_model_exchange, started, step, tabulate,
+};
 use crate::parameters::Actuation;
 use crate::parameters::Initial;
 use crate::plant::ReentryPlant;
@@ -107,7 +109,7 @@ fn impossible_parameters_are_refused_by_name() {
 
 #[test]
 fn a_singular_attitude_is_an_error_in_co_simulation_and_discarded_in_model_exchange() {
-    let mut singular = [0.0; 14];
+    let mut singular = [0.0; STATE_COUNT];
     singular[1] = 1.6;
     let mut instance = in_model_exchange(DisturbanceKind::None);
     instance.set_continuous_states(&singular);

@@ -1,7 +1,7 @@
 //! Tests of the sensors and the calibration sequence through the instance's interface.
 
 use super::model_exchange::{assert_same_motion, exchange, integrate};
-use super::{Constant, outputs, started, step};
+use super::{Constant, STATE_COUNT, outputs, started, step};
 use crate::plant::ReentryPlant;
 use fmi2_export::{Failure, Model};
 use nalgebra::Vector3;
@@ -258,7 +258,7 @@ fn oracle_in_the_calibration_sequence_nothing_but_what_is_felt_depends_on_the_st
     for known_position in 0..6 {
         let by = 1e-5;
         let mut shifted = |shift: f64| {
-            let mut states = [0.0; 14];
+            let mut states = [0.0; STATE_COUNT];
             instance.continuous_states(&mut states);
             states[known_position] += shift;
             instance.set_continuous_states(&states);

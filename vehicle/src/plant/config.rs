@@ -4,6 +4,7 @@ use crate::actuators::{self};
 use crate::calibration::Sequence;
 use crate::disturbance::Disturbance;
 use crate::dynamics::Inertia;
+use crate::entry;
 use crate::kinematics::Kinematics;
 use crate::platform::Surroundings;
 use crate::sensors::{self};
@@ -23,9 +24,13 @@ pub struct Config {
     pub initial: State,
     /// Disturbance that acts on the vehicle.
     pub disturbance: Disturbance,
+    /// Motion of the centre of mass at the start. Without an entry flight it stays.
+    pub motion: entry::Motion,
+    /// Entry flight; without it the trajectory is an input, and the flight condition is fixed.
+    pub entry: Option<entry::Config>,
     /// Attitude kinematics, with the matrix R in use.
     pub kinematics: Kinematics,
-    /// Angular rate ω_e of the Earth, rad/s.
+    /// Angular rate ω_e of the Earth for a trajectory that is an input, rad/s.
     pub earth_rate: f64,
     /// Surfaces and jets that make the control moment; without them the moment is an input.
     pub actuators: Option<actuators::Config>,

@@ -79,7 +79,8 @@ impl Plant {
             }
             _ => {
                 let (angles, rates) = (self.angles(), self.rates());
-                let moment = self.control_moment(input, delayed, &drive, 0.0);
+                let ratio = self.pressure_ratio(time);
+                let moment = self.control_moment(input, delayed, &drive, (0.0, ratio));
                 let view = View {
                     body: &self.body,
                     kinematics: self.kinematics,

@@ -5,6 +5,7 @@ use super::equations::{self, Load, Partials};
 use super::{Held, Plant};
 use crate::actuators::{Command, Drive};
 use crate::effectors::{JETS, SURFACES, Surfaces};
+use crate::entry::Prescribed;
 use crate::kinematics::{TRAJECTORY, Trajectory};
 use crate::state::State;
 use nalgebra::{Matrix3, SMatrix, Vector3};
@@ -19,8 +20,13 @@ pub struct Input {
     pub moment: Vector3<f64>,
     /// Further moment about the body axes, N m.
     pub disturbance_moment: Vector3<f64>,
-    /// Trajectory of the vehicle, which turns the axes from which the angles are counted.
+    /// Trajectory of the vehicle, which turns the axes from which the angles are counted. During
+    /// an entry flight the plant computes it.
     pub trajectory: Trajectory,
+    /// Attitude that a prescribed attitude follows.
+    pub prescribed: Prescribed,
+    /// Angle of attack at which the vehicle is trimmed, rad.
+    pub trim: f64,
 }
 
 impl Input {
@@ -29,6 +35,10 @@ impl Input {
         let broken = |values: &[f64]| values.iter().any(|value| !value.is_finite());
         if broken(self.moment.as_slice()) || broken(self.disturbance_moment.as_slice()) {
             return Some("moment");
+        }
+        let Prescribed { angles, rates } = &self.prescribed;
+        if broken(angles.as_slice()) || broken(rates.as_slice()) || !self.trim.is_finite() {
+            return Some("prescribed attitude or trim");
         }
         broken(&self.trajectory.values()).then_some("trajectory")
     }
@@ -51,18 +61,20 @@ impl Plant {
     }
 
     /// Control moment (N m) at the time `elapsed` (s) after the present one, provided that the
-    /// drive does not change until then.
+    /// drive does not change until then, and with the effectiveness of the surfaces times
+    /// `pressure_ratio`.
     pub(super) fn control_moment(
         &self,
         input: &Input,
         delayed: Option<Vector3<f64>>,
         drive: &Drive,
-        elapsed: f64,
+        (elapsed, pressure_ratio): (f64, f64),
     ) -> Vector3<f64> {
         self.actuators.as_ref().map_or_else(
             || self.converted(&delayed.unwrap_or(input.moment)),
             |actuators| {
-                actuators.moment(drive, &(self.deflections + actuators.rates(drive) * elapsed))
+                let deflections = self.deflections + actuators.rates(drive) * elapsed;
+                actuators.moment(drive, &deflections, pressure_ratio)
             },
         )
     }
@@ -75,9 +87,10 @@ impl Plant {
         }
     }
 
-    /// Control moment (N m) that acts at present.
-    pub fn applied_moment(&self, input: &Input, held: &Held) -> Vector3<f64> {
-        self.control_moment(input, held.delayed, &held.drive, 0.0)
+    /// Control moment (N m) that acts at `time` (s).
+    pub fn applied_moment(&self, time: f64, input: &Input, held: &Held) -> Vector3<f64> {
+        let ratio = self.pressure_ratio(time);
+        self.control_moment(input, held.delayed, &held.drive, (0.0, ratio))
     }
 
     /// Rate of each deflection, rad/s: plus or minus the rate limit, or zero.
@@ -107,21 +120,25 @@ impl Plant {
             .map_or_else(SMatrix::zeros, |actuators| actuators.moment_by_jets(command))
     }
 
-    /// Turn rate (rad/s) of the trajectory, which is zero during the calibration sequence.
-    pub(super) fn turn_rate(&self, input: &Input) -> Vector3<f64> {
-        if self.calibration.is_some() {
-            return Vector3::zeros();
+    /// Trajectory at `time` (s): that of the entry flight, or the input. Also its turn rate (rad/s),
+    /// which is zero during the calibration sequence.
+    pub(super) fn trajectory(&self, time: f64, input: &Input) -> (Trajectory, Vector3<f64>) {
+        if let Some(entering) = self.entering(time) {
+            return (entering.trajectory, entering.turn_rate);
         }
-        input.trajectory.turn_rate(self.earth_rate)
+        if self.calibration.is_some() {
+            return (input.trajectory, Vector3::zeros());
+        }
+        (input.trajectory, input.trajectory.turn_rate(self.earth_rate))
     }
 
     /// Returns the loads at `time` (s), which is `elapsed` (s) after the time of the deflections.
     pub(super) fn load(&self, time: f64, input: &Input, held: &Held, elapsed: f64) -> Load {
         Load {
-            moment: self.control_moment(input, held.delayed, &held.drive, elapsed)
+            moment: self.control_moment(input, held.delayed, &held.drive, (elapsed, 1.0))
                 + self.disturbance_moment(time, input, held),
             delta: held.delta(),
-            turn_rate: self.turn_rate(input),
+            turn_rate: self.trajectory(time, input).1,
         }
     }
 
@@ -135,13 +152,18 @@ impl Plant {
         }
     }
 
-    /// State derivative at `time` (s) for the present state.
+    /// Derivative of the attitude and the rates at `time` (s) for the present state.
     pub fn derivative(&self, time: f64, input: &Input, held: &Held) -> State {
-        self.derivative_at(time, &self.state, &self.load(time, input, held, 0.0))
+        match (&self.entry, self.entering(time)) {
+            (Some(entry), Some(entering)) => {
+                self.turned(entry, &entering, (time, 0.0), &self.state, (input, held))
+            }
+            _ => self.derivative_at(time, &self.state, &self.load(time, input, held, 0.0)),
+        }
     }
 
-    /// Partial derivatives of [`Plant::derivative`], and those of the turn rate with respect to the
-    /// trajectory (3 × 7).
+    /// Partial derivatives of [`Plant::derivative`] without an entry flight, and those of the turn
+    /// rate with respect to the trajectory (3 × 7).
     pub fn partial_derivatives(
         &self,
         time: f64,

@@ -2,7 +2,7 @@
 
 use super::Plant;
 use super::config::{Calibration, Config};
-use crate::actuators::Actuators;
+use crate::actuators::{self, Actuators};
 use crate::effectors::Surfaces;
 use crate::error::Error;
 use crate::sensors::Sensors;
@@ -34,6 +34,7 @@ impl Plant {
         if !(config.step > 0.0 && config.step.is_finite()) {
             return refuse("integrator.step", format!("= {} s must be positive", config.step));
         }
+        check_motion(config)?;
         if !config.earth_rate.is_finite() {
             return refuse("trajectory.earthRate", "is not finite".into());
         }
@@ -72,6 +73,13 @@ impl Plant {
             check_resolution(start_time, period)?;
         }
         config.surroundings.check()?;
+        let actuators = |actuators: &actuators::Config| match &config.entry {
+            None => Actuators::new(actuators),
+            // The moment of the surfaces is proportional to the dynamic pressure of the flight.
+            Some(_) => {
+                Actuators::new(&actuators::Config { dynamic_pressure: 1.0, ..actuators.clone() })
+            }
+        };
         let initial = angles(&config.initial);
         let mut state = config.initial;
         if let Some(sequence) = &config.calibration {
@@ -83,7 +91,7 @@ impl Plant {
             kinematics: config.kinematics,
             earth_rate: config.earth_rate,
             disturbance: config.disturbance.clone(),
-            actuators: config.actuators.as_ref().map(Actuators::new).transpose()?,
+            actuators: config.actuators.as_ref().map(actuators).transpose()?,
             transport,
             moment_resolution: resolution,
             calibration: config.calibration.map(|sequence| Calibration { sequence, initial }),
@@ -94,11 +102,15 @@ impl Plant {
                 .map(|sensors| Sensors::new(sensors, start_time))
                 .transpose()?,
             turntable,
+            entry: config.entry.clone().map(Box::new),
+            origin: [config.motion[1], config.motion[2]],
+            ended: None,
             step: config.step,
             start_time,
             held: None,
             noise: None,
             state,
+            motion: config.motion,
             deflections: Surfaces::zeros(),
         })
     }
@@ -113,7 +125,13 @@ impl Plant {
         let period =
             self.disturbance.intervals(self.start_time).map_or(self.step, |(_, length)| length);
         held && check_resolution(time, period).is_ok()
-            && self.state.iter().chain(&self.deflections).all(|value| value.is_finite())
+            && self.ended.is_none_or(f64::is_finite)
+            && self
+                .state
+                .iter()
+                .chain(&self.motion)
+                .chain(&self.deflections)
+                .all(|value| value.is_finite())
             && self.same_configuration(built)
             && self.sensors.as_ref().is_none_or(|sensors| sensors.fits(time, failed))
             && self.transport.as_ref().is_none_or(|transport| transport.fits(time, failed))
@@ -141,7 +159,23 @@ impl Plant {
             && self.moment_resolution == other.moment_resolution
             && self.calibration == other.calibration
             && self.surroundings == other.surroundings
+            && self.entry == other.entry
+            && self.origin == other.origin
             && self.step == other.step
             && self.start_time == other.start_time
     }
+}
+
+/// Checks the motion of the centre of mass.
+fn check_motion(config: &Config) -> Result<(), Error> {
+    if let Some(entry) = &config.entry {
+        entry.check(&config.motion)?;
+        if config.calibration.is_some() {
+            let problem = "prescribes the attitude, as an entry flight does not allow";
+            return Err(Error::parameter("calibration.active", problem));
+        }
+    } else if !config.motion.iter().all(|value| value.is_finite()) {
+        return Err(Error::parameter("flight", "holds a value that is not finite"));
+    }
+    Ok(())
 }

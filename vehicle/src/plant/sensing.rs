@@ -21,18 +21,24 @@ impl Plant {
     }
 
     fn pose(&self, time: f64, input: &Input) -> Pose {
+        let entering = self.entering(time);
+        let (trajectory, turn_rate) = match &entering {
+            Some(entering) => (entering.trajectory, entering.turn_rate),
+            None => self.trajectory(time, input),
+        };
         let angle_rates = if self.calibration.is_some() {
             angles(&self.derivative_at(time, &self.state, &Load::default()))
         } else {
             let matrix = self.kinematics.r(&self.angles());
-            angle_rates(self.kinematics, &matrix, &self.state, &self.turn_rate(input))
+            angle_rates(self.kinematics, &matrix, &self.state, &turn_rate)
         };
         Pose {
             kinematics: self.kinematics,
             angles: self.angles(),
             rates: self.rates(),
             alpha_rate: angle_rates.x,
-            trajectory: input.trajectory,
+            trajectory,
+            specific_force: entering.map(|entering| entering.passage.specific_force),
         }
     }
 
@@ -45,7 +51,9 @@ impl Plant {
     /// turntable, if there is one and a sample is due.
     fn felt_by(&self, sensors: &Sensors, time: f64, input: &Input, vehicle: &Pose) -> Readings {
         let pose = match (&self.turntable, sensors.due(time)) {
-            (Some(turntable), Some(at)) => turntable.pose(at, vehicle, &self.turn_rate(input)),
+            (Some(turntable), Some(at)) => {
+                turntable.pose(at, vehicle, &self.trajectory(time, input).1)
+            }
             _ => *vehicle,
         };
         pose.felt(&self.surroundings)

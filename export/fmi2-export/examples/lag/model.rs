@@ -222,7 +222,7 @@ impl Model for Lag {
         self.switched = time >= self.switch_time;
         self.offset_held = Some(self.offset);
         let next = (!self.switched).then_some(self.switch_time);
-        Ok(EventInfo { next_event_time: next, states_changed: false })
+        Ok(EventInfo { next_event_time: next, ..EventInfo::default() })
     }
 
     fn event_indicators(&self, indicators: &mut [f64]) {

@@ -96,13 +96,20 @@ impl Instance {
                 self.progress.extrapolations.clear();
                 self.stale = true;
                 self.last_step = FmiStatus::Ok;
+                self.has_ended = false;
                 Ok(())
             }
             Err(failure) => {
                 self.last_step = match failure {
-                    Failure::Discard(_) => FmiStatus::Discard,
+                    Failure::Discard(_) | Failure::Ended { .. } => FmiStatus::Discard,
                     Failure::Error(_) => FmiStatus::Error,
                 };
+                self.has_ended = matches!(failure, Failure::Ended { .. });
+                if let Failure::Ended { time, .. } = failure {
+                    self.progress.last_event = LastEvent::Step;
+                    self.progress.time = time;
+                    self.progress.extrapolations.clear();
+                }
                 self.progress.state = State::StepFailed;
                 self.stale = true;
                 Err(failure)
@@ -112,6 +119,10 @@ impl Instance {
 
     pub(crate) fn last_step(&self) -> FmiStatus {
         self.last_step
+    }
+
+    pub(crate) fn has_ended(&self) -> bool {
+        self.has_ended
     }
 
     pub(crate) fn time(&self) -> f64 {

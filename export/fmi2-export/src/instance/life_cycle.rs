@@ -62,6 +62,7 @@ impl Instance {
         self.progress.extrapolations.clear();
         self.stale = true;
         self.last_step = FmiStatus::Ok;
+        self.has_ended = false;
         self.logger.log(Category::Events, "reset");
     }
 

@@ -41,6 +41,8 @@ pub(crate) struct Instance {
     /// Whether calculated variables are older than the state, the inputs or the time.
     stale: bool,
     last_step: FmiStatus,
+    /// Whether the last step ended the simulation.
+    has_ended: bool,
     /// Saved states handed out by fmi2GetFMUstate; the importer holds their addresses.
     #[expect(clippy::vec_box, reason = "the address is the importer's handle and must not move")]
     saved: Vec<Box<Saved>>,
@@ -77,6 +79,7 @@ impl Instance {
             progress,
             stale: true,
             last_step: FmiStatus::Ok,
+            has_ended: false,
             saved: Vec::new(),
             strings: Vec::new(),
         }
@@ -100,6 +103,10 @@ impl Instance {
             Ok(Ok(())) => FmiStatus::Ok,
             Ok(Err(Failure::Discard(problem))) => {
                 self.logger.log(Category::Discard, &format!("{}: {problem}", call.name));
+                FmiStatus::Discard
+            }
+            Ok(Err(Failure::Ended { reason, .. })) => {
+                self.logger.log(Category::Events, &reason);
                 FmiStatus::Discard
             }
             Ok(Err(Failure::Error(problem))) => {

@@ -107,7 +107,11 @@ pub unsafe fn fmi2GetBooleanStatus(
 ) -> FmiStatus {
     let kinds = (kind, Some(TERMINATED));
     // SAFETY: the importer vouches for `component` and the result pointer, as `status` requires.
-    unsafe { status(component, &table::GET_BOOLEAN_STATUS, kinds, value, |_| 0) }
+    unsafe {
+        status(component, &table::GET_BOOLEAN_STATUS, kinds, value, |instance| {
+            c_int::from(instance.has_ended())
+        })
+    }
 }
 
 pub unsafe fn fmi2GetStringStatus(

@@ -23,6 +23,7 @@ pub unsafe fn fmi2NewDiscreteStates(
             values_of_continuous_states_changed: c_int::from(event.states_changed),
             next_event_time_defined: c_int::from(event.next_event_time.is_some()),
             next_event_time: event.next_event_time.unwrap_or_default(),
+            terminate_simulation: c_int::from(event.terminates),
             ..CEventInfo::default()
         };
         // SAFETY: the importer vouches for the result pointer, as `put` requires.

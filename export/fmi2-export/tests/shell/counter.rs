@@ -8,6 +8,9 @@ use serde::{Deserialize, Serialize};
 use settings::Choice;
 use std::path::Path;
 
+/// Time (s) at which the simulation ends with the defect `end`.
+pub(crate) const ENDS_AT: f64 = 0.75;
+
 /// Whether the count is even. The enumeration below leaves one out, as an FMU's author might.
 #[derive(Clone, Copy, PartialEq, Serialize, Deserialize)]
 enum Parity {
@@ -105,12 +108,15 @@ impl Model for Counter {
     fn step(
         &mut self,
         _from: f64,
-        _to: f64,
+        to: f64,
         _inputs: &dyn Inputs<Self>,
         _log: &mut dyn FnMut(&str),
     ) -> Result<(), Failure> {
         self.meet("step");
         self.count += self.increment;
+        if self.defect == "end" && to > ENDS_AT {
+            return Err(Failure::Ended { time: ENDS_AT, reason: "the count is over".into() });
+        }
         Ok(())
     }
 }

@@ -225,6 +225,37 @@ fn a_step_that_the_model_refuses_can_be_repeated_from_a_saved_state() {
     assert_eq!(instance.step(0.5, 0.25), FmiStatus::Ok);
 }
 
+/// FMI 2.0.5, section 4.2.3: the importer learns by fmi2Discard and the Boolean status fmi2Terminated
+/// that the simulation ends, and by the Real status fmi2LastSuccessfulTime when.
+#[test]
+fn a_step_to_the_end_of_the_simulation_is_discarded() {
+    const DEFECT: u32 = 0;
+    const COUNT: u32 = 2;
+    let instance = Instance::new("Counter", CO_SIMULATION);
+    assert_eq!(instance.set_string(DEFECT, c"end"), FmiStatus::Ok);
+    instance.initialize();
+    let has_terminated = || {
+        let mut terminated = -1;
+        assert_eq!(c!(fmi2GetBooleanStatus(instance.component, 3, &mut terminated)), FmiStatus::Ok);
+        terminated
+    };
+    assert_eq!(instance.step(0.0, 0.5), FmiStatus::Ok);
+    assert_eq!(has_terminated(), 0);
+    assert_eq!(instance.step(0.5, 0.5), FmiStatus::Discard);
+    instance.said(&["the count is over"]);
+    assert_eq!(has_terminated(), 1);
+    let mut time = f64::NAN;
+    assert_eq!(c!(fmi2GetRealStatus(instance.component, 2, &mut time)), FmiStatus::Ok);
+    assert_eq!(time, crate::counter::ENDS_AT);
+    // The outputs are those of the end, and no step leads beyond it.
+    assert_eq!(instance.real(COUNT), 2.0);
+    assert_eq!(instance.step(time, 0.5), FmiStatus::Error);
+    assert_eq!(c!(fmi2Reset(instance.component)), FmiStatus::Ok);
+    instance.initialize();
+    assert_eq!(instance.step(0.0, 0.5), FmiStatus::Ok);
+    assert_eq!(has_terminated(), 0);
+}
+
 #[test]
 #[allow(unsafe_code)]
 fn status_of_other_kinds_is_discarded() {

@@ -1,0 +1,175 @@
+//! Partial derivatives of the calculated variables.
+
+use crate::plant::{ATTITUDE, MOTION, Output, ReentryPlant};
+use crate::roles::{Known, Quantity, Unknown};
+use fmi2_export::Failure;
+use nalgebra::{SMatrix, Vector3};
+
+impl ReentryPlant {
+    /// Returns the partial derivative at a fixed flight condition, in closed form.
+    pub(crate) fn given_derivative(
+        &self,
+        time: f64,
+        unknown: Unknown,
+        known: Known,
+    ) -> Result<f64, Failure> {
+        let plant = self.ready()?;
+        let held = self.held(plant, time);
+        let (partials, turn_rate_by_trajectory) =
+            plant.partial_derivatives(time, &self.input, &held);
+        let (applied_by_moment, applied_by_deflections) =
+            plant.applied_moment_by_moment_and_deflections();
+        // In model exchange, commands are taken at events only.
+        let applied_by_jets = if self.event_driven {
+            SMatrix::zeros()
+        } else {
+            plant.applied_moment_by_jets(&self.command)
+        };
+        let by_applied = |column: Vector3<f64>, i: usize| (partials.by_moment * column)[i];
+        Ok(match (unknown, known) {
+            (Unknown::Derivative(i @ 0..ATTITUDE), Known::State(j @ 0..ATTITUDE)) => {
+                partials.by_state[(i, j)]
+            }
+            (Unknown::Derivative(i @ 0..ATTITUDE), Known::State(j @ ATTITUDE..MOTION)) => {
+                by_applied(applied_by_deflections.column(j - ATTITUDE).into(), i)
+            }
+            (Unknown::Derivative(i @ 0..ATTITUDE), Known::DisturbanceMoment(j)) => {
+                partials.by_moment[(i, j)]
+            }
+            (Unknown::Derivative(i @ 0..ATTITUDE), Known::Moment(j)) => {
+                by_applied(applied_by_moment.column(j).into(), i)
+            }
+            (Unknown::Derivative(i @ 0..ATTITUDE), Known::Jet(j)) => {
+                by_applied(applied_by_jets.column(j).into(), i)
+            }
+            (Unknown::Derivative(i @ 0..ATTITUDE), Known::Trajectory(j)) => {
+                (partials.by_turn_rate * turn_rate_by_trajectory.column(j))[i]
+            }
+            (Unknown::AppliedMoment(i), Known::Moment(j)) => applied_by_moment[(i, j)],
+            (Unknown::AppliedMoment(i), Known::Jet(j)) => applied_by_jets[(i, j)],
+            (Unknown::AppliedMoment(i), Known::State(j @ ATTITUDE..MOTION)) => {
+                applied_by_deflections[(i, j - ATTITUDE)]
+            }
+            (Unknown::Measured(i), Known::State(j @ 0..ATTITUDE)) => {
+                plant.measured_by_state_and_trajectory(time, &self.input, &held).0[(i, j)]
+            }
+            (Unknown::Measured(i), Known::Trajectory(j)) => {
+                plant.measured_by_state_and_trajectory(time, &self.input, &held).1[(i, j)]
+            }
+            (Unknown::State(i), Known::State(j))
+            | (Unknown::DisturbanceMoment(i), Known::DisturbanceMoment(j))
+                if i == j =>
+            {
+                1.0
+            }
+            _ => 0.0,
+        })
+    }
+
+    /// Returns the partial derivative during an entry flight: a difference of fourth order.
+    pub(crate) fn difference(
+        &mut self,
+        time: f64,
+        unknown: Unknown,
+        known: Known,
+    ) -> Result<f64, Failure> {
+        let held = self.held(self.ready()?, time);
+        let h = width(known);
+        let mut values = [0.0; 4];
+        for (value, steps) in values.iter_mut().zip([-2.0, -1.0, 1.0, 2.0]) {
+            let before = self.nudge(known, steps * h);
+            let plant = self.ready()?;
+            // A command to a jet acts at once in co-simulation.
+            let is_taken = matches!(known, Known::Jet(_)) && !self.event_driven;
+            let held = if is_taken { self.held(plant, time) } else { held };
+            *value = self.output_at(plant, time, &held).value(unknown);
+            self.put(known, before);
+        }
+        let [far_below, below, above, far_above] = values;
+        Ok((8.0 * (above - below) - (far_above - far_below)) / (12.0 * h))
+    }
+
+    /// Adds a number to a state or an input. Returns the value before.
+    pub(crate) fn nudge(&mut self, known: Known, by: f64) -> f64 {
+        let Some(place) = self.place(known) else { return 0.0 };
+        let before = *place;
+        *place += by;
+        before
+    }
+
+    fn put(&mut self, known: Known, value: f64) {
+        if let Some(place) = self.place(known) {
+            *place = value;
+        }
+    }
+
+    fn place(&mut self, known: Known) -> Option<&mut f64> {
+        let Self { input, command, plant, .. } = self;
+        Some(match known {
+            Known::State(i @ 0..ATTITUDE) => &mut plant.as_mut()?.state[i],
+            Known::State(i @ ATTITUDE..MOTION) => &mut plant.as_mut()?.deflections[i - ATTITUDE],
+            Known::State(i) => &mut plant.as_mut()?.motion[i - MOTION],
+            Known::Moment(i) => &mut input.moment[i],
+            Known::DisturbanceMoment(i) => &mut input.disturbance_moment[i],
+            Known::Surface(i) => &mut command.surfaces[i],
+            Known::Jet(j) => &mut command.jets[j],
+            // The trajectory of an entry flight is no input.
+            Known::Trajectory(_) => return None,
+            Known::Prescribed(i @ 0..3) => &mut input.prescribed.angles[i],
+            Known::Prescribed(i) => &mut input.prescribed.rates[i - 3],
+            Known::Trim => &mut input.trim,
+        })
+    }
+}
+
+/// Width of the difference with respect to a state or an input.
+fn width(known: Known) -> f64 {
+    const ALTITUDE: usize = MOTION;
+    const SPEED: usize = MOTION + 3;
+    match known {
+        Known::State(ALTITUDE) => 10.0,
+        Known::State(SPEED) => 1.0,
+        Known::Moment(_) | Known::DisturbanceMoment(_) => 1e3,
+        _ => 1e-3,
+    }
+}
+
+impl Output {
+    /// Returns the value of a calculated variable.
+    pub(crate) fn value(&self, unknown: Unknown) -> f64 {
+        match unknown {
+            Unknown::State(i @ 0..3) => self.angles[i],
+            Unknown::State(i @ 3..ATTITUDE) => self.rates[i - 3],
+            Unknown::State(i @ ATTITUDE..MOTION) => self.deflections[i - ATTITUDE],
+            Unknown::State(i) => self.motion[i - MOTION],
+            Unknown::Derivative(i @ 0..3) => self.angle_rates[i],
+            Unknown::Derivative(i @ 3..ATTITUDE) => self.angular_acceleration[i - 3],
+            Unknown::Derivative(i @ ATTITUDE..MOTION) => self.deflection_rates[i - ATTITUDE],
+            Unknown::Derivative(i) => self.motion_rate[i - MOTION],
+            Unknown::AppliedMoment(i) => self.applied_moment[i],
+            Unknown::Delta(i) => self.delta[i],
+            Unknown::DisturbanceMoment(i) => self.disturbance_moment[i],
+            Unknown::Flight(quantity) => self.flight(quantity),
+            Unknown::Measured(i) => self.measured.readings[i / 3][i % 3],
+            Unknown::MeasuredTime => self.measured.time,
+        }
+    }
+
+    fn flight(&self, quantity: Quantity) -> f64 {
+        let passage = &self.passage;
+        match quantity {
+            Quantity::DynamicPressure => passage.dynamic_pressure,
+            Quantity::KnownPressure => passage.known_pressure,
+            Quantity::Mach => passage.mach,
+            Quantity::Airspeed => passage.airspeed,
+            Quantity::Density => passage.density,
+            Quantity::AirAngle(i) => passage.air_angles[i],
+            Quantity::Lift => passage.lift,
+            Quantity::Drag => passage.drag,
+            Quantity::LoadFactor => self.load_factor,
+            Quantity::HeatFlux => self.heat_flux,
+            Quantity::Range => self.range,
+            Quantity::AirMoment(i) => self.air_moment[i],
+        }
+    }
+}

@@ -1,0 +1,135 @@
+//! Parameters of an entry flight.
+
+use serde::{Deserialize, Serialize};
+use settings::{Choice, Declared};
+use vehicle::aerodynamics::Aerodynamics;
+use vehicle::air::Air;
+use vehicle::entry::{Config, Deviations, End, Following, Motion, Trim};
+use vehicle::translation::Planet;
+
+/// Motion of the centre of mass.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Choice)]
+pub(crate) enum Translation {
+    /// The flight condition is fixed by flight.altitude and flight.mach; the inputs trajectory.*
+    /// say how the trajectory turns.
+    #[default]
+    Given,
+    /// An entry flight from the initial motion: the FMU computes the trajectory and the air.
+    Entry,
+}
+
+/// Data of the air's forces and moments.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Choice)]
+pub(crate) enum Vehicle {
+    /// The vehicle of the papers: representative forces and moments.
+    #[default]
+    Papers,
+    /// The Space Shuttle of Betts: forces and heating, no moments.
+    Shuttle,
+}
+
+/// Parameters of an entry flight.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Declared)]
+pub(crate) struct EntryParameters {
+    pub(crate) translation: Translation,
+    #[setting(name = "initial")]
+    pub(crate) start: Start,
+    pub(crate) planet: Planet,
+    #[setting(name = "aerodynamics.vehicle")]
+    pub(crate) vehicle: Vehicle,
+    #[setting(name = "aerodynamics.trim")]
+    pub(crate) trim: Trim,
+    #[setting(name = "aerodynamics")]
+    pub(crate) deviations: Deviations,
+    #[setting(name = "")]
+    pub(crate) air: Air,
+    pub(crate) prescribed: Following,
+    pub(crate) end: End,
+}
+
+/// Largest initial longitude and heading, rad.
+const TURN: f64 = 2.0 * std::f64::consts::PI;
+/// Largest initial latitude and flight path angle, rad.
+const STEEP: f64 = std::f64::consts::FRAC_PI_2 - 1e-6;
+
+/// Motion of the centre of mass at the start of an entry flight.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Declared)]
+pub(crate) struct Start {
+    /// Initial altitude of an entry flight.
+    #[setting(unit = "m", min = 0.0, max = 1e6, nominal = 1e5)]
+    pub(crate) altitude: f64,
+    /// Initial longitude of an entry flight.
+    #[setting(unit = "rad", min = -TURN, max = TURN, nominal = 1.0)]
+    pub(crate) longitude: f64,
+    /// Initial latitude of an entry flight.
+    #[setting(unit = "rad", min = -STEEP, max = STEEP, nominal = 1.0)]
+    pub(crate) latitude: f64,
+    /// Initial speed of an entry flight, relative to the rotating planet.
+    #[setting(unit = "m/s", above = 0.0, max = 2e4, nominal = 1e3)]
+    pub(crate) speed: f64,
+    /// Initial flight path angle of an entry flight, positive above the horizon.
+    #[setting(unit = "rad", min = -STEEP, max = STEEP, nominal = 0.1)]
+    pub(crate) flight_path_angle: f64,
+    /// Initial heading of an entry flight, measured from north towards east.
+    #[setting(unit = "rad", min = -TURN, max = TURN, nominal = 1.0)]
+    pub(crate) heading: f64,
+}
+
+impl Start {
+    /// Returns the initial motion.
+    pub(crate) fn motion(&self) -> Motion {
+        let Self { altitude, longitude, latitude, speed, flight_path_angle, heading } = *self;
+        Motion::new(altitude, longitude, latitude, speed, flight_path_angle, heading)
+    }
+}
+
+impl Default for EntryParameters {
+    /// Returns the start of the guided flight from 120 km in docs/entry.md.
+    fn default() -> Self {
+        Self {
+            translation: Translation::default(),
+            start: Start {
+                altitude: 120e3,
+                longitude: 0.0,
+                latitude: -10_f64.to_radians(),
+                speed: 7450.0,
+                flight_path_angle: -1.2_f64.to_radians(),
+                heading: 60_f64.to_radians(),
+            },
+            planet: Planet::EARTH,
+            vehicle: Vehicle::default(),
+            trim: Trim::default(),
+            deviations: Deviations::default(),
+            air: Air::default(),
+            prescribed: Following { active: false, frequency: 1.0 },
+            // The terminal area of the Space Shuttle begins at 80,000 ft.
+            end: End { altitude: 24_384.0, speed: 0.0 },
+        }
+    }
+}
+
+impl EntryParameters {
+    /// Whether the FMU computes an entry flight.
+    pub(crate) fn is_entry(&self) -> bool {
+        self.translation == Translation::Entry
+    }
+
+    /// Returns the configuration of the entry flight, with a factor on the density of the air, or
+    /// `None` without one.
+    pub(crate) fn config(&self, density_scale: f64) -> Option<Config> {
+        let aerodynamics = match (self.translation, self.vehicle) {
+            (Translation::Given, _) => return None,
+            (Translation::Entry, Vehicle::Papers) => Aerodynamics::papers(),
+            (Translation::Entry, Vehicle::Shuttle) => Aerodynamics::shuttle(),
+        };
+        Some(Config {
+            planet: self.planet,
+            aerodynamics,
+            deviations: self.deviations,
+            air: Air { scale: density_scale, ..self.air },
+            trim: self.trim,
+            following: self.prescribed,
+            end: self.end,
+        })
+    }
+}

@@ -1,0 +1,183 @@
+//! Entry flights: co-simulation against model exchange, the end, partial derivatives, and what a
+//! fixed flight condition shows.
+
+use super::model_exchange::exchange;
+use super::{Constant, STATES, outputs, started, step};
+use crate::entry::Translation;
+use crate::plant::{MOTION, ReentryPlant};
+use crate::table::role;
+use fmi2_export::{Failure, Model, describe};
+use nalgebra::Vector3;
+use vehicle::air::Row;
+use vehicle::disturbance::DisturbanceKind;
+use vehicle::effectors::Surfaces;
+use vehicle::entry::Trim;
+
+/// An entry flight without disturbance at 45 km, through wind, with surfaces and jets.
+fn entering(instance: &mut ReentryPlant) {
+    super::actuate(instance);
+    instance.parameters.kind = DisturbanceKind::None;
+    instance.parameters.jet_duty = true;
+    let entry = &mut instance.parameters.entry;
+    entry.translation = Translation::Entry;
+    entry.start.altitude = 45e3;
+    entry.start.speed = 3000.0;
+    entry.trim = Trim::Input;
+    entry.air.rows = 2;
+    entry.air.profile[0] = Row { altitude: 0.0, density: 0.9, wind: [20.0, -10.0] };
+    entry.air.profile[1] = Row { altitude: 8e4, density: 1.1, wind: [-10.0, 40.0] };
+    instance.input.trim = 0.13;
+}
+
+/// An entry flight that follows a prescribed attitude.
+fn prescribed(instance: &mut ReentryPlant) {
+    let entry = &mut instance.parameters.entry;
+    entry.translation = Translation::Entry;
+    entry.prescribed.active = true;
+    entry.start.altitude = 60e3;
+    entry.start.speed = 5000.0;
+    instance.parameters.initial.beta = 0.0;
+    instance.input.prescribed.angles = Vector3::new(0.4, 0.0, 0.8);
+}
+
+#[test]
+fn oracle_model_exchange_agrees_with_co_simulation_during_an_entry() {
+    for set in [entering, prescribed] {
+        let [mut cs, mut me] = [0, 1].map(|_| started(set));
+        for k in 0..50 {
+            step(&mut cs, 0.04 * f64::from(k), 0.04 * f64::from(k + 1)).unwrap();
+        }
+        exchange(&mut me, 0.0, 2.0);
+        let (cs, me) = (outputs(&mut cs, 2.0), outputs(&mut me, 2.0));
+        assert!((cs.angles - me.angles).amax() < 1e-9, "{}", cs.angles - me.angles);
+        assert!((cs.rates - me.rates).amax() < 1e-9);
+        let off =
+            (cs.motion - me.motion).component_div(&me.motion.map(|value| value.abs().max(1.0)));
+        assert!(off.amax() < 1e-11, "{off}");
+    }
+}
+
+#[test]
+fn an_entry_ends_at_its_altitude_or_speed() {
+    for by_speed in [false, true] {
+        let mut instance = started(|instance| {
+            prescribed(instance);
+            instance.parameters.entry.end.altitude = if by_speed { 0.0 } else { 59_900.0 };
+            instance.parameters.entry.end.speed = if by_speed { 4990.0 } else { 0.0 };
+        });
+        let ended = (0..2000).find_map(|k| {
+            let (from, to) = (0.04 * f64::from(k), 0.04 * f64::from(k + 1));
+            step(&mut instance, from, to).err()
+        });
+        let Some(Failure::Ended { time, reason }) = ended else { panic!("{ended:?}") };
+        assert!(reason.contains(if by_speed { "end.speed" } else { "end.altitude" }), "{reason}");
+        let motion = outputs(&mut instance, time).motion;
+        let margin = if by_speed { motion[3] - 4990.0 } else { motion[0] - 59_900.0 };
+        assert!(margin <= 0.0 && margin > -1e-4, "{margin}");
+        assert!(instance.new_discrete_states(time).unwrap().terminates);
+    }
+}
+
+#[test]
+fn an_entry_that_begins_at_its_end_is_refused() {
+    let mut instance = ReentryPlant::new();
+    prescribed(&mut instance);
+    instance.parameters.entry.end.altitude = 60e3;
+    let refusal = instance.initialize(&super::CONTEXT).unwrap_err().to_string();
+    assert!(refusal.contains("initial.altitude") && refusal.contains("end.altitude"), "{refusal}");
+}
+
+#[test]
+fn oracle_an_ideal_loop_follows_the_prescribed_attitude() {
+    let mut instance = started(prescribed);
+    for k in 0..1000 {
+        step(&mut instance, 0.04 * f64::from(k), 0.04 * f64::from(k + 1)).unwrap();
+    }
+    let output = outputs(&mut instance, 40.0);
+    assert!((output.angles - instance.input.prescribed.angles).amax() < 1e-3, "{}", output.angles);
+    assert!(output.angle_rates.amax() < 1e-3);
+}
+
+/// A state or an input as a function of its position in the table, moved by a number.
+fn moved(set: fn(&mut ReentryPlant), position: usize, by: f64) -> ReentryPlant {
+    let mut instance = in_general_motion(set);
+    instance.nudge(role(position).as_known.unwrap(), by);
+    instance
+}
+
+fn in_general_motion(set: fn(&mut ReentryPlant)) -> ReentryPlant {
+    let mut instance = started(set);
+    instance.set_continuous_states(&STATES);
+    instance.new_discrete_states(0.0).unwrap();
+    instance
+}
+
+#[test]
+fn oracle_partial_derivatives_of_an_entry_against_differences_and_declared_dependencies() {
+    let description = describe::<ReentryPlant>();
+    let count = description.variables.len();
+    let knowns: Vec<_> = (0..count).filter(|&i| role(i).as_known.is_some()).collect();
+    let unknowns: Vec<_> = (0..count).filter(|&i| role(i).as_unknown.is_some()).collect();
+    for set in [entering as fn(&mut ReentryPlant), prescribed] {
+        for &known in &knowns {
+            let by = match description.variables[known].name.as_str() {
+                "motion.altitude" => 1.0,
+                "motion.speed" => 0.1,
+                name if name.contains("oment.") => 100.0,
+                _ => 1e-5,
+            };
+            let at = |by: f64| outputs(&mut moved(set, known, by), 0.02);
+            let (below, above) = (at(-by), at(by));
+            let mut instance = in_general_motion(set);
+            for &unknown in &unknowns {
+                let exact = instance.partial_derivative(0.02, unknown, known).unwrap();
+                let what = role(unknown).as_unknown.unwrap();
+                let numeric = (above.value(what) - below.value(what)) / (2.0 * by);
+                let size = outputs(&mut instance, 0.02).value(what).abs().max(1.0);
+                let (variable, known) =
+                    (&description.variables[unknown], &description.variables[known].name);
+                assert!(
+                    (numeric - exact).abs() < 1e-6 * (exact.abs() + size),
+                    "{} by {known}: {exact}, not {numeric}",
+                    variable.name
+                );
+                if exact.abs() > 1e-9 * size && variable.name != *known {
+                    let declared = variable.dependencies.contains(known);
+                    assert!(declared, "{} depends on {known}: {exact}", variable.name);
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn a_fixed_flight_condition_shows_its_altitude_and_speed() {
+    let mut instance = started(|_| {});
+    instance.step(0.0, 0.04, &Constant, &mut |_| {}).unwrap();
+    let output = outputs(&mut instance, 0.04);
+    assert_eq!(output.motion[0], instance.parameters.flight.altitude);
+    assert!((output.motion[3] - 3172.5).abs() < 0.1, "{}", output.motion[3]);
+    assert_eq!((output.passage.mach, output.motion_rate.amax()), (9.8, 0.0));
+    assert_eq!(MOTION, 14);
+}
+
+/// The moment of the surfaces grows with the dynamic pressure of the flight.
+#[test]
+fn oracle_surfaces_act_in_proportion_to_the_dynamic_pressure() {
+    let mut entry = in_general_motion(entering);
+    let mut fixed = started(super::actuate);
+    fixed.parameters.jet_duty = true;
+    fixed.initialize(&super::CONTEXT).unwrap();
+    fixed.set_continuous_states(&STATES);
+    let jets = |instance: &mut ReentryPlant| {
+        if let Some(plant) = &mut instance.plant {
+            plant.deflections = Surfaces::zeros();
+        }
+        outputs(instance, 0.0).applied_moment
+    };
+    let with = [outputs(&mut entry, 0.0), outputs(&mut fixed, 0.0)];
+    let without = [jets(&mut entry), jets(&mut fixed)];
+    let pressure = with.map(|output| output.passage.dynamic_pressure);
+    let surfaces = [0, 1].map(|i| (with[i].applied_moment - without[i]) / pressure[i]);
+    assert!((surfaces[0] - surfaces[1]).amax() < 1e-9 * surfaces[1].amax(), "{surfaces:?}");
+}

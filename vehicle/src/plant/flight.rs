@@ -1,0 +1,196 @@
+//! Entry flight of the plant: the motion of the centre of mass and the attitude move together.
+
+use super::equations::{self, Load};
+use super::{Held, Input, Plant};
+use crate::air::AlongTheWay;
+use crate::entry::{self, Motion, Passage, ground_distance};
+use crate::error::Error;
+use crate::integrator::rk4;
+use crate::kinematics::Trajectory;
+use crate::math::sin;
+use crate::state::{State, angles, rates, state};
+use nalgebra::{SVector, Vector3};
+
+/// Motion of the centre of mass and attitude with its rates, as one state.
+type Joint = SVector<f64, 12>;
+
+/// Times of an integration step: the instant of the deflections, the beginning of the step, and its
+/// length, s.
+pub(super) type Step = (f64, f64, f64);
+
+/// The entry flight at one instant.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Entering {
+    /// What the air does to the vehicle.
+    pub passage: Passage,
+    /// Time derivative of the motion.
+    pub derivative: Motion,
+    /// The trajectory's angles and rates.
+    pub trajectory: Trajectory,
+    /// Turn rate of the trajectory's axes, rad/s.
+    pub turn_rate: Vector3<f64>,
+}
+
+impl Entering {
+    fn new(entry: &entry::Config, motion: &Motion, passage: Passage) -> Self {
+        let (derivative, trajectory, turn_rate) = entry.derivative(motion, &passage);
+        Self { passage, derivative, trajectory, turn_rate }
+    }
+}
+
+fn joint(motion: &Motion, state: &State) -> Joint {
+    let mut joint = Joint::zeros();
+    joint.fixed_rows_mut::<6>(0).copy_from(motion);
+    joint.fixed_rows_mut::<6>(6).copy_from(state);
+    joint
+}
+
+fn parts(joint: &Joint) -> (Motion, State) {
+    (joint.fixed_rows::<6>(0).into(), joint.fixed_rows::<6>(6).into())
+}
+
+impl Plant {
+    /// Returns the entry flight at `time` (s), or `None` if there is none.
+    pub fn entering(&self, time: f64) -> Option<Entering> {
+        let entry = self.entry.as_ref()?;
+        let passage = entry.passage(time, &self.motion, &self.angles());
+        Some(Entering::new(entry, &self.motion, passage))
+    }
+
+    /// Moment of the air about the body axes (N m), without that of the surfaces.
+    pub fn air_moment(&self, entering: &Entering, input: &Input) -> Vector3<f64> {
+        let moment =
+            |entry: &entry::Config| entry.moment(&entering.passage, &self.rates(), input.trim);
+        self.entry.as_deref().map_or_else(Vector3::zeros, moment)
+    }
+
+    /// Heat flux into the leading edge, W/m².
+    pub fn heat_flux(&self, entering: &Entering) -> f64 {
+        self.entry.as_ref().map_or(0.0, |entry| entry.heat_flux(&entering.passage))
+    }
+
+    /// Distance over ground from the start, m.
+    pub fn range(&self) -> f64 {
+        let here = [self.motion[1], self.motion[2]];
+        self.entry.as_ref().map_or(0.0, |entry| ground_distance(&entry.planet, self.origin, here))
+    }
+
+    /// Effectiveness of the surfaces relative to that for which the actuators were made.
+    pub(super) fn pressure_ratio(&self, time: f64) -> f64 {
+        match (&self.entry, &self.actuators) {
+            (Some(entry), Some(_)) => {
+                entry.passage(time, &self.motion, &self.angles()).surface_pressure
+            }
+            _ => 1.0,
+        }
+    }
+
+    /// Derivative of the attitude and the rates at the first time (s), which is the second one (s)
+    /// after the instant of the deflections.
+    pub(super) fn turned(
+        &self,
+        entry: &entry::Config,
+        entering: &Entering,
+        (time, elapsed): (f64, f64),
+        attitude: &State,
+        (input, held): (&Input, &Held),
+    ) -> State {
+        let Entering { passage, turn_rate, .. } = entering;
+        let (angles, rates) = (angles(attitude), rates(attitude));
+        if entry.following.active {
+            let matrix = self.kinematics.r(&angles);
+            let acceleration = entry.prescribed_acceleration(
+                self.kinematics,
+                &input.prescribed,
+                (&angles, &rates),
+                turn_rate,
+            );
+            let angle_rates = equations::angle_rates(self.kinematics, &matrix, attitude, turn_rate);
+            return state(&angle_rates, &acceleration);
+        }
+        let ratio = (elapsed, passage.surface_pressure);
+        let load = Load {
+            moment: self.control_moment(input, held.delayed, &held.drive, ratio)
+                + self.disturbance_moment(time, input, held)
+                + entry.moment(passage, &rates, input.trim),
+            delta: held.delta(),
+            turn_rate: *turn_rate,
+        };
+        equations::derivative(&self.body, self.kinematics, attitude, &load)
+    }
+
+    /// Returns motion and attitude after an integration step.
+    pub(super) fn moved(
+        &self,
+        entry: &entry::Config,
+        (since, begin, h): Step,
+        air: &AlongTheWay,
+        held: &Held,
+        input: &mut impl FnMut(f64) -> Input,
+    ) -> (Motion, State) {
+        let mut f = |t: f64, both: &Joint| {
+            let (motion, attitude) = parts(both);
+            let conditions = entry.air.deviating(t, motion[0], &air.at(motion[0]));
+            let passage = entry.passage_through(&conditions, &motion, &angles(&attitude));
+            let entering = Entering::new(entry, &motion, passage);
+            let turned =
+                self.turned(entry, &entering, (t, t - since), &attitude, (&input(t), held));
+            joint(&entering.derivative, &turned)
+        };
+        parts(&rk4(&mut f, begin, &joint(&self.motion, &self.state), h))
+    }
+
+    /// Standard atmosphere along the way that an entry flight takes within `length` (s).
+    pub(super) fn air_ahead(&self, length: f64) -> AlongTheWay {
+        AlongTheWay::new(self.motion[0], self.motion[3] * sin(self.motion[4]) * length)
+    }
+
+    /// Checks that the equations of the motion hold.
+    pub(super) fn check_motion(motion: &Motion, time: f64) -> Result<(), Error> {
+        if motion.iter().all(|value| value.is_finite()) {
+            return Ok(());
+        }
+        Err(Error::NotFinite { time, what: "motion of the centre of mass" })
+    }
+
+    /// Whether the entry flight has ended if it came to this motion.
+    pub(super) fn has_ended_at(&self, motion: &Motion) -> bool {
+        self.entry
+            .as_ref()
+            .is_some_and(|entry| entry.margins(motion).iter().any(|margin| *margin <= 0.0))
+    }
+
+    /// Time at which the entry flight ended, s.
+    pub fn ended(&self) -> Option<f64> {
+        self.ended
+    }
+
+    /// How far an entry flight is from its end: altitude (m) and speed (m/s).
+    pub fn margins(&self) -> Option<[f64; 2]> {
+        Some(self.entry.as_ref()?.margins(&self.motion))
+    }
+
+    /// Moves the plant to the end of its flight, which lies within an integration step.
+    pub(super) fn end(
+        &mut self,
+        (since, begin, h): Step,
+        air: &AlongTheWay,
+        held: &Held,
+        input: &mut impl FnMut(f64) -> Input,
+    ) {
+        let Some(entry) = &self.entry else { return };
+        // The end lies between these lengths of the step.
+        let (mut before, mut after) = (0.0, h);
+        while after - before > 1e-9 * h {
+            let middle = 0.5 * (before + after);
+            let (motion, _) = self.moved(entry, (since, begin, middle), air, held, input);
+            let is_over = entry.margins(&motion).iter().any(|margin| *margin <= 0.0);
+            if is_over { after = middle } else { before = middle }
+        }
+        (self.motion, self.state) = self.moved(entry, (since, begin, after), air, held, input);
+        let end = begin + after;
+        self.deflections += self.deflection_rates(held) * (end - since);
+        self.settle(end, held);
+        self.ended = Some(end);
+    }
+}
