@@ -121,6 +121,7 @@ impl SampledInstance for EstimatorInstance {
 /// rests. The sample has no number.
 fn at_rest() -> Line {
     let pose = Pose {
+        specific_force: None,
         kinematics: Kinematics::Printed,
         angles: Scenario::crmpc2022().initial_angles,
         rates: Vector3::zeros(),

@@ -52,7 +52,7 @@ fn refusal<M: Model>(change: impl FnOnce(&mut M)) -> String {
     let mut instance = M::new();
     change(&mut instance);
     match instance.initialize(&context()) {
-        Err(Failure::Error(text) | Failure::Discard(text)) => text,
+        Err(failure) => failure.to_string(),
         Ok(()) => String::new(),
     }
 }

@@ -252,7 +252,8 @@ fn record(system: &mut System, options: &Options) -> Result<RunReport, Failure> 
             return Err(error.into());
         }
     };
-    Ok(RunReport { metrics, out, files, ended })
+    let end = master.end().map(String::from);
+    Ok(RunReport { metrics, out, files, ended, end })
 }
 
 /// Warns of missed deadlines and of a refused priority if no summary is printed.

@@ -22,6 +22,8 @@ pub(crate) struct RunReport {
     /// Reason why the run ended before its stop time, for example a request or a missed deadline;
     /// `None` if it did not.
     pub ended: Option<Error>,
+    /// How the instance that may do so ended the run.
+    pub end: Option<String>,
 }
 
 /// Prints the summary of a run.
@@ -90,6 +92,9 @@ pub(crate) fn summary(system: &System, report: &RunReport, out: &mut impl Write)
     }
     if let Some(factor) = metrics.real_time_factor {
         line("real-time factor", format!("{factor:.1} ({:.3} s elapsed)", metrics.wall_s))?;
+    }
+    if let Some(end) = &report.end {
+        line("ended", end.clone())?;
     }
     if let Some(ended) = &report.ended {
         line("ended early", ended.to_string())?;

@@ -88,6 +88,7 @@ pub fn calibration(duration: f64) -> Vec<Truth> {
 /// Returns the readings of sensors without errors in this state.
 pub fn felt(truth: &Truth) -> Readings {
     let pose = Pose {
+        specific_force: None,
         kinematics: Kinematics::Printed,
         angles: truth.angles,
         rates: truth.rates,

@@ -54,6 +54,13 @@ pub fn check(
         .check()
         .map_err(|problem| experiment.source.error(&(0..0), format!("[isolation] {problem}")))?;
     check_single_instances(&experiment, &components)?;
+    if let Some(name) = &experiment.simulation.ends_with
+        && !experiment.components.contains_key(name)
+    {
+        let hint = names::hint(name, experiment.components.keys().map(String::as_str));
+        let problem = format!("[simulation] ends_with: there is no component \"{name}\"{hint}");
+        return Err(experiment.source.error(&(0..0), problem));
+    }
 
     let wires = wiring::wires(&experiment, &parts)?;
     let settings = (0..parts.len())

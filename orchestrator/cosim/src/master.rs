@@ -71,6 +71,10 @@ pub struct Master {
     spent: Vec<Rc<Spent>>,
     pacer: Option<Pacer>,
     interrupt: Interrupt,
+    /// Instance that may end the run before the stop time.
+    ender: Option<usize>,
+    /// How it ended the run.
+    end: Option<String>,
 }
 
 impl Master {
@@ -97,6 +101,8 @@ impl Master {
             spent: Vec::new(),
             pacer: None,
             interrupt: Interrupt::default(),
+            ender: None,
+            end: None,
         }
     }
 
@@ -104,6 +110,16 @@ impl Master {
     /// [`Self::pace`] is called.
     pub fn set_interrupt(&mut self, interrupt: &Interrupt) {
         self.interrupt = interrupt.clone();
+    }
+
+    /// Lets an instance end the run before the stop time, by its index.
+    pub fn set_ender(&mut self, ender: Option<usize>) {
+        self.ender = ender;
+    }
+
+    /// Returns how the instance that may do so ended the run, if it did.
+    pub fn end(&self) -> Option<&str> {
+        self.end.as_deref()
     }
 
     /// Paces the run from now on, so that it keeps in step with the timer.
@@ -192,6 +208,7 @@ impl Master {
         mut prepare: impl FnMut(usize, &mut dyn Instance) -> Outcome,
     ) -> Result<(), Error> {
         let start = self.clock.start();
+        self.end = None;
         for index in 0..self.members.len() {
             let instance = self.members[index].instance.as_mut();
             let outcome = instance.reset().and_then(|()| prepare(index, instance));
@@ -239,7 +256,12 @@ impl Master {
             if let Some(request) = self.interrupt.asked() {
                 return Err(Error::Interrupted { time, request });
             }
-            let outcome = self.round(tick);
+            let (outcome, end) = match self.round(tick) {
+                Err((index, failure)) if failure.ends.is_some() && self.ender == Some(index) => {
+                    (Ok(()), Some((index, failure)))
+                }
+                outcome => (outcome.map_err(|culprit| self.error(time, culprit)), None),
+            };
             let deadlines = self.pacer.as_mut().map_or(Ok(()), |pacer| pacer.check(tick));
             let last = tick == self.clock.ticks();
             let sample = Sample { tick, time, last, values: &self.row.values };
@@ -247,11 +269,38 @@ impl Master {
                 observer.observe(&sample)?;
             }
             outcome.and(deadlines)?;
+            if let Some(end) = end {
+                self.observe_end(tick, &end, observers)?;
+                break;
+            }
         }
         for index in 0..self.members.len() {
             let outcome = self.members[index].instance.terminate();
             outcome.map_err(|failure| self.error(self.clock.stop(), (index, failure)))?;
         }
+        Ok(())
+    }
+
+    /// Shows the observers the values at the moment at which an instance ended the run, within the
+    /// step from `tick`.
+    fn observe_end(
+        &mut self,
+        tick: u64,
+        (index, failure): &Culprit,
+        observers: &mut [&mut dyn Observer],
+    ) -> Result<(), Error> {
+        let reached = failure.ends.filter(|time| time.is_finite());
+        let time = reached.unwrap_or_else(|| self.clock.time(tick));
+        self.read_instance(*index, true).map_err(|culprit| self.error(time, culprit))?;
+        for index in 0..self.members.len() {
+            self.values.arrive(index);
+        }
+        self.row.fill(&self.values);
+        let sample = Sample { tick: tick + 1, time, last: true, values: &self.row.values };
+        for observer in observers.iter_mut() {
+            observer.observe(&sample)?;
+        }
+        self.end = Some(format!("by {}: {}", self.members[*index].name, failure.message));
         Ok(())
     }
 
@@ -264,13 +313,14 @@ impl Master {
         if let Some(request) = self.interrupt.asked() {
             return Err(Error::Interrupted { time: self.clock.time(tick), request });
         }
-        self.round(tick)?;
+        let outcome = self.round(tick);
+        outcome.map_err(|culprit| self.error(self.clock.time(tick), culprit))?;
         Ok(&self.row.values)
     }
 
     /// Sets and steps the instances whose communication point is this tick, and fills the row. If
     /// one fails, the row shows what could be read.
-    fn round(&mut self, tick: u64) -> Result<(), Error> {
+    fn round(&mut self, tick: u64) -> Result<(), Culprit> {
         let time = self.clock.time(tick);
         warnings::at(time);
         for index in 0..self.members.len() {
@@ -283,7 +333,7 @@ impl Master {
             Coupling::Jacobi => self.step_all_at_once(tick),
         };
         self.row.fill(&self.values);
-        outcome.map_err(|culprit| self.error(time, culprit))
+        outcome
     }
 
     fn step_one_by_one(&mut self, tick: u64) -> Result<(), Culprit> {
@@ -369,7 +419,7 @@ impl Master {
     #[cold]
     fn error(&self, time: f64, (index, failure): Culprit) -> Error {
         let component = self.members[index].name.clone();
-        if failure.ends {
+        if failure.ends.is_some() {
             Error::EndedByInstance { component, time, message: failure.message }
         } else {
             Error::Call { component, time, failure }

@@ -295,6 +295,8 @@ impl System {
         let probes = delay::readings_of_probes(&parts, &self.wires, &self.probes);
         let mut master = Master::new(self.clock, coupling, members, &wires, &probes);
         master.set_interrupt(interrupt);
+        let ender = self.experiment.simulation.ends_with.as_ref();
+        master.set_ender(ender.and_then(|ender| self.names().iter().position(|n| n == ender)));
         master.initialize()?;
         Ok(master)
     }

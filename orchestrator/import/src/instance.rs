@@ -5,10 +5,11 @@ use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 
 /// A call to an instance that did not succeed.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct CallFailure {
-    /// Whether the instance ended the simulation by this call, which is not a fault.
-    pub ends: bool,
+    /// Time (s) at which the instance ended the simulation by this call, which is not a fault; not
+    /// a number if it does not say when.
+    pub ends: Option<f64>,
     /// Name of the call, for example `doStep`.
     pub call: Cow<'static, str>,
     /// Message of the instance, or its status if there is none.
@@ -18,7 +19,7 @@ pub struct CallFailure {
 impl CallFailure {
     /// Creates a failure of this call that does not end the simulation.
     pub fn new(call: &'static str, message: impl Into<String>) -> Self {
-        Self { ends: false, call: call.into(), message: message.into() }
+        Self { ends: None, call: call.into(), message: message.into() }
     }
 }
 

@@ -251,11 +251,12 @@ impl FmuInstance {
         if !ends && parts.is_empty() {
             parts.push("its log holds no message".into());
         }
-        if knows_time && time.is_finite() {
+        let reached = (knows_time && time.is_finite()).then_some(time);
+        if let Some(time) = reached {
             parts.push(format!("it got as far as t = {time} s"));
         }
         CallFailure {
-            ends,
+            ends: ends.then_some(reached.unwrap_or(f64::NAN)),
             ..CallFailure::new("doStep", format!("{} ({:?})", parts.join("; "), Status::Discard))
         }
     }

@@ -67,6 +67,26 @@ fn an_instance_may_end_the_simulation() {
     assert_eq!(code, 0);
     assert!(errors.contains("plant ended the simulation at t = 2 s"), "{errors}");
 
+    // The experiment may expect it: the run is then complete, up to the moment of the end.
+    let text = LOOP.replace("[simulation]", "[simulation]\nends_with = \"plant\"");
+    let bench = Bench::made(&text, &Recipe { flags: &["-DENDS=1"], ..Recipe::default() });
+    for isolation in [&[][..], &["--isolate"]] {
+        let (code, summary, errors) = bench.run(&[&fails[..], isolation].concat());
+        assert_eq!(code, 0, "{errors}");
+        assert!(
+            summary.contains("ended             by plant: out of propellant at 2"),
+            "{summary}"
+        );
+        assert_eq!(bench.json("out/loop/metrics.json")["completed"], true);
+        let rows = fs::read_to_string(bench.path("out/loop/results.csv")).unwrap();
+        assert_eq!(rows.lines().count(), 5);
+        assert!(rows.lines().last().unwrap().starts_with("3.0,"), "{rows}");
+    }
+    let other = LOOP.replace("[simulation]", "[simulation]\nends_with = \"plan\"");
+    let (code, _, errors) = Bench::made(&other, &Recipe::default()).run(&[]);
+    assert_eq!(code, 2);
+    assert!(errors.contains("ends_with: there is no component \"plan\""), "{errors}");
+
     // Without fmi2Terminated the discarded step is a failure, whose message says how far the
     // instance got.
     let (code, _, errors) = Bench::new().run(&fails);

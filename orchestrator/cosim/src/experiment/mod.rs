@@ -79,6 +79,10 @@ pub struct Simulation {
     /// Names of components, in the order in which they are stepped from each communication point.
     #[serde(default)]
     pub order: Vec<String>,
+    /// Component whose FMU may end the simulation before the stop time, for example a vehicle that
+    /// arrives. The run is then complete, and its last values are those of that moment.
+    #[serde(default)]
+    pub ends_with: Option<String>,
     /// Action taken if an instance gives a value that is not finite, or not valid for its type.
     #[serde(default)]
     pub on_invalid: OnInvalid,

@@ -182,6 +182,7 @@ pub fn load(path: &Path, overrides: &Overrides) -> Result<Loaded, Error> {
     let step = overrides.step.or(stated).or(proposed.reduce(f64::min));
     let simulation = Simulation {
         on_invalid: OnInvalid::default(),
+        ends_with: None,
         start: time("startTime")?.unwrap_or(0.0),
         stop: stop.ok_or_else(|| refuse("has no stop time: give --stop".into()))?,
         step: step.ok_or_else(|| refuse("none of its FMUs proposes a step: give --step".into()))?,
