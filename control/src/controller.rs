@@ -29,12 +29,15 @@ impl Measurement {
     /// Returns the measurement with the rates relative to axes that turn with the trajectory, for a
     /// law that takes Θ̇ = R ω to be true. While the trajectory turns, Θ̇ = R ω + Δ_f by Chai 2022
     /// (2), with Δ_f by Wu 2015 (1); relative to it, Θ̇ = R (ω + R⁻¹ Δ_f). `turn_rate` (rad/s)
-    /// comes from [`vehicle::kinematics::Trajectory::turn_rate`].
+    /// comes from [`vehicle::trajectory::Trajectory::turn_rate`].
     ///
     /// What this leaves for the law to bear as a disturbance is of second order: the change of
     /// R⁻¹ Δ_f, and what the gyroscopic moment of the relative rates lacks.
     #[must_use]
     pub fn relative_to(self, turn_rate: &Vector3<f64>) -> Self {
+        if *turn_rate == Vector3::zeros() {
+            return self;
+        }
         let known = Kinematics::Printed.turn(&self.angles) * turn_rate;
         Self { rates: self.rates + r_inverse(&self.angles) * known, ..self }
     }

@@ -7,8 +7,8 @@ use control::lqr::{Lqr, LqrSettings};
 use vehicle::Scenario;
 use vehicle::actuators::Command;
 use vehicle::disturbance::DisturbanceKind;
-use vehicle::kinematics::Trajectory;
 use vehicle::plant::{Input, Plant};
+use vehicle::trajectory::Trajectory;
 
 const PERIOD: f64 = 0.04;
 

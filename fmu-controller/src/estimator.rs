@@ -13,9 +13,10 @@ use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 use settings::Choice;
 use vehicle::Scenario;
-use vehicle::kinematics::{Kinematics, Trajectory};
+use vehicle::kinematics::Kinematics;
 use vehicle::platform::Pose;
 use vehicle::sensor_data::SensorData;
+use vehicle::trajectory::Trajectory;
 
 /// The estimator as an FMU.
 pub type AttitudeEstimator = SampledFmu<EstimatorInstance>;

@@ -302,3 +302,29 @@ fn variants_have_an_observer_if_their_published_settings_have_one() {
         agrees::<tvsmc::Btvsmc>() && agrees::<tvsmc::BtvsmcDo>() && agrees::<tvsmc::SotvsmcDo>()
     );
 }
+
+/// The law sees rates relative to the trajectory that it is told of, Wu 2015 (1).
+#[test]
+fn oracle_a_known_trajectory_is_taken_out_of_the_rates() {
+    let told = |rate: f64, rates: Vector3<f64>| {
+        let mut instance = ready::<Lqr>(|instance| {
+            let input = &mut instance.input;
+            input.measured.rates = rates;
+            input.trajectory.heading = 0.7;
+            input.trajectory.flight_path_angle = -0.02;
+            input.trajectory.heading_rate = rate;
+        });
+        instance.calculate(0.0, LastEvent::InputSet).unwrap();
+        instance.output.moment
+    };
+    let (rates, rate) = (Vector3::new(0.02, -0.01, 0.03), 0.006);
+    let angles = Scenario::crmpc2022().initial_angles;
+    // A heading that turns, with the cosine of the flight path angle, turns the trajectory's axes
+    // about the axis down.
+    let turn = Vector3::new(-rate * (-0.02_f64).sin(), 0.0, rate * (-0.02_f64).cos());
+    let known = vehicle::kinematics::Kinematics::Printed.turn(&angles) * turn;
+    let relative = rates + vehicle::kinematics::r_inverse(&angles) * known;
+    let (with, expected) = (told(rate, rates), told(0.0, relative));
+    assert!((with - expected).amax() < 1e-9 * expected.amax(), "{with} {expected}");
+    assert!((with - told(0.0, rates)).amax() > 1e3);
+}

@@ -5,7 +5,7 @@ mod sensors;
 
 use crate::parameters::TABLE_ROWS;
 use crate::plant::{ATTITUDE, INDICATORS, ReentryPlant};
-use crate::roles::{Known, Quantity, Role, Unknown, Variables};
+use crate::roles::{self, Known, Role, Unknown, Variables};
 use fmi2_export::table::{
     Description, Real, discrete_input, discrete_output, input, output, parameter,
 };
@@ -14,7 +14,7 @@ use nalgebra::Vector3;
 use std::sync::LazyLock;
 use vehicle::Scenario;
 use vehicle::effectors::{Effectors, JETS, SURFACES};
-use vehicle::kinematics::Trajectory;
+use vehicle::trajectory::{self, Quantity};
 
 const ANGLES: [(&str, &str); 3] =
     [("alpha", "angle of attack"), ("beta", "sideslip angle"), ("sigma", "bank angle")];
@@ -30,8 +30,9 @@ pub(crate) fn role(position: usize) -> Role {
 
 /// Returns all variables, in the order of the variable table.
 fn all_variables() -> PlantVariables {
-    let variables =
-        trajectory(deflection_rates(commands(actuated(inputs(outputs(PlantVariables::new()))))));
+    let variables = trajectory_inputs(deflection_rates(commands(actuated(inputs(outputs(
+        PlantVariables::new(),
+    ))))));
     let variables = sensors::measured(variables.settings(|m| &mut m.parameters))
         .settings(|m| &mut m.parameters.sensing)
         .settings(|m| &mut m.parameters.converter)
@@ -103,7 +104,7 @@ fn outputs(variables: PlantVariables) -> PlantVariables {
         let common =
             output(&format!("attitudeRate.{axis}"), &format!("Time derivative of the {meaning}"))
                 .depends_on(turning.clone())
-                .depends_on(TRAJECTORY_INPUTS.map(|(name, ..)| name));
+                .depends_on(trajectory::NAMES);
         let real = common.depends_on(depends).real().unit("rad/s").nominal(0.05);
         real.derivative_of(&format!("attitude.{axis}"))
     };
@@ -222,7 +223,7 @@ fn actuated(mut variables: PlantVariables) -> PlantVariables {
             .depends_on(entry::MOTION_NAMES);
     variables
         .real(pressure.real().unit("Pa").nominal(1e3), |m| &mut m.output.passage.dynamic_pressure)
-        .role(Unknown::Flight(Quantity::DynamicPressure))
+        .role(Unknown::Flight(roles::Quantity::DynamicPressure))
 }
 
 /// Adds the dynamic pressure that an on-board computer knows.
@@ -234,7 +235,7 @@ fn standard_pressure(variables: PlantVariables) -> PlantVariables {
     .depends_on(entry::MOTION_NAMES);
     variables
         .real(pressure.real().unit("Pa").nominal(1e3), |m| &mut m.output.passage.known_pressure)
-        .role(Unknown::Flight(Quantity::KnownPressure))
+        .role(Unknown::Flight(roles::Quantity::KnownPressure))
 }
 
 fn commands(mut variables: PlantVariables) -> PlantVariables {
@@ -269,37 +270,11 @@ fn deflection_rates(mut variables: PlantVariables) -> PlantVariables {
     variables
 }
 
-/// Input of the trajectory: its name, its meaning, whether it is a rate, and its field.
-type TrajectoryInput = (&'static str, &'static str, bool, fn(&mut Trajectory) -> &mut f64);
-const TRAJECTORY_INPUTS: [TrajectoryInput; 7] = [
-    ("trajectory.flightPathAngle", "Flight path angle, positive above the horizon", false, |t| {
-        &mut t.flight_path_angle
-    }),
-    (
-        "trajectory.heading",
-        "Heading of the velocity, measured from north towards east",
-        false,
-        |t| &mut t.heading,
-    ),
-    ("trajectory.latitude", "Latitude, positive to the north", false, |t| &mut t.latitude),
-    ("trajectory.flightPathAngleRate", "Time derivative of the flight path angle", true, |t| {
-        &mut t.flight_path_angle_rate
-    }),
-    ("trajectory.headingRate", "Time derivative of the heading", true, |t| &mut t.heading_rate),
-    (
-        "trajectory.longitudeRate",
-        "Time derivative of the longitude, positive to the east",
-        true,
-        |t| &mut t.longitude_rate,
-    ),
-    ("trajectory.latitudeRate", "Time derivative of the latitude", true, |t| &mut t.latitude_rate),
-];
-
-fn trajectory(mut variables: PlantVariables) -> PlantVariables {
-    for (i, (name, meaning, is_rate, field)) in TRAJECTORY_INPUTS.into_iter().enumerate() {
-        let real = input(name, meaning).real();
-        let real =
-            if is_rate { real.unit("rad/s").nominal(1e-3) } else { real.unit("rad").nominal(0.1) };
+fn trajectory_inputs(mut variables: PlantVariables) -> PlantVariables {
+    for (i, Quantity { name, meaning, unit, nominal, field }) in
+        trajectory::QUANTITIES.into_iter().enumerate()
+    {
+        let real = input(name, meaning).real().unit(unit).nominal(nominal);
         variables = variables
             .real(real, move |m| field(&mut m.input.trajectory))
             .role(Known::Trajectory(i));

@@ -7,9 +7,10 @@
 use crate::aerodynamics::{Aerodynamics, Flow};
 use crate::air::{Air, Conditions};
 use crate::error::Error;
-use crate::kinematics::{Kinematics, Trajectory};
+use crate::kinematics::Kinematics;
 use crate::math::{asin, atan2, cos, hypot, sin_cos};
 use crate::platform::{body_from_velocity, velocity_from_level};
+use crate::trajectory::Trajectory;
 use crate::translation::{self, Planet, derivative_at};
 use nalgebra::{SVector, Vector3};
 use serde::{Deserialize, Serialize};

@@ -7,7 +7,7 @@
 //! [`Kinematics`] offers both forms.
 
 use crate::math::{cos, sin, sin_cos};
-use nalgebra::{Matrix3, SMatrix, Vector3};
+use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 use settings::Choice;
 
@@ -221,102 +221,4 @@ fn turn(angles: &Vector3<f64>) -> Matrix3<f64> {
     let cb = cos(angles.y);
     let (ss, cs) = sin_cos(angles.z);
     Matrix3::new(0.0, -cs / cb, ss / cb, 0.0, ss, cs, 1.0, 0.0, 0.0)
-}
-
-/// Direction of flight and its change: the angles and rates of the trajectory in Wu 2015 (1).
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Trajectory {
-    /// Flight path angle γ above the horizon, rad.
-    pub flight_path_angle: f64,
-    /// Heading ψ, counted from north to east, rad.
-    pub heading: f64,
-    /// Latitude φ of the vehicle, rad.
-    pub latitude: f64,
-    /// Rate γ̇ of the flight path angle, rad/s.
-    pub flight_path_angle_rate: f64,
-    /// Rate ψ̇ of the heading, rad/s.
-    pub heading_rate: f64,
-    /// Longitude rate θ̇, positive to the east, rad/s.
-    pub longitude_rate: f64,
-    /// Rate φ̇ of the latitude, rad/s.
-    pub latitude_rate: f64,
-}
-
-/// Number of the trajectory's angles and rates.
-pub const TRAJECTORY: usize = 7;
-
-impl Trajectory {
-    /// Returns all values in the order of the fields.
-    pub fn values(&self) -> [f64; TRAJECTORY] {
-        [
-            self.flight_path_angle,
-            self.heading,
-            self.latitude,
-            self.flight_path_angle_rate,
-            self.heading_rate,
-            self.longitude_rate,
-            self.latitude_rate,
-        ]
-    }
-
-    /// Angular velocity (rad/s) of the trajectory's axes relative to inertial space, about these
-    /// axes: x along the velocity, y to the right in the horizontal plane, z down. `earth_rate` is
-    /// the angular rate of the Earth, rad/s. The sign of sin φ sin γ in the bank row corrects Wu
-    /// 2015 (1), which prints −.
-    pub fn turn_rate(&self, earth_rate: f64) -> Vector3<f64> {
-        let around = self.longitude_rate + earth_rate;
-        let (climb, turn, north) =
-            (self.flight_path_angle_rate, self.heading_rate, self.latitude_rate);
-        if [around, climb, turn, north] == [0.0; 4] {
-            return Vector3::zeros();
-        }
-        self.turn_rate_at(around, &self.sines())
-    }
-
-    /// Sines and cosines of flight path angle, heading and latitude.
-    pub(crate) fn sines(&self) -> [(f64, f64); 3] {
-        [self.flight_path_angle, self.heading, self.latitude].map(sin_cos)
-    }
-
-    /// Turn rate with the sum `around` of the rates of longitude and Earth, rad/s.
-    pub(crate) fn turn_rate_at(&self, around: f64, sines: &[(f64, f64); 3]) -> Vector3<f64> {
-        let (climb, turn, north) =
-            (self.flight_path_angle_rate, self.heading_rate, self.latitude_rate);
-        let [(sg, cg), (sp, cp), (sl, cl)] = *sines;
-        Vector3::new(
-            -turn * sg - north * sp * cg + around * (cl * cp * cg + sl * sg),
-            climb - north * cp - around * cl * sp,
-            turn * cg - north * sp * sg + around * (cl * cp * sg - sl * cg),
-        )
-    }
-
-    /// Partial derivatives of [`Trajectory::turn_rate`] with respect to the fields, in their order.
-    pub fn turn_rate_by_fields(&self, earth_rate: f64) -> SMatrix<f64, 3, TRAJECTORY> {
-        let around = self.longitude_rate + earth_rate;
-        let (turn, north) = (self.heading_rate, self.latitude_rate);
-        let (sg, cg) = sin_cos(self.flight_path_angle);
-        let (sp, cp) = sin_cos(self.heading);
-        let (sl, cl) = sin_cos(self.latitude);
-        SMatrix::from_columns(&[
-            Vector3::new(
-                -turn * cg + north * sp * sg + around * (sl * cg - cl * cp * sg),
-                0.0,
-                -turn * sg - north * sp * cg + around * (cl * cp * cg + sl * sg),
-            ),
-            Vector3::new(
-                -north * cp * cg - around * cl * sp * cg,
-                north * sp - around * cl * cp,
-                -north * cp * sg - around * cl * sp * sg,
-            ),
-            Vector3::new(
-                around * (cl * sg - sl * cp * cg),
-                around * sl * sp,
-                -around * (sl * cp * sg + cl * cg),
-            ),
-            Vector3::y(),
-            Vector3::new(-sg, 0.0, cg),
-            Vector3::new(cl * cp * cg + sl * sg, -cl * sp, cl * cp * sg - sl * cg),
-            Vector3::new(-sp * cg, -cp, -sp * sg),
-        ])
-    }
 }

@@ -29,6 +29,7 @@ pub mod sensors;
 pub mod state;
 pub mod table;
 pub mod time;
+pub mod trajectory;
 pub mod translation;
 pub mod transport;
 pub mod triad;

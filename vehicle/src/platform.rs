@@ -7,8 +7,9 @@
 
 use crate::axes::LEVEL;
 use crate::error::Error;
-use crate::kinematics::{Kinematics, TRAJECTORY, Trajectory};
+use crate::kinematics::Kinematics;
 use crate::math::sin_cos;
+use crate::trajectory::{TRAJECTORY, Trajectory};
 use nalgebra::{Matrix3, SMatrix, Vector3};
 use serde::{Deserialize, Serialize};
 use settings::Declared;

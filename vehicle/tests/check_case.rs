@@ -7,9 +7,10 @@ use nalgebra::{Rotation3, Vector3};
 use vehicle::actuators::Command;
 use vehicle::disturbance::Disturbance;
 use vehicle::dynamics::Inertia;
-use vehicle::kinematics::{Kinematics, Trajectory};
+use vehicle::kinematics::Kinematics;
 use vehicle::plant::{self, Config, Input, Plant};
 use vehicle::scenario::Scenario;
+use vehicle::trajectory::Trajectory;
 
 /// Unit of the inertia, kg m². As no moment acts it does not change the motion.
 const SLUG_FT2: f64 = 1.3558179483;

@@ -3,10 +3,11 @@
 
 use nalgebra::{Matrix3, Rotation3, Vector3};
 use proptest::prelude::*;
-use vehicle::kinematics::{Kinematics, TRAJECTORY, Trajectory};
+use vehicle::kinematics::Kinematics;
 use vehicle::kinematics::{
     r, r_alpha, r_alpha_alpha, r_alpha_beta, r_beta, r_beta_beta, r_dot, r_inverse,
 };
+use vehicle::trajectory::{TRAJECTORY, Trajectory};
 
 fn attitude() -> impl Strategy<Value = Vector3<f64>> {
     (-3.0..3.0, -1.4..1.4, -3.0..3.0)

@@ -5,11 +5,12 @@ use nalgebra::{Matrix3, Vector3};
 use proptest::prelude::*;
 use std::f64::consts::FRAC_PI_2;
 use vehicle::calibration::Sequence;
-use vehicle::kinematics::{Kinematics, Trajectory};
+use vehicle::kinematics::Kinematics;
 use vehicle::plant::{BETA_LIMIT, Input, Plant};
 use vehicle::platform::{Pose, Surroundings, body_from_velocity, velocity_from_level};
 use vehicle::scenario::Scenario;
 use vehicle::sensor_data::SensorData;
+use vehicle::trajectory::Trajectory;
 
 const G: f64 = 9.80665;
 /// Magnetic field to the north, to the east and down, T.

@@ -4,9 +4,10 @@
 use nalgebra::Vector3;
 use proptest::prelude::*;
 use std::f64::consts::TAU;
-use vehicle::kinematics::{Kinematics, Trajectory};
+use vehicle::kinematics::Kinematics;
 use vehicle::platform::Pose;
 use vehicle::sensors::Instant;
+use vehicle::trajectory::Trajectory;
 use vehicle::turntable::{Config, Turntable};
 
 const PERIOD: f64 = 0.01;

@@ -93,7 +93,7 @@ pub fn felt(truth: &Truth) -> Readings {
         angles: truth.angles,
         rates: truth.rates,
         alpha_rate: (kinematics::r(&truth.angles) * truth.rates).x,
-        trajectory: vehicle::kinematics::Trajectory::default(),
+        trajectory: vehicle::trajectory::Trajectory::default(),
     };
     pose.felt(&SensorData::embedded().surroundings)
 }

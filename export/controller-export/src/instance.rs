@@ -43,7 +43,9 @@ impl<L: Law> ControllerInstance<L> {
         let Self { settings, input, source, .. } = self;
         let controller = &mut device.controller;
         let achieved_moment = L::uses_achieved_moment(settings).then_some(input.achieved_moment);
+        let turn_rate = input.trajectory.turn_rate(self.parameters.earth_rate);
         let measured = Measurement { achieved_moment, stale, ..input.measured };
+        let measured = measured.relative_to(&turn_rate);
         let now = ticks.next_time();
         // The future of an external reference is unknown; the law uses its present value for the
         // time at which its moment acts.
@@ -78,6 +80,7 @@ impl<L: Law> SampledInstance for ControllerInstance<L> {
                 limit_moment: scenario.limit_moment,
                 saturation: false,
                 latency: Latency::default(),
+                earth_rate: 0.0,
             },
             settings: L::settings(),
             input: Input {

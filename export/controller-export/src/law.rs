@@ -12,6 +12,7 @@ use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use settings::Declared;
 use vehicle::dynamics::{Inertia, RigidBody};
 use vehicle::reference::Reference;
+use vehicle::trajectory::Trajectory;
 
 /// Data that every controller receives: its vehicle, limits and schedule.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -74,6 +75,10 @@ pub struct Parameters {
     /// Delays over which the law predicts the state.
     #[setting(name = "")]
     pub latency: Latency,
+    /// Angular rate of the Earth, for the inputs trajectory.*: 7.2921e-5 rad/s, or 0 to neglect the
+    /// rotation.
+    #[setting(name = "trajectory.earthRate", unit = "rad/s", min = 0.0, max = 1.0, nominal = 1e-4)]
+    pub earth_rate: f64,
 }
 
 /// Inputs that every controller has.
@@ -83,6 +88,8 @@ pub struct Input {
     pub measured: Measurement,
     /// Moment that the actuators give, N m.
     pub achieved_moment: Vector3<f64>,
+    /// Trajectory as it is known, which turns the axes from which the angles are counted.
+    pub trajectory: Trajectory,
     /// Reference from outside the FMU.
     pub reference: Reference,
 }

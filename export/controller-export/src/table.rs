@@ -7,6 +7,7 @@ use fmi2_export::table::{
 use model_description::DefaultExperiment;
 use nalgebra::Vector3;
 use vehicle::Scenario;
+use vehicle::trajectory::{self, Trajectory};
 
 /// Names and meanings of the components of Θ.
 pub const ANGLES: [(&str, &str); 3] =
@@ -37,7 +38,7 @@ const EXTERNAL: [&str; 9] = [
 
 /// Returns the names of the inputs on which a sampled output depends.
 fn sampled_inputs() -> impl Iterator<Item = &'static str> {
-    MEASURED.into_iter().chain(EXTERNAL)
+    MEASURED.into_iter().chain(EXTERNAL).chain(trajectory::NAMES)
 }
 
 /// Declares an output of a law, which changes at its ticks only.
@@ -128,7 +129,22 @@ fn inputs<L: Law>(table: VariableTable<ControllerFmu<L>>) -> VariableTable<Contr
     let accelerations = external("externalAcceleration", SECOND_DERIVATIVE, "rad/s2");
     let table = vector(table, ANGLES, angles, |m| &mut m.input.reference.angles);
     let table = vector(table, ANGLES, rates, |m| &mut m.input.reference.rates);
-    vector(table, ANGLES, accelerations, |m| &mut m.input.reference.accelerations)
+    let table = vector(table, ANGLES, accelerations, |m| &mut m.input.reference.accelerations);
+    known_trajectory().into_iter().fold(table, |table, (real, field)| {
+        table.real(real, move |m| field(&mut m.input.trajectory))
+    })
+}
+
+/// Declares the inputs of the known trajectory. It is not inlined, so that the libraries stay
+/// small.
+#[inline(never)]
+fn known_trajectory() -> Vec<(Real, fn(&mut Trajectory) -> &mut f64)> {
+    let declare = |quantity: trajectory::Quantity| {
+        let trajectory::Quantity { name, meaning, unit, nominal, field } = quantity;
+        let text = format!("{meaning}, as it is known");
+        (input(name, &text).real().unit(unit).nominal(nominal), field)
+    };
+    trajectory::QUANTITIES.into_iter().map(declare).collect()
 }
 
 fn moment(axis: &str, meaning: &str) -> Real {

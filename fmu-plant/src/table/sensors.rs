@@ -1,8 +1,9 @@
 //! Variables of the readings of the sensors.
 
-use super::{AXES, PlantVariables, RATES, TRAJECTORY_INPUTS, vector};
+use super::{AXES, PlantVariables, RATES, vector};
 use crate::roles::Unknown;
 use fmi2_export::table::{Common, Real, discrete_output, output};
+use vehicle::trajectory;
 
 struct Sensor {
     name: &'static str,
@@ -51,9 +52,7 @@ pub(super) fn measured(mut variables: PlantVariables) -> PlantVariables {
                     .depends_on(["attitude.alpha", "attitude.beta", "attitude.sigma"]);
             let common = if i == 0 {
                 let rates = RATES.map(|(axis, _)| format!("rate.{axis}"));
-                common
-                    .depends_on(rates.iter().map(String::as_str))
-                    .depends_on(TRAJECTORY_INPUTS.map(|(name, ..)| name))
+                common.depends_on(rates.iter().map(String::as_str)).depends_on(trajectory::NAMES)
             } else {
                 common.depends_on(["trajectory.flightPathAngle", "trajectory.heading"])
             };

@@ -10,7 +10,8 @@ use crate::table::role;
 use fmi2_export::{Model, describe};
 use nalgebra::Vector3;
 use vehicle::disturbance::DisturbanceKind;
-use vehicle::kinematics::{Kinematics, Trajectory};
+use vehicle::kinematics::Kinematics;
+use vehicle::trajectory::Trajectory;
 
 /// Calculated variables with their positions in the table.
 fn calculated(instance: &mut ReentryPlant, time: f64) -> Vec<(usize, f64)> {

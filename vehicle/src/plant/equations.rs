@@ -14,7 +14,7 @@ pub struct Load {
     pub moment: Vector3<f64>,
     /// Disturbance Δ that enters ẋ_ω, rad/s².
     pub delta: Vector3<f64>,
-    /// Turn rate of the trajectory's axes from [`crate::kinematics::Trajectory::turn_rate`], rad/s.
+    /// Turn rate of the trajectory's axes from [`crate::trajectory::Trajectory::turn_rate`], rad/s.
     pub turn_rate: Vector3<f64>,
 }
 

@@ -6,9 +6,9 @@ use crate::air::AlongTheWay;
 use crate::entry::{self, Motion, Passage, ground_distance};
 use crate::error::Error;
 use crate::integrator::rk4;
-use crate::kinematics::Trajectory;
 use crate::math::sin;
 use crate::state::{State, angles, rates, state};
+use crate::trajectory::Trajectory;
 use nalgebra::{SVector, Vector3};
 
 /// Motion of the centre of mass and attitude with its rates, as one state.

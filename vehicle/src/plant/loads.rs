@@ -6,8 +6,8 @@ use super::{Held, Plant};
 use crate::actuators::{Command, Drive};
 use crate::effectors::{JETS, SURFACES, Surfaces};
 use crate::entry::Prescribed;
-use crate::kinematics::{TRAJECTORY, Trajectory};
 use crate::state::State;
+use crate::trajectory::{TRAJECTORY, Trajectory};
 use nalgebra::{Matrix3, SMatrix, Vector3};
 use serde::{Deserialize, Serialize};
 

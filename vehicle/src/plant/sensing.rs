@@ -3,9 +3,9 @@
 
 use super::equations::angle_rates;
 use super::{Held, Input, Load, Plant, angles};
-use crate::kinematics::TRAJECTORY;
 use crate::platform::{Pose, Readings};
 use crate::sensors::{Sample, Sensors};
+use crate::trajectory::TRAJECTORY;
 use nalgebra::SMatrix;
 
 impl Plant {

@@ -4,10 +4,11 @@ use super::{TUMBLING, config, moment, undisturbed};
 use nalgebra::{Vector3, Vector6};
 use proptest::prelude::*;
 use vehicle::actuators::Command;
-use vehicle::kinematics::{Kinematics, Trajectory};
+use vehicle::kinematics::Kinematics;
 use vehicle::plant::{
     Config, Input, Load, Partials, Plant, State, derivative, partial_derivatives,
 };
+use vehicle::trajectory::Trajectory;
 
 #[test]
 fn oracle_torque_free_motion_conserves_energy_and_angular_momentum() {
