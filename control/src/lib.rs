@@ -12,6 +12,7 @@ pub mod dlmpc;
 pub mod error;
 pub mod error_dynamics;
 pub mod estimation;
+pub mod guidance;
 pub mod linearise;
 pub mod loop_delay;
 pub mod lqr;

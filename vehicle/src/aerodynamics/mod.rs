@@ -161,6 +161,12 @@ impl Aerodynamics {
         LiftAndDrag { lift, drag }
     }
 
+    /// Returns the coefficients of lift and drag at an angle of attack (rad), at a Mach number above
+    /// that of all tables.
+    pub fn lift_and_drag(&self, alpha: f64) -> [f64; 2] {
+        [&self.forces.lift, &self.forces.drag].map(|coefficient| coefficient.at(alpha, f64::MAX))
+    }
+
     /// Returns drag, side force (to the right) and lift, N.
     pub fn forces(&self, flow: &Flow) -> [f64; 3] {
         let Flow { dynamic_pressure, mach, alpha, beta, .. } = *flow;

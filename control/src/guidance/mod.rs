@@ -1,0 +1,271 @@
+//! Guidance of an entry flight to the terminal area: a predictor–corrector in the bank angle, P. Lu,
+//! "Entry guidance: a unified method", Journal of Guidance, Control, and Dynamics 37(3) (2014).
+//!
+//! Once a second the magnitude of the bank angle is found with which the predicted flight ends at
+//! the wanted distance from the target. The angle of attack follows a schedule over speed. The sign
+//! of the bank angle is reversed when the heading has left a dead band about the direction to the
+//! target. At every tick the reference of the attitude follows these commands within limits on its
+//! rate and acceleration.
+
+mod predictor;
+mod settings;
+mod shaping;
+
+pub use predictor::{Beginning, End, Predictor};
+pub use settings::{Alpha, Bank, Filter, Reversal, Settings, Shaping, Target};
+pub use shaping::{Limits, Shaped};
+
+use crate::error::DesignError;
+use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
+use std::f64::consts::PI;
+use vehicle::entry::{Motion, ground_distance};
+use vehicle::math::{atan2, cos, exp, sin_cos};
+use vehicle::reference::Reference;
+
+/// Time between two ticks, s.
+pub const PERIOD: f64 = 0.04;
+/// Ticks from one correction of the bank angle to the next.
+const TICKS: u64 = 25;
+/// Difference of the bank angle from which the predictor's slope follows, rad.
+const PROBE: f64 = 0.01;
+/// Largest change of the bank angle in one correction, rad.
+const CORRECTION: f64 = 0.1;
+/// Bisections by which the first bank angle is found.
+const BISECTIONS: u32 = 20;
+/// Energy that is left when the bank angle is no longer corrected, relative to that of a circular
+/// orbit: a bank angle has hardly any influence on where the flight ends then.
+const FROZEN: f64 = 0.01;
+
+/// What the guidance measures.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Navigation {
+    /// Motion relative to the rotating planet.
+    pub motion: Motion,
+    /// Lift per mass, m/s².
+    pub lift: f64,
+    /// Drag per mass, m/s².
+    pub drag: f64,
+}
+
+/// Commands of the guidance, and what is worth plotting.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Command {
+    /// Reference of the attitude.
+    pub reference: Reference,
+    /// Commanded angle of attack and bank angle, before they are shaped, rad.
+    pub alpha: f64,
+    /// Commanded bank angle, rad.
+    pub bank: f64,
+    /// Distance over ground to the target, m.
+    pub range: f64,
+    /// Direction to the target less the heading, positive to the right, rad.
+    pub heading_error: f64,
+    /// By how much the predicted flight ends too far from the target, m.
+    pub miss: f64,
+    /// Whether the target can be reached: the bank angle is not at its end.
+    pub in_reach: bool,
+}
+
+/// State that is carried from tick to tick.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Memory {
+    /// Whether a first bank angle was found.
+    begun: bool,
+    /// Magnitude of the bank angle, rad.
+    magnitude: f64,
+    /// Whether the vehicle turns to the left, which a positive bank angle does.
+    to_left: bool,
+    /// Tick of the last reversal.
+    reversed: u64,
+    /// Number of reversals.
+    pub reversals: u64,
+    /// Ratios of the measured to the predicted lift and drag.
+    ratios: [f64; 2],
+    alpha: Shaped,
+    bank: Shaped,
+    /// Commands of the last tick.
+    pub command: Command,
+}
+
+/// Entry guidance.
+#[derive(Clone, Debug)]
+pub struct Guidance {
+    settings: Settings,
+    predictor: Predictor,
+}
+
+impl Guidance {
+    /// Makes a guidance.
+    ///
+    /// # Errors
+    /// Names the setting that is out of range.
+    pub fn new(settings: Settings) -> Result<Self, DesignError> {
+        settings.check()?;
+        Ok(Self { settings, predictor: Predictor::new() })
+    }
+
+    /// Returns the settings.
+    pub fn settings(&self) -> &Settings {
+        &self.settings
+    }
+
+    /// Returns whether a restored memory can be used.
+    pub fn fits(&self, memory: &Memory) -> bool {
+        let Memory { magnitude, ratios, alpha, bank, .. } = memory;
+        [*magnitude, alpha.value, alpha.rate, bank.value, bank.rate, ratios[0], ratios[1]]
+            .iter()
+            .all(|value| value.is_finite())
+    }
+
+    /// Returns distance over ground to the target (m) and the direction to it from north, rad.
+    fn bearing(&self, motion: &Motion) -> (f64, f64) {
+        let target = &self.settings.target;
+        let here = [motion[1], motion[2]];
+        let there = [target.longitude, target.latitude];
+        let range = ground_distance(&self.settings.planet, here, there);
+        let (sine, cosine) = sin_cos(there[0] - here[0]);
+        let (sin_here, cos_here) = sin_cos(here[1]);
+        let (sin_there, cos_there) = sin_cos(there[1]);
+        let direction =
+            atan2(sine * cos_there, cos_here * sin_there - sin_here * cos_there * cosine);
+        (range, direction)
+    }
+
+    /// Evaluates the guidance at the tick with this number.
+    pub fn update(&self, memory: &mut Memory, tick: u64, measured: &Navigation) -> Command {
+        let [_, _, _, speed, _, heading] = measured.motion.into();
+        let (range, direction) = self.bearing(&measured.motion);
+        let heading_error = wrapped(direction - heading);
+        let first = !memory.begun;
+        if first {
+            memory.ratios = [1.0; 2];
+            // A positive heading error asks for a turn to the right.
+            memory.to_left = heading_error < 0.0;
+        }
+        let mut command = Command { range, heading_error, ..memory.command };
+        if first || tick.is_multiple_of(TICKS) {
+            self.filter(memory, measured);
+            self.correct(memory, measured, &mut command);
+            self.reverse(memory, tick, speed, heading_error);
+        }
+        let schedule = self.schedule(memory);
+        let bank = if memory.to_left { memory.magnitude } else { -memory.magnitude };
+        let alpha = schedule.at(speed);
+        let Shaping { bank_rate, bank_acceleration, alpha_rate, alpha_acceleration } =
+            self.settings.shaping;
+        if first {
+            memory.alpha.value = alpha;
+            memory.bank.value = bank;
+            memory.begun = true;
+        }
+        let limits = Limits { rate: alpha_rate, acceleration: alpha_acceleration };
+        memory.alpha.follow(alpha, &limits, PERIOD);
+        let limits = Limits { rate: bank_rate, acceleration: bank_acceleration };
+        memory.bank.follow(bank, &limits, PERIOD);
+        let vector =
+            |part: fn(&Shaped) -> f64| Vector3::new(part(&memory.alpha), 0.0, part(&memory.bank));
+        command.reference = Reference {
+            angles: vector(|shaped| shaped.value),
+            rates: vector(|shaped| shaped.rate),
+            accelerations: vector(|shaped| shaped.acceleration),
+        };
+        (command.alpha, command.bank) = (alpha, bank);
+        memory.command = command;
+        command
+    }
+
+    /// Compares measured and predicted lift and drag.
+    fn filter(&self, memory: &mut Memory, measured: &Navigation) {
+        let Filter { time, drag } = self.settings.filter;
+        if !(measured.drag > drag && measured.lift.is_finite()) {
+            return;
+        }
+        let [altitude, _, _, speed, ..]: [f64; 6] = measured.motion.into();
+        let alpha = memory.alpha.value;
+        let predicted = self.predictor.accelerations(altitude, speed, alpha);
+        let share = 1.0 - exp(-(TICKS as f64) * PERIOD / time);
+        let actual = [measured.lift, measured.drag];
+        for ((ratio, actual), predicted) in memory.ratios.iter_mut().zip(actual).zip(predicted) {
+            let latest = (actual / predicted).clamp(0.3, 3.0);
+            *ratio += share * (latest - *ratio);
+        }
+    }
+
+    /// Schedule of the angle of attack. Its end is moved so that the lift there is that of the model:
+    /// the flight is in equilibrium at the altitude of the target then, not at another one.
+    fn schedule(&self, memory: &Memory) -> Alpha {
+        let alpha = self.settings.alpha;
+        let [lift_ratio, _] = memory.ratios;
+        let lift = |angle: f64| self.predictor.coefficients(angle)[0];
+        let slope = (lift(alpha.low + PROBE) - lift(alpha.low)) / PROBE;
+        let change = lift(alpha.low) * (1.0 / lift_ratio - 1.0) / slope;
+        let largest = self.settings.alpha.adjustment;
+        Alpha { low: alpha.low + change.clamp(-largest, largest), ..alpha }
+    }
+
+    /// Corrects the magnitude of the bank angle by the predicted miss: Lu 2014, section III, with
+    /// a Newton step whose slope is a difference.
+    fn correct(&self, memory: &mut Memory, measured: &Navigation, command: &mut Command) {
+        let settings = &Settings { alpha: self.schedule(memory), ..self.settings };
+        let [altitude, _, latitude, speed, path, heading] = measured.motion.into();
+        let energy = |altitude: f64, speed: f64| Predictor::energy(settings, altitude, speed);
+        let last = energy(settings.target.altitude, settings.target.speed);
+        let circular = settings.planet.gravitation / (2.0 * settings.planet.radius);
+        let left = (last - energy(altitude, speed)) / circular;
+        let (_, cos_latitude) = sin_cos(latitude);
+        let direction = heading + command.heading_error;
+        let begin = Beginning {
+            altitude,
+            speed,
+            path,
+            eastward: cos_latitude * sin_cos(direction).0,
+            near_equator: cos_latitude * cos(settings.target.latitude),
+            ratios: memory.ratios,
+        };
+        // How much too far from the target the flight ends with this bank angle.
+        let miss = |bank: f64| {
+            let end = self.predictor.fly(settings, &begin, bank);
+            command.range - settings.target.range - end.range
+        };
+        let largest = settings.bank.largest;
+        if !memory.begun {
+            let (mut low, mut high) = (0.0, largest);
+            for _ in 0..BISECTIONS {
+                let middle = f64::midpoint(low, high);
+                if miss(middle) > 0.0 { high = middle } else { low = middle }
+            }
+            memory.magnitude = f64::midpoint(low, high);
+        }
+        let here = miss(memory.magnitude);
+        (command.miss, command.in_reach) = (here, true);
+        if left.abs() < FROZEN {
+            return;
+        }
+        let slope = (miss(memory.magnitude + PROBE) - here) / PROBE;
+        // A larger bank angle makes the flight shorter. Where it does not, the correction only has
+        // the right sign.
+        let change = if slope > 0.0 { -here / slope } else { -CORRECTION.copysign(here) };
+        let wanted = memory.magnitude + change.clamp(-CORRECTION, CORRECTION);
+        memory.magnitude = wanted.clamp(0.0, largest);
+        command.in_reach = wanted == memory.magnitude;
+    }
+
+    /// Reverses the bank angle when the heading has left its dead band and still moves away.
+    fn reverse(&self, memory: &mut Memory, tick: u64, speed: f64, heading_error: f64) {
+        let reversal = &self.settings.reversal;
+        let turns_away = (heading_error > 0.0) == memory.to_left;
+        let passed = tick.saturating_sub(memory.reversed) as f64 * PERIOD;
+        let is_early = memory.reversals > 0 && passed < reversal.interval;
+        if turns_away && heading_error.abs() > reversal.at(speed) && !is_early {
+            memory.to_left = !memory.to_left;
+            memory.reversed = tick;
+            memory.reversals += 1;
+        }
+    }
+}
+
+/// Returns the angle between −π and π.
+fn wrapped(angle: f64) -> f64 {
+    angle - (angle / (2.0 * PI)).round() * 2.0 * PI
+}

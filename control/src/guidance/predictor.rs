@@ -1,0 +1,139 @@
+//! Predicts the range of a flight whose bank angle is linear in energy.
+
+use super::settings::Settings;
+use nalgebra::Vector4;
+use vehicle::aerodynamics::Aerodynamics;
+use vehicle::atmosphere::air_anywhere;
+use vehicle::integrator::rk4;
+use vehicle::math::{cos, exp, ln, sin_cos};
+
+/// Distance between the altitudes at which the density is known, m.
+const SPACING: f64 = 500.0;
+/// Number of these altitudes, up to 140 km.
+const ALTITUDES: usize = 281;
+/// Longest step of the prediction, s.
+const STEP: f64 = 4.0;
+/// Steps after which a prediction is given up: the flight does not come down.
+const MOST_STEPS: usize = 1500;
+
+/// What the guidance knows of vehicle, air and planet.
+#[derive(Clone, Debug)]
+pub struct Predictor {
+    aerodynamics: Aerodynamics,
+    area_per_mass: f64,
+    /// Logarithms of the density of the standard atmosphere.
+    density: [f64; ALTITUDES],
+}
+
+/// Where a prediction begins.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Beginning {
+    /// Altitude, m.
+    pub altitude: f64,
+    /// Speed, m/s.
+    pub speed: f64,
+    /// Flight path angle, rad.
+    pub path: f64,
+    /// cos φ sin ψ of the great circle to the target, which is constant along it.
+    pub eastward: f64,
+    /// cos² of the latitude, for the centrifugal acceleration.
+    pub near_equator: f64,
+    /// Ratios of the actual lift and drag to those of the model.
+    pub ratios: [f64; 2],
+}
+
+/// End of a prediction.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct End {
+    /// Distance over ground, m.
+    pub range: f64,
+    /// Whether the flight comes to the energy of the target.
+    pub arrives: bool,
+}
+
+impl Predictor {
+    /// Makes a predictor for the vehicle of the papers in the standard atmosphere.
+    pub fn new() -> Self {
+        let aerodynamics = Aerodynamics::papers();
+        Self {
+            area_per_mass: aerodynamics.area() / aerodynamics.mass(),
+            aerodynamics,
+            density: std::array::from_fn(|i| ln(air_anywhere(i as f64 * SPACING).density)),
+        }
+    }
+
+    /// Returns the density of the standard atmosphere (kg/m³) at an altitude (m), within 0.1 %.
+    fn density(&self, altitude: f64) -> f64 {
+        let place = (altitude / SPACING).max(0.0);
+        let below = (place as usize).min(ALTITUDES - 2);
+        let (low, high) = (self.density[below], self.density[below + 1]);
+        exp(low + (place - below as f64) * (high - low))
+    }
+
+    /// Returns the coefficients of lift and drag at an angle of attack (rad).
+    pub fn coefficients(&self, alpha: f64) -> [f64; 2] {
+        self.aerodynamics.lift_and_drag(alpha)
+    }
+
+    /// Returns lift and drag per mass (m/s²) of the model at an altitude (m), a speed (m/s) and an
+    /// angle of attack (rad).
+    pub fn accelerations(&self, altitude: f64, speed: f64, alpha: f64) -> [f64; 2] {
+        let pressure = 0.5 * self.density(altitude) * speed * speed * self.area_per_mass;
+        self.coefficients(alpha).map(|coefficient| pressure * coefficient)
+    }
+
+    /// Returns the energy-like variable e = μ/r − V²/2 of Lu 2014, which grows during the entry,
+    /// m²/s².
+    pub fn energy(settings: &Settings, altitude: f64, speed: f64) -> f64 {
+        settings.planet.gravitation / (settings.planet.radius + altitude) - speed * speed / 2.0
+    }
+
+    /// Flies from `begin` with a bank angle that is linear in energy, from `bank` (rad) to that of
+    /// the settings, until the energy of the target.
+    pub fn fly(&self, settings: &Settings, begin: &Beginning, bank: f64) -> End {
+        let planet = &settings.planet;
+        let target = &settings.target;
+        let from = Self::energy(settings, begin.altitude, begin.speed);
+        let to = Self::energy(settings, target.altitude, target.speed);
+        let [lift_ratio, drag_ratio] = begin.ratios;
+        let energy = |state: &Vector4<f64>| Self::energy(settings, state[0], state[1]);
+        // Altitude, speed, flight path angle, and the angle travelled over ground.
+        let mut f = |_: f64, state: &Vector4<f64>| {
+            let [altitude, speed, path, _]: [f64; 4] = (*state).into();
+            let r = planet.radius + altitude;
+            let share = ((energy(state) - from) / (to - from)).clamp(0.0, 1.0);
+            let sigma = bank + share * (settings.bank.last - bank);
+            let [lift, drag] = self.accelerations(altitude, speed, settings.alpha.at(speed));
+            let (lift, drag) = (lift * lift_ratio, drag * drag_ratio);
+            let (sin_path, cos_path) = sin_cos(path);
+            // The planet's rotation makes what flies to the east lighter.
+            let centrifugal = planet.rate * planet.rate * r * begin.near_equator;
+            let g = planet.gravitation / (r * r) - centrifugal;
+            let eastward = 2.0 * planet.rate * speed * begin.eastward;
+            Vector4::new(
+                speed * sin_path,
+                -drag - g * sin_path,
+                (lift * cos(sigma) + (speed * speed / r - g) * cos_path + eastward) / speed,
+                speed * cos_path / r,
+            )
+        };
+        let mut state = Vector4::new(begin.altitude, begin.speed, begin.path, 0.0);
+        for _ in 0..MOST_STEPS {
+            let next = rk4(&mut f, 0.0, &state, STEP);
+            if energy(&next) >= to || next[0] <= 0.0 {
+                let (before, after) = (energy(&state), energy(&next));
+                let share = ((to - before) / (after - before)).clamp(0.0, 1.0);
+                let angle = state[3] + share * (next[3] - state[3]);
+                return End { range: angle * planet.radius, arrives: after >= to };
+            }
+            state = next;
+        }
+        End { range: state[3] * planet.radius, arrives: false }
+    }
+}
+
+impl Default for Predictor {
+    fn default() -> Self {
+        Self::new()
+    }
+}

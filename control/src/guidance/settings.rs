@@ -1,0 +1,187 @@
+//! Settings of the guidance, with ours from `data/guidance.toml`.
+
+use crate::error::DesignError;
+use ::settings::{Declared, check};
+use serde::{Deserialize, Serialize};
+use std::sync::LazyLock;
+use toml::Table;
+use vehicle::data;
+use vehicle::translation::Planet;
+
+/// All settings of the guidance.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Declared)]
+pub struct Settings {
+    #[allow(missing_docs)] // Its type says what it is.
+    pub target: Target,
+    #[allow(missing_docs)]
+    pub bank: Bank,
+    #[allow(missing_docs)]
+    pub alpha: Alpha,
+    #[allow(missing_docs)]
+    pub reversal: Reversal,
+    #[allow(missing_docs)]
+    pub shaping: Shaping,
+    #[allow(missing_docs)]
+    pub filter: Filter,
+    #[allow(missing_docs)]
+    pub planet: Planet,
+}
+
+/// Where the flight is to end.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Declared)]
+pub struct Target {
+    /// Latitude of the runway point.
+    #[setting(unit = "rad", min = -1.5, max = 1.5, nominal = 1.0)]
+    pub latitude: f64,
+    /// Longitude of the runway point.
+    #[setting(unit = "rad", min = -7.0, max = 7.0, nominal = 1.0)]
+    pub longitude: f64,
+    /// Distance to the runway point at which the flight is to end.
+    #[setting(unit = "m", min = 0.0, nominal = 1e5)]
+    pub range: f64,
+    /// Altitude at which the flight is to end.
+    #[setting(unit = "m", min = 0.0, nominal = 1e4)]
+    pub altitude: f64,
+    /// Speed at which the flight is to end.
+    #[setting(unit = "m/s", above = 0.0, nominal = 1e3)]
+    pub speed: f64,
+}
+
+/// Magnitude of the bank angle.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Declared)]
+pub struct Bank {
+    /// Bank angle planned for the end of the flight.
+    #[setting(name = "final", unit = "rad", min = 0.0, max = 1.5, nominal = 0.1)]
+    pub last: f64,
+    /// Largest bank angle.
+    #[setting(unit = "rad", above = 0.0, max = 3.0, nominal = 1.0)]
+    pub largest: f64,
+}
+
+/// Angle of attack over speed: constant, linear, and constant again.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Declared)]
+pub struct Alpha {
+    /// Angle of attack at high speed.
+    #[setting(unit = "rad", min = 0.0, max = 1.5, nominal = 0.1)]
+    pub high: f64,
+    /// Angle of attack at low speed.
+    #[setting(unit = "rad", min = 0.0, max = 1.5, nominal = 0.1)]
+    pub low: f64,
+    /// Largest change of alpha.low by which the flight ends at the target's altitude although its
+    /// lift differs from the predicted one.
+    #[setting(unit = "rad", min = 0.0, max = 0.5, nominal = 0.1)]
+    pub adjustment: f64,
+    /// Speed from which on the angle of attack is alpha.high.
+    #[setting(unit = "m/s", min = 0.0, nominal = 1e3)]
+    pub upper_speed: f64,
+    /// Speed below which the angle of attack is alpha.low.
+    #[setting(unit = "m/s", min = 0.0, nominal = 1e3)]
+    pub lower_speed: f64,
+}
+
+/// Dead band of the heading, beyond which the bank is reversed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Declared)]
+pub struct Reversal {
+    /// Heading error at high speed beyond which the bank is reversed.
+    #[setting(unit = "rad", above = 0.0, max = 1.5, nominal = 0.1)]
+    pub high: f64,
+    /// Heading error at low speed beyond which the bank is reversed.
+    #[setting(unit = "rad", above = 0.0, max = 1.5, nominal = 0.1)]
+    pub low: f64,
+    /// Speed from which on the heading error may be reversal.high.
+    #[setting(unit = "m/s", min = 0.0, nominal = 1e3)]
+    pub upper_speed: f64,
+    /// Speed below which the heading error may be reversal.low.
+    #[setting(unit = "m/s", min = 0.0, nominal = 1e3)]
+    pub lower_speed: f64,
+    /// Least time between two reversals.
+    #[setting(unit = "s", min = 0.0, nominal = 10.0)]
+    pub interval: f64,
+}
+
+/// Limits within which the reference follows the commands.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Declared)]
+pub struct Shaping {
+    /// Largest rate of the reference of the bank angle.
+    #[setting(unit = "rad/s", above = 0.0, nominal = 0.1)]
+    pub bank_rate: f64,
+    /// Largest acceleration of the reference of the bank angle.
+    #[setting(unit = "rad/s2", above = 0.0, nominal = 0.01)]
+    pub bank_acceleration: f64,
+    /// Largest rate of the reference of the angle of attack.
+    #[setting(unit = "rad/s", above = 0.0, nominal = 0.1)]
+    pub alpha_rate: f64,
+    /// Largest acceleration of the reference of the angle of attack.
+    #[setting(unit = "rad/s2", above = 0.0, nominal = 0.01)]
+    pub alpha_acceleration: f64,
+}
+
+/// Filters of the measured lift and drag.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Declared)]
+pub struct Filter {
+    /// Time constant of the ratios of measured to predicted lift and drag.
+    #[setting(unit = "s", above = 0.0, nominal = 10.0)]
+    pub time: f64,
+    /// Drag per mass below which these ratios are not updated.
+    #[setting(unit = "m/s2", min = 0.0, nominal = 1.0)]
+    pub drag: f64,
+}
+
+const FILE: &str = "guidance.toml";
+
+#[derive(Deserialize)]
+struct File {
+    settings: Table,
+}
+
+impl Default for Settings {
+    /// Returns the settings of `data/guidance.toml`.
+    fn default() -> Self {
+        static READ: LazyLock<Settings> = LazyLock::new(|| {
+            let file: File = data::embedded(FILE, include_str!("../../data/guidance.toml"));
+            let mut settings = Settings {
+                target: Target::default(),
+                bank: Bank::default(),
+                alpha: Alpha::default(),
+                reversal: Reversal::default(),
+                shaping: Shaping::default(),
+                filter: Filter::default(),
+                planet: Planet::EARTH,
+            };
+            data::set(&mut settings, FILE, &file.settings);
+            settings
+        });
+        *READ
+    }
+}
+
+impl Settings {
+    /// Checks the settings.
+    ///
+    /// # Errors
+    /// Names the setting that is out of range.
+    pub fn check(&self) -> Result<(), DesignError> {
+        Ok(check(self)?)
+    }
+}
+
+/// Returns a value that is `low` up to the lower speed, `high` from the upper speed on, and linear
+/// in between.
+pub(super) fn over_speed(speed: f64, [lower, upper]: [f64; 2], [low, high]: [f64; 2]) -> f64 {
+    let share = if upper > lower { (speed - lower) / (upper - lower) } else { 1.0 };
+    low + share.clamp(0.0, 1.0) * (high - low)
+}
+
+impl Alpha {
+    /// Returns the angle of attack of the schedule (rad) at a speed (m/s).
+    pub fn at(&self, speed: f64) -> f64 {
+        over_speed(speed, [self.lower_speed, self.upper_speed], [self.low, self.high])
+    }
+}
+
+impl Reversal {
+    /// Returns the largest heading error (rad) at a speed (m/s).
+    pub fn at(&self, speed: f64) -> f64 {
+        over_speed(speed, [self.lower_speed, self.upper_speed], [self.low, self.high])
+    }
+}

@@ -1,0 +1,103 @@
+//! Entry guidance: where its flights end, and what its reference keeps to.
+
+#[path = "harness/entry.rs"]
+mod entry;
+
+use control::guidance::{Guidance, Limits, Memory, Navigation, PERIOD, Settings, Shaped};
+use entry::{Flight, fly, start};
+use proptest::prelude::*;
+use vehicle::noise::uniform;
+
+#[test]
+fn regress_the_nominal_flights_end_in_the_terminal_area() {
+    for flight in [Flight::nominal(), Flight::lower()] {
+        let settings = Settings::default();
+        let outcome = fly(settings, &flight, |_, _, memory| {
+            assert!(memory.command.in_reach);
+        });
+        assert!(outcome.arrived(), "{} m to go", outcome.range);
+        assert!((outcome.end[0] - settings.target.altitude).abs() < 500.0, "{}", outcome.end[0]);
+        assert!((outcome.end[3] - settings.target.speed).abs() < 1.0, "{}", outcome.end[3]);
+        assert!(outcome.memory.reversals >= 3);
+        assert!((1500.0..2000.0).contains(&outcome.seconds), "{} s", outcome.seconds);
+        assert!(outcome.greatest_load < 1.3 && outcome.greatest_pressure < 14e3);
+        assert!(outcome.greatest_turn.to_degrees() < 0.45, "{}", outcome.greatest_turn);
+    }
+}
+
+/// Density, lift and drag are wrong by up to 10 %, and the wind blows with up to 50 m/s.
+#[test]
+fn regress_dispersed_flights_end_in_the_terminal_area() {
+    for number in 2000..2010 {
+        let flight = Flight::dispersed(0.1, uniform(2, number));
+        let outcome = fly(Settings::default(), &flight, |_, _, _| {});
+        assert!(outcome.arrived(), "{flight:?}: {} m to go", outcome.range);
+    }
+}
+
+#[test]
+fn a_target_out_of_reach_is_reported() {
+    let mut settings = Settings::default();
+    settings.target.longitude += 1.5;
+    let guidance = Guidance::new(settings).unwrap();
+    let mut memory = Memory::default();
+    let navigation = Navigation { motion: Flight::nominal().start, ..Navigation::default() };
+    let command = (0..250).map(|tick| guidance.update(&mut memory, tick, &navigation)).last();
+    let command = command.unwrap();
+    assert!(!command.in_reach && command.miss > 1e5, "{command:?}");
+}
+
+#[test]
+fn a_setting_out_of_range_is_refused_by_name() {
+    let mut settings = Settings::default();
+    settings.shaping.bank_rate = 0.0;
+    let refusal = Guidance::new(settings).unwrap_err().to_string();
+    assert!(refusal.contains("shaping.bankRate"), "{refusal}");
+}
+
+/// The first turn is towards the target: a positive bank angle turns to the left.
+#[test]
+fn oracle_the_first_bank_turns_towards_the_target() {
+    for (heading, is_positive) in [(70.0, true), (50.0, false)] {
+        let guidance = Guidance::new(Settings::default()).unwrap();
+        let motion = start([120e3, 0.0, -10.0, 7450.0, -1.2, heading]);
+        let mut memory = Memory::default();
+        let navigation = Navigation { motion, ..Navigation::default() };
+        let command = guidance.update(&mut memory, 0, &navigation);
+        assert_eq!(command.bank > 0.0, is_positive, "{}", command.bank);
+    }
+}
+
+proptest! {
+    #[test]
+    fn oracle_the_reference_keeps_to_its_limits_and_does_not_overshoot(
+        commands in prop::collection::vec(-1.5..1.5, 1..6), rate in 0.01..0.2, acceleration in 0.002..0.1,
+    ) {
+        let limits = Limits { rate, acceleration };
+        let mut shaped = Shaped::default();
+        for command in commands {
+            for _ in 0..500 {
+                shaped.follow(command, &limits, PERIOD);
+                prop_assert!(shaped.rate.abs() <= rate * (1.0 + 1e-12));
+                prop_assert!(shaped.acceleration.abs() <= acceleration * (1.0 + 1e-12));
+            }
+        }
+        // From standstill it arrives without going beyond.
+        let mut shaped = Shaped::default();
+        let mut ticks = 0.0;
+        while (shaped.value - 1.0).abs() > 1e-3 {
+            shaped.follow(1.0, &limits, PERIOD);
+            ticks += 1.0;
+            prop_assert!(shaped.value <= 1.0 + 1e-12);
+        }
+        // The least time: a trapezoid or a triangle of the rate.
+        let ramp = rate / acceleration;
+        let least = if rate * ramp <= 1.0 {
+            1.0 / rate + ramp
+        } else {
+            2.0 / acceleration.sqrt()
+        };
+        let taken = ticks * PERIOD;
+        prop_assert!(taken < least + 12.0 * PERIOD + 0.1 * least, "{} s instead of {} s", taken, least);
+    }
+}
