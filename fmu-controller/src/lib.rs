@@ -8,6 +8,7 @@ mod crmpc;
 mod dlmpc;
 mod estimator;
 mod fbl;
+mod guidance;
 mod lqr;
 mod solver;
 #[cfg(test)]
@@ -18,6 +19,7 @@ mod two_loop;
 pub use allocator::ControlAllocator;
 use controller_export::ControllerFmu;
 pub use estimator::AttitudeEstimator;
+pub use guidance::EntryGuidance;
 
 /// `CRMPC`: centralised robust model predictive control.
 pub type Crmpc = ControllerFmu<crmpc::CrmpcLaw>;

@@ -7,7 +7,7 @@ use fmi2_export::table::{
 use model_description::DefaultExperiment;
 use nalgebra::Vector3;
 use vehicle::Scenario;
-use vehicle::trajectory::{self, Trajectory};
+use vehicle::trajectory;
 
 /// Names and meanings of the components of Θ.
 pub const ANGLES: [(&str, &str); 3] =
@@ -130,19 +130,22 @@ fn inputs<L: Law>(table: VariableTable<ControllerFmu<L>>) -> VariableTable<Contr
     let table = vector(table, ANGLES, angles, |m| &mut m.input.reference.angles);
     let table = vector(table, ANGLES, rates, |m| &mut m.input.reference.rates);
     let table = vector(table, ANGLES, accelerations, |m| &mut m.input.reference.accelerations);
-    known_trajectory().into_iter().fold(table, |table, (real, field)| {
-        table.real(real, move |m| field(&mut m.input.trajectory))
-    })
+    known_trajectory().into_iter().zip(trajectory::QUANTITIES).fold(
+        table,
+        |table, (real, quantity)| {
+            table.real(real, move |m| (quantity.field)(&mut m.input.trajectory))
+        },
+    )
 }
 
 /// Declares the inputs of the known trajectory. It is not inlined, so that the libraries stay
 /// small.
 #[inline(never)]
-fn known_trajectory() -> Vec<(Real, fn(&mut Trajectory) -> &mut f64)> {
+fn known_trajectory() -> Vec<Real> {
     let declare = |quantity: trajectory::Quantity| {
-        let trajectory::Quantity { name, meaning, unit, nominal, field } = quantity;
+        let trajectory::Quantity { name, meaning, unit, nominal, .. } = quantity;
         let text = format!("{meaning}, as it is known");
-        (input(name, &text).real().unit(unit).nominal(nominal), field)
+        input(name, &text).real().unit(unit).nominal(nominal)
     };
     trajectory::QUANTITIES.into_iter().map(declare).collect()
 }

@@ -1,6 +1,17 @@
 //! The library of the FMUs whose laws are formulas: they solve no optimisation while they run.
 #![deny(clippy::disallowed_methods)]
 
-use fmu_controller::{AttitudeEstimator, Btvsmc, BtvsmcDo, Fbl, Lqr, SotvsmcDo, TwoLoopSmc};
+use fmu_controller::{
+    AttitudeEstimator, Btvsmc, BtvsmcDo, EntryGuidance, Fbl, Lqr, SotvsmcDo, TwoLoopSmc,
+};
 
-fmi2_export::export_fmus!(Lqr, Fbl, Btvsmc, BtvsmcDo, SotvsmcDo, TwoLoopSmc, AttitudeEstimator);
+fmi2_export::export_fmus!(
+    Lqr,
+    Fbl,
+    Btvsmc,
+    BtvsmcDo,
+    SotvsmcDo,
+    TwoLoopSmc,
+    AttitudeEstimator,
+    EntryGuidance
+);

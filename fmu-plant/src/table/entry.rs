@@ -60,8 +60,9 @@ fn rates(mut variables: PlantVariables) -> PlantVariables {
     {
         let short = meaning.split([',']).next().unwrap_or(meaning);
         let text = format!("Time derivative of the {short}; 0 without an entry flight");
-        let common =
-            output(&format!("{name}Rate"), &text).depends_on(MOTION_NAMES).depends_on(ATTITUDE);
+        let common = output(&name.replace("motion.", "motionRate."), &text)
+            .depends_on(MOTION_NAMES)
+            .depends_on(ATTITUDE);
         let real = common.real().unit(unit).nominal(nominal / 100.0).derivative_of(name);
         variables = variables
             .real(real, move |m| &mut m.output.motion_rate[i])
@@ -105,7 +106,7 @@ fn quantities(variables: PlantVariables) -> PlantVariables {
         .role(Unknown::Flight(Quantity::Drag))
         .real(
             declare(
-                "load.factor",
+                "loadFactor",
                 "Specific force in units of 9.80665 m/s2; 0 without an entry flight",
                 "",
                 1.0,
@@ -123,7 +124,7 @@ fn quantities(variables: PlantVariables) -> PlantVariables {
             |m| &mut m.output.heat_flux,
         )
         .role(Unknown::Flight(Quantity::HeatFlux))
-        .real(declare("motion.range", "Distance over ground from the start", "m", 1e6), |m| {
+        .real(declare("downrange", "Distance over ground from the start", "m", 1e6), |m| {
             &mut m.output.range
         })
         .role(Unknown::Flight(Quantity::Range));

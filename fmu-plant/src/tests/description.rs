@@ -24,7 +24,8 @@ fn positions_and_names_agree() {
             Some(Unknown::AppliedMoment(_)) => "appliedMoment",
             Some(Unknown::Delta(_) | Unknown::DisturbanceMoment(_)) => "disturbance",
             Some(Unknown::Flight(Quantity::DynamicPressure | Quantity::KnownPressure)) => "flight",
-            Some(Unknown::State(_) | Unknown::Derivative(_)) => "motion",
+            Some(Unknown::State(_)) => "motion",
+            Some(Unknown::Derivative(_)) => "motionRate",
             Some(Unknown::Flight(_)) => continue,
             Some(Unknown::Measured(_) | Unknown::MeasuredTime) => "measured",
             None => match role(position).as_known {
@@ -144,7 +145,7 @@ fn outputs_need_no_start_and_inputs_have_one() {
             "aerodynamics.scale",
             "sensor.drop.probability",
             "flow.mach",
-            "load.factor",
+            "loadFactor",
             "planet.oblateness",
             "aerodynamics.lift.scale",
             "aerodynamics.drag.scale",

@@ -1,0 +1,202 @@
+//! `EntryGuidance`: the reference of the attitude along an entry flight.
+
+use control::guidance::{Command, Guidance, Memory, Navigation, PERIOD, Settings};
+use controller_export::sampled::{SampledFmu, SampledInstance, Ticks};
+use controller_export::table::{ANGLES, vector};
+use fmi2_export::table::{Common, Real, discrete_output, input};
+use fmi2_export::{Description, Failure, VariableTable};
+use model_description::DefaultExperiment;
+use serde::{Deserialize, Serialize};
+use vehicle::entry::Motion;
+
+/// The guidance as an FMU.
+pub type EntryGuidance = SampledFmu<GuidanceInstance>;
+
+/// An instance of the guidance: its parameters, inputs and outputs.
+#[derive(Serialize, Deserialize)]
+pub struct GuidanceInstance {
+    pub(crate) settings: Settings,
+    pub(crate) navigation: Navigation,
+    pub(crate) output: Output,
+}
+
+/// Outputs of the guidance.
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
+pub(crate) struct Output {
+    pub(crate) command: Command,
+    reversals: u64,
+}
+
+/// Longest flight that is expected, s.
+const LONGEST: f64 = 3000.0;
+
+impl SampledInstance for GuidanceInstance {
+    type Device = Guidance;
+    type Memory = Memory;
+    type Input = Navigation;
+    type Output = ();
+
+    fn description() -> Description<EntryGuidance> {
+        Description {
+            name: "EntryGuidance",
+            description: "Guidance of an entry flight to the terminal area by a predictor-corrector, Lu (2014)",
+            documentation: include_str!("guidance.html").into(),
+            version: env!("CARGO_PKG_VERSION"),
+            model_exchange: false,
+            event_indicators: 0,
+            default_experiment: DefaultExperiment {
+                start: 0.0,
+                stop: LONGEST,
+                tolerance: 1e-6,
+                step: PERIOD,
+            },
+            table: outputs(inputs(VariableTable::new()))
+                .settings(|m: &mut EntryGuidance| &mut m.settings),
+        }
+    }
+
+    fn new() -> Self {
+        let degrees = f64::to_radians;
+        Self {
+            settings: Settings::default(),
+            navigation: Navigation {
+                // The start of the plant's entry flight.
+                motion: Motion::new(
+                    120e3,
+                    0.0,
+                    degrees(-10.0),
+                    7450.0,
+                    degrees(-1.2),
+                    degrees(60.0),
+                ),
+                ..Navigation::default()
+            },
+            output: Output::default(),
+        }
+    }
+
+    fn design(&self) -> Result<Guidance, Failure> {
+        Guidance::new(self.settings).map_err(|error| Failure::Error(error.to_string()))
+    }
+
+    fn is_designed(&self, guidance: &Guidance) -> bool {
+        *guidance.settings() == self.settings
+    }
+
+    fn period(_guidance: &Guidance) -> f64 {
+        PERIOD
+    }
+
+    fn evaluate(&self, guidance: &mut Guidance, ticks: &mut Ticks<Self>) -> Result<(), Failure> {
+        let navigation = self.navigation;
+        let Navigation { motion, lift, drag } = navigation;
+        if !motion.iter().chain(&[lift, drag]).all(|value| value.is_finite()) {
+            return Err(Failure::Error("an input motion.* or load.* is not finite".into()));
+        }
+        if motion[3] <= 0.0 {
+            let problem = format!("motion.speed = {} m/s must be positive", motion[3]);
+            return Err(Failure::Error(problem));
+        }
+        ticks.evaluate_with(navigation, |memory, tick| {
+            guidance.update(memory, tick, &navigation);
+        });
+        Ok(())
+    }
+
+    fn show(&mut self, _time: f64, _guidance: &Guidance, ((), memory): ((), &Memory)) {
+        self.output = Output { command: memory.command, reversals: memory.reversals };
+    }
+
+    fn warning(before: &Memory, after: &Memory) -> Option<&'static str> {
+        let (before, after) = (&before.command, &after.command);
+        (before.in_reach && !after.in_reach)
+            .then_some("the target is out of reach: the bank angle is at its limit (see miss)")
+    }
+
+    fn fits(guidance: &Guidance, memory: &Memory) -> bool {
+        guidance.fits(memory)
+    }
+}
+
+type Variables = VariableTable<EntryGuidance>;
+
+/// Inputs: name, meaning, unit and nominal value.
+const INPUTS: [(&str, &str, &str, f64); 8] = [
+    ("motion.altitude", "Altitude above the planet's radius", "m", 1e5),
+    ("motion.longitude", "Longitude, positive to the east", "rad", 1.0),
+    ("motion.latitude", "Latitude, positive to the north", "rad", 1.0),
+    ("motion.speed", "Speed relative to the rotating planet", "m/s", 1e3),
+    ("motion.flightPathAngle", "Flight path angle, positive above the horizon", "rad", 0.1),
+    ("motion.heading", "Heading of the velocity, measured from north towards east", "rad", 1.0),
+    ("load.lift", "Measured lift per mass", "m/s2", 10.0),
+    ("load.drag", "Measured drag per mass", "m/s2", 10.0),
+];
+
+fn inputs(mut table: Variables) -> Variables {
+    for (i, (name, meaning, unit, nominal)) in INPUTS.into_iter().enumerate() {
+        let real = input(name, meaning).real().unit(unit).nominal(nominal);
+        table = table.real(real, move |m| match i {
+            6 => &mut m.navigation.lift,
+            7 => &mut m.navigation.drag,
+            i => &mut m.navigation.motion[i],
+        });
+    }
+    table
+}
+
+fn sampled(name: &str, text: &str) -> Common {
+    discrete_output(name, text).depends_on(INPUTS.map(|(name, ..)| name))
+}
+
+fn outputs(table: Variables) -> Variables {
+    let reference = |name: &'static str, quantity: &'static str, unit: &'static str| {
+        move |axis: &str, meaning: &str| -> Real {
+            let common = sampled(&format!("{name}.{axis}"), &format!("{quantity} {meaning}"));
+            common.real().unit(unit).nominal(0.1)
+        }
+    };
+    let angles = reference("reference", "Reference of the", "rad");
+    let rates = reference("referenceRate", "First derivative of the reference of the", "rad/s");
+    let accelerations =
+        reference("referenceAcceleration", "Second derivative of the reference of the", "rad/s2");
+    let table = vector(table, ANGLES, angles, |m| &mut m.output.command.reference.angles);
+    let table = vector(table, ANGLES, rates, |m| &mut m.output.command.reference.rates);
+    let table =
+        vector(table, ANGLES, accelerations, |m| &mut m.output.command.reference.accelerations);
+    let real = |name: &str, text: &str, unit: &str, nominal: f64| {
+        sampled(name, text).real().unit(unit).nominal(nominal)
+    };
+    table
+        .real(real("command.alpha", "Angle of attack of the schedule", "rad", 0.1), |m| {
+            &mut m.output.command.alpha
+        })
+        .real(real("command.bank", "Bank angle before it is shaped", "rad", 1.0), |m| {
+            &mut m.output.command.bank
+        })
+        .real(real("range", "Distance over ground to the runway point", "m", 1e6), |m| {
+            &mut m.output.command.range
+        })
+        .real(
+            real(
+                "headingError",
+                "Direction to the runway point less the heading, positive to the right",
+                "rad",
+                0.1,
+            ),
+            |m| &mut m.output.command.heading_error,
+        )
+        .real(
+            real("miss", "By how much the predicted flight ends too far from the target", "m", 1e3),
+            |m| &mut m.output.command.miss,
+        )
+        .boolean(
+            sampled(
+                "inReach",
+                "Whether the target is in reach of the largest and least bank angle",
+            ),
+            |m| &mut m.output.command.in_reach,
+        )
+        .integer(sampled("reversals", "Number of bank reversals so far"), (Some(0), None), |m| {
+            &mut m.output.reversals
+        })
+}
