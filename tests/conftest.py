@@ -32,6 +32,7 @@ NAMES = [
     "TwoLoopSMC",
     "ControlAllocator",
     "AttitudeEstimator",
+    "EntryGuidance",
 ]
 
 # The files that take longest. Begun first, none of them runs alone at the end while the other

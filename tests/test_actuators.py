@@ -255,15 +255,15 @@ def test_a_saved_state_continues_a_moving_surface_in_model_exchange(fmu):
     model.enterContinuousTimeMode()
 
     def seen():
-        indicators = (c_double * 8)()
-        model.getEventIndicators(indicators, 8)
+        indicators = (c_double * 10)()
+        model.getEventIndicators(indicators, 10)
         return model.getReal(reference(DEFLECTION + SURFACE_RATE)), list(indicators)
 
     saved = model.getFMUstate()
     before = seen()
     assert before[0][12] == np.radians(RATE) and before[1][4] == pytest.approx(0.1 / np.radians(RATE))
     model.setTime(1.0)
-    model.setContinuousStates((c_double * 14)(*[0.0] * 10, 0.11, *[0.0] * 3), 14)
+    model.setContinuousStates((c_double * 20)(*[0.0] * 10, 0.11, *[0.0] * 9), 20)
     assert seen()[1][4] < 0.0
     model.enterEventMode()
     *_, changed, _, _ = model.newDiscreteStates()

@@ -101,7 +101,8 @@ def test_oracle_directional_derivatives_are_central_differences(fmu, kinematics)
     derivatives = [v for v in plant.variables.values() if v.derivative is not None]
     states = [v.derivative for v in derivatives]
     deflections = [f"deflection[{i}]" for i in range(1, 9)]
-    assert [v.name for v in states] == ANGLES + RATES + deflections
+    motion = [name for name in plant.names("output") if name.startswith("motion.")]
+    assert [v.name for v in states] == ANGLES + RATES + deflections + motion
     loads = MOMENT + [f"disturbanceMoment.{axis}" for axis in "xyz"]
     trajectory = [name for name in plant.names("input") if name.startswith("trajectory.")]
     assert len(trajectory) == 7
@@ -117,18 +118,18 @@ def test_oracle_directional_derivatives_are_central_differences(fmu, kinematics)
     while model.newDiscreteStates()[0]:
         pass
     model.enterContinuousTimeMode()
-    point = np.array([0.3, -0.4, 0.5, 0.05, -0.08, 0.11, *0.01 * np.arange(-4, 4)])
+    point = np.array([0.3, -0.4, 0.5, 0.05, -0.08, 0.11, *0.01 * np.arange(-4, 4), 55e3, 0.1, -0.2, 3e3, -0.02, 1.0])
     load = np.array([2e4, -3e4, 5e4, 1e3, 2e3, -3e3, -0.1, 0.8, 0.4, 0.01, -0.02, 0.03, 0.01])
     references = [v.valueReference for v in derivatives]
 
     def right_side(state, values):
-        model.setContinuousStates((c_double * 14)(*state), 14)
+        model.setContinuousStates((c_double * 20)(*state), 20)
         model.setReal([v.valueReference for v in inputs], values)
         return np.array(model.getReal(references))
 
     none = np.zeros(13)
-    steps = [(1e-5, row, none, states[i]) for i, row in enumerate(np.eye(14))]
-    steps += [(10.0 if i < 6 else 1e-5, np.zeros(14), row, inputs[i]) for i, row in enumerate(np.eye(13))]
+    steps = [(1e-5, row, none, states[i]) for i, row in enumerate(np.eye(20))]
+    steps += [(10.0 if i < 6 else 1e-5, np.zeros(20), row, inputs[i]) for i, row in enumerate(np.eye(13))]
     for h, by_state, by_input, known in steps:
         ahead = right_side(point + h * by_state, load + h * by_input)
         behind = right_side(point - h * by_state, load - h * by_input)

@@ -510,8 +510,8 @@ def test_every_controller_flies_every_scenario(tmp_path):
 
 def test_every_controller_turns_the_bank_angle(tmp_path):
     results = reproduced("reversal", tmp_path)
-    assert len(results["runs"]) == 37
-    assert [claim["verdict"] for claim in results["claims"]] == [HOLDS, HOLDS, FAILS, HOLDS]
+    assert len(results["runs"]) == 46
+    assert [claim["verdict"] for claim in results["claims"]] == [HOLDS, HOLDS, HOLDS, FAILS, HOLDS]
     members = {name: run["members"][0] for name, run in results["runs"].items()}
     # Nobody turns 120 deg faster than the rate allows without breaking its limit.
     for name, member in members.items():

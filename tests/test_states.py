@@ -25,6 +25,8 @@ def course(tick: int) -> dict:
 def inputs(name: str, tick: int) -> dict:
     if name == "AttitudeEstimator":
         return {"measured.gyroscope.x": 1e-3 * tick, "measured.gyroscope.y": -0.02, "measured.time": STEP * tick, "measured.sample": tick + 1}
+    if name == "EntryGuidance":
+        return {"motion.altitude": 60e3 - 10.0 * tick, "motion.speed": 5000.0 - 30.0 * tick, "motion.heading": 1.2 + 0.01 * tick, "load.drag": 3.0}
     if name not in ("ReentryPlant", "ControlAllocator"):
         return course(tick)
     return dict(zip(MOMENT, [1e4 * (-1) ** (tick // 10), 2e3 * tick, -3e4 + 1e3 * tick]))
@@ -97,6 +99,7 @@ def test_interleaved_instances_do_not_disturb_each_other(fmu, name):
         "LQR": {"weight.P[1]": 20.0},
         "ControlAllocator": {"method": "blending"},
         "AttitudeEstimator": {"filter.cutoff": 3.0},
+        "EntryGuidance": {"bank.final": 0.3},
         "FBL": {"gain.p": 4.0},
     }.get(name, {"surface.lambda": 1.5})
     alone = []

@@ -20,15 +20,15 @@ impl ReentryPlant {
         check(state, time).map_err(|error| failure(error.to_string()))
     }
 
-    /// Says why an entry flight ended at `time` (s).
-    fn reason_of_the_end(&self, time: f64) -> String {
+    /// Says why an entry flight ended.
+    fn reason_of_the_end(&self) -> String {
         let End { altitude, speed } = self.parameters.entry.end;
         let margins = self.plant.as_ref().and_then(|plant| plant.margins());
         match margins {
             Some([above, _]) if above <= 0.0 => {
-                format!("the entry flight ended at t = {time} s at end.altitude = {altitude} m")
+                format!("the entry flight ended at end.altitude = {altitude} m")
             }
-            _ => format!("the entry flight ended at t = {time} s at end.speed = {speed} m/s"),
+            _ => format!("the entry flight ended at end.speed = {speed} m/s"),
         }
     }
 }
@@ -96,7 +96,7 @@ impl Model for ReentryPlant {
         result.map_err(|error| Failure::Error(error.to_string()))?;
         match ended {
             None => Ok(()),
-            Some(time) => Err(Failure::Ended { time, reason: self.reason_of_the_end(time) }),
+            Some(time) => Err(Failure::Ended { time, reason: self.reason_of_the_end() }),
         }
     }
 

@@ -19,7 +19,7 @@ ALPHA = "plant.attitude.alpha"
 
 
 def test_every_fmu_is_there_and_simulates():
-    names = "AttitudeEstimator BTVSMC BTVSMC_DO ControlAllocator CRMPC DLMPC FBL LQR ReentryPlant"
+    names = "AttitudeEstimator BTVSMC BTVSMC_DO ControlAllocator CRMPC DLMPC EntryGuidance FBL LQR ReentryPlant"
     assert fmus() == [*names.split(), "SOTVSMC_DO", "TwoLoopSMC"]
     for name in fmus():
         assert fmpy.read_model_description(str(fmu(name))).modelName == name
@@ -110,7 +110,7 @@ def test_step_and_units_are_chosen(tmp_path):
 
 @pytest.mark.filterwarnings("ignore::reentry_fmus.OrchestratorWarning")
 def test_every_experiment_runs():
-    assert len(experiments()) == 25
+    assert len(experiments()) == 29
     assert experiments()["crmpc-robust"].startswith("CRMPC, robust constraint sets")
     for name in experiments():
         assert experiment(name, stop=1.0).metrics["completed"], name

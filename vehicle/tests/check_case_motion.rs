@@ -1,6 +1,6 @@
 //! Atmospheric check cases of NASA/TM-2015-218675 (Murri, Jackson, Shelton, Check-Cases for
-//! Verification of 6-Degree-of-Freedom Flight Vehicle Simulations, volume II) that need the motion of
-//! the centre of mass. The numbers are those of tool SIM 4 (`Atmos_03_sim_04.csv` and so on).
+//! Verification of 6-Degree-of-Freedom Flight Vehicle Simulations, volume II) that need the motion
+//! of the centre of mass. The numbers are those of tool SIM 4 (`Atmos_03_sim_04.csv` and so on).
 
 use nalgebra::{SVector, Vector3};
 use vehicle::aerodynamics::{Aerodynamics, FOOT, Flow};
@@ -25,10 +25,10 @@ fn position(planet: &Planet, altitude: f64, latitude: f64) -> [f64; 2] {
     [out.hypot(up), up.atan2(out)]
 }
 
-/// Cases 4, 5, 9 and 10: a sphere falls from 30,000 ft over a round Earth without and with rotation,
-/// and is shot to the east and to the north from the equator of the ellipsoid, through the standard
-/// atmosphere. The first two begin at 0.1 s, because the angles of the velocity have no meaning at
-/// rest.
+/// Cases 4, 5, 9 and 10: a sphere falls from 30,000 ft over a round Earth without and with
+/// rotation, and is shot to the east and to the north from the equator of the ellipsoid, through
+/// the standard atmosphere. The first two begin at 0.1 s, because the angles of the velocity have
+/// no meaning at rest.
 #[test]
 fn published_a_sphere_falls_and_is_shot() {
     struct Case {

@@ -1,5 +1,5 @@
-//! Guidance of an entry flight to the terminal area: a predictor–corrector in the bank angle, P. Lu,
-//! "Entry guidance: a unified method", Journal of Guidance, Control, and Dynamics 37(3) (2014).
+//! Guidance of an entry flight to the terminal area: a predictor–corrector in the bank angle, P.
+//! Lu, "Entry guidance: a unified method", Journal of Guidance, Control, and Dynamics 37(3) (2014).
 //!
 //! Once a second the magnitude of the bank angle is found with which the predicted flight ends at
 //! the wanted distance from the target. The angle of attack follows a schedule over speed. The sign
@@ -74,6 +74,9 @@ pub struct Memory {
     begun: bool,
     /// Magnitude of the bank angle, rad.
     magnitude: f64,
+    /// Magnitude before the last correction, from which the command moves on in a second: steps of
+    /// the command would cost moments at each.
+    before: f64,
     /// Whether the vehicle turns to the left, which a positive bank angle does.
     to_left: bool,
     /// Tick of the last reversal.
@@ -112,8 +115,8 @@ impl Guidance {
 
     /// Returns whether a restored memory can be used.
     pub fn fits(&self, memory: &Memory) -> bool {
-        let Memory { magnitude, ratios, alpha, bank, .. } = memory;
-        [*magnitude, alpha.value, alpha.rate, bank.value, bank.rate, ratios[0], ratios[1]]
+        let Memory { magnitude, before, ratios, alpha, bank, .. } = memory;
+        [*magnitude, *before, alpha.value, alpha.rate, bank.value, bank.rate, ratios[0], ratios[1]]
             .iter()
             .all(|value| value.is_finite())
     }
@@ -146,11 +149,17 @@ impl Guidance {
         let mut command = Command { range, heading_error, ..memory.command };
         if first || tick.is_multiple_of(TICKS) {
             self.filter(memory, measured);
+            memory.before = memory.magnitude;
             self.correct(memory, measured, &mut command);
             self.reverse(memory, tick, speed, heading_error);
         }
         let schedule = self.schedule(memory);
-        let bank = if memory.to_left { memory.magnitude } else { -memory.magnitude };
+        if first {
+            memory.before = memory.magnitude;
+        }
+        let share = (tick % TICKS + 1) as f64 / TICKS as f64;
+        let magnitude = memory.before + share * (memory.magnitude - memory.before);
+        let bank = if memory.to_left { magnitude } else { -magnitude };
         let alpha = schedule.at(speed);
         let Shaping { bank_rate, bank_acceleration, alpha_rate, alpha_acceleration } =
             self.settings.shaping;
@@ -192,8 +201,8 @@ impl Guidance {
         }
     }
 
-    /// Schedule of the angle of attack. Its end is moved so that the lift there is that of the model:
-    /// the flight is in equilibrium at the altitude of the target then, not at another one.
+    /// Schedule of the angle of attack. Its end is moved so that the lift there is that of the
+    /// model: the flight is in equilibrium at the altitude of the target then, not at another one.
     fn schedule(&self, memory: &Memory) -> Alpha {
         let alpha = self.settings.alpha;
         let [lift_ratio, _] = memory.ratios;

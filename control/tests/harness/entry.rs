@@ -34,8 +34,8 @@ impl Flight {
         Self { start: start([80e3, 15.7, -0.5, 7400.0, -1.0, 58.0]), ..Self::nominal() }
     }
 
-    /// With density, lift and drag each wrong by up to this share, and wind up to 50 m/s, by numbers
-    /// of size 1.
+    /// With density, lift and drag each wrong by up to this share, and wind up to 50 m/s, by
+    /// numbers of size 1.
     pub(crate) fn dispersed(share: f64, draws: [f64; 5]) -> Self {
         let [lift, drag, density] = [draws[0], draws[1], draws[2]].map(|draw| 1.0 + share * draw);
         let deviations = Deviations { lift, drag, ..Deviations::default() };
@@ -51,8 +51,8 @@ impl Outcome {
     }
 }
 
-/// Returns a motion from altitude (m), longitude, latitude (deg), speed (m/s), flight path angle and
-/// heading (deg).
+/// Returns a motion from altitude (m), longitude, latitude (deg), speed (m/s), flight path angle
+/// and heading (deg).
 pub(crate) fn start([altitude, longitude, latitude, speed, path, heading]: [f64; 6]) -> Motion {
     let degrees = [longitude, latitude, path, heading].map(f64::to_radians);
     Motion::new(altitude, degrees[0], degrees[1], speed, degrees[2], degrees[3])

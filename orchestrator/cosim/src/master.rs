@@ -10,6 +10,7 @@
 //! instance's future, and an instance that steps at every n-th tick only is stepped when its
 //! interval begins.
 
+mod ending;
 mod transfer;
 
 pub use transfer::Member;
@@ -110,16 +111,6 @@ impl Master {
     /// [`Self::pace`] is called.
     pub fn set_interrupt(&mut self, interrupt: &Interrupt) {
         self.interrupt = interrupt.clone();
-    }
-
-    /// Lets an instance end the run before the stop time, by its index.
-    pub fn set_ender(&mut self, ender: Option<usize>) {
-        self.ender = ender;
-    }
-
-    /// Returns how the instance that may do so ended the run, if it did.
-    pub fn end(&self) -> Option<&str> {
-        self.end.as_deref()
     }
 
     /// Paces the run from now on, so that it keeps in step with the timer.
@@ -278,29 +269,6 @@ impl Master {
             let outcome = self.members[index].instance.terminate();
             outcome.map_err(|failure| self.error(self.clock.stop(), (index, failure)))?;
         }
-        Ok(())
-    }
-
-    /// Shows the observers the values at the moment at which an instance ended the run, within the
-    /// step from `tick`.
-    fn observe_end(
-        &mut self,
-        tick: u64,
-        (index, failure): &Culprit,
-        observers: &mut [&mut dyn Observer],
-    ) -> Result<(), Error> {
-        let reached = failure.ends.filter(|time| time.is_finite());
-        let time = reached.unwrap_or_else(|| self.clock.time(tick));
-        self.read_instance(*index, true).map_err(|culprit| self.error(time, culprit))?;
-        for index in 0..self.members.len() {
-            self.values.arrive(index);
-        }
-        self.row.fill(&self.values);
-        let sample = Sample { tick: tick + 1, time, last: true, values: &self.row.values };
-        for observer in observers.iter_mut() {
-            observer.observe(&sample)?;
-        }
-        self.end = Some(format!("by {}: {}", self.members[*index].name, failure.message));
         Ok(())
     }
 

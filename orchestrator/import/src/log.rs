@@ -163,7 +163,11 @@ impl Log {
     ) {
         let component = &self.component;
         match status {
-            Ok(Status::Ok | Status::Pending) if !tracing::enabled!(tracing::Level::INFO) => return,
+            Ok(Status::Ok | Status::Pending | Status::Discard)
+                if !tracing::enabled!(tracing::Level::INFO) =>
+            {
+                return;
+            }
             // Warnings are collected, each once.
             Ok(Status::Warning)
                 if warnings::collected(&format!("{component}: [{category}] {message}")) =>
@@ -178,11 +182,12 @@ impl Log {
             return;
         }
         match status {
-            Ok(Status::Ok | Status::Pending) => {
+            // What was discarded is told with the call that it failed, or that it ended.
+            Ok(Status::Ok | Status::Pending | Status::Discard) => {
                 tracing::info!("{component}: [{category}] {message}");
             }
             Ok(Status::Warning) => tracing::warn!("{component}: [{category}] {message}"),
-            Ok(Status::Discard | Status::Error | Status::Fatal) | Err(_) => {
+            Ok(Status::Error | Status::Fatal) | Err(_) => {
                 if !self.instantiates.load(Ordering::Relaxed) {
                     tracing::error!("{component}: [{category}] {message}");
                 }

@@ -161,8 +161,8 @@ impl Aerodynamics {
         LiftAndDrag { lift, drag }
     }
 
-    /// Returns the coefficients of lift and drag at an angle of attack (rad), at a Mach number above
-    /// that of all tables.
+    /// Returns the coefficients of lift and drag at an angle of attack (rad), at a Mach number
+    /// above that of all tables.
     pub fn lift_and_drag(&self, alpha: f64) -> [f64; 2] {
         [&self.forces.lift, &self.forces.drag].map(|coefficient| coefficient.at(alpha, f64::MAX))
     }

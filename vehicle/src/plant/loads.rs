@@ -120,8 +120,8 @@ impl Plant {
             .map_or_else(SMatrix::zeros, |actuators| actuators.moment_by_jets(command))
     }
 
-    /// Trajectory at `time` (s): that of the entry flight, or the input. Also its turn rate (rad/s),
-    /// which is zero during the calibration sequence.
+    /// Trajectory at `time` (s): that of the entry flight, or the input. Also its turn rate
+    /// (rad/s), which is zero during the calibration sequence.
     pub(super) fn trajectory(&self, time: f64, input: &Input) -> (Trajectory, Vector3<f64>) {
         if let Some(entering) = self.entering(time) {
             return (entering.trajectory, entering.turn_rate);

@@ -225,8 +225,8 @@ fn a_step_that_the_model_refuses_can_be_repeated_from_a_saved_state() {
     assert_eq!(instance.step(0.5, 0.25), FmiStatus::Ok);
 }
 
-/// FMI 2.0.5, section 4.2.3: the importer learns by fmi2Discard and the Boolean status fmi2Terminated
-/// that the simulation ends, and by the Real status fmi2LastSuccessfulTime when.
+/// FMI 2.0.5, section 4.2.3: the importer learns by fmi2Discard and the Boolean status
+/// fmi2Terminated that the simulation ends, and by the Real status fmi2LastSuccessfulTime when.
 #[test]
 fn a_step_to_the_end_of_the_simulation_is_discarded() {
     const DEFECT: u32 = 0;

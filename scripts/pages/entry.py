@@ -1,0 +1,96 @@
+"""Draws docs/images/entry.png from a finished run of an entry flight: entry.py RUN_DIR OUT_FILE.
+
+RUN_DIR is what `orchestrator run orchestrator/experiments/entry/from-120km.toml` wrote and holds its results.csv.
+The corridor of the first picture has the altitudes at which the vehicle of vehicle/data/papers.toml, at the
+flight's angle of attack, would meet a load of 2.5, a heat flux of 700 kW/m2, or a lift that holds it in
+equilibrium without bank.
+"""
+
+import csv
+import sys
+
+import matplotlib
+
+matplotlib.use("Agg")  # to a file, with no window
+import matplotlib.pyplot as plt
+import numpy as np
+
+GRAVITY, RADIUS = 9.80665, 6_378_137.0
+LARGEST_LOAD, LARGEST_FLUX = 2.5, 700.0  # g; kW/m2
+
+
+def read(path: str) -> dict[str, np.ndarray]:
+    with open(path, newline="") as file:
+        rows = list(csv.DictReader(file))
+    return {name: np.array([float(row[name]) for row in rows]) for name in rows[0]}
+
+
+def corridor(run: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Altitudes (km) at which each limit would be met at the speed of the flight. The density at which a
+    quantity has its limit follows from the flight's own values, which are proportional to the density, or
+    the flux to its root; the density over altitude is the flight's own."""
+    altitude, density = run["plant.motion.altitude"], run["plant.flow.density"]
+    order = np.argsort(density)
+    height = lambda wanted: np.interp(np.log(wanted), np.log(density[order]), altitude[order] / 1e3, np.nan, np.nan)
+    speed, lift = run["plant.motion.speed"], run["plant.load.lift"]
+    load, flux = run["plant.loadFactor"], run["plant.heating.flux"] / 1e3
+    needed = GRAVITY - speed**2 / (RADIUS + altitude)
+    return {
+        f"load of {LARGEST_LOAD} g": height(density * LARGEST_LOAD / np.maximum(load, 1e-9)),
+        f"heat flux of {LARGEST_FLUX:.0f} kW/m²": height(density * (LARGEST_FLUX / np.maximum(flux, 1e-9)) ** 2),
+        "equilibrium without bank": height(density * np.maximum(needed, 1e-3) / np.maximum(lift, 1e-9)),
+    }
+
+
+def main(folder: str, picture: str) -> None:
+    run = read(f"{folder}/results.csv")
+    time = run["time"]
+    degrees = lambda name: np.degrees(run[name])
+    figure, axes = plt.subplots(2, 3, figsize=(15, 8), layout="constrained")
+    (corridor_axes, track, bank), (load, rates, moments) = axes
+
+    corridor_axes.plot(run["plant.motion.speed"] / 1e3, run["plant.motion.altitude"] / 1e3, "k", lw=2, label="flight")
+    for (name, altitude), color in zip(corridor(run).items(), ("C3", "C1", "C0")):
+        corridor_axes.plot(run["plant.motion.speed"] / 1e3, altitude, color, ls="--", label=name)
+    corridor_axes.set(xlabel="speed, km/s", ylabel="altitude, km", title="Altitude over speed", ylim=(15, 125))
+    corridor_axes.legend(loc="upper left")
+
+    track.plot(degrees("plant.motion.longitude"), degrees("plant.motion.latitude"), "C0", lw=2)
+    sign = np.sign(run["guidance.command.bank"])
+    for i in np.flatnonzero(np.diff(sign)):
+        track.plot(degrees("plant.motion.longitude")[i], degrees("plant.motion.latitude")[i], "C3o")
+    track.plot(degrees("guidance.target.longitude")[0], degrees("guidance.target.latitude")[0], "k*", ms=12)
+    track.set(xlabel="longitude, deg", ylabel="latitude, deg", title="Ground track, bank reversals and runway point")
+
+    bank.plot(time, degrees("guidance.command.bank"), "0.7", label="commanded")
+    bank.plot(time, degrees("controller.reference.sigma"), "C1", label="reference")
+    bank.plot(time, degrees("plant.attitude.sigma"), "C0", label="bank angle")
+    bank.plot(time, degrees("plant.attitude.alpha"), "C2", label="angle of attack")
+    bank.set(xlabel="time, s", ylabel="deg", title="Attitude")
+    bank.legend(loc="upper right")
+
+    load.plot(time, run["plant.loadFactor"], "C0", label="load, g")
+    load.plot(time, run["plant.flight.dynamicPressure"] / 1e4, "C1", label="dynamic pressure, 10 kPa")
+    load.plot(time, run["plant.heating.flux"] / 5e5, "C3", label="heat flux, 500 kW/m²")
+    load.set(xlabel="time, s", title="Loads")
+    load.legend()
+
+    size = np.sqrt(sum(degrees(f"plant.rate.{axis}") ** 2 for axis in "pqr"))
+    rates.plot(time, size, "C0", label="‖ω‖")
+    rates.axhline(5.0, color="C3", ls="--", label="limit")
+    rates.set(xlabel="time, s", ylabel="deg/s", title="Angular rate")
+    rates.legend()
+
+    norm = lambda name: np.sqrt(sum(run[f"{name}.{axis}"] ** 2 for axis in "xyz")) / 1e3
+    moments.plot(time, norm("controller.moment"), "C0", label="control")
+    moments.plot(time, norm("plant.airMoment"), "C1", label="air, without surfaces")
+    moments.axhline(135.6, color="C3", ls="--", label="limit")
+    moments.set(xlabel="time, s", ylabel="kN m", title="Moments")
+    moments.legend()
+    for one in axes.flat:
+        one.grid(alpha=0.3)
+    figure.savefig(picture, dpi=90)
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])
