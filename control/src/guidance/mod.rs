@@ -12,7 +12,7 @@ mod settings;
 mod shaping;
 
 pub use predictor::{Beginning, End, Predictor};
-pub use settings::{Alpha, Bank, Filter, Reversal, Settings, Shaping, Target};
+pub use settings::{Alpha, Bank, Filter, Initial, Reversal, Settings, Shaping, Target};
 pub use shaping::{Limits, Shaped};
 
 use crate::error::DesignError;
@@ -164,8 +164,8 @@ impl Guidance {
         let Shaping { bank_rate, bank_acceleration, alpha_rate, alpha_acceleration } =
             self.settings.shaping;
         if first {
-            memory.alpha.value = alpha;
-            memory.bank.value = bank;
+            memory.alpha.value = self.settings.initial.alpha;
+            memory.bank.value = self.settings.initial.sigma;
             memory.begun = true;
         }
         let limits = Limits { rate: alpha_rate, acceleration: alpha_acceleration };

@@ -14,6 +14,8 @@ pub struct Settings {
     #[allow(missing_docs)] // Its type says what it is.
     pub target: Target,
     #[allow(missing_docs)]
+    pub initial: Initial,
+    #[allow(missing_docs)]
     pub bank: Bank,
     #[allow(missing_docs)]
     pub alpha: Alpha,
@@ -45,6 +47,17 @@ pub struct Target {
     /// Speed at which the flight is to end.
     #[setting(unit = "m/s", above = 0.0, nominal = 1e3)]
     pub speed: f64,
+}
+
+/// Where the reference begins.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Declared)]
+pub struct Initial {
+    /// Angle of attack at which the reference begins, to be that of the vehicle.
+    #[setting(unit = "rad", min = -7.0, max = 7.0, nominal = 0.1)]
+    pub alpha: f64,
+    /// Bank angle at which the reference begins, to be that of the vehicle.
+    #[setting(unit = "rad", min = -7.0, max = 7.0, nominal = 1.0)]
+    pub sigma: f64,
 }
 
 /// Magnitude of the bank angle.
@@ -141,6 +154,7 @@ impl Default for Settings {
             let file: File = data::embedded(FILE, include_str!("../../data/guidance.toml"));
             let mut settings = Settings {
                 target: Target::default(),
+                initial: Initial::default(),
                 bank: Bank::default(),
                 alpha: Alpha::default(),
                 reversal: Reversal::default(),
