@@ -82,6 +82,38 @@ def test_oracle_co_simulation_agrees_with_cvode_over_a_whole_entry(fmu):
     assert np.all(np.abs(motion - other) < 1e-6 * np.maximum(np.abs(other), 1.0)), motion - other
 
 
+def test_a_saved_state_goes_on_bit_for_bit(fmu):
+    plant = fmu("ReentryPlant")
+    names = plant.names("output")
+    with Instance(plant, FLIGHT).start(inputs=INPUTS) as instance:
+        for tick in range(1380, 1400):
+            instance.set({"prescribed.sigma": 1e-3 * tick})
+            instance.step(0.5 * (tick - 1380), 0.5)
+        saved = instance.save()
+
+        def onward():
+            for tick in range(20, 40):
+                instance.step(0.5 * tick, 0.5)
+            return [float(value).hex() for value in instance.get(names)]
+
+        expected = onward()
+        instance.restore(saved)
+        assert onward() == expected
+    with Instance(plant, FLIGHT).start(inputs=INPUTS) as instance:
+        instance.restore(saved)
+        assert onward() == expected
+
+
+def test_fmpy_ends_with_the_flight(fmu):
+    plant = fmu("ReentryPlant")
+    values = {name: plant.item(name, value) if isinstance(value, str) else value for name, value in FLIGHT.items()}
+    start = {**values, **INPUTS, "initial.altitude": 30e3, "initial.speed": 1200.0}
+    for kind in ("CoSimulation", "ModelExchange"):
+        rows = simulate_fmu(str(plant.path), fmi_type=kind, start_values=start, stop_time=500.0, output_interval=1.0, output=MOTION)
+        assert 10 < rows["time"][-1] < 400, kind
+        assert abs(rows["motion.altitude"][-1] - 24_384) < 300, kind
+
+
 @pytest.mark.parametrize("name", ["from-120km", "from-80km"])
 def test_the_guidance_brings_the_vehicle_to_the_terminal_area(orchestrate, name):
     finished, out = orchestrate(EXPERIMENTS.parent / "entry" / f"{name}.toml")

@@ -520,6 +520,19 @@ def test_every_controller_turns_the_bank_angle(tmp_path):
     assert differences(tmp_path / "out") == []
 
 
+def test_every_controller_flies_an_entry(tmp_path):
+    results = reproduced("entry", tmp_path)
+    assert len(results["runs"]) == 27
+    assert [claim["verdict"] for claim in results["claims"]] == [HOLDS, HOLDS]
+    for name, run in results["runs"].items():
+        [member] = run["members"]
+        assert member["metrics"]["completed"] and member["measures"]["reversals"] >= 3, name
+        # Jets work alone until the dynamic pressure passes the selector's threshold.
+        if name.startswith("surfaces-and-jets"):
+            assert 0.05 < member["measures"]["jets-alone"] < 0.5, name
+    assert differences(tmp_path / "out") == []
+
+
 def test_oracle_the_shaped_reversal_is_the_integral_of_its_derivatives():
     rows = np.genfromtxt(EXPERIMENTS.parent / "reversal" / "reversal.csv", delimiter=",", skip_header=1)
     time, alpha, beta, sigma, rate, acceleration = rows.T
