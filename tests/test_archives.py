@@ -49,7 +49,8 @@ def test_description_says_what_tools_rely_on(fmu, name):
     assert description.coSimulation.canHandleVariableCommunicationStepSize
     assert description.coSimulation.canGetAndSetFMUstate and description.coSimulation.canSerializeFMUstate
     assert (description.modelExchange is not None) == (name == "ReentryPlant")
-    assert description.defaultExperiment.stopTime == "50" or float(description.defaultExperiment.stopTime) == 50.0
+    # The duration of the paper's scenario, or of an entry flight.
+    assert float(description.defaultExperiment.stopTime) == (3000.0 if name == "EntryGuidance" else 50.0)
     for variable in description.modelVariables:
         assert variable.description, f"{variable.name} has no description"
     with zipfile.ZipFile(archive(name)) as packed:
@@ -72,7 +73,7 @@ def test_fmpy_simulates_an_fmu_as_it_is(fmu, name):
     assert len(result) == 251
     values = np.array(result.tolist())
     assert np.isfinite(values).all()
-    assert (np.ptp(values, axis=0) > 0.0).sum() > 6
+    assert (np.ptp(values, axis=0) > 0.0).sum() >= 6
 
 
 def test_controllers_can_be_exchanged_without_rewiring(fmu):

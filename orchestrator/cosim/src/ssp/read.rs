@@ -65,6 +65,7 @@ struct RunSettings {
     description: String,
     step: f64,
     coupling: Coupling,
+    ends_with: Option<String>,
     /// Names of the components with their periods, in the order in which their inputs are set.
     order: Vec<(String, u32)>,
     recorded: Vec<String>,
@@ -95,6 +96,7 @@ impl RunSettings {
             description: element.attribute("description").unwrap_or_default().to_string(),
             step: element.number("step")?.ok_or("the annotation of the run has no step")?,
             coupling,
+            ends_with: element.attribute("endsWith").map(String::from),
             order: those("Component")
                 .map(|child| Ok((child.required("name")?.to_string(), count(child, "every")?)))
                 .collect::<Result<_, String>>()?,
@@ -109,6 +111,7 @@ impl RunSettings {
     fn apply(self, experiment: &mut Experiment) -> Result<(), String> {
         (experiment.title, experiment.description) = (self.title, self.description);
         experiment.simulation.coupling = self.coupling;
+        experiment.simulation.ends_with = self.ends_with;
         for (name, every) in &self.order {
             let component = experiment.components.get_mut(name);
             component

@@ -160,7 +160,7 @@ fn run_settings(xml: &mut Xml, system: &Source) -> io::Result<()> {
         Coupling::Sequential => "sequential",
         Coupling::Jacobi => "jacobi",
     };
-    let attributes = [
+    let mut attributes = vec![
         ("xmlns:run", "urn:orchestrator:run:1".into()),
         ("title", experiment.title.clone()),
         ("description", experiment.description.trim().to_string()),
@@ -168,6 +168,8 @@ fn run_settings(xml: &mut Xml, system: &Source) -> io::Result<()> {
         ("coupling", coupling.into()),
         ("recordEvery", experiment.record.every.to_string()),
     ];
+    let ends_with = experiment.simulation.ends_with.clone();
+    attributes.extend(ends_with.map(|name| ("endsWith", name)));
     element(xml, "run:Experiment", &attributes, |xml| {
         for CheckedComponent { name, every, .. } in &system.components {
             let attributes = [("name", name.clone()), ("every", every.to_string())];
