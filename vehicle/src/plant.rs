@@ -43,6 +43,9 @@ pub use flight::Entering;
 pub use holding::Held;
 pub use loads::Input;
 
+/// Time (s) over which a parabola stands for the standard atmosphere.
+const AIR_WAY: f64 = 0.05;
+
 /// Plant: the vehicle with its state.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Plant {
@@ -175,8 +178,13 @@ impl Plant {
             let end = cut.unwrap_or(to);
             let steps = equal_steps(end - time, self.step);
             let h = (end - time) / steps as f64;
-            let air = self.entry.as_ref().map(|_| self.air_ahead(end - time));
+            // Over a longer way a parabola would not do.
+            let renewed = ((AIR_WAY / h) as u64).max(1);
+            let mut air = None;
             for k in 0..steps {
+                if self.entry.is_some() && k.is_multiple_of(renewed) {
+                    air = Some(self.air_ahead(renewed as f64 * h));
+                }
                 let begin = time + k as f64 * h;
                 let (motion, next) = if let (Some(entry), Some(air)) = (&self.entry, &air) {
                     self.moved(entry, (time, begin, h), air, &held, &mut input)

@@ -95,6 +95,9 @@ impl Predictor {
         let target = &settings.target;
         let from = Self::energy(settings, begin.altitude, begin.speed);
         let to = Self::energy(settings, target.altitude, target.speed);
+        if to <= from {
+            return End { range: 0.0, arrives: true };
+        }
         let [lift_ratio, drag_ratio] = begin.ratios;
         let energy = |state: &Vector4<f64>| Self::energy(settings, state[0], state[1]);
         // Altitude, speed, flight path angle, and the angle travelled over ground.

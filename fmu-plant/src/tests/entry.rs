@@ -4,7 +4,7 @@
 use super::model_exchange::exchange;
 use super::{Constant, STATES, outputs, started, step};
 use crate::entry::Translation;
-use crate::plant::{MOTION, ReentryPlant};
+use crate::plant::{MOTION, Output, ReentryPlant};
 use crate::table::role;
 use fmi2_export::{Failure, Model, describe};
 use nalgebra::Vector3;
@@ -180,4 +180,26 @@ fn oracle_surfaces_act_in_proportion_to_the_dynamic_pressure() {
     let pressure = with.map(|output| output.passage.dynamic_pressure);
     let surfaces = [0, 1].map(|i| (with[i].applied_moment - without[i]) / pressure[i]);
     assert!((surfaces[0] - surfaces[1]).amax() < 1e-9 * surfaces[1].amax(), "{surfaces:?}");
+}
+
+/// The result does not depend on the length of the communication steps.
+#[test]
+fn oracle_long_steps_of_an_entry_agree_with_short_ones() {
+    let ends: Vec<Output> = [0.04, 0.5, 20.0]
+        .into_iter()
+        .map(|length: f64| {
+            let mut instance = started(prescribed);
+            for k in 0..(20.0 / length).round() as u32 {
+                let (from, to) = (f64::from(k) * length, f64::from(k + 1) * length);
+                step(&mut instance, from, to).unwrap();
+            }
+            outputs(&mut instance, 20.0)
+        })
+        .collect();
+    for end in &ends[1..] {
+        let off =
+            (end.motion - ends[0].motion).component_div(&ends[0].motion.map(|x| x.abs().max(1.0)));
+        assert!(off.amax() < 1e-11, "{off}");
+        assert!((end.angles - ends[0].angles).amax() < 1e-9);
+    }
 }
