@@ -1,6 +1,7 @@
-"""Draws docs/images/entry.png from a finished run of an entry flight: entry.py RUN_DIR OUT_FILE.
+"""Draws the pictures of docs/entry.md from finished runs of entry flights: entry.py DIRECT_DIR ACTUATED_DIR.
 
-RUN_DIR is what `orchestrator run orchestrator/experiments/entry/from-120km.toml` wrote and holds its results.csv.
+The folders are what `orchestrator run from-120km` and `orchestrator run surfaces-and-jets` wrote, the latter with
+`--fmu controller=CRMPC.fmu`; each holds its results.csv.
 The corridor of the first picture has the altitudes at which the vehicle of vehicle/data/papers.toml, at the
 flight's angle of attack, would meet a load of 2.5, a heat flux of 700 kW/m2, or a lift that holds it in
 equilibrium without bank.
@@ -8,6 +9,7 @@ equilibrium without bank.
 
 import csv
 import sys
+from pathlib import Path
 
 import matplotlib
 
@@ -15,6 +17,7 @@ matplotlib.use("Agg")  # to a file, with no window
 import matplotlib.pyplot as plt
 import numpy as np
 
+IMAGES = Path(__file__).resolve().parents[2] / "docs" / "images"
 GRAVITY, RADIUS = 9.80665, 6_378_137.0
 LARGEST_LOAD, LARGEST_FLUX = 2.5, 700.0  # g; kW/m2
 
@@ -42,8 +45,7 @@ def corridor(run: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
     }
 
 
-def main(folder: str, picture: str) -> None:
-    run = read(f"{folder}/results.csv")
+def whole(run: dict[str, np.ndarray]) -> None:
     time = run["time"]
     degrees = lambda name: np.degrees(run[name])
     figure, axes = plt.subplots(2, 3, figsize=(15, 8), layout="constrained")
@@ -67,7 +69,7 @@ def main(folder: str, picture: str) -> None:
     bank.plot(time, degrees("plant.attitude.sigma"), "C0", label="bank angle")
     bank.plot(time, degrees("plant.attitude.alpha"), "C2", label="angle of attack")
     bank.set(xlabel="time, s", ylabel="deg", title="Attitude")
-    bank.legend(loc="upper right")
+    bank.legend(loc="lower left")
 
     load.plot(time, run["plant.loadFactor"], "C0", label="load, g")
     load.plot(time, run["plant.flight.dynamicPressure"] / 1e4, "C1", label="dynamic pressure, 10 kPa")
@@ -89,8 +91,35 @@ def main(folder: str, picture: str) -> None:
     moments.legend()
     for one in axes.flat:
         one.grid(alpha=0.3)
-    figure.savefig(picture, dpi=90)
+    figure.savefig(f"{IMAGES}/entry.png", dpi=90)
+
+
+def actuated(run: dict[str, np.ndarray]) -> None:
+    """Who gives the moment: jets at first, then surfaces."""
+    time = run["time"]
+    figure, (pressure, jets, surfaces, moment) = plt.subplots(4, 1, figsize=(9, 9), sharex=True, layout="constrained")
+    pressure.semilogy(time, run["plant.flight.standardDynamicPressure"], "C0")
+    pressure.axhline(500.0, color="C3", ls="--", label="selector")
+    pressure.set(ylabel="dynamic pressure, Pa")
+    pressure.legend()
+    duties = [run[f"allocator.jet[{j}]"] for j in range(1, 11)]
+    jets.plot(time, np.sum(duties, axis=0), "C1")
+    jets.set(ylabel="jets, sum of duties")
+    names = ["left outer elevon", "right outer elevon", "left inner elevon", "right inner elevon", "left flap", "right flap"]
+    for i, name in enumerate(names, start=1):
+        surfaces.plot(time, np.degrees(run[f"plant.deflection[{i}]"]), label=name)
+    surfaces.set(ylabel="deflection, deg")
+    surfaces.legend(ncols=3, fontsize="small")
+    for axis, name in zip("xyz", ("roll", "pitch", "yaw")):
+        moment.plot(time, run[f"plant.appliedMoment.{axis}"] / 1e3, label=name)
+    moment.set(xlabel="time, s", ylabel="moment, kN m")
+    moment.legend(ncols=3)
+    for one in (pressure, jets, surfaces, moment):
+        one.grid(alpha=0.3)
+    figure.savefig(f"{IMAGES}/entry-actuators.png", dpi=90)
 
 
 if __name__ == "__main__":
-    main(*sys.argv[1:])
+    direct, by_actuators = sys.argv[1:]
+    whole(read(f"{direct}/results.csv"))
+    actuated(read(f"{by_actuators}/results.csv"))
