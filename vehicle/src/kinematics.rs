@@ -189,8 +189,8 @@ impl Kinematics {
         self.complete(r_beta(angles), &r(angles), sb, cb)
     }
 
-    /// Matrix that maps [`Trajectory::turn_rate`] to the part of Θ̇ that a turning trajectory adds
-    /// to R ω, Wu 2015 (1).
+    /// Matrix that maps [`crate::trajectory::Trajectory::turn_rate`] to the part of Θ̇ that a
+    /// turning trajectory adds to R ω, Wu 2015 (1).
     pub fn turn(self, angles: &Vector3<f64>) -> Matrix3<f64> {
         let matrix = turn(angles);
         match self {
