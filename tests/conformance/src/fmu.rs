@@ -96,7 +96,9 @@ impl Fmu {
         let is_input = |name: &&str| {
             !self.references(|v| v.name == *name && v.causality == Causality::Input).is_empty()
         };
-        let name = ["moment.y", "rate.q", "measured.gyroscope.y"].into_iter().find(is_input);
+        let name = ["moment.y", "rate.q", "measured.gyroscope.y", "motion.heading"]
+            .into_iter()
+            .find(is_input);
         self.reference(name.expect("one of these inputs"))
     }
 
