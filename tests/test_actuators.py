@@ -269,7 +269,7 @@ def test_a_saved_state_continues_a_moving_surface_in_model_exchange(fmu):
     *_, changed, _, _ = model.newDiscreteStates()
     assert changed
     assert (seen()[0][4], seen()[0][12]) == (0.1, 0.0)
-    assert seen()[1] == [1.0] * 8
+    assert seen()[1] == [1.0] * 10
     model.setFMUstate(saved)
     assert seen() == before
     model.freeFMUstate(saved)

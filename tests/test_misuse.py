@@ -11,7 +11,7 @@ from conftest import NAMES
 from fmi import ANGLES, RATES, Instance
 
 STEP = 0.04
-INPUT = {"ReentryPlant": "moment.x", "CRMPC": "rate.p", "DLMPC": "rate.q", "LQR": "attitude.beta", "ControlAllocator": "moment.y", "AttitudeEstimator": "measured.gyroscope.y", "EntryGuidance": "motion.speed"}
+INPUT = {"ReentryPlant": "moment.x", "CRMPC": "rate.p", "DLMPC": "rate.q", "LQR": "attitude.beta", "ControlAllocator": "moment.y", "AttitudeEstimator": "measured.gyroscope.y", "EntryGuidance": "motion.heading"}
 INPUT |= {name: "rate.p" for name in NAMES if name not in INPUT}
 
 
@@ -89,7 +89,7 @@ def test_value_references_that_do_not_exist(instance):
         ("ControlAllocator", "limit.surfaceMax[3]", -0.1),
         ("ControlAllocator", "dynamicPressure", -1.0),
         ("AttitudeEstimator", "filter.cutoff", -1.0),
-        ("EntryGuidance", "shaping.bankRate", 0.0),
+        ("EntryGuidance", "shaping.bankRate", -1.0),
         ("LQR", "reference.profile", 77),
     ],
 )
@@ -120,6 +120,7 @@ def test_parameters_out_of_range_are_refused_when_set(fmu, name, variable, value
         ("ControlAllocator", {"weight.moment[2]": 0.0}, ["weight.moment[2]"]),
         ("AttitudeEstimator", {"filter.cutoff": 50.0}, ["filter.cutoff"]),
         ("AttitudeEstimator", {"lost.after": 0.0}, ["lost.after"]),
+        ("EntryGuidance", {"shaping.bankRate": 0.0}, ["shaping.bankRate"]),
         ("ReentryPlant", {"translation": "entry", "initial.altitude": 10e3}, ["initial.altitude", "end.altitude"]),
         ("ReentryPlant", {"translation": "entry", "air.rows": 2}, ["air.altitude[2]"]),
     ],
