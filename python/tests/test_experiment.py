@@ -224,7 +224,7 @@ def test_the_command_runs_an_experiment_from_any_folder(tmp_path):
 def test_the_command_lists_what_the_package_has(tmp_path):
     done = orchestrator(tmp_path, "list")
     assert done.returncode == 0, done.stderr
-    for line in ("experiments (25)", "studies (6)", "FMUs (11)"):
+    for line in ("experiments (29)", "studies (7)", "FMUs (12)"):
         assert line in done.stdout
     assert "FAULT" not in done.stdout
 
