@@ -247,7 +247,8 @@ impl FmuInstance {
         drop(calling);
         let [knows_time, knows_end] = statuses.map(|status| fmi::status(status) == Ok(Status::Ok));
         let ends = knows_end && terminated != fmi::FALSE;
-        let mut parts: Vec<String> = message.into_iter().collect();
+        let told = message.or_else(|| self.data.log.take_event().filter(|_| ends));
+        let mut parts: Vec<String> = told.into_iter().collect();
         if !ends && parts.is_empty() {
             parts.push("its log holds no message".into());
         }

@@ -27,6 +27,7 @@ pub(crate) struct LogMessage {
 pub(crate) struct Log {
     pub(crate) component: String,
     last: Mutex<Option<String>>,
+    event: Mutex<Option<String>>,
     /// Whether the instance is being instantiated. Messages about problems are then part of the
     /// error that follows.
     instantiates: AtomicBool,
@@ -115,6 +116,7 @@ impl Log {
         Self {
             component: component.to_string(),
             last: Mutex::default(),
+            event: Mutex::default(),
             instantiates: AtomicBool::new(true),
             sink,
         }
@@ -127,6 +129,11 @@ impl Log {
 
     pub(crate) fn take(&self) -> Option<String> {
         self.last.lock().take()
+    }
+
+    /// Takes the last message that tells of no problem, such as why a simulation ends.
+    pub(crate) fn take_event(&self) -> Option<String> {
+        self.event.lock().take()
     }
 
     pub(crate) fn message(&self, status: Result<Status, c_int>, category: &str, message: &str) {
@@ -143,9 +150,8 @@ impl Log {
             }
             Sink::Printed(pace) => self.print(pace, status, cut(category), &message),
         }
-        if is_problem {
-            *self.last.lock() = Some(message);
-        }
+        let place = if is_problem { &self.last } else { &self.event };
+        *place.lock() = Some(message);
     }
 
     fn report_lost(&self, lost: u64) {
@@ -163,9 +169,7 @@ impl Log {
     ) {
         let component = &self.component;
         match status {
-            Ok(Status::Ok | Status::Pending | Status::Discard)
-                if !tracing::enabled!(tracing::Level::INFO) =>
-            {
+            Ok(Status::Ok | Status::Pending) if !tracing::enabled!(tracing::Level::INFO) => {
                 return;
             }
             // Warnings are collected, each once.
@@ -182,12 +186,11 @@ impl Log {
             return;
         }
         match status {
-            // What was discarded is told with the call that it failed, or that it ended.
-            Ok(Status::Ok | Status::Pending | Status::Discard) => {
+            Ok(Status::Ok | Status::Pending) => {
                 tracing::info!("{component}: [{category}] {message}");
             }
             Ok(Status::Warning) => tracing::warn!("{component}: [{category}] {message}"),
-            Ok(Status::Error | Status::Fatal) | Err(_) => {
+            Ok(Status::Discard | Status::Error | Status::Fatal) | Err(_) => {
                 if !self.instantiates.load(Ordering::Relaxed) {
                     tracing::error!("{component}: [{category}] {message}");
                 }

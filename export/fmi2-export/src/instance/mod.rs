@@ -106,7 +106,7 @@ impl Instance {
                 FmiStatus::Discard
             }
             Ok(Err(Failure::Ended { reason, .. })) => {
-                self.logger.log(Category::Discard, &reason);
+                self.logger.log(Category::Events, &reason);
                 FmiStatus::Discard
             }
             Ok(Err(Failure::Error(problem))) => {

@@ -52,6 +52,7 @@ impl Instance {
         self.progress.extrapolations.reserve(self.description.variables.len());
         self.stale = true;
         self.last_step = FmiStatus::Ok;
+        self.has_ended = false;
         self.logger.log(Category::Events, "state restored");
         Ok(())
     }

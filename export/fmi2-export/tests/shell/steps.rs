@@ -241,6 +241,7 @@ fn a_step_to_the_end_of_the_simulation_is_discarded() {
     };
     assert_eq!(instance.step(0.0, 0.5), FmiStatus::Ok);
     assert_eq!(has_terminated(), 0);
+    let state = instance.save();
     assert_eq!(instance.step(0.5, 0.5), FmiStatus::Discard);
     instance.said(&["the count is over"]);
     assert_eq!(has_terminated(), 1);
@@ -250,6 +251,9 @@ fn a_step_to_the_end_of_the_simulation_is_discarded() {
     // The outputs are those of the end, and no step leads beyond it.
     assert_eq!(instance.real(COUNT), 2.0);
     assert_eq!(instance.step(time, 0.5), FmiStatus::Error);
+    // A state from before the end has not ended.
+    assert_eq!(c!(fmi2SetFMUstate(instance.component, state)), FmiStatus::Ok);
+    assert_eq!(has_terminated(), 0);
     assert_eq!(c!(fmi2Reset(instance.component)), FmiStatus::Ok);
     instance.initialize();
     assert_eq!(instance.step(0.0, 0.5), FmiStatus::Ok);
