@@ -47,6 +47,18 @@ fn a_target_out_of_reach_is_reported() {
     assert!(!command.in_reach && command.miss > 1e5, "{command:?}");
 }
 
+/// From 120 km with −1° and 7,500 m/s eastward over the equator the vehicle skips at every bank
+/// angle.
+#[test]
+fn a_start_that_skips_is_reported() {
+    let guidance = Guidance::new(Settings::default()).unwrap();
+    let motion = start([120e3, 0.0, 0.0, 7500.0, -1.0, 90.0]);
+    let mut memory = Memory::default();
+    let navigation = Navigation { motion, ..Navigation::default() };
+    let command = guidance.update(&mut memory, 0, &navigation);
+    assert!(!command.in_reach, "{command:?}");
+}
+
 #[test]
 fn a_setting_out_of_range_is_refused_by_name() {
     let mut settings = Settings::default();

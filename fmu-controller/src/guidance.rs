@@ -7,7 +7,7 @@ use fmi2_export::table::{Common, Real, discrete_output, input};
 use fmi2_export::{Description, Failure, VariableTable};
 use model_description::DefaultExperiment;
 use serde::{Deserialize, Serialize};
-use vehicle::entry::Motion;
+use vehicle::entry::{Motion, QUANTITIES, Quantity};
 
 /// The guidance as an FMU.
 pub type EntryGuidance = SampledFmu<GuidanceInstance>;
@@ -120,32 +120,32 @@ impl SampledInstance for GuidanceInstance {
 
 type Variables = VariableTable<EntryGuidance>;
 
-/// Inputs: name, meaning, unit and nominal value.
-const INPUTS: [(&str, &str, &str, f64); 8] = [
-    ("motion.altitude", "Altitude above the planet's radius", "m", 1e5),
-    ("motion.longitude", "Longitude, positive to the east", "rad", 1.0),
-    ("motion.latitude", "Latitude, positive to the north", "rad", 1.0),
-    ("motion.speed", "Speed relative to the rotating planet", "m/s", 1e3),
-    ("motion.flightPathAngle", "Flight path angle, positive above the horizon", "rad", 0.1),
-    ("motion.heading", "Heading of the velocity, measured from north towards east", "rad", 1.0),
-    ("load.lift", "Measured lift per mass", "m/s2", 10.0),
-    ("load.drag", "Measured drag per mass", "m/s2", 10.0),
+/// Names of the inputs, which are those of outputs of the plant.
+const INPUTS: [&str; 8] = [
+    "motion.altitude",
+    "motion.longitude",
+    "motion.latitude",
+    "motion.speed",
+    "motion.flightPathAngle",
+    "motion.heading",
+    "load.lift",
+    "load.drag",
 ];
 
 fn inputs(mut table: Variables) -> Variables {
-    for (i, (name, meaning, unit, nominal)) in INPUTS.into_iter().enumerate() {
+    for (i, (name, quantity)) in INPUTS.into_iter().zip(QUANTITIES).enumerate() {
+        let Quantity { meaning, units: [unit, _], nominal, .. } = quantity;
         let real = input(name, meaning).real().unit(unit).nominal(nominal);
-        table = table.real(real, move |m| match i {
-            6 => &mut m.navigation.lift,
-            7 => &mut m.navigation.drag,
-            i => &mut m.navigation.motion[i],
-        });
+        table = table.real(real, move |m| &mut m.navigation.motion[i]);
     }
+    let load = |name: &str, text: &str| input(name, text).real().unit("m/s2").nominal(10.0);
     table
+        .real(load("load.lift", "Measured lift per mass"), |m| &mut m.navigation.lift)
+        .real(load("load.drag", "Measured drag per mass"), |m| &mut m.navigation.drag)
 }
 
 fn sampled(name: &str, text: &str) -> Common {
-    discrete_output(name, text).depends_on(INPUTS.map(|(name, ..)| name))
+    discrete_output(name, text).depends_on(INPUTS)
 }
 
 fn outputs(table: Variables) -> Variables {

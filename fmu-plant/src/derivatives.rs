@@ -73,17 +73,18 @@ impl ReentryPlant {
         unknown: Unknown,
         known: Known,
     ) -> Result<f64, Failure> {
+        if let Known::Jet(j) = known {
+            return self.difference_by_jet(time, unknown, j);
+        }
         let held = self.held(self.ready()?, time);
         let h = width(known);
         let mut values = [0.0; 4];
         for (value, steps) in values.iter_mut().zip([-2.0, -1.0, 1.0, 2.0]) {
             let before = self.nudge(known, steps * h);
-            let plant = self.ready()?;
-            // A command to a jet acts at once in co-simulation.
-            let is_taken = matches!(known, Known::Jet(_)) && !self.event_driven;
-            let held = if is_taken { self.held(plant, time) } else { held };
-            *value = self.output_at(plant, time, &held).value(unknown);
-            self.put(known, before);
+            *value = self.output_at(self.ready()?, time, &held).value(unknown);
+            if let Some(place) = self.place(known) {
+                *place = before;
+            }
         }
         let [far_below, below, above, far_above] = values;
         Ok((8.0 * (above - below) - (far_above - far_below)) / (12.0 * h))
@@ -97,9 +98,26 @@ impl ReentryPlant {
         before
     }
 
-    fn put(&mut self, known: Known, value: f64) {
-        if let Some(place) = self.place(known) {
-            *place = value;
+    /// Returns the partial derivative with respect to the command to a jet. Its thrust has an edge at
+    /// no and at full thrust, so that its moment is taken in closed form, as without an entry flight.
+    fn difference_by_jet(
+        &mut self,
+        time: f64,
+        unknown: Unknown,
+        jet: usize,
+    ) -> Result<f64, Failure> {
+        // In model exchange, commands are taken at events only.
+        if self.event_driven {
+            return Ok(0.0);
+        }
+        let by_jets = self.ready()?.applied_moment_by_jets(&self.command);
+        match unknown {
+            Unknown::AppliedMoment(i) => Ok(by_jets[(i, jet)]),
+            Unknown::Derivative(_) => (0..3).try_fold(0.0, |sum, axis| {
+                let by_moment = self.difference(time, unknown, Known::DisturbanceMoment(axis))?;
+                Ok(sum + by_moment * by_jets[(axis, jet)])
+            }),
+            _ => Ok(0.0),
         }
     }
 

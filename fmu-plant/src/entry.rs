@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 use settings::{Choice, Declared};
 use vehicle::aerodynamics::Aerodynamics;
 use vehicle::air::Air;
-use vehicle::entry::{Config, Deviations, End, Following, Motion, Trim};
+use vehicle::entry::{Config, Deviations, End, Following, Motion, STEEPEST, Trim};
 use vehicle::translation::Planet;
 
 /// Motion of the centre of mass.
@@ -49,8 +49,6 @@ pub(crate) struct EntryParameters {
 
 /// Largest initial longitude and heading, rad.
 const TURN: f64 = 2.0 * std::f64::consts::PI;
-/// Largest initial latitude and flight path angle, rad.
-const STEEP: f64 = std::f64::consts::FRAC_PI_2 - 1e-6;
 
 /// Motion of the centre of mass at the start of an entry flight.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Declared)]
@@ -62,13 +60,13 @@ pub(crate) struct Start {
     #[setting(unit = "rad", min = -TURN, max = TURN, nominal = 1.0)]
     pub(crate) longitude: f64,
     /// Initial latitude of an entry flight.
-    #[setting(unit = "rad", min = -STEEP, max = STEEP, nominal = 1.0)]
+    #[setting(unit = "rad", min = -STEEPEST, max = STEEPEST, nominal = 1.0)]
     pub(crate) latitude: f64,
     /// Initial speed of an entry flight, relative to the rotating planet.
     #[setting(unit = "m/s", above = 0.0, max = 2e4, nominal = 1e3)]
     pub(crate) speed: f64,
     /// Initial flight path angle of an entry flight, positive above the horizon.
-    #[setting(unit = "rad", min = -STEEP, max = STEEP, nominal = 0.1)]
+    #[setting(unit = "rad", min = -STEEPEST, max = STEEPEST, nominal = 0.1)]
     pub(crate) flight_path_angle: f64,
     /// Initial heading of an entry flight, measured from north towards east.
     #[setting(unit = "rad", min = -TURN, max = TURN, nominal = 1.0)]

@@ -17,7 +17,10 @@ impl ReentryPlant {
     /// discard, as the state may be an integrator's trial that the importer can take back.
     pub(crate) fn check(&self, state: &State, time: f64) -> Result<(), Failure> {
         let failure = if self.event_driven { Failure::Discard } else { Failure::Error };
-        check(state, time).map_err(|error| failure(error.to_string()))
+        let motion = |plant: &Plant| plant.check_motion(&plant.motion, time);
+        check(state, time)
+            .and_then(|()| self.plant.as_deref().map_or(Ok(()), motion))
+            .map_err(|error| failure(error.to_string()))
     }
 
     /// Says why an entry flight ended.

@@ -78,14 +78,16 @@ impl ReentryPlant {
 
     /// Outputs at `time` (s) while these quantities hold.
     pub(crate) fn output_at(&self, plant: &Plant, time: f64, held: &Held) -> Output {
-        let derivative = plant.derivative(time, &self.input, held);
+        let entering = plant.entering(time);
+        let entering = entering.as_ref();
+        let derivative = plant.derivative(entering, time, &self.input, held);
         let mut passage =
             Passage { air_angles: [plant.angles().x, plant.angles().y], ..self.fixed };
         let (mut motion_rate, mut air_moment) = (Motion::zeros(), Vector3::zeros());
         let mut heat_flux = 0.0;
-        if let Some(entering) = plant.entering(time) {
-            air_moment = plant.air_moment(&entering, &self.input);
-            heat_flux = plant.heat_flux(&entering);
+        if let Some(entering) = entering {
+            air_moment = plant.air_moment(entering, &self.input);
+            heat_flux = plant.heat_flux(entering);
             (passage, motion_rate) = (entering.passage, entering.derivative);
         }
         let mut indicators = SVector::<f64, INDICATORS>::repeat(AT_REST);
@@ -103,16 +105,16 @@ impl ReentryPlant {
             rates: plant.rates(),
             angle_rates: derivative.fixed_rows::<3>(0).into(),
             angular_acceleration: derivative.fixed_rows::<3>(3).into(),
-            applied_moment: plant.applied_moment(time, &self.input, held),
+            applied_moment: plant.applied_moment(entering, &self.input, held),
             delta: held.delta(),
             disturbance_moment: plant.disturbance_moment(time, &self.input, held),
             deflections: plant.deflections,
             deflection_rates: plant.deflection_rates(held),
             indicators,
             measured: if self.event_driven {
-                plant.measured_since_held(time, &self.input)
+                plant.measured_since_held(entering, time, &self.input)
             } else {
-                plant.measured(time, &self.input)
+                plant.measured(entering, time, &self.input)
             },
             motion: plant.motion,
             motion_rate,

@@ -155,14 +155,14 @@ impl Air {
     /// Names the value at fault.
     pub fn check(&self) -> Result<(), Error> {
         let refuse = |name: String, problem: String| Err(Error::parameter(name, problem));
-        for (name, value, least) in [
-            ("air.seaLevelDensity", self.sea_level_density, 0.0),
-            ("air.scaleHeight", self.scale_height, f64::MIN_POSITIVE),
-            ("gust.duration", self.gust.duration, f64::MIN_POSITIVE),
-            ("density.scale", self.scale, 0.0),
+        for (name, value, least, needed) in [
+            ("air.seaLevelDensity", self.sea_level_density, 0.0, "not be negative"),
+            ("density.scale", self.scale, 0.0, "not be negative"),
+            ("air.scaleHeight", self.scale_height, f64::MIN_POSITIVE, "be positive"),
+            ("gust.duration", self.gust.duration, f64::MIN_POSITIVE, "be positive"),
         ] {
             if !(value >= least && value.is_finite()) {
-                return refuse(name.into(), format!("= {value} must be positive"));
+                return refuse(name.into(), format!("= {value} must {needed}"));
             }
         }
         let Gust { velocity, start, .. } = &self.gust;
@@ -181,8 +181,11 @@ impl Air {
                 let problem = format!("= {} must not be negative", row.density);
                 return refuse(format!("air.densityRatio[{number}]"), problem);
             }
-            if !row.wind.iter().all(|part| part.is_finite()) {
-                return refuse(format!("air.wind[{number}]"), "is not finite".into());
+            for (part, direction) in row.wind.iter().zip(["north", "east"]) {
+                if !part.is_finite() {
+                    let name = format!("air.wind.{direction}[{number}]");
+                    return refuse(name, "is not finite".into());
+                }
             }
             let follows = i == 0 || row.altitude > used[i - 1].altitude;
             if !(row.altitude.is_finite() && follows) {

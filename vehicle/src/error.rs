@@ -51,6 +51,16 @@ pub enum Error {
         /// Sideslip angle at that time, deg.
         beta_deg: f64,
     },
+    /// The flight has no course: it is vertical, over a pole, or stands still.
+    #[error(
+        "the flight {problem} at t = {time} s: its flight path angle and heading have no meaning"
+    )]
+    NoCourse {
+        /// Time at which this happened, s.
+        time: f64,
+        /// What the flight does.
+        problem: &'static str,
+    },
     /// A state or an input is no longer a finite number.
     #[error(
         "{what} is not finite or beyond all bounds at t = {time} s: wrong input, unstable loop, or too long a step"

@@ -196,7 +196,7 @@ impl Plant {
                     (self.motion, rk4(&mut f, begin, &self.state, h))
                 };
                 check(&next, begin + h)
-                    .and_then(|()| Self::check_motion(&motion, begin + h))
+                    .and_then(|()| self.check_motion(&motion, begin + h))
                     .map_err(|error| {
                         let fault = input(begin).fault().or_else(|| input(begin + h).fault());
                         let fault = fault.or_else(|| command.fault());

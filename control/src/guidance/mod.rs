@@ -19,8 +19,8 @@ use crate::error::DesignError;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
-use vehicle::entry::{Motion, ground_distance};
-use vehicle::math::{atan2, cos, exp, sin_cos};
+use vehicle::entry::{Motion, great_circle};
+use vehicle::math::{cos, exp, sin_cos};
 use vehicle::reference::Reference;
 
 /// Time between two ticks, s.
@@ -63,7 +63,8 @@ pub struct Command {
     pub heading_error: f64,
     /// By how much the predicted flight ends too far from the target, m.
     pub miss: f64,
-    /// Whether the target can be reached: the bank angle is not at its end.
+    /// Whether the target can be reached: the predicted flight comes down to its energy, and the
+    /// bank angle is not at its end.
     pub in_reach: bool,
 }
 
@@ -121,24 +122,12 @@ impl Guidance {
             .all(|value| value.is_finite())
     }
 
-    /// Returns distance over ground to the target (m) and the direction to it from north, rad.
-    fn bearing(&self, motion: &Motion) -> (f64, f64) {
-        let target = &self.settings.target;
-        let here = [motion[1], motion[2]];
-        let there = [target.longitude, target.latitude];
-        let range = ground_distance(&self.settings.planet, here, there);
-        let (sine, cosine) = sin_cos(there[0] - here[0]);
-        let (sin_here, cos_here) = sin_cos(here[1]);
-        let (sin_there, cos_there) = sin_cos(there[1]);
-        let direction =
-            atan2(sine * cos_there, cos_here * sin_there - sin_here * cos_there * cosine);
-        (range, direction)
-    }
-
     /// Evaluates the guidance at the tick with this number.
     pub fn update(&self, memory: &mut Memory, tick: u64, measured: &Navigation) -> Command {
         let [_, _, _, speed, _, heading] = measured.motion.into();
-        let (range, direction) = self.bearing(&measured.motion);
+        let target = [self.settings.target.longitude, self.settings.target.latitude];
+        let here = [measured.motion[1], measured.motion[2]];
+        let (range, direction) = great_circle(&self.settings.planet, here, target);
         let heading_error = wrapped(direction - heading);
         let first = !memory.begun;
         if first {
@@ -153,14 +142,13 @@ impl Guidance {
             self.correct(memory, measured, &mut command);
             self.reverse(memory, tick, speed, heading_error);
         }
-        let schedule = self.schedule(memory);
         if first {
             memory.before = memory.magnitude;
         }
         let share = (tick % TICKS + 1) as f64 / TICKS as f64;
         let magnitude = memory.before + share * (memory.magnitude - memory.before);
         let bank = if memory.to_left { magnitude } else { -magnitude };
-        let alpha = schedule.at(speed);
+        let alpha = self.schedule(memory).at(speed);
         let Shaping { bank_rate, bank_acceleration, alpha_rate, alpha_acceleration } =
             self.settings.shaping;
         if first {
@@ -233,10 +221,9 @@ impl Guidance {
             ratios: memory.ratios,
         };
         // How much too far from the target the flight ends with this bank angle.
-        let miss = |bank: f64| {
-            let end = self.predictor.fly(settings, &begin, bank);
-            command.range - settings.target.range - end.range
-        };
+        let wanted = command.range - settings.target.range;
+        let fly = |bank: f64| self.predictor.fly(settings, &begin, bank);
+        let miss = |bank: f64| wanted - fly(bank).range;
         let largest = settings.bank.largest;
         if !memory.begun {
             let (mut low, mut high) = (0.0, largest);
@@ -246,8 +233,9 @@ impl Guidance {
             }
             memory.magnitude = f64::midpoint(low, high);
         }
-        let here = miss(memory.magnitude);
-        (command.miss, command.in_reach) = (here, true);
+        let End { range, arrives } = fly(memory.magnitude);
+        let here = wanted - range;
+        (command.miss, command.in_reach) = (here, arrives);
         if left.abs() < FROZEN {
             return;
         }
@@ -255,9 +243,9 @@ impl Guidance {
         // A larger bank angle makes the flight shorter. Where it does not, the correction only has
         // the right sign.
         let change = if slope > 0.0 { -here / slope } else { -CORRECTION.copysign(here) };
-        let wanted = memory.magnitude + change.clamp(-CORRECTION, CORRECTION);
-        memory.magnitude = wanted.clamp(0.0, largest);
-        command.in_reach = wanted == memory.magnitude;
+        let corrected = memory.magnitude + change.clamp(-CORRECTION, CORRECTION);
+        memory.magnitude = corrected.clamp(0.0, largest);
+        command.in_reach &= corrected == memory.magnitude;
     }
 
     /// Reverses the bank angle when the heading has left its dead band and still moves away.

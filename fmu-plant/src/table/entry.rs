@@ -1,10 +1,11 @@
 //! Variables of an entry flight.
 
-use super::{ANGLES, AXES, PlantVariables, sentence, vector};
+use super::{ANGLES, AXES, PlantVariables, vector};
 use crate::plant::MOTION;
 use crate::roles::{Known, Quantity, Role, Unknown};
 use fmi2_export::table::{Real, input, output, parameter};
 use vehicle::air::{ROWS, Row};
+use vehicle::entry;
 
 /// Names of the states of the motion.
 pub(super) const MOTION_NAMES: [&str; 6] = [
@@ -25,16 +26,7 @@ pub(super) const INPUT_NAMES: [&str; 7] = [
     "prescribedRate.sigma",
     "trim.alpha",
 ];
-/// Meaning, unit, unit of the rate, and nominal value of each state.
-const MEANINGS: [(&str, &str, &str, f64); 6] = [
-    ("altitude above the planet's radius", "m", "m/s", 1e5),
-    ("longitude, positive to the east", "rad", "rad/s", 1.0),
-    ("latitude, positive to the north", "rad", "rad/s", 1.0),
-    ("speed relative to the rotating planet", "m/s", "m/s2", 1e3),
-    ("flight path angle, positive above the horizon", "rad", "rad/s", 0.1),
-    ("heading of the velocity, measured from north towards east", "rad", "rad/s", 1.0),
-];
-/// Names and meanings of the attitude angles on which the air's forces depend.
+/// Names of the attitude angles, on which the air's forces depend.
 const ATTITUDE: [&str; 3] = ["attitude.alpha", "attitude.beta", "attitude.sigma"];
 
 /// Adds everything that belongs to an entry flight.
@@ -44,10 +36,9 @@ pub(super) fn entry(variables: PlantVariables) -> PlantVariables {
 }
 
 fn states(mut variables: PlantVariables) -> PlantVariables {
-    for (i, (name, (meaning, unit, _, nominal))) in
-        MOTION_NAMES.into_iter().zip(MEANINGS).enumerate()
-    {
-        let real = output(name, &sentence(meaning)).real().unit(unit).nominal(nominal);
+    for (i, (name, quantity)) in MOTION_NAMES.into_iter().zip(entry::QUANTITIES).enumerate() {
+        let entry::Quantity { meaning, units: [unit, _], nominal, .. } = quantity;
+        let real = output(name, meaning).real().unit(unit).nominal(nominal);
         variables =
             variables.real(real, move |m| &mut m.output.motion[i]).role(Role::state(MOTION + i));
     }
@@ -55,15 +46,13 @@ fn states(mut variables: PlantVariables) -> PlantVariables {
 }
 
 fn rates(mut variables: PlantVariables) -> PlantVariables {
-    for (i, (name, (meaning, _, unit, nominal))) in
-        MOTION_NAMES.into_iter().zip(MEANINGS).enumerate()
-    {
-        let short = meaning.split([',']).next().unwrap_or(meaning);
-        let text = format!("Time derivative of the {short}; 0 without an entry flight");
-        let common = output(&name.replace("motion.", "motionRate."), &text)
+    for (i, (state, quantity)) in MOTION_NAMES.into_iter().zip(entry::QUANTITIES).enumerate() {
+        let entry::Quantity { name, units: [_, unit], nominal, .. } = quantity;
+        let text = format!("Time derivative of {state}; 0 without an entry flight");
+        let common = output(&format!("motionRate.{name}"), &text)
             .depends_on(MOTION_NAMES)
             .depends_on(ATTITUDE);
-        let real = common.real().unit(unit).nominal(nominal / 100.0).derivative_of(name);
+        let real = common.real().unit(unit).nominal(nominal / 100.0).derivative_of(state);
         variables = variables
             .real(real, move |m| &mut m.output.motion_rate[i])
             .role(Unknown::Derivative(MOTION + i));

@@ -3,7 +3,7 @@
 use super::equations::{self, Load};
 use super::{Held, Input, Plant};
 use crate::air::AlongTheWay;
-use crate::entry::{self, Motion, Passage, ground_distance};
+use crate::entry::{self, Motion, Passage, great_circle};
 use crate::error::Error;
 use crate::integrator::rk4;
 use crate::math::sin;
@@ -72,7 +72,7 @@ impl Plant {
     /// Distance over ground from the start, m.
     pub fn range(&self) -> f64 {
         let here = [self.motion[1], self.motion[2]];
-        self.entry.as_ref().map_or(0.0, |entry| ground_distance(&entry.planet, self.origin, here))
+        self.entry.as_ref().map_or(0.0, |entry| great_circle(&entry.planet, self.origin, here).0)
     }
 
     /// Effectiveness of the surfaces relative to that for which the actuators were made.
@@ -145,12 +145,12 @@ impl Plant {
         AlongTheWay::new(self.motion[0], self.motion[3] * sin(self.motion[4]) * length)
     }
 
-    /// Checks that the equations of the motion hold.
-    pub(super) fn check_motion(motion: &Motion, time: f64) -> Result<(), Error> {
-        if motion.iter().all(|value| value.is_finite()) {
-            return Ok(());
-        }
-        Err(Error::NotFinite { time, what: "motion of the centre of mass" })
+    /// Checks that the equations of an entry flight hold at a motion.
+    ///
+    /// # Errors
+    /// Reports a motion without a course.
+    pub fn check_motion(&self, motion: &Motion, time: f64) -> Result<(), Error> {
+        self.entry.as_ref().map_or(Ok(()), |_| entry::check(motion, time))
     }
 
     /// Whether the entry flight has ended if it came to this motion.

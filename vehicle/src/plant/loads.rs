@@ -2,7 +2,7 @@
 
 use super::config::Calibration;
 use super::equations::{self, Load, Partials};
-use super::{Held, Plant};
+use super::{Entering, Held, Plant};
 use crate::actuators::{Command, Drive};
 use crate::effectors::{JETS, SURFACES, Surfaces};
 use crate::entry::Prescribed;
@@ -87,9 +87,14 @@ impl Plant {
         }
     }
 
-    /// Control moment (N m) that acts at `time` (s).
-    pub fn applied_moment(&self, time: f64, input: &Input, held: &Held) -> Vector3<f64> {
-        let ratio = self.pressure_ratio(time);
+    /// Control moment (N m) that acts at present, during an entry flight if there is one.
+    pub fn applied_moment(
+        &self,
+        entering: Option<&Entering>,
+        input: &Input,
+        held: &Held,
+    ) -> Vector3<f64> {
+        let ratio = entering.map_or(1.0, |entering| entering.passage.surface_pressure);
         self.control_moment(input, held.delayed, &held.drive, (0.0, ratio))
     }
 
@@ -120,10 +125,14 @@ impl Plant {
             .map_or_else(SMatrix::zeros, |actuators| actuators.moment_by_jets(command))
     }
 
-    /// Trajectory at `time` (s): that of the entry flight, or the input. Also its turn rate
-    /// (rad/s), which is zero during the calibration sequence.
-    pub(super) fn trajectory(&self, time: f64, input: &Input) -> (Trajectory, Vector3<f64>) {
-        if let Some(entering) = self.entering(time) {
+    /// Trajectory: that of the entry flight, or the input. Also its turn rate (rad/s), which is
+    /// zero during the calibration sequence.
+    pub(super) fn trajectory(
+        &self,
+        entering: Option<&Entering>,
+        input: &Input,
+    ) -> (Trajectory, Vector3<f64>) {
+        if let Some(entering) = entering {
             return (entering.trajectory, entering.turn_rate);
         }
         if self.calibration.is_some() {
@@ -132,13 +141,13 @@ impl Plant {
         (input.trajectory, input.trajectory.turn_rate(self.earth_rate))
     }
 
-    /// Returns the loads at `time` (s), which is `elapsed` (s) after the time of the deflections.
+    /// Returns the loads without an entry flight at `time` (s), which is `elapsed` (s) after the time of the deflections.
     pub(super) fn load(&self, time: f64, input: &Input, held: &Held, elapsed: f64) -> Load {
         Load {
             moment: self.control_moment(input, held.delayed, &held.drive, (elapsed, 1.0))
                 + self.disturbance_moment(time, input, held),
             delta: held.delta(),
-            turn_rate: self.trajectory(time, input).1,
+            turn_rate: self.trajectory(None, input).1,
         }
     }
 
@@ -152,11 +161,18 @@ impl Plant {
         }
     }
 
-    /// Derivative of the attitude and the rates at `time` (s) for the present state.
-    pub fn derivative(&self, time: f64, input: &Input, held: &Held) -> State {
-        match (&self.entry, self.entering(time)) {
+    /// Derivative of the attitude and the rates at `time` (s) for the present state, during an entry
+    /// flight if there is one.
+    pub fn derivative(
+        &self,
+        entering: Option<&Entering>,
+        time: f64,
+        input: &Input,
+        held: &Held,
+    ) -> State {
+        match (&self.entry, entering) {
             (Some(entry), Some(entering)) => {
-                self.turned(entry, &entering, (time, 0.0), &self.state, (input, held))
+                self.turned(entry, entering, (time, 0.0), &self.state, (input, held))
             }
             _ => self.derivative_at(time, &self.state, &self.load(time, input, held, 0.0)),
         }

@@ -2,7 +2,7 @@
 //! output.
 
 use super::equations::angle_rates;
-use super::{Held, Input, Load, Plant, angles};
+use super::{Entering, Held, Input, Load, Plant, angles};
 use crate::platform::{Pose, Readings};
 use crate::sensors::{Sample, Sensors};
 use crate::trajectory::TRAJECTORY;
@@ -12,20 +12,17 @@ impl Plant {
     /// Takes the sample that is due at `time` (s), if there is one.
     pub(super) fn sense(&mut self, time: f64, input: &Input) {
         let Some(mut sensors) = self.sensors.take() else { return };
-        let vehicle = self.pose(time, input);
-        sensors.take(time, &self.felt_by(&sensors, time, input, &vehicle));
+        let entering = self.entering(time);
+        let vehicle = self.pose(entering.as_ref(), time, input);
+        sensors.take(time, &self.felt_by(&sensors, entering.as_ref(), (time, input), &vehicle));
         if let (Some(turntable), Some(at)) = (&mut self.turntable, sensors.due(time)) {
             turntable.follow(at, &vehicle);
         }
         self.sensors = Some(sensors);
     }
 
-    fn pose(&self, time: f64, input: &Input) -> Pose {
-        let entering = self.entering(time);
-        let (trajectory, turn_rate) = match &entering {
-            Some(entering) => (entering.trajectory, entering.turn_rate),
-            None => self.trajectory(time, input),
-        };
+    fn pose(&self, entering: Option<&Entering>, time: f64, input: &Input) -> Pose {
+        let (trajectory, turn_rate) = self.trajectory(entering, input);
         let angle_rates = if self.calibration.is_some() {
             angles(&self.derivative_at(time, &self.state, &Load::default()))
         } else {
@@ -44,15 +41,21 @@ impl Plant {
 
     /// Readings of ideal sensors at `time` (s).
     pub fn felt(&self, time: f64, input: &Input) -> Readings {
-        self.pose(time, input).felt(&self.surroundings)
+        self.pose(self.entering(time).as_ref(), time, input).felt(&self.surroundings)
     }
 
     /// Readings without errors that the sampled sensors take at `time` (s): in the pose of the
     /// turntable, if there is one and a sample is due.
-    fn felt_by(&self, sensors: &Sensors, time: f64, input: &Input, vehicle: &Pose) -> Readings {
+    fn felt_by(
+        &self,
+        sensors: &Sensors,
+        entering: Option<&Entering>,
+        (time, input): (f64, &Input),
+        vehicle: &Pose,
+    ) -> Readings {
         let pose = match (&self.turntable, sensors.due(time)) {
             (Some(turntable), Some(at)) => {
-                turntable.pose(at, vehicle, &self.trajectory(time, input).1)
+                turntable.pose(at, vehicle, &self.trajectory(entering, input).1)
             }
             _ => *vehicle,
         };
@@ -61,20 +64,29 @@ impl Plant {
 
     /// Newest sample that the sensors output at `time` (s), including one that is due then but not
     /// yet taken. Without sampled sensors it holds the readings of ideal ones and the number 0.
-    pub fn measured(&self, time: f64, input: &Input) -> Sample {
-        let vehicle = self.pose(time, input);
+    pub fn measured(&self, entering: Option<&Entering>, time: f64, input: &Input) -> Sample {
+        let vehicle = self.pose(entering, time, input);
         match &self.sensors {
-            Some(sensors) => sensors.shown(time, &self.felt_by(sensors, time, input, &vehicle)),
+            Some(sensors) => {
+                let felt = self.felt_by(sensors, entering, (time, input), &vehicle);
+                sensors.shown(time, &felt)
+            }
             None => Sample { number: 0, time, readings: vehicle.felt(&self.surroundings) },
         }
     }
 
     /// Sample that the sensors output at `time` (s) after the last call of [`Plant::hold`].
-    pub fn measured_since_held(&self, time: f64, input: &Input) -> Sample {
-        self.sensors.as_ref().map_or_else(|| self.measured(time, input), Sensors::arrived)
+    pub fn measured_since_held(
+        &self,
+        entering: Option<&Entering>,
+        time: f64,
+        input: &Input,
+    ) -> Sample {
+        let ideal = || self.measured(entering, time, input);
+        self.sensors.as_ref().map_or_else(ideal, Sensors::arrived)
     }
 
-    /// Partial derivatives of the readings of [`Plant::measured`], in their order, with respect to
+    /// Partial derivatives of the readings of [`Plant::measured`] without an entry flight, with respect to
     /// the state (9 × 6) and the trajectory (9 × 7). They are zero for sampled sensors, whose
     /// samples depend on either only at the instant of sampling.
     pub fn measured_by_state_and_trajectory(
@@ -89,7 +101,7 @@ impl Plant {
         let (partials, turn_rate_by_trajectory) = self.partial_derivatives(time, input, held);
         let by_state = partials.by_state.fixed_rows::<1>(0).into_owned();
         let by_trajectory = partials.by_turn_rate.fixed_rows::<1>(0) * turn_rate_by_trajectory;
-        let pose = self.pose(time, input);
+        let pose = self.pose(None, time, input);
         pose.felt_by_state_and_trajectory(&self.surroundings, &by_state, &by_trajectory)
     }
 }

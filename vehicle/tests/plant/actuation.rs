@@ -106,7 +106,7 @@ fn oracle_a_delayed_moment_acts_that_much_later() {
                 let input = moment(k + 1).into();
                 let held = delayed.in_force(to, &input, &Command::default());
                 assert_eq!(
-                    delayed.applied_moment(to, &input, &held),
+                    delayed.applied_moment(None, &input, &held),
                     acting(arrived),
                     "{delay} s, {kind:?}, {k}"
                 );
@@ -147,7 +147,7 @@ fn oracle_a_converted_moment_acts_as_the_rounded_one_does() {
             assert_eq!(converted.state, rounded.state, "{k}");
         }
         let held = converted.in_force(2.0, &moment(50).into(), &Command::default());
-        let applied = converted.applied_moment(2.0, &moment(50).into(), &held) / step;
+        let applied = converted.applied_moment(None, &moment(50).into(), &held) / step;
         assert!((applied - applied.map(f64::round)).amax() < 1e-12 && applied.amax() > 1.0);
     }
 }

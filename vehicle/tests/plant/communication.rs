@@ -144,7 +144,7 @@ fn samples_on_a_turntable_do_not_depend_on_the_communication_step() {
         }
         let input = moment(k).into();
         let [at_long, at_short, at_vehicle] =
-            [&long, &short, &on_the_vehicle].map(|plant| plant.measured(time + 0.04, &input));
+            [&long, &short, &on_the_vehicle].map(|plant| plant.measured(None, time + 0.04, &input));
         assert_eq!(at_long.number, at_short.number);
         for i in 0..3 {
             let scale = at_long.readings[i].amax();
