@@ -16,6 +16,9 @@ pub struct Measurement {
     /// The moment that acted since the last tick, N m, if it is measured. Without it a controller
     /// assumes that its command acted.
     pub achieved_moment: Option<Vector3<f64>>,
+    /// Moment that acts besides that of the actuators and is known, such as the air's static
+    /// moment, N m. A law commands the sum of both, and the actuators are asked for the rest.
+    pub known_moment: Vector3<f64>,
     /// Whether the measurement was made at an earlier instant than the tick, because the
     /// communication step is longer than the period or no multiple of it.
     pub stale: bool,
@@ -145,8 +148,8 @@ pub trait Controller {
     /// its place.
     fn limited(&mut self, _memory: &mut Self::Memory, _applied: &Vector3<f64>) {}
 
-    /// Evaluates a tick, and returns the moment to hold until the next one, N m. Commands are
-    /// limited here alone, except that the inner law of [`Dlmpc`](crate::Dlmpc) also limits its
+    /// Evaluates a tick, and returns the moment to hold until the next one, N m: the command less
+    /// what is known to act already. It is limited here alone, except that the inner law of [`Dlmpc`](crate::Dlmpc) also limits its
     /// moment.
     fn update(
         &mut self,
@@ -157,10 +160,19 @@ pub trait Controller {
         reference: ReferenceAt,
     ) -> Vector3<f64> {
         let commanded = self.command(memory, tick, time, measured, reference);
-        let applied = saturated(commanded, self.limit(memory));
-        if applied != commanded {
-            self.limited(memory, &applied);
+        let known = measured.known_moment;
+        if known == Vector3::zeros() {
+            let applied = saturated(commanded, self.limit(memory));
+            if applied != commanded {
+                self.limited(memory, &applied);
+            }
+            return applied;
         }
-        applied
+        let asked = commanded - known;
+        let given = saturated(asked, self.limit(memory));
+        if given != asked {
+            self.limited(memory, &(given + known));
+        }
+        given
     }
 }

@@ -42,9 +42,11 @@ impl<L: Law> ControllerInstance<L> {
     ) -> Result<(), Failure> {
         let Self { settings, input, source, .. } = self;
         let controller = &mut device.controller;
-        let achieved_moment = L::uses_achieved_moment(settings).then_some(input.achieved_moment);
+        let known_moment = input.known_moment;
+        let achieved_moment =
+            L::uses_achieved_moment(settings).then_some(input.achieved_moment + known_moment);
         let turn_rate = input.trajectory.turn_rate(self.parameters.earth_rate);
-        let measured = Measurement { achieved_moment, stale, ..input.measured };
+        let measured = Measurement { achieved_moment, known_moment, stale, ..input.measured };
         let measured = measured.relative_to(&turn_rate);
         let now = ticks.next_time();
         // The future of an external reference is unknown; the law uses its present value for the

@@ -88,6 +88,8 @@ pub struct Input {
     pub measured: Measurement,
     /// Moment that the actuators give, N m.
     pub achieved_moment: Vector3<f64>,
+    /// Moment that is known to act besides that of the actuators, N m.
+    pub known_moment: Vector3<f64>,
     /// Trajectory as it is known, which turns the axes from which the angles are counted.
     pub trajectory: Trajectory,
     /// Reference from outside the FMU.

@@ -36,9 +36,11 @@ const EXTERNAL: [&str; 9] = [
     "reference.externalAcceleration.sigma",
 ];
 
+const KNOWN_MOMENT: [&str; 3] = ["knownMoment.x", "knownMoment.y", "knownMoment.z"];
+
 /// Returns the names of the inputs on which a sampled output depends.
 fn sampled_inputs() -> impl Iterator<Item = &'static str> {
-    MEASURED.into_iter().chain(EXTERNAL).chain(trajectory::NAMES)
+    MEASURED.into_iter().chain(EXTERNAL).chain(trajectory::NAMES).chain(KNOWN_MOMENT)
 }
 
 /// Declares an output of a law, which changes at its ticks only.
@@ -107,6 +109,13 @@ fn achieved(axis: &str, meaning: &str) -> Real {
     common.real().unit("N.m").nominal(1e5)
 }
 
+fn known_moment(axis: &str, meaning: &str) -> Real {
+    let text = format!(
+        "{meaning} moment that is known to act besides that of the actuators, such as the air's; the command is what it leaves to do"
+    );
+    input(&format!("knownMoment.{axis}"), &capital(&text)).real().unit("N.m").nominal(1e5)
+}
+
 /// Declares inputs for a reference from outside.
 fn external(
     name: &'static str,
@@ -130,6 +139,7 @@ fn inputs<L: Law>(table: VariableTable<ControllerFmu<L>>) -> VariableTable<Contr
     let table = vector(table, ANGLES, angles, |m| &mut m.input.reference.angles);
     let table = vector(table, ANGLES, rates, |m| &mut m.input.reference.rates);
     let table = vector(table, ANGLES, accelerations, |m| &mut m.input.reference.accelerations);
+    let table = vector(table, AXES, known_moment, |m| &mut m.input.known_moment);
     known_trajectory().into_iter().zip(trajectory::QUANTITIES).fold(
         table,
         |table, (real, quantity)| {

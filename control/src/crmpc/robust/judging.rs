@@ -16,7 +16,8 @@ impl Robust {
     /// limit.
     pub(super) fn judge(&self, memory: &mut Memory, tick: &Tick) {
         let Tick { measured, angle_rates, deviation: [angles, rates], command, .. } = tick;
-        let limits_kept = command.moment.norm() <= self.settings.limit_moment * (1.0 + ROUNDING)
+        let asked = command.moment - measured.known_moment;
+        let limits_kept = asked.norm() <= self.settings.limit_moment * (1.0 + ROUNDING)
             && measured.rates.norm() <= self.rate_shown();
         let feedback = command.commanded - command.nominal;
         let explained = self.explains(memory, tick.within, angles, rates, &feedback);
