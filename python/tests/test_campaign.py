@@ -129,8 +129,8 @@ def test_parts_do_not_depend_on_where_the_files_are(file, flown, tmp_path):
     assert {"campaign.toml", "experiment.toml"} < names and len(names) == 4
     taken = campaign(here / "campaign.toml")
     assert json.loads(taken.call("--work", "--out", str(flown.folder)))["missing"] == []
-    taken.call("--cases", "250..500", "--out", str(tmp_path / "out"))
-    part = "0000000250-0000000500.parquet"
+    taken.call("--cases", "250..275", "--out", str(tmp_path / "out"))
+    part = "0000000250-0000000275.parquet"
     assert (tmp_path / "out" / "parts" / part).read_bytes() == (
         flown.folder / "parts" / part
     ).read_bytes()

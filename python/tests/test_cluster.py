@@ -49,7 +49,7 @@ at_most = 6.45
 [signals]
 rate-norm = ["norm(plant.rate.p, plant.rate.q, plant.rate.r)"]
 """
-PARTS = CASES // 250
+PARTS = CASES // 25
 # The wall clock of a loaded machine is no matter of these tests.
 LONG = 120.0
 

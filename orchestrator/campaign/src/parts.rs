@@ -8,12 +8,18 @@ use std::path::{Path, PathBuf};
 use sweep::parts::{self, PartResult, PartState};
 use sweep::table::{CaseTable, Values};
 
-/// Number of cases in a part.
+/// Number of cases in a part beyond the first [`FEW`] cases.
 pub const LENGTH: u64 = 250;
 
-/// Returns the parts of the cases below `cases`.
+/// Number of cases that are flown in parts of a tenth of this length, so that a small campaign has
+/// work for all cores and loses little when it ends early.
+const FEW: u64 = 2500;
+
+/// Returns the parts of a campaign of `cases` cases. The parts of a smaller one are the first of
+/// them, but for its last.
 pub fn parts(cases: u64) -> impl Iterator<Item = Range<u64>> {
-    parts::parts(cases, LENGTH)
+    let others = parts::parts(cases, LENGTH).skip_while(|part| part.start < FEW);
+    parts::parts(cases.min(FEW), LENGTH / 10).chain(others)
 }
 
 fn folder(out: &Path) -> PathBuf {
@@ -66,4 +72,22 @@ pub fn fly(
     let result = PartResult { rows, units: plan.units(), curves: String::new() };
     parts::write(&folder(out), &plan.sweep.keys, part, result)?;
     Ok(broken)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::parts;
+
+    #[test]
+    fn parts_follow_one_another_and_do_not_change_when_cases_are_added() {
+        for cases in [1, 25, 1100, 2500, 2510, 10_000] {
+            let some: Vec<_> = parts(cases).collect();
+            let more: Vec<_> = parts(20_000).take(some.len()).collect();
+            assert_eq!((some[0].start, some[some.len() - 1].end), (0, cases));
+            assert!(some.windows(2).all(|pair| pair[0].end == pair[1].start));
+            assert_eq!(some[..some.len() - 1], more[..some.len() - 1]);
+        }
+        let lengths: Vec<u64> = parts(3000).map(|part| part.end - part.start).collect();
+        assert_eq!((lengths.len(), lengths[99], lengths[100]), (102, 25, 250));
+    }
 }

@@ -110,6 +110,13 @@ impl<'a> State<'a> {
         missing
     }
 
+    /// Returns the number of cases whose results are there.
+    fn done(&self) -> u64 {
+        let parts = parts::parts(self.plan.sweep.cases());
+        let found = parts.filter(|part| self.broken_counts.contains_key(&part.start));
+        found.map(|part| part.end - part.start).sum()
+    }
+
     fn broken(&self, limit: usize, cases: u64) -> u64 {
         self.broken_counts.range(..cases).filter_map(|(_, broken)| broken.get(limit)).sum()
     }
@@ -179,14 +186,11 @@ pub fn remaining(plan: &Plan, out: &Path) -> Work {
 /// Returns an error if the range does not consist of parts, or if a file cannot be written.
 pub fn fly_range(plan: &Plan, range: &Range<u64>, options: &Options) -> Result<u64, Error> {
     let total = plan.sweep.cases();
-    let is_edge = |case: u64| case.is_multiple_of(parts::LENGTH) || case == total;
-    if range.start >= range.end || range.end > total || !is_edge(range.start) || !is_edge(range.end)
-    {
+    let is_edge = |case| parts::parts(total).any(|part| [part.start, part.end].contains(&case));
+    if range.start >= range.end || !is_edge(range.start) || !is_edge(range.end) {
         let message = format!(
-            "--cases {}..{}: the range must lie within 0..{total}, and its ends must be multiples of {} or the last case",
-            range.start,
-            range.end,
-            parts::LENGTH
+            "--cases {}..{}: the range must lie within 0..{total} and consist of parts, which --work lists",
+            range.start, range.end,
         );
         return Err(Single::experiment(message).into());
     }
@@ -267,8 +271,7 @@ fn fly_parts(
     let interrupt = &options.interrupt;
     let resets = state.resets(interrupt)?;
     let left: u64 = missing.iter().map(|part| part.end - part.start).sum();
-    let done = state.broken_counts.keys().count() as u64 * parts::LENGTH;
-    let done = done.min(plan.sweep.cases().saturating_sub(left));
+    let done = state.done();
     let progress = Parts::new("cases", &plan.campaign.title, done + left, done, options.quiet);
     let Worked { results, failures } = work::on_parts(
         missing,
@@ -282,8 +285,7 @@ fn fly_parts(
     match failures.into_values().next() {
         None => Ok(()),
         Some(Single::Interrupted { request, .. }) => {
-            let done = (state.broken_counts.len() as u64 * parts::LENGTH).min(plan.sweep.cases());
-            let (what, total) = ("cases are flown", plan.sweep.cases());
+            let (what, done, total) = ("cases are flown", state.done(), plan.sweep.cases());
             Err(Error::Unfinished { what, done, total, out: out.to_path_buf(), request })
         }
         Some(error) => Err(error.into()),
