@@ -149,8 +149,8 @@ pub trait Controller {
     fn limited(&mut self, _memory: &mut Self::Memory, _applied: &Vector3<f64>) {}
 
     /// Evaluates a tick, and returns the moment to hold until the next one, N m: the command less
-    /// what is known to act already. It is limited here alone, except that the inner law of [`Dlmpc`](crate::Dlmpc) also limits its
-    /// moment.
+    /// what is known to act already. It is limited here alone, except that the inner law of
+    /// [`Dlmpc`](crate::Dlmpc) also limits its moment.
     fn update(
         &mut self,
         memory: &mut Self::Memory,

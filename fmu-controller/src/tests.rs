@@ -328,3 +328,23 @@ fn oracle_a_known_trajectory_is_taken_out_of_the_rates() {
     assert!((with - expected).amax() < 1e-9 * expected.amax(), "{with} {expected}");
     assert!((with - told(0.0, rates)).amax() > 1e3);
 }
+
+#[test]
+fn oracle_a_known_moment_is_left_out_of_the_command_before_its_limit() {
+    let told = |known: Vector3<f64>, saturation: bool| {
+        let mut instance = ready::<Lqr>(|instance| {
+            instance.input.known_moment = known;
+            instance.parameters.saturation = saturation;
+        });
+        instance.calculate(0.0, LastEvent::InputSet).map(|()| instance.output.moment)
+    };
+    let (free, known) = (told(Vector3::zeros(), false).unwrap(), Vector3::new(9e4, -4e4, 2e4));
+    assert!((told(known, false).unwrap() - (free - known)).amax() < 1e-9 * free.amax());
+    let limit = ready::<Lqr>(|_| ()).parameters.limit_moment;
+    let expected = (free - known) * (limit / (free - known).norm());
+    assert!((told(known, true).unwrap() - expected).amax() < 1e-9 * limit);
+    let Err(Failure::Error(text)) = told(Vector3::repeat(f64::NAN), true) else {
+        panic!("accepted")
+    };
+    assert!(text.contains("not finite"), "{text}");
+}

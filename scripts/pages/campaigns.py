@@ -69,7 +69,8 @@ CAMPAIGNS = {
     "everything-measured": Campaign(ANY),
     "everything-wu": Campaign(ANY),
     "everything-jia": Campaign(ANY),
-    "entry": Campaign({"CRMPC": ANY["CRMPC"]}),
+    "entry": Campaign(ANY),
+    "entry-told": Campaign({"CRMPC": ANY["CRMPC"]}),
 }
 # Name of a limit, its measure, and what the largest value is called, by the limit's id.
 LIMITS = {
