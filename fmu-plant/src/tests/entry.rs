@@ -222,7 +222,7 @@ fn a_flight_that_becomes_vertical_is_an_error_that_says_so() {
     assert!(text.contains("the flight is vertical"), "{text}");
     // In model exchange a trial state like this is discarded.
     let mut trial = STATES;
-    trial[18] = -1.5708;
+    trial[18] = -std::f64::consts::FRAC_PI_2;
     let mut instance = in_general_motion(entering);
     instance.set_continuous_states(&trial);
     let refused = instance.calculate(0.0, LastEvent::InputSet).unwrap_err();

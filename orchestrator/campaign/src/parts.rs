@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use sweep::parts::{self, PartResult, PartState};
 use sweep::table::{CaseTable, Values};
 
-/// Number of cases in a part beyond the first [`FEW`] cases.
+/// Number of cases in a part beyond the first `FEW` cases.
 pub const LENGTH: u64 = 250;
 
 /// Number of cases that are flown in parts of a tenth of this length, so that a small campaign has

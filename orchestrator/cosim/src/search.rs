@@ -89,20 +89,28 @@ fn is_passed_over(name: &str) -> bool {
 /// without a title only serves to be extended, a file that names a paper is a study, and one in
 /// which something varies is a campaign.
 pub fn is_experiment(text: &str) -> bool {
-    let mut lines = text.lines().map(str::trim_start);
-    let sets = |key: &str| {
-        let is_it = |line: &str| {
-            line.strip_prefix(key).is_some_and(|rest| rest.trim_start().starts_with('='))
-        };
-        text.lines().any(|line| is_it(line.trim_start()))
-    };
-    let has_components = lines.any(|line| line.starts_with("[components."));
-    sets("title") && !sets("paper") && !is_campaign(text) && (has_components || sets("extends"))
+    let has_components = text.lines().any(|line| line.trim_start().starts_with("[components."));
+    sets(text.lines(), "title")
+        && !sets(text.lines(), "paper")
+        && !is_campaign(text)
+        && (has_components || sets(text.lines(), "extends"))
 }
 
-/// Returns whether the text of a TOML file is that of a campaign: something varies in it.
+/// Returns whether the text of a TOML file is that of a campaign: something varies in it, or its
+/// first keys give it a title and name the experiment that is varied.
 pub fn is_campaign(text: &str) -> bool {
-    text.lines().any(|line| line.trim_start().starts_with("[[vary]]"))
+    let starts = |line: &str, with: &str| line.trim_start().starts_with(with);
+    text.lines().any(|line| starts(line, "[[vary]]"))
+        || ["title", "experiment"]
+            .iter()
+            .all(|key| sets(text.lines().take_while(|line| !starts(line, "[")), key))
+}
+
+/// Returns whether one of these lines sets a key.
+fn sets<'a>(mut lines: impl Iterator<Item = &'a str>, key: &str) -> bool {
+    lines.any(|line| {
+        line.trim_start().strip_prefix(key).is_some_and(|rest| rest.trim_start().starts_with('='))
+    })
 }
 
 /// Finds the experiments below a folder.
