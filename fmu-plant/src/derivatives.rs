@@ -98,8 +98,9 @@ impl ReentryPlant {
         before
     }
 
-    /// Returns the partial derivative with respect to the command to a jet. Its thrust has an edge at
-    /// no and at full thrust, so that its moment is taken in closed form, as without an entry flight.
+    /// Returns the partial derivative with respect to the command to a jet. Its thrust has an edge
+    /// at no and at full thrust, so that its moment is taken in closed form, as without an entry
+    /// flight.
     fn difference_by_jet(
         &mut self,
         time: f64,

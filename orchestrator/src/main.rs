@@ -7,6 +7,7 @@ mod catalogue;
 mod failure;
 mod inspect;
 mod isolated;
+mod linear;
 mod list;
 mod live;
 mod pack;
@@ -134,6 +135,15 @@ enum Command {
     Campaign(campaign::Fly),
     /// Look for the worst case of a campaign, and write it as an experiment.
     Falsify(campaign::Falsify),
+    /// Linearise an experiment at an instant of its run, and write the open loop as a discrete
+    /// state-space model (JSON).
+    ///
+    /// Units with derivatives give them; of all others the responses to small changes are taken
+    /// from a kept state and realised as a model.
+    Linearise(linear::Linearise),
+    /// Print the stability margins of an experiment at an instant of its run: gain, phase and delay
+    /// of each signal, disk margins of each and of all together.
+    Margins(linear::Margins),
     /// Write an experiment as an SSP archive (System Structure and Parameterization 1.0), FMUs
     /// included.
     Pack {
@@ -248,6 +258,8 @@ fn execute(command: Command, out: &mut impl Write, interrupt: &Interrupt) -> Res
             | Command::Reproduce { .. }
             | Command::Campaign(_)
             | Command::Falsify(_)
+            | Command::Linearise(_)
+            | Command::Margins(_)
             | Command::Pack { .. }
     );
     if takes_long {
@@ -299,6 +311,8 @@ fn execute(command: Command, out: &mut impl Write, interrupt: &Interrupt) -> Res
         }
         Command::Campaign(asked) => campaign::fly(&asked, out, interrupt),
         Command::Falsify(asked) => campaign::falsify(&asked, out, interrupt),
+        Command::Linearise(asked) => linear::linearise(&asked, out, interrupt),
+        Command::Margins(asked) => linear::margins(&asked, out, interrupt),
         Command::Pack { experiment, out: archive, fmu_dir, overrides, no_enumerations, force } => {
             let archive = pack::Archive { path: archive, enumerations: !no_enumerations, force };
             pack::pack(&experiment, &overrides.into(), &fmu_dir, archive, out, interrupt)

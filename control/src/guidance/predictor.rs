@@ -36,7 +36,8 @@ pub struct Beginning {
     pub path: f64,
     /// cos φ sin ψ of the great circle to the target, which is constant along it.
     pub eastward: f64,
-    /// About cos² φ on the way, for the centrifugal acceleration: the product of cos φ at both ends.
+    /// About cos² φ on the way, for the centrifugal acceleration: the product of cos φ at both
+    /// ends.
     pub near_equator: f64,
     /// Ratios of the actual lift and drag to those of the model.
     pub ratios: [f64; 2],

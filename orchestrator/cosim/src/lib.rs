@@ -26,6 +26,7 @@ pub mod signal;
 pub mod ssp;
 mod stopwatch;
 pub mod system;
+mod topology;
 pub mod variation;
 mod watch;
-mod wiring;
+pub mod wiring;

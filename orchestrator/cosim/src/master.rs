@@ -11,6 +11,7 @@
 //! interval begins.
 
 mod ending;
+mod kept;
 mod transfer;
 
 pub use transfer::Member;

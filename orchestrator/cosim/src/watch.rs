@@ -174,4 +174,22 @@ impl Instance for Watched {
     fn reset(&mut self) -> Outcome {
         self.instance.reset()
     }
+
+    fn save(&mut self, number: usize) -> Outcome {
+        self.instance.save(number)
+    }
+
+    fn restore(&mut self, number: usize) -> Outcome {
+        self.instance.restore(number)
+    }
+
+    fn directional_derivative(
+        &mut self,
+        unknown: &[u32],
+        known: &[u32],
+        seed: &[f64],
+        added: &mut [f64],
+    ) -> Outcome {
+        self.instance.directional_derivative(unknown, known, seed, added)
+    }
 }

@@ -104,6 +104,8 @@ pub struct Variable {
     pub kind: VariableKind,
     /// Start value as the file writes it.
     pub start: Option<String>,
+    /// Position of the continuous state whose derivative by time this variable is.
+    pub derivative_of: Option<usize>,
 }
 
 /// Type of a variable, with the attributes of that type.
@@ -119,6 +121,8 @@ pub enum VariableKind {
         min: Option<f64>,
         /// Largest allowed value, in the variable's unit.
         max: Option<f64>,
+        /// Typical magnitude of the value, in the variable's unit.
+        nominal: Option<f64>,
     },
     /// An integer number of 32 bits.
     Integer {
@@ -194,6 +198,15 @@ impl ModelDescription {
         let place = ordered.partition_point(|position| name_of(position) < name);
         let position = *ordered.get(place).filter(|position| name_of(position) == name)?;
         Some((position as usize, &self.variables[position as usize]))
+    }
+
+    /// Returns the positions of the continuous states, each with that of its derivative.
+    pub fn states(&self) -> impl Iterator<Item = (usize, usize)> {
+        let variables = self.variables.iter().enumerate();
+        variables.filter_map(|(position, variable)| {
+            let state = variable.derivative_of.filter(|state| *state < self.variables.len())?;
+            Some((state, position))
+        })
     }
 
     /// Returns the names of the variables with this causality.

@@ -81,6 +81,24 @@ pub(crate) type DoStep = unsafe extern "C" fn(Handle, f64, f64, c_int) -> c_int;
 /// the status and its value.
 pub(crate) type GetStatus<T> = unsafe extern "C" fn(Handle, c_int, *mut T) -> c_int;
 
+/// Pointer to a state that an instance keeps, which FMI calls fmi2FMUstate.
+pub(crate) type StateHandle = *mut c_void;
+/// Type of the functions fmi2GetFMUstate and fmi2FreeFMUstate.
+pub(crate) type StateInPlace = unsafe extern "C" fn(Handle, *mut StateHandle) -> c_int;
+/// Type of the function fmi2SetFMUstate.
+pub(crate) type SetState = unsafe extern "C" fn(Handle, StateHandle) -> c_int;
+/// Type of the function fmi2GetDirectionalDerivative. The arguments are the unknown and the known
+/// variables with their numbers, the seed of the known ones, and what it adds to the unknown ones.
+pub(crate) type DirectionalDerivative = unsafe extern "C" fn(
+    Handle,
+    *const c_uint,
+    usize,
+    *const c_uint,
+    usize,
+    *const f64,
+    *mut f64,
+) -> c_int;
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -99,4 +99,34 @@ pub trait Instance {
     /// # Errors
     /// Returns an error if the instance reports a failure.
     fn reset(&mut self) -> Outcome;
+    /// Keeps the present state under a number, counted from 0 without gaps. A state that was kept
+    /// under this number before is lost.
+    ///
+    /// # Errors
+    /// Returns an error if the instance reports a failure or keeps no states.
+    fn save(&mut self, _number: usize) -> Outcome {
+        Err(CallFailure::new("getFMUstate", "the instance keeps no states"))
+    }
+    /// Goes back to the state that was kept under a number.
+    ///
+    /// # Errors
+    /// Returns an error if the instance reports a failure, or if there is no such state.
+    fn restore(&mut self, _number: usize) -> Outcome {
+        Err(CallFailure::new("setFMUstate", "the instance keeps no states"))
+    }
+    /// Computes what a change `seed` of the `known` variables adds to the `unknown` ones, by their
+    /// partial derivatives.
+    ///
+    /// # Errors
+    /// Returns an error if the instance reports a failure or has no such function.
+    fn directional_derivative(
+        &mut self,
+        _unknown: &[u32],
+        _known: &[u32],
+        _seed: &[f64],
+        _added: &mut [f64],
+    ) -> Outcome {
+        let call = "getDirectionalDerivative";
+        Err(CallFailure::new(call, "the instance computes no derivatives"))
+    }
 }

@@ -11,6 +11,7 @@ pub mod faults;
 mod fmi;
 pub mod fmu;
 pub mod folder;
+mod functions;
 pub mod instance;
 pub mod isolation;
 mod library;

@@ -10,12 +10,11 @@
 use crate::crash::Calling;
 use crate::fmi::{self, Status};
 use crate::folder::TemporaryFolder;
+use crate::functions::{Functions, text_of};
 use crate::instance::{CallFailure, Instance, Outcome};
 use crate::log::Log;
 use crate::logs::{self, Listed};
-use libloading::Library;
-use std::ffi::{CStr, CString, c_int, c_void};
-use std::path::Path;
+use std::ffi::{CString, c_int, c_void};
 use std::rc::Rc;
 
 unsafe extern "C" {
@@ -26,86 +25,6 @@ unsafe extern "C" {
     fn calloc(count: usize, size: usize) -> *mut c_void;
     /// The C library's `free`, which releases that memory.
     fn free(memory: *mut c_void);
-}
-
-/// The FMI functions that this program calls, and the library that holds them.
-pub(crate) struct Functions {
-    instantiate: fmi::Instantiate,
-    free_instance: fmi::FreeInstance,
-    setup_experiment: fmi::SetupExperiment,
-    enter_initialization_mode: fmi::Plain,
-    exit_initialization_mode: fmi::Plain,
-    terminate: fmi::Plain,
-    get_real: fmi::Get<f64>,
-    get_integer: fmi::Get<i32>,
-    get_boolean: fmi::Get<i32>,
-    set_real: fmi::Set<f64>,
-    set_integer: fmi::Set<i32>,
-    set_boolean: fmi::Set<i32>,
-    set_string: fmi::Set<fmi::Text>,
-    do_step: fmi::DoStep,
-    get_real_status: fmi::GetStatus<f64>,
-    get_boolean_status: fmi::GetStatus<c_int>,
-    /// Optional, because nothing depends on it and some libraries lack it.
-    get_version: Option<fmi::GetText>,
-    /// Optional, because a new instance does the same.
-    reset: Option<fmi::Plain>,
-    _library: Library,
-}
-
-impl Functions {
-    pub(crate) fn load(file: &Path) -> Result<Self, libloading::Error> {
-        // SAFETY: loading runs the library's own initializers, which are sound only if the library
-        // is. Whoever runs an FMU trusts its code.
-        let library = unsafe { Library::new(file) }?;
-        // SAFETY: FMI 2.0 gives each function the type it is loaded as, and `_library` keeps the
-        // code loaded as long as the pointers exist.
-        unsafe {
-            Ok(Self {
-                instantiate: *library.get(b"fmi2Instantiate\0")?,
-                free_instance: *library.get(b"fmi2FreeInstance\0")?,
-                setup_experiment: *library.get(b"fmi2SetupExperiment\0")?,
-                enter_initialization_mode: *library.get(b"fmi2EnterInitializationMode\0")?,
-                exit_initialization_mode: *library.get(b"fmi2ExitInitializationMode\0")?,
-                terminate: *library.get(b"fmi2Terminate\0")?,
-                get_real: *library.get(b"fmi2GetReal\0")?,
-                get_integer: *library.get(b"fmi2GetInteger\0")?,
-                get_boolean: *library.get(b"fmi2GetBoolean\0")?,
-                set_real: *library.get(b"fmi2SetReal\0")?,
-                set_integer: *library.get(b"fmi2SetInteger\0")?,
-                set_boolean: *library.get(b"fmi2SetBoolean\0")?,
-                set_string: *library.get(b"fmi2SetString\0")?,
-                do_step: *library.get(b"fmi2DoStep\0")?,
-                get_real_status: *library.get(b"fmi2GetRealStatus\0")?,
-                get_boolean_status: *library.get(b"fmi2GetBooleanStatus\0")?,
-                get_version: library.get(b"fmi2GetVersion\0").ok().map(|function| *function),
-                reset: library.get(b"fmi2Reset\0").ok().map(|function| *function),
-                _library: library,
-            })
-        }
-    }
-
-    /// Returns a line about the version that the library reports, if it is missing or not FMI 2.0.
-    pub(crate) fn version_fault(&self) -> Option<String> {
-        let Some(get_version) = self.get_version else {
-            return Some("its library has no fmi2GetVersion".into());
-        };
-        // SAFETY: FMI 2.0 gives the function this type and allows the call at any time.
-        let version = text_of(unsafe { get_version() });
-        let is_supported = version == "2.0" || version.starts_with("2.0.");
-        (!is_supported)
-            .then(|| format!("its library reports version \"{}\" of FMI", version.escape_default()))
-    }
-}
-
-/// Copies the C string at `text`; a null pointer gives an empty string.
-fn text_of(text: fmi::Text) -> String {
-    if text.is_null() {
-        return String::new();
-    }
-    // SAFETY: FMI passes strings that end with a zero byte and stay valid during the call; the null
-    // pointer was excluded above.
-    unsafe { CStr::from_ptr(text) }.to_string_lossy().into_owned()
 }
 
 /// The logger callback, called by the C function that expands the arguments.
@@ -134,6 +53,8 @@ struct InstanceData {
 pub(crate) struct FmuInstance {
     handle: fmi::Handle,
     data: Rc<InstanceData>,
+    /// States that the instance keeps, by their numbers.
+    kept: Vec<fmi::StateHandle>,
     fatal: bool,
     _folder: Option<Rc<TemporaryFolder>>,
 }
@@ -190,7 +111,7 @@ impl FmuInstance {
         }
         log.is_instantiated();
         let data = Rc::new(InstanceData { functions, _callbacks: callbacks, _listed: listed, log });
-        Ok(Self { handle, data, fatal: false, _folder: folder })
+        Ok(Self { handle, data, kept: Vec::new(), fatal: false, _folder: folder })
     }
 
     /// Makes a call, whose name is recorded meanwhile in case it crashes.
@@ -270,6 +191,13 @@ impl Drop for FmuInstance {
             // so the instance is leaked.
             std::mem::forget(Rc::clone(&self.data));
         } else {
+            if let Some(functions) = self.data.functions.states {
+                let _calling = Calling::new(&self.data.log, "freeFMUstate");
+                for state in &mut self.kept {
+                    // SAFETY: the instance is alive, made this state, and frees it only here.
+                    unsafe { (functions.free)(self.handle, state) };
+                }
+            }
             let _calling = Calling::new(&self.data.log, "freeInstance");
             // SAFETY: the instance is alive, is freed only here, and is not used afterwards.
             unsafe { (self.data.functions.free_instance)(self.handle) };
@@ -349,5 +277,55 @@ impl Instance for FmuInstance {
             return Err(CallFailure::new("reset", "its library has no fmi2Reset"));
         };
         self.call_plain("reset", reset)
+    }
+
+    fn save(&mut self, number: usize) -> Outcome {
+        let Some(functions) = self.data.functions.states else {
+            return Err(CallFailure::new("getFMUstate", "its library keeps no states"));
+        };
+        // A null pointer asks for a new state.
+        let mut state = self.kept.get(number).copied().unwrap_or(std::ptr::null_mut());
+        // SAFETY: the instance is alive, and the state is null or one that it made.
+        self.call("getFMUstate", |_, handle| unsafe { (functions.get)(handle, &raw mut state) })?;
+        match self.kept.get_mut(number) {
+            Some(kept) => *kept = state,
+            None => self.kept.push(state),
+        }
+        Ok(())
+    }
+
+    fn restore(&mut self, number: usize) -> Outcome {
+        let (Some(functions), Some(&state)) = (self.data.functions.states, self.kept.get(number))
+        else {
+            return Err(CallFailure::new("setFMUstate", "no such state was kept"));
+        };
+        // SAFETY: the instance is alive and made this state.
+        self.call("setFMUstate", |_, handle| unsafe { (functions.set)(handle, state) })
+    }
+
+    fn directional_derivative(
+        &mut self,
+        unknown: &[u32],
+        known: &[u32],
+        seed: &[f64],
+        added: &mut [f64],
+    ) -> Outcome {
+        assert_eq!((known.len(), unknown.len()), (seed.len(), added.len()), "one value for each");
+        let Some(function) = self.data.functions.directional_derivative else {
+            let call = "getDirectionalDerivative";
+            return Err(CallFailure::new(call, "its library computes no derivatives"));
+        };
+        // SAFETY: the instance is alive, and all arrays have the lengths that are passed.
+        self.call("getDirectionalDerivative", |_, handle| unsafe {
+            function(
+                handle,
+                unknown.as_ptr(),
+                unknown.len(),
+                known.as_ptr(),
+                known.len(),
+                seed.as_ptr(),
+                added.as_mut_ptr(),
+            )
+        })
     }
 }

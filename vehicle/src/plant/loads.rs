@@ -141,7 +141,8 @@ impl Plant {
         (input.trajectory, input.trajectory.turn_rate(self.earth_rate))
     }
 
-    /// Returns the loads without an entry flight at `time` (s), which is `elapsed` (s) after the time of the deflections.
+    /// Returns the loads without an entry flight at `time` (s), which is `elapsed` (s) after the
+    /// time of the deflections.
     pub(super) fn load(&self, time: f64, input: &Input, held: &Held, elapsed: f64) -> Load {
         Load {
             moment: self.control_moment(input, held.delayed, &held.drive, (elapsed, 1.0))
@@ -161,8 +162,8 @@ impl Plant {
         }
     }
 
-    /// Derivative of the attitude and the rates at `time` (s) for the present state, during an entry
-    /// flight if there is one.
+    /// Derivative of the attitude and the rates at `time` (s) for the present state, during an
+    /// entry flight if there is one.
     pub fn derivative(
         &self,
         entering: Option<&Entering>,

@@ -86,9 +86,9 @@ impl Plant {
         self.sensors.as_ref().map_or_else(ideal, Sensors::arrived)
     }
 
-    /// Partial derivatives of the readings of [`Plant::measured`] without an entry flight, with respect to
-    /// the state (9 × 6) and the trajectory (9 × 7). They are zero for sampled sensors, whose
-    /// samples depend on either only at the instant of sampling.
+    /// Partial derivatives of the readings of [`Plant::measured`] without an entry flight, with
+    /// respect to the state (9 × 6) and the trajectory (9 × 7). They are zero for sampled sensors,
+    /// whose samples depend on either only at the instant of sampling.
     pub fn measured_by_state_and_trajectory(
         &self,
         time: f64,

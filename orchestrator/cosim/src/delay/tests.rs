@@ -15,6 +15,7 @@ fn description(outputs: &[Option<bool>]) -> ModelDescription {
         variability: "continuous".into(),
         kind: VariableKind::Boolean,
         start: None,
+        derivative_of: None,
     };
     let causalities = std::iter::once("input").chain(outputs.iter().map(|_| "output"));
     let mut description = ModelDescription {
@@ -87,6 +88,7 @@ fn with_duration(mut description: ModelDescription, name: &str, unit: &str) -> M
         display_unit: None,
         min: Some(0.0),
         max: None,
+        nominal: None,
     };
     let start = Some("0".to_string());
     let causality = "parameter".into();

@@ -188,8 +188,13 @@ fn variable(element: &Element, types: &Types) -> Result<Variable, String> {
                 None => declared.map_or(Ok(None), |declared| declared.number(name)),
                 bound => Ok(bound),
             };
-            let (min, max) = (bound("min")?, bound("max")?);
-            VariableKind::Real { unit: text("unit"), display_unit: text("displayUnit"), min, max }
+            VariableKind::Real {
+                unit: text("unit"),
+                display_unit: text("displayUnit"),
+                min: bound("min")?,
+                max: bound("max")?,
+                nominal: bound("nominal")?,
+            }
         }
         "Integer" => {
             let bound = |name: &str| match typed.parsed(name, "a whole number")? {
@@ -231,6 +236,10 @@ fn variable(element: &Element, types: &Types) -> Result<Variable, String> {
         variability: keyword("variability", "continuous"),
         kind,
         start: typed.attribute("start").map(ToString::to_string),
+        // Indices in the file count from 1.
+        derivative_of: typed
+            .parsed::<usize>("derivative", "an index from 1 on")?
+            .and_then(|index| index.checked_sub(1)),
     })
 }
 

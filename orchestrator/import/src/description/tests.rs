@@ -47,6 +47,7 @@ fn everything_needed_is_read() {
         display_unit: None,
         min: None,
         max: Some(2.0),
+        nominal: None,
     };
     assert_eq!((u.reference, &u.kind, u.start.as_deref()), (7, &real, Some("0.5")));
     let items = vec![("none".to_string(), 1), ("white".to_string(), 2)];

@@ -127,6 +127,7 @@ impl LookupTable {
             variability: if is_output { "discrete" } else { "fixed" }.into(),
             kind,
             start,
+            derivative_of: None,
         }
     }
 }
@@ -144,9 +145,13 @@ impl Column {
 impl Form {
     fn kind(&self) -> VariableKind {
         match self {
-            Self::Real(unit) => {
-                VariableKind::Real { unit: unit.clone(), display_unit: None, min: None, max: None }
-            }
+            Self::Real(unit) => VariableKind::Real {
+                unit: unit.clone(),
+                display_unit: None,
+                min: None,
+                max: None,
+                nominal: None,
+            },
             Self::Integer => VariableKind::Integer { min: None, max: None },
             Self::Boolean => VariableKind::Boolean,
         }

@@ -1,0 +1,40 @@
+//! What a system consists of, for those who look into it: variables, and connections with the time
+//! at which their values are read.
+
+use crate::delay::{self, Reading};
+use crate::system::System;
+use crate::wiring::{self, Port, Wire};
+use fmu_import::description::Variable;
+use fmu_import::names;
+
+impl System {
+    /// Returns the connections, and when the source of each is read.
+    pub fn wires(&self) -> Vec<(Wire, Reading)> {
+        delay::readings_of_wires(&self.parts(), &self.wires, self.experiment.simulation.coupling)
+    }
+
+    /// Returns the variables that a name stands for, as `component.variable` or
+    /// `component.prefix.*`, in the order of the description. Texts are left out.
+    pub fn ports(&self, pattern: &str) -> Vec<Port> {
+        let Some((name, rest)) = names::split(pattern) else { return Vec::new() };
+        let parts = self.parts();
+        let Some(component) = parts.iter().position(|part| part.name == name) else {
+            return Vec::new();
+        };
+        let variables = parts[component].description.variables.iter().enumerate();
+        variables
+            .filter(|(_, variable)| names::matches(rest, &variable.name))
+            .filter_map(|(position, variable)| wiring::port(component, position, variable))
+            .collect()
+    }
+
+    /// Returns the variable behind a port.
+    pub fn variable_at(&self, port: Port) -> &Variable {
+        &self.components[port.component].fmu.description.variables[port.variable]
+    }
+
+    /// Returns the full name of a variable, `component.variable`.
+    pub fn name(&self, port: Port) -> String {
+        format!("{}.{}", self.components[port.component].name, self.variable_at(port).name)
+    }
+}

@@ -1,0 +1,69 @@
+//! Units with continuous states: derivatives at an instant, and the exact step under held inputs.
+
+use crate::Matrix;
+use crate::model::Step;
+use fmu_import::instance::{CallFailure, Instance};
+
+/// A continuous linear system: ẋ = A x + B u, y = C x + D u.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Continuous {
+    /// Matrix A, 1/s.
+    pub a: Matrix,
+    /// Matrix B, derivatives by inputs.
+    pub b: Matrix,
+    /// Matrix C, outputs by states.
+    pub c: Matrix,
+    /// Matrix D, outputs by inputs.
+    pub d: Matrix,
+}
+
+/// Value references of a unit's states, their derivatives, inputs and outputs.
+pub struct References<'a> {
+    /// States.
+    pub states: &'a [u32],
+    /// Derivatives of the states, in their order.
+    pub derivatives: &'a [u32],
+    /// Inputs.
+    pub inputs: &'a [u32],
+    /// Outputs.
+    pub outputs: &'a [u32],
+}
+
+impl Continuous {
+    /// Asks an instance for its partial derivatives at its present state.
+    ///
+    /// # Errors
+    /// Returns an error if the instance has no derivatives.
+    pub fn of(instance: &mut dyn Instance, references: &References) -> Result<Self, CallFailure> {
+        let References { states, derivatives, inputs, outputs } = references;
+        let mut partial = |unknown: &[u32], known: &[u32]| {
+            let mut matrix = Matrix::zeros(unknown.len(), known.len());
+            for (column, reference) in known.iter().enumerate() {
+                let added = &mut matrix.as_mut_slice()[column * unknown.len()..][..unknown.len()];
+                if !unknown.is_empty() {
+                    instance.directional_derivative(unknown, &[*reference], &[1.0], added)?;
+                }
+            }
+            Ok(matrix)
+        };
+        Ok(Self {
+            a: partial(derivatives, states)?,
+            b: partial(derivatives, inputs)?,
+            c: partial(outputs, states)?,
+            d: partial(outputs, inputs)?,
+        })
+    }
+
+    /// Returns the step of this length (s) under inputs that are held, after which the outputs are
+    /// read: x⁺ = e^{Ah} x + ∫e^{As}ds B u, y = C x⁺ + D u.
+    pub fn step(&self, length: f64) -> Step {
+        let (n, m) = (self.a.nrows(), self.b.ncols());
+        let mut both = Matrix::zeros(n + m, n + m);
+        both.view_mut((0, 0), (n, n)).copy_from(&(&self.a * length));
+        both.view_mut((0, n), (n, m)).copy_from(&(&self.b * length));
+        let both = both.exp();
+        let a = both.view((0, 0), (n, n)).into_owned();
+        let b = both.view((0, n), (n, m)).into_owned();
+        Step { c: &self.c * &a, d: &self.c * &b + &self.d, a, b }
+    }
+}

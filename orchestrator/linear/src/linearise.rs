@@ -1,0 +1,245 @@
+//! From an experiment to the linear model of its loop at an instant.
+
+use crate::model::{OpenLoop, Signal};
+use crate::propagation::{Link, Net};
+use crate::replay::Recorded;
+use crate::units::{Builder, Found, Unit, needed_steps};
+use cosim::clock::Clock;
+use cosim::delay::Reading;
+use cosim::error::Error;
+use cosim::interrupt::Interrupt;
+use cosim::master::Master;
+use cosim::system::System;
+use cosim::wiring::{Port, Wire};
+use fmu_import::description::{Carrier, VariableKind};
+use std::ops::Range;
+
+/// The loop of an experiment at an instant.
+#[derive(Clone, Debug)]
+pub struct Linearised {
+    /// Time of the instant, s.
+    pub time: f64,
+    /// The loop with its units.
+    pub net: Net,
+    /// The loop for increases and for decreases of every input, if a unit has no derivative.
+    pub sides: Option<[Net; 2]>,
+    /// The open loop of `net`.
+    pub open: OpenLoop,
+    /// How each unit's model was found.
+    pub notes: Vec<String>,
+}
+
+/// A unit that responds to others, with what is connected to it.
+struct Wired {
+    component: usize,
+    /// Number of communication steps in one of its steps.
+    every: u64,
+    recorded: Recorded,
+    /// Places of the recorded inputs among a sample's values.
+    places: Vec<usize>,
+    first: u64,
+    inputs: Vec<Port>,
+    outputs: Vec<Port>,
+}
+
+/// Linearises an experiment at `time` (s), with the loop opened at signals that are named as
+/// `component.variable` or `component.prefix.*`: connected inputs, or outputs with all their
+/// connections.
+///
+/// # Errors
+/// Returns an error if the time is not a communication point, if a signal is not connected, if an
+/// instance fails or keeps no states, or if the run was asked to end.
+pub fn linearise(
+    mut system: System,
+    time: f64,
+    open: &[String],
+    interrupt: &Interrupt,
+) -> Result<Linearised, Error> {
+    let first = tick_at(&system.clock, time)?;
+    let time = system.clock.time(first);
+    if let Some(isolated) = system.components.iter().find(|component| component.is_isolated) {
+        return Err(Error::experiment(format!(
+            "the instance of {} is in a process of its own, where it keeps no states: --isolate=false puts it into this one",
+            isolated.name
+        )));
+    }
+    let (signals, opened) = opened(&system, open)?;
+    let mut units = wired(&mut system, first)?;
+    let needed =
+        |unit: &Wired| unit.first + unit.every * (needed_steps(unit.recorded.length) as u64 + 1);
+    let last = units.iter().map(needed).max().unwrap_or(first + 1);
+    let (start, step) = (system.clock.start(), system.clock.step());
+    system.clock =
+        Clock::new(start, start + last as f64 * step, step).map_err(Error::experiment)?;
+
+    let mut master = record(&system, &mut units, first..last, interrupt)?;
+    let mut found: Vec<Found> = Vec::new();
+    for unit in &units {
+        if let Some(request) = interrupt.asked() {
+            return Err(Error::Interrupted { time, request });
+        }
+        let builder = Builder {
+            system: &system,
+            component: unit.component,
+            first: unit.first,
+            recorded: &unit.recorded,
+            inputs: unit.inputs.clone(),
+            outputs: unit.outputs.clone(),
+        };
+        found.push(master.call(unit.component, time, |instance| builder.find(instance))?);
+    }
+    let links = links(&system, &units, &opened);
+    for (channel, signal) in signals.iter().enumerate() {
+        if !links.iter().any(|link| link.opened == Some(channel)) {
+            let problem =
+                format!("--open {}: no unit that responds gives this signal", signal.name);
+            return Err(Error::experiment(problem));
+        }
+    }
+    let net = |of: &dyn Fn(&Found) -> Unit| Net {
+        units: found.iter().map(of).collect(),
+        links: links.clone(),
+        coupling: system.experiment.simulation.coupling,
+        first,
+        length: system.clock.step(),
+        signals: signals.clone(),
+    };
+    let side = |side: usize| {
+        net(&|found| found.sides.as_ref().map_or(&found.model, |sides| &sides[side]).clone())
+    };
+    let has_edge = found.iter().any(|found| found.sides.is_some());
+    let sides = has_edge.then(|| [side(0), side(1)]);
+    let net = net(&|found| found.model.clone());
+    let open = net.open();
+    let notes = found.into_iter().map(|found| found.note).collect();
+    Ok(Linearised { time, net, sides, open, notes })
+}
+
+/// Finds the units that respond to others. The inputs of each are seen at every communication
+/// point from now on.
+fn wired(system: &mut System, first: u64) -> Result<Vec<Wired>, Error> {
+    let wires = system.wires();
+    let is_real = |port: &Port| port.carrier == Carrier::Real;
+    let mut units = Vec::new();
+    for component in 0..system.components.len() {
+        let into = wires.iter().filter(|(wire, _)| wire.to.component == component);
+        let ports: Vec<Port> = into.map(|(wire, _)| wire.to).collect();
+        let mut outputs: Vec<Port> = Vec::new();
+        for (wire, _) in wires.iter().filter(|(wire, _)| wire.from.component == component) {
+            if is_real(&wire.from) && !outputs.contains(&wire.from) {
+                outputs.push(wire.from);
+            }
+        }
+        // What responds to nothing does not change.
+        if ports.is_empty() || outputs.is_empty() {
+            continue;
+        }
+        let places = ports
+            .iter()
+            .map(|port| Ok(system.probe(&system.name(*port))?.place))
+            .collect::<Result<Vec<_>, String>>()
+            .map_err(Error::experiment)?;
+        let every = u64::from(system.components[component].every);
+        let length = every as f64 * system.clock.step();
+        units.push(Wired {
+            component,
+            every,
+            recorded: Recorded { ports: ports.clone(), length, ..Recorded::default() },
+            places,
+            first: first.div_ceil(every) * every,
+            inputs: ports.into_iter().filter(is_real).collect(),
+            outputs,
+        });
+    }
+    Ok(units)
+}
+
+/// Runs the experiment to the end of some communication points, at whose beginning every unit keeps
+/// its state, and records the units' inputs at them.
+fn record(
+    system: &System,
+    units: &mut [Wired],
+    ticks: Range<u64>,
+    interrupt: &Interrupt,
+) -> Result<Master, Error> {
+    let mut master = system.start(interrupt)?;
+    for tick in 0..ticks.start {
+        master.advance(tick)?;
+    }
+    let time = system.clock.time(ticks.start);
+    for unit in units.iter() {
+        master.call(unit.component, time, |instance| instance.save(0))?;
+    }
+    for tick in ticks {
+        let values = master.advance(tick)?;
+        for unit in units.iter_mut().filter(|unit| tick.is_multiple_of(unit.every)) {
+            let row = unit.places.iter().map(|place| values[*place]).collect();
+            unit.recorded.rows.push(row);
+            unit.recorded.times.push(system.clock.time(tick));
+        }
+    }
+    Ok(master)
+}
+
+/// Finds the connections between the units.
+fn links(system: &System, units: &[Wired], opened: &[Port]) -> Vec<Link> {
+    let place = |port: &Port, of: fn(&Wired) -> &Vec<Port>| {
+        let unit = units.iter().position(|unit| unit.component == port.component)?;
+        Some((unit, of(&units[unit]).iter().position(|other| other == port)?))
+    };
+    let link = |(wire, reading): (Wire, Reading)| {
+        Some(Link {
+            from: place(&wire.from, |unit| &unit.outputs)?,
+            to: place(&wire.to, |unit| &unit.inputs)?,
+            factor: wire.scaling.apply(1.0) - wire.scaling.apply(0.0),
+            reading,
+            opened: opened.iter().position(|port| *port == wire.to || *port == wire.from),
+        })
+    };
+    system.wires().into_iter().filter_map(link).collect()
+}
+
+fn tick_at(clock: &Clock, time: f64) -> Result<u64, Error> {
+    let exact = (time - clock.start()) / clock.step();
+    let tick = exact.round();
+    if !time.is_finite() || tick < 0.0 || (exact - tick).abs() > 1e-6 {
+        return Err(Error::experiment(format!(
+            "--at {time}: must be a communication point, {} s and then every {} s",
+            clock.start(),
+            clock.step()
+        )));
+    }
+    Ok(tick as u64)
+}
+
+/// Finds the signals at which the loop is opened.
+fn opened(system: &System, patterns: &[String]) -> Result<(Vec<Signal>, Vec<Port>), Error> {
+    let wires = system.wires();
+    let is_wired =
+        |port: &Port| wires.iter().any(|(wire, _)| wire.from == *port || wire.to == *port);
+    let mut ports: Vec<Port> = Vec::new();
+    for pattern in patterns {
+        let meant = system.ports(pattern).into_iter();
+        let found: Vec<Port> =
+            meant.filter(|port| port.carrier == Carrier::Real && is_wired(port)).collect();
+        if found.is_empty() {
+            let mut names: Vec<String> = Vec::new();
+            for port in wires.iter().flat_map(|(wire, _)| [wire.to, wire.from]) {
+                names.push(system.name(port));
+            }
+            let hint = fmu_import::names::hint(pattern, names.iter().map(String::as_str));
+            return Err(Error::experiment(format!(
+                "--open {pattern}: there is no such connected input or output{hint}"
+            )));
+        }
+        ports.extend(found.into_iter().filter(|port| !ports.contains(port)).collect::<Vec<_>>());
+    }
+    let signal = |port: &Port| Signal {
+        name: system.name(*port),
+        unit: match &system.variable_at(*port).kind {
+            VariableKind::Real { unit: Some(unit), .. } => unit.clone(),
+            _ => String::new(),
+        },
+    };
+    Ok((ports.iter().map(signal).collect(), ports))
+}

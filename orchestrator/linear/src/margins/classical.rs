@@ -1,0 +1,120 @@
+//! Gains, phase and delay at which the loop becomes unstable, by the eigenvalues of the closed
+//! loop.
+
+use crate::Matrix;
+use crate::model::{OpenLoop, Step};
+use crate::propagation::{Delay, Net};
+use crate::spectrum::{dominant, spectral_radius};
+use nalgebra::{Complex, ComplexField, DMatrix};
+use serde::Serialize;
+
+/// Factor between the gains that are tried, and the largest one.
+const FACTOR: f64 = 1.15;
+const LARGEST_GAIN: f64 = 1e3;
+/// Angle between the phases that are tried, deg.
+const TURN: f64 = 3.0;
+/// Parts of a step between the delays that are tried, and the longest delay in steps.
+const PARTS: f64 = 4.0;
+const LONGEST_DELAY: f64 = 200.0;
+/// Number of halvings after a change of stability is enclosed.
+const HALVINGS: usize = 40;
+
+/// A change at which the loop becomes unstable.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct Crossing {
+    /// The change.
+    pub value: f64,
+    /// Frequency of the oscillation there, rad/s.
+    pub frequency: f64,
+}
+
+/// Gains, phase and delay at which the loop becomes unstable; `None` if none within the range that
+/// is looked at does.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct Classical {
+    /// Least factor above 1, up to 1000.
+    pub gain_above: Option<Crossing>,
+    /// Largest factor below 1, down to 0.001.
+    pub gain_below: Option<Crossing>,
+    /// Least phase lag, deg.
+    pub phase: Option<Crossing>,
+    /// Least delay in addition, s.
+    pub delay: Option<Crossing>,
+}
+
+/// Looks at one signal, or at all of them changed in the same way.
+pub(super) fn classical(net: &Net, open: &OpenLoop, channel: Option<usize>) -> Classical {
+    let count = open.channels();
+    let gains = |gain: f64| -> Vec<f64> {
+        (0..count).map(|i| if channel.is_none_or(|c| c == i) { gain } else { 1.0 }).collect()
+    };
+    let by_gain = |logarithm: f64| open.closed(&gains(logarithm.exp()));
+    let by_phase = |lag: f64| {
+        let turn = Complex::from_polar(1.0, -lag.to_radians());
+        let turned = |i: usize| channel.is_none_or(|c| c == i);
+        turned_loop(open, &|i| if turned(i) { turn } else { Complex::new(1.0, 0.0) })
+    };
+    let step = net.receiving_step();
+    let by_delay = |steps: f64| {
+        let (whole, part) = (steps.floor(), steps.fract());
+        let part = if net.takes_parts() { part } else { 0.0 };
+        let delay = Delay { channel, steps: whole as usize, part };
+        Some(net.closed(delay))
+    };
+    let gain = |direction: f64| {
+        let last = LARGEST_GAIN.ln();
+        let crossing = first(&|x| by_gain(direction * x), FACTOR.ln(), last, open.period)?;
+        Some(Crossing { value: (direction * crossing.value).exp(), ..crossing })
+    };
+    let delay = first(&by_delay, 1.0 / PARTS, LONGEST_DELAY, open.period);
+    Classical {
+        gain_above: gain(1.0),
+        gain_below: gain(-1.0),
+        phase: first(&by_phase, TURN, 180.0, open.period),
+        delay: delay.map(|found| Crossing { value: found.value * step, ..found }),
+    }
+}
+
+/// Closes the loop with a complex factor at each signal.
+fn turned_loop(
+    open: &OpenLoop,
+    factor: &dyn Fn(usize) -> Complex<f64>,
+) -> Option<DMatrix<Complex<f64>>> {
+    let Step { a, b, c, d } = &open.step;
+    let complex = |matrix: &Matrix| matrix.map(|value| Complex::new(value, 0.0));
+    let n = d.nrows();
+    let count = open.channels();
+    let k = DMatrix::from_fn(n, n, |row, column| {
+        if row == column { factor(row % count) } else { Complex::new(0.0, 0.0) }
+    });
+    let inverse = (DMatrix::identity(n, n) - &k * complex(d)).try_inverse()?;
+    Some(complex(a) + complex(b) * inverse * k * complex(c))
+}
+
+/// Finds the least change at which the closed loop has an eigenvalue outside the unit circle, up to
+/// `last`. A loop that cannot be closed counts as unstable.
+fn first<T: ComplexField<RealField = f64>>(
+    closed: &dyn Fn(f64) -> Option<DMatrix<T>>,
+    step: f64,
+    last: f64,
+    period: f64,
+) -> Option<Crossing> {
+    let is_stable = |x: f64| closed(x).is_some_and(|a| spectral_radius(&a) < 1.0);
+    let mut stable = 0.0;
+    let mut unstable = loop {
+        let next = stable + step;
+        if next > last {
+            return None;
+        }
+        if !is_stable(next) {
+            break next;
+        }
+        stable = next;
+    };
+    for _ in 0..HALVINGS {
+        let middle = 0.5 * (stable + unstable);
+        if is_stable(middle) { stable = middle } else { unstable = middle }
+    }
+    let frequency = closed(stable).map_or(0.0, |a| dominant(&a).arg().abs() / period);
+    Some(Crossing { value: stable, frequency })
+}

@@ -1,0 +1,187 @@
+//! Disk margins and sensitivities, by frequency.
+//!
+//! A disk margin α says that the loop stays stable while the gain at each opened signal is
+//! multiplied by any (2 + δ)/(2 − δ) with a stable δ of magnitude below α, which may change gain
+//! and phase at a time, and differ from signal to signal: P. Seiler, A. Packard and P. Gahinet, "An
+//! introduction to disk margins", IEEE Control Systems Magazine 40 (2020), with skew 0. α is the
+//! inverse of the largest structured singular value of S − I/2 over all frequencies.
+//!
+//! A loop that repeats itself after several samples answers to a sine with several: those whose
+//! frequencies differ by multiples of that of the period. δ acts on each of them by itself, so that
+//! in these coordinates it is still diagonal.
+
+use super::structured::{ComplexMatrix, balanced, golden, largest_singular_value, upper_bound};
+use crate::model::{OpenLoop, Step};
+use crate::spectrum::dominant;
+use nalgebra::Complex;
+use serde::Serialize;
+use std::f64::consts::{PI, TAU};
+
+/// Number of frequencies that are looked at, and their range in relation to the largest.
+const FREQUENCIES: usize = 300;
+const RANGE: f64 = 1e-4;
+/// Relative distance to which the worst frequency is found.
+const NEIGHBOURS: f64 = 1.0;
+
+/// A largest value over all frequencies.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct Peak {
+    /// The value.
+    pub value: f64,
+    /// Its frequency, rad/s.
+    pub frequency: f64,
+}
+
+/// A disk margin.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct Disk {
+    /// Radius α.
+    pub alpha: f64,
+    /// Frequency at which it is reached, rad/s.
+    pub frequency: f64,
+    /// Factor by which the gain may be multiplied, or divided; infinite from α = 2 on.
+    pub gain: f64,
+    /// Phase by which the loop may be turned at an unchanged gain, deg.
+    pub phase: f64,
+}
+
+impl Disk {
+    fn new(peak: Peak) -> Self {
+        let alpha = 1.0 / peak.value;
+        let gain = if alpha < 2.0 { (2.0 + alpha) / (2.0 - alpha) } else { f64::INFINITY };
+        let phase = (2.0 * (0.5 * alpha).atan()).to_degrees();
+        Self { alpha, frequency: peak.frequency, gain, phase }
+    }
+}
+
+/// The sensitivity S = (I + L)⁻¹ of a loop at many frequencies.
+pub struct Responses<'a> {
+    open: &'a OpenLoop,
+    /// Frequencies in rad/s, ascending, with the sensitivities there.
+    known: Vec<(f64, ComplexMatrix)>,
+}
+
+impl<'a> Responses<'a> {
+    /// Computes the sensitivities of a stable loop.
+    pub fn of(open: &'a OpenLoop) -> Self {
+        let largest = PI / open.period;
+        let mut frequencies: Vec<f64> = (0..=FREQUENCIES)
+            .map(|k| largest * RANGE.powf(1.0 - k as f64 / FREQUENCIES as f64))
+            .collect();
+        // A weakly damped motion may have its peak between two of them.
+        if let Some(closed) = open.closed(&vec![1.0; open.channels()]) {
+            let own = dominant(&closed).arg().abs() / open.period;
+            frequencies.extend(Some(own).filter(|frequency| *frequency > RANGE * largest));
+        }
+        frequencies.sort_by(f64::total_cmp);
+        let known = frequencies.into_iter().map(|w| (w, sensitivity(open, w))).collect();
+        Self { open, known }
+    }
+
+    /// Returns the frequencies (rad/s) with the sensitivity at each.
+    pub fn sensitivities(&self) -> &[(f64, ComplexMatrix)] {
+        &self.known
+    }
+
+    /// Returns the disk margin of some signals, while the loops of the others stay closed.
+    pub fn disk(&self, channels: &[usize]) -> Disk {
+        let shifted = |mut s: ComplexMatrix| {
+            for i in 0..s.nrows() {
+                s[(i, i)] -= 0.5;
+            }
+            s
+        };
+        let bound = |s| largest_singular_value(&balanced(shifted(s)));
+        Disk::new(self.peak(channels, &bound, &|s| upper_bound(&shifted(s))))
+    }
+
+    /// Returns the largest singular value of the sensitivity of some signals.
+    pub fn sensitivity(&self, channels: &[usize]) -> Peak {
+        let value = |s: ComplexMatrix| largest_singular_value(&s);
+        self.peak(channels, &value, &value)
+    }
+
+    /// Finds the largest value of a function of the sensitivity. Where an upper `bound` of it is
+    /// below the largest value so far, it is not computed.
+    fn peak(
+        &self,
+        channels: &[usize],
+        bound: &dyn Fn(ComplexMatrix) -> f64,
+        value: &dyn Fn(ComplexMatrix) -> f64,
+    ) -> Peak {
+        let chosen = |s: &ComplexMatrix| {
+            let count = self.open.channels();
+            let places: Vec<usize> =
+                (0..s.nrows()).filter(|place| channels.contains(&(place % count))).collect();
+            s.select_rows(&places).select_columns(&places)
+        };
+        let mut order: Vec<(usize, f64)> =
+            self.known.iter().enumerate().map(|(k, (_, s))| (k, bound(chosen(s)))).collect();
+        order.sort_by(|a, b| b.1.total_cmp(&a.1));
+        let mut best = (0, 0.0);
+        for (k, bound) in order {
+            if bound <= best.1 {
+                break;
+            }
+            let found = value(chosen(&self.known[k].1));
+            if found > best.1 {
+                best = (k, found);
+            }
+        }
+        let (k, found) = best;
+        let frequency = self.known[k].0;
+        let at = |place: usize| self.known[place].0;
+        let below = at(k.saturating_sub(1));
+        let above = at((k + 1).min(self.known.len() - 1));
+        // Within its neighbours a peak of a smooth function has no other beside it.
+        let reach = (above / frequency).ln().max((frequency / below).ln()) * NEIGHBOURS;
+        let limit = PI / self.open.period;
+        let near = |x: f64| (frequency * (x * reach).exp()).min(limit);
+        let (x, negative) = golden(&mut |x| -value(chosen(&sensitivity(self.open, near(x)))), 1.0);
+        if -negative > found {
+            Peak { value: -negative, frequency: near(x) }
+        } else {
+            Peak { value: found, frequency }
+        }
+    }
+}
+
+/// Returns the open loop's response at a frequency (rad/s): what arrives by what is put in, with
+/// the parts at all frequencies that the period mixes.
+pub fn response(open: &OpenLoop, frequency: f64) -> ComplexMatrix {
+    let Step { a, b, c, d } = &open.step;
+    let complex = |matrix: &crate::Matrix| matrix.map(|value| Complex::new(value, 0.0));
+    let z = Complex::from_polar(1.0, frequency * open.period);
+    let mut resolvent = complex(&-a);
+    for i in 0..resolvent.nrows() {
+        resolvent[(i, i)] += z;
+    }
+    let states = resolvent.lu().solve(&complex(b)).unwrap_or_else(|| {
+        ComplexMatrix::from_element(b.nrows(), b.ncols(), Complex::new(f64::INFINITY, 0.0))
+    });
+    let lifted = complex(c) * states + complex(d);
+    let (count, samples) = (open.channels(), open.samples);
+    if samples == 1 {
+        return lifted;
+    }
+    let step = open.period / samples as f64;
+    let sines = ComplexMatrix::from_fn(samples * count, samples * count, |row, column| {
+        if row % count != column % count {
+            return Complex::new(0.0, 0.0);
+        }
+        let (sample, harmonic) = ((row / count) as f64, (column / count) as f64);
+        Complex::from_polar(1.0, (frequency + TAU * harmonic / open.period) * sample * step)
+    });
+    let inverse = sines.adjoint() * Complex::new(1.0 / samples as f64, 0.0);
+    inverse * lifted * sines
+}
+
+/// Returns S = (I − G)⁻¹ of the open loop G; G is −L.
+fn sensitivity(open: &OpenLoop, frequency: f64) -> ComplexMatrix {
+    let g = response(open, frequency);
+    let n = g.nrows();
+    let difference = ComplexMatrix::identity(n, n) - g;
+    difference
+        .try_inverse()
+        .unwrap_or_else(|| ComplexMatrix::from_element(n, n, Complex::new(f64::INFINITY, 0.0)))
+}

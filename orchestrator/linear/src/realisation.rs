@@ -1,0 +1,143 @@
+//! Realisation of responses as a linear model of few states.
+//!
+//! This is the algorithm of Ho and Kalman with singular values (J.-N. Juang and R. S. Pappa, "An
+//! eigensystem realization algorithm", Journal of Guidance, Control, and Dynamics 8, 1985), in the
+//! form for periodic systems, where the matrix of responses is factored before each step of the
+//! period (M. Majji, J.-N. Juang and J. L. Junkins, "Time-varying eigensystem realization
+//! algorithm", the same journal 33, 2010).
+
+use crate::Matrix;
+use crate::model::Step;
+use crate::responses::Lags;
+
+/// Returns a model of each step of a period. `phases` are the responses to changes at each step,
+/// for `2 blocks` lags each. States whose singular value is below `tolerance`, relative to the
+/// largest, are left out.
+pub fn realise(phases: &[Lags], blocks: usize, tolerance: f64) -> Vec<Step> {
+    let period = phases.len();
+    let (outputs, inputs) = phases[0][0].shape();
+    // Before step j, the future outputs are the products of an observability matrix with the
+    // state, and the state that of a reachability matrix with the past inputs.
+    let factors: Vec<(Matrix, Matrix)> = (0..period)
+        .map(|j| {
+            let mut hankel = Matrix::zeros(blocks * outputs, blocks * inputs);
+            for (ahead, ago) in (0..blocks).flat_map(|a| (1..=blocks).map(move |b| (a, b))) {
+                let phase = (j + blocks * period - ago) % period;
+                let place = (ahead * outputs, (ago - 1) * inputs);
+                hankel.view_mut(place, (outputs, inputs)).copy_from(&phases[phase][ahead + ago]);
+            }
+            factor(hankel, tolerance)
+        })
+        .collect();
+    (0..period)
+        .map(|j| {
+            let (observability, _) = &factors[j];
+            let (next, reachability) = &factors[(j + 1) % period];
+            let rows = (blocks - 1) * outputs;
+            let later = observability.rows(outputs, rows).into_owned();
+            let a = least_squares(next.rows(0, rows).into_owned(), &later);
+            Step {
+                a,
+                b: reachability.columns(0, inputs).into_owned(),
+                c: observability.rows(0, outputs).into_owned(),
+                d: phases[j][0].clone(),
+            }
+        })
+        .collect()
+}
+
+/// Splits a matrix into U √S and √S Vᵀ of its singular values that count.
+fn factor(matrix: Matrix, tolerance: f64) -> (Matrix, Matrix) {
+    let (rows, columns) = matrix.shape();
+    let largest = matrix.amax();
+    if largest == 0.0 {
+        return (Matrix::zeros(rows, 0), Matrix::zeros(0, columns));
+    }
+    // A response that died out may leave numbers too small for the iteration.
+    let svd = (matrix / largest).svd(true, true);
+    let values = &svd.singular_values;
+    let rank = values.iter().filter(|value| **value > tolerance * values[0]).count();
+    let (Some(u), Some(v)) = (svd.u, svd.v_t) else { unreachable!("both were asked for") };
+    let roots = values.map(|value| (value * largest).sqrt());
+    let left = Matrix::from_fn(rows, rank, |row, column| u[(row, column)] * roots[column]);
+    let right = Matrix::from_fn(rank, columns, |row, column| roots[row] * v[(row, column)]);
+    (left, right)
+}
+
+/// Returns the X with the smallest ‖M X − Y‖.
+fn least_squares(m: Matrix, y: &Matrix) -> Matrix {
+    let shape = (m.ncols(), y.ncols());
+    if shape.0 == 0 || shape.1 == 0 {
+        return Matrix::zeros(shape.0, shape.1);
+    }
+    let svd = m.svd(true, true);
+    let smallest = 1e-12 * svd.singular_values.max();
+    svd.solve(y, smallest).unwrap_or_else(|_| Matrix::zeros(shape.0, shape.1))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Responses of a periodic system to a change at each step.
+    fn responses(steps: &[Step], count: usize) -> Vec<Lags> {
+        let period = steps.len();
+        let after = |first: usize| {
+            let mut state = steps[first].b.clone();
+            let mut lags = vec![steps[first].d.clone()];
+            for lag in 1..count {
+                let step = &steps[(first + lag) % period];
+                lags.push(&step.c * &state);
+                state = &step.a * state;
+            }
+            lags
+        };
+        (0..period).map(after).collect()
+    }
+
+    fn step(a: &[f64], b: &[f64], c: &[f64], d: f64) -> Step {
+        Step {
+            a: Matrix::from_row_slice(2, 2, a),
+            b: Matrix::from_row_slice(2, 1, b),
+            c: Matrix::from_row_slice(1, 2, c),
+            d: Matrix::from_element(1, 1, d),
+        }
+    }
+
+    #[test]
+    fn oracle_an_integrator_with_a_delay_has_two_states_and_the_same_responses() {
+        let system = [step(&[1.0, 0.3, 0.0, 0.0], &[0.0, 1.0], &[1.0, 0.0], 0.2)];
+        let given = responses(&system, 16);
+        let found = realise(&given, 8, 1e-9);
+        assert_eq!(found[0].a.shape(), (2, 2));
+        for (lag, (given, found)) in given[0].iter().zip(&responses(&found, 16)[0]).enumerate() {
+            assert!((given - found).amax() < 1e-12, "{lag}: {given} {found}");
+        }
+    }
+
+    #[test]
+    fn oracle_a_sample_that_is_held_for_three_steps_is_a_periodic_system_of_one_state() {
+        // x⁺ = u at the first step of three, else x; y = x⁺.
+        let one = |value| Matrix::from_element(1, 1, value);
+        let take = Step { a: one(0.0), b: one(2.0), c: one(0.0), d: one(2.0) };
+        let hold = Step { a: one(1.0), b: one(0.0), c: one(1.0), d: one(0.0) };
+        let given = responses(&[take, hold.clone(), hold], 12);
+        let found = realise(&given, 6, 1e-9);
+        // Before the first step nothing of the past counts.
+        assert_eq!(
+            found.iter().map(|step| step.a.shape()).collect::<Vec<_>>(),
+            [(1, 0), (1, 1), (0, 1)]
+        );
+        for (given, found) in given.iter().zip(&responses(&found, 12)) {
+            assert!(given.iter().zip(found).all(|(given, found)| (given - found).amax() < 1e-12));
+        }
+    }
+
+    #[test]
+    fn a_unit_without_memory_has_no_states() {
+        let mut lags = vec![Matrix::zeros(2, 3); 8];
+        lags[0] = Matrix::from_element(2, 3, 4.0);
+        let found = realise(&[lags.clone()], 4, 1e-9);
+        assert_eq!((found[0].a.shape(), &found[0].d), ((0, 0), &lags[0]));
+    }
+}

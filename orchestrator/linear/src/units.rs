@@ -1,0 +1,318 @@
+//! Linear models of the units of a system.
+
+use crate::Matrix;
+use crate::continuous::{Continuous, References};
+use crate::model::Step;
+use crate::realisation::realise;
+use crate::replay::Recorded;
+use crate::responses::{Lags, Probe, Response, Scales};
+use cosim::system::System;
+use cosim::wiring::Port;
+use fmu_import::description::VariableKind;
+use fmu_import::instance::{CallFailure, Instance};
+
+/// Longest period of a unit that is looked for, in its steps, and in s.
+const LONGEST: usize = 25;
+const LONGEST_TIME: f64 = 1.0;
+/// Least number of steps whose responses a model reproduces twice over.
+const BLOCKS: usize = 24;
+/// Lags that are compared to find the period.
+const COMPARED: usize = 6;
+/// Difference of two periods up to which they count as equal, relative to the largest response, and
+/// in relation to the least difference that any period leaves.
+const EQUAL: f64 = 1e-6;
+const AS_EQUAL: f64 = 3.0;
+/// Smallest singular value of a model, relative to the largest.
+const SMALLEST: f64 = 1e-9;
+/// Difference between the derivatives of a unit and its response to a step, relative to the largest
+/// response of a variable, up to which they describe the unit.
+const DESCRIBED: f64 = 0.01;
+
+/// How a unit answers to its inputs.
+#[derive(Clone, Debug)]
+pub enum Dynamics {
+    /// By derivatives of its states.
+    Continuous(Continuous),
+    /// From step to step, with a period of several steps.
+    Sampled(Vec<Step>),
+}
+
+/// A model of a unit.
+#[derive(Clone, Debug)]
+pub struct Unit {
+    /// Name of the component.
+    pub name: String,
+    /// Number of communication steps in one of its steps.
+    pub every: u64,
+    /// Communication point of the first step of its period.
+    pub first: u64,
+    /// Its connected inputs that are real numbers.
+    pub inputs: Vec<Port>,
+    /// Its connected outputs that are real numbers.
+    pub outputs: Vec<Port>,
+    /// Names of its continuous states.
+    pub states: Vec<String>,
+    /// How it answers.
+    pub dynamics: Dynamics,
+}
+
+/// What is found of a unit: its model, those for changes to one side, if they differ, and what to
+/// know of it.
+pub struct Found {
+    /// The model of the unit.
+    pub model: Unit,
+    /// The models for increases and for decreases of the inputs.
+    pub sides: Option<[Unit; 2]>,
+    /// One line on how the model was found.
+    pub note: String,
+}
+
+/// Returns the number of steps of which the inputs of a unit must be known.
+pub fn needed_steps(length: f64) -> usize {
+    let longest = longest_period(length);
+    2 * longest + 2 * BLOCKS.max(2 * longest)
+}
+
+fn longest_period(length: f64) -> usize {
+    ((LONGEST_TIME / length + 1e-9) as usize).clamp(1, LONGEST)
+}
+
+/// Builds the model of a unit.
+pub struct Builder<'a> {
+    /// System that the unit is part of.
+    pub system: &'a System,
+    /// Index of its component.
+    pub component: usize,
+    /// Communication point of the first recorded step.
+    pub first: u64,
+    /// Its inputs as they were in the loop.
+    pub recorded: &'a Recorded,
+    /// Its connected inputs that are real numbers.
+    pub inputs: Vec<Port>,
+    /// Its connected outputs that are real numbers.
+    pub outputs: Vec<Port>,
+}
+
+impl Builder<'_> {
+    fn scale(&self, port: Port) -> f64 {
+        match &self.system.variable_at(port).kind {
+            VariableKind::Real { nominal: Some(nominal), .. } if *nominal > 0.0 => *nominal,
+            _ => 1.0,
+        }
+    }
+
+    fn unit(&self, states: Vec<String>, dynamics: Dynamics) -> Unit {
+        let component = &self.system.components[self.component];
+        Unit {
+            name: component.name.clone(),
+            every: u64::from(component.every),
+            first: self.first,
+            inputs: self.inputs.clone(),
+            outputs: self.outputs.clone(),
+            states,
+            dynamics,
+        }
+    }
+
+    /// Finds the model of the unit from an instance that kept the state before the first recorded
+    /// step under number 0.
+    ///
+    /// # Errors
+    /// Returns an error if the instance fails.
+    pub fn find(&self, instance: &mut dyn Instance) -> Result<Found, CallFailure> {
+        let longest = longest_period(self.recorded.length);
+        self.recorded.keep(instance, 2 * longest)?;
+        if let Some(found) = self.continuous(instance)? {
+            return Ok(found);
+        }
+        let scales = Scales {
+            inputs: self.inputs.iter().map(|port| self.scale(*port)).collect(),
+            outputs: self.outputs.iter().map(|port| self.scale(*port)).collect(),
+        };
+        let references: Vec<u32> = self.outputs.iter().map(|port| port.reference).collect();
+        let places = self.places();
+        let probe = Probe {
+            recorded: self.recorded,
+            inputs: &places,
+            outputs: &references,
+            scales: &scales,
+        };
+        let short: Vec<Response> = (0..2 * longest)
+            .map(|first| probe.responses(instance, first, COMPARED))
+            .collect::<Result<_, _>>()?;
+        let period = period(&short, longest);
+        let blocks = BLOCKS.max(2 * period);
+        let phases: Vec<Response> = (0..2 * period)
+            .map(|first| probe.responses(instance, first, 2 * blocks))
+            .collect::<Result<_, _>>()?;
+        let error = phases.iter().map(|phase| phase.error).fold(0.0, f64::max);
+        let drift = difference(&phases, period).max(error * 10.0);
+        let tolerance = SMALLEST.max(drift);
+        let model = |lags: &dyn Fn(&Response) -> &Lags| {
+            let lags: Vec<Lags> =
+                phases[..period].iter().map(|phase| lags(phase).clone()).collect();
+            let steps = realise(&lags, blocks, tolerance);
+            let steps = steps.into_iter().map(|step| scaled(step, &scales)).collect();
+            self.unit(Vec::new(), Dynamics::Sampled(steps))
+        };
+        let has_edge = phases[..period].iter().any(|phase| phase.sides.is_some());
+        let side = |side: usize| {
+            model(&move |phase| phase.sides.as_ref().map_or(&phase.central, |sides| &sides[side]))
+        };
+        let found = model(&|phase| &phase.central);
+        let Dynamics::Sampled(steps) = &found.dynamics else { unreachable!("built above") };
+        let states = steps.iter().map(|step| step.a.ncols()).max().unwrap_or(0);
+        let note = format!(
+            "{}: responses to changes of its inputs, a period of {period} steps of {} s, {states} states, tolerance {tolerance:.1e}",
+            found.name, self.recorded.length
+        );
+        Ok(Found { model: found, sides: has_edge.then(|| [side(0), side(1)]), note })
+    }
+
+    /// Returns the places of the inputs among the recorded ones.
+    fn places(&self) -> Vec<usize> {
+        let place = |port: &Port| self.recorded.ports.iter().position(|other| other == port);
+        self.inputs.iter().filter_map(place).collect()
+    }
+
+    /// Returns the model by derivatives, if the unit gives them and they describe what it does.
+    fn continuous(&self, instance: &mut dyn Instance) -> Result<Option<Found>, CallFailure> {
+        let description = &self.system.components[self.component].fmu.description;
+        let offers = description.co_simulation.as_ref();
+        if !offers.is_some_and(|interface| interface.has("providesDirectionalDerivative")) {
+            return Ok(None);
+        }
+        let variables = &description.variables;
+        let (states, derivatives): (Vec<usize>, Vec<usize>) = description.states().unzip();
+        if states.is_empty() {
+            return Ok(None);
+        }
+        let of = |positions: &[usize]| -> Vec<u32> {
+            positions.iter().map(|position| variables[*position].reference).collect()
+        };
+        let (states_at, derivatives_at) = (of(&states), of(&derivatives));
+        let inputs: Vec<u32> = self.inputs.iter().map(|port| port.reference).collect();
+        let outputs: Vec<u32> = self.outputs.iter().map(|port| port.reference).collect();
+        let references = References {
+            states: &states_at,
+            derivatives: &derivatives_at,
+            inputs: &inputs,
+            outputs: &outputs,
+        };
+        instance.restore(0)?;
+        let Ok(found) = Continuous::of(instance, &references) else { return Ok(None) };
+        // The states may be read, so that the response of each of them can be held against it.
+        let nominal = |position: &usize| match &variables[*position].kind {
+            VariableKind::Real { nominal: Some(nominal), .. } => *nominal,
+            _ => 1.0,
+        };
+        let scales = Scales {
+            inputs: self.inputs.iter().map(|port| self.scale(*port)).collect(),
+            outputs: states
+                .iter()
+                .map(nominal)
+                .chain(self.outputs.iter().map(|port| self.scale(*port)))
+                .collect(),
+        };
+        let read: Vec<u32> = states_at.iter().chain(&outputs).copied().collect();
+        let places = self.places();
+        let probe =
+            Probe { recorded: self.recorded, inputs: &places, outputs: &read, scales: &scales };
+        let response = probe.responses(instance, 0, 2)?;
+        let step = found.step(self.recorded.length);
+        if response.sides.is_some() || !describes(&step, &response, &scales) {
+            return Ok(None);
+        }
+        let found = reduced(found, &states);
+        let names = found.1.iter().map(|place| variables[states[*place]].name.clone()).collect();
+        let note = format!(
+            "{}: derivatives by fmi2GetDirectionalDerivative, {} of {} states",
+            self.system.components[self.component].name,
+            found.1.len(),
+            states.len()
+        );
+        let model = self.unit(names, Dynamics::Continuous(found.0));
+        Ok(Some(Found { model, sides: None, note }))
+    }
+}
+
+/// Returns whether a step describes the responses of states and outputs after one and two steps.
+fn describes(step: &Step, response: &Response, scales: &Scales) -> bool {
+    let (states, inputs) = step.b.shape();
+    let outputs = step.c.nrows();
+    let stacked = |upper: &Matrix, lower: &Matrix| {
+        Matrix::from_fn(states + outputs, inputs, |row, column| {
+            let value =
+                if row < states { upper[(row, column)] } else { lower[(row - states, column)] };
+            value * scales.inputs[column] / scales.outputs[row]
+        })
+    };
+    let expected = [stacked(&step.b, &step.d), stacked(&(&step.a * &step.b), &(&step.c * &step.b))];
+    (0..states + outputs).all(|row| {
+        let largest = |matrices: &[Matrix]| {
+            matrices.iter().map(|matrix| matrix.row(row).amax()).fold(0.0, f64::max)
+        };
+        let differences: Vec<Matrix> =
+            expected.iter().zip(&response.central).map(|(a, b)| a - b).collect();
+        largest(&differences) <= DESCRIBED * largest(&response.central) + 1e-9
+    })
+}
+
+/// Leaves out the states that neither an input nor another state moves, or that move nothing.
+fn reduced(system: Continuous, states: &[usize]) -> (Continuous, Vec<usize>) {
+    let Continuous { a, b, c, d } = system;
+    let reach = |start: &dyn Fn(usize) -> bool, leads: &dyn Fn(usize, usize) -> bool| {
+        let mut reached: Vec<bool> = (0..states.len()).map(start).collect();
+        for _ in 0..states.len() {
+            for to in 0..states.len() {
+                reached[to] |= (0..states.len()).any(|from| reached[from] && leads(from, to));
+            }
+        }
+        reached
+    };
+    let moved = reach(&|i| b.row(i).amax() > 0.0, &|from, to| a[(to, from)] != 0.0);
+    let seen = reach(&|i| c.column(i).amax() > 0.0, &|from, to| a[(from, to)] != 0.0);
+    let kept: Vec<usize> = (0..states.len()).filter(|i| moved[*i] && seen[*i]).collect();
+    let system = Continuous {
+        a: a.select_rows(&kept).select_columns(&kept),
+        b: b.select_rows(&kept),
+        c: c.select_columns(&kept),
+        d,
+    };
+    (system, kept)
+}
+
+/// Returns the difference of the responses at steps one period apart, relative to the largest.
+fn difference(phases: &[Response], period: usize) -> f64 {
+    let norm = |lags: &Lags| lags.iter().map(Matrix::amax).fold(0.0, f64::max);
+    let largest = phases.iter().map(|phase| norm(&phase.central)).fold(f64::MIN_POSITIVE, f64::max);
+    let pairs = phases.iter().zip(&phases[period..]);
+    let differences = pairs.map(|(a, b)| {
+        let lags = a.central.iter().zip(&b.central);
+        lags.map(|(a, b)| (a - b).amax()).fold(0.0, f64::max)
+    });
+    differences.fold(0.0, f64::max) / largest
+}
+
+/// Finds the period after which the responses repeat, in steps.
+fn period(responses: &[Response], longest: usize) -> usize {
+    let differences: Vec<f64> =
+        (1..=longest).map(|period| difference(&responses[..longest + period], period)).collect();
+    let least = differences.iter().copied().fold(f64::INFINITY, f64::min);
+    let equal = EQUAL.max(AS_EQUAL * least);
+    differences.iter().position(|difference| *difference <= equal).map_or(1, |place| place + 1)
+}
+
+/// Converts a step in typical magnitudes to one in the units of the variables.
+fn scaled(step: Step, scales: &Scales) -> Step {
+    let Step { a, mut b, mut c, mut d } = step;
+    for (column, scale) in scales.inputs.iter().enumerate() {
+        b.column_mut(column).scale_mut(1.0 / scale);
+        d.column_mut(column).scale_mut(1.0 / scale);
+    }
+    for (row, scale) in scales.outputs.iter().enumerate() {
+        c.row_mut(row).scale_mut(*scale);
+        d.row_mut(row).scale_mut(*scale);
+    }
+    Step { a, b, c, d }
+}

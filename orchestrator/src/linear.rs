@@ -1,0 +1,177 @@
+//! The commands `linearise` and `margins`.
+
+use crate::arguments;
+use crate::failure::Failure;
+use crate::run;
+use clap::Args;
+use cosim::error::Error;
+use cosim::interrupt::Interrupt;
+use cosim::search;
+use fmu_import::quantity::rounded;
+use linear::linearise::Linearised;
+use linear::margins::{Crossing, LoopMargins};
+use linear::model::{OpenLoop, Step};
+use linear::{Matrix, margins as analysis};
+use serde_json::{Value, json};
+use std::fs;
+use std::io::Write;
+use std::path::PathBuf;
+
+/// What is linearised, when, and where the loop is opened.
+#[derive(Args)]
+struct Instant {
+    /// Experiment: a file, an SSP archive, or the name of an experiment that `list` shows.
+    experiment: PathBuf,
+    /// Time of the run at which it is linearised, s.
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
+    at: f64,
+    /// Signals at which the loop is opened: connected inputs or outputs, as `plant.moment.*`. The
+    /// option may be given several times.
+    #[arg(long, value_name = "SIGNAL", required = true)]
+    open: Vec<String>,
+    /// Also look for FMUs in this folder, besides the folder of the experiment and target/fmu. The
+    /// option may be given several times.
+    #[arg(long, value_name = "DIR")]
+    fmu_dir: Vec<PathBuf>,
+    #[command(flatten)]
+    overrides: arguments::Overrides,
+}
+
+impl Instant {
+    fn linearise(&self, interrupt: &Interrupt) -> Result<Linearised, Failure> {
+        let path = search::experiment(&self.experiment)?;
+        let (system, _) = run::system(&path, &self.overrides.clone().into(), &self.fmu_dir)?;
+        Ok(linear::linearise::linearise(system, self.at, &self.open, interrupt)?)
+    }
+}
+
+/// Arguments of `linearise`.
+#[derive(Args)]
+pub(crate) struct Linearise {
+    #[command(flatten)]
+    instant: Instant,
+    /// File for the model [default: standard output].
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+}
+
+/// Arguments of `margins`.
+#[derive(Args)]
+pub(crate) struct Margins {
+    #[command(flatten)]
+    instant: Instant,
+    /// Print JSON, for other programs.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Writes the open loop of an experiment.
+pub(crate) fn linearise(
+    asked: &Linearise,
+    out: &mut impl Write,
+    interrupt: &Interrupt,
+) -> Result<(), Failure> {
+    let found = asked.instant.linearise(interrupt)?;
+    let mut model = model(&found.open);
+    model["time"] = json!(found.time);
+    model["notes"] = json!(found.notes);
+    if let Some(sides) = &found.sides {
+        let [increases, decreases] = sides.each_ref().map(|net| self::model(&net.open()));
+        model["sides"] = json!({ "increases": increases, "decreases": decreases });
+    }
+    let text = format!("{}\n", serde_json::to_string(&model).unwrap_or_default());
+    match &asked.out {
+        Some(path) => fs::write(path, text).map_err(Error::file(path))?,
+        None => out.write_all(text.as_bytes())?,
+    }
+    Ok(())
+}
+
+fn model(open: &OpenLoop) -> Value {
+    let Step { a, b, c, d } = &open.step;
+    let rows = |matrix: &Matrix| -> Vec<Vec<f64>> {
+        matrix.row_iter().map(|row| row.iter().copied().collect()).collect()
+    };
+    json!({
+        "period": open.period,
+        "samples": open.samples,
+        "signals": open.signals,
+        "states": open.states,
+        "a": rows(a), "b": rows(b), "c": rows(c), "d": rows(d),
+    })
+}
+
+/// Prints the margins of an experiment.
+pub(crate) fn margins(
+    asked: &Margins,
+    out: &mut impl Write,
+    interrupt: &Interrupt,
+) -> Result<(), Failure> {
+    let found = asked.instant.linearise(interrupt)?;
+    let margins = analysis::margins(&found.net, &found.open);
+    let sides = found
+        .sides
+        .as_ref()
+        .map(|sides| sides.each_ref().map(|net| analysis::margins(net, &net.open())));
+    if asked.json {
+        let mut value = serde_json::to_value(&margins).unwrap_or_default();
+        value["time"] = json!(found.time);
+        value["period"] = json!(found.open.period);
+        value["notes"] = json!(found.notes);
+        if let Some([increases, decreases]) = &sides {
+            value["sides"] = json!({ "increases": increases, "decreases": decreases });
+        }
+        writeln!(out, "{value:#}")?;
+        return Ok(());
+    }
+    writeln!(
+        out,
+        "t = {} s, {} states, period {} s",
+        rounded(found.time),
+        found.open.states.len(),
+        rounded(found.open.period)
+    )?;
+    for note in &found.notes {
+        writeln!(out, "  {note}")?;
+    }
+    print(&margins, out)?;
+    for (title, side) in ["increases", "decreases"].iter().zip(sides.iter().flatten()) {
+        writeln!(out, "\na unit has an edge here; for {title} of every input:")?;
+        print(side, out)?;
+    }
+    Ok(())
+}
+
+fn print(margins: &analysis::Margins, out: &mut impl Write) -> Result<(), Failure> {
+    if !margins.stable {
+        writeln!(
+            out,
+            "unstable: an eigenvalue of the closed loop has the magnitude {:.6}",
+            margins.spectral_radius
+        )?;
+        return Ok(());
+    }
+    writeln!(
+        out,
+        "{:<24} {:>16} {:>10} {:>10} {:>7} {:>11} {:>7}",
+        "signal", "gain", "phase deg", "delay s", "disk", "at rad/s", "max |S|"
+    )?;
+    for row in margins.loops.iter().chain(&margins.together) {
+        let LoopMargins { signal, classical, disk, sensitivity } = row;
+        let shown = |crossing: Option<Crossing>, digits: usize| {
+            crossing.map_or("none".into(), |crossing| format!("{:.digits$}", crossing.value))
+        };
+        let gain =
+            format!("{} to {}", shown(classical.gain_below, 3), shown(classical.gain_above, 3));
+        writeln!(
+            out,
+            "{signal:<24} {gain:>16} {:>10} {:>10} {:>7.3} {:>11.3} {:>7.3}",
+            shown(classical.phase, 2),
+            shown(classical.delay, 4),
+            disk.alpha,
+            disk.frequency,
+            sensitivity.value
+        )?;
+    }
+    Ok(())
+}

@@ -1,0 +1,83 @@
+//! The motion of the centre of mass as six numbers, and where it has a meaning.
+
+use crate::error::Error;
+use crate::math::{atan2, hypot, sin_cos};
+use crate::translation::Planet;
+use nalgebra::SVector;
+
+/// Motion of the centre of mass `[altitude, longitude, latitude, speed, flight path angle,
+/// heading]`, relative to the rotating planet, in m, rad and m/s.
+pub type Motion = SVector<f64, 6>;
+
+/// Largest flight path angle and latitude (rad), up and down, at which the motion's angles are
+/// used: they have no meaning in vertical flight and at the poles.
+pub const STEEPEST: f64 = std::f64::consts::FRAC_PI_2 - 1e-4;
+
+/// A component of [`Motion`], as users see it.
+#[derive(Clone, Copy, Debug)]
+pub struct Quantity {
+    /// Name of the variable.
+    pub name: &'static str,
+    /// What it is.
+    pub meaning: &'static str,
+    /// Its unit, and that of its rate.
+    pub units: [&'static str; 2],
+    /// Its typical magnitude.
+    pub nominal: f64,
+}
+
+const fn quantity(
+    name: &'static str,
+    meaning: &'static str,
+    units: [&'static str; 2],
+    nominal: f64,
+) -> Quantity {
+    Quantity { name, meaning, units, nominal }
+}
+
+const LENGTH: [&str; 2] = ["m", "m/s"];
+const SPEED: [&str; 2] = ["m/s", "m/s2"];
+const ANGLE: [&str; 2] = ["rad", "rad/s"];
+
+/// The components of [`Motion`], in their order.
+pub const QUANTITIES: [Quantity; 6] = [
+    quantity("altitude", "Altitude above the planet's radius", LENGTH, 1e5),
+    quantity("longitude", "Longitude, positive to the east", ANGLE, 1.0),
+    quantity("latitude", "Latitude, positive to the north", ANGLE, 1.0),
+    quantity("speed", "Speed relative to the rotating planet", SPEED, 1e3),
+    quantity("flightPathAngle", "Flight path angle, positive above the horizon", ANGLE, 0.1),
+    quantity("heading", "Heading of the velocity, measured from north towards east", ANGLE, 1.0),
+];
+
+/// Checks that the motion's angles have a meaning at `time` (s).
+///
+/// # Errors
+/// Reports a motion that is not finite, stands still, is vertical or is over a pole.
+pub fn check(motion: &Motion, time: f64) -> Result<(), Error> {
+    if !motion.iter().all(|value| value.is_finite()) {
+        return Err(Error::NotFinite { time, what: "motion of the centre of mass" });
+    }
+    let [_, _, latitude, speed, path, _] = (*motion).into();
+    let problem = if path.abs() > STEEPEST {
+        "is vertical"
+    } else if latitude.abs() > STEEPEST {
+        "is over a pole"
+    } else if speed <= 0.0 {
+        "stands still"
+    } else {
+        return Ok(());
+    };
+    Err(Error::NoCourse { time, problem })
+}
+
+/// Returns the great circle from one position to another, given as longitude and latitude (rad):
+/// its length over ground (m, at zero altitude), and its direction at the first position from north
+/// to east, rad.
+pub fn great_circle(planet: &Planet, from: [f64; 2], to: [f64; 2]) -> (f64, f64) {
+    let (sin_from, cos_from) = sin_cos(from[1]);
+    let (sin_to, cos_to) = sin_cos(to[1]);
+    let (sine, cosine) = sin_cos(to[0] - from[0]);
+    let (east, north) = (cos_to * sine, cos_from * sin_to - sin_from * cos_to * cosine);
+    let ahead = sin_from * sin_to + cos_from * cos_to * cosine;
+    (planet.radius * atan2(hypot(east, north), ahead), atan2(east, north))
+}
