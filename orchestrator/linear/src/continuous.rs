@@ -15,6 +15,33 @@ pub struct Continuous {
     pub c: Matrix,
     /// Matrix D, outputs by inputs.
     pub d: Matrix,
+    /// Time after which an input acts, s.
+    pub delay: f64,
+}
+
+/// A delay, in steps of a unit.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Steps {
+    /// Whole steps.
+    pub whole: usize,
+    /// Part of a further step.
+    pub part: f64,
+}
+
+impl Steps {
+    /// Converts a time; both in s.
+    pub fn of(time: f64, step: f64) -> Self {
+        let steps = time / step;
+        // A whole multiple may be inexact by rounding.
+        let whole = (steps + 1e-9).floor();
+        let part = steps - whole;
+        Self { whole: whole as usize, part: if part < 1e-9 { 0.0 } else { part } }
+    }
+
+    /// Returns the number of earlier steps whose inputs act in a step.
+    pub fn remembered(self) -> usize {
+        self.whole + usize::from(self.part > 0.0)
+    }
 }
 
 /// Value references of a unit's states, their derivatives, inputs and outputs.
@@ -51,11 +78,32 @@ impl Continuous {
             b: partial(derivatives, inputs)?,
             c: partial(outputs, states)?,
             d: partial(outputs, inputs)?,
+            delay: 0.0,
         })
     }
 
-    /// Returns the step of this length (s) under inputs that are held, after which the outputs are
-    /// read: x⁺ = e^{Ah} x + ∫e^{As}ds B u, y = C x⁺ + D u.
+    /// Returns the responses of states and outputs to inputs of 1 over one step of this length (s),
+    /// after each of `count` steps.
+    pub fn responses(&self, length: f64, count: usize) -> Vec<[Matrix; 2]> {
+        let Steps { whole, part } = Steps::of(self.delay, length);
+        let [first, rest] = [part, 1.0 - part].map(|part| self.step(part * length));
+        let mut state = Matrix::zeros(self.a.nrows(), self.b.ncols());
+        let one = Matrix::identity(self.b.ncols(), self.b.ncols());
+        let none = &one * 0.0;
+        (0..count)
+            .map(|lag| {
+                let at = |age: usize| if lag == age { &one } else { &none };
+                let (older, newer) = (at(whole + 1), at(whole));
+                state = &first.a * &state + &first.b * older;
+                let output = &rest.c * &state + &rest.d * newer;
+                state = &rest.a * &state + &rest.b * newer;
+                [state.clone(), output]
+            })
+            .collect()
+    }
+
+    /// Returns the step of this length (s) under inputs that act at once and are held, after which
+    /// the outputs are read: x⁺ = e^{Ah} x + ∫e^{As}ds B u, y = C x⁺ + D u.
     pub fn step(&self, length: f64) -> Step {
         let (n, m) = (self.a.nrows(), self.b.ncols());
         let mut both = Matrix::zeros(n + m, n + m);

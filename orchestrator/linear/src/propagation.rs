@@ -4,6 +4,7 @@
 //! The order of the calls is that of [`cosim::master`], so that the delays are those of a run.
 
 use crate::Matrix;
+use crate::continuous::Steps;
 use crate::model::{OpenLoop, Signal, Step};
 use crate::reduction::{held, reduced};
 use crate::units::{Dynamics, Unit};
@@ -47,10 +48,9 @@ pub struct Net {
 pub struct Delay {
     /// The signal that is delayed; `None` for all.
     pub channel: Option<usize>,
-    /// Number of whole steps of the units that receive them.
-    pub steps: usize,
-    /// Part of a further step. It must be zero unless all these units are continuous.
-    pub part: f64,
+    /// Time, s. It must be a whole number of steps of the units that receive the signals, unless
+    /// all of them are continuous.
+    pub time: f64,
 }
 
 fn lcm(a: u64, b: u64) -> u64 {
@@ -100,10 +100,21 @@ impl Unit {
         matches!(&self.dynamics, Dynamics::Continuous(system) if system.d.amax() == 0.0)
     }
 
-    fn name_of(&self, state: usize) -> String {
-        let known = self.states.get(state).cloned();
-        let name = known.unwrap_or_else(|| format!("memory[{}]", state + 1));
-        format!("{}.{name}", self.name)
+    /// Returns the names of the states before a communication point, and of the outputs that are
+    /// held there.
+    fn names(&self, tick: u64) -> Vec<String> {
+        let state = |place: usize| {
+            let known = self.states.get(place).cloned();
+            known.unwrap_or_else(|| format!("memory[{}]", place + 1))
+        };
+        let mut names: Vec<String> = (0..self.states_at(tick)).map(state).collect();
+        if !self.shows_states() {
+            for kind in ["held", "held before"] {
+                let outputs = 1..=self.outputs.len();
+                names.extend(outputs.map(|output| format!("output[{output}] ({kind})")));
+            }
+        }
+        names.into_iter().map(|name| format!("{}.{name}", self.name)).collect()
     }
 }
 
@@ -119,11 +130,10 @@ struct Rows<'a> {
     /// Where what is put in at a communication point begins among the columns; `None` if the loop
     /// is closed.
     put_in: Option<usize>,
-    delay: Option<Delay>,
-    /// What arrived at the opened signals at the last steps, the newest first.
-    queue: Vec<Matrix>,
-    /// The opened signals that have arrived since the last communication point.
-    arrived: Vec<bool>,
+    /// Delay of each unit's inputs.
+    delays: Vec<Vec<Steps>>,
+    /// Inputs of each unit at its last steps, the newest first.
+    history: Vec<Vec<Matrix>>,
 }
 
 impl Net {
@@ -144,6 +154,24 @@ impl Net {
         let targets = self.links.iter().filter(|link| link.opened.is_some());
         let every = targets.map(|link| self.units[link.to.0].every).max().unwrap_or(1);
         every as f64 * self.length
+    }
+
+    /// Returns the delay of each input of a unit.
+    fn delays(&self, unit: usize, delay: Option<Delay>) -> Vec<Steps> {
+        let model = &self.units[unit];
+        let own = match &model.dynamics {
+            Dynamics::Continuous(system) => system.delay,
+            Dynamics::Sampled(_) => 0.0,
+        };
+        let more = |input: usize| {
+            let delay = delay?;
+            let into = |link: &&Link| link.to == (unit, input);
+            let channel = self.links.iter().find(into)?.opened?;
+            delay.channel.is_none_or(|delayed| delayed == channel).then_some(delay.time)
+        };
+        let step = model.every as f64 * self.length;
+        let inputs = 0..model.inputs.len();
+        inputs.map(|input| Steps::of(own + more(input).unwrap_or(0.0), step)).collect()
     }
 
     /// Returns the open loop.
@@ -188,16 +216,12 @@ impl Net {
     /// Returns the matrix A of the closed loop over its period, with a delay.
     pub fn closed(&self, delay: Delay) -> Matrix {
         let (mut rows, names) = Rows::start(self, 0, Some(delay));
-        let ticks = self.period();
-        for tick in 0..ticks {
+        for tick in 0..self.period() {
             rows.round(self.first + tick);
         }
         let end = rows.end();
         let a = end.columns(0, names.len()).into_owned();
-        let none = |rows, columns| Matrix::zeros(rows, columns);
-        let step = Step { b: none(a.nrows(), 0), c: none(0, a.ncols()), d: none(0, 0), a };
         // What nothing depends on cannot make the loop unstable.
-        let Step { a, .. } = step;
         let kept: Vec<usize> = (0..a.ncols()).filter(|i| a.column(*i).amax() > 0.0).collect();
         a.select_rows(&kept).select_columns(&kept)
     }
@@ -206,27 +230,16 @@ impl Net {
 impl<'a> Rows<'a> {
     /// Begins a period. Returns the names of the states.
     fn start(net: &'a Net, inputs: usize, delay: Option<Delay>) -> (Self, Vec<String>) {
+        let delays: Vec<Vec<Steps>> =
+            (0..net.units.len()).map(|unit| net.delays(unit, delay)).collect();
         let mut names = Vec::new();
-        let mut sizes = Vec::new();
-        for unit in &net.units {
-            let count = unit.states_at(net.first);
-            names.extend((0..count).map(|state| unit.name_of(state)));
-            let outputs = if unit.shows_states() { 0 } else { unit.outputs.len() };
-            for kind in ["held", "held before"] {
-                names.extend(
-                    (0..outputs)
-                        .map(|place| format!("{}.output[{}] ({kind})", unit.name, place + 1)),
-                );
+        for (unit, delays) in net.units.iter().zip(&delays) {
+            names.extend(unit.names(net.first));
+            for age in 1..=remembered(delays) {
+                let past = (1..=unit.inputs.len())
+                    .map(|input| format!("{}.input[{input}] ({age} steps ago)", unit.name));
+                names.extend(past);
             }
-            // A connection may read what was there before the last step.
-            sizes.push((count, outputs));
-        }
-        let channels = net.signals.len();
-        let queued = delay.map_or(0, |delay| delay.steps + 1);
-        for age in 0..queued {
-            names.extend(
-                (0..channels).map(|c| format!("{} ({} steps ago)", net.signals[c].name, age + 1)),
-            );
         }
         let columns = names.len() + inputs;
         let mut next = 0;
@@ -238,33 +251,29 @@ impl<'a> Rows<'a> {
             next += count;
             rows
         };
-        let (mut states, mut latest, mut before) = (Vec::new(), Vec::new(), Vec::new());
-        for (unit, (count, outputs)) in net.units.iter().zip(sizes) {
-            states.push(unity(count));
-            if let (Dynamics::Continuous(system), true) = (&unit.dynamics, unit.shows_states()) {
-                let shown = &system.c * &states[states.len() - 1];
-                latest.push(shown.clone());
-                before.push(shown);
-            } else {
-                latest.push(unity(outputs));
-                before.push(unity(outputs));
-            }
-        }
-        let queue = (0..queued).map(|_| unity(channels)).collect();
-        let arriving = Matrix::zeros(channels, columns);
-        let arrived = vec![false; channels];
-        let rows = Self {
+        let mut rows = Self {
             net,
             columns,
-            states,
-            latest,
-            before,
-            arriving,
+            states: Vec::new(),
+            latest: Vec::new(),
+            before: Vec::new(),
+            arriving: Matrix::zeros(net.signals.len(), columns),
             put_in: None,
-            delay,
-            queue,
-            arrived,
+            delays,
+            history: Vec::new(),
         };
+        for (unit, delays) in net.units.iter().zip(&rows.delays) {
+            let state = unity(unit.states_at(net.first));
+            if let (Dynamics::Continuous(system), true) = (&unit.dynamics, unit.shows_states()) {
+                rows.latest.push(&system.c * &state);
+                rows.before.push(&system.c * &state);
+            } else {
+                rows.latest.push(unity(unit.outputs.len()));
+                rows.before.push(unity(unit.outputs.len()));
+            }
+            rows.states.push(state);
+            rows.history.push((0..remembered(delays)).map(|_| unity(unit.inputs.len())).collect());
+        }
         (rows, names)
     }
 
@@ -277,8 +286,8 @@ impl<'a> Rows<'a> {
                 parts.push(self.latest[place].clone());
                 parts.push(self.before[place].clone());
             }
+            parts.extend(self.history[place].iter().cloned());
         }
-        parts.extend(self.queue);
         let mut all = Matrix::zeros(parts.iter().map(Matrix::nrows).sum(), self.columns);
         let mut next = 0;
         for part in parts {
@@ -291,7 +300,6 @@ impl<'a> Rows<'a> {
     fn round(&mut self, tick: u64) {
         let net = self.net;
         let begins = |unit: &Unit| tick.is_multiple_of(unit.every);
-        self.arrived.fill(false);
         for (place, unit) in net.units.iter().enumerate() {
             if begins(unit) {
                 self.before[place] = self.latest[place].clone();
@@ -302,84 +310,87 @@ impl<'a> Rows<'a> {
             Coupling::Sequential => {
                 for (place, _) in units {
                     let inputs = self.gather(place);
-                    self.step(place, tick, &inputs);
+                    self.step(place, tick, inputs);
                 }
             }
             Coupling::Jacobi => {
                 let gathered: Vec<_> =
                     units.map(|(place, _)| (place, self.gather(place))).collect();
                 for (place, inputs) in gathered {
-                    self.step(place, tick, &inputs);
+                    self.step(place, tick, inputs);
                 }
             }
         }
-        if self.delay.is_some() && self.arrived.contains(&true) {
-            self.queue.rotate_right(1);
-            self.queue[0] = self.arriving.clone();
-        }
     }
 
-    /// Returns the inputs of a unit over the first part of a step and over the rest. Both are the
-    /// same, unless a delay ends within the step.
-    fn gather(&mut self, unit: usize) -> [Matrix; 2] {
-        let count = self.net.units[unit].inputs.len();
-        let mut inputs = [Matrix::zeros(count, self.columns), Matrix::zeros(count, self.columns)];
+    /// Returns the inputs of a unit.
+    fn gather(&mut self, unit: usize) -> Matrix {
+        let mut inputs = Matrix::zeros(self.net.units[unit].inputs.len(), self.columns);
         for link in self.net.links.iter().filter(|link| link.to.0 == unit) {
             let source = match link.reading {
                 Reading::BeforeStep => &self.before[link.from.0],
                 Reading::AfterStep => &self.latest[link.from.0],
             };
-            let value = source.row(link.from.1) * link.factor;
-            let mut both = [value.clone(), value.clone()];
+            let mut value = source.row(link.from.1) * link.factor;
             if let Some(channel) = link.opened {
                 self.arriving.set_row(channel, &value);
-                self.arrived[channel] = true;
                 if let Some(first) = self.put_in {
-                    both = [0, 1].map(|_| {
-                        let mut row = Matrix::zeros(1, self.columns);
-                        row[(0, first + channel)] = 1.0;
-                        row.row(0).into_owned()
-                    });
-                }
-                if let Some(delay) = self.delay
-                    && delay.channel.is_none_or(|delayed| delayed == channel)
-                {
-                    let ago = |steps: usize| match steps.checked_sub(1) {
-                        None => value.clone(),
-                        Some(place) => self.queue[place].row(channel).into_owned(),
-                    };
-                    both = [ago(delay.steps + 1), ago(delay.steps)];
+                    value.fill(0.0);
+                    value[first + channel] = 1.0;
                 }
             }
-            for (rows, value) in inputs.iter_mut().zip(&both) {
-                let sum = rows.row(link.to.1) + value;
-                rows.set_row(link.to.1, &sum);
-            }
+            inputs.set_row(link.to.1, &value);
         }
         inputs
     }
 
-    fn step(&mut self, unit: usize, tick: u64, [older, newer]: &[Matrix; 2]) {
+    fn step(&mut self, unit: usize, tick: u64, inputs: Matrix) {
         let model = &self.net.units[unit];
-        let part = self.delay.map_or(0.0, |delay| delay.part);
+        let delays = &self.delays[unit];
         let state = &self.states[unit];
+        // What acts on each input over the part of the step that begins at `from`.
+        let acting = |from: f64| {
+            let mut acting = inputs.clone();
+            for (row, delay) in delays.iter().enumerate() {
+                let age = delay.whole + usize::from(from < delay.part);
+                if age > 0 {
+                    acting.set_row(row, &self.history[unit][age - 1].row(row));
+                }
+            }
+            acting
+        };
         let (state, output) = match &model.dynamics {
             Dynamics::Sampled(steps) => {
                 let step = &steps[model.phase(tick)];
-                (&step.a * state + &step.b * newer, &step.c * state + &step.d * newer)
+                let acting = acting(1.0);
+                (&step.a * state + &step.b * &acting, &step.c * state + &step.d * &acting)
             }
             Dynamics::Continuous(system) => {
                 let length = model.every as f64 * self.net.length;
-                let mut state = state.clone();
-                if part > 0.0 {
-                    let first = system.step(part * length);
-                    state = &first.a * state + &first.b * older;
+                let mut ends: Vec<f64> = delays.iter().map(|delay| delay.part).collect();
+                ends.push(1.0);
+                ends.sort_by(f64::total_cmp);
+                ends.dedup();
+                let (mut state, mut from) = (state.clone(), 0.0);
+                let mut output = Matrix::zeros(system.c.nrows(), self.columns);
+                for end in ends.into_iter().filter(|end| *end > 0.0) {
+                    let (step, acting) = (system.step((end - from) * length), acting(from));
+                    output = &step.c * &state + &step.d * &acting;
+                    state = &step.a * &state + &step.b * &acting;
+                    from = end;
                 }
-                let rest = system.step((1.0 - part) * length);
-                let output = &rest.c * &state + &rest.d * newer;
-                (&rest.a * state + &rest.b * newer, output)
+                (state, output)
             }
         };
         (self.states[unit], self.latest[unit]) = (state, output);
+        if let Some(oldest) = self.history[unit].last_mut() {
+            *oldest = inputs;
+            self.history[unit].rotate_right(1);
+        }
     }
+}
+
+/// Returns the number of earlier inputs that a unit with these delays needs.
+fn remembered(delays: &[Steps]) -> usize {
+    delays.iter().map(|delay| delay.remembered()).max().unwrap_or(0)
 }

@@ -65,7 +65,7 @@ fn factor(matrix: Matrix, tolerance: f64) -> (Matrix, Matrix) {
 }
 
 /// Returns the X with the smallest ‖M X − Y‖.
-fn least_squares(m: Matrix, y: &Matrix) -> Matrix {
+pub(crate) fn least_squares(m: Matrix, y: &Matrix) -> Matrix {
     let shape = (m.ncols(), y.ncols());
     if shape.0 == 0 || shape.1 == 0 {
         return Matrix::zeros(shape.0, shape.1);

@@ -2,14 +2,16 @@
 
 use crate::Matrix;
 use crate::continuous::{Continuous, References};
+use crate::margins::structured::golden;
 use crate::model::Step;
-use crate::realisation::realise;
+use crate::realisation::{least_squares, realise};
 use crate::replay::Recorded;
 use crate::responses::{Lags, Probe, Response, Scales};
 use cosim::system::System;
 use cosim::wiring::Port;
 use fmu_import::description::VariableKind;
 use fmu_import::instance::{CallFailure, Instance};
+use fmu_import::quantity::rounded;
 
 /// Longest period of a unit that is looked for, in its steps, and in s.
 const LONGEST: usize = 25;
@@ -27,6 +29,11 @@ const SMALLEST: f64 = 1e-9;
 /// Difference between the derivatives of a unit and its response to a step, relative to the largest
 /// response of a variable, up to which they describe the unit.
 const DESCRIBED: f64 = 0.01;
+
+/// Number of responses from which a delay is found.
+const FITTED: usize = 4;
+/// Shortest delay within a step that is told from a change of the operating point, in steps.
+const SMALLEST_PART: f64 = 1e-3;
 
 /// How a unit answers to its inputs.
 #[derive(Clone, Debug)]
@@ -218,49 +225,121 @@ impl Builder<'_> {
         let places = self.places();
         let probe =
             Probe { recorded: self.recorded, inputs: &places, outputs: &read, scales: &scales };
-        let response = probe.responses(instance, 0, 2)?;
-        let step = found.step(self.recorded.length);
-        if response.sides.is_some() || !describes(&step, &response, &scales) {
+        let response = probe.responses(instance, 0, 2 + longest_period(self.recorded.length))?;
+        if response.sides.is_some() {
+            return Ok(None);
+        }
+        let (lags, length) = (&response.central, self.recorded.length);
+        let found = if describes(&found, lags, &scales, length) {
+            found
+        } else {
+            delayed(found, lags, &scales, length)
+        };
+        if !describes(&found, lags, &scales, length) {
             return Ok(None);
         }
         let found = reduced(found, &states);
         let names = found.1.iter().map(|place| variables[states[*place]].name.clone()).collect();
         let note = format!(
-            "{}: derivatives by fmi2GetDirectionalDerivative, {} of {} states",
+            "{}: derivatives by fmi2GetDirectionalDerivative, {} of {} states, inputs act after {} s",
             self.system.components[self.component].name,
             found.1.len(),
-            states.len()
+            states.len(),
+            rounded(found.0.delay)
         );
         let model = self.unit(names, Dynamics::Continuous(found.0));
         Ok(Some(Found { model, sides: None, note }))
     }
 }
 
-/// Returns whether a step describes the responses of states and outputs after one and two steps.
-fn describes(step: &Step, response: &Response, scales: &Scales) -> bool {
-    let (states, inputs) = step.b.shape();
-    let outputs = step.c.nrows();
-    let stacked = |upper: &Matrix, lower: &Matrix| {
-        Matrix::from_fn(states + outputs, inputs, |row, column| {
-            let value =
-                if row < states { upper[(row, column)] } else { lower[(row - states, column)] };
-            value * scales.inputs[column] / scales.outputs[row]
+/// Returns whether derivatives describe the responses of states and outputs to a change that is
+/// held for one step.
+fn describes(system: &Continuous, lags: &Lags, scales: &Scales, length: f64) -> bool {
+    let states = system.a.nrows();
+    let expected: Lags = system
+        .responses(length, lags.len())
+        .iter()
+        .map(|[state, output]| {
+            Matrix::from_fn(states + output.nrows(), output.ncols(), |row, column| {
+                let value = match row.checked_sub(states) {
+                    None => state[(row, column)],
+                    Some(row) => output[(row, column)],
+                };
+                value * scales.inputs[column] / scales.outputs[row]
+            })
+        })
+        .collect();
+    let differences: Lags = expected.iter().zip(lags).map(|(a, b)| a - b).collect();
+    (0..lags[0].nrows()).all(|row| {
+        let largest =
+            |lags: &Lags| lags.iter().map(|matrix| matrix.row(row).amax()).fold(0.0, f64::max);
+        largest(&differences) <= DESCRIBED * largest(lags) + 1e-9
+    })
+}
+
+/// Gives a system the delay and the matrix B of its responses, and no D. While an input has not
+/// acted yet, the unit's own derivatives by it are zero. With a trial of the delay, the responses
+/// are linear in B; the delay is the one with the least rest.
+fn delayed(system: Continuous, lags: &Lags, scales: &Scales, length: f64) -> Continuous {
+    let states = system.a.nrows();
+    let state = |matrix: &Matrix| {
+        Matrix::from_fn(states, matrix.ncols(), |row, column| {
+            matrix[(row, column)] * scales.outputs[row] / scales.inputs[column]
         })
     };
-    let expected = [stacked(&step.b, &step.d), stacked(&(&step.a * &step.b), &(&step.c * &step.b))];
-    (0..states + outputs).all(|row| {
-        let largest = |matrices: &[Matrix]| {
-            matrices.iter().map(|matrix| matrix.row(row).amax()).fold(0.0, f64::max)
+    let largest = lags.iter().map(|matrix| matrix.rows(0, states).amax()).fold(0.0, f64::max);
+    let begins = |matrix: &Matrix| matrix.rows(0, states).amax() > 1e-6 * largest;
+    let Some(whole) = lags.iter().position(begins) else { return system };
+    let measured: Vec<Matrix> =
+        lags[whole..].iter().take(FITTED).map(|matrix| weighted(state(matrix), scales)).collect();
+    let measured = stacked(&measured);
+    // The response to an input that moves each state by itself.
+    let (none, each) = (Matrix::zeros(0, states), Matrix::identity(states, states));
+    let fit = |part: f64| {
+        let trial = Continuous {
+            a: system.a.clone(),
+            b: each.clone(),
+            c: none.clone(),
+            d: none.clone(),
+            delay: part * length,
         };
-        let differences: Vec<Matrix> =
-            expected.iter().zip(&response.central).map(|(a, b)| a - b).collect();
-        largest(&differences) <= DESCRIBED * largest(&response.central) + 1e-9
-    })
+        let responses = trial.responses(length, FITTED.min(lags.len() - whole));
+        let responses: Vec<Matrix> =
+            responses.into_iter().map(|[state, _]| weighted(state, scales)).collect();
+        let responses = stacked(&responses);
+        let b = least_squares(responses.clone(), &measured);
+        let rest = (responses * &b - &measured).norm();
+        (b, rest)
+    };
+    let (middle, _) = golden(&mut |x| fit(0.5 + x).1, 0.5);
+    let part = 0.5 + middle;
+    // A change of the operating point over a step is no delay.
+    let counts = (SMALLEST_PART..=1.0 - SMALLEST_PART).contains(&part);
+    let part = if counts { part } else { part.round() };
+    let d = Matrix::zeros(system.c.nrows(), lags[0].ncols());
+    Continuous { b: fit(part).0, d, delay: (whole as f64 + part) * length, ..system }
+}
+
+/// Divides the states by their typical magnitudes.
+fn weighted(mut matrix: Matrix, scales: &Scales) -> Matrix {
+    for row in 0..matrix.nrows() {
+        matrix.row_mut(row).unscale_mut(scales.outputs[row]);
+    }
+    matrix
+}
+
+fn stacked(matrices: &[Matrix]) -> Matrix {
+    let rows = matrices[0].nrows();
+    let mut all = Matrix::zeros(rows * matrices.len(), matrices[0].ncols());
+    for (place, matrix) in matrices.iter().enumerate() {
+        all.rows_mut(place * rows, rows).copy_from(matrix);
+    }
+    all
 }
 
 /// Leaves out the states that neither an input nor another state moves, or that move nothing.
 fn reduced(system: Continuous, states: &[usize]) -> (Continuous, Vec<usize>) {
-    let Continuous { a, b, c, d } = system;
+    let Continuous { a, b, c, d, delay } = system;
     let reach = |start: &dyn Fn(usize) -> bool, leads: &dyn Fn(usize, usize) -> bool| {
         let mut reached: Vec<bool> = (0..states.len()).map(start).collect();
         for _ in 0..states.len() {
@@ -278,6 +357,7 @@ fn reduced(system: Continuous, states: &[usize]) -> (Continuous, Vec<usize>) {
         b: b.select_rows(&kept),
         c: c.select_columns(&kept),
         d,
+        delay,
     };
     (system, kept)
 }

@@ -54,13 +54,9 @@ pub(super) fn classical(net: &Net, open: &OpenLoop, channel: Option<usize>) -> C
         let turned = |i: usize| channel.is_none_or(|c| c == i);
         turned_loop(open, &|i| if turned(i) { turn } else { Complex::new(1.0, 0.0) })
     };
-    let step = net.receiving_step();
-    let by_delay = |steps: f64| {
-        let (whole, part) = (steps.floor(), steps.fract());
-        let part = if net.takes_parts() { part } else { 0.0 };
-        let delay = Delay { channel, steps: whole as usize, part };
-        Some(net.closed(delay))
-    };
+    let (step, takes_parts) = (net.receiving_step(), net.takes_parts());
+    let whole = |steps: f64| if takes_parts { steps } else { steps.floor() };
+    let by_delay = |steps: f64| Some(net.closed(Delay { channel, time: whole(steps) * step }));
     let gain = |direction: f64| {
         let last = LARGEST_GAIN.ln();
         let crossing = first(&|x| by_gain(direction * x), FACTOR.ln(), last, open.period)?;
@@ -71,7 +67,7 @@ pub(super) fn classical(net: &Net, open: &OpenLoop, channel: Option<usize>) -> C
         gain_above: gain(1.0),
         gain_below: gain(-1.0),
         phase: first(&by_phase, TURN, 180.0, open.period),
-        delay: delay.map(|found| Crossing { value: found.value * step, ..found }),
+        delay: delay.map(|found| Crossing { value: whole(found.value) * step, ..found }),
     }
 }
 
