@@ -36,6 +36,20 @@ pub fn collect() -> Collection {
     Collection(())
 }
 
+/// A guard: warnings of this thread's instances are dropped as long as this value lives.
+pub struct Silence(Option<Collected>);
+
+/// Begins to drop warnings, such as those of an instance that is disturbed on purpose.
+pub fn silence() -> Silence {
+    Silence(COLLECTED.replace(Some(Collected::default())))
+}
+
+impl Drop for Silence {
+    fn drop(&mut self) {
+        COLLECTED.set(self.0.take());
+    }
+}
+
 /// Sets the current simulated time, s.
 pub fn at(time: f64) {
     COLLECTED.with_borrow_mut(|collection| {
@@ -100,6 +114,22 @@ impl Drop for Collection {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_comes_in_silence_is_dropped_and_what_was_collected_stays() {
+        let collection = collect();
+        warn("before");
+        let silence = silence();
+        warn("meanwhile");
+        drop(silence);
+        warn("after");
+        let texts: Vec<String> = COLLECTED.with_borrow(|collection| {
+            let warnings = collection.iter().flat_map(|collection| &collection.warnings);
+            warnings.map(|warning| warning.text.clone()).collect()
+        });
+        assert_eq!(texts, ["before", "after"]);
+        drop(collection);
+    }
 
     #[test]
     fn a_warning_is_told_once_with_its_first_time_and_its_count() {

@@ -12,6 +12,7 @@ use cosim::master::Master;
 use cosim::system::System;
 use cosim::wiring::{Port, Wire};
 use fmu_import::description::{Carrier, VariableKind};
+use fmu_import::warnings;
 use std::ops::Range;
 
 /// The loop of an experiment at an instant.
@@ -72,7 +73,10 @@ pub fn linearise(
     system.clock =
         Clock::new(start, start + last as f64 * step, step).map_err(Error::experiment)?;
 
+    let collection = warnings::collect();
     let mut master = record(&system, &mut units, first..last, interrupt)?;
+    drop(collection);
+    let _silence = warnings::silence();
     let mut found: Vec<Found> = Vec::new();
     for unit in &units {
         if let Some(request) = interrupt.asked() {
@@ -111,6 +115,12 @@ pub fn linearise(
     let sides = has_edge.then(|| [side(0), side(1)]);
     let net = net(&|found| found.model.clone());
     let open = net.open();
+    if open.step.b.amax().max(open.step.d.amax()) == 0.0 || open.step.c.amax() == 0.0 {
+        return Err(Error::experiment(format!(
+            "at t = {time} s nothing comes back of what is put in at {}: a unit may round its outputs, or hold them",
+            open.signals[0].name
+        )));
+    }
     let notes = found.into_iter().map(|found| found.note).collect();
     Ok(Linearised { time, net, sides, open, notes })
 }

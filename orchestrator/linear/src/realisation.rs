@@ -1,18 +1,18 @@
 //! Realisation of responses as a linear model of few states.
 //!
-//! This is the algorithm of Ho and Kalman with singular values (J.-N. Juang and R. S. Pappa, "An
-//! eigensystem realization algorithm", Journal of Guidance, Control, and Dynamics 8, 1985), in the
-//! form for periodic systems, where the matrix of responses is factored before each step of the
-//! period (M. Majji, J.-N. Juang and J. L. Junkins, "Time-varying eigensystem realization
-//! algorithm", the same journal 33, 2010).
+//! This is the algorithm of B. L. Ho and R. E. Kalman, "Effective construction of linear
+//! state-variable models from input/output functions" (Regelungstechnik 14, 1966), in the form for
+//! periodic systems, where the matrix of responses is factored before each step of the period (M.
+//! Majji, J.-N. Juang and J. L. Junkins, "Time-varying eigensystem realization algorithm", Journal
+//! of Guidance, Control, and Dynamics 33, 2010).
 
 use crate::Matrix;
 use crate::model::Step;
 use crate::responses::Lags;
 
 /// Returns a model of each step of a period. `phases` are the responses to changes at each step,
-/// for `2 blocks` lags each. States whose singular value is below `tolerance`, relative to the
-/// largest, are left out.
+/// for `2 blocks` lags each. States that add less than `tolerance` to them, relative to the largest,
+/// are left out.
 pub fn realise(phases: &[Lags], blocks: usize, tolerance: f64) -> Vec<Step> {
     let period = phases.len();
     let (outputs, inputs) = phases[0][0].shape();
@@ -46,33 +46,40 @@ pub fn realise(phases: &[Lags], blocks: usize, tolerance: f64) -> Vec<Step> {
         .collect()
 }
 
-/// Splits a matrix into U √S and √S Vᵀ of its singular values that count.
+/// A QR decomposition M = Q R P with pivoting, with the columns of Q and rows of R whose pivot is
+/// above `tolerance`, relative to the largest. R is not permuted back.
+fn decomposed(
+    matrix: Matrix,
+    tolerance: f64,
+) -> (Matrix, Matrix, nalgebra::PermutationSequence<nalgebra::Dyn>) {
+    let decomposition = matrix.col_piv_qr();
+    let (q, r) = (decomposition.q(), decomposition.r());
+    let pivot = |place: usize| r[(place, place)].abs();
+    let places = 0..r.nrows().min(r.ncols());
+    let largest = places.clone().map(pivot).fold(0.0, f64::max);
+    let rank = places.take_while(|place| pivot(*place) > tolerance * largest).count();
+    let kept = (q.columns(0, rank).into_owned(), r.rows(0, rank).into_owned());
+    (kept.0, kept.1, decomposition.p().clone())
+}
+
+/// Splits a matrix into an orthonormal factor and the rest.
 fn factor(matrix: Matrix, tolerance: f64) -> (Matrix, Matrix) {
-    let (rows, columns) = matrix.shape();
-    let largest = matrix.amax();
-    if largest == 0.0 {
-        return (Matrix::zeros(rows, 0), Matrix::zeros(0, columns));
-    }
-    // A response that died out may leave numbers too small for the iteration.
-    let svd = (matrix / largest).svd(true, true);
-    let values = &svd.singular_values;
-    let rank = values.iter().filter(|value| **value > tolerance * values[0]).count();
-    let (Some(u), Some(v)) = (svd.u, svd.v_t) else { unreachable!("both were asked for") };
-    let roots = values.map(|value| (value * largest).sqrt());
-    let left = Matrix::from_fn(rows, rank, |row, column| u[(row, column)] * roots[column]);
-    let right = Matrix::from_fn(rank, columns, |row, column| roots[row] * v[(row, column)]);
-    (left, right)
+    let (q, mut r, permutation) = decomposed(matrix, tolerance);
+    permutation.inv_permute_columns(&mut r);
+    (q, r)
 }
 
 /// Returns the X with the smallest ‖M X − Y‖.
 pub(crate) fn least_squares(m: Matrix, y: &Matrix) -> Matrix {
-    let shape = (m.ncols(), y.ncols());
-    if shape.0 == 0 || shape.1 == 0 {
-        return Matrix::zeros(shape.0, shape.1);
+    let mut x = Matrix::zeros(m.ncols(), y.ncols());
+    let (q, r, permutation) = decomposed(m, 1e-12);
+    let rank = r.nrows();
+    let right = q.transpose() * y;
+    if let Some(solved) = r.columns(0, rank).solve_upper_triangular(&right) {
+        x.rows_mut(0, rank).copy_from(&solved);
     }
-    let svd = m.svd(true, true);
-    let smallest = 1e-12 * svd.singular_values.max();
-    svd.solve(y, smallest).unwrap_or_else(|_| Matrix::zeros(shape.0, shape.1))
+    permutation.inv_permute_rows(&mut x);
+    x
 }
 
 #[cfg(test)]

@@ -9,8 +9,6 @@ use crate::Matrix;
 use crate::replay::{Change, Recorded};
 use fmu_import::instance::{CallFailure, Instance};
 
-/// Change of an input in relation to its typical magnitude.
-const CHANGE: f64 = 1e-5;
 /// Share of the difference between the slopes to both sides that is left when the change is halved,
 /// above which there is an edge. A smooth unit leaves a half, one with an edge all of it.
 const FALLS: f64 = 0.75;
@@ -51,6 +49,8 @@ pub struct Probe<'a> {
     pub outputs: &'a [u32],
     /// Typical magnitudes of both.
     pub scales: &'a Scales,
+    /// Change of an input in relation to its typical magnitude.
+    pub change: f64,
 }
 
 impl Probe<'_> {
@@ -79,7 +79,8 @@ impl Probe<'_> {
                     (values[lag][row] - base[lag][row]) / (by * self.scales.outputs[row])
                 }))
             };
-            let [whole, half] = [CHANGE, 0.5 * CHANGE].map(|by| Ok([changed(by)?, changed(-by)?]));
+            let [whole, half] =
+                [self.change, 0.5 * self.change].map(|by| Ok([changed(by)?, changed(-by)?]));
             let ([more, less], [more_half, less_half]): ([Matrix; 2], [Matrix; 2]) =
                 (whole?, half?);
             let (mean, mean_half) = ((&more + &less) * 0.5, (&more_half + &less_half) * 0.5);

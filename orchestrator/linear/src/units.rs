@@ -24,11 +24,19 @@ const COMPARED: usize = 6;
 /// in relation to the least difference that any period leaves.
 const EQUAL: f64 = 1e-6;
 const AS_EQUAL: f64 = 3.0;
-/// Smallest singular value of a model, relative to the largest.
+/// Difference of two periods, relative to the largest response, from which nothing repeats itself,
+/// and from which it is told.
+const REPEATS: f64 = 0.1;
+const DRIFTS: f64 = 0.01;
+/// Changes of an input that are tried, in relation to its typical magnitude.
+const CHANGES: [f64; 2] = [1e-5, 1e-7];
+/// What a state of a model must add to the responses, relative to the largest.
 const SMALLEST: f64 = 1e-9;
 /// Difference between the derivatives of a unit and its response to a step, relative to the largest
-/// response of a variable, up to which they describe the unit.
-const DESCRIBED: f64 = 0.01;
+/// response of a variable, up to which they describe the unit: soon after the step, and over as many
+/// steps as an output may lag behind, in which the operating point moves.
+const DESCRIBED: f64 = 0.02;
+const AT_LENGTH: f64 = 0.2;
 
 /// Number of responses from which a delay is found.
 const FITTED: usize = 4;
@@ -138,23 +146,32 @@ impl Builder<'_> {
         };
         let references: Vec<u32> = self.outputs.iter().map(|port| port.reference).collect();
         let places = self.places();
-        let probe = Probe {
+        let probe = |change: f64| Probe {
             recorded: self.recorded,
             inputs: &places,
             outputs: &references,
             scales: &scales,
+            change,
         };
-        let short: Vec<Response> = (0..2 * longest)
-            .map(|first| probe.responses(instance, first, COMPARED))
-            .collect::<Result<_, _>>()?;
-        let period = period(&short, longest);
+        // A law that is not smooth wants a small change, and one that iterates a larger one.
+        let mut best: Option<(f64, usize, f64)> = None;
+        for change in CHANGES {
+            let short: Vec<Response> = (0..2 * longest)
+                .map(|first| probe(change).responses(instance, first, COMPARED))
+                .collect::<Result<_, _>>()?;
+            let (period, difference) = period(&short, longest);
+            if best.is_none_or(|(_, _, least)| difference < least) {
+                best = Some((change, period, difference));
+            }
+        }
+        let Some((change, period, _)) = best else { unreachable!("there are changes to try") };
         let blocks = BLOCKS.max(2 * period);
         let phases: Vec<Response> = (0..2 * period)
-            .map(|first| probe.responses(instance, first, 2 * blocks))
+            .map(|first| probe(change).responses(instance, first, 2 * blocks))
             .collect::<Result<_, _>>()?;
         let error = phases.iter().map(|phase| phase.error).fold(0.0, f64::max);
-        let drift = difference(&phases, period).max(error * 10.0);
-        let tolerance = SMALLEST.max(drift);
+        let drift = difference(&phases, period);
+        let tolerance = SMALLEST.max(drift).max(error * 10.0);
         let model = |lags: &dyn Fn(&Response) -> &Lags| {
             let lags: Vec<Lags> =
                 phases[..period].iter().map(|phase| lags(phase).clone()).collect();
@@ -169,10 +186,16 @@ impl Builder<'_> {
         let found = model(&|phase| &phase.central);
         let Dynamics::Sampled(steps) = &found.dynamics else { unreachable!("built above") };
         let states = steps.iter().map(|step| step.a.ncols()).max().unwrap_or(0);
-        let note = format!(
-            "{}: responses to changes of its inputs, a period of {period} steps of {} s, {states} states, tolerance {tolerance:.1e}",
+        let mut note = format!(
+            "{}: responses to changes of its inputs, which repeat after {period} steps of {} s, {states} states",
             found.name, self.recorded.length
         );
+        if drift > DRIFTS {
+            let share = 1e2 * drift;
+            note = format!(
+                "{note}; those of the next {period} differ by {share:.1} %, and states that count for less are left out"
+            );
+        }
         Ok(Found { model: found, sides: has_edge.then(|| [side(0), side(1)]), note })
     }
 
@@ -223,21 +246,32 @@ impl Builder<'_> {
         };
         let read: Vec<u32> = states_at.iter().chain(&outputs).copied().collect();
         let places = self.places();
-        let probe =
-            Probe { recorded: self.recorded, inputs: &places, outputs: &read, scales: &scales };
-        let response = probe.responses(instance, 0, 2 + longest_period(self.recorded.length))?;
+        let probe = Probe {
+            recorded: self.recorded,
+            inputs: &places,
+            outputs: &read,
+            scales: &scales,
+            change: CHANGES[0],
+        };
+        let response =
+            probe.responses(instance, 0, COMPARED + longest_period(self.recorded.length))?;
         if response.sides.is_some() {
             return Ok(None);
         }
         let (lags, length) = (&response.central, self.recorded.length);
-        let found = if describes(&found, lags, &scales, length) {
+        let at_once = lags.len().min(COMPARED);
+        let found = if describes(&found, &lags[..at_once], &scales, length, DESCRIBED)
+            && describes(&found, lags, &scales, length, AT_LENGTH)
+        {
             found
         } else {
-            delayed(found, lags, &scales, length)
+            let (found, whole) = delayed(found, lags, &scales, length);
+            let compared = lags.len().min(whole + COMPARED);
+            if !describes(&found, &lags[..compared], &scales, length, DESCRIBED) {
+                return Ok(None);
+            }
+            found
         };
-        if !describes(&found, lags, &scales, length) {
-            return Ok(None);
-        }
         let found = reduced(found, &states);
         let names = found.1.iter().map(|place| variables[states[*place]].name.clone()).collect();
         let note = format!(
@@ -254,7 +288,13 @@ impl Builder<'_> {
 
 /// Returns whether derivatives describe the responses of states and outputs to a change that is
 /// held for one step.
-fn describes(system: &Continuous, lags: &Lags, scales: &Scales, length: f64) -> bool {
+fn describes(
+    system: &Continuous,
+    lags: &[Matrix],
+    scales: &Scales,
+    length: f64,
+    accuracy: f64,
+) -> bool {
     let states = system.a.nrows();
     let expected: Lags = system
         .responses(length, lags.len())
@@ -272,15 +312,15 @@ fn describes(system: &Continuous, lags: &Lags, scales: &Scales, length: f64) -> 
     let differences: Lags = expected.iter().zip(lags).map(|(a, b)| a - b).collect();
     (0..lags[0].nrows()).all(|row| {
         let largest =
-            |lags: &Lags| lags.iter().map(|matrix| matrix.row(row).amax()).fold(0.0, f64::max);
-        largest(&differences) <= DESCRIBED * largest(lags) + 1e-9
+            |lags: &[Matrix]| lags.iter().map(|matrix| matrix.row(row).amax()).fold(0.0, f64::max);
+        largest(&differences) <= accuracy * largest(lags) + 1e-9
     })
 }
 
 /// Gives a system the delay and the matrix B of its responses, and no D. While an input has not
 /// acted yet, the unit's own derivatives by it are zero. With a trial of the delay, the responses
-/// are linear in B; the delay is the one with the least rest.
-fn delayed(system: Continuous, lags: &Lags, scales: &Scales, length: f64) -> Continuous {
+/// are linear in B; the delay is the one with the least rest. Returns the whole steps of it, too.
+fn delayed(system: Continuous, lags: &Lags, scales: &Scales, length: f64) -> (Continuous, usize) {
     let states = system.a.nrows();
     let state = |matrix: &Matrix| {
         Matrix::from_fn(states, matrix.ncols(), |row, column| {
@@ -289,7 +329,7 @@ fn delayed(system: Continuous, lags: &Lags, scales: &Scales, length: f64) -> Con
     };
     let largest = lags.iter().map(|matrix| matrix.rows(0, states).amax()).fold(0.0, f64::max);
     let begins = |matrix: &Matrix| matrix.rows(0, states).amax() > 1e-6 * largest;
-    let Some(whole) = lags.iter().position(begins) else { return system };
+    let Some(whole) = lags.iter().position(begins) else { return (system, 0) };
     let measured: Vec<Matrix> =
         lags[whole..].iter().take(FITTED).map(|matrix| weighted(state(matrix), scales)).collect();
     let measured = stacked(&measured);
@@ -317,7 +357,8 @@ fn delayed(system: Continuous, lags: &Lags, scales: &Scales, length: f64) -> Con
     let counts = (SMALLEST_PART..=1.0 - SMALLEST_PART).contains(&part);
     let part = if counts { part } else { part.round() };
     let d = Matrix::zeros(system.c.nrows(), lags[0].ncols());
-    Continuous { b: fit(part).0, d, delay: (whole as f64 + part) * length, ..system }
+    let delay = (whole as f64 + part) * length;
+    (Continuous { b: fit(part).0, d, delay, ..system }, whole)
 }
 
 /// Divides the states by their typical magnitudes.
@@ -374,13 +415,16 @@ fn difference(phases: &[Response], period: usize) -> f64 {
     differences.fold(0.0, f64::max) / largest
 }
 
-/// Finds the period after which the responses repeat, in steps.
-fn period(responses: &[Response], longest: usize) -> usize {
+/// Finds the period after which the responses repeat, in steps, and the difference that it leaves.
+fn period(responses: &[Response], longest: usize) -> (usize, f64) {
     let differences: Vec<f64> =
         (1..=longest).map(|period| difference(&responses[..longest + period], period)).collect();
     let least = differences.iter().copied().fold(f64::INFINITY, f64::min);
     let equal = EQUAL.max(AS_EQUAL * least);
-    differences.iter().position(|difference| *difference <= equal).map_or(1, |place| place + 1)
+    // Nothing repeats itself if the least difference is a large one.
+    let place = differences.iter().position(|difference| *difference <= equal);
+    let place = place.filter(|_| least < REPEATS).unwrap_or(0);
+    (place + 1, differences[place])
 }
 
 /// Converts a step in typical magnitudes to one in the units of the variables.

@@ -13,9 +13,11 @@ const FACTOR: f64 = 1.15;
 const LARGEST_GAIN: f64 = 1e3;
 /// Angle between the phases that are tried, deg.
 const TURN: f64 = 3.0;
-/// Parts of a step between the delays that are tried, and the longest delay in steps.
+/// Most parts of a step between the delays that are tried, and the longest delay in steps.
 const PARTS: f64 = 4.0;
 const LONGEST_DELAY: f64 = 200.0;
+/// Number of delays that are tried up to the one that the phase lets expect.
+const TRIALS: f64 = 8.0;
 /// Number of halvings after a change of stability is enclosed.
 const HALVINGS: usize = 40;
 
@@ -62,11 +64,16 @@ pub(super) fn classical(net: &Net, open: &OpenLoop, channel: Option<usize>) -> C
         let crossing = first(&|x| by_gain(direction * x), FACTOR.ln(), last, open.period)?;
         Some(Crossing { value: (direction * crossing.value).exp(), ..crossing })
     };
-    let delay = first(&by_delay, 1.0 / PARTS, LONGEST_DELAY, open.period);
+    let phase = first(&by_phase, TURN, 180.0, open.period);
+    // A delay turns the loop by its product with the frequency, which says where to look for it.
+    let expected = phase.map_or(0.0, |at| at.value.to_radians() / (at.frequency * step));
+    let trial = (expected / TRIALS).clamp(1.0 / PARTS, LONGEST_DELAY / TRIALS);
+    let trial = if takes_parts { trial } else { trial.ceil() };
+    let delay = first(&by_delay, trial, LONGEST_DELAY, open.period);
     Classical {
         gain_above: gain(1.0),
         gain_below: gain(-1.0),
-        phase: first(&by_phase, TURN, 180.0, open.period),
+        phase,
         delay: delay.map(|found| Crossing { value: whole(found.value) * step, ..found }),
     }
 }
