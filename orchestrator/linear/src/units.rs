@@ -29,7 +29,7 @@ const AS_EQUAL: f64 = 3.0;
 const REPEATS: f64 = 0.1;
 const DRIFTS: f64 = 0.01;
 /// Changes of an input that are tried, in relation to its typical magnitude.
-const CHANGES: [f64; 2] = [1e-5, 1e-7];
+const CHANGES: [f64; 3] = [1e-5, 1e-7, 1e-9];
 /// What a state of a model must add to the responses, relative to the largest.
 const SMALLEST: f64 = 1e-9;
 /// Difference between the derivatives of a unit and its response to a step, relative to the largest
@@ -160,8 +160,9 @@ impl Builder<'_> {
                 .map(|first| probe(change).responses(instance, first, COMPARED))
                 .collect::<Result<_, _>>()?;
             let (period, difference) = period(&short, longest);
-            if best.is_none_or(|(_, _, least)| difference < least) {
-                best = Some((change, period, difference));
+            let worst = short.iter().map(|response| response.error).fold(difference, f64::max);
+            if best.is_none_or(|(_, _, least)| worst < least) {
+                best = Some((change, period, worst));
             }
         }
         let Some((change, period, _)) = best else { unreachable!("there are changes to try") };

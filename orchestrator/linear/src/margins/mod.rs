@@ -63,3 +63,6 @@ pub fn margins(net: &Net, open: &OpenLoop) -> Margins {
     let together = (all.len() > 1).then(|| of("all together".into(), &all, None));
     Margins { stable, spectral_radius: radius, loops, together }
 }
+
+#[cfg(test)]
+mod tests;
