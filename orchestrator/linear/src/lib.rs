@@ -8,6 +8,7 @@
 //! The loop is opened at named signals. [`margins`] says how far it is from instability there.
 
 pub mod continuous;
+mod fitting;
 pub mod linearise;
 pub mod margins;
 pub mod model;

@@ -11,8 +11,8 @@ use crate::model::Step;
 use crate::responses::Lags;
 
 /// Returns a model of each step of a period. `phases` are the responses to changes at each step,
-/// for `2 blocks` lags each. States that add less than `tolerance` to them, relative to the largest,
-/// are left out.
+/// for `2 blocks` lags each. States that add less than `tolerance` to them, relative to the
+/// largest, are left out.
 pub fn realise(phases: &[Lags], blocks: usize, tolerance: f64) -> Vec<Step> {
     let period = phases.len();
     let (outputs, inputs) = phases[0][0].shape();

@@ -3,7 +3,8 @@
 `fmu` gives the path of an FMU for FMPy or any other importer, `ClosedLoop` connects a controller in
 Python to the vehicle, and `experiment` runs a paper's experiment and returns its table. `campaign`
 flies thousands of cases of an experiment, on this machine or on a cluster (`reentry_fmus.cluster`),
-and `falsify` looks for the worst case. `reproduce` runs a paper's comparison and judges its claims.
+and `falsify` looks for the worst case. `linearise` gives the linear model of a loop, and `margins`
+its stability margins. `reproduce` runs a paper's comparison and judges its claims.
 Quantities are in SI units and radians unless `units="deg"` selects degrees.
 """
 
@@ -11,6 +12,7 @@ from ._campaign import Campaign, Flown, Search, campaign, falsify
 from ._data import experiments, fmu, fmus
 from ._experiment import Figure, OrchestratorError, OrchestratorWarning, Run, experiment
 from ._instance import InstanceError, InstanceWarning
+from ._linear import OpenLoop, linearise, margins
 from ._loop import ClosedLoop, State
 from ._study import Study, reproduce
 
@@ -21,6 +23,7 @@ __all__ = [
     "Flown",
     "InstanceError",
     "InstanceWarning",
+    "OpenLoop",
     "OrchestratorError",
     "OrchestratorWarning",
     "Run",
@@ -33,5 +36,7 @@ __all__ = [
     "falsify",
     "fmu",
     "fmus",
+    "linearise",
+    "margins",
     "reproduce",
 ]

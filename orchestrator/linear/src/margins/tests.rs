@@ -23,8 +23,8 @@ fn unit(name: &str, ports: [usize; 2], every: u64, dynamics: Dynamics) -> Unit {
     Unit { name: name.into(), every, first: 0, inputs, outputs, states: Vec::new(), dynamics }
 }
 
-/// Double integrators ẍ = u, each under u = −k x − c ẋ that is sampled at every step of the law. The
-/// plant makes `per_step` communication steps meanwhile, and its input acts after `delay` (s).
+/// Double integrators ẍ = u, each under u = −k x − c ẋ that is sampled at every step of the law.
+/// The plant makes `per_step` communication steps meanwhile, and its input acts after `delay` (s).
 fn double_integrators(axes: usize, delay: f64, per_step: u64) -> Net {
     let (none, one) = (Matrix::zeros(axes, axes), Matrix::identity(axes, axes));
     let stacked = |rows: [[&Matrix; 2]; 2]| {

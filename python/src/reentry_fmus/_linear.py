@@ -1,0 +1,211 @@
+"""Linear models of loops, and their stability margins: the orchestrator is run, and its answer is
+read."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+import pandas as pd
+
+from ._data import FMUS, experiment_path, fmu_path
+from ._experiment import OrchestratorError, Value, orchestrate, written
+
+if TYPE_CHECKING:
+    import control
+
+Matrix = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class OpenLoop:
+    """The open loop of an experiment over one common period of its units, x⁺ = A x + B u,
+    y = C x + D u: from what is put in at the opened signals to what arrives there. The loop is
+    closed by u = y, so that the return ratio is the negative of this system."""
+
+    a: Matrix
+    b: Matrix
+    c: Matrix
+    d: Matrix
+    period: float
+    """Length of the period, s."""
+    samples: int
+    """Number of samples in a period. Inputs and outputs are all signals at the first sample, then
+    all at the second, and so on."""
+    signals: list[str]
+    """Names of the opened signals."""
+    units: list[str]
+    """Their units."""
+    states: list[str]
+    """Names of the states."""
+    time: float
+    """Time of the run at which it was linearised, s."""
+    notes: list[str]
+    """How the model of each unit was found."""
+    sides: tuple[OpenLoop, OpenLoop] | None
+    """The loop for increases and for decreases of every input, where a unit has no derivative."""
+
+    def statespace(self) -> control.StateSpace:
+        """The open loop for python-control, which must be installed."""
+        import control
+
+        names = [
+            name if self.samples == 1 else f"{name}[{sample}]"
+            for sample in range(self.samples)
+            for name in self.signals
+        ]
+        return control.ss(
+            self.a,
+            self.b,
+            self.c,
+            self.d,
+            self.period,
+            inputs=[name.replace(".", "_") for name in names],
+            outputs=[name.replace(".", "_") + "_back" for name in names],
+            states=[name.replace(".", "_") for name in self.states],
+        )
+
+
+def linearise(
+    name: str | os.PathLike[str],
+    at: float,
+    open: str | Sequence[str],
+    set: Mapping[str, Value] | None = None,
+    *,
+    fmu: Mapping[str, str | os.PathLike[str]] | None = None,
+    step: float | None = None,
+) -> OpenLoop:
+    """Linearises an experiment at an instant of its run.
+
+    >>> loop = linearise("lqr", at=10.0, open="plant.moment.*")
+    >>> loop.a.shape, loop.period, loop.signals[0]
+    ((6, 6), 0.04, 'plant.moment.x')
+
+    Args:
+        name: An experiment of `experiments()`, or the path of an experiment file (TOML).
+        at: Time of the run, s.
+        open: Signals at which the loop is opened: connected inputs or outputs.
+        set: Parameters by component.parameter.
+        fmu: FMUs that replace those of components.
+        step: Length of the communication step, s.
+
+    Raises:
+        OrchestratorError: The experiment was refused, or its run failed.
+    """
+    found = answer(["linearise"], name, at, open, set, fmu, step)
+    sides = found.get("sides")
+    return open_loop(
+        found,
+        found,
+        (open_loop(sides["increases"], found), open_loop(sides["decreases"], found))
+        if sides
+        else None,
+    )
+
+
+def margins(
+    name: str | os.PathLike[str],
+    at: float,
+    open: str | Sequence[str],
+    set: Mapping[str, Value] | None = None,
+    *,
+    fmu: Mapping[str, str | os.PathLike[str]] | None = None,
+    step: float | None = None,
+) -> pd.DataFrame:
+    """Computes the stability margins of an experiment at an instant of its run.
+
+    >>> table = margins("lqr", at=10.0, open="plant.moment.*", set={"plant.disturbance.kind": "none"})
+    >>> round(table.loc["all together", "disk"], 2)
+    1.35
+
+    Args:
+        name: An experiment of `experiments()`, or the path of an experiment file (TOML).
+        at: Time of the run, s.
+        open: Signals at which the loop is opened: connected inputs or outputs.
+        set: Parameters by component.parameter.
+        fmu: FMUs that replace those of components.
+        step: Length of the communication step, s.
+
+    Returns:
+        One row for each signal, with the loops of the others closed, and one for all together:
+        factors of the gain, phase lag (deg) and delay (s) at which the loop becomes unstable, the
+        radius of the disk margin with its frequency (rad/s), and the largest magnitude of the
+        sensitivity. What has no limit is not a number. The table is empty if the loop is unstable;
+        `attrs` has "stable", "spectral_radius", "period", "notes", and "sides" with the answers for
+        increases and decreases where a unit has no derivative.
+
+    Raises:
+        OrchestratorError: The experiment was refused, or its run failed.
+    """
+    found = answer(["margins", "--json"], name, at, open, set, fmu, step)
+    rows = found["loops"] + ([found["together"]] if found["together"] else [])
+
+    def value(crossing: dict[str, float] | None) -> float:
+        return crossing["value"] if crossing else float("nan")
+
+    table = pd.DataFrame(
+        {
+            "gain_below": [value(row["classical"]["gain_below"]) for row in rows],
+            "gain_above": [value(row["classical"]["gain_above"]) for row in rows],
+            "phase": [value(row["classical"]["phase"]) for row in rows],
+            "delay": [value(row["classical"]["delay"]) for row in rows],
+            "disk": [row["disk"]["alpha"] for row in rows],
+            "disk_frequency": [row["disk"]["frequency"] for row in rows],
+            "sensitivity": [row["sensitivity"]["value"] for row in rows],
+        },
+        index=pd.Index([row["signal"] for row in rows], name="signal"),
+    )
+    kept = ("stable", "spectral_radius", "period", "notes", "sides")
+    table.attrs.update({key: found[key] for key in kept if key in found})
+    return table
+
+
+def answer(
+    command: list[str],
+    name: str | os.PathLike[str],
+    at: float,
+    open: str | Sequence[str],
+    set: Mapping[str, Value] | None,
+    fmu: Mapping[str, str | os.PathLike[str]] | None,
+    step: float | None,
+) -> dict[str, Any]:
+    """The orchestrator's answer."""
+    arguments = [*command, experiment_path(name), "--at", repr(float(at)), "--fmu-dir", str(FMUS)]
+    for signal in [open] if isinstance(open, str) else open:
+        arguments += ["--open", signal]
+    for component, replacement in (fmu or {}).items():
+        arguments += ["--fmu", f"{component}={fmu_path(replacement)}"]
+    for parameter, value in (set or {}).items():
+        arguments += ["--set", f"{parameter}={written(parameter, value)}"]
+    if step is not None:
+        arguments += ["--step", repr(float(step))]
+    exit_code, error, text = orchestrate(arguments, 4)
+    if exit_code != 0:
+        raise OrchestratorError(error, exit_code, None)
+    found: dict[str, Any] = json.loads(text)
+    return found
+
+
+def open_loop(
+    model: dict[str, Any], whole: dict[str, Any], sides: tuple[OpenLoop, OpenLoop] | None = None
+) -> OpenLoop:
+    """Reads one model of an answer."""
+    states, ports = len(model["states"]), model["samples"] * len(model["signals"])
+    shapes = {"a": (states, states), "b": (states, ports), "c": (ports, states), "d": (ports, ports)}
+    matrices = {key: np.array(model[key], float).reshape(shape) for key, shape in shapes.items()}
+    return OpenLoop(
+        **matrices,
+        period=model["period"],
+        samples=model["samples"],
+        signals=[signal["name"] for signal in model["signals"]],
+        units=[signal["unit"] for signal in model["signals"]],
+        states=model["states"],
+        time=whole["time"],
+        notes=whole["notes"],
+        sides=sides,
+    )
