@@ -520,6 +520,17 @@ def test_every_controller_turns_the_bank_angle(tmp_path):
     assert differences(tmp_path / "out") == []
 
 
+def test_every_controller_has_its_margins(tmp_path):
+    results = reproduced("margins", tmp_path)
+    assert len(results["runs"]) == 63
+    assert [claim["verdict"] for claim in results["claims"]] == [HOLDS, HOLDS]
+    [member] = results["runs"]["late-lqr"]["members"]
+    # What a delay takes, the delay margin loses.
+    [ideal] = results["runs"]["ideal-lqr"]["members"]
+    assert ideal["metrics"]["margin_delay_s"] - member["metrics"]["margin_delay_s"] == pytest.approx(0.04, abs=1e-6)
+    assert differences(tmp_path / "out") == []
+
+
 def test_every_controller_flies_an_entry(tmp_path):
     results = reproduced("entry", tmp_path)
     assert len(results["runs"]) == 27

@@ -5,11 +5,14 @@ use crate::failure::Failure;
 use crate::run;
 use clap::Args;
 use cosim::error::Error;
+use cosim::experiment::Margins;
 use cosim::interrupt::Interrupt;
 use cosim::search;
+use cosim::system::System;
 use fmu_import::quantity::rounded;
 use linear::linearise::Linearised;
 use linear::margins::{Crossing, LoopMargins};
+use linear::measures::Measured;
 use linear::model::{OpenLoop, Step};
 use linear::{Matrix, margins as analysis};
 use serde_json::{Value, json};
@@ -22,12 +25,13 @@ use std::path::PathBuf;
 struct Instant {
     /// Experiment: a file, an SSP archive, or the name of an experiment that `list` shows.
     experiment: PathBuf,
-    /// Time of the run at which it is linearised, s.
+    /// Time of the run at which it is linearised, s [default: what the experiment's
+    /// [observe.margins] says].
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
-    at: f64,
+    at: Option<f64>,
     /// Signals at which the loop is opened: connected inputs or outputs, as `plant.moment.*`. The
-    /// option may be given several times.
-    #[arg(long, value_name = "SIGNAL", required = true)]
+    /// option may be given several times [default: those of [observe.margins]].
+    #[arg(long, value_name = "SIGNAL")]
     open: Vec<String>,
     /// Also look for FMUs in this folder, besides the folder of the experiment and target/fmu. The
     /// option may be given several times.
@@ -41,7 +45,20 @@ impl Instant {
     fn linearise(&self, interrupt: &Interrupt) -> Result<Linearised, Failure> {
         let path = search::experiment(&self.experiment)?;
         let (system, _) = run::system(&path, &self.overrides.clone().into(), &self.fmu_dir)?;
-        Ok(linear::linearise::linearise(system, self.at, &self.open, interrupt)?)
+        let asked = system.experiment.observe.margins.clone();
+        let missing = |option: &str| {
+            let problem = format!(
+                "{option} is missing: the experiment has no [observe.margins] that says it"
+            );
+            Error::experiment(problem)
+        };
+        let at = self.at.or(asked.as_ref().map(|asked| asked.at));
+        let at = at.ok_or_else(|| missing("--at SECONDS"))?;
+        let mut open = self.open.clone();
+        if open.is_empty() {
+            open = asked.ok_or_else(|| missing("--open SIGNAL"))?.open;
+        }
+        Ok(linear::linearise::linearise(system, at, &open, interrupt)?)
     }
 }
 
@@ -57,7 +74,7 @@ pub(crate) struct Linearise {
 
 /// Arguments of `margins`.
 #[derive(Args)]
-pub(crate) struct Margins {
+pub(crate) struct PrintMargins {
     #[command(flatten)]
     instant: Instant,
     /// Print JSON, for other programs.
@@ -87,6 +104,15 @@ pub(crate) fn linearise(
     Ok(())
 }
 
+/// Computes the margins that a system's experiment asks for, as metrics.
+pub(crate) fn measured(system: &System, interrupt: &Interrupt) -> Result<Measured, Error> {
+    let Some(Margins { at, open }) = &system.experiment.observe.margins else {
+        return Ok(Measured::new());
+    };
+    let found = linear::linearise::linearise(system.clone(), *at, open, interrupt)?;
+    Ok(linear::measures::measure(&found))
+}
+
 fn model(open: &OpenLoop) -> Value {
     let Step { a, b, c, d } = &open.step;
     let rows = |matrix: &Matrix| -> Vec<Vec<f64>> {
@@ -103,7 +129,7 @@ fn model(open: &OpenLoop) -> Value {
 
 /// Prints the margins of an experiment.
 pub(crate) fn margins(
-    asked: &Margins,
+    asked: &PrintMargins,
     out: &mut impl Write,
     interrupt: &Interrupt,
 ) -> Result<(), Failure> {

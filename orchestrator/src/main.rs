@@ -143,7 +143,7 @@ enum Command {
     Linearise(linear::Linearise),
     /// Print the stability margins of an experiment at an instant of its run: gain, phase and delay
     /// of each signal, disk margins of each and of all together.
-    Margins(linear::Margins),
+    Margins(linear::PrintMargins),
     /// Write an experiment as an SSP archive (System Structure and Parameterization 1.0), FMUs
     /// included.
     Pack {

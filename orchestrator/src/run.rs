@@ -3,6 +3,7 @@
 
 use crate::arguments::choice;
 use crate::failure::Failure;
+use crate::linear;
 use crate::live::{self, Live, scene::Scene};
 use crate::summary::{self, RunReport};
 use cosim::check::check;
@@ -124,6 +125,26 @@ pub(crate) fn system(
     Ok((check(experiment, fmu_dirs, &mut Opened::default())?, None))
 }
 
+/// Returns why a run ended early, if its results are those of a run.
+///
+/// # Errors
+/// Returns the failure of a run; its results so far are in the folder `out`.
+fn early(outcome: Result<(), Error>, out: &Path) -> Result<Option<Error>, Error> {
+    match outcome {
+        Ok(()) => Ok(None),
+        Err(
+            error @ (Error::Deadline { .. }
+            | Error::Interrupted { .. }
+            | Error::EndedByInstance { .. }
+            | Error::Lost { .. }),
+        ) => Ok(Some(error)),
+        Err(error) => {
+            tracing::warn!("the results up to this failure are in {}", out.display());
+            Err(error)
+        }
+    }
+}
+
 /// Returns an error if a run ended early for a reason that is a failure.
 fn ended(reason: Option<Error>, quiet: bool) -> Result<(), Failure> {
     match reason {
@@ -226,6 +247,9 @@ fn record(system: &mut System, options: &Options) -> Result<RunReport, Failure> 
         loop_delay_s: system.loop_delay(),
         ..meters.metrics()
     };
+    if outcome.is_ok() {
+        metrics.asked.extend(linear::measured(system, &options.interrupt)?);
+    }
     if let Some(pacer) = master.take_pacer() {
         let (mut real_time, wake_ups, steps) = pacer.report();
         real_time.priority = priority;
@@ -239,19 +263,7 @@ fn record(system: &mut System, options: &Options) -> Result<RunReport, Failure> 
     if !options.files.no_plot && curves.draw(&out.join("plot.svg"), &title)? {
         files.push("plot.svg");
     }
-    let ended = match outcome {
-        Ok(()) => None,
-        Err(
-            error @ (Error::Deadline { .. }
-            | Error::Interrupted { .. }
-            | Error::EndedByInstance { .. }
-            | Error::Lost { .. }),
-        ) => Some(error),
-        Err(error) => {
-            tracing::warn!("the results up to this failure are in {}", out.display());
-            return Err(error.into());
-        }
-    };
+    let ended = early(outcome, &out)?;
     let end = master.end().map(String::from);
     Ok(RunReport { metrics, out, files, ended, end })
 }

@@ -295,7 +295,7 @@ ClosedLoop().run(1.0, lambda state: state.atitude)
     package = [*mypy, "--package", "reentry_fmus", "--config-file", tmp_path / "mypy.ini"]
     missing = "".join(
         f"[mypy-{name}.*]\nignore_missing_imports = true\n"
-        for name in ("fmpy", "fsspec", "pyarrow", "distributed")
+        for name in ("control", "fmpy", "fsspec", "pyarrow", "distributed")
     )
     (tmp_path / "mypy.ini").write_text(f"[mypy]\n{missing}follow_imports = skip\n")
     whole = subprocess.run(package, cwd=tmp_path, capture_output=True, text=True)

@@ -32,7 +32,7 @@ def test_margins_are_a_table():
 
 
 def test_a_loop_that_is_unstable_has_no_rows():
-    table = margins("lqr", at=1.0, open=OPEN, set={**QUIET, "plant.inertia.scale": 0.05})
+    table = margins("lqr", at=1.0, open=OPEN, set={**QUIET, "plant.actuation.delay": 0.45})
     assert not table.attrs["stable"] and table.empty and table.attrs["spectral_radius"] > 1.0
 
 

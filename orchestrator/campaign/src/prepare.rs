@@ -3,7 +3,7 @@
 use crate::changes::Changes;
 use crate::definition::Campaign;
 use cosim::error::Error;
-use cosim::experiment::{self, Experiment, Observe, Overrides, Protection};
+use cosim::experiment::{self, Experiment, Margins, Observe, Overrides, Protection};
 use cosim::files;
 use cosim::search;
 use cosim_report::metrics::{Meters, Metrics};
@@ -12,6 +12,7 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 use sweep::vary::DesignKind;
+use toml::Spanned;
 
 /// A number that is recorded of each case.
 #[derive(Clone, Debug, PartialEq)]
@@ -88,13 +89,17 @@ pub(crate) fn observe(campaign: &Campaign, experiment: &Observe) -> Result<Obser
     for measure in metrics.values_mut() {
         measure.limit = None;
     }
-    let asks_guarantee =
-        campaign.metrics.iter().any(|name| !experiment.metrics.contains_key(name.get_ref()));
+    // What no measure of the experiment computes is a metric of its guarantee or of its margins.
+    let others = campaign.metrics.iter().map(Spanned::get_ref);
+    let others = others.filter(|name| !experiment.metrics.contains_key(*name));
+    let (of_margins, of_guarantee): (Vec<&String>, Vec<&String>) =
+        others.partition(|name| Margins::is_metric(name));
     Ok(Observe {
         signals,
         metrics,
         summary: Vec::new(),
-        guarantee: experiment.guarantee.clone().filter(|_| asks_guarantee),
+        guarantee: experiment.guarantee.clone().filter(|_| !of_guarantee.is_empty()),
+        margins: experiment.margins.clone().filter(|_| !of_margins.is_empty()),
         loss: experiment.loss.clone(),
         panels: experiment.panels.clone(),
         readings: BTreeMap::new(),
@@ -108,7 +113,7 @@ pub(crate) fn recorded(campaign: &Campaign, observe: &Observe, meters: &Meters) 
     let names = names.chain(campaign.measures.iter().map(|measure| measure.id.clone()));
     names
         .map(|name| Recorded {
-            unit: units.get(&name).cloned().unwrap_or_default(),
+            unit: units.get(&name).cloned().or_else(|| Margins::unit(&name)).unwrap_or_default(),
             is_never: observe.metrics.get(&name).is_some_and(|measure| {
                 matches!(
                     measure.kind,

@@ -27,6 +27,7 @@ pub type Opened = BTreeMap<PathBuf, Rc<Fmu>>;
 pub type Parameters = BTreeMap<String, BTreeMap<String, Value>>;
 
 /// The components of an experiment with their connections, as [`crate::check::check`] creates them.
+#[derive(Clone)]
 pub struct System {
     /// The experiment that the system was made from.
     pub experiment: Experiment,
@@ -43,6 +44,7 @@ pub struct System {
 }
 
 /// A component of an experiment whose FMU is opened and whose names are looked up.
+#[derive(Clone)]
 pub struct CheckedComponent {
     /// Name of the component in the experiment.
     pub name: String,

@@ -7,8 +7,8 @@ use crate::realisation::least_squares;
 use crate::responses::{Lags, Scales};
 
 /// Difference between the derivatives of a unit and its response to a step, relative to the largest
-/// response of a variable, up to which they describe the unit: soon after the step, and over as many
-/// steps as an output may lag behind, in which the operating point moves.
+/// response of a variable, up to which they describe the unit: soon after the step, and over as
+/// many steps as an output may lag behind, in which the operating point moves.
 pub(crate) const DESCRIBED: f64 = 0.02;
 pub(crate) const AT_LENGTH: f64 = 0.2;
 /// Number of responses from which a delay is found.

@@ -11,6 +11,7 @@ pub mod continuous;
 mod fitting;
 pub mod linearise;
 pub mod margins;
+pub mod measures;
 pub mod model;
 pub mod propagation;
 pub mod realisation;

@@ -35,6 +35,7 @@ struct Wired {
     component: usize,
     /// Number of communication steps in one of its steps.
     every: u64,
+    /// Its inputs, of which nothing is recorded yet.
     recorded: Recorded,
     /// Places of the recorded inputs among a sample's values.
     places: Vec<usize>,
@@ -43,86 +44,129 @@ struct Wired {
     outputs: Vec<Port>,
 }
 
+/// Linearises runs of a system at one instant.
+pub struct Lineariser {
+    system: System,
+    time: f64,
+    /// Communication points at which units keep their states and their inputs are recorded.
+    ticks: Range<u64>,
+    units: Vec<Wired>,
+    signals: Vec<Signal>,
+    links: Vec<Link>,
+}
+
 /// Linearises an experiment at `time` (s), with the loop opened at signals that are named as
 /// `component.variable` or `component.prefix.*`: connected inputs, or outputs with all their
 /// connections.
 ///
 /// # Errors
-/// Returns an error if the time is not a communication point, if a signal is not connected, if an
-/// instance fails or keeps no states, or if the run was asked to end.
+/// Returns the errors of [`Lineariser::new`] and [`Lineariser::linearise`].
 pub fn linearise(
-    mut system: System,
+    system: System,
     time: f64,
     open: &[String],
     interrupt: &Interrupt,
 ) -> Result<Linearised, Error> {
-    let first = tick_at(&system.clock, time)?;
-    let time = system.clock.time(first);
-    if let Some(isolated) = system.components.iter().find(|component| component.is_isolated) {
-        return Err(Error::experiment(format!(
-            "the instance of {} is in a process of its own, where it keeps no states: --isolate=false puts it into this one",
-            isolated.name
-        )));
-    }
-    let (signals, opened) = opened(&system, open)?;
-    let mut units = wired(&mut system, first)?;
-    let needed =
-        |unit: &Wired| unit.first + unit.every * (needed_steps(unit.recorded.length) as u64 + 1);
-    let last = units.iter().map(needed).max().unwrap_or(first + 1);
-    let (start, step) = (system.clock.start(), system.clock.step());
-    system.clock =
-        Clock::new(start, start + last as f64 * step, step).map_err(Error::experiment)?;
-
+    let lineariser = Lineariser::new(system, time, open)?;
     let collection = warnings::collect();
-    let mut master = record(&system, &mut units, first..last, interrupt)?;
+    let mut master = lineariser.system.start(interrupt)?;
+    let found = lineariser.linearise(&mut master, interrupt);
     drop(collection);
-    let _silence = warnings::silence();
-    let mut found: Vec<Found> = Vec::new();
-    for unit in &units {
-        if let Some(request) = interrupt.asked() {
-            return Err(Error::Interrupted { time, request });
+    found
+}
+
+impl Lineariser {
+    /// Prepares a system to be linearised at `time` (s), with the loop opened at these signals.
+    ///
+    /// # Errors
+    /// Returns an error if the time is not a communication point, if a signal is not connected, or
+    /// if an instance has a process of its own.
+    pub fn new(mut system: System, time: f64, open: &[String]) -> Result<Self, Error> {
+        let first = tick_at(&system.clock, time)?;
+        let time = system.clock.time(first);
+        if let Some(isolated) = system.components.iter().find(|component| component.is_isolated) {
+            return Err(Error::experiment(format!(
+                "the instance of {} is in a process of its own, where it keeps no states: --isolate=false puts it into this one",
+                isolated.name
+            )));
         }
-        let builder = Builder {
-            system: &system,
-            component: unit.component,
-            first: unit.first,
-            recorded: &unit.recorded,
-            inputs: unit.inputs.clone(),
-            outputs: unit.outputs.clone(),
+        let (signals, opened) = opened(&system, open)?;
+        let units = wired(&mut system, first)?;
+        let links = links(&system, &units, &opened);
+        for (channel, signal) in signals.iter().enumerate() {
+            if !links.iter().any(|link| link.opened == Some(channel)) {
+                let problem =
+                    format!("--open {}: no unit that responds gives this signal", signal.name);
+                return Err(Error::experiment(problem));
+            }
+        }
+        let needed = |unit: &Wired| {
+            unit.first + unit.every * (needed_steps(unit.recorded.length) as u64 + 1)
         };
-        found.push(master.call(unit.component, time, |instance| builder.find(instance))?);
+        let last = units.iter().map(needed).max().unwrap_or(first + 1);
+        let (start, step) = (system.clock.start(), system.clock.step());
+        system.clock =
+            Clock::new(start, start + last as f64 * step, step).map_err(Error::experiment)?;
+        Ok(Self { system, time, ticks: first..last, units, signals, links })
     }
-    let links = links(&system, &units, &opened);
-    for (channel, signal) in signals.iter().enumerate() {
-        if !links.iter().any(|link| link.opened == Some(channel)) {
-            let problem =
-                format!("--open {}: no unit that responds gives this signal", signal.name);
-            return Err(Error::experiment(problem));
+
+    /// Returns the system, from which masters are started.
+    pub fn system(&self) -> &System {
+        &self.system
+    }
+
+    /// Linearises a run of the system, given its master after initialisation.
+    ///
+    /// # Errors
+    /// Returns an error if an instance fails or keeps no states, if nothing comes back of what is
+    /// put in at the opened signals, or if the run was asked to end.
+    pub fn linearise(
+        &self,
+        master: &mut Master,
+        interrupt: &Interrupt,
+    ) -> Result<Linearised, Error> {
+        let Self { system, time, ticks, units, signals, links } = self;
+        let recorded = record(system, units, ticks.clone(), master)?;
+        let _silence = warnings::silence();
+        let mut found: Vec<Found> = Vec::new();
+        for (unit, recorded) in units.iter().zip(&recorded) {
+            if let Some(request) = interrupt.asked() {
+                return Err(Error::Interrupted { time: *time, request });
+            }
+            let builder = Builder {
+                system,
+                component: unit.component,
+                first: unit.first,
+                recorded,
+                inputs: unit.inputs.clone(),
+                outputs: unit.outputs.clone(),
+            };
+            found.push(master.call(unit.component, *time, |instance| builder.find(instance))?);
         }
+        let net = |of: &dyn Fn(&Found) -> Unit| Net {
+            units: found.iter().map(of).collect(),
+            links: links.clone(),
+            coupling: system.experiment.simulation.coupling,
+            first: ticks.start,
+            length: system.clock.step(),
+            signals: signals.clone(),
+        };
+        let side = |side: usize| {
+            net(&|found| found.sides.as_ref().map_or(&found.model, |sides| &sides[side]).clone())
+        };
+        let has_edge = found.iter().any(|found| found.sides.is_some());
+        let sides = has_edge.then(|| [side(0), side(1)]);
+        let net = net(&|found| found.model.clone());
+        let open = net.open();
+        if open.step.b.amax().max(open.step.d.amax()) == 0.0 || open.step.c.amax() == 0.0 {
+            return Err(Error::experiment(format!(
+                "at t = {time} s nothing comes back of what is put in at {}: a unit may round its outputs, or hold them",
+                open.signals[0].name
+            )));
+        }
+        let notes = found.into_iter().map(|found| found.note).collect();
+        Ok(Linearised { time: *time, net, sides, open, notes })
     }
-    let net = |of: &dyn Fn(&Found) -> Unit| Net {
-        units: found.iter().map(of).collect(),
-        links: links.clone(),
-        coupling: system.experiment.simulation.coupling,
-        first,
-        length: system.clock.step(),
-        signals: signals.clone(),
-    };
-    let side = |side: usize| {
-        net(&|found| found.sides.as_ref().map_or(&found.model, |sides| &sides[side]).clone())
-    };
-    let has_edge = found.iter().any(|found| found.sides.is_some());
-    let sides = has_edge.then(|| [side(0), side(1)]);
-    let net = net(&|found| found.model.clone());
-    let open = net.open();
-    if open.step.b.amax().max(open.step.d.amax()) == 0.0 || open.step.c.amax() == 0.0 {
-        return Err(Error::experiment(format!(
-            "at t = {time} s nothing comes back of what is put in at {}: a unit may round its outputs, or hold them",
-            open.signals[0].name
-        )));
-    }
-    let notes = found.into_iter().map(|found| found.note).collect();
-    Ok(Linearised { time, net, sides, open, notes })
 }
 
 /// Finds the units that respond to others. The inputs of each are seen at every communication
@@ -164,31 +208,32 @@ fn wired(system: &mut System, first: u64) -> Result<Vec<Wired>, Error> {
     Ok(units)
 }
 
-/// Runs the experiment to the end of some communication points, at whose beginning every unit keeps
-/// its state, and records the units' inputs at them.
+/// Runs to the end of some communication points, at whose beginning every unit keeps its state.
+/// Returns the units' inputs at them.
 fn record(
     system: &System,
-    units: &mut [Wired],
+    units: &[Wired],
     ticks: Range<u64>,
-    interrupt: &Interrupt,
-) -> Result<Master, Error> {
-    let mut master = system.start(interrupt)?;
+    master: &mut Master,
+) -> Result<Vec<Recorded>, Error> {
     for tick in 0..ticks.start {
         master.advance(tick)?;
     }
     let time = system.clock.time(ticks.start);
-    for unit in units.iter() {
+    for unit in units {
         master.call(unit.component, time, |instance| instance.save(0))?;
     }
+    let mut all: Vec<Recorded> = units.iter().map(|unit| unit.recorded.clone()).collect();
     for tick in ticks {
         let values = master.advance(tick)?;
-        for unit in units.iter_mut().filter(|unit| tick.is_multiple_of(unit.every)) {
-            let row = unit.places.iter().map(|place| values[*place]).collect();
-            unit.recorded.rows.push(row);
-            unit.recorded.times.push(system.clock.time(tick));
+        for (unit, recorded) in units.iter().zip(&mut all) {
+            if tick.is_multiple_of(unit.every) {
+                recorded.rows.push(unit.places.iter().map(|place| values[*place]).collect());
+                recorded.times.push(system.clock.time(tick));
+            }
         }
     }
-    Ok(master)
+    Ok(all)
 }
 
 /// Finds the connections between the units.

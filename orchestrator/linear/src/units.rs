@@ -145,6 +145,7 @@ impl Builder<'_> {
         };
         // A law that is not smooth wants a small change, and one that iterates a larger one.
         let mut best: Option<(f64, usize, f64)> = None;
+        let mut trials: Vec<Response> = Vec::new();
         for change in CHANGES {
             let short: Vec<Response> = (0..2 * longest)
                 .map(|first| probe(change).responses(instance, first, COMPARED))
@@ -154,7 +155,10 @@ impl Builder<'_> {
             if best.is_none_or(|(_, _, least)| worst < least) {
                 best = Some((change, period, worst));
             }
+            trials.extend(short.into_iter().next());
         }
+        // The same response with every size of the change, if the unit is smooth.
+        let depends = trials.windows(2).map(|pair| difference(pair, 1)).fold(0.0, f64::max);
         let Some((change, period, _)) = best else { unreachable!("there are changes to try") };
         let blocks = BLOCKS.max(2 * period);
         let phases: Vec<Response> = (0..2 * period)
@@ -185,6 +189,14 @@ impl Builder<'_> {
             let share = 1e2 * drift;
             note = format!(
                 "{note}; those of the next {period} differ by {share:.1} %, and states that count for less are left out"
+            );
+        }
+        if depends > DRIFTS {
+            note = format!(
+                "{note}; they depend on the size of the change, by {:.1} % from {:.0e} to {:.0e} of the typical magnitudes: the model is that of {change:.0e}",
+                1e2 * depends,
+                CHANGES[0],
+                CHANGES[CHANGES.len() - 1]
             );
         }
         Ok(Found { model: found, sides: has_edge.then(|| [side(0), side(1)]), note })

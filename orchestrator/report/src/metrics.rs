@@ -4,7 +4,7 @@
 use crate::guarantee::{GuaranteeRecord, GuaranteeSignals};
 use crate::measure::{self, Gauge};
 use cosim::error::Error;
-use cosim::experiment::{Guarantee, Observe};
+use cosim::experiment::{Guarantee, Margins, Observe};
 use cosim::master::{Observer, Sample};
 use cosim::pacing::report::RealTime;
 use cosim::signal::{Resolved, Signal, common_unit};
@@ -85,11 +85,13 @@ impl Metrics {
     /// Returns the names of the metrics that runs of an experiment have.
     pub fn names(observe: &Observe) -> Vec<String> {
         let guarantee = observe.guarantee.iter().flat_map(guarantee_names);
+        let margins = observe.margins.iter().flat_map(|_| margin_names());
         ALWAYS
             .map(String::from)
             .into_iter()
             .chain(observe.metrics.keys().cloned())
             .chain(guarantee)
+            .chain(margins)
             .collect()
     }
 
@@ -131,6 +133,11 @@ impl Metrics {
             _ => None,
         }
     }
+}
+
+/// Returns the names of the metrics of a loop's stability margins.
+fn margin_names() -> impl Iterator<Item = String> {
+    Margins::NAMES.iter().map(|(name, _)| (*name).to_string())
 }
 
 /// Returns the names of the metrics of a guarantee.
@@ -182,6 +189,7 @@ impl Meters {
         let mut taken: Vec<String> =
             ALWAYS.iter().chain(&GROUPS).map(ToString::to_string).collect();
         taken.extend(observe.guarantee.iter().flat_map(guarantee_names));
+        taken.extend(observe.margins.iter().flat_map(|_| margin_names()));
         let mut gauges = BTreeMap::new();
         for (name, measure) in &observe.metrics {
             let fault = |problem| Error::experiment(format!("[observe.metrics.{name}] {problem}"));

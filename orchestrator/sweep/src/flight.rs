@@ -3,6 +3,7 @@
 use crate::cases::Sweep;
 use crate::table::{Column, Values};
 use cosim::error::Error;
+use cosim::experiment::Margins;
 use cosim::interrupt::Interrupt;
 use cosim::master::{Master, Observer, Sample};
 use cosim::system::{Opened, Parameters, System};
@@ -10,6 +11,8 @@ use cosim::variation::SettingValue;
 use cosim_report::metrics::{Meters, Metrics};
 use fmu_import::description::VariableKind as Type;
 use fmu_import::error::Error as Import;
+use linear::linearise::Lineariser;
+use linear::measures::{self, Measured};
 use std::collections::BTreeMap;
 
 /// Result of a case.
@@ -51,6 +54,9 @@ pub struct Flight<'a> {
     /// Whether computing times of components are measured.
     times: bool,
     bounds: Vec<Bound>,
+    /// What linearises each case, if the experiment asks for margins, and its instances.
+    lineariser: Option<Lineariser>,
+    linearised: Option<Master>,
 }
 
 impl<'a> Flight<'a> {
@@ -67,8 +73,22 @@ impl<'a> Flight<'a> {
     ) -> Result<Self, Error> {
         let mut system = sweep.system(opened)?;
         let meters = Meters::new(&mut system)?;
-        let (times, bounds, master) = (false, Vec::new(), None);
-        Ok(Self { sweep, system, meters, master, interrupt, resets, times, bounds })
+        let lineariser = match &system.experiment.observe.margins {
+            Some(Margins { at, open }) => Some(Lineariser::new(sweep.system(opened)?, *at, open)?),
+            None => None,
+        };
+        Ok(Self {
+            sweep,
+            system,
+            meters,
+            master: None,
+            interrupt,
+            resets,
+            times: false,
+            bounds: Vec::new(),
+            lineariser,
+            linearised: None,
+        })
     }
 
     /// Lets a case end as soon as it is lost, or exceeds one of these bounds.
@@ -166,12 +186,39 @@ impl<'a> Flight<'a> {
             Err(error) if !is_of_case(&error) => return Err(error),
             outcome => outcome,
         };
-        let metrics = Metrics {
+        let mut metrics = Metrics {
             step_us: step_us.into_iter().collect(),
             loop_delay_s: self.system.loop_delay(),
             ..self.meters.metrics()
         };
+        metrics.asked.extend(self.margins(&values)?);
         Ok(Flown { case, values, metrics, outcome, broken, time })
+    }
+}
+
+impl Flight<'_> {
+    /// Computes the margins of a case with these values, if the experiment asks for them. They have
+    /// no value if an instance fails.
+    fn margins(&mut self, values: &[SettingValue]) -> Result<Measured, Error> {
+        let Some(lineariser) = &self.lineariser else { return Ok(Measured::new()) };
+        let changes = self.sweep.changes(values);
+        let system = lineariser.system();
+        let started = match self.linearised.take().filter(|_| self.resets) {
+            Some(mut master) => system.restart(&mut master, &changes).map(|()| master),
+            None => system.start_varied(&changes, self.interrupt),
+        };
+        let found = started.and_then(|mut master| {
+            let found = lineariser.linearise(&mut master, self.interrupt);
+            if found.is_ok() {
+                self.linearised = Some(master);
+            }
+            found
+        });
+        match found {
+            Ok(found) => Ok(measures::measure(&found)),
+            Err(error) if is_of_case(&error) => Ok(measures::none()),
+            Err(error) => Err(error),
+        }
     }
 }
 

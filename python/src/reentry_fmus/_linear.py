@@ -120,7 +120,7 @@ def margins(
     """Computes the stability margins of an experiment at an instant of its run.
 
     >>> table = margins("lqr", at=10.0, open="plant.moment.*", set={"plant.disturbance.kind": "none"})
-    >>> round(table.loc["all together", "disk"], 2)
+    >>> float(table.loc["all together", "disk"].round(2))
     1.35
 
     Args:

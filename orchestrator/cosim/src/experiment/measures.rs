@@ -24,6 +24,9 @@ pub struct Observe {
     /// Variables in which a component reports whether it guarantees that limits are kept.
     #[serde(default)]
     pub guarantee: Option<Guarantee>,
+    /// Instant and signals at which the stability margins of the loop are computed.
+    #[serde(default)]
+    pub margins: Option<Margins>,
     /// Condition under which a run counts as lost.
     #[serde(default)]
     pub loss: Option<Loss>,
@@ -33,6 +36,41 @@ pub struct Observe {
     /// Further lines of the live view: lists of variables, by the heading of the line.
     #[serde(default)]
     pub readings: BTreeMap<String, Vec<String>>,
+}
+
+/// Stability margins of the loop as metrics: `margin_disk` and so on, each the smallest of all
+/// opened signals by themselves and together, and of both sides of an edge.
+#[derive(Clone, Debug, Deserialize, JsonSchema, Serialize)]
+#[serde(deny_unknown_fields)]
+pub struct Margins {
+    /// Time of the run at which the loop is linearised, s.
+    pub at: f64,
+    /// Signals at which the loop is opened: connected inputs or outputs, as `plant.moment.*`.
+    pub open: Vec<String>,
+}
+
+impl Margins {
+    /// Names of the metrics, in the order in which they are computed, with their units.
+    pub const NAMES: [(&str, &str); 7] = [
+        ("margin_stable", ""),
+        ("margin_gain_above", ""),
+        ("margin_gain_below", ""),
+        ("margin_phase_deg", "deg"),
+        ("margin_delay_s", "s"),
+        ("margin_disk", ""),
+        ("margin_sensitivity", ""),
+    ];
+
+    /// Returns whether a metric of this name is one of the margins.
+    pub fn is_metric(name: &str) -> bool {
+        Self::NAMES.iter().any(|(other, _)| *other == name)
+    }
+
+    /// Returns the unit of a margin, if it has one.
+    pub fn unit(name: &str) -> Option<String> {
+        let (_, unit) = Self::NAMES.iter().find(|(other, _)| *other == name)?;
+        (!unit.is_empty()).then(|| (*unit).to_string())
+    }
 }
 
 /// A number that is computed from signals of a run.

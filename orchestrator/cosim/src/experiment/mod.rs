@@ -9,7 +9,7 @@ mod overrides;
 mod protection;
 
 pub use crate::watch::OnInvalid;
-pub use measures::{Curve, Guarantee, Loss, Measure, MeasureKind, Observe, Panel, Scaled};
+pub use measures::{Curve, Guarantee, Loss, Margins, Measure, MeasureKind, Observe, Panel, Scaled};
 pub use overrides::Overrides;
 pub use protection::Protection;
 
