@@ -5,14 +5,11 @@ use crate::failure::Failure;
 use crate::run;
 use clap::Args;
 use cosim::error::Error;
-use cosim::experiment::Margins;
 use cosim::interrupt::Interrupt;
 use cosim::search;
-use cosim::system::System;
 use fmu_import::quantity::rounded;
 use linear::linearise::Linearised;
 use linear::margins::{Crossing, LoopMargins};
-use linear::measures::Measured;
 use linear::model::{OpenLoop, Step};
 use linear::{Matrix, margins as analysis};
 use serde_json::{Value, json};
@@ -102,15 +99,6 @@ pub(crate) fn linearise(
         None => out.write_all(text.as_bytes())?,
     }
     Ok(())
-}
-
-/// Computes the margins that a system's experiment asks for, as metrics.
-pub(crate) fn measured(system: &System, interrupt: &Interrupt) -> Result<Measured, Error> {
-    let Some(Margins { at, open }) = &system.experiment.observe.margins else {
-        return Ok(Measured::new());
-    };
-    let found = linear::linearise::linearise(system.clone(), *at, open, interrupt)?;
-    Ok(linear::measures::measure(&found))
 }
 
 fn model(open: &OpenLoop) -> Value {

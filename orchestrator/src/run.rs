@@ -3,7 +3,6 @@
 
 use crate::arguments::choice;
 use crate::failure::Failure;
-use crate::linear;
 use crate::live::{self, Live, scene::Scene};
 use crate::summary::{self, RunReport};
 use cosim::check::check;
@@ -27,6 +26,7 @@ use cosim_report::panels::Panel;
 use cosim_report::plot::Curves;
 use cosim_report::progress::Progress;
 use fmu_import::warnings;
+use linear::measures;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
@@ -248,7 +248,7 @@ fn record(system: &mut System, options: &Options) -> Result<RunReport, Failure> 
         ..meters.metrics()
     };
     if outcome.is_ok() {
-        metrics.asked.extend(linear::measured(system, &options.interrupt)?);
+        metrics.asked.extend(measures::asked(system, &options.interrupt)?);
     }
     if let Some(pacer) = master.take_pacer() {
         let (mut real_time, wake_ups, steps) = pacer.report();

@@ -1,8 +1,11 @@
 //! Margins as metrics of a run.
 
-use crate::linearise::Linearised;
+use crate::linearise::{Linearised, linearise};
 use crate::margins::{self, Crossing, LoopMargins, Margins};
+use cosim::error::Error;
 use cosim::experiment;
+use cosim::interrupt::Interrupt;
+use cosim::system::System;
 use cosim_report::metrics::Value;
 use std::collections::BTreeMap;
 
@@ -12,6 +15,17 @@ pub type Measured = BTreeMap<String, Option<Value>>;
 /// Returns the metrics without values, for a run that could not be linearised.
 pub fn none() -> Measured {
     experiment::Margins::NAMES.iter().map(|(name, _)| ((*name).to_string(), None)).collect()
+}
+
+/// Computes the margins that a system's experiment asks for; nothing if it asks for none.
+///
+/// # Errors
+/// The errors are those of [`linearise`].
+pub fn asked(system: &System, interrupt: &Interrupt) -> Result<Measured, Error> {
+    let Some(experiment::Margins { at, open }) = &system.experiment.observe.margins else {
+        return Ok(Measured::new());
+    };
+    Ok(measure(&linearise(system.clone(), *at, open, interrupt)?))
 }
 
 /// Computes the margins of a loop: the smallest of all opened signals by themselves and together,

@@ -4,22 +4,23 @@
 use crate::Matrix;
 use crate::model::{OpenLoop, Step};
 use crate::propagation::{Delay, Net};
-use crate::spectrum::{dominant, spectral_radius};
+use crate::spectrum::{dominant, is_stable, spectral_radius};
 use nalgebra::{Complex, ComplexField, DMatrix};
 use serde::Serialize;
 
 /// Factor between the gains that are tried, and the largest one.
-const FACTOR: f64 = 1.15;
+const FACTOR: f64 = 1.3;
 const LARGEST_GAIN: f64 = 1e3;
 /// Angle between the phases that are tried, deg.
-const TURN: f64 = 3.0;
+const TURN: f64 = 6.0;
 /// Most parts of a step between the delays that are tried, and the longest delay in steps.
 const PARTS: f64 = 4.0;
 const LONGEST_DELAY: f64 = 200.0;
 /// Number of delays that are tried up to the one that the phase lets expect.
 const TRIALS: f64 = 8.0;
-/// Number of halvings after a change of stability is enclosed.
-const HALVINGS: usize = 40;
+/// Steps that enclose a change of stability, and the relative width at which they end.
+const REFINEMENTS: usize = 60;
+const ACCURACY: f64 = 1e-8;
 
 /// A change at which the loop becomes unstable.
 #[derive(Clone, Copy, Debug, Serialize)]
@@ -102,21 +103,39 @@ fn first<T: ComplexField<RealField = f64>>(
     last: f64,
     period: f64,
 ) -> Option<Crossing> {
-    let is_stable = |x: f64| closed(x).is_some_and(|a| spectral_radius(&a) < 1.0);
+    let is_stable_at = |x: f64| closed(x).is_some_and(|a| is_stable(&a));
     let mut stable = 0.0;
     let mut unstable = loop {
         let next = stable + step;
         if next > last {
             return None;
         }
-        if !is_stable(next) {
+        if !is_stable_at(next) {
             break next;
         }
         stable = next;
     };
-    for _ in 0..HALVINGS {
-        let middle = 0.5 * (stable + unstable);
-        if is_stable(middle) { stable = middle } else { unstable = middle }
+    // Regula falsi (Illinois) on the logarithm of the largest magnitude, which is smooth there.
+    let excess = |x: f64| closed(x).map_or(1.0, |a| spectral_radius(&a).ln());
+    let (mut below, mut above) = (excess(stable), excess(unstable));
+    for _ in 0..REFINEMENTS {
+        if unstable - stable <= ACCURACY * unstable {
+            break;
+        }
+        let mut middle = (stable * above - unstable * below) / (above - below);
+        if !(middle > stable && middle < unstable) {
+            middle = 0.5 * (stable + unstable);
+        }
+        let value = excess(middle);
+        if value < 0.0 {
+            (stable, below, above) = (middle, value, 0.5 * above);
+        } else {
+            (unstable, above, below) = (middle, value, 0.5 * below);
+        }
+        if value.abs() < ACCURACY * 1e-3 {
+            stable = middle;
+            break;
+        }
     }
     let frequency = closed(stable).map_or(0.0, |a| dominant(&a).arg().abs() / period);
     Some(Crossing { value: stable, frequency })
