@@ -180,6 +180,23 @@ def test_the_margins_of_a_law_that_is_replanned_are_those_of_its_period():
     assert any("repeat after 5 steps of 0.04 s" in note for note in found["notes"])
 
 
+@pytest.mark.parametrize("law", ["LQR", "CRMPC", "TwoLoopSMC"])
+def test_oracle_the_loop_in_flight_has_the_frequency_response_of_the_model(law, tmp_path):
+    plot = tmp_path / "response.svg"
+    # The gain of TwoLoopSMC depends on the amplitude.
+    arguments = ["--count", "5", "--open", "plant.moment.y", "--amplitude", "1e-4" if law == "TwoLoopSMC" else "0.01", "--plot", plot]
+    text = call("response", FOLDER / "margins" / "rest.toml", "--fmu", f"controller={law}.fmu", *arguments)
+    rows = [line.split() for line in text.splitlines()[1:]]
+    assert len(rows) == 5
+    for _, _, measured_db, measured_deg, predicted_db, predicted_deg in rows:
+        measured, predicted = (
+            10.0 ** (float(db) / 20.0) * np.exp(1j * np.radians(float(deg)))
+            for db, deg in ((measured_db, measured_deg), (predicted_db, predicted_deg))
+        )
+        assert abs(measured - predicted) <= 0.01 * abs(predicted)
+    assert plot.read_text().startswith("<svg")
+
+
 @pytest.mark.parametrize(
     ("arguments", "problem"),
     [

@@ -7,6 +7,7 @@ use clap::Args;
 use cosim::error::Error;
 use cosim::interrupt::Interrupt;
 use cosim::search;
+use cosim::system::System;
 use fmu_import::quantity::rounded;
 use linear::linearise::Linearised;
 use linear::margins::{Crossing, LoopMargins};
@@ -19,7 +20,7 @@ use std::path::PathBuf;
 
 /// What is linearised, when, and where the loop is opened.
 #[derive(Args)]
-struct Instant {
+pub(crate) struct Instant {
     /// Experiment: a file, an SSP archive, or the name of an experiment that `list` shows.
     experiment: PathBuf,
     /// Time of the run at which it is linearised, s [default: what the experiment's
@@ -39,7 +40,9 @@ struct Instant {
 }
 
 impl Instant {
-    fn linearise(&self, interrupt: &Interrupt) -> Result<Linearised, Failure> {
+    /// Returns the system of the experiment, the time at which it is linearised (s), and the
+    /// signals at which the loop is opened.
+    pub(crate) fn system(&self) -> Result<(System, f64, Vec<String>), Failure> {
         let path = search::experiment(&self.experiment)?;
         let (system, _) = run::system(&path, &self.overrides.clone().into(), &self.fmu_dir)?;
         let asked = system.experiment.observe.margins.clone();
@@ -55,6 +58,11 @@ impl Instant {
         if open.is_empty() {
             open = asked.ok_or_else(|| missing("--open SIGNAL"))?.open;
         }
+        Ok((system, at, open))
+    }
+
+    fn linearise(&self, interrupt: &Interrupt) -> Result<Linearised, Failure> {
+        let (system, at, open) = self.system()?;
         Ok(linear::linearise::linearise(system, at, &open, interrupt)?)
     }
 }

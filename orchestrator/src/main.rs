@@ -12,6 +12,7 @@ mod list;
 mod live;
 mod pack;
 mod plain;
+mod response;
 mod run;
 mod schema;
 mod show;
@@ -144,6 +145,9 @@ enum Command {
     /// Print the stability margins of an experiment at an instant of its run: gain, phase and delay
     /// of each signal, disk margins of each and of all together.
     Margins(linear::PrintMargins),
+    /// Measure the frequency response of an experiment's loop in flight, with a sine added at each
+    /// opened signal, and compare it with that of the linear model.
+    Response(response::Response),
     /// Write an experiment as an SSP archive (System Structure and Parameterization 1.0), FMUs
     /// included.
     Pack {
@@ -260,6 +264,7 @@ fn execute(command: Command, out: &mut impl Write, interrupt: &Interrupt) -> Res
             | Command::Falsify(_)
             | Command::Linearise(_)
             | Command::Margins(_)
+            | Command::Response(_)
             | Command::Pack { .. }
     );
     if takes_long {
@@ -313,6 +318,7 @@ fn execute(command: Command, out: &mut impl Write, interrupt: &Interrupt) -> Res
         Command::Falsify(asked) => campaign::falsify(&asked, out, interrupt),
         Command::Linearise(asked) => linear::linearise(&asked, out, interrupt),
         Command::Margins(asked) => linear::margins(&asked, out, interrupt),
+        Command::Response(asked) => response::respond(&asked, out, interrupt),
         Command::Pack { experiment, out: archive, fmu_dir, overrides, no_enumerations, force } => {
             let archive = pack::Archive { path: archive, enumerations: !no_enumerations, force };
             pack::pack(&experiment, &overrides.into(), &fmu_dir, archive, out, interrupt)

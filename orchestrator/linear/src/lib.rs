@@ -9,6 +9,7 @@
 
 pub mod continuous;
 mod fitting;
+pub mod frequency;
 pub mod linearise;
 pub mod margins;
 pub mod measures;

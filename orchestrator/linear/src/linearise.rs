@@ -52,6 +52,8 @@ pub struct Lineariser {
     ticks: Range<u64>,
     units: Vec<Wired>,
     signals: Vec<Signal>,
+    /// The opened variables, in the order of the signals.
+    opened: Vec<Port>,
     links: Vec<Link>,
 }
 
@@ -107,12 +109,22 @@ impl Lineariser {
         let (start, step) = (system.clock.start(), system.clock.step());
         system.clock =
             Clock::new(start, start + last as f64 * step, step).map_err(Error::experiment)?;
-        Ok(Self { system, time, ticks: first..last, units, signals, links })
+        Ok(Self { system, time, ticks: first..last, units, signals, opened, links })
     }
 
     /// Returns the system, from which masters are started.
     pub fn system(&self) -> &System {
         &self.system
+    }
+
+    /// Returns the communication point at which runs are linearised.
+    pub fn first(&self) -> u64 {
+        self.ticks.start
+    }
+
+    /// Returns the opened variables, in the order of the signals.
+    pub fn opened(&self) -> &[Port] {
+        &self.opened
     }
 
     /// Linearises a run of the system, given its master after initialisation.
@@ -125,7 +137,7 @@ impl Lineariser {
         master: &mut Master,
         interrupt: &Interrupt,
     ) -> Result<Linearised, Error> {
-        let Self { system, time, ticks, units, signals, links } = self;
+        let Self { system, time, ticks, units, signals, links, .. } = self;
         let recorded = record(system, units, ticks.clone(), master)?;
         let _silence = warnings::silence();
         let mut found: Vec<Found> = Vec::new();

@@ -160,6 +160,7 @@ fn quantity(value: &Value) -> Result<f64, String> {
             let (number, unit) = text.split_once(' ').ok_or_else(refused)?;
             let number: f64 = number.parse().map_err(|_| refused())?;
             match unit {
+                "s" => Ok(number),
                 "deg" | "deg/s" | "deg/s2" => Ok(number.to_radians()),
                 _ => Err(refused()),
             }

@@ -1,7 +1,9 @@
-//! Calls of one instance between two ticks, for those who look into a run.
+//! Calls of one instance between two ticks, and values added on the way, for those who look into a
+//! run.
 
 use super::Master;
 use crate::error::Error;
+use crate::wiring::Port;
 use fmu_import::instance::{CallFailure, Instance};
 
 impl Master {
@@ -17,5 +19,10 @@ impl Master {
     ) -> Result<T, Error> {
         let instance = self.members[index].instance.as_mut();
         calls(instance).map_err(|failure| self.error(time, (index, failure)))
+    }
+
+    /// Adds a value to what a connected real input receives, from now on.
+    pub fn add(&mut self, input: Port, value: f64) {
+        self.inputs[input.component].add(input.reference, value);
     }
 }

@@ -169,6 +169,8 @@ struct Bundle<T> {
     references: Vec<u32>,
     places: Vec<(Place, Scaling)>,
     values: Vec<T>,
+    /// What is added to the values on the way; empty for nothing.
+    added: Vec<T>,
 }
 
 impl<T: Copy + Default> Bundle<T> {
@@ -180,7 +182,7 @@ impl<T: Copy + Default> Bundle<T> {
         };
         let references: Vec<u32> = wires.clone().map(|(wire, _)| wire.to.reference).collect();
         let values = vec![T::default(); references.len()];
-        Self { references, places: wires.map(place).collect(), values }
+        Self { references, places: wires.map(place).collect(), values, added: Vec::new() }
     }
 
     /// Takes the values over; `convert` is exact for what was read.
@@ -211,8 +213,22 @@ impl Inputs {
         }
     }
 
+    /// Adds a value to what a real input receives from now on.
+    pub(super) fn add(&mut self, reference: u32, value: f64) {
+        let Bundle { references, added, .. } = &mut self.real;
+        added.resize(references.len(), 0.0);
+        for (added, other) in added.iter_mut().zip(references) {
+            if *other == reference {
+                *added = value;
+            }
+        }
+    }
+
     pub(super) fn gather(&mut self, values: &Values) {
         self.real.gather(values, |value| value);
+        for (value, added) in self.real.values.iter_mut().zip(&self.real.added) {
+            *value += added;
+        }
         self.integer.gather(values, |value| value as i32);
         self.boolean.gather(values, |value| value as i32);
     }

@@ -146,26 +146,29 @@ impl<'a> Responses<'a> {
     }
 }
 
-/// Returns the open loop's response at a frequency (rad/s): what arrives by what is put in, with
-/// the parts at all frequencies that the period mixes.
-pub fn response(open: &OpenLoop, frequency: f64) -> ComplexMatrix {
+/// Returns the sensitivity S = (I − G)⁻¹ of the open loop G = −L at a frequency (rad/s), with the
+/// parts at all frequencies that the period mixes. It is computed from the closed loop, whose
+/// poles are not on the unit circle: w = E (C x + d) and x⁺ = A x + B w with E = (I − D)⁻¹.
+pub fn sensitivity(open: &OpenLoop, frequency: f64) -> ComplexMatrix {
     let Step { a, b, c, d } = &open.step;
+    let n = d.nrows();
+    let infinite = || ComplexMatrix::from_element(n, n, Complex::new(f64::INFINITY, 0.0));
+    let Some(e) = (crate::Matrix::identity(n, n) - d).try_inverse() else { return infinite() };
     let complex = |matrix: &crate::Matrix| matrix.map(|value| Complex::new(value, 0.0));
+    let (input, output) = (b * &e, &e * c);
+    let mut resolvent = complex(&-(a + b * &output));
     let z = Complex::from_polar(1.0, frequency * open.period);
-    let mut resolvent = complex(&-a);
     for i in 0..resolvent.nrows() {
         resolvent[(i, i)] += z;
     }
-    let states = resolvent.lu().solve(&complex(b)).unwrap_or_else(|| {
-        ComplexMatrix::from_element(b.nrows(), b.ncols(), Complex::new(f64::INFINITY, 0.0))
-    });
-    let lifted = complex(c) * states + complex(d);
+    let Some(states) = resolvent.lu().solve(&complex(&input)) else { return infinite() };
+    let lifted = complex(&output) * states + complex(&e);
     let (count, samples) = (open.channels(), open.samples);
     if samples == 1 {
         return lifted;
     }
-    let step = open.period / samples as f64;
-    let sines = ComplexMatrix::from_fn(samples * count, samples * count, |row, column| {
+    let step = open.sampling();
+    let sines = ComplexMatrix::from_fn(n, n, |row, column| {
         if row % count != column % count {
             return Complex::new(0.0, 0.0);
         }
@@ -174,14 +177,4 @@ pub fn response(open: &OpenLoop, frequency: f64) -> ComplexMatrix {
     });
     let inverse = sines.adjoint() * Complex::new(1.0 / samples as f64, 0.0);
     inverse * lifted * sines
-}
-
-/// Returns S = (I − G)⁻¹ of the open loop G; G is −L.
-fn sensitivity(open: &OpenLoop, frequency: f64) -> ComplexMatrix {
-    let g = response(open, frequency);
-    let n = g.nrows();
-    let difference = ComplexMatrix::identity(n, n) - g;
-    difference
-        .try_inverse()
-        .unwrap_or_else(|| ComplexMatrix::from_element(n, n, Complex::new(f64::INFINITY, 0.0)))
 }

@@ -1,0 +1,163 @@
+//! The command `response`: the frequency response of a loop in flight, beside that of its linear
+//! model.
+
+use crate::failure::Failure;
+use crate::linear::Instant;
+use clap::Args;
+use cosim::error::Error;
+use cosim::interrupt::Interrupt;
+use cosim_report::figure::{Color, Curve, Figure, Legend, Panel, Shape, svg};
+use fmu_import::description::VariableKind;
+use linear::frequency::{self, Complex, Point, return_ratio};
+use linear::linearise::Lineariser;
+use linear::model::OpenLoop;
+use std::f64::consts::PI;
+use std::io::Write;
+use std::path::PathBuf;
+
+/// Number of frequencies at which the curve of the model is drawn.
+const DRAWN: usize = 400;
+/// Colours of the signals.
+const COLORS: [Color; 6] = [
+    Color(0, 114, 178),
+    Color(213, 94, 0),
+    Color(0, 158, 115),
+    Color(204, 121, 167),
+    Color(86, 180, 233),
+    Color(230, 159, 0),
+];
+
+/// Arguments of `response`.
+#[derive(Args)]
+pub(crate) struct Response {
+    #[command(flatten)]
+    instant: Instant,
+    /// Lowest frequency, rad/s.
+    #[arg(long, value_name = "RAD/S", default_value_t = 0.3)]
+    from: f64,
+    /// Highest frequency, rad/s [default: 0.77 of half the sampling frequency].
+    #[arg(long, value_name = "RAD/S")]
+    to: Option<f64>,
+    /// Number of frequencies, equally spaced on a logarithmic scale.
+    #[arg(long, value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u32).range(2..))]
+    count: u32,
+    /// Amplitude of the sine, in the unit of the signals [default: a ten-thousandth of their
+    /// typical magnitude].
+    #[arg(long, value_name = "NUMBER")]
+    amplitude: Option<f64>,
+    /// File for a plot of both responses (SVG).
+    #[arg(long, value_name = "FILE")]
+    plot: Option<PathBuf>,
+}
+
+/// Measures the frequency response of a loop, and compares it with that of the linear model.
+pub(crate) fn respond(
+    asked: &Response,
+    out: &mut impl Write,
+    interrupt: &Interrupt,
+) -> Result<(), Failure> {
+    let (system, at, open) = asked.instant.system()?;
+    let title = system.experiment.title.clone();
+    let lineariser = Lineariser::new(system, at, &open)?;
+    let mut master = lineariser.system().start(interrupt)?;
+    let found = lineariser.linearise(&mut master, interrupt)?;
+    drop(master);
+    let nyquist = PI / found.open.sampling();
+    let to = asked.to.unwrap_or(0.77 * nyquist);
+    if !(asked.from > 0.0 && to > asked.from && to < nyquist) {
+        let problem = format!(
+            "--from {} --to {to}: 0 < from < to < {nyquist:.3} rad/s, half the sampling frequency, is needed",
+            asked.from
+        );
+        return Err(Error::experiment(problem).into());
+    }
+    let frequencies: Vec<f64> = (0..asked.count)
+        .map(|k| asked.from * (to / asked.from).powf(f64::from(k) / f64::from(asked.count - 1)))
+        .collect();
+    writeln!(
+        out,
+        "{:<24} {:>9} {:>12} {:>12} {:>12} {:>12}",
+        "signal", "rad/s", "in flight dB", "deg", "predicted dB", "deg"
+    )?;
+    let mut all: Vec<Vec<Point>> = Vec::new();
+    for (channel, signal) in found.open.signals.iter().enumerate() {
+        let input = lineariser.opened()[channel];
+        let nominal = match &lineariser.system().variable_at(input).kind {
+            VariableKind::Real { nominal: Some(nominal), .. } => *nominal,
+            _ => 1.0,
+        };
+        let amplitude = asked.amplitude.unwrap_or(1e-4 * nominal);
+        let mut points = Vec::new();
+        for &frequency in &frequencies {
+            let point =
+                frequency::measure(&lineariser, &found, channel, frequency, amplitude, interrupt)?;
+            let [measured, predicted] = [point.measured, point.predicted];
+            writeln!(
+                out,
+                "{:<24} {frequency:>9.4} {:>12.3} {:>12.2} {:>12.3} {:>12.2}",
+                signal.name,
+                decibel(measured.norm()),
+                measured.arg().to_degrees(),
+                decibel(predicted.norm()),
+                predicted.arg().to_degrees()
+            )?;
+            points.push(point);
+        }
+        all.push(points);
+    }
+    if let Some(path) = &asked.plot {
+        svg::write(&figure(&title, &found.open, &all, [asked.from, to]), path)?;
+    }
+    Ok(())
+}
+
+fn decibel(magnitude: f64) -> f64 {
+    20.0 * magnitude.log10()
+}
+
+/// Draws magnitude and phase of the return ratios: the models' as lines, and those in flight as
+/// dots.
+fn figure(title: &str, open: &OpenLoop, all: &[Vec<Point>], [from, to]: [f64; 2]) -> Figure {
+    let grid: Vec<f64> =
+        (0..=DRAWN).map(|k| from * (to / from).powf(k as f64 / DRAWN as f64)).collect();
+    let panel = |label: &str, of: &dyn Fn(Complex) -> f64| {
+        let curves = all.iter().enumerate().flat_map(|(channel, points)| {
+            let color = COLORS[channel % COLORS.len()];
+            let name = open.signals[channel].name.clone();
+            let model = grid.iter().map(|w| of(return_ratio(open, channel, *w))).collect();
+            let line = Curve {
+                name: format!("{name}, linear model"),
+                color,
+                shape: Shape::Line,
+                x: grid.clone(),
+                y: model,
+            };
+            let dots = Curve {
+                name: format!("{name}, in flight"),
+                color,
+                shape: Shape::Dots,
+                x: points.iter().map(|point| point.frequency).collect(),
+                y: points.iter().map(|point| of(point.measured)).collect(),
+            };
+            [line, dots]
+        });
+        Panel {
+            title: String::new(),
+            x_label: "frequency, rad/s".into(),
+            y_label: label.into(),
+            log_x: true,
+            x_range: None,
+            curves: curves.collect(),
+        }
+    };
+    Figure {
+        title: format!("{title}: return ratio"),
+        columns: 1,
+        legend: Legend::Above,
+        panels: vec![
+            panel("|L|, dB", &|l| decibel(l.norm())),
+            // From 0 down to −360 deg, so that a curve around −180 deg does not jump.
+            panel("arg L, deg", &|l| (l.arg().to_degrees() - 360.0) % 360.0),
+        ],
+    }
+}
