@@ -16,8 +16,8 @@ use std::f64::consts::TAU;
 /// Share of a transient that is left when the response is taken, and the longest wait for it, s.
 const LEFT: f64 = 1e-6;
 const LONGEST: f64 = 300.0;
-/// Number of periods of the sine, and least number of periods of the loop, over which the response is
-/// taken: frequencies that the loop mixes may be close to one another.
+/// Number of periods of the sine, and least number of periods of the loop, over which the response
+/// is taken: frequencies that the loop mixes may be close to one another.
 const PERIODS: f64 = 4.0;
 const LOOP_PERIODS: f64 = 60.0;
 
