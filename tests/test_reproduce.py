@@ -522,7 +522,7 @@ def test_every_controller_turns_the_bank_angle(tmp_path):
 
 def test_every_controller_has_its_margins(tmp_path):
     results = reproduced("margins", tmp_path)
-    assert len(results["runs"]) == 63
+    assert len(results["runs"]) == 67
     assert [claim["verdict"] for claim in results["claims"]] == [HOLDS, HOLDS]
     [member] = results["runs"]["late-lqr"]["members"]
     # What a delay takes, the delay margin loses.
