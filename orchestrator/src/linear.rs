@@ -158,7 +158,7 @@ pub(crate) fn margins(
     }
     print(&margins, out)?;
     for (title, side) in ["increases", "decreases"].iter().zip(sides.iter().flatten()) {
-        writeln!(out, "\na unit has an edge here; for {title} of every input:")?;
+        writeln!(out, "\na component has an edge here; for {title} of every input:")?;
         print(side, out)?;
     }
     Ok(())

@@ -139,8 +139,8 @@ enum Command {
     /// Linearise an experiment at an instant of its run, and write the open loop as a discrete
     /// state-space model (JSON).
     ///
-    /// Units with derivatives give them; of all others the responses to small changes are taken
-    /// from a kept state and realised as a model.
+    /// Components with derivatives give them; of all others the responses to small changes are
+    /// taken from a kept state and realised as a model.
     Linearise(linear::Linearise),
     /// Print the stability margins of an experiment at an instant of its run: gain, phase and delay
     /// of each signal, disk margins of each and of all together.

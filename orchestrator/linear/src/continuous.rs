@@ -1,4 +1,5 @@
-//! Units with continuous states: derivatives at an instant, and the exact step under held inputs.
+//! Components with continuous states: derivatives at an instant, and the exact step under held
+//! inputs.
 
 use crate::Matrix;
 use crate::model::Step;
@@ -19,7 +20,7 @@ pub struct Continuous {
     pub delay: f64,
 }
 
-/// A delay, in steps of a unit.
+/// A delay, in steps of a component.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Steps {
     /// Whole steps.
@@ -44,7 +45,7 @@ impl Steps {
     }
 }
 
-/// Value references of a unit's states, their derivatives, inputs and outputs.
+/// Value references of a component's states, their derivatives, inputs and outputs.
 pub struct References<'a> {
     /// States.
     pub states: &'a [u32],

@@ -1,4 +1,4 @@
-//! Holding derivatives of a unit against its responses, and finding its delay from them.
+//! Holding derivatives of a component against its responses, and finding its delay from them.
 
 use crate::Matrix;
 use crate::continuous::Continuous;
@@ -6,9 +6,9 @@ use crate::margins::structured::golden;
 use crate::realisation::least_squares;
 use crate::responses::{Lags, Scales};
 
-/// Difference between the derivatives of a unit and its response to a step, relative to the largest
-/// response of a variable, up to which they describe the unit: soon after the step, and over as
-/// many steps as an output may lag behind, in which the operating point moves.
+/// Difference between the derivatives of a component and its response to a step, relative to the
+/// largest response of a variable, up to which they describe the component: soon after the step,
+/// and over as many steps as an output may lag behind, in which the operating point moves.
 pub(crate) const DESCRIBED: f64 = 0.02;
 pub(crate) const AT_LENGTH: f64 = 0.2;
 /// Number of responses from which a delay is found.
@@ -48,8 +48,9 @@ pub(crate) fn describes(
 }
 
 /// Gives a system the delay and the matrix B of its responses, and no D. While an input has not
-/// acted yet, the unit's own derivatives by it are zero. With a trial of the delay, the responses
-/// are linear in B; the delay is the one with the least rest. Returns the whole steps of it, too.
+/// acted yet, the component's own derivatives by it are zero. With a trial of the delay, the
+/// responses are linear in B; the delay is the one with the least rest. Returns the whole steps of
+/// it, too.
 pub(crate) fn delayed(
     system: Continuous,
     lags: &Lags,

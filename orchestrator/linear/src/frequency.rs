@@ -42,8 +42,8 @@ pub fn return_ratio(open: &OpenLoop, channel: usize, frequency: f64) -> Complex 
 }
 
 /// Adds a sine of this frequency (rad/s) and amplitude at an opened input, waits until the
-/// transient is gone, and compares what the unit then receives with what was added: their ratio is
-/// S. A run without the sine is subtracted.
+/// transient is gone, and compares what the component then receives with what was added: their
+/// ratio is S. A run without the sine is subtracted.
 ///
 /// # Errors
 /// Returns an error if the signal is no input, if an instance fails, or if the run was asked to

@@ -1,12 +1,13 @@
 //! Linear models of a loop of FMUs as it is sampled, and its stability margins.
 //!
-//! An experiment is run to an instant and kept there. A unit that declares continuous states gives
-//! its derivatives ([`continuous`]); of every other one the responses to small changes of its
+//! An experiment is run to an instant and kept there. A component that declares continuous states
+//! gives its derivatives ([`continuous`]); of every other one the responses to small changes of its
 //! inputs are taken from the kept state ([`responses`]), and realised as a linear model of the
 //! fewest states ([`realisation`]). Then the master's calls are repeated on matrices instead of
-//! values ([`propagation`]), so that order, coupling, periods and delays are those of the run.
-//! The loop is opened at named signals. [`margins`] says how far it is from instability there.
+//! values ([`propagation`]), so that order, coupling, periods and delays are those of the run. The
+//! loop is opened at named signals. [`margins`] says how far it is from instability there.
 
+pub mod components;
 pub mod continuous;
 mod fitting;
 pub mod frequency;
@@ -20,7 +21,6 @@ mod reduction;
 pub mod replay;
 pub mod responses;
 pub mod spectrum;
-pub mod units;
 
 /// A real matrix.
 pub type Matrix = nalgebra::DMatrix<f64>;

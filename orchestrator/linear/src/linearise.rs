@@ -1,9 +1,9 @@
 //! From an experiment to the linear model of its loop at an instant.
 
+use crate::components::{Builder, Component, Found, needed_steps};
 use crate::model::{OpenLoop, Signal};
 use crate::propagation::{Link, Net};
 use crate::replay::Recorded;
-use crate::units::{Builder, Found, Unit, needed_steps};
 use cosim::clock::Clock;
 use cosim::delay::Reading;
 use cosim::error::Error;
@@ -20,17 +20,17 @@ use std::ops::Range;
 pub struct Linearised {
     /// Time of the instant, s.
     pub time: f64,
-    /// The loop with its units.
+    /// The loop with its components.
     pub net: Net,
-    /// The loop for increases and for decreases of every input, if a unit has no derivative.
+    /// The loop for increases and for decreases of every input, if a component has no derivative.
     pub sides: Option<[Net; 2]>,
     /// The open loop of `net`.
     pub open: OpenLoop,
-    /// How each unit's model was found.
+    /// How each component's model was found.
     pub notes: Vec<String>,
 }
 
-/// A unit that responds to others, with what is connected to it.
+/// A component that responds to others, with what is connected to it.
 struct Wired {
     component: usize,
     /// Number of communication steps in one of its steps.
@@ -48,9 +48,9 @@ struct Wired {
 pub struct Lineariser {
     system: System,
     time: f64,
-    /// Communication points at which units keep their states and their inputs are recorded.
+    /// Communication points at which components keep their states and their inputs are recorded.
     ticks: Range<u64>,
-    units: Vec<Wired>,
+    wired: Vec<Wired>,
     signals: Vec<Signal>,
     /// The opened variables, in the order of the signals.
     opened: Vec<Port>,
@@ -93,23 +93,22 @@ impl Lineariser {
             )));
         }
         let (signals, opened) = opened(&system, open)?;
-        let units = wired(&mut system, first)?;
-        let links = links(&system, &units, &opened);
+        let wired = wired(&mut system, first)?;
+        let links = links(&system, &wired, &opened);
         for (channel, signal) in signals.iter().enumerate() {
             if !links.iter().any(|link| link.opened == Some(channel)) {
                 let problem =
-                    format!("--open {}: no unit that responds gives this signal", signal.name);
+                    format!("--open {}: no component that responds gives this signal", signal.name);
                 return Err(Error::experiment(problem));
             }
         }
-        let needed = |unit: &Wired| {
-            unit.first + unit.every * (needed_steps(unit.recorded.length) as u64 + 1)
-        };
-        let last = units.iter().map(needed).max().unwrap_or(first + 1);
+        let needed =
+            |one: &Wired| one.first + one.every * (needed_steps(one.recorded.length) as u64 + 1);
+        let last = wired.iter().map(needed).max().unwrap_or(first + 1);
         let (start, step) = (system.clock.start(), system.clock.step());
         system.clock =
             Clock::new(start, start + last as f64 * step, step).map_err(Error::experiment)?;
-        Ok(Self { system, time, ticks: first..last, units, signals, opened, links })
+        Ok(Self { system, time, ticks: first..last, wired, signals, opened, links })
     }
 
     /// Returns the system, from which masters are started.
@@ -137,26 +136,26 @@ impl Lineariser {
         master: &mut Master,
         interrupt: &Interrupt,
     ) -> Result<Linearised, Error> {
-        let Self { system, time, ticks, units, signals, links, .. } = self;
-        let recorded = record(system, units, ticks.clone(), master)?;
+        let Self { system, time, ticks, wired, signals, links, .. } = self;
+        let recorded = record(system, wired, ticks.clone(), master)?;
         let _silence = warnings::silence();
         let mut found: Vec<Found> = Vec::new();
-        for (unit, recorded) in units.iter().zip(&recorded) {
+        for (one, recorded) in wired.iter().zip(&recorded) {
             if let Some(request) = interrupt.asked() {
                 return Err(Error::Interrupted { time: *time, request });
             }
             let builder = Builder {
                 system,
-                component: unit.component,
-                first: unit.first,
+                component: one.component,
+                first: one.first,
                 recorded,
-                inputs: unit.inputs.clone(),
-                outputs: unit.outputs.clone(),
+                inputs: one.inputs.clone(),
+                outputs: one.outputs.clone(),
             };
-            found.push(master.call(unit.component, *time, |instance| builder.find(instance))?);
+            found.push(master.call(one.component, *time, |instance| builder.find(instance))?);
         }
-        let net = |of: &dyn Fn(&Found) -> Unit| Net {
-            units: found.iter().map(of).collect(),
+        let net = |of: &dyn Fn(&Found) -> Component| Net {
+            components: found.iter().map(of).collect(),
             links: links.clone(),
             coupling: system.experiment.simulation.coupling,
             first: ticks.start,
@@ -172,7 +171,7 @@ impl Lineariser {
         let open = net.open();
         if open.step.b.amax().max(open.step.d.amax()) == 0.0 || open.step.c.amax() == 0.0 {
             return Err(Error::experiment(format!(
-                "at t = {time} s nothing comes back of what is put in at {}: a unit may round its outputs, or hold them",
+                "at t = {time} s nothing comes back of what is put in at {}: a component may round its outputs, or hold them",
                 open.signals[0].name
             )));
         }
@@ -181,12 +180,12 @@ impl Lineariser {
     }
 }
 
-/// Finds the units that respond to others. The inputs of each are seen at every communication
+/// Finds the components that respond to others. The inputs of each are seen at every communication
 /// point from now on.
 fn wired(system: &mut System, first: u64) -> Result<Vec<Wired>, Error> {
     let wires = system.wires();
     let is_real = |port: &Port| port.carrier == Carrier::Real;
-    let mut units = Vec::new();
+    let mut wired = Vec::new();
     for component in 0..system.components.len() {
         let into = wires.iter().filter(|(wire, _)| wire.to.component == component);
         let ports: Vec<Port> = into.map(|(wire, _)| wire.to).collect();
@@ -207,7 +206,7 @@ fn wired(system: &mut System, first: u64) -> Result<Vec<Wired>, Error> {
             .map_err(Error::experiment)?;
         let every = u64::from(system.components[component].every);
         let length = every as f64 * system.clock.step();
-        units.push(Wired {
+        wired.push(Wired {
             component,
             every,
             recorded: Recorded { ports: ports.clone(), length, ..Recorded::default() },
@@ -217,14 +216,14 @@ fn wired(system: &mut System, first: u64) -> Result<Vec<Wired>, Error> {
             outputs,
         });
     }
-    Ok(units)
+    Ok(wired)
 }
 
-/// Runs to the end of some communication points, at whose beginning every unit keeps its state.
-/// Returns the units' inputs at them.
+/// Runs to the end of some communication points, at whose beginning every component keeps its
+/// state. Returns the components' inputs at them.
 fn record(
     system: &System,
-    units: &[Wired],
+    wired: &[Wired],
     ticks: Range<u64>,
     master: &mut Master,
 ) -> Result<Vec<Recorded>, Error> {
@@ -232,15 +231,15 @@ fn record(
         master.advance(tick)?;
     }
     let time = system.clock.time(ticks.start);
-    for unit in units {
-        master.call(unit.component, time, |instance| instance.save(0))?;
+    for one in wired {
+        master.call(one.component, time, |instance| instance.save(0))?;
     }
-    let mut all: Vec<Recorded> = units.iter().map(|unit| unit.recorded.clone()).collect();
+    let mut all: Vec<Recorded> = wired.iter().map(|one| one.recorded.clone()).collect();
     for tick in ticks {
         let values = master.advance(tick)?;
-        for (unit, recorded) in units.iter().zip(&mut all) {
-            if tick.is_multiple_of(unit.every) {
-                recorded.rows.push(unit.places.iter().map(|place| values[*place]).collect());
+        for (one, recorded) in wired.iter().zip(&mut all) {
+            if tick.is_multiple_of(one.every) {
+                recorded.rows.push(one.places.iter().map(|place| values[*place]).collect());
                 recorded.times.push(system.clock.time(tick));
             }
         }
@@ -248,16 +247,16 @@ fn record(
     Ok(all)
 }
 
-/// Finds the connections between the units.
-fn links(system: &System, units: &[Wired], opened: &[Port]) -> Vec<Link> {
+/// Finds the connections between the components.
+fn links(system: &System, wired: &[Wired], opened: &[Port]) -> Vec<Link> {
     let place = |port: &Port, of: fn(&Wired) -> &Vec<Port>| {
-        let unit = units.iter().position(|unit| unit.component == port.component)?;
-        Some((unit, of(&units[unit]).iter().position(|other| other == port)?))
+        let one = wired.iter().position(|one| one.component == port.component)?;
+        Some((one, of(&wired[one]).iter().position(|other| other == port)?))
     };
     let link = |(wire, reading): (Wire, Reading)| {
         Some(Link {
-            from: place(&wire.from, |unit| &unit.outputs)?,
-            to: place(&wire.to, |unit| &unit.inputs)?,
+            from: place(&wire.from, |one| &one.outputs)?,
+            to: place(&wire.to, |one| &one.inputs)?,
             factor: wire.scaling.apply(1.0) - wire.scaling.apply(0.0),
             reading,
             opened: opened.iter().position(|port| *port == wire.to || *port == wire.from),

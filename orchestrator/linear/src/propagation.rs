@@ -4,19 +4,19 @@
 //! The order of the calls is that of [`cosim::master`], so that the delays are those of a run.
 
 use crate::Matrix;
+use crate::components::{Component, Dynamics};
 use crate::continuous::Steps;
 use crate::model::{OpenLoop, Signal, Step};
 use crate::reduction::{held, reduced};
-use crate::units::{Dynamics, Unit};
 use cosim::delay::Reading;
 use cosim::experiment::Coupling;
 
-/// A connection between units, by places of units and of their outputs and inputs.
+/// A connection between components, by places of components and of their outputs and inputs.
 #[derive(Clone, Copy, Debug)]
 pub struct Link {
-    /// Unit and output that it comes from.
+    /// Component and output that it comes from.
     pub from: (usize, usize),
-    /// Unit and input that it goes to.
+    /// Component and input that it goes to.
     pub to: (usize, usize),
     /// Factor on the way.
     pub factor: f64,
@@ -26,11 +26,11 @@ pub struct Link {
     pub opened: Option<usize>,
 }
 
-/// The units of a loop with their connections.
+/// The components of a loop with their connections.
 #[derive(Clone, Debug)]
 pub struct Net {
-    /// Units, in the order in which they are stepped.
-    pub units: Vec<Unit>,
+    /// Components, in the order in which they are stepped.
+    pub components: Vec<Component>,
     /// Connections.
     pub links: Vec<Link>,
     /// Way in which values are passed on.
@@ -48,8 +48,8 @@ pub struct Net {
 pub struct Delay {
     /// The signal that is delayed; `None` for all.
     pub channel: Option<usize>,
-    /// Time, s. It must be a whole number of steps of the units that receive the signals, unless
-    /// all of them are continuous.
+    /// Time, s. It must be a whole number of steps of the components that receive the signals,
+    /// unless all of them are continuous.
     pub time: f64,
 }
 
@@ -63,8 +63,8 @@ fn lcm(a: u64, b: u64) -> u64 {
     a / gcd(a, b) * b
 }
 
-impl Unit {
-    /// Returns the number of communication points after which the unit repeats itself.
+impl Component {
+    /// Returns the number of communication points after which the component repeats itself.
     fn period(&self) -> u64 {
         let steps = match &self.dynamics {
             Dynamics::Continuous(_) => 1,
@@ -79,12 +79,12 @@ impl Unit {
         let Dynamics::Sampled(steps) = &self.dynamics else { return 0 };
         let count = steps.len() as u64;
         // Less than one of its steps lies between the beginning of the loop's period and the first
-        // step of the unit's.
+        // step of the component's.
         let steps = (tick + self.every * count - self.first) / self.every;
         (steps % count) as usize
     }
 
-    /// Returns the number of states that the unit has before a communication point.
+    /// Returns the number of states that the component has before a communication point.
     fn states_at(&self, tick: u64) -> usize {
         match &self.dynamics {
             Dynamics::Continuous(system) => system.a.nrows(),
@@ -130,42 +130,42 @@ struct Rows<'a> {
     /// Where what is put in at a communication point begins among the columns; `None` if the loop
     /// is closed.
     put_in: Option<usize>,
-    /// Delay of each unit's inputs.
+    /// Delay of each component's inputs.
     delays: Vec<Vec<Steps>>,
-    /// Inputs of each unit at its last steps, the newest first.
+    /// Inputs of each component at its last steps, the newest first.
     history: Vec<Vec<Matrix>>,
 }
 
 impl Net {
     /// Returns the number of communication points of the common period.
     pub fn period(&self) -> u64 {
-        self.units.iter().map(Unit::period).fold(1, lcm)
+        self.components.iter().map(Component::period).fold(1, lcm)
     }
 
-    /// Returns whether every unit that receives an opened signal is continuous, so that a delay
-    /// may be any part of a step.
+    /// Returns whether every component that receives an opened signal is continuous, so that a
+    /// delay may be any part of a step.
     pub fn takes_parts(&self) -> bool {
         let mut targets = self.links.iter().filter(|link| link.opened.is_some());
-        targets.all(|link| matches!(self.units[link.to.0].dynamics, Dynamics::Continuous(_)))
+        targets.all(|link| matches!(self.components[link.to.0].dynamics, Dynamics::Continuous(_)))
     }
 
-    /// Returns the time between two steps of the units that receive opened signals, s.
+    /// Returns the time between two steps of the components that receive opened signals, s.
     pub fn receiving_step(&self) -> f64 {
         let targets = self.links.iter().filter(|link| link.opened.is_some());
-        let every = targets.map(|link| self.units[link.to.0].every).max().unwrap_or(1);
+        let every = targets.map(|link| self.components[link.to.0].every).max().unwrap_or(1);
         every as f64 * self.length
     }
 
-    /// Returns the delay of each input of a unit.
-    fn delays(&self, unit: usize, delay: Option<Delay>) -> Vec<Steps> {
-        let model = &self.units[unit];
+    /// Returns the delay of each input of a component.
+    fn delays(&self, component: usize, delay: Option<Delay>) -> Vec<Steps> {
+        let model = &self.components[component];
         let own = match &model.dynamics {
             Dynamics::Continuous(system) => system.delay,
             Dynamics::Sampled(_) => 0.0,
         };
         let more = |input: usize| {
             let delay = delay?;
-            let into = |link: &&Link| link.to == (unit, input);
+            let into = |link: &&Link| link.to == (component, input);
             let channel = self.links.iter().find(into)?.opened?;
             delay.channel.is_none_or(|delayed| delayed == channel).then_some(delay.time)
         };
@@ -231,13 +231,13 @@ impl<'a> Rows<'a> {
     /// Begins a period. Returns the names of the states.
     fn start(net: &'a Net, inputs: usize, delay: Option<Delay>) -> (Self, Vec<String>) {
         let delays: Vec<Vec<Steps>> =
-            (0..net.units.len()).map(|unit| net.delays(unit, delay)).collect();
+            (0..net.components.len()).map(|component| net.delays(component, delay)).collect();
         let mut names = Vec::new();
-        for (unit, delays) in net.units.iter().zip(&delays) {
-            names.extend(unit.names(net.first));
+        for (component, delays) in net.components.iter().zip(&delays) {
+            names.extend(component.names(net.first));
             for age in 1..=remembered(delays) {
-                let past = (1..=unit.inputs.len())
-                    .map(|input| format!("{}.input[{input}] ({age} steps ago)", unit.name));
+                let past = (1..=component.inputs.len())
+                    .map(|input| format!("{}.input[{input}] ({age} steps ago)", component.name));
                 names.extend(past);
             }
         }
@@ -262,17 +262,20 @@ impl<'a> Rows<'a> {
             delays,
             history: Vec::new(),
         };
-        for (unit, delays) in net.units.iter().zip(&rows.delays) {
-            let state = unity(unit.states_at(net.first));
-            if let (Dynamics::Continuous(system), true) = (&unit.dynamics, unit.shows_states()) {
+        for (component, delays) in net.components.iter().zip(&rows.delays) {
+            let state = unity(component.states_at(net.first));
+            if let (Dynamics::Continuous(system), true) =
+                (&component.dynamics, component.shows_states())
+            {
                 rows.latest.push(&system.c * &state);
                 rows.before.push(&system.c * &state);
             } else {
-                rows.latest.push(unity(unit.outputs.len()));
-                rows.before.push(unity(unit.outputs.len()));
+                rows.latest.push(unity(component.outputs.len()));
+                rows.before.push(unity(component.outputs.len()));
             }
             rows.states.push(state);
-            rows.history.push((0..remembered(delays)).map(|_| unity(unit.inputs.len())).collect());
+            rows.history
+                .push((0..remembered(delays)).map(|_| unity(component.inputs.len())).collect());
         }
         (rows, names)
     }
@@ -280,9 +283,9 @@ impl<'a> Rows<'a> {
     /// Returns the rows of all states at the end of the period, in the order of the names.
     fn end(self) -> Matrix {
         let mut parts: Vec<Matrix> = Vec::new();
-        for (place, unit) in self.net.units.iter().enumerate() {
+        for (place, component) in self.net.components.iter().enumerate() {
             parts.push(self.states[place].clone());
-            if !unit.shows_states() {
+            if !component.shows_states() {
                 parts.push(self.latest[place].clone());
                 parts.push(self.before[place].clone());
             }
@@ -299,23 +302,24 @@ impl<'a> Rows<'a> {
 
     fn round(&mut self, tick: u64) {
         let net = self.net;
-        let begins = |unit: &Unit| tick.is_multiple_of(unit.every);
-        for (place, unit) in net.units.iter().enumerate() {
-            if begins(unit) {
+        let begins = |component: &Component| tick.is_multiple_of(component.every);
+        for (place, component) in net.components.iter().enumerate() {
+            if begins(component) {
                 self.before[place] = self.latest[place].clone();
             }
         }
-        let units = net.units.iter().enumerate().filter(|(_, unit)| begins(unit));
+        let components =
+            net.components.iter().enumerate().filter(|(_, component)| begins(component));
         match net.coupling {
             Coupling::Sequential => {
-                for (place, _) in units {
+                for (place, _) in components {
                     let inputs = self.gather(place);
                     self.step(place, tick, inputs);
                 }
             }
             Coupling::Jacobi => {
                 let gathered: Vec<_> =
-                    units.map(|(place, _)| (place, self.gather(place))).collect();
+                    components.map(|(place, _)| (place, self.gather(place))).collect();
                 for (place, inputs) in gathered {
                     self.step(place, tick, inputs);
                 }
@@ -323,10 +327,10 @@ impl<'a> Rows<'a> {
         }
     }
 
-    /// Returns the inputs of a unit.
-    fn gather(&mut self, unit: usize) -> Matrix {
-        let mut inputs = Matrix::zeros(self.net.units[unit].inputs.len(), self.columns);
-        for link in self.net.links.iter().filter(|link| link.to.0 == unit) {
+    /// Returns the inputs of a component.
+    fn gather(&mut self, component: usize) -> Matrix {
+        let mut inputs = Matrix::zeros(self.net.components[component].inputs.len(), self.columns);
+        for link in self.net.links.iter().filter(|link| link.to.0 == component) {
             let source = match link.reading {
                 Reading::BeforeStep => &self.before[link.from.0],
                 Reading::AfterStep => &self.latest[link.from.0],
@@ -344,17 +348,17 @@ impl<'a> Rows<'a> {
         inputs
     }
 
-    fn step(&mut self, unit: usize, tick: u64, inputs: Matrix) {
-        let model = &self.net.units[unit];
-        let delays = &self.delays[unit];
-        let state = &self.states[unit];
+    fn step(&mut self, component: usize, tick: u64, inputs: Matrix) {
+        let model = &self.net.components[component];
+        let delays = &self.delays[component];
+        let state = &self.states[component];
         // What acts on each input over the part of the step that begins at `from`.
         let acting = |from: f64| {
             let mut acting = inputs.clone();
             for (row, delay) in delays.iter().enumerate() {
                 let age = delay.whole + usize::from(from < delay.part);
                 if age > 0 {
-                    acting.set_row(row, &self.history[unit][age - 1].row(row));
+                    acting.set_row(row, &self.history[component][age - 1].row(row));
                 }
             }
             acting
@@ -382,15 +386,15 @@ impl<'a> Rows<'a> {
                 (state, output)
             }
         };
-        (self.states[unit], self.latest[unit]) = (state, output);
-        if let Some(oldest) = self.history[unit].last_mut() {
+        (self.states[component], self.latest[component]) = (state, output);
+        if let Some(oldest) = self.history[component].last_mut() {
             *oldest = inputs;
-            self.history[unit].rotate_right(1);
+            self.history[component].rotate_right(1);
         }
     }
 }
 
-/// Returns the number of earlier inputs that a unit with these delays needs.
+/// Returns the number of earlier inputs that a component with these delays needs.
 fn remembered(delays: &[Steps]) -> usize {
     delays.iter().map(|delay| delay.remembered()).max().unwrap_or(0)
 }

@@ -1,10 +1,11 @@
-//! Running one unit alone, from a state that it kept and with the inputs that it had in the loop.
+//! Running one component alone, from a state that it kept and with the inputs that it had in the
+//! loop.
 
 use cosim::wiring::Port;
 use fmu_import::description::Carrier;
 use fmu_import::instance::{CallFailure, Instance, Outcome};
 
-/// The inputs of a unit at its steps, as they were in the loop.
+/// The inputs of a component at its steps, as they were in the loop.
 #[derive(Clone, Debug, Default)]
 pub struct Recorded {
     /// Inputs of every type, in the order of the values.

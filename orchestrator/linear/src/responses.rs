@@ -1,16 +1,16 @@
-//! Responses of a unit to short changes of its inputs, by differences.
+//! Responses of a component to short changes of its inputs, by differences.
 //!
 //! An input is changed during one step, by ±δ and by ±δ/2, from the same kept state. The central
 //! differences of both, extrapolated to δ = 0 (Richardson), leave an error of the order δ⁴. Where
-//! the unit has no derivative, as at the edge of a constraint, the slopes to both sides do not come
-//! closer as δ falls, and both are kept besides.
+//! the component has no derivative, as at the edge of a constraint, the slopes to both sides do not
+//! come closer as δ falls, and both are kept besides.
 
 use crate::Matrix;
 use crate::replay::{Change, Recorded};
 use fmu_import::instance::{CallFailure, Instance};
 
 /// Share of the difference between the slopes to both sides that is left when the change is halved,
-/// above which there is an edge. A smooth unit leaves a half, one with an edge all of it.
+/// above which there is an edge. A smooth component leaves a half, one with an edge all of it.
 const FALLS: f64 = 0.75;
 /// Difference of the slopes to both sides, relative to the largest slope, below which it does not
 /// count.
@@ -19,7 +19,7 @@ const SAME: f64 = 1e-3;
 /// Responses to changes at one step: one matrix, outputs by inputs, for each lag.
 pub type Lags = Vec<Matrix>;
 
-/// Responses of a unit to changes at one step, in multiples of the typical magnitudes.
+/// Responses of a component to changes at one step, in multiples of the typical magnitudes.
 #[derive(Clone, Debug)]
 pub struct Response {
     /// The responses by central differences.
@@ -31,7 +31,7 @@ pub struct Response {
     pub error: f64,
 }
 
-/// Typical magnitudes of a unit's inputs and outputs.
+/// Typical magnitudes of a component's inputs and outputs.
 pub struct Scales {
     /// Magnitudes of the inputs.
     pub inputs: Vec<f64>,
@@ -41,7 +41,7 @@ pub struct Scales {
 
 /// The inputs that are changed and the outputs that are read.
 pub struct Probe<'a> {
-    /// Inputs of the unit as they were in the loop.
+    /// Inputs of the component as they were in the loop.
     pub recorded: &'a Recorded,
     /// Places of the changed inputs among the recorded ones.
     pub inputs: &'a [usize],

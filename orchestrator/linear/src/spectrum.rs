@@ -6,7 +6,7 @@
 use nalgebra::{Complex, ComplexField, DMatrix, DVector};
 
 /// Logarithm of a norm from which its growth is looked at: transients of quantities in different
-/// units are smaller.
+/// components are smaller.
 const GROWN: f64 = 60.0;
 /// Number of squarings.
 const SQUARINGS: i32 = 40;

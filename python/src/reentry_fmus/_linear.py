@@ -24,7 +24,7 @@ Matrix = npt.NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class OpenLoop:
-    """The open loop of an experiment over one common period of its units, x⁺ = A x + B u,
+    """The open loop of an experiment over one common period of its components, x⁺ = A x + B u,
     y = C x + D u: from what is put in at the opened signals to what arrives there. The loop is
     closed by u = y, so that the return ratio is the negative of this system."""
 
@@ -46,9 +46,9 @@ class OpenLoop:
     time: float
     """Time of the run at which it was linearised, s."""
     notes: list[str]
-    """How the model of each unit was found."""
+    """How the model of each component was found."""
     sides: tuple[OpenLoop, OpenLoop] | None
-    """The loop for increases and for decreases of every input, where a unit has no derivative."""
+    """The loop for increases and for decreases of every input, where a component has no derivative."""
 
     def statespace(self) -> control.StateSpace:
         """The open loop for python-control, which must be installed."""
@@ -137,7 +137,7 @@ def margins(
         radius of the disk margin with its frequency (rad/s), and the largest magnitude of the
         sensitivity. What has no limit is not a number. The table is empty if the loop is unstable;
         `attrs` has "stable", "spectral_radius", "period", "notes", and "sides" with the answers for
-        increases and decreases where a unit has no derivative.
+        increases and decreases where a component has no derivative.
 
     Raises:
         OrchestratorError: The experiment was refused, or its run failed.

@@ -2,10 +2,10 @@
 
 use super::*;
 use crate::Matrix;
+use crate::components::{Component, Dynamics};
 use crate::continuous::Continuous;
 use crate::model::{Signal, Step};
 use crate::propagation::Link;
-use crate::units::{Dynamics, Unit};
 use cosim::delay::Reading;
 use cosim::experiment::Coupling;
 use cosim::wiring::Port;
@@ -16,11 +16,11 @@ const STEP: f64 = 0.05;
 const ANGLE: f64 = 2.25;
 const RATE: f64 = 3.0;
 
-fn unit(name: &str, ports: [usize; 2], every: u64, dynamics: Dynamics) -> Unit {
+fn component(name: &str, ports: [usize; 2], every: u64, dynamics: Dynamics) -> Component {
     let port =
         |variable: usize| Port { component: 0, variable, reference: 0, carrier: Carrier::Real };
     let [inputs, outputs] = ports.map(|count| (0..count).map(port).collect());
-    Unit { name: name.into(), every, first: 0, inputs, outputs, states: Vec::new(), dynamics }
+    Component { name: name.into(), every, first: 0, inputs, outputs, states: Vec::new(), dynamics }
 }
 
 /// Double integrators ẍ = u, each under u = −k x − c ẋ that is sampled at every step of the law.
@@ -64,9 +64,9 @@ fn double_integrators(axes: usize, delay: f64, per_step: u64) -> Net {
     let measured = (0..2 * axes).map(|i| link((1, i), (0, i), None));
     let commanded = (0..axes).map(|i| link((0, i), (1, i), Some(i)));
     Net {
-        units: vec![
-            unit("law", [2 * axes, axes], per_step, Dynamics::Sampled(vec![law])),
-            unit("plant", [axes, 2 * axes], 1, Dynamics::Continuous(plant)),
+        components: vec![
+            component("law", [2 * axes, axes], per_step, Dynamics::Sampled(vec![law])),
+            component("plant", [axes, 2 * axes], 1, Dynamics::Continuous(plant)),
         ],
         links: measured.chain(commanded).collect(),
         coupling: Coupling::Sequential,

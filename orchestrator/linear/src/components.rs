@@ -1,4 +1,4 @@
-//! Linear models of the units of a system.
+//! Linear models of the components of a system.
 
 use crate::Matrix;
 use crate::continuous::{Continuous, References};
@@ -13,7 +13,7 @@ use fmu_import::description::VariableKind;
 use fmu_import::instance::{CallFailure, Instance};
 use fmu_import::quantity::rounded;
 
-/// Longest period of a unit that is looked for, in its steps, and in s.
+/// Longest period of a component that is looked for, in its steps, and in s.
 const LONGEST: usize = 25;
 const LONGEST_TIME: f64 = 1.0;
 /// Least number of steps whose responses a model reproduces twice over.
@@ -33,7 +33,7 @@ const CHANGES: [f64; 3] = [1e-5, 1e-7, 1e-9];
 /// What a state of a model must add to the responses, relative to the largest.
 const SMALLEST: f64 = 1e-9;
 
-/// How a unit answers to its inputs.
+/// How a component answers to its inputs.
 #[derive(Clone, Debug)]
 pub enum Dynamics {
     /// By derivatives of its states.
@@ -42,9 +42,9 @@ pub enum Dynamics {
     Sampled(Vec<Step>),
 }
 
-/// A model of a unit.
+/// A model of a component.
 #[derive(Clone, Debug)]
-pub struct Unit {
+pub struct Component {
     /// Name of the component.
     pub name: String,
     /// Number of communication steps in one of its steps.
@@ -61,18 +61,18 @@ pub struct Unit {
     pub dynamics: Dynamics,
 }
 
-/// What is found of a unit: its model, those for changes to one side, if they differ, and what to
-/// know of it.
+/// What is found of a component: its model, those for changes to one side, if they differ, and what
+/// to know of it.
 pub struct Found {
-    /// The model of the unit.
-    pub model: Unit,
+    /// The model of the component.
+    pub model: Component,
     /// The models for increases and for decreases of the inputs.
-    pub sides: Option<[Unit; 2]>,
+    pub sides: Option<[Component; 2]>,
     /// One line on how the model was found.
     pub note: String,
 }
 
-/// Returns the number of steps of which the inputs of a unit must be known.
+/// Returns the number of steps of which the inputs of a component must be known.
 pub fn needed_steps(length: f64) -> usize {
     let longest = longest_period(length);
     2 * longest + 2 * BLOCKS.max(2 * longest)
@@ -82,9 +82,9 @@ fn longest_period(length: f64) -> usize {
     ((LONGEST_TIME / length + 1e-9) as usize).clamp(1, LONGEST)
 }
 
-/// Builds the model of a unit.
+/// Builds the model of a component.
 pub struct Builder<'a> {
-    /// System that the unit is part of.
+    /// System that the component is part of.
     pub system: &'a System,
     /// Index of its component.
     pub component: usize,
@@ -106,9 +106,9 @@ impl Builder<'_> {
         }
     }
 
-    fn unit(&self, states: Vec<String>, dynamics: Dynamics) -> Unit {
+    fn of_dynamics(&self, states: Vec<String>, dynamics: Dynamics) -> Component {
         let component = &self.system.components[self.component];
-        Unit {
+        Component {
             name: component.name.clone(),
             every: u64::from(component.every),
             first: self.first,
@@ -119,8 +119,8 @@ impl Builder<'_> {
         }
     }
 
-    /// Finds the model of the unit from an instance that kept the state before the first recorded
-    /// step under number 0.
+    /// Finds the model of the component from an instance that kept the state before the first
+    /// recorded step under number 0.
     ///
     /// # Errors
     /// Returns an error if the instance fails.
@@ -157,7 +157,7 @@ impl Builder<'_> {
             }
             trials.extend(short.into_iter().next());
         }
-        // The same response with every size of the change, if the unit is smooth.
+        // The same response with every size of the change, if the component is smooth.
         let depends = trials.windows(2).map(|pair| difference(pair, 1)).fold(0.0, f64::max);
         let Some((change, period, _)) = best else { unreachable!("there are changes to try") };
         let blocks = BLOCKS.max(2 * period);
@@ -172,7 +172,7 @@ impl Builder<'_> {
                 phases[..period].iter().map(|phase| lags(phase).clone()).collect();
             let steps = realise(&lags, blocks, tolerance);
             let steps = steps.into_iter().map(|step| scaled(step, &scales)).collect();
-            self.unit(Vec::new(), Dynamics::Sampled(steps))
+            self.of_dynamics(Vec::new(), Dynamics::Sampled(steps))
         };
         let has_edge = phases[..period].iter().any(|phase| phase.sides.is_some());
         let side = |side: usize| {
@@ -208,7 +208,8 @@ impl Builder<'_> {
         self.inputs.iter().filter_map(place).collect()
     }
 
-    /// Returns the model by derivatives, if the unit gives them and they describe what it does.
+    /// Returns the model by derivatives, if the component gives them and they describe what it
+    /// does.
     fn continuous(&self, instance: &mut dyn Instance) -> Result<Option<Found>, CallFailure> {
         let description = &self.system.components[self.component].fmu.description;
         let offers = description.co_simulation.as_ref();
@@ -284,7 +285,7 @@ impl Builder<'_> {
             states.len(),
             rounded(found.0.delay)
         );
-        let model = self.unit(names, Dynamics::Continuous(found.0));
+        let model = self.of_dynamics(names, Dynamics::Continuous(found.0));
         Ok(Some(Found { model, sides: None, note }))
     }
 }
