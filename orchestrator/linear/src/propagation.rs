@@ -7,7 +7,7 @@ use crate::Matrix;
 use crate::components::{Component, Dynamics};
 use crate::continuous::Steps;
 use crate::model::{OpenLoop, Signal, Step};
-use crate::reduction::{held, reduced};
+use crate::reduction::{held, merged, reduced};
 use cosim::delay::Reading;
 use cosim::experiment::Coupling;
 
@@ -48,6 +48,9 @@ pub struct Net {
 pub struct Delay {
     /// The signal that is delayed; `None` for all.
     pub channel: Option<usize>,
+    /// Number of communication steps for which the opened signals are held, from the beginning of a
+    /// period.
+    pub held: u64,
     /// Time, s. It must be a whole number of steps of the components that receive the signals,
     /// unless all of them are continuous.
     pub time: f64,
@@ -134,6 +137,8 @@ struct Rows<'a> {
     delays: Vec<Vec<Steps>>,
     /// Inputs of each component at its last steps, the newest first.
     history: Vec<Vec<Matrix>>,
+    /// Number of communication steps for which what arrives at the opened signals is held.
+    held: u64,
 }
 
 impl Net {
@@ -223,7 +228,7 @@ impl Net {
         let a = end.columns(0, names.len()).into_owned();
         // What nothing depends on cannot make the loop unstable.
         let kept: Vec<usize> = (0..a.ncols()).filter(|i| a.column(*i).amax() > 0.0).collect();
-        a.select_rows(&kept).select_columns(&kept)
+        merged(a.select_rows(&kept).select_columns(&kept))
     }
 }
 
@@ -261,6 +266,7 @@ impl<'a> Rows<'a> {
             put_in: None,
             delays,
             history: Vec::new(),
+            held: delay.map_or(1, |delay| delay.held),
         };
         for (component, delays) in net.components.iter().zip(&rows.delays) {
             let state = unity(component.states_at(net.first));
@@ -313,13 +319,13 @@ impl<'a> Rows<'a> {
         match net.coupling {
             Coupling::Sequential => {
                 for (place, _) in components {
-                    let inputs = self.gather(place);
+                    let inputs = self.gather(place, tick);
                     self.step(place, tick, inputs);
                 }
             }
             Coupling::Jacobi => {
                 let gathered: Vec<_> =
-                    components.map(|(place, _)| (place, self.gather(place))).collect();
+                    components.map(|(place, _)| (place, self.gather(place, tick))).collect();
                 for (place, inputs) in gathered {
                     self.step(place, tick, inputs);
                 }
@@ -328,7 +334,7 @@ impl<'a> Rows<'a> {
     }
 
     /// Returns the inputs of a component.
-    fn gather(&mut self, component: usize) -> Matrix {
+    fn gather(&mut self, component: usize, tick: u64) -> Matrix {
         let mut inputs = Matrix::zeros(self.net.components[component].inputs.len(), self.columns);
         for link in self.net.links.iter().filter(|link| link.to.0 == component) {
             let source = match link.reading {
@@ -337,6 +343,10 @@ impl<'a> Rows<'a> {
             };
             let mut value = source.row(link.from.1) * link.factor;
             if let Some(channel) = link.opened {
+                if !(tick - self.net.first).is_multiple_of(self.held) {
+                    // To the last digit, so that what is remembered of it is found to be equal.
+                    value = self.arriving.row(channel).into_owned();
+                }
                 self.arriving.set_row(channel, &value);
                 if let Some(first) = self.put_in {
                     value.fill(0.0);

@@ -61,3 +61,24 @@ pub(crate) fn reduced(step: Step) -> (Step, Vec<usize>) {
         };
     }
 }
+
+/// Combines states that always change to the same value, such as the remembered values of a signal
+/// that is held. The eigenvalues but for zeros stay: where they are not zero, the components of
+/// these states in an eigenvector are equal.
+pub(crate) fn merged(mut a: Matrix) -> Matrix {
+    loop {
+        let n = a.nrows();
+        let first_equal = |row: usize| (0..row).find(|other| a.row(*other) == a.row(row));
+        let equal: Vec<usize> = (0..n).map(|row| first_equal(row).unwrap_or(row)).collect();
+        let kept: Vec<usize> = (0..n).filter(|row| equal[*row] == *row).collect();
+        if kept.len() == n {
+            return a;
+        }
+        let mut sums = Matrix::zeros(n, n);
+        for (column, into) in equal.iter().enumerate() {
+            let mut sum = sums.column_mut(*into);
+            sum += a.column(column);
+        }
+        a = sums.select_rows(&kept).select_columns(&kept);
+    }
+}

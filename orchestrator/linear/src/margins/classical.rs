@@ -59,7 +59,9 @@ pub(super) fn classical(net: &Net, open: &OpenLoop, channel: Option<usize>) -> C
     };
     let (step, takes_parts) = (net.receiving_step(), net.takes_parts());
     let whole = |steps: f64| if takes_parts { steps } else { steps.floor() };
-    let by_delay = |steps: f64| Some(net.closed(Delay { channel, time: whole(steps) * step }));
+    let held = (open.sampling() / net.length).round() as u64;
+    let by_delay =
+        |steps: f64| Some(net.closed(Delay { channel, held, time: whole(steps) * step }));
     let gain = |direction: f64| {
         let last = LARGEST_GAIN.ln();
         let crossing = first(&|x| by_gain(direction * x), FACTOR.ln(), last, open.period)?;
