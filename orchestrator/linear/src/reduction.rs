@@ -2,6 +2,7 @@
 
 use crate::Matrix;
 use crate::model::Step;
+use std::collections::HashMap;
 
 /// Combines communication points between which no opened signal changes, so that what is put in is
 /// held there too. Returns the number of samples that are left.
@@ -68,8 +69,17 @@ pub(crate) fn reduced(step: Step) -> (Step, Vec<usize>) {
 pub(crate) fn merged(mut a: Matrix) -> Matrix {
     loop {
         let n = a.nrows();
-        let first_equal = |row: usize| (0..row).find(|other| a.row(*other) == a.row(row));
-        let equal: Vec<usize> = (0..n).map(|row| first_equal(row).unwrap_or(row)).collect();
+        let rows = a.transpose();
+        let mut first: HashMap<Vec<u64>, usize> = HashMap::new();
+        let equal: Vec<usize> = rows
+            .column_iter()
+            .enumerate()
+            .map(|(place, row)| {
+                // The sum makes a zero of either sign positive.
+                let bits = row.iter().map(|value| (value + 0.0).to_bits()).collect();
+                *first.entry(bits).or_insert(place)
+            })
+            .collect();
         let kept: Vec<usize> = (0..n).filter(|row| equal[*row] == *row).collect();
         if kept.len() == n {
             return a;
