@@ -66,61 +66,6 @@ fn lcm(a: u64, b: u64) -> u64 {
     a / gcd(a, b) * b
 }
 
-impl Component {
-    /// Returns the number of communication points after which the component repeats itself.
-    fn period(&self) -> u64 {
-        let steps = match &self.dynamics {
-            Dynamics::Continuous(_) => 1,
-            Dynamics::Sampled(steps) => steps.len() as u64,
-        };
-        self.every * steps
-    }
-
-    /// Returns the place of the step that begins at a communication point, or that was the last
-    /// one before it.
-    fn phase(&self, tick: u64) -> usize {
-        let Dynamics::Sampled(steps) = &self.dynamics else { return 0 };
-        let count = steps.len() as u64;
-        // Less than one of its steps lies between the beginning of the loop's period and the first
-        // step of the component's.
-        let steps = (tick + self.every * count - self.first) / self.every;
-        (steps % count) as usize
-    }
-
-    /// Returns the number of states that the component has before a communication point.
-    fn states_at(&self, tick: u64) -> usize {
-        match &self.dynamics {
-            Dynamics::Continuous(system) => system.a.nrows(),
-            Dynamics::Sampled(steps) if tick.is_multiple_of(self.every) => {
-                steps[self.phase(tick)].a.ncols()
-            }
-            Dynamics::Sampled(steps) => steps[self.phase(tick)].a.nrows(),
-        }
-    }
-
-    /// Returns whether the outputs follow from the states alone.
-    fn shows_states(&self) -> bool {
-        matches!(&self.dynamics, Dynamics::Continuous(system) if system.d.amax() == 0.0)
-    }
-
-    /// Returns the names of the states before a communication point, and of the outputs that are
-    /// held there.
-    fn names(&self, tick: u64) -> Vec<String> {
-        let state = |place: usize| {
-            let known = self.states.get(place).cloned();
-            known.unwrap_or_else(|| format!("memory[{}]", place + 1))
-        };
-        let mut names: Vec<String> = (0..self.states_at(tick)).map(state).collect();
-        if !self.shows_states() {
-            for kind in ["held", "held before"] {
-                let outputs = 1..=self.outputs.len();
-                names.extend(outputs.map(|output| format!("output[{output}] ({kind})")));
-            }
-        }
-        names.into_iter().map(|name| format!("{}.{name}", self.name)).collect()
-    }
-}
-
 /// All values as rows of factors.
 struct Rows<'a> {
     net: &'a Net,
