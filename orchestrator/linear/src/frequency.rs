@@ -46,7 +46,7 @@ pub fn return_ratio(open: &OpenLoop, channel: usize, frequency: f64) -> Complex 
 /// ratio is S. A run without the sine is subtracted.
 ///
 /// # Errors
-/// Returns an error if the signal is no input, if an instance fails, or if the run was asked to
+/// Returns an error if the signal is no input, if the loop is unstable, if an instance fails, or if the run was asked to
 /// end.
 pub fn measure(
     lineariser: &Lineariser,
@@ -67,6 +67,11 @@ pub fn measure(
     }
     let step = system.clock.step();
     let radius = open.closed(&vec![1.0; open.channels()]).map_or(1.0, |a| spectral_radius(&a));
+    if radius >= 1.0 {
+        let time = lineariser.system().clock.time(lineariser.first());
+        let problem = format!("the loop is unstable at t = {time} s, so that it has no response");
+        return Err(Error::experiment(problem));
+    }
     let settling = (LEFT.ln() / radius.ln() * open.period).clamp(0.0, LONGEST);
     let wait = (settling / step).ceil() as u64;
     let window = (PERIODS * TAU / frequency).max(LOOP_PERIODS * open.period);

@@ -64,15 +64,17 @@ pub(super) fn classical(net: &Net, open: &OpenLoop, channel: Option<usize>) -> C
         |steps: f64| Some(net.closed(Delay { channel, held, time: whole(steps) * step }));
     let gain = |direction: f64| {
         let last = LARGEST_GAIN.ln();
-        let crossing = first(&|x| by_gain(direction * x), FACTOR.ln(), last, open.period)?;
+        let crossing = first(&|x| by_gain(direction * x), FACTOR.ln(), last, [0.0, open.period])?;
         Some(Crossing { value: (direction * crossing.value).exp(), ..crossing })
     };
-    let phase = first(&by_phase, TURN, 180.0, open.period);
+    let phase = first(&by_phase, TURN, 180.0, [0.0, open.period]);
     // A delay turns the loop by its product with the frequency, which says where to look for it.
-    let expected = phase.map_or(0.0, |at| at.value.to_radians() / (at.frequency * step));
+    let expected = phase
+        .filter(|at| at.frequency > 0.0)
+        .map_or(0.0, |at| at.value.to_radians() / (at.frequency * step));
     let trial = (expected / TRIALS).clamp(1.0 / PARTS, LONGEST_DELAY / TRIALS);
-    let trial = if takes_parts { trial } else { trial.ceil() };
-    let delay = first(&by_delay, trial, LONGEST_DELAY, open.period);
+    let (trial, grain) = if takes_parts { (trial, 0.0) } else { (trial.ceil(), 1.0) };
+    let delay = first(&by_delay, trial, LONGEST_DELAY, [grain, open.period]);
     Classical {
         gain_above: gain(1.0),
         gain_below: gain(-1.0),
@@ -98,12 +100,12 @@ fn turned_loop(
 }
 
 /// Finds the least change at which the closed loop has an eigenvalue outside the unit circle, up to
-/// `last`. A loop that cannot be closed counts as unstable.
+/// `last`, to the `grain` in which it changes. A loop that cannot be closed counts as unstable.
 fn first<T: ComplexField<RealField = f64>>(
     closed: &dyn Fn(f64) -> Option<DMatrix<T>>,
     step: f64,
     last: f64,
-    period: f64,
+    [grain, period]: [f64; 2],
 ) -> Option<Crossing> {
     let is_stable_at = |x: f64| closed(x).is_some_and(|a| is_stable(&a));
     let mut stable = 0.0;
@@ -121,7 +123,7 @@ fn first<T: ComplexField<RealField = f64>>(
     let excess = |x: f64| closed(x).map_or(1.0, |a| spectral_radius(&a).ln());
     let (mut below, mut above) = (excess(stable), excess(unstable));
     for _ in 0..REFINEMENTS {
-        if unstable - stable <= ACCURACY * unstable {
+        if unstable - stable <= grain.max(ACCURACY * unstable) {
             break;
         }
         let mut middle = (stable * above - unstable * below) / (above - below);

@@ -18,10 +18,8 @@ use serde::Serialize;
 use std::f64::consts::{PI, TAU};
 
 /// Number of frequencies that are looked at, and their range in relation to the largest.
-const FREQUENCIES: usize = 300;
-const RANGE: f64 = 1e-4;
-/// Relative distance to which the worst frequency is found.
-const NEIGHBOURS: f64 = 1.0;
+const FREQUENCIES: usize = 450;
+const RANGE: f64 = 1e-6;
 
 /// A largest value over all frequencies.
 #[derive(Clone, Copy, Debug, Serialize)]
@@ -78,11 +76,6 @@ impl<'a> Responses<'a> {
         Self { open, known }
     }
 
-    /// Returns the frequencies (rad/s) with the sensitivity at each.
-    pub fn sensitivities(&self) -> &[(f64, ComplexMatrix)] {
-        &self.known
-    }
-
     /// Returns the disk margin of some signals, while the loops of the others stay closed.
     pub fn disk(&self, channels: &[usize]) -> Disk {
         let shifted = |mut s: ComplexMatrix| {
@@ -134,7 +127,7 @@ impl<'a> Responses<'a> {
         let below = at(k.saturating_sub(1));
         let above = at((k + 1).min(self.known.len() - 1));
         // Within its neighbours a peak of a smooth function has no other beside it.
-        let reach = (above / frequency).ln().max((frequency / below).ln()) * NEIGHBOURS;
+        let reach = (above / frequency).ln().max((frequency / below).ln());
         let limit = PI / self.open.period;
         let near = |x: f64| (frequency * (x * reach).exp()).min(limit);
         let (x, negative) = golden(&mut |x| -value(chosen(&sensitivity(self.open, near(x)))), 1.0);
