@@ -525,6 +525,14 @@ def test_every_controller_has_its_margins(tmp_path):
     assert len(results["runs"]) == 67
     assert [claim["verdict"] for claim in results["claims"]] == [HOLDS, HOLDS]
     [member] = results["runs"]["late-lqr"]["members"]
+    # What the disk allows is within what gain and phase by themselves allow.
+    for name, run in results["runs"].items():
+        metrics = run["members"][0]["metrics"]
+        alpha = metrics["margin_disk"]
+        gain = (2.0 + alpha) / (2.0 - alpha)
+        assert metrics["margin_gain_above"] is None or gain <= metrics["margin_gain_above"] * (1.0 + 1e-6), name
+        assert metrics["margin_gain_below"] is None or 1.0 / gain >= metrics["margin_gain_below"] * (1.0 - 1e-6), name
+        assert np.degrees(2.0 * np.arctan(0.5 * alpha)) <= metrics["margin_phase_deg"] * (1.0 + 1e-6), name
     # What a delay takes, the delay margin loses.
     [ideal] = results["runs"]["ideal-lqr"]["members"]
     assert ideal["metrics"]["margin_delay_s"] - member["metrics"]["margin_delay_s"] == pytest.approx(0.04, abs=1e-6)
