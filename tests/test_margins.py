@@ -142,11 +142,11 @@ def crossings(loop: control.StateSpace, last: float) -> tuple[float, float, floa
     return gain, *min(margins)
 
 
-def final_over_initial(law: str, attitude, delay: float, gain: float, stop: float, out) -> float:
+def final_over_initial(law: str, attitude, delay: float, gain: float, stop: float, out, *more: str) -> float:
     """Rates at the end of a flight from a small start, by those of the start. A loop gain is raised by a lower inertia."""
     arguments = settings(attitude, delay, 1.0 / gain, START[law])
     command = [program("orchestrator"), "run", FILES[law], "--quiet", "--force", "--no-plot", "--out", out]
-    command += ["--stop", str(stop), "--fmu-dir", TARGET / "fmu", *arguments]
+    command += ["--stop", str(stop), "--fmu-dir", TARGET / "fmu", *arguments, *more]
     done = subprocess.run(command, capture_output=True, text=True, timeout=120)
     if done.returncode != 0:
         assert done.returncode in (1, 3) and ("singular" in done.stderr or "lost" in done.stderr), done.stderr
@@ -169,6 +169,20 @@ def test_oracle_flights_are_stable_below_the_margin_and_unstable_above_it(law, a
         for setting in ((delay, gain), (longer, 1.0)):
             growth = final_over_initial(law, attitude, *setting, stop, tmp_path / "run")
             assert (growth < 0.5) if is_stable else (growth > 2.0), f"{share} {setting}: {growth}"
+
+
+@pytest.mark.parametrize("law", ["LQR", "FBL"])
+def test_oracle_the_other_order_of_calls_is_a_step_of_delay_in_flight_too(law, tmp_path):
+    jacobi = ["--coupling", "jacobi"]
+    arguments = ["--at", "10", "--open", SIGNALS, "--json", *settings(ATTITUDES[1], 0.0), *jacobi]
+    found = json.loads(call("margins", FILES[law], *arguments))["together"]
+    late = margins(law, ATTITUDES[1], PERIOD[law])["together"]
+    assert found["disk"]["alpha"] == pytest.approx(late["disk"]["alpha"], rel=1e-5)
+    gain = found["classical"]["gain_above"]["value"]
+    assert gain == pytest.approx(late["classical"]["gain_above"]["value"], rel=1e-5)
+    for share, is_stable in ((0.98, True), (1.02, False)):
+        growth = final_over_initial(law, ATTITUDES[1], 0.0, share * gain, 80.0, tmp_path / "run", *jacobi)
+        assert (growth < 0.5) if is_stable else (growth > 2.0), f"{share}: {growth}"
 
 
 def test_the_margins_of_a_law_that_is_replanned_are_those_of_its_period():

@@ -7,7 +7,6 @@ use clap::Args;
 use cosim::error::Error;
 use cosim::interrupt::Interrupt;
 use cosim_report::figure::{Color, Curve, Figure, Legend, Panel, Shape, svg};
-use fmu_import::description::VariableKind;
 use linear::frequency::{self, Complex, Point, return_ratio};
 use linear::linearise::Lineariser;
 use linear::model::OpenLoop;
@@ -81,12 +80,8 @@ pub(crate) fn respond(
     )?;
     let mut all: Vec<Vec<Point>> = Vec::new();
     for (channel, signal) in found.open.signals.iter().enumerate() {
-        let input = lineariser.opened()[channel];
-        let nominal = match &lineariser.system().variable_at(input).kind {
-            VariableKind::Real { nominal: Some(nominal), .. } => *nominal,
-            _ => 1.0,
-        };
-        let amplitude = asked.amplitude.unwrap_or(1e-4 * nominal);
+        let input = lineariser.system().variable_at(lineariser.opened()[channel]);
+        let amplitude = asked.amplitude.unwrap_or(1e-4 * input.nominal());
         let mut points = Vec::new();
         for &frequency in &frequencies {
             let point =

@@ -108,6 +108,17 @@ pub struct Variable {
     pub derivative_of: Option<usize>,
 }
 
+impl Variable {
+    /// Returns the typical magnitude of the value, in the variable's unit: 1 if none is declared,
+    /// as FMI says.
+    pub fn nominal(&self) -> f64 {
+        match self.kind {
+            VariableKind::Real { nominal: Some(nominal), .. } if nominal > 0.0 => nominal,
+            _ => 1.0,
+        }
+    }
+}
+
 /// Type of a variable, with the attributes of that type.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub enum VariableKind {

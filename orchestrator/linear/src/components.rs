@@ -9,7 +9,6 @@ use crate::replay::Recorded;
 use crate::responses::{Lags, Probe, Response, Scales};
 use cosim::system::System;
 use cosim::wiring::Port;
-use fmu_import::description::VariableKind;
 use fmu_import::instance::{CallFailure, Instance};
 use fmu_import::quantity::rounded;
 
@@ -154,11 +153,8 @@ pub struct Builder<'a> {
 }
 
 impl Builder<'_> {
-    fn scale(&self, port: Port) -> f64 {
-        match &self.system.variable_at(port).kind {
-            VariableKind::Real { nominal: Some(nominal), .. } if *nominal > 0.0 => *nominal,
-            _ => 1.0,
-        }
+    fn scale(&self, port: &Port) -> f64 {
+        self.system.variable_at(*port).nominal()
     }
 
     fn of_dynamics(&self, states: Vec<String>, dynamics: Dynamics) -> Component {
@@ -186,8 +182,8 @@ impl Builder<'_> {
             return Ok(found);
         }
         let scales = Scales {
-            inputs: self.inputs.iter().map(|port| self.scale(*port)).collect(),
-            outputs: self.outputs.iter().map(|port| self.scale(*port)).collect(),
+            inputs: self.inputs.iter().map(|port| self.scale(port)).collect(),
+            outputs: self.outputs.iter().map(|port| self.scale(port)).collect(),
         };
         let references: Vec<u32> = self.outputs.iter().map(|port| port.reference).collect();
         let places = self.places();
@@ -291,16 +287,12 @@ impl Builder<'_> {
         instance.restore(0)?;
         let Ok(found) = Continuous::of(instance, &references) else { return Ok(None) };
         // The states may be read, so that the response of each of them can be held against it.
-        let nominal = |position: &usize| match &variables[*position].kind {
-            VariableKind::Real { nominal: Some(nominal), .. } => *nominal,
-            _ => 1.0,
-        };
         let scales = Scales {
-            inputs: self.inputs.iter().map(|port| self.scale(*port)).collect(),
+            inputs: self.inputs.iter().map(|port| self.scale(port)).collect(),
             outputs: states
                 .iter()
-                .map(nominal)
-                .chain(self.outputs.iter().map(|port| self.scale(*port)))
+                .map(|position| variables[*position].nominal())
+                .chain(self.outputs.iter().map(|port| self.scale(port)))
                 .collect(),
         };
         let read: Vec<u32> = states_at.iter().chain(&outputs).copied().collect();

@@ -46,8 +46,8 @@ pub fn return_ratio(open: &OpenLoop, channel: usize, frequency: f64) -> Complex 
 /// ratio is S. A run without the sine is subtracted.
 ///
 /// # Errors
-/// Returns an error if the signal is no input, if the loop is unstable, if an instance fails, or if the run was asked to
-/// end.
+/// Returns an error if the signal is no input, if the loop is unstable, if an instance fails, or if
+/// the run was asked to end.
 pub fn measure(
     lineariser: &Lineariser,
     found: &Linearised,
