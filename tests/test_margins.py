@@ -185,6 +185,31 @@ def test_oracle_the_other_order_of_calls_is_a_step_of_delay_in_flight_too(law, t
         assert (growth < 0.5) if is_stable else (growth > 2.0), f"{share}: {growth}"
 
 
+@pytest.mark.parametrize("law", ["FBL", "TwoLoopSMC", "CRMPC"])
+def test_oracle_surfaces_give_small_motions_the_margins_of_the_loop_without_them(law, tmp_path):
+    experiment = FOLDER / "margins" / "allocated.toml"
+    arguments = ["--fmu", f"controller={law}.fmu", *settings(ATTITUDES[0], 0.0)]
+    arguments = [part for part in arguments if part not in ("--set", "plant.actuation.delay=0.0")]
+    arguments = [part for value in arguments[2:] for part in ("--set", value)]
+    law_of = ["--fmu", f"controller={law}.fmu"]
+    found = json.loads(call("margins", experiment, "--json", *law_of, *arguments))
+    assert any(note.startswith("allocator and plant: ") for note in found["notes"]) and "sides" not in found
+    ideal = json.loads(call("margins", FOLDER / "margins" / "rest.toml", "--json", *law_of, *arguments))
+    assert found["together"]["disk"]["alpha"] == pytest.approx(ideal["together"]["disk"]["alpha"], rel=5e-3)
+    gain = found["together"]["classical"]["gain_above"]["value"]
+    assert gain == pytest.approx(ideal["together"]["classical"]["gain_above"]["value"], rel=5e-3)
+    # Beyond the margin a small motion grows until the surfaces are too slow for it.
+    for share, is_stable in ((0.98, True), (1.02, False)):
+        start = [f"plant.initial.{name}={rate * 1e-7} deg/s" for name, rate in zip("pqr", (1.3, 1.0, 0.7))]
+        more = [f"plant.inertia.scale={1.0 / (share * gain)}", *start]
+        command = ["run", experiment, *law_of, *arguments, *(part for value in more for part in ("--set", value))]
+        call(*command, "--quiet", "--force", "--no-plot", "--stop", "40", "--out", tmp_path / "run")
+        table = pd.read_csv(tmp_path / "run" / "results.csv", index_col="time")
+        rates = table[[f"plant.rate.{name}" for name in "pqr"]].abs().max(axis=1)
+        growth = rates[rates.index > 32.0].max() / np.radians(1e-7)
+        assert (growth < 0.5) if is_stable else (growth > 2.0), f"{share}: {growth}"
+
+
 def test_the_margins_of_a_law_that_is_replanned_are_those_of_its_period():
     found = json.loads(
         call("margins", FOLDER / "crmpc-2022" / "crmpc-robust.toml", "--at", "10", "--open", SIGNALS, "--json",

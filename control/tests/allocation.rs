@@ -131,6 +131,31 @@ fn oracle_duty_cycles_of_the_modulator() {
 }
 
 #[test]
+fn oracle_the_describing_function_at_low_frequency_is_that_of_the_duty_cycles() {
+    let pwpf = Settings::published().pwpf;
+    let [gain, on, off] = [pwpf.gain, pwpf.on, pwpf.off];
+    let duty = |command: f64| {
+        if command <= on / gain {
+            return 0.0;
+        }
+        let pulse = ((on + gain * (1.0 - command)) / (off + gain * (1.0 - command))).ln();
+        let pause = ((gain * command - off) / (gain * command - on)).ln();
+        pulse / (pulse + pause)
+    };
+    for amplitude in [0.15, 0.3, 1.0] {
+        // (2/π A) ∫ d(A sin θ) sin θ dθ over half a period, of the exact duty cycle d.
+        let parts = 20_000;
+        let angle = |k: i32| (f64::from(k) + 0.5) * std::f64::consts::PI / f64::from(parts);
+        let integral: f64 =
+            (0..parts).map(|k| duty(amplitude * angle(k).sin()) * angle(k).sin()).sum();
+        let exact = 2.0 * integral / (f64::from(parts) * amplitude);
+        let (found, phase) = pwpf.describing_function(amplitude, 0.02);
+        assert!((found / exact - 1.0).abs() < 0.02, "{amplitude}: {found} instead of {exact}");
+        assert!(phase.abs() < 0.03, "{amplitude}: {phase}");
+    }
+}
+
+#[test]
 fn surfaces_alone_give_what_they_can_once_the_rate_let_them() {
     let commanded = command([1e4, -1e4, -3e3], PRESSURE);
     let mut optimal = allocator(Method::Optimal);

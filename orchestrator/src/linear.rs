@@ -8,7 +8,9 @@ use cosim::error::Error;
 use cosim::interrupt::Interrupt;
 use cosim::search;
 use cosim::system::System;
+use cosim_report::figure::{Color, Curve, Figure, Legend, Panel, Shape, svg};
 use fmu_import::quantity::rounded;
+use linear::curves::{ResponseCurves, excluded};
 use linear::linearise::Linearised;
 use linear::margins::{Crossing, LoopMargins};
 use linear::model::{OpenLoop, Step};
@@ -17,6 +19,9 @@ use serde_json::{Value, json};
 use std::fs;
 use std::io::Write;
 use std::path::PathBuf;
+
+/// Colour of the return ratio.
+const SIGNAL: Color = Color(0, 114, 178);
 
 /// What is linearised, when, and where the loop is opened.
 #[derive(Args)]
@@ -85,6 +90,9 @@ pub(crate) struct PrintMargins {
     /// Print JSON, for other programs.
     #[arg(long)]
     json: bool,
+    /// File for a Nichols plot of the return ratio and a plot of the sensitivity (SVG).
+    #[arg(long, value_name = "FILE")]
+    plot: Option<PathBuf>,
 }
 
 /// Writes the open loop of an experiment.
@@ -131,6 +139,9 @@ pub(crate) fn margins(
 ) -> Result<(), Failure> {
     let found = asked.instant.linearise(interrupt)?;
     let margins = analysis::margins(&found.net, &found.open);
+    if let Some(path) = &asked.plot {
+        svg::write(&figure(&found, &margins)?, path)?;
+    }
     let sides = found
         .sides
         .as_ref()
@@ -162,6 +173,42 @@ pub(crate) fn margins(
         print(side, out)?;
     }
     Ok(())
+}
+
+/// Draws the return ratio at the signal with the smallest disk margin in a Nichols plot, with the
+/// set that it does not enter, and the sensitivity over the frequency.
+fn figure(found: &Linearised, margins: &analysis::Margins) -> Result<Figure, Failure> {
+    let curves = ResponseCurves::of(found);
+    let worst = margins.loops.iter().min_by(|a, b| a.disk.alpha.total_cmp(&b.disk.alpha));
+    let (Some(curves), Some(worst)) = (curves, worst) else {
+        let problem = format!("--plot: the loop is unstable at t = {} s", rounded(found.time));
+        return Err(Error::experiment(problem).into());
+    };
+    let line = |name: &str, color, shape, x, y| Curve { name: name.into(), color, shape, x, y };
+    // From 2 on the set has no edge.
+    let alpha = worst.disk.alpha.min(1.999);
+    let (x, y) = excluded(alpha);
+    let excluded = line(&format!("disk margin {alpha:.3}"), Color::LIMIT, Shape::Dashed, x, y);
+    let ratio = line(&worst.signal, SIGNAL, Shape::Line, curves.phase, curves.gain);
+    let sensitivity =
+        line("all together", Color(0, 0, 0), Shape::Line, curves.frequency, curves.sensitivity);
+    let panel = |x_label: &str, y_label: &str, log_x, curves| Panel {
+        title: String::new(),
+        x_label: x_label.into(),
+        y_label: y_label.into(),
+        log_x,
+        x_range: None,
+        curves,
+    };
+    Ok(Figure {
+        title: format!("Return ratio and sensitivity at t = {} s", rounded(found.time)),
+        columns: 2,
+        legend: Legend::Above,
+        panels: vec![
+            panel("phase of L, deg", "|L|, dB", false, vec![excluded, ratio]),
+            panel("frequency, rad/s", "σ̄(S), dB", true, vec![sensitivity]),
+        ],
+    })
 }
 
 fn print(margins: &analysis::Margins, out: &mut impl Write) -> Result<(), Failure> {

@@ -7,6 +7,7 @@ use clap::Args;
 use cosim::error::Error;
 use cosim::interrupt::Interrupt;
 use cosim_report::figure::{Color, Curve, Figure, Legend, Panel, Shape, svg};
+use linear::curves::decibel;
 use linear::frequency::{self, Complex, Point, return_ratio};
 use linear::linearise::Lineariser;
 use linear::model::OpenLoop;
@@ -104,10 +105,6 @@ pub(crate) fn respond(
         svg::write(&figure(&title, &found.open, &all, [asked.from, to]), path)?;
     }
     Ok(())
-}
-
-fn decibel(magnitude: f64) -> f64 {
-    20.0 * magnitude.log10()
 }
 
 /// Draws magnitude and phase of the return ratios: the models' as lines, and those in flight as

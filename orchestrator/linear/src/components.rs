@@ -2,7 +2,7 @@
 
 use crate::Matrix;
 use crate::continuous::{Continuous, References};
-use crate::fitting::{AT_LENGTH, DESCRIBED, delayed, describes, reduced};
+use crate::fitting::{AT_LENGTH, DESCRIBED, delayed, describes, deviation, reduced};
 use crate::model::Step;
 use crate::realisation::realise;
 use crate::replay::Recorded;
@@ -31,6 +31,9 @@ const DRIFTS: f64 = 0.01;
 const CHANGES: [f64; 3] = [1e-5, 1e-7, 1e-9];
 /// What a state of a model must add to the responses, relative to the largest.
 const SMALLEST: f64 = 1e-9;
+/// The same for a pair. An allocator ends its iterations anywhere near the optimum, and what the
+/// effectors do on their way from one end to the next is noise.
+const SMALLEST_OF_PAIR: f64 = 1e-3;
 
 /// How a component answers to its inputs.
 #[derive(Clone, Debug)]
@@ -129,7 +132,13 @@ pub struct Found {
 /// Returns the number of steps of which the inputs of a component must be known.
 pub fn needed_steps(length: f64) -> usize {
     let longest = longest_period(length);
-    2 * longest + 2 * BLOCKS.max(2 * longest)
+    let shown = 2 * longest + 2 * BLOCKS.max(2 * longest);
+    shown.max(compared_steps(length))
+}
+
+/// Returns the number of steps over which a model is held against the motion of a vehicle.
+fn compared_steps(length: f64) -> usize {
+    (LONGEST_TIME / length).ceil() as usize
 }
 
 fn longest_period(length: f64) -> usize {
@@ -140,8 +149,8 @@ fn longest_period(length: f64) -> usize {
 pub struct Builder<'a> {
     /// System that the component is part of.
     pub system: &'a System,
-    /// Index of its component.
-    pub component: usize,
+    /// Indices of its components: one, or two that are taken as one.
+    pub components: &'a [usize],
     /// Communication point of the first recorded step.
     pub first: u64,
     /// Its inputs as they were in the loop.
@@ -158,16 +167,52 @@ impl Builder<'_> {
     }
 
     fn of_dynamics(&self, states: Vec<String>, dynamics: Dynamics) -> Component {
-        let component = &self.system.components[self.component];
+        let components = self.components.iter().map(|index| &self.system.components[*index]);
+        let names: Vec<&str> = components.map(|component| component.name.as_str()).collect();
         Component {
-            name: component.name.clone(),
-            every: u64::from(component.every),
+            name: names.join(" and "),
+            every: u64::from(self.system.components[self.components[0]].every),
             first: self.first,
             inputs: self.inputs.clone(),
             outputs: self.outputs.clone(),
             states,
             dynamics,
         }
+    }
+
+    /// Returns whether an instance that kept the state before the first recorded step under number
+    /// 0 has different slopes to both sides there.
+    ///
+    /// # Errors
+    /// Returns an error if the instance fails.
+    pub fn has_edge(&self, instance: &mut dyn Instance) -> Result<bool, CallFailure> {
+        let (scales, references, places) = (self.scales(), self.references(), self.places());
+        let probe = Probe {
+            recorded: self.recorded,
+            inputs: &places,
+            outputs: &references,
+            scales: &scales,
+            change: CHANGES[0],
+        };
+        Ok(probe.responses(instance, 0, COMPARED)?.sides.is_some())
+    }
+
+    /// Returns whether a component has continuous states, whose motion may be slow beside the
+    /// steps.
+    fn moves(&self) -> bool {
+        let components = self.components.iter().map(|index| &self.system.components[*index]);
+        components.into_iter().any(|one| one.fmu.description.states().next().is_some())
+    }
+
+    fn scales(&self) -> Scales {
+        Scales {
+            inputs: self.inputs.iter().map(|port| self.scale(port)).collect(),
+            outputs: self.outputs.iter().map(|port| self.scale(port)).collect(),
+        }
+    }
+
+    fn references(&self) -> Vec<u32> {
+        self.outputs.iter().map(|port| port.reference).collect()
     }
 
     /// Finds the model of the component from an instance that kept the state before the first
@@ -181,12 +226,7 @@ impl Builder<'_> {
         if let Some(found) = self.continuous(instance)? {
             return Ok(found);
         }
-        let scales = Scales {
-            inputs: self.inputs.iter().map(|port| self.scale(port)).collect(),
-            outputs: self.outputs.iter().map(|port| self.scale(port)).collect(),
-        };
-        let references: Vec<u32> = self.outputs.iter().map(|port| port.reference).collect();
-        let places = self.places();
+        let (scales, references, places) = (self.scales(), self.references(), self.places());
         let probe = |change: f64| Probe {
             recorded: self.recorded,
             inputs: &places,
@@ -217,11 +257,30 @@ impl Builder<'_> {
             .collect::<Result<_, _>>()?;
         let error = phases.iter().map(|phase| phase.error).fold(0.0, f64::max);
         let drift = difference(&phases, period);
-        let tolerance = SMALLEST.max(drift).max(error * 10.0);
-        let model = |lags: &dyn Fn(&Response) -> &Lags| {
+        let smallest = if self.components.len() > 1 { SMALLEST_OF_PAIR } else { SMALLEST };
+        let tolerance = smallest.max(drift).max(error * 10.0);
+        let realised = |lags: &dyn Fn(&Response) -> &Lags| {
             let lags: Vec<Lags> =
                 phases[..period].iter().map(|phase| lags(phase).clone()).collect();
-            let steps = realise(&lags, blocks, tolerance);
+            realise(&lags, blocks, tolerance)
+        };
+        if self.moves() {
+            let count = compared_steps(self.recorded.length);
+            let measured = probe(change).responses(instance, 0, count)?;
+            let deviation = deviation(&realised(&|phase| &phase.central), &measured.central);
+            if deviation > AT_LENGTH {
+                return Err(CallFailure::new(
+                    "linearise",
+                    format!(
+                        "steps of {} s show too little of the motion: the model is {:.0} % off the response to a change within {LONGEST_TIME} s. The experiment needs a longer step",
+                        self.recorded.length,
+                        1e2 * deviation
+                    ),
+                ));
+            }
+        }
+        let model = |lags: &dyn Fn(&Response) -> &Lags| {
+            let steps = realised(lags);
             let steps = steps.into_iter().map(|step| scaled(step, &scales)).collect();
             self.of_dynamics(Vec::new(), Dynamics::Sampled(steps))
         };
@@ -262,7 +321,8 @@ impl Builder<'_> {
     /// Returns the model by derivatives, if the component gives them and they describe what it
     /// does.
     fn continuous(&self, instance: &mut dyn Instance) -> Result<Option<Found>, CallFailure> {
-        let description = &self.system.components[self.component].fmu.description;
+        let [component] = self.components else { return Ok(None) };
+        let description = &self.system.components[*component].fmu.description;
         let offers = description.co_simulation.as_ref();
         if !offers.is_some_and(|interface| interface.has("providesDirectionalDerivative")) {
             return Ok(None);
@@ -286,7 +346,7 @@ impl Builder<'_> {
         };
         instance.restore(0)?;
         let Ok(found) = Continuous::of(instance, &references) else { return Ok(None) };
-        // The states may be read, so that the response of each of them can be held against it.
+        // The states may be read, so that each of their responses can be held against it.
         let scales = Scales {
             inputs: self.inputs.iter().map(|port| self.scale(port)).collect(),
             outputs: states
@@ -327,7 +387,7 @@ impl Builder<'_> {
         let names = found.1.iter().map(|place| variables[states[*place]].name.clone()).collect();
         let note = format!(
             "{}: derivatives by fmi2GetDirectionalDerivative, {} of {} states, inputs act after {} s",
-            self.system.components[self.component].name,
+            self.system.components[*component].name,
             found.1.len(),
             states.len(),
             rounded(found.0.delay)

@@ -3,6 +3,7 @@
 use crate::Matrix;
 use crate::continuous::Continuous;
 use crate::margins::structured::golden;
+use crate::model::Step;
 use crate::realisation::least_squares;
 use crate::responses::{Lags, Scales};
 
@@ -45,6 +46,23 @@ pub(crate) fn describes(
             |lags: &[Matrix]| lags.iter().map(|matrix| matrix.row(row).amax()).fold(0.0, f64::max);
         largest(&differences) <= accuracy * largest(lags) + 1e-9
     })
+}
+
+/// Returns the largest difference between the responses of steps that repeat themselves and those
+/// that were measured, relative to the largest response of a variable.
+pub(crate) fn deviation(steps: &[Step], lags: &[Matrix]) -> f64 {
+    let mut state = steps[0].b.clone();
+    let mut differences = vec![&steps[0].d - &lags[0]];
+    for (lag, measured) in lags.iter().enumerate().skip(1) {
+        let step = &steps[lag % steps.len()];
+        differences.push(&step.c * &state - measured);
+        state = &step.a * state;
+    }
+    let largest =
+        |lags: &[Matrix], row: usize| lags.iter().map(|m| m.row(row).amax()).fold(0.0, f64::max);
+    (0..lags[0].nrows())
+        .map(|row| largest(&differences, row) / largest(lags, row).max(1e-9))
+        .fold(0.0, f64::max)
 }
 
 /// Gives a system the delay and the matrix B of its responses, and no D. While an input has not

@@ -3,18 +3,21 @@
 //! An experiment is run to an instant and kept there. A component that declares continuous states
 //! gives its derivatives ([`continuous`]); of every other one the responses to small changes of its
 //! inputs are taken from the kept state ([`responses`]), and realised as a linear model of the
-//! fewest states ([`realisation`]). Then the master's calls are repeated on matrices instead of
+//! fewest states ([`realisation`]). One that has edges is taken together with the one that it hands
+//! on to ([`pair`]). Then the master's calls are repeated on matrices instead of
 //! values ([`propagation`]), so that order, coupling, periods and delays are those of the run. The
 //! loop is opened at named signals. [`margins`] says how far it is from instability there.
 
 pub mod components;
 pub mod continuous;
+pub mod curves;
 mod fitting;
 pub mod frequency;
 pub mod linearise;
 pub mod margins;
 pub mod measures;
 pub mod model;
+mod pair;
 pub mod propagation;
 pub mod realisation;
 mod reduction;

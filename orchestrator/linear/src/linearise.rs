@@ -2,6 +2,7 @@
 
 use crate::components::{Builder, Component, Found, needed_steps};
 use crate::model::{OpenLoop, Signal};
+use crate::pair::{Joined, Pair};
 use crate::propagation::{Link, Net};
 use crate::replay::Recorded;
 use cosim::clock::Clock;
@@ -54,7 +55,6 @@ pub struct Lineariser {
     signals: Vec<Signal>,
     /// The opened variables, in the order of the signals.
     opened: Vec<Port>,
-    links: Vec<Link>,
 }
 
 /// Linearises an experiment at `time` (s), with the loop opened at signals that are named as
@@ -94,9 +94,11 @@ impl Lineariser {
         }
         let (signals, opened) = opened(&system, open)?;
         let wired = wired(&mut system, first)?;
-        let links = links(&system, &wired, &opened);
-        for (channel, signal) in signals.iter().enumerate() {
-            if !links.iter().any(|link| link.opened == Some(channel)) {
+        let responds = |component: usize| wired.iter().any(|one| one.component == component);
+        for (port, signal) in opened.iter().zip(&signals) {
+            let carries = |wire: &Wire| wire.from == *port || wire.to == *port;
+            let mut sources = system.wires().into_iter().map(|(wire, _)| wire).filter(carries);
+            if !sources.any(|wire| responds(wire.from.component)) {
                 let problem =
                     format!("--open {}: no component that responds gives this signal", signal.name);
                 return Err(Error::experiment(problem));
@@ -108,7 +110,7 @@ impl Lineariser {
         let (start, step) = (system.clock.start(), system.clock.step());
         system.clock =
             Clock::new(start, start + last as f64 * step, step).map_err(Error::experiment)?;
-        Ok(Self { system, time, ticks: first..last, wired, signals, opened, links })
+        Ok(Self { system, time, ticks: first..last, wired, signals, opened })
     }
 
     /// Returns the system, from which masters are started.
@@ -136,24 +138,25 @@ impl Lineariser {
         master: &mut Master,
         interrupt: &Interrupt,
     ) -> Result<Linearised, Error> {
-        let Self { system, time, ticks, wired, signals, links, .. } = self;
+        let Self { system, time, ticks, wired, signals, opened } = self;
         let recorded = record(system, wired, ticks.clone(), master)?;
         let _silence = warnings::silence();
         let mut found: Vec<Found> = Vec::new();
-        for (one, recorded) in wired.iter().zip(&recorded) {
+        let mut next = 0;
+        while next < wired.len() {
             if let Some(request) = interrupt.asked() {
                 return Err(Error::Interrupted { time: *time, request });
             }
-            let builder = Builder {
-                system,
-                component: one.component,
-                first: one.first,
-                recorded,
-                inputs: one.inputs.clone(),
-                outputs: one.outputs.clone(),
-            };
-            found.push(master.call(one.component, *time, |instance| builder.find(instance))?);
+            if let Some(pair) = self.pair(next, &recorded, master)? {
+                found.push(pair);
+                next += 2;
+            } else {
+                found.push(self.alone(next, &recorded[next], master)?);
+                next += 1;
+            }
         }
+        let models: Vec<&Component> = found.iter().map(|found| &found.model).collect();
+        let links = links(system, &models, opened);
         let net = |of: &dyn Fn(&Found) -> Component| Net {
             components: found.iter().map(of).collect(),
             links: links.clone(),
@@ -177,6 +180,71 @@ impl Lineariser {
         }
         let notes = found.into_iter().map(|found| found.note).collect();
         Ok(Linearised { time: *time, net, sides, open, notes })
+    }
+}
+
+impl Lineariser {
+    /// Finds the model of a component by itself.
+    fn alone(
+        &self,
+        place: usize,
+        recorded: &Recorded,
+        master: &mut Master,
+    ) -> Result<Found, Error> {
+        let one = &self.wired[place];
+        let builder = self.builder(one, recorded);
+        master.call(one.component, self.time, |instance| builder.find(instance))
+    }
+
+    fn builder<'a>(&'a self, one: &'a Wired, recorded: &'a Recorded) -> Builder<'a> {
+        Builder {
+            system: &self.system,
+            components: std::slice::from_ref(&one.component),
+            first: one.first,
+            recorded,
+            inputs: one.inputs.clone(),
+            outputs: one.outputs.clone(),
+        }
+    }
+
+    /// Finds the model of a component together with the next one, if it has an edge by itself and
+    /// none together with what it acts on.
+    fn pair(
+        &self,
+        place: usize,
+        recorded: &[Recorded],
+        master: &mut Master,
+    ) -> Result<Option<Found>, Error> {
+        let [first, second] = match self.wired.get(place..place + 2) {
+            Some([first, second]) if first.every == second.every => [first, second],
+            _ => return Ok(None),
+        };
+        let components = [first.component, second.component];
+        let joined = Joined::new(
+            &self.system,
+            components,
+            [&recorded[place], &recorded[place + 1]],
+            [&first.outputs, &second.outputs],
+            &self.opened,
+        );
+        let Some(joined) = joined else { return Ok(None) };
+        let builder = self.builder(first, &recorded[place]);
+        if !master.call(first.component, self.time, |instance| builder.has_edge(instance))? {
+            return Ok(None);
+        }
+        let builder = Builder {
+            system: &self.system,
+            components: &components,
+            first: first.first,
+            recorded: &joined.recorded,
+            inputs: joined.inputs.clone(),
+            outputs: joined.outputs.clone(),
+        };
+        let found = master.call_both(components, self.time, |instances| {
+            let mut pair = Pair::new(&joined, instances);
+            builder.find(&mut pair).map_err(|failure| (pair.last, failure))
+        })?;
+        Ok(Some(found).filter(|found| found.sides.is_none()))
     }
 }
 
@@ -248,10 +316,13 @@ fn record(
 }
 
 /// Finds the connections between the components.
-fn links(system: &System, wired: &[Wired], opened: &[Port]) -> Vec<Link> {
-    let place = |port: &Port, of: fn(&Wired) -> &Vec<Port>| {
-        let one = wired.iter().position(|one| one.component == port.component)?;
-        Some((one, of(&wired[one]).iter().position(|other| other == port)?))
+fn links(system: &System, models: &[&Component], opened: &[Port]) -> Vec<Link> {
+    // A pair counts its references anew.
+    let is_same = |a: &Port, b: &Port| a.component == b.component && a.variable == b.variable;
+    let place = |port: &Port, of: fn(&Component) -> &Vec<Port>| {
+        models.iter().enumerate().find_map(|(one, model)| {
+            Some((one, of(model).iter().position(|other| is_same(port, other))?))
+        })
     };
     let link = |(wire, reading): (Wire, Reading)| {
         Some(Link {

@@ -3,6 +3,7 @@
 use cosim::master::{Observer, Sample};
 use cosim::signal::{Resolved, Signal};
 use cosim::system::Parameters;
+use linear::curves::ResponseCurves;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -28,6 +29,9 @@ pub struct Series {
     pub units: BTreeMap<Signal, String>,
     /// Single values of the metrics that keep them, by name.
     pub samples: BTreeMap<String, Vec<f64>>,
+    /// Frequency responses of the loop, if a figure draws them.
+    #[serde(default)]
+    pub response: Option<ResponseCurves>,
 }
 
 /// Smallest and largest value at each communication point.
@@ -99,6 +103,7 @@ impl Watch {
             signals: signals.map(|((s, _), values)| (s.clone(), values.clone())).collect(),
             units: units.collect(),
             samples,
+            response: None,
         }
     }
 

@@ -35,8 +35,8 @@ fn one() -> usize {
     1
 }
 
-/// A panel of a figure. Exactly one of `signal`, `signals`, `histogram`, `scatter` and `across`
-/// selects the curves; a panel may also have `points` alone.
+/// A panel of a figure. Exactly one of `signal`, `signals`, `histogram`, `scatter`, `across` and
+/// `response` selects the curves; a panel may also have `points` alone.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Panel {
@@ -67,6 +67,12 @@ pub struct Panel {
     pub scatter: Option<Scatter>,
     /// Two metrics that are drawn against each other, as lines through several runs.
     pub across: Option<Across>,
+    /// Frequency response of the loop that `[observe.margins]` linearises, as one curve for each
+    /// run.
+    pub response: Option<Response>,
+    /// Radius of a disk margin, below 2, whose excluded set a panel with `response = "nichols"`
+    /// shows.
+    pub disk: Option<f64>,
     /// Horizontal lines across the panel.
     #[serde(default)]
     pub bounds: Vec<Line>,
@@ -93,6 +99,18 @@ pub struct Curve {
     pub label: String,
     /// Colour of the curve.
     pub color: Color,
+}
+
+/// Frequency response of a loop.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Response {
+    /// Magnitude of the return ratio, in dB, over its phase in deg: at the signal with the smallest
+    /// disk margin, while the loops of the others are closed.
+    Nichols,
+    /// Largest singular value of the sensitivity of all signals, in dB, over the frequency in
+    /// rad/s.
+    Sensitivity,
 }
 
 /// Two metrics of a run that are drawn against each other.

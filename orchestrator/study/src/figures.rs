@@ -1,12 +1,13 @@
 //! Draws the figures of a study from the results of its runs.
 
 use crate::curves::Series;
-use crate::drawings::{Across, Axis, Figure, Panel, Through};
+use crate::drawings::{Across, Axis, Figure, Panel, Response, Through};
 use crate::results::{Metric, Results, RunResult};
 use crate::runs::Run;
 use cosim::experiment::Scaled;
 use cosim::signal::Signal;
 use cosim_report::figure::{self, Color, Curve, Legend, Shape};
+use linear::curves::excluded;
 use toml::Spanned;
 
 /// Number of columns of a histogram for each decade.
@@ -51,6 +52,31 @@ fn panel(figure: &Figure, panel: &Panel, results: &Results) -> Result<figure::Pa
                 name: run.label.clone(),
                 color: run.color,
                 shape: Shape::Dots,
+                x,
+                y,
+            });
+        }
+    } else if let Some(response) = panel.response {
+        x_label = match response {
+            Response::Nichols => "phase of L, deg".into(),
+            Response::Sensitivity => "frequency, rad/s".into(),
+        };
+        if let (Response::Nichols, Some(alpha)) = (response, panel.disk) {
+            let (x, y) = excluded(alpha);
+            let name = format!("disk margin {alpha}");
+            curves.push(Curve { name, color: Color::LIMIT, shape: Shape::Dashed, x, y });
+        }
+        for (run, result) in &runs {
+            let Some(curve) = &result.series.response else { continue };
+            let (x, y) = match response {
+                Response::Nichols => (&curve.phase, &curve.gain),
+                Response::Sensitivity => (&curve.frequency, &curve.sensitivity),
+            };
+            let (x, y) = (x.clone(), y.clone());
+            curves.push(Curve {
+                name: run.label.clone(),
+                color: run.color,
+                shape: Shape::Line,
                 x,
                 y,
             });
@@ -113,7 +139,7 @@ fn panel(figure: &Figure, panel: &Panel, results: &Results) -> Result<figure::Pa
         title: panel.title.clone(),
         x_label: panel.x_label.clone().unwrap_or(x_label),
         y_label: panel.label.clone(),
-        log_x: panel.histogram.is_some(),
+        log_x: panel.histogram.is_some() || panel.response == Some(Response::Sensitivity),
         x_range: panel.x_range,
         curves,
     })

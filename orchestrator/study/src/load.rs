@@ -193,6 +193,7 @@ impl Study {
                     !panel.signals.is_empty(),
                     panel.histogram.is_some(),
                     panel.scatter.is_some(),
+                    panel.response.is_some(),
                     panel.across.is_some(),
                 ];
                 let count = drawn.iter().filter(|is| **is).count();
@@ -200,10 +201,29 @@ impl Study {
                     return Err(self.source.error(
                         &(0..0),
                         format!(
-                            "[[figure]] id = \"{}\", panel \"{}\": a panel needs exactly one of signal, signals, histogram, scatter and across, or points alone",
+                            "[[figure]] id = \"{}\", panel \"{}\": a panel needs exactly one of signal, signals, histogram, scatter, across and response, or points alone",
                             figure.id, panel.label
                         ),
                     ));
+                }
+                if panel.response.is_some()
+                    && let Some(run) =
+                        self.runs_of(figure, panel).find(|run| run.observe.margins.is_none())
+                {
+                    let problem = format!(
+                        "[[figure]] id = \"{}\", panel \"{}\": response needs [observe.margins], which the experiment of the run \"{}\" does not have",
+                        figure.id,
+                        panel.label,
+                        run.id.get_ref()
+                    );
+                    return Err(self.source.error(&run.id.span(), problem));
+                }
+                if panel.disk.is_some_and(|alpha| !(alpha > 0.0 && alpha < 2.0)) {
+                    let problem = format!(
+                        "[[figure]] id = \"{}\", panel \"{}\": disk must lie between 0 and 2",
+                        figure.id, panel.label
+                    );
+                    return Err(self.source.error(&(0..0), problem));
                 }
                 let lines = panel.bounds.iter().chain(&panel.marks).map(|line| &line.at);
                 let points = panel.points.iter().flat_map(|point| [&point.x, &point.y]);

@@ -1,6 +1,6 @@
 //! One part of the work of a study: some cases of a run, from its experiment to stored results.
 
-use crate::curves::{Curves, Watch, widen};
+use crate::curves::{Curves, Series, Watch, widen};
 use crate::definition::Study;
 use crate::runs::Run;
 use crate::table::table;
@@ -12,6 +12,7 @@ use cosim::master::Observer;
 use cosim::signal::Signal;
 use cosim::system::Opened;
 use cosim_report::metrics::{Meters, Metrics, Value};
+use linear::curves::ResponseCurves;
 use serde_json::json;
 use std::collections::BTreeSet;
 use std::ops::Range;
@@ -44,6 +45,8 @@ pub(crate) struct DrawnSignals {
     pub series: BTreeSet<Signal>,
     /// Signals that are drawn as bands.
     pub spread: BTreeSet<Signal>,
+    /// Whether frequency responses are drawn.
+    pub response: bool,
 }
 
 impl DrawnSignals {
@@ -58,6 +61,7 @@ impl DrawnSignals {
                 let drawn =
                     panel.signal.iter().chain(panel.signals.iter().map(|curve| &curve.signal));
                 let drawn: Vec<Signal> = drawn.cloned().collect();
+                signals.response |= panel.response.is_some();
                 if panel.spread {
                     signals.spread.extend(drawn.iter().cloned());
                 }
@@ -191,6 +195,7 @@ fn key(run: &Run, drawn: &DrawnSignals, observe: &Observe) -> String {
         observe,
         drawn.series,
         drawn.spread,
+        drawn.response,
     ]);
     files::digest(inputs.to_string())
 }
@@ -263,7 +268,9 @@ impl Instances<'_> {
             if case == 0 {
                 curves.parameters = self.flight.parameters()?;
                 samples.retain(|name, _| !name.starts_with("measure."));
-                curves.series = Some(self.watch.series(samples));
+                let response = self.flight.linearised().filter(|_| drawn.response);
+                let response = response.and_then(ResponseCurves::of);
+                curves.series = Some(Series { response, ..self.watch.series(samples) });
             }
             cases.push(flown);
         }

@@ -11,7 +11,7 @@ use cosim::variation::SettingValue;
 use cosim_report::metrics::{Meters, Metrics};
 use fmu_import::description::VariableKind as Type;
 use fmu_import::error::Error as Import;
-use linear::linearise::Lineariser;
+use linear::linearise::{Linearised, Lineariser};
 use linear::measures::{self, Measured};
 use std::collections::BTreeMap;
 
@@ -57,6 +57,8 @@ pub struct Flight<'a> {
     /// What linearises each case, if the experiment asks for margins, and its instances.
     lineariser: Option<Lineariser>,
     linearised: Option<Master>,
+    /// The loop of the last case, linearised.
+    found: Option<Linearised>,
 }
 
 impl<'a> Flight<'a> {
@@ -88,6 +90,7 @@ impl<'a> Flight<'a> {
             bounds: Vec::new(),
             lineariser,
             linearised: None,
+            found: None,
         })
     }
 
@@ -128,6 +131,11 @@ impl<'a> Flight<'a> {
     /// Returns the single values of the metrics that keep them in the last case, by name.
     pub fn samples(&self) -> BTreeMap<String, Vec<f64>> {
         self.meters.samples()
+    }
+
+    /// Returns the loop of the last case, linearised as the experiment asks.
+    pub fn linearised(&self) -> Option<&Linearised> {
+        self.found.as_ref()
     }
 
     /// Flies the case with this number, seen by further observers.
@@ -202,6 +210,7 @@ impl Flight<'_> {
     fn margins(&mut self, values: &[SettingValue]) -> Result<Measured, Error> {
         let Some(lineariser) = &self.lineariser else { return Ok(Measured::new()) };
         let changes = self.sweep.changes(values);
+        self.found = None;
         let system = lineariser.system();
         let started = match self.linearised.take().filter(|_| self.resets) {
             Some(mut master) => system.restart(&mut master, &changes).map(|()| master),
@@ -215,7 +224,7 @@ impl Flight<'_> {
             found
         });
         match found {
-            Ok(found) => Ok(measures::measure(&found)),
+            Ok(found) => Ok(measures::measure(self.found.insert(found))),
             Err(error) if is_of_case(&error) => Ok(measures::none()),
             Err(error) => Err(error),
         }

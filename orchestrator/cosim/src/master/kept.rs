@@ -21,6 +21,23 @@ impl Master {
         calls(instance).map_err(|failure| self.error(time, (index, failure)))
     }
 
+    /// Calls two instances, given their indices, between two ticks. A failure comes with the place
+    /// of the instance among the two.
+    ///
+    /// # Errors
+    /// Returns an error that names the instance if the calls fail; `time` (s) is named with it.
+    pub fn call_both<T>(
+        &mut self,
+        indices: [usize; 2],
+        time: f64,
+        calls: impl FnOnce([&mut dyn Instance; 2]) -> Result<T, (usize, CallFailure)>,
+    ) -> Result<T, Error> {
+        let members = self.members.get_disjoint_mut(indices);
+        let [first, second] = members.expect("two different members");
+        let outcome = calls([first.instance.as_mut(), second.instance.as_mut()]);
+        outcome.map_err(|(place, failure)| self.error(time, (indices[place], failure)))
+    }
+
     /// Adds a value to what a connected real input receives, from now on.
     pub fn add(&mut self, input: Port, value: f64) {
         self.inputs[input.component].add(input.reference, value);
