@@ -13,6 +13,7 @@ pub mod continuous;
 pub mod curves;
 mod fitting;
 pub mod frequency;
+pub mod identification;
 pub mod linearise;
 pub mod margins;
 pub mod measures;

@@ -1,6 +1,7 @@
 //! From an experiment to the linear model of its loop at an instant.
 
-use crate::components::{Builder, Component, Found, needed_steps};
+use crate::components::Component;
+use crate::identification::{Builder, Found, needed_steps};
 use crate::model::{OpenLoop, Signal};
 use crate::pair::{Joined, Pair};
 use crate::propagation::{Link, Net};

@@ -1,0 +1,354 @@
+//! Finding the linear model of a component from what its instance answers.
+
+use crate::Matrix;
+use crate::components::{Component, Dynamics};
+use crate::continuous::{Continuous, References};
+use crate::fitting::{AT_LENGTH, DESCRIBED, delayed, describes, deviation, reduced};
+use crate::model::Step;
+use crate::realisation::realise;
+use crate::replay::Recorded;
+use crate::responses::{Lags, Probe, Response, Scales};
+use cosim::system::System;
+use cosim::wiring::Port;
+use fmu_import::instance::{CallFailure, Instance};
+use fmu_import::quantity::rounded;
+
+/// Longest period of a component that is looked for, in its steps, and in s.
+const LONGEST: usize = 25;
+const LONGEST_TIME: f64 = 1.0;
+/// Least number of steps whose responses a model reproduces twice over.
+const BLOCKS: usize = 24;
+/// Lags that are compared to find the period.
+const COMPARED: usize = 6;
+/// Difference of two periods up to which they count as equal, relative to the largest response, and
+/// in relation to the least difference that any period leaves.
+const EQUAL: f64 = 1e-6;
+const AS_EQUAL: f64 = 3.0;
+/// Difference of two periods, relative to the largest response, from which nothing repeats itself,
+/// and from which it is told.
+const REPEATS: f64 = 0.1;
+const DRIFTS: f64 = 0.01;
+/// Changes of an input that are tried, in relation to its typical magnitude.
+const CHANGES: [f64; 3] = [1e-5, 1e-7, 1e-9];
+/// What a state of a model must add to the responses, relative to the largest.
+const SMALLEST: f64 = 1e-9;
+/// The same for a pair. An allocator ends its iterations anywhere near the optimum, and what the
+/// effectors do on their way from one end to the next is noise.
+const SMALLEST_OF_PAIR: f64 = 1e-3;
+
+/// What is found of a component: its model, those for changes to one side, if they differ, and what
+/// to know of it.
+pub struct Found {
+    /// The model of the component.
+    pub model: Component,
+    /// The models for increases and for decreases of the inputs.
+    pub sides: Option<[Component; 2]>,
+    /// One line on how the model was found.
+    pub note: String,
+}
+
+/// Returns the number of steps of which the inputs of a component must be known.
+pub fn needed_steps(length: f64) -> usize {
+    let longest = longest_period(length);
+    let shown = 2 * longest + 2 * BLOCKS.max(2 * longest);
+    shown.max(compared_steps(length))
+}
+
+/// Returns the number of steps over which a model is held against the motion of a vehicle.
+fn compared_steps(length: f64) -> usize {
+    (LONGEST_TIME / length).ceil() as usize
+}
+
+fn longest_period(length: f64) -> usize {
+    ((LONGEST_TIME / length + 1e-9) as usize).clamp(1, LONGEST)
+}
+
+/// Builds the model of a component.
+pub struct Builder<'a> {
+    /// System that the component is part of.
+    pub system: &'a System,
+    /// Indices of its components: one, or two that are taken as one.
+    pub components: &'a [usize],
+    /// Communication point of the first recorded step.
+    pub first: u64,
+    /// Its inputs as they were in the loop.
+    pub recorded: &'a Recorded,
+    /// Its connected inputs that are real numbers.
+    pub inputs: Vec<Port>,
+    /// Its connected outputs that are real numbers.
+    pub outputs: Vec<Port>,
+}
+
+impl Builder<'_> {
+    fn scale(&self, port: &Port) -> f64 {
+        self.system.variable_at(*port).nominal()
+    }
+
+    fn of_dynamics(&self, states: Vec<String>, dynamics: Dynamics) -> Component {
+        let components = self.components.iter().map(|index| &self.system.components[*index]);
+        let names: Vec<&str> = components.map(|component| component.name.as_str()).collect();
+        Component {
+            name: names.join(" and "),
+            every: u64::from(self.system.components[self.components[0]].every),
+            first: self.first,
+            inputs: self.inputs.clone(),
+            outputs: self.outputs.clone(),
+            states,
+            dynamics,
+        }
+    }
+
+    /// Returns whether an instance that kept the state before the first recorded step under number
+    /// 0 has different slopes to both sides there.
+    ///
+    /// # Errors
+    /// Returns an error if the instance fails.
+    pub fn has_edge(&self, instance: &mut dyn Instance) -> Result<bool, CallFailure> {
+        let (scales, references, places) = (self.scales(), self.references(), self.places());
+        let probe = Probe {
+            recorded: self.recorded,
+            inputs: &places,
+            outputs: &references,
+            scales: &scales,
+            change: CHANGES[0],
+        };
+        Ok(probe.responses(instance, 0, COMPARED)?.sides.is_some())
+    }
+
+    /// Returns whether a component has continuous states, whose motion may be slow beside the
+    /// steps.
+    fn moves(&self) -> bool {
+        let components = self.components.iter().map(|index| &self.system.components[*index]);
+        components.into_iter().any(|one| one.fmu.description.states().next().is_some())
+    }
+
+    fn scales(&self) -> Scales {
+        Scales {
+            inputs: self.inputs.iter().map(|port| self.scale(port)).collect(),
+            outputs: self.outputs.iter().map(|port| self.scale(port)).collect(),
+        }
+    }
+
+    fn references(&self) -> Vec<u32> {
+        self.outputs.iter().map(|port| port.reference).collect()
+    }
+
+    /// Finds the model of the component from an instance that kept the state before the first
+    /// recorded step under number 0.
+    ///
+    /// # Errors
+    /// Returns an error if the instance fails.
+    pub fn find(&self, instance: &mut dyn Instance) -> Result<Found, CallFailure> {
+        let longest = longest_period(self.recorded.length);
+        self.recorded.keep(instance, 2 * longest)?;
+        if let Some(found) = self.continuous(instance)? {
+            return Ok(found);
+        }
+        let (scales, references, places) = (self.scales(), self.references(), self.places());
+        let probe = |change: f64| Probe {
+            recorded: self.recorded,
+            inputs: &places,
+            outputs: &references,
+            scales: &scales,
+            change,
+        };
+        // A law that is not smooth wants a small change, and one that iterates a larger one.
+        let mut best: Option<(f64, usize, f64)> = None;
+        let mut trials: Vec<Response> = Vec::new();
+        for change in CHANGES {
+            let short: Vec<Response> = (0..2 * longest)
+                .map(|first| probe(change).responses(instance, first, COMPARED))
+                .collect::<Result<_, _>>()?;
+            let (period, difference) = period(&short, longest);
+            let worst = short.iter().map(|response| response.error).fold(difference, f64::max);
+            if best.is_none_or(|(_, _, least)| worst < least) {
+                best = Some((change, period, worst));
+            }
+            trials.extend(short.into_iter().next());
+        }
+        // The same response with every size of the change, if the component is smooth.
+        let depends = trials.windows(2).map(|pair| difference(pair, 1)).fold(0.0, f64::max);
+        let Some((change, period, _)) = best else { unreachable!("there are changes to try") };
+        let blocks = BLOCKS.max(2 * period);
+        let phases: Vec<Response> = (0..2 * period)
+            .map(|first| probe(change).responses(instance, first, 2 * blocks))
+            .collect::<Result<_, _>>()?;
+        let error = phases.iter().map(|phase| phase.error).fold(0.0, f64::max);
+        let drift = difference(&phases, period);
+        let smallest = if self.components.len() > 1 { SMALLEST_OF_PAIR } else { SMALLEST };
+        let tolerance = smallest.max(drift).max(error * 10.0);
+        let realised = |lags: &dyn Fn(&Response) -> &Lags| {
+            let lags: Vec<Lags> =
+                phases[..period].iter().map(|phase| lags(phase).clone()).collect();
+            realise(&lags, blocks, tolerance)
+        };
+        if self.moves() {
+            let count = compared_steps(self.recorded.length);
+            let measured = probe(change).responses(instance, 0, count)?;
+            let deviation = deviation(&realised(&|phase| &phase.central), &measured.central);
+            if deviation > AT_LENGTH {
+                return Err(CallFailure::new(
+                    "linearise",
+                    format!(
+                        "steps of {} s show too little of the motion: the model is {:.0} % off the response to a change within {LONGEST_TIME} s. The experiment needs a longer step",
+                        self.recorded.length,
+                        1e2 * deviation
+                    ),
+                ));
+            }
+        }
+        let model = |lags: &dyn Fn(&Response) -> &Lags| {
+            let steps = realised(lags);
+            let steps = steps.into_iter().map(|step| scaled(step, &scales)).collect();
+            self.of_dynamics(Vec::new(), Dynamics::Sampled(steps))
+        };
+        let has_edge = phases[..period].iter().any(|phase| phase.sides.is_some());
+        let side = |side: usize| {
+            model(&move |phase| phase.sides.as_ref().map_or(&phase.central, |sides| &sides[side]))
+        };
+        let found = model(&|phase| &phase.central);
+        let Dynamics::Sampled(steps) = &found.dynamics else { unreachable!("built above") };
+        let states = steps.iter().map(|step| step.a.ncols()).max().unwrap_or(0);
+        let mut note = format!(
+            "{}: responses to changes of its inputs, which repeat after {period} steps of {} s, {states} states",
+            found.name, self.recorded.length
+        );
+        if drift > DRIFTS {
+            let share = 1e2 * drift;
+            note = format!(
+                "{note}; those of the next {period} differ by {share:.1} %, and states that count for less are left out"
+            );
+        }
+        if depends > DRIFTS {
+            note = format!(
+                "{note}; they depend on the size of the change, by {:.1} % from {:.0e} to {:.0e} of the typical magnitudes: the model is that of {change:.0e}",
+                1e2 * depends,
+                CHANGES[0],
+                CHANGES[CHANGES.len() - 1]
+            );
+        }
+        Ok(Found { model: found, sides: has_edge.then(|| [side(0), side(1)]), note })
+    }
+
+    /// Returns the places of the inputs among the recorded ones.
+    fn places(&self) -> Vec<usize> {
+        let place = |port: &Port| self.recorded.ports.iter().position(|other| other == port);
+        self.inputs.iter().filter_map(place).collect()
+    }
+
+    /// Returns the model by derivatives, if the component gives them and they describe what it
+    /// does.
+    fn continuous(&self, instance: &mut dyn Instance) -> Result<Option<Found>, CallFailure> {
+        let [component] = self.components else { return Ok(None) };
+        let description = &self.system.components[*component].fmu.description;
+        let offers = description.co_simulation.as_ref();
+        if !offers.is_some_and(|interface| interface.has("providesDirectionalDerivative")) {
+            return Ok(None);
+        }
+        let variables = &description.variables;
+        let (states, derivatives): (Vec<usize>, Vec<usize>) = description.states().unzip();
+        if states.is_empty() {
+            return Ok(None);
+        }
+        let of = |positions: &[usize]| -> Vec<u32> {
+            positions.iter().map(|position| variables[*position].reference).collect()
+        };
+        let (states_at, derivatives_at) = (of(&states), of(&derivatives));
+        let inputs: Vec<u32> = self.inputs.iter().map(|port| port.reference).collect();
+        let outputs: Vec<u32> = self.outputs.iter().map(|port| port.reference).collect();
+        let references = References {
+            states: &states_at,
+            derivatives: &derivatives_at,
+            inputs: &inputs,
+            outputs: &outputs,
+        };
+        instance.restore(0)?;
+        let Ok(found) = Continuous::of(instance, &references) else { return Ok(None) };
+        // The states may be read, so that each of their responses can be held against it.
+        let scales = Scales {
+            inputs: self.inputs.iter().map(|port| self.scale(port)).collect(),
+            outputs: states
+                .iter()
+                .map(|position| variables[*position].nominal())
+                .chain(self.outputs.iter().map(|port| self.scale(port)))
+                .collect(),
+        };
+        let read: Vec<u32> = states_at.iter().chain(&outputs).copied().collect();
+        let places = self.places();
+        let probe = Probe {
+            recorded: self.recorded,
+            inputs: &places,
+            outputs: &read,
+            scales: &scales,
+            change: CHANGES[0],
+        };
+        let response =
+            probe.responses(instance, 0, COMPARED + longest_period(self.recorded.length))?;
+        if response.sides.is_some() {
+            return Ok(None);
+        }
+        let (lags, length) = (&response.central, self.recorded.length);
+        let at_once = lags.len().min(COMPARED);
+        let found = if describes(&found, &lags[..at_once], &scales, length, DESCRIBED)
+            && describes(&found, lags, &scales, length, AT_LENGTH)
+        {
+            found
+        } else {
+            let (found, whole) = delayed(found, lags, &scales, length);
+            let compared = lags.len().min(whole + COMPARED);
+            if !describes(&found, &lags[..compared], &scales, length, DESCRIBED) {
+                return Ok(None);
+            }
+            found
+        };
+        let found = reduced(found, &states);
+        let names = found.1.iter().map(|place| variables[states[*place]].name.clone()).collect();
+        let note = format!(
+            "{}: derivatives by fmi2GetDirectionalDerivative, {} of {} states, inputs act after {} s",
+            self.system.components[*component].name,
+            found.1.len(),
+            states.len(),
+            rounded(found.0.delay)
+        );
+        let model = self.of_dynamics(names, Dynamics::Continuous(found.0));
+        Ok(Some(Found { model, sides: None, note }))
+    }
+}
+
+/// Returns the difference of the responses at steps one period apart, relative to the largest.
+fn difference(phases: &[Response], period: usize) -> f64 {
+    let norm = |lags: &Lags| lags.iter().map(Matrix::amax).fold(0.0, f64::max);
+    let largest = phases.iter().map(|phase| norm(&phase.central)).fold(f64::MIN_POSITIVE, f64::max);
+    let pairs = phases.iter().zip(&phases[period..]);
+    let differences = pairs.map(|(a, b)| {
+        let lags = a.central.iter().zip(&b.central);
+        lags.map(|(a, b)| (a - b).amax()).fold(0.0, f64::max)
+    });
+    differences.fold(0.0, f64::max) / largest
+}
+
+/// Finds the period after which the responses repeat, in steps, and the difference that it leaves.
+fn period(responses: &[Response], longest: usize) -> (usize, f64) {
+    let differences: Vec<f64> =
+        (1..=longest).map(|period| difference(&responses[..longest + period], period)).collect();
+    let least = differences.iter().copied().fold(f64::INFINITY, f64::min);
+    let equal = EQUAL.max(AS_EQUAL * least);
+    // Nothing repeats itself if the least difference is a large one.
+    let place = differences.iter().position(|difference| *difference <= equal);
+    let place = place.filter(|_| least < REPEATS).unwrap_or(0);
+    (place + 1, differences[place])
+}
+
+/// Converts a step in typical magnitudes to one in the units of the variables.
+fn scaled(step: Step, scales: &Scales) -> Step {
+    let Step { a, mut b, mut c, mut d } = step;
+    for (column, scale) in scales.inputs.iter().enumerate() {
+        b.column_mut(column).scale_mut(1.0 / scale);
+        d.column_mut(column).scale_mut(1.0 / scale);
+    }
+    for (row, scale) in scales.outputs.iter().enumerate() {
+        c.row_mut(row).scale_mut(*scale);
+        d.row_mut(row).scale_mut(*scale);
+    }
+    Step { a, b, c, d }
+}
