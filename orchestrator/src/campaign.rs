@@ -7,7 +7,6 @@ use campaign::changes::Changes;
 use campaign::definition::Campaign;
 use campaign::findings::Findings;
 use campaign::plan::Plan;
-use campaign::prepare;
 use campaign::run::{self, Options};
 use campaign::search;
 use clap::Args;
@@ -15,6 +14,7 @@ use cosim::error::Error;
 use cosim::experiment::Overrides;
 use cosim::files;
 use cosim::interrupt::Interrupt;
+use cosim::search::named::{Kind, find};
 use std::io::Write;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -24,7 +24,7 @@ use sweep::statistics::CONFIDENCE;
 /// Options that the commands `campaign` and `falsify` share.
 #[derive(Args)]
 pub(crate) struct Common {
-    /// Campaign: a file, or the name of one below orchestrator/experiments/campaigns.
+    /// Campaign: a file, or the name of one that `list` shows.
     campaign: PathBuf,
     /// Experiment that replaces that of the campaign: a file, or the name of an experiment.
     #[arg(long, value_name = "EXPERIMENT")]
@@ -95,7 +95,7 @@ fn range(text: &str) -> Result<Range<u64>, String> {
 }
 
 fn prepare(common: &Common) -> Result<Plan, Error> {
-    let campaign = Campaign::load(&prepare::find(&common.campaign)?)?;
+    let campaign = Campaign::load(&find(&common.campaign, Kind::Campaign)?)?;
     let overrides = common.overrides.clone().into();
     let changes = Changes { experiment: common.experiment.clone(), overrides };
     Plan::new(campaign, &changes, &common.fmu_dir)

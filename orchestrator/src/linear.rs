@@ -6,7 +6,7 @@ use crate::run;
 use clap::Args;
 use cosim::error::Error;
 use cosim::interrupt::Interrupt;
-use cosim::search;
+use cosim::search::named::{Kind, find};
 use cosim::system::System;
 use fmu_import::quantity::rounded;
 use linear::linearise::Linearised;
@@ -43,7 +43,7 @@ impl Instant {
     /// Returns the system of the experiment, the time at which it is linearised (s), and the
     /// signals at which the loop is opened.
     pub(crate) fn system(&self) -> Result<(System, f64, Vec<String>), Failure> {
-        let path = search::experiment(&self.experiment)?;
+        let path = find(&self.experiment, Kind::Experiment)?;
         let (system, _) = run::system(&path, &self.overrides.clone().into(), &self.fmu_dir)?;
         let asked = system.experiment.observe.margins.clone();
         let missing = |option: &str| {

@@ -30,7 +30,7 @@ pub fn check(
 ) -> Result<System, Error> {
     let simulation = &experiment.simulation;
     let clock = Clock::new(simulation.start, simulation.stop, simulation.step)
-        .map_err(|message| experiment.source.error(&(0..0), format!("[simulation] {message}")))?;
+        .map_err(|problem| experiment.time_error(&problem))?;
 
     let mut components = Vec::new();
     for name in order(&experiment)? {
@@ -49,10 +49,7 @@ pub fn check(
     if let Some(target) = experiment.unplaced.first() {
         return Err(Error::experiment(format!("--set {target}: {}", whereabouts(target, &parts))));
     }
-    experiment
-        .isolation
-        .check()
-        .map_err(|problem| experiment.source.error(&(0..0), format!("[isolation] {problem}")))?;
+    experiment.isolation.check().map_err(|problem| experiment.isolation_error(&problem))?;
     check_single_instances(&experiment, &components)?;
     if let Some(name) = &experiment.simulation.ends_with
         && !experiment.components.contains_key(name)
@@ -137,12 +134,12 @@ fn check_size(experiment: &Experiment, clock: &Clock, columns: usize) -> Result<
     let gigabytes = rows * (columns + 1) as f64 * NUMBER / 1e9;
     if steps > MOST_STEPS {
         let message = format!(
-            "[simulation] {steps} steps of {} s are too many, at most {MOST_STEPS} are possible. results.csv would take \
+            "{steps} steps of {} s are too many, at most {MOST_STEPS} are possible. results.csv would take \
              about {gigabytes:.0} GB and the run {:.0} h or more: choose a longer step or an earlier stop",
             clock.step(),
             steps as f64 * QUICK / 3600.0
         );
-        return Err(experiment.source.error(&(0..0), message));
+        return Err(experiment.time_error(&message));
     }
     if gigabytes > 10.0 {
         warnings::warn_once(format!(

@@ -7,6 +7,7 @@ use crate::document::Source;
 use crate::error::Error;
 use crate::experiment::{
     Coupling, Experiment, Observe, OnInvalid, Overrides, Protection, Record, Simulation,
+    TimeOptions,
 };
 use crate::system::Opened;
 use crate::wiring::{self, Part};
@@ -221,6 +222,7 @@ pub fn load(path: &Path, overrides: &Overrides) -> Result<Loaded, Error> {
         leaves_inputs_open: true,
         assigned: BTreeSet::new(),
         unplaced: Vec::new(),
+        options: TimeOptions::default(),
         source: Source::plain(path, text),
     };
     let parts = parts(&structure.components, &opened, &structure.folder);
