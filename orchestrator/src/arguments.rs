@@ -23,10 +23,10 @@ pub(crate) struct Overrides {
     #[arg(long = "fmu", value_name = "COMPONENT=FMU")]
     fmu: Vec<String>,
     /// Stop time of the simulation, s.
-    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
+    #[arg(long, value_name = "SECONDS")]
     stop: Option<f64>,
     /// Length of the communication step, s.
-    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
+    #[arg(long, value_name = "SECONDS")]
     step: Option<f64>,
     /// Choose how components are stepped and values are passed on.
     #[arg(long, value_parser = choice::<Coupling>(&[("sequential", "gauss-seidel")]))]
@@ -45,7 +45,7 @@ pub(crate) struct Overrides {
 struct Protection {
     #[arg(long, help = key("isolate"), value_name = "BOOL", num_args = 0..=1, default_missing_value = "true", require_equals = true)]
     isolate: Option<bool>,
-    #[arg(long, help = key("call_timeout"), value_name = "SECONDS", allow_negative_numbers = true)]
+    #[arg(long, help = key("call_timeout"), value_name = "SECONDS")]
     call_timeout: Option<f64>,
     #[arg(long = "unit-memory", help = key("memory"), value_name = "MIB")]
     memory: Option<u64>,

@@ -4,7 +4,7 @@ use crate::arguments::{self, choice};
 use crate::catalogue::Filter;
 use crate::run::Files;
 use crate::{campaign, examples, linear, response, schema};
-use clap::{Parser, Subcommand};
+use clap::{Arg, CommandFactory, FromArgMatches, Parser, Subcommand};
 use cosim::pacing::{Factor, OnMiss};
 use std::path::PathBuf;
 
@@ -24,6 +24,27 @@ pub(crate) struct Arguments {
     pub(crate) command: Command,
 }
 
+/// Returns the definition of the command line.
+pub(crate) fn definition() -> clap::Command {
+    // A negative number is the value of its option, which is then blamed for it.
+    let with_negative_values = |argument: Arg| {
+        let is_option = !argument.is_positional() && argument.get_action().takes_values();
+        argument.allow_negative_numbers(is_option)
+    };
+    Arguments::command().mut_subcommands(|command| {
+        let examples = examples::of(command.get_name());
+        command.mut_args(with_negative_values).after_help(examples)
+    })
+}
+
+/// Reads the command line. Help is printed, and faults end the program.
+pub(crate) fn parse() -> Arguments {
+    let mut definition = definition();
+    let matches = definition.get_matches_mut();
+    Arguments::from_arg_matches(&matches)
+        .unwrap_or_else(|error| error.format(&mut definition).exit())
+}
+
 /// Commands of the program.
 #[derive(Subcommand)]
 pub(crate) enum Command {
@@ -32,7 +53,6 @@ pub(crate) enum Command {
     /// With --real-time the run keeps in step with the wall clock; the summary, metrics.json and
     /// realtime.svg show how well it did. Ctrl-C, SIGTERM and SIGHUP end a run and keep its
     /// results.
-    #[command(after_help = examples::of("run"))]
     Run {
         /// Experiment to run: a file, an SSP archive, or the name of an experiment that `list`
         /// shows.
@@ -51,7 +71,7 @@ pub(crate) enum Command {
         quiet: bool,
         /// Keep the run in step with the wall clock, FACTOR times as fast as real time. FACTOR is 1
         /// if it is left out.
-        #[arg(long, value_name = "FACTOR", num_args = 0..=1, default_missing_value = "1", allow_negative_numbers = true,
+        #[arg(long, value_name = "FACTOR", num_args = 0..=1, default_missing_value = "1",
               help_heading = "Real time")]
         real_time: Option<Factor>,
         /// Choose what happens after a missed deadline, that is, if the values that a component
@@ -81,13 +101,12 @@ pub(crate) enum Command {
     /// each claim.
     ///
     /// Finished parts are kept. After an interruption the same command continues where it stopped.
-    #[command(after_help = examples::of("reproduce"))]
     Reproduce {
         /// Study to run: the name of one that `list` shows, a folder with a study.toml, or such a
         /// file.
         study: PathBuf,
         /// Folder for the results [default: out/STUDY].
-        #[arg(long, value_name = "DIR")]
+        #[arg(long, value_name = "DIR", help_heading = "Results")]
         out: Option<PathBuf>,
         /// Also look for FMUs in this folder, besides the folder of the study and target/fmu. The
         /// option may be given several times.
@@ -100,7 +119,7 @@ pub(crate) enum Command {
         #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
         members: Option<u64>,
         /// Run everything again, including what is finished.
-        #[arg(long)]
+        #[arg(long, help_heading = "Results")]
         fresh: bool,
         /// Show neither progress nor summary.
         #[arg(long)]
@@ -111,34 +130,28 @@ pub(crate) enum Command {
     /// worst cases.
     ///
     /// Finished cases are kept. After an interruption the same command continues where it stopped.
-    #[command(after_help = examples::of("campaign"))]
     Campaign(campaign::Fly),
     /// Look for the worst case of a campaign, and write it as an experiment.
-    #[command(after_help = examples::of("falsify"))]
     Falsify(campaign::Falsify),
     /// Linearise an experiment at an instant of its run, and write the open loop as a discrete
     /// state-space model (JSON).
     ///
     /// Components with derivatives give them; of all others the responses to small changes are
     /// taken from a kept state and realised as a model.
-    #[command(after_help = examples::of("linearise"))]
     Linearise(linear::Linearise),
     /// Print the stability margins of an experiment at an instant of its run: gain, phase and delay
     /// of each signal, disk margins of each and of all together.
-    #[command(after_help = examples::of("margins"))]
     Margins(linear::PrintMargins),
     /// Measure the frequency response of an experiment's loop in flight, with a sine added at each
     /// opened signal, and compare it with that of the linear model.
-    #[command(after_help = examples::of("response"))]
     Response(response::Response),
     /// Write an experiment as an SSP archive (System Structure and Parameterization 1.0), FMUs
     /// included.
-    #[command(after_help = examples::of("pack"))]
     Pack {
         /// Experiment to pack: a file, or the name of an experiment that `list` shows.
         experiment: PathBuf,
         /// Path of the archive [default: EXPERIMENT.ssp].
-        #[arg(long, value_name = "FILE")]
+        #[arg(long, value_name = "FILE", help_heading = "Results")]
         out: Option<PathBuf>,
         /// Also look for FMUs in this folder, besides the folder of the experiment and target/fmu.
         /// The option may be given several times.
@@ -148,14 +161,13 @@ pub(crate) enum Command {
         overrides: arguments::Overrides,
         /// Write no connectors for outputs that are enumerations, because libcosim aborts if there
         /// is one.
-        #[arg(long)]
+        #[arg(long, help_heading = "Results")]
         no_enumerations: bool,
         /// Replace the archive if it exists.
-        #[arg(long)]
+        #[arg(long, help_heading = "Results")]
         force: bool,
     },
     /// Show the variables and capabilities of an FMU.
-    #[command(after_help = examples::of("inspect"))]
     Inspect {
         /// FMU to show: a file, or the name of one that `list` shows.
         fmu: PathBuf,
@@ -171,13 +183,11 @@ pub(crate) enum Command {
     },
     /// Print an experiment, a study or a campaign with all that it extends, templates and lists
     /// expanded.
-    #[command(after_help = examples::of("show"))]
     Show {
         /// What to print: a file, or the name of an experiment, a study or a campaign.
         name: PathBuf,
     },
     /// Print the JSON Schema of a kind of file, by which editors complete and check such files.
-    #[command(after_help = examples::of("schema"))]
     Schema {
         /// Kind of file that the schema describes.
         #[arg(value_enum)]
@@ -185,20 +195,17 @@ pub(crate) enum Command {
     },
     /// Write a script that completes commands and options in a shell, for example `orchestrator
     /// completions bash`.
-    #[command(after_help = examples::of("completions"))]
     Completions {
         /// Shell that the script is for.
         shell: clap_complete::Shell,
     },
     /// Write the manual pages of the program and of its commands, for `man orchestrator`.
-    #[command(after_help = examples::of("man"))]
     Man {
         /// Folder for the pages, for example one called man1 that `man` searches.
         #[arg(value_name = "DIR")]
         folder: PathBuf,
     },
     /// List experiments, studies, campaigns and FMUs by the names that the other commands take.
-    #[command(after_help = examples::of("list"))]
     List {
         /// Folder to search [default: the current one, and those where experiments and FMUs are
         /// found from any folder].

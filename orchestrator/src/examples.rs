@@ -189,12 +189,11 @@ pub(crate) fn of(command: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::command_line::Arguments;
-    use clap::{CommandFactory, Parser};
+    use crate::command_line::definition;
 
     #[test]
     fn every_command_has_examples_that_the_program_takes() {
-        let commands = Arguments::command();
+        let commands = definition();
         let names: Vec<&str> = commands.get_subcommands().map(clap::Command::get_name).collect();
         assert_eq!(names.len(), EXAMPLES.len());
         for name in names {
@@ -207,7 +206,7 @@ mod tests {
                         || *line == "orchestrator list"
                 );
                 let words = line.split_whitespace().map(|word| word.trim_matches('\''));
-                if let Err(error) = Arguments::try_parse_from(words) {
+                if let Err(error) = definition().try_get_matches_from(words) {
                     panic!("{line}: {error}");
                 }
             }
@@ -216,7 +215,7 @@ mod tests {
 
     #[test]
     fn help_fits_a_terminal_of_80_columns_where_words_allow() {
-        let mut commands = Arguments::command().term_width(80);
+        let mut commands = definition().term_width(80);
         commands.build();
         for command in commands.get_subcommands_mut() {
             let name = command.get_name().to_string();

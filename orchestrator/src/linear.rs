@@ -25,11 +25,11 @@ pub(crate) struct Instant {
     experiment: PathBuf,
     /// Time of the run at which it is linearised, s [default: what the experiment's
     /// [observe.margins] says].
-    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
+    #[arg(long, value_name = "SECONDS", help_heading = "Linearisation")]
     at: Option<f64>,
     /// Signals at which the loop is opened: connected inputs or outputs, as `plant.moment.*`. The
     /// option may be given several times [default: those of [observe.margins]].
-    #[arg(long, value_name = "SIGNAL")]
+    #[arg(long, value_name = "SIGNAL", help_heading = "Linearisation")]
     open: Vec<String>,
     /// Also look for FMUs in this folder, besides the folder of the experiment and target/fmu. The
     /// option may be given several times.

@@ -20,8 +20,7 @@ mod schema;
 mod show;
 mod summary;
 
-use clap::{CommandFactory, Parser};
-use command_line::{Arguments, Command};
+use command_line::{Command, definition};
 use cosim::interrupt::Interrupt;
 use cosim::pacing;
 use cosim::search::named::{Kind, find};
@@ -41,7 +40,7 @@ fn main() -> ExitCode {
         return code;
     }
     let _watch = crash::watch();
-    let arguments = Arguments::parse();
+    let arguments = command_line::parse();
     // A study may have a thousand runs, and its report counts their warnings. The results table of
     // a campaign holds the messages of instances.
     let usual = match arguments.command {
@@ -160,10 +159,10 @@ fn execute(command: Command, out: &mut impl Write, interrupt: &Interrupt) -> Res
         Command::Show { name } => show::show(&name, out),
         Command::Schema { kind } => Ok(out.write_all(schema::text(kind).as_bytes())?),
         Command::Completions { shell } => {
-            clap_complete::generate(shell, &mut Arguments::command(), "orchestrator", out);
+            clap_complete::generate(shell, &mut definition(), "orchestrator", out);
             Ok(())
         }
-        Command::Man { folder } => man::write(Arguments::command(), &folder),
+        Command::Man { folder } => man::write(definition(), &folder),
         Command::List { folder, long, json } => {
             let form = match (json, long) {
                 (true, _) => list::Form::Json,

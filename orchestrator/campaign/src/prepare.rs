@@ -3,7 +3,7 @@
 use crate::changes::Changes;
 use crate::definition::Campaign;
 use cosim::error::Error;
-use cosim::experiment::{self, Experiment, Margins, Observe, Overrides, Protection};
+use cosim::experiment::{self, Experiment, Given, Margins, Observe, Overrides, Protection};
 use cosim::files;
 use cosim::search::named::{Kind, find};
 use cosim_report::metrics::{Meters, Metrics};
@@ -41,6 +41,8 @@ pub(crate) fn read_experiment(campaign: &Campaign, changes: &Changes) -> Result<
         overrides.fmu.push(format!("{component}={}", file.display()));
     }
     experiment.apply(&overrides)?;
+    // A fault of these is that of the campaign's file, not of an option.
+    experiment.given = Given::default();
     for (name, value) in &campaign.set {
         let outcome = experiment.set(name, value.get_ref().clone());
         outcome.map_err(|problem| source.error(&value.span(), format!("[set] {problem}")))?;

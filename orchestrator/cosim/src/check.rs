@@ -232,8 +232,8 @@ fn find_fmu(experiment: &Experiment, name: &str, fmu_dirs: &[PathBuf]) -> Result
     if let Some(path) =
         folders.iter().map(|folder| folder.join(written.get_ref())).find(|path| path.is_dir())
     {
-        let message = format!("[components.{name}] {} is a folder, not an archive", path.display());
-        return Err(experiment.source.error(&written.span(), message));
+        let problem = format!("{} is a folder, not an archive", path.display());
+        return Err(experiment.fmu_error(name, &problem));
     }
     let files: Vec<String> = folders
         .iter()
@@ -246,10 +246,7 @@ fn find_fmu(experiment: &Experiment, name: &str, fmu_dirs: &[PathBuf]) -> Result
         .collect();
     let hint = names::hint(written.get_ref(), files.iter().map(String::as_str));
     let searched: Vec<String> = folders.iter().map(|folder| folder.display().to_string()).collect();
-    let message = format!(
-        "[components.{name}] there is no file \"{}\" in {}{hint}",
-        written.get_ref(),
-        searched.join(", ")
-    );
-    Err(experiment.source.error(&written.span(), message))
+    let message =
+        format!("there is no file \"{}\" in {}{hint}", written.get_ref(), searched.join(", "));
+    Err(experiment.fmu_error(name, &message))
 }

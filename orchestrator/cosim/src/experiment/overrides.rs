@@ -27,19 +27,22 @@ pub struct Overrides {
     pub isolation: Protection,
 }
 
-/// Times that the command line gives in place of those of an experiment.
+/// What the command line gives in place of an experiment's file, so that a fault is blamed on the
+/// option.
 #[derive(Clone, Debug, Default)]
-pub struct TimeOptions {
+pub struct Given {
     stop: Option<f64>,
     step: Option<f64>,
     call_timeout: Option<f64>,
+    /// Components whose FMU is given.
+    fmu: Vec<String>,
 }
 
 impl Experiment {
     /// Returns the error for a fault of start, stop and step. It blames the option that gives the
     /// value, or the file if none does.
     pub(crate) fn time_error(&self, problem: &str) -> Error {
-        let TimeOptions { stop, step, .. } = self.options;
+        let Given { stop, step, .. } = self.given;
         // A step that is no step at all is the fault, whatever the stop time is.
         let is_step = step.is_some_and(|step| stop.is_none() || !(step > 0.0 && step.is_finite()));
         match (stop, step) {
@@ -49,10 +52,23 @@ impl Experiment {
         }
     }
 
+    /// Returns the error for an FMU that cannot be found. It blames the option that names it, or the
+    /// file if none does.
+    pub(crate) fn fmu_error(&self, component: &str, problem: &str) -> Error {
+        let written = &self.components[component].fmu;
+        if self.given.fmu.iter().any(|name| name == component) {
+            return Error::experiment(format!(
+                "--fmu {component}={}: {problem}",
+                written.get_ref()
+            ));
+        }
+        self.source.error(&written.span(), format!("[components.{component}] {problem}"))
+    }
+
     /// Returns the error for a fault of the limits of isolated instances. It blames the option that
     /// gives the value, or the file if none does.
     pub(crate) fn isolation_error(&self, problem: &str) -> Error {
-        match self.options.call_timeout {
+        match self.given.call_timeout {
             Some(time) => Error::experiment(format!("--call-timeout {time}: {problem}")),
             None => self.source.error(&(0..0), format!("[isolation] {problem}")),
         }
@@ -68,9 +84,9 @@ impl Experiment {
         self.simulation.coupling = overrides.coupling.unwrap_or(self.simulation.coupling);
         self.simulation.on_invalid = overrides.on_invalid.unwrap_or(self.simulation.on_invalid);
         self.isolation.apply(&overrides.isolation);
-        self.options.stop = overrides.stop.or(self.options.stop);
-        self.options.step = overrides.step.or(self.options.step);
-        self.options.call_timeout = overrides.isolation.call_timeout.or(self.options.call_timeout);
+        self.given.stop = overrides.stop.or(self.given.stop);
+        self.given.step = overrides.step.or(self.given.step);
+        self.given.call_timeout = overrides.isolation.call_timeout.or(self.given.call_timeout);
         if overrides.isolation.isolate.is_some() {
             // The command line decides for components that decide for themselves, too.
             self.components.values_mut().for_each(|component| component.isolate = None);
@@ -99,6 +115,7 @@ impl Experiment {
                 // The title of the file is about another FMU.
                 self.title = format!("{new} in place of {old}: {}", self.title);
             }
+            self.given.fmu.push(name.to_string());
             (component.fmu, component.is_exchanged) = (Spanned::new(0..0, file), true);
         }
         for assignment in &overrides.set {

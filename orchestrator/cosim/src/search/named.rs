@@ -97,8 +97,9 @@ impl Kind {
     }
 
     /// Returns the kind of a TOML file with this text, with or without faults. A file without a
-    /// title only serves to be extended, a file that names a paper is a study, and one in which
-    /// something varies is a campaign, as is one whose first keys name the experiment that varies.
+    /// title only serves to be extended, a file that names a paper is part of a study, and one in
+    /// which something varies is a campaign, as is one whose first keys name the experiment that
+    /// varies.
     pub fn of_text(text: &str) -> Option<Self> {
         let starts = |line: &str, with: &str| line.trim_start().starts_with(with);
         let first = || text.lines().take_while(|line| !starts(line, "["));
@@ -107,12 +108,10 @@ impl Kind {
             || (sets(first(), "title") && sets(first(), "experiment"))
         {
             Some(Self::Campaign)
-        } else if !sets(text.lines(), "title") {
-            None
-        } else if sets(text.lines(), "paper") {
-            Some(Self::Study)
         } else {
-            (has_components() || sets(text.lines(), "extends")).then_some(Self::Experiment)
+            let has_title = sets(text.lines(), "title") && !sets(text.lines(), "paper");
+            (has_title && (has_components() || sets(text.lines(), "extends")))
+                .then_some(Self::Experiment)
         }
     }
 
@@ -296,7 +295,7 @@ mod tests {
         assert_eq!(kind("title = \"a\"\nextends = \"b.toml\""), Some(Kind::Experiment));
         assert_eq!(kind("title = \"a\"\nexperiment = \"b\""), Some(Kind::Campaign));
         assert_eq!(kind("extends = \"b.toml\"\n[[vary]]"), Some(Kind::Campaign));
-        assert_eq!(kind("title = \"a\"\npaper = \"b\""), Some(Kind::Study));
+        assert_eq!(kind("title = \"a\"\npaper = \"b\""), None);
         assert_eq!(kind(&experiment.replace("title", "# title")), None);
         assert_eq!(kind("[package]\nname = \"a\""), None);
     }
