@@ -107,7 +107,7 @@ const EXAMPLES: [(&str, [Example; 3]); 14] = [
             ],
             [
                 "Draw both responses",
-                "orchestrator response rest --fmu controller=FBL --count 5 --plot response.svg",
+                "orchestrator response rest --fmu controller=FBL --plot fbl.svg",
             ],
         ],
     ),
@@ -200,6 +200,8 @@ mod tests {
             let (_, examples) = EXAMPLES.iter().find(|(other, _)| *other == name).expect(name);
             let help = commands.find_subcommand(name).unwrap().get_after_help().expect(name);
             for [_, line] in examples {
+                // A line that is wrapped cannot be copied.
+                assert!(line.len() <= 76, "{line}");
                 assert!(help.to_string().contains(line), "{line}");
                 assert!(
                     line.starts_with(&format!("orchestrator {name} "))

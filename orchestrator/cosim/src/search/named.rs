@@ -259,7 +259,7 @@ fn of_another_kind(name: &Path, others: &[Kind], reads: bool) -> Error {
 /// Returns the error for a name that nothing has.
 fn unknown(name: &Path, kinds: &[Kind]) -> Error {
     let shown = name.display();
-    if name.is_absolute() || has_extension(name, "ssp") {
+    if kinds == [Kind::Experiment] && (name.is_absolute() || has_extension(name, "ssp")) {
         let is_what = if name.is_dir() { "this is a folder" } else { "there is no such file" };
         return Error::experiment(format!("{shown}: {is_what}"));
     }
