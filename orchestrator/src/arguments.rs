@@ -17,9 +17,9 @@ pub(crate) struct Overrides {
     /// `plant.disturbance.bound="1 deg/s2"`.
     #[arg(long = "set", value_name = "COMPONENT.PARAMETER=VALUE")]
     set: Vec<String>,
-    /// Replace the FMU of a component: `controller=MyLaw.fmu`, or by its name `controller=LQR`. Settings,
-    /// recorded variables and unconnected inputs of the experiment that the new FMU does not have
-    /// are left out.
+    /// Replace the FMU of a component: `controller=MyLaw.fmu`, or by its name `controller=LQR`.
+    /// Settings, recorded variables and unconnected inputs of the experiment that the new FMU does
+    /// not have are left out.
     #[arg(long = "fmu", value_name = "COMPONENT=FMU")]
     fmu: Vec<String>,
     /// Stop time of the simulation, s.

@@ -271,8 +271,8 @@ const TRANSPORT: &str = "actuation.delay";
 /// `step` (s), plus the transport delays of the other components on it. If there are several loops,
 /// the one with the longest delay counts; the warning says so if another one has the delay that the
 /// law is designed for. If the component responds to some of its loops at once, those through its
-/// states alone do not count: what they bring, as the moment that actuators achieved, is a record of
-/// earlier ticks and not the measurement that the law acts upon.
+/// states alone do not count: what they bring, as the moment that actuators achieved, is a record
+/// of earlier ticks and not the measurement that the law acts upon.
 pub fn warnings(
     parts: &[Part],
     settings: &[Vec<Setting>],

@@ -35,7 +35,7 @@ fn bar(length: u64, quiet: bool, template: &str) -> ProgressBar {
 
 /// Formats the number of parts per second, with one digit after the point if it is small.
 fn rate(per_second: f64) -> String {
-    let digits = if per_second < 9.95 { 1 } else { 0 };
+    let digits = usize::from(per_second < 9.95);
     format!("{per_second:.digits$} per second")
 }
 

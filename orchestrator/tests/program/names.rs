@@ -5,8 +5,7 @@ use crate::bench::{Bench, LOOP};
 use crate::campaign::CAMPAIGN;
 use std::fs;
 
-/// A folder with an experiment `loop`, a campaign `gains`, a study `papers` and an FMU `Model`, which
-/// has nothing but these, wherever the program was built.
+/// A folder with an experiment `loop`, a campaign `gains`, a study `papers` and an FMU `Model`.
 fn bench() -> Bench {
     let bench = Bench::new();
     fs::write(bench.path("gains.toml"), CAMPAIGN).unwrap();
@@ -77,7 +76,6 @@ fn every_command_takes_names() {
         &["run", "b/loop", "--quiet", "--out", "out/other"],
         &["campaign", "gains", "--quiet"],
         &["pack", "loop"],
-        &["margins", "loop", "--at", "1", "--open", "plant.input", "--isolate=false"],
         &["show", "loop"],
         &["show", "gains"],
         &["show", "papers"],

@@ -52,8 +52,8 @@ impl Experiment {
         }
     }
 
-    /// Returns the error for an FMU that cannot be found. It blames the option that names it, or the
-    /// file if none does.
+    /// Returns the error for an FMU that cannot be found. It blames the option that names it, or
+    /// the file if none does.
     pub(crate) fn fmu_error(&self, component: &str, problem: &str) -> Error {
         let written = &self.components[component].fmu;
         if self.given.fmu.iter().any(|name| name == component) {
