@@ -96,3 +96,22 @@ fn place(line: Option<u64>, column: Option<&str>) -> String {
     let column = column.map(|column| format!(", column {column}")).unwrap_or_default();
     line + &column
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn times_in_messages_show_no_rounding_errors() {
+        let time = 477.0 * 0.04;
+        assert_eq!(time.to_string(), "19.080000000000002");
+        let messages = [
+            Error::Singular { time, beta_deg: 89.0 },
+            Error::NoCourse { time, problem: "is vertical" },
+            Error::NotFinite { time, what: "moment" },
+        ];
+        for message in messages.map(|error| error.to_string()) {
+            assert!(message.contains("at t = 19.08 s: "), "{message}");
+        }
+    }
+}
