@@ -13,6 +13,7 @@ use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 use settings::Choice;
 use vehicle::Scenario;
+use vehicle::error::rounded_time;
 use vehicle::kinematics::Kinematics;
 use vehicle::platform::Pose;
 use vehicle::sensor_data::SensorData;
@@ -101,7 +102,8 @@ impl SampledInstance for EstimatorInstance {
             return Ok(());
         }
         Err(Failure::Error(format!(
-            "the estimate at t = {time} s is not finite; check the inputs measured.*"
+            "the estimate at t = {} s is not finite; check the inputs measured.*",
+            rounded_time(time)
         )))
     }
 

@@ -10,6 +10,7 @@ use fmi2_export::{
 use vehicle::actuators::Command;
 use vehicle::effectors::SURFACES;
 use vehicle::entry::{End, Passage};
+use vehicle::error::rounded_time;
 use vehicle::plant::{Input, Plant, State, check};
 
 impl ReentryPlant {
@@ -73,7 +74,8 @@ impl Model for ReentryPlant {
         let moved = output.angle_rates.iter().chain(output.angular_acceleration.iter());
         if !moved.chain(output.motion_rate.iter()).all(|value| value.is_finite()) {
             return Err(Failure::Error(format!(
-                "an input moment, command, trajectory or prescribed attitude is not a finite number at t = {time} s"
+                "an input moment, command, trajectory or prescribed attitude is not a finite number at t = {} s",
+                rounded_time(time)
             )));
         }
         self.output = output;

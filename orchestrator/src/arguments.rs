@@ -11,21 +11,22 @@ use serde_json::Value;
 
 /// Settings of an experiment that the command line may change.
 #[derive(Clone, Args)]
+#[command(next_help_heading = "Changes of the experiment")]
 pub(crate) struct Overrides {
     /// Set a parameter: `plant.disturbance.seed=7`, `controller.constraints=paper`,
     /// `plant.disturbance.bound="1 deg/s2"`.
     #[arg(long = "set", value_name = "COMPONENT.PARAMETER=VALUE")]
     set: Vec<String>,
-    /// Replace the FMU of a component: `controller=MyLaw.fmu`, as a file or by its name. Settings,
-    /// recorded variables and unconnected inputs of the experiment that the new FMU does not have
-    /// are left out.
+    /// Replace the FMU of a component: `controller=MyLaw.fmu`, or by its name `controller=LQR`.
+    /// Settings, recorded variables and unconnected inputs of the experiment that the new FMU does
+    /// not have are left out.
     #[arg(long = "fmu", value_name = "COMPONENT=FMU")]
     fmu: Vec<String>,
     /// Stop time of the simulation, s.
-    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
+    #[arg(long, value_name = "SECONDS")]
     stop: Option<f64>,
     /// Length of the communication step, s.
-    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
+    #[arg(long, value_name = "SECONDS")]
     step: Option<f64>,
     /// Choose how components are stepped and values are passed on.
     #[arg(long, value_parser = choice::<Coupling>(&[("sequential", "gauss-seidel")]))]
@@ -40,10 +41,11 @@ pub(crate) struct Overrides {
 
 /// Processes of instances and their limits. The texts are those of the section `[isolation]`.
 #[derive(Clone, Args)]
+#[command(next_help_heading = "Processes of instances")]
 struct Protection {
     #[arg(long, help = key("isolate"), value_name = "BOOL", num_args = 0..=1, default_missing_value = "true", require_equals = true)]
     isolate: Option<bool>,
-    #[arg(long, help = key("call_timeout"), value_name = "SECONDS", allow_negative_numbers = true)]
+    #[arg(long, help = key("call_timeout"), value_name = "SECONDS")]
     call_timeout: Option<f64>,
     #[arg(long = "unit-memory", help = key("memory"), value_name = "MIB")]
     memory: Option<u64>,

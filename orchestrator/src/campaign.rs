@@ -7,7 +7,6 @@ use campaign::changes::Changes;
 use campaign::definition::Campaign;
 use campaign::findings::Findings;
 use campaign::plan::Plan;
-use campaign::prepare;
 use campaign::run::{self, Options};
 use campaign::search;
 use clap::Args;
@@ -15,6 +14,7 @@ use cosim::error::Error;
 use cosim::experiment::Overrides;
 use cosim::files;
 use cosim::interrupt::Interrupt;
+use cosim::search::named::{Kind, find};
 use std::io::Write;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -24,7 +24,7 @@ use sweep::statistics::CONFIDENCE;
 /// Options that the commands `campaign` and `falsify` share.
 #[derive(Args)]
 pub(crate) struct Common {
-    /// Campaign: a file, or the name of one below orchestrator/experiments/campaigns.
+    /// Campaign: a file, or the name of one that `list` shows.
     campaign: PathBuf,
     /// Experiment that replaces that of the campaign: a file, or the name of an experiment.
     #[arg(long, value_name = "EXPERIMENT")]
@@ -32,7 +32,7 @@ pub(crate) struct Common {
     #[command(flatten)]
     overrides: arguments::Overrides,
     /// Folder for the results [default: out/CAMPAIGN].
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", help_heading = "Results")]
     out: Option<PathBuf>,
     /// Also look for FMUs in this folder, besides the folder of the experiment and target/fmu. The
     /// option may be given several times.
@@ -53,24 +53,24 @@ pub(crate) struct Fly {
     common: Common,
     /// Write the experiment of one case to a file that `orchestrator run` takes, and run it with
     /// everything recorded.
-    #[arg(long, value_name = "K", conflicts_with_all = ["cases", "work", "fresh", "csv"])]
+    #[arg(long, value_name = "K", help_heading = "Part of the campaign", conflicts_with_all = ["cases", "work", "fresh", "csv"])]
     case: Option<u64>,
     /// Fly only the cases from FIRST up to, but not including, LAST. A later command for the whole
     /// campaign merges them. Several processes may work in the same folder at once.
-    #[arg(long, value_name = "FIRST..LAST", value_parser = range, conflicts_with_all = ["work", "csv"])]
+    #[arg(long, value_name = "FIRST..LAST", help_heading = "Part of the campaign", value_parser = range, allow_hyphen_values = true, conflicts_with_all = ["work", "csv"])]
     cases: Option<Range<u64>>,
     /// Print which parts of the campaign are not flown yet, as JSON, and fly no case.
-    #[arg(long, conflicts_with_all = ["fresh", "csv"])]
+    #[arg(long, help_heading = "Part of the campaign", conflicts_with_all = ["fresh", "csv"])]
     work: bool,
     /// Write the campaign and everything that its cases need into a folder, for another machine,
     /// which then flies DIR/campaign.toml with --fmu-dir DIR/fmu. No case is flown here.
-    #[arg(long, value_name = "DIR", conflicts_with_all = ["case", "cases", "work", "fresh", "csv"])]
+    #[arg(long, value_name = "DIR", help_heading = "Part of the campaign", conflicts_with_all = ["case", "cases", "work", "fresh", "csv"])]
     bundle: Option<PathBuf>,
     /// Fly all cases again, including those that are finished.
-    #[arg(long)]
+    #[arg(long, help_heading = "Results")]
     fresh: bool,
     /// Also write the results table as cases.csv.
-    #[arg(long)]
+    #[arg(long, help_heading = "Results")]
     csv: bool,
 }
 
@@ -83,7 +83,7 @@ pub(crate) struct Falsify {
     #[arg(long, value_name = "SECONDS", value_parser = clap::value_parser!(u64).range(1..))]
     time: Option<u64>,
     /// Replace the results of an earlier search in the folder.
-    #[arg(long)]
+    #[arg(long, help_heading = "Results")]
     force: bool,
 }
 
@@ -95,7 +95,7 @@ fn range(text: &str) -> Result<Range<u64>, String> {
 }
 
 fn prepare(common: &Common) -> Result<Plan, Error> {
-    let campaign = Campaign::load(&prepare::find(&common.campaign)?)?;
+    let campaign = Campaign::load(&find(&common.campaign, Kind::Campaign)?)?;
     let overrides = common.overrides.clone().into();
     let changes = Changes { experiment: common.experiment.clone(), overrides };
     Plan::new(campaign, &changes, &common.fmu_dir)

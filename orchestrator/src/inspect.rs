@@ -31,18 +31,27 @@ pub(crate) fn inspect(
 }
 
 /// Checks the description of an archive and its library, which is loaded for this, and prints each
-/// fault. It prints nothing if there is none.
+/// fault, or that the FMU is sound.
 ///
 /// # Errors
 /// Returns an error if there are faults, if the archive is no FMU at all, or if the text cannot be
 /// written.
 pub(crate) fn check(path: &Path, out: &mut impl Write) -> Result<(), Failure> {
-    let faults = Fmu::open(path)?.faults();
+    let fmu = Fmu::open(path)?;
+    let faults = fmu.faults();
     for fault in &faults {
         writeln!(out, "{}: {fault}", path.display())?;
     }
     match faults.len() {
-        0 => Ok(()),
+        0 => {
+            let (name, variables) = (&fmu.description.model_name, fmu.description.variables.len());
+            let platforms = if fmu.is_lookup_table() {
+                String::new()
+            } else {
+                format!(" for {}", fmu.platforms().join(", "))
+            };
+            Ok(writeln!(out, "{name}: sound, {variables} variables{platforms}")?)
+        }
         count => Err(Failure::Faults { path: path.to_path_buf(), count }),
     }
 }

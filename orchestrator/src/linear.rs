@@ -6,7 +6,7 @@ use crate::run;
 use clap::Args;
 use cosim::error::Error;
 use cosim::interrupt::Interrupt;
-use cosim::search;
+use cosim::search::named::{Kind, find};
 use cosim::system::System;
 use cosim_report::figure::{Color, Curve, Figure, Legend, Panel, Shape, svg};
 use fmu_import::quantity::rounded;
@@ -30,11 +30,11 @@ pub(crate) struct Instant {
     experiment: PathBuf,
     /// Time of the run at which it is linearised, s [default: what the experiment's
     /// [observe.margins] says].
-    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
+    #[arg(long, value_name = "SECONDS", help_heading = "Linearisation")]
     at: Option<f64>,
     /// Signals at which the loop is opened: connected inputs or outputs, as `plant.moment.*`. The
     /// option may be given several times [default: those of [observe.margins]].
-    #[arg(long, value_name = "SIGNAL")]
+    #[arg(long, value_name = "SIGNAL", help_heading = "Linearisation")]
     open: Vec<String>,
     /// Also look for FMUs in this folder, besides the folder of the experiment and target/fmu. The
     /// option may be given several times.
@@ -48,7 +48,7 @@ impl Instant {
     /// Returns the system of the experiment, the time at which it is linearised (s), and the
     /// signals at which the loop is opened.
     pub(crate) fn system(&self) -> Result<(System, f64, Vec<String>), Failure> {
-        let path = search::experiment(&self.experiment)?;
+        let path = find(&self.experiment, Kind::Experiment)?;
         let (system, _) = run::system(&path, &self.overrides.clone().into(), &self.fmu_dir)?;
         let asked = system.experiment.observe.margins.clone();
         let missing = |option: &str| {

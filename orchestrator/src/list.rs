@@ -4,94 +4,207 @@ use crate::failure::Failure;
 use campaign::definition::Campaign;
 use cosim::error::Error;
 use cosim::experiment::Experiment;
-use cosim::search::{self, files};
+use cosim::search;
+use cosim::search::named::Kind;
 use fmu_import::fmu::Fmu;
+use ratatui::crossterm::terminal;
+use serde::Serialize;
 use std::collections::BTreeSet;
-use std::io::Write;
+use std::fs;
+use std::io::{IsTerminal, Write, stdout};
 use std::path::{Path, PathBuf};
-use std::{fs, iter};
 use study::definition::Study;
 
-/// Prints the experiments, studies and campaigns below a folder with their titles, and the FMUs
-/// below it. Without a folder it prints those below the current one, and all others that the
-/// program finds from any folder.
+/// Form in which the list is printed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Form {
+    /// Names and titles, which are wrapped and shortened.
+    Short,
+    /// Names and whole titles, and the file of each.
+    Long,
+    /// JSON, for other programs.
+    Json,
+}
+
+/// An entry of the list.
+#[derive(Debug, Serialize)]
+struct Row {
+    kind: &'static str,
+    name: String,
+    path: PathBuf,
+    /// Title, or the description of an FMU; `None` if the file is faulty.
+    title: Option<String>,
+    fault: Option<String>,
+}
+
+/// Prints the names and titles of all experiments, studies, campaigns and FMUs: of those below a
+/// folder, or without a folder of all that the program finds.
 ///
 /// # Errors
 /// Returns an error if the folder does not exist, or if the text cannot be written.
-pub(crate) fn list(folder: Option<&Path>, out: &mut impl Write) -> Result<(), Failure> {
+pub(crate) fn list(folder: Option<&Path>, form: Form, out: &mut impl Write) -> Result<(), Failure> {
     if let Some(folder) = folder
         && !folder.is_dir()
     {
         return Err(Error::experiment(format!("{} is not a folder", folder.display())).into());
     }
-    let searched = folder.unwrap_or(Path::new("."));
-    let find = |extension: &str, others: Vec<PathBuf>| {
-        let mut seen = BTreeSet::new();
-        let paths = iter::once(searched.to_path_buf())
-            .chain(others)
-            .flat_map(|root| files(&root, extension));
-        paths
-            .filter(|path| fs::canonicalize(path).is_ok_and(|path| seen.insert(path)))
-            .collect::<Vec<_>>()
-    };
-    let elsewhere = if folder.is_none() { search::experiments() } else { Vec::new() };
-    let tables = find("toml", elsewhere);
-    let mut rows: Vec<(PathBuf, String)> = Vec::new();
-    for path in &tables {
-        // Other TOML files are no experiments, and are skipped. A faulty experiment is shown with
-        // its fault.
-        let Ok(text) = fs::read_to_string(path) else { continue };
-        if search::is_experiment(&text) {
-            let title = Experiment::parse(path, text)
-                .map_or_else(|error| format!("FAULT {error}"), |e| e.title);
-            rows.push((path.clone(), title));
-        }
+    let sections = Kind::ALL.map(|kind| rows(kind, folder));
+    if form == Form::Json {
+        let rows: Vec<&Row> = sections.iter().flatten().collect();
+        serde_json::to_writer_pretty(&mut *out, &rows).map_err(std::io::Error::from)?;
+        return Ok(writeln!(out)?);
     }
-    print("experiments", &rows, out)?;
-
-    let studies: Vec<(PathBuf, String)> = tables
-        .iter()
-        .filter(|path| path.file_name().is_some_and(|name| name == "study.toml"))
-        .map(|path| {
-            let title = Study::load(path)
-                .map_or_else(|error| format!("FAULT {error}"), |study| study.title);
-            (path.clone(), title)
-        })
-        .collect();
-    print("studies", &studies, out)?;
-
-    let campaigns: Vec<(PathBuf, String)> = tables
-        .into_iter()
-        .filter(|path| fs::read_to_string(path).is_ok_and(|text| search::is_campaign(&text)))
-        .map(|path| {
-            let title = Campaign::load(&path)
-                .map_or_else(|error| format!("FAULT {error}"), |campaign| campaign.title);
-            (path, title)
-        })
-        .collect();
-    print("campaigns", &campaigns, out)?;
-
-    let others =
-        if folder.is_none() { search::fmu_folders() } else { vec![PathBuf::from("target/fmu")] };
-    let rows: Vec<(PathBuf, String)> = find("fmu", others)
-        .into_iter()
-        .map(|path| {
-            let text = Fmu::open(&path).map_or_else(
-                |error| format!("FAULT {error}"),
-                |fmu| format!("{}: {}", fmu.description.model_name, fmu.description.description),
-            );
-            (path, text)
-        })
-        .collect();
-    print("FMUs", &rows, out)
-}
-
-fn print(what: &str, rows: &[(PathBuf, String)], out: &mut impl Write) -> Result<(), Failure> {
-    writeln!(out, "{what} ({})", rows.len())?;
-    let width =
-        rows.iter().map(|(path, _)| path.display().to_string().chars().count()).max().unwrap_or(0);
-    for (path, text) in rows {
-        writeln!(out, "  {:<width$}  {text}", path.display().to_string())?;
+    let width = if stdout().is_terminal() {
+        terminal::size().map_or(WIDTH, |(columns, _)| usize::from(columns).clamp(40, 120))
+    } else {
+        WIDTH
+    };
+    for (index, (kind, rows)) in Kind::ALL.iter().zip(&sections).enumerate() {
+        if index > 0 {
+            writeln!(out)?;
+        }
+        let (many, command) = (kind.plural(), kind.command());
+        writeln!(out, "{many} ({}): orchestrator {command} NAME", rows.len())?;
+        print(rows, form, width, out)?;
     }
     Ok(())
+}
+
+/// Width of the list where there is no terminal.
+const WIDTH: usize = 80;
+/// Largest width of the column of names. A longer name gets a line of its own.
+const NAMES: usize = 32;
+/// Number of lines to which a title is shortened.
+const LINES: usize = 2;
+
+/// Finds everything of a kind below a folder, or everywhere.
+fn rows(kind: Kind, folder: Option<&Path>) -> Vec<Row> {
+    let mut seen = BTreeSet::new();
+    let folders = search::folders().into_iter().chain(folder.map(Path::to_path_buf));
+    let mut paths: Vec<PathBuf> = folders.flat_map(|folder| kind.below(&folder)).collect();
+    paths.retain(|path| fs::canonicalize(path).is_ok_and(|path| seen.insert(path)));
+    // Names are those by which the file is found from here, so that all files count.
+    let named: Vec<String> = paths.iter().map(|path| shortest(kind, path, &paths)).collect();
+    let canonical = folder.and_then(|folder| fs::canonicalize(folder).ok());
+    let is_below = |path: &Path| {
+        canonical
+            .as_ref()
+            .is_none_or(|folder| fs::canonicalize(path).is_ok_and(|path| path.starts_with(folder)))
+    };
+    let listed = paths.into_iter().zip(named).filter(|(path, _)| is_below(path));
+    listed.map(|(path, name)| row(kind, path, name)).collect()
+}
+
+fn row(kind: Kind, path: PathBuf, name: String) -> Row {
+    let title = match kind {
+        Kind::Experiment => Experiment::load(&path).map(|found| found.title).map_err(text),
+        Kind::Study => Study::load(&path).map(|found| found.title).map_err(text),
+        Kind::Campaign => Campaign::load(&path).map(|found| found.title).map_err(text),
+        Kind::Fmu => Fmu::open(&path).map(|found| found.description.description).map_err(text),
+    };
+    let (title, fault) = match title {
+        Ok(title) => (Some(title), None),
+        Err(fault) => (None, Some(fault)),
+    };
+    Row { kind: kind.word(), name, path, title, fault }
+}
+
+#[expect(clippy::needless_pass_by_value, reason = "used as a function of errors")]
+fn text(error: impl ToString) -> String {
+    error.to_string()
+}
+
+/// Returns the shortest end of a file's path that no other one has, without the extension.
+fn shortest(kind: Kind, path: &Path, all: &[PathBuf]) -> String {
+    let name = kind.name(path);
+    let parts: Vec<_> = name.components().collect();
+    let ends = (0..parts.len()).rev().map(|from| parts[from..].iter().collect::<PathBuf>());
+    let is_unique = |end: &PathBuf| {
+        let file = kind.file(end);
+        all.iter().filter(|other| other.ends_with(&file)).count() == 1
+    };
+    let mut unique = ends.filter(is_unique);
+    unique.next().unwrap_or(name.clone()).display().to_string()
+}
+
+fn print(rows: &[Row], form: Form, width: usize, out: &mut impl Write) -> Result<(), Failure> {
+    let names = rows.iter().map(|row| row.name.chars().count()).max().unwrap_or(0).min(NAMES);
+    if !rows.is_empty() {
+        writeln!(out, "  {:<names$}  TITLE", "NAME")?;
+    }
+    for Row { name, path, title, fault, .. } in rows {
+        let text = match (title, fault) {
+            (Some(title), _) => title.clone(),
+            (None, fault) => format!("FAULT {}", fault.as_deref().unwrap_or_default()),
+        };
+        // The widths of the margin and of the space between the columns are 2.
+        let room = width - names - 4;
+        let mut lines: Vec<String> =
+            textwrap::wrap(&text, room).into_iter().map(String::from).collect();
+        if form == Form::Short && fault.is_none() && lines.len() > LINES {
+            lines.truncate(LINES);
+            shorten(&mut lines[LINES - 1], room);
+        }
+        if form == Form::Long {
+            lines.push(path.display().to_string());
+        }
+        let mut lines = lines.iter();
+        if name.chars().count() > names {
+            writeln!(out, "  {name}")?;
+        } else {
+            let first = lines.next().map_or("", String::as_str);
+            writeln!(out, "{}", format!("  {name:<names$}  {first}").trim_end())?;
+        }
+        for line in lines {
+            writeln!(out, "  {:<names$}  {line}", "")?;
+        }
+    }
+    Ok(())
+}
+
+/// Ends a line with an ellipsis, after the last whole word that leaves room for it.
+fn shorten(line: &mut String, room: usize) {
+    while line.chars().count() + 2 > room {
+        let Some(end) = line.rfind(' ') else { break };
+        line.truncate(end);
+    }
+    line.push_str(" …");
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_are_as_short_as_they_can_be() {
+        let paths =
+            ["a/lqr.toml", "a/x/same.toml", "b/x/same.toml", "./lonely.toml", "/c/lonely.toml"];
+        let paths = paths.map(PathBuf::from);
+        let names = paths.each_ref().map(|path| shortest(Kind::Experiment, path, &paths));
+        assert_eq!(names, ["lqr", "a/x/same", "b/x/same", "./lonely", "c/lonely"]);
+        let studies = [PathBuf::from("a/exchange/study.toml"), PathBuf::from("a/entry/study.toml")];
+        assert_eq!(shortest(Kind::Study, &studies[1], &studies), "entry");
+    }
+
+    #[test]
+    fn long_titles_are_wrapped_and_shortened() {
+        let row = |name: &str, title: &str| Row {
+            kind: "experiment",
+            name: name.into(),
+            path: PathBuf::from("a.toml"),
+            title: Some(title.into()),
+            fault: None,
+        };
+        let rows = [row("a", &"word ".repeat(40)), row(&"n".repeat(40), "title")];
+        let printed = |form| {
+            let mut out = Vec::new();
+            print(&rows, form, 60, &mut out).unwrap();
+            String::from_utf8(out).unwrap()
+        };
+        let short = printed(Form::Short);
+        assert!(short.lines().all(|line| line.chars().count() <= 60), "{short}");
+        assert_eq!((short.lines().count(), short.matches(" …").count()), (5, 1), "{short}");
+        let long = printed(Form::Long);
+        assert!(long.matches("word").count() == 40 && long.contains("a.toml"), "{long}");
+    }
 }

@@ -5,8 +5,9 @@ use crate::run::system;
 use cosim::error::Error;
 use cosim::experiment::Overrides;
 use cosim::interrupt::Interrupt;
+use cosim::search::named::{Kind, find};
+use cosim::ssp;
 use cosim::system::System;
-use cosim::{search, ssp};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
@@ -32,7 +33,7 @@ pub(crate) fn pack(
     out: &mut impl Write,
     interrupt: &Interrupt,
 ) -> Result<(), Failure> {
-    let path = search::experiment(experiment)?;
+    let path = find(experiment, Kind::Experiment)?;
     let Archive { path: archive, enumerations, force } = archive;
     let archive = archive.unwrap_or_else(|| {
         PathBuf::from(path.file_stem().unwrap_or_default()).with_extension("ssp")

@@ -33,17 +33,17 @@ pub(crate) struct Response {
     #[command(flatten)]
     instant: Instant,
     /// Lowest frequency, rad/s.
-    #[arg(long, value_name = "RAD/S", default_value_t = 0.3)]
+    #[arg(long, value_name = "RAD/S", help_heading = "Sine", default_value_t = 0.3)]
     from: f64,
     /// Highest frequency, rad/s [default: 0.77 of half the sampling frequency].
-    #[arg(long, value_name = "RAD/S")]
+    #[arg(long, value_name = "RAD/S", help_heading = "Sine")]
     to: Option<f64>,
     /// Number of frequencies, equally spaced on a logarithmic scale.
-    #[arg(long, value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u32).range(2..))]
+    #[arg(long, value_name = "N", help_heading = "Sine", default_value_t = 10, value_parser = clap::value_parser!(u32).range(2..))]
     count: u32,
     /// Amplitude of the sine, in the unit of the signals [default: a ten-thousandth of their
     /// typical magnitude].
-    #[arg(long, value_name = "NUMBER")]
+    #[arg(long, value_name = "NUMBER", help_heading = "Sine")]
     amplitude: Option<f64>,
     /// File for a plot of both responses (SVG).
     #[arg(long, value_name = "FILE")]
@@ -57,6 +57,12 @@ pub(crate) fn respond(
     interrupt: &Interrupt,
 ) -> Result<(), Failure> {
     let (system, at, open) = asked.instant.system()?;
+    if let Some(amplitude) = asked.amplitude
+        && !(amplitude > 0.0 && amplitude.is_finite())
+    {
+        let problem = format!("--amplitude {amplitude}: it must be finite and above 0");
+        return Err(Error::experiment(problem).into());
+    }
     let title = system.experiment.title.clone();
     let lineariser = Lineariser::new(system, at, &open)?;
     let mut master = lineariser.system().start(interrupt)?;
@@ -66,7 +72,7 @@ pub(crate) fn respond(
     let to = asked.to.unwrap_or(0.77 * nyquist);
     if !(asked.from > 0.0 && to > asked.from && to < nyquist) {
         let problem = format!(
-            "--from {} --to {to}: 0 < from < to < {nyquist:.3} rad/s, half the sampling frequency, is needed",
+            "--from {} --to {to:.3}: 0 < from < to < {nyquist:.3} rad/s, half the sampling frequency, is needed",
             asked.from
         );
         return Err(Error::experiment(problem).into());

@@ -34,6 +34,7 @@ use std::time::Instant;
 
 /// Choice of the files that a run writes, and of their format.
 #[derive(Clone, Copy, Debug, Default, clap::Args)]
+#[command(next_help_heading = "Results")]
 pub(crate) struct Files {
     /// Write no results.csv.
     #[arg(long)]

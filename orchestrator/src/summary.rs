@@ -170,19 +170,21 @@ fn metric_lines(observe: &Observe, metrics: &Metrics) -> Vec<(String, String)> {
         else {
             continue;
         };
-        let unit = metrics.units.get(name).filter(|unit| !unit.is_empty());
-        let unit = unit.map_or(String::new(), |unit| format!(" {unit}"));
+        let unit = metrics.units.get(name).map_or("", String::as_str);
+        let (unit, factor) =
+            observe.units.get(unit).map_or((unit, 1.0), |shown| (&*shown.name, shown.factor));
+        let unit = if unit.is_empty() { String::new() } else { format!(" {unit}") };
         let text = match value {
             None => continue,
             Some(Value::Count(count)) => count.to_string(),
-            Some(Value::Number(number)) => shown(*number),
+            Some(Value::Number(number)) => shown(factor * number),
             Some(Value::Flag(is)) => is.to_string(),
             Some(Value::Text(text)) => text.clone(),
         };
         let number = |name: &String| metrics.number(name);
         let compared = match (number(name), measure.limit.as_ref().and_then(number)) {
             (Some(value), Some(limit)) => {
-                against(value / limit, &format!("{}{unit}", shown(limit)))
+                against(value / limit, &format!("{}{unit}", shown(factor * limit)))
             }
             _ => String::new(),
         };

@@ -52,7 +52,7 @@ For {systems}.
     {program} run crmpc-2022/crmpc-robust  flies an experiment
     {program} --help                      explains all commands
 
-The program finds experiments/ and fmu/ beside itself, from any folder.
+The program finds experiments/ and fmu/ beside itself, from any folder.{manual}
 
 LICENSE-MIT and LICENSE-APACHE are the licences of program and FMUs, either of which may be chosen.
 LICENSES.txt and LICENSES-rust-std.html are those of what is linked in.
@@ -102,9 +102,10 @@ def check(dist: Path) -> None:
         for path in sorted(folder.glob("*.fmu")):
             if path.stem not in described:
                 raise Fault(f"{path} is no FMU of this version: remove it")
-    for platform in platforms:
-        if not program(dist, platform).is_file():
-            raise Fault(f"{program(dist, platform)} does not exist: run scripts/package")
+    programs = [program(dist, platform) for platform in platforms]
+    for path in (*programs, dist / "man" / "orchestrator.1"):
+        if not path.is_file():
+            raise Fault(f"{path} does not exist: run scripts/package")
 
 
 def program(dist: Path, platform: str) -> Path:
@@ -173,10 +174,14 @@ def write_programs(dist: Path, output: Path, version: str, epoch: int) -> None:
     for platform, systems in PLATFORMS.items():
         binary = program(dist, platform)
         name = binary.stem if binary.suffix else f"./{binary.name}"
-        page = readme(PROGRAM_README, version=version, systems=systems, program=name)
+        manual = "" if binary.suffix else " `man -M man orchestrator` explains it, too."
+        page = readme(PROGRAM_README, version=version, systems=systems, program=name, manual=manual)
         fmus = [(f"fmu/{name}", content, mode) for name, content, mode in packed_fmus(dist, platform)]
+        # Windows has no man.
+        pages = [] if binary.suffix else sorted((dist / "man").glob("*.1"))
         entries = [
             (binary.name, binary.read_bytes(), 0o755),
+            *((f"man/man1/{path.name}", path.read_bytes(), 0o644) for path in pages),
             *experiments,
             *fmus,
             *licence_files(output),

@@ -43,7 +43,8 @@ pub enum Error {
     },
     /// The sideslip angle reached ±90°, where the attitude angles are singular.
     #[error(
-        "sideslip beta = {beta_deg:.3} deg at t = {time} s: the attitude angles are singular at 90 deg"
+        "sideslip beta = {beta_deg:.3} deg at t = {} s: the attitude angles are singular at 90 deg",
+        rounded_time(*time)
     )]
     Singular {
         /// Time at which this happened, s.
@@ -53,7 +54,8 @@ pub enum Error {
     },
     /// The flight has no course: it is vertical, over a pole, or stands still.
     #[error(
-        "the flight {problem} at t = {time} s: its flight path angle and heading have no meaning"
+        "the flight {problem} at t = {} s: its flight path angle and heading have no meaning",
+        rounded_time(*time)
     )]
     NoCourse {
         /// Time at which this happened, s.
@@ -63,7 +65,8 @@ pub enum Error {
     },
     /// A state or an input is no longer a finite number.
     #[error(
-        "{what} is not finite or beyond all bounds at t = {time} s: wrong input, unstable loop, or too long a step"
+        "{what} is not finite or beyond all bounds at t = {} s: wrong input, unstable loop, or too long a step",
+        rounded_time(*time)
     )]
     NotFinite {
         /// Time at which this happened, s.
@@ -71,6 +74,11 @@ pub enum Error {
         /// Name of the quantity at fault.
         what: &'static str,
     },
+}
+
+/// Rounds a time (s) for a message, so that its last digits show no rounding errors.
+pub fn rounded_time(time: f64) -> f64 {
+    (time * 1e9).round() / 1e9
 }
 
 impl Error {
@@ -87,4 +95,23 @@ fn place(line: Option<u64>, column: Option<&str>) -> String {
     let line = line.map(|line| format!(", line {line}")).unwrap_or_default();
     let column = column.map(|column| format!(", column {column}")).unwrap_or_default();
     line + &column
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn times_in_messages_show_no_rounding_errors() {
+        let time = 477.0 * 0.04;
+        assert_eq!(time.to_string(), "19.080000000000002");
+        let messages = [
+            Error::Singular { time, beta_deg: 89.0 },
+            Error::NoCourse { time, problem: "is vertical" },
+            Error::NotFinite { time, what: "moment" },
+        ];
+        for message in messages.map(|error| error.to_string()) {
+            assert!(message.contains("at t = 19.08 s: "), "{message}");
+        }
+    }
 }

@@ -1,7 +1,7 @@
 //! Transport delay of the commanded moment. A moment commanded at t acts from t + delay on and is
 //! held until the next change arrives. No moment acts before the first command arrives.
 
-use crate::error::Error;
+use crate::error::{Error, rounded_time};
 use crate::time::tolerance;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
@@ -94,8 +94,9 @@ impl Transport {
         self.changes.drain(..past);
         if self.changes.len() - self.arrived(time) >= UNDER_WAY {
             let problem = format!(
-                "= {} s at t = {time} s: the moment changed more than {UNDER_WAY} times within it; use longer communication steps or a shorter delay",
-                self.delay
+                "= {} s at t = {} s: the moment changed more than {UNDER_WAY} times within it; use longer communication steps or a shorter delay",
+                self.delay,
+                rounded_time(time)
             );
             return Err(Error::parameter(NAME, problem));
         }

@@ -10,6 +10,7 @@ use control::schedule::ControllerInput;
 use fmi2_export::{Context, Description, Failure};
 use nalgebra::Vector3;
 use vehicle::Scenario;
+use vehicle::error::rounded_time;
 
 /// A controller with the settings and the vehicle for which it was designed.
 pub struct Designed<L: Law> {
@@ -57,7 +58,8 @@ impl<L: Law> ControllerInstance<L> {
             return Ok(());
         }
         Err(Failure::Error(format!(
-            "the control moment at t = {now} s is not finite; the attitude may be singular (sideslip angle near 90 deg)"
+            "the control moment at t = {} s is not finite; the attitude may be singular (sideslip angle near 90 deg)",
+            rounded_time(now)
         )))
     }
 }

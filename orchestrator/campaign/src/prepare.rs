@@ -3,14 +3,11 @@
 use crate::changes::Changes;
 use crate::definition::Campaign;
 use cosim::error::Error;
-use cosim::experiment::{self, Experiment, Margins, Observe, Overrides, Protection};
+use cosim::experiment::{self, Experiment, Given, Margins, Observe, Overrides, Protection};
 use cosim::files;
-use cosim::search;
+use cosim::search::named::{Kind, find};
 use cosim_report::metrics::{Meters, Metrics};
-use fmu_import::names;
 use std::collections::BTreeMap;
-use std::fs;
-use std::path::{Path, PathBuf};
 use sweep::vary::DesignKind;
 use toml::Spanned;
 
@@ -31,9 +28,9 @@ pub(crate) fn read_experiment(campaign: &Campaign, changes: &Changes) -> Result<
     let span = campaign.experiment.span();
     let beside = source.beside(campaign.experiment.get_ref());
     let path = match &changes.experiment {
-        Some(name) => search::experiment(name)?,
+        Some(name) => find(name, Kind::Experiment)?,
         None if beside.is_file() => beside,
-        None => search::experiment(campaign.experiment.get_ref())
+        None => find(campaign.experiment.get_ref(), Kind::Experiment)
             .map_err(|error| source.error(&span, error.to_string()))?,
     };
     let mut experiment = Experiment::load(&path)?;
@@ -44,6 +41,8 @@ pub(crate) fn read_experiment(campaign: &Campaign, changes: &Changes) -> Result<
         overrides.fmu.push(format!("{component}={}", file.display()));
     }
     experiment.apply(&overrides)?;
+    // A fault of these is that of the campaign's file, not of an option.
+    experiment.given = Given::default();
     for (name, value) in &campaign.set {
         let outcome = experiment.set(name, value.get_ref().clone());
         outcome.map_err(|problem| source.error(&value.span(), format!("[set] {problem}")))?;
@@ -97,6 +96,7 @@ pub(crate) fn observe(campaign: &Campaign, experiment: &Observe) -> Result<Obser
     Ok(Observe {
         signals,
         metrics,
+        units: experiment.units.clone(),
         summary: Vec::new(),
         guarantee: experiment.guarantee.clone().filter(|_| !of_guarantee.is_empty()),
         margins: experiment.margins.clone().filter(|_| !of_margins.is_empty()),
@@ -143,28 +143,4 @@ pub(crate) fn keys(campaign: &Campaign, changes: &Changes) -> Result<String, Err
     let (fmu, isolation) = (Vec::new(), Protection::default());
     let overrides = Overrides { fmu, isolation, ..changes.overrides.clone() };
     Ok(files::digest(format!("{text}{overrides:?}")))
-}
-
-/// Finds the campaign with this name: a file, or one below the campaigns of the experiments.
-///
-/// # Errors
-/// Returns an error if there is no such campaign.
-pub fn find(name: &Path) -> Result<PathBuf, Error> {
-    if name.is_file() {
-        return Ok(name.to_path_buf());
-    }
-    let folders = || search::experiments().into_iter().map(|root| root.join("campaigns"));
-    let file = search::with_toml(name);
-    if let Some(path) = folders().map(|folder| folder.join(&file)).find(|path| path.is_file()) {
-        return Ok(path);
-    }
-    let there: Vec<String> = folders()
-        .flat_map(|folder| fs::read_dir(folder).into_iter().flatten().flatten())
-        .filter_map(|entry| Some(entry.path().file_stem()?.to_string_lossy().into_owned()))
-        .collect();
-    let hint = names::hint(&name.to_string_lossy(), there.iter().map(String::as_str));
-    Err(Error::experiment(format!(
-        "there is no campaign \"{}\", neither as a file nor among the experiments' campaigns{hint}",
-        name.display()
-    )))
 }

@@ -30,7 +30,7 @@ pub fn check(
 ) -> Result<System, Error> {
     let simulation = &experiment.simulation;
     let clock = Clock::new(simulation.start, simulation.stop, simulation.step)
-        .map_err(|message| experiment.source.error(&(0..0), format!("[simulation] {message}")))?;
+        .map_err(|problem| experiment.time_error(&problem))?;
 
     let mut components = Vec::new();
     for name in order(&experiment)? {
@@ -49,10 +49,7 @@ pub fn check(
     if let Some(target) = experiment.unplaced.first() {
         return Err(Error::experiment(format!("--set {target}: {}", whereabouts(target, &parts))));
     }
-    experiment
-        .isolation
-        .check()
-        .map_err(|problem| experiment.source.error(&(0..0), format!("[isolation] {problem}")))?;
+    experiment.isolation.check().map_err(|problem| experiment.isolation_error(&problem))?;
     check_single_instances(&experiment, &components)?;
     if let Some(name) = &experiment.simulation.ends_with
         && !experiment.components.contains_key(name)
@@ -137,12 +134,12 @@ fn check_size(experiment: &Experiment, clock: &Clock, columns: usize) -> Result<
     let gigabytes = rows * (columns + 1) as f64 * NUMBER / 1e9;
     if steps > MOST_STEPS {
         let message = format!(
-            "[simulation] {steps} steps of {} s are too many, at most {MOST_STEPS} are possible. results.csv would take \
+            "{steps} steps of {} s are too many, at most {MOST_STEPS} are possible. results.csv would take \
              about {gigabytes:.0} GB and the run {:.0} h or more: choose a longer step or an earlier stop",
             clock.step(),
             steps as f64 * QUICK / 3600.0
         );
-        return Err(experiment.source.error(&(0..0), message));
+        return Err(experiment.time_error(&message));
     }
     if gigabytes > 10.0 {
         warnings::warn_once(format!(
@@ -235,8 +232,8 @@ fn find_fmu(experiment: &Experiment, name: &str, fmu_dirs: &[PathBuf]) -> Result
     if let Some(path) =
         folders.iter().map(|folder| folder.join(written.get_ref())).find(|path| path.is_dir())
     {
-        let message = format!("[components.{name}] {} is a folder, not an archive", path.display());
-        return Err(experiment.source.error(&written.span(), message));
+        let problem = format!("{} is a folder, not an archive", path.display());
+        return Err(experiment.fmu_error(name, &problem));
     }
     let files: Vec<String> = folders
         .iter()
@@ -249,10 +246,7 @@ fn find_fmu(experiment: &Experiment, name: &str, fmu_dirs: &[PathBuf]) -> Result
         .collect();
     let hint = names::hint(written.get_ref(), files.iter().map(String::as_str));
     let searched: Vec<String> = folders.iter().map(|folder| folder.display().to_string()).collect();
-    let message = format!(
-        "[components.{name}] there is no file \"{}\" in {}{hint}",
-        written.get_ref(),
-        searched.join(", ")
-    );
-    Err(experiment.source.error(&written.span(), message))
+    let message =
+        format!("there is no file \"{}\" in {}{hint}", written.get_ref(), searched.join(", "));
+    Err(experiment.fmu_error(name, &message))
 }

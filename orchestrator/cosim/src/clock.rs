@@ -18,10 +18,11 @@ impl Clock {
     /// # Errors
     /// Returns an error if `stop` is not a whole, positive number of steps after `start`.
     pub fn new(start: f64, stop: f64, step: f64) -> Result<Self, String> {
-        if !(step > 0.0 && step.is_finite() && start.is_finite() && stop.is_finite()) {
-            return Err(format!(
-                "start = {start} s, stop = {stop} s, step = {step} s: all must be finite, and the step must be positive"
-            ));
+        if !(step > 0.0 && step.is_finite()) {
+            return Err(format!("step = {step} s must be positive and finite"));
+        }
+        if !(start.is_finite() && stop.is_finite()) {
+            return Err(format!("start = {start} s and stop = {stop} s must be finite"));
         }
         let exact = (stop - start) / step;
         let ticks = exact.round();

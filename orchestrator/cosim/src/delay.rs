@@ -36,6 +36,9 @@ pub struct FeedbackLoop {
     /// Components of the loop that do not declare their outputs' dependencies, so that the worst
     /// case was assumed.
     pub undeclared: Vec<usize>,
+    /// Components of the loop that respond to it through states only, so that what comes round is
+    /// never part of the same instant's output.
+    pub stateful: Vec<usize>,
 }
 
 /// Way in which an output depends on an input of its component.
@@ -147,7 +150,7 @@ fn measure(
 ) -> FeedbackLoop {
     let n = components.len();
     let mut ticks = 0;
-    let mut undeclared = Vec::new();
+    let (mut undeclared, mut stateful) = (Vec::new(), Vec::new());
     for (place, &component) in components.iter().enumerate() {
         let (before, after) = (components[(place + n - 1) % n], components[(place + 1) % n]);
         let entering =
@@ -171,8 +174,11 @@ fn measure(
         if passages.contains(&Passage::Undeclared) {
             undeclared.push(component);
         }
+        if passages.iter().all(|passage| *passage == Passage::Delayed) {
+            stateful.push(component);
+        }
     }
-    FeedbackLoop { components: components.to_vec(), ticks, undeclared }
+    FeedbackLoop { components: components.to_vec(), ticks, undeclared, stateful }
 }
 
 /// Finds an order of the components in which sequential coupling has no delay, if there is one: a
@@ -264,7 +270,9 @@ const TRANSPORT: &str = "actuation.delay";
 /// feedback loop has, beyond the error that the law allows for. The loop's delay is its ticks times
 /// `step` (s), plus the transport delays of the other components on it. If there are several loops,
 /// the one with the longest delay counts; the warning says so if another one has the delay that the
-/// law is designed for.
+/// law is designed for. If the component responds to some of its loops at once, those through its
+/// states alone do not count: what they bring, as the moment that actuators achieved, is a record
+/// of earlier ticks and not the measurement that the law acts upon.
 pub fn warnings(
     parts: &[Part],
     settings: &[Vec<Setting>],
@@ -277,11 +285,16 @@ pub fn warnings(
             continue;
         };
         let error = duration(COUNTED_ERROR, parts[component], &settings[component]).unwrap_or(0.0);
-        let its_loops = loops.iter().filter(|feedback| feedback.components.contains(&component));
+        let mut its_loops: Vec<&FeedbackLoop> =
+            loops.iter().filter(|feedback| feedback.components.contains(&component)).collect();
+        let is_at_once = |feedback: &&FeedbackLoop| !feedback.stateful.contains(&component);
+        if its_loops.iter().any(is_at_once) {
+            its_loops.retain(is_at_once);
+        }
         let fits = |delay: f64| {
             (delay - counted_on).abs() <= error + 1e-9 * delay.abs().max(counted_on.abs())
         };
-        let delays = its_loops.map(|feedback| {
+        let delays = its_loops.into_iter().map(|feedback| {
             let others = feedback.components.iter().filter(|other| **other != component);
             let transport: f64 = others
                 .filter_map(|&other| duration(TRANSPORT, parts[other], &settings[other]))

@@ -14,6 +14,7 @@ use crate::functions::{Functions, text_of};
 use crate::instance::{CallFailure, Instance, Outcome};
 use crate::log::Log;
 use crate::logs::{self, Listed};
+use crate::quantity::rounded;
 use std::ffi::{CString, c_int, c_void};
 use std::rc::Rc;
 
@@ -175,7 +176,7 @@ impl FmuInstance {
         }
         let reached = (knows_time && time.is_finite()).then_some(time);
         if let Some(time) = reached {
-            parts.push(format!("it got as far as t = {time} s"));
+            parts.push(format!("it got as far as t = {} s", rounded(time)));
         }
         CallFailure {
             ends: ends.then_some(reached.unwrap_or(f64::NAN)),

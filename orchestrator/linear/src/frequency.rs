@@ -11,6 +11,7 @@ use cosim::clock::Clock;
 use cosim::error::Error;
 use cosim::interrupt::Interrupt;
 use cosim::system::System;
+use fmu_import::quantity::rounded;
 use std::f64::consts::TAU;
 
 /// Share of a transient that is left when the response is taken, and the longest wait for it, s.
@@ -69,6 +70,7 @@ pub fn measure(
     let radius = open.closed(&vec![1.0; open.channels()]).map_or(1.0, |a| spectral_radius(&a));
     if radius >= 1.0 {
         let time = lineariser.system().clock.time(lineariser.first());
+        let time = rounded(time);
         let problem = format!("the loop is unstable at t = {time} s, so that it has no response");
         return Err(Error::experiment(problem));
     }

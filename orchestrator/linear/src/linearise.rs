@@ -14,6 +14,7 @@ use cosim::master::Master;
 use cosim::system::System;
 use cosim::wiring::{Port, Wire};
 use fmu_import::description::{Carrier, VariableKind};
+use fmu_import::quantity::rounded;
 use fmu_import::warnings;
 use std::ops::Range;
 
@@ -175,7 +176,8 @@ impl Lineariser {
         let open = net.open();
         if open.step.b.amax().max(open.step.d.amax()) == 0.0 || open.step.c.amax() == 0.0 {
             return Err(Error::experiment(format!(
-                "at t = {time} s nothing comes back of what is put in at {}: a component may round its outputs, or hold them",
+                "at t = {} s nothing comes back of what is put in at {}: a component may round its outputs, or hold them",
+                rounded(*time),
                 open.signals[0].name
             )));
         }

@@ -53,6 +53,7 @@ impl Panel {
     }
 
     fn resolve(requested: &experiment::Panel, system: &mut System) -> Result<Self, String> {
+        let units = system.experiment.observe.units.clone();
         let mut resolve = |signal: &Signal| {
             if system.lost_by_exchange(signal.paths()) {
                 return Ok(None);
@@ -69,10 +70,9 @@ impl Panel {
         let followed = curves.iter().filter_map(|curve| curve.reference.as_ref());
         let drawn = curves.iter().map(|curve| &curve.signal).chain(followed).chain(&limit);
         let signal_unit = common_unit(drawn)?.to_string();
-        let (unit, factor) = requested
-            .unit
-            .as_ref()
-            .map_or((signal_unit, 1.0), |unit| (unit.name.clone(), unit.factor));
+        let shown = requested.unit.as_ref().or_else(|| units.get(&signal_unit));
+        let (unit, factor) =
+            shown.map_or((signal_unit, 1.0), |unit| (unit.name.clone(), unit.factor));
         let label = if requested.label.is_empty() { &requested.name } else { &requested.label };
         Ok(Self { name: requested.name.clone(), label: label.clone(), unit, factor, curves, limit })
     }

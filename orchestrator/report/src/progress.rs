@@ -2,7 +2,7 @@
 
 use cosim::error::Error;
 use cosim::master::{Observer, Sample};
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 use std::fmt::Arguments;
 use std::io::{IsTerminal, Write, stderr};
 use std::sync::{Mutex, PoisonError};
@@ -20,9 +20,33 @@ fn bar(length: u64, quiet: bool, template: &str) -> ProgressBar {
         if shown { ProgressDrawTarget::stderr_with_hz(10) } else { ProgressDrawTarget::hidden() };
     let bar = ProgressBar::with_draw_target(Some(length), target);
     if let Ok(style) = ProgressStyle::with_template(template) {
+        // Writing to the line of the bar cannot fail.
+        let speed = |state: &ProgressState, line: &mut dyn std::fmt::Write| {
+            let _ = line.write_str(&rate(state.per_sec()));
+        };
+        let left = |state: &ProgressState, line: &mut dyn std::fmt::Write| {
+            let _ = write!(line, "{} left", duration(state.eta()));
+        };
+        let style = style.with_key("rate", speed).with_key("left", left);
         bar.set_style(style.progress_chars("=> "));
     }
     bar
+}
+
+/// Formats the number of parts per second, with one digit after the point if it is small.
+fn rate(per_second: f64) -> String {
+    let digits = usize::from(per_second < 9.95);
+    format!("{per_second:.digits$} per second")
+}
+
+/// Formats a time to wait in its two largest units.
+fn duration(time: Duration) -> String {
+    let seconds = time.as_secs();
+    match (seconds / 3600, seconds / 60 % 60, seconds % 60) {
+        (0, 0, seconds) => format!("{seconds} s"),
+        (0, minutes, seconds) => format!("{minutes} min {seconds} s"),
+        (hours, minutes, _) => format!("{hours} h {minutes} min"),
+    }
 }
 
 /// A progress bar of a run, which is redrawn a few times a second.
@@ -39,7 +63,7 @@ impl Progress {
         if !stderr().is_terminal() && !quiet {
             tell(format_args!("running {title}: {ticks} steps"));
         }
-        let bar = bar(ticks, quiet, "{msg} [{bar:40}] {percent} %, {eta} left");
+        let bar = bar(ticks, quiet, "{msg} [{bar:40}] {percent} %, {left}");
         bar.set_message(title.to_string());
         if apart {
             bar.enable_steady_tick(Duration::from_millis(100));
@@ -87,8 +111,7 @@ impl Parts {
         if !stderr().is_terminal() && !quiet {
             tell(format_args!("{title}: {} of {total} {what} to run", total - done));
         }
-        let template =
-            format!("[{{bar:40}}] {{pos}} of {{len}} {what}, {{per_sec}}, {{eta}} left, {{msg}}");
+        let template = format!("[{{bar:40}}] {{pos}} of {{len}} {what}, {{rate}}, {{left}}{{msg}}");
         let bar = bar(total, quiet, &template);
         bar.set_position(done);
         bar.reset_eta();
@@ -98,7 +121,7 @@ impl Parts {
 
     /// Counts one more part as finished.
     pub fn finished(&self, what: &str) {
-        self.bar.set_message(what.to_string());
+        self.bar.set_message(format!(", {what}"));
         self.advance(1);
     }
 
@@ -107,11 +130,12 @@ impl Parts {
         self.bar.inc(count);
         let mut last = self.last_line.lock().unwrap_or_else(PoisonError::into_inner);
         if !self.quiet && !stderr().is_terminal() && last.elapsed() >= BETWEEN_LINES {
-            let (rate, what) = (self.bar.per_sec(), self.what);
             tell(format_args!(
-                "{} of {} {what} done, {rate:.0} per second",
+                "{} of {} {} done, {}",
                 self.bar.position(),
-                self.total
+                self.total,
+                self.what,
+                rate(self.bar.per_sec())
             ));
             *last = Instant::now();
         }
@@ -126,5 +150,20 @@ impl Parts {
 impl Drop for Parts {
     fn drop(&mut self) {
         self.bar.finish_and_clear();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rates_and_times_have_units_and_no_more_digits_than_matter() {
+        let rates = [64.3074, 9.9499, 9.951, 0.25, 0.0].map(rate);
+        let expected = ["64", "9.9", "10", "0.2", "0.0"].map(|text| format!("{text} per second"));
+        assert_eq!(rates, expected);
+        let times = [10.4, 59.0, 60.0, 125.0, 3600.0, 7384.0];
+        let times = times.map(|seconds| duration(Duration::from_secs_f64(seconds)));
+        assert_eq!(times, ["10 s", "59 s", "1 min 0 s", "2 min 5 s", "1 h 0 min", "2 h 3 min"]);
     }
 }

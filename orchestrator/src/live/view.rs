@@ -318,7 +318,7 @@ fn deadlines(state: &State, tally: &Tally) -> Vec<Line<'static>> {
             "{:<10} {} at t = {} s by {:.3} ms; longest step: {}, {:.3} ms",
             "last miss",
             name(miss.component),
-            miss.time,
+            rounded(miss.time),
             milliseconds(miss.late),
             name(miss.longest.component),
             milliseconds(miss.longest.duration)

@@ -12,7 +12,6 @@ use crate::results::{Results, RunResult, resolve};
 use crate::runs::Run;
 use cosim::error::Error as Single;
 use cosim::interrupt::Interrupt;
-use cosim::search;
 use cosim::system::Opened;
 use cosim_report::folder::Folder;
 use cosim_report::progress::Parts;
@@ -63,32 +62,6 @@ pub struct StudyReport {
     pub verdicts: Vec<Judgement>,
     /// Names of all files that were written, relative to the folder.
     pub files: Vec<String>,
-}
-
-/// Finds the study with this name: a file, a folder with a `study.toml`, or such a folder below
-/// `orchestrator/experiments`.
-///
-/// # Errors
-/// Returns an error if there is no study with this name.
-pub fn find(name: &Path) -> Result<PathBuf, Single> {
-    let roots = search::experiments();
-    let mut candidates = vec![name.to_path_buf(), name.join("study.toml")];
-    candidates.extend(
-        roots.iter().flat_map(|root| [root.join(name), root.join(name).join("study.toml")]),
-    );
-    candidates.iter().find(|path| path.is_file()).cloned().ok_or_else(|| {
-        let there: Vec<String> = roots
-            .iter()
-            .flat_map(|root| fs::read_dir(root).into_iter().flatten().flatten())
-            .filter(|entry| entry.path().join("study.toml").is_file())
-            .map(|entry| entry.file_name().to_string_lossy().into_owned())
-            .collect();
-        let hint = fmu_import::names::hint(&name.to_string_lossy(), there.iter().map(String::as_str));
-        Single::experiment(format!(
-            "there is no study \"{}\", neither as a file nor as a folder with a study.toml, here or among the experiments{hint}",
-            name.display()
-        ))
-    })
 }
 
 /// Runs those parts of a study that are not finished yet, and writes its report.

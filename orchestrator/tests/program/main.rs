@@ -9,6 +9,7 @@ mod isolation;
 #[cfg(target_os = "linux")]
 mod kills;
 mod malformed;
+mod names;
 mod results;
 mod search;
 mod table;

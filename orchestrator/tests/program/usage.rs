@@ -6,10 +6,10 @@ use std::io::Write;
 use std::path::Path;
 use zip::write::SimpleFileOptions;
 
-/// Returns whether a line of the list shows this file with this title. If the program was built in
+/// Returns whether a line of the list shows this name with this title. If the program was built in
 /// the project, the list also shows the project's files.
-fn lists(text: &str, file: &str, title: &str) -> bool {
-    text.lines().any(|line| line.contains(file) && line.ends_with(title))
+fn lists(text: &str, name: &str, title: &str) -> bool {
+    text.lines().any(|line| line.trim_start().starts_with(name) && line.ends_with(title))
 }
 
 fn refusal_of(from: &str, to: &str) -> String {
@@ -33,7 +33,7 @@ fn experiments_and_fmus_are_found_from_any_folder() {
         (output.status.code(), text(output.stdout), text(output.stderr))
     };
     let (code, text, _) = run(&["list"]);
-    assert!(code == Some(0) && lists(&text, "loop.toml", "gain and integrator"), "{text}");
+    assert!(code == Some(0) && lists(&text, "loop", "gain and integrator"), "{text}");
     for (name, out) in [("loop", "a"), ("loop.toml", "b")] {
         let (code, _, errors) = run(&["run", name, "--quiet", "--out", out]);
         assert_eq!(code, Some(0), "{errors}");
@@ -60,7 +60,9 @@ fn experiments_and_fmus_are_found_from_any_folder() {
 fn usage_that_is_nearly_right_is_told_what_it_lacks() {
     let bench = Bench::new();
     assert!(
-        bench.refusal(&["--stop", "-1"]).contains("stop = -1 s must be at least one step of 1 s")
+        bench
+            .refusal(&["--stop", "-1"])
+            .starts_with("error: --stop -1: stop = -1 s must be at least one step of 1 s")
     );
     let (code, _, errors) = bench.call(&["reproduce", "loop", "--members", "0"]);
     assert!(code == 2 && errors.contains("--members"), "{errors}");
@@ -335,7 +337,7 @@ fn inspect_and_list_show_what_there_is() {
     let (code, text, _) = bench.call(&["list"]);
     assert_eq!(code, 0);
     assert!(
-        lists(&text, "loop.toml", "gain and integrator") && text.contains("Model.fmu"),
+        lists(&text, "loop", "gain and integrator") && lists(&text, "Model", "gain and integrator"),
         "{text}"
     );
 }
@@ -383,7 +385,7 @@ fn an_experiment_that_extends_another_is_all_of_them() {
     fs::write(bench.path("loop.toml"), LOOP.replace("title = \"gain and integrator\"\n", ""))
         .unwrap();
     let (_, text, _) = bench.call(&["list"]);
-    assert!(lists(&text, "longer.toml", "longer") && !text.contains("./loop.toml"), "{text}");
+    assert!(lists(&text, "longer", "longer") && !lists(&text, "loop", "integrator"), "{text}");
 }
 
 #[test]
@@ -391,5 +393,5 @@ fn all_experiments_of_the_project_can_be_read() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("experiments");
     let (code, text, _) = Bench::new().call(&["list", folder.to_str().unwrap()]);
     assert_eq!(code, 0);
-    assert!(text.contains("crmpc-robust.toml") && !text.contains("FAULT"), "{text}");
+    assert!(text.contains("crmpc-robust") && !text.contains("FAULT"), "{text}");
 }

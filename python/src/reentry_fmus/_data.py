@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import json
 import os
-import re
 import subprocess
 from collections.abc import Iterable
 from difflib import get_close_matches
@@ -78,12 +78,13 @@ def experiments() -> dict[str, str]:
     >>> experiments()["lqr"]
     'LQR, scenario of Chai 2022'
     """
-    command = [str(program()), "list", str(EXPERIMENTS)]
+    command = [str(program()), "list", "--json", str(EXPERIMENTS)]
     listed = subprocess.run(command, capture_output=True, text=True, encoding="utf-8", check=True)
-    section = listed.stdout.partition("\nstudies (")[0]
+    rows = [row for row in json.loads(listed.stdout) if row["kind"] == "experiment"]
+    folder = EXPERIMENTS.resolve()
     titles = {
-        Path(path).relative_to(EXPERIMENTS).with_suffix("").as_posix(): title
-        for path, title in re.findall(r"^  (.+?\.toml) +(.+)$", section, re.MULTILINE)
+        Path(row["path"]).resolve().relative_to(folder).with_suffix("").as_posix(): row["title"]
+        for row in rows
     }
     stems = [name.rpartition("/")[2] for name in titles]
     return {

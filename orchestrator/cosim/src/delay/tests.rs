@@ -186,6 +186,32 @@ fn the_longest_loop_counts_and_what_is_on_no_loop_does_not() {
 }
 
 #[test]
+fn a_loop_through_the_states_of_a_law_does_not_count_beside_one_to_which_it_responds_at_once() {
+    // The law responds at once by its first output and through states by the second, which returns
+    // a tick later.
+    let law = with_duration(description(&[Some(true), Some(false)]), "delay", "s");
+    let (direct, state) = (description(&[Some(true)]), description(&[Some(false)]));
+    let parts = [
+        Part { name: "law", description: &law },
+        Part { name: "allocator", description: &direct },
+        Part { name: "plant", description: &state },
+    ];
+    let record = [wire((0, 2), 1), wire((1, 1), 0)];
+    let flight = [wire((0, 1), 2), wire((2, 1), 0)];
+    let warned = |wires: &[Wire], coupling| {
+        let loops = feedback_loops(&parts, &[1; 3], wires, coupling);
+        warnings(&parts, &[const { Vec::new() }; 3], &loops, 0.5)
+    };
+    let both = [record, flight].concat();
+    assert!(warned(&both, Coupling::Sequential).is_empty());
+    assert!(
+        warned(&both, Coupling::Jacobi)[0].contains("law -> plant -> law has a delay of 0.5 s")
+    );
+    // A law whose only loop is through its states is designed for that one.
+    assert!(warned(&record, Coupling::Sequential)[0].contains("law -> allocator -> law"));
+}
+
+#[test]
 fn a_parameter_that_is_no_duration_means_something_else() {
     let law = with_duration(description(&[Some(true)]), "delay", "1");
     let parts = ["a", "b"].map(|name| Part { name, description: &law });
@@ -202,7 +228,9 @@ fn what_is_not_declared_counts_as_direct_and_is_named() {
         descriptions.iter().map(|description| Part { name: "c", description }).collect();
     let wires = [wire((0, 1), 1), wire((1, 1), 0)];
     let loops = feedback_loops(&parts, &[1, 1], &wires, Coupling::Jacobi);
-    assert_eq!(loops, [FeedbackLoop { components: vec![0, 1], ticks: 1, undeclared: vec![0] }]);
+    let expected =
+        FeedbackLoop { components: vec![0, 1], ticks: 1, undeclared: vec![0], stateful: vec![1] };
+    assert_eq!(loops, [expected]);
     assert_eq!(algebraic_loop(&parts, &wires), None);
 }
 

@@ -18,6 +18,9 @@ pub struct Observe {
     /// Metrics that are computed from the signals of a run, by their names in `metrics.json`.
     #[serde(default)]
     pub metrics: BTreeMap<String, Measure>,
+    /// Units in which the summary and the panels show values, by the unit of the values.
+    #[serde(default)]
+    pub units: BTreeMap<String, Scaled>,
     /// Names of the metrics that the summary prints, in this order.
     #[serde(default)]
     pub summary: Vec<String>,

@@ -10,7 +10,7 @@ mod protection;
 
 pub use crate::watch::OnInvalid;
 pub use measures::{Curve, Guarantee, Loss, Margins, Measure, MeasureKind, Observe, Panel, Scaled};
-pub use overrides::Overrides;
+pub use overrides::{Given, Overrides};
 pub use protection::Protection;
 
 use crate::document::Source;
@@ -57,6 +57,9 @@ pub struct Experiment {
     /// Settings of the command line that name no component of the experiment.
     #[serde(skip)]
     pub unplaced: Vec<String>,
+    /// What the command line gives in place of the file.
+    #[serde(skip)]
+    pub given: Given,
     /// The experiment file, together with the files that it extends.
     #[serde(skip)]
     pub source: Source,

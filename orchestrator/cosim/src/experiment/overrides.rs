@@ -27,7 +27,53 @@ pub struct Overrides {
     pub isolation: Protection,
 }
 
+/// What the command line gives in place of an experiment's file, so that a fault is blamed on the
+/// option.
+#[derive(Clone, Debug, Default)]
+pub struct Given {
+    stop: Option<f64>,
+    step: Option<f64>,
+    call_timeout: Option<f64>,
+    /// Components whose FMU is given.
+    fmu: Vec<String>,
+}
+
 impl Experiment {
+    /// Returns the error for a fault of start, stop and step. It blames the option that gives the
+    /// value, or the file if none does.
+    pub(crate) fn time_error(&self, problem: &str) -> Error {
+        let Given { stop, step, .. } = self.given;
+        // A step that is no step at all is the fault, whatever the stop time is.
+        let is_step = step.is_some_and(|step| stop.is_none() || !(step > 0.0 && step.is_finite()));
+        match (stop, step) {
+            (_, Some(step)) if is_step => Error::experiment(format!("--step {step}: {problem}")),
+            (Some(stop), _) => Error::experiment(format!("--stop {stop}: {problem}")),
+            _ => self.source.error(&(0..0), format!("[simulation] {problem}")),
+        }
+    }
+
+    /// Returns the error for an FMU that cannot be found. It blames the option that names it, or
+    /// the file if none does.
+    pub(crate) fn fmu_error(&self, component: &str, problem: &str) -> Error {
+        let written = &self.components[component].fmu;
+        if self.given.fmu.iter().any(|name| name == component) {
+            return Error::experiment(format!(
+                "--fmu {component}={}: {problem}",
+                written.get_ref()
+            ));
+        }
+        self.source.error(&written.span(), format!("[components.{component}] {problem}"))
+    }
+
+    /// Returns the error for a fault of the limits of isolated instances. It blames the option that
+    /// gives the value, or the file if none does.
+    pub(crate) fn isolation_error(&self, problem: &str) -> Error {
+        match self.given.call_timeout {
+            Some(time) => Error::experiment(format!("--call-timeout {time}: {problem}")),
+            None => self.source.error(&(0..0), format!("[isolation] {problem}")),
+        }
+    }
+
     /// Applies the settings of the command line.
     ///
     /// # Errors
@@ -38,6 +84,9 @@ impl Experiment {
         self.simulation.coupling = overrides.coupling.unwrap_or(self.simulation.coupling);
         self.simulation.on_invalid = overrides.on_invalid.unwrap_or(self.simulation.on_invalid);
         self.isolation.apply(&overrides.isolation);
+        self.given.stop = overrides.stop.or(self.given.stop);
+        self.given.step = overrides.step.or(self.given.step);
+        self.given.call_timeout = overrides.isolation.call_timeout.or(self.given.call_timeout);
         if overrides.isolation.isolate.is_some() {
             // The command line decides for components that decide for themselves, too.
             self.components.values_mut().for_each(|component| component.isolate = None);
@@ -55,13 +104,18 @@ impl Experiment {
                 .ok_or_else(|| refuse(format!("there is no component \"{name}\"{hint}")))?;
             // A path is relative to the current folder, not to the experiment.
             let file = Path::new(fmu).is_file().then(|| std::path::absolute(fmu).ok()).flatten();
-            let file =
-                file.map_or_else(|| fmu.to_string(), |file| file.to_string_lossy().into_owned());
+            // Its name is that of its file without the extension.
+            let named = if Path::new(fmu).extension().is_none() { ".fmu" } else { "" };
+            let file = file.map_or_else(
+                || format!("{fmu}{named}"),
+                |file| file.to_string_lossy().into_owned(),
+            );
             let (new, old) = (stem(&file), stem(component.fmu.get_ref()));
             if new != old {
                 // The title of the file is about another FMU.
                 self.title = format!("{new} in place of {old}: {}", self.title);
             }
+            self.given.fmu.push(name.to_string());
             (component.fmu, component.is_exchanged) = (Spanned::new(0..0, file), true);
         }
         for assignment in &overrides.set {

@@ -3,6 +3,7 @@
 use super::distribution::Summary;
 use super::priority::Priority;
 use super::{Factor, OnMiss};
+use fmu_import::quantity::rounded;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::io::{self, Write};
@@ -258,14 +259,20 @@ impl RealTime {
 
 impl std::fmt::Display for Late {
     fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
-        write!(f, "{} at t = {} s, {} ms late", self.component, self.time, plain(self.late_ms))?;
+        write!(
+            f,
+            "{} at t = {} s, {} ms late",
+            self.component,
+            rounded(self.time),
+            plain(self.late_ms)
+        )?;
         write!(f, "; that communication point began {} ms late", plain(self.lag_ms))?;
         write!(
             f,
             "; longest step since the last wait: {}, {} ms, to t = {} s",
             self.longest,
             plain(self.longest_ms),
-            self.longest_time
+            rounded(self.longest_time)
         )
     }
 }

@@ -6,7 +6,7 @@ use crate::delay;
 use crate::document::Source;
 use crate::error::Error;
 use crate::experiment::{
-    Coupling, Experiment, Observe, OnInvalid, Overrides, Protection, Record, Simulation,
+    Coupling, Experiment, Given, Observe, OnInvalid, Overrides, Protection, Record, Simulation,
 };
 use crate::system::Opened;
 use crate::wiring::{self, Part};
@@ -221,6 +221,7 @@ pub fn load(path: &Path, overrides: &Overrides) -> Result<Loaded, Error> {
         leaves_inputs_open: true,
         assigned: BTreeSet::new(),
         unplaced: Vec::new(),
+        given: Given::default(),
         source: Source::plain(path, text),
     };
     let parts = parts(&structure.components, &opened, &structure.folder);

@@ -1,0 +1,311 @@
+//! Experiments, studies, campaigns and FMUs by their names.
+//!
+//! A name is the path of a file, or the end of one without its extension: `lqr`, or
+//! `reversal/allocated` where several experiments are called `allocated`. A study is called by its
+//! folder.
+
+use super::{files, folders, has_extension};
+use crate::document::Source;
+use crate::error::Error;
+use fmu_import::names;
+use std::collections::BTreeSet;
+use std::ffi::OsString;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// File that makes its folder a study.
+const STUDY: &str = "study.toml";
+
+/// What a file describes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Kind {
+    /// The file describes an experiment, or it is an SSP archive.
+    Experiment,
+    /// The file describes a study.
+    Study,
+    /// The file describes a campaign.
+    Campaign,
+    /// The file is an FMU.
+    Fmu,
+}
+
+impl Kind {
+    /// All kinds, in the order in which they are listed.
+    pub const ALL: [Self; 4] = [Self::Experiment, Self::Study, Self::Campaign, Self::Fmu];
+
+    /// Returns the word for a file of this kind.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Experiment => "experiment",
+            Self::Study => "study",
+            Self::Campaign => "campaign",
+            Self::Fmu => "FMU",
+        }
+    }
+
+    /// Returns the word for a file of this kind with its article.
+    pub fn with_article(self) -> &'static str {
+        match self {
+            Self::Experiment => "an experiment",
+            Self::Study => "a study",
+            Self::Campaign => "a campaign",
+            Self::Fmu => "an FMU",
+        }
+    }
+
+    /// Returns the word for several files of this kind.
+    pub fn plural(self) -> &'static str {
+        match self {
+            Self::Experiment => "experiments",
+            Self::Study => "studies",
+            Self::Campaign => "campaigns",
+            Self::Fmu => "FMUs",
+        }
+    }
+
+    /// Returns the command that is usually called with a file of this kind.
+    pub fn command(self) -> &'static str {
+        match self {
+            Self::Experiment => "run",
+            Self::Study => "reproduce",
+            Self::Campaign => "campaign",
+            Self::Fmu => "inspect",
+        }
+    }
+
+    /// Returns the kind of a file; `None` if it is of no kind, as a file that others extend.
+    pub fn of(path: &Path) -> Option<Self> {
+        if has_extension(path, "fmu") {
+            return Some(Self::Fmu);
+        }
+        if has_extension(path, "ssp") {
+            return Some(Self::Experiment);
+        }
+        if path.ends_with(STUDY) {
+            return Some(Self::Study);
+        }
+        if !has_extension(path, "toml") {
+            return None;
+        }
+        let text = fs::read_to_string(path).ok()?;
+        let kind = Self::of_text(&text)?;
+        // What extends a campaign is one, too.
+        let whole = (kind == Self::Experiment && sets(text.lines(), "extends"))
+            .then(|| Source::new(path, text).ok())
+            .flatten();
+        whole.map_or(Some(kind), |source| Self::of_text(source.whole()))
+    }
+
+    /// Returns the kind of a TOML file with this text, with or without faults. A file without a
+    /// title only serves to be extended, a file that names a paper is part of a study, and one in
+    /// which something varies is a campaign, as is one whose first keys name the experiment that
+    /// varies.
+    pub fn of_text(text: &str) -> Option<Self> {
+        let starts = |line: &str, with: &str| line.trim_start().starts_with(with);
+        let first = || text.lines().take_while(|line| !starts(line, "["));
+        let has_components = || text.lines().any(|line| starts(line, "[components."));
+        if text.lines().any(|line| starts(line, "[[vary]]"))
+            || (sets(first(), "title") && sets(first(), "experiment"))
+        {
+            Some(Self::Campaign)
+        } else {
+            let has_title = sets(text.lines(), "title") && !sets(text.lines(), "paper");
+            (has_title && (has_components() || sets(text.lines(), "extends")))
+                .then_some(Self::Experiment)
+        }
+    }
+
+    /// Returns the end of the path of a file of this kind that has this name.
+    pub fn file(self, name: &Path) -> PathBuf {
+        match self {
+            Self::Experiment if has_extension(name, "ssp") => name.to_path_buf(),
+            Self::Experiment | Self::Campaign => with_extension(name, "toml"),
+            Self::Study if name.ends_with(STUDY) => name.to_path_buf(),
+            Self::Study => name.join(STUDY),
+            Self::Fmu => with_extension(name, "fmu"),
+        }
+    }
+
+    /// Returns the name of a file of this kind by its whole path.
+    pub fn name(self, path: &Path) -> PathBuf {
+        match self {
+            Self::Study => path.parent().unwrap_or(path).to_path_buf(),
+            _ => path.with_extension(""),
+        }
+    }
+
+    /// Lists the files of this kind below a folder.
+    pub fn below(self, folder: &Path) -> Vec<PathBuf> {
+        self.below_that(folder, |_| true)
+    }
+
+    /// Lists the files of this kind below a folder whose paths fit.
+    fn below_that(self, folder: &Path, fits: impl Fn(&Path) -> bool) -> Vec<PathBuf> {
+        let extension = if self == Self::Fmu { "fmu" } else { "toml" };
+        let mut paths = files(folder, extension);
+        paths.retain(|path| fits(path) && Self::of(path) == Some(self));
+        paths
+    }
+}
+
+/// Returns whether one of these lines sets a key.
+fn sets<'a>(mut lines: impl Iterator<Item = &'a str>, key: &str) -> bool {
+    lines.any(|line| {
+        line.trim_start().strip_prefix(key).is_some_and(|rest| rest.trim_start().starts_with('='))
+    })
+}
+
+/// Adds an extension to a name that does not have it.
+fn with_extension(name: &Path, extension: &str) -> PathBuf {
+    if has_extension(name, extension) {
+        return name.to_path_buf();
+    }
+    let mut text = OsString::from(name);
+    text.push(".");
+    text.push(extension);
+    PathBuf::from(text)
+}
+
+/// Finds what this name stands for: a file, or something of this kind that `list` shows, by its
+/// name or the end of its path.
+///
+/// # Errors
+/// Returns an error if there is nothing of this kind with this name, if there are several, or if
+/// the name is that of something else. It says then which command takes that.
+pub fn find(name: &Path, kind: Kind) -> Result<PathBuf, Error> {
+    find_any(name, &[kind])
+}
+
+/// Finds what this name stands for, of the first of these kinds that has such a name.
+///
+/// # Errors
+/// Returns an error as [`find`] does.
+pub fn find_any(name: &Path, kinds: &[Kind]) -> Result<PathBuf, Error> {
+    for kind in kinds {
+        if let Some(path) = look(name, *kind)? {
+            return Ok(path);
+        }
+    }
+    let is_other = |kind: &Kind| {
+        let is_there = || !matches!(look(name, *kind), Ok(None));
+        !kinds.contains(kind) && is_there()
+    };
+    let others: Vec<Kind> = Kind::ALL.into_iter().filter(is_other).collect();
+    let is_fmu = others == [Kind::Fmu] || others.is_empty() && has_extension(name, "fmu");
+    Err(if is_fmu && kinds.contains(&Kind::Experiment) && kinds.len() == 1 {
+        of_an_fmu(name)
+    } else if others.is_empty() {
+        unknown(name, kinds)
+    } else {
+        of_another_kind(name, &others, kinds == [Kind::Fmu])
+    })
+}
+
+/// Looks for a name among the files of one kind.
+fn look(name: &Path, kind: Kind) -> Result<Option<PathBuf>, Error> {
+    let file = kind.file(name);
+    // What is of no kind is taken as it was meant, and its reader says what is wrong with it.
+    let fits = |path: &Path| path.is_file() && Kind::of(path).is_none_or(|other| other == kind);
+    if let Some(path) = [name, &file].into_iter().find(|path| fits(path)) {
+        return Ok(Some(path.to_path_buf()));
+    }
+    if name.is_absolute() || has_extension(name, "ssp") {
+        return Ok(None);
+    }
+    for folder in folders() {
+        let below = kind.below_that(&folder, |path| path.ends_with(&file));
+        match &below[..] {
+            [] => {}
+            [path] => return Ok(Some(path.clone())),
+            [..] => {
+                let paths: Vec<String> =
+                    below.iter().map(|path| path.display().to_string()).collect();
+                return Err(Error::experiment(format!(
+                    "several {} are called {}: {}",
+                    kind.plural(),
+                    name.display(),
+                    paths.join(", ")
+                )));
+            }
+        }
+    }
+    Ok(None)
+}
+
+/// Returns the error for the name of an FMU in place of that of an experiment.
+fn of_an_fmu(name: &Path) -> Error {
+    let shown = name.display();
+    Error::experiment(format!(
+        "{shown} is an FMU, and FMUs are run by an experiment: `orchestrator inspect {shown}` shows its variables, \
+         --fmu COMPONENT={} puts it into an existing experiment",
+        Kind::Fmu.file(name).display()
+    ))
+}
+
+/// Returns the error for a name of other kinds, with the commands that take it.
+fn of_another_kind(name: &Path, others: &[Kind], reads: bool) -> Error {
+    let shown = name.display();
+    let what: Vec<&str> = others.iter().map(|kind| kind.with_article()).collect();
+    let mut commands: Vec<&str> = others.iter().map(|kind| kind.command()).collect();
+    if reads {
+        // Who asks what an FMU is asks what another file says, too.
+        commands.push("show");
+    }
+    let calls: Vec<String> =
+        commands.iter().map(|command| format!("orchestrator {command} {shown}")).collect();
+    Error::experiment(format!("{shown} is {}: {}", what.join(" and "), calls.join(", or ")))
+}
+
+/// Returns the error for a name that nothing has.
+fn unknown(name: &Path, kinds: &[Kind]) -> Error {
+    let shown = name.display();
+    if kinds == [Kind::Experiment] && (name.is_absolute() || has_extension(name, "ssp")) {
+        let is_what = if name.is_dir() { "this is a folder" } else { "there is no such file" };
+        return Error::experiment(format!("{shown}: {is_what}"));
+    }
+    let last = |path: PathBuf| Some(path.file_name()?.to_string_lossy().into_owned());
+    let there: BTreeSet<String> = folders()
+        .iter()
+        .flat_map(|folder| {
+            kinds.iter().flat_map(|kind| {
+                kind.below(folder).into_iter().filter_map(|path| last(kind.name(&path)))
+            })
+        })
+        .collect();
+    let wrong =
+        kinds.first().and_then(|kind| last(kind.name(&kind.file(name)))).unwrap_or_default();
+    let hint = names::hint(&wrong, there.iter().map(String::as_str));
+    let mut words: Vec<&str> = kinds.iter().map(|kind| kind.word()).collect();
+    let last = words.pop().unwrap_or_default();
+    let before = if words.is_empty() { String::new() } else { words.join(", ") + " or " };
+    Error::experiment(format!(
+        "there is no {before}{last} \"{shown}\", neither as a file nor among those that `orchestrator list` shows{hint}"
+    ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_kind_of_a_file_is_told_by_its_first_keys() {
+        let kind = |text: &str| Kind::of_text(text);
+        let experiment = "title = \"a\"\n[components.x]\nfmu = \"A.fmu\"";
+        assert_eq!(kind(experiment), Some(Kind::Experiment));
+        assert_eq!(kind("title = \"a\"\nextends = \"b.toml\""), Some(Kind::Experiment));
+        assert_eq!(kind("title = \"a\"\nexperiment = \"b\""), Some(Kind::Campaign));
+        assert_eq!(kind("extends = \"b.toml\"\n[[vary]]"), Some(Kind::Campaign));
+        assert_eq!(kind("title = \"a\"\npaper = \"b\""), None);
+        assert_eq!(kind(&experiment.replace("title", "# title")), None);
+        assert_eq!(kind("[package]\nname = \"a\""), None);
+    }
+
+    #[test]
+    fn names_are_paths_without_their_extension() {
+        let name = |kind: Kind, path: &str| kind.name(Path::new(path));
+        assert_eq!(name(Kind::Experiment, "a/b.toml"), Path::new("a/b"));
+        assert_eq!(name(Kind::Study, "a/study.toml"), Path::new("a"));
+        assert_eq!(Kind::Fmu.file(Path::new("A.b")), Path::new("A.b.fmu"));
+        assert_eq!(Kind::Study.file(Path::new("a/study.toml")), Path::new("a/study.toml"));
+    }
+}

@@ -1,0 +1,220 @@
+//! The command line: commands, their arguments and help texts.
+
+use crate::arguments::{self, choice};
+use crate::catalogue::Filter;
+use crate::run::Files;
+use crate::{campaign, examples, linear, response, schema};
+use clap::{Arg, CommandFactory, FromArgMatches, Parser, Subcommand};
+use cosim::pacing::{Factor, OnMiss};
+use std::path::PathBuf;
+
+/// Runs FMI 2.0 co-simulation experiments.
+///
+/// The exit code is 0 if all went well, 1 if a run failed, 2 for bad usage or a bad experiment, 3
+/// if the attitude was lost as the experiment defines it, and 130, 143 or 129 if Ctrl-C, SIGTERM or
+/// SIGHUP ended the run. Log messages go to standard error; the environment variable RUST_LOG
+/// chooses how many there are (error, warn, info, debug).
+///
+/// Experiments and FMUs are also looked for beside the program and in the folders of the
+/// environment variable ORCHESTRATOR_PATH.
+#[derive(Parser)]
+#[command(version, name = "orchestrator", max_term_width = 100)]
+pub(crate) struct Arguments {
+    #[command(subcommand)]
+    pub(crate) command: Command,
+}
+
+/// Returns the definition of the command line.
+pub(crate) fn definition() -> clap::Command {
+    // A negative number is the value of its option, which is then blamed for it.
+    let with_negative_values = |argument: Arg| {
+        let is_option = !argument.is_positional() && argument.get_action().takes_values();
+        argument.allow_negative_numbers(is_option)
+    };
+    Arguments::command().mut_subcommands(|command| {
+        let examples = examples::of(command.get_name());
+        command.mut_args(with_negative_values).after_help(examples)
+    })
+}
+
+/// Reads the command line. Help is printed, and faults end the program.
+pub(crate) fn parse() -> Arguments {
+    let mut definition = definition();
+    let matches = definition.get_matches_mut();
+    Arguments::from_arg_matches(&matches)
+        .unwrap_or_else(|error| error.format(&mut definition).exit())
+}
+
+/// Commands of the program.
+#[derive(Subcommand)]
+pub(crate) enum Command {
+    /// Run an experiment and write results.csv, results.json, metrics.json and plot.svg.
+    ///
+    /// With --real-time the run keeps in step with the wall clock; the summary, metrics.json and
+    /// realtime.svg show how well it did. Ctrl-C, SIGTERM and SIGHUP end a run and keep its
+    /// results.
+    Run {
+        /// Experiment to run: a file, an SSP archive, or the name of an experiment that `list`
+        /// shows.
+        experiment: PathBuf,
+        /// Folder for the results [default: out/EXPERIMENT].
+        #[arg(long, value_name = "DIR", help_heading = "Results")]
+        out: Option<PathBuf>,
+        /// Also look for FMUs in this folder, besides the folder of the experiment and target/fmu.
+        /// The option may be given several times.
+        #[arg(long, value_name = "DIR")]
+        fmu_dir: Vec<PathBuf>,
+        #[command(flatten)]
+        overrides: arguments::Overrides,
+        /// Show neither progress nor summary.
+        #[arg(long, help_heading = "Display")]
+        quiet: bool,
+        /// Keep the run in step with the wall clock, FACTOR times as fast as real time. FACTOR is 1
+        /// if it is left out.
+        #[arg(long, value_name = "FACTOR", num_args = 0..=1, default_missing_value = "1",
+              help_heading = "Real time")]
+        real_time: Option<Factor>,
+        /// Choose what happens after a missed deadline, that is, if the values that a component
+        /// computes at one of its communication points are not ready at its next one. All missed
+        /// deadlines are counted and reported.
+        #[arg(long, value_parser = choice::<OnMiss>(&[]), default_value = "catch-up", requires = "real_time",
+              help_heading = "Real time")]
+        on_miss: OnMiss,
+        /// Ask for real-time scheduling (SCHED_FIFO with this priority, 1 to 99; 50 if it is left
+        /// out) and for memory that is never swapped out. If the system refuses either, the refusal
+        /// is reported and the run continues without it.
+        #[arg(long, value_name = "PRIORITY", num_args = 0..=1, default_missing_value = "50", requires = "real_time",
+              value_parser = clap::value_parser!(u8).range(1..=99), help_heading = "Real time")]
+        priority: Option<u8>,
+        /// Show the run on the terminal while it is in progress. The key q ends the run and keeps
+        /// its results.
+        #[arg(long, conflicts_with = "quiet", help_heading = "Display")]
+        live: bool,
+        #[command(flatten)]
+        files: Files,
+        /// Replace the results of an earlier run in the folder. Without this option they are left
+        /// alone and nothing is run.
+        #[arg(long, help_heading = "Results")]
+        force: bool,
+    },
+    /// Repeat a paper's comparison and write report.html, with figures, tables and a verdict on
+    /// each claim.
+    ///
+    /// Finished parts are kept. After an interruption the same command continues where it stopped.
+    Reproduce {
+        /// Study to run: the name of one that `list` shows, a folder with a study.toml, or such a
+        /// file.
+        study: PathBuf,
+        /// Folder for the results [default: out/STUDY].
+        #[arg(long, value_name = "DIR", help_heading = "Results")]
+        out: Option<PathBuf>,
+        /// Also look for FMUs in this folder, besides the folder of the study and target/fmu. The
+        /// option may be given several times.
+        #[arg(long, value_name = "DIR")]
+        fmu_dir: Vec<PathBuf>,
+        /// Number of threads [default: one for each core].
+        #[arg(long, value_name = "N", default_value_t = 0, hide_default_value = true)]
+        jobs: usize,
+        /// Run at most N cases of each run, for a quick look.
+        #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
+        members: Option<u64>,
+        /// Run everything again, including what is finished.
+        #[arg(long, help_heading = "Results")]
+        fresh: bool,
+        /// Show neither progress nor summary.
+        #[arg(long)]
+        quiet: bool,
+    },
+    /// Fly thousands of cases of an experiment in which parameters vary, and write cases.parquet,
+    /// summary.json and report.html: how often limits are broken, with which confidence, and the
+    /// worst cases.
+    ///
+    /// Finished cases are kept. After an interruption the same command continues where it stopped.
+    Campaign(campaign::Fly),
+    /// Look for the worst case of a campaign, and write it as an experiment.
+    Falsify(campaign::Falsify),
+    /// Linearise an experiment at an instant of its run, and write the open loop as a discrete
+    /// state-space model (JSON).
+    ///
+    /// Components with derivatives give them; of all others the responses to small changes are
+    /// taken from a kept state and realised as a model.
+    Linearise(linear::Linearise),
+    /// Print the stability margins of an experiment at an instant of its run: gain, phase and delay
+    /// of each signal, disk margins of each and of all together.
+    Margins(linear::PrintMargins),
+    /// Measure the frequency response of an experiment's loop in flight, with a sine added at each
+    /// opened signal, and compare it with that of the linear model.
+    Response(response::Response),
+    /// Write an experiment as an SSP archive (System Structure and Parameterization 1.0), FMUs
+    /// included.
+    Pack {
+        /// Experiment to pack: a file, or the name of an experiment that `list` shows.
+        experiment: PathBuf,
+        /// Path of the archive [default: EXPERIMENT.ssp].
+        #[arg(long, value_name = "FILE", help_heading = "Results")]
+        out: Option<PathBuf>,
+        /// Also look for FMUs in this folder, besides the folder of the experiment and target/fmu.
+        /// The option may be given several times.
+        #[arg(long, value_name = "DIR")]
+        fmu_dir: Vec<PathBuf>,
+        #[command(flatten)]
+        overrides: arguments::Overrides,
+        /// Write no connectors for outputs that are enumerations, because libcosim aborts if there
+        /// is one.
+        #[arg(long, help_heading = "Results")]
+        no_enumerations: bool,
+        /// Replace the archive if it exists.
+        #[arg(long, help_heading = "Results")]
+        force: bool,
+    },
+    /// Show the variables and capabilities of an FMU.
+    Inspect {
+        /// FMU to show: a file, or the name of one that `list` shows.
+        fmu: PathBuf,
+        #[command(flatten)]
+        filter: Filter,
+        /// Print JSON, for other programs.
+        #[arg(long)]
+        json: bool,
+        /// Report the faults of the FMU and of its library instead, or that it is sound. The exit
+        /// code is 1 if there are any faults.
+        #[arg(long, conflicts_with_all = ["json", "pattern", "causality"])]
+        check: bool,
+    },
+    /// Print an experiment, a study or a campaign with all that it extends, templates and lists
+    /// expanded.
+    Show {
+        /// What to print: a file, or the name of an experiment, a study or a campaign.
+        name: PathBuf,
+    },
+    /// Print the JSON Schema of a kind of file, by which editors complete and check such files.
+    Schema {
+        /// Kind of file that the schema describes.
+        #[arg(value_enum)]
+        kind: schema::FileKind,
+    },
+    /// Write a script that completes commands and options in a shell, for example `orchestrator
+    /// completions bash`.
+    Completions {
+        /// Shell that the script is for.
+        shell: clap_complete::Shell,
+    },
+    /// Write the manual pages of the program and of its commands, for `man orchestrator`.
+    Man {
+        /// Folder for the pages, for example one called man1 that `man` searches.
+        #[arg(value_name = "DIR")]
+        folder: PathBuf,
+    },
+    /// List experiments, studies, campaigns and FMUs by the names that the other commands take.
+    List {
+        /// Folder to search [default: the current one, and those where experiments and FMUs are
+        /// found from any folder].
+        folder: Option<PathBuf>,
+        /// Show titles in full, and the file of each.
+        #[arg(long)]
+        long: bool,
+        /// Print JSON, for other programs.
+        #[arg(long, conflicts_with = "long")]
+        json: bool,
+    },
+}

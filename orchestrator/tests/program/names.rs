@@ -1,0 +1,222 @@
+//! Tests of names: what the list shows, what each command takes, and what it says of a name of
+//! another kind.
+
+use crate::bench::{Bench, LOOP};
+use crate::campaign::CAMPAIGN;
+use std::fs;
+
+/// A folder with an experiment `loop`, a campaign `gains`, a study `papers` and an FMU `Model`.
+fn bench() -> Bench {
+    let bench = Bench::new();
+    fs::write(bench.path("gains.toml"), CAMPAIGN).unwrap();
+    fs::create_dir(bench.path("papers")).unwrap();
+    let study = "title = \"a study\"\npaper = \"somebody\"\n";
+    fs::write(bench.path("papers/study.toml"), study).unwrap();
+    bench
+}
+
+#[test]
+fn a_name_of_another_kind_is_told_what_to_call() {
+    let bench = bench();
+    let says = [
+        ("run", "gains", "gains is a campaign: orchestrator campaign gains"),
+        ("run", "gains.toml", "gains.toml is a campaign: orchestrator campaign gains.toml"),
+        ("run", "papers", "papers is a study: orchestrator reproduce papers"),
+        (
+            "run",
+            "Model",
+            "Model is an FMU, and FMUs are run by an experiment: `orchestrator inspect Model`",
+        ),
+        ("run", "Model.fmu", "--fmu COMPONENT=Model.fmu puts it into an existing experiment"),
+        ("pack", "gains", "gains is a campaign: orchestrator campaign gains"),
+        ("margins", "papers", "papers is a study: orchestrator reproduce papers"),
+        ("linearise", "gains", "gains is a campaign: orchestrator campaign gains"),
+        ("response", "gains", "gains is a campaign: orchestrator campaign gains"),
+        ("reproduce", "loop", "loop is an experiment: orchestrator run loop"),
+        ("reproduce", "gains", "gains is a campaign: orchestrator campaign gains"),
+        ("reproduce", "Model", "Model is an FMU: orchestrator inspect Model"),
+        ("campaign", "loop", "loop is an experiment: orchestrator run loop"),
+        ("campaign", "papers", "papers is a study: orchestrator reproduce papers"),
+        ("falsify", "loop.toml", "loop.toml is an experiment: orchestrator run loop.toml"),
+        ("falsify", "Model", "Model is an FMU: orchestrator inspect Model"),
+        (
+            "inspect",
+            "loop",
+            "loop is an experiment: orchestrator run loop, or orchestrator show loop",
+        ),
+        ("inspect", "gains", "orchestrator campaign gains, or orchestrator show gains"),
+        ("show", "Model", "Model is an FMU: orchestrator inspect Model"),
+    ];
+    for (command, name, says) in says {
+        let (code, _, errors) = bench.call(&[command, name]);
+        assert!(code == 2 && errors.contains(says), "{command} {name}: {errors}");
+        assert_eq!(errors.lines().count(), 1, "{errors}");
+    }
+    // A name of several kinds is told all of them, and each command takes its own.
+    fs::write(bench.path("papers.toml"), CAMPAIGN).unwrap();
+    let (_, _, errors) = bench.call(&["run", "papers"]);
+    let both = "papers is a study and a campaign: orchestrator reproduce papers, or orchestrator campaign papers";
+    assert!(errors.contains(both), "{errors}");
+    // A campaign that extends another one says itself neither what varies nor of what.
+    fs::write(bench.path("more.toml"), "extends = \"gains.toml\"\ntitle = \"more\"\n").unwrap();
+    let (code, _, errors) = bench.call(&["campaign", "more", "--quiet"]);
+    assert_eq!(code, 0, "{errors}");
+}
+
+#[test]
+fn every_command_takes_names() {
+    let bench = bench();
+    let deep = bench.path("a/b");
+    fs::create_dir_all(&deep).unwrap();
+    for file in ["loop.toml", "gains.toml", "Model.fmu"] {
+        fs::rename(bench.path(file), deep.join(file)).unwrap();
+    }
+    for arguments in [
+        &["run", "loop", "--quiet"][..],
+        &["run", "b/loop", "--quiet", "--out", "out/other"],
+        &["campaign", "gains", "--quiet"],
+        &["pack", "loop"],
+        &["show", "loop"],
+        &["show", "gains"],
+        &["show", "papers"],
+        &["inspect", "Model"],
+        &["inspect", "Model", "seed"],
+        &["inspect", "Model", "--check"],
+    ] {
+        let (code, _, errors) = bench.call(arguments);
+        assert_eq!(code, 0, "{arguments:?}: {errors}");
+    }
+    for (arguments, says) in [
+        (["run", "lop"], "there is no experiment \"lop\", neither as a file"),
+        (["campaign", "gans"], "there is no campaign \"gans\", neither as a file"),
+        (["reproduce", "papers2"], "there is no study \"papers2\", neither as a file"),
+        (["inspect", "Modle"], "there is no FMU \"Modle\", neither as a file"),
+        (["show", "gans"], "there is no study, experiment or campaign \"gans\", neither as a file"),
+    ] {
+        let (code, _, errors) = bench.call(&arguments);
+        assert!(code == 2 && errors.contains(says), "{errors}");
+        assert!(errors.contains("; did you mean \""), "{errors}");
+    }
+    fs::create_dir_all(bench.path("c/b")).unwrap();
+    fs::copy(deep.join("Model.fmu"), bench.path("c/b/Model.fmu")).unwrap();
+    let (code, _, errors) = bench.call(&["inspect", "Model"]);
+    assert!(code == 2 && errors.contains("several FMUs are called Model: "), "{errors}");
+    assert_eq!(bench.call(&["inspect", "c/b/Model"]).0, 0);
+}
+
+#[test]
+fn an_fmu_takes_the_place_of_another_by_its_name() {
+    let bench = bench();
+    fs::copy(bench.path("Model.fmu"), bench.path("Mine.fmu")).unwrap();
+    let (code, _, errors) = bench.run(&["--fmu", "gain=Mine", "--quiet"]);
+    assert_eq!(code, 0, "{errors}");
+    assert_eq!(bench.json("out/loop/results.json")["components"]["gain"]["fmu"], "Mine.fmu");
+    let (code, _, errors) = bench.run(&["--fmu", "gain=Mone"]);
+    assert_eq!(code, 2);
+    assert!(errors.starts_with("error: --fmu gain=Mone.fmu: there is no file"), "{errors}");
+}
+
+#[test]
+fn the_list_has_names_titles_and_nothing_of_a_fuzzer() {
+    let bench = bench();
+    fs::create_dir_all(bench.path("fuzz/corpus")).unwrap();
+    fs::write(bench.path("fuzz/corpus/wrong.toml"), LOOP.replace("stop =", "stopp =")).unwrap();
+    let long = LOOP.replace(
+        "gain and integrator",
+        "a very long title of many words, which takes much more than one line",
+    );
+    fs::write(bench.path("long.toml"), long).unwrap();
+    let (code, text, errors) = bench.call(&["list", "."]);
+    assert_eq!(code, 0, "{errors}");
+    for heading in [
+        "experiments (2): orchestrator run NAME",
+        "studies (1): orchestrator reproduce NAME",
+        "campaigns (1): orchestrator campaign NAME",
+        "FMUs (1): orchestrator inspect NAME",
+    ] {
+        assert!(text.contains(heading), "{heading}: {text}");
+    }
+    assert!(!text.contains("wrong") && !text.contains("fuzz"), "{text}");
+    assert!(text.lines().all(|line| line.chars().count() <= 80), "{text}");
+    let (_, whole, _) = bench.call(&["list", "--long", "."]);
+    assert!(whole.contains("./long.toml") && whole.contains("./papers/study.toml"), "{whole}");
+    let (_, json, _) = bench.call(&["list", "--json", "."]);
+    let rows: serde_json::Value = serde_json::from_str(&json).unwrap();
+    let entry = rows.as_array().unwrap().iter().find(|row| row["name"] == "loop").unwrap();
+    assert_eq!((&entry["kind"], &entry["path"]), (&"experiment".into(), &"./loop.toml".into()));
+    assert_eq!(
+        (&entry["title"], &entry["fault"]),
+        (&"gain and integrator".into(), &serde_json::Value::Null)
+    );
+    // A faulty experiment is listed with its fault, whole.
+    fs::write(bench.path("faulty.toml"), LOOP.replace("stop =", "stopp =")).unwrap();
+    let (_, text, _) = bench.call(&["list", "."]);
+    assert!(text.contains("FAULT ./faulty.toml:4: ") && text.contains("`stop`"), "{text}");
+}
+
+#[test]
+fn a_bad_value_is_blamed_on_its_option() {
+    let bench = bench();
+    for (arguments, blamed) in [
+        (&["run", "loop", "--stop", "-1"][..], "--stop -1: "),
+        (&["run", "loop", "--stop", "nan"], "--stop NaN: "),
+        (&["run", "loop", "--stop", "2.5"], "--stop 2.5: "),
+        (&["run", "loop", "--step", "0"], "--step 0: "),
+        (&["run", "loop", "--step", "-1", "--stop", "3"], "--step -1: "),
+        (&["run", "loop", "--step", "2"], "--step 2: "),
+        (&["run", "loop", "--step", "1e-10"], "--step 0.0000000001: "),
+        (&["run", "loop", "--call-timeout", "-1"], "--call-timeout -1: "),
+        (&["run", "loop", "--unit-memory", "-1"], "'-1' for '--unit-memory"),
+        (&["run", "loop", "--unit-cpu", "0"], "'0' for '--unit-cpu"),
+        (&["run", "loop", "--real-time", "-1"], "'-1' for '--real-time"),
+        (&["campaign", "gains", "--stop", "-1"], "--stop -1: "),
+        (&["campaign", "gains", "--jobs", "-1"], "'-1' for '--jobs"),
+        (&["campaign", "gains", "--case", "-1"], "'-1' for '--case"),
+        (&["campaign", "gains", "--case", "6"], "--case 6: "),
+        (&["campaign", "gains", "--cases", "-5..3"], "'-5..3' for '--cases"),
+        (&["falsify", "gains", "--time", "-1"], "'-1' for '--time"),
+        (&["reproduce", "papers", "--members", "-1"], "'-1' for '--members"),
+        (&["margins", "loop", "--at", "-5", "--open", "plant.input"], "--at -5: "),
+        (
+            &["response", "loop", "--at", "1", "--open", "plant.input", "--amplitude", "-1"],
+            "--amplitude -1: ",
+        ),
+        (
+            &["response", "loop", "--at", "1", "--open", "plant.input", "--amplitude", "0"],
+            "--amplitude 0: ",
+        ),
+        (
+            &["response", "loop", "--at", "1", "--open", "plant.input", "--count", "-3"],
+            "'-3' for '--count",
+        ),
+    ] {
+        let (code, _, errors) = bench.call(arguments);
+        assert!(code == 2 && errors.contains(blamed), "{arguments:?}: {errors}");
+        assert!(!errors.contains(".toml"), "{errors}");
+    }
+    // Values of the file are still its own fault.
+    fs::write(bench.path("short.toml"), LOOP.replace("stop = 3.0", "stop = 0.5")).unwrap();
+    let (_, _, errors) = bench.call(&["run", "short"]);
+    assert!(errors.contains("short.toml: [simulation] stop = 0.5 s"), "{errors}");
+}
+
+#[test]
+fn manual_pages_are_written() {
+    let bench = Bench::new();
+    let (code, _, errors) = bench.call(&["man", "man/man1"]);
+    assert_eq!(code, 0, "{errors}");
+    let page = |name: &str| fs::read_to_string(bench.path(&format!("man/man1/{name}.1"))).unwrap();
+    let (_, help, _) = bench.call(&["--help"]);
+    let commands = help.lines().skip_while(|line| *line != "Commands:").skip(1);
+    // Texts that are wrapped go on further to the right.
+    let commands =
+        commands.take_while(|line| !line.is_empty()).filter(|line| !line.starts_with("   "));
+    let commands: Vec<&str> = commands.filter_map(|line| line.split_whitespace().next()).collect();
+    assert!(commands.contains(&"run"), "{help}");
+    for command in commands.into_iter().filter(|command| *command != "help") {
+        assert!(page(&format!("orchestrator-{command}")).contains("Examples:"), "{command}");
+    }
+    assert!(page("orchestrator").contains("orchestrator\\-run(1)"));
+    let (code, _, errors) = bench.call(&["man", "loop.toml/man1"]);
+    assert!(code == 1 && errors.contains("loop.toml/man1"), "{errors}");
+}
