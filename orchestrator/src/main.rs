@@ -7,6 +7,7 @@ mod catalogue;
 mod failure;
 mod inspect;
 mod isolated;
+mod judge;
 mod linear;
 mod list;
 mod live;
@@ -148,6 +149,21 @@ enum Command {
     /// Measure the frequency response of an experiment's loop in flight, with a sine added at each
     /// opened signal, and compare it with that of the linear model.
     Response(response::Response),
+    /// Judge a run that the program at the other end of standard input and output flies, as the
+    /// Python package does, and write the files that `run` writes.
+    #[command(hide = true)]
+    Judge {
+        /// Experiment that is flown: a file, or the name of an experiment.
+        experiment: PathBuf,
+        /// Folder for the results.
+        #[arg(long, value_name = "DIR")]
+        out: PathBuf,
+        /// Also look for FMUs in this folder.
+        #[arg(long, value_name = "DIR")]
+        fmu_dir: Vec<PathBuf>,
+        #[command(flatten)]
+        overrides: arguments::Overrides,
+    },
     /// Write an experiment as an SSP archive (System Structure and Parameterization 1.0), FMUs
     /// included.
     Pack {
@@ -319,6 +335,10 @@ fn execute(command: Command, out: &mut impl Write, interrupt: &Interrupt) -> Res
         Command::Linearise(asked) => linear::linearise(&asked, out, interrupt),
         Command::Margins(asked) => linear::margins(&asked, out, interrupt),
         Command::Response(asked) => response::respond(&asked, out, interrupt),
+        Command::Judge { experiment, out: folder, fmu_dir, overrides } => {
+            let experiment = search::experiment(&experiment)?;
+            judge::judge(&experiment, &overrides.into(), &fmu_dir, &folder)
+        }
         Command::Pack { experiment, out: archive, fmu_dir, overrides, no_enumerations, force } => {
             let archive = pack::Archive { path: archive, enumerations: !no_enumerations, force };
             pack::pack(&experiment, &overrides.into(), &fmu_dir, archive, out, interrupt)

@@ -11,7 +11,7 @@ from typing import Any
 import pandas as pd
 
 from ._data import FMUS
-from ._experiment import OrchestratorError, orchestrate
+from ._orchestrator import OrchestratorError, orchestrate
 
 
 @dataclass(frozen=True, eq=False)
