@@ -13,7 +13,7 @@ import pandas as pd
 from ._arrays import dataset
 from ._data import FMUS, fmu, need
 from ._experiment import recorded
-from ._law import REFERENCE, Flyer, PickledLaw
+from ._law import REFERENCE, Flyer, LawError, PickledLaw
 from ._orchestrator import OrchestratorError, missing_parts, orchestrate
 from ._pool import Pool
 from ._run import Figure, Run
@@ -198,8 +198,11 @@ class Campaign:
         command = [*self.command("campaign"), "--case", str(number)]
         if self.law is None:
             return recorded(command, out, units)
-        with Flyer(self.law) as fly:
-            return recorded(command, out, units, fly=fly)
+        with Flyer(self.law, number) as fly:
+            try:
+                return recorded(command, out, units, fly=fly)
+            except LawError as error:
+                raise error.in_file(self.law.file) from error.__cause__
 
     def _fly(self, law: PickledLaw, folder: Path, jobs: int | None) -> None:
         """Flies the missing parts with a law, and lets the orchestrator merge and judge them."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -49,7 +50,9 @@ def judged(flown: Flown) -> Judgement:
         exit_code, error = serve(command(flown, Path(temporary), out), rows)
         # A run in which the attitude was lost is judged up to then.
         if not (out / "metrics.json").exists():
-            raise OrchestratorError(error, exit_code, None)
+            # The experiment's file was made here, and nobody has seen it.
+            problem = re.sub(r"^\S*closed_loop\.toml:(\d+:)? ", "", error)
+            raise OrchestratorError(problem, exit_code, None)
         return read_judgement(out)
 
 

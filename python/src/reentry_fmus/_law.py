@@ -9,6 +9,7 @@ import sys
 import traceback
 from collections.abc import Callable
 from pathlib import Path
+from traceback import FrameSummary
 from typing import Any
 
 import numpy.typing as npt
@@ -29,28 +30,47 @@ DIRECT = {
 }
 """Connections of the loops that a law can fly."""
 
+SENT = "<dynamic-code>"
+"""Name that cloudpickle gives to the file of a function that it sends."""
+
+Line = tuple[str, int, str]
+"""File, line and function of a call."""
+
 
 class LawError(RuntimeError):
-    """A law in Python failed. The text names the case and the time, and has the law's own
-    traceback."""
+    """A law in Python failed. The text names the case and the time, and the lines of the law."""
 
-    def __init__(self, message: str, case: int | None, time: float) -> None:
-        super().__init__(message)
+    def __init__(self, problem: str, lines: list[Line], case: int | None, time: float) -> None:
+        super().__init__(problem, lines, case, time)
+        self.problem = problem
+        """The law with the time, and the error that it raised."""
+        self.lines = lines
+        """Calls within the law that led to the error."""
         self.case = case
         """Number of the case, if it is one of a campaign."""
         self.time = time
         """Simulated time, s."""
 
-    def __reduce__(self) -> tuple[Any, ...]:
-        return LawError, (str(self), self.case, self.time)
+    def __str__(self) -> str:
+        summary = [FrameSummary(file, line, function) for file, line, function in self.lines]
+        return "\n".join([self.problem, *traceback.format_list(summary)]).rstrip()
+
+    def in_file(self, file: str | None) -> LawError:
+        """Returns the error with the file of a law that was sent without it."""
+        lines = [
+            (file if file and name == SENT else name, line, function)
+            for name, line, function in self.lines
+        ]
+        return LawError(self.problem, lines, self.case, self.time)
 
 
 class Flyer:
     """Flies runs of the vehicle with a law in Python. The instances are reset between two
     runs, as far as they are FMUs of this package."""
 
-    def __init__(self, make: Callable[[], Law]) -> None:
+    def __init__(self, make: Callable[[], Law], case: int | None = None) -> None:
         self._make = make
+        self._case = case
         self._loop: ClosedLoop | None = None
         self._opened: tuple[Any, ...] = ()
 
@@ -63,14 +83,15 @@ class Flyer:
         """
         check(request)
         loop = self._prepared(request)
-        law, case = self._make(), request["case"]
+        law = self._make()
+        case = self._case if request["case"] is None else request["case"]
 
         def moment(state: State) -> npt.ArrayLike:
             try:
                 return vector(law(state))
             except Exception as error:
-                message = explained(error, name_of(law), case, state.time)
-                raise LawError(message, case, state.time) from error
+                problem = explained(error, name_of(law), case, state.time)
+                raise LawError(problem, lines_of(error), case, state.time) from error
 
         variables = [(str(name), bool(responds)) for name, responds in request["variables"]]
         rows, failure = loop._fly(request["steps"], moment, variables)
@@ -127,12 +148,16 @@ def check(request: dict[str, Any]) -> None:
 
 
 def explained(error: Exception, name: str, case: int | None, time: float) -> str:
-    """Explains an error of a law, with the lines of the law that led to it."""
+    """Says which law failed when, and why."""
     where = f"at t = {time:.10g} s" if case is None else f"in case {case} at t = {time:.10g} s"
-    lines = traceback.extract_tb(error.__traceback__)[1:]
-    trace = "".join(traceback.format_list(lines))
     what = "".join(traceback.format_exception_only(error)).strip()
-    return f"the law {name} failed {where}: {what}" + (f"\n{trace.rstrip()}" if trace else "")
+    return f"the law {name} failed {where}: {what}"
+
+
+def lines_of(error: Exception) -> list[Line]:
+    """Returns file, line and function of the calls within a law that led to an error."""
+    calls = traceback.extract_tb(error.__traceback__)[1:]
+    return [(call.filename, call.lineno or 0, call.name) for call in calls]
 
 
 class PickledLaw:
@@ -143,6 +168,9 @@ class PickledLaw:
         import cloudpickle
 
         self.name = name_of(law)
+        code = getattr(law, "__code__", None) or getattr(type(law).__call__, "__code__", None)
+        self.file: str | None = getattr(code, "co_filename", None)
+        """File that defines the law."""
         self.content: bytes = cloudpickle.dumps(law)
         digest = hashlib.sha256(self.content)
         # A function of an imported module is sent by its name.

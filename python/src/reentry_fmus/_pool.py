@@ -18,13 +18,17 @@ class Worker:
     """A process that flies parts, one after the other."""
 
     def __init__(self, law: PickledLaw, command: list[str]) -> None:
-        # A session of its own: Ctrl-C is this process's, which then ends the others.
+        # Ctrl-C is for this process, which then ends the others.
+        apart: dict[str, Any] = {"start_new_session": True}
+        if os.name == "nt":
+            apart = {"creationflags": 0x200}  # CREATE_NEW_PROCESS_GROUP
         self._process = subprocess.Popen(
             [sys.executable, "-m", "reentry_fmus._worker"],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
-            start_new_session=True,
+            **apart,
         )
+        self._file = law.file
         self._send(sys.path)
         self._send({"law": law.content, "command": command})
 
@@ -43,7 +47,7 @@ class Worker:
             code = self._process.wait()
             raise RuntimeError(f"a process that flew cases has ended, exit code {code}") from None
         if kind == "law":
-            raise LawError(*error)
+            raise LawError(*error).in_file(self._file)
         if kind == "orchestrator":
             raise OrchestratorError(error[0], error[1], None)
         if kind == "other":

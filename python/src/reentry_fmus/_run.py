@@ -117,7 +117,7 @@ class Run:
             shown = [f"{name}\0{short(value)}" for name, value in self._numbers().items()]
             summary = textwrap.fill(", ".join(shown), 76).replace("\0", " ")
         except RuntimeError as error:
-            summary = textwrap.shorten(f"no metrics: {error}", 76)
+            summary = textwrap.fill(f"no metrics: {error}", 76, max_lines=3)
         return f"Run: {self.title}\n  {self._extent()}\n{textwrap.indent(summary, '  ')}"
 
     def _repr_html_(self) -> str:

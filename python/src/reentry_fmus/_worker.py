@@ -49,7 +49,7 @@ def serve(tasks: BinaryIO, answers: BinaryIO, law: bytes, command: list[str]) ->
                 exit_code, error = orchestrate([*command, *arguments], fly)
                 answer = ("orchestrator", (error, exit_code)) if exit_code else ("done", None)
             except LawError as failed:
-                answer = ("law", (str(failed), failed.case, failed.time))
+                answer = ("law", failed.args)
             except Exception as failed:
                 answer = ("other", f"{type(failed).__name__}: {failed}")
             pickle.dump(answer, answers)

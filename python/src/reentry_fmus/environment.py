@@ -188,4 +188,4 @@ class AttitudeEnv(gymnasium.Env[Observation, npt.NDArray[np.float32]]):
 
 
 if ID not in gymnasium.registry:
-    gymnasium.register(ID, entry_point=AttitudeEnv)
+    gymnasium.register(ID, entry_point="reentry_fmus.environment:AttitudeEnv")
