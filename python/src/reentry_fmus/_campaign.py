@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 import json
 import os
 from dataclasses import dataclass
@@ -69,7 +70,18 @@ class Flown:
                 f"  {limit['says']}: broken by {broken['events']} of {broken['cases']}, "
                 f"probability {broken['low']:.3g} to {broken['high']:.3g}"
             )
-        return "\n".join([*lines, f"  {self.report}"])
+        return "\n".join([*lines, f"  {near(self.report)}"])
+
+    def _repr_html_(self) -> str:
+        rows = "".join(
+            f"<tr><td>{html.escape(limit['says'])}</td>"
+            f"<td>{limit['broken']['events']} of {limit['broken']['cases']}</td>"
+            f"<td>{limit['broken']['low']:.3g} to {limit['broken']['high']:.3g}</td></tr>"
+            for limit in self.summary["limits"]
+        )
+        heading = "<tr><th>limit</th><th>broken by</th><th>probability (95 %)</th></tr>"
+        title = f"{html.escape(self.summary['title'])}, {len(self.table)} cases"
+        return f"<p><b>{title}</b></p><table>{heading}{rows}</table>"
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,7 +114,7 @@ class Search:
         ]
         if found["broken"]:
             lines.append(f"  breaks {', '.join(found['broken'])}")
-        return "\n".join([*lines, f"  {self.worst}"])
+        return "\n".join([*lines, f"  {near(self.worst)}"])
 
     def _repr_svg_(self) -> str:
         return str(self.figure)
@@ -287,6 +299,11 @@ def falsify(
         figure=Figure((folder / "history.svg").read_text("utf-8")),
         folder=folder.absolute(),
     )
+
+
+def near(path: Path) -> Path:
+    """Returns a path as it is from the current folder, if it lies below it."""
+    return path.relative_to(Path.cwd()) if path.is_relative_to(Path.cwd()) else path
 
 
 def read_cases(path: Path, units: Units) -> pd.DataFrame:

@@ -37,6 +37,11 @@ class Study:
         """Path of the report, a page for the browser."""
         return self.folder / "report.html"
 
+    def __repr__(self) -> str:
+        verdicts = self.claims.drop_duplicates("says")["verdict"].value_counts()
+        counts = ", ".join(f"{count} {verdict}" for verdict, count in verdicts.items())
+        return f"Study: {len(self.runs)} runs, claims: {counts}\n  {self.report}"
+
 
 def reproduce(
     name: str | os.PathLike[str],
