@@ -218,7 +218,7 @@ class ClosedLoop:
         >>> run.table.shape, run.table.attrs["units"]["controller.moment.x"]
         ((251, 18), 'N.m')
         >>> round(run.metrics["max_rate_deg_s"], 1)
-        6.3
+        6.4
 
         Args:
             stop: Time to advance to, s: a multiple of the step.
