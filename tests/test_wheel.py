@@ -255,7 +255,7 @@ def site(wheel, tmp_path_factory) -> Path:
 # What each notebook prints, and how many pictures it has.
 PRINTED = {
     "campaign": (["broken in ", "deg/s again: True"], {"image/png": 2}),
-    "own_controller": (["PD: EMS 2.7", "CRMPC: EMS 2.0", "Run: PD, closed loop"], {"image/png": 2}),
+    "own_controller": (["PD: EMS 2.7", "CRMPC: EMS 2.0", "Run: pd, closed loop", "broken by 2 of 200"], {"image/png": 2}),
     "closed_loop": (["CRMPC: EMS 1.974"], {"image/png": 2}),
 }
 

@@ -129,10 +129,10 @@ class Run:
             f"<tr><th>{html.escape(name)}</th><td>{short(value)}</td></tr>"
             for name, value in numbers.items()
         )
-        picture = base64.b64encode(figure.encode()).decode()
+        picture = "data:image/svg+xml;base64," + base64.b64encode(figure.encode()).decode()
         return (
             f"<p><b>{html.escape(self.title)}</b><br>{self._extent()}</p><table>{rows}</table>"
-            + (f'<img alt="" src="data:image/svg+xml;base64,{picture}">' if figure else "")
+            + (f'<img alt="{html.escape(self.title)}" src="{picture}">' if figure else "")
         )
 
 
