@@ -16,6 +16,7 @@ import pytest
 from laws import lqr
 from laws import pd as pd_law
 from reentry_fmus import LawError, OrchestratorError, campaign
+from reentry_fmus._data import FMUS, experiment_path, program
 from test_campaign import CAMPAIGN
 
 CASES = 30
@@ -265,6 +266,21 @@ def test_a_case_that_an_fmu_refuses_has_failed(file, tmp_path):
     assert message.count("in doStep: ") == 1
 
 
+def test_values_that_an_fmu_refuses_fail_their_cases_alone(short, tmp_path):
+    """A normal distribution has no ends: here some bounds of the disturbance are negative."""
+    varied = SHORT.replace("cases = 50", "cases = 10").replace("plant.disturbance.seed", "plant.x")
+    varied = varied.replace('"plant.x"\ncase = 1', '"plant.disturbance.bound"\nnormal = { mean = 0.01, deviation = 0.02 }')
+    short.write_text(varied)
+    mine = campaign(short, law=lqr).run(out=tmp_path / "law").table
+    packaged = campaign(short).run(out=tmp_path / "fmu").table
+    assert set(packaged["status"]) == {"completed", "failed"}
+    assert mine["status"].equals(packaged["status"]) and mine["time"].equals(packaged["time"])
+    assert np.allclose(mine["ems_deg"], packaged["ems_deg"], rtol=1e-9, equal_nan=True)
+    first = int((mine["status"] == "failed").idxmax())
+    beginnings = [table["message"][first][:60] for table in (mine, packaged)]
+    assert beginnings[0] == beginnings[1] and beginnings[0].startswith("plant failed at t = 0 s in")
+
+
 def test_loops_and_metrics_that_no_law_can_fly_are_refused(short, tmp_path):
     short.write_text(SHORT.replace("short.toml", "two-loop-smc/allocated"))
     with pytest.raises(RuntimeError, match="connected directly.*allocator"):
@@ -308,3 +324,24 @@ def test_an_interruption_keeps_what_is_flown(tmp_path):
     # Nothing flies on.
     time.sleep(1.0)
     assert sorted(path.name for path in parts.glob("*.parquet")) == kept
+
+
+@pytest.mark.parametrize(
+    ("answer", "says"),
+    [
+        (b"", 'the program that flies the law answered "": EOF'),
+        (b"rows: 3\n", 'the program that flies the law answered "rows: 3": expected value'),
+        (b'{"rows": 3, "failure": null}\n', "the program that flies the law gave 3 rows instead"),
+        (b'{"rows": 26, "failure": null}\n' + bytes(80), "the program that flies the law ended"),
+    ],
+)
+def test_the_orchestrator_says_what_is_wrong_with_an_answer(answer, says, tmp_path):
+    """A program of another's may speak to it, too."""
+    command = [program(), "judge", experiment_path("lqr"), "--stop", "1", "--out", tmp_path / "out"]
+    done = subprocess.run([*command, "--fmu-dir", FMUS], input=answer, capture_output=True)
+    assert done.returncode == 2
+    assert done.stderr.decode().startswith(f"error: {says}")
+    request = json.loads(done.stdout)
+    assert request["steps"] == 25 and request["order"] == ["controller", "plant"]
+    assert ["controller.moment.x", True] in request["variables"]
+    assert ["plant.rate.p", False] in request["variables"]

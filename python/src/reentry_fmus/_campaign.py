@@ -205,6 +205,7 @@ class Campaign:
 
         Raises:
             OrchestratorError: The campaign was refused, or the run failed.
+            LawError: The law failed.
         """
         check_units(units)
         command = [*self.command("campaign"), "--case", str(number)]

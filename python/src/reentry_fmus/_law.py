@@ -12,6 +12,7 @@ from pathlib import Path
 from traceback import FrameSummary
 from typing import Any
 
+import numpy as np
 import numpy.typing as npt
 
 from ._data import FMUS, need
@@ -82,7 +83,12 @@ class Flyer:
             ValueError: The loop is none that a law can fly.
         """
         check(request)
-        loop = self._prepared(request)
+        try:
+            loop = self._prepared(request)
+        except InstanceError as failure:
+            # An FMU may refuse the values of one case and take those of others.
+            self.close()
+            return Rows(np.empty((0, len(request["variables"]))), described(failure))
         law = self._make()
         case = self._case if request["case"] is None else request["case"]
 
@@ -95,7 +101,7 @@ class Flyer:
 
         variables = [(str(name), bool(responds)) for name, responds in request["variables"]]
         rows, failure = loop._fly(request["steps"], moment, variables)
-        return Rows(rows, None if failure is None else self._described(loop, failure))
+        return Rows(rows, None if failure is None else described(failure))
 
     def _prepared(self, request: dict[str, Any]) -> ClosedLoop:
         paths = {name: Path(found["fmu"]) for name, found in request["components"].items()}
@@ -108,14 +114,6 @@ class Flyer:
         self._loop._restart({name: c["set"] for name, c in request["components"].items()})
         return self._loop
 
-    @staticmethod
-    def _described(loop: ClosedLoop, failure: InstanceError) -> dict[str, str]:
-        """Describes a failure as the orchestrator describes those of its own instances."""
-        call = failure.call.removeprefix("fmi2")
-        component = "plant" if failure.fmu == loop._plant.name else "controller"
-        message = str(failure).removeprefix(f"{failure.fmu}: ")
-        return {"component": component, "call": call[:1].lower() + call[1:], "message": message}
-
     def close(self) -> None:
         """Frees the instances."""
         if self._loop is not None:
@@ -127,6 +125,14 @@ class Flyer:
 
     def __exit__(self, *_: object) -> None:
         self.close()
+
+
+def described(failure: InstanceError) -> dict[str, str]:
+    """Describes a failure as the orchestrator describes those of its own instances."""
+    component = "controller" if failure.fmu == REFERENCE else "plant"
+    call = failure.call.removeprefix("fmi2")
+    message = str(failure).removeprefix(f"{failure.fmu}: ")
+    return {"component": component, "call": call[:1].lower() + call[1:], "message": message}
 
 
 def check(request: dict[str, Any]) -> None:
