@@ -146,6 +146,7 @@ pub(crate) fn fly(asked: &Fly, out: &mut impl Write, interrupt: &Interrupt) -> R
             return judge::judge(
                 &experiment,
                 &Overrides::default(),
+                None,
                 &asked.common.fmu_dir,
                 &folder,
             );

@@ -24,11 +24,15 @@ use sweep::outside;
 pub(crate) fn judge(
     experiment: &Path,
     overrides: &Overrides,
+    law: Option<&str>,
     fmu_dirs: &[PathBuf],
     out: &Path,
 ) -> Result<(), Failure> {
     let mut experiment = Experiment::load(experiment)?;
     experiment.apply(overrides)?;
+    if let Some(law) = law {
+        experiment.name_law(law, overrides);
+    }
     let mut system = check(experiment, fmu_dirs, &mut Opened::default())?;
     if system.experiment.observe.margins.is_some() {
         let problem = "[observe.margins] is for FMUs, not for a law in another program";

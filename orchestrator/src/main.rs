@@ -155,6 +155,9 @@ enum Command {
     Judge {
         /// Experiment that is flown: a file, or the name of an experiment.
         experiment: PathBuf,
+        /// Name of the law that is flown in place of the last FMU of --fmu.
+        #[arg(long)]
+        law: Option<String>,
         /// Folder for the results.
         #[arg(long, value_name = "DIR")]
         out: PathBuf,
@@ -335,9 +338,9 @@ fn execute(command: Command, out: &mut impl Write, interrupt: &Interrupt) -> Res
         Command::Linearise(asked) => linear::linearise(&asked, out, interrupt),
         Command::Margins(asked) => linear::margins(&asked, out, interrupt),
         Command::Response(asked) => response::respond(&asked, out, interrupt),
-        Command::Judge { experiment, out: folder, fmu_dir, overrides } => {
+        Command::Judge { experiment, law, out: folder, fmu_dir, overrides } => {
             let experiment = search::experiment(&experiment)?;
-            judge::judge(&experiment, &overrides.into(), &fmu_dir, &folder)
+            judge::judge(&experiment, &overrides.into(), law.as_deref(), &fmu_dir, &folder)
         }
         Command::Pack { experiment, out: archive, fmu_dir, overrides, no_enumerations, force } => {
             let archive = pack::Archive { path: archive, enumerations: !no_enumerations, force };

@@ -91,6 +91,9 @@ def test_a_law_replaces_the_controller_of_an_experiment():
     run = experiment("crmpc-robust", set=quiet, stop=4.0, law=pd_law)
     with ClosedLoop(parameters={**quiet, "plant.inertia.scale": 1.05}) as loop:
         usual = loop.run(4.0, pd_law)
+    assert run.title == f"law pd in place of CRMPC: {experiments()['crmpc-robust']}"
+    assert by_law.title == f"law lqr in place of the controller: {by_fmu.title}"
+    assert run.description["law"] == usual.description["law"] == "pd"
     shared = run.table.columns.intersection(usual.table.columns)
     assert len(shared) >= 12 and run.table[shared].equals(usual.table[shared])
     assert run.metrics["rate_limit_deg_s"] == pytest.approx(np.degrees(0.1))

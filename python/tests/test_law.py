@@ -109,6 +109,7 @@ def test_limits_and_intervals_are_those_of_the_fmu(by_law, by_fmu):
     assert verdicts[0] == verdicts[1] and "Clopper" in pages[0]
     headings = [re.findall(r"<h[123]>.*?</h[123]>", page) for page in pages]
     assert headings[0] == headings[1]
+    assert "law lqr in place of the controller: LQR, scenario of Chai 2022" in pages[0]
     # The page shows how a case is flown again.
     assert "law=lqr).case(" in pages[0] and "orchestrator campaign" not in pages[0]
 
@@ -283,7 +284,7 @@ def test_values_that_an_fmu_refuses_fail_their_cases_alone(short, tmp_path):
 
 def test_loops_and_metrics_that_no_law_can_fly_are_refused(short, tmp_path):
     short.write_text(SHORT.replace("short.toml", "two-loop-smc/allocated"))
-    with pytest.raises(RuntimeError, match="connected directly.*allocator"):
+    with pytest.raises(ValueError, match="connected directly.*allocator"):
         campaign(short, law=pd_law).run(out=tmp_path / "out")
     with pytest.raises(OrchestratorError, match="margins are those of FMUs"):
         campaign("margins", law=pd_law).run(out=tmp_path / "out")

@@ -17,9 +17,14 @@ pub struct Changes {
 }
 
 impl Changes {
+    /// Returns the name of the law in another program.
+    pub(crate) fn law_name(&self) -> Option<&str> {
+        self.law.as_ref().and_then(|law| law.split_whitespace().next())
+    }
+
     /// Returns the command that runs a case of a campaign with these changes.
     pub(crate) fn command(&self, campaign: &Campaign) -> Command {
-        if let Some(name) = self.law.as_ref().and_then(|law| law.split_whitespace().next()) {
+        if let Some(name) = self.law_name() {
             let path = campaign.source.path.display();
             return Command::Python(format!("campaign(\"{path}\", law={name})"));
         }

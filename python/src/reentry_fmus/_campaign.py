@@ -168,6 +168,7 @@ class Campaign:
             OrchestratorError: The campaign was refused, or flying it failed.
             ClusterError: The cluster failed. Finished parts are kept.
             LawError: The law failed. Finished parts are kept.
+            ValueError: The loop is none that a law can fly.
         """
         check_units(units)
         is_address = out is not None and "://" in os.fspath(out)

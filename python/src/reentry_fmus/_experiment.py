@@ -13,7 +13,7 @@ from ._data import FMUS, experiment_path, fmu_path
 from ._law import REFERENCE, Flyer
 from ._orchestrator import OrchestratorError, orchestrate, serve
 from ._run import Run, read
-from ._state import Law
+from ._state import Law, name_of
 from ._table import Units, check_units
 
 Value = bool | int | float | str
@@ -63,7 +63,7 @@ def experiment(
         if "controller" in (fmu or {}):
             raise TypeError("the law replaces the controller: leave out its FMU")
         fmu = {**(fmu or {}), "controller": REFERENCE}
-    begin = ["run", "--quiet", "--force"] if law is None else ["judge"]
+    begin = ["run", "--quiet", "--force"] if law is None else ["judge", "--law", name_of(law)]
     command = [*begin, experiment_path(name), "--fmu-dir", str(FMUS)]
     for component, replacement in (fmu or {}).items():
         command += ["--fmu", f"{component}={fmu_path(replacement)}"]
@@ -99,6 +99,8 @@ def recorded(
             exit_code, error = serve(command, fly)
         is_new = stale.exists() and stale.stat().st_mtime_ns != before
         run = read(folder, units) if is_new else None
+    if run is not None and fly is not None:
+        run.description["law"] = fly.name
     if exit_code != 0 or run is None:
         raise OrchestratorError(error, exit_code, run)
     return run

@@ -33,6 +33,8 @@ class Flown:
     parameters: dict[str, dict[str, Value]]
     columns: dict[str, npt.NDArray[np.float64]]
     """Values of variables at each communication point."""
+    law: str | None = None
+    """Name of the law, if it is one in Python."""
 
 
 def judged(flown: Flown) -> Judgement:
@@ -53,7 +55,10 @@ def judged(flown: Flown) -> Judgement:
             # The experiment's file was made here, and nobody has seen it.
             problem = re.sub(r"^\S*closed_loop\.toml:(\d+:)? ", "", error)
             raise OrchestratorError(problem, exit_code, None)
-        return read_judgement(out)
+        judgement = read_judgement(out)
+    if flown.law is not None:
+        judgement.description["law"] = flown.law
+    return judgement
 
 
 class Noted(Exception):

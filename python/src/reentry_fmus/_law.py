@@ -70,6 +70,8 @@ class Flyer:
     runs, as far as they are FMUs of this package."""
 
     def __init__(self, make: Callable[[], Law], case: int | None = None) -> None:
+        self.name = name_of(make())
+        """Name of the law."""
         self._make = make
         self._case = case
         self._loop: ClosedLoop | None = None
@@ -85,10 +87,10 @@ class Flyer:
         check(request)
         try:
             loop = self._prepared(request)
-        except InstanceError as failure:
+        except InstanceError as refusal:
             # An FMU may refuse the values of one case and take those of others.
             self.close()
-            return Rows(np.empty((0, len(request["variables"]))), described(failure))
+            return Rows(np.empty((0, len(request["variables"]))), described(refusal))
         law = self._make()
         case = self._case if request["case"] is None else request["case"]
 

@@ -253,7 +253,8 @@ class ClosedLoop:
         name = self._controller.name if law is None else name_of(law)
         title = f"{name}, closed loop"
         span = (first * self._step, self._tick * self._step, self._step)
-        flown = Flown(title, span, self._paths, self._parameters, by_name)
+        by_law = None if law is None else name
+        flown = Flown(title, span, self._paths, self._parameters, by_name, by_law)
         return Run(title, self._table(rows, first, units), partial(judged, flown))
 
     def _fly(

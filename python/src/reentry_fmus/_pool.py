@@ -50,6 +50,8 @@ class Worker:
             raise LawError(*error).in_file(self._file)
         if kind == "orchestrator":
             raise OrchestratorError(error[0], error[1], None)
+        if kind == "value":
+            raise ValueError(error)
         if kind == "other":
             raise RuntimeError(error)
 

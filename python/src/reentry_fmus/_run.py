@@ -75,7 +75,8 @@ class Run:
     @property
     def description(self) -> dict[str, Any]:
         """Description of the run: the experiment, all parameters, seeds, and the GUIDs of the
-        FMUs."""
+        FMUs. "law" is the name of a law in Python, whose reference and limits are those of the FMU
+        in its place."""
         return self._judgement.description
 
     def __getitem__(self, column: str) -> pd.Series[Any]:

@@ -50,6 +50,8 @@ def serve(tasks: BinaryIO, answers: BinaryIO, law: bytes, command: list[str]) ->
                 answer = ("orchestrator", (error, exit_code)) if exit_code else ("done", None)
             except LawError as failed:
                 answer = ("law", failed.args)
+            except ValueError as failed:
+                answer = ("value", str(failed))
             except Exception as failed:
                 answer = ("other", f"{type(failed).__name__}: {failed}")
             pickle.dump(answer, answers)
