@@ -77,7 +77,7 @@ pub fn fly(
     let request = serde_json::to_string(&request(system, case, changes))
         .map_err(|error| Error::experiment(error.to_string()))?;
     let mut output = std::io::stdout().lock();
-    writeln!(output, "{request}").and_then(|()| output.flush()).map_err(ended)?;
+    writeln!(output, "{request}").and_then(|()| output.flush()).map_err(|error| ended(&error))?;
     show(system, &mut std::io::stdin().lock(), observers)
 }
 
@@ -113,7 +113,7 @@ fn show(
     observers: &mut [&mut dyn Observer],
 ) -> Result<(), Error> {
     let mut line = String::new();
-    input.read_line(&mut line).map_err(ended)?;
+    input.read_line(&mut line).map_err(|error| ended(&error))?;
     let answer: Answer = serde_json::from_str(&line)
         .map_err(|error| wrong(&format!("answered \"{}\": {error}", line.trim_end())))?;
     let ticks = system.clock.ticks();
@@ -125,7 +125,7 @@ fn show(
     let mut values = vec![0.0; system.probed().len()];
     let mut outcome = Ok(());
     for tick in 0..answer.rows {
-        input.read_exact(&mut bytes).map_err(ended)?;
+        input.read_exact(&mut bytes).map_err(|error| ended(&error))?;
         if outcome.is_err() {
             continue;
         }
@@ -144,7 +144,7 @@ fn show(
     })
 }
 
-fn ended(error: std::io::Error) -> Error {
+fn ended(error: &std::io::Error) -> Error {
     wrong(&format!("ended: {error}"))
 }
 
