@@ -2,6 +2,7 @@
 
 use crate::arguments;
 use crate::failure::Failure;
+use crate::judge;
 use campaign::bundle;
 use campaign::changes::Changes;
 use campaign::definition::Campaign;
@@ -66,6 +67,10 @@ pub(crate) struct Fly {
     /// which then flies DIR/campaign.toml with --fmu-dir DIR/fmu. No case is flown here.
     #[arg(long, value_name = "DIR", help_heading = "Part of the campaign", conflicts_with_all = ["case", "cases", "work", "fresh", "csv"])]
     bundle: Option<PathBuf>,
+    /// Let the program at the other end of standard input and output fly the cases, with a control
+    /// law of this name and hash, as the Python package does.
+    #[arg(long, value_name = "NAME HASH", hide = true, conflicts_with_all = ["bundle", "csv"])]
+    law: Option<String>,
     /// Fly all cases again, including those that are finished.
     #[arg(long, help_heading = "Results")]
     fresh: bool,
@@ -94,10 +99,11 @@ fn range(text: &str) -> Result<Range<u64>, String> {
     Ok(first..last)
 }
 
-fn prepare(common: &Common) -> Result<Plan, Error> {
+fn prepare(common: &Common, law: Option<&String>) -> Result<Plan, Error> {
     let campaign = Campaign::load(&find(&common.campaign, Kind::Campaign)?)?;
     let overrides = common.overrides.clone().into();
-    let changes = Changes { experiment: common.experiment.clone(), overrides };
+    let experiment = common.experiment.clone();
+    let changes = Changes { experiment, overrides, law: law.cloned() };
     Plan::new(campaign, &changes, &common.fmu_dir)
 }
 
@@ -106,7 +112,7 @@ fn prepare(common: &Common) -> Result<Plan, Error> {
 /// # Errors
 /// Returns an error if the campaign is faulty, or if a file cannot be written.
 pub(crate) fn fly(asked: &Fly, out: &mut impl Write, interrupt: &Interrupt) -> Result<(), Failure> {
-    let plan = prepare(&asked.common)?;
+    let plan = prepare(&asked.common, asked.law.as_ref())?;
     let folder = run::folder(&plan, asked.common.out.as_deref());
     if let Some(folder) = &asked.bundle {
         let overrides = Overrides::from(asked.common.overrides.clone());
@@ -136,6 +142,15 @@ pub(crate) fn fly(asked: &Fly, out: &mut impl Write, interrupt: &Interrupt) -> R
             None => folder.join("cases").join(case.to_string()),
         };
         let experiment = write_case(&plan, case, &folder)?;
+        if asked.law.is_some() {
+            return judge::judge(
+                &experiment,
+                &Overrides::default(),
+                None,
+                &asked.common.fmu_dir,
+                &folder,
+            );
+        }
         let options = crate::run::Options {
             out: Some(folder),
             quiet: asked.common.quiet,
@@ -150,7 +165,7 @@ pub(crate) fn fly(asked: &Fly, out: &mut impl Write, interrupt: &Interrupt) -> R
         out: asked.common.out.clone(),
         jobs: asked.common.jobs,
         fresh: asked.fresh,
-        quiet: asked.common.quiet,
+        quiet: asked.common.quiet || asked.law.is_some(),
         csv: asked.csv,
         interrupt: interrupt.clone(),
     };
@@ -253,7 +268,7 @@ pub(crate) fn falsify(
     out: &mut impl Write,
     interrupt: &Interrupt,
 ) -> Result<(), Failure> {
-    let plan = prepare(&asked.common)?;
+    let plan = prepare(&asked.common, None)?;
     let options = search::Options {
         out: asked.common.out.clone(),
         jobs: asked.common.jobs,

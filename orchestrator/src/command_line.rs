@@ -145,6 +145,24 @@ pub(crate) enum Command {
     /// Measure the frequency response of an experiment's loop in flight, with a sine added at each
     /// opened signal, and compare it with that of the linear model.
     Response(response::Response),
+    /// Judge a run that the program at the other end of standard input and output flies, as the
+    /// Python package does, and write the files that `run` writes.
+    #[command(hide = true)]
+    Judge {
+        /// Experiment that is flown: a file, or the name of an experiment.
+        experiment: PathBuf,
+        /// Name of the law that is flown in place of the last FMU of --fmu.
+        #[arg(long)]
+        law: Option<String>,
+        /// Folder for the results.
+        #[arg(long, value_name = "DIR")]
+        out: PathBuf,
+        /// Also look for FMUs in this folder.
+        #[arg(long, value_name = "DIR")]
+        fmu_dir: Vec<PathBuf>,
+        #[command(flatten)]
+        overrides: arguments::Overrides,
+    },
     /// Write an experiment as an SSP archive (System Structure and Parameterization 1.0), FMUs
     /// included.
     Pack {

@@ -8,6 +8,7 @@ mod examples;
 mod failure;
 mod inspect;
 mod isolated;
+mod judge;
 mod linear;
 mod list;
 mod live;
@@ -144,6 +145,10 @@ fn execute(command: Command, out: &mut impl Write, interrupt: &Interrupt) -> Res
         Command::Linearise(asked) => linear::linearise(&asked, out, interrupt),
         Command::Margins(asked) => linear::margins(&asked, out, interrupt),
         Command::Response(asked) => response::respond(&asked, out, interrupt),
+        Command::Judge { experiment, law, out: folder, fmu_dir, overrides } => {
+            let experiment = find(&experiment, Kind::Experiment)?;
+            judge::judge(&experiment, &overrides.into(), law.as_deref(), &fmu_dir, &folder)
+        }
         Command::Pack { experiment, out: archive, fmu_dir, overrides, no_enumerations, force } => {
             let archive = pack::Archive { path: archive, enumerations: !no_enumerations, force };
             pack::pack(&experiment, &overrides.into(), &fmu_dir, archive, out, interrupt)

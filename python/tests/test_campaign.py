@@ -89,6 +89,24 @@ def test_the_summary_follows_from_the_table(flown):
     assert flown.report.read_text().lstrip().lower().startswith("<!doctype html>")
 
 
+def test_a_campaign_is_shown_in_a_few_lines(flown):
+    broken = flown.summary["limits"][0]["broken"]["events"]
+    lines = repr(flown).splitlines()
+    assert lines[:2] == ["Flown: LQR, inertia and gusts", "  600 cases, 600 completed"]
+    assert lines[2].startswith(f"  rate ≤ 6 deg/s: broken by {broken} of 600, probability 0.")
+    assert lines[3] == f"  {flown.report}" and len(lines) == 4
+    assert f"<td>{broken} of 600</td>" in flown._repr_html_()
+
+
+def test_a_campaign_becomes_arrays(flown):
+    pytest.importorskip("xarray")
+    data = flown.to_xarray()
+    assert dict(data.sizes) == {"case": 600} and set(data.data_vars) == set(flown.table)
+    assert data["rate"].attrs == {"units": "deg/s"} and data.attrs["title"] == flown.summary["title"]
+    assert np.array_equal(data["rate"], flown.table["rate"])
+    assert set(data["status"].values) == {"completed"} and data["kept.rate"].dtype == bool
+
+
 def test_what_is_flown_is_not_flown_again(file, flown):
     before = {path: path.stat().st_mtime_ns for path in (flown.folder / "parts").iterdir()}
     assert len(before) == 24

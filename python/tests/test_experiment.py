@@ -12,7 +12,18 @@ import fmpy
 import numpy as np
 import pandas as pd
 import pytest
-from reentry_fmus import OrchestratorError, OrchestratorWarning, experiment, experiments, fmu, fmus
+from laws import lqr
+from laws import pd as pd_law
+from reentry_fmus import (
+    ClosedLoop,
+    LawError,
+    OrchestratorError,
+    OrchestratorWarning,
+    experiment,
+    experiments,
+    fmu,
+    fmus,
+)
 
 COMMAND = Path(sysconfig.get_path("scripts"), "orchestrator" + (".exe" if os.name == "nt" else ""))
 ALPHA = "plant.attitude.alpha"
@@ -49,11 +60,77 @@ def test_a_run_is_a_table_with_figures_of_merit():
     assert run.table.index[-1] == 50.0
     assert run.metrics["completed"] and run.metrics["fallbacks"] == 0
     assert run.metrics["max_rate_deg_s"] < run.metrics["rate_limit_deg_s"] == 5.0
-    assert run.figure.startswith("<svg") and run.figure._repr_svg_() == run._repr_svg_()
+    assert run.figure.startswith("<svg") and run.figure._repr_svg_() == run.figure
     assert run.description["seeds"]["plant.disturbance.seed"] == 1
     assert set(run.table.attrs["units"]) == set(run.table.columns)
     assert run.table.attrs["units"][ALPHA] == "rad"
     assert run.table.attrs["descriptions"][ALPHA] == "Angle of attack"
+
+
+def test_a_run_is_shown_in_a_few_lines():
+    run = experiment("crmpc-robust")
+    lines = repr(run).splitlines()
+    assert lines[0] == f"Run: {experiments()['crmpc-robust']}"
+    assert lines[1] == "  0 to 50 s, 1251 rows, 31 columns"
+    assert 3 <= len(lines) <= 9 and max(map(len, lines)) <= 80
+    assert "ems_deg 1.974" in repr(run) and "guarantee_broken no" in repr(run)
+    # Computing times would differ from run to run.
+    assert "ms" not in repr(run).replace("ems", "").replace("cms", "") and "wall" not in repr(run)
+    shown = run._repr_html_()
+    assert "<th>ems_deg</th><td>1.974</td>" in shown and "data:image/svg+xml;base64," in shown
+    assert run[ALPHA].equals(run.table[ALPHA])
+
+
+def test_a_law_replaces_the_controller_of_an_experiment():
+    by_fmu, by_law = experiment("lqr", units="deg"), experiment("lqr", law=lqr, units="deg")
+    assert list(by_law.table) == list(by_fmu.table)
+    assert by_law.table.attrs == by_fmu.table.attrs
+    assert np.allclose(by_law.table, by_fmu.table, rtol=1e-9, atol=1e-9)
+    assert by_law.metrics["ems_deg"] == pytest.approx(by_fmu.metrics["ems_deg"], rel=1e-9)
+    quiet = {"plant.disturbance.kind": "none", "controller.limit.rate": 0.1}
+    run = experiment("crmpc-robust", set=quiet, stop=4.0, law=pd_law)
+    with ClosedLoop(parameters={**quiet, "plant.inertia.scale": 1.05}) as loop:
+        usual = loop.run(4.0, pd_law)
+    assert run.title == f"law pd in place of CRMPC: {experiments()['crmpc-robust']}"
+    assert by_law.title == f"law lqr in place of the controller: {by_fmu.title}"
+    assert run.description["law"] == usual.description["law"] == "pd"
+    shared = run.table.columns.intersection(usual.table.columns)
+    assert len(shared) >= 12 and run.table[shared].equals(usual.table[shared])
+    assert run.metrics["rate_limit_deg_s"] == pytest.approx(np.degrees(0.1))
+
+
+def test_laws_fly_direct_loops_alone():
+    def wrong(state):
+        return state.attitud
+
+    with pytest.raises(ValueError, match="connected directly.*allocator"):
+        experiment("two-loop-smc/allocated", law=pd_law)
+    with pytest.raises(TypeError, match="leave out its FMU"):
+        experiment("lqr", law=pd_law, fmu={"controller": "FBL"})
+    with pytest.raises(LawError, match="the law wrong failed at t = 0 s: AttributeError") as caught:
+        experiment("lqr", law=wrong)
+    assert "return state.attitud" in str(caught.value)
+    assert caught.value.case is None and caught.value.time == 0.0
+    with pytest.raises(LawError, match="three finite numbers"):
+        experiment("lqr", law=lambda state: [0.0, 0.0])
+
+
+def test_a_run_becomes_arrays():
+    xarray = pytest.importorskip("xarray")
+    run = experiment("crmpc-robust", stop=2.0, units="deg")
+    data = run.to_xarray()
+    assert isinstance(data, xarray.Dataset) and dict(data.sizes) == {"time": 51}
+    assert data["time"].attrs == {"units": "s"}
+    assert data[ALPHA].attrs == {"units": "deg", "long_name": "Angle of attack"}
+    assert np.array_equal(data[ALPHA], run.table[ALPHA])
+    assert set(data.data_vars) == set(run.table.columns)
+    status = data["controller.solver.status"]
+    assert status.dtype.kind == "U" and status.values.tolist() == run["controller.solver.status"].tolist()
+    assert data["controller.solver.iterations"].dtype == np.int64
+    assert data.attrs["title"] == run.title and data.attrs["ems_deg"] == run.metrics["ems_deg"]
+    # What a netCDF file can hold.
+    assert all(isinstance(value, (int, float, str)) for value in data.attrs.values())
+    assert float(data[ALPHA].sel(time=1.0)) == run.table[ALPHA][1.0]
 
 
 def test_oracle_metrics_follow_from_the_table():
@@ -270,7 +347,9 @@ assert_type(campaign("x.toml").case(1), Run)
 with ClosedLoop(controller="CRMPC", step=0.04) as loop:
     assert_type(loop.step(), State)
     loop.step(np.zeros(3))
-    assert_type(loop.run(1.0, law), pd.DataFrame)
+    assert_type(loop.run(1.0, law), Run)
+assert_type(experiment("lqr", law=law), Run)
+assert_type(campaign("x.toml", law=law).run(), Flown)
 """
     )
     (tmp_path / "wrong.py").write_text(
@@ -295,7 +374,7 @@ ClosedLoop().run(1.0, lambda state: state.atitude)
     package = [*mypy, "--package", "reentry_fmus", "--config-file", tmp_path / "mypy.ini"]
     missing = "".join(
         f"[mypy-{name}.*]\nignore_missing_imports = true\n"
-        for name in ("control", "fmpy", "fsspec", "pyarrow", "distributed")
+        for name in ("cloudpickle", "control", "distributed", "fmpy", "fsspec", "pyarrow")
     )
     (tmp_path / "mypy.ini").write_text(f"[mypy]\n{missing}follow_imports = skip\n")
     whole = subprocess.run(package, cwd=tmp_path, capture_output=True, text=True)

@@ -5,7 +5,16 @@ import warnings
 
 import numpy as np
 import pytest
-from reentry_fmus import ClosedLoop, InstanceError, InstanceWarning, experiment, fmu
+from laws import lqr
+from laws import pd as pd_law
+from reentry_fmus import (
+    ClosedLoop,
+    InstanceError,
+    InstanceWarning,
+    OrchestratorError,
+    experiment,
+    fmu,
+)
 
 ATTITUDE = [f"plant.attitude.{axis}" for axis in ("alpha", "beta", "sigma")]
 RATE = [f"plant.rate.{axis}" for axis in "pqr"]
@@ -14,16 +23,11 @@ REFERENCE = [f"controller.reference.{axis}" for axis in ("alpha", "beta", "sigma
 COLUMNS = ATTITUDE + RATE + REFERENCE + MOMENT
 
 
-def pd_law(state):
-    a = 0.25 * (state.reference - state.attitude) - 0.8 * state.attitude_rate
-    return np.array([0.6e6 * -a[2], 1.3e6 * a[0], 1.5e6 * -a[1]])
-
-
 @pytest.mark.parametrize(("controller", "named"), [("CRMPC", "crmpc-robust"), ("LQR", "lqr")])
 def test_oracle_the_loop_is_the_orchestrators_bit_for_bit(controller, named):
     recorded = experiment(named).table
     with ClosedLoop(controller=controller) as loop:
-        table = loop.run(50.0)
+        table = loop.run(50.0).table
     assert table.shape == (1251, 18)
     assert np.array_equal(table[COLUMNS].to_numpy(), recorded[COLUMNS].to_numpy())
     assert np.array_equal(table.index, recorded.index)
@@ -53,26 +57,26 @@ def test_oracle_parameters_are_those_of_an_experiment():
     values = experiment("crmpc-paper", stop=0.04).description["components"]["controller"]
     paper |= {f"controller.{name}": value for name, value in values["parameters"].items()}
     with ClosedLoop(controller="CRMPC", parameters={**seed, **paper}) as loop:
-        table = loop.run(4.0)
+        table = loop.run(4.0).table
     assert np.array_equal(table[COLUMNS].to_numpy(), recorded[COLUMNS].to_numpy())
 
 
 def test_a_law_in_python_is_a_controller():
     """The packaged controller's moments, played back as a law, give the same motion."""
     with ClosedLoop(controller="CRMPC") as loop:
-        recorded = loop.run(10.0)
+        recorded = loop.run(10.0).table
     moments = iter(recorded[MOMENT].to_numpy())
     with warnings.catch_warnings(), ClosedLoop() as loop:
         warnings.simplefilter("error")
-        table = loop.run(10.0, lambda state: next(moments))
+        table = loop.run(10.0, lambda state: next(moments)).table
     assert table.equals(recorded)
 
 
 def test_steps_and_run_agree():
     with ClosedLoop() as loop:
-        table = loop.run(2.0, pd_law)
+        table = loop.run(2.0, pd_law).table
         state = loop.reset()
-        for row in table.itertuples():
+        for row in table.iloc[:-1].itertuples():
             assert row[0] == state.time
             assert row[1:4] == tuple(state.attitude)
             moment = pd_law(state)
@@ -81,15 +85,98 @@ def test_steps_and_run_agree():
             assert np.array_equal(state.moment, moment)
             applied = [loop.get(f"plant.appliedMoment.{axis}") for axis in "xyz"]
             assert applied == moment.tolist()
+        # No step begins at the last point, which repeats the moment before.
+        last = table.iloc[-1]
+        assert last.iloc[:3].tolist() == state.attitude.tolist()
+        assert last.iloc[-3:].tolist() == moment.tolist()
 
 
 def test_run_goes_on_from_the_present_time():
     with ClosedLoop() as loop:
-        whole = loop.run(2.0, pd_law)
+        whole = loop.run(2.0, pd_law).table
         loop.reset()
         loop.run(1.0, pd_law)
-        rest = loop.run(2.0, pd_law)
+        rest = loop.run(2.0, pd_law).table
     assert rest.equals(whole.loc[1.0:])
+
+
+# Metrics and figure
+
+
+@pytest.mark.parametrize(("controller", "named"), [("CRMPC", "crmpc-robust"), ("LQR", "lqr")])
+def test_oracle_metrics_and_figure_of_a_loop_are_the_orchestrators(controller, named):
+    """The parameters of the experiment are set, so that the loop is that of the experiment."""
+    recorded = experiment(named)
+    components = recorded.description["components"]
+    parameters = {
+        f"{component}.{name}": value
+        for component in ("plant", "controller")
+        for name, value in components[component]["set"].items()
+    }
+    with ClosedLoop(controller=controller, parameters=parameters) as loop:
+        run = loop.run(50.0)
+    # The loop is closed, and its metrics are still to be had.
+    assert set(run.metrics) == set(recorded.metrics)
+    compared = untimed(recorded.metrics)
+    assert untimed(run.metrics) == compared and len(compared) >= 12
+    assert run.metrics["wall_s"] is None
+    assert run.title == f"{controller}, closed loop"
+    assert run.figure.replace(run.title, recorded.title) == recorded.figure
+    for component in ("plant", "controller"):
+        mine = run.description["components"][component]
+        assert mine["parameters"] == components[component]["parameters"]
+        assert mine["guid"] == components[component]["guid"]
+
+
+def untimed(metrics):
+    """Metrics that do not depend on the wall clock."""
+    timed = ("solver_ms", "wall_s", "real_time_factor")
+    return {name: value for name, value in metrics.items() if not name.startswith(timed)}
+
+
+def test_oracle_a_law_in_python_has_the_metrics_of_its_fmu():
+    with ClosedLoop() as loop, ClosedLoop(controller="LQR") as packaged:
+        by_law, by_fmu = loop.run(50.0, lqr), packaged.run(50.0)
+    assert np.allclose(by_law.table[COLUMNS], by_fmu.table[COLUMNS], rtol=1e-9, atol=1e-12)
+    numbers = {name: v for name, v in untimed(by_fmu.metrics).items() if isinstance(v, float)}
+    assert len(numbers) >= 8
+    for name, value in numbers.items():
+        assert by_law.metrics[name] == pytest.approx(value, rel=1e-9), name
+    assert by_law.title == "lqr, closed loop"
+
+
+def test_oracle_metrics_are_those_of_the_time_that_was_run():
+    """By their definition, from the table: EMS counts the steps, not the last point."""
+    with ClosedLoop(controller="CRMPC") as loop:
+        loop.run(20.0)
+        run = loop.run(50.0)
+    error = run.table[ATTITUDE].to_numpy() - run.table[REFERENCE].to_numpy()
+    ems = np.degrees(np.sqrt(np.square(error[:-1]).sum(axis=1).mean()))
+    assert run.metrics["ems_deg"] == pytest.approx(ems, rel=1e-12)
+    norms = np.linalg.norm(run.table[RATE], axis=1)
+    assert run.metrics["max_rate_deg_s"] == pytest.approx(np.degrees(norms.max()), rel=1e-12)
+    assert run.description["simulation"]["start"] == 20.0 and run.metrics["samples"] == 751
+
+
+def test_a_loop_that_is_lost_is_judged_up_to_then():
+    with ClosedLoop(parameters={"controller.limit.moment": 2e5}) as loop:
+        run = loop.run(20.0, lambda state: [1e4, 0.0, 0.0])
+    assert run.metrics["lost_at"] < 20.0 and not run.metrics["completed"]
+    assert run.metrics["moment_limit"] == 2e5
+    assert len(run.table) == 501
+
+
+def test_fmus_that_the_orchestrator_refuses_fly_without_metrics(tmp_path):
+    """Such as one that has left since."""
+    copy = tmp_path / "Mine.fmu"
+    copy.write_bytes(fmu("LQR").read_bytes())
+    with ClosedLoop(controller=copy) as loop:
+        run = loop.run(1.0)
+    copy.unlink()
+    with pytest.raises(OrchestratorError, match="Mine.fmu"):
+        run.metrics
+    assert "no metrics: " in repr(run) and "Mine.fmu" in repr(run)
+    assert len(run["plant.rate.p"]) == 26 and "Mine.fmu" in run._repr_html_()
 
 
 def test_the_step_is_chosen():
@@ -99,9 +186,9 @@ def test_the_step_is_chosen():
 
 def test_degrees_are_for_reading():
     with ClosedLoop() as loop:
-        si = loop.run(1.0, pd_law)
+        si = loop.run(1.0, pd_law).table
         loop.reset()
-        deg = loop.run(1.0, pd_law, units="deg")
+        deg = loop.run(1.0, pd_law, units="deg").table
     assert np.allclose(deg[ATTITUDE + RATE], np.degrees(si[ATTITUDE + RATE]), rtol=1e-15)
     assert deg[MOMENT].equals(si[MOMENT])
     expected = {ATTITUDE[0]: "deg", RATE[0]: "deg/s", MOMENT[0]: "N.m"}
@@ -123,14 +210,14 @@ def test_the_reference_is_chosen():
 
 def test_a_reset_repeats_and_takes_other_parameters():
     with ClosedLoop(controller="LQR") as loop:
-        first = loop.run(2.0)
+        first = loop.run(2.0).table
         assert loop.reset().time == 0.0
-        assert loop.run(2.0).equals(first)
+        assert loop.run(2.0).table.equals(first)
         loop.reset({"plant.disturbance.seed": 2})
-        other = loop.run(2.0)
+        other = loop.run(2.0).table
         assert not other.equals(first)
         loop.reset()
-        assert loop.run(2.0).equals(other)
+        assert loop.run(2.0).table.equals(other)
 
 
 def test_inputs_that_are_not_connected_can_be_set():
@@ -144,7 +231,7 @@ def test_an_fmu_may_be_a_file(tmp_path):
     copy = tmp_path / "Other name.fmu"
     copy.write_bytes(fmu("LQR").read_bytes())
     with ClosedLoop(controller=copy) as loop, ClosedLoop(controller="LQR") as usual:
-        assert loop.run(1.0).equals(usual.run(1.0))
+        assert loop.run(1.0).table.equals(usual.run(1.0).table)
 
 
 def test_two_loops_do_not_disturb_each_other():
@@ -198,8 +285,8 @@ def test_nothing_is_left_behind(temporary):
         ({"parameters": {"plant.moment.x": 1.0}}, "moment.x is no parameter"),
         ({"parameters": {"plant.disturbance.bound": -1.0}}, "= -1.0 is below the minimum 0"),
         (
-            {"parameters": {"controller.limit.rate": 1.0}},
-            "controller.limit.rate: the loop has no controller, only a reference",
+            {"parameters": {"controller.weight.P[1]": 1.0}},
+            "controller.weight.P[1]: the loop has no controller, only a reference and limits",
         ),
         (
             {"controller": "CRMPC", "parameters": {"controller.disturbance.bound": 1.0}},

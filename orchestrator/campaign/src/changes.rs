@@ -12,11 +12,27 @@ pub struct Changes {
     pub experiment: Option<PathBuf>,
     /// Changes to the experiment.
     pub overrides: Overrides,
+    /// Law in another program that flies the cases: its name, and a hash of what it consists of.
+    pub law: Option<String>,
 }
 
 impl Changes {
+    /// Returns the name of the law in another program.
+    pub(crate) fn law_name(&self) -> Option<&str> {
+        self.law.as_ref().and_then(|law| law.split_whitespace().next())
+    }
+
+    /// Returns the command that runs a case of a campaign with these changes.
+    pub(crate) fn command(&self, campaign: &Campaign) -> Command {
+        if let Some(name) = self.law_name() {
+            let path = campaign.source.path.display();
+            return Command::Python(format!("campaign(\"{path}\", law={name})"));
+        }
+        Command::Program(self.arguments(campaign))
+    }
+
     /// Returns the arguments that name a campaign and these changes.
-    pub(crate) fn command(&self, campaign: &Campaign) -> String {
+    fn arguments(&self, campaign: &Campaign) -> String {
         let mut words = vec![campaign.source.path.display().to_string()];
         // A case is the same in whichever process its instances run.
         let Overrides { set, fmu, stop, step, coupling, on_invalid, isolation: _ } =
@@ -39,6 +55,25 @@ impl Changes {
             if is_plain { word } else { format!("'{word}'") }
         };
         words.into_iter().map(quoted).collect::<Vec<_>>().join(" ")
+    }
+}
+
+/// Command that flies a campaign.
+#[derive(Clone, Debug)]
+pub enum Command {
+    /// Arguments of the program that name the campaign and the changes to it.
+    Program(String),
+    /// Expression of the Python package for a campaign with a law in Python.
+    Python(String),
+}
+
+impl Command {
+    /// Returns the command that runs one case with everything recorded.
+    pub fn of_case(&self, case: u64) -> String {
+        match self {
+            Self::Program(arguments) => format!("orchestrator campaign {arguments} --case {case}"),
+            Self::Python(campaign) => format!("{campaign}.case({case})"),
+        }
     }
 }
 

@@ -1,6 +1,6 @@
 //! A campaign that is ready to be flown: its cases, and the numbers that are recorded of each.
 
-use crate::changes::Changes;
+use crate::changes::{Changes, Command};
 use crate::definition::{Campaign, Limit};
 use crate::prepare::{Recorded, keys, observe, read_experiment, recorded};
 use cosim::error::Error;
@@ -19,8 +19,8 @@ pub struct Plan {
     pub sweep: Sweep,
     /// Numbers that are recorded of each case.
     pub recorded: Vec<Recorded>,
-    /// Arguments of the program that name the campaign and the changes to it.
-    pub command: String,
+    /// Command that flies the campaign.
+    pub command: Command,
     /// Experiment that the command line names.
     replaced: Option<PathBuf>,
 }
@@ -47,6 +47,14 @@ impl Plan {
         let meters = Meters::new(&mut system)?;
         let recorded = recorded(&campaign, &system.experiment.observe, &meters);
         sweep.keys.insert("campaign".into(), keys(&campaign, changes)?);
+        if let Some(law) = &changes.law {
+            if system.experiment.observe.margins.is_some() {
+                let problem = "metrics: margins are those of FMUs, not of a law in another program";
+                return Err(campaign.source.error(&(0..0), problem));
+            }
+            sweep.keys.insert("law".into(), law.clone());
+            sweep.is_flown_outside = true;
+        }
         let plan = Self {
             command: changes.command(&campaign),
             replaced: changes.experiment.clone(),

@@ -146,7 +146,7 @@ fn page(
                         h2 { "Worst cases" }
                         @if let Some((name, cases)) = ranked {
                             p { "These cases have the largest values of " code { (name) } ", in descending order. Each command runs a case again and records all of its variables:" }
-                            ul { @for case in cases { li { code { "orchestrator campaign " (plan.command) " --case " (case) } } } }
+                            ul { @for case in cases { li { code { (plan.command.of_case(*case)) } } } }
                         }
                         @if !kept_cases.is_empty() {
                             p {

@@ -126,7 +126,9 @@ impl<'a> State<'a> {
         if let Some(resets) = self.resets {
             return Ok(resets);
         }
-        let resets = can_reset(&self.plan.sweep, &mut Opened::default(), interrupt)?;
+        // The program that flies the cases outside looks after its instances.
+        let is_outside = self.plan.sweep.is_flown_outside;
+        let resets = is_outside || can_reset(&self.plan.sweep, &mut Opened::default(), interrupt)?;
         if !resets {
             tracing::warn!(
                 "a case gave another result after fmi2Reset than with a new instance: each case gets new instances"
@@ -273,9 +275,12 @@ fn fly_parts(
     let left: u64 = missing.iter().map(|part| part.end - part.start).sum();
     let done = state.done();
     let progress = Parts::new("cases", &plan.campaign.title, done + left, done, options.quiet);
+    // All requests to another program go through one standard output.
+    let is_outside = plan.sweep.is_flown_outside;
+    let threads = if is_outside { 1 } else { work::threads(options.jobs, [&plan.sweep]) };
     let Worked { results, failures } = work::on_parts(
         missing,
-        work::threads(options.jobs, [&plan.sweep]),
+        threads,
         || Flight::new(plan, resets, interrupt),
         |flight, part| parts::fly(plan, out, part, flight, |_| progress.advance(1)),
         |_| false,

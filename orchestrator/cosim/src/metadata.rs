@@ -27,20 +27,9 @@ pub fn metadata(
         .map(|(component, name, value)| (format!("{component}.{name}"), value))
         .collect();
     let parts = system.parts();
-    let variable = |component: usize, variable: usize| {
-        let part = parts[component];
-        format!("{}.{}", part.name, part.description.variables[variable].name)
-    };
-    let connections: Vec<Value> = system
-        .wires
-        .iter()
-        .map(|w| {
-            json!({
-                "from": variable(w.from.component, w.from.variable),
-                "to": variable(w.to.component, w.to.variable),
-            })
-        })
-        .collect();
+    let connections = system.connections().into_iter();
+    let connections: Vec<Value> =
+        connections.map(|(from, to)| json!({ "from": from, "to": to })).collect();
     let columns: Vec<Value> = system
         .columns
         .iter()

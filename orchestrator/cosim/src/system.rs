@@ -219,6 +219,23 @@ impl System {
             .collect()
     }
 
+    /// Returns the full names of the probed variables, in the order of a sample's values, and
+    /// whether each responds to the inputs of the communication point.
+    pub fn probed(&self) -> Vec<(String, bool)> {
+        let named = self.probes.iter().enumerate();
+        named.map(|(place, port)| (self.path(*port), self.is_response(place))).collect()
+    }
+
+    /// Returns the full names of the connected outputs and inputs.
+    pub fn connections(&self) -> Vec<(String, String)> {
+        self.wires.iter().map(|wire| (self.path(wire.from), self.path(wire.to))).collect()
+    }
+
+    fn path(&self, port: Port) -> String {
+        let component = &self.components[port.component];
+        format!("{}.{}", component.name, component.fmu.description.variables[port.variable].name)
+    }
+
     fn kind(&self, port: Port) -> &VariableKind {
         &self.components[port.component].fmu.description.variables[port.variable].kind
     }

@@ -5,7 +5,7 @@ use crate::error::Error;
 use crate::interrupt::Interrupt;
 use crate::master::Master;
 use crate::settings::{self, Setting};
-use crate::system::System;
+use crate::system::{Parameters, System};
 use fmu_import::description::Variable;
 use fmu_import::names;
 use toml::Value;
@@ -91,6 +91,14 @@ impl System {
         let settings = self.varied(changes);
         master.reset(|index, instance| settings::apply(&settings[index], instance))?;
         master.initialize()
+    }
+
+    /// Returns the values that are set in all components with the changes made to them.
+    pub fn set_values(&self, changes: &[(Target, SettingValue)]) -> Parameters {
+        let settings = self.varied(changes).into_iter().map(|settings| {
+            settings.into_iter().map(|setting| (setting.name, setting.value.to_json())).collect()
+        });
+        self.names().into_iter().map(String::from).zip(settings).collect()
     }
 
     /// Returns the settings of all components with the changes made to them.

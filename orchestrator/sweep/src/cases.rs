@@ -36,6 +36,8 @@ pub struct Sweep {
     pub keys: BTreeMap<String, String>,
     /// Archive of an FMU that can be instantiated only once per process, if there is one.
     pub single: Option<PathBuf>,
+    /// Whether another program flies the cases ([`crate::outside`]).
+    pub is_flown_outside: bool,
     experiment: Experiment,
     /// File that describes the variation, for errors.
     source: Source,
@@ -90,6 +92,7 @@ impl Sweep {
             span: [system.clock.start(), system.clock.stop()],
             keys: keys(&system)?,
             single: single.map(|component| component.fmu.path.clone()),
+            is_flown_outside: false,
             varied,
             source: source.clone(),
             archives: system.components.into_iter().map(|c| (c.name, c.fmu.path.clone())).collect(),

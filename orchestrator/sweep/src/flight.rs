@@ -1,6 +1,7 @@
 //! Flies cases one after the other with the same instances, which are reset between cases.
 
 use crate::cases::Sweep;
+use crate::outside;
 use crate::table::{Column, Values};
 use cosim::error::Error;
 use cosim::experiment::Margins;
@@ -159,36 +160,41 @@ impl<'a> Flight<'a> {
     ) -> Result<Flown, Error> {
         let changes = self.sweep.changes(&values);
         self.meters.reset();
-        let started = match self.master.take().filter(|_| self.resets) {
-            Some(mut master) => self.system.restart(&mut master, &changes).map(|()| master),
-            None => self.system.start_varied(&changes, self.interrupt),
-        };
         let mut watch = Watch {
             meters: &mut self.meters,
             bounds: &self.bounds,
             broken: None,
             time: self.sweep.span[0],
         };
+        let mut observers: Vec<&mut dyn Observer> = Vec::with_capacity(1 + others.len());
+        for other in others.iter_mut() {
+            observers.push(&mut **other);
+        }
+        // The watch comes last, because it may end the case.
+        observers.push(&mut watch);
         let mut step_us = Vec::new();
-        let outcome = started.and_then(|mut master| {
-            if self.times {
-                master.measure_time();
-            }
-            let mut observers: Vec<&mut dyn Observer> = Vec::with_capacity(1 + others.len());
-            for other in others.iter_mut() {
-                observers.push(&mut **other);
-            }
-            // The watch comes last, because it may end the case.
-            observers.push(&mut watch);
-            let outcome = master.run(&mut observers);
-            let times = master.step_seconds();
-            step_us = times.map(|(name, seconds)| (name.to_string(), seconds * 1e6)).collect();
-            // An instance that failed is not used again.
-            if !matches!(outcome, Err(Error::Call { .. })) {
-                self.master = Some(master);
-            }
-            outcome
-        });
+        let outcome = if self.sweep.is_flown_outside {
+            outside::fly(&self.system, Some(case), &changes, &mut observers)
+        } else {
+            let started = match self.master.take().filter(|_| self.resets) {
+                Some(mut master) => self.system.restart(&mut master, &changes).map(|()| master),
+                None => self.system.start_varied(&changes, self.interrupt),
+            };
+            started.and_then(|mut master| {
+                if self.times {
+                    master.measure_time();
+                }
+                let outcome = master.run(&mut observers);
+                let times = master.step_seconds();
+                step_us = times.map(|(name, seconds)| (name.to_string(), seconds * 1e6)).collect();
+                // An instance that failed is not used again.
+                if !matches!(outcome, Err(Error::Call { .. })) {
+                    self.master = Some(master);
+                }
+                outcome
+            })
+        };
+        drop(observers);
         let Watch { broken, time, .. } = watch;
         let outcome = match outcome {
             Err(error) if !is_of_case(&error) => return Err(error),

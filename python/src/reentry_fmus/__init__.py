@@ -10,10 +10,14 @@ Quantities are in SI units and radians unless `units="deg"` selects degrees.
 
 from ._campaign import Campaign, Flown, Search, campaign, falsify
 from ._data import experiments, fmu, fmus
-from ._experiment import Figure, OrchestratorError, OrchestratorWarning, Run, experiment
+from ._experiment import experiment
 from ._instance import InstanceError, InstanceWarning
+from ._law import LawError
 from ._linear import OpenLoop, linearise, margins
-from ._loop import ClosedLoop, State
+from ._loop import ClosedLoop
+from ._orchestrator import OrchestratorError, OrchestratorWarning
+from ._run import Figure, Run
+from ._state import State
 from ._study import Study, reproduce
 
 __all__ = [
@@ -23,6 +27,7 @@ __all__ = [
     "Flown",
     "InstanceError",
     "InstanceWarning",
+    "LawError",
     "OpenLoop",
     "OrchestratorError",
     "OrchestratorWarning",

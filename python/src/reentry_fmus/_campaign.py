@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 import json
 import os
 from dataclasses import dataclass
@@ -10,12 +11,19 @@ from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
-from ._data import FMUS, need
-from ._experiment import Figure, OrchestratorError, Run, orchestrate, recorded
+from ._arrays import dataset
+from ._data import FMUS, fmu, need
+from ._experiment import recorded
+from ._law import REFERENCE, Flyer, LawError, PickledLaw
+from ._orchestrator import OrchestratorError, missing_parts, orchestrate
+from ._pool import Pool
+from ._run import Figure, Run
+from ._state import Law
 from ._table import Units, check_units, convert
 
 if TYPE_CHECKING:
     from distributed import Client
+    from xarray import Dataset
 
 STATUS = ["completed", "ended", "lost", "failed"]
 
@@ -43,6 +51,38 @@ class Flown:
         """Path of the report, a page for the browser."""
         return self.folder / "report.html"
 
+    def to_xarray(self) -> Dataset:
+        """Returns the table as an xarray Dataset with the dimension "case". Each variable has its
+        unit as an attribute.
+
+        Raises:
+            ModuleNotFoundError: xarray is not installed.
+        """
+        return dataset(self.table, self.summary["title"], {})
+
+    def __repr__(self) -> str:
+        status = self.table["status"].value_counts()
+        counts = ", ".join(f"{count} {name}" for name, count in status.items() if count)
+        lines = [f"Flown: {self.summary['title']}", f"  {len(self.table)} cases, {counts}"]
+        for limit in self.summary["limits"]:
+            broken = limit["broken"]
+            lines.append(
+                f"  {limit['says']}: broken by {broken['events']} of {broken['cases']}, "
+                f"probability {broken['low']:.3g} to {broken['high']:.3g}"
+            )
+        return "\n".join([*lines, f"  {near(self.report)}"])
+
+    def _repr_html_(self) -> str:
+        rows = "".join(
+            f"<tr><td>{html.escape(limit['says'])}</td>"
+            f"<td>{limit['broken']['events']} of {limit['broken']['cases']}</td>"
+            f"<td>{limit['broken']['low']:.3g} to {limit['broken']['high']:.3g}</td></tr>"
+            for limit in self.summary["limits"]
+        )
+        heading = "<tr><th>limit</th><th>broken by</th><th>probability (95 %)</th></tr>"
+        title = f"{html.escape(self.summary['title'])}, {len(self.table)} cases"
+        return f"<p><b>{title}</b></p><table>{heading}{rows}</table>"
+
 
 @dataclass(frozen=True, eq=False)
 class Search:
@@ -66,6 +106,16 @@ class Search:
         """Path of the worst case, an experiment for `experiment`."""
         return self.folder / "worst.toml"
 
+    def __repr__(self) -> str:
+        found = self.outcome
+        lines = [
+            f"Search: largest {found['measure']} {found['largest']:.6g} {found['unit']}",
+            f"  {len(self.table)} cases; {found['ended']}",
+        ]
+        if found["broken"]:
+            lines.append(f"  breaks {', '.join(found['broken'])}")
+        return "\n".join([*lines, f"  {near(self.worst)}"])
+
     def _repr_svg_(self) -> str:
         return str(self.figure)
 
@@ -74,17 +124,21 @@ class Campaign:
     """A campaign: an experiment, the parameters that vary from case to case, and the limits that
     the cases are to keep. `campaign` makes one."""
 
-    def __init__(self, path: str) -> None:
+    def __init__(self, path: str, law: Law | None = None) -> None:
         self.path = path
         """The campaign's file, or a name that the orchestrator knows."""
+        self.law = None if law is None else PickledLaw(law)
+        """Law in Python that replaces the controller."""
 
     def __repr__(self) -> str:
-        return f"campaign({self.path!r})"
+        law = "" if self.law is None else f", law={self.law.name}"
+        return f"campaign({self.path!r}{law})"
 
     @property
     def name(self) -> str:
-        """Name of the campaign, which is that of its file."""
-        return Path(self.path).stem
+        """Name of the campaign, which is that of its file, and that of a law."""
+        stem = Path(self.path).stem
+        return stem if self.law is None else f"{stem}-{self.law.name.strip('<>')}"
 
     def run(
         self,
@@ -106,12 +160,15 @@ class Campaign:
             out: Folder of the results, by default out/NAME. With a client it may be the address
                 of a folder that all workers reach, such as "s3://bucket/folder", where they store
                 the finished parts; the results are then in out/NAME as well.
-            jobs: Number of threads without a client, by default one for each core.
+            jobs: Number of threads without a client, or of processes with a law in Python, by
+                default one for each core.
             units: "deg" gives angles and angular rates of the table in degrees.
 
         Raises:
             OrchestratorError: The campaign was refused, or flying it failed.
             ClusterError: The cluster failed. Finished parts are kept.
+            LawError: The law failed. Finished parts are kept.
+            ValueError: The loop is none that a law can fly.
         """
         check_units(units)
         is_address = out is not None and "://" in os.fspath(out)
@@ -120,7 +177,11 @@ class Campaign:
         if client is not None and jobs is not None:
             raise ValueError("jobs is for runs without a client: workers have threads of their own")
         folder = Path("out", self.name) if out is None or is_address else Path(out)
-        if client is not None:
+        if self.law is not None:
+            if client is not None:
+                raise ValueError("a law in Python flies on this machine alone, without a client")
+            self._fly(self.law, folder, jobs)
+        elif client is not None:
             from . import cluster
 
             cluster.fly(self.call, client, folder, os.fspath(out) if out and is_address else None)
@@ -145,35 +206,64 @@ class Campaign:
 
         Raises:
             OrchestratorError: The campaign was refused, or the run failed.
+            LawError: The law failed.
         """
         check_units(units)
-        return recorded([*self.command("campaign"), "--case", str(number)], out, units)
+        command = [*self.command("campaign"), "--case", str(number)]
+        if self.law is None:
+            return recorded(command, out, units)
+        with Flyer(self.law, number) as fly:
+            try:
+                return recorded(command, out, units, fly=fly)
+            except LawError as error:
+                raise error.in_file(self.law.file) from error.__cause__
+
+    def _fly(self, law: PickledLaw, folder: Path, jobs: int | None) -> None:
+        """Flies the missing parts with a law, and lets the orchestrator merge and judge them."""
+        flown: set[int] = set()
+        with Pool(law, [*self.command("campaign"), "--out", str(folder)], jobs) as pool:
+            # A campaign that ends with an answer needs more cases at each look.
+            while missing := missing_parts(self.call, folder):
+                if not flown.isdisjoint(first for first, _ in missing):
+                    raise RuntimeError("the campaign's files were changed while it was flown")
+                flown.update(first for first, _ in missing)
+                pool.fly(missing)
+            pool.finish()
 
     def command(self, name: str) -> list[str]:
         """Returns the arguments of a command of the orchestrator for this campaign."""
-        return [name, self.path, "--fmu-dir", str(FMUS), "--quiet"]
+        command = [name, self.path, "--fmu-dir", str(FMUS), "--quiet"]
+        if self.law is not None:
+            command += ["--law", self.law.key, "--fmu", f"controller={fmu(REFERENCE)}"]
+        return command
 
     def call(self, *arguments: str, command: str = "campaign") -> str:
         """Calls the orchestrator with this campaign, and returns what it prints."""
         command_line = [*self.command(command), *arguments]
-        exit_code, error, printed = orchestrate(command_line, stacklevel=4)
+        # What the FMU that stands for a law lacks is no matter of the law.
+        level = "warn" if self.law is None else "error"
+        exit_code, error, printed = orchestrate(command_line, stacklevel=4, level=level)
         if exit_code != 0:
             raise OrchestratorError(error, exit_code, None)
         return printed
 
 
-def campaign(name: str | os.PathLike[str]) -> Campaign:
+def campaign(name: str | os.PathLike[str], law: Law | None = None) -> Campaign:
     """Returns a campaign, whose `run` flies it.
 
     Args:
         name: Path of a campaign file (TOML), or the name of a campaign of this package.
+        law: Law in Python that replaces the controller, a function from the state to the moment as
+            in `ClosedLoop.run`, in a loop in which the moment acts directly. It is sent to
+            processes by cloudpickle, and each case begins with a fresh copy of it, so that it may
+            be an object with a memory.
 
     Raises:
-        ModuleNotFoundError: pyarrow, which reads the results, is not installed.
+        ModuleNotFoundError: pyarrow, which reads the results, or cloudpickle is not installed.
     """
     need("pyarrow", "campaign")
     path = Path(name)
-    return Campaign(str(path.absolute()) if path.is_file() else os.fspath(name))
+    return Campaign(str(path.absolute()) if path.is_file() else os.fspath(name), law)
 
 
 def falsify(
@@ -211,6 +301,11 @@ def falsify(
         figure=Figure((folder / "history.svg").read_text("utf-8")),
         folder=folder.absolute(),
     )
+
+
+def near(path: Path) -> Path:
+    """Returns a path as it is from the current folder, if it lies below it."""
+    return path.relative_to(Path.cwd()) if path.is_relative_to(Path.cwd()) else path
 
 
 def read_cases(path: Path, units: Units) -> pd.DataFrame:

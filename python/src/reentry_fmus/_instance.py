@@ -123,6 +123,18 @@ class Instance:
         """Sets real variables by value reference."""
         self._call(self._fmpy.setReal, references, values)
 
+    def reader(self, kind: str, names: Sequence[str]) -> Callable[[], Sequence[float]]:
+        """Returns a function that reads variables of a type as numbers."""
+        functions = {"Real": self._fmpy.getReal, "Boolean": self._fmpy.getBoolean}
+        function = functions.get(kind, self._fmpy.getInteger)
+        references = self.references(names)
+
+        def read() -> Sequence[float]:
+            values: Sequence[float] = self._call(function, references)
+            return values
+
+        return read
+
     def get(self, name: str) -> Value:
         """Returns a variable; an enumeration as its item's name."""
         variable = self.variable(name)

@@ -14,7 +14,8 @@ import numpy.typing as npt
 import pandas as pd
 
 from ._data import FMUS, experiment_path, fmu_path
-from ._experiment import OrchestratorError, Value, orchestrate, written
+from ._experiment import Value, written
+from ._orchestrator import OrchestratorError, orchestrate
 
 if TYPE_CHECKING:
     import control

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from functools import partial
+from pathlib import Path
 from types import TracebackType
 
 import numpy as np
@@ -13,50 +14,12 @@ import pandas as pd
 
 from ._data import fmu_path, hint
 from ._instance import Instance, InstanceError, Value
+from ._judged import Flown, judged, observed
+from ._recording import ATTITUDE, ATTITUDE_RATE, MOMENT, RATE, RECORDED, REFERENCES
+from ._recording import Probes, Variable
+from ._run import Run
+from ._state import Law, State, name_of, vector
 from ._table import Units, check_units, convert
-
-Vector = npt.NDArray[np.float64]
-
-ANGLES = ("alpha", "beta", "sigma")
-ATTITUDE = [f"attitude.{axis}" for axis in ANGLES]
-ATTITUDE_RATE = [f"attitudeRate.{axis}" for axis in ANGLES]
-RATE = [f"rate.{axis}" for axis in "pqr"]
-MOMENT = [f"moment.{axis}" for axis in "xyz"]
-REFERENCES = [
-    f"{kind}.{axis}"
-    for kind in ("reference", "referenceRate", "referenceAcceleration")
-    for axis in ANGLES
-]
-
-
-@dataclass(frozen=True, eq=False)
-class State:
-    """State of the loop at one communication point. All arrays have the shape (3,)."""
-
-    time: float
-    """Time, s."""
-
-    attitude: Vector
-    """Angle of attack, sideslip angle and bank angle, rad."""
-
-    attitude_rate: Vector
-    """Time derivative of the attitude, rad/s."""
-
-    rate: Vector
-    """Body rates p, q, r, rad/s."""
-
-    reference: Vector
-    """Reference of the attitude, rad."""
-
-    reference_rate: Vector
-    """First derivative of the reference, rad/s."""
-
-    reference_acceleration: Vector
-    """Second derivative of the reference, rad/s2."""
-
-    moment: Vector
-    """Roll, pitch and yaw moment of the last step, N m. Before the first step it is the
-    controller's initial moment, or zero without a controller."""
 
 
 class ClosedLoop:
@@ -89,7 +52,8 @@ class ClosedLoop:
         step: Length of a communication step, s.
         parameters: Parameters by component, such as {"plant.disturbance.seed": 7,
             "controller.constraints": "paper"}: numbers in SI units, enumerations by their items'
-            names. Without a controller, "controller.reference.*" chooses the reference.
+            names. Without a controller, "controller.reference.*" chooses the reference, and
+            "controller.limit.*" the limits on rate and moment that metrics and figure show.
 
     Raises:
         ValueError: There is no such FMU, variable or item.
@@ -106,17 +70,27 @@ class ClosedLoop:
         if not (np.isfinite(step) and step > 0.0):
             raise ValueError(f"step = {step} s, but a positive time is needed")
         by_component = split(parameters or {}, has_controller=controller is not None)
-        self._step = float(step)
+        # Every controller computes the reference. If the law is in Python, one of them is used for
+        # that alone: its inputs are not set, and its moment is not read.
+        paths = {"plant": fmu_path(plant), "controller": fmu_path(controller or "LQR")}
+        self._open(paths, by_component, float(step), has_controller=controller is not None)
+
+    def _open(
+        self,
+        paths: dict[str, Path],
+        parameters: dict[str, dict[str, Value]],
+        step: float,
+        has_controller: bool,
+    ) -> None:
+        self._paths = paths
+        self._step = step
         self._is_open = True
         self._failure: InstanceError | None = None
-        self._has_controller = controller is not None
-        self._parameters = by_component
-        self._plant = Instance(fmu_path(plant), by_component["plant"])
+        self._has_controller = has_controller
+        self._parameters = parameters
+        self._plant = Instance(paths["plant"], parameters["plant"])
         try:
-            # Every controller computes the reference. If the law is in Python, one of them is
-            # used for that alone: its inputs are not set, and its moment is not read.
-            path = fmu_path(controller if controller is not None else "LQR")
-            self._controller = Instance(path, by_component["controller"])
+            self._controller = Instance(paths["controller"], parameters["controller"])
         except BaseException:
             self._plant.close()
             raise
@@ -126,6 +100,27 @@ class ClosedLoop:
         except BaseException:
             self.close()
             raise
+
+    @classmethod
+    def _with_law(cls, paths: dict[str, Path], step: float) -> ClosedLoop:
+        """Opens a loop without a controller, whose reference is that of an FMU."""
+        loop = cls.__new__(cls)
+        loop._open(paths, {"plant": {}, "controller": {}}, step, has_controller=False)
+        return loop
+
+    def _restart(self, settings: Mapping[str, Mapping[str, Value]]) -> None:
+        """Starts again at t = 0 with these values of parameters and inputs, by component."""
+        inputs: dict[str, Value] = {}
+        self._parameters = {"plant": {}, "controller": {}}
+        for component, values in settings.items():
+            for name, value in values.items():
+                if self._component(f"{component}.")[0].variable(name).causality == "input":
+                    inputs[f"{component}.{name}"] = value
+                else:
+                    self._parameters[component][name] = value
+        self.reset()
+        for name, value in inputs.items():
+            self.set(name, value)
 
     def _wire(self) -> None:
         self._from_plant = self._plant.references(ATTITUDE + RATE)
@@ -215,18 +210,15 @@ class ClosedLoop:
         self._tick += 1
         self._measured, self._state = self._read()
 
-    def run(
-        self,
-        stop: float,
-        law: Callable[[State], npt.ArrayLike] | None = None,
-        units: Units = "si",
-    ) -> pd.DataFrame:
-        """Advances the loop to a time and returns a table of it.
+    def run(self, stop: float, law: Law | None = None, units: Units = "si") -> Run:
+        """Advances the loop to a time, and returns table, metrics and figure as `experiment` does.
 
         >>> with ClosedLoop(controller="LQR") as loop:
-        ...     table = loop.run(1.0)
-        >>> table.shape, table.attrs["units"]["controller.moment.x"]
-        ((26, 18), 'N.m')
+        ...     run = loop.run(10.0)
+        >>> run.table.shape, run.table.attrs["units"]["controller.moment.x"]
+        ((251, 18), 'N.m')
+        >>> round(run.metrics["max_rate_deg_s"], 1)
+        6.4
 
         Args:
             stop: Time to advance to, s: a multiple of the step.
@@ -235,10 +227,10 @@ class ClosedLoop:
             units: "deg" gives angles and angular rates in degrees for reading.
 
         Returns:
-            One row for each communication point, the present one included, with the time (s) as
-            index. The moment is that of the step which begins there; the last row repeats the one
-            before, or has the moment of the law. Columns and `attrs` are those of `experiment`:
-            "plant.attitude.alpha", ...
+            A table with one row for each communication point, the present one included, with the
+            time (s) as index. The moment is that of the step which begins there; the last row
+            repeats the one before. Columns and `attrs` are those of `experiment`:
+            "plant.attitude.alpha", ... Metrics and figure are those of the time that was run.
         """
         check_units(units)
         self._check_open()
@@ -251,33 +243,56 @@ class ClosedLoop:
             raise TypeError("run needs a law, because the loop has no controller")
         if law is not None and self._has_controller:
             raise TypeError(f"the moment comes from {self._controller.name}: leave out the law")
-        rows: list[list[float]] = []
+        more = [variable for variable in observed(self._paths) if variable not in RECORDED]
+        variables = RECORDED + more
+        first = self._tick
+        rows, failure = self._fly(steps, law, variables)
+        if failure is not None:
+            raise failure
+        by_name = dict(zip((name for name, _ in variables), rows.T, strict=True))
+        name = self._controller.name if law is None else name_of(law)
+        title = f"{name}, closed loop"
+        span = (first * self._step, self._tick * self._step, self._step)
+        by_law = None if law is None else name
+        flown = Flown(title, span, self._paths, self._parameters, by_name, by_law)
+        return Run(title, self._table(rows, first, units), partial(judged, flown))
+
+    def _fly(
+        self, steps: int, law: Law | None, variables: Sequence[Variable]
+    ) -> tuple[npt.NDArray[np.float64], InstanceError | None]:
+        """Advances the loop by steps. Returns the variables at each communication point, up to the
+        one at which an FMU failed, if one did."""
+        components = {"plant": self._plant, "controller": self._controller}
+        probes = Probes(components, variables, has_law=not self._has_controller)
+        rows = np.empty((steps + 1, len(variables)))
+        probes.response(rows[0], self._moment)
         for k in range(steps + 1):
             if k > 0:
-                self.step(None if law is None else rows[-1][-3:])
-                rows[-1][-3:] = self._moment
-            state = self._state
-            moment = state.moment if law is None else vector(law(state))
-            rows.append(
-                [
-                    state.time,
-                    *state.attitude,
-                    *state.rate,
-                    *state.reference,
-                    *state.reference_rate,
-                    *state.reference_acceleration,
-                    *moment,
-                ]
-            )
-        columns = {f"plant.{name}": self._plant.variable(name) for name in ATTITUDE + RATE}
-        columns |= {
-            f"controller.{name}": self._controller.variable(name) for name in REFERENCES + MOMENT
-        }
-        table = pd.DataFrame(rows, columns=["time", *columns]).set_index("time")
-        table.attrs["units"] = {name: variable.unit for name, variable in columns.items()}
-        table.attrs["descriptions"] = {
-            name: variable.description for name, variable in columns.items()
-        }
+                rows[k] = rows[k - 1]
+            probes.point(rows[k])
+            if k == steps:
+                break
+            try:
+                self.step(None if law is None else law(self._state))
+            except InstanceError as failure:
+                probes.command(rows[k], self._moment)
+                return rows[: k + 1], failure
+            probes.response(rows[k], self._moment)
+        return rows, None
+
+    def _table(
+        self, rows: npt.NDArray[np.float64], first: int, units: Units
+    ) -> pd.DataFrame:
+        times = [tick * self._step for tick in range(first, self._tick + 1)]
+        names = [name for name, _ in RECORDED]
+        index = pd.Index(times, name="time")
+        table = pd.DataFrame(rows[:, : len(names)].copy(), index=index, columns=names)
+        about = {}
+        for path in names:
+            component, name = self._component(path)
+            about[path] = component.variable(name)
+        table.attrs["units"] = {name: variable.unit for name, variable in about.items()}
+        table.attrs["descriptions"] = {name: v.description for name, v in about.items()}
         convert(table, units)
         return table
 
@@ -356,19 +371,6 @@ class ClosedLoop:
         self.close()
 
 
-def vector(moment: npt.ArrayLike) -> Vector:
-    """Checks a moment and returns it as an array of the shape (3,)."""
-    try:
-        components = np.asarray(moment, dtype=np.float64)
-    except (TypeError, ValueError):
-        components = np.array(np.nan)
-    if components.shape != (3,) or not np.isfinite(components).all():
-        raise ValueError(
-            f"a moment is three finite numbers, x, y and z in N m, but this is {moment!r}"
-        )
-    return components
-
-
 def split(parameters: Mapping[str, Value], has_controller: bool) -> dict[str, dict[str, Value]]:
     """Sorts parameters by component."""
     by_component: dict[str, dict[str, Value]] = {"plant": {}, "controller": {}}
@@ -379,7 +381,8 @@ def split(parameters: Mapping[str, Value], has_controller: bool) -> dict[str, di
                 f'{name}: there is no component "{component}"{hint(component, by_component)}'
             )
         if component == "controller" and not has_controller:
-            if not variable.startswith("reference."):
-                raise ValueError(f"{name}: the loop has no controller, only a reference")
+            if not variable.startswith(("reference.", "limit.")):
+                problem = "the loop has no controller, only a reference and limits"
+                raise ValueError(f"{name}: {problem}")
         by_component[component][variable] = value
     return by_component

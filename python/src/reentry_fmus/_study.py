@@ -11,7 +11,7 @@ from typing import Any
 import pandas as pd
 
 from ._data import FMUS
-from ._experiment import OrchestratorError, orchestrate
+from ._orchestrator import OrchestratorError, orchestrate
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,6 +36,11 @@ class Study:
     def report(self) -> Path:
         """Path of the report, a page for the browser."""
         return self.folder / "report.html"
+
+    def __repr__(self) -> str:
+        verdicts = self.claims.drop_duplicates("says")["verdict"].value_counts()
+        counts = ", ".join(f"{count} {verdict}" for verdict, count in verdicts.items())
+        return f"Study: {len(self.runs)} runs, claims: {counts}\n  {self.report}"
 
 
 def reproduce(

@@ -10,7 +10,6 @@ import asyncio
 import concurrent.futures
 import hashlib
 import io
-import json
 import os
 import shutil
 import subprocess
@@ -25,6 +24,7 @@ from pathlib import Path
 from typing import Any
 
 from ._data import need, program
+from ._orchestrator import missing_parts
 
 need("distributed", "cluster")
 
@@ -116,7 +116,7 @@ def fly(campaign: Command, client: Client, folder: Path, address: str | None = N
     is_sent = False
     try:
         # A campaign that ends with an answer needs more cases at each look.
-        while missing := work(campaign, folder):
+        while missing := missing_parts(campaign, folder):
             again = flown.intersection(first for first, _ in missing)
             if again:
                 raise ClusterError(
@@ -134,12 +134,6 @@ def fly(campaign: Command, client: Client, folder: Path, address: str | None = N
     if store is not None:
         for name in ("cases.parquet", "summary.json", "report.html"):
             store.keep(folder / name, name)
-
-
-def work(campaign: Command, folder: Path) -> list[tuple[int, int]]:
-    """Returns the parts that are missing, each with its first case and the one after its last."""
-    left: dict[str, Any] = json.loads(campaign("--work", "--out", str(folder)))
-    return [(first, last) for first, last in left["missing"]]
 
 
 def pack(campaign: Command) -> Bundle:

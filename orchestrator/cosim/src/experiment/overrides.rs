@@ -148,6 +148,18 @@ impl Experiment {
     }
 }
 
+impl Experiment {
+    /// Puts the name of a law that another program flies into the title, in place of the FMU that
+    /// stands for it: the last one of the command line.
+    pub fn name_law(&mut self, law: &str, overrides: &Overrides) {
+        let stand_in = overrides.fmu.last().and_then(|assignment| assignment.split_once('='));
+        let prefix = stand_in.map(|(_, fmu)| format!("{} in place of ", stem(fmu)));
+        let rest = prefix.and_then(|prefix| self.title.strip_prefix(&prefix).map(String::from));
+        let rest = rest.unwrap_or_else(|| format!("the controller: {}", self.title));
+        self.title = format!("law {law} in place of {rest}");
+    }
+}
+
 /// Returns the name of an FMU's file without folder and extension.
 fn stem(path: &str) -> String {
     Path::new(path).file_stem().unwrap_or_default().to_string_lossy().into_owned()

@@ -1,0 +1,129 @@
+"""Runs that were flown here, judged by the orchestrator."""
+
+from __future__ import annotations
+
+import json
+import re
+import tempfile
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ._data import EXPERIMENTS, FMUS
+from ._instance import Value
+from ._orchestrator import OrchestratorError, Rows, serve
+from ._recording import RECORDED, Variable
+from ._run import Judgement, read_judgement
+
+
+@dataclass(frozen=True, eq=False)
+class Flown:
+    """A run of the loop of the vehicle and a controller."""
+
+    title: str
+    span: tuple[float, float, float]
+    """First time, last time and communication step, s."""
+    paths: dict[str, Path]
+    """FMUs by component."""
+    parameters: dict[str, dict[str, Value]]
+    columns: dict[str, npt.NDArray[np.float64]]
+    """Values of variables at each communication point."""
+    law: str | None = None
+    """Name of the law, if it is one in Python."""
+
+
+def judged(flown: Flown) -> Judgement:
+    """Returns the orchestrator's metrics, figure and description of a run.
+
+    Raises:
+        OrchestratorError: The orchestrator refused the FMUs.
+    """
+
+    def rows(request: dict[str, Any]) -> Rows:
+        return Rows(np.column_stack([flown.columns[name] for name, _ in request["variables"]]))
+
+    with tempfile.TemporaryDirectory(prefix="reentry-") as temporary:
+        out = Path(temporary, "out")
+        exit_code, error = serve(command(flown, Path(temporary), out), rows)
+        # A run in which the attitude was lost is judged up to then.
+        if not (out / "metrics.json").exists():
+            # The experiment's file was made here, and nobody has seen it.
+            problem = re.sub(r"^\S*closed_loop\.toml:(\d+:)? ", "", error)
+            raise OrchestratorError(problem, exit_code, None)
+        judgement = read_judgement(out)
+    if flown.law is not None:
+        judgement.description["law"] = flown.law
+    return judgement
+
+
+class Noted(Exception):
+    """Nothing but the request was wanted."""
+
+
+@lru_cache
+def observed_by(plant: Path, controller: Path) -> tuple[Variable, ...]:
+    found: list[Variable] = []
+
+    def note(request: dict[str, Any]) -> Rows:
+        found.extend((str(name), bool(responds)) for name, responds in request["variables"])
+        raise Noted
+
+    paths = {"plant": plant, "controller": controller}
+    nothing = Flown("", (0.0, 1.0, 1.0), paths, {"plant": {}, "controller": {}}, {})
+    with tempfile.TemporaryDirectory(prefix="reentry-") as temporary:
+        try:
+            serve(command(nothing, Path(temporary), Path(temporary, "out")), note)
+        except Noted:
+            pass
+    # The loop runs also if these FMUs are refused. Whoever asks for its metrics gets the reason.
+    return tuple(found)
+
+
+def observed(paths: Mapping[str, Path]) -> tuple[Variable, ...]:
+    """Returns the variables that metrics and figure need of a loop of these FMUs. They are looked
+    up once."""
+    return observed_by(paths["plant"], paths["controller"])
+
+
+def command(flown: Flown, folder: Path, out: Path) -> list[str]:
+    """Writes the experiment of a run, and returns the command that judges it."""
+    path = folder / "closed_loop.toml"
+    path.write_text(experiment_of(flown), encoding="utf-8")
+    return ["judge", str(path), "--out", str(out), "--fmu-dir", str(FMUS)]
+
+
+def experiment_of(flown: Flown) -> str:
+    """Writes a run as an experiment."""
+    start, stop, step = flown.span
+    recorded = json.dumps([name for name, _ in RECORDED])
+    lines = [
+        f"extends = {text((EXPERIMENTS / 'base' / 'direct.toml').as_posix())}",
+        f"title = {text(flown.title)}",
+        f"[simulation]\nstart = {start!r}\nstop = {stop!r}\nstep = {step!r}",
+        f"[record]\nvariables = {recorded}",
+    ]
+    for component, path in flown.paths.items():
+        lines.append(f"[components.{component}]\nfmu = {text(str(path))}")
+        lines.append(f"[components.{component}.parameters]")
+        for name, value in flown.parameters[component].items():
+            lines.append(f"{text(name)} = {written(value)}")
+    return "\n".join(lines) + "\n"
+
+
+def text(value: str) -> str:
+    """Writes a text as TOML does, whose escapes are those of JSON."""
+    return json.dumps(value, ensure_ascii=False)
+
+
+def written(value: Value) -> str:
+    """Writes the value of a parameter as TOML."""
+    if isinstance(value, str):
+        return text(value)
+    if isinstance(value, (bool, np.bool_)):
+        return "true" if value else "false"
+    return repr(int(value)) if isinstance(value, (int, np.integer)) else repr(float(value))

@@ -1,0 +1,62 @@
+"""A process that flies parts of a campaign with a law in Python.
+
+It reads its task from standard input: the law and the command of the orchestrator, and then a line
+of arguments for each part. It answers each with a line: an error, or nothing.
+"""
+
+from __future__ import annotations
+
+import os
+import pickle
+import sys
+import warnings
+from typing import Any, BinaryIO
+
+Answer = tuple[str, Any]
+"""Kind of an error, and what describes it; ("done", None) if there is none."""
+
+
+def main() -> None:
+    """Serves until standard input ends."""
+    # What the law prints must not be taken for an answer.
+    answers = os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)
+    tasks = sys.stdin.buffer
+    # The law may be in a module that the other process has found.
+    sys.path[:] = pickle.load(tasks)
+    begun: dict[str, Any] = pickle.load(tasks)
+    warnings.simplefilter("ignore")
+    try:
+        serve(tasks, answers, **begun)
+    except BrokenPipeError:
+        # The other process has ended.
+        pass
+
+
+def serve(tasks: BinaryIO, answers: BinaryIO, law: bytes, command: list[str]) -> None:
+    """Flies part after part."""
+    from ._law import Flyer, LawError
+    from ._orchestrator import serve as orchestrate
+
+    with Flyer(lambda: pickle.loads(law)) as fly:
+        while True:
+            try:
+                arguments: list[str] = pickle.load(tasks)
+            except EOFError:
+                return
+            answer: Answer
+            try:
+                exit_code, error = orchestrate([*command, *arguments], fly)
+                answer = ("orchestrator", (error, exit_code)) if exit_code else ("done", None)
+            except LawError as failed:
+                answer = ("law", failed.args)
+            except ValueError as failed:
+                answer = ("value", str(failed))
+            except Exception as failed:
+                answer = ("other", f"{type(failed).__name__}: {failed}")
+            pickle.dump(answer, answers)
+            answers.flush()
+
+
+if __name__ == "__main__":
+    main()
