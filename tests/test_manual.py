@@ -70,7 +70,7 @@ def pages(site):
 
 
 def test_every_page_has_a_chapter():
-    listed = [name for part in CHAPTERS for name in part["pages"]]
+    listed = [re.sub(r".*<(.*)>", r"\1", name) for part in CHAPTERS for name in part["pages"]]
     assert len(listed) == len(set(listed))
     written = {f"docs/{path.stem}" for path in (ROOT / "docs").glob("*.md")} - {"docs/index"}
     assert written == {name for name in listed if name.startswith("docs/")}
@@ -147,6 +147,13 @@ def test_the_gallery_has_every_controller_and_every_experiment(site):
         assert re.search(r"<(polyline|path)", plot), name
 
 
+def browse(address, profile, *options):
+    """The page as Chromium has it when its scripts have run."""
+    quiet = "--headless --no-sandbox --disable-gpu --disable-quic --no-first-run --disable-background-networking --disable-component-update --disable-sync"
+    command = [CHROMIUM, *quiet.split(), *options, f"--user-data-dir={profile}", "--virtual-time-budget=60000", "--dump-dom", address]
+    return subprocess.run(command, capture_output=True, text=True, timeout=300).stdout
+
+
 @can_build
 @in_chromium
 @pytest.mark.parametrize(
@@ -162,9 +169,34 @@ def test_the_gallery_has_every_controller_and_every_experiment(site):
 )
 def test_the_search_finds(site, text, place, tmp_path):
     """Opened from a file, as a reader without a server does."""
-    quiet = "--headless --no-sandbox --disable-gpu --disable-quic --no-first-run --disable-background-networking --disable-component-update --disable-sync"
-    address = f"{(site / 'search.html').as_uri()}?q={text.replace(' ', '+')}"
-    command = [CHROMIUM, *quiet.split(), f"--user-data-dir={tmp_path}", "--virtual-time-budget=10000", "--dump-dom", address]
-    shown = subprocess.run(command, capture_output=True, text=True, timeout=120).stdout
+    shown = browse(f"{(site / 'search.html').as_uri()}?q={text.replace(' ', '+')}", tmp_path)
     found = re.findall(r'<a href="([^"]+)"', shown[shown.index('id="search-results"') :])
     assert any(link.startswith(place) for link in found), found
+
+
+# Lists what reaches beyond the right edge of a telephone's screen and does not scroll by itself.
+WIDE = """<pre></pre><script>(async () => {
+    const wide = [], scrolls = (e) => e.tagName !== "ARTICLE" && (["auto", "scroll", "hidden"].includes(getComputedStyle(e).overflowX) || scrolls(e.parentElement));
+    for (const page of PAGES) {
+        const frame = document.createElement("iframe");
+        Object.assign(frame.style, { width: "390px", height: "800px" });
+        frame.src = page;
+        document.body.append(frame);
+        await new Promise((loaded) => (frame.onload = loaded));
+        for (const element of frame.contentDocument.querySelectorAll("article *"))
+            if (element.getBoundingClientRect().right > 391 && !scrolls(element.parentElement)) wide.push(page + " " + element.tagName);
+        frame.remove();
+    }
+    document.querySelector("pre").textContent = "looked at " + PAGES.length + ": " + wide.join(", ") + ".";
+})();</script>"""
+
+
+@can_build
+@in_chromium
+def test_pages_fit_on_a_telephone(site, tmp_path):
+    shown = [path.as_uri() for path in pages(site) if path.relative_to(site).parts[0] != "source"]
+    harness = tmp_path / "harness.html"
+    harness.write_text(WIDE.replace("PAGES", json.dumps(shown)))
+    found = re.search(r"looked at (\d+): (.*?)\.</pre>", browse(harness.as_uri(), tmp_path / "profile", "--allow-file-access-from-files"), re.DOTALL)
+    assert found and int(found[1]) == len(shown) >= 60
+    assert found[2] == ""

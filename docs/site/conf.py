@@ -54,6 +54,7 @@ imported = {
 autodoc_mock_imports = sorted(imported - sys.stdlib_module_names - {"reentry_fmus"})
 autodoc_typehints = "signature"
 autodoc_member_order = "bysource"
+toc_object_entries = False
 
 html_theme = "furo"
 html_static_path = [str(SITE / "static"), os.environ["MANUAL_STATIC"]]
@@ -77,7 +78,8 @@ def add_chapters(app, docname, source):
     """Puts the chapters below the front page, which is plain Markdown."""
     if docname == root_doc:
         for part in tomllib.loads((SITE / "chapters.toml").read_text(encoding="utf-8"))["part"]:
-            pages = "\n".join(f"/{page}" for page in part["pages"])
+            # Paths begin at the root of the pages, also in brackets behind a title.
+            pages = "\n".join(re.sub(r"^([^<]*<)?(?=[^<]*$)", r"\g<0>/", page) for page in part["pages"])
             source[0] += f"\n```{{toctree}}\n:hidden:\n:caption: {part['title']}\n\n{pages}\n```\n"
 
 

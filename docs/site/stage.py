@@ -153,8 +153,9 @@ def gallery_page(folder, pictures):
     parts = [
         "# Gallery\n\nEach plot is the `plot.svg` of a run with the experiment's own settings. "
         "The command above it repeats the run.\n",
-        "## Every controller\n\nAll of them on the scenario of Chai 2022, "
-        "with the moment acting as commanded.\n",
+        "## Every controller\n\nAll of them on the scenario of Chai 2022, with the moment acting as "
+        "commanded. The vehicle is in every picture; ControlAllocator is in the experiments with control "
+        "allocation, AttitudeEstimator in those with sensors, and EntryGuidance in the entry flights.\n",
     ]
     groups = {None: gallery.controllers(), **gallery.experiments()}
     for group, members in groups.items():
