@@ -161,7 +161,7 @@ def browse(address, profile, *options):
     [
         ("guarantee", "docs/guarantee.html"),
         ("k1", "reference/variables/CRMPC.html#CRMPC.feedback.k1"),
-        ("EMS", "docs/symbols.html"),
+        ("EMS", "docs/glossary.html"),
         ("guarantee.rateMargin", "reference/variables/CRMPC.html#CRMPC.guarantee.rateMargin"),
         ("at_most", "reference/campaign-keys.html#campaign.Limit.at_most"),
         ("disk margin", "docs/margins.html"),
@@ -171,7 +171,7 @@ def test_the_search_finds(site, text, place, tmp_path):
     """Opened from a file, as a reader without a server does."""
     shown = browse(f"{(site / 'search.html').as_uri()}?q={text.replace(' ', '+')}", tmp_path)
     found = re.findall(r'<a href="([^"]+)"', shown[shown.index('id="search-results"') :])
-    assert any(link.startswith(place) for link in found), found
+    assert any(link.startswith(place) for link in found[:4]), found
 
 
 # Lists what reaches beyond the right edge of a telephone's screen and does not scroll by itself.

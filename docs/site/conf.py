@@ -67,6 +67,7 @@ html_copy_source = False
 html_show_sphinx = False
 # Opened from a file, the site cannot read the pages for excerpts: it finds pages and sections.
 html_show_search_summary = False
+html_search_scorer = str(SITE / "scorer.js")
 html_theme_options = {"navigation_with_keys": True}
 # The committed pages do not say what a block without a language is: it is text.
 highlight_language = "text"
