@@ -45,17 +45,18 @@ def explained(name):
 
 
 def variable_table(fmu, rows):
-    lines = ["| variable | start | range | meaning |", "|---|---|---|---|"]
+    table = [["variable", "start", "unit", "range", "meaning"]]
     for (stem, span, unit, meaning, _), entries in parameters.grouped(rows):
         endings = [ending if not ending or ending.startswith("[") else f".{ending}" for ending, _ in entries]
         entry = [f"{{variable}}`{fmu}.{stem}{ending}`" for ending in endings]
         name = ", ".join(entry) if len(entry) <= 3 else f"{entry[0]} … {entry[-1]}"
         starts = [start or "" for _, start in entries]
         start = starts[0] if len(set(starts)) == 1 else ", ".join(starts) if len(starts) <= 10 else "various"
-        start += f" {unit}" if unit and start and start != "various" else ""
-        text = meaning if start else f"{meaning}{f', {unit}' if unit else ''}"
-        lines.append(f"| {name} | {start} | {span}{f' {unit}' if unit and span else ''} | {text} |")
-    return "\n".join(lines)
+        table.append([name, start, unit, span, meaning])
+    # Outputs have no start value, and few variables have a range.
+    filled = [column for column in zip(*table) if any(column[1:])]
+    lines = ["| " + " | ".join(row) + " |" for row in zip(*filled)]
+    return "\n".join([lines[0], "|---" * len(filled) + "|", *lines[1:]])
 
 
 def keys(folder, kind):
@@ -130,8 +131,8 @@ def python_api(folder):
     write(folder / "python-api.md", text)
 
 
-def rust_api(folder, has_pages):
-    """Lists the crates with their descriptions; `has_pages`: rust/ holds what cargo doc wrote."""
+def rust_api(folder, rust):
+    """Lists the crates with their descriptions, and links what cargo doc wrote to the folder `rust`."""
     lines = ["# Rust API\n", "| crate | folder | what it is |", "|---|---|---|"]
     for file in tracked("*/Cargo.toml"):
         folder_name = str(Path(file).parent)
@@ -141,8 +142,9 @@ def rust_api(folder, has_pages):
         if folder_name.split("/")[0] in ("tests", "examples") or not (name and about):
             continue
         library = re.search(r'\[lib\][^\[]*?^name = "(\w+)"', text, re.M)
-        page = f"../rust/{library[1] if library else name[1].replace('-', '_')}/index.html"
-        title = f'<a href="{page}">{name[1]}</a>' if has_pages else f"`{name[1]}`"
+        module = library[1] if library else name[1].replace("-", "_")
+        has_page = (rust / module / "index.html").is_file()
+        title = f'<a href="../rust/{module}/index.html">{name[1]}</a>' if has_page else f"`{name[1]}`"
         lines.append(f"| {title} | [{folder_name}](../{folder_name}) | {about[1]} |")
     lines.append("\n`cargo doc --workspace --no-deps --open` makes the pages of all crates and opens them.")
     write(folder / "rust-api.md", "\n".join(lines))
@@ -186,7 +188,7 @@ def pages(stage):
             shutil.copy2(ROOT / file, stage / file)
 
 
-def main(stage, pictures, has_rust):
+def main(stage, pictures, rust):
     shutil.rmtree(stage, ignore_errors=True)
     pages(stage)
     folder = stage / "reference"
@@ -194,9 +196,9 @@ def main(stage, pictures, has_rust):
     for kind in EXPLAINED:
         keys(folder, kind)
     python_api(folder)
-    rust_api(folder, has_rust)
+    rust_api(folder, rust)
     gallery_page(folder, pictures)
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]), Path(sys.argv[2]), Path(sys.argv[3]).is_dir())
+    main(Path(sys.argv[1]), Path(sys.argv[2]), Path(sys.argv[3]))
