@@ -55,6 +55,8 @@ autodoc_mock_imports = sorted(imported - sys.stdlib_module_names - {"reentry_fmu
 autodoc_typehints = "signature"
 autodoc_member_order = "bysource"
 toc_object_entries = False
+# Names in docstrings stand between single backticks.
+default_role = "literal"
 
 html_theme = "furo"
 html_static_path = [str(SITE / "static"), os.environ["MANUAL_STATIC"]]
@@ -69,7 +71,7 @@ html_show_sphinx = False
 html_show_search_summary = False
 html_search_scorer = str(SITE / "scorer.js")
 html_theme_options = {"navigation_with_keys": True}
-# The committed pages do not say what a block without a language is: it is text.
+# A block without a language is text.
 highlight_language = "text"
 pygments_style = "a11y-high-contrast-light"
 pygments_dark_style = "a11y-high-contrast-dark"
