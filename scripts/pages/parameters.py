@@ -29,11 +29,11 @@ def number(text, unit):
     return f"{value:.7g}".replace("-", "−")
 
 
-def rows(root):
-    """Yields name, start, range and meaning of each parameter."""
+def rows(root, causality="parameter"):
+    """Yields name, start, range, unit and meaning of each parameter, or input, or output."""
     types = {item.get("name"): item for item in root.iter("SimpleType")}
     for variable in root.iter("ScalarVariable"):
-        if variable.get("causality") != "parameter":
+        if variable.get("causality") != causality:
             continue
         [kind] = list(variable)
         unit, text = kind.get("unit", ""), variable.get("description")
@@ -41,13 +41,14 @@ def rows(root):
         shown = unit.replace("rad", "deg", 1) if unit.startswith("rad") else unit
         if kind.tag == "Enumeration":
             items = types[kind.get("declaredType")].findall("Enumeration/Item")
-            start = f"`{items[int(kind.get('start')) - 1].get('name')}`"
+            start = kind.get("start") and f"`{items[int(kind.get('start')) - 1].get('name')}`"
             text += ". " + "; ".join(f"`{item.get('name')}`: {item.get('description')}" for item in items)
             ends = [None, None]
         elif kind.tag in ("Boolean", "String"):
             start = kind.get("start") or "empty"
         else:
-            start = number(kind.get("start"), unit) if kind.tag == "Real" else kind.get("start")
+            start = kind.get("start")
+            start = start and (number(start, unit) if kind.tag == "Real" else start)
             ends = [end and (number(end, unit) if kind.tag == "Real" else end) for end in ends]
         low, high = ends
         span = f"{low} to {high}" if low and high else f"from {low}" if low else f"up to {high}" if high else ""
@@ -62,11 +63,10 @@ def pattern(name):
     return (stem, last) if any(last in axes for axes in AXES) else (name, "")
 
 
-def table(root, leaves_out_common):
+def grouped(variables):
+    """Joins the entries of vectors: returns what they share, and the ending and start of each."""
     groups = []
-    for name, start, span, unit, text in rows(root):
-        if leaves_out_common and COMMON.match(name):
-            continue
+    for name, start, span, unit, text in variables:
         stem, ending = pattern(name)
         meaning = re.sub(r" \([^()]*\)$", "", text) if ending else text
         key = (stem, span, unit, meaning, bool(ending))
@@ -74,8 +74,13 @@ def table(root, leaves_out_common):
             groups[-1][1].append((ending, start))
         else:
             groups.append((key, [(ending, start)]))
+    return groups
+
+
+def table(root, leaves_out_common):
     lines = [HEAD]
-    for (stem, span, unit, meaning, _), entries in groups:
+    chosen = [row for row in rows(root) if not (leaves_out_common and COMMON.match(row[0]))]
+    for (stem, span, unit, meaning, _), entries in grouped(chosen):
         endings, starts = zip(*entries)
         if not endings[0].startswith("[") and endings[0]:
             name = f"`{stem}.{'/'.join(endings)}`"
