@@ -125,7 +125,8 @@ build() {
     local like_tests=()
     if [[ $PROGRAM_PROFILE == dev ]]; then like_tests=(--example fmi_rs); fi
     fetch
-    cargo build --profile "$PROGRAM_PROFILE" --locked --workspace \
+    # The page for browsers is for another target (scripts/browser).
+    cargo build --profile "$PROGRAM_PROFILE" --locked --workspace --exclude reentry-browser \
         "${like_tests[@]+"${like_tests[@]}"}" "$@"
 }
 

@@ -1,6 +1,7 @@
 // The page: settings on one side, the flight that they give on the other.
 //
-// For tests and for curious people: `flight` is the flight that is shown, with its columns and signals.
+// For tests and for curious people: `flight` is the flight that is shown, with its columns and signals, and `first`
+// says how long the first one took.
 "use strict";
 
 const $ = (id) => document.getElementById(id);
@@ -18,6 +19,8 @@ const SPEED = 5;
 
 let settings, worker, busy = false, wanted = null;
 let flight = null;
+// When the first flight was drawn, ms after the page was opened.
+let first = null;
 let time = 26;
 const view = new Vehicle3D($("view"));
 const charts = Object.fromEntries(PANELS.map(([id, panel]) => [id, new Chart($(id), panel, point)]));
@@ -92,6 +95,7 @@ function show() {
   judge(limits);
   point(time);
   $("cost").textContent = `Computed in ${flight.ms.toFixed(0)} ms.`;
+  first ??= performance.now();
   document.documentElement.dataset.flights = 1 + Number(document.documentElement.dataset.flights ?? 0);
 }
 
@@ -124,7 +128,7 @@ function judge(limits) {
   let verdict = `${name} keeps both limits`;
   if (over.length) verdict = `${name} exceeds the ${over.map(([limit, ratio]) => `${limit} limit (${percent(ratio)})`).join(" and the ")}`;
   if (summary.end) verdict = `The flight ends at ${summary.end.time.toFixed(1)} s`;
-  $("verdict").textContent = verdict;
+  $("verdict").textContent = verdict[0].toUpperCase() + verdict.slice(1);
   const meter = (label, ratio, limit, unit, digits) => `
     <div class="${ratio > 1 ? "over" : ""}"><dt>${label}</dt>
     <dd class="meter"><i style="width:${Math.min(100, (ratio * 200) / 3)}%"></i></dd>

@@ -195,7 +195,7 @@ class Chart {
       const number = value.toFixed(panel.digits).replace("-", "−");
       context.textAlign = "right";
       if (roomy) context.fillText(number, x, 11);
-      x -= roomy ? 46 : 0;
+      x -= roomy ? 50 : 0;
       context.fillText(panel.names[i], x, 11);
       x -= 14;
       context.beginPath();
