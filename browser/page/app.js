@@ -88,12 +88,12 @@ function show() {
   const { summary, time: at, angles, reference, errors, rates, moment } = flight;
   const { stop } = settings.description;
   const limits = { rate: summary.limits.rate * DEG, moment: summary.limits.moment * 1e-3 };
-  charts.attitude.show({ stop, time: at, curves: angles, references: reference });
-  charts.error.show({ stop, time: at, curves: errors });
-  charts.rate.show({ stop, time: at, curves: rates, limit: limits.rate, exceeded: exceeded(rates, limits.rate) });
-  charts.moment.show({ stop, time: at, curves: moment, limit: limits.moment, exceeded: exceeded(moment, limits.moment) });
+  charts.attitude.show({ stop, time: at, curves: angles, references: reference }, time);
+  charts.error.show({ stop, time: at, curves: errors }, time);
+  charts.rate.show({ stop, time: at, curves: rates, limit: limits.rate, exceeded: exceeded(rates, limits.rate) }, time);
+  charts.moment.show({ stop, time: at, curves: moment, limit: limits.moment, exceeded: exceeded(moment, limits.moment) }, time);
   judge(limits);
-  point(time);
+  pose(time);
   $("cost").textContent = `Computed in ${flight.ms.toFixed(0)} ms.`;
   first ??= performance.now();
   document.documentElement.dataset.flights = 1 + Number(document.documentElement.dataset.flights ?? 0);
@@ -157,8 +157,14 @@ function point(at) {
   time = at;
   $("time").value = at;
   $("clock").textContent = `${at.toFixed(1)} s`;
-  if (!flight || !flight.rows) return;
+  if (!flight) return;
   for (const chart of Object.values(charts)) chart.point(at);
+  pose(at);
+}
+
+// Shows the vehicle as it flies at a time.
+function pose(at) {
+  if (!flight.rows) return;
   const row = Math.min(flight.rows - 1, Math.round(at / flight.summary.step));
   const from = row * flight.width;
   const part = (first) => Array.from(flight.signals.subarray(from + first, from + first + 3));
@@ -329,6 +335,7 @@ function begin({ text, error }) {
   $("length").textContent = stop;
   $("time").max = stop;
   $("version").textContent = version;
+  point(time);
   load(location.hash.slice(1));
 }
 

@@ -1,8 +1,8 @@
 // Curves over time on a canvas: one panel with its limits, drawn again at once when settings change.
 //
 //   const chart = new Chart(canvas, { title: "Body rates", unit: "deg/s", names: ["p", "q", "r"], digits: 2 }, (time) => …);
-//   chart.show({ time, curves: [[…], …], references: [[…], …], limit, exceeded: [[from, to], …] });
-//   chart.point(time);      // cursor
+//   chart.show({ stop, time, curves: [[…], …], references: [[…], …], limit, exceeded: [[from, to], …] }, cursor);
+//   chart.point(cursor);    // time, s
 //
 // The three curves differ by colour and by dashes: --x, --y, --z of the canvas. References are drawn in --ink,
 // limits in --muted with their name at the line.
@@ -26,13 +26,14 @@ class Chart {
     new ResizeObserver(() => this.draw()).observe(canvas);
   }
 
-  show(data) {
+  show(data, cursor) {
     this.data = data;
+    this.cursor = cursor;
     this.draw();
   }
 
-  point(time) {
-    this.cursor = time;
+  point(cursor) {
+    this.cursor = cursor;
     this.draw();
   }
 

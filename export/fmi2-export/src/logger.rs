@@ -171,6 +171,15 @@ mod tests {
     }
 
     #[test]
+    fn warnings_are_listed_until_they_are_taken() {
+        let mut logger = Logger::listing();
+        logger.log(Category::Warning, "one");
+        logger.log(Category::Events, "initialized");
+        assert_eq!(logger.take_warnings(), ["one"]);
+        assert_eq!(logger.take_warnings(), Vec::<String>::new());
+    }
+
+    #[test]
     fn messages_hold_no_format() {
         assert_eq!(to_c("at 5 %\0s").to_str(), Ok("at 5 percent s"));
     }
