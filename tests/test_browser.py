@@ -199,6 +199,19 @@ def test_the_page_answers_fast(chromium):
     assert page.evaluate("flight.ms") < 2000
 
 
+def test_the_view_of_the_vehicle_turns_as_the_angles_are_defined(chromium):
+    """The velocity in body axes is (cos α cos β, sin β, sin α cos β); positive bank lowers the right wing."""
+    page = opened(chromium)
+    rotation = np.array(page.evaluate("Vehicle3D.rotation([0.3, -0.2, 0.7])"))
+    alpha, beta = 0.3, -0.2
+    velocity = [np.cos(alpha) * np.cos(beta), np.sin(beta), np.sin(alpha) * np.cos(beta)]
+    np.testing.assert_allclose(rotation @ velocity, [1.0, 0.0, 0.0], atol=1e-15)
+    np.testing.assert_allclose(rotation @ rotation.T, np.eye(3), atol=1e-15)
+    assert np.linalg.det(rotation) > 0.0
+    banked = np.array(page.evaluate("Vehicle3D.rotation([0, 0, 0.7])"))
+    np.testing.assert_allclose(banked @ [0.0, 1.0, 0.0], [0.0, np.cos(0.7), np.sin(0.7)], atol=1e-15)
+
+
 @pytest.mark.parametrize("width", [390, 760, 1000, 1400])
 def test_nothing_is_wider_than_the_window_and_everything_has_a_name(chromium, width):
     page = opened(chromium, viewport={"width": width, "height": 800})

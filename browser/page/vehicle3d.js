@@ -80,7 +80,7 @@ class Vehicle3D {
       // The belly is flat, the back is round.
       const side = Math.sin(turn), up = Math.cos(turn);
       const lift = up > 0 ? above * up : -below * Math.pow(-up, 0.55);
-      return [x, width * side * (up < 0 ? Math.pow(1 - up * up, -0.12) : 1), -lift];
+      return [x, width * side * (up < 0 ? Math.pow(Math.max(1e-3, 1 - up * up), -0.12) : 1), -lift];
     });
     const rings = Vehicle3D.STATIONS.map(ring);
     for (let s = 0; s + 1 < rings.length; s++) {
@@ -216,8 +216,7 @@ class Vehicle3D {
     for (const { face, points, seen } of faces.sort((a, b) => b.depth - a.depth)) {
       let area = 0;
       seen.forEach((p, i) => { const q = seen[(i + 1) % seen.length]; area += p[0] * q[1] - q[0] * p[1]; });
-      if (face.closed && area > 0) continue;
-      if (face.above && area < 0) continue;
+      if ((face.closed || face.above) && area < 0) continue;
       context.beginPath();
       seen.forEach((p, i) => context[i ? "lineTo" : "moveTo"](p[0], p[1]));
       context.closePath();

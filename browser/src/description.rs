@@ -2,8 +2,8 @@
 //! tables declare them, and the scenario's values.
 
 use crate::error::Error;
-use crate::flight::COLUMNS;
 use crate::scenario;
+use crate::signals::COLUMNS;
 use fmi2_export::Export;
 use fmi2_export::linked::Linked;
 use model_description::variable::{Causality, Variable};

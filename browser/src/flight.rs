@@ -4,27 +4,11 @@
 
 use crate::error::Error;
 use crate::request::{GUARANTEE, Prepared};
+use crate::signals::{COLUMNS, Row};
 use crate::summary::{Limits, Summary};
 use fmi2_export::Failure;
 use fmi2_export::linked::Linked;
 
-/// Columns of the signals, in this order.
-pub const COLUMNS: [&str; 14] = [
-    "time",
-    "plant.attitude.alpha",
-    "plant.attitude.beta",
-    "plant.attitude.sigma",
-    "plant.rate.p",
-    "plant.rate.q",
-    "plant.rate.r",
-    "controller.reference.alpha",
-    "controller.reference.beta",
-    "controller.reference.sigma",
-    "controller.moment.x",
-    "controller.moment.y",
-    "controller.moment.z",
-    "controller.guarantee.status",
-];
 /// Number of angles and rates.
 const STATES: usize = 6;
 
@@ -85,7 +69,7 @@ pub fn fly(prepared: Prepared, signals: &mut Vec<f64>) -> Result<Summary, Error>
         Summary::new(Limits { rate: limits[0], moment: limits[1] }, step, &controller);
     signals.clear();
     signals.reserve((steps + 1) * COLUMNS.len());
-    let mut row = [0.0; COLUMNS.len()];
+    let mut row: Row = [0.0; COLUMNS.len()];
     for tick in 0..=steps {
         row[0] = tick as f64 * step;
         let end = tick == steps;
@@ -108,7 +92,7 @@ fn point(
     controller: &mut Linked,
     plant: &mut Linked,
     wires: &Wires,
-    row: &mut [f64; COLUMNS.len()],
+    row: &mut Row,
     step: Option<f64>,
 ) -> Result<(), Failure> {
     plant.reals(&wires.state, &mut row[1..=STATES])?;

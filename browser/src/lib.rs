@@ -25,6 +25,7 @@ pub mod flight;
 pub mod request;
 pub mod scenario;
 pub mod setting;
+pub mod signals;
 pub mod summary;
 #[cfg(test)]
 mod tests;

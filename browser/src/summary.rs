@@ -1,7 +1,7 @@
 //! Figures of merit of a flight, as docs/symbols.md defines them.
 
-use crate::flight::COLUMNS;
 use crate::request::GUARANTEE;
+use crate::signals::Row;
 use fmi2_export::linked::Linked;
 use model_description::variable::VariableKind;
 use serde::Serialize;
@@ -78,7 +78,7 @@ impl Summary {
 
     /// Takes a row into account. At the end of the flight no step begins, so that it has no command
     /// of its own.
-    pub fn take(&mut self, row: &[f64; COLUMNS.len()], end: bool) {
+    pub fn take(&mut self, row: &Row, end: bool) {
         let before = self.rows as f64;
         self.rows += 1;
         let rate = squared(row[4..7].iter().copied()).sqrt() / self.limits.rate;

@@ -1,9 +1,10 @@
 //! Requests of the page, and what is refused.
 
 use crate::description;
-use crate::flight::{COLUMNS, fly};
+use crate::flight::fly;
 use crate::request::Request;
 use crate::scenario;
+use crate::signals::COLUMNS;
 use serde_json::{Value, json};
 
 /// Flies a request. Returns the summary and the signals.
