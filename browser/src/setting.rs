@@ -25,11 +25,10 @@ pub fn value(written: &toml::Value, variable: &Variable) -> Result<Value, String
         (VariableKind::Boolean { .. }, toml::Value::Boolean(value)) => Ok(Value::Boolean(*value)),
         (VariableKind::Boolean { .. }, _) => mismatch("true or false"),
         (VariableKind::Enumeration { enumeration_type, .. }, toml::Value::String(text)) => {
-            let items: Vec<&str> =
-                enumeration_type.items.iter().map(|(name, _)| name.as_str()).collect();
-            match items.iter().position(|name| name == text) {
-                Some(position) => Ok(Value::Integer(position as i32 + 1)),
-                None => mismatch(&format!("one of {}", items.join(", "))),
+            let items = enumeration_type.items.iter().map(|(name, _)| name.as_str());
+            match (1..).zip(items.clone()).find(|(_, name)| name == text) {
+                Some((number, _)) => Ok(Value::Integer(number)),
+                None => mismatch(&format!("one of {}", items.collect::<Vec<_>>().join(", "))),
             }
         }
         (VariableKind::Enumeration { .. }, _) => mismatch("the name of an item"),
