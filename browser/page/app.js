@@ -17,7 +17,7 @@ const LIGHTS = { inForce: "good", pending: "good", exceeded: "bad", uncertified:
 // Playback is five times as fast as the flight.
 const SPEED = 5;
 
-let settings, worker, busy = false, wanted = null;
+let settings, worker, busy = false, wanted = null, patience = null;
 let flight = null;
 // When the first flight was drawn, ms after the page was opened.
 let first = null;
@@ -35,6 +35,7 @@ function fly() {
 function send() {
   if (!wanted) return;
   busy = true;
+  patience = setTimeout(() => { $("cost").textContent = "Computing …"; }, 400);
   worker.postMessage({ call: "fly", request: wanted });
   wanted = null;
 }
@@ -43,6 +44,7 @@ function received({ data }) {
   if (data.call === "describe") return begin(data);
   if (data.call === "experiment") return saved(data);
   busy = false;
+  clearTimeout(patience);
   if (data.error) {
     say(data.error, true);
   } else {

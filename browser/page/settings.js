@@ -64,6 +64,10 @@ class Parameter {
     return rounded(number / (READABLE[this.kind.unit?.name]?.[0] ?? 1));
   }
 
+  isInitial(value) {
+    return value === this.initial || (this.type === "Real" && this.shown(value) === this.shown(this.initial));
+  }
+
   get unit() {
     const name = this.display?.name ?? READABLE[this.kind.unit?.name]?.[1] ?? this.kind.unit?.name ?? "";
     return name.replace(/(?<=[a-z])([0-9])$/, (digit) => "²³"[digit - 2]).replace(".", " ");
@@ -120,7 +124,7 @@ class Settings {
   }
 
   change(name, value) {
-    if (value === this.parameters.get(name).initial) delete this.set[name];
+    if (this.parameters.get(name).isInitial(value)) delete this.set[name];
     else this.set[name] = value;
   }
 
