@@ -87,11 +87,11 @@ library() {
 }
 
 # The libraries that are packed as FMUs.
-fmu_libraries=(fmu_plant fmu_optimising fmu_feedback)
+fmu_libraries=(fmu_plant_library fmu_optimising fmu_feedback)
 
 # The folder with the icons and the generated descriptions of the FMUs in the library $1.
 fmu_folder() {
-    if [[ $1 == fmu_plant ]]; then echo fmu-plant; else echo fmu-controller; fi
+    if [[ $1 == fmu_plant_library ]]; then echo fmu-plant; else echo fmu-controller; fi
 }
 
 # Packs every FMU of the libraries in the folder $1 into the folder $2, together with their builds for
@@ -125,7 +125,8 @@ build() {
     local like_tests=()
     if [[ $PROGRAM_PROFILE == dev ]]; then like_tests=(--example fmi_rs); fi
     fetch
-    cargo build --profile "$PROGRAM_PROFILE" --locked --workspace \
+    # The page for browsers is for another target (scripts/browser).
+    cargo build --profile "$PROGRAM_PROFILE" --locked --workspace --exclude reentry-browser \
         "${like_tests[@]+"${like_tests[@]}"}" "$@"
 }
 

@@ -119,6 +119,36 @@ cross_build() (
     esac
 )
 
+# What browsers run. rustup has the standard library for it; else Debian's Rust builds it from its
+# sources, for which it takes the place of the Rust that everything else is built with.
+wasm=wasm32-unknown-unknown
+debian=/usr/bin
+
+debian_can_build() {
+    [[ -x $debian/rustc && -x $debian/cargo ]] &&
+        [[ -d $("$debian/rustc" --print sysroot)/lib/rustlib/src/rust/library ]]
+}
+
+can_build_browser() { get_target "$wasm" || debian_can_build; }
+
+# Builds the WebAssembly module of the page for browsers.
+browser_build() {
+    local rust=() build=(build --locked --release --target "$wasm" --package reentry-browser)
+    fetch
+    set_flags
+    if ! get_target "$wasm"; then
+        say "Building Rust's standard library for $wasm with Debian's Rust"
+        # Debian's Rust has no linker for WebAssembly; that of rustup has.
+        local lld
+        lld="$(rustc --print sysroot)/lib/rustlib/$(rustc -vV | sed -n 's/host: //p')/bin"
+        rust=(env RUSTC="$debian/rustc" RUSTC_BOOTSTRAP=1 PATH="$lld:$PATH" "$debian/cargo")
+        build+=(-Zbuild-std=std,panic_abort)
+    else
+        rust=(cargo)
+    fi
+    CARGO_ENCODED_RUSTFLAGS="$flags" "${rust[@]}" "${build[@]}"
+}
+
 # What every build for another platform needs.
 need_cross() {
     need_rust

@@ -12,7 +12,7 @@ from fmpy.validation import validate_fmu
 from conftest import NAMES, ROOT, TARGET, archive, library, newest, program
 
 # The libraries by the folder with their FMUs' descriptions.
-LIBRARIES = {"fmu-plant": ["fmu_plant"], "fmu-controller": ["fmu_optimising", "fmu_feedback"]}
+LIBRARIES = {"fmu-plant": ["fmu_plant_library"], "fmu-controller": ["fmu_optimising", "fmu_feedback"]}
 
 
 def pack(folder, *arguments, folders=LIBRARIES):
@@ -30,7 +30,7 @@ def test_every_fmu_was_packed_and_tested():
     assert sorted(path.stem for path in archive("LQR").parent.glob("*.fmu")) == sorted(NAMES)
 
 
-@pytest.mark.parametrize("crate", ["reentry-fmu-plant", "reentry-fmu-optimising", "reentry-fmu-feedback"])
+@pytest.mark.parametrize("crate", ["reentry-fmu-plant-library", "reentry-fmu-optimising", "reentry-fmu-feedback"])
 def test_a_library_is_built_again_if_a_source_or_a_dependency_has_changed_and_only_then(crate):
     # What cargo watches. Of a path that does not exist it thinks that it has changed.
     said = newest(*TARGET.glob(f"*/build/{crate}-*/output"), *TARGET.glob(f"*/*/build/{crate}-*/output")).read_text()

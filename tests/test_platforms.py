@@ -418,7 +418,7 @@ def built(platform: str, crate: str) -> Path:
     ids=["sources", "imports", "exports", "format"],
 )
 def test_a_library_that_does_not_belong_to_the_others_is_refused(old, new, words, tmp_path):
-    host, other = (built(platform, "fmu_plant") for platform in ("linux-x86_64", "windows-x86_64"))
+    host, other = (built(platform, "fmu_plant_library") for platform in ("linux-x86_64", "windows-x86_64"))
     content = other.read_bytes()
     if old is None:
         windows = lief.PE.parse(list(content))

@@ -217,7 +217,7 @@ def test_wheels_have_the_fmus_and_the_licences_of_what_is_linked_in(made, dist):
 
 def compiled_in() -> set[str]:
     """The packages, as NAME-VERSION, whose source files the messages in the binaries name."""
-    files = [program("orchestrator"), *map(library, ("fmu_plant", "fmu_optimising", "fmu_feedback"))]
+    files = [program("orchestrator"), *map(library, ("fmu_plant_library", "fmu_optimising", "fmu_feedback"))]
     pattern = re.compile(rb"registry/src/[^/]+/([\w.+-]+)/src/")
     return {name.decode() for file in files for name in pattern.findall(file.read_bytes())}
 

@@ -3,6 +3,7 @@
 #![cfg_attr(not(test), deny(clippy::disallowed_methods))]
 
 pub mod allocation;
+mod clock;
 pub mod closed_loop;
 mod conic_program;
 pub mod controller;

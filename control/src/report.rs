@@ -1,9 +1,9 @@
 //! Report of an optimisation, common to all controllers with one.
 
+use crate::clock::Instant;
 use crate::mpc;
 use serde::{Deserialize, Serialize};
 use settings::Choice;
-use std::time::Instant;
 
 /// Origin of the plan in force.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Choice)]

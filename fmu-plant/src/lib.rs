@@ -13,5 +13,3 @@ mod table;
 mod tests;
 
 pub use plant::ReentryPlant;
-
-fmi2_export::export_fmus!(ReentryPlant);

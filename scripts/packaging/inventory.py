@@ -32,7 +32,7 @@ from license_expression import ExpressionError, get_spdx_licensing
 from packageurl import PackageURL
 
 # The packages whose libraries and programs are released.
-ROOTS = ("reentry-fmu-plant", "reentry-fmu-optimising", "reentry-fmu-feedback", "orchestrator")
+ROOTS = ("reentry-fmu-plant-library", "reentry-fmu-optimising", "reentry-fmu-feedback", "orchestrator")
 # Licences that binaries may be passed on under together with the project's own.
 ALLOWED = {
     "0BSD",

@@ -7,13 +7,13 @@ mod settings;
 
 pub use settings::{JetCommand, Method, Settings};
 
+use crate::clock::Instant;
 use crate::error::DesignError;
 use ::settings::Choice;
 use nalgebra::{SMatrix, Vector3};
 use optimum::{OptimalAllocation, Weights};
 use pwpf::Modulator;
 use serde::{Deserialize, Serialize};
-use std::time::Instant;
 use vehicle::effectors::{JETS, Jets, Surfaces};
 
 /// Effectiveness D_RCS of the jets, N m at full thrust.

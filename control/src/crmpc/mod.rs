@@ -17,6 +17,7 @@ mod state;
 mod supervision;
 mod terminal;
 
+use crate::clock::Instant;
 pub use crate::report::{SolverReport, SolverStatus};
 pub use commands::Commands;
 pub use design::{
@@ -41,7 +42,6 @@ use planner::Planner;
 use robust::Robust;
 use set::{Command, ConstraintSet, Planned, Tick};
 use state::{join, split};
-use std::time::Instant;
 use vehicle::kinematics;
 
 /// The controller: settings, offline design, solvers and scratch memory. All state that later ticks

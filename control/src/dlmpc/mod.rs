@@ -10,6 +10,7 @@ mod plan;
 mod rate_limit;
 mod settings;
 
+use crate::clock::Instant;
 pub use crate::report::{SolverReport, SolverStatus};
 pub use plan::Plan;
 pub use settings::{Settings, SlidingMode};
@@ -20,7 +21,6 @@ use crate::mpc::{Chain, Cost, ErrorTrajectory, Layout, Optimiser, State};
 use nalgebra::Vector3;
 use rate_limit::RateLimit;
 use serde::{Deserialize, Serialize};
-use std::time::Instant;
 use vehicle::kinematics;
 use vehicle::math::powf;
 use vehicle::reference::Reference;

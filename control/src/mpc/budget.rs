@@ -1,7 +1,8 @@
 //! Limits of one optimisation: computing time, and iterations of all solvers together.
 
 use super::settings::SolverSettings;
-use std::time::{Duration, Instant};
+use crate::clock::Instant;
+use std::time::Duration;
 
 /// The cone solver is started only if the remaining time is at least this many times the elapsed
 /// time, because its setup takes longer than one iteration.

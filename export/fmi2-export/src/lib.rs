@@ -5,6 +5,7 @@
 //! |---|---|
 //! | [`model`], [`table`] | the interface that a model must implement, and its variable table |
 //! | `model_instance` | a model bound to its variable table, without its type |
+//! | [`linked`] | an instance in the same program, without the C interface |
 //! | `instance` | one instance: checks, laziness, saved states; no pointers |
 //! | `call` | the table of calls allowed in each state |
 //! | [`interface`], [`types`] | the C signatures |
@@ -21,6 +22,7 @@ mod export;
 mod instance;
 #[doc(hidden)]
 pub mod interface;
+pub mod linked;
 mod logger;
 pub mod model;
 mod model_instance;

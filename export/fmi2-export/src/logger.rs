@@ -7,6 +7,7 @@
 
 use crate::types::{Callbacks, FmiStatus, LogCallback};
 use model_description::LOG_CATEGORIES;
+use std::cell::RefCell;
 use std::ffi::{CString, c_void};
 
 /// Log category, one for each row of [`LOG_CATEGORIES`].
@@ -50,6 +51,8 @@ pub(crate) struct Logger {
     instance: CString,
     /// Bit set of the categories that are reported.
     active: u8,
+    /// Warnings for a program that is linked with the FMU.
+    warnings: Option<RefCell<Vec<String>>>,
 }
 
 const EVERYTHING: u8 = u8::MAX;
@@ -65,7 +68,19 @@ impl Logger {
                 .map_or(std::ptr::null_mut(), |callbacks| callbacks.component_environment),
             instance,
             active: if on { EVERYTHING } else { ALWAYS },
+            warnings: None,
         }
+    }
+
+    /// Returns a logger that lists warnings until they are taken, and reports nothing else: who is
+    /// linked with the FMU gets failures as results.
+    pub(crate) fn listing() -> Self {
+        Self { warnings: Some(RefCell::default()), ..Self::new(None, CString::default(), false) }
+    }
+
+    /// Returns the listed warnings, which are then forgotten.
+    pub(crate) fn take_warnings(&mut self) -> Vec<String> {
+        self.warnings.as_mut().map(|list| std::mem::take(list.get_mut())).unwrap_or_default()
     }
 
     /// Switches the named categories on or off, or all if none is named. Returns a name that is not
@@ -87,6 +102,9 @@ impl Logger {
     }
 
     pub(crate) fn log(&self, category: Category, text: &str) {
+        if let (Category::Warning, Some(list)) = (category, &self.warnings) {
+            list.borrow_mut().push(text.into());
+        }
         let Some(callback) = self.callback else { return };
         if self.active & (1 << category as u8) == 0 {
             return;
@@ -150,6 +168,15 @@ mod tests {
         assert_eq!(logger.choose(false, &["logEvents"]), None);
         assert!(hears(&logger, Category::Warning) && !hears(&logger, Category::Events));
         assert_eq!(logger.choose(true, &["logWeather"]), Some("logWeather"));
+    }
+
+    #[test]
+    fn warnings_are_listed_until_they_are_taken() {
+        let mut logger = Logger::listing();
+        logger.log(Category::Warning, "one");
+        logger.log(Category::Events, "initialized");
+        assert_eq!(logger.take_warnings(), ["one"]);
+        assert_eq!(logger.take_warnings(), Vec::<String>::new());
     }
 
     #[test]

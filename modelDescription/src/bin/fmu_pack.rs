@@ -19,7 +19,7 @@ use std::{fs, io};
 #[derive(Parser)]
 #[command(version, name = "fmu-pack")]
 struct Arguments {
-    /// Built libraries, for example target/release/libfmu_plant.so
+    /// Built libraries, for example target/release/libfmu_plant_library.so
     #[arg(required = true)]
     libraries: Vec<PathBuf>,
     /// Build of one of the libraries for another platform; can be repeated

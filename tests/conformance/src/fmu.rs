@@ -46,7 +46,7 @@ pub fn fmus() -> Vec<Fmu> {
             description,
         })
     };
-    ["fmu_plant", "fmu_optimising", "fmu_feedback"].into_iter().flat_map(open).collect()
+    ["fmu_plant_library", "fmu_optimising", "fmu_feedback"].into_iter().flat_map(open).collect()
 }
 
 /// Returns the FMU with that name.

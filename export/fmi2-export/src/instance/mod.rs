@@ -128,7 +128,7 @@ impl Instance {
         }
     }
 
-    fn permit(&self, call: &Call) -> Outcome {
+    pub(crate) fn permit(&self, call: &Call) -> Outcome {
         if call.interface.is_some_and(|interface| interface != self.interface) {
             let interface = match self.interface {
                 Interface::ModelExchange => "model exchange",

@@ -10,6 +10,7 @@ mod support;
 mod calls;
 mod exchange;
 mod instances;
+mod linked;
 mod logging;
 mod saved;
 mod steps;

@@ -55,7 +55,7 @@ fn taken_from_the_platform(krate: &str) -> BTreeSet<&'static str> {
 
 #[test]
 fn fmus_without_a_solver_take_no_elementary_function_from_the_platform() {
-    for library in ["fmu_plant", "fmu_feedback"] {
+    for library in ["fmu_plant_library", "fmu_feedback"] {
         assert_eq!(taken_from_the_platform(library), BTreeSet::new(), "{library}");
     }
 }
@@ -74,7 +74,7 @@ fn fmus_with_a_solver_take_no_other_elementary_function_from_the_platform() {
 fn no_library_has_kernels_that_are_chosen_by_the_processor() {
     let mut cargo = Command::new(env!("CARGO"));
     cargo.args(["tree", "--locked", "--offline", "--edges", "normal", "--prefix", "none"]);
-    for library in ["plant", "optimising", "feedback"] {
+    for library in ["plant-library", "optimising", "feedback"] {
         cargo.arg("--package").arg(format!("reentry-fmu-{library}"));
     }
     let tree = cargo.output().unwrap();

@@ -1,0 +1,383 @@
+// The page: settings on one side, the flight that they give on the other.
+//
+// For tests and for curious people: `flight` is the flight that is shown, with its columns and signals, and `first`
+// says how long the first one took.
+"use strict";
+
+const $ = (id) => document.getElementById(id);
+const DEG = 180 / Math.PI;
+const PANELS = [
+  ["attitude", { title: "Attitude", unit: "deg", names: ["α", "β", "σ"], digits: 2 }],
+  ["error", { title: "Tracking error", unit: "deg", names: ["α", "β", "σ"], digits: 2 }],
+  ["rate", { title: "Body rates", unit: "deg/s", names: ["p", "q", "r"], digits: 2 }],
+  ["moment", { title: "Control moment", unit: "kN m", names: ["x", "y", "z"], digits: 1, axis: true }],
+];
+// Items of the guarantee's status by what they mean for whoever looks.
+const LIGHTS = { inForce: "good", pending: "good", exceeded: "bad", uncertified: "warn", stale: "warn", refused: "warn" };
+// Playback is five times as fast as the flight.
+const SPEED = 5;
+
+let settings, worker, busy = false, wanted = null, patience = null;
+let flight = null;
+// When the first flight was drawn, ms after the page was opened.
+let first = null;
+let time = 26;
+const view = new Vehicle3D($("view"));
+const charts = Object.fromEntries(PANELS.map(([id, panel]) => [id, new Chart($(id), panel, point)]));
+
+// --- The flight -----------------------------------------------------------------------------------------------------
+
+function fly() {
+  wanted = settings.request();
+  if (!busy) send();
+}
+
+function send() {
+  if (!wanted) return;
+  busy = true;
+  patience = setTimeout(() => { $("cost").textContent = "Computing …"; }, 400);
+  worker.postMessage({ call: "fly", request: wanted });
+  wanted = null;
+}
+
+function received({ data }) {
+  if (data.call === "describe") return begin(data);
+  if (data.call === "experiment") return saved(data);
+  busy = false;
+  clearTimeout(patience);
+  if (data.error) {
+    say(data.error, true);
+  } else {
+    flight = read(data);
+    say(settings.unknown?.length ? `Unknown here: ${settings.unknown.join(", ")}` : "");
+    settings.unknown = null;
+    show();
+  }
+  send();
+}
+
+function read({ text, signals, ms }) {
+  const summary = JSON.parse(text);
+  const columns = settings.description.columns;
+  const width = columns.length;
+  const rows = signals.length / width;
+  const column = (index, factor) => Float64Array.from({ length: rows }, (_, row) => signals[row * width + index] * factor);
+  const three = (first, factor) => [0, 1, 2].map((i) => column(first + i, factor));
+  const angles = three(1, DEG), reference = three(7, DEG);
+  const errors = angles.map((angle, i) => angle.map((value, row) => value - reference[i][row]));
+  const name = settings.choice.name.replace(", ", " with ");
+  return {
+    summary, signals, columns, ms, rows, width, name, time: column(0, 1), angles, reference, errors,
+    rates: three(4, DEG), moment: three(10, 1e-3), status: column(13, 1),
+  };
+}
+
+// Times between which a norm exceeds its limit.
+function exceeded([x, y, z], limit) {
+  const spans = [];
+  let from = null;
+  for (let row = 0; row < flight.rows; row++) {
+    const over = Math.hypot(x[row], y[row], z[row]) > limit;
+    if (over && from === null) from = flight.time[row];
+    if (!over && from !== null) spans.push([from, flight.time[row]]);
+    if (!over) from = null;
+  }
+  if (from !== null) spans.push([from, flight.time.at(-1)]);
+  return spans;
+}
+
+function show() {
+  const { summary, time: at, angles, reference, errors, rates, moment } = flight;
+  const { stop } = settings.description;
+  const limits = { rate: summary.limits.rate * DEG, moment: summary.limits.moment * 1e-3 };
+  charts.attitude.show({ stop, time: at, curves: angles, references: reference }, time);
+  charts.error.show({ stop, time: at, curves: errors }, time);
+  charts.rate.show({ stop, time: at, curves: rates, limit: limits.rate, exceeded: exceeded(rates, limits.rate) }, time);
+  charts.moment.show({ stop, time: at, curves: moment, limit: limits.moment, exceeded: exceeded(moment, limits.moment) }, time);
+  judge(limits);
+  pose(time);
+  $("cost").textContent = `Computed in ${flight.ms.toFixed(0)} ms.`;
+  first ??= performance.now();
+  document.documentElement.dataset.flights = 1 + Number(document.documentElement.dataset.flights ?? 0);
+}
+
+// --- The verdict ----------------------------------------------------------------------------------------------------
+
+function item(row) {
+  return flight.summary.guarantee[flight.status[row] - 1]?.[0];
+}
+
+function guarantee() {
+  if (!flight.summary.guarantee.length) return ["none", `${flight.name} gives none`];
+  const counts = {};
+  const rows = Math.max(1, flight.rows - 1);
+  for (let row = 0; row < rows; row++) counts[item(row)] = (counts[item(row)] ?? 0) + 1;
+  const share = ((counts.inForce ?? 0) + (counts.pending ?? 0)) / rows;
+  if (share === 1) return ["good", "in force throughout"];
+  const [worst] = Object.entries(counts).filter(([name]) => LIGHTS[name] !== "good").sort((a, b) => b[1] - a[1])[0];
+  const meaning = {
+    none: "these constraint sets give none", refused: "refused: not possible with these settings",
+    uncertified: "no plan satisfies its conditions", exceeded: "an assumption is contradicted", stale: "measurements are stale",
+  };
+  if (share === 0) return [LIGHTS[worst] ?? "none", meaning[worst] ?? worst];
+  return [LIGHTS[worst] ?? "warn", `in force ${(share * 100).toFixed(0)} % of the time; ${meaning[worst] ?? worst}`];
+}
+
+function judge(limits) {
+  const { summary, name } = flight;
+  const over = [["rate", summary.rate_ratio], ["moment", summary.moment_ratio]].filter(([, ratio]) => ratio > 1);
+  const percent = (ratio) => `${(100 * ratio).toFixed(0)} %`;
+  let verdict = `${name} keeps both limits`;
+  if (over.length) verdict = `${name} exceeds the ${over.map(([limit, ratio]) => `${limit} limit (${percent(ratio)})`).join(" and the ")}`;
+  if (summary.end) verdict = `The flight ends at ${summary.end.time.toFixed(1)} s`;
+  $("verdict").textContent = verdict[0].toUpperCase() + verdict.slice(1);
+  const meter = (label, ratio, limit, unit, digits) => `
+    <div class="${ratio > 1 ? "over" : ""}"><dt>${label}</dt>
+    <dd class="meter"><i style="width:${Math.min(100, (ratio * 200) / 3)}%"></i></dd>
+    <dd>${(ratio * limit).toFixed(digits)} of ${limit.toFixed(digits)} ${unit}</dd></div>`;
+  const [light, text] = guarantee();
+  $("figures").innerHTML = `
+    ${meter("Largest rate", summary.rate_ratio, limits.rate, "deg/s", 2)}
+    ${meter("Largest moment", summary.moment_ratio, limits.moment, "kN m", 1)}
+    <div><dt>EMS</dt><dd class="wide">${(summary.ems * DEG).toFixed(3)} deg</dd></div>
+    <div><dt>CMS</dt><dd class="wide">${summary.cms.toFixed(4)}</dd></div>
+    <div><dt>Guarantee</dt><dd class="wide ${light}"><i class="light"></i>${text}</dd></div>`;
+  const said = [...summary.warnings, ...(summary.end ? [summary.end] : [])];
+  $("messages").hidden = said.length === 0;
+  $("messages").open ||= summary.end !== null;
+  $("messages").querySelector("summary").textContent = said.length === 1 ? "One message" : `${said.length} messages`;
+  $("messages").querySelector("ul").replaceChildren(...said.slice(0, 20).map(({ time: at, text: words }) => {
+    const entry = document.createElement("li");
+    entry.textContent = `${at.toFixed(2)} s: ${words}`;
+    return entry;
+  }));
+}
+
+// --- The chosen time ------------------------------------------------------------------------------------------------
+
+function point(at) {
+  time = at;
+  $("time").value = at;
+  $("clock").textContent = `${at.toFixed(1)} s`;
+  if (!flight) return;
+  for (const chart of Object.values(charts)) chart.point(at);
+  pose(at);
+}
+
+// Shows the vehicle as it flies at a time.
+function pose(at) {
+  if (!flight.rows) return;
+  const row = Math.min(flight.rows - 1, Math.round(at / flight.summary.step));
+  const from = row * flight.width;
+  const part = (first) => Array.from(flight.signals.subarray(from + first, from + first + 3));
+  const now = item(row);
+  const words = { inForce: "guarantee in force", pending: "guarantee pending", none: "no guarantee" };
+  const text = now === undefined ? "no guarantee" : (words[now] ?? `guarantee ${now}`);
+  view.show({
+    angles: part(1), reference: part(7), rates: part(4), moment: part(10),
+    rateLimit: flight.summary.limits.rate, momentLimit: flight.summary.limits.moment,
+    light: { state: LIGHTS[now] ?? "none", text },
+  });
+}
+
+function play() {
+  let last = null;
+  const playing = $("play").getAttribute("aria-pressed") !== "true";
+  $("play").setAttribute("aria-pressed", playing);
+  $("play").textContent = playing ? "Pause" : "Play";
+  if (!playing) return;
+  const { stop } = settings.description;
+  if (time >= stop) point(0);
+  const frame = (now) => {
+    if ($("play").getAttribute("aria-pressed") !== "true") return;
+    if (last !== null) point(Math.min(stop, time + ((now - last) / 1000) * SPEED));
+    last = now;
+    if (time < stop) requestAnimationFrame(frame);
+    else play();
+  };
+  requestAnimationFrame(frame);
+}
+
+// --- The settings ---------------------------------------------------------------------------------------------------
+
+function say(text, wrong = false) {
+  $("said").textContent = text;
+  $("said").classList.toggle("wrong", wrong);
+}
+
+function changed(names, value) {
+  for (const name of names) settings.change(name, value);
+  history.replaceState(null, "", `#${settings.address()}`);
+  mark();
+  fly();
+}
+
+// Names of rows whose values differ from the scenario.
+function mark() {
+  for (const row of document.querySelectorAll(".row")) {
+    row.classList.toggle("changed", row.dataset.names.split(" ").some((name) => name in settings.set));
+  }
+}
+
+function build() {
+  $("controller").value = settings.choice.id;
+  const open = new Set([...$("groups").querySelectorAll("details[open]")].map((group) => group.dataset.title.split(" of ")[1]));
+  $("groups").replaceChildren(...settings.groups().map(([title, rows, folded]) => {
+    const group = document.createElement(folded ? "details" : "fieldset");
+    group.dataset.title = title;
+    const head = document.createElement(folded ? "summary" : "legend");
+    head.textContent = title;
+    if (folded && open.has(title.split(" of ")[1])) group.open = true;
+    group.append(head, ...rows.map(control));
+    return group;
+  }));
+  mark();
+}
+
+function control({ names, label, low, high, exact }) {
+  const parameter = settings.parameters.get(names[0]);
+  const row = document.createElement("div");
+  row.className = "row";
+  row.dataset.names = names.join(" ");
+  const id = `set-${names[0]}`;
+  const caption = document.createElement("label");
+  caption.htmlFor = id;
+  // Names of variables are broken at their dots.
+  label.split(/(?<=\.)/).forEach((part, i) => caption.append(...(i ? [document.createElement("wbr")] : []), part));
+  caption.title = parameter.variable.description;
+  const { type, kind } = parameter;
+  let input;
+  if (type === "Enumeration") {
+    input = document.createElement("select");
+    for (const [name, meaning] of kind.of.items.filter(([name]) => !/^(table|external)$/.test(name))) {
+      const option = new Option(name, name);
+      option.title = meaning;
+      input.add(option);
+    }
+    input.value = settings.value(names[0]);
+    input.onchange = () => changed(names, input.value);
+  } else {
+    input = document.createElement("input");
+    if (type === "Boolean") {
+      input.type = "checkbox";
+      input.checked = settings.value(names[0]);
+      input.onchange = () => changed(names, input.checked);
+    } else {
+      number(input, parameter, { names, low, high, exact: exact || type === "Integer" });
+    }
+  }
+  input.id = id;
+  row.append(caption, input);
+  if (input.type === "range") {
+    const shown = document.createElement("output");
+    shown.htmlFor = id;
+    const write = () => {
+      const text = `${Number(Number(input.value).toPrecision(4))} ${parameter.unit}`.replace("-", "−").trim();
+      shown.textContent = text;
+      input.setAttribute("aria-valuetext", text);
+    };
+    input.addEventListener("input", write);
+    write();
+    row.append(shown);
+  } else {
+    row.classList.add("plain");
+    if (exact && parameter.unit) caption.append(`, ${parameter.unit}`);
+  }
+  return row;
+}
+
+function number(input, parameter, { names, low, high, exact }) {
+  const { kind, type } = parameter;
+  const value = parameter.shown(settings.value(names[0]));
+  if (exact) {
+    input.type = "number";
+    input.step = type === "Integer" ? 1 : "any";
+    if (kind.min !== null) input.min = parameter.shown(kind.min);
+    if (kind.max !== null) input.max = parameter.shown(kind.max);
+    input.value = value;
+    input.oninput = () => { if (input.value !== "" && input.checkValidity()) changed(names, parameter.written(input.valueAsNumber)); };
+    return;
+  }
+  input.type = "range";
+  const step = Chart.step(high - low, 200);
+  [low, high] = [Math.min(low, value), Math.max(high, value)];
+  input.min = low;
+  input.max = high;
+  // The initial value is one of the steps.
+  input.step = Number.isInteger(Number(((value - low) / step).toFixed(6))) ? step : "any";
+  input.value = value;
+  input.oninput = () => {
+    const chosen = input.step === "any" ? Number((Math.round(input.valueAsNumber / step) * step).toPrecision(10)) : input.valueAsNumber;
+    changed(names, parameter.written(chosen));
+  };
+}
+
+function load(address) {
+  try {
+    settings.unknown = settings.read(address);
+  } catch (error) {
+    say(error.message, true);
+    settings.read("");
+  }
+  build();
+  fly();
+}
+
+// --- Beginning and leaving ------------------------------------------------------------------------------------------
+
+function begin({ text, error }) {
+  if (error) return say(error, true);
+  settings = new Settings(JSON.parse(text));
+  const { controllers, stop, version } = settings.description;
+  for (const { id, name, fmu } of controllers) {
+    const option = new Option(name, id);
+    option.title = settings.description.fmus[fmu].description;
+    $("controller").add(option);
+  }
+  $("length").textContent = stop;
+  $("time").max = stop;
+  $("version").textContent = version;
+  point(time);
+  load(location.hash.slice(1));
+}
+
+function saved({ text, error }) {
+  if (error) return say(error, true);
+  const link = document.createElement("a");
+  link.href = URL.createObjectURL(new Blob([text], { type: "application/toml" }));
+  link.download = `${settings.choice.id}.toml`;
+  link.click();
+  URL.revokeObjectURL(link.href);
+  say(`orchestrator run ${link.download} flies this with the same bits.`);
+}
+
+$("controller").onchange = () => {
+  settings.choose($("controller").value);
+  build();
+  changed([], null);
+};
+$("reset").onclick = () => {
+  settings.set = {};
+  settings.choose(settings.choice.id);
+  build();
+  changed([], null);
+};
+$("copy").onclick = async () => {
+  try {
+    await navigator.clipboard.writeText(location.href);
+    say("Copied. The address holds all settings.");
+  } catch {
+    say("The address of this page holds all settings; this browser does not let the page copy it.");
+  }
+};
+$("save").onclick = () => worker.postMessage({ call: "experiment", request: settings.request() });
+$("time").oninput = () => point($("time").valueAsNumber);
+$("play").onclick = play;
+window.addEventListener("hashchange", () => load(location.hash.slice(1)));
+matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => flight && show());
+
+worker = new Worker(URL.createObjectURL(new Blob([$("worker").textContent], { type: "text/javascript" })));
+worker.onmessage = received;
+worker.onerror = (event) => say(`The flights cannot be computed: ${event.message}`, true);
+const packed = Uint8Array.from(atob($("module").textContent.trim()), (letter) => letter.charCodeAt(0));
+worker.postMessage({ module: packed, call: "describe" }, [packed.buffer]);

@@ -1,0 +1,155 @@
+//! The experiments that the page flies. Controllers, scenario, connections and order come from the
+//! files that the orchestrator runs; nothing of them is said again here.
+
+use crate::error::Error;
+use fmi2_export::Export;
+use fmu_controller::{Btvsmc, BtvsmcDo, Crmpc, Dlmpc, Fbl, Lqr, SotvsmcDo, TwoLoopSmc};
+use fmu_plant::ReentryPlant;
+use serde::Deserialize;
+use std::collections::BTreeMap;
+use toml::{Table, Value};
+
+/// Experiment that all flights extend: any controller in the scenario of Chai 2022.
+const EXPERIMENT: &str = "exchange/crmpc-2022.toml";
+/// File with the list of all controllers.
+const CONTROLLERS: &str = include_str!("../../orchestrator/experiments/base/studies.toml");
+
+macro_rules! embedded {
+    ($($name:literal),+) => {
+        &[$(($name, include_str!(concat!("../../orchestrator/experiments/", $name)))),+]
+    };
+}
+
+/// The files that the experiment consists of.
+const FILES: &[(&str, &str)] = embedded!(
+    "exchange/crmpc-2022.toml",
+    "exchange/any.toml",
+    "base/direct.toml",
+    "base/attitude.toml",
+    "base/crmpc-2022.toml"
+);
+
+/// The FMU of the vehicle.
+pub static PLANT: Export = Export::new::<ReentryPlant>();
+
+static LAWS: [(&str, Export); 8] = [
+    ("CRMPC", Export::new::<Crmpc>()),
+    ("DLMPC", Export::new::<Dlmpc>()),
+    ("LQR", Export::new::<Lqr>()),
+    ("FBL", Export::new::<Fbl>()),
+    ("BTVSMC", Export::new::<Btvsmc>()),
+    ("BTVSMC_DO", Export::new::<BtvsmcDo>()),
+    ("SOTVSMC_DO", Export::new::<SotvsmcDo>()),
+    ("TwoLoopSMC", Export::new::<TwoLoopSmc>()),
+];
+
+/// Returns the FMU of a control law.
+pub fn law(name: &str) -> Option<&'static Export> {
+    LAWS.iter().find(|(other, _)| *other == name).map(|(_, export)| export)
+}
+
+/// A controller that can be chosen: an FMU with settings of its own.
+#[derive(Clone, Debug)]
+pub struct Choice {
+    /// Short name for addresses and files.
+    pub id: String,
+    /// Name for people.
+    pub name: String,
+    /// Name of the FMU.
+    pub fmu: String,
+    /// Parameters of the controller that differ from its start values.
+    pub set: Table,
+}
+
+/// The part of the list of controllers that is used here.
+#[derive(Deserialize)]
+struct Listed {
+    lists: Lists,
+    templates: BTreeMap<String, Value>,
+}
+
+#[derive(Deserialize)]
+struct Lists {
+    controllers: Vec<Entry>,
+}
+
+#[derive(Deserialize)]
+struct Entry {
+    id: String,
+    name: String,
+    fmu: String,
+    fit: String,
+}
+
+/// Returns the controllers, in the order of the studies.
+///
+/// # Errors
+/// Says what is wrong with the list.
+pub fn choices() -> Result<Vec<Choice>, Error> {
+    let file = "base/studies.toml";
+    let Listed { lists, templates } =
+        toml::from_str(CONTROLLERS).map_err(|error| problem(file, &error.to_string()))?;
+    let choice = |entry: Entry| {
+        let template = templates.get(&entry.fit).and_then(|fit| fit.get("set"));
+        let set = template.and_then(Value::as_table).into_iter().flatten();
+        let set = set.map(|(name, value)| {
+            let name = name.strip_prefix("controller.");
+            let name = name.ok_or_else(|| problem(file, "a parameter is of another component"))?;
+            Ok((name.to_string(), value.clone()))
+        });
+        let fmu = entry.fmu.trim_end_matches(".fmu").to_string();
+        Ok(Choice { id: entry.id, name: entry.name, fmu, set: set.collect::<Result<_, Error>>()? })
+    };
+    lists.controllers.into_iter().map(choice).collect()
+}
+
+/// Returns the experiment with all that it extends.
+///
+/// # Errors
+/// Names a file that is not built in, or is not TOML.
+pub fn experiment() -> Result<Table, Error> {
+    merged(EXPERIMENT)
+}
+
+fn merged(file: &str) -> Result<Table, Error> {
+    let text = FILES.iter().find(|(name, _)| *name == file);
+    let (_, text) = text.ok_or_else(|| problem(file, "the file is not built in"))?;
+    let mut own: Table = text.parse().map_err(|error| problem(file, &format!("{error}")))?;
+    let bases = match own.remove("extends") {
+        Some(Value::Array(files)) => files,
+        Some(file) => vec![file],
+        None => vec![],
+    };
+    let mut table = Table::new();
+    for base in bases {
+        merge(&mut table, merged(&beside(file, base.as_str().unwrap_or_default()))?);
+    }
+    // A file without a title is meant to be extended, and so are title and description.
+    merge(&mut table, own);
+    Ok(table)
+}
+
+/// Returns the name of a file relative to the folder of another one.
+fn beside(file: &str, base: &str) -> String {
+    match base.strip_prefix("../") {
+        Some(base) => base.to_string(),
+        None => format!("{}/{base}", file.split('/').next().unwrap_or_default()),
+    }
+}
+
+/// Merges tables key by key; any other value replaces the one before.
+fn merge(table: &mut Table, over: Table) {
+    for (key, value) in over {
+        match (table.get_mut(&key), value) {
+            (Some(Value::Table(inner)), Value::Table(value)) => merge(inner, value),
+            (_, value) => {
+                table.insert(key, value);
+            }
+        }
+    }
+}
+
+/// Returns the error that an experiment or list contradicts itself.
+pub fn problem(file: &str, problem: &str) -> Error {
+    Error::Experiment { file: file.into(), problem: problem.into() }
+}

@@ -1,0 +1,22 @@
+//! The signals that a flight records.
+
+/// Columns of the signals, in this order; in SI units, the status as the number of its item.
+pub const COLUMNS: [&str; 14] = [
+    "time",
+    "plant.attitude.alpha",
+    "plant.attitude.beta",
+    "plant.attitude.sigma",
+    "plant.rate.p",
+    "plant.rate.q",
+    "plant.rate.r",
+    "controller.reference.alpha",
+    "controller.reference.beta",
+    "controller.reference.sigma",
+    "controller.moment.x",
+    "controller.moment.y",
+    "controller.moment.z",
+    "controller.guarantee.status",
+];
+
+/// Values of all columns at one communication point.
+pub type Row = [f64; COLUMNS.len()];

@@ -1,0 +1,106 @@
+//! Figures of merit of a flight, as docs/symbols.md defines them.
+
+use crate::request::GUARANTEE;
+use crate::signals::Row;
+use fmi2_export::linked::Linked;
+use model_description::variable::VariableKind;
+use serde::Serialize;
+
+/// Limits of the norms.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct Limits {
+    /// Limit on ‖ω‖, rad/s.
+    pub rate: f64,
+    /// Limit on ‖m‖, N m.
+    pub moment: f64,
+}
+
+/// A message of an FMU.
+#[derive(Clone, Debug, Serialize)]
+pub struct Message {
+    /// Communication point at which it appeared, s.
+    time: f64,
+    /// What it says.
+    text: String,
+}
+
+/// Result of a flight, apart from its signals.
+#[derive(Clone, Debug, Serialize)]
+pub struct Summary {
+    /// Number of rows of the signals.
+    rows: usize,
+    /// Communication step, s.
+    step: f64,
+    /// Limits that the controller knows.
+    limits: Limits,
+    /// Root mean square of ‖Θ − Θ_r‖ over the steps, rad.
+    ems: f64,
+    /// Root mean square of ‖m‖ over the steps, as a share of its limit.
+    cms: f64,
+    /// Largest ‖ω‖ as a share of its limit.
+    rate_ratio: f64,
+    /// Largest ‖m‖ as a share of its limit.
+    moment_ratio: f64,
+    /// Items of the guarantee's status, counted from 1; none if the controller gives no guarantee.
+    guarantee: Vec<(String, String)>,
+    /// Warnings of the FMUs.
+    warnings: Vec<Message>,
+    /// Why the flight ended early, if it did.
+    end: Option<Message>,
+}
+
+fn squared(values: impl Iterator<Item = f64>) -> f64 {
+    values.map(|value| value * value).sum()
+}
+
+impl Summary {
+    /// Returns the summary of a flight that has not begun.
+    pub fn new(limits: Limits, step: f64, controller: &Linked) -> Self {
+        let guarantee = match controller.find(GUARANTEE).map(|(_, variable)| &variable.kind) {
+            Some(VariableKind::Enumeration { enumeration_type, .. }) => {
+                enumeration_type.items.clone()
+            }
+            _ => vec![],
+        };
+        Self {
+            rows: 0,
+            step,
+            limits,
+            ems: 0.0,
+            cms: 0.0,
+            rate_ratio: 0.0,
+            moment_ratio: 0.0,
+            guarantee,
+            warnings: vec![],
+            end: None,
+        }
+    }
+
+    /// Takes a row into account. At the end of the flight no step begins, so that it has no command
+    /// of its own.
+    pub fn take(&mut self, row: &Row, end: bool) {
+        let before = self.rows as f64;
+        self.rows += 1;
+        let rate = squared(row[4..7].iter().copied()).sqrt() / self.limits.rate;
+        self.rate_ratio = self.rate_ratio.max(rate);
+        if end {
+            return;
+        }
+        let effort = squared(row[10..13].iter().copied()).sqrt() / self.limits.moment;
+        self.moment_ratio = self.moment_ratio.max(effort);
+        let error = squared((1..4).map(|i| row[i] - row[i + 6]));
+        let mean = |rms: f64, square: f64| ((rms * rms * before + square) / (before + 1.0)).sqrt();
+        self.ems = mean(self.ems, error);
+        self.cms = mean(self.cms, effort * effort);
+    }
+
+    /// Adds a warning of an FMU.
+    pub fn warn(&mut self, time: f64, text: String) {
+        self.warnings.push(Message { time, text });
+    }
+
+    /// Says why the flight ends at `time` (s).
+    pub fn end(&mut self, time: f64, text: String) {
+        self.end = Some(Message { time, text });
+    }
+}

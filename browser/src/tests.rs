@@ -1,0 +1,92 @@
+//! Requests of the page, and what is refused.
+
+use crate::description;
+use crate::flight::fly;
+use crate::request::Request;
+use crate::scenario;
+use crate::signals::COLUMNS;
+use serde_json::{Value, json};
+
+/// Flies a request. Returns the summary and the signals.
+fn flown(request: &Value) -> Result<(Value, Vec<f64>), String> {
+    let mut signals = vec![];
+    let request = Request::read(request.to_string().as_bytes());
+    let prepared = request.and_then(Request::prepare);
+    let summary = prepared.and_then(|prepared| fly(prepared, &mut signals));
+    let summary = summary.map_err(|error| error.to_string())?;
+    Ok((serde_json::to_value(summary).unwrap(), signals))
+}
+
+fn refused(set: &Value) -> String {
+    flown(&json!({"controller": "lqr", "set": set})).unwrap_err()
+}
+
+#[test]
+fn every_controller_flies_to_the_end() {
+    for choice in scenario::choices().unwrap() {
+        let (summary, signals) = flown(&json!({"controller": choice.id})).unwrap();
+        assert_eq!(summary["end"], Value::Null, "{}", choice.id);
+        let step = summary["step"].as_f64().unwrap();
+        assert_eq!(signals.len(), ((50.0 / step).round() as usize + 1) * COLUMNS.len());
+        assert_eq!(signals[signals.len() - COLUMNS.len()], 50.0, "{}", choice.id);
+        assert!(summary["ems"].as_f64().unwrap().to_degrees() < 3.0, "{}: {summary}", choice.id);
+    }
+}
+
+#[test]
+fn a_text_with_a_display_unit_is_the_number_in_si_units() {
+    let flight = |bound: Value| {
+        flown(&json!({"controller": "lqr", "set": {"plant.disturbance.bound": bound}})).unwrap()
+    };
+    let (_, in_degrees) = flight(json!("3 deg/s2"));
+    assert_eq!(in_degrees, flight(json!(3.0 / (180.0 / std::f64::consts::PI))).1);
+    assert_ne!(in_degrees, flight(json!("2 deg/s2")).1);
+}
+
+#[test]
+fn the_guarantee_of_crmpc_is_shown_and_only_that() {
+    let status = |controller: &str| {
+        let (summary, signals) = flown(&json!({"controller": controller})).unwrap();
+        (summary["guarantee"].as_array().unwrap().len(), signals[100 * COLUMNS.len() - 1] as usize)
+    };
+    let (items, item) = status("crmpc");
+    assert!((1..=items).contains(&item));
+    assert_eq!(status("lqr"), (0, 0));
+}
+
+#[test]
+fn a_flight_that_cannot_go_on_ends_with_a_reason() {
+    let set = json!({"controller.weight.Q[1]": 1e12, "controller.weight.Q[2]": 1e12, "plant.disturbance.bound": 10.0});
+    let (summary, signals) = flown(&json!({"controller": "lqr", "set": set})).unwrap();
+    let rows = summary["rows"].as_u64().unwrap() as usize;
+    assert_eq!(signals.len(), rows * COLUMNS.len());
+    assert!(rows < 1251 && summary["end"]["text"].as_str().unwrap().len() > 20, "{summary}");
+}
+
+#[test]
+fn wrong_requests_are_refused_by_name() {
+    let unknown = flown(&json!({"controller": "pid"})).unwrap_err();
+    assert!(unknown.contains("'pid'"), "{unknown}");
+    for (set, words) in [
+        (json!({"plant.nothing": 1}), "plant.nothing: ReentryPlant has no such parameter"),
+        (json!({"planet.x": 1}), "planet: the experiment has no such component"),
+        (json!({"plant.disturbance.kind": "pink"}), "one of none, white"),
+        (json!({"plant.disturbance.bound": "2 kg"}), "'2 kg' is not in rad/s2"),
+        (json!({"plant.disturbance.bound": -1}), "disturbance.bound"),
+        (json!({"plant.disturbance.seed": 1.5}), "must be an integer"),
+        (json!({"controller.period.feedback": 0.03}), "a whole number of periods"),
+    ] {
+        assert!(refused(&set).contains(words), "{set}: {}", refused(&set));
+    }
+}
+
+#[test]
+fn the_page_knows_all_controllers_and_their_parameters() {
+    let described = serde_json::to_value(description::describe().unwrap()).unwrap();
+    assert_eq!(described["controllers"].as_array().unwrap().len(), 9);
+    for controller in described["controllers"].as_array().unwrap() {
+        let fmu = &described["fmus"][controller["fmu"].as_str().unwrap()];
+        assert!(fmu["parameters"].as_array().unwrap().len() > 20);
+    }
+    assert_eq!(described["scenario"]["plant"]["disturbance.bound"], "2 deg/s2");
+}

@@ -1,0 +1,6 @@
+//! The library of the FMU `ReentryPlant`.
+#![deny(clippy::disallowed_methods)]
+
+use fmu_plant::ReentryPlant;
+
+fmi2_export::export_fmus!(ReentryPlant);

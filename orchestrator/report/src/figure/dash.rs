@@ -1,0 +1,36 @@
+//! Dashes that tell the lines of a figure apart without their colours.
+
+use super::{Curve, Figure, Shape};
+
+/// Lengths of strokes and gaps of the patterns, px; the first one is a solid line.
+const PATTERNS: [&[f64]; 6] =
+    [&[], &[9.0, 4.0], &[2.5, 3.0], &[11.0, 3.5, 2.5, 3.5], &[18.0, 5.0], &[6.0, 3.0, 2.0, 3.0, 2.0, 3.0]];
+
+/// Patterns of the lines of a figure. A name has the same pattern in every panel.
+pub struct Dashes<'a>(Vec<&'a str>);
+
+impl<'a> Dashes<'a> {
+    /// Assigns a pattern to the name of every line.
+    pub fn new(figure: &'a Figure) -> Self {
+        let mut names: Vec<&str> = Vec::new();
+        let curves = figure.panels.iter().flat_map(|panel| &panel.curves);
+        for curve in curves.filter(|curve| curve.shape == Shape::Line) {
+            if !names.contains(&curve.name.as_str()) {
+                names.push(&curve.name);
+            }
+        }
+        Self(names)
+    }
+
+    /// Returns strokes and gaps of a curve, px; nothing for a solid line.
+    pub fn of(&self, curve: &Curve) -> &'static [f64] {
+        match curve.shape {
+            Shape::Dashed | Shape::Horizontal | Shape::Vertical => &[6.0, 4.0],
+            Shape::Line => {
+                let place = self.0.iter().position(|name| *name == curve.name).unwrap_or(0);
+                PATTERNS[place % PATTERNS.len()]
+            }
+            _ => &[],
+        }
+    }
+}

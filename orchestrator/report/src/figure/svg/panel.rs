@@ -1,0 +1,252 @@
+//! One panel of a figure: axes, grid and curves.
+
+use super::{escaped, stroke};
+use crate::figure::dash::Dashes;
+use crate::figure::thin::thinned;
+use crate::figure::{Curve, Panel, Shape, ticks};
+use std::fmt::Write as _;
+
+/// Space for labels to the left, to the right, above and below the axes, px.
+const LEFT: f64 = 64.0;
+const RIGHT: f64 = 14.0;
+const ABOVE: f64 = 10.0;
+const TITLE: f64 = 18.0;
+const BELOW: f64 = 40.0;
+/// Height and width that a mark of an axis needs, px.
+const MARK_HEIGHT: f64 = 38.0;
+const MARK_WIDTH: f64 = 80.0;
+
+/// Place of a panel with its labels, px.
+#[derive(Clone, Copy)]
+pub(super) struct Area {
+    pub x: f64,
+    pub y: f64,
+    pub width: f64,
+    pub height: f64,
+}
+
+/// A panel's axes: ranges of the values, and where they are drawn.
+struct Axes {
+    x: (f64, f64),
+    y: (f64, f64),
+    log_x: bool,
+    frame: Area,
+}
+
+impl Axes {
+    fn x_at(&self, value: f64) -> f64 {
+        let place = |x: f64| if self.log_x { x.log10() } else { x };
+        let (low, high) = (place(self.x.0), place(self.x.1));
+        self.frame.x + (place(value) - low) / (high - low) * self.frame.width
+    }
+
+    fn y_at(&self, value: f64) -> f64 {
+        let (low, high) = self.y;
+        self.frame.y + (high - value) / (high - low) * self.frame.height
+    }
+
+    /// Returns the runs of points of a curve that can be drawn, px.
+    fn runs(&self, xs: &[f64], ys: &[f64]) -> Vec<Vec<(f64, f64)>> {
+        let mut runs = vec![Vec::new()];
+        for (x, y) in xs.iter().zip(ys) {
+            if (self.x.0..=self.x.1).contains(x) && y.is_finite() {
+                let point = (self.x_at(*x), self.y_at(*y));
+                runs.last_mut().expect("there is a run").push(point);
+            } else if !runs.last().is_some_and(Vec::is_empty) {
+                runs.push(Vec::new());
+            }
+        }
+        runs.retain(|run| !run.is_empty());
+        runs
+    }
+}
+
+/// Draws a panel. A page's script finds ranges and frame in the attributes of its group.
+pub(super) fn draw_panel(
+    out: &mut String,
+    panel: &Panel,
+    dashes: &Dashes,
+    area: Area,
+    place: usize,
+) {
+    let above = ABOVE + if panel.title.is_empty() { 0.0 } else { TITLE };
+    let frame = Area {
+        x: area.x + LEFT,
+        y: area.y + above,
+        width: area.width - LEFT - RIGHT,
+        height: area.height - above - BELOW,
+    };
+    let axes = Axes { x: panel.range(true), y: panel.range(false), log_x: panel.log_x, frame };
+    let Area { x, y, width, height } = frame;
+    let ((left, right), (bottom, top)) = (axes.x, axes.y);
+    let _ = write!(
+        out,
+        "<g class=\"panel\" data-frame=\"{x} {y} {width} {height}\" data-x=\"{left:e} {right:e}\" data-y=\"{bottom:e} {top:e}\"{}>",
+        if panel.log_x { " data-log=\"\"" } else { "" }
+    );
+    draw_axes(out, panel, &axes, area);
+    // Every figure of a page has clips of its own, whose names may be equal: they are nested.
+    let _ = write!(
+        out,
+        "<svg class=\"curves\" x=\"{x}\" y=\"{y}\" width=\"{width}\" height=\"{height}\" viewBox=\"{x} {y} {width} {height}\" preserveAspectRatio=\"none\" data-panel=\"{place}\">"
+    );
+    for curve in &panel.curves {
+        draw_curve(out, curve, dashes, &axes);
+    }
+    out.push_str("</svg>");
+    name_lines(out, panel, &axes);
+    out.push_str("</g>");
+}
+
+fn draw_axes(out: &mut String, panel: &Panel, axes: &Axes, area: Area) {
+    let Area { x, y, width, height } = axes.frame;
+    let (bottom, middle) = (y + height, x + width / 2.0);
+    if !panel.title.is_empty() {
+        let above = y - 7.0;
+        let title = escaped(&panel.title);
+        let _ = write!(out, "<text x=\"{middle:.1}\" y=\"{above:.1}\" text-anchor=\"middle\">{title}</text>");
+    }
+    let (left, right) = axes.x;
+    let marks = if panel.log_x {
+        ticks::logarithmic(left, right)
+    } else {
+        ticks::linear(left, right, ((width / MARK_WIDTH) as usize).max(2))
+    };
+    out.push_str("<g class=\"marks-x small\" text-anchor=\"middle\">");
+    for mark in marks {
+        let at = axes.x_at(mark);
+        let range = if panel.log_x { mark } else { right - left };
+        let text = ticks::label(mark, range);
+        let _ = write!(
+            out,
+            "<path class=\"grid\" d=\"M{at:.1} {y:.1}v{height:.1}\"/><text class=\"small\" x=\"{at:.1}\" y=\"{:.1}\">{text}</text>",
+            bottom + 15.0
+        );
+    }
+    out.push_str("</g><g class=\"marks-y small\" text-anchor=\"end\">");
+    let (low, high) = axes.y;
+    for mark in ticks::linear(low, high, ((height / MARK_HEIGHT) as usize).max(2)) {
+        let at = axes.y_at(mark);
+        let text = ticks::label(mark, high - low);
+        let _ = write!(
+            out,
+            "<path class=\"grid\" d=\"M{x:.1} {at:.1}h{width:.1}\"/><text class=\"small\" x=\"{:.1}\" y=\"{:.1}\">{text}</text>",
+            x - 6.0,
+            at + 4.0
+        );
+    }
+    let _ = write!(
+        out,
+        "</g><path class=\"axis\" d=\"M{x:.1} {y:.1}v{height:.1}h{width:.1}\"/><text x=\"{middle:.1}\" y=\"{:.1}\" text-anchor=\"middle\">{}</text>",
+        bottom + 33.0,
+        escaped(&panel.x_label)
+    );
+    let (side, centre) = (area.x + 14.0, y + height / 2.0);
+    let _ = write!(
+        out,
+        "<text transform=\"translate({side:.1} {centre:.1}) rotate(-90)\" text-anchor=\"middle\">{}</text>",
+        escaped(&panel.y_label)
+    );
+}
+
+fn draw_curve(out: &mut String, curve: &Curve, dashes: &Dashes, axes: &Axes) {
+    let (name, paint) = (escaped(&curve.name), stroke(curve, dashes));
+    let begin = format!("data-name=\"{name}\" vector-effect=\"non-scaling-stroke\"");
+    let Area { x, y, width, height } = axes.frame;
+    let first = |values: &[f64]| values.first().copied().unwrap_or(f64::NAN);
+    let area = format!("fill=\"{}\" fill-opacity=\"{}\"", curve.color, curve.shape.opacity());
+    match &curve.shape {
+        Shape::Line | Shape::Pale | Shape::Dashed => {
+            for run in axes.runs(&curve.x, &curve.y) {
+                let data = path(&thinned(&run));
+                let _ = write!(out, "<path {begin} d=\"{data}\" fill=\"none\" stroke-linejoin=\"round\" {paint}/>");
+            }
+        }
+        Shape::Horizontal => {
+            let at = axes.y_at(first(&curve.y));
+            let _ = write!(out, "<path {begin} d=\"M{x:.1} {at:.1}h{width:.1}\" {paint}/>");
+        }
+        Shape::Vertical => {
+            let at = axes.x_at(first(&curve.x));
+            let _ = write!(out, "<path {begin} d=\"M{at:.1} {y:.1}v{height:.1}\" {paint}/>");
+        }
+        Shape::Band(lower) => {
+            let sides = [axes.runs(&curve.x, &curve.y), axes.runs(&curve.x, lower)];
+            let [upper, mut lower] = sides.map(|runs| thinned(&runs.concat()));
+            lower.reverse();
+            let data = path(&[upper, lower].concat());
+            let _ = write!(out, "<path {begin} d=\"{data}Z\" {area}/>");
+        }
+        Shape::Steps => {
+            let points = axes.runs(&curve.x, &curve.y).concat();
+            let (Some(start), Some(end)) = (points.first(), points.last()) else { return };
+            let mut data = format!("M{:.1} {:.1}", start.0, axes.y_at(0.0));
+            for pair in points.windows(2) {
+                let _ = write!(data, "V{:.1}H{:.1}", pair[0].1, pair[1].0);
+            }
+            let _ = write!(out, "<path {begin} d=\"{data}V{:.1}H{:.1}Z\" {area}/>", axes.y_at(0.0), end.0);
+        }
+        Shape::Dots => {
+            for (at, height) in axes.runs(&curve.x, &curve.y).concat() {
+                let _ = write!(out, "<circle {begin} cx=\"{at:.1}\" cy=\"{height:.1}\" r=\"3\" fill=\"{}\" fill-opacity=\"0.8\"/>", curve.color);
+            }
+        }
+        Shape::Crosses => {
+            for (at, height) in axes.runs(&curve.x, &curve.y).concat() {
+                let (left, top) = (at - 6.0, height - 6.0);
+                let _ = write!(out, "<path {begin} d=\"M{left:.1} {top:.1}l12 12m0 -12l-12 12\" stroke=\"{}\" stroke-width=\"2.4\"/>", curve.color);
+            }
+        }
+    }
+}
+
+/// Writes the names of straight lines beside them, each once.
+fn name_lines(out: &mut String, panel: &Panel, axes: &Axes) {
+    let Area { x, y, width, height } = axes.frame;
+    let mut named: Vec<&str> = Vec::new();
+    for curve in panel.curves.iter().filter(|curve| curve.shape.is_straight()) {
+        if named.contains(&curve.name.as_str()) {
+            continue;
+        }
+        named.push(&curve.name);
+        let (at_x, at_y, anchor) = match curve.shape {
+            Shape::Horizontal => {
+                let line = axes.y_at(curve.y.first().copied().unwrap_or(f64::NAN));
+                // Below the line if there is no room above it.
+                let at = if line - y < 16.0 { line + 14.0 } else { line - 5.0 };
+                (x + width - 4.0, at, "end")
+            }
+            _ => {
+                let line = axes.x_at(curve.x.first().copied().unwrap_or(f64::NAN));
+                let is_left = line - x < 0.8 * width;
+                let at = if is_left { line + 5.0 } else { line - 5.0 };
+                (at, y + height - 6.0 - 14.0 * (named.len() - 1) as f64, if is_left { "start" } else { "end" })
+            }
+        };
+        let _ = write!(
+            out,
+            "<text class=\"small limit-name\" x=\"{at_x:.1}\" y=\"{at_y:.1}\" text-anchor=\"{anchor}\">{}</text>",
+            escaped(&curve.name)
+        );
+    }
+}
+
+/// Returns a line through points as the data of a path, in tenths of a pixel and relative to the
+/// point before.
+fn path(points: &[(f64, f64)]) -> String {
+    let mut data = String::new();
+    let mut last = (0, 0);
+    for (place, (x, y)) in points.iter().enumerate() {
+        let next = ((x * 10.0).round() as i64, (y * 10.0).round() as i64);
+        let tenth = |value: i64| value as f64 / 10.0;
+        let (dx, dy) = (tenth(next.0 - last.0), tenth(next.1 - last.1));
+        let _ = match place {
+            0 => write!(data, "M{} {}", tenth(next.0), tenth(next.1)),
+            _ if next == last => Ok(()),
+            1 => write!(data, "l{dx} {dy}"),
+            _ => write!(data, " {dx} {dy}"),
+        };
+        last = next;
+    }
+    data
+}

@@ -1,0 +1,223 @@
+"""The page "Try it in the browser" in headless Chromium: its flights have the bits of the orchestrator, also for the
+experiment files that it writes."""
+
+from __future__ import annotations
+
+import base64
+import json
+import shutil
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from playwright.sync_api import Browser, Page, sync_playwright
+
+from conftest import ROOT, program
+
+PAGE = ROOT / "out" / "browser" / "index.html"
+CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+ARGUMENTS = [
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+]
+CONTROLLERS = ["crmpc", "crmpc-paper", "dlmpc", "lqr", "fbl", "btvsmc", "btvsmc-do", "sotvsmc-do", "two-loop"]
+# Another flight than the scenario's: text with a unit, integer, number, and both delays.
+CHANGED = "plant.disturbance.bound=1.7+deg/s2&plant.disturbance.seed=7&plant.initial.alpha=12+deg&plant.inertia.scale=0.97"
+DELAYED = f"{CHANGED}&plant.actuation.delay=0.04&controller.delay=0.04&controller.limit.moment=150000"
+
+pytestmark = [
+    pytest.mark.skipif(not PAGE.is_file(), reason=f"{PAGE.relative_to(ROOT)} does not exist: run scripts/browser"),
+    pytest.mark.skipif(CHROMIUM is None, reason="Chromium is not installed: run scripts/install-tools browser"),
+]
+
+
+@pytest.fixture(scope="module")
+def chromium():
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=ARGUMENTS)
+        yield browser
+        browser.close()
+
+
+def flights(page: Page) -> int:
+    return page.evaluate("Number(document.documentElement.dataset.flights ?? 0)")
+
+
+def after(page: Page, count: int) -> None:
+    """Waits for the flight after `count` others, and for the last one that was asked for."""
+    page.wait_for_function(f"Number(document.documentElement.dataset.flights ?? 0) > {count} && !busy && !wanted")
+
+
+def opened(browser: Browser, address: str = "", **options) -> Page:
+    """The page once its first flight is shown. A fault in it fails the test."""
+    page = browser.new_context(**options).new_page()
+    page.faults = []
+    page.on("pageerror", lambda error: page.faults.append(str(error)))
+    page.goto(f"{PAGE.as_uri()}#{address}")
+    after(page, 0)
+    assert page.faults == []
+    return page
+
+
+def signals(page: Page) -> pd.DataFrame:
+    """The recorded signals, as the bytes that they are in the page."""
+    columns, text = page.evaluate(
+        """() => {
+            const bytes = new Uint8Array(flight.signals.buffer), parts = [];
+            for (let i = 0; i < bytes.length; i += 8192) parts.push(String.fromCharCode(...bytes.subarray(i, i + 8192)));
+            return [flight.columns, btoa(parts.join(""))];
+        }"""
+    )
+    values = np.frombuffer(base64.b64decode(text), dtype="<f8")
+    return pd.DataFrame(values.reshape(-1, len(columns)), columns=columns)
+
+
+def assert_same_bits(shown: pd.DataFrame, table: pd.DataFrame, missing: int) -> None:
+    """All but so many columns of the page are those of the orchestrator."""
+    common = [name for name in shown.columns if name in table]
+    assert len(common) == len(shown.columns) - missing
+    for name in common:
+        assert shown[name].to_numpy().tobytes() == table[name].to_numpy(float).tobytes(), name
+
+
+def saved(page: Page, folder: Path) -> Path:
+    with page.expect_download() as download:
+        page.click("#save")
+    path = folder / download.value.suggested_filename
+    download.value.save_as(path)
+    return path
+
+
+def flown(experiment: Path, folder: Path) -> tuple[pd.DataFrame, dict]:
+    """What the orchestrator makes of an experiment file."""
+    subprocess.run([program("orchestrator"), "run", experiment, "--out", folder], check=True, capture_output=True)
+    table = pd.read_csv(folder / "results.csv", dtype=str).map(float)
+    return table, json.loads((folder / "metrics.json").read_text())
+
+
+@pytest.mark.parametrize("controller", CONTROLLERS)
+def test_a_flight_has_the_bits_of_the_orchestrator(chromium, tmp_path, controller):
+    address = f"controller={controller}&{DELAYED if controller in ('crmpc', 'lqr') else CHANGED}"
+    page = opened(chromium, address, accept_downloads=True)
+    shown = signals(page)
+    table, metrics = flown(saved(page, tmp_path), tmp_path / "out")
+    assert table["time"].iloc[-1] == 50.0
+    # Only CRMPC has the status of a guarantee.
+    assert_same_bits(shown, table, missing="crmpc" not in controller)
+    # The figures of merit are sums, which may be taken in another order.
+    summary = page.evaluate("flight.summary")
+    assert summary["cms"] == pytest.approx(metrics["cms"], rel=1e-9)
+    assert summary["moment_ratio"] == pytest.approx(metrics["max_moment_ratio"], rel=1e-12)
+    assert page.evaluate("flight.summary.ems * 180 / Math.PI") == pytest.approx(metrics["ems_deg"], rel=1e-9)
+    rate = summary["rate_ratio"] * metrics["rate_limit_deg_s"]
+    assert rate == pytest.approx(metrics["max_rate_deg_s"], rel=1e-12)
+
+
+def test_the_page_opens_with_the_published_scenario(chromium, tmp_path):
+    experiment = ROOT / "orchestrator" / "experiments" / "crmpc-2022" / "crmpc-robust.toml"
+    table, _ = flown(experiment, tmp_path)
+    # That experiment does not record the status of the guarantee.
+    assert_same_bits(signals(opened(chromium)), table, missing=1)
+
+
+def test_the_guarantee_is_told_as_the_orchestrator_tells_it(chromium):
+    page = opened(chromium)
+    assert "in force throughout" in page.inner_text("#figures")
+    assert "keeps both limits" in page.inner_text("#verdict")
+    # Three times the disturbance that the design provides for.
+    page = opened(chromium, "plant.disturbance.bound=6+deg/s2")
+    assert "an assumption is contradicted" in page.inner_text("#figures")
+    assert page.inner_text("#messages summary")
+    page = opened(chromium, "controller=lqr")
+    assert "LQR gives none" in page.inner_text("#figures")
+    assert "exceeds the rate limit (129 %) and the moment limit (446 %)" in page.inner_text("#verdict")
+
+
+def test_a_slider_changes_flight_and_address_and_the_address_holds_everything(chromium):
+    page = opened(chromium)
+    before, count = signals(page), flights(page)
+    slider = page.get_by_label("bound", exact=True)
+    slider.focus()
+    page.keyboard.press("ArrowRight")
+    after(page, count)
+    changed = signals(page)
+    assert not changed.equals(before)
+    page.select_option("#controller", "dlmpc")
+    page.get_by_label("seed").fill("3")
+    page.get_by_label("slidingMode.q").press("ArrowLeft")
+    page.wait_for_function("!busy && !wanted")
+    address = page.evaluate("location.hash.slice(1)")
+    names = ["controller=dlmpc", "plant.disturbance.bound=2.0", "plant.disturbance.seed=3", "controller.slidingMode.q=4."]
+    assert all(name in address for name in names), address
+    again = opened(chromium, address)
+    assert signals(again).equals(signals(page))
+    assert again.evaluate("location.hash.slice(1)") == address
+    count = flights(page)
+    page.click("#reset")
+    after(page, count)
+    assert page.evaluate("location.hash") == "#controller=dlmpc"
+
+
+def test_what_an_address_gets_wrong_is_named(chromium):
+    assert "plant.wind" in opened(chromium, "plant.wind=3").inner_text("#said")
+    page = chromium.new_context().new_page()
+    page.goto(f"{PAGE.as_uri()}#plant.disturbance.bound=900+deg/s2")
+    page.wait_for_function("document.querySelector('#said').textContent.includes('disturbance.bound')")
+    # The page goes on from there.
+    page.get_by_label("bound", exact=True).press("Home")
+    after(page, 0)
+    assert page.inner_text("#said") == ""
+
+
+def test_one_file_is_everything(chromium):
+    assert PAGE.stat().st_size <= 2_500_000
+    page = chromium.new_context(offline=True).new_page()
+    asked = []
+    page.on("request", lambda request: asked.append(request.url.split(":")[0]))
+    page.goto(PAGE.as_uri())
+    after(page, 0)
+    assert set(asked) <= {"file", "blob", "data"}
+
+
+def test_the_page_answers_fast(chromium):
+    """Bounds for machines with other work; scripts/bench browser measures."""
+    page = chromium.new_context().new_page()
+    page.goto(PAGE.as_uri())
+    after(page, 0)
+    assert page.evaluate("performance.now()") < 10e3
+    for _ in range(5):
+        count = flights(page)
+        page.get_by_label("bound", exact=True).press("ArrowRight")
+        after(page, count)
+    assert page.evaluate("flight.ms") < 2000
+
+
+def test_the_view_of_the_vehicle_turns_as_the_angles_are_defined(chromium):
+    """The velocity in body axes is (cos α cos β, sin β, sin α cos β); positive bank lowers the right wing."""
+    page = opened(chromium)
+    rotation = np.array(page.evaluate("Vehicle3D.rotation([0.3, -0.2, 0.7])"))
+    alpha, beta = 0.3, -0.2
+    velocity = [np.cos(alpha) * np.cos(beta), np.sin(beta), np.sin(alpha) * np.cos(beta)]
+    np.testing.assert_allclose(rotation @ velocity, [1.0, 0.0, 0.0], atol=1e-15)
+    np.testing.assert_allclose(rotation @ rotation.T, np.eye(3), atol=1e-15)
+    assert np.linalg.det(rotation) > 0.0
+    banked = np.array(page.evaluate("Vehicle3D.rotation([0, 0, 0.7])"))
+    np.testing.assert_allclose(banked @ [0.0, 1.0, 0.0], [0.0, np.cos(0.7), np.sin(0.7)], atol=1e-15)
+
+
+@pytest.mark.parametrize("width", [390, 760, 1000, 1400])
+def test_nothing_is_wider_than_the_window_and_everything_has_a_name(chromium, width):
+    page = opened(chromium, viewport={"width": width, "height": 800})
+    for summary in page.query_selector_all("#groups summary"):
+        summary.click()
+    assert page.evaluate("document.documentElement.scrollWidth") == width
+    unnamed = """[...document.querySelectorAll("input, select, button, canvas")]
+        .filter((each) => !each.labels?.length && !each.ariaLabel && !each.textContent.trim()).map((each) => each.id)"""
+    assert page.evaluate(unnamed) == []
