@@ -16,6 +16,7 @@ import pytest
 import results as pages
 
 from conftest import EXPERIMENTS, ROOT, TARGET, merged, program
+from figures import check_folder
 
 MEMBERS = 2
 
@@ -55,8 +56,7 @@ def claim(results, words: str) -> dict:
 
 def test_the_report_is_one_page_that_needs_no_network(report):
     page = (report[1] / "report.html").read_text()
-    # The library of the plots holds addresses in its own text, which no browser loads.
-    outside = re.sub(r"<script>.*?</script>", "", page, flags=re.DOTALL)
+    outside = re.sub(r"<script>.*?</script>", "", page, flags=re.DOTALL).replace('xmlns="http://www.w3.org/2000/svg"', "")
     loaded = re.findall(r'(?:src|href)\s*=\s*"([^"]*)"', outside)
     assert loaded and all(not re.match(r"(?:https?:)?//", address) for address in loaded)
     assert "<link" not in outside and "@import" not in outside
@@ -69,9 +69,14 @@ def test_every_figure_is_on_the_page_and_beside_it(report):
     figures = [figure["id"] for figure in study["figure"]]
     assert {"fig-3", "fig-4", "fig-5", "fig-6", "fig-7"} <= set(figures)
     for figure in figures:
-        assert f'data-plot="plot-{figure}"' in page and f'id="plot-{figure}"' in page
+        drawn = page.split(f'<figure id="{figure}">')[1].split("</figure>")[0]
+        assert drawn.count("<path data-name=") + drawn.count("<circle data-name=") > 0, figure
         assert (report[1] / "figures" / f"{figure}.svg").read_text().startswith("<svg")
         assert (report[1] / "figures" / f"{figure}.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_curves_of_every_figure_differ_without_red_and_green(report):
+    check_folder(report[1])
 
 
 def test_every_published_value_is_shown_with_its_place(report, results):
@@ -480,6 +485,10 @@ def test_wu_2015_with_control_allocation(wu):
     # With the selector of Jia et al. the laws with an observer are nearly as precise: 0.0135 deg.
     blended = {run: m["largest-error"] for run, m in measures.items() if run.startswith("blending-")}
     assert max(blended[f"blending-{law}-do"] for law in ("btvsmc", "sotvsmc")) <= 0.02
+
+
+def test_curves_of_wu_2015_differ_without_red_and_green(wu):
+    check_folder(wu[0])
 
 
 def test_published_parameters_of_wu_2015_are_those_of_the_fmus(wu):

@@ -20,9 +20,6 @@ use std::fs;
 use std::io::Write;
 use std::path::PathBuf;
 
-/// Colour of the return ratio.
-const SIGNAL: Color = Color(0, 114, 178);
-
 /// What is linearised, when, and where the loop is opened.
 #[derive(Args)]
 pub(crate) struct Instant {
@@ -189,7 +186,7 @@ fn figure(found: &Linearised, margins: &analysis::Margins) -> Result<Figure, Fai
     let alpha = worst.disk.alpha.min(1.999);
     let (x, y) = excluded(alpha);
     let excluded = line(&format!("disk margin {alpha:.3}"), Color::LIMIT, Shape::Dashed, x, y);
-    let ratio = line(&worst.signal, SIGNAL, Shape::Line, curves.phase, curves.gain);
+    let ratio = line(&worst.signal, Color::CURVES[0], Shape::Line, curves.phase, curves.gain);
     let sensitivity =
         line("all together", Color(0, 0, 0), Shape::Line, curves.frequency, curves.sensitivity);
     let panel = |x_label: &str, y_label: &str, log_x, curves| Panel {

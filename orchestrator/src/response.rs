@@ -17,15 +17,6 @@ use std::path::PathBuf;
 
 /// Number of frequencies at which the curve of the model is drawn.
 const DRAWN: usize = 400;
-/// Colours of the signals.
-const COLORS: [Color; 6] = [
-    Color(0, 114, 178),
-    Color(213, 94, 0),
-    Color(0, 158, 115),
-    Color(204, 121, 167),
-    Color(86, 180, 233),
-    Color(230, 159, 0),
-];
 
 /// Arguments of `response`.
 #[derive(Args)]
@@ -120,7 +111,7 @@ fn figure(title: &str, open: &OpenLoop, all: &[Vec<Point>], [from, to]: [f64; 2]
         (0..=DRAWN).map(|k| from * (to / from).powf(k as f64 / DRAWN as f64)).collect();
     let panel = |label: &str, of: &dyn Fn(Complex) -> f64| {
         let curves = all.iter().enumerate().flat_map(|(channel, points)| {
-            let color = COLORS[channel % COLORS.len()];
+            let color = Color::CURVES[channel % Color::CURVES.len()];
             let name = open.signals[channel].name.clone();
             let model = grid.iter().map(|w| of(return_ratio(open, channel, *w))).collect();
             let line = Curve {

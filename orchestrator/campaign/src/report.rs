@@ -12,7 +12,7 @@ use cosim::error::Error;
 use cosim::files;
 use cosim::interrupt::Interrupt;
 use cosim_report::figure::{Figure, svg};
-use cosim_report::page::head;
+use cosim_report::page::{head, script};
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -48,16 +48,15 @@ pub fn write(
     if let Some(worst) = ranked.first() {
         pictures.extend(cloud::draw(plan, flight.without_ends(), *worst, table.rows())?);
     }
-    let drawn = pictures.iter().map(drawn).collect::<Result<Vec<_>, _>>()?;
+    let drawn: Vec<_> = pictures.iter().map(drawn).collect();
     let page = page(plan, findings, &drawn, &kept_cases, ranking.zip(Some(ranked)).as_ref());
     files::write(&out.join("report.html"), page)
 }
 
-fn drawn(figure: &Figure) -> Result<(String, String), Error> {
+fn drawn(figure: &Figure) -> (String, String) {
     // The page writes the heading.
     let bare = Figure { title: String::new(), ..figure.clone() };
-    let text = svg::text(&bare).map_err(Error::file("report.html"))?;
-    Ok((figure.title.clone(), text))
+    (figure.title.clone(), svg::element(&bare))
 }
 
 /// Returns the measure that orders the cases: the one that is asked for, or that of the first
@@ -172,6 +171,7 @@ fn page(
                         }
                     }
                 }
+                (script())
             }
         }
     };

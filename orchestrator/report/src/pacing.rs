@@ -5,16 +5,6 @@ use cosim::error::Error;
 use cosim::pacing::report::{RealTime, Series};
 use std::path::Path;
 
-/// Colours of the components, assigned in their order.
-const COLORS: [Color; 6] = [
-    Color(31, 119, 180),
-    Color(255, 127, 14),
-    Color(44, 160, 44),
-    Color(148, 103, 189),
-    Color(140, 86, 75),
-    Color(23, 190, 207),
-];
-
 /// Draws the figure and writes it to a file.
 ///
 /// # Errors
@@ -26,7 +16,7 @@ pub fn draw(
     wake_ups: Series,
     steps: Vec<(String, Series)>,
 ) -> Result<(), Error> {
-    let color = |index: usize| COLORS[index % COLORS.len()];
+    let color = |index: usize| Color::CURVES[index % Color::CURVES.len()];
     let line = |name: &str, color, series: Series| Curve {
         name: name.into(),
         color,

@@ -3,6 +3,7 @@
 use maud::{Markup, PreEscaped, html};
 
 const STYLE: &str = include_str!("page.css");
+const SCRIPT: &str = include_str!("page.js");
 
 /// Returns the head of the page of a report, with the style of all reports.
 pub fn head(title: &str) -> Markup {
@@ -14,4 +15,10 @@ pub fn head(title: &str) -> Markup {
             style { (PreEscaped(STYLE)) }
         }
     }
+}
+
+/// Returns the script that lets a reader look into the figures of a page. It stands at the end of
+/// the body.
+pub fn script() -> Markup {
+    html! { script { (PreEscaped(SCRIPT)) } }
 }

@@ -9,16 +9,6 @@ use std::path::Path;
 /// Approximate largest number of points of a curve.
 const POINTS: u64 = 5000;
 
-/// Colours of the curves, assigned in their order.
-pub const COLORS: [Color; 6] = [
-    Color(31, 119, 180),
-    Color(44, 160, 44),
-    Color(214, 39, 40),
-    Color(148, 103, 189),
-    Color(140, 86, 75),
-    Color(23, 190, 207),
-];
-
 /// Collects the curves of a run's figure.
 pub struct Curves {
     panels: Vec<Track>,
@@ -67,7 +57,7 @@ impl Curves {
 
     fn panel(&self, track: &Track) -> figure::Panel {
         let Track { panel, values, references, limit } = track;
-        let colors = || COLORS.iter().copied().cycle();
+        let colors = || Color::CURVES.iter().copied().cycle();
         let pale = references.iter().zip(colors());
         let mut curves: Vec<_> = pale
             .map(|(y, color)| self.curve("thin: reference", color, Shape::Pale, y.clone()))

@@ -5,6 +5,7 @@ use cosim::pacing::pacer::Tally;
 use cosim::system::Probed;
 use cosim_report::panels::Panel;
 use fmu_import::quantity::rounded;
+use cosim_report::figure;
 use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::style::{Color, Style, Stylize};
@@ -13,14 +14,17 @@ use ratatui::text::{Line, Span};
 use ratatui::widgets::{self, Axis, Block, Dataset, GraphType, LineGauge, Paragraph};
 use std::time::{Duration, Instant};
 
-const COLORS: [Color; 6] = [
-    Color::LightBlue,
-    Color::LightGreen,
-    Color::LightRed,
-    Color::LightMagenta,
-    Color::LightYellow,
-    Color::LightCyan,
-];
+/// The colours of figures, for terminals that have them all.
+const COLORS: [Color; 6] = {
+    let mut colors = [Color::Reset; 6];
+    let mut place = 0;
+    while place < colors.len() {
+        let figure::Color(red, green, blue) = figure::Color::CURVES[place];
+        colors[place] = Color::Rgb(red, green, blue);
+        place += 1;
+    }
+    colors
+};
 /// Number of panels that are drawn as charts.
 const CHARTS: usize = 2;
 /// Largest number of points of a curve; when it is reached, every second point is dropped.

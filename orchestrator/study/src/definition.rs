@@ -29,6 +29,12 @@ pub struct Study {
     /// Files of published and computed values, with paths relative to the study.
     #[serde(rename = "values")]
     pub value_files: Vec<PathBuf>,
+    /// Id of the figure that stands at the top of the page; the first one if it is left out.
+    #[serde(default)]
+    pub lead: Option<String>,
+    /// Abbreviations that the page uses, with their meaning.
+    #[serde(default)]
+    pub terms: BTreeMap<String, String>,
     /// Lines of the table that describes the scenario.
     #[serde(default, rename = "scenario")]
     pub scenario: Vec<Fact>,

@@ -12,6 +12,7 @@ pub mod drawings;
 mod figures;
 mod grid;
 mod load;
+mod origin;
 mod output;
 mod page;
 mod part;

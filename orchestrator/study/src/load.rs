@@ -178,6 +178,13 @@ impl Study {
                 self.signals.keys().map(String::as_str),
             )?;
         }
+        if let Some(lead) = &self.lead
+            && !self.figures.iter().any(|figure| figure.id == *lead)
+        {
+            let hint = names::hint(lead, self.figures.iter().map(|figure| figure.id.as_str()));
+            let problem = format!("lead: there is no [[figure]] \"{lead}\"{hint}");
+            return Err(self.source.error(&(0..0), problem));
+        }
         for figure in &self.figures {
             self.source.check_names(&figure.runs, "[[run]]", ids.iter().copied())?;
             for panel in &figure.panels {

@@ -4,7 +4,7 @@ use crate::claims;
 use crate::definition::Study;
 use crate::results::{Metric, Results, RunResult};
 use crate::runs::Run;
-use crate::{figures, page};
+use crate::{figures, origin, page};
 use cosim::error::Error;
 use cosim::files;
 use cosim_report::figure::{png, svg};
@@ -26,7 +26,7 @@ pub(crate) fn write(results: &Results, out: &Path) -> Result<(Vec<Judgement>, Ve
     for figure in &study.figures {
         let picture = figures::figure(figure, results).map_err(fault)?;
         let path = out.join("figures").join(format!("{}.svg", figure.id));
-        let text = svg::text(&picture).map_err(Error::file(&path))?;
+        let text = svg::text(&picture);
         files::write(&path, &text)?;
         png::write(&text, &path.with_extension("png"))?;
         files.push(format!("figures/{}.svg, .png", figure.id));
@@ -39,7 +39,7 @@ pub(crate) fn write(results: &Results, out: &Path) -> Result<(Vec<Judgement>, Ve
         .collect::<Result<Vec<_>, _>>()
         .map_err(fault)?;
     files::write(&out.join("results.json"), numbers(results, &judged))?;
-    let page = page::page(results, &judged, &drawn).map_err(fault)?;
+    let page = page::page(results, &judged, &drawn, &origin::origin(study)).map_err(fault)?;
     files::write(&out.join("report.html"), page)?;
     let verdicts =
         study.claims.iter().zip(&judged).map(|(c, j)| (c.says.clone(), j.verdict)).collect();

@@ -1,20 +1,21 @@
-//! The report as one self-contained HTML page.
+//! The report as one self-contained HTML page. What a reader wants first stands on the first screen:
+//! how many claims hold, one picture and one small table. Everything else is folded.
 
-use crate::claims::{Checked, Judged, Verdict};
-use crate::comparisons::{Check, Claim, ComparisonRow, ComparisonTable, Overview, Relation};
-use crate::results::{Numbers, Results, RunResult};
-use crate::texts::{percent, several, shown, signed};
-use crate::values::{Quantity, ValueKind};
-use cosim_report::figure::{self, interactive};
-use cosim_report::page::head;
+mod evidence;
+mod numbers;
+
+use crate::claims::{Judged, Verdict};
+use crate::comparisons::Overview;
+use crate::drawings::Figure;
+use crate::results::{Results, RunResult};
+use cosim_report::figure::{self, svg};
+use cosim_report::page::{head, script};
+use evidence::claim;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
-use std::fmt::Write as _;
-use sweep::texts::short;
+use numbers::{all_values, overview, small, table};
 
-const SCRIPT: &str = include_str!("page.js");
-
-/// Returns the text of the page. `judged` belongs to the study's claims in order, and `drawn` to
-/// its figures.
+/// Returns the text of the page. `judged` belongs to the study's claims in order, `drawn` to its
+/// figures, and `origin` says where and how the runs were made.
 ///
 /// # Errors
 /// Returns an error if the study names an item that does not exist.
@@ -22,12 +23,13 @@ pub(crate) fn page(
     results: &Results,
     judged: &[Judged],
     drawn: &[figure::Figure],
+    origin: &[(String, String)],
 ) -> Result<String, String> {
     let study = results.study;
-    let runs: usize = results.runs.iter().map(RunResult::cases).sum();
     let claims = study.claims.iter().zip(judged).map(|(c, j)| claim(c, j)).collect::<Vec<_>>();
     let tables = study.tables.iter().map(|t| table(t, results)).collect::<Result<Vec<_>, _>>()?;
-    let overviews = study.overviews.iter().map(|o| overview(o, results)).collect::<Vec<_>>();
+    let overviews = study.overviews.iter().map(|o| (&o.title, overview(o, results)));
+    let tables = study.tables.iter().map(|table| &table.title).zip(tables).chain(overviews);
     let markup = html! {
         (DOCTYPE)
         html lang="en" {
@@ -36,75 +38,86 @@ pub(crate) fn page(
                 header {
                     h1 { (study.title) }
                     p.paper { (study.paper) }
+                    @if !judged.is_empty() { p.answer { (answer(judged)) } }
                     nav {
                         @for (id, name) in sections(results) { a href=(format!("#{id}")) { (name) } " " }
                     }
                 }
                 main {
-                    @for paragraph in paragraphs(&study.summary) { p { (paragraph) } }
+                    (lead(results, drawn))
                     @if !claims.is_empty() {
-                    section id="claims" {
-                        h2 { "Claims of the paper, and whether they hold here" }
-                        table.claims {
-                            thead { tr { th { "Claim" } th { "Verdict" } th { "Evidence" } } }
-                            tbody { @for row in &claims { (row) } }
-                        }
+                    section.claims id="claims" {
+                        h2 { "Claims, and whether they hold here" }
+                        @for claim in &claims { (claim) }
                         p.note {
-                            "A number with a range in brackets is the mean over several runs, followed by the smallest and the largest "
-                            "value. Differences are taken between runs with the same disturbance. Where a relation was tried in several runs, "
-                            "the percentages say how often it holds, with 95\u{a0}% confidence (Clopper and Pearson)."
+                            "A claim opens to its evidence. Differences are taken between runs with the same disturbance. Where a relation was "
+                            "tried in several runs, the percentages say how often it holds, with 95\u{a0}% confidence (Clopper and Pearson)."
                         }
                     }
                     }
+                    section id="about" {
+                        h2 { "What was compared" }
+                        @for paragraph in paragraphs(&study.summary) { p { (paragraph) } }
+                    }
+                    (figures(results, drawn))
                     section id="tables" {
                         h2 { "Numbers" }
-                        @for table in &tables { (table) }
-                        @for overview in &overviews { (overview) }
+                        @for (title, table) in tables { details { summary { h3 { (title) } } div.scroll { (table) } } }
                     }
-                    (plots(results, drawn))
                     (scenario(results))
-                    section id="origin" {
-                        h2 { "How the numbers were computed" }
-                        p {
-                            "Orchestrator " (env!("CARGO_PKG_VERSION")) " made " (runs) " simulation runs. All numbers of this page are in "
-                            code { "results.json" } ". The folder " code { "runs" } " holds the signals of the first run of each row below. "
-                            "A repetition gives the same bits, except for computing times."
-                        }
-                        (all_runs(results))
-                        @if !study.values.0.is_empty() {
-                            h3 { "Reference values" }
-                            (all_values(results))
-                        }
-                    }
+                    (origins(results, origin))
                 }
-                script { (PreEscaped(interactive::library())) }
-                @for (figure, picture) in study.figures.iter().zip(drawn) {
-                    (plot(&figure.id, picture))
-                }
-                script { (PreEscaped(SCRIPT)) }
+                (script())
             }
         }
     };
     Ok(markup.into_string())
 }
 
-/// Returns the section of the page that holds the figures.
-fn plots(results: &Results, drawn: &[figure::Figure]) -> Markup {
+/// Returns how many claims hold, in a sentence.
+fn answer(judged: &[Judged]) -> String {
+    let count = |verdict| judged.iter().filter(|judged| judged.verdict == verdict).count();
+    let parts = [
+        (Verdict::Holds, "hold", "holds"),
+        (Verdict::HoldsPartly, "hold in part", "holds in part"),
+        (Verdict::DoesNotHold, "do not hold", "does not hold"),
+        (Verdict::NotJudged, "are not judged", "is not judged"),
+    ];
+    let parts = parts.into_iter().map(|(verdict, several, one)| (count(verdict), several, one));
+    let texts: Vec<String> = parts
+        .filter(|(count, ..)| *count > 0)
+        .map(|(count, several, one)| format!("{count} {}", if count == 1 { one } else { several }))
+        .collect();
+    let (claims, of) = (judged.len(), texts.join(", "));
+    match (claims, texts.len()) {
+        (1, _) => format!("The claim {}.", of.trim_start_matches("1 ")),
+        (_, 1) => format!("All {claims} claims {}.", of.split_once(' ').map_or("", |(_, rest)| rest)),
+        _ => format!("Of {claims} claims, {of}."),
+    }
+}
+
+/// Returns the figure and the table that stand on the first screen, with the abbreviations that
+/// they use.
+fn lead(results: &Results, drawn: &[figure::Figure]) -> Markup {
+    let study = results.study;
+    let pictured = lead_figure(results).map(|place| (&study.figures[place], &drawn[place]));
+    let first: Option<&Overview> = study.overviews.first();
+    let uses = |term: &str| {
+        let titles = study.overviews.iter().flat_map(|o| o.metrics.iter().map(|m| &m.label));
+        titles.chain(pictured.iter().map(|(_, picture)| &picture.panels[0].y_label)).any(|label| {
+            label.split(|letter: char| !letter.is_alphanumeric()).any(|word| word == term)
+        })
+    };
     html! {
-        section id="figures" {
-            h2 { "Figures" }
-            p.note {
-                "Drag to zoom, and double-click to return to the whole view. A click on a name in a legend hides its curve, a "
-                "double-click hides all others. The folder " code { "figures" } " beside this page holds each figure as SVG and PNG."
-            }
-            @for (figure, picture) in results.study.figures.iter().zip(drawn) {
-                figure id=(figure.id) {
-                    h3 { (figure.title) }
-                    div.plot id=(format!("plot-{}", figure.id)) style=(format!("height:{}px", interactive::height(picture))) {}
-                    figcaption {
-                        (figure.caption) " "
-                        a href=(format!("figures/{}.svg", figure.id)) { "SVG" } ", "
-                        a href=(format!("figures/{}.png", figure.id)) { "PNG" }
+        section.lead id="answer" {
+            @if let Some((figure, picture)) = pictured { (drawing(figure, picture)) }
+            @if let Some(first) = first {
+                div {
+                    h3 { (first.title) }
+                    (small(first, results))
+                    p.note {
+                        @for (term, meaning) in study.terms.iter().filter(|(term, _)| uses(term)) { b { (term) } ": " (meaning) ". " }
+                        "A number with a range in brackets is the mean over several runs, with the smallest and the largest value."
                     }
                 }
             }
@@ -112,31 +125,94 @@ fn plots(results: &Results, drawn: &[figure::Figure]) -> Markup {
     }
 }
 
-/// Returns the sections with the scenario and the assumptions.
+fn lead_figure(results: &Results) -> Option<usize> {
+    let figures = &results.study.figures;
+    match &results.study.lead {
+        Some(lead) => figures.iter().position(|figure| figure.id == *lead),
+        None => (!figures.is_empty()).then_some(0),
+    }
+}
+
+fn drawing(figure: &Figure, picture: &figure::Figure) -> Markup {
+    html! {
+        figure id=(figure.id) {
+            h3 { (figure.title) }
+            div.plot { (PreEscaped(svg::element(picture))) }
+            figcaption {
+                (figure.caption) " "
+                a href=(format!("figures/{}.svg", figure.id)) { "SVG" } ", "
+                a href=(format!("figures/{}.png", figure.id)) { "PNG" }
+            }
+        }
+    }
+}
+
+/// Returns the section of the page that holds the other figures, folded.
+fn figures(results: &Results, drawn: &[figure::Figure]) -> Markup {
+    let first = lead_figure(results);
+    let others = results.study.figures.iter().zip(drawn).enumerate();
+    html! {
+        section id="figures" {
+            h2 { "Figures" }
+            p.note {
+                "A pointer shows values, a dragged rectangle is enlarged, a double-click returns to the whole view, and a click on a name in a "
+                "legend hides its curve. The folder " code { "figures" } " beside this page holds each figure as SVG and PNG."
+            }
+            @for (_, (figure, picture)) in others.filter(|(place, _)| Some(*place) != first) {
+                details.figure { summary { h3 { (figure.title) } } (drawing(figure, picture)) }
+            }
+        }
+    }
+}
+
+/// Returns the parts with the scenario and the assumptions, folded.
 fn scenario(results: &Results) -> Markup {
     html! {
-        @if !results.study.scenario.is_empty() { section id="scenario" {
-            h2 { "Scenario" }
-            table {
+        @if !results.study.scenario.is_empty() { details id="scenario" {
+            summary { h2 { "Scenario" } }
+            div.scroll { table {
                 thead { tr { th { "Quantity" } th { "Value" } th { "Source" } } }
                 tbody {
                     @for fact in &results.study.scenario {
                         tr { td { (fact.what) } td { (fact.value) } td { (fact.source) } }
                     }
                 }
-            }
+            } }
         } }
-        @if !results.study.assumptions.is_empty() { section id="assumptions" {
-            h2 { "Assumptions where the paper is incomplete or in error" }
-            table {
+        @if !results.study.assumptions.is_empty() { details id="assumptions" {
+            summary { h2 { "Assumptions where the paper is incomplete or in error" } }
+            div.scroll { table {
                 thead { tr { th { "Gap or error in the paper" } th { "Assumption made here" } } }
                 tbody {
                     @for assumption in &results.study.assumptions {
                         tr { td { (assumption.silent) } td { (assumption.taken) } }
                     }
                 }
-            }
+            } }
         } }
+    }
+}
+
+/// Returns the part that says where the numbers come from, folded.
+fn origins(results: &Results, origin: &[(String, String)]) -> Markup {
+    let runs: usize = results.runs.iter().map(RunResult::cases).sum();
+    html! {
+        details id="origin" {
+            summary { h2 { "Origin: how the numbers were computed" } }
+            p {
+                "Orchestrator " (env!("CARGO_PKG_VERSION")) " made " (runs) " simulation runs. All numbers of this page are in "
+                code { "results.json" } ". The folder " code { "runs" } " holds the signals of the first run of each row below. "
+                "A repetition gives the same bits, except for computing times."
+            }
+            @if !origin.is_empty() {
+                table { tbody { @for (what, value) in origin { tr { td { (what) } td { code { (value) } } } } } }
+            }
+            div.scroll { (all_runs(results)) }
+            @if !results.study.values.0.is_empty() {
+                h3 { "Reference values" }
+                div.scroll { (all_values(results)) }
+            }
+        }
     }
 }
 
@@ -145,8 +221,9 @@ fn sections(results: &Results) -> impl Iterator<Item = (&'static str, &'static s
     let study = results.study;
     let sections = [
         ("claims", "Claims", study.claims.is_empty()),
-        ("tables", "Numbers", study.tables.is_empty() && study.overviews.is_empty()),
+        ("about", "What was compared", study.summary.is_empty()),
         ("figures", "Figures", study.figures.is_empty()),
+        ("tables", "Numbers", study.tables.is_empty() && study.overviews.is_empty()),
         ("scenario", "Scenario", study.scenario.is_empty()),
         ("assumptions", "Assumptions", study.assumptions.is_empty()),
         ("origin", "Origin", false),
@@ -156,164 +233,6 @@ fn sections(results: &Results) -> impl Iterator<Item = (&'static str, &'static s
 
 fn paragraphs(text: &str) -> impl Iterator<Item = &str> {
     text.split("\n\n").map(str::trim).filter(|paragraph| !paragraph.is_empty())
-}
-
-/// Returns the data of a plot, which the page's script draws.
-fn plot(id: &str, picture: &figure::Figure) -> Markup {
-    let (data, layout) = interactive::plot(picture);
-    // A slash may be escaped in JSON. With this no text of a figure can end the element.
-    let text =
-        serde_json::json!({ "data": data, "layout": layout }).to_string().replace("</", "<\\/");
-    html! { script type="application/json" class="figure" data-plot=(format!("plot-{id}")) { (PreEscaped(text)) } }
-}
-
-fn claim(claim: &Claim, judged: &Judged) -> Markup {
-    html! {
-        tr {
-            td { (claim.says) " " span.source { "(" (claim.source) ")" } }
-            td { span class=(class(judged.verdict)) { (judged.verdict.text()) } }
-            td {
-                ul { @for (check, checked) in claim.checks.iter().zip(&judged.checks) { li { (evidence(check, checked)) } } }
-                @if !claim.remark.is_empty() { p.remark { (claim.remark) } }
-            }
-        }
-    }
-}
-
-fn class(verdict: Verdict) -> &'static str {
-    match verdict {
-        Verdict::Holds => "verdict holds",
-        Verdict::HoldsPartly => "verdict partly",
-        Verdict::DoesNotHold => "verdict not",
-        Verdict::NotJudged => "verdict",
-    }
-}
-
-fn evidence(check: &Check, checked: &Checked) -> Markup {
-    let (held, pairs) = (checked.held, checked.pairs);
-    if pairs == 0 {
-        return html! { span.verdict { (checked.verdict().text()) } " " (check.label) ": no run has this number" };
-    }
-    let required = match (check.relation, checked.by) {
-        (Relation::Below, None) => "below".to_string(),
-        (Relation::Above, None) => "above".to_string(),
-        (Relation::AtMost, None) => "not above".to_string(),
-        (Relation::AtLeast, None) => "not below".to_string(),
-        (Relation::Below | Relation::AtMost, Some(by)) if by < 0.0 => {
-            format!("at most {}\u{a0}% above", shown(-100.0 * by))
-        }
-        (Relation::Above | Relation::AtLeast, Some(by)) if by < 0.0 => {
-            format!("at most {}\u{a0}% below", shown(-100.0 * by))
-        }
-        (Relation::Below | Relation::AtMost, Some(by)) => {
-            format!("at least {}\u{a0}% below", shown(100.0 * by))
-        }
-        (Relation::Above | Relation::AtLeast, Some(by)) => {
-            format!("at least {}\u{a0}% above", shown(100.0 * by))
-        }
-    };
-    let mut count = String::new();
-    if let Some(probability) = checked.probability() {
-        let [low, high] = [probability.low, probability.high].map(|share| short(100.0 * share));
-        let _ = write!(count, ", in {held} of {pairs} runs, hence {low} to {high}\u{a0}%");
-    }
-    let missing = pairs - checked.difference.0.len();
-    if pairs > 1 && missing > 0 {
-        let _ = write!(count, ", of which {missing} do not have this number");
-    }
-    // Only a time after which something settles can be without a number here.
-    let side = |side: &Numbers| if side.0.is_empty() { "never".into() } else { several(side) };
-    let is_compared = !checked.difference.0.is_empty();
-    html! {
-        span class=(class(checked.verdict())) { (checked.verdict().text()) } " "
-        (check.label) ": " (side(&checked.left)) " against " (side(&checked.right)) " ("
-        @if is_compared { (percent(&checked.difference)) "; " }
-        "required: " (required) (count) ")"
-    }
-}
-
-fn table(table: &ComparisonTable, results: &Results) -> Result<Markup, String> {
-    let rows = table
-        .rows
-        .iter()
-        .map(|r| row(r, !table.beside.is_empty(), results))
-        .collect::<Result<Vec<_>, _>>()?;
-    Ok(html! {
-        h3 { (table.title) }
-        table.numbers {
-            thead {
-                tr {
-                    th { "Quantity" } th { (table.against) } th { (table.ours) } th { "Difference" }
-                    @if !table.beside.is_empty() { th { (table.beside) } }
-                    th { "" }
-                }
-            }
-            tbody { @for row in rows { (row) } }
-        }
-        @if !table.note.is_empty() { p.note { (table.note) } }
-    })
-}
-
-fn row(row: &ComparisonRow, has_beside: bool, results: &Results) -> Result<Markup, String> {
-    let ours = results.numbers(&row.ours)?;
-    let beside = row.beside.as_ref().map(|beside| results.numbers(beside)).transpose()?;
-    let paper = row.paper.as_ref().map(|paper| results.study.values.number(paper)).transpose()?;
-    let origin = match &row.paper {
-        Some(Quantity::Named(id)) => {
-            results.study.values.find(id).map(|value| value.source.as_str())
-        }
-        _ => None,
-    };
-    let difference = paper.map(|paper| {
-        let absolute = ours.mean() - paper;
-        // A difference that stems from the rounding of a mean counts as none.
-        if absolute.abs() <= 1e-12 * paper.abs() {
-            return "0".to_string();
-        }
-        format!("{} ({})", signed(absolute), percent(&Numbers(vec![ours.mean() / paper - 1.0])))
-    });
-    Ok(html! {
-        tr {
-            td { (row.label) }
-            td title=[origin] { @match paper { Some(paper) => (shown(paper)), None => "–" } }
-            td { (several(&ours)) }
-            td { (difference.as_deref().unwrap_or("–")) }
-            @if has_beside { td { (beside.as_ref().map_or("–".into(), several)) } }
-            td.remark { (row.note) }
-        }
-    })
-}
-
-fn overview(overview: &Overview, results: &Results) -> Markup {
-    let mut rows = Vec::new();
-    for id in &overview.runs {
-        let Some(run) = results.study.run(id.get_ref()) else { continue };
-        let numbers = overview.metrics.iter().map(|column| {
-            let reference = format!("{}.{}", id.get_ref(), column.metric);
-            let numbers =
-                results.numbers(&reference).map_or_else(|_| Vec::new(), |numbers| numbers.0);
-            Numbers(numbers.into_iter().map(|number| number * column.factor).collect())
-        });
-        rows.push((run, numbers.collect::<Vec<_>>()));
-    }
-    html! {
-        h3 { (overview.title) }
-        table.numbers.overview {
-            thead { tr { th { "" } @for column in &overview.metrics { th { (column.label) } } } }
-            tbody {
-                @for (place, (run, numbers)) in rows.iter().enumerate() {
-                    @if !run.group.is_empty() && (place == 0 || rows[place - 1].0.group != run.group) {
-                        tr.group { th colspan=(overview.metrics.len() + 1) { (run.group) } }
-                    }
-                    tr {
-                        td { span.swatch style=(format!("background:{}", run.color)) {} " " (run.label) }
-                        @for numbers in numbers { td { (several(numbers)) } }
-                    }
-                }
-            }
-        }
-        @if !overview.note.is_empty() { p.note { (overview.note) } }
-    }
 }
 
 fn all_runs(results: &Results) -> Markup {
@@ -341,50 +260,5 @@ fn all_runs(results: &Results) -> Markup {
     }
 }
 
-fn all_values(results: &Results) -> Markup {
-    let kind = |kind| match kind {
-        ValueKind::Table => "table",
-        ValueKind::Text => "text",
-        ValueKind::Figure => "figure, read off",
-        ValueKind::Computed => "not printed, computed",
-    };
-    html! {
-        table {
-            thead { tr { th { "Id" } th { "Value" } th { "Printed in" } th { "Source" } } }
-            tbody {
-                @for value in &results.study.values.0 {
-                    tr {
-                        td { code { (value.id) } }
-                        td { (shown(value.value)) " " (value.unit) }
-                        td { (kind(value.kind)) }
-                        td { (value.source) }
-                    }
-                }
-            }
-        }
-    }
-}
-
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn text_of_a_figure_cannot_end_the_script_element() {
-        let picture = figure::Figure {
-            title: String::new(),
-            columns: 1,
-            legend: figure::Legend::Above,
-            panels: vec![figure::Panel {
-                title: "</script><b>".into(),
-                x_label: String::new(),
-                y_label: String::new(),
-                log_x: false,
-                x_range: None,
-                curves: Vec::new(),
-            }],
-        };
-        let text = plot("x", &picture).into_string();
-        assert_eq!(text.matches("</").count(), 1, "{text}");
-    }
-}
+mod tests;

@@ -44,8 +44,17 @@ pub(crate) fn several(numbers: &Numbers) -> String {
     format!("{mean} [{},\u{a0}{}]", shown(low), shown(high))
 }
 
-/// Formats fractions as differences in per cent.
-pub(crate) fn percent(fractions: &Numbers) -> String {
+/// Formats fractions as differences in per cent, or as ratios where a percentage says little.
+pub(crate) fn difference(fractions: &Numbers) -> String {
+    let (low, high) = fractions.extent();
+    if low > -0.9 && high < 1.0 {
+        return percent(fractions);
+    }
+    let times = Numbers(fractions.0.iter().map(|fraction| 1.0 + fraction).collect());
+    format!("{}\u{a0}times", several(&times))
+}
+
+fn percent(fractions: &Numbers) -> String {
     let one = |fraction: f64| {
         let percent = 100.0 * fraction;
         let sign = if percent < 0.0 { "−" } else { "+" };
@@ -85,6 +94,8 @@ mod tests {
         assert_eq!(several(&Numbers(vec![1.0, 1.0])), "1");
         assert_eq!(several(&Numbers(vec![1.0, 2.0])), "1.5 [1,\u{a0}2]");
         assert_eq!(several(&Numbers(Vec::new())), "–");
-        assert_eq!(percent(&Numbers(vec![-0.342])), "−34.2\u{a0}%");
+        assert_eq!(difference(&Numbers(vec![-0.342])), "−34.2\u{a0}%");
+        assert_eq!(difference(&Numbers(vec![-0.998])), "0.002\u{a0}times");
+        assert_eq!(difference(&Numbers(vec![2.5])), "3.5\u{a0}times");
     }
 }

@@ -1,9 +1,11 @@
-//! A figure of panels with curves. It is drawn as SVG ([`svg`]) and PNG ([`png`]) for papers, and
-//! as an [`interactive`] plot for the page.
+//! A figure of panels with curves. It is drawn as SVG ([`svg`]) for papers and pages, and as PNG
+//! ([`png`]).
 
-pub mod interactive;
+pub mod dash;
 pub mod png;
 pub mod svg;
+mod thin;
+mod ticks;
 
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -16,8 +18,18 @@ pub struct Color(pub u8, pub u8, pub u8);
 impl Color {
     /// Colour of references and norms, a grey.
     pub const GREY: Self = Self(110, 110, 110);
-    /// Colour of limits, a dark red.
-    pub const LIMIT: Self = Self(200, 0, 0);
+    /// Colour of limits, a neutral grey.
+    pub const LIMIT: Self = Self(91, 104, 117);
+    /// Colours that also differ for people who see no red or no green, for curves in their order
+    /// (M. Okabe and K. Ito, Color Universal Design, 2008).
+    pub const CURVES: [Self; 6] = [
+        Self(0, 114, 178),
+        Self(213, 94, 0),
+        Self(0, 158, 115),
+        Self(204, 121, 167),
+        Self(86, 180, 233),
+        Self(230, 159, 0),
+    ];
 }
 
 impl TryFrom<String> for Color {
@@ -115,6 +127,18 @@ pub enum Shape {
     Horizontal,
     /// A dashed line across the panel at the first x.
     Vertical,
+}
+
+impl Shape {
+    /// Returns whether the shape is a straight line across the panel, such as a limit.
+    pub fn is_straight(&self) -> bool {
+        matches!(self, Self::Horizontal | Self::Vertical)
+    }
+
+    /// Returns the opacity of an area.
+    fn opacity(&self) -> f64 {
+        if *self == Self::Steps { 0.45 } else { 0.25 }
+    }
 }
 
 impl Panel {

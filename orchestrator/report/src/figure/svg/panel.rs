@@ -67,7 +67,7 @@ pub(super) fn draw_panel(
     panel: &Panel,
     dashes: &Dashes,
     area: Area,
-    place: usize,
+    names_x: bool,
 ) {
     let above = ABOVE + if panel.title.is_empty() { 0.0 } else { TITLE };
     let frame = Area {
@@ -84,11 +84,11 @@ pub(super) fn draw_panel(
         "<g class=\"panel\" data-frame=\"{x} {y} {width} {height}\" data-x=\"{left:e} {right:e}\" data-y=\"{bottom:e} {top:e}\"{}>",
         if panel.log_x { " data-log=\"\"" } else { "" }
     );
-    draw_axes(out, panel, &axes, area);
+    draw_axes(out, panel, &axes, area, names_x);
     // Every figure of a page has clips of its own, whose names may be equal: they are nested.
     let _ = write!(
         out,
-        "<svg class=\"curves\" x=\"{x}\" y=\"{y}\" width=\"{width}\" height=\"{height}\" viewBox=\"{x} {y} {width} {height}\" preserveAspectRatio=\"none\" data-panel=\"{place}\">"
+        "<svg class=\"curves\" x=\"{x}\" y=\"{y}\" width=\"{width}\" height=\"{height}\" viewBox=\"{x} {y} {width} {height}\" preserveAspectRatio=\"none\">"
     );
     for curve in &panel.curves {
         draw_curve(out, curve, dashes, &axes);
@@ -98,7 +98,7 @@ pub(super) fn draw_panel(
     out.push_str("</g>");
 }
 
-fn draw_axes(out: &mut String, panel: &Panel, axes: &Axes, area: Area) {
+fn draw_axes(out: &mut String, panel: &Panel, axes: &Axes, area: Area, names_x: bool) {
     let Area { x, y, width, height } = axes.frame;
     let (bottom, middle) = (y + height, x + width / 2.0);
     if !panel.title.is_empty() {
@@ -137,10 +137,12 @@ fn draw_axes(out: &mut String, panel: &Panel, axes: &Axes, area: Area) {
     }
     let _ = write!(
         out,
-        "</g><path class=\"axis\" d=\"M{x:.1} {y:.1}v{height:.1}h{width:.1}\"/><text x=\"{middle:.1}\" y=\"{:.1}\" text-anchor=\"middle\">{}</text>",
-        bottom + 33.0,
-        escaped(&panel.x_label)
+        "</g><path class=\"axis\" d=\"M{x:.1} {y:.1}v{height:.1}h{width:.1}\"/>"
     );
+    if names_x {
+        let (below, label) = (bottom + 33.0, escaped(&panel.x_label));
+        let _ = write!(out, "<text x=\"{middle:.1}\" y=\"{below:.1}\" text-anchor=\"middle\">{label}</text>");
+    }
     let (side, centre) = (area.x + 14.0, y + height / 2.0);
     let _ = write!(
         out,

@@ -1,0 +1,131 @@
+//! Tables of numbers.
+
+use crate::comparisons::{ComparisonRow, ComparisonTable, Overview};
+use crate::results::{Numbers, Results};
+use crate::texts::{difference, several, shown, signed};
+use crate::values::{Quantity, ValueKind};
+use maud::{Markup, html};
+
+/// Rows and columns of the table on the first screen.
+const ROWS: usize = 9;
+const COLUMNS: usize = 4;
+
+/// Returns the first rows and columns of an overview.
+pub(super) fn small(full: &Overview, results: &Results) -> Markup {
+    let mut part = full.clone();
+    part.runs.truncate(ROWS);
+    part.metrics.truncate(COLUMNS);
+    part.note.clear();
+    let is_part = part.runs.len() < full.runs.len() || part.metrics.len() < full.metrics.len();
+    html! {
+        (overview(&part, results))
+        @if is_part { p.note { a href="#tables" { "All rows and columns" } } }
+    }
+}
+
+pub(super) fn table(table: &ComparisonTable, results: &Results) -> Result<Markup, String> {
+    let rows = table
+        .rows
+        .iter()
+        .map(|r| row(r, !table.beside.is_empty(), results))
+        .collect::<Result<Vec<_>, _>>()?;
+    Ok(html! {
+        table.numbers {
+            thead {
+                tr {
+                    th { "Quantity" } th { (table.against) } th { (table.ours) } th { "Difference" }
+                    @if !table.beside.is_empty() { th { (table.beside) } }
+                    th { "" }
+                }
+            }
+            tbody { @for row in rows { (row) } }
+        }
+        @if !table.note.is_empty() { p.note { (table.note) } }
+    })
+}
+
+fn row(row: &ComparisonRow, has_beside: bool, results: &Results) -> Result<Markup, String> {
+    let ours = results.numbers(&row.ours)?;
+    let beside = row.beside.as_ref().map(|beside| results.numbers(beside)).transpose()?;
+    let paper = row.paper.as_ref().map(|paper| results.study.values.number(paper)).transpose()?;
+    let origin = match &row.paper {
+        Some(Quantity::Named(id)) => {
+            results.study.values.find(id).map(|value| value.source.as_str())
+        }
+        _ => None,
+    };
+    let difference = paper.map(|paper| {
+        let absolute = ours.mean() - paper;
+        // A difference that stems from the rounding of a mean counts as none.
+        if absolute.abs() <= 1e-12 * paper.abs() {
+            return "0".to_string();
+        }
+        format!("{} ({})", signed(absolute), difference(&Numbers(vec![ours.mean() / paper - 1.0])))
+    });
+    Ok(html! {
+        tr {
+            td { (row.label) }
+            td title=[origin] { @match paper { Some(paper) => (shown(paper)), None => "–" } }
+            td { (several(&ours)) }
+            td { (difference.as_deref().unwrap_or("–")) }
+            @if has_beside { td { (beside.as_ref().map_or("–".into(), several)) } }
+            td.remark { (row.note) }
+        }
+    })
+}
+
+pub(super) fn overview(overview: &Overview, results: &Results) -> Markup {
+    let mut rows = Vec::new();
+    for id in &overview.runs {
+        let Some(run) = results.study.run(id.get_ref()) else { continue };
+        let numbers = overview.metrics.iter().map(|column| {
+            let reference = format!("{}.{}", id.get_ref(), column.metric);
+            let numbers =
+                results.numbers(&reference).map_or_else(|_| Vec::new(), |numbers| numbers.0);
+            Numbers(numbers.into_iter().map(|number| number * column.factor).collect())
+        });
+        rows.push((run, numbers.collect::<Vec<_>>()));
+    }
+    html! {
+        table.numbers.overview {
+            thead { tr { th { "" } @for column in &overview.metrics { th { (column.label) } } } }
+            tbody {
+                @for (place, (run, numbers)) in rows.iter().enumerate() {
+                    @if !run.group.is_empty() && (place == 0 || rows[place - 1].0.group != run.group) {
+                        tr.group { th colspan=(overview.metrics.len() + 1) { (run.group) } }
+                    }
+                    tr {
+                        td { span.swatch style=(format!("background:{}", run.color)) {} " " (run.label) }
+                        @for numbers in numbers { td { (several(numbers)) } }
+                    }
+                }
+            }
+        }
+        @if !overview.note.is_empty() { p.note { (overview.note) } }
+    }
+}
+
+pub(super) fn all_values(results: &Results) -> Markup {
+    let kind = |kind| match kind {
+        ValueKind::Table => "table",
+        ValueKind::Text => "text",
+        ValueKind::Figure => "figure, read off",
+        ValueKind::Computed => "not printed, computed",
+    };
+    html! {
+        table {
+            thead { tr { th { "Id" } th { "Value" } th { "Printed in" } th { "Source" } } }
+            tbody {
+                @for value in &results.study.values.0 {
+                    tr {
+                        td { code { (value.id) } }
+                        td { (shown(value.value)) " " (value.unit) }
+                        td { (kind(value.kind)) }
+                        td { (value.source) }
+                    }
+                }
+            }
+        }
+    }
+}
+
