@@ -3,9 +3,9 @@
 use super::scene::{self, Scene, Snapshot};
 use cosim::pacing::pacer::Tally;
 use cosim::system::Probed;
+use cosim_report::figure;
 use cosim_report::panels::Panel;
 use fmu_import::quantity::rounded;
-use cosim_report::figure;
 use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::style::{Color, Style, Stylize};

@@ -91,7 +91,9 @@ fn answer(judged: &[Judged]) -> String {
     let (claims, of) = (judged.len(), texts.join(", "));
     match (claims, texts.len()) {
         (1, _) => format!("The claim {}.", of.trim_start_matches("1 ")),
-        (_, 1) => format!("All {claims} claims {}.", of.split_once(' ').map_or("", |(_, rest)| rest)),
+        (_, 1) => {
+            format!("All {claims} claims {}.", of.split_once(' ').map_or("", |(_, rest)| rest))
+        }
         _ => format!("Of {claims} claims, {of}."),
     }
 }
@@ -110,7 +112,7 @@ fn lead(results: &Results, drawn: &[figure::Figure]) -> Markup {
     };
     html! {
         section.lead id="answer" {
-            @if let Some((figure, picture)) = pictured { (drawing(figure, picture)) }
+            @if let Some((figure, picture)) = pictured { (drawing(figure, picture, true)) }
             @if let Some(first) = first {
                 div {
                     h3 { (first.title) }
@@ -133,10 +135,10 @@ fn lead_figure(results: &Results) -> Option<usize> {
     }
 }
 
-fn drawing(figure: &Figure, picture: &figure::Figure) -> Markup {
+fn drawing(figure: &Figure, picture: &figure::Figure, titled: bool) -> Markup {
     html! {
         figure id=(figure.id) {
-            h3 { (figure.title) }
+            @if titled { h3 { (figure.title) } }
             div.plot { (PreEscaped(svg::element(picture))) }
             figcaption {
                 (figure.caption) " "
@@ -159,7 +161,7 @@ fn figures(results: &Results, drawn: &[figure::Figure]) -> Markup {
                 "legend hides its curve. The folder " code { "figures" } " beside this page holds each figure as SVG and PNG."
             }
             @for (_, (figure, picture)) in others.filter(|(place, _)| Some(*place) != first) {
-                details.figure { summary { h3 { (figure.title) } } (drawing(figure, picture)) }
+                details.figure { summary { h3 { (figure.title) } } (drawing(figure, picture, false)) }
             }
         }
     }

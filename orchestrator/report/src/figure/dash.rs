@@ -3,8 +3,14 @@
 use super::{Curve, Figure, Shape};
 
 /// Lengths of strokes and gaps of the patterns, px; the first one is a solid line.
-const PATTERNS: [&[f64]; 6] =
-    [&[], &[9.0, 4.0], &[2.5, 3.0], &[11.0, 3.5, 2.5, 3.5], &[18.0, 5.0], &[6.0, 3.0, 2.0, 3.0, 2.0, 3.0]];
+const PATTERNS: [&[f64]; 6] = [
+    &[],
+    &[9.0, 4.0],
+    &[2.5, 3.0],
+    &[11.0, 3.5, 2.5, 3.5],
+    &[18.0, 5.0],
+    &[6.0, 3.0, 2.0, 3.0, 2.0, 3.0],
+];
 
 /// Patterns of the lines of a figure. A name has the same pattern in every panel.
 pub struct Dashes<'a>(Vec<&'a str>);

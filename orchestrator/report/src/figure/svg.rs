@@ -36,7 +36,8 @@ pub fn write(figure: &Figure, path: &Path) -> Result<(), Error> {
 
 /// Returns a figure as the text of an SVG file.
 pub fn text(figure: &Figure) -> String {
-    let style = format!("<style>{STYLE}</style><rect class=\"paper\" width=\"100%\" height=\"100%\"/>");
+    let style =
+        format!("<style>{STYLE}</style><rect class=\"paper\" width=\"100%\" height=\"100%\"/>");
     document(figure, &style, true)
 }
 

@@ -34,8 +34,7 @@ mod tests {
 
     #[test]
     fn a_peak_in_a_column_of_many_points_is_kept() {
-        let mut points: Vec<(f64, f64)> =
-            (0..10_000).map(|k| (f64::from(k) * 0.01, 0.0)).collect();
+        let mut points: Vec<(f64, f64)> = (0..10_000).map(|k| (f64::from(k) * 0.01, 0.0)).collect();
         points[5050].1 = 7.0;
         points[5051].1 = -3.0;
         let kept = thinned(&points);

@@ -19,7 +19,8 @@ pub(super) fn linear(low: f64, high: f64, count: usize) -> Vec<f64> {
 pub(super) fn logarithmic(low: f64, high: f64) -> Vec<f64> {
     let (first, last) = (low.log10().floor() as i32, high.log10().ceil() as i32);
     let multiples: &[f64] = if last - first > 3 { &[1.0] } else { &[1.0, 2.0, 5.0] };
-    let all = (first..=last).flat_map(|power| multiples.iter().map(move |m| m * 10_f64.powi(power)));
+    let all =
+        (first..=last).flat_map(|power| multiples.iter().map(move |m| m * 10_f64.powi(power)));
     all.filter(|value| (low..=high).contains(value)).collect()
 }
 

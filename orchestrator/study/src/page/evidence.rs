@@ -91,4 +91,3 @@ fn evidence(check: &Check, checked: &Checked) -> Markup {
         "required: " (required) (count) ")"
     }
 }
-

@@ -128,4 +128,3 @@ pub(super) fn all_values(results: &Results) -> Markup {
         }
     }
 }
-

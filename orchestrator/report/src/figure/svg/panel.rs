@@ -104,7 +104,10 @@ fn draw_axes(out: &mut String, panel: &Panel, axes: &Axes, area: Area, names_x: 
     if !panel.title.is_empty() {
         let above = y - 7.0;
         let title = escaped(&panel.title);
-        let _ = write!(out, "<text x=\"{middle:.1}\" y=\"{above:.1}\" text-anchor=\"middle\">{title}</text>");
+        let _ = write!(
+            out,
+            "<text x=\"{middle:.1}\" y=\"{above:.1}\" text-anchor=\"middle\">{title}</text>"
+        );
     }
     let (left, right) = axes.x;
     let marks = if panel.log_x {
@@ -135,13 +138,13 @@ fn draw_axes(out: &mut String, panel: &Panel, axes: &Axes, area: Area, names_x: 
             at + 4.0
         );
     }
-    let _ = write!(
-        out,
-        "</g><path class=\"axis\" d=\"M{x:.1} {y:.1}v{height:.1}h{width:.1}\"/>"
-    );
+    let _ = write!(out, "</g><path class=\"axis\" d=\"M{x:.1} {y:.1}v{height:.1}h{width:.1}\"/>");
     if names_x {
         let (below, label) = (bottom + 33.0, escaped(&panel.x_label));
-        let _ = write!(out, "<text x=\"{middle:.1}\" y=\"{below:.1}\" text-anchor=\"middle\">{label}</text>");
+        let _ = write!(
+            out,
+            "<text x=\"{middle:.1}\" y=\"{below:.1}\" text-anchor=\"middle\">{label}</text>"
+        );
     }
     let (side, centre) = (area.x + 14.0, y + height / 2.0);
     let _ = write!(
@@ -161,7 +164,10 @@ fn draw_curve(out: &mut String, curve: &Curve, dashes: &Dashes, axes: &Axes) {
         Shape::Line | Shape::Pale | Shape::Dashed => {
             for run in axes.runs(&curve.x, &curve.y) {
                 let data = path(&thinned(&run));
-                let _ = write!(out, "<path {begin} d=\"{data}\" fill=\"none\" stroke-linejoin=\"round\" {paint}/>");
+                let _ = write!(
+                    out,
+                    "<path {begin} d=\"{data}\" fill=\"none\" stroke-linejoin=\"round\" {paint}/>"
+                );
             }
         }
         Shape::Horizontal => {
@@ -186,17 +192,30 @@ fn draw_curve(out: &mut String, curve: &Curve, dashes: &Dashes, axes: &Axes) {
             for pair in points.windows(2) {
                 let _ = write!(data, "V{:.1}H{:.1}", pair[0].1, pair[1].0);
             }
-            let _ = write!(out, "<path {begin} d=\"{data}V{:.1}H{:.1}Z\" {area}/>", axes.y_at(0.0), end.0);
+            let _ = write!(
+                out,
+                "<path {begin} d=\"{data}V{:.1}H{:.1}Z\" {area}/>",
+                axes.y_at(0.0),
+                end.0
+            );
         }
         Shape::Dots => {
             for (at, height) in axes.runs(&curve.x, &curve.y).concat() {
-                let _ = write!(out, "<circle {begin} cx=\"{at:.1}\" cy=\"{height:.1}\" r=\"3\" fill=\"{}\" fill-opacity=\"0.8\"/>", curve.color);
+                let _ = write!(
+                    out,
+                    "<circle {begin} cx=\"{at:.1}\" cy=\"{height:.1}\" r=\"3\" fill=\"{}\" fill-opacity=\"0.8\"/>",
+                    curve.color
+                );
             }
         }
         Shape::Crosses => {
             for (at, height) in axes.runs(&curve.x, &curve.y).concat() {
                 let (left, top) = (at - 6.0, height - 6.0);
-                let _ = write!(out, "<path {begin} d=\"M{left:.1} {top:.1}l12 12m0 -12l-12 12\" stroke=\"{}\" stroke-width=\"2.4\"/>", curve.color);
+                let _ = write!(
+                    out,
+                    "<path {begin} d=\"M{left:.1} {top:.1}l12 12m0 -12l-12 12\" stroke=\"{}\" stroke-width=\"2.4\"/>",
+                    curve.color
+                );
             }
         }
     }
@@ -222,7 +241,11 @@ fn name_lines(out: &mut String, panel: &Panel, axes: &Axes) {
                 let line = axes.x_at(curve.x.first().copied().unwrap_or(f64::NAN));
                 let is_left = line - x < 0.8 * width;
                 let at = if is_left { line + 5.0 } else { line - 5.0 };
-                (at, y + height - 6.0 - 14.0 * (named.len() - 1) as f64, if is_left { "start" } else { "end" })
+                (
+                    at,
+                    y + height - 6.0 - 14.0 * (named.len() - 1) as f64,
+                    if is_left { "start" } else { "end" },
+                )
             }
         };
         let _ = write!(
