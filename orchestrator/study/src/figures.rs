@@ -61,26 +61,7 @@ fn panel(figure: &Figure, panel: &Panel, results: &Results) -> Result<figure::Pa
             Response::Nichols => "phase of L, deg".into(),
             Response::Sensitivity => "frequency, rad/s".into(),
         };
-        if let (Response::Nichols, Some(alpha)) = (response, panel.disk) {
-            let (x, y) = excluded(alpha);
-            let name = format!("disk margin {alpha}");
-            curves.push(Curve { name, color: Color::LIMIT, shape: Shape::Dashed, x, y });
-        }
-        for (run, result) in &runs {
-            let Some(curve) = &result.series.response else { continue };
-            let (x, y) = match response {
-                Response::Nichols => (&curve.phase, &curve.gain),
-                Response::Sensitivity => (&curve.frequency, &curve.sensitivity),
-            };
-            let (x, y) = (x.clone(), y.clone());
-            curves.push(Curve {
-                name: run.label.clone(),
-                color: run.color,
-                shape: Shape::Line,
-                x,
-                y,
-            });
-        }
+        curves.extend(responses(response, panel, &runs));
     } else if let Some(across) = &panel.across {
         x_label.clone_from(&across.x.metric);
         for line in &across.lines {
@@ -143,6 +124,26 @@ fn panel(figure: &Figure, panel: &Panel, results: &Results) -> Result<figure::Pa
         x_range: panel.x_range,
         curves,
     })
+}
+
+/// The frequency responses of runs, with the set that a disk margin excludes.
+fn responses(response: Response, panel: &Panel, runs: &[(&Run, &RunResult)]) -> Vec<Curve> {
+    let mut curves = Vec::new();
+    if let (Response::Nichols, Some(alpha)) = (response, panel.disk) {
+        let (x, y) = excluded(alpha);
+        let name = format!("disk margin {alpha}");
+        curves.push(Curve { name, color: Color::LIMIT, shape: Shape::Dashed, x, y });
+    }
+    for (run, result) in runs {
+        let Some(curve) = &result.series.response else { continue };
+        let (x, y) = match response {
+            Response::Nichols => (&curve.phase, &curve.gain),
+            Response::Sensitivity => (&curve.frequency, &curve.sensitivity),
+        };
+        let (name, x, y) = (run.label.clone(), x.clone(), y.clone());
+        curves.push(Curve { name, color: run.color, shape: Shape::Line, x, y });
+    }
+    curves
 }
 
 /// The straight lines of a panel: its bounds and its marks.

@@ -1,6 +1,7 @@
 //! Reads a study and checks everything that can be checked without running anything.
 
 use crate::definition::Study;
+use crate::drawings::{Figure, Panel};
 use crate::runs::Run;
 use crate::{grid, template};
 use cosim::document::Source;
@@ -178,6 +179,19 @@ impl Study {
                 self.signals.keys().map(String::as_str),
             )?;
         }
+        self.check_figures(&ids)?;
+        for overview in &self.overviews {
+            self.source.check_names(&overview.runs, "[[run]]", ids.iter().copied())?;
+        }
+        for quantity in
+            self.tables.iter().flat_map(|table| &table.rows).filter_map(|row| row.paper.as_ref())
+        {
+            self.number(quantity)?;
+        }
+        Ok(())
+    }
+
+    fn check_figures(&self, ids: &[&str]) -> Result<(), Error> {
         if let Some(lead) = &self.lead
             && !self.figures.iter().any(|figure| figure.id == *lead)
         {
@@ -188,49 +202,14 @@ impl Study {
         for figure in &self.figures {
             self.source.check_names(&figure.runs, "[[run]]", ids.iter().copied())?;
             for panel in &figure.panels {
-                let through = panel
-                    .across
-                    .iter()
-                    .flat_map(|across| &across.lines)
-                    .flat_map(|line| &line.runs);
+                let across = panel.across.iter().flat_map(|across| &across.lines);
+                let through = across.flat_map(|line| &line.runs);
                 let named = panel.runs.iter().flatten().chain(through);
                 self.source.check_names(named, "[[run]]", ids.iter().copied())?;
-                let drawn = [
-                    panel.signal.is_some(),
-                    !panel.signals.is_empty(),
-                    panel.histogram.is_some(),
-                    panel.scatter.is_some(),
-                    panel.response.is_some(),
-                    panel.across.is_some(),
-                ];
-                let count = drawn.iter().filter(|is| **is).count();
-                if count != 1 && (count > 1 || panel.points.is_empty()) {
-                    return Err(self.source.error(
-                        &(0..0),
-                        format!(
-                            "[[figure]] id = \"{}\", panel \"{}\": a panel needs exactly one of signal, signals, histogram, scatter, across and response, or points alone",
-                            figure.id, panel.label
-                        ),
-                    ));
-                }
-                if panel.response.is_some()
-                    && let Some(run) =
-                        self.runs_of(figure, panel).find(|run| run.observe.margins.is_none())
-                {
-                    let problem = format!(
-                        "[[figure]] id = \"{}\", panel \"{}\": response needs [observe.margins], which the experiment of the run \"{}\" does not have",
-                        figure.id,
-                        panel.label,
-                        run.id.get_ref()
-                    );
-                    return Err(self.source.error(&run.id.span(), problem));
-                }
-                if panel.disk.is_some_and(|alpha| !(alpha > 0.0 && alpha < 2.0)) {
-                    let problem = format!(
-                        "[[figure]] id = \"{}\", panel \"{}\": disk must lie between 0 and 2",
-                        figure.id, panel.label
-                    );
-                    return Err(self.source.error(&(0..0), problem));
+                if let Some(problem) = self.fault_of(figure, panel) {
+                    let place =
+                        format!("[[figure]] id = \"{}\", panel \"{}\"", figure.id, panel.label);
+                    return Err(self.source.error(&(0..0), format!("{place}: {problem}")));
                 }
                 let lines = panel.bounds.iter().chain(&panel.marks).map(|line| &line.at);
                 let points = panel.points.iter().flat_map(|point| [&point.x, &point.y]);
@@ -239,15 +218,34 @@ impl Study {
                 }
             }
         }
-        for overview in &self.overviews {
-            self.source.check_names(&overview.runs, "[[run]]", ids.iter().copied())?;
-        }
-        for quantity in
-            self.tables.iter().flat_map(|table| &table.rows).filter_map(|row| row.paper.as_ref())
-        {
-            self.number(quantity)?;
-        }
         Ok(())
+    }
+
+    /// Returns what is wrong with a panel by itself.
+    fn fault_of(&self, figure: &Figure, panel: &Panel) -> Option<String> {
+        let drawn = [
+            panel.signal.is_some(),
+            !panel.signals.is_empty(),
+            panel.histogram.is_some(),
+            panel.scatter.is_some(),
+            panel.response.is_some(),
+            panel.across.is_some(),
+        ];
+        let count = drawn.iter().filter(|is| **is).count();
+        if count != 1 && (count > 1 || panel.points.is_empty()) {
+            return Some("a panel needs exactly one of signal, signals, histogram, scatter, across and response, or points alone".into());
+        }
+        let without = |run: &&Run| run.observe.margins.is_none();
+        if panel.response.is_some()
+            && let Some(run) = self.runs_of(figure, panel).find(without)
+        {
+            let id = run.id.get_ref();
+            return Some(format!(
+                "response needs [observe.margins], which the experiment of the run \"{id}\" does not have"
+            ));
+        }
+        let is_disk = |alpha: f64| alpha > 0.0 && alpha < 2.0;
+        panel.disk.filter(|alpha| !is_disk(*alpha)).map(|_| "disk must lie between 0 and 2".into())
     }
 }
 

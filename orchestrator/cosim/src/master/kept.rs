@@ -26,6 +26,9 @@ impl Master {
     ///
     /// # Errors
     /// Returns an error that names the instance if the calls fail; `time` (s) is named with it.
+    ///
+    /// # Panics
+    /// Panics if the indices are equal, or if there is no such instance.
     pub fn call_both<T>(
         &mut self,
         indices: [usize; 2],

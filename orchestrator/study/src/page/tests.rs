@@ -1,5 +1,4 @@
 use super::*;
-use crate::results::Numbers;
 
 fn judged(verdict: Verdict) -> Judged {
     Judged { verdict, checks: Vec::new() }

@@ -230,23 +230,15 @@ fn name_lines(out: &mut String, panel: &Panel, axes: &Axes) {
             continue;
         }
         named.push(&curve.name);
-        let (at_x, at_y, anchor) = match curve.shape {
-            Shape::Horizontal => {
-                let line = axes.y_at(curve.y.first().copied().unwrap_or(f64::NAN));
-                // Below the line if there is no room above it.
-                let at = if line - y < 16.0 { line + 14.0 } else { line - 5.0 };
-                (x + width - 4.0, at, "end")
-            }
-            _ => {
-                let line = axes.x_at(curve.x.first().copied().unwrap_or(f64::NAN));
-                let is_left = line - x < 0.8 * width;
-                let at = if is_left { line + 5.0 } else { line - 5.0 };
-                (
-                    at,
-                    y + height - 6.0 - 14.0 * (named.len() - 1) as f64,
-                    if is_left { "start" } else { "end" },
-                )
-            }
+        let first = |values: &[f64]| values.first().copied().unwrap_or(f64::NAN);
+        let (at_x, at_y, anchor) = if curve.shape == Shape::Horizontal {
+            let line = axes.y_at(first(&curve.y));
+            // Below the line if there is no room above it.
+            (x + width - 4.0, if line - y < 16.0 { line + 14.0 } else { line - 5.0 }, "end")
+        } else {
+            let line = axes.x_at(first(&curve.x));
+            let at = y + height - 6.0 - 14.0 * (named.len() - 1) as f64;
+            if line - x < 0.8 * width { (line + 5.0, at, "start") } else { (line - 5.0, at, "end") }
         };
         let _ = write!(
             out,
