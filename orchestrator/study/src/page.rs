@@ -119,7 +119,7 @@ fn lead(results: &Results, drawn: &[figure::Figure]) -> Markup {
                     (small(first, results))
                     p.note {
                         @for (term, meaning) in study.terms.iter().filter(|(term, _)| uses(term)) { b { (term) } ": " (meaning) ". " }
-                        "A number with a range in brackets is the mean over several runs, with the smallest and the largest value."
+                        "Numbers are means over the runs; further down, brackets hold the smallest and the largest."
                     }
                 }
             }

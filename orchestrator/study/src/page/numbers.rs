@@ -18,7 +18,7 @@ pub(super) fn small(full: &Overview, results: &Results) -> Markup {
     part.note.clear();
     let is_part = part.runs.len() < full.runs.len() || part.metrics.len() < full.metrics.len();
     html! {
-        (overview(&part, results))
+        (rows(&part, results, &mean))
         @if is_part { p.note { a href="#tables" { "All rows and columns" } } }
     }
 }
@@ -74,7 +74,16 @@ fn row(row: &ComparisonRow, has_beside: bool, results: &Results) -> Result<Marku
     })
 }
 
+/// Returns all rows and columns of an overview.
 pub(super) fn overview(overview: &Overview, results: &Results) -> Markup {
+    rows(overview, results, &several)
+}
+
+fn mean(numbers: &Numbers) -> String {
+    if numbers.0.is_empty() { "–".into() } else { shown(numbers.mean()) }
+}
+
+fn rows(overview: &Overview, results: &Results, cell: &dyn Fn(&Numbers) -> String) -> Markup {
     let mut rows = Vec::new();
     for id in &overview.runs {
         let Some(run) = results.study.run(id.get_ref()) else { continue };
@@ -96,7 +105,7 @@ pub(super) fn overview(overview: &Overview, results: &Results) -> Markup {
                     }
                     tr {
                         td { span.swatch style=(format!("background:{}", run.color)) {} " " (run.label) }
-                        @for numbers in numbers { td { (several(numbers)) } }
+                        @for numbers in numbers { td { (cell(numbers)) } }
                     }
                 }
             }
