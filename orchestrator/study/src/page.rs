@@ -1,5 +1,5 @@
-//! The report as one self-contained HTML page. What a reader wants first stands on the first screen:
-//! how many claims hold, one picture and one small table. Everything else is folded.
+//! The report as one self-contained HTML page. What a reader wants first stands on the first
+//! screen: how many claims hold, one picture and one small table. Everything else is folded.
 
 mod evidence;
 mod numbers;

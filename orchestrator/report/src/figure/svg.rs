@@ -1,12 +1,14 @@
 //! Draws a figure as SVG, for files and for pages. In a page, classes let its style sheet choose
 //! the colours of paper and ink, and its script finds curves and axes.
 
+mod paint;
 mod panel;
 
 use super::dash::Dashes;
 use super::{Curve, Figure, Legend, Shape};
 use cosim::error::Error;
 use cosim::files;
+use paint::{escaped, stroke};
 use panel::{Area, draw_panel};
 use std::fmt::Write as _;
 use std::path::Path;
@@ -162,33 +164,6 @@ fn entry(out: &mut String, curve: &Curve, dashes: &Dashes, x: f64, y: f64) {
 /// Returns the width that an entry of a legend takes, px.
 fn entry_width(curve: &Curve) -> f64 {
     SAMPLE + LETTER * curve.name.chars().count() as f64
-}
-
-/// Returns the attributes of a curve's line. Lines in black are drawn in the ink of the page.
-fn stroke(curve: &Curve, dashes: &Dashes) -> String {
-    let width = if curve.shape == Shape::Pale { 1.0 } else { 1.8 };
-    let mut text = if curve.shape.is_straight() {
-        "class=\"limit\"".to_string()
-    } else if curve.color == super::Color(0, 0, 0) {
-        "class=\"ink\"".to_string()
-    } else {
-        format!("stroke=\"{}\"", curve.color)
-    };
-    let _ = write!(text, " stroke-width=\"{width}\"");
-    if curve.shape == Shape::Pale {
-        text.push_str(" stroke-opacity=\"0.6\"");
-    }
-    let dash = dashes.of(curve);
-    if !dash.is_empty() {
-        let lengths: Vec<String> = dash.iter().map(f64::to_string).collect();
-        let _ = write!(text, " stroke-dasharray=\"{}\"", lengths.join(" "));
-    }
-    text
-}
-
-/// Escapes a text for an element or an attribute.
-fn escaped(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 
 #[cfg(test)]

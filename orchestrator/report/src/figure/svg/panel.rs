@@ -1,6 +1,6 @@
 //! One panel of a figure: axes, grid and curves.
 
-use super::{escaped, stroke};
+use super::paint::{escaped, stroke};
 use crate::figure::dash::Dashes;
 use crate::figure::thin::thinned;
 use crate::figure::{Curve, Panel, Shape, ticks};
