@@ -59,9 +59,8 @@ impl Curves {
         let Track { panel, values, references, limit } = track;
         let colors = || Color::CURVES.iter().copied().cycle();
         let pale = references.iter().zip(colors());
-        let mut curves: Vec<_> = pale
-            .map(|(y, color)| self.curve("thin: reference", color, Shape::Pale, y.clone()))
-            .collect();
+        let mut curves: Vec<_> =
+            pale.map(|(y, color)| self.curve("reference", color, Shape::Pale, y.clone())).collect();
         let named = panel.curves.iter().zip(values).zip(colors());
         curves.extend(
             named.map(|((curve, y), color)| self.curve(&curve.name, color, Shape::Line, y.clone())),

@@ -1,6 +1,6 @@
 //! Dashes that tell the lines of a figure apart without their colours.
 
-use super::{Curve, Figure, Shape};
+use super::{Curve, Panel, Shape};
 
 /// Lengths of strokes and gaps of the patterns, px; the first one is a solid line.
 const PATTERNS: [&[f64]; 6] = [
@@ -12,14 +12,14 @@ const PATTERNS: [&[f64]; 6] = [
     &[6.0, 3.0, 2.0, 3.0, 2.0, 3.0],
 ];
 
-/// Patterns of the lines of a figure. A name has the same pattern in every panel.
+/// Patterns of the lines of panels. A name has the same pattern in each.
 pub struct Dashes<'a>(Vec<&'a str>);
 
 impl<'a> Dashes<'a> {
-    /// Assigns a pattern to the name of every line.
-    pub fn new(figure: &'a Figure) -> Self {
+    /// Assigns a pattern to the name of every line of panels that share a legend.
+    pub fn new(panels: &'a [Panel]) -> Self {
         let mut names: Vec<&str> = Vec::new();
-        let curves = figure.panels.iter().flat_map(|panel| &panel.curves);
+        let curves = panels.iter().flat_map(|panel| &panel.curves);
         for curve in curves.filter(|curve| curve.shape == Shape::Line) {
             if !names.contains(&curve.name.as_str()) {
                 names.push(&curve.name);

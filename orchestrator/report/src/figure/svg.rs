@@ -52,7 +52,7 @@ pub fn element(figure: &Figure) -> String {
 fn document(figure: &Figure, begin: &str, titled: bool) -> String {
     let columns = figure.columns.max(1);
     let rows = figure.panels.len().div_ceil(columns).max(1);
-    let dashes = Dashes::new(figure);
+    let shared = Dashes::new(&figure.panels);
     let lines = match figure.legend {
         Legend::Above => arrange(legend(figure.panels.iter().flat_map(|panel| &panel.curves))),
         Legend::Beside => Vec::new(),
@@ -75,7 +75,7 @@ fn document(figure: &Figure, begin: &str, titled: bool) -> String {
     for (row, line) in lines.iter().enumerate() {
         let mut x = 64.0;
         for curve in line {
-            entry(&mut out, curve, &dashes, x, title_height + LEGEND_HEIGHT * row as f64 + 12.0);
+            entry(&mut out, curve, &shared, x, title_height + LEGEND_HEIGHT * row as f64 + 12.0);
             x += entry_width(curve);
         }
     }
@@ -92,11 +92,13 @@ fn document(figure: &Figure, begin: &str, titled: bool) -> String {
         // Panels over the same axis say once what it shows.
         let below = figure.panels.get(place + columns);
         let is_named = below.is_none_or(|below| below.x_label != panel.x_label);
-        draw_panel(&mut out, panel, &dashes, area, is_named);
+        let own = Dashes::new(std::slice::from_ref(panel));
+        let dashes = if figure.legend == Legend::Beside { &own } else { &shared };
+        draw_panel(&mut out, panel, dashes, area, is_named);
         if figure.legend == Legend::Beside {
             for (line, curve) in legend(panel.curves.iter()).into_iter().enumerate() {
                 let (x, y) = (area.x + area.width + 4.0, area.y + 18.0 + 19.0 * line as f64);
-                entry(&mut out, curve, &dashes, x, y);
+                entry(&mut out, curve, dashes, x, y);
             }
         }
     }
