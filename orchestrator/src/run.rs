@@ -26,7 +26,7 @@ use cosim_report::panels::Panel;
 use cosim_report::plot::Curves;
 use cosim_report::progress::Progress;
 use fmu_import::warnings;
-use linear::measures;
+use linear::measures::{self, Measured};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
@@ -249,7 +249,7 @@ fn record(system: &mut System, options: &Options) -> Result<RunReport, Failure> 
         ..meters.metrics()
     };
     if outcome.is_ok() {
-        metrics.asked.extend(measures::asked(system, &options.interrupt)?);
+        metrics.asked.extend(margins(system, &options.interrupt)?);
     }
     if let Some(pacer) = master.take_pacer() {
         let (mut real_time, wake_ups, steps) = pacer.report();
@@ -267,6 +267,18 @@ fn record(system: &mut System, options: &Options) -> Result<RunReport, Failure> 
     let ended = early(outcome, &out)?;
     let end = master.end().map(String::from);
     Ok(RunReport { metrics, out, files, ended, end })
+}
+
+/// Computes the margins that an experiment asks for. A loop that cannot be linearised has none,
+/// which loses nothing of the run.
+fn margins(system: &System, interrupt: &Interrupt) -> Result<Measured, Error> {
+    match measures::asked(system, interrupt) {
+        Err(error @ Error::Call { .. }) => {
+            tracing::warn!("the margins are left out: {error}");
+            Ok(measures::none())
+        }
+        outcome => outcome,
+    }
 }
 
 /// Warns of missed deadlines and of a refused priority if no summary is printed.
