@@ -136,7 +136,8 @@ pub(crate) enum Command {
     ///
     /// Finished cases are kept. After an interruption the same command continues where it stopped.
     Campaign(campaign::Fly),
-    /// Look for the worst case of a campaign, and write it as an experiment.
+    /// Look for the worst case of a campaign, and write it as an experiment and report.html with
+    /// the worst case against its limit.
     Falsify(campaign::Falsify),
     /// Linearise an experiment at an instant of its run, and write the open loop as a discrete
     /// state-space model (JSON).

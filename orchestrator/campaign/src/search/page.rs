@@ -139,12 +139,19 @@ fn worst_case(plan: &Plan, outcome: &SearchOutcome, worst: &Row) -> Result<Figur
     let time = thin::times(&watch.time);
     let panels = watch.judged.iter().map(|judged| {
         let signals = judged.signals.iter().zip(&judged.values).zip(COLORS);
+        // A single signal is named by the title, because its name may be long.
+        let (alone, title) = match &judged.signals[..] {
+            [(name, _)] => (true, format!("{}: {name}", judged.measure)),
+            _ => (false, judged.measure.clone()),
+        };
         let curves = signals.map(|(((name, _), values), color)| {
+            let name = if alone { "worst case" } else { name };
             line(name, color, Shape::Line, time.clone(), thin::values(values))
         });
         let mut curves: Vec<Curve> = curves.collect();
         curves.extend(judged.limit.map(limit_line));
-        panel(&judged.measure, "time, s", with_unit("", &judged.unit).replace(", ", ""), curves)
+        let unit = if judged.unit.is_empty() { "ratio" } else { &judged.unit };
+        panel(&title, "time, s", unit.to_string(), curves)
     });
     let panels = panels.collect();
     Ok(Figure { title: "The worst case".into(), columns: 1, legend: Legend::Above, panels })

@@ -136,7 +136,7 @@ class Chart {
     const { svg, panel } = this;
     svg.replaceChildren();
     svg.setAttribute("viewBox", `0 0 ${width} ${HEIGHT}`);
-    for (const [value, text] of Chart.ticks(low, high, 4)) {
+    for (const [value, text] of Chart.ticks(low, high, 5)) {
       svg.append(svgElement("line", { class: "grid", x1: LEFT, x2: width - RIGHT, y1: y(value), y2: y(value) }));
       svg.append(svgElement("text", { x: LEFT - 7, y: y(value) + 4, "text-anchor": "end" }, text));
     }

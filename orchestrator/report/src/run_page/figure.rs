@@ -6,19 +6,38 @@ use crate::plot::COLORS;
 use crate::recording::Recording;
 use crate::recording::panels::{Curve, Panel, Role, symbols};
 
+/// Largest number of letters of a run's name that a legend has room for.
+const NAME: usize = 8;
+
 /// Returns the figure of these panels.
 pub fn figure(runs: &[Recording], panels: &[Panel]) -> Figure {
+    let names = names(runs);
+    let named = runs.iter().zip(&names);
+    let numbered = named.map(|(run, name)| match run.name == *name {
+        true => name.clone(),
+        false => format!("{name} {}", run.name),
+    });
     let title = match runs {
         [run] => run.title.clone(),
-        _ => runs.iter().map(|run| run.name.as_str()).collect::<Vec<_>>().join(", "),
+        _ => numbered.collect::<Vec<_>>().join(", "),
     };
-    let panels = panels.iter().map(|panel| drawn(runs, panel)).collect();
+    let panels = panels.iter().map(|panel| drawn(runs, &names, panel)).collect();
     Figure { title, columns: 1, legend: Legend::Beside, panels }
 }
 
-fn drawn(runs: &[Recording], panel: &Panel) -> figure::Panel {
+/// Returns the names of the runs in legends: numbers if the names are too long for them.
+fn names(runs: &[Recording]) -> Vec<String> {
+    let fits = runs.iter().all(|run| run.name.chars().count() <= NAME);
+    let name = |(place, run): (usize, &Recording)| match fits {
+        true => run.name.clone(),
+        false => format!("({})", place + 1),
+    };
+    runs.iter().enumerate().map(name).collect()
+}
+
+fn drawn(runs: &[Recording], names: &[String], panel: &Panel) -> figure::Panel {
     let mut curves: Vec<figure::Curve> =
-        panel.curves.iter().map(|curve| one(runs, panel, curve)).collect();
+        panel.curves.iter().map(|curve| one(runs, names, panel, curve)).collect();
     // What is drawn first lies lowest.
     curves.sort_by_key(|curve| curve.shape != Shape::Pale);
     curves.extend(panel.limit.map(|limit| figure::Curve {
@@ -40,12 +59,12 @@ fn drawn(runs: &[Recording], panel: &Panel) -> figure::Panel {
     }
 }
 
-fn one(runs: &[Recording], panel: &Panel, curve: &Curve) -> figure::Curve {
+fn one(runs: &[Recording], names: &[String], panel: &Panel, curve: &Curve) -> figure::Curve {
     let run = &runs[curve.run];
     let name = match (runs.len(), curve.role) {
         (_, Role::Reference) => "thin: reference".to_string(),
         (1, _) => curve.name.clone(),
-        _ => format!("{}, {}", curve.name, run.name),
+        _ => format!("{}, {}", curve.name, names[curve.run]),
     };
     // In a panel with one signal, the colour tells the runs apart.
     let alone = panel.curves.iter().all(|other| other.place == curve.place);

@@ -78,7 +78,10 @@ class Instruments {
     const state = { angles: at(vehicle.angles) || [0, 0, 0], light: this.light(frame) };
     for (const key of ["reference", "flaps"]) if (at(vehicle[key])) state[key] = at(vehicle[key]);
     for (const [key, limit] of [["rates", "rateLimit"], ["moment", "momentLimit"]]) {
-      if (at(vehicle[key]) && vehicle[limit]) Object.assign(state, { [key]: at(vehicle[key]), [limit]: vehicle[limit] });
+      if (at(vehicle[key]) && vehicle[limit]) {
+        // The values are rounded: one that lies at its limit may seem to lie beyond it.
+        Object.assign(state, { [key]: at(vehicle[key]), [limit]: vehicle[limit] * (1 + 5e-5) });
+      }
     }
     const degrees = (angle) => minus(((angle * 180) / Math.PI).toFixed(1));
     const [alpha, beta, sigma] = state.angles.map(degrees);

@@ -148,7 +148,7 @@ fn summary(runs: &[Recording]) -> Markup {
             @if runs.len() > 1 { thead { tr { th {} @for run in runs { th { (run.name) } } } } }
             tbody { @for (heading, texts) in &lines { tr {
                 th scope="row" { (heading) }
-                @for text in texts { td class=[text.contains("EXCEEDS").then_some("bad")] { (text) } }
+                @for text in texts { td class=[text.contains("EXCEEDS").then_some("bad")] { (text.replace(" %", "\u{a0}%")) } }
             } } }
         } }
     }
