@@ -19,6 +19,9 @@ use maud::{DOCTYPE, Markup, PreEscaped, html};
 use std::path::Path;
 use sweep::texts::short;
 
+/// On a narrow screen the figures scroll, because their texts would be too small to read.
+const STYLE: &str = ".plot { overflow-x: auto; } .plot svg { min-width: 640px; }";
+
 /// Writes `history.svg` and `report.html`, for which the worst case is flown again.
 ///
 /// # Errors
@@ -194,6 +197,7 @@ fn page(
         html lang="en" {
             (head(&outcome.title))
             body {
+                style { (PreEscaped(STYLE)) }
                 header {
                     h1 { (outcome.title) }
                     p.paper { "The worst of " (outcome.cases) " cases that a search flew" }

@@ -24,7 +24,8 @@ const rowAt = (times, time) => {
   return low;
 };
 
-const minus = (text) => text.replace("-", "−");
+// With the sign of typography, which zero does not have.
+const minus = (text) => text.replace(/^-(?=[0.]*$)/, "").replace("-", "−");
 
 class Chart {
   static HEIGHT = 190;
@@ -119,6 +120,8 @@ class Chart {
         if (value > high) high = value;
       }
     }
+    // Values at the cursor have the digits of the largest one.
+    this.digits = low > high ? 0 : Math.max(0, Math.min(9, 3 - Math.floor(Math.log10(Math.max(Math.abs(low), Math.abs(high)) || 1))));
     if (low > high) return [0, 1];
     const margin = 0.06 * (high - low) || 0.06 * Math.abs(high) || 1;
     return [low - margin, high + margin];
@@ -181,7 +184,7 @@ class Chart {
     for (const [curve, output] of this.outputs) {
       const times = this.runs[curve.run].time;
       const value = time > times.at(-1) + 1e-9 ? null : curve.values[rowAt(times, time)];
-      output.textContent = value === null ? "–" : minus(Number(value.toPrecision(4)).toString());
+      output.textContent = value === null ? "–" : minus(value.toFixed(this.digits));
     }
   }
 }

@@ -34,7 +34,8 @@ pub fn page(runs: &[Recording], panels: &[Panel], vehicles: &[usize]) -> Value {
             })
         });
         json!({
-            "label": symbols(&panel.label), "unit": panel.unit, "limit": panel.limit,
+            "label": symbols(&panel.label), "unit": panel.unit,
+            "limit": panel.limit.map(|limit| rounded(limit, DIGITS)),
             "curves": curves.collect::<Vec<_>>(),
         })
     };

@@ -110,7 +110,7 @@ fn player() -> Markup {
             button id="play" type="button" aria-label="Play" title="Space" { "▶" }
             input id="seek" type="range" min="0" max="1000" step="1" value="0" aria-label="Time";
             output id="time" for="seek" {}
-            label { "speed " select id="speed" aria-label="Speed" {} }
+            label { span { "speed " } select id="speed" aria-label="Speed" {} }
         }
     }
 }
