@@ -147,7 +147,9 @@ impl Recording {
             }
         }
         if signal.norm {
-            values.iter_mut().for_each(|value| *value = value.sqrt());
+            for value in &mut values {
+                *value = value.sqrt();
+            }
         }
         let Some(over) = &signal.over else {
             return Ok(Series { unit: unit.unwrap_or_default().into(), values });

@@ -88,7 +88,9 @@ fn of_experiment(
         let Series { unit: other, mut values } = run.series(signal).ok()?;
         let shown: Option<&Scaled> =
             asked.unit.as_ref().or_else(|| run.observe.units.get(other.as_str()));
-        values.iter_mut().for_each(|value| *value *= shown.map_or(1.0, |shown| shown.factor));
+        for value in &mut values {
+            *value *= shown.map_or(1.0, |shown| shown.factor);
+        }
         let other = shown.map_or(other, |shown| shown.name.clone());
         Some((unit.get_or_insert_with(|| other.clone()).clone() == other).then_some(values))
     };
@@ -180,21 +182,18 @@ fn add(
         let factor = shown.map_or(1.0, |shown| shown.factor);
         let values = values.iter().map(|value| factor * value).collect();
         let unit = shown.map_or(unit, |shown| shown.name.clone());
-        let fits = |panel: &&mut Panel| {
+        let fits = |panel: &Panel| {
             let names: BTreeSet<&str> =
                 panel.curves.iter().map(|curve| curve.name.as_str()).collect();
             panel.unit == unit
                 && panel.label == group
                 && (names.contains(name) || names.len() < room.max(1))
         };
-        let panel = match panels.iter_mut().find(fits) {
-            Some(panel) => panel,
-            None => {
-                panels.push(Panel { label: group.into(), unit, ..Panel::default() });
-                let Some(panel) = panels.last_mut() else { return };
-                panel
-            }
-        };
+        let position = panels.iter().position(fits).unwrap_or(panels.len());
+        if position == panels.len() {
+            panels.push(Panel { label: group.into(), unit, ..Panel::default() });
+        }
+        let panel = &mut panels[position];
         let there = panel.curves.iter().find(|curve| curve.name == name).map(|curve| curve.place);
         let next = panel.curves.iter().map(|curve| curve.place + 1).max().unwrap_or(0);
         let place = there.unwrap_or(next);

@@ -13,10 +13,12 @@ const NAME: usize = 8;
 pub fn figure(runs: &[Recording], panels: &[Panel]) -> Figure {
     let names = names(runs);
     let named = runs.iter().zip(&names);
-    let numbered = named.map(|(run, name)| match run.name == *name {
-        true => name.clone(),
-        false => format!("{name} {}", run.name),
-    });
+    let numbered =
+        named.map(
+            |(run, name)| {
+                if run.name == *name { name.clone() } else { format!("{name} {}", run.name) }
+            },
+        );
     let title = match runs {
         [run] => run.title.clone(),
         _ => numbered.collect::<Vec<_>>().join(", "),
@@ -28,9 +30,8 @@ pub fn figure(runs: &[Recording], panels: &[Panel]) -> Figure {
 /// Returns the names of the runs in legends: numbers if the names are too long for them.
 fn names(runs: &[Recording]) -> Vec<String> {
     let fits = runs.iter().all(|run| run.name.chars().count() <= NAME);
-    let name = |(place, run): (usize, &Recording)| match fits {
-        true => run.name.clone(),
-        false => format!("({})", place + 1),
+    let name = |(place, run): (usize, &Recording)| {
+        if fits { run.name.clone() } else { format!("({})", place + 1) }
     };
     runs.iter().enumerate().map(name).collect()
 }

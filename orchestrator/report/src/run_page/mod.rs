@@ -131,15 +131,12 @@ fn summary(runs: &[Recording]) -> Markup {
     let mut lines: Vec<(&str, Vec<&str>)> = Vec::new();
     for (place, run) in runs.iter().enumerate() {
         for (heading, text) in &run.summary {
-            let line = match lines.iter().position(|(other, _)| other == heading) {
-                Some(line) => &mut lines[line],
-                None => {
-                    lines.push((heading, vec![""; runs.len()]));
-                    let last = lines.len() - 1;
-                    &mut lines[last]
-                }
-            };
-            line.1[place] = text;
+            let there = lines.iter().position(|(other, _)| other == heading);
+            let position = there.unwrap_or(lines.len());
+            if position == lines.len() {
+                lines.push((heading, vec![""; runs.len()]));
+            }
+            lines[position].1[place] = text;
         }
     }
     html! {
