@@ -35,6 +35,19 @@ use std::path::{Path, PathBuf};
 use std::rc::Rc;
 use std::time::Instant;
 
+/// Choice of the pictures that a run draws.
+#[derive(Clone, Copy, Debug, Default, clap::Args)]
+#[command(next_help_heading = "Results")]
+struct Pictures {
+    /// Draw no plot.svg.
+    #[arg(long)]
+    no_plot: bool,
+    /// Also write page.html, which works without a network: curves with a common cursor, the
+    /// vehicle in motion, summary and parameters.
+    #[arg(long)]
+    page: bool,
+}
+
 /// Choice of the files that a run writes, and of their format.
 #[derive(Clone, Copy, Debug, Default, clap::Args)]
 #[command(next_help_heading = "Results")]
@@ -45,13 +58,8 @@ pub(crate) struct Files {
     /// Choose the format of the file of recorded variables.
     #[arg(long, value_parser = choice::<Format>(&[]), value_name = "FORMAT", default_value = "csv", conflicts_with = "no_csv")]
     format: Format,
-    /// Draw no plot.svg.
-    #[arg(long)]
-    no_plot: bool,
-    /// Also write page.html, which works without a network: curves with a common cursor, the
-    /// vehicle in motion, summary and parameters.
-    #[arg(long)]
-    page: bool,
+    #[command(flatten)]
+    pictures: Pictures,
     /// Write the header of results.csv as name [unit], and items of enumerations by their names.
     /// Without this option the header holds the names alone and every cell is a number, as FMPy and
     /// NumPy expect; results.json holds the units and items.
@@ -180,7 +188,7 @@ fn record(system: &mut System, options: &Options) -> Result<RunReport, Failure> 
     options.files.check()?;
     let mut meters = Meters::new(system)?.ending_when_lost();
     let panels = Panel::resolve_all(system)?;
-    let mut watch = options.files.page.then(|| Watch::new(system)).transpose()?;
+    let mut watch = options.files.pictures.page.then(|| Watch::new(system)).transpose()?;
     for doubt in doubts(system, &options.interrupt)? {
         tracing::warn!("{doubt}");
     }
@@ -270,7 +278,7 @@ fn record(system: &mut System, options: &Options) -> Result<RunReport, Failure> 
         metrics.real_time = Some(real_time);
     }
     files::write_json(&out.join("metrics.json"), &metrics)?;
-    if !options.files.no_plot && curves.draw(&out.join("plot.svg"), &title)? {
+    if !options.files.pictures.no_plot && curves.draw(&out.join("plot.svg"), &title)? {
         files.push("plot.svg");
     }
     if let Some(watch) = watch {

@@ -8,6 +8,7 @@ use cosim::error::Error;
 use cosim_report::figure::{png, svg};
 use cosim_report::recording::{Recording, panels};
 use cosim_report::run_page;
+use std::ffi::OsStr;
 use std::io::Write;
 use std::path::PathBuf;
 
@@ -43,7 +44,7 @@ enum Form {
 
 impl Plot {
     fn form(&self) -> Result<Form, Error> {
-        let extension = self.out.extension().map(|extension| extension.to_ascii_lowercase());
+        let extension = self.out.extension().map(OsStr::to_ascii_lowercase);
         match extension.as_ref().and_then(|extension| extension.to_str()) {
             Some("svg") => Ok(Form::Svg),
             Some("png") => Ok(Form::Png),
