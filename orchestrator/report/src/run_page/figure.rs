@@ -63,7 +63,7 @@ fn drawn(runs: &[Recording], names: &[String], panel: &Panel) -> figure::Panel {
 fn one(runs: &[Recording], names: &[String], panel: &Panel, curve: &Curve) -> figure::Curve {
     let run = &runs[curve.run];
     let name = match (runs.len(), curve.role) {
-        (_, Role::Reference) => "thin: reference".to_string(),
+        (_, Role::Reference) => "reference".to_string(),
         (1, _) => curve.name.clone(),
         _ => format!("{}, {}", curve.name, names[curve.run]),
     };
