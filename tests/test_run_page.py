@@ -184,3 +184,16 @@ def test_a_page_fits_a_telephone_in_both_themes(runs, opened, name, scheme):
     paper = page.evaluate("getComputedStyle(document.body).backgroundColor")
     assert paper == {"light": "rgb(252, 252, 251)", "dark": "rgb(18, 20, 23)"}[scheme]
     assert (runs / name).stat().st_size < 1e6
+
+
+def test_the_page_of_an_entry_flight(tmp_path, opened):
+    call("run", "from-120km", "--page", "--quiet", "--out", tmp_path / "run", cwd=os.getcwd())
+    path = tmp_path / "run" / "page.html"
+    assert path.stat().st_size < 3e6
+    page = opened(path)
+    page.keyboard.press("End")
+    assert shown_time(page) > 1800
+    # A peak of one row survives the thinning.
+    largest = json.loads((tmp_path / "run" / "metrics.json").read_text())["max_rate_deg_s"]
+    values = page.evaluate("JSON.parse(document.getElementById('run-data').textContent).panels[2].curves.at(-1).values")
+    assert max(values) == pytest.approx(largest, rel=1e-4)
