@@ -15,6 +15,8 @@ from conftest import EXPERIMENTS, ROOT, TARGET, program
 
 # What takes minutes, and what writes outside the folder.
 LONG = ("reproduce", "campaign white", "falsify", "~", "/usr")
+# Runs that the examples of a command take up.
+FLOWN = {"plot": ("lqr", "dlmpc", "crmpc-robust")}
 
 
 def call(*arguments: object, folder=ROOT) -> subprocess.CompletedProcess:
@@ -68,6 +70,8 @@ def test_the_examples_of_each_help_run(command, tmp_path):
     (tmp_path / "target" / "fmu").symlink_to(TARGET / "fmu")
     lines = examples(command)
     assert len(lines) == 3
+    for experiment in FLOWN.get(command, ()):
+        assert call("run", experiment, "--quiet", folder=tmp_path).returncode == 0
     for line in lines:
         words = shlex.split(line)[1:]
         if any(long in line for long in LONG):

@@ -297,5 +297,6 @@ pub(crate) fn falsify(
         writeln!(out, "  breaks {}", outcome.broken.join(", "))?;
     }
     writeln!(out, "  orchestrator run {}", outcome.out.join("worst.toml").display())?;
+    writeln!(out, "  {}", outcome.out.join("report.html").display())?;
     Ok(())
 }

@@ -3,7 +3,7 @@
 use crate::arguments::{self, choice};
 use crate::catalogue::Filter;
 use crate::run::Files;
-use crate::{campaign, examples, linear, response, schema};
+use crate::{campaign, examples, linear, plot, response, schema};
 use clap::{Arg, CommandFactory, FromArgMatches, Parser, Subcommand};
 use cosim::pacing::{Factor, OnMiss};
 use std::path::PathBuf;
@@ -97,6 +97,11 @@ pub(crate) enum Command {
         #[arg(long, help_heading = "Results")]
         force: bool,
     },
+    /// Draw recorded runs over one another, as a picture or as a page with the vehicle in motion.
+    ///
+    /// Each panel has curves of one unit, six at most. Units are those in which the FMUs and the
+    /// experiment display values.
+    Plot(plot::Plot),
     /// Repeat a paper's comparison and write report.html, with figures, tables and a verdict on
     /// each claim.
     ///
@@ -131,7 +136,8 @@ pub(crate) enum Command {
     ///
     /// Finished cases are kept. After an interruption the same command continues where it stopped.
     Campaign(campaign::Fly),
-    /// Look for the worst case of a campaign, and write it as an experiment.
+    /// Look for the worst case of a campaign, and write it as an experiment and report.html with
+    /// the worst case against its limit.
     Falsify(campaign::Falsify),
     /// Linearise an experiment at an instant of its run, and write the open loop as a discrete
     /// state-space model (JSON).

@@ -6,7 +6,7 @@ use std::fmt::Write;
 type Example = [&'static str; 2];
 
 /// Three examples of each command, by its name.
-const EXAMPLES: [(&str, [Example; 3]); 14] = [
+const EXAMPLES: [(&str, [Example; 3]); 15] = [
     (
         "run",
         [
@@ -18,6 +18,20 @@ const EXAMPLES: [(&str, [Example; 3]); 14] = [
             [
                 "Fly ten times as fast as real time, into another folder",
                 "orchestrator run crmpc-robust --real-time 10 --stop 20 --out out/paced",
+            ],
+        ],
+    ),
+    (
+        "plot",
+        [
+            ["Draw the rates of a run", "orchestrator plot out/lqr --signals 'plant.rate.*'"],
+            [
+                "Draw two runs over one another, from 20 s to 30 s",
+                "orchestrator plot out/lqr out/dlmpc --from 20 --to 30 --out both.png",
+            ],
+            [
+                "Fly both side by side in a page",
+                "orchestrator plot out/lqr out/crmpc-robust --out both.html",
             ],
         ],
     ),

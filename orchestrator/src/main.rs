@@ -15,6 +15,7 @@ mod live;
 mod man;
 mod pack;
 mod plain;
+mod plot;
 mod response;
 mod run;
 mod schema;
@@ -140,6 +141,7 @@ fn execute(command: Command, out: &mut impl Write, interrupt: &Interrupt) -> Res
             }
             Ok(())
         }
+        Command::Plot(asked) => plot::plot(&asked, out),
         Command::Campaign(asked) => campaign::fly(&asked, out, interrupt),
         Command::Falsify(asked) => campaign::falsify(&asked, out, interrupt),
         Command::Linearise(asked) => linear::linearise(&asked, out, interrupt),

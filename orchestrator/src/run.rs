@@ -25,12 +25,28 @@ use cosim_report::metrics::{Meters, Metrics};
 use cosim_report::panels::Panel;
 use cosim_report::plot::Curves;
 use cosim_report::progress::Progress;
+use cosim_report::recording::panels;
+use cosim_report::recording::watch::Watch;
+use cosim_report::run_page;
 use fmu_import::warnings;
 use linear::measures::{self, Measured};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
 use std::time::Instant;
+
+/// Choice of the pictures that a run draws.
+#[derive(Clone, Copy, Debug, Default, clap::Args)]
+#[command(next_help_heading = "Results")]
+struct Pictures {
+    /// Draw no plot.svg.
+    #[arg(long)]
+    no_plot: bool,
+    /// Also write page.html, which works without a network: curves with a common cursor, the
+    /// vehicle in motion, summary and parameters.
+    #[arg(long)]
+    page: bool,
+}
 
 /// Choice of the files that a run writes, and of their format.
 #[derive(Clone, Copy, Debug, Default, clap::Args)]
@@ -42,9 +58,8 @@ pub(crate) struct Files {
     /// Choose the format of the file of recorded variables.
     #[arg(long, value_parser = choice::<Format>(&[]), value_name = "FORMAT", default_value = "csv", conflicts_with = "no_csv")]
     format: Format,
-    /// Draw no plot.svg.
-    #[arg(long)]
-    no_plot: bool,
+    #[command(flatten)]
+    pictures: Pictures,
     /// Write the header of results.csv as name [unit], and items of enumerations by their names.
     /// Without this option the header holds the names alone and every cell is a number, as FMPy and
     /// NumPy expect; results.json holds the units and items.
@@ -173,13 +188,14 @@ fn record(system: &mut System, options: &Options) -> Result<RunReport, Failure> 
     options.files.check()?;
     let mut meters = Meters::new(system)?.ending_when_lost();
     let panels = Panel::resolve_all(system)?;
+    let mut watch = options.files.pictures.page.then(|| Watch::new(system)).transpose()?;
     for doubt in doubts(system, &options.interrupt)? {
         tracing::warn!("{doubt}");
     }
     let (clock, title) = (system.clock, system.experiment.title.clone());
     let source = &system.experiment.source.path;
-    let stem = source.file_stem().map_or("run".into(), |stem| stem.to_string_lossy());
-    let out = options.out.clone().unwrap_or_else(|| Path::new("out").join(stem.as_ref()));
+    let stem = source.file_stem().map_or("run".into(), |stem| stem.to_string_lossy().into_owned());
+    let out = options.out.clone().unwrap_or_else(|| Path::new("out").join(&stem));
 
     Folder::check(&out, options.force)?;
 
@@ -224,6 +240,7 @@ fn record(system: &mut System, options: &Options) -> Result<RunReport, Failure> 
 
     let begin = Instant::now();
     let mut observers: Vec<&mut dyn Observer> = vec![&mut curves, &mut progress];
+    observers.extend(watch.as_mut().map(|watch| watch as &mut dyn Observer));
     observers.extend(recorder.as_mut().map(|recorder| recorder as &mut dyn Observer));
     observers.extend(live.as_mut().map(|live| live as &mut dyn Observer));
     // The meters come last, because they may end the run.
@@ -261,8 +278,16 @@ fn record(system: &mut System, options: &Options) -> Result<RunReport, Failure> 
         metrics.real_time = Some(real_time);
     }
     files::write_json(&out.join("metrics.json"), &metrics)?;
-    if !options.files.no_plot && curves.draw(&out.join("plot.svg"), &title)? {
+    if !options.files.pictures.no_plot && curves.draw(&out.join("plot.svg"), &title)? {
         files.push("plot.svg");
+    }
+    if let Some(watch) = watch {
+        let mut run = watch.recording(&stem, &metadata);
+        run.summary = summary::lines(&system.experiment.observe, &metrics);
+        let runs = [run];
+        let drawn = panels::of_experiments(&runs).map_err(Error::experiment)?;
+        run_page::write(&runs, &drawn, &out.join("page.html"))?;
+        files.push("page.html");
     }
     let ended = early(outcome, &out)?;
     let end = master.end().map(String::from);

@@ -48,14 +48,11 @@ pub(crate) fn summary(system: &System, report: &RunReport, out: &mut impl Write)
         names.join(", ")
     )?;
     let mut line = |label: &str, text: String| writeln!(out, "  {label:<17} {text}");
-    for (label, text) in metric_lines(&experiment.observe, metrics) {
+    for (label, text) in lines(&experiment.observe, metrics) {
         line(&label, text)?;
     }
     if experiment.observe.metrics.is_empty() {
         line("metrics", "none: the experiment defines none ([observe.metrics])".into())?;
-    }
-    if let Some(guarantee) = guarantee(metrics) {
-        line("guarantee", guarantee)?;
     }
     if loops.is_empty() {
         line("loop delay", "no feedback loop".into())?;
@@ -104,6 +101,12 @@ pub(crate) fn summary(system: &System, report: &RunReport, out: &mut impl Write)
     }
     let mut line = |label: &str, text: String| writeln!(out, "  {label:<17} {text}");
     line("results", format!("{}: {}", report.out.display(), report.files.join(", ")))
+}
+
+/// Returns the headings and texts of the lines for the metrics of a run and for its guarantee.
+pub(crate) fn lines(observe: &Observe, metrics: &Metrics) -> Vec<(String, String)> {
+    let guarantee = guarantee(metrics).map(|text| ("guarantee".to_string(), text));
+    metric_lines(observe, metrics).into_iter().chain(guarantee).collect()
 }
 
 /// Prints the outcome of a reproduction.

@@ -97,6 +97,7 @@ pub(crate) fn observe(campaign: &Campaign, experiment: &Observe) -> Result<Obser
     let (of_margins, of_guarantee): (Vec<&String>, Vec<&String>) =
         others.partition(|name| Margins::is_metric(name));
     Ok(Observe {
+        vehicle: None,
         signals,
         metrics,
         units: experiment.units.clone(),

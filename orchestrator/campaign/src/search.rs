@@ -1,6 +1,8 @@
 //! Looks for the worst case: an evolution strategy (CMA-ES) with restarts moves through the
 //! space of the varied parameters towards larger values of a measure.
 
+mod page;
+
 use crate::definition::Search;
 use crate::flight::{CaseStatus, Flight, Row, table};
 use crate::plan::Plan;
@@ -8,7 +10,6 @@ use cmaes::{CMAESOptions, DVector};
 use cosim::error::Error as Single;
 use cosim::files;
 use cosim::interrupt::Interrupt;
-use cosim_report::figure::{Color, Curve, Figure, Legend, Panel, Shape, svg};
 use cosim_report::folder::Folder;
 use cosim_report::progress::Parts;
 use parking_lot::Mutex;
@@ -190,8 +191,7 @@ pub fn search(plan: &Plan, options: &Options) -> Result<SearchOutcome, Error> {
     let mut writer = Writer::create(&out.join("search.parquet"), &[("units", plan.units())])?;
     writer.add(table(plan, &rows))?;
     writer.finish()?;
-    let path = out.join("history.svg");
-    svg::write(&history(&outcome, &tried), &path)?;
+    page::write(plan, &outcome, &tried, &worst.row)?;
     files::write_json(&out.join("search.json"), &outcome)?;
     Ok(outcome)
 }
@@ -311,40 +311,4 @@ fn look(
         }
     }
     Ok((0, ""))
-}
-
-/// Draws the values that were tried, and the largest one so far.
-fn history(outcome: &SearchOutcome, tried: &[Tried]) -> Figure {
-    let number = (1..=tried.len()).map(|i| i as f64);
-    let mut largest = f64::NEG_INFINITY;
-    let so_far = tried.iter().map(|case| {
-        largest = largest.max(case.value);
-        largest
-    });
-    let curve = |name: &str, color, shape, y: Vec<f64>| Curve {
-        name: name.into(),
-        color,
-        shape,
-        x: number.clone().collect(),
-        y,
-    };
-    let unit = if outcome.unit.is_empty() { String::new() } else { format!(", {}", outcome.unit) };
-    let values = tried.iter().map(|case| case.value).collect();
-    let curves = vec![
-        curve("case", Color(31, 119, 180), Shape::Dots, values),
-        curve("largest so far", Color(214, 39, 40), Shape::Line, so_far.collect()),
-    ];
-    Figure {
-        title: format!("{}: search for the worst case", outcome.title),
-        columns: 1,
-        legend: Legend::Above,
-        panels: vec![Panel {
-            title: String::new(),
-            x_label: "number of cases".into(),
-            y_label: format!("{}{unit}", outcome.measure),
-            log_x: false,
-            x_range: None,
-            curves,
-        }],
-    }
 }

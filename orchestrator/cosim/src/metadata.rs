@@ -50,10 +50,12 @@ pub fn metadata(
                 ),
                 _ => None,
             };
+            let component = &system.components[column.port.component];
             json!({
                 "name": column.name,
                 "type": variable.kind.name(),
                 "unit": unit,
+                "display_unit": display_unit(component, column.port.variable),
                 "items": items,
                 "description": variable.description,
             })
@@ -112,6 +114,13 @@ fn component(component: &CheckedComponent, parameters: &Parameters) -> Value {
     let CheckedComponent { name, fmu, every, settings, .. } = component;
     let set: BTreeMap<&str, Value> =
         settings.iter().map(|s| (s.name.as_str(), s.value.to_json())).collect();
+    let variables = fmu.description.variables.iter().enumerate();
+    let units: BTreeMap<&str, Value> = variables
+        .filter(|(_, variable)| variable.causality == "parameter")
+        .filter_map(|(place, variable)| {
+            Some((variable.name.as_str(), display_unit(component, place)?))
+        })
+        .collect();
     json!({
         "fmu": fmu.path.file_name().map(|name| name.to_string_lossy()),
         "sha256": std::fs::read(&fmu.path).ok().map(digest),
@@ -122,5 +131,13 @@ fn component(component: &CheckedComponent, parameters: &Parameters) -> Value {
         "every": every,
         "set": set,
         "parameters": parameters.get(name),
+        "display_units": units,
     })
+}
+
+/// Returns the unit in which a variable is displayed, and the number of these units in one unit of
+/// its values; `None` if it has no unit.
+fn display_unit(component: &CheckedComponent, variable: usize) -> Option<Value> {
+    let (factor, name) = component.display(variable);
+    (!name.is_empty()).then(|| json!({ "name": name, "factor": factor }))
 }

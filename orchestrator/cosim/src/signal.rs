@@ -18,10 +18,12 @@ use std::iter;
 #[serde(try_from = "String", into = "String")]
 #[schemars(with = "String")]
 pub struct Signal {
-    pub(crate) terms: Vec<Term<String>>,
-    pub(crate) norm: bool,
+    /// Terms of the signal: a single one, or those whose norm is taken.
+    pub terms: Vec<Term<String>>,
+    /// Whether the norm is taken.
+    pub norm: bool,
     /// Variable that the whole signal is divided by.
-    pub(crate) over: Option<String>,
+    pub over: Option<String>,
 }
 
 /// A variable, and the variable that is subtracted from it, if any.

@@ -57,6 +57,26 @@ pub struct CheckedComponent {
     pub(crate) settings: Vec<Setting>,
 }
 
+impl CheckedComponent {
+    /// Returns the unit in which a variable is to be displayed, with the factor to that unit. Units
+    /// with an offset stay as they are.
+    pub(crate) fn display(&self, variable: usize) -> (f64, String) {
+        let description = &self.fmu.description;
+        let VariableKind::Real { unit: Some(unit), display_unit, .. } =
+            &description.variables[variable].kind
+        else {
+            return (1.0, String::new());
+        };
+        let defined = description.units.iter().find(|defined| defined.name == *unit);
+        let shown = defined.and_then(|defined| {
+            let display = display_unit.as_deref()?;
+            let (_, factor, _) = defined.displays.iter().find(|d| d.0 == display && d.2 == 0.0)?;
+            Some((*factor, display.to_string()))
+        });
+        shown.unwrap_or((1.0, unit.clone()))
+    }
+}
+
 /// A variable that is seen at every communication point.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Probed {
@@ -247,23 +267,8 @@ impl System {
         }
     }
 
-    /// Returns the unit in which a variable is to be displayed, with the factor to that unit. Units
-    /// with an offset stay as they are.
     fn display(&self, port: Port) -> (f64, String) {
-        let VariableKind::Real { unit: Some(unit), display_unit, .. } = self.kind(port) else {
-            return (1.0, String::new());
-        };
-        let units = &self.components[port.component].fmu.description.units;
-        units
-            .iter()
-            .find(|defined| defined.name == *unit)
-            .and_then(|defined| {
-                let display = display_unit.as_deref()?;
-                let (_, factor, _) =
-                    defined.displays.iter().find(|d| d.0 == display && d.2 == 0.0)?;
-                Some((*factor, display.to_string()))
-            })
-            .unwrap_or((1.0, unit.clone()))
+        self.components[port.component].display(port.variable)
     }
 
     /// Runs the experiment from its start to its stop time.

@@ -11,3 +11,5 @@ pub mod page;
 pub mod panels;
 pub mod plot;
 pub mod progress;
+pub mod recording;
+pub mod run_page;

@@ -10,6 +10,7 @@ mod isolation;
 mod kills;
 mod malformed;
 mod names;
+mod plot;
 mod results;
 mod search;
 mod table;

@@ -31,3 +31,26 @@ fn a_search_finds_the_corner_and_writes_it_as_an_experiment() {
     let (code, _, errors) = without.call(&["falsify", "c.toml"]);
     assert!(code == 2 && errors.contains("[search] is missing"), "{errors}");
 }
+
+#[test]
+fn the_page_of_a_search_shows_the_worst_case_against_its_limit() {
+    let text = format!("{RANDOM}[search]\nlargest = \"last\"\ncases = 60\n");
+    let bench = bench(&text);
+    let (code, said, errors) = bench.call(&["falsify", "c.toml", "--out", "w"]);
+    assert_eq!(code, 0, "{errors}");
+    assert!(said.contains("w/report.html"), "{said}");
+    let page = fs::read_to_string(bench.path("w/report.html")).unwrap();
+    let outcome = bench.json("w/search.json");
+    assert!(outcome["broken"][0] == "small" && page.contains("verdict not"), "{page}");
+    assert!(page.contains("orchestrator run w/worst.toml --page"), "{page}");
+    assert!(page.contains("<code>gain.gain</code>") && page.contains("largest so far"));
+    // Curves of the measure that was looked for and of the one with a limit, and the history.
+    assert_eq!(page.matches("<svg").count(), 2);
+    assert!(page.contains("plant.output.integral"), "{page}");
+    // The page has no network and no script.
+    assert!(!page.contains("<script") && !page.contains("src="), "{page}");
+    // The same search gives the same page.
+    let (code, _, errors) = bench.call(&["falsify", "c.toml", "--out", "w", "--force"]);
+    assert_eq!(code, 0, "{errors}");
+    assert!(fs::read_to_string(bench.path("w/report.html")).unwrap() == page);
+}

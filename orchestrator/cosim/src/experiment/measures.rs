@@ -1,5 +1,6 @@
 //! The signals of a run that an experiment measures, watches and draws.
 
+use super::Vehicle;
 use crate::signal::Signal;
 use fmu_import::names;
 use schemars::JsonSchema;
@@ -36,6 +37,9 @@ pub struct Observe {
     /// Panels of the figure of a run and of the live view.
     #[serde(default)]
     pub panels: Vec<Panel>,
+    /// Variables by which the page of a run shows the vehicle.
+    #[serde(default)]
+    pub vehicle: Option<Vehicle>,
     /// Further lines of the live view: lists of variables, by the heading of the line.
     #[serde(default)]
     pub readings: BTreeMap<String, Vec<String>>,

@@ -7,11 +7,13 @@
 mod measures;
 mod overrides;
 mod protection;
+mod vehicle;
 
 pub use crate::watch::OnInvalid;
 pub use measures::{Curve, Guarantee, Loss, Margins, Measure, MeasureKind, Observe, Panel, Scaled};
 pub use overrides::{Given, Overrides};
 pub use protection::Protection;
+pub use vehicle::Vehicle;
 
 use crate::document::Source;
 use crate::error::Error;

@@ -1,0 +1,92 @@
+//! Collects a recording while the run goes on, of variables that may not be written to its files.
+
+use super::{Recording, Track};
+use cosim::error::Error;
+use cosim::experiment::{Observe, Vehicle};
+use cosim::master::{Observer, Sample};
+use cosim::signal::Signal;
+use cosim::system::System;
+use serde_json::Value;
+use std::collections::BTreeMap;
+use std::iter;
+
+/// Largest number of rows that are kept.
+const ROWS: u64 = 100_000;
+/// Place that names the variables of a guarantee, which an FMU may lack.
+const GUARANTEE: &str = "[observe.guarantee]";
+
+/// An observer that keeps the variables that the pictures of a run show.
+pub struct Watch {
+    columns: Vec<(String, usize, Track)>,
+    time: Vec<f64>,
+    stride: u64,
+}
+
+impl Watch {
+    /// Requests the variables that are recorded, and those that the experiment draws. Variables
+    /// that are missing because the command line replaced their FMU are left out.
+    ///
+    /// # Errors
+    /// Returns an error if the experiment names a variable that does not exist.
+    pub fn new(system: &mut System) -> Result<Self, Error> {
+        let mut columns = Vec::new();
+        let named = names(&system.experiment.observe);
+        for (name, place) in named {
+            let is_optional = place == GUARANTEE || system.lost_by_exchange([name.as_str()]);
+            if !system.has(&name) && is_optional {
+                continue;
+            }
+            let fault = |problem| Error::experiment(format!("{place}: {problem}"));
+            let probed = system.probe(&name).map_err(fault)?;
+            let signal = Signal::try_from(name.clone()).map_err(fault)?;
+            let shown = system.resolve(&signal).map_err(fault)?;
+            let track = Track {
+                unit: shown.unit,
+                factor: shown.factor,
+                items: probed.items,
+                values: Vec::new(),
+            };
+            columns.push((name, probed.place, track));
+        }
+        Ok(Self { columns, time: Vec::new(), stride: system.clock.ticks().div_ceil(ROWS).max(1) })
+    }
+
+    /// Returns the recording of the run whose `results.json` has this content.
+    pub fn recording(self, name: &str, metadata: &Value) -> Recording {
+        let tracks = self.columns.into_iter().map(|(name, _, track)| (name, track)).collect();
+        Recording::new(name, metadata, self.time, tracks)
+    }
+}
+
+/// Returns the names of the variables that an experiment draws, each with the place that names it.
+fn names(observe: &Observe) -> BTreeMap<String, &'static str> {
+    let mut names = BTreeMap::new();
+    for panel in &observe.panels {
+        let curves = panel.curves.iter();
+        let signals = curves.flat_map(|curve| iter::once(&curve.of).chain(&curve.reference));
+        for path in signals.chain(&panel.limit).flat_map(Signal::paths) {
+            names.insert(path.to_string(), "[[observe.panels]]");
+        }
+    }
+    for (_, path) in observe.vehicle.iter().flat_map(Vehicle::paths) {
+        names.insert(path.to_string(), "[observe.vehicle]");
+    }
+    if let Some(guarantee) = &observe.guarantee {
+        for path in iter::once(&guarantee.in_force).chain(&guarantee.status) {
+            names.insert(path.clone(), GUARANTEE);
+        }
+    }
+    names
+}
+
+impl Observer for Watch {
+    fn observe(&mut self, sample: &Sample) -> Result<(), Error> {
+        if sample.tick.is_multiple_of(self.stride) || sample.last {
+            self.time.push(sample.time);
+            for (_, place, track) in &mut self.columns {
+                track.values.push(sample.values[*place]);
+            }
+        }
+        Ok(())
+    }
+}

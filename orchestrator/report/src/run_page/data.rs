@@ -1,0 +1,167 @@
+//! The numbers of a page as JSON: curves, and the vehicle over time.
+
+use super::thin;
+use crate::recording::panels::{Panel, Role, symbols};
+use crate::recording::{Recording, Track};
+use cosim::experiment::Vehicle;
+use serde_json::{Map, Value, json};
+
+/// Number of significant digits of a value, which is more than a screen can resolve.
+const DIGITS: usize = 5;
+/// Number of significant digits of a time.
+const TIME_DIGITS: usize = 7;
+
+/// Returns what the scripts of a page draw.
+pub fn page(runs: &[Recording], panels: &[Panel], vehicles: &[usize]) -> Value {
+    let run = |(place, run): (usize, &Recording)| {
+        let is_shown = vehicles.contains(&place);
+        json!({
+            "name": run.name,
+            "time": numbers(thin::times(&run.time), TIME_DIGITS),
+            "vehicle": is_shown.then(|| vehicle(run)).flatten(),
+        })
+    };
+    let panel = |panel: &Panel| {
+        let curves = panel.curves.iter().map(|curve| {
+            let role = match curve.role {
+                Role::Signal => "signal",
+                Role::Reference => "reference",
+                Role::Norm => "norm",
+            };
+            json!({
+                "name": curve.name, "run": curve.run, "place": curve.place, "role": role,
+                "values": numbers(thin::values(&curve.values), DIGITS),
+            })
+        });
+        json!({
+            "label": symbols(&panel.label), "unit": panel.unit,
+            "limit": panel.limit.map(|limit| rounded(limit, DIGITS)),
+            "curves": curves.collect::<Vec<_>>(),
+        })
+    };
+    json!({
+        "runs": runs.iter().enumerate().map(run).collect::<Vec<_>>(),
+        "panels": panels.iter().map(panel).collect::<Vec<_>>(),
+    })
+}
+
+/// Returns whether the attitude of a vehicle is recorded.
+pub fn has_vehicle(run: &Recording) -> bool {
+    let named = run.observe.vehicle.as_ref();
+    named.is_some_and(|vehicle| vehicle.attitude.iter().all(|path| run.tracks.contains_key(path)))
+        && !run.time.is_empty()
+}
+
+/// Returns the vehicle at some instants of the run, in SI units and radians.
+fn vehicle(run: &Recording) -> Option<Value> {
+    let named: &Vehicle = run.observe.vehicle.as_ref()?;
+    let frames = thin::frames(run.time.len());
+    let at_frames = |track: &Track, factor: f64| {
+        numbers(frames.iter().map(|row| factor * track.values[*row]), DIGITS)
+    };
+    // All of them or none: half a vector has no norm.
+    let list = |paths: &[String]| {
+        let tracks = paths.iter().map(|path| run.tracks.get(path));
+        let tracks = tracks.collect::<Option<Vec<_>>>().filter(|tracks| !tracks.is_empty())?;
+        Some(tracks.into_iter().map(|track| at_frames(track, 1.0)).collect::<Vec<_>>())
+    };
+    let three = |paths: &Option<[String; 3]>| list(paths.as_ref()?);
+    let limit = |path: &Option<String>| {
+        let track = run.tracks.get(path.as_ref()?)?;
+        track.values.last().copied().filter(|limit| limit.is_finite() && *limit > 0.0)
+    };
+    let deflection = |path: &String| {
+        let track = run.tracks.get(path)?;
+        let name = names_last(path);
+        Some(json!({ "name": name, "unit": track.unit, "values": at_frames(track, track.factor) }))
+    };
+    let mut value = Map::new();
+    let mut put = |key: &str, content: Value| {
+        if !content.is_null() {
+            value.insert(key.into(), content);
+        }
+    };
+    put("time", json!(numbers(frames.iter().map(|row| run.time[*row]), TIME_DIGITS)));
+    put("angles", json!(list(&named.attitude)));
+    put("reference", json!(three(&named.reference)));
+    put("rates", json!(three(&named.rate)));
+    put("rateLimit", json!(limit(&named.rate_limit)));
+    put("moment", json!(three(&named.moment)));
+    put("momentLimit", json!(limit(&named.moment_limit)));
+    put("flaps", json!(named.flaps.as_ref().and_then(|flaps| list(flaps))));
+    put("jets", json!(list(&named.jets)));
+    put("surfaces", json!(named.deflections.iter().filter_map(deflection).collect::<Vec<_>>()));
+    put("guarantee", guarantee(run, &frames));
+    Some(Value::Object(value))
+}
+
+/// Returns whether the guarantee is in force, and why, at some rows; null if that is not recorded.
+fn guarantee(run: &Recording, frames: &[usize]) -> Value {
+    let Some(named) = &run.observe.guarantee else { return Value::Null };
+    let Some(in_force) = run.tracks.get(&named.in_force) else { return Value::Null };
+    let values = |track: &Track| -> Vec<i64> {
+        frames.iter().map(|row| track.values[*row] as i64).collect()
+    };
+    let status = named.status.as_ref().and_then(|status| run.tracks.get(status));
+    let items: Map<String, Value> = status
+        .iter()
+        .flat_map(|track| &track.items)
+        .map(|(name, value)| (value.to_string(), json!(words(name))))
+        .collect();
+    json!({ "inForce": values(in_force), "status": status.map(values), "items": items })
+}
+
+/// Writes the name of an item as words: "inForce" as "in force".
+fn words(item: &str) -> String {
+    let mut text = String::new();
+    for letter in item.chars() {
+        if letter.is_uppercase() {
+            text.push(' ');
+        }
+        text.extend(letter.to_lowercase());
+    }
+    text
+}
+
+/// Returns the last part of a variable's name.
+fn names_last(path: &str) -> &str {
+    path.rsplit('.').next().unwrap_or(path)
+}
+
+/// Rounds numbers; those that are not finite become null.
+fn numbers(values: impl IntoIterator<Item = f64>, digits: usize) -> Vec<Value> {
+    values.into_iter().map(|value| rounded(value, digits)).collect()
+}
+
+fn rounded(value: f64, digits: usize) -> Value {
+    if !value.is_finite() {
+        return Value::Null;
+    }
+    let rounded: f64 = format!("{value:.*e}", digits - 1).parse().unwrap_or(value);
+    // A whole number is shorter without its point.
+    if rounded.fract() == 0.0 && rounded.abs() < 1e9 {
+        json!(rounded as i64)
+    } else {
+        json!(rounded)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_as_short_as_a_screen_needs() {
+        let text = |value: f64| rounded(value, DIGITS).to_string();
+        assert_eq!(text(1.0 / 3.0), "0.33333");
+        assert_eq!(text(135_600.4), "135600");
+        assert_eq!(text(-0.0), "0");
+        assert_eq!(text(f64::NAN), "null");
+    }
+
+    #[test]
+    fn an_item_is_written_as_words() {
+        assert_eq!(words("inForce"), "in force");
+        assert_eq!(words("pending"), "pending");
+    }
+}

@@ -1,0 +1,85 @@
+//! The panels of several recordings as a figure for SVG and PNG.
+
+use super::thin;
+use crate::figure::{self, Color, Figure, Legend, Shape};
+use crate::plot::COLORS;
+use crate::recording::Recording;
+use crate::recording::panels::{Curve, Panel, Role, symbols};
+
+/// Largest number of letters of a run's name that a legend has room for.
+const NAME: usize = 8;
+
+/// Returns the figure of these panels.
+pub fn figure(runs: &[Recording], panels: &[Panel]) -> Figure {
+    let names = names(runs);
+    let named = runs.iter().zip(&names);
+    let numbered =
+        named.map(
+            |(run, name)| {
+                if run.name == *name { name.clone() } else { format!("{name} {}", run.name) }
+            },
+        );
+    let title = match runs {
+        [run] => run.title.clone(),
+        _ => numbered.collect::<Vec<_>>().join(", "),
+    };
+    let panels = panels.iter().map(|panel| drawn(runs, &names, panel)).collect();
+    Figure { title, columns: 1, legend: Legend::Beside, panels }
+}
+
+/// Returns the names of the runs in legends: numbers if the names are too long for them.
+fn names(runs: &[Recording]) -> Vec<String> {
+    let fits = runs.iter().all(|run| run.name.chars().count() <= NAME);
+    let name = |(place, run): (usize, &Recording)| {
+        if fits { run.name.clone() } else { format!("({})", place + 1) }
+    };
+    runs.iter().enumerate().map(name).collect()
+}
+
+fn drawn(runs: &[Recording], names: &[String], panel: &Panel) -> figure::Panel {
+    let mut curves: Vec<figure::Curve> =
+        panel.curves.iter().map(|curve| one(runs, names, panel, curve)).collect();
+    // What is drawn first lies lowest.
+    curves.sort_by_key(|curve| curve.shape != Shape::Pale);
+    curves.extend(panel.limit.map(|limit| figure::Curve {
+        name: "limit of norm".into(),
+        color: Color::LIMIT,
+        shape: Shape::Horizontal,
+        x: vec![f64::NAN],
+        y: vec![limit],
+    }));
+    let parts = [symbols(&panel.label), panel.unit.clone()];
+    let parts: Vec<String> = parts.into_iter().filter(|part| !part.is_empty()).collect();
+    figure::Panel {
+        title: String::new(),
+        x_label: "time, s".into(),
+        y_label: parts.join(", "),
+        log_x: false,
+        x_range: None,
+        curves,
+    }
+}
+
+fn one(runs: &[Recording], names: &[String], panel: &Panel, curve: &Curve) -> figure::Curve {
+    let run = &runs[curve.run];
+    let name = match (runs.len(), curve.role) {
+        (_, Role::Reference) => "reference".to_string(),
+        (1, _) => curve.name.clone(),
+        _ => format!("{}, {}", curve.name, names[curve.run]),
+    };
+    // In a panel with one signal, the colour tells the runs apart.
+    let alone = panel.curves.iter().all(|other| other.place == curve.place);
+    let place = if alone { curve.run } else { curve.place };
+    let shape = match curve.role {
+        Role::Reference => Shape::Pale,
+        Role::Norm if runs.len() == 1 => Shape::Pale,
+        _ if curve.run % 2 == 1 => Shape::Dashed,
+        _ => Shape::Line,
+    };
+    let color = match curve.role {
+        Role::Reference => Color(0, 0, 0),
+        Role::Norm if runs.len() == 1 => Color::GREY,
+        _ => COLORS[place % COLORS.len()],
+    };
+    figure::Curve { name, color, shape, x: thin::times(&run.time), y: thin::values(&curve.values) }
+}

@@ -1,0 +1,193 @@
+//! The page of a run, or of several: curves with a common cursor, the vehicle in motion, the
+//! summary and the parameters. One file without a network.
+
+pub mod data;
+pub mod figure;
+pub mod thin;
+
+use crate::recording::panels::Panel;
+use crate::recording::{Parameter, Recording};
+use cosim::error::Error;
+use cosim::files;
+use maud::{DOCTYPE, Markup, PreEscaped, html};
+use std::collections::BTreeMap;
+use std::path::Path;
+
+const STYLE: &str = include_str!("page.css");
+const VEHICLE: &str = include_str!("../vehicle3d.js");
+const CHARTS: &str = include_str!("charts.js");
+const INSTRUMENTS: &str = include_str!("instruments.js");
+const PLAYER: &str = include_str!("player.js");
+
+/// Largest number of runs whose vehicles are shown.
+const VEHICLES: usize = 2;
+
+/// Writes the page of these runs with these panels.
+///
+/// # Errors
+/// Returns an error if the file cannot be written.
+pub fn write(runs: &[Recording], panels: &[Panel], path: &Path) -> Result<(), Error> {
+    files::write(path, page(runs, panels))
+}
+
+fn page(runs: &[Recording], panels: &[Panel]) -> String {
+    let title = runs.first().map_or("", |run| run.title.as_str());
+    let heading = match runs.len() {
+        0 | 1 => title.to_string(),
+        _ => runs.iter().map(|run| run.name.as_str()).collect::<Vec<_>>().join(" · "),
+    };
+    let vehicles: Vec<usize> =
+        (0..runs.len()).filter(|run| data::has_vehicle(&runs[*run])).collect();
+    let vehicles = if vehicles.len() > VEHICLES { &[] } else { &vehicles[..] };
+    // A script element ends at its closing tag, wherever that stands.
+    let json = data::page(runs, panels, vehicles).to_string().replace("</", "<\\/");
+    let layout = match vehicles.len() {
+        0 => "plain",
+        1 => "single",
+        _ => "pair",
+    };
+    let markup = html! {
+        (DOCTYPE)
+        html lang="en" {
+            head {
+                meta charset="utf-8";
+                meta name="viewport" content="width=device-width, initial-scale=1";
+                title { (heading) }
+                style { (PreEscaped(STYLE)) }
+            }
+            body {
+                header {
+                    h1 { (heading) }
+                    @if runs.len() > 1 { ul { @for run in runs { li { b { (run.name) } ": " (run.title) } } } }
+                    @for run in runs { (verdict(run, runs.len() > 1)) }
+                }
+                (player())
+                main class=(layout) {
+                    @if !vehicles.is_empty() {
+                        section id="vehicles" aria-label="Vehicle" {
+                            @for run in vehicles { (vehicle(*run, &runs[*run], runs.len() > 1)) }
+                            p.note { "Drag to turn the view, double click to turn it back." }
+                        }
+                    }
+                    section id="curves" aria-label="Curves" {}
+                    section id="summary" { h2 { "Summary" } (summary(runs)) }
+                    section id="parameters" { h2 { "Parameters" } (parameters(runs)) }
+                    section id="origin" { h2 { "Origin" } (origin(runs)) }
+                }
+                script type="application/json" id="run-data" { (PreEscaped(json)) }
+                @for script in [VEHICLE, CHARTS, INSTRUMENTS, PLAYER] { script { (PreEscaped(script)) } }
+            }
+        }
+    };
+    markup.into_string()
+}
+
+/// Returns the outcome of a run in one line.
+fn verdict(run: &Recording, named: bool) -> Markup {
+    let exceeded: Vec<&str> = run
+        .summary
+        .iter()
+        .filter(|(_, text)| text.contains("EXCEEDS") || text.contains("DEFECT"))
+        .map(|(heading, _)| heading.as_str())
+        .collect();
+    let limited = run.summary.iter().any(|(_, text)| text.contains("limit"));
+    html! {
+        p.verdict {
+            @if named { (run.name) ": " }
+            @if !exceeded.is_empty() {
+                span.light.bad {} "Beyond a limit: " (exceeded.join(", ")) "."
+            } @else if limited {
+                span.light.good {} "Every limit is kept."
+            }
+            @if run.status != "completed" && !run.status.is_empty() { " " (run.status) "." }
+        }
+    }
+}
+
+fn player() -> Markup {
+    html! {
+        div id="player" {
+            button id="play" type="button" aria-label="Play" title="Space" { "▶" }
+            input id="seek" type="range" min="0" max="1000" step="1" value="0" aria-label="Time";
+            output id="time" for="seek" {}
+            label { span { "speed " } select id="speed" aria-label="Speed" {} }
+        }
+    }
+}
+
+fn vehicle(place: usize, run: &Recording, named: bool) -> Markup {
+    html! {
+        div.vehicle data-run=(place) {
+            @if named { h2 { (run.name) } }
+            canvas.view aria-label=(format!("Attitude of the vehicle, {}", run.name)) role="img" {}
+            div.surfaces {}
+            div.jets {}
+        }
+    }
+}
+
+/// Returns the headings of all summaries with the texts of each run.
+fn summary(runs: &[Recording]) -> Markup {
+    let mut lines: Vec<(&str, Vec<&str>)> = Vec::new();
+    for (place, run) in runs.iter().enumerate() {
+        for (heading, text) in &run.summary {
+            let there = lines.iter().position(|(other, _)| other == heading);
+            let position = there.unwrap_or(lines.len());
+            if position == lines.len() {
+                lines.push((heading, vec![""; runs.len()]));
+            }
+            lines[position].1[place] = text;
+        }
+    }
+    html! {
+        @if lines.is_empty() { p.note { "The experiment defines no metrics." } }
+        div.scroll { table {
+            @if runs.len() > 1 { thead { tr { th {} @for run in runs { th { (run.name) } } } } }
+            tbody { @for (heading, texts) in &lines { tr {
+                th scope="row" { (heading) }
+                @for text in texts { td class=[text.contains("EXCEEDS").then_some("bad")] { (text.replace(" %", "\u{a0}%")) } }
+            } } }
+        } }
+    }
+}
+
+fn parameters(runs: &[Recording]) -> Markup {
+    let mut rows: BTreeMap<&str, Vec<Option<&Parameter>>> = BTreeMap::new();
+    for (place, run) in runs.iter().enumerate() {
+        for parameter in &run.parameters {
+            rows.entry(&parameter.name).or_insert_with(|| vec![None; runs.len()])[place] =
+                Some(parameter);
+        }
+    }
+    let differs = |values: &[Option<&Parameter>]| {
+        values.iter().any(|value| value.map(|v| &v.text) != values[0].map(|v| &v.text))
+    };
+    let is_set = |values: &[Option<&Parameter>]| values.iter().flatten().any(|value| value.is_set);
+    html! {
+        div.search {
+            input id="search" type="search" placeholder="Search name or value" aria-label="Search parameters";
+            label { input id="set-only" type="checkbox" checked; " set by the experiment" }
+            @if runs.len() > 1 { label { input id="different-only" type="checkbox"; " that differ" } }
+            output id="found" for="search" {}
+        }
+        div.scroll { table id="parameter-table" {
+            @if runs.len() > 1 { thead { tr { th {} @for run in runs { th { (run.name) } } } } }
+            tbody { @for (name, values) in &rows {
+                tr data-set[is_set(values)] data-differs[differs(values)] {
+                    th scope="row" { code { (name) } }
+                    @for value in values { td { (value.map_or("", |value| value.text.as_str())) } }
+                }
+            } }
+        } }
+    }
+}
+
+fn origin(runs: &[Recording]) -> Markup {
+    html! { details {
+        summary { "Where these values come from" }
+        @for run in runs {
+            @if runs.len() > 1 { h3 { (run.name) } }
+            dl { @for (heading, text) in &run.origin { dt { (heading) } dd { (text) } } }
+        }
+    } }
+}

@@ -1,0 +1,84 @@
+//! Thins curves to what the pixels of a picture can show.
+
+use std::ops::Range;
+
+/// Number of pixel columns for which a curve keeps its smallest and its largest value.
+const COLUMNS: usize = 1000;
+/// Largest number of instants at which a vehicle is shown.
+const FRAMES: usize = 1500;
+
+/// Returns the rows of each pixel column; `None` if all rows can be kept.
+fn columns(rows: usize) -> Option<impl Iterator<Item = Range<usize>>> {
+    let edge = move |column: usize| column * rows / COLUMNS;
+    (rows > 2 * COLUMNS).then(|| (0..COLUMNS).map(move |column| edge(column)..edge(column + 1)))
+}
+
+/// Returns the times of the values that [`values`] keeps.
+pub fn times(time: &[f64]) -> Vec<f64> {
+    let Some(columns) = columns(time.len()) else { return time.to_vec() };
+    columns.flat_map(|rows| [time[rows.start], time[rows.end - 1]]).collect()
+}
+
+/// Returns the smallest and the largest value of each pixel column, in the order in which they
+/// occur; all values if they are few.
+pub fn values(values: &[f64]) -> Vec<f64> {
+    let Some(columns) = columns(values.len()) else { return values.to_vec() };
+    let extremes = |rows: Range<usize>| {
+        let rank = |row: &usize| values[*row];
+        let finite = || rows.clone().filter(|row| values[*row].is_finite());
+        let by = |a: &usize, b: &usize| rank(a).total_cmp(&rank(b));
+        match (finite().min_by(by), finite().max_by(by)) {
+            (Some(low), Some(high)) => [values[low.min(high)], values[low.max(high)]],
+            _ => [f64::NAN; 2],
+        }
+    };
+    columns.flat_map(extremes).collect()
+}
+
+/// Returns the rows at which a vehicle is shown, evenly spaced, the last one among them.
+pub fn frames(rows: usize) -> Vec<usize> {
+    let stride = rows.div_ceil(FRAMES).max(1);
+    let mut frames: Vec<usize> = (0..rows).step_by(stride).collect();
+    if rows > 0 && frames.last() != Some(&(rows - 1)) {
+        frames.push(rows - 1);
+    }
+    frames
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_short_curve_keeps_every_value() {
+        let short: Vec<f64> = (0..2000).map(f64::from).collect();
+        assert_eq!(values(&short), short);
+        assert_eq!(times(&short), short);
+    }
+
+    #[test]
+    fn a_peak_of_one_row_is_kept_and_gaps_stay_gaps() {
+        let mut long = vec![0.0; 123_457];
+        long[77_777] = 9.0;
+        long[77_778] = -9.0;
+        long[..500].fill(f64::NAN);
+        let thinned = values(&long);
+        assert_eq!(thinned.len(), 2 * COLUMNS);
+        let peak = thinned.iter().position(|value| *value == 9.0).unwrap();
+        assert_eq!(thinned[peak + 1], -9.0, "in the order in which they occur");
+        assert!(thinned[0].is_nan() && !thinned[20].is_nan());
+        let time: Vec<f64> = (0..long.len()).map(|row| row as f64).collect();
+        let times = times(&time);
+        assert!(times.is_sorted() && times.len() == thinned.len());
+        assert!((times[peak] - 77_777.0).abs() < 124.0);
+        assert_eq!(times.last(), time.last());
+    }
+
+    #[test]
+    fn frames_end_with_the_last_row() {
+        assert_eq!(frames(0), [0_usize; 0]);
+        assert_eq!(frames(3), [0, 1, 2]);
+        let many = frames(100_001);
+        assert!(many.len() <= FRAMES + 1 && many.last() == Some(&100_000));
+    }
+}

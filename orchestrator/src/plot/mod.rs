@@ -1,0 +1,128 @@
+//! The command `plot`: draws recorded runs over one another.
+
+mod read;
+
+use crate::failure::Failure;
+use clap::Args;
+use cosim::error::Error;
+use cosim_report::figure::{png, svg};
+use cosim_report::recording::{Recording, panels};
+use cosim_report::run_page;
+use std::ffi::OsStr;
+use std::io::Write;
+use std::path::PathBuf;
+
+/// Options of `plot`.
+#[derive(Args)]
+pub(crate) struct Plot {
+    /// Run to draw: a folder of results (also by its name below out), or its results.csv or
+    /// results.parquet. Several runs are drawn over one another.
+    #[arg(required = true, value_name = "RUN")]
+    runs: Vec<PathBuf>,
+    /// Signals to draw: variables, patterns with an asterisk as `plant.rate.*`, or differences and
+    /// norms as in an experiment [default: those that the experiment draws].
+    #[arg(long, value_name = "SIGNAL", num_args = 1..)]
+    signals: Vec<String>,
+    /// Begin at this time, s.
+    #[arg(long, value_name = "SECONDS")]
+    from: Option<f64>,
+    /// End at this time, s.
+    #[arg(long, value_name = "SECONDS")]
+    to: Option<f64>,
+    /// File to write: a picture (.svg, .png), or a page with the vehicle in motion (.html).
+    #[arg(long, value_name = "FILE", default_value = "plot.svg")]
+    out: PathBuf,
+}
+
+/// Forms of the file that is written.
+#[derive(Clone, Copy)]
+enum Form {
+    Svg,
+    Png,
+    Page,
+}
+
+impl Plot {
+    fn form(&self) -> Result<Form, Error> {
+        let extension = self.out.extension().map(OsStr::to_ascii_lowercase);
+        match extension.as_ref().and_then(|extension| extension.to_str()) {
+            Some("svg") => Ok(Form::Svg),
+            Some("png") => Ok(Form::Png),
+            Some("html") => Ok(Form::Page),
+            _ => Err(Error::experiment(format!(
+                "--out {}: the name must end with .svg, .png or .html, which tells what is written",
+                self.out.display()
+            ))),
+        }
+    }
+
+    /// Reads the runs, cut to the times that are asked for.
+    fn recordings(&self) -> Result<Vec<Recording>, Error> {
+        if self.runs.len() > panels::CURVES {
+            return Err(Error::experiment(format!(
+                "{} runs: at most {} can be told apart in a picture",
+                self.runs.len(),
+                panels::CURVES
+            )));
+        }
+        if let (Some(from), Some(to)) = (self.from, self.to)
+            && from >= to
+        {
+            return Err(Error::experiment(format!("--from {from} must be below --to {to}")));
+        }
+        let mut runs = Vec::new();
+        for path in &self.runs {
+            let run = read::recording(path)?;
+            let span = match (run.time.first(), run.time.last()) {
+                (Some(first), Some(last)) => format!("it goes from {first} s to {last} s"),
+                _ => "it has no rows".into(),
+            };
+            let run = run.within(self.from, self.to);
+            if run.time.len() < 2 {
+                return Err(Error::experiment(format!(
+                    "{}: there is nothing to draw in this time; {span}",
+                    path.display()
+                )));
+            }
+            runs.push(run);
+        }
+        // Runs of the same name are told by their paths.
+        let names: Vec<String> = runs.iter().map(|run| run.name.clone()).collect();
+        for (place, run) in runs.iter_mut().enumerate() {
+            if names.iter().filter(|name| **name == names[place]).count() > 1 {
+                run.name = self.runs[place].display().to_string();
+            }
+        }
+        Ok(runs)
+    }
+}
+
+/// Draws runs into a file, and prints its name.
+///
+/// # Errors
+/// Returns an error if a run cannot be read, if a signal is recorded in none of them, or if the
+/// file cannot be written.
+pub(crate) fn plot(asked: &Plot, out: &mut impl Write) -> Result<(), Failure> {
+    let form = asked.form()?;
+    let runs = asked.recordings()?;
+    let panels = if asked.signals.is_empty() {
+        panels::of_experiments(&runs)
+    } else {
+        panels::of_signals(&runs, &asked.signals).map_err(|problem| format!("--signals: {problem}"))
+    };
+    let panels = panels.map_err(Error::experiment)?;
+    if panels.is_empty() {
+        return Err(Error::experiment("nothing that could be drawn is recorded").into());
+    }
+    let figure = || run_page::figure::figure(&runs, &panels);
+    match form {
+        Form::Svg => svg::write(&figure(), &asked.out)?,
+        Form::Png => {
+            let text = svg::text(&figure()).map_err(Error::file(&asked.out))?;
+            png::write(&text, &asked.out)?;
+        }
+        Form::Page => run_page::write(&runs, &panels, &asked.out)?,
+    }
+    writeln!(out, "{}", asked.out.display())?;
+    Ok(())
+}

@@ -1,0 +1,215 @@
+//! Reads recorded runs from their files.
+
+use crate::summary;
+use cosim::error::Error;
+use cosim::experiment::{MeasureKind, Observe};
+use cosim_report::metrics::Metrics;
+use cosim_report::recording::{Recording, Track, display_unit};
+use serde_json::{Map, Value};
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+use sweep::table;
+
+/// Files of recorded variables in a folder of results.
+const TABLES: [&str; 2] = ["results.csv", "results.parquet"];
+
+/// Columns of numbers with their names, and the units that the file itself gives, by name.
+type Columns = (Vec<(String, Vec<f64>)>, BTreeMap<String, String>);
+
+/// Reads a run: a folder of results, or a file of recorded variables.
+///
+/// # Errors
+/// Returns an error if there is no such run, or if a file is damaged.
+pub(super) fn recording(path: &Path) -> Result<Recording, Error> {
+    let file = table_of(path)?;
+    let folder = file.parent().unwrap_or(Path::new(""));
+    let metadata = json_of(&folder.join("results.json"))?;
+    let (columns, units) = match file.extension().and_then(|extension| extension.to_str()) {
+        Some("parquet") => parquet(&file)?,
+        _ => text(&file, &metadata)?,
+    };
+    let mut columns = columns.into_iter();
+    let first = columns.next().filter(|(name, _)| name.eq_ignore_ascii_case("time"));
+    let Some((_, time)) = first else {
+        let problem = format!("{}: the first column must be called time", file.display());
+        return Err(Error::experiment(problem));
+    };
+    let described = metadata["columns"].as_array().cloned().unwrap_or_default();
+    let tracks = columns.map(|(name, values)| {
+        let column = described.iter().find(|column| column["name"] == name.as_str());
+        (name.clone(), track(column.unwrap_or(&Value::Null), units.get(&name), values))
+    });
+    let name = match file.file_name().and_then(|name| name.to_str()) {
+        Some(name) if TABLES.contains(&name) => fs::canonicalize(folder).ok(),
+        _ => Some(file.with_extension("")),
+    };
+    let name = name.as_deref().and_then(Path::file_name).unwrap_or(file.as_os_str());
+    let mut run =
+        Recording::new(&name.to_string_lossy(), &metadata, time, tracks.collect::<Vec<_>>());
+    let metrics = json_of(&folder.join("metrics.json"))?;
+    if let Ok(metrics) = serde_json::from_value::<Metrics>(metrics) {
+        let units = metric_units(&run);
+        run.summary = summary::lines(&run.observe, &Metrics { units, ..metrics });
+    }
+    Ok(run)
+}
+
+/// Returns the file of recorded variables that a path stands for.
+fn table_of(path: &Path) -> Result<PathBuf, Error> {
+    let below = Path::new("out").join(path);
+    let mut tried = [path, &below].into_iter();
+    let Some(found) = tried.find(|path| path.exists()) else {
+        return Err(Error::experiment(format!(
+            "there is no run {}, neither here nor below out: `orchestrator run EXPERIMENT` flies one",
+            path.display()
+        )));
+    };
+    if found.is_file() {
+        return Ok(found.to_path_buf());
+    }
+    TABLES.map(|name| found.join(name)).into_iter().find(|file| file.is_file()).ok_or_else(|| {
+        let problem = format!("{} holds neither {}", found.display(), TABLES.join(" nor "));
+        Error::experiment(problem)
+    })
+}
+
+/// Reads a JSON file; null if there is none.
+fn json_of(path: &Path) -> Result<Value, Error> {
+    if !path.is_file() {
+        return Ok(Value::Null);
+    }
+    let text = fs::read_to_string(path).map_err(Error::file(path))?;
+    serde_json::from_str(&text).map_err(|error| Error::file(path)(error.into()))
+}
+
+/// Makes a track of a column, which `results.json` describes.
+fn track(column: &Value, unit: Option<&String>, values: Vec<f64>) -> Track {
+    let unit = column["unit"].as_str().or(unit.map(String::as_str)).unwrap_or_default();
+    let (unit, factor) = if column["display_unit"].is_null() {
+        usual_unit(unit)
+    } else {
+        display_unit(&column["display_unit"])
+    };
+    let items = column["items"].as_object().into_iter().flatten();
+    let items =
+        items.filter_map(|(value, name)| Some((name.as_str()?.into(), value.parse().ok()?)));
+    Track { unit, factor, items: items.collect(), values }
+}
+
+/// Returns the unit in which values are displayed if no FMU says so.
+fn usual_unit(unit: &str) -> (String, f64) {
+    match unit.strip_prefix("rad") {
+        Some(rest) if rest.is_empty() || rest.starts_with('/') => {
+            (format!("deg{rest}"), 1.0_f64.to_degrees())
+        }
+        _ => (unit.into(), 1.0),
+    }
+}
+
+fn parquet(path: &Path) -> Result<Columns, Error> {
+    let reader = table::Reader::open(path)?;
+    let units = reader.metadata("units").unwrap_or("{}");
+    let units: BTreeMap<String, String> = serde_json::from_str(units).unwrap_or_default();
+    let columns = reader.table()?.columns.into_iter();
+    Ok((columns.map(|column| (column.name, column.values.numbers())).collect(), units))
+}
+
+/// Reads a CSV file, also one whose header has units and whose cells have names of items.
+fn text(path: &Path, metadata: &Value) -> Result<Columns, Error> {
+    let failed = |error: csv::Error| Error::file(path)(std::io::Error::other(error));
+    let mut reader = csv::Reader::from_path(path).map_err(failed)?;
+    let mut units = BTreeMap::new();
+    let mut columns: Vec<(String, Vec<f64>)> = Vec::new();
+    for head in reader.headers().map_err(failed)? {
+        let labelled = head.strip_suffix(']').and_then(|head| head.rsplit_once(" ["));
+        let name = labelled.map_or(head, |(name, _)| name);
+        units.extend(labelled.map(|(name, unit)| (name.to_string(), unit.to_string())));
+        columns.push((name.into(), Vec::new()));
+    }
+    let items: Vec<Map<String, Value>> = columns
+        .iter()
+        .map(|(name, _)| {
+            let described = metadata["columns"].as_array().into_iter().flatten();
+            let column = described.into_iter().find(|column| column["name"] == name.as_str());
+            column.and_then(|column| column["items"].as_object()).cloned().unwrap_or_default()
+        })
+        .collect();
+    for (row, record) in reader.records().enumerate() {
+        let record = record.map_err(failed)?;
+        for ((cell, (name, values)), items) in record.iter().zip(&mut columns).zip(&items) {
+            let item = || items.iter().find(|(_, item)| *item == cell)?.0.parse().ok();
+            let number = cell.trim().parse().ok().or_else(item);
+            values.push(number.ok_or_else(|| {
+                Error::experiment(format!(
+                    "{}, row {}, {name}: \"{cell}\" is not a number",
+                    path.display(),
+                    row + 2
+                ))
+            })?);
+        }
+    }
+    Ok((columns, units))
+}
+
+/// Returns the units of those metrics whose signals are recorded.
+fn metric_units(run: &Recording) -> BTreeMap<String, String> {
+    let observe: &Observe = &run.observe;
+    let unit = |name: &String| {
+        let measure = &observe.metrics[name];
+        let of_signals = || {
+            let signal = observe.list(measure.signals.get_ref()).ok()?.first()?;
+            Some(run.series(signal).ok()?.unit)
+        };
+        match (measure.kind, &measure.unit) {
+            (MeasureKind::Settling | MeasureKind::Leaving, _) => Some("s".to_string()),
+            (MeasureKind::Share | MeasureKind::Pulses | MeasureKind::Rises, _) => None,
+            (_, Some(unit)) => Some(unit.name.clone()),
+            _ => of_signals(),
+        }
+    };
+    observe.metrics.keys().filter_map(|name| Some((name.clone(), unit(name)?))).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    fn read(name: &str, content: &str, metadata: Option<&Value>) -> Result<Recording, Error> {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join(name);
+        fs::write(&path, content).unwrap();
+        if let Some(metadata) = metadata {
+            fs::write(folder.path().join("results.json"), metadata.to_string()).unwrap();
+        }
+        recording(&path)
+    }
+
+    #[test]
+    fn a_file_alone_has_its_own_units() {
+        let run = read("mine.csv", "time [s],a.x [rad/s],a.y\n0,1,2\n1,3,4\n", None).unwrap();
+        assert_eq!((run.name.as_str(), run.time.as_slice()), ("mine", &[0.0, 1.0][..]));
+        let track = run.track("a.x").unwrap();
+        assert_eq!((track.unit.as_str(), track.values.as_slice()), ("deg/s", &[1.0, 3.0][..]));
+        assert_eq!(run.track("a.y").unwrap().unit, "");
+    }
+
+    #[test]
+    fn names_of_items_are_read_as_their_numbers() {
+        let items = json!({ "columns": [{ "name": "a.mode", "items": { "3": "fast" } }] });
+        let table = "time,a.mode\n0,fast\n1,3\n";
+        let run = read("results.csv", table, Some(&items)).unwrap();
+        assert_eq!(run.track("a.mode").unwrap().values, [3.0, 3.0]);
+        let fault = read("results.csv", "time,a.mode\n0,slow\n", Some(&items)).unwrap_err();
+        assert!(fault.to_string().contains("row 2, a.mode: \"slow\" is not a number"), "{fault}");
+    }
+
+    #[test]
+    fn what_is_no_table_of_a_run_is_refused() {
+        let fault = read("a.csv", "x,y\n0,1\n", None).unwrap_err().to_string();
+        assert!(fault.contains("the first column must be called time"), "{fault}");
+        let fault = read("a.parquet", "PAR1 and nothing else", None).unwrap_err().to_string();
+        assert!(fault.contains("a.parquet"), "{fault}");
+    }
+}

@@ -1,0 +1,145 @@
+//! Pictures and pages of recorded runs, of a loop that can be computed by hand.
+
+use crate::bench::{Bench, LOOP};
+use serde_json::Value;
+use std::fs;
+
+/// What the loop draws. Its integrator has the values 2^k at tick k.
+const PANELS: &str = r#"
+[observe]
+panels = [{ name = "integral", limit = "gain.gain", curves = [
+    { name = "alpha", of = "plant.output.integral", reference = "gain.output.direct" },
+] }]
+[observe.vehicle]
+attitude = ["plant.output.integral", "gain.output.direct", "plant.output.integral"]
+deflections = ["gain.output.direct"]
+"#;
+
+fn flown() -> Bench {
+    let bench = Bench::with(&format!("{LOOP}{PANELS}"));
+    for (out, gain) in [("a", "1.0"), ("b", "0.5")] {
+        let set = format!("gain.gain={gain}");
+        let (code, _, errors) = bench.run(&["--out", out, "--set", &set, "--quiet"]);
+        assert_eq!(code, 0, "{errors}");
+    }
+    bench
+}
+
+fn plotted(bench: &Bench, arguments: &[&str]) -> String {
+    let (code, said, errors) = bench.call(&[&["plot"], arguments].concat());
+    assert_eq!(code, 0, "{errors}");
+    fs::read_to_string(bench.path(said.trim())).unwrap()
+}
+
+fn refusal(bench: &Bench, arguments: &[&str]) -> String {
+    let (code, _, errors) = bench.call(&[&["plot"], arguments].concat());
+    assert_eq!((code, errors.lines().count()), (2, 1), "{errors}");
+    errors
+}
+
+/// Returns the numbers of a page.
+fn data(page: &str) -> Value {
+    let (_, rest) = page.split_once("id=\"run-data\">").unwrap();
+    serde_json::from_str(rest.split_once("</script>").unwrap().0).unwrap()
+}
+
+#[test]
+fn a_run_is_drawn_as_its_experiment_says_or_as_it_is_asked_for() {
+    let bench = flown();
+    let picture = plotted(&bench, &["a"]);
+    assert!(picture.starts_with("<svg") && picture.contains("limit of norm"), "{picture}");
+    assert!(picture.contains("α") && picture.contains("gain and integrator"));
+    let picture = plotted(&bench, &["a", "--signals", "plant.*", "--out", "p/other.svg"]);
+    assert!(picture.contains("steps") && !picture.contains("limit of norm"));
+    let (code, said, errors) = bench.call(&["plot", "a", "b", "--out", "both.png"]);
+    assert_eq!((code, said.as_str()), (0, "both.png\n"), "{errors}");
+    assert!(fs::read(bench.path("both.png")).unwrap().starts_with(b"\x89PNG"));
+    // A run below out is found by its name.
+    fs::create_dir(bench.path("out")).unwrap();
+    fs::rename(bench.path("b"), bench.path("out/b")).unwrap();
+    plotted(&bench, &["b", "--out", "b.svg"]);
+}
+
+#[test]
+fn oracle_the_numbers_of_a_page_are_those_of_the_runs() {
+    let bench = flown();
+    let page = plotted(&bench, &["a", "b", "--out", "both.html"]);
+    assert!(!page.contains("http://") || !page.contains("src="), "it needs no network");
+    let data = data(&page);
+    let values = |panel: usize, curve: usize| {
+        let values = data["panels"][panel]["curves"][curve]["values"].as_array().unwrap();
+        values.iter().map(|value| value.as_f64().unwrap()).collect::<Vec<_>>()
+    };
+    assert_eq!(data["runs"][0]["time"], serde_json::json!([0, 1, 2, 3]));
+    // Doubled at each tick, and half as much again; the norms have a panel of their own.
+    assert_eq!(values(0, 0), [1.0, 2.0, 4.0, 8.0]);
+    assert_eq!(values(0, 2), [1.0, 1.5, 2.25, 3.375]);
+    assert_eq!(values(1, 1), values(0, 2));
+    assert_eq!(data["panels"][1]["limit"], 1);
+    assert_eq!(data["runs"][1]["vehicle"]["angles"][0][2], 2.25);
+    // At the stop time, a response is that of the step before.
+    assert_eq!(
+        data["runs"][0]["vehicle"]["surfaces"][0]["values"],
+        serde_json::json!([1, 2, 4, 4])
+    );
+    assert!(page.contains("<tr data-set data-differs><th scope=\"row\"><code>gain.gain"), "{page}");
+    let window = plotted(&bench, &["a", "--from", "1", "--to", "2", "--out", "part.html"]);
+    assert!(window.contains("\"time\":[1,2]"));
+}
+
+#[test]
+fn oracle_a_table_of_another_form_gives_the_same_picture() {
+    let bench = flown();
+    let picture = plotted(&bench, &["a"]);
+    for (out, options) in [("p", &["--format", "parquet"][..]), ("l", &["--labels"])] {
+        let (code, _, errors) =
+            bench.run(&[&["--out", out, "--set", "gain.gain=1.0", "--quiet"], options].concat());
+        assert_eq!(code, 0, "{errors}");
+        assert!(plotted(&bench, &[out]) == picture, "{out}");
+    }
+    assert!(plotted(&bench, &["p/results.parquet"]) == picture);
+    // Without results.json nobody knows panels and title.
+    fs::copy(bench.path("a/results.csv"), bench.path("alone.csv")).unwrap();
+    let picture = plotted(&bench, &["alone.csv"]);
+    assert!(picture.contains("alone") && !picture.contains("limit of norm"));
+}
+
+#[test]
+fn a_run_writes_its_own_page_with_what_it_does_not_record() {
+    let text =
+        format!("{LOOP}{PANELS}").replace("variables = [\"gain.output.direct\", ", "variables = [");
+    let bench = Bench::with(&text);
+    let (code, said, errors) = bench.run(&["--page"]);
+    assert_eq!(code, 0, "{errors}");
+    assert!(said.contains("page.html"), "{said}");
+    let page = fs::read_to_string(bench.path("out/loop/page.html")).unwrap();
+    assert_eq!(data(&page)["panels"][0]["curves"][1]["role"], "reference");
+    // The page belongs to the results: it is replaced with them.
+    let (code, ..) = bench.run(&[]);
+    assert!(code == 0 && !bench.path("out/loop/page.html").exists());
+    let bench = Bench::with(&text.replace("\"gain.output.direct\"]", "\"gain.output.direkt\"]"));
+    let (code, _, errors) = bench.run(&["--page"]);
+    assert_eq!(code, 2);
+    assert!(errors.contains("[observe.vehicle]") && errors.contains("did you mean"), "{errors}");
+}
+
+#[test]
+fn what_cannot_be_drawn_is_refused_by_name() {
+    let bench = flown();
+    let fault = refusal(&bench, &["a", "--signals", "plant.output.intgral"]);
+    assert!(fault.contains("did you mean \"plant.output.integral\"?"), "{fault}");
+    let fault = refusal(&bench, &["a", "--signals", "plent.*"]);
+    assert!(fault.contains("no recorded variable matches \"plent.*\""), "{fault}");
+    let fault = refusal(&bench, &["c"]);
+    assert!(fault.contains("there is no run c"), "{fault}");
+    let fault = refusal(&bench, &["."]);
+    assert!(fault.contains("holds neither results.csv nor results.parquet"), "{fault}");
+    let fault = refusal(&bench, &["a", "--out", "a.pdf"]);
+    assert!(fault.contains("must end with .svg, .png or .html"), "{fault}");
+    let fault = refusal(&bench, &["a", "--from", "7"]);
+    assert!(fault.contains("it goes from 0 s to 3 s"), "{fault}");
+    let fault = refusal(&bench, &["a", "--from", "2", "--to", "1"]);
+    assert!(fault.contains("--from 2 must be below --to 1"), "{fault}");
+    let fault = refusal(&bench, &["a", "a", "a", "a", "a", "a", "a"]);
+    assert!(fault.contains("7 runs: at most 6"), "{fault}");
+}

@@ -1,0 +1,199 @@
+"""The page of a run in headless Chromium: it plays, seeks and shows the values at the cursor, without a network."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+
+import pandas as pd
+import pytest
+
+from conftest import program
+
+playwright = pytest.importorskip("playwright.sync_api")
+
+CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+ARGUMENTS = [
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-quic",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+]
+
+pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="Chromium is not installed: run scripts/install-tools browser")
+
+
+def call(*arguments, cwd):
+    subprocess.run([program("orchestrator"), *map(str, arguments)], check=True, capture_output=True, cwd=cwd)
+
+
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory):
+    """Two runs with their pages, one with surfaces and jets, and a page of two side by side."""
+    folder = tmp_path_factory.mktemp("runs")
+    root = os.getcwd()
+    for experiment in ("crmpc-robust", "lqr", "crmpc-2022-allocated"):
+        call("run", experiment, "--page", "--quiet", "--out", folder / experiment, cwd=root)
+    call("plot", folder / "crmpc-robust", folder / "lqr", "--out", folder / "both.html", cwd=root)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def chromium():
+    with playwright.sync_playwright() as started:
+        browser = started.chromium.launch(executable_path=CHROMIUM, args=ARGUMENTS)
+        yield browser
+        browser.close()
+
+
+@pytest.fixture
+def opened(chromium):
+    """Opens a page. What it loads from elsewhere, and every fault of its scripts, fails the test."""
+    seen, contexts = [], []
+
+    def open_page(path, **options):
+        context = chromium.new_context(**{"viewport": {"width": 1400, "height": 900}, **options})
+        contexts.append(context)
+        page = context.new_page()
+        page.on("pageerror", lambda error: seen.append(str(error)))
+        page.on("console", lambda message: seen.append(message.text) if message.type in ("error", "warning") else None)
+        page.on("request", lambda request: seen.append(request.url) if request.url != path.as_uri() else None)
+        page.goto(path.as_uri())
+        return page
+
+    yield open_page
+    assert seen == []
+    for context in contexts:
+        context.close()
+
+
+def shown_time(page) -> float:
+    return float(page.inner_text("#time").removesuffix(" s"))
+
+
+def legend(page, panel: int) -> dict[str, float]:
+    """Values at the cursor, by the names of the curves of a panel."""
+    items = page.locator(".panel").nth(panel).locator(".legend li:has(output)")
+    pairs = [(item.locator("span").inner_text(), item.locator("output").inner_text()) for item in items.all()]
+    return {name: float(value.replace("−", "-")) for name, value in pairs}
+
+
+def test_the_cursor_shows_what_is_recorded(runs, opened):
+    page = opened(runs / "crmpc-robust" / "page.html")
+    table = pd.read_csv(runs / "crmpc-robust" / "results.csv")
+    curves = page.locator(".panel svg[role=img]").nth(2)
+    curves.scroll_into_view_if_needed()
+    box = curves.bounding_box()
+    page.mouse.move(box["x"] + 0.4 * box["width"], box["y"] + 50)
+    time = shown_time(page)
+    assert 15 < time < 25
+    row = table[table["time"] <= time + 0.005].iloc[-1]
+    rates = legend(page, 2)
+    for name in "pqr":
+        assert rates[name] == pytest.approx(row[f"plant.rate.{name}"] * 57.29578, rel=2e-3, abs=2e-2), name
+    assert legend(page, 0)["σ"] == pytest.approx(row["plant.attitude.sigma"] * 57.29578, rel=1e-3)
+    assert rates["norm"] == pytest.approx(sum(rates[name] ** 2 for name in "pqr") ** 0.5, rel=2e-3)
+    # All panels have their cursors at one time.
+    places = page.eval_on_selector_all(".cursor", "lines => lines.map(line => line.getAttribute('x1'))")
+    assert len(places) == 4 and len(set(places)) == 1
+
+
+def test_keys_play_and_seek(runs, opened):
+    page = opened(runs / "crmpc-robust" / "page.html")
+    assert shown_time(page) == 0 and page.get_attribute("#play", "aria-label") == "Play"
+    page.keyboard.press("Space")
+    page.wait_for_function("parseFloat(document.getElementById('time').textContent) > 0.5")
+    page.keyboard.press("Space")
+    assert page.get_attribute("#play", "aria-label") == "Play"
+    paused = shown_time(page)
+    page.wait_for_timeout(150)
+    assert shown_time(page) == paused
+    page.keyboard.press("ArrowRight")
+    assert shown_time(page) == pytest.approx(paused + 0.5, abs=0.011)
+    page.keyboard.press("Shift+ArrowRight")
+    assert shown_time(page) == pytest.approx(paused + 5.5, abs=0.011)
+    page.keyboard.press("End")
+    assert shown_time(page) == 50
+    # Playing from the end begins again.
+    page.click("#play")
+    page.wait_for_function("parseFloat(document.getElementById('time').textContent) < 40")
+    page.click("#play")
+    page.fill("#seek", "500")
+    assert shown_time(page) == 25
+    # A view that is turned keeps the arrows.
+    page.focus(".view")
+    page.keyboard.press("ArrowRight")
+    assert shown_time(page) == 25
+
+
+def test_the_vehicle_moves_with_the_run(runs, opened):
+    page = opened(runs / "crmpc-2022-allocated" / "page.html")
+    picture = "document.querySelector('.view').toDataURL()"
+    first, label = page.evaluate(picture), page.get_attribute(".view", "aria-label")
+    assert "α 7.5, β 10.0, σ −30.0 deg" in label
+    assert page.locator(".surface").count() == 8 and page.locator(".jets i").count() == 10
+    page.fill("#seek", "60")
+    assert page.evaluate(picture) != first and page.get_attribute(".view", "aria-label") != label
+    deflections = page.locator(".surface output").all_inner_texts()
+    assert any(text not in ("0.0", "−0.0") for text in deflections)
+    data = json.loads(page.inner_text("#run-data") or page.eval_on_selector("#run-data", "e => e.textContent"))
+    assert len(data["runs"][0]["vehicle"]["time"]) <= 1501
+    guaranteed = opened(runs / "crmpc-robust" / "page.html").get_attribute(".view", "aria-label")
+    assert guaranteed.endswith("guarantee: in force")
+
+
+def test_parameters_are_searched(runs, opened):
+    page = opened(runs / "crmpc-robust" / "page.html")
+    rows = page.locator("#parameter-table tbody tr:visible")
+    few = rows.count()
+    assert 5 < few < 60
+    page.uncheck("#set-only")
+    assert rows.count() > 200
+    page.fill("#search", "LIMIT.RATE")
+    assert rows.count() == 1 and "5 deg/s" in rows.first.inner_text()
+    # Letters and spaces go into the search and do not play.
+    page.type("#search", " ")
+    assert page.get_attribute("#play", "aria-label") == "Play"
+
+
+def test_two_runs_side_by_side(runs, opened):
+    page = opened(runs / "both.html")
+    assert page.locator(".view").count() == 2
+    assert "Beyond a limit: largest rate, largest moment" in page.inner_text("header")
+    for panel in page.locator(".panel").all():
+        styles = panel.locator("path.curve").evaluate_all(
+            "paths => paths.map(path => path.getAttribute('stroke') + path.getAttribute('stroke-dasharray'))"
+        )
+        signals = [style for style in styles if "ink" not in style]
+        assert len(signals) <= 6 and len(set(signals)) == len(signals)
+    page.check("#different-only")
+    page.uncheck("#set-only")
+    assert page.locator("#parameter-table tbody tr:visible").count() > 3
+
+
+@pytest.mark.parametrize("name", ["crmpc-robust/page.html", "crmpc-2022-allocated/page.html", "both.html"])
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_a_page_fits_a_telephone_in_both_themes(runs, opened, name, scheme):
+    page = opened(runs / name, viewport={"width": 390, "height": 800}, color_scheme=scheme)
+    assert page.evaluate("document.documentElement.scrollWidth") <= 390
+    paper = page.evaluate("getComputedStyle(document.body).backgroundColor")
+    assert paper == {"light": "rgb(252, 252, 251)", "dark": "rgb(18, 20, 23)"}[scheme]
+    assert (runs / name).stat().st_size < 1e6
+
+
+def test_the_page_of_an_entry_flight(tmp_path, opened):
+    call("run", "from-120km", "--page", "--quiet", "--out", tmp_path / "run", cwd=os.getcwd())
+    path = tmp_path / "run" / "page.html"
+    assert path.stat().st_size < 3e6
+    page = opened(path)
+    page.keyboard.press("End")
+    assert shown_time(page) > 1800
+    # A peak of one row survives the thinning.
+    largest = json.loads((tmp_path / "run" / "metrics.json").read_text())["max_rate_deg_s"]
+    values = page.evaluate("JSON.parse(document.getElementById('run-data').textContent).panels[2].curves.at(-1).values")
+    assert max(values) == pytest.approx(largest, rel=1e-4)
