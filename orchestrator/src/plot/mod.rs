@@ -118,8 +118,7 @@ pub(crate) fn plot(asked: &Plot, out: &mut impl Write) -> Result<(), Failure> {
     match form {
         Form::Svg => svg::write(&figure(), &asked.out)?,
         Form::Png => {
-            let text = svg::text(&figure()).map_err(Error::file(&asked.out))?;
-            png::write(&text, &asked.out)?;
+            png::write(&svg::text(&figure()), &asked.out)?;
         }
         Form::Page => run_page::write(&runs, &panels, &asked.out)?,
     }

@@ -12,7 +12,6 @@ use cosim::signal::{Resolved, Signal};
 use cosim::variation::SettingValue;
 use cosim_report::figure::{Color, Curve, Figure, Legend, Panel, Shape, svg};
 use cosim_report::page::head;
-use cosim_report::plot::COLORS;
 use cosim_report::recording::panels::{CURVES, symbols};
 use cosim_report::run_page::thin;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
@@ -39,10 +38,10 @@ pub(super) fn write(
     let text = |figure: &Figure| {
         // The page writes the heading.
         let bare = Figure { title: String::new(), ..figure.clone() };
-        svg::text(&bare).map_err(Error::file("report.html"))
+        svg::element(&bare)
     };
-    let drawn = if worst_case.panels.is_empty() { None } else { Some(text(&worst_case)?) };
-    let page = page(plan, outcome, worst, drawn.as_deref(), &text(&history)?);
+    let drawn = if worst_case.panels.is_empty() { None } else { Some(text(&worst_case)) };
+    let page = page(plan, outcome, worst, drawn.as_deref(), &text(&history));
     files::write(&out.join("report.html"), page)
 }
 
@@ -80,8 +79,8 @@ fn history(plan: &Plan, outcome: &SearchOutcome, tried: &[Tried]) -> Figure {
     let so_far = so_far.collect();
     let values = tried.iter().map(|case| case.value).collect();
     let mut curves = vec![
-        line("case", COLORS[0], Shape::Dots, number.clone(), values),
-        line("largest so far", COLORS[1], Shape::Line, number, so_far),
+        line("case", Color::CURVES[0], Shape::Dots, number.clone(), values),
+        line("largest so far", Color::CURVES[1], Shape::Line, number, so_far),
     ];
     curves.extend(bound(plan, &outcome.measure).map(|(limit, _)| limit_line(limit)));
     let label = with_unit(&outcome.measure, &outcome.unit);
@@ -141,7 +140,7 @@ fn worst_case(plan: &Plan, outcome: &SearchOutcome, worst: &Row) -> Result<Figur
     flight.fly_with(CASE, worst.values.clone(), &mut [&mut watch])?;
     let time = thin::times(&watch.time);
     let panels = watch.judged.iter().map(|judged| {
-        let signals = judged.signals.iter().zip(&judged.values).zip(COLORS);
+        let signals = judged.signals.iter().zip(&judged.values).zip(Color::CURVES);
         // A single signal is named by the title, because its name may be long.
         let (alone, title) = match &judged.signals[..] {
             [(name, _)] => (true, format!("{}: {name}", judged.measure)),

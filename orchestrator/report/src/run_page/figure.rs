@@ -2,7 +2,6 @@
 
 use super::thin;
 use crate::figure::{self, Color, Figure, Legend, Shape};
-use crate::plot::COLORS;
 use crate::recording::Recording;
 use crate::recording::panels::{Curve, Panel, Role, symbols};
 
@@ -73,13 +72,12 @@ fn one(runs: &[Recording], names: &[String], panel: &Panel, curve: &Curve) -> fi
     let shape = match curve.role {
         Role::Reference => Shape::Pale,
         Role::Norm if runs.len() == 1 => Shape::Pale,
-        _ if curve.run % 2 == 1 => Shape::Dashed,
         _ => Shape::Line,
     };
     let color = match curve.role {
         Role::Reference => Color(0, 0, 0),
         Role::Norm if runs.len() == 1 => Color::GREY,
-        _ => COLORS[place % COLORS.len()],
+        _ => Color::CURVES[place % Color::CURVES.len()],
     };
     figure::Curve { name, color, shape, x: thin::times(&run.time), y: thin::values(&curve.values) }
 }
