@@ -9,7 +9,10 @@ import re
 import sys
 from pathlib import Path
 
-PAGE = Path(__file__).parent.parent.parent / "browser" / "page"
+ROOT = Path(__file__).parent.parent.parent
+PAGE = ROOT / "browser" / "page"
+# The view of the vehicle is that of the orchestrator's pages.
+SHARED = ROOT / "orchestrator" / "report" / "src"
 # Largest page, bytes.
 LARGEST = 2_500_000
 
@@ -21,7 +24,8 @@ def page(module: bytes) -> str:
         name = match[1]
         if name == "module":
             return base64.b64encode(gzip.compress(module, compresslevel=9, mtime=0)).decode()
-        text = (PAGE / name).read_text(encoding="utf-8")
+        folder = PAGE if (PAGE / name).is_file() else SHARED
+        text = (folder / name).read_text(encoding="utf-8")
         # The browser would take it for the end of the element that the part stands in.
         assert "</script" not in text and "</style" not in text, f"{name} ends its own element"
         return text
