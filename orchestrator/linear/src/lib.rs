@@ -4,7 +4,7 @@
 //! gives its derivatives ([`continuous`]); of every other one the responses to small changes of its
 //! inputs are taken from the kept state ([`responses`]), and realised as a linear model of the
 //! fewest states ([`realisation`]). One that has edges is taken together with the one that it hands
-//! on to ([`pair`]). Then the master's calls are repeated on matrices instead of
+//! on to. Then the master's calls are repeated on matrices instead of
 //! values ([`propagation`]), so that order, coupling, periods and delays are those of the run. The
 //! loop is opened at named signals. [`margins`] says how far it is from instability there.
 

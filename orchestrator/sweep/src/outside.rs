@@ -1,7 +1,7 @@
 //! Runs that another program flies, such as those of a control law that is no FMU.
 //!
-//! The other program is asked for a run by a line of JSON on standard output ([`Request`]). It
-//! answers on standard input by a line of JSON ([`Answer`]), which is followed by the values of the
+//! The other program is asked for a run by a line of JSON on standard output (`Request`). It
+//! answers on standard input by a line of JSON (`Answer`), which is followed by the values of the
 //! requested variables at each communication point, as 64-bit floats in little-endian order.
 
 use cosim::error::Error;

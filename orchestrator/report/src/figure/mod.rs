@@ -177,6 +177,9 @@ impl Panel {
             return if along_x && self.log_x { (1.0, 10.0) } else { (0.0, 1.0) };
         };
         if along_x && self.log_x {
+            // A logarithmic axis shows no zero.
+            let high = if high > 0.0 { high } else { 10.0 };
+            let low = if low > 0.0 { low } else { 1e-3 * high };
             return (low / 1.3, high * 1.3);
         }
         // An axis of time needs no margin.
@@ -235,5 +238,8 @@ mod tests {
         assert_eq!((empty.range(false), empty.range(true)), ((0.0, 1.0), (0.0, 1.0)));
         // The range must have ends whose logarithm is finite.
         assert_eq!(Panel { log_x: true, ..empty }.range(true), (1.0, 10.0));
+        let zero = panel(vec![curve(Shape::Dots, &[0.0, 2.0], &[1.0, 1.0])]);
+        let (low, high) = Panel { log_x: true, ..zero }.range(true);
+        assert!(low > 0.0 && high > 2.0);
     }
 }

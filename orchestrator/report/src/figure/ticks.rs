@@ -17,6 +17,9 @@ pub(super) fn linear(low: f64, high: f64, count: usize) -> Vec<f64> {
 
 /// Returns the powers of ten within a range, and 2 and 5 times them if there are few.
 pub(super) fn logarithmic(low: f64, high: f64) -> Vec<f64> {
+    if !(low > 0.0 && high.is_finite()) {
+        return Vec::new();
+    }
     let (first, last) = (low.log10().floor() as i32, high.log10().ceil() as i32);
     let multiples: &[f64] = if last - first > 3 { &[1.0] } else { &[1.0, 2.0, 5.0] };
     let all =
@@ -41,7 +44,9 @@ mod tests {
     fn marks_are_round_and_within_the_range() {
         assert_eq!(linear(-0.3, 10.2, 5), [0.0, 2.0, 4.0, 6.0, 8.0, 10.0]);
         assert_eq!(linear(0.0, 0.5, 5), [0.0, 0.1, 0.2, 0.30000000000000004, 0.4, 0.5]);
-        assert_eq!(linear(3.0, 3.0, 5), [] as [f64; 0]);
+        let none: [f64; 0] = [];
+        assert_eq!(linear(3.0, 3.0, 5), none);
+        assert_eq!((logarithmic(0.0, 1.0), linear(0.0, f64::INFINITY, 5)), (vec![], vec![]));
         assert_eq!(logarithmic(0.3, 30.0), [0.5, 1.0, 2.0, 5.0, 10.0, 20.0]);
         assert_eq!(logarithmic(1e-3, 1e2), [1e-3, 1e-2, 1e-1, 1.0, 10.0, 100.0]);
     }
