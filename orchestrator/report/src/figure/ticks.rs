@@ -42,7 +42,7 @@ mod tests {
 
     #[test]
     fn marks_are_round_and_within_the_range() {
-        assert_eq!(linear(-0.3, 10.2, 5), [0.0, 2.0, 4.0, 6.0, 8.0, 10.0]);
+        assert_eq!(linear(-0.3, 10.2, 6), [0.0, 2.0, 4.0, 6.0, 8.0, 10.0]);
         assert_eq!(linear(0.0, 0.5, 5), [0.0, 0.1, 0.2, 0.30000000000000004, 0.4, 0.5]);
         let none: [f64; 0] = [];
         assert_eq!(linear(3.0, 3.0, 5), none);
