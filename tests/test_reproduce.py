@@ -192,7 +192,7 @@ def test_exits_change_the_time_and_not_the_motion(results):
 
 def test_parameters_are_shown_in_the_unit_of_their_heading(report):
     page = (report[1] / "report.html").read_text()
-    row = page.split("Where the guarantee can be given")[1].split("errors 0.2 deg, 0.2 deg/s; disturbance 2.0 deg/s²")[1]
+    row = page.split("Where the guarantee can be given")[-1].split("errors 0.2 deg, 0.2 deg/s; disturbance 2.0 deg/s²")[1]
     # The FMU holds these 0.2 deg/s and 2 deg/s2 in rad.
     assert re.findall(r"<td[^>]*>([^<]*)</td>", row)[:2] == ["0.2", "2"]
 
