@@ -187,7 +187,7 @@ def test_step_and_units_are_chosen(tmp_path):
 
 @pytest.mark.filterwarnings("ignore::reentry_fmus.OrchestratorWarning")
 def test_every_experiment_runs():
-    assert len(experiments()) == 32
+    assert len(experiments()) == 33
     assert experiments()["crmpc-robust"].startswith("CRMPC, robust constraint sets")
     for name in experiments():
         assert experiment(name, stop=1.0).metrics["completed"], name
@@ -301,7 +301,7 @@ def test_the_command_runs_an_experiment_from_any_folder(tmp_path):
 def test_the_command_lists_what_the_package_has(tmp_path):
     done = orchestrator(tmp_path, "list")
     assert done.returncode == 0, done.stderr
-    for line in ("experiments (32)", "studies (8)", "FMUs (12)"):
+    for line in ("experiments (33)", "studies (8)", "FMUs (12)"):
         assert line in done.stdout
     assert "FAULT" not in done.stdout
 
@@ -371,11 +371,7 @@ ClosedLoop().run(1.0, lambda state: state.atitude)
         line.partition(": error")[0] for line in wrong.stdout.splitlines() if ": error" in line
     ]
     assert faults == [f"wrong.py:{line}" for line in range(3, 9)], wrong.stdout
-    package = [*mypy, "--package", "reentry_fmus", "--config-file", tmp_path / "mypy.ini"]
-    missing = "".join(
-        f"[mypy-{name}.*]\nignore_missing_imports = true\n"
-        for name in ("cloudpickle", "control", "distributed", "fmpy", "fsspec", "pyarrow")
-    )
-    (tmp_path / "mypy.ini").write_text(f"[mypy]\n{missing}follow_imports = skip\n")
+    settings = Path(__file__).parents[1] / "pyproject.toml"
+    package = [*mypy, "--package", "reentry_fmus", "--config-file", settings]
     whole = subprocess.run(package, cwd=tmp_path, capture_output=True, text=True)
     assert whole.returncode == 0, whole.stdout
