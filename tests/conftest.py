@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 import importers
+from browsing import ARGUMENTS, CHROMIUM
 from fmi import Fmu
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -83,6 +84,17 @@ def tool():
         return found
 
     return path
+
+
+@pytest.fixture(scope="module")
+def chromium():
+    """A headless Chromium. It is closed after each file, as other tests need the thread's event loop."""
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=ARGUMENTS)
+        yield browser
+        browser.close()
 
 
 @pytest.fixture(scope="session")

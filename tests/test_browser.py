@@ -5,28 +5,18 @@ from __future__ import annotations
 
 import base64
 import json
-import shutil
 import subprocess
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
-from playwright.sync_api import Browser, Page, sync_playwright
+from playwright.sync_api import Browser, Page
 
+from browsing import in_chromium
 from conftest import ROOT, program
 
 PAGE = ROOT / "out" / "browser" / "index.html"
-CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
-ARGUMENTS = [
-    "--no-sandbox",
-    "--disable-gpu",
-    "--disable-quic",
-    "--no-first-run",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-]
 CONTROLLERS = ["crmpc", "crmpc-paper", "dlmpc", "lqr", "fbl", "btvsmc", "btvsmc-do", "sotvsmc-do", "two-loop"]
 # Another flight than the scenario's: text with a unit, integer, number, and both delays.
 CHANGED = "plant.disturbance.bound=1.7+deg/s2&plant.disturbance.seed=7&plant.initial.alpha=12+deg&plant.inertia.scale=0.97"
@@ -34,16 +24,8 @@ DELAYED = f"{CHANGED}&plant.actuation.delay=0.04&controller.delay=0.04&controlle
 
 pytestmark = [
     pytest.mark.skipif(not PAGE.is_file(), reason=f"{PAGE.relative_to(ROOT)} does not exist: run scripts/browser"),
-    pytest.mark.skipif(CHROMIUM is None, reason="Chromium is not installed: run scripts/install-tools browser"),
+    in_chromium,
 ]
-
-
-@pytest.fixture(scope="module")
-def chromium():
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=ARGUMENTS)
-        yield browser
-        browser.close()
 
 
 def flights(page: Page) -> int:

@@ -14,6 +14,7 @@ from xml.etree import ElementTree
 
 import pytest
 
+from browsing import ARGUMENTS, CHROMIUM, in_chromium
 from conftest import NAMES, ROOT, TARGET
 
 if sys.version_info >= (3, 11):
@@ -23,7 +24,6 @@ else:
 
 SITE = TARGET / "manual"
 CHAPTERS = tomllib.loads((ROOT / "docs" / "site" / "chapters.toml").read_text())["part"]
-CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 # FMUs that command no moment. The gallery has them in experiments.
 NO_CONTROLLERS = {"ReentryPlant", "ControlAllocator", "AttitudeEstimator", "EntryGuidance"}
 # Files beside experiments: studies, their values, and what other experiments extend.
@@ -32,7 +32,6 @@ can_build = pytest.mark.skipif(
     os.name == "nt" or sys.version_info < (3, 11) or not (shutil.which("node") and shutil.which("npm")),
     reason="the manual needs Python 3.11 or later, node and npm",
 )
-in_chromium = pytest.mark.skipif(CHROMIUM is None, reason="Chromium is not installed")
 
 
 @pytest.fixture(scope="module")
@@ -149,8 +148,7 @@ def test_the_gallery_has_every_controller_and_every_experiment(site):
 
 def browse(address, profile, *options):
     """The page as Chromium has it when its scripts have run."""
-    quiet = "--headless --no-sandbox --disable-gpu --disable-quic --no-first-run --disable-background-networking --disable-component-update --disable-sync"
-    command = [CHROMIUM, *quiet.split(), *options, f"--user-data-dir={profile}", "--virtual-time-budget=60000", "--dump-dom", address]
+    command = [CHROMIUM, "--headless", *ARGUMENTS, *options, f"--user-data-dir={profile}", "--virtual-time-budget=60000", "--dump-dom", address]
     return subprocess.run(command, capture_output=True, text=True, timeout=300).stdout
 
 

@@ -7,7 +7,6 @@ import fmpy.fmi2
 import numpy as np
 import pytest
 
-from conftest import ROOT
 from fmi import ANGLES, MOMENT, RATES, Instance, Loop, of_step
 
 STEP = 0.04

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 import results as pages
 
-from conftest import EXPERIMENTS, ROOT, TARGET, merged, program
+from conftest import EXPERIMENTS, TARGET, merged, program
 from figures import check_folder
 
 MEMBERS = 2

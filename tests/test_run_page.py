@@ -4,28 +4,15 @@ from __future__ import annotations
 
 import json
 import os
-import shutil
 import subprocess
 
 import pandas as pd
 import pytest
 
+from browsing import in_chromium
 from conftest import program
 
-playwright = pytest.importorskip("playwright.sync_api")
-
-CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
-ARGUMENTS = [
-    "--no-sandbox",
-    "--disable-gpu",
-    "--disable-quic",
-    "--no-first-run",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-]
-
-pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="Chromium is not installed: run scripts/install-tools browser")
+pytestmark = in_chromium
 
 
 def call(*arguments, cwd):
@@ -41,14 +28,6 @@ def runs(tmp_path_factory):
         call("run", experiment, "--page", "--quiet", "--out", folder / experiment, cwd=root)
     call("plot", folder / "crmpc-robust", folder / "lqr", "--out", folder / "both.html", cwd=root)
     return folder
-
-
-@pytest.fixture(scope="module")
-def chromium():
-    with playwright.sync_playwright() as started:
-        browser = started.chromium.launch(executable_path=CHROMIUM, args=ARGUMENTS)
-        yield browser
-        browser.close()
 
 
 @pytest.fixture

@@ -5,12 +5,11 @@ import shutil
 import subprocess
 
 import pytest
-from playwright.sync_api import sync_playwright
 
+from browsing import in_chromium
 from conftest import EXPERIMENTS, ROOT, TARGET, program
-from test_browser import ARGUMENTS, CHROMIUM
 
-pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="Chromium is not installed: run scripts/install-tools browser")
+pytestmark = in_chromium
 
 
 def orchestrator(*arguments) -> str:
@@ -37,17 +36,9 @@ def campaign(tmp_path_factory):
     return out / "report.html"
 
 
-@pytest.fixture(scope="module")
-def browser():
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=ARGUMENTS)
-        yield browser
-        browser.close()
-
-
 @pytest.fixture
-def page(browser):
-    page = browser.new_page(viewport={"width": 1400, "height": 900})
+def page(chromium):
+    page = chromium.new_page(viewport={"width": 1400, "height": 900})
     faults = []
     page.on("pageerror", lambda error: faults.append(str(error)))
     page.on("request", lambda request: request.url.startswith("file:") or faults.append(request.url))
@@ -131,9 +122,9 @@ def test_the_command_line_answers():
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_pages_are_small_and_fit_every_screen(browser, report, scheme):
+def test_pages_are_small_and_fit_every_screen(chromium, report, scheme):
     assert report.stat().st_size < 3e6
-    page = browser.new_page(viewport={"width": 390, "height": 844}, color_scheme=scheme)
+    page = chromium.new_page(viewport={"width": 390, "height": 844}, color_scheme=scheme)
     page.goto(report.as_uri())
     assert page.evaluate("document.documentElement.scrollWidth") == 390
     assert page.evaluate("document.documentElement.scrollHeight") <= 25_000

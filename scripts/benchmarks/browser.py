@@ -9,7 +9,8 @@ from __future__ import annotations
 import argparse
 import statistics
 
-from test_browser import ARGUMENTS, CHROMIUM, CONTROLLERS, PAGE, after, flights
+from browsing import ARGUMENTS, CHROMIUM
+from test_browser import CONTROLLERS, PAGE, after, flights
 from playwright.sync_api import Page, sync_playwright
 
 # Time from an event of a slider until its flight is drawn, measured in the page, ms; and that of the flight alone.

@@ -169,11 +169,8 @@ pub struct Through {
 pub struct Line {
     /// Position of the line: a number, or the id of a value.
     pub at: Quantity,
-    /// Name of the line in the legend.
+    /// Name of the line, which stands beside it.
     pub label: String,
-    /// Colour of the line, which is red if it is left out.
-    #[serde(default)]
-    pub color: Option<Color>,
     /// Whether a second line is drawn at the negative position.
     #[serde(default)]
     pub symmetric: bool,

@@ -158,9 +158,8 @@ fn straight(panel: &Panel, results: &Results) -> Result<Vec<Curve>, String> {
                     Shape::Horizontal => (f64::NAN, side),
                     _ => (side, f64::NAN),
                 };
-                let color = line.color.unwrap_or(Color::LIMIT);
                 let (name, shape) = (line.label.clone(), shape.clone());
-                curves.push(Curve { name, color, shape, x: vec![x], y: vec![y] });
+                curves.push(Curve { name, color: Color::LIMIT, shape, x: vec![x], y: vec![y] });
             }
         }
     }
