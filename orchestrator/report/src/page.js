@@ -174,8 +174,33 @@ const seen = new IntersectionObserver((entries) => {
   for (const { target, isIntersecting } of entries) if (isIntersecting) { seen.unobserve(target); wire(target); }
 }, { rootMargin: "200px" });
 for (const figure of document.querySelectorAll(".plot > svg")) seen.observe(figure);
+
+// The drawings of folded parts are compressed. Their texts are read when nothing else is to do, so that they can be
+// shown, and printed, at once.
+const folded = new Map([...document.querySelectorAll("[data-folded]")].map((plot) => [plot, null]));
+async function read(plot) {
+  const bytes = Uint8Array.from(atob(plot.dataset.folded), (letter) => letter.charCodeAt(0));
+  const text = await new Response(new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate-raw"))).text();
+  if (folded.has(plot)) folded.set(plot, text);
+}
+function show(plot) {
+  if (!folded.get(plot)) return;
+  plot.innerHTML = folded.get(plot);
+  plot.removeAttribute("data-folded");
+  folded.delete(plot);
+  seen.observe(plot.firstElementChild);
+}
+for (const part of document.querySelectorAll("details.figure"))
+  part.addEventListener("toggle", async () => {
+    for (const plot of part.querySelectorAll("[data-folded]")) { if (!folded.get(plot)) await read(plot); show(plot); }
+  });
+const idle = window.requestIdleCallback ?? setTimeout;
+idle(async () => { for (const [plot, text] of [...folded]) if (!text) await read(plot); });
 // A link into a folded part opens it, and paper shows the figures.
 const open = (id) => { for (let part = id && document.getElementById(id); part; part = part.parentElement) if (part.tagName === "DETAILS") part.open = true; };
 window.addEventListener("hashchange", () => open(location.hash.slice(1)));
 open(location.hash.slice(1));
-window.addEventListener("beforeprint", () => document.querySelectorAll("details.figure").forEach((part) => { part.open = true; }));
+window.addEventListener("beforeprint", () => {
+  for (const plot of [...folded.keys()]) show(plot);
+  for (const part of document.querySelectorAll("details.figure")) part.open = true;
+});

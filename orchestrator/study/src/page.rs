@@ -9,7 +9,7 @@ use crate::comparisons::Overview;
 use crate::drawings::Figure;
 use crate::results::{Results, RunResult};
 use cosim_report::figure::{self, svg};
-use cosim_report::page::{head, script};
+use cosim_report::page::{folded, head, script};
 use evidence::claim;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 use numbers::{all_values, overview, small, table};
@@ -112,10 +112,16 @@ fn lead(results: &Results, drawn: &[figure::Figure]) -> Markup {
     };
     html! {
         section.lead id="answer" {
-            @if let Some((figure, picture)) = pictured { (drawing(figure, picture, true)) }
+            @if let Some((figure, picture)) = pictured {
+                figure id=(figure.id) {
+                    h2 { (figure.title) }
+                    div.plot { (PreEscaped(svg::element(picture))) }
+                    (caption(figure))
+                }
+            }
             @if let Some(first) = first {
                 div {
-                    h3 { (first.title) }
+                    h2 { (first.title) }
                     (small(first, results))
                     p.note {
                         @for (term, meaning) in study.terms.iter().filter(|(term, _)| uses(term)) { b { (term) } ": " (meaning) ". " }
@@ -135,16 +141,12 @@ fn lead_figure(results: &Results) -> Option<usize> {
     }
 }
 
-fn drawing(figure: &Figure, picture: &figure::Figure, titled: bool) -> Markup {
+fn caption(figure: &Figure) -> Markup {
     html! {
-        figure id=(figure.id) {
-            @if titled { h3 { (figure.title) } }
-            div.plot { (PreEscaped(svg::element(picture))) }
-            figcaption {
-                (figure.caption) " "
-                a href=(format!("figures/{}.svg", figure.id)) { "SVG" } ", "
-                a href=(format!("figures/{}.png", figure.id)) { "PNG" }
-            }
+        figcaption {
+            (figure.caption) " "
+            a href=(format!("figures/{}.svg", figure.id)) { "SVG" } ", "
+            a href=(format!("figures/{}.png", figure.id)) { "PNG" }
         }
     }
 }
@@ -161,7 +163,10 @@ fn figures(results: &Results, drawn: &[figure::Figure]) -> Markup {
                 "legend hides its curve. The folder " code { "figures" } " beside this page holds each figure as SVG and PNG."
             }
             @for (_, (figure, picture)) in others.filter(|(place, _)| Some(*place) != first) {
-                details.figure { summary { h3 { (figure.title) } } (drawing(figure, picture, false)) }
+                details.figure {
+                    summary { h3 { (figure.title) } }
+                    figure id=(figure.id) { (folded(&svg::element(picture))) (caption(figure)) }
+                }
             }
         }
     }
@@ -207,7 +212,7 @@ fn origins(results: &Results, origin: &[(String, String)]) -> Markup {
                 "A repetition gives the same bits, except for computing times."
             }
             @if !origin.is_empty() {
-                table { tbody { @for (what, value) in origin { tr { td { (what) } td { code { (value) } } } } } }
+                table { tbody { @for (what, value) in origin { tr { th scope="row" { (what) } td { code { (value) } } } } } }
             }
             div.scroll { (all_runs(results)) }
             @if !results.study.values.0.is_empty() {

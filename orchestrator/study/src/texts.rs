@@ -5,7 +5,7 @@ use crate::results::Numbers;
 /// Formats a number with as many digits as papers print.
 pub(crate) fn shown(value: f64) -> String {
     let magnitude = value.abs();
-    if value == 0.0 {
+    let text = if value == 0.0 {
         "0".into()
     } else if !value.is_finite() {
         value.to_string()
@@ -23,7 +23,9 @@ pub(crate) fn shown(value: f64) -> String {
         } else {
             text
         }
-    }
+    };
+    // A line is not broken at this sign.
+    text.replace('-', "−")
 }
 
 pub(crate) fn signed(value: f64) -> String {
@@ -81,8 +83,8 @@ mod tests {
             (12_345.6, "12346"),
             (0.08511, "0.0851"),
             (0.23413, "0.2341"),
-            (2e-5, "2.000e-5"),
-            (-0.0123, "-0.0123"),
+            (2e-5, "2.000e−5"),
+            (-0.0123, "−0.0123"),
             (100.0, "100"),
         ] {
             assert_eq!(shown(value), text);

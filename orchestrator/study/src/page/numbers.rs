@@ -35,7 +35,7 @@ pub(super) fn table(table: &ComparisonTable, results: &Results) -> Result<Markup
                 tr {
                     th { "Quantity" } th { (table.against) } th { (table.ours) } th { "Difference" }
                     @if !table.beside.is_empty() { th { (table.beside) } }
-                    th { "" }
+                    th { "Remark" }
                 }
             }
             tbody { @for row in rows { (row) } }
@@ -97,7 +97,7 @@ fn rows(overview: &Overview, results: &Results, cell: &dyn Fn(&Numbers) -> Strin
     }
     html! {
         table.numbers.overview {
-            thead { tr { th { "" } @for column in &overview.metrics { th { (column.label) } } } }
+            thead { tr { th { "Run" } @for column in &overview.metrics { th { (column.label) } } } }
             tbody {
                 @for (place, (run, numbers)) in rows.iter().enumerate() {
                     @if !run.group.is_empty() && (place == 0 || rows[place - 1].0.group != run.group) {
