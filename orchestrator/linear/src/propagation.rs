@@ -80,6 +80,9 @@ struct Rows<'a> {
     put_in: Option<usize>,
     /// Delay of each component's inputs.
     delays: Vec<Vec<Steps>>,
+    /// Steps of each continuous component from one change of its inputs to the next, with the share
+    /// of its communication step at which they begin.
+    parts: Vec<Vec<(f64, Step)>>,
     /// Inputs of each component at its last steps, the newest first.
     history: Vec<Vec<Matrix>>,
     /// Number of communication steps for which what arrives at the opened signals is held.
@@ -122,6 +125,19 @@ impl Net {
         let step = model.every as f64 * self.length;
         let inputs = 0..model.inputs.len();
         inputs.map(|input| Steps::of(own + more(input).unwrap_or(0.0), step)).collect()
+    }
+
+    /// Returns the steps of a continuous component from one change of its delayed inputs to the
+    /// next, with the share of its communication step at which each begins.
+    fn parts(&self, component: &Component, delays: &[Steps]) -> Vec<(f64, Step)> {
+        let Dynamics::Continuous(system) = &component.dynamics else { return Vec::new() };
+        let length = component.every as f64 * self.length;
+        let mut ends: Vec<f64> = delays.iter().map(|delay| delay.part).collect();
+        ends.extend([0.0, 1.0]);
+        ends.sort_by(f64::total_cmp);
+        ends.dedup();
+        let parts = ends.windows(2);
+        parts.map(|part| (part[0], system.step((part[1] - part[0]) * length))).collect()
     }
 
     /// Returns the open loop.
@@ -209,6 +225,7 @@ impl<'a> Rows<'a> {
             before: Vec::new(),
             arriving: Matrix::zeros(net.signals.len(), columns),
             put_in: None,
+            parts: net.components.iter().zip(&delays).map(|(one, d)| net.parts(one, d)).collect(),
             delays,
             history: Vec::new(),
             held: delay.map_or(1, |delay| delay.held),
@@ -325,18 +342,12 @@ impl<'a> Rows<'a> {
                 (&step.a * state + &step.b * &acting, &step.c * state + &step.d * &acting)
             }
             Dynamics::Continuous(system) => {
-                let length = model.every as f64 * self.net.length;
-                let mut ends: Vec<f64> = delays.iter().map(|delay| delay.part).collect();
-                ends.push(1.0);
-                ends.sort_by(f64::total_cmp);
-                ends.dedup();
-                let (mut state, mut from) = (state.clone(), 0.0);
+                let mut state = state.clone();
                 let mut output = Matrix::zeros(system.c.nrows(), self.columns);
-                for end in ends.into_iter().filter(|end| *end > 0.0) {
-                    let (step, acting) = (system.step((end - from) * length), acting(from));
+                for (from, step) in &self.parts[component] {
+                    let acting = acting(*from);
                     output = &step.c * &state + &step.d * &acting;
                     state = &step.a * &state + &step.b * &acting;
-                    from = end;
                 }
                 (state, output)
             }
