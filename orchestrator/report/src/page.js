@@ -96,8 +96,8 @@ class Panel {
       if (path.style.display === "none" || at < points[0][0] || at > points[points.length - 1][0]) continue;
       let low = 0, high = points.length - 1;
       while (high - low > 1) { const middle = (low + high) >> 1; if (points[middle][0] <= at) low = middle; else high = middle; }
-      const y = at - points[low][0] < points[high][0] - at ? points[low][1] : points[high][1];
-      found.push([path.dataset.name, this.value(y, 1)]);
+      const [[x, y], [next, other]] = [points[low], points[high]];
+      found.push([path.dataset.name, this.value(next > x ? y + ((other - y) * (at - x)) / (next - x) : y, 1)]);
     }
     return found;
   }

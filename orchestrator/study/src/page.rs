@@ -59,7 +59,7 @@ pub(crate) fn page(
                         h2 { "What was compared" }
                         @for paragraph in paragraphs(&study.summary) { p { (paragraph) } }
                     }
-                    (figures(results, drawn))
+                    @if has_more_figures(results) { (figures(results, drawn)) }
                     section id="tables" {
                         h2 { "Numbers" }
                         @for (title, table) in tables { details { summary { h3 { (title) } } div.scroll { (table) } } }
@@ -151,6 +151,11 @@ fn caption(figure: &Figure) -> Markup {
     }
 }
 
+/// Returns whether there are figures besides the one on the first screen.
+fn has_more_figures(results: &Results) -> bool {
+    results.study.figures.len() > 1
+}
+
 /// Returns the section of the page that holds the other figures, folded.
 fn figures(results: &Results, drawn: &[figure::Figure]) -> Markup {
     let first = lead_figure(results);
@@ -229,7 +234,7 @@ fn sections(results: &Results) -> impl Iterator<Item = (&'static str, &'static s
     let sections = [
         ("claims", "Claims", study.claims.is_empty()),
         ("about", "What was compared", study.summary.is_empty()),
-        ("figures", "Figures", study.figures.is_empty()),
+        ("figures", "Figures", !has_more_figures(results)),
         ("tables", "Numbers", study.tables.is_empty() && study.overviews.is_empty()),
         ("scenario", "Scenario", study.scenario.is_empty()),
         ("assumptions", "Assumptions", study.assumptions.is_empty()),
