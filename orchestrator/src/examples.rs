@@ -44,7 +44,7 @@ const EXAMPLES: [(&str, [Example; 3]); 15] = [
                 "orchestrator reproduce exchange --members 2 --out out/quick",
             ],
             [
-                "Leave a core to others",
+                "Use one core only",
                 "orchestrator reproduce two-loop-smc --jobs 1 --out out/two-loop",
             ],
         ],

@@ -48,7 +48,7 @@ PROGRAM_README = """# Re-entry attitude control: the orchestrator {version}
 
 For {systems}.
 
-    {program} list                        shows experiments, studies and FMUs
+    {program} list                        shows experiments, studies, campaigns and FMUs
     {program} run crmpc-2022/crmpc-robust  flies an experiment
     {program} --help                      explains all commands
 

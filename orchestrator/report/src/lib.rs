@@ -1,5 +1,6 @@
 //! Evaluates co-simulated runs: the [`metrics`] and the [`plot`] of each run that its experiment
-//! asks for, and the figures and pages that studies and campaigns are made of.
+//! asks for, recorded runs as pictures and pages, and the figures and pages that studies and
+//! campaigns are made of.
 
 pub mod figure;
 pub mod folder;
