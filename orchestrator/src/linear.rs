@@ -190,12 +190,11 @@ fn figure(found: &Linearised, margins: &analysis::Margins) -> Result<Figure, Fai
     let sensitivity =
         line("all together", Color(0, 0, 0), Shape::Line, curves.frequency, curves.sensitivity);
     let panel = |x_label: &str, y_label: &str, log_x, curves| Panel {
-        title: String::new(),
         x_label: x_label.into(),
         y_label: y_label.into(),
         log_x,
-        x_range: None,
         curves,
+        ..Panel::default()
     };
     Ok(Figure {
         title: format!("Return ratio and sensitivity at t = {} s", rounded(found.time)),

@@ -131,12 +131,11 @@ fn figure(title: &str, open: &OpenLoop, all: &[Vec<Point>], [from, to]: [f64; 2]
             [line, dots]
         });
         Panel {
-            title: String::new(),
             x_label: "frequency, rad/s".into(),
             y_label: label.into(),
             log_x: true,
-            x_range: None,
             curves: curves.collect(),
+            ..Panel::default()
         }
     };
     Figure {

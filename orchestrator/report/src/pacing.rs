@@ -38,12 +38,11 @@ pub fn draw(
         y: histogram.iter().map(|(_, count)| *count as f64).chain([0.0]).collect(),
     };
     let panel = |y_label: &str, x_label: &str, log_x, curves| Panel {
-        title: String::new(),
         x_label: x_label.into(),
         y_label: y_label.into(),
         log_x,
-        x_range: None,
         curves,
+        ..Panel::default()
     };
     let names: Vec<String> = steps.iter().map(|(name, _)| name.clone()).collect();
     let step_curves = steps

@@ -82,7 +82,7 @@ class Panel {
   // Lines with their points in coordinates of the whole range, read once.
   lines() {
     this.read ??= [...this.curves.querySelectorAll("path[data-name][fill=none]:not(.limit)")].map((path) => {
-      const values = path.getAttribute("d").slice(1).split(/[l ]/).map(Number), points = [];
+      const values = path.getAttribute("d").match(/-?[\d.]+/g).map(Number), points = [];
       for (let k = 0, x = 0, y = 0; k + 1 < values.length; k += 2) points.push([(x += values[k]), (y += values[k + 1])]);
       return { path, points };
     });

@@ -79,12 +79,10 @@ impl Curves {
         }
         let unit = if panel.unit.is_empty() { String::new() } else { format!(", {}", panel.unit) };
         figure::Panel {
-            title: String::new(),
             x_label: "time, s".into(),
             y_label: format!("{}{unit}", panel.label),
-            log_x: false,
-            x_range: None,
             curves,
+            ..figure::Panel::default()
         }
     }
 

@@ -86,6 +86,8 @@ pub struct Panel {
     pub unit: Option<Scaled>,
     /// Range of the horizontal axis to show, from and to.
     pub x_range: Option<[f64; 2]>,
+    /// Range of the vertical axis to show, from and to: the same in panels that are compared.
+    pub y_range: Option<[f64; 2]>,
 }
 
 /// A curve with a name and a colour of its own.
@@ -158,9 +160,6 @@ pub struct Through {
     /// Ids of the runs that the line connects, in this order.
     #[schemars(with = "Vec<String>")]
     pub runs: Vec<Spanned<String>>,
-    /// Whether the line is dashed.
-    #[serde(default)]
-    pub dashed: bool,
 }
 
 /// A straight line across a panel.

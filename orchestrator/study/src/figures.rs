@@ -122,6 +122,7 @@ fn panel(figure: &Figure, panel: &Panel, results: &Results) -> Result<figure::Pa
         y_label: panel.label.clone(),
         log_x: panel.histogram.is_some() || panel.response == Some(Response::Sensitivity),
         x_range: panel.x_range,
+        y_range: panel.y_range,
         curves,
     })
 }
@@ -177,8 +178,7 @@ fn through(across: &Across, line: &Through, results: &Results) -> Result<Curve, 
         line.runs.iter().map(mean).collect::<Result<Vec<_>, String>>()
     };
     let (x, y) = (along(&across.x)?, along(&across.y)?);
-    let shape = if line.dashed { Shape::Dashed } else { Shape::Line };
-    Ok(Curve { name: line.label.clone(), color: line.color, shape, x, y })
+    Ok(Curve { name: line.label.clone(), color: line.color, shape: Shape::Line, x, y })
 }
 
 /// Returns the curves that a panel draws for a run, each with its signal, name and colour.

@@ -88,16 +88,14 @@ pub(super) fn draw(
                 let unit =
                     if panel.unit.is_empty() { String::new() } else { format!(", {}", panel.unit) };
                 drawn.push(figure::Panel {
-                    title: String::new(),
                     x_label: "time, s".into(),
                     y_label: format!("{} {}{unit}", panel.label, curve.name),
-                    log_x: false,
-                    x_range: None,
                     curves: vec![
                         line("5 % to 95 %", BAND, Shape::Band(high), time, low),
                         line("median", BAND, Shape::Line, time, median),
                         line(&format!("case {worst}"), WORST, Shape::Line, &bad.time, worst_values),
                     ],
+                    ..figure::Panel::default()
                 });
             }
             place += 1;

@@ -33,14 +33,7 @@ fn curve(name: &str, color: Color, shape: Shape, x: Vec<f64>, y: Vec<f64>) -> Cu
 }
 
 fn panel(x_label: &str, y_label: &str, curves: Vec<Curve>) -> Panel {
-    Panel {
-        title: String::new(),
-        x_label: x_label.into(),
-        y_label: y_label.into(),
-        log_x: false,
-        x_range: None,
-        curves,
-    }
+    Panel { x_label: x_label.into(), y_label: y_label.into(), curves, ..Panel::default() }
 }
 
 /// Draws the histogram and the empirical distribution of each measure.

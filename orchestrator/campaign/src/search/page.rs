@@ -65,7 +65,7 @@ fn limit_line(limit: f64) -> Curve {
 
 fn panel(title: &str, x_label: &str, y_label: String, curves: Vec<Curve>) -> Panel {
     let (title, x_label) = (title.to_string(), x_label.to_string());
-    Panel { title, x_label, y_label, log_x: false, x_range: None, curves }
+    Panel { title, x_label, y_label, curves, ..Panel::default() }
 }
 
 /// Draws the values that were tried, and the largest one so far.

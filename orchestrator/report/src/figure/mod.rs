@@ -75,7 +75,7 @@ pub struct Figure {
 }
 
 /// One pair of axes with its curves.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Panel {
     /// Heading of the panel, possibly empty.
     pub title: String,
@@ -87,6 +87,8 @@ pub struct Panel {
     pub log_x: bool,
     /// Range of the horizontal axis that is shown at first.
     pub x_range: Option<[f64; 2]>,
+    /// Range of the vertical axis that is shown at first.
+    pub y_range: Option<[f64; 2]>,
     /// Curves of the panel; the first one is drawn lowest.
     pub curves: Vec<Curve>,
 }
@@ -170,7 +172,7 @@ impl Panel {
 
     /// Returns the range of values along one axis, with a margin for drawing.
     pub fn range(&self, along_x: bool) -> (f64, f64) {
-        if along_x && let Some([low, high]) = self.x_range {
+        if let Some([low, high]) = if along_x { self.x_range } else { self.y_range } {
             return (low, high);
         }
         let Some((low, high)) = self.extent(along_x) else {
@@ -201,14 +203,7 @@ mod tests {
     }
 
     fn panel(curves: Vec<Curve>) -> Panel {
-        Panel {
-            title: String::new(),
-            x_label: String::new(),
-            y_label: String::new(),
-            log_x: false,
-            x_range: None,
-            curves,
-        }
+        Panel { curves, ..Panel::default() }
     }
 
     #[test]

@@ -26,7 +26,7 @@ const SAMPLE: f64 = 56.0;
 
 /// Colours of a file, which a page replaces. Text keeps its size on every screen.
 const STYLE: &str = "text{font-family:sans-serif;font-size:13px;fill:#1c2530}.title{font-size:17px}.small{font-size:12px}\
-.axis{stroke:#5b6875;fill:none}.grid{stroke:#e1e5e9;fill:none}.paper{fill:#fff}.ink{stroke:#1c2530}.limit{stroke:#5b6875}.limit-name{fill:#5b6875}";
+.axis{stroke:#5b6875;fill:none}.grid{stroke:#e1e5e9;fill:none}.paper{fill:#fff}.ink{stroke:#1c2530}.limit{stroke:#5b6875}.limit-name{fill:#5b6875;stroke:#fff;stroke-width:3px;paint-order:stroke}";
 
 /// Writes a figure to a file.
 ///

@@ -50,12 +50,10 @@ fn drawn(runs: &[Recording], names: &[String], panel: &Panel) -> figure::Panel {
     let parts = [symbols(&panel.label), panel.unit.clone()];
     let parts: Vec<String> = parts.into_iter().filter(|part| !part.is_empty()).collect();
     figure::Panel {
-        title: String::new(),
         x_label: "time, s".into(),
         y_label: parts.join(", "),
-        log_x: false,
-        x_range: None,
         curves,
+        ..figure::Panel::default()
     }
 }
 

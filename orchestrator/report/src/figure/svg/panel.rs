@@ -248,22 +248,21 @@ fn name_lines(out: &mut String, panel: &Panel, axes: &Axes) {
     }
 }
 
-/// Returns a line through points as the data of a path, in tenths of a pixel and relative to the
-/// point before.
-fn path(points: &[(f64, f64)]) -> String {
-    let mut data = String::new();
-    let mut last = (0, 0);
-    for (place, (x, y)) in points.iter().enumerate() {
-        let next = ((x * 10.0).round() as i64, (y * 10.0).round() as i64);
-        let tenth = |value: i64| value as f64 / 10.0;
-        let (dx, dy) = (tenth(next.0 - last.0), tenth(next.1 - last.1));
-        let _ = match place {
-            0 => write!(data, "M{} {}", tenth(next.0), tenth(next.1)),
-            _ if next == last => Ok(()),
-            1 => write!(data, "l{dx} {dy}"),
-            _ => write!(data, " {dx} {dy}"),
-        };
-        last = next;
+/// Returns a line through points as the data of a path, in fifths of a pixel and relative to the
+/// point before, as short as it can be said.
+pub(super) fn path(points: &[(f64, f64)]) -> String {
+    let fifths = |value: i64| (value as f64 / 5.0).to_string();
+    let mut places =
+        points.iter().map(|(x, y)| ((x * 5.0).round() as i64, (y * 5.0).round() as i64));
+    let Some(mut last) = places.next() else { return String::new() };
+    let mut data = format!("M{} {}", fifths(last.0), fifths(last.1));
+    let mut separator = "l";
+    for next in places {
+        if next != last {
+            let (dx, dy) = (fifths(next.0 - last.0), fifths(next.1 - last.1));
+            let _ = write!(data, "{separator}{dx} {dy}");
+            (last, separator) = (next, " ");
+        }
     }
-    data
+    data.replace("l0.", "l.").replace(" 0.", " .").replace("-0.", "-.").replace(" -", "-")
 }

@@ -6,9 +6,9 @@ fn figure(curves: Vec<Curve>, x_range: Option<[f64; 2]>) -> Figure {
         title: "<t>".into(),
         x_label: "time, s".into(),
         y_label: "y".into(),
-        log_x: false,
         x_range,
         curves,
+        ..Panel::default()
     };
     Figure { title: "a & b".into(), columns: 1, legend: Legend::Above, panels: vec![panel] }
 }
@@ -31,7 +31,14 @@ fn what_lies_outside_the_range_is_not_drawn() {
     let [data] = paths(&text, "c")[..] else { panic!("{text}") };
     // One point to begin with and one step from it.
     assert_eq!((data.matches('M').count(), data.matches('l').count()), (1, 1), "{data}");
-    assert_eq!(data.split(['l', ' ']).count(), 4, "{data}");
+    assert_eq!(data.split(['l', ' ', '-']).count(), 4, "{data}");
+}
+
+#[test]
+fn a_path_is_short_and_leaves_out_points_on_one_another() {
+    let points = [(0.0, 0.0), (0.05, 0.0), (10.0, -0.3), (10.4, 0.0), (10.4, 10.5)];
+    assert_eq!(panel::path(&points), "M0 0l10-.4 .4 .4 0 10.6");
+    assert_eq!(panel::path(&[]), "");
 }
 
 #[test]
