@@ -222,6 +222,50 @@ def test_the_margins_of_a_law_that_is_replanned_are_those_of_its_period():
     assert any("repeat after 5 steps of 0.04 s" in note for note in found["notes"])
 
 
+@pytest.mark.parametrize(("law", "step"), [("LQR", 0.001), ("LQR", 0.002), ("CRMPC", 0.005)])
+def test_oracle_margins_do_not_depend_on_the_communication_step(law, step):
+    """The controllers sample with periods of their own, and act at once."""
+    command = ["margins", FOLDER / "margins" / "rest.toml", "--fmu", f"controller={law}.fmu", "--json"]
+    whole, fine = (json.loads(call(*command, *more)) for more in ((), ("--step", str(step))))
+    for one, other in zip([*whole["loops"], whole["together"]], [*fine["loops"], fine["together"]]):
+        for margin in ("gain_above", "gain_below", "phase", "delay"):
+            a, b = (row["classical"][margin] for row in (one, other))
+            # A delay beyond what is looked at is not found.
+            if margin == "delay" and b is None:
+                assert a["value"] > other["classical"]["longest_delay"] == 200 * step
+            else:
+                assert (a is None) == (b is None) and (a is None or b["value"] == pytest.approx(a["value"], rel=1e-4)), margin
+        assert other["disk"]["alpha"] == pytest.approx(one["disk"]["alpha"], rel=1e-4)
+        assert other["sensitivity"]["value"] == pytest.approx(one["sensitivity"]["value"], rel=1e-3)
+
+
+def test_a_signal_has_the_same_margins_whatever_else_is_opened():
+    command = ["margins", FOLDER / "margins" / "rest.toml", "--fmu", "controller=LQR.fmu", "--json"]
+    alone, beside = (json.loads(call(*command, "--open", SIGNALS, *more)) for more in ((), ("--open", "plant.rate.*")))
+    for one, other in zip(alone["loops"], beside["loops"]):
+        assert other["signal"] == one["signal"]
+        for margin in ("gain_above", "phase", "delay"):
+            assert other["classical"][margin]["value"] == pytest.approx(one["classical"][margin]["value"], rel=1e-6), margin
+    # N m and rad/s are compared in their typical magnitudes.
+    assert beside["together"]["sensitivity"]["value"] < 10.0
+
+
+@pytest.mark.parametrize(
+    ("experiment", "arguments", "code", "problem"),
+    [
+        # While the plan turns at a limit, no step is like another; nor does a period of 0.2 s show in 50 steps.
+        ("crmpc-2022/crmpc-robust.toml", ("--at", "1", "--open", SIGNALS), 1, "do not repeat within 25 steps"),
+        ("margins/rest.toml", ("--fmu", "controller=CRMPC.fmu", "--step", "0.002"), 1, "do not repeat within 50 steps"),
+        ("margins/allocated.toml", ("--fmu", "controller=FBL.fmu", "--at", "0"), 1, "off the response to a change within 1 s"),
+        ("entry/from-120km.toml", ("--at", "1900", "--open", SIGNALS), 2, "needs its motion until t = 190"),
+    ],
+)
+def test_where_there_is_no_linear_model_none_is_given(experiment, arguments, code, problem):
+    command = [program("orchestrator"), "margins", FOLDER / experiment, "--fmu-dir", TARGET / "fmu", *arguments]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=120)
+    assert done.returncode == code and problem in done.stderr and done.stdout == "", done.stderr
+
+
 @pytest.mark.parametrize("law", ["LQR", "CRMPC", "TwoLoopSMC"])
 def test_oracle_the_loop_in_flight_has_the_frequency_response_of_the_model(law, tmp_path):
     plot = tmp_path / "response.svg"

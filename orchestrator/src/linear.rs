@@ -232,7 +232,10 @@ fn print(margins: &analysis::Margins, out: &mut impl Write) -> Result<(), Failur
             out,
             "{signal:<24} {gain:>16} {:>10} {:>10} {:>7.3} {:>11.3} {:>7.3}",
             shown(classical.phase, 2),
-            shown(classical.delay, 4),
+            classical.delay.map_or_else(
+                || format!("> {:.3}", classical.longest_delay),
+                |crossing| format!("{:.4}", crossing.value)
+            ),
             disk.alpha,
             disk.frequency,
             sensitivity.value

@@ -3,8 +3,7 @@
 use crate::Matrix;
 use crate::frequency::return_ratio;
 use crate::linearise::Linearised;
-use crate::margins::disk::{Responses, sensitivity};
-use crate::margins::structured::largest_singular_value;
+use crate::margins::disk::{Responses, largest_gain, sensitivity};
 use crate::spectrum::spectral_radius;
 use nalgebra::Complex;
 use serde::{Deserialize, Serialize};
@@ -49,9 +48,10 @@ impl ResponseCurves {
         let ratios: Vec<Complex<f64>> =
             frequency.iter().map(|w| return_ratio(open, worst, *w)).collect();
         let count = open.channels();
+        let all: Vec<usize> = (0..count).collect();
         let s = frequency.iter().map(|w| {
             let s = sensitivity(open, *w);
-            largest_singular_value(&s.view((0, 0), (count, count)).into_owned())
+            largest_gain(open, &all, s.view((0, 0), (count, count)).into_owned())
         });
         Some(Self {
             sensitivity: s.map(decibel).collect(),

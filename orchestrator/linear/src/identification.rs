@@ -13,8 +13,11 @@ use cosim::wiring::Port;
 use fmu_import::instance::{CallFailure, Instance};
 use fmu_import::quantity::rounded;
 
-/// Longest period of a component that is looked for, in its steps, and in s.
-const LONGEST: usize = 25;
+/// Longest period of a component that is looked for: a time in s, but so many of its steps at least
+/// and at most.
+const LONGEST_PERIOD: f64 = 0.25;
+const LONGEST: [usize; 2] = [25, 50];
+/// Time over which responses are looked at, s. It limits the longest period, too.
 const LONGEST_TIME: f64 = 1.0;
 /// Least number of steps whose responses a model reproduces twice over.
 const BLOCKS: usize = 24;
@@ -24,12 +27,15 @@ const COMPARED: usize = 6;
 /// in relation to the least difference that any period leaves.
 const EQUAL: f64 = 1e-6;
 const AS_EQUAL: f64 = 3.0;
-/// Difference of two periods, relative to the largest response, from which nothing repeats itself,
-/// and from which it is told.
+/// Difference of two periods, relative to the largest response, from which nothing repeats itself
+/// and there is no model, and from which it is told.
 const REPEATS: f64 = 0.1;
 const DRIFTS: f64 = 0.01;
 /// Changes of an input that are tried, in relation to its typical magnitude.
 const CHANGES: [f64; 3] = [1e-5, 1e-7, 1e-9];
+/// Difference between a model and the response over `LONGEST_TIME`, relative to the largest
+/// response of a variable, from which the model does not describe the motion.
+const DEVIATES: f64 = 0.05;
 /// What a state of a model must add to the responses, relative to the largest.
 const SMALLEST: f64 = 1e-9;
 /// The same for a pair. An allocator ends its iterations anywhere near the optimum, and what the
@@ -60,7 +66,8 @@ fn compared_steps(length: f64) -> usize {
 }
 
 fn longest_period(length: f64) -> usize {
-    ((LONGEST_TIME / length + 1e-9) as usize).clamp(1, LONGEST)
+    let steps = |time: f64| (time / length + 1e-9) as usize;
+    steps(LONGEST_PERIOD).clamp(LONGEST[0], LONGEST[1]).min(steps(LONGEST_TIME)).max(1)
 }
 
 /// Builds the model of a component.
@@ -122,6 +129,11 @@ impl Builder<'_> {
         components.into_iter().any(|one| one.fmu.description.states().next().is_some())
     }
 
+    /// Returns what counts in its responses, in relation to the largest.
+    fn smallest(&self) -> f64 {
+        if self.components.len() > 1 { SMALLEST_OF_PAIR } else { SMALLEST }
+    }
+
     fn scales(&self) -> Scales {
         Scales {
             inputs: self.inputs.iter().map(|port| self.scale(port)).collect(),
@@ -156,14 +168,14 @@ impl Builder<'_> {
         let mut best: Option<(f64, usize, f64)> = None;
         let mut trials: Vec<Response> = Vec::new();
         for change in CHANGES {
-            // A change that leaves next to nothing is as good as any. Of the others one response tells
-            // whether the component is smooth.
+            // A change that leaves next to nothing is as good as any. Of the others one response
+            // tells whether the component is smooth.
             let is_found = best.is_some_and(|(_, _, least)| least <= EQUAL);
             let short: Vec<Response> = (0..if is_found { 1 } else { 2 * longest })
                 .map(|first| probe(change).responses(instance, first, COMPARED))
                 .collect::<Result<_, _>>()?;
             if !is_found {
-                let (period, difference) = period(&short, longest);
+                let (period, difference) = period(&short, longest, self.smallest());
                 let worst = short.iter().map(|response| response.error).fold(difference, f64::max);
                 if best.is_none_or(|(_, _, least)| worst < least) {
                     best = Some((change, period, worst));
@@ -180,8 +192,17 @@ impl Builder<'_> {
             .collect::<Result<_, _>>()?;
         let error = phases.iter().map(|phase| phase.error).fold(0.0, f64::max);
         let drift = difference(&phases, period);
-        let smallest = if self.components.len() > 1 { SMALLEST_OF_PAIR } else { SMALLEST };
-        let tolerance = smallest.max(drift).max(error * 10.0);
+        if drift > REPEATS {
+            return Err(CallFailure::new(
+                "linearise",
+                format!(
+                    "responses to a change of its inputs do not repeat within {longest} steps of {} s, but differ by {:.0} %: it has no linear model of such a period here",
+                    self.recorded.length,
+                    1e2 * drift
+                ),
+            ));
+        }
+        let tolerance = self.smallest().max(drift).max(error * 10.0);
         let realised = |lags: &dyn Fn(&Response) -> &Lags| {
             let lags: Vec<Lags> =
                 phases[..period].iter().map(|phase| lags(phase).clone()).collect();
@@ -191,13 +212,13 @@ impl Builder<'_> {
             let count = compared_steps(self.recorded.length);
             let measured = probe(change).responses(instance, 0, count)?;
             let deviation = deviation(&realised(&|phase| &phase.central), &measured.central);
-            if deviation > AT_LENGTH {
+            if deviation > DEVIATES {
                 return Err(CallFailure::new(
                     "linearise",
                     format!(
-                        "steps of {} s show too little of the motion: the model is {:.0} % off the response to a change within {LONGEST_TIME} s. The experiment needs a longer step",
-                        self.recorded.length,
-                        1e2 * deviation
+                        "a linear model is {:.0} % off the response to a change within {LONGEST_TIME} s: steps of {} s show too little of the motion, or it is not linear here",
+                        1e2 * deviation,
+                        self.recorded.length
                     ),
                 ));
             }
@@ -215,7 +236,7 @@ impl Builder<'_> {
         let Dynamics::Sampled(steps) = &found.dynamics else { unreachable!("built above") };
         let states = steps.iter().map(|step| step.a.ncols()).max().unwrap_or(0);
         let mut note = format!(
-            "{}: responses to changes of its inputs, which repeat after {period} steps of {} s, {states} states",
+            "{}: responses to changes of inputs, which repeat after {period} steps of {} s, {states} states",
             found.name, self.recorded.length
         );
         if drift > DRIFTS {
@@ -333,14 +354,13 @@ fn difference(phases: &[Response], period: usize) -> f64 {
 }
 
 /// Finds the period after which the responses repeat, in steps, and the difference that it leaves.
-fn period(responses: &[Response], longest: usize) -> (usize, f64) {
+/// Differences up to `noise` do not count.
+fn period(responses: &[Response], longest: usize, noise: f64) -> (usize, f64) {
     let differences: Vec<f64> =
         (1..=longest).map(|period| difference(&responses[..longest + period], period)).collect();
     let least = differences.iter().copied().fold(f64::INFINITY, f64::min);
-    let equal = EQUAL.max(AS_EQUAL * least);
-    // Nothing repeats itself if the least difference is a large one.
-    let place = differences.iter().position(|difference| *difference <= equal);
-    let place = place.filter(|_| least < REPEATS).unwrap_or(0);
+    let equal = EQUAL.max(noise).max(AS_EQUAL * least);
+    let place = differences.iter().position(|difference| *difference <= equal).unwrap_or(0);
     (place + 1, differences[place])
 }
 

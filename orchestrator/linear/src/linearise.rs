@@ -1,11 +1,13 @@
 //! From an experiment to the linear model of its loop at an instant.
 
+use crate::Matrix;
 use crate::components::Component;
 use crate::identification::{Builder, Found, needed_steps};
 use crate::model::{OpenLoop, Signal};
 use crate::pair::{Joined, Pair};
 use crate::propagation::{Link, Net};
 use crate::replay::Recorded;
+use crate::spectrum::spectral_radius;
 use cosim::clock::Clock;
 use cosim::delay::Reading;
 use cosim::error::Error;
@@ -14,9 +16,15 @@ use cosim::master::Master;
 use cosim::system::System;
 use cosim::wiring::{Port, Wire};
 use fmu_import::description::{Carrier, VariableKind};
+use fmu_import::instance::CallFailure;
 use fmu_import::quantity::rounded;
 use fmu_import::warnings;
 use std::ops::Range;
+
+/// Growth of a closed loop with a pair that is not told from none, and growth of the open loop that
+/// a vehicle does not have, 1/s.
+const SLOWEST_GROWTH: f64 = 0.1;
+const OWN_GROWTH: f64 = 1.0;
 
 /// The loop of an experiment at an instant.
 #[derive(Clone, Debug)]
@@ -76,7 +84,15 @@ pub fn linearise(
     let mut master = lineariser.system.start(interrupt)?;
     let found = lineariser.linearise(&mut master, interrupt);
     drop(collection);
-    found
+    found.map_err(|error| match error {
+        Error::EndedByInstance { .. } => {
+            let end = rounded(lineariser.system.clock.time(lineariser.ticks.end));
+            Error::experiment(format!(
+                "{error}, but a linear model needs its motion until t = {end} s"
+            ))
+        }
+        error => error,
+    })
 }
 
 impl Lineariser {
@@ -144,14 +160,14 @@ impl Lineariser {
         let recorded = record(system, wired, ticks.clone(), master)?;
         let _silence = warnings::silence();
         let mut found: Vec<Found> = Vec::new();
-        let mut next = 0;
+        let (mut next, mut has_pair) = (0, false);
         while next < wired.len() {
             if let Some(request) = interrupt.asked() {
                 return Err(Error::Interrupted { time: *time, request });
             }
             if let Some(pair) = self.pair(next, &recorded, master)? {
                 found.push(pair);
-                next += 2;
+                (next, has_pair) = (next + 2, true);
             } else {
                 found.push(self.alone(next, &recorded[next], master)?);
                 next += 1;
@@ -180,6 +196,19 @@ impl Lineariser {
                 rounded(*time),
                 open.signals[0].name
             )));
+        }
+        if let Some(growth) = noise(&open).filter(|_| has_pair) {
+            let names: Vec<&str> = models.iter().map(|model| model.name.as_str()).collect();
+            return Err(Error::Call {
+                component: names.join(" with "),
+                time: *time,
+                failure: CallFailure::new(
+                    "linearise",
+                    format!(
+                        "whether the loop is stable cannot be told, as the allocator's noise hides a growth of {growth:.1e}/s"
+                    ),
+                ),
+            });
         }
         let notes = found.into_iter().map(|found| found.note).collect();
         Ok(Linearised { time: *time, net, sides, open, notes })
@@ -249,6 +278,16 @@ impl Lineariser {
         })?;
         Ok(Some(found).filter(|found| found.sides.is_none()))
     }
+}
+
+/// Returns the growth, 1/s, of a closed loop with a pair if noise alone may make it unstable: a
+/// model of a pair may have motions that grow by themselves, and does not tell a very slow growth
+/// from none.
+fn noise(open: &OpenLoop) -> Option<f64> {
+    let growth = |a: &Matrix| spectral_radius(a).ln() / open.period;
+    let closed = open.closed(&vec![1.0; open.channels()]).map(|a| growth(&a))?;
+    let is_own = || growth(&open.step.a) > OWN_GROWTH;
+    (closed >= 0.0 && (closed < SLOWEST_GROWTH || is_own())).then_some(closed)
 }
 
 /// Finds the components that respond to others. The inputs of each are seen at every communication
@@ -376,6 +415,7 @@ fn opened(system: &System, patterns: &[String]) -> Result<(Vec<Signal>, Vec<Port
     }
     let signal = |port: &Port| Signal {
         name: system.name(*port),
+        size: system.variable_at(*port).nominal(),
         unit: match &system.variable_at(*port).kind {
             VariableKind::Real { unit: Some(unit), .. } => unit.clone(),
             _ => String::new(),

@@ -23,6 +23,9 @@ pub struct Signal {
     pub name: String,
     /// Unit of the variable, or an empty text.
     pub unit: String,
+    /// Typical magnitude of the variable, by which signals of different units are compared.
+    #[serde(skip)]
+    pub size: f64,
 }
 
 /// The open loop over one common period of its components: from what is put in at the opened

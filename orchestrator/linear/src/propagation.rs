@@ -95,17 +95,23 @@ impl Net {
         self.components.iter().map(Component::period).fold(1, lcm)
     }
 
-    /// Returns whether every component that receives an opened signal is continuous, so that a
-    /// delay may be any part of a step.
-    pub fn takes_parts(&self) -> bool {
-        let mut targets = self.links.iter().filter(|link| link.opened.is_some());
-        targets.all(|link| matches!(self.components[link.to.0].dynamics, Dynamics::Continuous(_)))
+    /// Returns the components that receive an opened signal, or any of them.
+    fn receivers(&self, channel: Option<usize>) -> impl Iterator<Item = &Component> {
+        let is_meant = move |opened: usize| channel.is_none_or(|channel| channel == opened);
+        let links = self.links.iter().filter(move |link| link.opened.is_some_and(is_meant));
+        links.map(|link| &self.components[link.to.0])
     }
 
-    /// Returns the time between two steps of the components that receive opened signals, s.
-    pub fn receiving_step(&self) -> f64 {
-        let targets = self.links.iter().filter(|link| link.opened.is_some());
-        let every = targets.map(|link| self.components[link.to.0].every).max().unwrap_or(1);
+    /// Returns whether every component that receives an opened signal, or any of them, is
+    /// continuous, so that a delay may be any part of a step.
+    pub fn takes_parts(&self, channel: Option<usize>) -> bool {
+        self.receivers(channel).all(|one| matches!(one.dynamics, Dynamics::Continuous(_)))
+    }
+
+    /// Returns the time between two steps of the components that receive an opened signal, or any
+    /// of them, s.
+    pub fn receiving_step(&self, channel: Option<usize>) -> f64 {
+        let every = self.receivers(channel).map(|one| one.every).max().unwrap_or(1);
         every as f64 * self.length
     }
 

@@ -43,6 +43,8 @@ pub struct Classical {
     pub phase: Option<Crossing>,
     /// Least delay in addition, s.
     pub delay: Option<Crossing>,
+    /// Longest delay that was looked at, s.
+    pub longest_delay: f64,
 }
 
 /// Looks at one signal, or at all of them changed in the same way.
@@ -57,7 +59,7 @@ pub(super) fn classical(net: &Net, open: &OpenLoop, channel: Option<usize>) -> C
         let turned = |i: usize| channel.is_none_or(|c| c == i);
         turned_loop(open, &|i| if turned(i) { turn } else { Complex::new(1.0, 0.0) })
     };
-    let (step, takes_parts) = (net.receiving_step(), net.takes_parts());
+    let (step, takes_parts) = (net.receiving_step(channel), net.takes_parts(channel));
     let whole = |steps: f64| if takes_parts { steps } else { steps.floor() };
     let held = (open.sampling() / net.length).round() as u64;
     let by_delay =
@@ -80,6 +82,7 @@ pub(super) fn classical(net: &Net, open: &OpenLoop, channel: Option<usize>) -> C
         gain_below: gain(-1.0),
         phase,
         delay: delay.map(|found| Crossing { value: whole(found.value) * step, ..found }),
+        longest_delay: LONGEST_DELAY * step,
     }
 }
 

@@ -88,9 +88,10 @@ impl<'a> Responses<'a> {
         Disk::new(self.peak(channels, &bound, &|s| upper_bound(&shifted(s))))
     }
 
-    /// Returns the largest singular value of the sensitivity of some signals.
+    /// Returns the largest singular value of the sensitivity of some signals, in ascending order,
+    /// each in its typical magnitude.
     pub fn sensitivity(&self, channels: &[usize]) -> Peak {
-        let value = |s: ComplexMatrix| largest_singular_value(&s);
+        let value = |s| largest_gain(self.open, channels, s);
         self.peak(channels, &value, &value)
     }
 
@@ -137,6 +138,17 @@ impl<'a> Responses<'a> {
             Peak { value: found, frequency }
         }
     }
+}
+
+/// Returns the largest singular value of a response of some signals, in ascending order, to
+/// themselves, each in its typical magnitude.
+pub(crate) fn largest_gain(open: &OpenLoop, channels: &[usize], mut s: ComplexMatrix) -> f64 {
+    for place in 0..s.nrows() {
+        let size = open.signals[channels[place % channels.len()]].size;
+        s.row_mut(place).unscale_mut(size);
+        s.column_mut(place).scale_mut(size);
+    }
+    largest_singular_value(&s)
 }
 
 /// Returns the sensitivity S = (I − G)⁻¹ of the open loop G = −L at a frequency (rad/s), with the

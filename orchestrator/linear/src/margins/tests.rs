@@ -73,7 +73,7 @@ fn double_integrators(axes: usize, delay: f64, per_step: u64) -> Net {
         first: 0,
         length: STEP / per_step as f64,
         signals: (0..axes)
-            .map(|i| Signal { name: format!("plant.u[{i}]"), unit: String::new() })
+            .map(|i| Signal { name: format!("plant.u[{i}]"), unit: String::new(), size: 1.0 })
             .collect(),
     }
 }
