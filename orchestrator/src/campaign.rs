@@ -30,8 +30,6 @@ pub(crate) struct Common {
     /// Experiment that replaces that of the campaign: a file, or the name of an experiment.
     #[arg(long, value_name = "EXPERIMENT")]
     experiment: Option<PathBuf>,
-    #[command(flatten)]
-    overrides: arguments::Overrides,
     /// Folder for the results [default: out/CAMPAIGN].
     #[arg(long, value_name = "DIR", help_heading = "Results")]
     out: Option<PathBuf>,
@@ -45,13 +43,14 @@ pub(crate) struct Common {
     /// Show neither progress nor summary.
     #[arg(long)]
     quiet: bool,
+    // Its heading holds for all that would follow.
+    #[command(flatten)]
+    overrides: arguments::Overrides,
 }
 
 /// Options of `campaign`.
 #[derive(Args)]
 pub(crate) struct Fly {
-    #[command(flatten)]
-    common: Common,
     /// Write the experiment of one case to a file that `orchestrator run` takes, and run it with
     /// everything recorded.
     #[arg(long, value_name = "K", help_heading = "Part of the campaign", conflicts_with_all = ["cases", "work", "fresh", "csv"])]
@@ -77,19 +76,21 @@ pub(crate) struct Fly {
     /// Also write the results table as cases.csv.
     #[arg(long, help_heading = "Results")]
     csv: bool,
+    #[command(flatten)]
+    common: Common,
 }
 
 /// Options of `falsify`.
 #[derive(Args)]
 pub(crate) struct Falsify {
-    #[command(flatten)]
-    common: Common,
     /// Begin no further cases after this time, s.
     #[arg(long, value_name = "SECONDS", value_parser = clap::value_parser!(u64).range(1..))]
     time: Option<u64>,
     /// Replace the results of an earlier search in the folder.
     #[arg(long, help_heading = "Results")]
     force: bool,
+    #[command(flatten)]
+    common: Common,
 }
 
 fn range(text: &str) -> Result<Range<u64>, String> {

@@ -72,24 +72,24 @@ impl Instant {
 /// Arguments of `linearise`.
 #[derive(Args)]
 pub(crate) struct Linearise {
-    #[command(flatten)]
-    instant: Instant,
     /// File for the model [default: standard output].
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
+    #[command(flatten)]
+    instant: Instant,
 }
 
 /// Arguments of `margins`.
 #[derive(Args)]
 pub(crate) struct PrintMargins {
-    #[command(flatten)]
-    instant: Instant,
     /// Print JSON, for other programs.
     #[arg(long)]
     json: bool,
     /// File for a Nichols plot of the return ratio and a plot of the sensitivity (SVG).
     #[arg(long, value_name = "FILE")]
     plot: Option<PathBuf>,
+    #[command(flatten)]
+    instant: Instant,
 }
 
 /// Writes the open loop of an experiment.

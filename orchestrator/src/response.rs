@@ -21,8 +21,6 @@ const DRAWN: usize = 400;
 /// Arguments of `response`.
 #[derive(Args)]
 pub(crate) struct Response {
-    #[command(flatten)]
-    instant: Instant,
     /// Lowest frequency, rad/s.
     #[arg(long, value_name = "RAD/S", help_heading = "Sine", default_value_t = 0.3)]
     from: f64,
@@ -39,6 +37,8 @@ pub(crate) struct Response {
     /// File for a plot of both responses (SVG).
     #[arg(long, value_name = "FILE")]
     plot: Option<PathBuf>,
+    #[command(flatten)]
+    instant: Instant,
 }
 
 /// Measures the frequency response of a loop, and compares it with that of the linear model.

@@ -84,15 +84,7 @@ pub fn linearise(
     let mut master = lineariser.system.start(interrupt)?;
     let found = lineariser.linearise(&mut master, interrupt);
     drop(collection);
-    found.map_err(|error| match error {
-        Error::EndedByInstance { .. } => {
-            let end = rounded(lineariser.system.clock.time(lineariser.ticks.end));
-            Error::experiment(format!(
-                "{error}, but a linear model needs its motion until t = {end} s"
-            ))
-        }
-        error => error,
-    })
+    found
 }
 
 impl Lineariser {
@@ -157,7 +149,16 @@ impl Lineariser {
         interrupt: &Interrupt,
     ) -> Result<Linearised, Error> {
         let Self { system, time, ticks, wired, signals, opened } = self;
-        let recorded = record(system, wired, ticks.clone(), master)?;
+        let recorded =
+            record(system, wired, ticks.clone(), master).map_err(|error| match error {
+                Error::EndedByInstance { component, time, message } => {
+                    let end = rounded(system.clock.time(ticks.end));
+                    let message =
+                        format!("{message}, but a linear model needs its motion until t = {end} s");
+                    Error::Call { component, time, failure: CallFailure::new("linearise", message) }
+                }
+                error => error,
+            })?;
         let _silence = warnings::silence();
         let mut found: Vec<Found> = Vec::new();
         let (mut next, mut has_pair) = (0, false);

@@ -10,13 +10,14 @@ use cosim_report::panels::Panel;
 
 /// Number of cases that the band is made of.
 const CASES: u64 = 100;
-/// Approximate number of points of a curve.
+/// Approximate number of points of the band. The worst case has all of its own: a peak may last for
+/// a single step.
 const POINTS: u64 = 250;
 /// Largest number of panels.
 const PANELS: usize = 12;
 
-const BAND: Color = Color(31, 119, 180);
-const WORST: Color = Color(214, 39, 40);
+const BAND: Color = Color::CURVES[0];
+const WORST: Color = Color::CURVES[1];
 
 /// Values of all curves of all panels over time.
 #[derive(Default)]
@@ -61,13 +62,14 @@ pub(super) fn draw(
         return Ok(None);
     }
     let stride = (flight.system().clock.ticks() / POINTS).max(1);
-    let mut track = |case: u64| {
+    let mut track = |case: u64, stride: u64| {
         let mut watch = Watch { panels: &panels, stride, track: Track::default() };
         flight.fly_with(case, plan.sweep.values(case)?, &mut [&mut watch])?;
         Ok::<Track, Error>(watch.track)
     };
-    let bad = track(worst)?;
-    let others = (0..cases.min(CASES)).map(&mut track).collect::<Result<Vec<_>, _>>()?;
+    let bad = track(worst, 1)?;
+    let others =
+        (0..cases.min(CASES)).map(|case| track(case, stride)).collect::<Result<Vec<_>, _>>()?;
     let Some(longest) = others.iter().max_by_key(|track| track.time.len()) else { return Ok(None) };
     let time = &longest.time;
     let mut drawn = Vec::new();
