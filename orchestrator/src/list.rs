@@ -84,7 +84,7 @@ fn rows(kind: Kind, folder: Option<&Path>) -> Vec<Row> {
     let mut paths: Vec<PathBuf> = folders.flat_map(|folder| kind.below(&folder)).collect();
     paths.retain(|path| fs::canonicalize(path).is_ok_and(|path| seen.insert(path)));
     // Names are those by which the file is found from here, so that all files count.
-    let named: Vec<String> = paths.iter().map(|path| shortest(kind, path, &paths)).collect();
+    let named: Vec<String> = paths.iter().map(|path| kind.shortest(path, &paths)).collect();
     let canonical = folder.and_then(|folder| fs::canonicalize(folder).ok());
     let is_below = |path: &Path| {
         canonical
@@ -112,19 +112,6 @@ fn row(kind: Kind, path: PathBuf, name: String) -> Row {
 #[expect(clippy::needless_pass_by_value, reason = "used as a function of errors")]
 fn text(error: impl ToString) -> String {
     error.to_string()
-}
-
-/// Returns the shortest end of a file's path that no other one has, without the extension.
-fn shortest(kind: Kind, path: &Path, all: &[PathBuf]) -> String {
-    let name = kind.name(path);
-    let parts: Vec<_> = name.components().collect();
-    let ends = (0..parts.len()).rev().map(|from| parts[from..].iter().collect::<PathBuf>());
-    let is_unique = |end: &PathBuf| {
-        let file = kind.file(end);
-        all.iter().filter(|other| other.ends_with(&file)).count() == 1
-    };
-    let mut unique = ends.filter(is_unique);
-    unique.next().unwrap_or(name.clone()).display().to_string()
 }
 
 fn print(rows: &[Row], form: Form, width: usize, out: &mut impl Write) -> Result<(), Failure> {
@@ -180,10 +167,10 @@ mod tests {
         let paths =
             ["a/lqr.toml", "a/x/same.toml", "b/x/same.toml", "./lonely.toml", "/c/lonely.toml"];
         let paths = paths.map(PathBuf::from);
-        let names = paths.each_ref().map(|path| shortest(Kind::Experiment, path, &paths));
+        let names = paths.each_ref().map(|path| Kind::Experiment.shortest(path, &paths));
         assert_eq!(names, ["lqr", "a/x/same", "b/x/same", "./lonely", "c/lonely"]);
         let studies = [PathBuf::from("a/exchange/study.toml"), PathBuf::from("a/entry/study.toml")];
-        assert_eq!(shortest(Kind::Study, &studies[1], &studies), "entry");
+        assert_eq!(Kind::Study.shortest(&studies[1], &studies), "entry");
     }
 
     #[test]

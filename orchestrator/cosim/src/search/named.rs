@@ -126,6 +126,19 @@ impl Kind {
         }
     }
 
+    /// Returns the shortest end of a file's path that no other one has, without the extension.
+    pub fn shortest(self, path: &Path, all: &[PathBuf]) -> String {
+        let name = self.name(path);
+        let parts: Vec<_> = name.components().collect();
+        let ends = (0..parts.len()).rev().map(|from| parts[from..].iter().collect::<PathBuf>());
+        let is_unique = |end: &PathBuf| {
+            let file = self.file(end);
+            all.iter().filter(|other| other.ends_with(&file)).count() == 1
+        };
+        let mut unique = ends.filter(is_unique);
+        unique.next().unwrap_or(name.clone()).display().to_string()
+    }
+
     /// Returns the name of a file of this kind by its whole path.
     pub fn name(self, path: &Path) -> PathBuf {
         match self {
@@ -264,14 +277,13 @@ fn unknown(name: &Path, kinds: &[Kind]) -> Error {
         return Error::experiment(format!("{shown}: {is_what}"));
     }
     let last = |path: PathBuf| Some(path.file_name()?.to_string_lossy().into_owned());
-    let there: BTreeSet<String> = folders()
-        .iter()
-        .flat_map(|folder| {
-            kinds.iter().flat_map(|kind| {
-                kind.below(folder).into_iter().filter_map(|path| last(kind.name(&path)))
-            })
-        })
-        .collect();
+    let mut there: BTreeSet<String> = BTreeSet::new();
+    for kind in kinds {
+        let mut seen = BTreeSet::new();
+        let mut all: Vec<PathBuf> = folders().iter().flat_map(|one| kind.below(one)).collect();
+        all.retain(|path| path.canonicalize().is_ok_and(|path| seen.insert(path)));
+        there.extend(all.iter().map(|path| kind.shortest(path, &all)));
+    }
     let wrong =
         kinds.first().and_then(|kind| last(kind.name(&kind.file(name)))).unwrap_or_default();
     let hint = names::hint(&wrong, there.iter().map(String::as_str));
