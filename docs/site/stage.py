@@ -122,10 +122,10 @@ def table(key):
 def python_api(folder):
     package = (ROOT / "python" / "src" / "reentry_fmus" / "__init__.py").read_text(encoding="utf-8")
     listed = re.search(r"__all__ = \[(.*?)\]", package, re.S)[1]
-    names = re.findall(r'"(\w+)"', listed)
+    names = [*re.findall(r'"(\w+)"', listed), "environment.AttitudeEnv", "cluster.ClusterError"]
     text = "# Python API\n\nThe package `reentry_fmus`; [python.md](../docs/python.md) has the examples.\n"
     for name in names:
-        kind = "class" if name[0].isupper() else "function"
+        kind = "class" if name.split(".")[-1][0].isupper() else "function"
         members = "\n:members:\n:undoc-members:" if kind == "class" else ""
         text += f"\n## {name}\n\n```{{eval-rst}}\n.. auto{kind}:: reentry_fmus.{name}{members.replace(chr(10), chr(10) + '   ')}\n```\n"
     write(folder / "python-api.md", text)

@@ -6,6 +6,7 @@ Importing this module registers "reentry_fmus/Attitude-v0" (`gymnasium.make`).
 from __future__ import annotations
 
 from collections.abc import Mapping
+from math import radians
 from typing import Any
 
 import numpy as np
@@ -26,11 +27,11 @@ __all__ = ["ID", "AttitudeEnv"]
 ID = "reentry_fmus/Attitude-v0"
 """Name under which gymnasium knows the environment."""
 
-LOST = np.radians(60.0)
+LOST = radians(60.0)
 """Tracking error at which the attitude is lost, rad, as in the papers' experiments."""
-FASTEST = np.radians(180.0)
+FASTEST = radians(180.0)
 """Largest body rate, and largest rate of the error, that is observed, rad/s."""
-ERROR_SCALE = np.radians(1.0)
+ERROR_SCALE = radians(1.0)
 
 Observation = npt.NDArray[np.float32]
 
@@ -39,13 +40,16 @@ class AttitudeEnv(gymnasium.Env[Observation, npt.NDArray[np.float32]]):
     """The vehicle tracks an attitude reference under a disturbance. The agent is the controller,
     which chooses a moment at every communication step.
 
-    | observation | index | unit | between |
-    |---|---|---|---|
-    | tracking error: angle of attack, sideslip angle, bank angle, less their references | 0 to 2 | rad | ±π/3 |
-    | time derivative of the tracking error | 3 to 5 | rad/s | ±π |
-    | body rates p, q, r | 6 to 8 | rad/s | ±π |
-    | reference of angle of attack, sideslip angle, bank angle | 9 to 11 | rad | ±π |
-    | moment of the last step, as in the action | 12 to 14 | 1 | ±1 |
+    ========  ==============================================  =====  =======
+    index     observation                                     unit   between
+    ========  ==============================================  =====  =======
+    0 to 2    tracking error: angle of attack, sideslip       rad    ±π/3
+              angle, bank angle, less their references
+    3 to 5    time derivative of the tracking error           rad/s  ±π
+    6 to 8    body rates p, q, r                              rad/s  ±π
+    9 to 11   reference of the three angles                   rad    ±π
+    12 to 14  moment of the last step, as in the action       1      ±1
+    ========  ==============================================  =====  =======
 
     The **action** has the shape (3,): roll, pitch and yaw moment between -1 and 1, in units of the
     moment limit (`moment_limit`, 1.356e5 N m). An action whose norm exceeds 1 is shortened to 1, so
@@ -93,7 +97,7 @@ class AttitudeEnv(gymnasium.Env[Observation, npt.NDArray[np.float32]]):
         stop: float = 50.0,
         parameters: Mapping[str, Value] | None = None,
         moment_limit: float = 1.356e5,
-        rate_limit: float = float(np.radians(5.0)),
+        rate_limit: float = radians(5.0),
     ) -> None:
         for name, value in (("moment_limit", moment_limit), ("rate_limit", rate_limit)):
             if not (np.isfinite(value) and value > 0.0):
