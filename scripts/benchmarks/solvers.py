@@ -339,7 +339,7 @@ def draw(by_kind: dict[str, dict[str, Timed]]) -> None:
     for axis, (kind, timed_by_solver) in zip(np.atleast_1d(axes), by_kind.items()):
         for row, (name, timed) in enumerate(timed_by_solver.items()):
             ms = np.array(timed.seconds) * 1e3
-            colour = "#1f77b4" if name in OURS else "#d62728"
+            colour = "#0072b2" if name in OURS else "#d55e00"
             rows = row + scatter.uniform(-0.28, 0.28, len(ms))
             axis.scatter(ms, rows, s=5, alpha=0.45, color=colour, linewidths=0, rasterized=True)
             for share, style in ((50, "-"), (99, ":")):

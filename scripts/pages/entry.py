@@ -20,6 +20,12 @@ import numpy as np
 IMAGES = Path(__file__).resolve().parents[2] / "docs" / "images"
 GRAVITY, RADIUS = 9.80665, 6_378_137.0
 LARGEST_LOAD, LARGEST_FLUX = 2.5, 700.0  # g; kW/m2
+# The colours and dashes of all pictures, and the neutral one of limits.
+plt.rcParams["axes.prop_cycle"] = plt.cycler(
+    color=["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00"],
+    linestyle=["-", (0, (5, 1.5)), (0, (1, 1)), (0, (5, 1, 1, 1)), (0, (9, 2)), (0, (3, 1, 1, 1, 1, 1))],
+)
+LIMIT = {"color": "#5b6875", "ls": "--"}
 
 
 def read(path: str) -> dict[str, np.ndarray]:
@@ -52,41 +58,41 @@ def whole(run: dict[str, np.ndarray]) -> None:
     (corridor_axes, track, bank), (load, rates, moments) = axes
 
     corridor_axes.plot(run["plant.motion.speed"] / 1e3, run["plant.motion.altitude"] / 1e3, "k", lw=2, label="flight")
-    for (name, altitude), color in zip(corridor(run).items(), ("C3", "C1", "C0")):
-        corridor_axes.plot(run["plant.motion.speed"] / 1e3, altitude, color, ls="--", label=name)
+    for name, altitude in corridor(run).items():
+        corridor_axes.plot(run["plant.motion.speed"] / 1e3, altitude, label=name)
     corridor_axes.set(xlabel="speed, km/s", ylabel="altitude, km", title="Altitude over speed", ylim=(15, 125))
     corridor_axes.legend(loc="upper left")
 
-    track.plot(degrees("plant.motion.longitude"), degrees("plant.motion.latitude"), "C0", lw=2)
+    track.plot(degrees("plant.motion.longitude"), degrees("plant.motion.latitude"), lw=2)
     sign = np.sign(run["guidance.command.bank"])
     for i in np.flatnonzero(np.diff(sign)):
-        track.plot(degrees("plant.motion.longitude")[i], degrees("plant.motion.latitude")[i], "C3o")
+        track.plot(degrees("plant.motion.longitude")[i], degrees("plant.motion.latitude")[i], "o", color="C1")
     track.plot(degrees("guidance.target.longitude")[0], degrees("guidance.target.latitude")[0], "k*", ms=12)
     track.set(xlabel="longitude, deg", ylabel="latitude, deg", title="Ground track, bank reversals and runway point")
 
-    bank.plot(time, degrees("guidance.command.bank"), "0.7", label="commanded")
-    bank.plot(time, degrees("controller.reference.sigma"), "C1", label="reference")
-    bank.plot(time, degrees("plant.attitude.sigma"), "C0", label="bank angle")
-    bank.plot(time, degrees("plant.attitude.alpha"), "C2", label="angle of attack")
+    bank.plot(time, degrees("guidance.command.bank"), color="0.7", ls="-", label="commanded")
+    bank.plot(time, degrees("controller.reference.sigma"), label="reference")
+    bank.plot(time, degrees("plant.attitude.sigma"), label="bank angle")
+    bank.plot(time, degrees("plant.attitude.alpha"), label="angle of attack")
     bank.set(xlabel="time, s", ylabel="deg", title="Attitude")
     bank.legend(loc="lower left")
 
-    load.plot(time, run["plant.loadFactor"], "C0", label="load, g")
-    load.plot(time, run["plant.flight.dynamicPressure"] / 1e4, "C1", label="dynamic pressure, 10 kPa")
-    load.plot(time, run["plant.heating.flux"] / 5e5, "C3", label="heat flux, 500 kW/m²")
+    load.plot(time, run["plant.loadFactor"], label="load, g")
+    load.plot(time, run["plant.flight.dynamicPressure"] / 1e4, label="dynamic pressure, 10 kPa")
+    load.plot(time, run["plant.heating.flux"] / 5e5, label="heat flux, 500 kW/m²")
     load.set(xlabel="time, s", title="Loads")
     load.legend()
 
     size = np.sqrt(sum(degrees(f"plant.rate.{axis}") ** 2 for axis in "pqr"))
-    rates.plot(time, size, "C0", label="‖ω‖")
-    rates.axhline(5.0, color="C3", ls="--", label="limit")
+    rates.plot(time, size, label="‖ω‖")
+    rates.axhline(5.0, **LIMIT, label="limit")
     rates.set(xlabel="time, s", ylabel="deg/s", title="Angular rate")
     rates.legend()
 
     norm = lambda name: np.sqrt(sum(run[f"{name}.{axis}"] ** 2 for axis in "xyz")) / 1e3
-    moments.plot(time, norm("controller.moment"), "C0", label="control")
-    moments.plot(time, norm("plant.airMoment"), "C1", label="air, without surfaces")
-    moments.axhline(135.6, color="C3", ls="--", label="limit")
+    moments.plot(time, norm("controller.moment"), label="control")
+    moments.plot(time, norm("plant.airMoment"), label="air, without surfaces")
+    moments.axhline(135.6, **LIMIT, label="limit")
     moments.set(xlabel="time, s", ylabel="kN m", title="Moments")
     moments.legend()
     for one in axes.flat:
@@ -98,12 +104,12 @@ def actuated(run: dict[str, np.ndarray]) -> None:
     """Who gives the moment: jets at first, then surfaces."""
     time = run["time"]
     figure, (pressure, jets, surfaces, moment) = plt.subplots(4, 1, figsize=(9, 9), sharex=True, layout="constrained")
-    pressure.semilogy(time, run["plant.flight.standardDynamicPressure"], "C0")
-    pressure.axhline(500.0, color="C3", ls="--", label="selector")
+    pressure.semilogy(time, run["plant.flight.standardDynamicPressure"])
+    pressure.axhline(500.0, **LIMIT, label="selector")
     pressure.set(ylabel="dynamic pressure, Pa")
     pressure.legend()
     duties = [run[f"allocator.jet[{j}]"] for j in range(1, 11)]
-    jets.plot(time, np.sum(duties, axis=0), "C1")
+    jets.plot(time, np.sum(duties, axis=0))
     jets.set(ylabel="jets, sum of duties")
     names = ["left outer elevon", "right outer elevon", "left inner elevon", "right inner elevon", "left flap", "right flap"]
     for i, name in enumerate(names, start=1):
