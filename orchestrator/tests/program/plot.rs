@@ -75,7 +75,13 @@ fn oracle_the_numbers_of_a_page_are_those_of_the_runs() {
     assert_eq!(values(0, 0), [1.0, 2.0, 4.0, 8.0]);
     assert_eq!(values(0, 2), [1.0, 1.5, 2.25, 3.375]);
     assert_eq!(values(1, 1), values(0, 2));
-    assert_eq!(data["panels"][1]["limit"], 1);
+    // Limits and references differ between the runs.
+    let limits = serde_json::json!([
+        { "name": "limit of norm, a", "value": 1 }, { "name": "limit of norm, b", "value": 0.5 },
+    ]);
+    assert_eq!(data["panels"][1]["limits"], limits);
+    assert_eq!(data["panels"][0]["curves"][3]["name"], "reference, b");
+    assert_eq!(values(0, 3), [0.5, 0.75, 1.125, 1.125]);
     assert_eq!(data["runs"][1]["vehicle"]["angles"][0][2], 2.25);
     // At the stop time, a response is that of the step before.
     assert_eq!(
