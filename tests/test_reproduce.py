@@ -74,6 +74,7 @@ def test_every_figure_is_on_the_page_and_beside_it(report):
         drawn = page.split(f'<figure id="{figure}">')[1].split("</figure>")[0]
         # Those of folded parts are compressed.
         if folded := re.search('data-folded="([^"]+)"', drawn):
+            assert f'<noscript><img src="figures/{figure}.svg"' in drawn
             drawn = zlib.decompress(base64.b64decode(folded[1]), -zlib.MAX_WBITS).decode()
         assert drawn.count("<path data-name=") + drawn.count("<circle data-name=") > 0, figure
         assert (report[1] / "figures" / f"{figure}.svg").read_text().startswith("<svg")

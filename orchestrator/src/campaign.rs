@@ -197,9 +197,10 @@ fn summary(report: &run::CampaignReport, out: &mut impl Write) -> std::io::Resul
     let Findings { title, cases, status, limits, measures, answer } = &report.findings;
     let rate = report.flown as f64 / report.elapsed;
     writeln!(out, "{title}")?;
+    let several = if *cases == 1 { "case" } else { "cases" };
     writeln!(
         out,
-        "  {cases} cases, {} flown now in {:.1} s ({rate:.0} per second)",
+        "  {cases} {several}, {} flown now in {:.1} s ({rate:.0} per second)",
         report.flown, report.elapsed
     )?;
     for note in &report.notes {

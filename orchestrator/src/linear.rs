@@ -2,13 +2,14 @@
 
 use crate::arguments;
 use crate::failure::Failure;
+use crate::picture;
 use crate::run;
 use clap::Args;
 use cosim::error::Error;
 use cosim::interrupt::Interrupt;
 use cosim::search::named::{Kind, find};
 use cosim::system::System;
-use cosim_report::figure::{Color, Curve, Figure, Legend, Panel, Shape, svg};
+use cosim_report::figure::{Color, Curve, Figure, Legend, Panel, Shape};
 use fmu_import::quantity::rounded;
 use linear::curves::{ResponseCurves, excluded};
 use linear::linearise::Linearised;
@@ -85,7 +86,7 @@ pub(crate) struct PrintMargins {
     /// Print JSON, for other programs.
     #[arg(long)]
     json: bool,
-    /// File for a Nichols plot of the return ratio and a plot of the sensitivity (SVG).
+    /// File for a Nichols plot of the return ratio and a plot of the sensitivity (.svg, .png).
     #[arg(long, value_name = "FILE")]
     plot: Option<PathBuf>,
     #[command(flatten)]
@@ -134,10 +135,11 @@ pub(crate) fn margins(
     out: &mut impl Write,
     interrupt: &Interrupt,
 ) -> Result<(), Failure> {
+    let plot = picture::asked(asked.plot.as_deref())?;
     let found = asked.instant.linearise(interrupt)?;
     let margins = analysis::margins(&found.net, &found.open);
-    if let Some(path) = &asked.plot {
-        svg::write(&figure(&found, &margins)?, path)?;
+    if let Some((path, form)) = plot {
+        picture::write(&figure(&found, &margins)?, form, path)?;
     }
     let sides = found
         .sides

@@ -14,6 +14,7 @@ mod list;
 mod live;
 mod man;
 mod pack;
+mod picture;
 mod plain;
 mod plot;
 mod response;

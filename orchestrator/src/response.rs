@@ -3,10 +3,11 @@
 
 use crate::failure::Failure;
 use crate::linear::Instant;
+use crate::picture;
 use clap::Args;
 use cosim::error::Error;
 use cosim::interrupt::Interrupt;
-use cosim_report::figure::{Color, Curve, Figure, Legend, Panel, Shape, svg};
+use cosim_report::figure::{Color, Curve, Figure, Legend, Panel, Shape};
 use linear::curves::decibel;
 use linear::frequency::{self, Complex, Point, return_ratio};
 use linear::linearise::Lineariser;
@@ -34,7 +35,7 @@ pub(crate) struct Response {
     /// typical magnitude].
     #[arg(long, value_name = "NUMBER", help_heading = "Sine")]
     amplitude: Option<f64>,
-    /// File for a plot of both responses (SVG).
+    /// File for a plot of both responses (.svg, .png).
     #[arg(long, value_name = "FILE")]
     plot: Option<PathBuf>,
     #[command(flatten)]
@@ -47,6 +48,7 @@ pub(crate) fn respond(
     out: &mut impl Write,
     interrupt: &Interrupt,
 ) -> Result<(), Failure> {
+    let plot = picture::asked(asked.plot.as_deref())?;
     let (system, at, open) = asked.instant.system()?;
     if let Some(amplitude) = asked.amplitude
         && !(amplitude > 0.0 && amplitude.is_finite())
@@ -98,8 +100,8 @@ pub(crate) fn respond(
         }
         all.push(points);
     }
-    if let Some(path) = &asked.plot {
-        svg::write(&figure(&title, &found.open, &all, [asked.from, to]), path)?;
+    if let Some((path, form)) = plot {
+        picture::write(&figure(&title, &found.open, &all, [asked.from, to]), form, path)?;
     }
     Ok(())
 }

@@ -16,7 +16,7 @@ use cosim_report::page::{head, script};
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 use std::collections::BTreeSet;
 use std::path::Path;
-use sweep::statistics::Probability;
+use sweep::statistics::{Probability, Summary};
 use sweep::table::Reader;
 use sweep::texts::{percent, short};
 use sweep::vary::DesignKind;
@@ -97,7 +97,7 @@ fn page(
             body {
                 header {
                     h1 { (campaign.title) }
-                    p.paper { (findings.cases) " cases of the experiment " (plan.sweep.experiment().title) }
+                    p.paper { (cases(findings.cases)) " of the experiment " (plan.sweep.experiment().title) }
                     nav {
                         a href="#limits" { "Limits" } " "
                         a href="#measures" { "Measures" } " "
@@ -114,7 +114,7 @@ fn page(
                     section id="limits" {
                         h2 { "Limits" }
                         p {
-                            (ended("completed")) " cases completed"
+                            (cases(ended("completed"))) " completed"
                             @for (status, words) in [("ended", "ended early by a limit or an FMU"), ("lost", "lost"), ("failed", "failed")] {
                                 @if ended(status) > 0 { ", " (ended(status)) " " (words) }
                             }
@@ -227,6 +227,16 @@ fn interval(probability: &Probability) -> String {
     }
 }
 
+/// Returns a number of cases in words.
+fn cases(count: u64) -> String {
+    if count == 1 { "1 case".into() } else { format!("{count} cases") }
+}
+
+/// Returns the standard deviation as text. A single case has none.
+fn deviation(summary: &Summary) -> String {
+    if summary.deviation.is_finite() { short(summary.deviation) } else { "–".into() }
+}
+
 fn measures(measures: &[Measured]) -> Markup {
     html! {
         table.numbers {
@@ -237,7 +247,7 @@ fn measures(measures: &[Measured]) -> Markup {
             tbody { @for measure in measures { tr {
                 td { (measure.name) @if !measure.unit.is_empty() { ", " (measure.unit) } }
                 @if let Some(summary) = &measure.summary {
-                    td { (summary.cases) } td { (short(summary.mean)) } td { (short(summary.deviation)) }
+                    td { (summary.cases) } td { (short(summary.mean)) } td { (deviation(summary)) }
                     @for quantile in &summary.quantiles {
                         td {
                             (short(quantile.value))

@@ -9,7 +9,9 @@ use fmu_import::names;
 use fmu_import::quantity::Scaling;
 use fmu_import::warnings::warn_once;
 use std::collections::{BTreeSet, HashSet};
+use std::fmt::Write as _;
 use std::ops::Range;
+use std::path::Path;
 use toml::Spanned;
 
 /// A component's name and its FMU's description. Its position in the list of parts is its index.
@@ -61,6 +63,8 @@ struct Reference<'a> {
     text: &'a str,
     component: usize,
     part: Part<'a>,
+    /// FMU that replaces the experiment's one, if the command line names one.
+    exchanged: Option<&'a str>,
     rest: &'a str,
 }
 
@@ -68,8 +72,9 @@ impl<'a> Reference<'a> {
     fn new(
         text: &'a Spanned<String>,
         parts: &[Part<'a>],
-        source: &'a Source,
+        experiment: &'a Experiment,
     ) -> Result<Self, Error> {
+        let source = &experiment.source;
         let span = text.span();
         let text = text.get_ref().as_str();
         let refuse = |message: String| source.error(&span, message);
@@ -80,10 +85,19 @@ impl<'a> Reference<'a> {
             let hint = names::hint(name, parts.iter().map(|part| part.name));
             refuse(format!("there is no component \"{name}\"{hint}"))
         })?;
-        Ok(Self { source, span: span.clone(), text, component, part: parts[component], rest })
+        let used = experiment.components.get(name).filter(|used| used.is_exchanged);
+        let exchanged = used.map(|used| used.fmu.get_ref().as_str());
+        let part = parts[component];
+        Ok(Self { source, span: span.clone(), text, component, part, exchanged, rest })
     }
 
     fn refuse(&self, message: impl Into<String>) -> Error {
+        let mut message = message.into();
+        // The line of the experiment was right for its own FMU.
+        if let Some(fmu) = self.exchanged.and_then(|fmu| Path::new(fmu).file_stem()) {
+            let (component, fmu) = (self.part.name, fmu.display());
+            let _ = write!(message, "; --fmu {component}={fmu} replaces the experiment's FMU");
+        }
         self.source.error(&self.span, message)
     }
 
@@ -129,11 +143,10 @@ pub(crate) fn port(component: usize, position: usize, variable: &Variable) -> Op
 /// an input is connected twice. It also returns one if an input is neither connected, nor given a
 /// value, nor declared to stay unconnected.
 pub(crate) fn wires(experiment: &Experiment, parts: &[Part]) -> Result<Vec<Wire>, Error> {
-    let source = &experiment.source;
     let mut wires: Vec<Wire> = Vec::new();
     for connection in &experiment.connections {
-        let from = Reference::new(&connection.from, parts, source)?;
-        let to = Reference::new(&connection.to, parts, source)?;
+        let from = Reference::new(&connection.from, parts, experiment)?;
+        let to = Reference::new(&connection.to, parts, experiment)?;
         let pairs: Vec<(String, String)> = match (from.prefix(), to.prefix()) {
             (None, None) => vec![(from.rest.to_string(), to.rest.to_string())],
             (Some(from_prefix), Some(to_prefix)) => expand(&from, from_prefix, &to, to_prefix)?,
@@ -346,7 +359,7 @@ pub(crate) fn columns(experiment: &Experiment, parts: &[Part]) -> Result<Vec<Col
     let (mut columns, mut missing) = (Vec::<Column>::new(), Vec::new());
     let mut seen: HashSet<Port> = HashSet::new();
     for text in &experiment.record.variables {
-        let reference = Reference::new(text, parts, &experiment.source)?;
+        let reference = Reference::new(text, parts, experiment)?;
         let (component, part) = (reference.component, reference.part);
         let is_pattern = reference.prefix().is_some();
         let before = columns.len();

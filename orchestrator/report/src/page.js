@@ -19,8 +19,16 @@ function marks(low, high, count, logarithmic) {
   return all;
 }
 
-const label = (value, range) =>
-  Number(value.toFixed(Math.min(12, Math.max(0, 2 - Math.floor(Math.log10(Math.abs(range) || 1)))))).toString().replace("-", "−");
+// Texts of marks, each with its range, with the digits that tell them apart; with exponents if they need many letters.
+function labels(values, range) {
+  const power = (value) => Math.floor(Math.log10(Math.abs(value)));
+  const rounded = values.map((value) => {
+    const digits = power(value) - power(range(value)) + 3;
+    return digits >= -5 ? Number(value.toPrecision(Math.min(17, Math.max(1, digits)))) : 0;
+  });
+  const long = rounded.some((value) => String(value).length > 7);
+  return rounded.map((value) => (long && value ? value.toExponential().replace("e+", "e") : String(value)).replaceAll("-", "−"));
+}
 
 // A panel's axes. Coordinates are those of the figure, px.
 class Panel {
@@ -67,7 +75,8 @@ class Panel {
     group.replaceChildren();
     const isLog = this.log && axis === 0, back = (value) => (isLog ? 10 ** value : value);
     const count = Math.max(2, Math.floor(axis === 0 ? this.width / 80 : this.height / 38));
-    for (const mark of marks(back(low), back(high), count, isLog)) {
+    const all = marks(back(low), back(high), count, isLog), texts = labels(all, (mark) => (isLog ? mark : high - low));
+    all.forEach((mark, place) => {
       const at = this.place(isLog ? Math.log10(mark) : mark, axis);
       const line = group.appendChild(document.createElementNS(SVG, "path")), text = group.appendChild(document.createElementNS(SVG, "text"));
       line.setAttribute("class", "grid");
@@ -75,8 +84,8 @@ class Panel {
       text.setAttribute("class", "small");
       text.setAttribute("x", axis === 0 ? at : this.x - 6);
       text.setAttribute("y", axis === 0 ? this.y + this.height + 15 : at + 4);
-      text.textContent = label(mark, isLog ? mark : high - low);
-    }
+      text.textContent = texts[place];
+    });
   }
 
   // Lines with their points in coordinates of the whole range, read once.

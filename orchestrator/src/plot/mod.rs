@@ -3,12 +3,11 @@
 mod read;
 
 use crate::failure::Failure;
+use crate::picture::{self, Form};
 use clap::Args;
 use cosim::error::Error;
-use cosim_report::figure::{png, svg};
 use cosim_report::recording::{Recording, panels};
 use cosim_report::run_page;
-use std::ffi::OsStr;
 use std::io::Write;
 use std::path::PathBuf;
 
@@ -19,43 +18,31 @@ pub(crate) struct Plot {
     /// results.parquet. Several runs are drawn over one another.
     #[arg(required = true, value_name = "RUN")]
     runs: Vec<PathBuf>,
-    /// Signals to draw: variables, patterns with an asterisk as `plant.rate.*`, or differences and
-    /// norms as in an experiment [default: those that the experiment draws].
-    #[arg(long, value_name = "SIGNAL", num_args = 1..)]
+    /// Signal to draw: a variable, a pattern with an asterisk as `plant.rate.*`, or a difference or
+    /// norm as in an experiment. The option may be given several times [default: those that the
+    /// experiment draws].
+    #[arg(long, value_name = "SIGNAL")]
     signals: Vec<String>,
     /// Begin at this time, s.
-    #[arg(long, value_name = "SECONDS")]
+    #[arg(long, value_name = "SECONDS", value_parser = instant, allow_negative_numbers = true)]
     from: Option<f64>,
     /// End at this time, s.
-    #[arg(long, value_name = "SECONDS")]
+    #[arg(long, value_name = "SECONDS", value_parser = instant, allow_negative_numbers = true)]
     to: Option<f64>,
     /// File to write: a picture (.svg, .png), or a page with the vehicle in motion (.html).
     #[arg(long, value_name = "FILE", default_value = "plot.svg")]
     out: PathBuf,
 }
 
-/// Forms of the file that is written.
-#[derive(Clone, Copy)]
-enum Form {
-    Svg,
-    Png,
-    Page,
+/// Reads a time, s.
+fn instant(text: &str) -> Result<f64, String> {
+    match text.parse() {
+        Ok(time) if f64::is_finite(time) => Ok(time),
+        _ => Err("it must be a finite number of seconds".into()),
+    }
 }
 
 impl Plot {
-    fn form(&self) -> Result<Form, Error> {
-        let extension = self.out.extension().map(OsStr::to_ascii_lowercase);
-        match extension.as_ref().and_then(|extension| extension.to_str()) {
-            Some("svg") => Ok(Form::Svg),
-            Some("png") => Ok(Form::Png),
-            Some("html") => Ok(Form::Page),
-            _ => Err(Error::experiment(format!(
-                "--out {}: the name must end with .svg, .png or .html, which tells what is written",
-                self.out.display()
-            ))),
-        }
-    }
-
     /// Reads the runs, cut to the times that are asked for.
     fn recordings(&self) -> Result<Vec<Recording>, Error> {
         if self.runs.len() > panels::CURVES {
@@ -103,7 +90,7 @@ impl Plot {
 /// Returns an error if a run cannot be read, if a signal is recorded in none of them, or if the
 /// file cannot be written.
 pub(crate) fn plot(asked: &Plot, out: &mut impl Write) -> Result<(), Failure> {
-    let form = asked.form()?;
+    let form = Form::of(&asked.out, "--out", &Form::RUNS)?;
     let runs = asked.recordings()?;
     let panels = if asked.signals.is_empty() {
         panels::of_experiments(&runs)
@@ -114,13 +101,9 @@ pub(crate) fn plot(asked: &Plot, out: &mut impl Write) -> Result<(), Failure> {
     if panels.is_empty() {
         return Err(Error::experiment("nothing that could be drawn is recorded").into());
     }
-    let figure = || run_page::figure::figure(&runs, &panels);
     match form {
-        Form::Svg => svg::write(&figure(), &asked.out)?,
-        Form::Png => {
-            png::write(&svg::text(&figure()), &asked.out)?;
-        }
         Form::Page => run_page::write(&runs, &panels, &asked.out)?,
+        _ => picture::write(&run_page::figure::figure(&runs, &panels), form, &asked.out)?,
     }
     writeln!(out, "{}", asked.out.display())?;
     Ok(())

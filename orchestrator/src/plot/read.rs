@@ -6,7 +6,8 @@ use cosim::experiment::{MeasureKind, Observe};
 use cosim_report::metrics::Metrics;
 use cosim_report::recording::{Recording, Track, display_unit};
 use serde_json::{Map, Value};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
+use std::ffi::OsStr;
 use std::fs;
 use std::path::{Path, PathBuf};
 use sweep::table;
@@ -25,16 +26,26 @@ pub(super) fn recording(path: &Path) -> Result<Recording, Error> {
     let file = table_of(path)?;
     let folder = file.parent().unwrap_or(Path::new(""));
     let metadata = json_of(&folder.join("results.json"))?;
-    let (columns, units) = match file.extension().and_then(|extension| extension.to_str()) {
+    let ending = file.extension().and_then(OsStr::to_str).map(str::to_ascii_lowercase);
+    let (columns, units) = match ending.as_deref() {
         Some("parquet") => parquet(&file)?,
-        _ => text(&file, &metadata)?,
+        Some("csv") => text(&file, &metadata)?,
+        _ => {
+            let problem = format!(
+                "{} is no table of recorded variables: name a folder of results, or a .csv or .parquet file",
+                file.display()
+            );
+            return Err(Error::experiment(problem));
+        }
     };
+    check_names(&columns, &file)?;
     let mut columns = columns.into_iter();
     let first = columns.next().filter(|(name, _)| name.eq_ignore_ascii_case("time"));
     let Some((_, time)) = first else {
         let problem = format!("{}: the first column must be called time", file.display());
         return Err(Error::experiment(problem));
     };
+    check_time(&time, &file)?;
     let described = metadata["columns"].as_array().cloned().unwrap_or_default();
     let tracks = columns.map(|(name, values)| {
         let column = described.iter().find(|column| column["name"] == name.as_str());
@@ -53,6 +64,37 @@ pub(super) fn recording(path: &Path) -> Result<Recording, Error> {
         run.summary = summary::lines(&run.observe, &Metrics { units, ..metrics });
     }
     Ok(run)
+}
+
+/// Checks that a name stands for one column only.
+fn check_names(columns: &[(String, Vec<f64>)], file: &Path) -> Result<(), Error> {
+    let mut seen = BTreeSet::new();
+    match columns.iter().find(|(name, _)| !seen.insert(name)) {
+        Some((name, _)) => {
+            let problem = format!("{}: two columns are called {name}", file.display());
+            Err(Error::experiment(problem))
+        }
+        None => Ok(()),
+    }
+}
+
+/// Checks that time never goes backwards.
+fn check_time(time: &[f64], file: &Path) -> Result<(), Error> {
+    // A CSV file has its header in the first row.
+    let first = if file.extension().is_some_and(|ending| ending == "parquet") { 1 } else { 2 };
+    let not_a_number = time.iter().position(|time| !time.is_finite());
+    let backwards = time.windows(2).position(|pair| pair[1] < pair[0]).map(|before| before + 1);
+    let problem = match (not_a_number, backwards) {
+        (Some(row), _) => format!("row {}, time: {} is no time", row + first, time[row]),
+        (None, Some(row)) => format!(
+            "row {}, time: {} s comes after {} s, but time must not go backwards",
+            row + first,
+            time[row],
+            time[row - 1]
+        ),
+        (None, None) => return Ok(()),
+    };
+    Err(Error::experiment(format!("{}, {problem}", file.display())))
 }
 
 /// Returns the file of recorded variables that a path stands for.
@@ -117,7 +159,13 @@ fn parquet(path: &Path) -> Result<Columns, Error> {
 
 /// Reads a CSV file, also one whose header has units and whose cells have names of items.
 fn text(path: &Path, metadata: &Value) -> Result<Columns, Error> {
-    let failed = |error: csv::Error| Error::file(path)(std::io::Error::other(error));
+    let failed = |error: csv::Error| {
+        if error.is_io_error() {
+            Error::file(path)(error.into())
+        } else {
+            Error::experiment(format!("{}: {error}", path.display()))
+        }
+    };
     let mut reader = csv::Reader::from_path(path).map_err(failed)?;
     let mut units = BTreeMap::new();
     let mut columns: Vec<(String, Vec<f64>)> = Vec::new();
@@ -206,9 +254,33 @@ mod tests {
     }
 
     #[test]
+    fn a_column_may_be_called_as_another_program_likes() {
+        let run = read("mine.csv", "time,b\n0,1\n1,3\n1,4\n", None).unwrap();
+        assert_eq!(run.track("b").unwrap().values, [1.0, 3.0, 4.0]);
+        let panels = cosim_report::recording::panels::of_experiments(&[run]).unwrap();
+        assert_eq!((panels.len(), panels[0].label.as_str()), (1, "b"));
+    }
+
+    #[test]
+    fn what_is_no_curve_over_time_is_refused_by_row_and_column() {
+        let fault = |table: &str| read("a.csv", table, None).unwrap_err().to_string();
+        let backwards = fault("time,a.x\n0,1\n2,3\n1,2\n");
+        let said = "a.csv, row 4, time: 1 s comes after 2 s, but time must not go backwards";
+        assert!(backwards.ends_with(said), "{backwards}");
+        let unknown = fault("time,a.x\n0,1\nNaN,3\n");
+        assert!(unknown.ends_with("a.csv, row 3, time: NaN is no time"), "{unknown}");
+        let twice = fault("time,a.x [m],a.x [s]\n0,1,1\n");
+        assert!(twice.ends_with("a.csv: two columns are called a.x"), "{twice}");
+    }
+
+    #[test]
     fn what_is_no_table_of_a_run_is_refused() {
         let fault = read("a.csv", "x,y\n0,1\n", None).unwrap_err().to_string();
         assert!(fault.contains("the first column must be called time"), "{fault}");
+        for (name, content) in [("metrics.json", "{}"), ("a.csv", "time,x\n0,1\n0\n")] {
+            let fault = read(name, content, None).unwrap_err();
+            assert!(fault.exit_code() == 2 && fault.to_string().contains(name), "{fault}");
+        }
         let fault = read("a.parquet", "PAR1 and nothing else", None).unwrap_err().to_string();
         assert!(fault.contains("a.parquet"), "{fault}");
     }

@@ -145,10 +145,15 @@ fn caption(figure: &Figure) -> Markup {
     html! {
         figcaption {
             (figure.caption) " "
-            a href=(format!("figures/{}.svg", figure.id)) { "SVG" } ", "
+            a href=(svg_file(figure)) { "SVG" } ", "
             a href=(format!("figures/{}.png", figure.id)) { "PNG" }
         }
     }
+}
+
+/// Returns the path of a figure's file beside the page.
+fn svg_file(figure: &Figure) -> String {
+    format!("figures/{}.svg", figure.id)
 }
 
 /// Returns whether there are figures besides the one on the first screen.
@@ -170,7 +175,12 @@ fn figures(results: &Results, drawn: &[figure::Figure]) -> Markup {
             @for (_, (figure, picture)) in others.filter(|(place, _)| Some(*place) != first) {
                 details.figure {
                     summary { h3 { (figure.title) } }
-                    figure id=(figure.id) { (folded(&svg::element(picture))) (caption(figure)) }
+                    figure id=(figure.id) {
+                        (folded(&svg::element(picture)))
+                        // Without scripts nothing unfolds the drawing: its file is shown instead.
+                        noscript { img src=(svg_file(figure)) alt=(figure.title) loading="lazy"; }
+                        (caption(figure))
+                    }
                 }
             }
         }
@@ -217,7 +227,9 @@ fn origins(results: &Results, origin: &[(String, String)]) -> Markup {
                 "A repetition gives the same bits, except for computing times."
             }
             @if !origin.is_empty() {
-                table { tbody { @for (what, value) in origin { tr { th scope="row" { (what) } td { code { (value) } } } } } }
+                div.scroll { table { tbody {
+                    @for (what, value) in origin { tr { th scope="row" { (what) } td { code { (value) } } } }
+                } } }
             }
             div.scroll { (all_runs(results)) }
             @if !results.study.values.0.is_empty() {

@@ -89,6 +89,16 @@ fn oracle_a_case_is_a_row_also_if_its_instance_fails() {
 }
 
 #[test]
+fn the_page_of_a_single_case_has_no_deviation() {
+    let campaign = CAMPAIGN.replace("[0.5, 1.0, 2.0]", "[1.0]").replace("[1e9, 2.0]", "[1e9]");
+    let bench = bench(&campaign);
+    flown(&bench, &[]);
+    let page = fs::read_to_string(bench.path("out/c/report.html")).unwrap();
+    assert!(page.contains("1 case of the experiment") && page.contains("1 case completed."));
+    assert!(!page.contains("NaN") && !page.contains("1 cases"), "{page}");
+}
+
+#[test]
 fn oracle_a_limit_can_end_a_case() {
     let campaign = CAMPAIGN.replace("at_most = 8.0", "at_most = 4.0\nends = true");
     let rows = flown(&bench(&campaign.replace("[1e9, 2.0]", "[1e9]")), &[]);

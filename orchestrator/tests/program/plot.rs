@@ -51,6 +51,16 @@ fn a_run_is_drawn_as_its_experiment_says_or_as_it_is_asked_for() {
     assert!(picture.contains("α") && picture.contains("gain and integrator"));
     let picture = plotted(&bench, &["a", "--signals", "plant.*", "--out", "p/other.svg"]);
     assert!(picture.contains("steps") && !picture.contains("limit of norm"));
+    let named = ["--signals", "plant.steps", "--signals", "plant.output.integral", "a", "b"];
+    let picture = plotted(&bench, &[&named[..], &["--out", "named.svg"]].concat());
+    // The labels name the signals, and the legends the runs alone.
+    for (text, count) in [("plant.steps", 1), ("plant.output.integral, m", 1), ("a", 2), ("b", 2)] {
+        assert_eq!(picture.matches(&format!(">{text}</text>")).count(), count, "{text}: {picture}");
+    }
+    let picture = plotted(&bench, &["a", "b", "--out", "both.svg"]);
+    for name in ["limit of norm, a", "limit of norm, b", "reference", "reference, b"] {
+        assert_eq!(picture.matches(&format!(">{name}</text>")).count(), 1, "{name}: {picture}");
+    }
     let (code, said, errors) = bench.call(&["plot", "a", "b", "--out", "both.png"]);
     assert_eq!((code, said.as_str()), (0, "both.png\n"), "{errors}");
     assert!(fs::read(bench.path("both.png")).unwrap().starts_with(b"\x89PNG"));
@@ -75,7 +85,13 @@ fn oracle_the_numbers_of_a_page_are_those_of_the_runs() {
     assert_eq!(values(0, 0), [1.0, 2.0, 4.0, 8.0]);
     assert_eq!(values(0, 2), [1.0, 1.5, 2.25, 3.375]);
     assert_eq!(values(1, 1), values(0, 2));
-    assert_eq!(data["panels"][1]["limit"], 1);
+    // Limits and references differ between the runs.
+    let limits = serde_json::json!([
+        { "name": "limit of norm, a", "value": 1 }, { "name": "limit of norm, b", "value": 0.5 },
+    ]);
+    assert_eq!(data["panels"][1]["limits"], limits);
+    assert_eq!(data["panels"][0]["curves"][3]["name"], "reference, b");
+    assert_eq!(values(0, 3), [0.5, 0.75, 1.125, 1.125]);
     assert_eq!(data["runs"][1]["vehicle"]["angles"][0][2], 2.25);
     // At the stop time, a response is that of the step before.
     assert_eq!(
@@ -124,6 +140,28 @@ fn a_run_writes_its_own_page_with_what_it_does_not_record() {
 }
 
 #[test]
+fn the_page_of_a_run_without_panels_draws_what_is_recorded() {
+    let bench = Bench::new();
+    let (code, _, errors) = bench.run(&["--page", "--out", "a"]);
+    assert_eq!(code, 0, "{errors}");
+    let page = data(&fs::read_to_string(bench.path("a/page.html")).unwrap());
+    assert_eq!(page["panels"].as_array().unwrap().len(), 3);
+    // The same as `plot` draws of the files.
+    assert_eq!(page["panels"], data(&plotted(&bench, &["a", "--out", "a.html"]))["panels"]);
+}
+
+#[test]
+fn figures_of_margins_and_responses_are_svg_or_png() {
+    let bench = flown();
+    for command in ["margins", "response"] {
+        let (code, _, errors) = bench.call(&[command, "loop.toml", "--plot", "a.pdf"]);
+        assert_eq!(code, 2, "{errors}");
+        let said = "--plot a.pdf: the name must end with .svg or .png, which tells what is written";
+        assert!(errors.contains(said), "{errors}");
+    }
+}
+
+#[test]
 fn what_cannot_be_drawn_is_refused_by_name() {
     let bench = flown();
     let fault = refusal(&bench, &["a", "--signals", "plant.output.intgral"]);
@@ -140,6 +178,10 @@ fn what_cannot_be_drawn_is_refused_by_name() {
     assert!(fault.contains("it goes from 0 s to 3 s"), "{fault}");
     let fault = refusal(&bench, &["a", "--from", "2", "--to", "1"]);
     assert!(fault.contains("--from 2 must be below --to 1"), "{fault}");
+    let (code, _, fault) = bench.call(&["plot", "a", "--from", "-5", "--to", "nan"]);
+    assert!(code == 2 && fault.contains("'nan' for '--to <SECONDS>'"), "{fault}");
+    let fault = refusal(&bench, &["a/metrics.json"]);
+    assert!(fault.contains("a/metrics.json is no table of recorded variables"), "{fault}");
     let fault = refusal(&bench, &["a", "a", "a", "a", "a", "a", "a"]);
     assert!(fault.contains("7 runs: at most 6"), "{fault}");
 }

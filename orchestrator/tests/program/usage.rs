@@ -248,6 +248,10 @@ fn wrong_wiring_is_refused() {
     assert!(message.contains("is of causality parameter, not an output"), "{message}");
     let message = refusal_of("to = \"plant.input\"", "to = \"plant.output.direct\"");
     assert!(message.contains("is of causality output, not an input"), "{message}");
+    // A line that was right for the experiment's own FMU is not at fault alone.
+    let changed = LOOP.replace("to = \"plant.input\"", "to = \"plant.output.direct\"");
+    let message = Bench::with(&changed).refusal(&["--fmu", "plant=Model"]);
+    assert!(message.contains("; --fmu plant=Model replaces the experiment's FMU"), "{message}");
     let message = refusal_of("to = \"plant.input\"", "to = \"gain.input\"");
     assert!(message.contains("loop.toml:16: ") && message.contains("connected twice"), "{message}");
     let message = refusal_of("plant.output.integral\"\nto", "plant.output.direct\"\nto");

@@ -76,7 +76,8 @@ pub(super) fn distributions(
         let mut steps = vec![curve("share of cases up to this value", WORST, Shape::Line, x, y)];
         steps.extend(marks());
         panels.push(panel(&label(measure), "share of cases", steps));
-        let title = format!("Distribution of {} over {} cases", measure.name, findings.cases);
+        let title =
+            format!("Distribution of {} over {}", measure.name, super::cases(findings.cases));
         figures.push(Figure { title, columns: 2, legend: Legend::Above, panels });
     }
     Ok(figures)

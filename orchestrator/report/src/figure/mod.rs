@@ -6,6 +6,7 @@ pub mod png;
 pub mod svg;
 mod thin;
 mod ticks;
+mod words;
 
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -64,7 +65,7 @@ pub enum Legend {
 /// A figure, whose panels are arranged in rows.
 #[derive(Clone, Debug)]
 pub struct Figure {
-    /// Heading above the whole figure, one line.
+    /// Heading above the whole figure, wrapped if it is long.
     pub title: String,
     /// Number of panels in a row, side by side.
     pub columns: usize,
@@ -96,7 +97,8 @@ pub struct Panel {
 /// A sequence of points, and the way in which they are drawn. Points that are not finite are gaps.
 #[derive(Clone, Debug)]
 pub struct Curve {
-    /// Name of the curve in the legend. Curves with the same name are shown and hidden together.
+    /// Name of the curve in the legend, which leaves out a curve without a name. Curves with the
+    /// same name are shown and hidden together.
     pub name: String,
     /// Colour in which the curve is drawn.
     pub color: Color,
@@ -187,10 +189,22 @@ impl Panel {
         // An axis of time needs no margin.
         let is_time =
             along_x && self.curves.iter().any(|c| matches!(c.shape, Shape::Line | Shape::Band(_)));
-        let margin =
-            if is_time { 0.0 } else { 0.06 * (high - low).max(1e-9 * high.abs()).max(1e-12) };
+        let margin = if is_time { 0.0 } else { 0.06 * size(low, high) };
         let is_count = !along_x && self.curves.iter().any(|curve| curve.shape == Shape::Steps);
         (if is_count { 0.0 } else { low - margin }, high + margin)
+    }
+}
+
+/// Returns the size to which an axis from `low` to `high` is drawn. A value that does not change,
+/// but for rounding, is drawn to its own magnitude, as the page of a run does.
+fn size(low: f64, high: f64) -> f64 {
+    let magnitude = low.abs().max(high.abs());
+    if high - low > 1e-9 * magnitude {
+        high - low
+    } else if magnitude > 0.0 {
+        magnitude
+    } else {
+        1.0 / 0.06
     }
 }
 
@@ -225,6 +239,15 @@ mod tests {
         ]);
         assert_eq!(panel.extent(true), Some((0.0, 5.0)));
         assert_eq!(panel.extent(false), Some((-1.0, 9.0)));
+    }
+
+    #[test]
+    fn a_constant_is_drawn_to_its_own_magnitude() {
+        let range = |y: &[f64]| panel(vec![curve(Shape::Line, &[0.0, 1.0], y)]).range(false);
+        let (low, high) = range(&[135.6, 135.6 + 1e-12]);
+        assert!((low - 0.94 * 135.6).abs() < 1e-9 && (high - 1.06 * 135.6).abs() < 1e-9);
+        assert_eq!(range(&[0.0, 0.0]), (-1.0, 1.0));
+        assert_eq!(range(&[-2.0, -2.0]), (-2.12, -1.88));
     }
 
     #[test]

@@ -5,21 +5,29 @@ mod paint;
 mod panel;
 
 use super::dash::Dashes;
-use super::{Curve, Figure, Legend, Shape};
+use super::words::{letters, shortened, wrapped};
+use super::{Curve, Figure, Legend, Panel, Shape};
 use cosim::error::Error;
 use cosim::files;
 use paint::{escaped, stroke};
-use panel::{Area, draw_panel};
+use panel::{Area, draw_panel, left_of};
 use std::fmt::Write as _;
 use std::path::Path;
 
-/// Width of a figure, width of a legend beside a panel, and height of a panel, px.
+/// Width of a figure, smallest width of a legend beside a panel, and height of a panel, px.
 const WIDTH: f64 = 1000.0;
 const LEGEND_WIDTH: f64 = 110.0;
 const HEIGHT: f64 = 250.0;
-/// Height of the title, and of a row of the legend above the panels, px.
+/// Height of a title of one line, of each further line, and of a row of the legend above the
+/// panels, px.
 const TITLE_HEIGHT: f64 = 34.0;
+const TITLE_LINE: f64 = 22.0;
 const LEGEND_HEIGHT: f64 = 22.0;
+/// Largest number of letters of a line of the title, and of a name in a legend beside a panel.
+const TITLE_LETTERS: usize = 100;
+const NAME_LETTERS: usize = 36;
+/// Largest number of lines of the title.
+const TITLE_LINES: usize = 4;
 /// Width of a letter in the legend, and of what stands beside the name, px.
 const LETTER: f64 = 7.2;
 const SAMPLE: f64 = 56.0;
@@ -57,30 +65,36 @@ fn document(figure: &Figure, begin: &str, titled: bool) -> String {
         Legend::Above => arrange(legend(figure.panels.iter().flat_map(|panel| &panel.curves))),
         Legend::Beside => Vec::new(),
     };
-    let title_height = if titled && !figure.title.is_empty() { TITLE_HEIGHT } else { 4.0 };
+    let title =
+        if titled { wrapped(&figure.title, TITLE_LETTERS, TITLE_LINES) } else { Vec::new() };
+    let further = TITLE_LINE * title.len().saturating_sub(1) as f64;
+    let title_height = if title.is_empty() { 4.0 } else { TITLE_HEIGHT + further };
     let above = title_height + LEGEND_HEIGHT * lines.len() as f64;
     let height = above + HEIGHT * rows as f64;
     let mut out = format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{WIDTH}\" height=\"{height}\" viewBox=\"0 0 {WIDTH} {height}\" role=\"img\" aria-label=\"{}\">{begin}",
         escaped(&figure.title)
     );
-    if titled {
-        let middle = WIDTH / 2.0;
+    for (place, line) in title.iter().enumerate() {
+        let (middle, y) = (WIDTH / 2.0, 24.0 + TITLE_LINE * place as f64);
         let _ = write!(
             out,
-            "<text class=\"title\" x=\"{middle}\" y=\"24\" text-anchor=\"middle\">{}</text>",
-            escaped(&figure.title)
+            "<text class=\"title\" x=\"{middle}\" y=\"{y}\" text-anchor=\"middle\">{}</text>",
+            escaped(line)
         );
     }
     for (row, line) in lines.iter().enumerate() {
         let mut x = 64.0;
         for curve in line {
-            entry(&mut out, curve, &shared, x, title_height + LEGEND_HEIGHT * row as f64 + 12.0);
+            let y = title_height + LEGEND_HEIGHT * row as f64 + 12.0;
+            entry(&mut out, curve, &shared, (x, y), TITLE_LETTERS);
             x += entry_width(curve);
         }
     }
-    let beside = if figure.legend == Legend::Beside { LEGEND_WIDTH } else { 0.0 };
+    let beside = if figure.legend == Legend::Beside { beside(&figure.panels) } else { 0.0 };
     let width = WIDTH / columns as f64;
+    // Axes over one another begin at the same place.
+    let left = figure.panels.iter().map(|panel| left_of(panel, HEIGHT)).fold(0.0, f64::max);
     for (place, panel) in figure.panels.iter().enumerate() {
         let (row, column) = (place / columns, place % columns);
         let area = Area {
@@ -94,11 +108,11 @@ fn document(figure: &Figure, begin: &str, titled: bool) -> String {
         let is_named = below.is_none_or(|below| below.x_label != panel.x_label);
         let own = Dashes::new(std::slice::from_ref(panel));
         let dashes = if figure.legend == Legend::Beside { &own } else { &shared };
-        draw_panel(&mut out, panel, dashes, area, is_named);
+        draw_panel(&mut out, panel, dashes, area, left, is_named);
         if figure.legend == Legend::Beside {
             for (line, curve) in legend(panel.curves.iter()).into_iter().enumerate() {
                 let (x, y) = (area.x + area.width + 4.0, area.y + 18.0 + 19.0 * line as f64);
-                entry(&mut out, curve, dashes, x, y);
+                entry(&mut out, curve, dashes, (x, y), NAME_LETTERS);
             }
         }
     }
@@ -106,11 +120,18 @@ fn document(figure: &Figure, begin: &str, titled: bool) -> String {
     out
 }
 
+/// Returns the width of the legends beside panels, which follows their longest name, px.
+fn beside(panels: &[Panel]) -> f64 {
+    let entries = panels.iter().flat_map(|panel| legend(panel.curves.iter()));
+    let longest = entries.map(|curve| letters(&curve.name).min(NAME_LETTERS)).max();
+    longest.map_or(0.0, |longest| LEGEND_WIDTH.max(38.0 + LETTER * longest as f64))
+}
+
 /// Returns the first curve of each name, for the legend. Straight lines have their names beside
 /// them.
 fn legend<'a>(curves: impl Iterator<Item = &'a Curve>) -> Vec<&'a Curve> {
     let mut entries: Vec<&Curve> = Vec::new();
-    for curve in curves.filter(|curve| !curve.shape.is_straight()) {
+    for curve in curves.filter(|curve| !curve.shape.is_straight() && !curve.name.is_empty()) {
         if !entries.iter().any(|entry| entry.name == curve.name) {
             entries.push(curve);
         }
@@ -136,8 +157,9 @@ fn arrange(entries: Vec<&Curve>) -> Vec<Vec<&Curve>> {
     lines
 }
 
-/// Draws an entry of a legend whose sample is centred at this height.
-fn entry(out: &mut String, curve: &Curve, dashes: &Dashes, x: f64, y: f64) {
+/// Draws an entry of a legend whose sample begins at this place, and whose name has room for this
+/// number of letters.
+fn entry(out: &mut String, curve: &Curve, dashes: &Dashes, (x, y): (f64, f64), room: usize) {
     let (name, paint) = (escaped(&curve.name), stroke(curve, dashes));
     let _ = write!(out, "<g class=\"entry\" data-name=\"{name}\">");
     let _ = match &curve.shape {
@@ -160,12 +182,13 @@ fn entry(out: &mut String, curve: &Curve, dashes: &Dashes, x: f64, y: f64) {
         ),
         _ => write!(out, "<path d=\"M{x} {y}h28\" fill=\"none\" {paint}/>"),
     };
-    let _ = write!(out, "<text x=\"{}\" y=\"{}\">{name}</text></g>", x + 34.0, y + 4.5);
+    let text = escaped(&shortened(&curve.name, room));
+    let _ = write!(out, "<text x=\"{}\" y=\"{}\">{text}</text></g>", x + 34.0, y + 4.5);
 }
 
 /// Returns the width that an entry of a legend takes, px.
 fn entry_width(curve: &Curve) -> f64 {
-    SAMPLE + LETTER * curve.name.chars().count() as f64
+    SAMPLE + LETTER * letters(&curve.name).min(TITLE_LETTERS) as f64
 }
 
 #[cfg(test)]

@@ -27,13 +27,33 @@ pub(super) fn logarithmic(low: f64, high: f64) -> Vec<f64> {
     all.filter(|value| (low..=high).contains(value)).collect()
 }
 
-/// Writes a value with the digits that tell the marks of an axis apart, without trailing zeros.
-pub(super) fn label(value: f64, range: f64) -> String {
-    let decimals = (2.0 - range.abs().max(1e-12).log10().floor()).clamp(0.0, 12.0) as usize;
-    let text = format!("{value:.decimals$}");
-    let text =
-        if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { &text };
-    if text == "-0" { "0".into() } else { text.replace('-', "\u{2212}") }
+/// Largest number of letters of a mark without an exponent.
+const LETTERS: usize = 7;
+
+/// Writes the marks of an axis with the digits that tell them apart, without trailing zeros; with
+/// exponents if they need many letters otherwise. Marks of a logarithmic axis, which has no
+/// `range`, have digits of their own.
+pub(super) fn labels(marks: &[f64], range: Option<f64>) -> Vec<String> {
+    let marks: Vec<f64> = marks.iter().map(|mark| rounded(*mark, range.unwrap_or(*mark))).collect();
+    let plain: Vec<String> = marks.iter().map(f64::to_string).collect();
+    let texts = if plain.iter().any(|text| text.len() > LETTERS) {
+        let exponent = |mark: &f64| if *mark == 0.0 { "0".into() } else { format!("{mark:e}") };
+        marks.iter().map(exponent).collect()
+    } else {
+        plain
+    };
+    texts.iter().map(|text| text.replace('-', "\u{2212}")).collect()
+}
+
+/// Rounds a mark to a thousandth of the range or so.
+fn rounded(mark: f64, range: f64) -> f64 {
+    let power = |value: f64| value.abs().log10().floor();
+    let digits = power(mark) - power(range) + 2.0;
+    // The mark at zero may have been computed with an error.
+    if digits.is_nan() || digits < -6.0 {
+        return 0.0;
+    }
+    format!("{mark:.*e}", digits.clamp(0.0, 16.0) as usize).parse().unwrap_or(mark)
 }
 
 #[cfg(test)]
@@ -51,9 +71,25 @@ mod tests {
         assert_eq!(logarithmic(1e-3, 1e2), [1e-3, 1e-2, 1e-1, 1.0, 10.0, 100.0]);
     }
 
+    /// Labels of marks on a linear axis.
+    fn linear_labels<const N: usize>(marks: [f64; N], range: f64) -> [String; N] {
+        labels(&marks, Some(range)).try_into().unwrap()
+    }
+
     #[test]
     fn labels_are_as_short_as_they_can_be() {
-        let labels = [(10.0, 50.0), (0.30000000000000004, 0.5), (-0.0, 1.0), (-2.5, 6.0)];
-        assert_eq!(labels.map(|(value, range)| label(value, range)), ["10", "0.3", "0", "−2.5"]);
+        let cases = [(10.0, 50.0), (0.30000000000000004, 0.5), (-0.0, 1.0), (-2.5, 6.0)];
+        let labels = cases.map(|(value, range)| linear_labels([value], range).concat());
+        assert_eq!(labels, ["10", "0.3", "0", "−2.5"]);
+    }
+
+    #[test]
+    fn labels_with_many_letters_have_exponents() {
+        assert_eq!(linear_labels([0.0, 1e7, 1.5e7], 2e7), ["0", "1e7", "1.5e7"]);
+        assert_eq!(linear_labels([-0.0, 2.9999999999999998e300], 4e300), ["0", "3e300"]);
+        assert_eq!(linear_labels([-2e-6, 1e-22, 2e-6], 5e-6), ["−2e−6", "0", "2e−6"]);
+        assert_eq!(linear_labels([130.0, 135.0, 140.0], 16.3), ["130", "135", "140"]);
+        assert_eq!(labels(&[1e-3, 1.0, 100.0], None), ["0.001", "1", "100"]);
+        assert_eq!(labels(&[1e-13, 1.0], None), ["1e−13", "1e0"]);
     }
 }

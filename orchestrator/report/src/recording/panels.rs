@@ -2,14 +2,15 @@
 
 use super::{Recording, Series};
 use cosim::experiment::{self, Scaled};
-use cosim::signal::Signal;
+use cosim::signal::{Signal, Term};
 use fmu_import::names;
 use std::collections::BTreeSet;
+use std::iter;
 
 /// Largest number of curves in a panel, beside references, norms and limits.
 pub const CURVES: usize = 6;
 /// Largest number of variables that are drawn if nobody says which ones.
-const UNASKED: usize = 24;
+pub(super) const UNASKED: usize = 24;
 
 /// A panel with curves of one unit.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -20,8 +21,17 @@ pub struct Panel {
     pub unit: String,
     /// Curves of the panel.
     pub curves: Vec<Curve>,
-    /// Limit of the norm of all curves.
-    pub limit: Option<f64>,
+    /// Limits of the norm of all curves, each value once.
+    pub limits: Vec<Limit>,
+}
+
+/// A limit of the norm of all curves of a panel.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Limit {
+    /// Value of the limit, in the unit of the panel.
+    pub value: f64,
+    /// Places of the runs that have this limit.
+    pub runs: Vec<usize>,
 }
 
 /// A curve of a panel.
@@ -44,8 +54,11 @@ pub struct Curve {
 pub enum Role {
     /// A signal.
     Signal,
-    /// What a signal is to follow.
+    /// What a signal is to follow: in the first run that has it, and in the others as well unless
+    /// they have their own.
     Reference,
+    /// What a signal of this run is to follow, where that differs from the first run's.
+    OwnReference,
     /// The norm of all signals of the panel, which its limit is for.
     Norm,
 }
@@ -73,7 +86,7 @@ pub fn of_experiments(runs: &[Recording]) -> Result<Vec<Panel>, String> {
         let all: Vec<String> = all.filter(|name| seen.insert(*name)).cloned().collect();
         return grouped(runs, all.into_iter().take(UNASKED).map(|name| (stem(&name).into(), name)));
     }
-    Ok(panels.into_iter().flat_map(|panel| panel.divided(runs.len())).collect())
+    Ok(panels.into_iter().flat_map(|panel| panel.divided(runs)).collect())
 }
 
 fn of_experiment(
@@ -112,7 +125,8 @@ fn of_experiment(
     let limit = asked.limit.as_ref().and_then(&mut drawn).flatten();
     panel.unit = unit.unwrap_or_default();
     if let (Some(limit), false) = (limit, panel.curves.is_empty()) {
-        panel.limit = limit.last().copied().filter(|limit| limit.is_finite());
+        let limit = limit.last().copied().filter(|limit| limit.is_finite());
+        panel.limits.extend(limit.map(|value| Limit { value, runs: vec![place] }));
         let norm = |row: usize| {
             let signals = panel.curves.iter().filter(|curve| curve.role == Role::Signal);
             signals.map(|curve| curve.values[row].powi(2)).sum::<f64>().sqrt()
@@ -151,7 +165,7 @@ fn grouped(
 ) -> Result<Vec<Panel>, String> {
     let mut panels: Vec<Panel> = Vec::new();
     for (group, name) in names {
-        let signal = Signal::try_from(name.clone())?;
+        let signal = signal(runs, &name)?;
         let mut series = Vec::new();
         let mut fault = None;
         for (run, recording) in runs.iter().enumerate() {
@@ -167,6 +181,15 @@ fn grouped(
     }
     panels.iter_mut().for_each(Panel::shorten);
     Ok(panels)
+}
+
+/// Returns the signal of this name. A file of another program may call its columns as it likes.
+fn signal(runs: &[Recording], name: &str) -> Result<Signal, String> {
+    if runs.iter().any(|run| run.recorded.iter().any(|recorded| recorded == name)) {
+        let term = Term { value: name.to_string(), minus: None };
+        return Ok(Signal { terms: vec![term], norm: false, over: None });
+    }
+    Signal::try_from(name.to_string())
 }
 
 /// Adds a signal to the panel of its unit and group that has room for it.
@@ -222,23 +245,60 @@ fn matching(runs: &[Recording], asked: &str) -> Result<Vec<String>, String> {
 }
 
 impl Panel {
-    /// Takes the curves of another run's panel.
+    /// Returns whether all curves of the panel are of one signal, so that colours can tell the runs
+    /// apart.
+    pub fn has_one_signal(&self) -> bool {
+        self.curves.iter().all(|curve| curve.place == self.curves[0].place)
+    }
+
+    /// Returns the text of a curve in the legend; it is empty if the label of the panel says all.
+    /// `names` are those of the runs, of which a single one need not be named.
+    pub fn legend(&self, curve: &Curve, names: &[String]) -> String {
+        let run = names.get(curve.run).filter(|_| names.len() > 1).map_or("", String::as_str);
+        let text = match curve.role {
+            Role::Reference => return "reference".into(),
+            Role::OwnReference if self.has_one_signal() => "reference".into(),
+            Role::OwnReference => format!("reference of {}", curve.name),
+            // The norms of several runs have a panel of their own.
+            Role::Norm if !run.is_empty() => String::new(),
+            _ if curve.name == symbols(&self.label) => String::new(),
+            _ => curve.name.clone(),
+        };
+        let parts = [text.as_str(), run];
+        parts.into_iter().filter(|part| !part.is_empty()).collect::<Vec<_>>().join(", ")
+    }
+
+    /// Returns the text beside a limit, with the names of its runs if the limits of others differ.
+    pub fn limit_name(&self, limit: &Limit, names: &[String]) -> String {
+        let runs = limit.runs.iter().filter_map(|run| names.get(*run)).map(String::as_str);
+        match self.limits.len() {
+            1 => "limit of norm".into(),
+            _ => iter::once("limit of norm").chain(runs).collect::<Vec<_>>().join(", "),
+        }
+    }
+
+    /// Takes the curves and limits of another run's panel.
     fn join(&mut self, other: Self) {
         self.curves.extend(other.curves);
-        self.limit = self.limit.or(other.limit);
+        for limit in other.limits {
+            match self.limits.iter_mut().find(|there| there.value == limit.value) {
+                Some(there) => there.runs.extend(limit.runs),
+                None => self.limits.push(limit),
+            }
+        }
     }
 
     /// Divides a panel with curves of several runs, so that none has too many. The norms, with
-    /// their limit, then have a panel of their own, and so do references one run only.
-    fn divided(mut self, runs: usize) -> Vec<Self> {
-        if runs < 2 {
+    /// their limits, then have a panel of their own.
+    fn divided(mut self, runs: &[Recording]) -> Vec<Self> {
+        if runs.len() < 2 {
             return vec![self];
         }
-        self.curves.retain(|curve| curve.role != Role::Reference || curve.run == 0);
+        self.tell_references_apart(runs);
         let (norms, curves): (Vec<_>, Vec<_>) =
             self.curves.into_iter().partition(|curve| curve.role == Role::Norm);
         let (label, unit) = (self.label, self.unit);
-        let room = (CURVES / runs).max(1);
+        let room = (CURVES / runs.len()).max(1);
         let mut panels: Vec<Self> = Vec::new();
         for curve in curves {
             let part = curve.place / room;
@@ -251,22 +311,69 @@ impl Panel {
         panels.retain(|panel| !panel.curves.is_empty());
         if !norms.is_empty() {
             let label = format!("norm of {label}");
-            panels.push(Self { label, unit, curves: norms, limit: self.limit });
+            panels.push(Self { label, unit, curves: norms, limits: self.limits });
         }
         panels
     }
 
-    /// Leaves out of the names of the curves what the label already says.
+    /// Leaves out references that are those of the first run as well, and marks the others as their
+    /// runs' own.
+    fn tell_references_apart(&mut self, runs: &[Recording]) {
+        let mut firsts: Vec<Curve> = Vec::new();
+        self.curves.retain_mut(|curve| {
+            if curve.role != Role::Reference {
+                return true;
+            }
+            let Some(first) = firsts.iter().find(|first| first.place == curve.place) else {
+                firsts.push(curve.clone());
+                return true;
+            };
+            curve.role = Role::OwnReference;
+            let [there, here] = [first, curve].map(|curve| (&runs[curve.run].time, &curve.values));
+            !covers(there, here)
+        });
+    }
+
+    /// Leaves out of the names of the curves what the label already says. The label names the
+    /// signal if it is the only one.
     fn shorten(&mut self) {
+        let first = self.curves.first().map(|curve| curve.name.clone()).unwrap_or_default();
+        if self.curves.iter().all(|curve| curve.name == first) {
+            self.label = symbols(&first);
+            self.curves.iter_mut().for_each(|curve| curve.name.clone_from(&self.label));
+            return;
+        }
         for curve in &mut self.curves {
             let rest = curve.name.strip_prefix(&self.label).filter(|_| !self.label.is_empty());
             curve.name = symbols(rest.map_or(&*curve.name, |rest| rest.trim_start_matches('.')));
         }
-        let first = self.curves.first().map(|curve| curve.name.clone()).unwrap_or_default();
-        if self.label.is_empty() && self.curves.iter().all(|curve| curve.name == first) {
-            self.label = first;
-        }
     }
+}
+
+/// Returns whether a curve passes through all points of another one.
+fn covers(curve: (&Vec<f64>, &Vec<f64>), other: (&Vec<f64>, &Vec<f64>)) -> bool {
+    let magnitude = other
+        .1
+        .iter()
+        .filter(|value| value.is_finite())
+        .fold(0.0, |most, value| f64::max(most, value.abs()));
+    let passes = |(time, value): (&f64, &f64)| match at(curve.0, curve.1, *time) {
+        Some(there) => (there - value).abs() <= 1e-6 * magnitude || !value.is_finite(),
+        None => false,
+    };
+    other.0.iter().zip(other.1).all(passes)
+}
+
+/// Returns the value of a curve at a time by linear interpolation; `None` beyond its ends.
+fn at(times: &[f64], values: &[f64], time: f64) -> Option<f64> {
+    let after = times.partition_point(|other| *other < time);
+    let (end, value) = (*times.get(after)?, *values.get(after)?);
+    if end == time {
+        return Some(value);
+    }
+    let before = after.checked_sub(1)?;
+    let share = (time - times[before]) / (end - times[before]);
+    Some(values[before] + share * (value - values[before]))
 }
 
 /// Returns what the name of a variable has before its last part; nothing for a combination.

@@ -1,5 +1,6 @@
 //! Collects a recording while the run goes on, of variables that may not be written to its files.
 
+use super::panels::UNASKED;
 use super::{Recording, Track};
 use cosim::error::Error;
 use cosim::experiment::{Observe, Vehicle};
@@ -12,25 +13,34 @@ use std::iter;
 
 /// Largest number of rows that are kept.
 const ROWS: u64 = 100_000;
+/// Place that names the variables that are recorded.
+const RECORD: &str = "[record]";
 /// Place that names the variables of a guarantee, which an FMU may lack.
 const GUARANTEE: &str = "[observe.guarantee]";
 
 /// An observer that keeps the variables that the pictures of a run show.
 pub struct Watch {
     columns: Vec<(String, usize, Track)>,
+    /// Number of columns, the first ones, that are drawn because the experiment has no panels.
+    unasked: usize,
     time: Vec<f64>,
     stride: u64,
 }
 
 impl Watch {
-    /// Requests the variables that are recorded, and those that the experiment draws. Variables
-    /// that are missing because the command line replaced their FMU are left out.
+    /// Requests the variables that the experiment draws, and the first ones that are recorded if it
+    /// has no panels. Variables that are missing because the command line replaced their FMU are
+    /// left out.
     ///
     /// # Errors
     /// Returns an error if the experiment names a variable that does not exist.
     pub fn new(system: &mut System) -> Result<Self, Error> {
         let mut columns = Vec::new();
-        let named = names(&system.experiment.observe);
+        let unasked = unasked(system);
+        let count = unasked.len();
+        let mut named = names(&system.experiment.observe);
+        named.retain(|name, _| !unasked.contains(name));
+        let named = unasked.into_iter().map(|name| (name, RECORD)).chain(named);
         for (name, place) in named {
             let is_optional = place == GUARANTEE || system.lost_by_exchange([name.as_str()]);
             if !system.has(&name) && is_optional {
@@ -48,14 +58,25 @@ impl Watch {
             };
             columns.push((name, probed.place, track));
         }
-        Ok(Self { columns, time: Vec::new(), stride: system.clock.ticks().div_ceil(ROWS).max(1) })
+        let stride = system.clock.ticks().div_ceil(ROWS).max(1);
+        Ok(Self { columns, unasked: count, time: Vec::new(), stride })
     }
 
     /// Returns the recording of the run whose `results.json` has this content.
     pub fn recording(self, name: &str, metadata: &Value) -> Recording {
         let tracks = self.columns.into_iter().map(|(name, _, track)| (name, track)).collect();
-        Recording::new(name, metadata, self.time, tracks)
+        let mut recording = Recording::new(name, metadata, self.time, tracks);
+        if self.unasked > 0 {
+            recording.recorded.truncate(self.unasked);
+        }
+        recording
     }
+}
+
+/// Returns the recorded variables that are drawn if an experiment has no panels.
+fn unasked(system: &System) -> Vec<String> {
+    let count = if system.experiment.observe.panels.is_empty() { UNASKED } else { 0 };
+    system.recorded().into_iter().take(count).collect()
 }
 
 /// Returns the names of the variables that an experiment draws, each with the place that names it.

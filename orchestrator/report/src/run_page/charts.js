@@ -40,7 +40,7 @@ class Chart {
     const times = runs.flatMap((run) => [run.time[0], run.time.at(-1)]);
     this.span = [Math.min(...times), Math.max(...times)];
     // In a panel with one signal, the colour tells the runs apart.
-    this.isAlone = panel.curves.every((curve) => curve.place === panel.curves[0].place && curve.role !== "reference");
+    this.isAlone = panel.curves.every((curve) => curve.place === panel.curves[0].place);
     this.figure = document.createElement("figure");
     this.figure.className = "panel";
     const heading = document.createElement("h3");
@@ -69,20 +69,20 @@ class Chart {
     if (curve.role === "reference") return { stroke: "var(--ink)", "stroke-width": 1, "stroke-dasharray": "1.5 2.5" };
     if (curve.role === "norm" && single) return { stroke: "var(--limit)", "stroke-width": 1.2, "stroke-dasharray": "" };
     const colour = this.isAlone ? curve.run : curve.place;
+    if (curve.role === "own reference") return { stroke: `var(--c${colour % 6})`, "stroke-width": 1, "stroke-dasharray": "1.5 2.5" };
     const dash = single ? curve.place : curve.run;
     return { stroke: `var(--c${colour % 6})`, "stroke-width": 1.8, "stroke-dasharray": Chart.DASHES[dash % 6] };
   }
 
   list() {
-    const shown = this.panel.curves.filter((curve) => curve.role !== "reference");
-    const references = this.panel.curves.filter((curve) => curve.role === "reference");
-    this.outputs = shown.map((curve) => {
-      const name = this.runs.length === 1 ? curve.name : `${curve.name}, ${this.runs[curve.run].name}`;
+    const isReference = (curve) => curve.role.endsWith("reference");
+    this.outputs = this.panel.curves.filter((curve) => !isReference(curve)).map((curve) => {
       const output = document.createElement("output");
-      this.legend.append(this.entry(this.style(curve), name, output));
+      this.legend.append(this.entry(this.style(curve), curve.name, output));
       return [curve, output];
     });
-    if (references.length) this.legend.append(this.entry(this.style(references[0]), "reference"));
+    const references = new Map(this.panel.curves.filter(isReference).map((curve) => [curve.name, curve]));
+    for (const [name, curve] of references) this.legend.append(this.entry(this.style(curve), name));
   }
 
   entry(style, name, output) {
@@ -104,15 +104,20 @@ class Chart {
 
   static ticks(low, high, count) {
     const step = Chart.step(high - low, count);
-    const digits = Math.max(0, -Math.floor(Math.log10(step)));
-    const ticks = [];
-    for (let i = Math.ceil(low / step - 1e-9); i * step <= high + 1e-9 * step; i++) ticks.push([i * step, minus((i * step).toFixed(digits))]);
-    return ticks;
+    const digits = Math.max(0, Math.min(100, -Math.floor(Math.log10(step))));
+    const [first, last] = [Math.ceil(low / step - 1e-9), Math.floor(high / step + 1e-9)];
+    const values = Array.from({ length: last - first + 1 }, (_, i) => (first + i) * step);
+    const texts = values.map((value) => value.toFixed(digits));
+    // Marks that need many letters have exponents.
+    const isLong = texts.some((text) => text.length > 7);
+    const short = (value) => Number(value.toPrecision(12)).toExponential().replace("e+", "e").replace("e0", "");
+    return values.map((value, i) => [value, minus(isLong ? short(value) : texts[i])]);
   }
 
   range() {
-    const { limit, curves } = this.panel;
-    let [low, high] = limit === null ? [Infinity, -Infinity] : [limit, limit];
+    const { limits, curves } = this.panel;
+    let [low, high] = [Infinity, -Infinity];
+    for (const { value } of limits) [low, high] = [Math.min(low, value), Math.max(high, value)];
     for (const curve of curves) {
       for (const value of curve.values) {
         if (value === null) continue;
@@ -150,13 +155,19 @@ class Chart {
       svg.append(svgElement("text", { x: Math.min(this.x(value), width - 22), y: HEIGHT - 6, "text-anchor": "middle" }, label));
     });
     // Norms lie lowest, signals on top of what they follow.
-    const order = { norm: 0, reference: 1, signal: 2 };
+    const order = { norm: 0, reference: 1, "own reference": 1, signal: 2 };
     for (const curve of [...panel.curves].sort((a, b) => order[a.role] - order[b.role])) {
       svg.append(svgElement("path", { class: "curve", d: this.path(curve, y), ...this.style(curve) }));
     }
-    if (panel.limit !== null) {
-      svg.append(svgElement("line", { x1: LEFT, x2: width - RIGHT, y1: y(panel.limit), y2: y(panel.limit), stroke: "var(--limit)", "stroke-width": 1.4, "stroke-dasharray": "6 4" }));
-      svg.append(svgElement("text", { class: "limit", x: width - RIGHT - 4, y: y(panel.limit) + 14, "text-anchor": "end" }, `limit of norm ${minus(String(panel.limit))} ${panel.unit}`));
+    const heights = [];
+    for (const { name, value } of panel.limits) {
+      svg.append(svgElement("line", { x1: LEFT, x2: width - RIGHT, y1: y(value), y2: y(value), stroke: "var(--limit)", "stroke-width": 1.4, "stroke-dasharray": "6 4" }));
+      // Above the line if there is no room below it.
+      const isFree = (at) => at > TOP + 10 && at < HEIGHT - BOTTOM && heights.every((other) => Math.abs(other - at) >= 13);
+      const at = [y(value) + 14, y(value) - 5].find(isFree) ?? y(value) + 14;
+      heights.push(at);
+      const text = `${name}: ${minus(String(value))} ${panel.unit}`;
+      svg.append(svgElement("text", { class: "limit", x: width - RIGHT - 4, y: at, "text-anchor": "end" }, text));
     }
     this.line = svgElement("line", { class: "cursor", x1: LEFT, x2: LEFT, y1: TOP, y2: HEIGHT - BOTTOM });
     svg.append(this.line);

@@ -21,21 +21,27 @@ pub fn page(runs: &[Recording], panels: &[Panel], vehicles: &[usize]) -> Value {
             "vehicle": is_shown.then(|| vehicle(run)).flatten(),
         })
     };
+    let names: Vec<String> = runs.iter().map(|run| run.name.clone()).collect();
     let panel = |panel: &Panel| {
         let curves = panel.curves.iter().map(|curve| {
             let role = match curve.role {
                 Role::Signal => "signal",
                 Role::Reference => "reference",
+                Role::OwnReference => "own reference",
                 Role::Norm => "norm",
             };
             json!({
-                "name": curve.name, "run": curve.run, "place": curve.place, "role": role,
+                "name": panel.legend(curve, &names), "run": curve.run, "place": curve.place, "role": role,
                 "values": numbers(thin::values(&curve.values), DIGITS),
             })
         });
+        let limits = panel.limits.iter().map(|limit| {
+            let name = panel.limit_name(limit, &names);
+            json!({ "name": name, "value": rounded(limit.value, DIGITS) })
+        });
         json!({
             "label": symbols(&panel.label), "unit": panel.unit,
-            "limit": panel.limit.map(|limit| rounded(limit, DIGITS)),
+            "limits": limits.collect::<Vec<_>>(),
             "curves": curves.collect::<Vec<_>>(),
         })
     };

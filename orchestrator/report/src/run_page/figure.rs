@@ -6,18 +6,15 @@ use crate::recording::Recording;
 use crate::recording::panels::{Curve, Panel, Role, symbols};
 
 /// Largest number of letters of a run's name that a legend has room for.
-const NAME: usize = 8;
+const NAME: usize = 16;
 
 /// Returns the figure of these panels.
 pub fn figure(runs: &[Recording], panels: &[Panel]) -> Figure {
     let names = names(runs);
     let named = runs.iter().zip(&names);
-    let numbered =
-        named.map(
-            |(run, name)| {
-                if run.name == *name { name.clone() } else { format!("{name} {}", run.name) }
-            },
-        );
+    let numbered = named.map(|(run, name)| {
+        if run.name == *name { name.clone() } else { format!("{name}\u{a0}{}", run.name) }
+    });
     let title = match runs {
         [run] => run.title.clone(),
         _ => numbered.collect::<Vec<_>>().join(", "),
@@ -40,12 +37,12 @@ fn drawn(runs: &[Recording], names: &[String], panel: &Panel) -> figure::Panel {
         panel.curves.iter().map(|curve| one(runs, names, panel, curve)).collect();
     // What is drawn first lies lowest.
     curves.sort_by_key(|curve| curve.shape != Shape::Pale);
-    curves.extend(panel.limit.map(|limit| figure::Curve {
-        name: "limit of norm".into(),
+    curves.extend(panel.limits.iter().map(|limit| figure::Curve {
+        name: panel.limit_name(limit, names),
         color: Color::LIMIT,
         shape: Shape::Horizontal,
         x: vec![f64::NAN],
-        y: vec![limit],
+        y: vec![limit.value],
     }));
     let parts = [symbols(&panel.label), panel.unit.clone()];
     let parts: Vec<String> = parts.into_iter().filter(|part| !part.is_empty()).collect();
@@ -59,23 +56,15 @@ fn drawn(runs: &[Recording], names: &[String], panel: &Panel) -> figure::Panel {
 
 fn one(runs: &[Recording], names: &[String], panel: &Panel, curve: &Curve) -> figure::Curve {
     let run = &runs[curve.run];
-    let name = match (runs.len(), curve.role) {
-        (_, Role::Reference) => "reference".to_string(),
-        (1, _) => curve.name.clone(),
-        _ => format!("{}, {}", curve.name, names[curve.run]),
-    };
     // In a panel with one signal, the colour tells the runs apart.
-    let alone = panel.curves.iter().all(|other| other.place == curve.place);
-    let place = if alone { curve.run } else { curve.place };
-    let shape = match curve.role {
-        Role::Reference => Shape::Pale,
-        Role::Norm if runs.len() == 1 => Shape::Pale,
-        _ => Shape::Line,
+    let place = if panel.has_one_signal() { curve.run } else { curve.place };
+    let own = Color::CURVES[place % Color::CURVES.len()];
+    let (color, shape) = match curve.role {
+        Role::Reference => (Color(0, 0, 0), Shape::Pale),
+        Role::OwnReference => (own, Shape::Pale),
+        Role::Norm if runs.len() == 1 => (Color::GREY, Shape::Pale),
+        _ => (own, Shape::Line),
     };
-    let color = match curve.role {
-        Role::Reference => Color(0, 0, 0),
-        Role::Norm if runs.len() == 1 => Color::GREY,
-        _ => Color::CURVES[place % Color::CURVES.len()],
-    };
-    figure::Curve { name, color, shape, x: thin::times(&run.time), y: thin::values(&curve.values) }
+    let (x, y) = (thin::times(&run.time), thin::values(&curve.values));
+    figure::Curve { name: panel.legend(curve, names), color, shape, x, y }
 }

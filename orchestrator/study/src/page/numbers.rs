@@ -19,7 +19,7 @@ pub(super) fn small(full: &Overview, results: &Results) -> Markup {
     let is_part = part.runs.len() < full.runs.len() || part.metrics.len() < full.metrics.len();
     html! {
         (rows(&part, results, &mean))
-        @if is_part { p.note { a href="#tables" { "All rows and columns" } } }
+        @if is_part { p.note.on-screen { a href="#tables" { "All rows and columns" } } }
     }
 }
 

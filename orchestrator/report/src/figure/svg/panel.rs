@@ -3,10 +3,11 @@
 use super::paint::{escaped, stroke};
 use crate::figure::dash::Dashes;
 use crate::figure::thin::thinned;
+use crate::figure::words::{letters, wrapped};
 use crate::figure::{Curve, Panel, Shape, ticks};
 use std::fmt::Write as _;
 
-/// Space for labels to the left, to the right, above and below the axes, px.
+/// Space for labels to the left, at least, to the right, above and below the axes, px.
 const LEFT: f64 = 64.0;
 const RIGHT: f64 = 14.0;
 const ABOVE: f64 = 10.0;
@@ -15,6 +16,14 @@ const BELOW: f64 = 40.0;
 /// Height and width that a mark of an axis needs, px.
 const MARK_HEIGHT: f64 = 38.0;
 const MARK_WIDTH: f64 = 80.0;
+/// Width of a letter of a mark, space of a mark beside its letters, and height of a line of the
+/// label, px.
+const LETTER: f64 = 6.6;
+const BESIDE: f64 = 10.0;
+const LINE: f64 = 15.0;
+/// Largest number of letters of a line of the vertical axis's label, and of its lines.
+const LABEL_LETTERS: usize = 30;
+const LABEL_LINES: usize = 2;
 
 /// Place of a panel with its labels, px.
 #[derive(Clone, Copy)]
@@ -61,19 +70,45 @@ impl Axes {
     }
 }
 
+/// Returns the space that a panel of this height needs to the left of its axes, px.
+pub(super) fn left_of(panel: &Panel, height: f64) -> f64 {
+    let height = height - above(panel) - BELOW;
+    let longest = marks_y(panel.range(false), height).iter().map(|(_, text)| letters(text)).max();
+    let lines = label(panel).len().max(1) as f64;
+    LEFT.max(LINE * lines + BESIDE + LETTER * longest.unwrap_or(0) as f64)
+}
+
+/// Returns the space above a panel's axes, px.
+fn above(panel: &Panel) -> f64 {
+    ABOVE + if panel.title.is_empty() { 0.0 } else { TITLE }
+}
+
+/// Returns the lines of the label of the vertical axis.
+fn label(panel: &Panel) -> Vec<String> {
+    wrapped(&panel.y_label, LABEL_LETTERS, LABEL_LINES)
+}
+
+/// Returns the marks of a vertical axis of this height, and what they say.
+fn marks_y((low, high): (f64, f64), height: f64) -> Vec<(f64, String)> {
+    let marks = ticks::linear(low, high, ((height / MARK_HEIGHT) as usize).max(2));
+    let texts = ticks::labels(&marks, Some(high - low));
+    marks.into_iter().zip(texts).collect()
+}
+
 /// Draws a panel. A page's script finds ranges and frame in the attributes of its group.
 pub(super) fn draw_panel(
     out: &mut String,
     panel: &Panel,
     dashes: &Dashes,
     area: Area,
+    left_space: f64,
     names_x: bool,
 ) {
-    let above = ABOVE + if panel.title.is_empty() { 0.0 } else { TITLE };
+    let above = above(panel);
     let frame = Area {
-        x: area.x + LEFT,
+        x: area.x + left_space,
         y: area.y + above,
-        width: area.width - LEFT - RIGHT,
+        width: area.width - left_space - RIGHT,
         height: area.height - above - BELOW,
     };
     let axes = Axes { x: panel.range(true), y: panel.range(false), log_x: panel.log_x, frame };
@@ -116,10 +151,9 @@ fn draw_axes(out: &mut String, panel: &Panel, axes: &Axes, area: Area, names_x: 
         ticks::linear(left, right, ((width / MARK_WIDTH) as usize).max(2))
     };
     out.push_str("<g class=\"marks-x small\" text-anchor=\"middle\">");
-    for mark in marks {
+    let texts = ticks::labels(&marks, (!panel.log_x).then_some(right - left));
+    for (mark, text) in marks.into_iter().zip(texts) {
         let at = axes.x_at(mark);
-        let range = if panel.log_x { mark } else { right - left };
-        let text = ticks::label(mark, range);
         let _ = write!(
             out,
             "<path class=\"grid\" d=\"M{at:.1} {y:.1}v{height:.1}\"/><text class=\"small\" x=\"{at:.1}\" y=\"{:.1}\">{text}</text>",
@@ -127,10 +161,8 @@ fn draw_axes(out: &mut String, panel: &Panel, axes: &Axes, area: Area, names_x: 
         );
     }
     out.push_str("</g><g class=\"marks-y small\" text-anchor=\"end\">");
-    let (low, high) = axes.y;
-    for mark in ticks::linear(low, high, ((height / MARK_HEIGHT) as usize).max(2)) {
+    for (mark, text) in marks_y(axes.y, height) {
         let at = axes.y_at(mark);
-        let text = ticks::label(mark, high - low);
         let _ = write!(
             out,
             "<path class=\"grid\" d=\"M{x:.1} {at:.1}h{width:.1}\"/><text class=\"small\" x=\"{:.1}\" y=\"{:.1}\">{text}</text>",
@@ -146,12 +178,14 @@ fn draw_axes(out: &mut String, panel: &Panel, axes: &Axes, area: Area, names_x: 
             "<text x=\"{middle:.1}\" y=\"{below:.1}\" text-anchor=\"middle\">{label}</text>"
         );
     }
-    let (side, centre) = (area.x + 14.0, y + height / 2.0);
-    let _ = write!(
-        out,
-        "<text transform=\"translate({side:.1} {centre:.1}) rotate(-90)\" text-anchor=\"middle\">{}</text>",
-        escaped(&panel.y_label)
-    );
+    for (place, line) in label(panel).iter().enumerate() {
+        let (side, centre) = (area.x + 14.0 + LINE * place as f64, y + height / 2.0);
+        let _ = write!(
+            out,
+            "<text transform=\"translate({side:.1} {centre:.1}) rotate(-90)\" text-anchor=\"middle\">{}</text>",
+            escaped(line)
+        );
+    }
 }
 
 fn draw_curve(out: &mut String, curve: &Curve, dashes: &Dashes, axes: &Axes) {
@@ -225,6 +259,8 @@ fn draw_curve(out: &mut String, curve: &Curve, dashes: &Dashes, axes: &Axes) {
 fn name_lines(out: &mut String, panel: &Panel, axes: &Axes) {
     let Area { x, y, width, height } = axes.frame;
     let mut named: Vec<&str> = Vec::new();
+    // Heights at which names of horizontal lines stand.
+    let mut heights: Vec<f64> = Vec::new();
     for curve in panel.curves.iter().filter(|curve| curve.shape.is_straight()) {
         if named.contains(&curve.name.as_str()) {
             continue;
@@ -234,7 +270,13 @@ fn name_lines(out: &mut String, panel: &Panel, axes: &Axes) {
         let (at_x, at_y, anchor) = if curve.shape == Shape::Horizontal {
             let line = axes.y_at(first(&curve.y));
             // Below the line if there is no room above it.
-            (x + width - 4.0, if line - y < 16.0 { line + 14.0 } else { line - 5.0 }, "end")
+            let is_free = |at: &f64| {
+                (y + 11.0..y + height).contains(at)
+                    && heights.iter().all(|other| (other - at).abs() >= 13.0)
+            };
+            let at = [line - 5.0, line + 14.0].into_iter().find(is_free).unwrap_or(line - 5.0);
+            heights.push(at);
+            (x + width - 4.0, at, "end")
         } else {
             let line = axes.x_at(first(&curve.x));
             let at = y + height - 6.0 - 14.0 * (named.len() - 1) as f64;

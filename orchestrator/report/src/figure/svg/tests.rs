@@ -72,3 +72,84 @@ fn names_cannot_end_an_element() {
     assert!(!text.contains("<script>") && text.matches("</svg>").count() == 2);
     assert!(text.contains("a &amp; b") && text.contains("&lt;t&gt;"));
 }
+
+/// Attributes of the first text that contains these words.
+fn text_with<'a>(svg: &'a str, words: &str) -> &'a str {
+    let end = svg.find(words).unwrap_or_else(|| panic!("{words} in {svg}"));
+    &svg[svg[..end].rfind("<text").unwrap()..end]
+}
+
+/// Place and size of the axes of the first panel: x, y, width and height.
+fn frame(svg: &str) -> Vec<f64> {
+    let (_, rest) = svg.split_once("data-frame=\"").unwrap();
+    let numbers = rest.split('"').next().unwrap().split(' ');
+    numbers.map(|number| number.parse().unwrap()).collect()
+}
+
+#[test]
+fn a_legend_beside_a_panel_has_the_room_that_its_names_need() {
+    let drawn = |name: &str| {
+        let figure = figure(vec![curve(name, Shape::Line)], None);
+        text(&Figure { legend: Legend::Beside, ..figure })
+    };
+    let right = |svg: &str| frame(svg)[0] + frame(svg)[2];
+    assert_eq!(right(&drawn("p")), 876.0);
+    let long = drawn("plant.attitude.alpha, crmpc-robust");
+    assert!(long.contains(">plant.attitude.alpha, crmpc-robust<"), "{long}");
+    // As many letters as there are, and the sample before them, fit between axes and edge.
+    assert!(right(&long) + 38.0 + 34.0 * 7.0 < WIDTH, "{}", right(&long));
+    // A name beyond all measure is shortened, but a script still finds its curve by it.
+    let name = "x".repeat(200);
+    let (svg, short) = (drawn(&name), format!(">{}…", "x".repeat(18)));
+    assert!(right(&svg) > 600.0 && svg.contains(&short) && svg.contains(&name), "{svg}");
+    assert_eq!(right(&drawn("")), 986.0);
+}
+
+#[test]
+fn a_long_title_is_wrapped_and_makes_room_for_itself() {
+    let titled = |title: &str| {
+        text(&Figure { title: title.into(), ..figure(vec![curve("c", Shape::Line)], None) })
+    };
+    let (short, long) = (titled("short"), titled(&["a long run"; 20].join(", ")));
+    let lines = long.matches("<text class=\"title\"").count();
+    assert_eq!((short.matches("<text class=\"title\"").count(), lines), (1, 3));
+    assert_eq!(frame(&long)[1], frame(&short)[1] + 2.0 * TITLE_LINE);
+}
+
+#[test]
+fn a_long_label_is_wrapped_and_keeps_its_unit() {
+    let labelled = |label: &str| {
+        let mut figure = figure(vec![curve("c", Shape::Line)], None);
+        figure.panels[0].y_label = label.into();
+        text(&figure)
+    };
+    let svg = labelled("norm(plant.rate.p, plant.rate.q, plant.rate.r), deg/s");
+    assert!(text_with(&svg, ">norm(plant.rate.p,").contains("rotate(-90)"), "{svg}");
+    assert!(text_with(&svg, "plant.rate.r), deg/s<").contains("rotate(-90)"), "{svg}");
+}
+
+#[test]
+fn long_marks_have_exponents_and_push_the_axes_aside() {
+    let scaled = |scale: f64| {
+        let mut curve = curve("c", Shape::Line);
+        curve.y.iter_mut().for_each(|y| *y *= -scale);
+        text(&figure(vec![curve], None))
+    };
+    let small = scaled(1.0);
+    assert_eq!(frame(&small)[0], 64.0);
+    let large = scaled(1e300);
+    assert!(large.contains(">−5e299<") && frame(&large)[0] > 64.0, "{large}");
+    assert!(scaled(1e7).contains(">−5e6<"));
+}
+
+#[test]
+fn names_of_limits_close_to_one_another_do_not_overlap() {
+    let limit = |name: &str, y: f64| Curve { y: vec![y], ..curve(name, Shape::Horizontal) };
+    let curves = vec![curve("c", Shape::Line), limit("first", 0.5), limit("second", 0.49)];
+    let svg = text(&figure(curves, None));
+    let height = |name: &str| -> f64 {
+        let (_, rest) = text_with(&svg, &format!(">{name}</text>")).split_once(" y=\"").unwrap();
+        rest.split('"').next().unwrap().parse().unwrap()
+    };
+    assert!(height("second") - height("first") > 13.0, "{svg}");
+}

@@ -36,13 +36,20 @@ fn names(panel: &Panel) -> Vec<(&str, usize)> {
     panel.curves.iter().map(|curve| (curve.name.as_str(), curve.run)).collect()
 }
 
+/// Texts of the legend of a panel, for runs of these names.
+fn legend(panel: &Panel, runs: &[&str]) -> Vec<String> {
+    let runs: Vec<String> = runs.iter().map(ToString::to_string).collect();
+    panel.curves.iter().map(|curve| panel.legend(curve, &runs)).collect()
+}
+
 #[test]
 fn oracle_the_panel_of_an_experiment_with_the_norm_and_its_limit() {
     let panels = of_experiments(&[run("a", &SIGNALS, PANELS)]).unwrap();
     assert_eq!(panels.len(), 1);
     assert_eq!(names(&panels[0]), [("p", 0), ("q", 0), ("norm", 0)]);
     assert_eq!(panels[0].curves[2].values, [5.0, 1.0]);
-    assert_eq!((panels[0].limit, panels[0].unit.as_str()), (Some(5.0), "deg/s"));
+    assert_eq!(panels[0].limits, [Limit { value: 5.0, runs: vec![0] }]);
+    assert_eq!(panels[0].unit, "deg/s");
 }
 
 #[test]
@@ -53,9 +60,66 @@ fn panels_of_several_runs_have_six_curves_at_most() {
     // One for p, one for q, one for the norms with their limit.
     assert_eq!(panels.len(), 3);
     assert!(panels.iter().all(|panel| panel.curves.len() == 4));
-    assert_eq!((panels[0].limit, panels[2].limit), (None, Some(5.0)));
+    assert!(panels[0].limits.is_empty());
+    assert_eq!(panels[2].limits, [Limit { value: 5.0, runs: vec![0, 1, 2, 3] }]);
     let panels = of_experiments(&runs[..2]).unwrap();
     assert_eq!(names(&panels[0]), [("p", 0), ("q", 0), ("p", 1), ("q", 1)]);
+}
+
+#[test]
+fn limits_that_differ_are_drawn_with_the_names_of_their_runs() {
+    let limited = |name: &str, limit: f64| {
+        let mut signals = SIGNALS;
+        signals[3].2 = [limit; 2];
+        run(name, &signals, PANELS)
+    };
+    let runs = [limited("a", 5.0), limited("b", 4.0), limited("c", 5.0)];
+    let panels = of_experiments(&runs).unwrap();
+    let norms = panels.last().unwrap();
+    let names = ["a", "b", "c"].map(String::from);
+    let limits = norms.limits.iter().map(|limit| (limit.value, norms.limit_name(limit, &names)));
+    assert_eq!(
+        limits.collect::<Vec<_>>(),
+        [(5.0, "limit of norm, a, c".into()), (4.0, "limit of norm, b".into())]
+    );
+    assert_eq!(legend(norms, &["a", "b", "c"]), ["a", "b", "c"]);
+    let equal = of_experiments(&runs[..1]).unwrap();
+    assert_eq!(equal[0].limit_name(&equal[0].limits[0], &names[..1]), "limit of norm");
+}
+
+#[test]
+fn references_that_differ_from_the_first_runs_are_drawn_as_their_runs_own() {
+    const FOLLOWING: &str = r#"panels = [{ name = "angle", curves = [
+        { name = "alpha", of = "plant.attitude.alpha", reference = "law.reference" },
+    ] }]"#;
+    let following = |name: &str, reference: [f64; 2]| {
+        let angle = ("plant.attitude.alpha", "deg", [1.0, 2.0]);
+        run(name, &[angle, ("law.reference", "deg", reference)], FOLLOWING)
+    };
+    let mut runs =
+        [following("a", [1.0, 3.0]), following("b", [1.0, 3.0]), following("c", [1.0, 4.0])];
+    // Sampled at other times, the same line is the same reference.
+    runs[1].time = vec![0.0, 0.5];
+    runs[1].tracks.get_mut("law.reference").unwrap().values = vec![1.0, 2.0];
+    let panels = of_experiments(&runs).unwrap();
+    let names = ["a", "b", "c"];
+    assert_eq!(legend(&panels[0], &names), ["α, a", "reference", "α, b", "α, c", "reference, c"]);
+    // A reference that goes on after the first run's is not covered by it.
+    runs[1].time = vec![0.0, 2.0];
+    let panels = of_experiments(&runs[..2]).unwrap();
+    assert_eq!(legend(&panels[0], &names[..2]), ["α, a", "reference", "α, b", "reference, b"]);
+}
+
+#[test]
+fn a_legend_says_only_what_the_label_does_not() {
+    let runs = ["a", "b"].map(|name| run(name, &SIGNALS, ""));
+    let signals = |names: &[&str]| names.iter().map(ToString::to_string).collect::<Vec<_>>();
+    let alone = of_signals(&runs, &signals(&["plant.rate.p"])).unwrap();
+    assert_eq!(alone[0].label, "plant.rate.p");
+    assert_eq!(legend(&alone[0], &["a", "b"]), ["a", "b"]);
+    assert_eq!(legend(&of_signals(&runs[..1], &signals(&["law.limit"])).unwrap()[0], &["a"]), [""]);
+    let both = of_signals(&runs, &signals(&["plant.rate.*"])).unwrap();
+    assert_eq!(legend(&both[0], &["a", "b"]), ["p, a", "p, b", "q, a", "q, b"]);
 }
 
 #[test]
@@ -71,7 +135,9 @@ fn signals_that_are_asked_for_are_grouped_by_unit_and_stem() {
         (panels[0].label.as_str(), names(&panels[0])),
         ("plant.rate", vec![("p", 0), ("q", 0)])
     );
-    assert_eq!(names(&panels[1]), [("α", 0)]);
+    // The label has room for the name of a signal alone.
+    assert_eq!(panels[1].label, "plant.attitude.α");
+    assert_eq!(legend(&panels[1], &["a"]), [""]);
     // Signals that are named one by one are compared, also with what a combination gives.
     let panels = asked(&["plant.rate.p", "law.limit", "norm(plant.rate.p, plant.rate.q)"]).unwrap();
     assert_eq!((panels.len(), panels[0].curves.len()), (1, 3));
