@@ -267,7 +267,7 @@ fn all_runs(results: &Results) -> Markup {
                 @for (run, result) in results.study.runs.iter().zip(&results.runs) {
                     tr {
                         td {
-                            span.swatch style=(format!("background:{}", run.color)) {} " " (run.label)
+                            (run.label)
                             @if !run.group.is_empty() { ", " (run.group) }
                         }
                         td { code { (run.experiment.display()) } }
