@@ -77,9 +77,10 @@ def saved(page: Page, folder: Path) -> Path:
     return path
 
 
-def flown(experiment: Path, folder: Path) -> tuple[pd.DataFrame, dict]:
+def flown(experiment: Path, folder: Path, code: int = 0) -> tuple[pd.DataFrame, dict]:
     """What the orchestrator makes of an experiment file."""
-    subprocess.run([program("orchestrator"), "run", experiment, "--out", folder], check=True, capture_output=True)
+    done = subprocess.run([program("orchestrator"), "run", experiment, "--out", folder], capture_output=True, text=True)
+    assert done.returncode == code, done.stderr
     table = pd.read_csv(folder / "results.csv", dtype=str).map(float)
     return table, json.loads((folder / "metrics.json").read_text())
 
@@ -93,6 +94,10 @@ def test_a_flight_has_the_bits_of_the_orchestrator(chromium, tmp_path, controlle
     assert table["time"].iloc[-1] == 50.0
     # Only CRMPC has the status of a guarantee.
     assert_same_bits(shown, table, missing="crmpc" not in controller)
+    assert_same_figures(page, metrics)
+
+
+def assert_same_figures(page: Page, metrics: dict) -> None:
     # The figures of merit are sums, which may be taken in another order.
     summary = page.evaluate("flight.summary")
     assert summary["cms"] == pytest.approx(metrics["cms"], rel=1e-9)
@@ -100,6 +105,19 @@ def test_a_flight_has_the_bits_of_the_orchestrator(chromium, tmp_path, controlle
     assert page.evaluate("flight.summary.ems * 180 / Math.PI") == pytest.approx(metrics["ems_deg"], rel=1e-9)
     rate = summary["rate_ratio"] * metrics["rate_limit_deg_s"]
     assert rate == pytest.approx(metrics["max_rate_deg_s"], rel=1e-12)
+
+
+@pytest.mark.parametrize("address", ["controller=two-loop&plant.actuation.delay=0.2", "controller=btvsmc&plant.initial.beta=89+deg"])
+def test_a_lost_attitude_ends_the_flight_as_in_the_orchestrator(chromium, tmp_path, address):
+    page = opened(chromium, address, accept_downloads=True)
+    shown, end = signals(page), page.evaluate("flight.summary.end")
+    table, metrics = flown(saved(page, tmp_path), tmp_path / "out", code=3)
+    assert end["time"] == table["time"].iloc[-1] == metrics["lost_at"] < 5.0
+    assert_same_bits(shown, table, missing=1)
+    assert_same_figures(page, metrics)
+    assert "loses the attitude" in page.inner_text("#verdict")
+    # Time stands where the flight ended.
+    assert float(page.inner_text("#clock").removesuffix(" s")) == pytest.approx(end["time"], abs=0.05)
 
 
 def test_the_page_opens_with_the_published_scenario(chromium, tmp_path):
@@ -149,6 +167,12 @@ def test_a_slider_changes_flight_and_address_and_the_address_holds_everything(ch
 
 def test_what_an_address_gets_wrong_is_named(chromium):
     assert "plant.wind" in opened(chromium, "plant.wind=3").inner_text("#said")
+    page = opened(chromium, "controller=LQR&plant.disturbance.bound=4+deg/s2")
+    assert 'no controller "LQR"' in page.inner_text("#said") and page.evaluate("location.hash") == "#controller=crmpc"
+    for wrong in ("plant.disturbance.bound=2+rad", "controller.saturation=yes"):
+        page = chromium.new_context().new_page()
+        page.goto(f"{PAGE.as_uri()}#{wrong}")
+        page.wait_for_function("document.querySelector('#verdict').textContent.startsWith('Refused')")
     page = chromium.new_context().new_page()
     page.goto(f"{PAGE.as_uri()}#plant.disturbance.bound=900+deg/s2")
     page.wait_for_function("document.querySelector('#said').textContent.includes('disturbance.bound')")
@@ -182,7 +206,7 @@ def test_the_page_answers_fast(chromium):
 
 
 def test_the_view_of_the_vehicle_turns_as_the_angles_are_defined(chromium):
-    """The velocity in body axes is (cos α cos β, sin β, sin α cos β); positive bank lowers the right wing."""
+    """The velocity in body axes is (cos α cos β, sin β, sin α cos β); positive bank raises the right wing, which is y."""
     page = opened(chromium)
     rotation = np.array(page.evaluate("Vehicle3D.rotation([0.3, -0.2, 0.7])"))
     alpha, beta = 0.3, -0.2
@@ -191,7 +215,66 @@ def test_the_view_of_the_vehicle_turns_as_the_angles_are_defined(chromium):
     np.testing.assert_allclose(rotation @ rotation.T, np.eye(3), atol=1e-15)
     assert np.linalg.det(rotation) > 0.0
     banked = np.array(page.evaluate("Vehicle3D.rotation([0, 0, 0.7])"))
-    np.testing.assert_allclose(banked @ [0.0, 1.0, 0.0], [0.0, np.cos(0.7), np.sin(0.7)], atol=1e-15)
+    np.testing.assert_allclose(banked @ [0.0, 1.0, 0.0], [0.0, np.cos(0.7), -np.sin(0.7)], atol=1e-15)
+
+
+def test_oracle_the_view_of_the_vehicle_turns_with_the_body_rates(chromium):
+    page = opened(chromium, "controller=btvsmc&plant.kinematics=exact&plant.disturbance.kind=none")
+    table = signals(page).iloc[:200]
+    angles = table[[f"plant.attitude.{name}" for name in ("alpha", "beta", "sigma")]].to_numpy().tolist()
+    views = np.array(page.evaluate("(all) => all.map((angles) => Vehicle3D.rotation(angles))", angles))
+    step = np.diff(table["time"])[:, None, None]
+    turned = (views[:-1].transpose(0, 2, 1) @ views[1:] - np.eye(3)) / step
+    rates = np.stack([turned[:, 2, 1] - turned[:, 1, 2], turned[:, 0, 2] - turned[:, 2, 0], turned[:, 1, 0] - turned[:, 0, 1]], axis=1) / 2.0
+    recorded = table[[f"plant.rate.{name}" for name in "pqr"]].to_numpy()
+    middle = (recorded[1:] + recorded[:-1]) / 2.0
+    assert np.abs(middle).max() > 0.05
+    np.testing.assert_allclose(rates, middle, atol=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("address", "name", "value", "shown"),
+    [
+        ("controller.limit.moment=135.6+N.m", "flight.summary.limits.moment", 135.6, "0.1356 kN m"),
+        ("controller.limit.moment=120000+N.m", "flight.summary.limits.moment", 120e3, "120 kN m"),
+        ("controller.limit.rate=0.08+rad/s", "flight.summary.limits.rate", 0.08, "4.584 deg/s"),
+        ("plant.initial.alpha=0.2+rad", "flight.signals[1]", 0.2, "11.46 deg"),
+    ],
+)
+def test_a_setting_is_shown_in_the_unit_of_its_slider(chromium, address, name, value, shown):
+    page = opened(chromium, address)
+    assert page.evaluate(name) == pytest.approx(value, rel=1e-12)
+    parameter = address.split("=")[0]
+    assert page.inner_text(f".row[data-names='{parameter}'] output") == shown
+
+
+def test_a_slider_says_what_is_flown(chromium):
+    page = opened(chromium)
+    for parameter, of in (("controller.limit.moment", "flight.summary.limits.moment / 1e3"), ("plant.initial.alpha", "flight.signals[1] * 180 / Math.PI")):
+        for key in ("ArrowRight", "PageDown", "End"):
+            count = flights(page)
+            page.locator(f"[id='set-{parameter}']").press(key)
+            after(page, count)
+            shown = page.inner_text(f".row[data-names='{parameter}'] output").split()[0].replace("−", "-")
+            assert float(shown) == pytest.approx(page.evaluate(of), rel=1e-3, abs=1e-9), (parameter, key)
+
+
+def test_a_refused_setting_is_told_where_the_flight_is_judged(chromium):
+    page = opened(chromium)
+    page.get_by_label("rate limit", exact=True).press("Home")
+    page.wait_for_function("document.body.classList.contains('refused')")
+    assert page.inner_text("#verdict").startswith("Refused: ")
+    count = flights(page)
+    page.get_by_label("rate limit", exact=True).press("End")
+    after(page, count)
+    assert "keeps both limits" in page.inner_text("#verdict") and not page.evaluate("document.body.classList.contains('refused')")
+
+
+def test_a_moment_that_is_scaled_into_its_limit_keeps_it(chromium):
+    for limit in range(50, 70, 2):
+        page = opened(chromium, f"controller=lqr&controller.saturation=true&controller.limit.moment={limit}000")
+        assert "moment limit" not in page.inner_text("#verdict")
+        page.close()
 
 
 @pytest.mark.parametrize("width", [390, 760, 1000, 1400])

@@ -17,6 +17,7 @@ import numpy as np
 import pytest
 import results as pages
 
+from browsing import in_chromium
 from conftest import EXPERIMENTS, TARGET, merged, program
 from figures import check_folder
 
@@ -415,9 +416,14 @@ def test_an_unknown_study_is_refused(tmp_path):
     assert finished.returncode == 2 and "there is no study" in finished.stderr
 
 
+# The pages of the studies that the tests have flown so far.
+PAGES = {}
+
+
 def reproduced(name: str, folder) -> dict:
     finished = reproduce(EXPERIMENTS.parent / name, folder / "out")
     assert finished.returncode == 0, finished.stderr
+    PAGES[name] = folder / "out" / "report.html"
     return json.loads((folder / "out" / "results.json").read_text())
 
 
@@ -572,6 +578,28 @@ def test_every_controller_flies_an_entry(tmp_path):
         if name.startswith("surfaces-and-jets"):
             assert 0.05 < member["measures"]["jets-alone"] < 0.5, name
     assert differences(tmp_path / "out") == []
+
+
+@in_chromium
+def test_pages_are_small_and_fit_a_telephone_and_few_sheets(chromium, tmp_path):
+    if not PAGES:
+        reproduced("two-loop-smc", tmp_path)
+    for name, report in PAGES.items():
+        assert report.stat().st_size < 1e6, name
+        page = chromium.new_page(viewport={"width": 390, "height": 844})
+        page.goto(report.as_uri())
+        assert page.evaluate("document.documentElement.scrollWidth") == 390, name
+        assert page.evaluate("document.documentElement.scrollHeight") <= 15_000, name
+        # Everything that opens still fits.
+        page.evaluate("for (const part of document.querySelectorAll('details')) part.open = true")
+        page.wait_for_function("!document.querySelector('[data-folded]')")
+        assert page.evaluate("document.documentElement.scrollWidth") == 390, name
+        assert page.evaluate("[...document.querySelectorAll('figure')].every((figure) => figure.querySelector('svg path'))"), name
+        page.reload()
+        page.wait_for_timeout(1000)
+        page.pdf(path=tmp_path / "report.pdf", format="A4")
+        assert (tmp_path / "report.pdf").read_bytes().count(b"/Type /Page\n") <= 12, name
+        page.close()
 
 
 def test_oracle_the_shaped_reversal_is_the_integral_of_its_derivatives():

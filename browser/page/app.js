@@ -16,9 +16,13 @@ const PANELS = [
 const LIGHTS = { inForce: "good", pending: "good", exceeded: "bad", uncertified: "warn", stale: "warn", refused: "warn" };
 // Playback is five times as fast as the flight.
 const SPEED = 5;
+// Ratio up to which a limit counts as met: 1 up to rounding.
+const MET = 1 + 1e-9;
 
 let settings, worker, busy = false, wanted = null, patience = null;
 let flight = null;
+// The request that is being flown, and what is to be said of an address once it is.
+let sent = null, remark = null;
 // When the first flight was drawn, ms after the page was opened.
 let first = null;
 let time = 26;
@@ -36,6 +40,7 @@ function send() {
   if (!wanted) return;
   busy = true;
   patience = setTimeout(() => { $("cost").textContent = "Computing …"; }, 400);
+  sent = { name: settings.choice.name.replace(", ", " with ") };
   worker.postMessage({ call: "fly", request: wanted });
   wanted = null;
 }
@@ -45,14 +50,17 @@ function received({ data }) {
   if (data.call === "experiment") return saved(data);
   busy = false;
   clearTimeout(patience);
+  // What is shown is not what is set.
+  document.body.classList.toggle("refused", Boolean(data.error));
   if (data.error) {
     say(data.error, true);
+    $("verdict").textContent = `Refused: ${data.error}`;
   } else {
     flight = read(data);
-    say(settings.unknown?.length ? `Unknown here: ${settings.unknown.join(", ")}` : "");
-    settings.unknown = null;
+    say(remark?.text ?? "", remark?.wrong);
     show();
   }
+  if (!wanted) remark = null;
   send();
 }
 
@@ -65,9 +73,8 @@ function read({ text, signals, ms }) {
   const three = (first, factor) => [0, 1, 2].map((i) => column(first + i, factor));
   const angles = three(1, DEG), reference = three(7, DEG);
   const errors = angles.map((angle, i) => angle.map((value, row) => value - reference[i][row]));
-  const name = settings.choice.name.replace(", ", " with ");
   return {
-    summary, signals, columns, ms, rows, width, name, time: column(0, 1), angles, reference, errors,
+    summary, signals, columns, ms, rows, width, name: sent.name, time: column(0, 1), angles, reference, errors,
     rates: three(4, DEG), moment: three(10, 1e-3), status: column(13, 1),
   };
 }
@@ -77,7 +84,7 @@ function exceeded([x, y, z], limit) {
   const spans = [];
   let from = null;
   for (let row = 0; row < flight.rows; row++) {
-    const over = Math.hypot(x[row], y[row], z[row]) > limit;
+    const over = Math.hypot(x[row], y[row], z[row]) > limit * MET;
     if (over && from === null) from = flight.time[row];
     if (!over && from !== null) spans.push([from, flight.time[row]]);
     if (!over) from = null;
@@ -95,6 +102,7 @@ function show() {
   charts.rate.show({ stop, time: at, curves: rates, limit: limits.rate, exceeded: exceeded(rates, limits.rate) }, time);
   charts.moment.show({ stop, time: at, curves: moment, limit: limits.moment, exceeded: exceeded(moment, limits.moment) }, time);
   judge(limits);
+  clock();
   pose(time);
   $("cost").textContent = `Computed in ${flight.ms.toFixed(0)} ms.`;
   first ??= performance.now();
@@ -125,14 +133,14 @@ function guarantee() {
 
 function judge(limits) {
   const { summary, name } = flight;
-  const over = [["rate", summary.rate_ratio], ["moment", summary.moment_ratio]].filter(([, ratio]) => ratio > 1);
+  const over = [["rate", summary.rate_ratio], ["moment", summary.moment_ratio]].filter(([, ratio]) => ratio > MET);
   const percent = (ratio) => `${(100 * ratio).toFixed(0)} %`;
   let verdict = `${name} keeps both limits`;
   if (over.length) verdict = `${name} exceeds the ${over.map(([limit, ratio]) => `${limit} limit (${percent(ratio)})`).join(" and the ")}`;
-  if (summary.end) verdict = `The flight ends at ${summary.end.time.toFixed(1)} s`;
+  if (summary.end) verdict = `${summary.lost ? `${name} loses the attitude` : "The flight ends"} at ${summary.end.time.toFixed(1)} s`;
   $("verdict").textContent = verdict[0].toUpperCase() + verdict.slice(1);
   const meter = (label, ratio, limit, unit, digits) => `
-    <div class="${ratio > 1 ? "over" : ""}"><dt>${label}</dt>
+    <div class="${ratio > MET ? "over" : ""}"><dt>${label}</dt>
     <dd class="meter"><i style="width:${Math.min(100, (ratio * 200) / 3)}%"></i></dd>
     <dd>${(ratio * limit).toFixed(digits)} of ${limit.toFixed(digits)} ${unit}</dd></div>`;
   const [light, text] = guarantee();
@@ -155,10 +163,16 @@ function judge(limits) {
 
 // --- The chosen time ------------------------------------------------------------------------------------------------
 
+// Shows the chosen time, or the end of a flight that ended before it.
+function clock() {
+  const shown = Math.min(time, flight?.time.at(-1) ?? time);
+  $("time").value = shown;
+  $("clock").textContent = `${shown.toFixed(1)} s`;
+}
+
 function point(at) {
   time = at;
-  $("time").value = at;
-  $("clock").textContent = `${at.toFixed(1)} s`;
+  clock();
   if (!flight) return;
   for (const chart of Object.values(charts)) chart.point(at);
   pose(at);
@@ -254,13 +268,16 @@ function control({ names, label, low, high, exact }) {
       option.title = meaning;
       input.add(option);
     }
-    input.value = settings.value(names[0]);
+    const value = settings.value(names[0]);
+    // An address may have an item that the page does not offer.
+    if (![...input.options].some((option) => option.value === value)) input.add(new Option(value, value));
+    input.value = value;
     input.onchange = () => changed(names, input.value);
   } else {
     input = document.createElement("input");
     if (type === "Boolean") {
       input.type = "checkbox";
-      input.checked = settings.value(names[0]);
+      input.checked = settings.value(names[0]) === true;
       input.onchange = () => changed(names, input.checked);
     } else {
       number(input, parameter, { names, low, high, exact: exact || type === "Integer" });
@@ -272,7 +289,7 @@ function control({ names, label, low, high, exact }) {
     const shown = document.createElement("output");
     shown.htmlFor = id;
     const write = () => {
-      const text = `${Number(Number(input.value).toPrecision(4))} ${parameter.unit}`.replace("-", "−").trim();
+      const text = `${Number(input.chosen().toPrecision(4))} ${parameter.unit}`.replace("-", "−").trim();
       shown.textContent = text;
       input.setAttribute("aria-valuetext", text);
     };
@@ -295,29 +312,38 @@ function number(input, parameter, { names, low, high, exact }) {
     if (kind.min !== null) input.min = parameter.shown(kind.min);
     if (kind.max !== null) input.max = parameter.shown(kind.max);
     input.value = value;
-    input.oninput = () => { if (input.value !== "" && input.checkValidity()) changed(names, parameter.written(input.valueAsNumber)); };
+    input.oninput = () => {
+      if (!input.checkValidity()) say(`${parameter.name}: ${input.validationMessage}`, true);
+      else if (input.value !== "") changed(names, parameter.written(input.valueAsNumber));
+    };
     return;
   }
   input.type = "range";
   const step = Chart.step(high - low, 200);
-  [low, high] = [Math.min(low, value), Math.max(high, value)];
+  // What is no number of the unit is refused, and the slider stands anywhere.
+  if (Number.isFinite(value)) [low, high] = [Math.min(low, value), Math.max(high, value)];
   input.min = low;
   input.max = high;
   // The initial value is one of the steps.
   input.step = Number.isInteger(Number(((value - low) / step).toFixed(6))) ? step : "any";
   input.value = value;
-  input.oninput = () => {
-    const chosen = input.step === "any" ? Number((Math.round(input.valueAsNumber / step) * step).toPrecision(10)) : input.valueAsNumber;
-    changed(names, parameter.written(chosen));
+  // The value that is shown and flown: a round one, or the initial value.
+  input.chosen = () => {
+    const at = input.valueAsNumber;
+    if (input.step !== "any" || at === value) return at;
+    return Math.min(high, Math.max(low, Number((Math.round(at / step) * step).toPrecision(10))));
   };
+  input.oninput = () => changed(names, parameter.written(input.chosen()));
 }
 
 function load(address) {
   try {
-    settings.unknown = settings.read(address);
+    const unknown = settings.read(address);
+    remark = unknown.length ? { text: `Unknown here: ${unknown.join(", ")}` } : null;
   } catch (error) {
-    say(error.message, true);
+    remark = { text: `${error.message}: this is ${settings.description.controllers[0].name}`, wrong: true };
     settings.read("");
+    history.replaceState(null, "", `#${settings.address()}`);
   }
   build();
   fly();
@@ -374,7 +400,7 @@ $("save").onclick = () => worker.postMessage({ call: "experiment", request: sett
 $("time").oninput = () => point($("time").valueAsNumber);
 $("play").onclick = play;
 window.addEventListener("hashchange", () => load(location.hash.slice(1)));
-matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => flight && show());
+for (const what of ["(prefers-color-scheme: dark)", "print"]) matchMedia(what).addEventListener("change", () => flight && show());
 
 worker = new Worker(URL.createObjectURL(new Blob([$("worker").textContent], { type: "text/javascript" })));
 worker.onmessage = received;

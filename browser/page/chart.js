@@ -193,7 +193,7 @@ class Chart {
     let x = right;
     for (let i = panel.names.length - 1; i >= 0; i--) {
       const value = data.curves[i][row] ?? 0;
-      const number = value.toFixed(panel.digits).replace("-", "−");
+      const number = value.toFixed(Math.abs(value) < 1000 ? panel.digits : 0).replace("-", "−");
       context.textAlign = "right";
       if (roomy) context.fillText(number, x, 11);
       x -= roomy ? 50 : 0;

@@ -50,9 +50,14 @@ class Parameter {
     return this.kind.start;
   }
 
-  // Number to show, in the display unit.
+  // Number to show, in the display unit. Not a number: a text in a unit that is not the variable's, which is refused.
   shown(value) {
-    if (typeof value === "string") return parseFloat(value);
+    if (typeof value === "string") {
+      const [, number, unit] = /^\s*([-+]?[\d.]+(?:e[-+]?\d+)?)\s*(.*)$/i.exec(value) ?? [];
+      if (unit === this.display?.name) return Number(number);
+      if (unit !== this.kind.unit?.name) return NaN;
+      value = Number(number);
+    }
     const [factor] = READABLE[this.kind.unit?.name] ?? [1];
     return rounded(value * (this.display?.factor ?? factor));
   }
@@ -78,9 +83,13 @@ class Parameter {
     const initial = this.shown(this.initial);
     const size = Math.abs(initial) * 3 || this.shown(this.kind.nominal ?? 1);
     let [low, high] = initial < 0 ? [-size, 0] : [0, size];
+    const step = Chart.step(size, 200);
     if (this.kind.min !== null) low = Math.max(low, this.shown(this.kind.min));
     if (this.kind.max !== null) high = Math.min(high, this.shown(this.kind.max));
-    return [low, high];
+    // Laws refuse many limits themselves, such as a gain of 0.
+    if (low === this.shown(this.kind.min ?? NaN) && low < initial) low += step;
+    if (high === this.shown(this.kind.max ?? NaN) && high > initial) high -= step;
+    return [rounded(low), rounded(high)];
   }
 }
 
@@ -146,7 +155,7 @@ class Settings {
       const parameter = this.parameters.get(name);
       if (name === "controller") continue;
       if (!parameter) unknown.push(name);
-      else if (parameter.type === "Boolean") this.change(name, text === "true");
+      else if (/^(true|false)$/.test(text)) this.change(name, text === "true");
       else this.change(name, text.trim() !== "" && !Number.isNaN(Number(text)) ? Number(text) : text);
     }
     return unknown;

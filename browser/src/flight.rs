@@ -55,10 +55,10 @@ impl Wires {
 /// the last one repeats the responses of the step before.
 ///
 /// # Errors
-/// Says which parameter the FMUs refuse. If a step fails, the flight ends there, and the summary
-/// says why.
+/// Says which parameter the FMUs refuse. If a step fails or the attitude is lost, the flight ends
+/// there, and the summary says why.
 pub fn fly(prepared: Prepared, signals: &mut Vec<f64>) -> Result<Summary, Error> {
-    let Prepared { mut controller, mut plant, step, steps, .. } = prepared;
+    let Prepared { mut controller, mut plant, step, steps, lost_beyond, .. } = prepared;
     let wires = Wires::new(&controller, &plant)?;
     let stop = steps as f64 * step;
     controller.initialize(0.0, stop)?;
@@ -81,8 +81,13 @@ pub fn fly(prepared: Prepared, signals: &mut Vec<f64>) -> Result<Summary, Error>
         for text in controller.take_warnings().into_iter().chain(plant.take_warnings()) {
             summary.warn(row[0], text);
         }
-        summary.take(&row, end);
+        let error = summary.take(&row, end).to_degrees();
         signals.extend_from_slice(&row);
+        // An error that is not a number counts as lost, too.
+        if error.is_nan() || error > lost_beyond {
+            summary.lose(row[0], lost_beyond);
+            break;
+        }
     }
     Ok(summary)
 }

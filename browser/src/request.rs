@@ -35,6 +35,8 @@ pub struct Prepared {
     pub step: f64,
     /// Number of steps.
     pub steps: usize,
+    /// Tracking error beyond which the attitude counts as lost, deg.
+    pub lost_beyond: f64,
     /// Experiment as the orchestrator reads it.
     pub experiment: Table,
 }
@@ -71,7 +73,11 @@ impl Request {
         apply(&mut experiment, "plant", &mut plant)?;
         record_guarantee(&mut experiment, &controller);
         let (step, steps) = clock(&mut experiment, &controller)?;
-        Ok(Prepared { controller, plant, step, steps, experiment })
+        let loss = experiment.get("observe").and_then(|observe| observe.get("loss"));
+        let beyond = loss.and_then(|loss| loss.get("beyond")).and_then(toml::Value::as_float);
+        let lost_beyond =
+            beyond.ok_or_else(|| scenario::problem("observe.loss", "beyond is no number"))?;
+        Ok(Prepared { controller, plant, step, steps, lost_beyond, experiment })
     }
 }
 

@@ -47,6 +47,8 @@ pub struct Summary {
     warnings: Vec<Message>,
     /// Why the flight ended early, if it did.
     end: Option<Message>,
+    /// Whether it ended because the attitude was lost.
+    lost: bool,
 }
 
 fn squared(values: impl Iterator<Item = f64>) -> f64 {
@@ -73,25 +75,33 @@ impl Summary {
             guarantee,
             warnings: vec![],
             end: None,
+            lost: false,
         }
     }
 
     /// Takes a row into account. At the end of the flight no step begins, so that it has no command
-    /// of its own.
-    pub fn take(&mut self, row: &Row, end: bool) {
+    /// of its own. Returns the norm of the tracking error, rad.
+    pub fn take(&mut self, row: &Row, end: bool) -> f64 {
         let before = self.rows as f64;
         self.rows += 1;
         let rate = squared(row[4..7].iter().copied()).sqrt() / self.limits.rate;
         self.rate_ratio = self.rate_ratio.max(rate);
+        let error = squared((1..4).map(|i| row[i] - row[i + 6]));
         if end {
-            return;
+            return error.sqrt();
         }
         let effort = squared(row[10..13].iter().copied()).sqrt() / self.limits.moment;
         self.moment_ratio = self.moment_ratio.max(effort);
-        let error = squared((1..4).map(|i| row[i] - row[i + 6]));
         let mean = |rms: f64, square: f64| ((rms * rms * before + square) / (before + 1.0)).sqrt();
         self.ems = mean(self.ems, error);
         self.cms = mean(self.cms, effort * effort);
+        error.sqrt()
+    }
+
+    /// Says that the attitude is lost at `time` (s), as its error exceeds this bound (deg).
+    pub fn lose(&mut self, time: f64, beyond: f64) {
+        self.lost = true;
+        self.end(time, format!("attitude lost: its error exceeds {beyond} deg"));
     }
 
     /// Adds a warning of an FMU.

@@ -64,6 +64,14 @@ fn a_flight_that_cannot_go_on_ends_with_a_reason() {
 }
 
 #[test]
+fn a_lost_attitude_ends_the_flight() {
+    let set = json!({"plant.initial.beta": "61 deg"});
+    let (summary, signals) = flown(&json!({"controller": "lqr", "set": set})).unwrap();
+    assert_eq!((&summary["lost"], &summary["end"]["time"]), (&json!(true), &json!(0.0)));
+    assert_eq!(signals.len(), COLUMNS.len());
+}
+
+#[test]
 fn wrong_requests_are_refused_by_name() {
     let unknown = flown(&json!({"controller": "pid"})).unwrap_err();
     assert!(unknown.contains("'pid'"), "{unknown}");

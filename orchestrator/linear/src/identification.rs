@@ -21,6 +21,8 @@ const LONGEST: [usize; 2] = [25, 50];
 const LONGEST_TIME: f64 = 1.0;
 /// Least number of steps whose responses a model reproduces twice over.
 const BLOCKS: usize = 24;
+/// Most steps of the next period whose responses are held against those of the first.
+const AGAIN: usize = 4;
 /// Lags that are compared to find the period.
 const COMPARED: usize = 6;
 /// Difference of two periods up to which they count as equal, relative to the largest response, and
@@ -187,7 +189,7 @@ impl Builder<'_> {
         let depends = trials.windows(2).map(|pair| difference(pair, 1)).fold(0.0, f64::max);
         let Some((change, period, _)) = best else { unreachable!("there are changes to try") };
         let blocks = BLOCKS.max(2 * period);
-        let phases: Vec<Response> = (0..2 * period)
+        let phases: Vec<Response> = (0..period + period.min(AGAIN))
             .map(|first| probe(change).responses(instance, first, 2 * blocks))
             .collect::<Result<_, _>>()?;
         let error = phases.iter().map(|phase| phase.error).fold(0.0, f64::max);

@@ -103,13 +103,14 @@ class Vehicle3D {
     return faces;
   }
 
-  // Body axes to axes with x along the velocity and z down, as columns of rows.
+  // Body axes to axes with x along the velocity and z down, as columns of rows. A positive bank angle raises the right
+  // wing, as in the papers: σ̇ = −p cos α − r sin α without sideslip.
   static rotation([alpha, beta, sigma]) {
     const [ca, sa, cb, sb, cs, ss] = [alpha, beta, sigma].flatMap((a) => [Math.cos(a), Math.sin(a)]);
     const first = [[cb * ca, sb, cb * sa], [-sb * ca, cb, -sb * sa], [-sa, 0, ca]];
     const [x, y, z] = first;
     const row = (a, b) => y.map((value, i) => a * value + b * z[i]);
-    return [x, row(cs, -ss), row(ss, cs)];
+    return [x, row(cs, ss), row(-ss, cs)];
   }
 
   static times(matrix, v) {
@@ -293,7 +294,8 @@ class Vehicle3D {
     const [left, right] = [64, size.width - 112];
     const mark = left + ((right - left) * 2) / 3;
     const end = Math.min(right, left + ((mark - left) * norm) / limit);
-    const exceeds = norm > limit;
+    // A limit counts as met up to rounding.
+    const exceeds = norm > limit * (1 + 1e-9);
     context.fillStyle = this.colour("line");
     context.fillRect(left, y - 4, right - left, 8);
     context.fillStyle = exceeds ? this.colour("bad") : this.colour("muted");

@@ -55,7 +55,7 @@ class AttitudeEnv(gymnasium.Env[Observation, npt.NDArray[np.float32]]):
     moment limit (`moment_limit`, 1.356e5 N m). An action whose norm exceeds 1 is shortened to 1, so
     that the moment keeps its limit. It acts for one step of 0.04 s.
 
-    The **reward** of a step is
+    The **reward** of a step is::
 
         -step · (|e|² / (1 deg)² + 0.1 |m|² / limit² + 10 max(0, |ω| / rate limit - 1)²)
 
