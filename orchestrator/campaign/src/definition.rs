@@ -142,8 +142,8 @@ pub struct Search {
     /// Measure whose largest value is looked for.
     #[schemars(with = "String")]
     pub largest: Spanned<String>,
-    /// Number of cases after which the search ends, with those that are flown together with the last
-    /// of them.
+    /// Number of cases after which the search ends, with those that are flown together with the
+    /// last of them.
     #[serde(default = "thousand")]
     pub cases: u64,
     /// Value of the measure at which the search ends.

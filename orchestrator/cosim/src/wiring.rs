@@ -318,35 +318,12 @@ fn check_unconnected(experiment: &Experiment, parts: &[Part], wires: &[Wire]) ->
                      [components.{name}]: unconnected = [{patterns}]",
                     name = part.name,
                     list = open.join(", "),
-                    patterns = shortest_patterns(&open, &inputs.iter().map(|(_, name)| *name)),
+                    patterns = names::patterns(&open, &inputs.iter().map(|(_, name)| *name)),
                 ),
             ));
         }
     }
     Ok(())
-}
-
-/// Finds patterns that stand for exactly the `open` ones among the `inputs`: a group is named by
-/// its prefix if all of its inputs are open.
-fn shortest_patterns<'a>(
-    open: &[&str],
-    inputs: &(impl Iterator<Item = &'a str> + Clone),
-) -> String {
-    let mut patterns: Vec<String> = Vec::new();
-    for name in open {
-        let group = name.rsplit_once('.').map(|(prefix, _)| format!("{prefix}.*"));
-        let whole = |pattern: &String| {
-            inputs
-                .clone()
-                .filter(|name| names::matches(pattern, name))
-                .all(|name| open.contains(&name))
-        };
-        let pattern = group.filter(whole).unwrap_or_else(|| (*name).to_string());
-        if !patterns.contains(&pattern) {
-            patterns.push(pattern);
-        }
-    }
-    patterns.iter().map(|pattern| format!("\"{pattern}\"")).collect::<Vec<_>>().join(", ")
 }
 
 /// Resolves the recorded variables. A pattern stands for inputs, outputs and local variables; a

@@ -47,6 +47,23 @@ pub fn split(path: &str) -> Option<(&str, &str)> {
         .filter(|(component, variable)| !component.is_empty() && !variable.is_empty())
 }
 
+/// Finds patterns that stand for exactly the `open` ones among the `inputs`: a group is named by
+/// its prefix if all of its inputs are open.
+pub fn patterns<'a>(open: &[&str], inputs: &(impl Iterator<Item = &'a str> + Clone)) -> String {
+    let mut patterns: Vec<String> = Vec::new();
+    for name in open {
+        let group = name.rsplit_once('.').map(|(prefix, _)| format!("{prefix}.*"));
+        let whole = |pattern: &String| {
+            inputs.clone().filter(|name| matches(pattern, name)).all(|name| open.contains(&name))
+        };
+        let pattern = group.filter(whole).unwrap_or_else(|| (*name).to_string());
+        if !patterns.contains(&pattern) {
+            patterns.push(pattern);
+        }
+    }
+    patterns.iter().map(|pattern| format!("\"{pattern}\"")).collect::<Vec<_>>().join(", ")
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -18,6 +18,7 @@ pub mod linearise;
 pub mod margins;
 pub mod measures;
 pub mod model;
+mod opening;
 mod pair;
 pub mod propagation;
 pub mod realisation;

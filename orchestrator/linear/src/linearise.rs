@@ -4,6 +4,7 @@ use crate::Matrix;
 use crate::components::Component;
 use crate::identification::{Builder, Found, needed_steps};
 use crate::model::{OpenLoop, Signal};
+use crate::opening::{opened, tick_at};
 use crate::pair::{Joined, Pair};
 use crate::propagation::{Link, Net};
 use crate::replay::Recorded;
@@ -15,7 +16,7 @@ use cosim::interrupt::Interrupt;
 use cosim::master::Master;
 use cosim::system::System;
 use cosim::wiring::{Port, Wire};
-use fmu_import::description::{Carrier, VariableKind};
+use fmu_import::description::Carrier;
 use fmu_import::instance::CallFailure;
 use fmu_import::quantity::rounded;
 use fmu_import::warnings;
@@ -377,50 +378,4 @@ fn links(system: &System, models: &[&Component], opened: &[Port]) -> Vec<Link> {
         })
     };
     system.wires().into_iter().filter_map(link).collect()
-}
-
-fn tick_at(clock: &Clock, time: f64) -> Result<u64, Error> {
-    let exact = (time - clock.start()) / clock.step();
-    let tick = exact.round();
-    if !time.is_finite() || tick < 0.0 || (exact - tick).abs() > 1e-6 {
-        return Err(Error::experiment(format!(
-            "--at {time}: must be a communication point, {} s and then every {} s",
-            clock.start(),
-            clock.step()
-        )));
-    }
-    Ok(tick as u64)
-}
-
-/// Finds the signals at which the loop is opened.
-fn opened(system: &System, patterns: &[String]) -> Result<(Vec<Signal>, Vec<Port>), Error> {
-    let wires = system.wires();
-    let is_wired =
-        |port: &Port| wires.iter().any(|(wire, _)| wire.from == *port || wire.to == *port);
-    let mut ports: Vec<Port> = Vec::new();
-    for pattern in patterns {
-        let meant = system.ports(pattern).into_iter();
-        let found: Vec<Port> =
-            meant.filter(|port| port.carrier == Carrier::Real && is_wired(port)).collect();
-        if found.is_empty() {
-            let mut names: Vec<String> = Vec::new();
-            for port in wires.iter().flat_map(|(wire, _)| [wire.to, wire.from]) {
-                names.push(system.name(port));
-            }
-            let hint = fmu_import::names::hint(pattern, names.iter().map(String::as_str));
-            return Err(Error::experiment(format!(
-                "--open {pattern}: there is no such connected input or output{hint}"
-            )));
-        }
-        ports.extend(found.into_iter().filter(|port| !ports.contains(port)).collect::<Vec<_>>());
-    }
-    let signal = |port: &Port| Signal {
-        name: system.name(*port),
-        size: system.variable_at(*port).nominal(),
-        unit: match &system.variable_at(*port).kind {
-            VariableKind::Real { unit: Some(unit), .. } => unit.clone(),
-            _ => String::new(),
-        },
-    };
-    Ok((ports.iter().map(signal).collect(), ports))
 }

@@ -4,6 +4,7 @@
 use crate::bench::{Bench, LOOP};
 use crate::campaign::CAMPAIGN;
 use std::fs;
+use std::path::Path;
 
 /// A folder with an experiment `loop`, a campaign `gains`, a study `papers` and an FMU `Model`.
 fn bench() -> Bench {
@@ -219,4 +220,12 @@ fn manual_pages_are_written() {
     assert!(page("orchestrator").contains("orchestrator\\-run(1)"));
     let (code, _, errors) = bench.call(&["man", "loop.toml/man1"]);
     assert!(code == 1 && errors.contains("loop.toml/man1"), "{errors}");
+}
+
+#[test]
+fn all_experiments_of_the_project_can_be_read() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("experiments");
+    let (code, text, _) = Bench::new().call(&["list", folder.to_str().unwrap()]);
+    assert_eq!(code, 0);
+    assert!(text.contains("crmpc-robust") && !text.contains("FAULT"), "{text}");
 }

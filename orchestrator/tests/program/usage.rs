@@ -391,11 +391,3 @@ fn an_experiment_that_extends_another_is_all_of_them() {
     let (_, text, _) = bench.call(&["list"]);
     assert!(lists(&text, "longer", "longer") && !lists(&text, "loop", "integrator"), "{text}");
 }
-
-#[test]
-fn all_experiments_of_the_project_can_be_read() {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("experiments");
-    let (code, text, _) = Bench::new().call(&["list", folder.to_str().unwrap()]);
-    assert_eq!(code, 0);
-    assert!(text.contains("crmpc-robust") && !text.contains("FAULT"), "{text}");
-}

@@ -31,7 +31,8 @@ pub(super) fn shortened(text: &str, room: usize) -> String {
     all().take(begin).chain(['…']).chain(all().skip(length - end)).collect()
 }
 
-/// Breaks a text between its words at plain spaces, and words that are longer than a line within themselves.
+/// Breaks a text between its words at plain spaces, and words that are longer than a line within
+/// themselves.
 fn broken(text: &str, room: usize) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
     for word in text.split(' ').filter(|word| !word.is_empty()) {

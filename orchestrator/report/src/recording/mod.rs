@@ -1,6 +1,7 @@
 //! What is known of a run for its pictures: the recorded variables over time, what its experiment
 //! draws, its parameters and its outcome. It comes from the files of a run, or from the run itself.
 
+mod cover;
 pub mod panels;
 pub mod watch;
 
