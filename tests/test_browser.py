@@ -242,14 +242,14 @@ def test_oracle_the_view_of_the_vehicle_turns_with_the_body_rates(chromium):
     ],
 )
 def test_a_setting_is_shown_in_the_unit_of_its_slider(chromium, address, name, value, shown):
-    page = opened(chromium, address)
+    page = opened(chromium, f"controller=lqr&{address}")
     assert page.evaluate(name) == pytest.approx(value, rel=1e-12)
     parameter = address.split("=")[0]
     assert page.inner_text(f".row[data-names='{parameter}'] output") == shown
 
 
 def test_a_slider_says_what_is_flown(chromium):
-    page = opened(chromium)
+    page = opened(chromium, "controller=lqr")
     for parameter, of in (("controller.limit.moment", "flight.summary.limits.moment / 1e3"), ("plant.initial.alpha", "flight.signals[1] * 180 / Math.PI")):
         for key in ("ArrowRight", "PageDown", "End"):
             count = flights(page)
