@@ -291,7 +291,7 @@ class Vehicle3D {
   // The norm as a bar; the limit is the mark at two thirds of its width.
   bar(name, norm, limit, factor, unit, y) {
     const { context, size } = this;
-    const [left, right] = [64, size.width - 112];
+    const [left, right] = [64, size.width - 122];
     const mark = left + ((right - left) * 2) / 3;
     const end = Math.min(right, left + ((mark - left) * norm) / limit);
     // A limit counts as met up to rounding.
