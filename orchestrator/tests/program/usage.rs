@@ -3,7 +3,6 @@
 use crate::bench::{Bench, LOOP, Recipe};
 use std::fs;
 use std::io::Write;
-use std::path::Path;
 use zip::write::SimpleFileOptions;
 
 /// Returns whether a line of the list shows this name with this title. If the program was built in
