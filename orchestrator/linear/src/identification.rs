@@ -198,7 +198,7 @@ impl Builder<'_> {
             return Err(CallFailure::new(
                 "linearise",
                 format!(
-                    "responses to a change of its inputs do not repeat within {longest} steps of {} s, but differ by {:.0} %: it has no linear model of such a period here",
+                    "responses to a change of its inputs do not repeat within {longest} steps of {} s, but differ by {:.0} %: it has no linear model here, or a longer period than that, which takes fewer of a longer step",
                     self.recorded.length,
                     1e2 * drift
                 ),

@@ -199,7 +199,7 @@ impl Lineariser {
                 open.signals[0].name
             )));
         }
-        if let Some(growth) = noise(&open).filter(|_| has_pair) {
+        if has_pair && let Some(growth) = noise(&open) {
             let names: Vec<&str> = models.iter().map(|model| model.name.as_str()).collect();
             return Err(Error::Call {
                 component: names.join(" with "),

@@ -8,8 +8,8 @@ use cosim::error::Error;
 use cosim_report::figure::{Color, Curve, Figure, Legend, Panel, Shape};
 use sweep::table::Reader;
 
-const CASES: Color = Color::CURVES[0];
-const WORST: Color = Color::CURVES[1];
+const FIRST: Color = Color::CURVES[0];
+const SECOND: Color = Color::CURVES[1];
 /// Largest number of bins of a histogram.
 const BINS: usize = 60;
 /// Approximate largest number of points of a curve or of dots in a panel.
@@ -63,7 +63,7 @@ pub(super) fn distributions(
             limits.iter().map(mark)
         };
         let (edges, counts) = histogram(&values, low, high);
-        let mut bars = vec![curve("cases", CASES, Shape::Steps, edges, counts)];
+        let mut bars = vec![curve("cases", FIRST, Shape::Steps, edges, counts)];
         bars.extend(marks());
         let mut panels = vec![panel(&label(measure), "number of cases", bars)];
         let n = values.len();
@@ -73,7 +73,7 @@ pub(super) fn distributions(
         let places = || (0..tail).step_by(stride).chain(tail..n);
         let x = places().map(|i| values[i]).collect();
         let y = places().map(|i| (i + 1) as f64 / n as f64).collect();
-        let mut steps = vec![curve("share of cases up to this value", WORST, Shape::Line, x, y)];
+        let mut steps = vec![curve("share of cases up to this value", SECOND, Shape::Line, x, y)];
         steps.extend(marks());
         panels.push(panel(&label(measure), "share of cases", steps));
         let title =
@@ -139,9 +139,9 @@ pub(super) fn scatters(plan: &Plan, table: &Reader) -> Result<Vec<Figure>, Error
             };
             let (all_x, all_y) = pick(&mut (0..y.len()).step_by(stride));
             let (bad_x, bad_y) = pick(&mut (0..y.len()).filter(|i| bad[*i]).take(MARKED));
-            let mut curves = vec![curve("cases", CASES, Shape::Dots, all_x, all_y)];
+            let mut curves = vec![curve("cases", FIRST, Shape::Dots, all_x, all_y)];
             if !bad_x.is_empty() {
-                curves.push(curve("broke a limit", WORST, Shape::Dots, bad_x, bad_y));
+                curves.push(curve("broke a limit", SECOND, Shape::Dots, bad_x, bad_y));
             }
             Panel { title: x_label, ..panel("", &label(measure), curves) }
         });
