@@ -149,7 +149,8 @@ fn page(
                         }
                         @if !kept_cases.is_empty() {
                             p {
-                                "The folder " code { "cases" } " holds the full results of the cases "
+                                "The folder " code { "cases" } " holds the full results of "
+                                (if kept_cases.len() == 1 { "case " } else { "the cases " })
                                 @for (i, case) in kept_cases.iter().take(200).enumerate() { @if i > 0 { ", " } (case) }
                                 @if kept_cases.len() > 200 { ", …" }
                             }

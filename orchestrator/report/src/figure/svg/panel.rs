@@ -279,7 +279,9 @@ fn name_lines(out: &mut String, panel: &Panel, axes: &Axes) {
             (x + width - 4.0, at, "end")
         } else {
             let line = axes.x_at(first(&curve.x));
-            let at = y + height - 6.0 - 14.0 * (named.len() - 1) as f64;
+            // Names of vertical lines stand over one another at the bottom.
+            let above = named.len() - 1 - heights.len();
+            let at = y + height - 6.0 - 14.0 * above as f64;
             if line - x < 0.8 * width { (line + 5.0, at, "start") } else { (line - 5.0, at, "end") }
         };
         let _ = write!(
