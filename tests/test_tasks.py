@@ -109,6 +109,15 @@ def test_a_figure_shows_values_and_is_enlarged_and_hides_curves(page, report):
     assert not hidden.is_visible() and entry.get_attribute("aria-checked") == "false"
 
 
+def test_figures_that_are_opened_while_all_are_read_are_shown(page, report):
+    page.add_init_script("window.requestIdleCallback = (read) => { window.readAll = read; }")
+    page.goto(report.as_uri())
+    page.evaluate("() => { readAll(); for (const part of document.querySelectorAll('details.figure')) part.open = true; }")
+    page.wait_for_function("!document.querySelector('[data-folded]')")
+    # Time for what is still being read.
+    page.wait_for_timeout(500)
+
+
 def test_the_worst_case_of_a_campaign_has_its_command(page, campaign):
     page.goto(campaign.as_uri())
     page.get_by_role("link", name="Worst cases").click()

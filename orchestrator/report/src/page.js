@@ -204,7 +204,8 @@ for (const part of document.querySelectorAll("details.figure"))
     for (const plot of part.querySelectorAll("[data-folded]")) { if (!folded.get(plot)) await read(plot); show(plot); }
   });
 const idle = window.requestIdleCallback ?? setTimeout;
-idle(async () => { for (const [plot, text] of [...folded]) if (!text) await read(plot); });
+// What is opened meanwhile is no longer folded when its turn comes.
+idle(async () => { for (const plot of [...folded.keys()]) if (folded.get(plot) === null) await read(plot); });
 // A link into a folded part opens it, and paper shows the figures.
 const open = (id) => { for (let part = id && document.getElementById(id); part; part = part.parentElement) if (part.tagName === "DETAILS") part.open = true; };
 window.addEventListener("hashchange", () => open(location.hash.slice(1)));
