@@ -112,7 +112,8 @@ impl Crmpc {
         let Self { settings, set, planner, .. } = self;
         planner.optimiser.begin();
         let shift = set.shift(memory);
-        planner.preview(set.stages_mut(), time, reference, shift);
+        let (angles, _) = split(measured);
+        planner.preview(set.stages_mut(), time, reference, (shift, &angles));
         let first = !memory.started;
         if first {
             memory.plan.resize(settings.horizon);

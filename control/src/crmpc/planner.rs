@@ -7,7 +7,7 @@
 use super::design::Design;
 use super::memory::Memory;
 use super::plan::Plan;
-use super::settings::{InitialState, Settings};
+use super::settings::{Constraints, InitialState, Settings};
 use super::stages::Stages;
 use super::state::error;
 use crate::controller::ReferenceAt;
@@ -16,12 +16,20 @@ use crate::error_dynamics::InvariantSet;
 use crate::mpc::{self, Bounded, Chain, Cost, ErrorTrajectory, Layout, Optimiser, State, per_axis};
 use crate::report::SolverStatus;
 use nalgebra::{Vector3, Vector6};
+use std::f64::consts::PI;
+use vehicle::reference::Reference;
 
 /// Largest change of any state (rad, rad/s) between passes at which the first optimisation has
 /// converged.
 const STANDSTILL: f64 = 1e-8;
 /// Typical angle error, by which the cone solver's unknowns are scaled, rad.
 const ANGLE_SCALE: f64 = 0.1;
+/// Largest distance at which a reference is followed as it is: a share of the way that the rate limit
+/// leaves within the horizon, and an angle, rad.
+const SHARE_OF_THE_WAY: f64 = 0.8;
+const FURTHEST: f64 = 50.0 * PI / 180.0;
+/// Smallest share of the rate limit for that way; below it no guarantee is given anyway.
+const SMALLEST_RATE_LEFT: f64 = 0.1;
 /// Smallest disturbance bound for which the invariant set is computed, rad/s², so that the set has
 /// an interior.
 const SMALLEST_DISTURBANCE: f64 = 1e-5;
@@ -36,6 +44,8 @@ pub(super) struct Planner {
     affine: Vec<State<2>>,
     /// Shift of the reference's angles by the observer, rad.
     shift: Vector3<f64>,
+    /// Distance from the measured angles beyond which a reference is replaced, rad.
+    reach: f64,
 }
 
 impl Planner {
@@ -76,6 +86,14 @@ impl Planner {
             standstill: STANDSTILL,
         };
         let optimiser = Optimiser::new(layout, settings.solver).map_err(DesignError::Solver)?;
+        // With the paper's sets the problem is that of the paper, whatever the reference.
+        let reach = match settings.constraints {
+            Constraints::Paper => f64::INFINITY,
+            Constraints::Robust => {
+                let left = design.assessment.rate_left.max(SMALLEST_RATE_LEFT);
+                (SHARE_OF_THE_WAY * left * settings.limit_rate * n as f64 * h).min(FURTHEST)
+            }
+        };
         Ok(Self {
             settings: *settings,
             optimiser,
@@ -83,22 +101,34 @@ impl Planner {
             chain,
             affine: vec![[Vector3::zeros(); 2]; n],
             shift: Vector3::zeros(),
+            reach,
         })
     }
 
     /// Computes the references at the prediction times, with angles shifted by `shift` (rad), and
     /// d_k = A x_r,k + B Θ̈_r,k − x_r,k+1.
+    ///
+    /// A reference that is too far from the `measured` angles (rad) is replaced by one at rest on
+    /// the way to it: an artificial reference as in Limon et al., "MPC for tracking piecewise
+    /// constant references", Automatica 44 (2008). From the far one the optimum without constraints
+    /// would exceed the bounds by orders of magnitude, and no iteration would come back from there.
     pub(super) fn preview(
         &mut self,
         stages: &mut Stages,
         time: f64,
         reference: ReferenceAt,
-        shift: Vector3<f64>,
+        (shift, measured): (Vector3<f64>, &Vector3<f64>),
     ) {
         self.shift = shift;
         for (k, slot) in stages.references.iter_mut().enumerate() {
             *slot = reference(time + k as f64 * stages.step);
             slot.angles += shift;
+            let way = slot.angles - measured;
+            let distance = way.norm();
+            if distance > self.reach {
+                let angles = measured + way * (self.reach / distance);
+                *slot = Reference { angles, ..Reference::default() };
+            }
         }
         for (d, pair) in self.affine.iter_mut().zip(stages.references.windows(2)) {
             let moved =

@@ -114,27 +114,21 @@ fn the_robust_plan_is_kept_where_no_optimum_is_found() {
     let settings = settings(Constraints::Robust);
     let solver = SolverSettings { max_iterations: 1, ..settings.solver };
     let mut failing = Crmpc::new(Settings { solver, ..settings }).unwrap();
-    let (mut shifted, mut moved) = (0, 0);
+    let mut kept = 0;
     for sample in optimisations(Constraints::Robust).iter().skip(1) {
         let (after, _) = sample.update(&mut failing);
         if after.report.status != SolverStatus::Kept {
             continue;
         }
+        kept += 1;
         let before = &sample.before.plan;
-        if after.plan.accelerations[0] == before.accelerations[1] {
-            shifted += 1;
-            assert_is_shifted(&after.plan, before, &settings, |_, rate, i| {
-                -rate * if i == 1 { before.braking } else { 0.01 }
-            });
-        } else {
-            moved += 1;
-            assert_eq!(after.plan.states[0], before.states[1]);
-        }
+        assert_eq!(after.plan.states[0], before.states[1]);
+        assert_ne!(after.plan.accelerations[0], before.accelerations[1], "it moves");
         assert_eq!(after.guarantee, GuaranteeStatus::InForce, "tick {}", sample.tick);
         assert_eq!(after.age, sample.before.age + 5);
         assert!(after.margins.rate >= 0.0 && after.margins.moment >= 0.0, "{:?}", after.margins);
     }
-    assert!(shifted > 20 && moved > 0, "{shifted} {moved}");
+    assert!(kept > 100, "{kept}");
 }
 
 /// Runs the scenario with a solver that fails `during` some ticks. Returns the outcome, the

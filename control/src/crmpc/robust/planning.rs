@@ -23,7 +23,7 @@ use nalgebra::{Vector3, Vector6};
 const LESS: [f64; 2] = [0.5, 0.0];
 /// Number of steps from a kept plan towards the optimum without constraints that are tried: the
 /// first covers half of the way, each further one half as much as the one before.
-const HALVINGS: usize = 6;
+const HALVINGS: usize = 12;
 /// Share by which a window of the horizon is wider than the violated intervals, at each end. Most
 /// intervals of a window are near their bounds, and an iteration costs more than with the paper's
 /// set.
