@@ -8,6 +8,7 @@ use crate::signals::{COLUMNS, Row};
 use crate::summary::{Limits, Summary};
 use fmi2_export::Failure;
 use fmi2_export::linked::Linked;
+use vehicle::axes::{REPEATS, nearest};
 
 /// Number of angles and rates.
 const STATES: usize = 6;
@@ -102,6 +103,9 @@ fn point(
 ) -> Result<(), Failure> {
     plant.reals(&wires.state, &mut row[1..=STATES])?;
     controller.reals(&wires.reference, &mut row[7..10])?;
+    for i in (0..3).filter(|i| REPEATS[*i]) {
+        row[7 + i] = nearest(row[7 + i], row[1 + i]);
+    }
     let Some(step) = step else { return Ok(()) };
     controller.set_reals(&wires.measured, &row[1..=STATES])?;
     controller.step(row[0], step)?;

@@ -16,6 +16,7 @@
 use crate::controller::{Controller, Measurement, ReferenceAt};
 use crate::error::{DesignError, invalid};
 use crate::loop_delay::{LoopDelay, LoopDelaySettings};
+use crate::turns::{Turns, turned_reference};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 use settings::Declared;
@@ -133,6 +134,8 @@ pub struct Memory<M> {
     pub under_way: Vec<Vector3<f64>>,
     /// Estimate of the actual delay of the loop.
     pub loop_delay: LoopDelay,
+    /// Turns of the measured angles and of the reference.
+    pub turns: Turns,
 }
 
 impl<M: Clone> Clone for Memory<M> {
@@ -141,6 +144,7 @@ impl<M: Clone> Clone for Memory<M> {
             inner: self.inner.clone(),
             under_way: self.under_way.clone(),
             loop_delay: self.loop_delay.clone(),
+            turns: self.turns,
         }
     }
 
@@ -149,6 +153,7 @@ impl<M: Clone> Clone for Memory<M> {
         self.inner.clone_from(&source.inner);
         self.under_way.clone_from(&source.under_way);
         self.loop_delay.clone_from(&source.loop_delay);
+        self.turns = source.turns;
     }
 }
 
@@ -231,12 +236,14 @@ impl<C: Controller> Controller for Delayed<C> {
             inner: self.inner.memory(),
             under_way: vec![Vector3::zeros(); self.predictor.count],
             loop_delay: self.loop_delay.memory(),
+            turns: Turns::default(),
         }
     }
 
     fn fits(&self, memory: &Self::Memory) -> bool {
         memory.under_way.len() == self.predictor.count
             && self.loop_delay.fits(&memory.loop_delay)
+            && memory.turns.fits()
             && self.inner.fits(&memory.inner)
     }
 
@@ -248,25 +255,23 @@ impl<C: Controller> Controller for Delayed<C> {
         measured: &Measurement,
         reference: ReferenceAt,
     ) -> Vector3<f64> {
-        let Memory { inner, under_way, loop_delay } = memory;
-        self.loop_delay.observe(loop_delay, measured);
+        let Memory { inner, under_way, loop_delay, turns } = memory;
+        let measured = turns.continued(measured);
+        self.loop_delay.observe(loop_delay, &measured);
         let measured = Measurement {
             has_other_delay: loop_delay.is_other,
             is_unexplained: loop_delay.is_unexplained,
-            ..*measured
+            ..measured
         };
-        if self.predictor.count == 0 {
-            let moment = self.inner.command(inner, tick, time, &measured, reference);
-            self.loop_delay.remember(loop_delay, &moment);
-            return moment;
-        }
-        let predicted = self.predictor.predict(under_way, &measured);
-        let moment =
-            self.inner.command(inner, tick, time + self.latency.action, &predicted, reference);
+        let measured = self.predictor.predict(under_way, &measured);
+        let time = time + self.latency.action;
+        let added = turns.follow(time, &measured.angles, &reference(time));
+        let nearest = |time: f64| turned_reference(reference(time), &added);
+        let moment = self.inner.command(inner, tick, time, &measured, &nearest);
         self.loop_delay.remember(loop_delay, &moment);
         // A default memory has no room yet.
         under_way.resize(self.predictor.count, Vector3::zeros());
-        under_way.rotate_left(1);
+        under_way.rotate_left(self.predictor.count.min(1));
         if let Some(newest) = under_way.last_mut() {
             *newest = moment;
         }

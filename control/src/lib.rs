@@ -21,6 +21,7 @@ pub mod mpc;
 pub mod report;
 pub mod schedule;
 pub mod sliding;
+pub mod turns;
 pub mod two_loop;
 
 pub use allocation::Allocator;

@@ -1,4 +1,7 @@
-//! Endings of the names of vectors' entries, each with what the entry is for.
+//! Endings of the names of vectors' entries, each with what the entry is for; and which angles repeat
+//! after a whole turn.
+
+use std::f64::consts::TAU;
 
 /// Ending of a name, and what the entry is for.
 pub type Entry = (&'static str, &'static str);
@@ -31,3 +34,22 @@ pub const NUMBERED_STATE: [Entry; 6] = [
     ("[5]", "derivative of the sideslip angle"),
     ("[6]", "derivative of the bank angle"),
 ];
+
+/// Which of α, β and σ are the same attitude after a whole turn.
+pub const REPEATS: [bool; 3] = [true, false, true];
+
+/// Returns the number of whole turns that brings `angle` nearest to `to` (rad).
+pub fn turns(angle: f64, to: f64) -> f64 {
+    let turns = ((to - angle) / TAU).round();
+    if turns.is_finite() { turns } else { 0.0 }
+}
+
+/// Returns the angle after whole turns, rad. Without turns it keeps its bits.
+pub fn turned(angle: f64, turns: f64) -> f64 {
+    if turns == 0.0 { angle } else { angle + turns * TAU }
+}
+
+/// Returns `angle` as the turn nearest to `to` (rad): itself if it is within half a turn.
+pub fn nearest(angle: f64, to: f64) -> f64 {
+    turned(angle, turns(angle, to))
+}

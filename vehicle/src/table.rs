@@ -1,6 +1,7 @@
 //! Reference table: points over time and the cubic spline through them, which is twice continuously
 //! differentiable and ends with the not-a-knot condition.
 
+use crate::axes::{REPEATS, nearest};
 use crate::error::Error;
 use crate::reference::Reference;
 use nalgebra::Vector3;
@@ -30,13 +31,19 @@ const DEGREE: f64 = std::f64::consts::PI / 180.0;
 
 impl LookupTable {
     /// Makes the spline through `angles` (rad) at strictly increasing `times` (s); both have the
-    /// same length.
+    /// same length. From point to point α and σ turn the shorter way: a table that counts them from
+    /// −180° to 180° has no jump.
     ///
     /// # Errors
     /// Refuses a table without points, with unequal lengths, with a value that is not finite, or
     /// with times that do not increase.
-    pub fn new(times: Vec<f64>, angles: Vec<Vector3<f64>>) -> Result<Self, Error> {
+    pub fn new(times: Vec<f64>, mut angles: Vec<Vector3<f64>>) -> Result<Self, Error> {
         check(&times, &angles)?;
+        for k in 1..angles.len() {
+            for i in (0..3).filter(|i| REPEATS[*i]) {
+                angles[k][i] = nearest(angles[k][i], angles[k - 1][i]);
+            }
+        }
         let curvatures = curvatures(&times, &angles);
         Ok(Self { times, angles, curvatures })
     }

@@ -23,6 +23,7 @@ use estimate::{Nine, Running};
 use fusion::{Fusion, triad};
 use lowpass::LowPass;
 use nalgebra::{Rotation3, Vector3};
+use vehicle::axes::nearest;
 use vehicle::kinematics::{self, Kinematics};
 use vehicle::math::{asin, atan2};
 use vehicle::platform::body_from_velocity;
@@ -344,7 +345,10 @@ impl Estimator {
         // A field at rest turns against the body.
         let attitude =
             Rotation3::new(rate * -ahead) * running.fusion.attitude() * self.magnetic_to_north();
-        let angles = angles(&attitude);
+        let mut angles = angles(&attitude);
+        for (angle, before) in angles.iter_mut().zip(&memory.estimate.angles) {
+            *angle = nearest(*angle, *before);
+        }
         let rates = match s.kinematics {
             Kinematics::Exact => rate,
             Kinematics::Printed => {

@@ -18,7 +18,7 @@ pub use shaping::{Limits, Shaped};
 use crate::error::DesignError;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
-use std::f64::consts::PI;
+use vehicle::axes::nearest;
 use vehicle::entry::{Motion, great_circle};
 use vehicle::math::{cos, exp, sin_cos};
 use vehicle::reference::Reference;
@@ -128,7 +128,7 @@ impl Guidance {
         let target = [self.settings.target.longitude, self.settings.target.latitude];
         let here = [measured.motion[1], measured.motion[2]];
         let (range, direction) = great_circle(&self.settings.planet, here, target);
-        let heading_error = wrapped(direction - heading);
+        let heading_error = nearest(direction - heading, 0.0);
         let first = !memory.begun;
         if first {
             memory.ratios = [1.0; 2];
@@ -153,7 +153,7 @@ impl Guidance {
             self.settings.shaping;
         if first {
             memory.alpha.value = self.settings.initial.alpha;
-            memory.bank.value = self.settings.initial.sigma;
+            memory.bank.value = nearest(self.settings.initial.sigma, bank);
             memory.begun = true;
         }
         let limits = Limits { rate: alpha_rate, acceleration: alpha_acceleration };
@@ -260,9 +260,4 @@ impl Guidance {
             memory.reversals += 1;
         }
     }
-}
-
-/// Returns the angle between −π and π.
-fn wrapped(angle: f64) -> f64 {
-    angle - (angle / (2.0 * PI)).round() * 2.0 * PI
 }

@@ -1,9 +1,12 @@
 //! Signals that are observed in a run: a variable, the difference of two, or the norm of several.
-//! Each of them may be divided by another variable.
+//! Each of them may be divided by another variable. The difference of two angles may be taken the
+//! shorter way round, and an angle as the turn nearest to another one.
 //!
 //! ```text
 //! plant.rate.p
 //! plant.attitude.alpha - controller.reference.alpha
+//! turn(plant.attitude.sigma - controller.reference.sigma)
+//! controller.reference.sigma near plant.attitude.sigma
 //! norm(plant.rate.p, plant.rate.q, plant.rate.r) / controller.limit.rate
 //! ```
 
@@ -26,13 +29,91 @@ pub struct Signal {
     pub over: Option<String>,
 }
 
-/// A variable, and the variable that is subtracted from it, if any.
+/// A variable, and the variable that it is combined with, if any.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Term<Variable> {
     /// Variable that the term starts from.
     pub value: Variable,
-    /// Variable that is subtracted.
-    pub minus: Option<Variable>,
+    /// Variable that it is combined with, and how.
+    pub with: Option<(Relation, Variable)>,
+}
+
+/// How a term combines two variables.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Relation {
+    /// Their difference, `a - b`.
+    Minus,
+    /// The difference of two angles the shorter way round, `turn(a - b)`.
+    Turn,
+    /// The first angle and the whole turns that bring it nearest to the second, `a near b`.
+    Near,
+}
+
+impl Relation {
+    /// Combines two values; `whole` is a whole turn in their unit.
+    pub fn combine(self, value: f64, other: f64, whole: f64) -> f64 {
+        let turns = ((value - other) / whole).round();
+        match self {
+            Self::Minus => value - other,
+            // Without turns the difference keeps its bits.
+            Self::Turn if turns == 0.0 => value - other,
+            Self::Turn => value - other - turns * whole,
+            Self::Near => value - turns * whole,
+        }
+    }
+
+    /// Returns a whole turn in this unit; not a number for [`Relation::Minus`], which needs none.
+    ///
+    /// # Errors
+    /// Refuses a unit that is not one of angles.
+    pub fn whole_turn(self, unit: &str) -> Result<f64, String> {
+        match (self, unit) {
+            (Self::Minus, _) => Ok(f64::NAN),
+            (_, "deg") => Ok(360.0),
+            (_, "rad") => Ok(std::f64::consts::TAU),
+            _ => Err(format!("turn(…) and near need angles in rad or deg, not in \"{unit}\"")),
+        }
+    }
+}
+
+impl<Variable> Term<Variable> {
+    /// Creates the term of a single variable.
+    pub fn single(value: Variable) -> Self {
+        Self { value, with: None }
+    }
+
+    /// Returns the variables of the term.
+    pub fn variables(&self) -> impl Iterator<Item = &Variable> {
+        iter::once(&self.value).chain(self.with.as_ref().map(|with| &with.1))
+    }
+}
+
+impl Term<String> {
+    fn read(text: &str) -> Self {
+        let text = text.trim();
+        let inside = text.strip_prefix("turn(").and_then(|rest| rest.strip_suffix(')'));
+        let minus = if inside.is_some() { Relation::Turn } else { Relation::Minus };
+        let text = inside.unwrap_or(text);
+        for (word, relation) in [(" - ", minus), (" near ", Relation::Near)] {
+            if let Some((value, other)) = text.split_once(word) {
+                let other = other.trim().to_string();
+                return Self { value: value.trim().into(), with: Some((relation, other)) };
+            }
+        }
+        Self::single(text.into())
+    }
+}
+
+impl fmt::Display for Term<String> {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let value = &self.value;
+        match &self.with {
+            None => f.write_str(value),
+            Some((Relation::Minus, other)) => write!(f, "{value} - {other}"),
+            Some((Relation::Turn, other)) => write!(f, "turn({value} - {other})"),
+            Some((Relation::Near, other)) => write!(f, "{value} near {other}"),
+        }
+    }
 }
 
 impl TryFrom<String> for Signal {
@@ -44,13 +125,7 @@ impl TryFrom<String> for Signal {
             None => (text.trim(), None),
         };
         let inside = whole.strip_prefix("norm(").and_then(|rest| rest.strip_suffix(')'));
-        let term = |text: &str| match text.split_once(" - ") {
-            Some((from, minus)) => {
-                Term { value: from.trim().into(), minus: Some(minus.trim().into()) }
-            }
-            None => Term { value: text.trim().to_string(), minus: None },
-        };
-        let terms: Vec<_> = inside.unwrap_or(whole).split(',').map(term).collect();
+        let terms: Vec<_> = inside.unwrap_or(whole).split(',').map(Term::read).collect();
         let signal = Self { terms, norm: inside.is_some(), over };
         let broken = |path: &&str| {
             !path.contains('.') || path.contains(|c: char| c.is_whitespace() || c == '(')
@@ -67,11 +142,7 @@ impl TryFrom<String> for Signal {
 
 impl From<Signal> for String {
     fn from(signal: Signal) -> Self {
-        let term = |term: &Term<String>| match &term.minus {
-            Some(minus) => format!("{} - {minus}", term.value),
-            None => term.value.clone(),
-        };
-        let terms = signal.terms.iter().map(term).collect::<Vec<_>>().join(", ");
+        let terms = signal.terms.iter().map(Term::to_string).collect::<Vec<_>>().join(", ");
         let whole = if signal.norm { format!("norm({terms})") } else { terms };
         signal.over.iter().fold(whole, |whole, over| format!("{whole} / {over}"))
     }
@@ -85,7 +156,7 @@ impl fmt::Display for Signal {
 
 impl Signal {
     fn all_paths(&self) -> impl Iterator<Item = &str> {
-        let terms = self.terms.iter().flat_map(|term| iter::once(&term.value).chain(&term.minus));
+        let terms = self.terms.iter().flat_map(Term::variables);
         terms.chain(&self.over).map(String::as_str)
     }
 
@@ -104,6 +175,8 @@ pub struct Resolved {
     pub norm: bool,
     /// Index of the value that the whole signal is divided by.
     pub over: Option<usize>,
+    /// A whole turn in the unit of the variables, if a term needs it.
+    pub whole_turn: f64,
     /// Factor from the unit of the variables to the unit of the signal.
     pub factor: f64,
     /// Unit of [`Self::value`].
@@ -118,12 +191,12 @@ pub struct Resolved {
 impl Resolved {
     /// Creates a signal that is the variable at an index of a sample's values.
     pub fn variable(place: usize) -> Self {
-        Self::single(Term { value: place, minus: None })
+        Self::single(Term::single(place))
     }
 
     /// Creates a signal that is the difference of two variables at indices of a sample's values.
     pub fn difference(place: usize, minus: usize) -> Self {
-        Self::single(Term { value: place, minus: Some(minus) })
+        Self::single(Term { value: place, with: Some((Relation::Minus, minus)) })
     }
 
     fn single(term: Term<usize>) -> Self {
@@ -132,6 +205,7 @@ impl Resolved {
             terms,
             norm: false,
             over: None,
+            whole_turn: f64::NAN,
             factor: 1.0,
             unit: String::new(),
             is_integer: false,
@@ -141,8 +215,12 @@ impl Resolved {
 
     /// Computes the value of the signal in a sample, in the signal's unit.
     pub fn value(&self, values: &[f64]) -> f64 {
-        let term =
-            |term: &Term<usize>| values[term.value] - term.minus.map_or(0.0, |minus| values[minus]);
+        let term = |term: &Term<usize>| match term.with {
+            None => values[term.value],
+            Some((relation, other)) => {
+                relation.combine(values[term.value], values[other], self.whole_turn)
+            }
+        };
         let value = if self.norm {
             self.terms.iter().map(|t| term(t).powi(2)).sum::<f64>().sqrt()
         } else {
@@ -171,7 +249,15 @@ mod tests {
 
     #[test]
     fn a_signal_reads_back_as_it_was_written() {
-        for text in ["a.b", "a.b - c.d", "norm(a.x, a.y - b.y)", "norm(a.x, a.y) / b.z"] {
+        for text in [
+            "a.b",
+            "a.b - c.d",
+            "turn(a.b - c.d)",
+            "a.b near c.d",
+            "norm(a.x, turn(b.y - c.y))",
+            "norm(a.x, a.y - b.y)",
+            "norm(a.x, a.y) / b.z",
+        ] {
             assert_eq!(String::from(Signal::try_from(text.to_string()).unwrap()), text);
         }
     }
@@ -188,11 +274,15 @@ mod tests {
 
     #[test]
     fn oracle_differences_and_norms_in_the_display_unit() {
-        let term = |value, minus| Term { value, minus };
+        let term = |value, minus: Option<usize>| Term {
+            value,
+            with: minus.map(|minus| (Relation::Minus, minus)),
+        };
         let mut signal = Resolved {
             terms: vec![term(0, Some(1)), term(2, None)],
             norm: true,
             over: None,
+            whole_turn: f64::NAN,
             factor: 10.0,
             unit: "mm".into(),
             is_integer: false,
@@ -201,5 +291,24 @@ mod tests {
         assert_eq!(signal.value(&[5.0, 2.0, 4.0]), 50.0);
         signal.over = Some(1);
         assert_eq!(signal.value(&[5.0, 2.0, 4.0]), 25.0);
+    }
+
+    #[test]
+    fn oracle_angles_are_compared_the_shorter_way_round() {
+        for (a, b, difference, near) in [
+            (179.0, -179.0, -2.0, -181.0),
+            (-179.0, 179.0, 2.0, 181.0),
+            (539.0, 179.0, 0.0, 179.0),
+            (10.0, 4.0, 6.0, 10.0),
+        ] {
+            assert_eq!(Relation::Turn.combine(a, b, 360.0), difference, "{a} {b}");
+            assert_eq!(Relation::Near.combine(a, b, 360.0), near, "{a} {b}");
+        }
+        assert_eq!(
+            Relation::Turn.combine(0.3, 0.1, 6.28),
+            0.3 - 0.1,
+            "the same bits without turns"
+        );
+        assert!(Relation::Near.whole_turn("N.m").unwrap_err().contains("N.m"));
     }
 }

@@ -189,13 +189,17 @@ impl System {
                 }
                 Ok(probed.place)
             };
-            Ok(Term {
-                value: place(&term.value)?,
-                minus: term.minus.as_deref().map(place).transpose()?,
-            })
+            let value = place(&term.value)?;
+            let with = term.with.as_ref();
+            let with = with.map(|(relation, path)| place(path).map(|place| (*relation, place)));
+            Ok(Term { value, with: with.transpose()? })
         });
         let terms = terms.collect::<Result<Vec<_>, String>>()?;
         let (mut factor, mut unit) = shown.unwrap_or((1.0, String::new()));
+        let turns = terms.iter().filter_map(|term| term.with).map(|with| with.0.whole_turn(&unit));
+        let turns = turns.collect::<Result<Vec<_>, _>>();
+        let turns = turns.map_err(|problem| format!("\"{signal}\": {problem}"))?;
+        let whole_turn = turns.into_iter().fold(f64::NAN, f64::max) / factor;
         let over = signal
             .over
             .as_deref()
@@ -209,14 +213,11 @@ impl System {
             }
             (factor, unit) = (factor / divisor, String::new());
         }
-        let is_integer = matches!(terms[..], [Term { value, minus: None }]
+        let is_integer = matches!(terms[..], [Term { value, with: None }]
             if !matches!(self.kind(self.probes[value]), VariableKind::Real { .. }));
-        let responds = terms
-            .iter()
-            .flat_map(|term: &Term<usize>| [Some(term.value), term.minus])
-            .flatten()
-            .any(|place| self.is_response(place));
-        Ok(Resolved { terms, norm: signal.norm, over, factor, unit, is_integer, responds })
+        let responds = terms.iter().flat_map(Term::variables).any(|place| self.is_response(*place));
+        let norm = signal.norm;
+        Ok(Resolved { terms, norm, over, whole_turn, factor, unit, is_integer, responds })
     }
 
     fn is_response(&self, place: usize) -> bool {

@@ -11,6 +11,7 @@ use fmu_import::names;
 use serde::Deserialize;
 use serde_json::Value;
 use std::collections::BTreeMap;
+use std::iter;
 
 /// A run as its pictures show it.
 #[derive(Clone, Debug, Default)]
@@ -132,18 +133,26 @@ impl Recording {
     pub fn series(&self, signal: &Signal) -> Result<Series, String> {
         let mut unit: Option<&str> = None;
         let mut values = vec![0.0; self.time.len()];
-        for Term { value, minus } in &signal.terms {
-            let (value, minus) =
-                (self.track(value)?, minus.as_ref().map(|m| self.track(m)).transpose()?);
-            for track in [Some(value), minus].into_iter().flatten() {
+        for Term { value, with } in &signal.terms {
+            let value = self.track(value)?;
+            let with = with.as_ref();
+            let with =
+                with.map(|(relation, name)| self.track(name).map(|track| (*relation, track)));
+            let with = with.transpose()?;
+            for track in iter::once(value).chain(with.map(|with| with.1)) {
                 if unit.is_some_and(|unit| unit != track.unit) {
                     return Err(format!("\"{signal}\" mixes units"));
                 }
                 unit = Some(&track.unit);
             }
+            let turn = with.map_or(Ok(f64::NAN), |(relation, _)| relation.whole_turn(&value.unit));
+            let turn = turn.map_err(|problem| format!("\"{signal}\": {problem}"))?;
             for (row, sum) in values.iter_mut().enumerate() {
-                let term = value.factor * value.values[row]
-                    - minus.map_or(0.0, |minus| minus.factor * minus.values[row]);
+                let at = |track: &Track| track.factor * track.values[row];
+                let term = with.map_or_else(
+                    || at(value),
+                    |(relation, other)| relation.combine(at(value), at(other), turn),
+                );
                 *sum += if signal.norm { term * term } else { term };
             }
         }

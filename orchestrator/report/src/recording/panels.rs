@@ -187,8 +187,8 @@ fn grouped(
 /// Returns the signal of this name. A file of another program may call its columns as it likes.
 fn signal(runs: &[Recording], name: &str) -> Result<Signal, String> {
     if runs.iter().any(|run| run.recorded.iter().any(|recorded| recorded == name)) {
-        let term = Term { value: name.to_string(), minus: None };
-        return Ok(Signal { terms: vec![term], norm: false, over: None });
+        let terms = vec![Term::single(name.to_string())];
+        return Ok(Signal { terms, norm: false, over: None });
     }
     Signal::try_from(name.to_string())
 }
