@@ -11,6 +11,7 @@ use fmi2_export::{Context, Description, Failure};
 use nalgebra::Vector3;
 use vehicle::Scenario;
 use vehicle::error::rounded_time;
+use vehicle::reference::Reference;
 
 /// A controller with the settings and the vehicle for which it was designed.
 pub struct Designed<L: Law> {
@@ -93,7 +94,10 @@ impl<L: Law> SampledInstance for ControllerInstance<L> {
                     rates: scenario.initial_rates,
                     ..Measurement::default()
                 },
-                reference: scenario.reference.at(0.0),
+                reference: Reference {
+                    angles: scenario.reference.at(0.0).angles,
+                    ..Reference::default()
+                },
                 ..Input::default()
             },
             output: Output::default(),
@@ -154,6 +158,11 @@ impl<L: Law> SampledInstance for ControllerInstance<L> {
         if after.loop_delay.is_other && !before.loop_delay.is_other {
             return Some(
                 "the response of the vehicle shows another loop delay than delay + measurement.age; see loopDelay.estimate",
+            );
+        }
+        if after.turns.contradicts && !before.turns.contradicts {
+            return Some(
+                "the rates of the reference have not been the derivatives of its angles for a second; set reference.externalRate.* to the derivatives of reference.external.*, or to 0 where these are constant",
             );
         }
         L::warning(&before.inner, &after.inner)
