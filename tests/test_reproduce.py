@@ -532,12 +532,15 @@ def test_every_controller_flies_every_scenario(tmp_path):
 def test_every_controller_turns_the_bank_angle(tmp_path):
     results = reproduced("reversal", tmp_path)
     assert len(results["runs"]) == 46
-    assert [claim["verdict"] for claim in results["claims"]] == [HOLDS, HOLDS, HOLDS, FAILS, HOLDS]
+    assert [claim["verdict"] for claim in results["claims"]] == [HOLDS, HOLDS, HOLDS, FAILS, HOLDS, PARTLY]
     members = {name: run["members"][0] for name, run in results["runs"].items()}
     # Nobody turns 120 deg faster than the rate allows without breaking its limit.
     for name, member in members.items():
         settling, rate = member["measures"]["settling"], member["metrics"]["max_rate_deg_s"]
-        assert name.startswith("shaped") or settling is None or settling > 24.0 - 2.0 / 5.0 or rate > 5.0, name
+        assert settling is None or settling > 24.0 - 2.0 / 5.0 or rate > 5.0, name
+    # Of the reference whose derivatives are known, only CRMPC makes no use of them.
+    shaped = {name: member["metrics"]["ems_deg"] for name, member in members.items() if name.startswith("shaped")}
+    assert [name for name, ems in shaped.items() if ems > 1.0] == ["shaped-crmpc", "shaped-crmpc-paper"]
     assert differences(tmp_path / "out") == []
 
 
