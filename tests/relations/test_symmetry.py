@@ -99,3 +99,26 @@ def test_an_entry_is_the_same_at_every_longitude_and_over_the_date_line(tmp_path
     for other in others:
         scale = np.abs(first).max(axis=1, keepdims=True)
         assert (np.abs(other - first) <= 1e-6 * scale + 1e-12).all()
+
+
+def swaps() -> list[tuple[str, tuple[str, ...]]]:
+    """Orders of components that differ from an experiment's in two neighbours without a connection."""
+    found = []
+    for name, path in experiments().items():
+        text = content(path)
+        order = text["simulation"].get("order", [])
+        wired = {(wire["from"].split(".")[0], wire["to"].split(".")[0]) for wire in text.get("connections", [])}
+        for k, pair in enumerate(zip(order, order[1:])):
+            if pair not in wired and pair[::-1] not in wired:
+                found.append((name, (*order[:k], pair[1], pair[0], *order[k + 2:])))
+    return found
+
+
+@pytest.mark.parametrize(("name", "order"), swaps())
+def test_components_without_a_connection_may_change_places(tmp_path, name, order):
+    flights = [
+        fly(experiments()[name], tmp_path / f"order{k}", "--stop", "1", record=STATE, simulation=simulation)
+        for k, simulation in enumerate((None, {"order": list(order)}))
+    ]
+    assert all(flight.finished.returncode == 0 for flight in flights), flights[1].finished.stderr
+    assert (flights[0][STATE] == flights[1][STATE]).all()
