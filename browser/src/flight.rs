@@ -59,9 +59,8 @@ impl Wires {
 /// Says which parameter the FMUs refuse. If a step fails or the attitude is lost, the flight ends
 /// there, and the summary says why.
 pub fn fly(prepared: Prepared, signals: &mut Vec<f64>) -> Result<Summary, Error> {
-    let Prepared { mut controller, mut plant, step, steps, lost_beyond, .. } = prepared;
+    let Prepared { mut controller, mut plant, step, steps, stop, lost_beyond, .. } = prepared;
     let wires = Wires::new(&controller, &plant)?;
-    let stop = steps as f64 * step;
     controller.initialize(0.0, stop)?;
     plant.initialize(0.0, stop)?;
     let mut limits = [0.0; 2];
@@ -72,8 +71,8 @@ pub fn fly(prepared: Prepared, signals: &mut Vec<f64>) -> Result<Summary, Error>
     signals.reserve((steps + 1) * COLUMNS.len());
     let mut row: Row = [0.0; COLUMNS.len()];
     for tick in 0..=steps {
-        row[0] = tick as f64 * step;
         let end = tick == steps;
+        row[0] = if end { stop } else { tick as f64 * step };
         let done = point(&mut controller, &mut plant, &wires, &mut row, (!end).then_some(step));
         if let Err(failure) = done {
             summary.end(row[0], failure.to_string());

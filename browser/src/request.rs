@@ -35,6 +35,8 @@ pub struct Prepared {
     pub step: f64,
     /// Number of steps.
     pub steps: usize,
+    /// Stop time, s.
+    pub stop: f64,
     /// Tracking error beyond which the attitude counts as lost, deg.
     pub lost_beyond: f64,
     /// Experiment as the orchestrator reads it.
@@ -72,12 +74,12 @@ impl Request {
         apply(&mut experiment, "controller", &mut controller)?;
         apply(&mut experiment, "plant", &mut plant)?;
         record_guarantee(&mut experiment, &controller);
-        let (step, steps) = clock(&mut experiment, &controller)?;
+        let (step, steps, stop) = clock(&mut experiment, &controller)?;
         let loss = experiment.get("observe").and_then(|observe| observe.get("loss"));
         let beyond = loss.and_then(|loss| loss.get("beyond")).and_then(toml::Value::as_float);
         let lost_beyond =
             beyond.ok_or_else(|| scenario::problem("observe.loss", "beyond is no number"))?;
-        Ok(Prepared { controller, plant, step, steps, lost_beyond, experiment })
+        Ok(Prepared { controller, plant, step, steps, stop, lost_beyond, experiment })
     }
 }
 
@@ -129,8 +131,9 @@ fn record_guarantee(experiment: &mut Table, controller: &Linked) {
     }
 }
 
-/// Returns the length of a step (s), which is the period of the controller, and their number.
-fn clock(experiment: &mut Table, controller: &Linked) -> Result<(f64, usize), Error> {
+/// Returns the length of a step (s), which is the period of the controller, the number of steps, and
+/// the stop time (s).
+fn clock(experiment: &mut Table, controller: &Linked) -> Result<(f64, usize, f64), Error> {
     let wrong = |problem: &str| Error::Setting {
         name: format!("controller.{PERIOD}"),
         problem: problem.into(),
@@ -150,10 +153,11 @@ fn clock(experiment: &mut Table, controller: &Linked) -> Result<(f64, usize), Er
     let simulation = simulation.ok_or_else(|| wrong("the experiment has no simulation"))?;
     simulation.insert("step".into(), step.into());
     let stop = simulation.get("stop").and_then(toml::Value::as_float);
-    let exact = stop.ok_or_else(|| wrong("the experiment has no stop time"))? / step;
+    let stop = stop.ok_or_else(|| wrong("the experiment has no stop time"))?;
+    let exact = stop / step;
     let steps = exact.round();
     if steps < 1.0 || (exact - steps).abs() > 1e-9 * steps {
         return Err(wrong("the flight must be a whole number of periods long"));
     }
-    Ok((step, steps as usize))
+    Ok((step, steps as usize, stop))
 }

@@ -33,6 +33,15 @@ def test_oracle_the_loop_is_the_orchestrators_bit_for_bit(controller, named):
     assert np.array_equal(table.index, recorded.index)
 
 
+def test_oracle_the_last_time_is_the_stop_time_as_in_the_orchestrator():
+    # Three steps of 0.2 s are 0.6000000000000001 s.
+    recorded = experiment("lqr", step=0.2, stop=0.6).table
+    with ClosedLoop(controller="LQR", step=0.2) as loop:
+        table = loop.run(0.6).table
+    assert table.index[-1] == 0.6 and np.array_equal(table.index, recorded.index)
+    assert np.array_equal(table[COLUMNS].to_numpy(), recorded[COLUMNS].to_numpy())
+
+
 def test_oracle_the_state_at_10_s_is_the_orchestrators():
     recorded = experiment("crmpc-robust").table
     with ClosedLoop(controller="CRMPC") as loop:

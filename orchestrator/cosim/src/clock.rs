@@ -56,6 +56,39 @@ impl Clock {
         if tick == self.ticks { self.stop } else { self.start + tick as f64 * self.step }
     }
 
+    /// Returns whether an instance that steps at every n-th tick begins a step at this tick; it
+    /// must end by the stop time.
+    pub fn begins(&self, tick: u64, every: u32) -> bool {
+        let every = u64::from(every);
+        tick.is_multiple_of(every) && tick + every <= self.ticks
+    }
+
+    /// Returns the length of a step of `every` ticks that begins at this tick, s. The last one ends
+    /// exactly at the stop time, if an instance adds time and length: whole steps may miss it by
+    /// their rounding. Where no sum is the stop time, it ends as shortly before it as possible.
+    pub fn length(&self, tick: u64, every: u32) -> f64 {
+        let (time, whole) = (self.time(tick), self.whole(every));
+        if tick + u64::from(every) != self.ticks || time + whole == self.stop {
+            return whole;
+        }
+        let rest = self.stop - time;
+        let by = [rest.next_up(), rest].into_iter().find(|by| time + by <= self.stop);
+        by.unwrap_or(rest.next_down())
+    }
+
+    /// Returns the length of `every` ticks, s.
+    pub fn whole(&self, every: u32) -> f64 {
+        f64::from(every) * self.step
+    }
+
+    /// Returns the time that an instance whose steps are all whole does not pass: the stop time, or
+    /// where the rounding of its last step takes it.
+    pub fn end(&self, every: u32) -> f64 {
+        let last = self.ticks.saturating_sub(u64::from(every));
+        let end = self.time(last) + self.whole(every);
+        if self.begins(last, every) { end.max(self.stop) } else { self.stop }
+    }
+
     /// Returns the length of one communication step, s.
     pub fn step(&self) -> f64 {
         self.step
@@ -107,6 +140,26 @@ mod tests {
     }
 
     proptest::proptest! {
+        /// An instance that adds time and length ends at the stop time, or one place before it
+        /// where no sum of two numbers is the stop time. Whole steps never pass what it is told.
+        #[test]
+        fn oracle_the_last_step_ends_at_the_stop_time(ticks in 1u64..5000, every in 1u32..6, step in 1e-3f64..2.0, start in -50.0f64..50.0, places in 1i32..5) {
+            // Numbers as people write them, and their sum with all its digits.
+            let short = |value: f64| (value * 10f64.powi(places)).round() / 10f64.powi(places);
+            let (start, step) = (short(start), short(step).max(10f64.powi(-places)));
+            let written = format!("{:.4}", start + ticks as f64 * step).parse().unwrap();
+            let clock = Clock::new(start, written, step).unwrap();
+            for tick in (0..ticks).filter(|tick| clock.begins(*tick, every)) {
+                let end = clock.time(tick) + clock.length(tick, every);
+                let whole = clock.time(tick) + clock.whole(every);
+                proptest::prop_assert!(end <= written && whole <= clock.end(every));
+                let is_last = tick + u64::from(every) == ticks;
+                let misses = if is_last { written - end } else { end - whole };
+                proptest::prop_assert!(misses.abs() <= written.abs().max(start.abs()) * f64::EPSILON / 2.0);
+                proptest::prop_assert!(!is_last || start.abs() > 0.5 * written.abs() || end == written);
+            }
+        }
+
         #[test]
         fn whole_numbers_of_steps_are_taken_exactly(ticks in 1u64..2_000_000, step in 1e-4f64..10.0, start in -10.0f64..10.0) {
             let stop = start + ticks as f64 * step;

@@ -138,11 +138,11 @@ impl Master {
     fn measure(&mut self, timer: &Rc<dyn Timer>) {
         let members = std::mem::take(&mut self.members).into_iter();
         (self.members, self.spent) = members
-            .map(|Member { name, every, instance, .. }| {
-                let (instance, spent) = Stopwatch::new(instance, Rc::clone(timer));
+            .map(|member| {
+                let (instance, spent) = Stopwatch::new(member.instance, Rc::clone(timer));
                 // Computing times of two instances that work at the same time could not be told
                 // apart.
-                (Member { name, every, ahead: false, instance: Box::new(instance) }, spent)
+                (Member { ahead: false, instance: Box::new(instance), ..member }, spent)
             })
             .unzip();
     }
@@ -162,8 +162,9 @@ impl Master {
     pub fn initialize(&mut self) -> Result<(), Error> {
         let start = self.clock.start();
         for index in 0..self.members.len() {
-            let outcome =
-                self.members[index].instance.enter_initialization(start, self.clock.stop());
+            let Member { every, varies, instance, .. } = &mut self.members[index];
+            let stop = if *varies { self.clock.stop() } else { self.clock.end(*every) };
+            let outcome = instance.enter_initialization(start, stop);
             outcome.map_err(|failure| self.error(start, (index, failure)))?;
         }
         // Whatever the coupling, inputs are transferred one after the other here, so that the
@@ -335,10 +336,8 @@ impl Master {
         self.finish_all(tick)
     }
 
-    /// Returns whether a step of the instance begins at this tick and ends by the stop time.
     fn begins(&self, index: usize, tick: u64) -> bool {
-        let every = u64::from(self.members[index].every);
-        tick.is_multiple_of(every) && tick + every <= self.clock.ticks()
+        self.clock.begins(tick, self.members[index].every)
     }
 
     fn set(&mut self, index: usize) -> Result<(), Culprit> {
@@ -375,9 +374,10 @@ impl Master {
         tick: u64,
         call: impl Fn(&mut (dyn Instance + 'static), f64, f64) -> Outcome,
     ) -> Result<(), Culprit> {
-        let Member { every, instance, .. } = &mut self.members[index];
-        let length = f64::from(*every) * self.clock.step();
-        call(instance.as_mut(), self.clock.time(tick), length).map_err(|failure| (index, failure))
+        let Member { every, varies, instance, .. } = &mut self.members[index];
+        let clock = self.clock;
+        let length = if *varies { clock.length(tick, *every) } else { clock.whole(*every) };
+        call(instance.as_mut(), clock.time(tick), length).map_err(|failure| (index, failure))
     }
 
     fn read_instance(&mut self, index: usize, probed: bool) -> Result<(), Culprit> {

@@ -312,7 +312,7 @@ impl System {
                 failure,
             })?;
             let (name, every, ahead) = (name.clone(), *every, *is_isolated);
-            members.push(Member { name, every, ahead, instance });
+            members.push(Member { name, every, ahead, varies: fmu.fits_last_step(), instance });
         }
         let coupling = self.experiment.simulation.coupling;
         let parts = self.parts();

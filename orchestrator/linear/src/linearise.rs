@@ -119,8 +119,10 @@ impl Lineariser {
             |one: &Wired| one.first + one.every * (needed_steps(one.recorded.length) as u64 + 1);
         let last = wired.iter().map(needed).max().unwrap_or(first + 1);
         let (start, step) = (system.clock.start(), system.clock.step());
-        system.clock =
-            Clock::new(start, start + last as f64 * step, step).map_err(Error::experiment)?;
+        // No step that is repeated reaches the stop time, so that all of them are whole.
+        let longest = system.components.iter().map(|component| component.every).max();
+        let stop = start + (last + u64::from(longest.unwrap_or(1))) as f64 * step;
+        system.clock = Clock::new(start, stop, step).map_err(Error::experiment)?;
         Ok(Self { system, time, ticks: first..last, wired, signals, opened })
     }
 

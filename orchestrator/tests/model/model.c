@@ -5,7 +5,7 @@
    setting and stepping, once it is initialized, as FMI 2.0.5, section 4.2.1, allows it to.
    What it does wrong is chosen by the compiler's flags: -DENDS: a discarded step ends the simulation; -DVERSION: its version; -DTROUBLE: the text of its failure; -DDIRECT(value),
    -DITEM(value), -DTRUTH(value): what becomes of output.direct, guarantee.status, guarantee.inForce after two steps; -DRESETS=0: fmi2Reset leaves
-   the state as it is; -DPLACE=STEP -DHOW=ABORT: fault.h; -DOUTSIDE="\"/folder\"": hostile.h. */
+   the state as it is; -DSTRICT: it refuses a step beyond the stop time, and its speed is the time that it has reached; -DPLACE=STEP -DHOW=ABORT: fault.h; -DOUTSIDE="\"/folder\"": hostile.h. */
 #ifdef OUTSIDE
 #define _GNU_SOURCE
 #else
@@ -51,7 +51,7 @@ typedef struct {
 typedef struct {
     const Callbacks *callbacks;
     const char *name;
-    double input, state, gain, fail_time, pause, delay, transport, largest;
+    double input, state, gain, fail_time, pause, delay, transport, largest, stop, reached;
     int fail_status, flag, kind, count, seed, runs, is_set;
     char text[64];
 } Model;
@@ -102,6 +102,8 @@ void fmi2FreeInstance(Model *model) {
 
 int fmi2SetupExperiment(Model *model, int tolerance_defined, double tolerance, double start, int stop_defined, double stop) {
     (void)tolerance_defined, (void)tolerance, (void)stop_defined;
+    model->stop = stop;
+    model->reached = start;
     return stop > start ? OK : complain(model, ERROR, "bad stop time", stop);
 }
 
@@ -134,6 +136,9 @@ int fmi2GetReal(Model *model, const unsigned *references, size_t n, double *valu
             break;
         case 2: values[i] = model->state; break;
         case 3: values[i] = model->gain; break;
+#ifdef STRICT
+        case 10: values[i] = model->reached; break;
+#endif
         case 4: values[i] = model->fail_time; break;
         case 12: values[i] = model->pause; break;
         case 13: values[i] = model->delay; break;
@@ -216,6 +221,10 @@ int fmi2DoStep(Model *model, double time, double step, int no_set_state) {
 #ifdef HARM_BY_GAIN
     if (model->gain == 13.0) abort();
 #endif
+#ifdef STRICT
+    if (time + step > model->stop) return complain(model, ERROR, "beyond the stop time:", time + step - model->stop);
+#endif
+    model->reached = time + step;
     if (time >= 2.0 - 1e-9) fault(STEP, model->callbacks->logger, model->callbacks->environment);
     if (time >= model->fail_time - 1e-9) return complain(model, model->fail_status, TROUBLE, time);
     if (model->flag) complain(model, WARNING, "runs hot at", 7.0);

@@ -252,10 +252,10 @@ class ClosedLoop:
         by_name = dict(zip((name for name, _ in variables), rows.T, strict=True))
         name = self._controller.name if law is None else name_of(law)
         title = f"{name}, closed loop"
-        span = (first * self._step, self._tick * self._step, self._step)
+        span = (first * self._step, float(stop), self._step)
         by_law = None if law is None else name
         flown = Flown(title, span, self._paths, self._parameters, by_name, by_law)
-        return Run(title, self._table(rows, first, units), partial(judged, flown))
+        return Run(title, self._table(rows, stop, units), partial(judged, flown))
 
     def _fly(
         self, steps: int, law: Law | None, variables: Sequence[Variable]
@@ -281,9 +281,11 @@ class ClosedLoop:
         return rows, None
 
     def _table(
-        self, rows: npt.NDArray[np.float64], first: int, units: Units
+        self, rows: npt.NDArray[np.float64], stop: float, units: Units
     ) -> pd.DataFrame:
-        times = [tick * self._step for tick in range(first, self._tick + 1)]
+        # As in the orchestrator, the last time is the stop time itself, without a rounding.
+        first = self._tick + 1 - len(rows)
+        times = [tick * self._step for tick in range(first, self._tick)] + [float(stop)]
         names = [name for name, _ in RECORDED]
         index = pd.Index(times, name="time")
         table = pd.DataFrame(rows[:, : len(names)].copy(), index=index, columns=names)

@@ -17,6 +17,9 @@ pub struct Member {
     pub every: u32,
     /// Whether others may work while it steps, because it has a process of its own.
     pub ahead: bool,
+    /// Whether its last step is fitted to the stop time. Otherwise all its steps are whole, and it
+    /// is told where the last one ends.
+    pub varies: bool,
     /// The instance itself, instantiated and with its parameters set.
     pub instance: Box<dyn Instance>,
 }

@@ -62,7 +62,7 @@ pub struct Tally {
 /// A component with its timing, as the pacer needs it.
 struct Task {
     name: String,
-    every: u64,
+    every: u32,
     spent: Rc<Spent>,
     /// Computing time of this component that earlier communication points have already counted.
     counted: Duration,
@@ -71,13 +71,6 @@ struct Task {
     wake_ups: Distribution,
     misses: u64,
     series: Series,
-}
-
-impl Task {
-    /// Returns whether a step of the component begins at this tick and ends by the `last`.
-    fn begins(&self, tick: u64, last: u64) -> bool {
-        tick.is_multiple_of(self.every) && tick + self.every <= last
-    }
 }
 
 /// Keeps a run in step with a timer, and records how well it did.
@@ -124,7 +117,7 @@ impl Pacer {
     ) -> Self {
         let tasks = components.map(|(name, every, spent)| Task {
             name,
-            every: u64::from(every),
+            every,
             counted: spent.time(),
             spent,
             steps: Distribution::default(),
@@ -220,7 +213,7 @@ impl Pacer {
         }
         let release = self.release(tick);
         for (component, task) in self.tasks.iter_mut().enumerate() {
-            if !task.begins(tick, self.clock.ticks()) {
+            if !self.clock.begins(tick, task.every) {
                 continue;
             }
             let duration = task.spent.time().saturating_sub(task.counted);
@@ -238,10 +231,11 @@ impl Pacer {
         let mut outcome = Ok(());
         for component in 0..self.tasks.len() {
             let task = &self.tasks[component];
-            if !task.begins(tick, self.clock.ticks()) {
+            if !self.clock.begins(tick, task.every) {
                 continue;
             }
-            let late = task.spent.ended().saturating_sub(self.release(tick + task.every));
+            let late =
+                task.spent.ended().saturating_sub(self.release(tick + u64::from(task.every)));
             self.update(|tally| tally.deadlines += 1);
             if !late.is_zero() {
                 let miss = Miss {
@@ -334,7 +328,7 @@ impl Pacer {
         let mut series = Vec::new();
         for task in self.tasks {
             let component = ComponentTiming {
-                period_ms: period * task.every as f64,
+                period_ms: period * f64::from(task.every),
                 misses: task.misses,
                 step_ms: task.steps.summary(),
                 response_ms: task.responses.summary(),
