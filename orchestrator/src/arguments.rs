@@ -42,7 +42,7 @@ pub(crate) struct Overrides {
 /// Processes of instances and their limits. The texts are those of the section `[isolation]`.
 #[derive(Clone, Args)]
 #[command(next_help_heading = "Processes of instances")]
-struct Protection {
+pub(crate) struct Protection {
     #[arg(long, help = key("isolate"), value_name = "BOOL", num_args = 0..=1, default_missing_value = "true", require_equals = true)]
     isolate: Option<bool>,
     #[arg(long, help = key("call_timeout"), value_name = "SECONDS")]
@@ -58,9 +58,14 @@ struct Protection {
 impl From<Overrides> for experiment::Overrides {
     fn from(overrides: Overrides) -> Self {
         let Overrides { set, fmu, stop, step, coupling, on_invalid, isolation } = overrides;
-        let Protection { isolate, call_timeout, memory, cpu, sandbox } = isolation;
-        let isolation = experiment::Protection { isolate, call_timeout, memory, cpu, sandbox };
-        Self { set, fmu, stop, step, coupling, on_invalid, isolation }
+        Self { set, fmu, stop, step, coupling, on_invalid, isolation: isolation.into() }
+    }
+}
+
+impl From<Protection> for experiment::Protection {
+    fn from(protection: Protection) -> Self {
+        let Protection { isolate, call_timeout, memory, cpu, sandbox } = protection;
+        Self { isolate, call_timeout, memory, cpu, sandbox }
     }
 }
 

@@ -129,6 +129,8 @@ pub(crate) enum Command {
         /// Show neither progress nor summary.
         #[arg(long)]
         quiet: bool,
+        #[command(flatten)]
+        isolation: arguments::Protection,
     },
     /// Fly thousands of cases of an experiment in which parameters vary, and write cases.parquet,
     /// summary.json and report.html: how often limits are broken, with which confidence, and the
@@ -204,6 +206,8 @@ pub(crate) enum Command {
         /// code is 1 if there are any faults.
         #[arg(long, conflicts_with_all = ["json", "pattern", "causality"])]
         check: bool,
+        #[command(flatten)]
+        isolation: arguments::Protection,
     },
     /// Print an experiment, a study or a campaign with all that it extends, templates and lists
     /// expanded.
@@ -241,4 +245,28 @@ pub(crate) enum Command {
         #[arg(long, conflicts_with = "long")]
         json: bool,
     },
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Commands that are told where FMUs are load them.
+    #[test]
+    fn whatever_loads_fmus_can_do_so_in_a_sandbox() {
+        let definition = definition();
+        let has = |command: &clap::Command, name: &str| {
+            command.get_arguments().any(|argument| argument.get_id() == name)
+        };
+        let loading: Vec<&clap::Command> = definition
+            .get_subcommands()
+            .filter(|command| has(command, "fmu_dir") || has(command, "fmu"))
+            .collect();
+        assert!(loading.len() >= 10, "{}", loading.len());
+        for command in loading {
+            for option in ["sandbox", "isolate", "call_timeout", "memory", "cpu"] {
+                assert!(has(command, option), "{} has no {option}", command.get_name());
+            }
+        }
+    }
 }

@@ -2,9 +2,12 @@
 
 use crate::catalogue::{self, Filter};
 use crate::failure::Failure;
+use cosim::error::Error;
+use cosim::experiment::Protection;
 use fmu_import::description::CAUSALITIES;
 use fmu_import::description::{Interface, ModelDescription, Variable, VariableKind};
 use fmu_import::fmu::Fmu;
+use fmu_import::isolation;
 use std::io::{self, Write};
 use std::path::Path;
 
@@ -34,11 +37,18 @@ pub(crate) fn inspect(
 /// fault, or that the FMU is sound.
 ///
 /// # Errors
-/// Returns an error if there are faults, if the archive is no FMU at all, or if the text cannot be
-/// written.
-pub(crate) fn check(path: &Path, out: &mut impl Write) -> Result<(), Failure> {
+/// Returns an error if there are faults, if the archive is no FMU at all, if a limit is none, or if
+/// the text cannot be written.
+pub(crate) fn check(
+    path: &Path,
+    protection: &Protection,
+    out: &mut impl Write,
+) -> Result<(), Failure> {
+    protection.check().map_err(|problem| Error::experiment(format!("--check: {problem}")))?;
     let fmu = Fmu::open(path)?;
-    let faults = fmu.faults();
+    let shares = protection.isolate == Some(false) && protection.sandbox != Some(true);
+    let limits = (isolation::is_enabled() && !shares).then(|| protection.limits());
+    let faults = fmu.faults(limits.as_ref());
     for fault in &faults {
         writeln!(out, "{}: {fault}", path.display())?;
     }

@@ -24,6 +24,8 @@ mod show;
 mod summary;
 
 use command_line::{Command, definition};
+use cosim::error::Error;
+use cosim::experiment::Protection;
 use cosim::interrupt::Interrupt;
 use cosim::pacing;
 use cosim::search::named::{Kind, find};
@@ -125,12 +127,22 @@ fn execute(command: Command, out: &mut impl Write, interrupt: &Interrupt) -> Res
             let experiment = find(&experiment, Kind::Experiment)?;
             run::run(&experiment, &overrides.into(), &fmu_dir, &options, out)
         }
-        Command::Reproduce { study, out: folder, fmu_dir, jobs, members, fresh, quiet } => {
+        Command::Reproduce {
+            study,
+            out: folder,
+            fmu_dir,
+            jobs,
+            members,
+            fresh,
+            quiet,
+            isolation,
+        } => {
             let study = Study::load_with(&find(&study, Kind::Study)?, members)?;
             let interrupt = interrupt.clone();
             let options = reproduce::Options {
                 out: folder,
                 fmu_dirs: fmu_dir,
+                isolation: isolation.into(),
                 jobs,
                 fresh,
                 quiet,
@@ -156,10 +168,13 @@ fn execute(command: Command, out: &mut impl Write, interrupt: &Interrupt) -> Res
             let archive = pack::Archive { path: archive, enumerations: !no_enumerations, force };
             pack::pack(&experiment, &overrides.into(), &fmu_dir, archive, out, interrupt)
         }
-        Command::Inspect { fmu, filter, json, check } => {
-            let fmu = find(&fmu, Kind::Fmu)?;
+        Command::Inspect { fmu, filter, json, check, isolation } => {
+            let (fmu, isolation) = (find(&fmu, Kind::Fmu)?, isolation.into());
             if check {
-                inspect::check(&fmu, out)
+                inspect::check(&fmu, &isolation, out)
+            } else if isolation != Protection::default() {
+                let problem = "options of the process of an instance go with --check, as nothing else runs the FMU";
+                Err(Error::experiment(problem).into())
             } else {
                 inspect::inspect(&fmu, &filter, json, out)
             }

@@ -2,6 +2,7 @@
 
 use crate::error::Error;
 use crate::folder::TemporaryFolder;
+use std::collections::HashSet;
 use std::fs::{self, File};
 use std::io::{self, Read};
 use std::path::Path;
@@ -9,8 +10,12 @@ use zip::ZipArchive;
 
 /// Largest size of an archive's content when unpacked, bytes.
 const SIZE_LIMIT: u64 = 1 << 30;
-/// Largest number of entries in an archive.
+/// Largest number of entries in an archive, and of folders that they make.
 const ENTRY_LIMIT: usize = 20_000;
+/// Largest number of folders within one another.
+const DEPTH_LIMIT: usize = 50;
+/// Largest number of bytes of an entry's name.
+const LONGEST_NAME: usize = 1000;
 /// Number of characters of an entry's name that an error shows.
 const LONGEST_NAME_SHOWN: usize = 200;
 
@@ -19,8 +24,8 @@ const LONGEST_NAME_SHOWN: usize = 200;
 ///
 /// # Errors
 /// Returns an error if the file is not an archive, or if the archive has absolute paths, paths that
-/// lead out of the folder, duplicate names, links, encrypted entries, or more content than any FMU
-/// has.
+/// lead out of the folder, duplicate names, links, encrypted entries, or more content or folders
+/// than any FMU has.
 pub fn unpack(path: &Path) -> Result<TemporaryFolder, Error> {
     unpack_limited(path, SIZE_LIMIT, ENTRY_LIMIT)
 }
@@ -34,35 +39,20 @@ fn unpack_limited(
     let file = File::open(path).map_err(|source| refuse(format!("cannot be opened: {source}")))?;
     let mut archive = ZipArchive::new(file)
         .map_err(|source| refuse(format!("is not a zip archive: {source}")))?;
-    if archive.has_duplicate_names() {
-        return Err(refuse("refused: two entries of the archive have the same name".into()));
-    }
-    if archive.len() > entry_limit {
-        return Err(refuse(format!(
-            "refused: it has {} entries, at most {entry_limit} are allowed",
-            archive.len()
-        )));
-    }
+    let names = names(&mut archive, entry_limit).map_err(refuse)?;
 
     let folder = TemporaryFolder::new().map_err(Error::file(std::env::temp_dir()))?;
     let mut left = size_limit;
-    for index in 0..archive.len() {
+    for (index, name) in names.iter().enumerate() {
         let mut entry =
             archive.by_index(index).map_err(|source| refuse(format!("entry {index}: {source}")))?;
-        let name = String::from_utf8(entry.name_raw().to_vec())
-            .map_err(|_| refuse(format!("refused: the name of entry {index} is not UTF-8")))?;
-        let shown: String = name.escape_default().take(LONGEST_NAME_SHOWN).collect();
-        if let Some(reason) = unsafe_name(&name) {
-            return Err(refuse(format!("refused: entry \"{shown}\" {reason}")));
-        }
-        if entry.is_symlink() {
-            return Err(refuse(format!("refused: entry \"{shown}\" is a symbolic link")));
-        }
-        // A message names the archive and the entry, because the temporary folder means nothing to
-        // a reader.
-        let fault =
-            |source: io::Error| refuse(format!("entry \"{shown}\" cannot be unpacked: {source}"));
-        let target = folder.path().join(&name);
+        // A message names the entry and where it goes, because the name of the temporary folder
+        // means nothing to a reader.
+        let fault = |source: io::Error| {
+            let (name, into) = (shown(name), std::env::temp_dir());
+            refuse(format!("entry \"{name}\" cannot be unpacked into {}: {source}", into.display()))
+        };
+        let target = folder.path().join(name);
         if name.ends_with('/') {
             fs::create_dir_all(&target).map_err(fault)?;
             continue;
@@ -81,10 +71,55 @@ fn unpack_limited(
     Ok(folder)
 }
 
+/// Returns the names of the entries, or the reason why nothing of the archive is written.
+fn names(archive: &mut ZipArchive<File>, limit: usize) -> Result<Vec<String>, String> {
+    if archive.has_duplicate_names() {
+        return Err("refused: two entries of the archive have the same name".into());
+    }
+    let count = archive.len();
+    if count > limit {
+        return Err(format!("refused: it has {count} entries, at most {limit} are allowed"));
+    }
+    let (mut names, mut folders) = (Vec::with_capacity(count), HashSet::new());
+    for index in 0..count {
+        let entry =
+            archive.by_index_raw(index).map_err(|source| format!("entry {index}: {source}"))?;
+        let name = String::from_utf8(entry.name_raw().to_vec())
+            .map_err(|_| format!("refused: the name of entry {index} is not UTF-8"))?;
+        let refuse = |reason: &str| format!("refused: entry \"{}\" {reason}", shown(&name));
+        if let Some(reason) = unsafe_name(&name) {
+            return Err(refuse(reason));
+        }
+        if entry.is_symlink() {
+            return Err(refuse("is a symbolic link"));
+        }
+        let depth = name.split('/').filter(|part| !matches!(*part, "" | ".")).count();
+        if depth > DEPTH_LIMIT {
+            return Err(refuse(&format!(
+                "is {depth} folders deep, at most {DEPTH_LIMIT} are allowed"
+            )));
+        }
+        // Folders that no entry stands for are made as well.
+        folders.extend(name.match_indices('/').map(|(end, _)| name[..end].to_string()));
+        if folders.len() > limit {
+            return Err(format!("refused: it has more than {limit} folders"));
+        }
+        names.push(name);
+    }
+    Ok(names)
+}
+
+/// Returns a name as a message shows it.
+fn shown(name: &str) -> String {
+    name.escape_default().take(LONGEST_NAME_SHOWN).collect()
+}
+
 /// Returns the reason why an entry of this name must not be written; `None` if it may be.
 pub fn unsafe_name(name: &str) -> Option<&'static str> {
     if name.is_empty() {
         Some("has no name")
+    } else if name.len() > LONGEST_NAME {
+        Some("has a name of more than 1000 bytes")
     } else if name.starts_with('/') || name.contains(':') {
         Some("is an absolute path")
     } else if name.contains('\\') {
@@ -161,6 +196,29 @@ mod tests {
         assert!(refusal(&archive(&entries)).contains("11 entries"));
         let file = archive(&entries[..10]);
         assert!(unpack_limited(file.path(), 1000, 10).is_ok());
+    }
+
+    #[test]
+    fn folders_are_bounded_in_number_and_depth_also_where_no_entry_stands_for_them() {
+        let deep = |depth: usize| format!("{}x", "a/".repeat(depth - 1));
+        for name in [deep(DEPTH_LIMIT), format!("{}y", "./".repeat(100))] {
+            unpack(archive(&[(&name, b"")]).path()).unwrap();
+        }
+        let message = refusal(&archive(&[("first", b""), (&deep(51), b"")]));
+        assert!(message.ends_with("is 51 folders deep, at most 50 are allowed"), "{message}");
+        // Three entries make twelve folders.
+        let names = ["a", "b", "c"].map(|name| format!("{name}/1/2/3/x"));
+        let entries = names.each_ref().map(|name| (name.as_str(), &b""[..]));
+        assert!(refusal(&archive(&entries)).contains("more than 10 folders"));
+        assert!(unpack_limited(archive(&entries[..2]).path(), 1000, 10).is_ok());
+    }
+
+    #[test]
+    fn nothing_is_written_of_an_archive_that_is_refused_by_a_name() {
+        // The disk of the temporary folder is not even looked at.
+        let file = archive(&[("good", b"1"), ("../evil", b"x")]);
+        let mut zip = ZipArchive::new(File::open(file.path()).unwrap()).unwrap();
+        assert!(names(&mut zip, 10).unwrap_err().contains("leads out"));
     }
 
     #[test]

@@ -83,13 +83,14 @@ impl Fmu {
     }
 
     /// Lists the faults of the archive that do not keep it from being opened: one line for each
-    /// fault of the description and of the library for this platform.
-    pub fn faults(&self) -> Vec<String> {
+    /// fault of the description and of the library for this platform. The library is loaded in this
+    /// process, or in a process of its own if `isolation` is given.
+    pub fn faults(&self, isolation: Option<&Isolation>) -> Vec<String> {
         let mut faults = faults::faults(&self.description);
         if let (Content::Archive(archive), Some(_)) =
             (&self.content, &self.description.co_simulation)
         {
-            match self.try_instance(archive) {
+            match self.try_instance(archive, isolation) {
                 Ok(fault) => faults.extend(fault),
                 Err(fault) => faults.push(fault),
             }
@@ -181,12 +182,15 @@ impl Fmu {
         Ok(instance)
     }
 
-    /// Makes an instance, in a process of its own where that is possible, and frees it. Returns
-    /// what is wrong with the version of FMI that the library names.
-    fn try_instance(&self, archive: &Archive) -> Result<Option<String>, String> {
-        let isolation = isolation::is_enabled().then(Isolation::default);
+    /// Makes an instance and frees it. Returns what is wrong with the version of FMI that the
+    /// library names.
+    fn try_instance(
+        &self,
+        archive: &Archive,
+        isolation: Option<&Isolation>,
+    ) -> Result<Option<String>, String> {
         let name = self.path.file_name().unwrap_or_default().to_string_lossy();
-        let (instance, fault) = self.made(archive, &name, "its instance", isolation.as_ref())?;
+        let (instance, fault) = self.made(archive, &name, "its instance", isolation)?;
         drop(instance);
         let failure = isolation::late_failures().into_iter().next();
         failure.map_or(Ok(fault), Err)

@@ -6,7 +6,6 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Once;
 use std::time::{Duration, SystemTime};
-use tempfile::TempDir;
 
 /// Beginning of the names of these folders, which the number of the process follows.
 const PREFIX: &str = "unpacked-fmu-";
@@ -14,13 +13,15 @@ const PREFIX: &str = "unpacked-fmu-";
 /// new one is not held for a moment.
 const AGE: Duration = Duration::from_secs(60);
 
+/// Number of folders within one another that are removed where they are.
+const DEEP: usize = 50;
+
 /// A temporary folder that is removed when this value is dropped.
 #[derive(Debug)]
 pub struct TemporaryFolder {
-    /// Tells other processes that the folder is in use. It is dropped first, because some systems
-    /// do not remove a folder as long as a file in it is open.
-    _hold: Option<File>,
-    folder: TempDir,
+    /// Tells other processes that the folder is in use.
+    hold: Option<File>,
+    path: PathBuf,
 }
 
 /// Removes the folders that killed processes have left. A process does so with its first folder; it
@@ -37,16 +38,96 @@ impl TemporaryFolder {
         static ONCE: Once = Once::new();
         ONCE.call_once(remove_left);
         let prefix = format!("{PREFIX}{}-", std::process::id());
-        let folder = tempfile::Builder::new().prefix(&prefix).tempdir()?;
+        let path = tempfile::Builder::new().prefix(&prefix).tempdir()?.keep();
         // Without a lock, another process may take the folder for an orphan once it is old enough.
-        let hold = hold(folder.path()).ok().filter(|hold| hold.try_lock().is_ok());
-        Ok(Self { _hold: hold, folder })
+        let hold = hold(&path).ok().filter(|hold| hold.try_lock().is_ok());
+        Ok(Self { hold, path })
     }
 
     /// Returns the path of the folder.
     pub fn path(&self) -> &Path {
-        self.folder.path()
+        &self.path
     }
+}
+
+impl Drop for TemporaryFolder {
+    fn drop(&mut self) {
+        // Some systems do not remove a folder as long as a file in it is open.
+        self.hold = None;
+        remove(&self.path);
+    }
+}
+
+/// Removes a folder with all that is in it, and says so if this fails.
+fn remove(folder: &Path) {
+    match empty(folder).and_then(|()| fs::remove_dir(folder)) {
+        Err(error) if error.kind() != io::ErrorKind::NotFound => tracing::warn!(
+            target: "orchestrator",
+            "the temporary folder {} cannot be removed: {error}",
+            folder.display()
+        ),
+        _ => {}
+    }
+}
+
+/// Removes all that is in a folder. An FMU may have nested its folders deeper than a path or a
+/// stack is long, so that what lies deep is moved to the top first.
+fn empty(top: &Path) -> io::Result<()> {
+    let mut places = (0_u64..).map(|number| top.join(format!("{number:x}")));
+    // Folders to be emptied, and those that are empty when their turn comes, with their depths.
+    let mut folders = vec![(top.to_path_buf(), 0, false)];
+    while let Some((folder, depth, is_empty)) = folders.pop() {
+        if is_empty {
+            fs::remove_dir(folder)?;
+            continue;
+        }
+        allow(&folder)?;
+        if depth > 0 {
+            folders.push((folder.clone(), depth, true));
+        }
+        for entry in fs::read_dir(folder)? {
+            let entry = entry?;
+            let path = entry.path();
+            if !entry.file_type()?.is_dir() {
+                fs::remove_file(path)?;
+            } else if depth < DEEP {
+                folders.push((path, depth + 1, false));
+            } else {
+                allow(&path)?;
+                let free = places.find(|place| fs::symlink_metadata(place).is_err());
+                let place = free.unwrap_or_default();
+                fs::rename(path, &place)?;
+                folders.push((place, 1, false));
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Allows the owner everything in a folder, whose maker may have closed it.
+#[cfg(unix)]
+fn allow(folder: &Path) -> io::Result<()> {
+    use std::os::unix::fs::PermissionsExt;
+    fs::set_permissions(folder, fs::Permissions::from_mode(0o700))
+}
+
+#[cfg(not(unix))]
+fn allow(_folder: &Path) -> io::Result<()> {
+    Ok(())
+}
+
+/// Returns whether a folder belongs to the user of this process. In a folder of another one, paths
+/// may change under the feet of whoever removes it.
+#[cfg(unix)]
+fn is_own(folder: &Path) -> bool {
+    use std::os::unix::fs::MetadataExt;
+    let own = rustix::process::geteuid().as_raw();
+    fs::symlink_metadata(folder).is_ok_and(|metadata| metadata.uid() == own)
+}
+
+#[cfg(not(unix))]
+fn is_own(_folder: &Path) -> bool {
+    true
 }
 
 /// Opens the file that is locked in place of a folder: the folder itself, or a file in it.
@@ -80,9 +161,8 @@ fn remove_orphans(within: &Path, age: Duration) {
     for path in
         folders.map(|entry| entry.path()).filter(|path| is_of_the_dead(path) || is_old(path))
     {
-        if hold(&path).is_ok_and(|hold| hold.try_lock().is_ok()) {
-            // A folder of another user stays.
-            let _ = fs::remove_dir_all(&path);
+        if is_own(&path) && hold(&path).is_ok_and(|hold| hold.try_lock().is_ok()) {
+            remove(&path);
         }
     }
 }
@@ -117,9 +197,30 @@ mod tests {
 
         let folder = TemporaryFolder::new().unwrap();
         let path = folder.path().to_path_buf();
+        #[cfg(unix)]
+        nest(&path);
         remove_orphans(&std::env::temp_dir(), AGE);
         assert!(path.is_dir());
         drop(folder);
         assert!(!path.exists());
+    }
+
+    /// Fills a folder with what is hard to remove: folders far deeper than a path is long, names as
+    /// the removal gives them, links to what must stay, and folders that are closed.
+    #[cfg(unix)]
+    fn nest(folder: &Path) {
+        use rustix::fs::{CWD, Mode, OFlags, mkdirat, openat};
+        let mode = Mode::from_raw_mode(0o700);
+        let mut inner = openat(CWD, folder, OFlags::DIRECTORY, mode).unwrap();
+        for name in (0..3000).map(|depth| if depth % 2 == 0 { "0" } else { "a folder" }) {
+            mkdirat(&inner, name, mode).unwrap();
+            inner = openat(&inner, name, OFlags::DIRECTORY, mode).unwrap();
+        }
+        for name in ["1", "2"] {
+            fs::create_dir_all(folder.join(name).join("1/2")).unwrap();
+            fs::write(folder.join(name).join("1/2/3"), "").unwrap();
+            std::os::unix::fs::symlink("/", folder.join(name).join("root")).unwrap();
+        }
+        mkdirat(CWD, folder.join("2/1/closed"), Mode::empty()).unwrap();
     }
 }

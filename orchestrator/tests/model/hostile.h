@@ -49,7 +49,7 @@ static int ends(pid_t child) {
 static int write_file(void) { return opens(fresh(), O_WRONLY | O_CREAT); }
 static int append_file(void) { return opens(secret(), O_WRONLY | O_APPEND); }
 static int read_file(void) { return opens(secret(), O_RDONLY); }
-static int read_home(void) { return opens(getenv("HOME") ? getenv("HOME") : "/root", O_RDONLY | O_DIRECTORY); }
+static int read_home(void) { return opens("/root", O_RDONLY | O_DIRECTORY) || opens("/home", O_RDONLY | O_DIRECTORY); }
 static int read_passwords(void) { return opens("/etc/passwd", O_RDONLY); }
 static int truncate_file(void) { return truncate(secret(), 1) == 0; }
 static int remove_file(void) { return unlink(secret()) == 0; }
@@ -78,6 +78,24 @@ static int large_file(void) {
     signal(SIGXFSZ, SIG_IGN);
     while (written < 200 && write(file, block, sizeof block) == sizeof block) written++;
     return file >= 0 && written == 200;
+}
+static int inherited_file(void) {
+    int is_written = 0;
+    for (int file = 3; file < 64; file++) is_written |= write(file, "x", 1) == 1;
+    return is_written;
+}
+static int environment(void) { return getenv("SECRET_KEY") != NULL; }
+static int own_environment(void) { return opens("/proc/self/environ", O_RDONLY) || opens("/proc/self/cmdline", O_RDONLY); }
+static int connections(void) { return opens("/proc/self/net/tcp", O_RDONLY) || opens("/proc/net/dev", O_RDONLY) || opens("/proc/thread-self/net/unix", O_RDONLY); }
+static int mounts(void) { return opens("/proc/self/mountinfo", O_RDONLY) || opens("/proc/mounts", O_RDONLY) || opens("/proc/self/cgroup", O_RDONLY); }
+static int users_folder(void) { return opens("loop.toml", O_RDONLY); }
+/* Folders that are hard to remove: deeper than any path is long, and closed. Another instance may have made them already. */
+static int deep_folders(void) {
+    if (chdir(getenv("TMPDIR")) != 0) return 1;
+    mkdir("closed", 0700), mkdir("closed/inner", 0), mkdir("last", 0);
+    for (int depth = 0; depth < 15000; depth++)
+        if (mkdir("d", 0700) != 0 || chdir("d") != 0) break;
+    return 0;
 }
 static int parent_environment(void) { return opens_of_parent("environ", O_RDONLY); }
 static int parent_memory(void) { return opens_of_parent("mem", O_RDWR); }
@@ -221,7 +239,8 @@ typedef struct { const char *name; int (*attempt)(void); } Attempt;
 static const Attempt ATTEMPTS[] = {
     A(write_file), A(append_file), A(read_file), A(read_home), A(read_passwords), A(truncate_file), A(remove_file), A(rename_file), A(link_file),
     A(follow_link), A(make_folder), A(change_mode), A(change_mode_at), A(change_owner), A(change_times), A(set_attribute), A(make_device),
-    A(make_pipe), A(through_root), A(through_handle), A(large_file), A(parent_environment), A(parent_memory), A(parent_files), A(parent_command),
+    A(make_pipe), A(through_root), A(through_handle), A(large_file), A(inherited_file), A(environment),
+    A(own_environment), A(connections), A(mounts), A(users_folder), A(deep_folders), A(parent_environment), A(parent_memory), A(parent_files), A(parent_command),
     A(parent_score), A(all_processes), A(shared_folder), A(cut_memory), A(watch_files), A(change_root), A(mount_folder), A(open_tree), A(internet),
     A(local_socket), A(netlink), A(packets), A(socket_pair), A(signal_parent), A(signal_all), A(signal_group), A(signal_thread), A(queue_signal),
     A(signal_by_descriptor), A(signal_by_pipe), A(signal_by_owner), A(signal_by_lease), A(signal_by_timer), A(outlive_parent), A(limit_parent),

@@ -31,16 +31,24 @@ impl Hostile {
     /// Runs the experiment with one attempt. Returns the exit code and standard error.
     fn attempt(&self, number: u32, arguments: &[&str]) -> (Option<i32>, String) {
         let seed = format!("gain.noise.seed={number}");
-        let mut command = self.bench.command(&["run", "loop.toml", "--force", "--quiet"]);
-        command.args(["--set", &seed, "--unit-memory=64", "--call-timeout=5"]).args(arguments);
-        command.env("TMPDIR", self.bench.path("temporary")).env("HOSTILE", self.mark());
-        let output = command.output().unwrap();
+        let run = ["run", "loop.toml", "--force", "--quiet", "--set", &seed, "--unit-memory=64"];
+        let output = self.command(&run).arg("--call-timeout=5").args(arguments).output().unwrap();
         (output.status.code(), String::from_utf8(output.stderr).unwrap())
     }
 
-    /// A text in the environment of all processes of a run.
+    /// Returns a command of the program, which inherits an open file and a key.
+    fn command(&self, arguments: &[&str]) -> Command {
+        let mut command = Command::new("sh");
+        command.args(["-c", r#"exec 9>>"$0"; exec "$@""#]).arg(self.outside.path().join("secret"));
+        command.arg(env!("CARGO_BIN_EXE_orchestrator")).args(arguments).env_remove("RUST_LOG");
+        command.current_dir(self.bench.folder.path()).env("SECRET_KEY", "nobody's");
+        command.env("TMPDIR", self.mark());
+        command
+    }
+
+    /// A text in the environment of all processes of a run: the folder of their temporary files.
     fn mark(&self) -> String {
-        self.outside.path().display().to_string()
+        self.bench.path("temporary").display().to_string()
     }
 
     /// Asserts that nothing outside is changed and nothing is left behind.
@@ -97,6 +105,11 @@ fn the_attempts_get_through_without_a_sandbox() {
         "write_file",
         "append_file",
         "read_file",
+        "environment",
+        "own_environment",
+        "connections",
+        "mounts",
+        "users_folder",
         "parent_environment",
         "signal_parent",
         "signal_by_pipe",
@@ -127,6 +140,30 @@ fn the_attempts_get_through_without_a_sandbox() {
     }
     assert!(through.is_empty() || through.len() == harmless.len(), "{through:?}");
     assert_gone(&hostile.mark(), "attempts");
+}
+
+#[test]
+fn whatever_loads_a_library_can_do_so_in_a_sandbox_and_cleans_up_after_it() {
+    let hostile = Hostile::new();
+    // In all cases it nests its folders; the first one is the number of that attempt.
+    let mut number = 1;
+    while !hostile.attempt(number, &["--sandbox"]).1.contains("deep_folders") {
+        number += 1;
+        if number > 200 {
+            return; // There is no sandbox here.
+        }
+    }
+    let seed = format!("gain.noise.seed={number}");
+    fs::write(hostile.bench.path("c.toml"), CAMPAIGN).unwrap();
+    for command in [
+        &["campaign", "c.toml", "--jobs=2", "--quiet", "--sandbox", "--set", &seed][..],
+        &["inspect", "--check", "--sandbox", "Model.fmu"],
+    ] {
+        let output = hostile.command(command).output().unwrap();
+        let errors = String::from_utf8_lossy(&output.stderr);
+        assert!(output.status.success() && errors.is_empty(), "{command:?}: {errors}");
+        hostile.assert_untouched(&errors);
+    }
 }
 
 #[test]

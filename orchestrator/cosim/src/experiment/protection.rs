@@ -72,7 +72,7 @@ impl Protection {
     }
 
     /// Returns the limits that the process of an instance gets.
-    pub(crate) fn limits(&self) -> Isolation {
+    pub fn limits(&self) -> Isolation {
         let usual = Isolation::default();
         let timeout = self.call_timeout.map(Duration::try_from_secs_f64);
         Isolation {

@@ -15,6 +15,7 @@ pub(super) fn ended(status: ExitStatus) -> String {
             11 => " (SIGSEGV, access to memory that is not its own)",
             15 => " (SIGTERM)",
             24 => " (SIGXCPU, its processor time is used up)",
+            25 => " (SIGXFSZ, a file that is larger than allowed)",
             31 => " (SIGSYS, a call of the system that is not allowed)",
             _ => "",
         };

@@ -100,7 +100,7 @@ impl Library<'_> {
                 "has no process of its own, because this program cannot start any".into(),
             );
         };
-        let mut process = match Process::start(program, name, self.isolation) {
+        let mut process = match Process::start(program, name, self.isolation, self.folder) {
             Ok(process) => process,
             Err(error) => return Loaded::Refused(format!("has no process of its own: {error}")),
         };

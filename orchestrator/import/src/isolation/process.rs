@@ -11,6 +11,7 @@ use crate::log::{Log, LogMessage};
 use parking_lot::Mutex;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
+use std::ffi::OsStr;
 use std::io::{self, BufRead, BufReader, PipeReader};
 use std::path::Path;
 use std::process::{Child, Command, ExitStatus, Stdio};
@@ -73,13 +74,26 @@ enum NoAnswer {
 
 impl Process {
     /// Starts a process, which then waits for [`Self::set_up`].
-    pub(super) fn start(program: &Path, name: &str, isolation: &Isolation) -> io::Result<Self> {
+    ///
+    /// In a sandbox it works in the `folder` of the archive, which is also its home and its place for
+    /// temporary files. Of the environment it has language, time zone and where libraries are.
+    pub(super) fn start(
+        program: &Path,
+        name: &str,
+        isolation: &Isolation,
+        folder: &Path,
+    ) -> io::Result<Self> {
         let (memory, channel) = Memory::new()?;
         let (prints, pipe) = io::pipe()?;
         let mut command = Command::new(program);
         command.arg(COMMAND).stdin(Stdio::piped());
         command.stdout(pipe.try_clone()?).stderr(pipe);
         memory.pass(&mut command)?;
+        if isolation.sandbox {
+            command.current_dir(folder).env_clear();
+            command.envs(std::env::vars_os().filter(|(name, _)| passes(name)));
+            command.envs(["HOME", "TMPDIR", "TMP", "TEMP"].map(|name| (name, folder)));
+        }
         apart(&mut command);
         let child = command.spawn()?;
         // The command holds the writing end of the pipe, which must be closed when the process
@@ -295,6 +309,12 @@ impl Drop for Process {
         }
         self.kill();
     }
+}
+
+/// Returns whether a variable of the environment is passed on into a sandbox.
+fn passes(name: &OsStr) -> bool {
+    let name = name.to_string_lossy();
+    name.starts_with("LC_") || ["LANG", "LANGUAGE", "TZ", "LD_LIBRARY_PATH"].contains(&&*name)
 }
 
 impl Printed {

@@ -4,7 +4,7 @@ use crate::isolation::channel::Channel;
 use std::ffi::OsString;
 use std::fs::File;
 use std::io;
-use std::os::fd::AsFd;
+use std::os::fd::{AsFd, RawFd};
 use std::process::{Command, Stdio};
 
 /// The memory, as long as the process has not opened it.
@@ -25,12 +25,33 @@ impl Memory {
     }
 }
 
-/// Opens the memory that this process has inherited.
+/// Opens the memory that this process has inherited, and closes all else that it has, beside the
+/// standard streams: files that the program's own parent left open are not for instances.
 pub(crate) fn inherited(_arguments: impl Iterator<Item = OsString>) -> io::Result<Channel> {
+    close_from(3)?;
     let file = File::from(rustix::stdio::stdout().try_clone_to_owned()?);
     let channel = Channel::open(&file)?;
     rustix::stdio::dup2_stdout(rustix::stdio::stderr().as_fd())?;
     Ok(channel)
+}
+
+/// Closes all descriptors from this one on. They must belong to nothing in this process.
+#[allow(unsafe_code)]
+fn close_from(first: RawFd) -> io::Result<()> {
+    // SAFETY: the call takes numbers only, and nothing here owns these descriptors.
+    #[cfg(target_os = "linux")]
+    if unsafe { libc::syscall(libc::SYS_close_range, first, RawFd::MAX, 0) } == 0 {
+        return Ok(());
+    }
+    // Before Linux 5.9, and elsewhere. The list is complete before the first one is closed.
+    let numbers: Vec<RawFd> = std::fs::read_dir("/dev/fd")?
+        .filter_map(|entry| entry.ok()?.file_name().to_str()?.parse().ok())
+        .collect();
+    for number in numbers.into_iter().filter(|number| *number >= first) {
+        // SAFETY: as above. The descriptor by which the list was read is closed already.
+        unsafe { libc::close(number) };
+    }
+    Ok(())
 }
 
 #[cfg(target_os = "linux")]

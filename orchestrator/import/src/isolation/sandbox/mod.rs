@@ -19,7 +19,7 @@ const NEWEST: ABI = ABI::V6;
 /// Largest size of a file that the instance may write, in bytes.
 const LARGEST_FILE: u64 = 64 << 20;
 /// Folders and files that libraries and the C library read.
-const READABLE: [&str; 15] = [
+const READABLE: [&str; 18] = [
     "/usr",
     "/lib",
     "/lib32",
@@ -30,7 +30,11 @@ const READABLE: [&str; 15] = [
     "/dev/zero",
     "/dev/random",
     "/dev/urandom",
-    "/proc/self",
+    // Of its own process, without its mounts and the network of the machine.
+    "/proc/self/maps",
+    "/proc/self/stat",
+    "/proc/self/statm",
+    "/proc/self/status",
     "/proc/cpuinfo",
     "/proc/meminfo",
     "/proc/sys/vm/overcommit_memory",
