@@ -44,15 +44,21 @@ pub(crate) fn judge(
     let mut recorder = system.recorder(out, Format::Csv, false)?;
     let mut curves = Curves::new(panels, system.clock.ticks());
     let outcome = outside::fly(&system, None, &[], &mut [&mut curves, &mut recorder, &mut meters]);
-    recorder.finish()?;
-    let mut master = system.start(&Interrupt::default())?;
-    let parameters = system.parameters(&mut master)?;
-    let metadata = metadata::metadata(&system, &parameters, None, outcome.as_ref().err());
-    files::write_json(&out.join("results.json"), &metadata)?;
-    // How long the other program took is not known here.
-    let wall_s = f64::NAN;
-    let metrics = Metrics { wall_s, loop_delay_s: system.loop_delay(), ..meters.metrics() };
-    files::write_json(&out.join("metrics.json"), &metrics)?;
-    curves.draw(&out.join("plot.svg"), &system.experiment.title)?;
-    Ok(outcome?)
+    let mut write = || -> Result<(), Failure> {
+        recorder.finish()?;
+        let mut master = system.start(&Interrupt::default())?;
+        let parameters = system.parameters(&mut master)?;
+        let metadata = metadata::metadata(&system, &parameters, None, outcome.as_ref().err());
+        files::write_json(&out.join("results.json"), &metadata)?;
+        // How long the other program took is not known here.
+        let wall_s = f64::NAN;
+        let metrics = Metrics { wall_s, loop_delay_s: system.loop_delay(), ..meters.metrics() };
+        files::write_json(&out.join("metrics.json"), &metrics)?;
+        curves.draw(&out.join("plot.svg"), &system.experiment.title)?;
+        Ok(())
+    };
+    let written = write();
+    // What ended the run is told first, as by `run`.
+    outcome?;
+    written
 }

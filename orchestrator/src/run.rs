@@ -250,46 +250,52 @@ fn record(system: &mut System, options: &Options) -> Result<RunReport, Failure> 
     let priority = scheduling.priority.clone();
     drop((scheduling, live, progress, warnings));
 
-    let mut files = vec!["results.json", "metrics.json"];
-    if let Some(recorder) = &mut recorder {
-        recorder.finish()?;
-        files.insert(0, format.file());
-    }
-    let metadata =
-        metadata::metadata(system, &parameters, options.real_time, outcome.as_ref().err());
-    files::write_json(&out.join("results.json"), &metadata)?;
-    let reached = clock.step() * meters.seen().saturating_sub(1) as f64;
-    let mut metrics = Metrics {
-        real_time_factor: (wall > 0.0).then(|| reached / wall),
-        wall_s: wall,
-        loop_delay_s: system.loop_delay(),
-        ..meters.metrics()
+    let write = || -> Result<_, Failure> {
+        let mut files = vec!["results.json", "metrics.json"];
+        if let Some(recorder) = &mut recorder {
+            recorder.finish()?;
+            files.insert(0, format.file());
+        }
+        let metadata =
+            metadata::metadata(system, &parameters, options.real_time, outcome.as_ref().err());
+        files::write_json(&out.join("results.json"), &metadata)?;
+        let reached = clock.step() * meters.seen().saturating_sub(1) as f64;
+        let mut metrics = Metrics {
+            real_time_factor: (wall > 0.0).then(|| reached / wall),
+            wall_s: wall,
+            loop_delay_s: system.loop_delay(),
+            ..meters.metrics()
+        };
+        if outcome.is_ok() {
+            metrics.asked.extend(margins(system, &options.interrupt)?);
+        }
+        if let Some(pacer) = master.take_pacer() {
+            let (mut real_time, wake_ups, steps) = pacer.report();
+            real_time.priority = priority;
+            warn(&real_time, options.quiet);
+            let path = out.join("realtime.svg");
+            cosim_report::pacing::draw(&path, &title, &real_time, wake_ups, steps)?;
+            files.push("realtime.svg");
+            metrics.real_time = Some(real_time);
+        }
+        files::write_json(&out.join("metrics.json"), &metrics)?;
+        if !options.files.pictures.no_plot && curves.draw(&out.join("plot.svg"), &title)? {
+            files.push("plot.svg");
+        }
+        if let Some(watch) = watch {
+            let mut run = watch.recording(&stem, &metadata);
+            run.summary = summary::lines(&system.experiment.observe, &metrics);
+            let runs = [run];
+            let drawn = panels::of_experiments(&runs).map_err(Error::experiment)?;
+            run_page::write(&runs, &drawn, &out.join("page.html"))?;
+            files.push("page.html");
+        }
+        Ok((metrics, files))
     };
-    if outcome.is_ok() {
-        metrics.asked.extend(margins(system, &options.interrupt)?);
-    }
-    if let Some(pacer) = master.take_pacer() {
-        let (mut real_time, wake_ups, steps) = pacer.report();
-        real_time.priority = priority;
-        warn(&real_time, options.quiet);
-        let path = out.join("realtime.svg");
-        cosim_report::pacing::draw(&path, &title, &real_time, wake_ups, steps)?;
-        files.push("realtime.svg");
-        metrics.real_time = Some(real_time);
-    }
-    files::write_json(&out.join("metrics.json"), &metrics)?;
-    if !options.files.pictures.no_plot && curves.draw(&out.join("plot.svg"), &title)? {
-        files.push("plot.svg");
-    }
-    if let Some(watch) = watch {
-        let mut run = watch.recording(&stem, &metadata);
-        run.summary = summary::lines(&system.experiment.observe, &metrics);
-        let runs = [run];
-        let drawn = panels::of_experiments(&runs).map_err(Error::experiment)?;
-        run_page::write(&runs, &drawn, &out.join("page.html"))?;
-        files.push("page.html");
-    }
+    let written = write();
+    // What ended the run is told first: a disk that its results filled has no room for the rest.
     let ended = early(outcome, &out)?;
+    let (metrics, files) = written?;
     let end = master.end().map(String::from);
     Ok(RunReport { metrics, out, files, ended, end })
 }

@@ -93,7 +93,8 @@ pub fn unwatch() {
 /// Watches from now on for signals that end this process, and for calls of `exit`; under Linux with
 /// the GNU C library also for those of `_exit`, `_Exit` and `quick_exit`. One line on standard
 /// error names the instance that was being called, or the FMUs that were loaded. An exit is then a
-/// failure, with code 1.
+/// failure, with code 1. A file that grows beyond the limit of the user (`ulimit -f`) ends nothing:
+/// whoever writes it gets an error.
 pub fn watch() -> Watch {
     WATCHED.store(std::process::id(), Ordering::SeqCst);
     listen();
@@ -115,6 +116,7 @@ fn listen() {
     }
     // SAFETY: the functions have the type that C wants and stay where they are.
     unsafe {
+        libc::signal(libc::SIGXFSZ, libc::SIG_IGN);
         libc::atexit(on_exit);
         #[cfg(all(target_os = "linux", target_env = "gnu"))]
         gnu::at_quick_exit(gnu::on_quick_exit);

@@ -169,7 +169,7 @@ impl Fmu {
         let archive = match &self.content {
             Content::Archive(archive) => archive,
             Content::LookupTable(table) => {
-                return Ok(Box::new(LookupTableInstance::new(table.clone())));
+                return Ok(Box::new(LookupTableInstance::new(name, table.clone())));
             }
         };
         let of_component = format!("the component \"{name}\"");
@@ -240,9 +240,27 @@ impl Archive {
         if let Some((missing, _)) = text.split_once(": cannot open shared object file") {
             return format!("{entry} needs {missing}, which is not on this system");
         }
+        if runs_nothing(self.folder.path()) {
+            return format!(
+                "{entry} cannot be loaded from {}, whose files may not be run (noexec): set TMPDIR to another folder",
+                std::env::temp_dir().display()
+            );
+        }
         // The path of the temporary folder is removed, because it means nothing to a reader.
         format!("{entry}: {}", text.replace(&format!("{}/", self.folder.path().display()), ""))
     }
+}
+
+/// Returns whether a folder is on a file system from which nothing may be run.
+#[cfg(unix)]
+fn runs_nothing(folder: &Path) -> bool {
+    use rustix::fs::{StatVfsMountFlags, statvfs};
+    statvfs(folder).is_ok_and(|found| found.f_flag.contains(StatVfsMountFlags::NOEXEC))
+}
+
+#[cfg(not(unix))]
+fn runs_nothing(_folder: &Path) -> bool {
+    false
 }
 
 /// Returns the names of the entries of a folder, sorted. There are none if the folder does not

@@ -187,7 +187,9 @@ fn text(path: &Path, metadata: &Value) -> Result<Columns, Error> {
         let record = record.map_err(failed)?;
         for ((cell, (name, values)), items) in record.iter().zip(&mut columns).zip(&items) {
             let item = || items.iter().find(|(_, item)| *item == cell)?.0.parse().ok();
-            let number = cell.trim().parse().ok().or_else(item);
+            // A blank cell is a missing value, at which a curve has a gap.
+            let blank = cell.trim().is_empty().then_some(f64::NAN);
+            let number = blank.or_else(|| cell.trim().parse().ok()).or_else(item);
             values.push(number.ok_or_else(|| {
                 Error::experiment(format!(
                     "{}, row {}, {name}: \"{cell}\" is not a number",
@@ -251,6 +253,17 @@ mod tests {
         assert_eq!(run.track("a.mode").unwrap().values, [3.0, 3.0]);
         let fault = read("results.csv", "time,a.mode\n0,slow\n", Some(&items)).unwrap_err();
         assert!(fault.to_string().contains("row 2, a.mode: \"slow\" is not a number"), "{fault}");
+    }
+
+    #[test]
+    fn a_blank_cell_is_a_gap_but_no_time() {
+        let run = read("mine.csv", "time,a,b\n0,1,2\n1,,NaN\n2, ,4\n3,5,nan\n", None).unwrap();
+        let gaps =
+            |name: &str| run.track(name).unwrap().values.iter().map(|v| v.is_nan()).collect();
+        let (a, b): (Vec<bool>, Vec<bool>) = (gaps("a"), gaps("b"));
+        assert_eq!((a, b), (vec![false, true, true, false], vec![false, true, false, true]));
+        let fault = read("a.csv", "time,a\n0,1\n,2\n", None).unwrap_err().to_string();
+        assert!(fault.ends_with("a.csv, row 3, time: NaN is no time"), "{fault}");
     }
 
     #[test]

@@ -2,6 +2,7 @@
 
 mod bench;
 mod campaign;
+mod ends;
 mod foreign;
 #[cfg(target_os = "linux")]
 mod hostile;

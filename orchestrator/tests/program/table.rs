@@ -57,6 +57,27 @@ fn oracle_an_input_follows_the_rows_of_a_table() {
 }
 
 #[test]
+fn a_table_that_the_run_does_not_meet_is_told() {
+    let bench = bench(TABLE);
+    let told = |table: &str, arguments: &[&str]| {
+        fs::write(bench.path("drive.csv"), table).unwrap();
+        let (code, _, errors) = bench.run(&[&["--quiet"], arguments].concat());
+        assert_eq!(code, 0, "{errors}");
+        errors
+    };
+    let late = told("time,input [m]\n10,3\n20,5\n", &[]);
+    let said = "drive: its rows are from 10 s to 20 s, outside the run from 0 s to 4 s, in which it holds its first row";
+    assert!(late.contains(said) && late.lines().count() == 1, "{late}");
+    let early = told(TABLE, &["--set", "drive.shift=-5 s"]);
+    assert!(early.contains("from -4 s to -1 s") && early.contains("its last row"), "{early}");
+    // A constant, tables that cover a part of the run, and those that begin or end with it.
+    let rows = ["-3,1", "9,1", "-3,1\n2,1", "3,1\n9,1", "-3,1\n9,1", "4,1\n9,1", "-3,1\n0,1"];
+    for rows in rows {
+        assert_eq!(told(&format!("time,input [m]\n{rows}\n"), &[]), "", "{rows}");
+    }
+}
+
+#[test]
 fn a_recorded_run_drives_another() {
     let bench = bench(TABLE);
     let first = answers(&bench, &["--labels"]);

@@ -3,6 +3,8 @@
 use super::description::{HOLD, LINEAR, Place};
 use super::{Form, LONGEST, LookupTable};
 use crate::instance::{CallFailure, Instance, Outcome};
+use crate::quantity::rounded;
+use crate::warnings;
 use std::sync::Arc;
 
 /// Part of a time by which two times may differ and still be the same.
@@ -10,6 +12,8 @@ const TOLERANCE: f64 = 1e-9;
 
 /// A lookup table with the time that it has reached.
 pub(crate) struct LookupTableInstance {
+    /// Name of the component.
+    name: String,
     /// The table as its file has it.
     file: LookupTable,
     /// The table with the values that were set.
@@ -33,8 +37,9 @@ struct Present {
 }
 
 impl LookupTableInstance {
-    pub(crate) fn new(table: LookupTable) -> Self {
+    pub(crate) fn new(name: &str, table: LookupTable) -> Self {
         Self {
+            name: name.into(),
             places: table.places(),
             interpolation: HOLD,
             shift: 0.0,
@@ -168,7 +173,7 @@ impl Instance for LookupTableInstance {
         Err(CallFailure::new("setString", format!("variable {reference} is not a text")))
     }
 
-    fn enter_initialization(&mut self, start: f64, _stop: f64) -> Outcome {
+    fn enter_initialization(&mut self, start: f64, stop: f64) -> Outcome {
         let times = &self.table.times;
         if let Some(row) = times.windows(2).position(|pair| pair[0] > pair[1]) {
             return Err(CallFailure::new(
@@ -184,6 +189,19 @@ impl Instance for LookupTableInstance {
         }
         self.is_running = true;
         self.go_to(start);
+        // One row is a constant.
+        if let [first, .., last] = self.table.times[..] {
+            let [first, last] = [first, last].map(|time| rounded(time + self.shift));
+            if first > stop || last < start {
+                let held = if first > stop { "first" } else { "last" };
+                warnings::warn(&format!(
+                    "{}: its rows are from {first} s to {last} s, outside the run from {} s to {} s, in which it holds its {held} row",
+                    self.name,
+                    rounded(start),
+                    rounded(stop)
+                ));
+            }
+        }
         Ok(())
     }
 
@@ -201,7 +219,7 @@ impl Instance for LookupTableInstance {
     }
 
     fn reset(&mut self) -> Outcome {
-        *self = Self::new(self.file.clone());
+        *self = Self::new(&self.name, self.file.clone());
         Ok(())
     }
 }

@@ -13,7 +13,7 @@ const FILE: &str = "\u{feff}time,gust.x [N.m],count [Integer],open [Boolean],pla
 fn opened(text: &str) -> (LookupTableInstance, crate::description::ModelDescription) {
     let table = LookupTable::parse(text.as_bytes()).unwrap();
     let description = table.description("gusts").unwrap();
-    (LookupTableInstance::new(table), description)
+    (LookupTableInstance::new("gusts", table), description)
 }
 
 fn at(instance: &mut LookupTableInstance, time: f64) -> (f64, i32, i32, f64) {
