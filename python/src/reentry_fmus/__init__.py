@@ -12,12 +12,11 @@ from ._campaign import Campaign, Flown, Search, campaign, falsify
 from ._data import experiments, fmu, fmus
 from ._experiment import experiment
 from ._instance import InstanceError, InstanceWarning
-from ._law import LawError
 from ._linear import OpenLoop, linearise, margins
 from ._loop import ClosedLoop
 from ._orchestrator import OrchestratorError, OrchestratorWarning
 from ._run import Figure, Run
-from ._state import State
+from ._state import LawError, State
 from ._study import Study, reproduce
 
 __all__ = [

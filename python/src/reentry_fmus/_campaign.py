@@ -14,11 +14,11 @@ import pandas as pd
 from ._arrays import dataset
 from ._data import FMUS, fmu, need
 from ._experiment import recorded
-from ._law import REFERENCE, Flyer, LawError, PickledLaw
+from ._law import REFERENCE, Flyer, PickledLaw
 from ._orchestrator import OrchestratorError, missing_parts, orchestrate
 from ._pool import Pool
 from ._run import Figure, Run
-from ._state import Law
+from ._state import Law, LawError
 from ._table import Units, check_units, convert
 
 if TYPE_CHECKING:
@@ -221,7 +221,8 @@ class Campaign:
     def _fly(self, law: PickledLaw, folder: Path, jobs: int | None) -> None:
         """Flies the missing parts with a law, and lets the orchestrator merge and judge them."""
         flown: set[int] = set()
-        with Pool(law, [*self.command("campaign"), "--out", str(folder)], jobs) as pool:
+        command = [*self.command("campaign"), "--out", str(folder.absolute())]
+        with Pool(law, command, jobs) as pool:
             # A campaign that ends with an answer needs more cases at each look.
             while missing := missing_parts(self.call, folder):
                 if not flown.isdisjoint(first for first, _ in missing):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import tempfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -15,6 +14,7 @@ from ._orchestrator import OrchestratorError, orchestrate, serve
 from ._run import Run, read
 from ._state import Law, name_of
 from ._table import Units, check_units
+from ._unpacked import Folder
 
 Value = bool | int | float | str
 """Value of a parameter: a number in the variable's SI unit, a truth value, the name of an
@@ -87,8 +87,8 @@ def recorded(
 ) -> Run:
     """Calls the orchestrator for one run, and reads what it recorded. With `fly` it asks for the
     run."""
-    with tempfile.TemporaryDirectory(prefix="reentry-") as temporary:
-        folder = Path(temporary) if out is None else Path(out)
+    with Folder() as temporary:
+        folder = temporary / "out" if out is None else Path(out)
         command = [*arguments, "--out", str(folder)]
         # A folder of earlier results must not pass for those of a run that was refused.
         stale = folder / "results.json"

@@ -2,21 +2,36 @@
 
 from __future__ import annotations
 
-import tempfile
+import operator
+import os
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import fmpy
+import numpy as np
 from fmpy import fmi2
 from fmpy.fmi1 import FMICallException
 
 from ._data import hint
+from ._unpacked import copies
 
 Value = bool | int | float | str
 """Value of a variable: a number in its SI unit, a truth value, a text, or the name of an
 enumeration's item."""
+
+LEAST, MOST = -(2**31), 2**31 - 1
+"""Range of an fmi2Integer. A number beyond it would be cut to its last 32 bits on its way."""
+
+
+def plain(value: Any) -> int | float:
+    """Returns a number as one of Python's. A truth value and a text are none."""
+    if isinstance(value, (str, bytes, bool, np.bool_)):
+        raise TypeError
+    try:
+        return operator.index(value)
+    except TypeError:
+        return float(value)
 
 
 class InstanceError(RuntimeError):
@@ -27,7 +42,7 @@ class InstanceError(RuntimeError):
         self.fmu = fmu
         """Name of the FMU."""
         self.call = call
-        """Function of FMI 2.0 that was refused."""
+        """Function of FMI 2.0 that was refused, or "loading" if the library cannot be loaded."""
 
 
 class InstanceWarning(UserWarning):
@@ -35,26 +50,18 @@ class InstanceWarning(UserWarning):
 
 
 class Instance:
-    """An instance of an FMU with its unpacked archive. `close` frees both."""
+    """An instance of an FMU. `close` frees it."""
 
     def __init__(self, path: Path, parameters: Mapping[str, Value]) -> None:
         self._messages: list[tuple[int, str]] = []
         self._fmpy: Any = None
-        self._folder = tempfile.TemporaryDirectory(prefix="reentry-")
+        self._unpacked = copies.open(path)
         try:
-            fmpy.extract(str(path), self._folder.name)
-            description = fmpy.read_model_description(self._folder.name)
+            description = self._unpacked.description
             self.name: str = description.modelName
             self.variables: dict[str, Any] = {v.name: v for v in description.modelVariables}
             self.values(parameters, "parameter")
-            identifier = description.coSimulation.modelIdentifier
-            instance = fmi2.FMU2Slave(
-                guid=description.guid,
-                modelIdentifier=identifier,
-                unzipDirectory=self._folder.name,
-                instanceName=self.name,
-                libraryPath=self._library(identifier),
-            )
+            instance = self._loaded()
             callbacks = fmi2.fmi2CallbackFunctions()
             callbacks.logger = fmi2.fmi2CallbackLoggerTYPE(self._log)
             callbacks.allocateMemory = fmi2.defaultCallbacks.allocateMemory
@@ -70,18 +77,21 @@ class Instance:
             self.close()
             raise
 
-    def _library(self, identifier: str) -> str:
-        # FMI 2.0 names no folder for ARM processors; FMI 3.0 does.
-        file = f"{identifier}{fmpy.sharedLibraryExtension}"
-        places = [Path(self._folder.name, "binaries", name, file) for name in self._platforms()]
-        present = [place for place in places if place.is_file()]
-        if not present:
-            raise FileNotFoundError(f"{self.name} has no library for {fmpy.platform_tuple}")
-        return str(present[0])
-
-    @staticmethod
-    def _platforms() -> tuple[str, str]:
-        return fmpy.platform_tuple, fmpy.platform
+    def _loaded(self) -> Any:
+        unpacked = self._unpacked
+        # FMPy looks for the library in its folder, and stays there if it cannot be loaded.
+        here = os.getcwd()
+        try:
+            return fmi2.FMU2Slave(
+                guid=unpacked.description.guid,
+                modelIdentifier=unpacked.interface.modelIdentifier,
+                unzipDirectory=str(unpacked.folder),
+                instanceName=self.name,
+                libraryPath=unpacked.library,
+            )
+        except Exception as error:
+            os.chdir(here)
+            raise InstanceError(self.name, "loading", str(error)) from error
 
     def _log(self, _: Any, __: bytes, status: int, ___: bytes, message: bytes) -> None:
         self._messages.append((status, message.decode(errors="replace")))
@@ -168,11 +178,11 @@ class Instance:
         needs = f"{self.name}: {variable.name} needs"
         if variable.type == "Enumeration":
             items = {str(item.name): int(item.value) for item in variable.declaredType.items}
-            if value not in items:
+            if not isinstance(value, str) or value not in items:
                 raise ValueError(
                     f"{needs} one of its items, not {value!r}{hint(str(value), items)}"
                 )
-            return items[str(value)]
+            return items[value]
         if variable.type == "String":
             if isinstance(value, str):
                 return value
@@ -183,13 +193,18 @@ class Instance:
             raise TypeError(f"{needs} True or False, not {value!r}")
         unit = f" in {variable.unit}" if getattr(variable, "unit", None) else ""
         try:
-            number = float(value)
-        except (TypeError, ValueError):
-            raise TypeError(f"{needs} a number{unit}, not {value!r}") from None
-        if variable.type == "Real":
-            return number
-        if not number.is_integer():
+            number = plain(value)
+            if variable.type == "Real":
+                return float(number)
+        except (TypeError, ValueError, OverflowError):
+            kind = "an integer" if variable.type == "Integer" else f"a number{unit}"
+            raise TypeError(f"{needs} {kind}, not {value!r}") from None
+        if number != number or number in (np.inf, -np.inf) or number != int(number):
             raise TypeError(f"{needs} an integer, not {value!r}")
+        low = LEAST if variable.min is None else int(variable.min)
+        high = MOST if variable.max is None else int(variable.max)
+        if not low <= number <= high:
+            raise ValueError(f"{needs} an integer from {low} to {high}, not {value!r}")
         return int(number)
 
     def set(self, settings: Mapping[str, Value], causality: str) -> None:
@@ -226,8 +241,8 @@ class Instance:
         self.set(parameters, "parameter")
 
     def close(self) -> None:
-        """Frees the instance and removes the unpacked archive. A second call does nothing."""
+        """Frees the instance. A second call does nothing."""
         instance, self._fmpy = self._fmpy, None
         if instance is not None:
             instance.freeInstance()
-        self._folder.cleanup()
+        self._unpacked.release()

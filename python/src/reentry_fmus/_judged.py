@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
@@ -19,6 +18,10 @@ from ._instance import Value
 from ._orchestrator import OrchestratorError, Rows, serve
 from ._recording import RECORDED, Variable
 from ._run import Judgement, read_judgement
+from ._unpacked import Folder
+
+LOST = 3
+"""Exit code of the orchestrator for a run in which the attitude was lost."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,11 +50,11 @@ def judged(flown: Flown) -> Judgement:
     def rows(request: dict[str, Any]) -> Rows:
         return Rows(np.column_stack([flown.columns[name] for name, _ in request["variables"]]))
 
-    with tempfile.TemporaryDirectory(prefix="reentry-") as temporary:
-        out = Path(temporary, "out")
-        exit_code, error = serve(command(flown, Path(temporary), out), rows)
+    with Folder() as temporary:
+        out = temporary / "out"
+        exit_code, error = serve(command(flown, temporary, out), rows)
         # A run in which the attitude was lost is judged up to then.
-        if not (out / "metrics.json").exists():
+        if exit_code not in (0, LOST):
             # The experiment's file was made here, and nobody has seen it.
             problem = re.sub(r"^\S*closed_loop\.toml:(\d+:)? ", "", error)
             raise OrchestratorError(problem, exit_code, None)
@@ -66,7 +69,7 @@ class Noted(Exception):
 
 
 @lru_cache
-def observed_by(plant: Path, controller: Path) -> tuple[Variable, ...]:
+def observed_by(plant: Path, controller: Path, changed: Any) -> tuple[Variable, ...]:
     found: list[Variable] = []
 
     def note(request: dict[str, Any]) -> Rows:
@@ -75,9 +78,9 @@ def observed_by(plant: Path, controller: Path) -> tuple[Variable, ...]:
 
     paths = {"plant": plant, "controller": controller}
     nothing = Flown("", (0.0, 1.0, 1.0), paths, {"plant": {}, "controller": {}}, {})
-    with tempfile.TemporaryDirectory(prefix="reentry-") as temporary:
+    with Folder() as temporary:
         try:
-            serve(command(nothing, Path(temporary), Path(temporary, "out")), note)
+            serve(command(nothing, temporary, temporary / "out"), note)
         except Noted:
             pass
     # The loop runs also if these FMUs are refused. Whoever asks for its metrics gets the reason.
@@ -86,8 +89,9 @@ def observed_by(plant: Path, controller: Path) -> tuple[Variable, ...]:
 
 def observed(paths: Mapping[str, Path]) -> tuple[Variable, ...]:
     """Returns the variables that metrics and figure need of a loop of these FMUs. They are looked
-    up once."""
-    return observed_by(paths["plant"], paths["controller"])
+    up once, as long as no file changes."""
+    changed = tuple(path.stat().st_mtime_ns for path in paths.values() if path.exists())
+    return observed_by(paths["plant"], paths["controller"], changed)
 
 
 def command(flown: Flown, folder: Path, out: Path) -> list[str]:

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+import functools
 import hashlib
 import inspect
 import pickle
 import sys
-import traceback
 from collections.abc import Callable
+from mmap import mmap
 from pathlib import Path
-from traceback import FrameSummary
+from struct import Struct
 from typing import Any
 
 import numpy as np
@@ -20,7 +21,7 @@ from ._instance import InstanceError
 from ._loop import ClosedLoop
 from ._orchestrator import Rows
 from ._recording import ATTITUDE, COMMAND, RATE
-from ._state import Law, State, name_of, vector
+from ._state import Law, State, moment_of, name_of
 
 REFERENCE = "LQR"
 """FMU that computes the reference of a law and has the limits that it is judged by."""
@@ -31,49 +32,19 @@ DIRECT = {
 }
 """Connections of the loops that a law can fly."""
 
-SENT = "<dynamic-code>"
-"""Name that cloudpickle gives to the file of a function that it sends."""
-
-Line = tuple[str, int, str]
-"""File, line and function of a call."""
-
-
-class LawError(RuntimeError):
-    """A law in Python failed. The text names the case and the time, and the lines of the law."""
-
-    def __init__(self, problem: str, lines: list[Line], case: int | None, time: float) -> None:
-        super().__init__(problem, lines, case, time)
-        self.problem = problem
-        """The law with the time, and the error that it raised."""
-        self.lines = lines
-        """Calls within the law that led to the error."""
-        self.case = case
-        """Number of the case, if it is one of a campaign."""
-        self.time = time
-        """Simulated time, s."""
-
-    def __str__(self) -> str:
-        summary = [FrameSummary(file, line, function) for file, line, function in self.lines]
-        return "\n".join([self.problem, *traceback.format_list(summary)]).rstrip()
-
-    def in_file(self, file: str | None) -> LawError:
-        """Returns the error with the file of a law that was sent without it."""
-        lines = [
-            (file if file and name == SENT else name, line, function)
-            for name, line, function in self.lines
-        ]
-        return LawError(self.problem, lines, self.case, self.time)
-
 
 class Flyer:
     """Flies runs of the vehicle with a law in Python. The instances are reset between two
     runs, as far as they are FMUs of this package."""
 
-    def __init__(self, make: Callable[[], Law], case: int | None = None) -> None:
+    def __init__(
+        self, make: Callable[[], Law], case: int | None = None, progress: Progress | None = None
+    ) -> None:
         self.name = name_of(make())
         """Name of the law."""
         self._make = make
         self._case = case
+        self._progress = progress
         self._loop: ClosedLoop | None = None
         self._opened: tuple[Any, ...] = ()
 
@@ -81,31 +52,36 @@ class Flyer:
         """Flies a run that the orchestrator asks for. `make` gives each run a law.
 
         Raises:
-            LawError: The law raised an error, or gave something else than a moment.
+            LawError: The law ended in another way than by returning a moment.
+            InstanceError: An FMU cannot be opened, which is no matter of the run.
             ValueError: The loop is none that a law can fly.
         """
         check(request)
+        loop = self._opened_for(request)
+        case = self._case if request["case"] is None else request["case"]
+        if self._progress is not None:
+            self._progress.begin(case)
         try:
-            loop = self._prepared(request)
+            loop._restart({name: found["set"] for name, found in request["components"].items()})
         except InstanceError as refusal:
             # An FMU may refuse the values of one case and take those of others.
             self.close()
             return Rows(np.empty((0, len(request["variables"]))), described(refusal))
-        law = self._make()
-        case = self._case if request["case"] is None else request["case"]
+        law, progress = self._make(), self._progress
 
         def moment(state: State) -> npt.ArrayLike:
-            try:
-                return vector(law(state))
-            except Exception as error:
-                problem = explained(error, name_of(law), case, state.time)
-                raise LawError(problem, lines_of(error), case, state.time) from error
+            if progress is None:
+                return moment_of(law, state, case)
+            progress.ask(state.time)
+            answer = moment_of(law, state, case)
+            progress.answer()
+            return answer
 
         variables = [(str(name), bool(responds)) for name, responds in request["variables"]]
         rows, failure = loop._fly(request["steps"], moment, variables)
         return Rows(rows, None if failure is None else described(failure))
 
-    def _prepared(self, request: dict[str, Any]) -> ClosedLoop:
+    def _opened_for(self, request: dict[str, Any]) -> ClosedLoop:
         paths = {name: Path(found["fmu"]) for name, found in request["components"].items()}
         wanted = (paths, request["step"])
         is_ours = all(path.parent == FMUS for path in paths.values())
@@ -113,7 +89,6 @@ class Flyer:
             self.close()
             self._loop = ClosedLoop._with_law(paths, request["step"])
             self._opened = wanted
-        self._loop._restart({name: c["set"] for name, c in request["components"].items()})
         return self._loop
 
     def close(self) -> None:
@@ -127,6 +102,43 @@ class Flyer:
 
     def __exit__(self, *_: object) -> None:
         self.close()
+
+
+class Progress:
+    """The case and the time at which a process asks a law, in a file that another process reads
+    when the first one has ended."""
+
+    FORM = Struct("=?qd")
+    """Whether the law is being asked, number of the case, time in s."""
+
+    def __init__(self, path: Path) -> None:
+        if not path.exists():
+            path.write_bytes(self.FORM.pack(False, -1, 0.0))
+        with open(path, "r+b") as file:
+            self._map = mmap(file.fileno(), self.FORM.size)
+        self._case = -1
+
+    def begin(self, case: int | None) -> None:
+        """Notes the case."""
+        self._case = -1 if case is None else case
+        self.FORM.pack_into(self._map, 0, False, self._case, 0.0)
+
+    def ask(self, time: float) -> None:
+        """Notes that the law is asked."""
+        self.FORM.pack_into(self._map, 0, True, self._case, time)
+
+    def answer(self) -> None:
+        """Notes that the law has answered."""
+        self._map[0] = 0
+
+    def read(self) -> tuple[bool, int | None, float]:
+        """Returns whether the law was being asked, the case, and the time, s."""
+        is_asked, case, time = self.FORM.unpack_from(self._map)
+        return is_asked, None if case < 0 else case, time
+
+    def close(self) -> None:
+        """Closes the file."""
+        self._map.close()
 
 
 def described(failure: InstanceError) -> dict[str, str]:
@@ -155,19 +167,6 @@ def check(request: dict[str, Any]) -> None:
         )
 
 
-def explained(error: Exception, name: str, case: int | None, time: float) -> str:
-    """Says which law failed when, and why."""
-    where = f"at t = {time:.10g} s" if case is None else f"in case {case} at t = {time:.10g} s"
-    what = "".join(traceback.format_exception_only(error)).strip()
-    return f"the law {name} failed {where}: {what}"
-
-
-def lines_of(error: Exception) -> list[Line]:
-    """Returns file, line and function of the calls within a law that led to an error."""
-    calls = traceback.extract_tb(error.__traceback__)[1:]
-    return [(call.filename, call.lineno or 0, call.name) for call in calls]
-
-
 class PickledLaw:
     """A law that can be sent to other processes, in which each run gets a fresh copy of it."""
 
@@ -176,11 +175,19 @@ class PickledLaw:
         import cloudpickle
 
         self.name = name_of(law)
+        if not callable(law):
+            raise TypeError(f"a law is a function from the state to the moment, not {law!r}")
         code = getattr(law, "__code__", None) or getattr(type(law).__call__, "__code__", None)
         self.file: str | None = getattr(code, "co_filename", None)
         """File that defines the law."""
-        self.content: bytes = cloudpickle.dumps(law)
+        try:
+            self.content: bytes = cloudpickle.dumps(law)
+        except Exception as error:
+            problem = f"the law {self.name} cannot be sent to other processes"
+            raise TypeError(f"{problem}: {error}") from error
         digest = hashlib.sha256(self.content)
+        while isinstance(law, functools.partial):
+            law = law.func
         # A function of an imported module is sent by its name.
         source = inspect.getmodule(law if inspect.isroutine(law) else type(law))
         file = getattr(source, "__file__", None)

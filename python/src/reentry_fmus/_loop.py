@@ -18,7 +18,7 @@ from ._judged import Flown, judged, observed
 from ._recording import ATTITUDE, ATTITUDE_RATE, MOMENT, RATE, RECORDED, REFERENCES
 from ._recording import Probes, Variable
 from ._run import Run
-from ._state import Law, State, name_of, vector
+from ._state import Law, State, moment_of, name_of, vector
 from ._table import Units, check_units, convert
 
 
@@ -74,6 +74,11 @@ class ClosedLoop:
         # that alone: its inputs are not set, and its moment is not read.
         paths = {"plant": fmu_path(plant), "controller": fmu_path(controller or "LQR")}
         self._open(paths, by_component, float(step), has_controller=controller is not None)
+        try:
+            self._initialize()
+        except BaseException:
+            self.close()
+            raise
 
     def _open(
         self,
@@ -85,6 +90,7 @@ class ClosedLoop:
         self._paths = paths
         self._step = step
         self._is_open = True
+        self._is_asking = False
         self._failure: InstanceError | None = None
         self._has_controller = has_controller
         self._parameters = parameters
@@ -96,14 +102,14 @@ class ClosedLoop:
             raise
         try:
             self._wire()
-            self._initialize()
         except BaseException:
             self.close()
             raise
 
     @classmethod
     def _with_law(cls, paths: dict[str, Path], step: float) -> ClosedLoop:
-        """Opens a loop without a controller, whose reference is that of an FMU."""
+        """Opens a loop without a controller, whose reference is that of an FMU. It begins when it
+        is restarted."""
         loop = cls.__new__(cls)
         loop._open(paths, {"plant": {}, "controller": {}}, step, has_controller=False)
         return loop
@@ -177,7 +183,7 @@ class ClosedLoop:
             TypeError: A moment is missing, or is given although there is a controller.
             InstanceError: An FMU refused the moment or the step. `reset` makes the loop usable again.
         """
-        self._check_open()
+        self._check_idle()
         if self._failure is not None:
             name, call = self._failure.fmu, self._failure.call
             raise InstanceError(name, call, "the loop ended when this FMU failed: reset the loop")
@@ -226,6 +232,10 @@ class ClosedLoop:
                 be left out.
             units: "deg" gives angles and angular rates in degrees for reading.
 
+        Raises:
+            LawError: The law failed, as its text says with the time.
+            InstanceError: An FMU refused a step.
+
         Returns:
             A table with one row for each communication point, the present one included, with the
             time (s) as index. The moment is that of the step which begins there; the last row
@@ -233,7 +243,9 @@ class ClosedLoop:
             "plant.attitude.alpha", ... Metrics and figure are those of the time that was run.
         """
         check_units(units)
-        self._check_open()
+        self._check_idle()
+        if not np.isfinite(stop):
+            raise ValueError(f"stop = {stop} s, but a finite time is needed")
         steps = round((stop - self._state.time) / self._step)
         if steps < 0:
             raise ValueError(f"stop = {stop} s is before the present time, {self._state.time} s")
@@ -246,7 +258,8 @@ class ClosedLoop:
         more = [variable for variable in observed(self._paths) if variable not in RECORDED]
         variables = RECORDED + more
         first = self._tick
-        rows, failure = self._fly(steps, law, variables)
+        asked = None if law is None else partial(moment_of, law)
+        rows, failure = self._fly(steps, asked, variables)
         if failure is not None:
             raise failure
         by_name = dict(zip((name for name, _ in variables), rows.T, strict=True))
@@ -272,13 +285,21 @@ class ClosedLoop:
             probes.point(rows[k])
             if k == steps:
                 break
+            moment = None if law is None else self._asked(law)
             try:
-                self.step(None if law is None else law(self._state))
+                self.step(moment)
             except InstanceError as failure:
                 probes.command(rows[k], self._moment)
                 return rows[: k + 1], failure
             probes.response(rows[k], self._moment)
         return rows, None
+
+    def _asked(self, law: Law) -> npt.ArrayLike:
+        self._is_asking = True
+        try:
+            return law(self._state)
+        finally:
+            self._is_asking = False
 
     def _table(
         self, rows: npt.NDArray[np.float64], stop: float, units: Units
@@ -339,7 +360,7 @@ class ClosedLoop:
             parameters: Parameters in place of the present ones, or None for the same
                 again.
         """
-        self._check_open()
+        self._check_idle()
         if parameters is not None:
             by_component = split(parameters, self._has_controller)
             self._plant.values(by_component["plant"], "parameter")
@@ -352,7 +373,8 @@ class ClosedLoop:
         return self._state
 
     def close(self) -> None:
-        """Frees the instances and removes their temporary folders. A second call does nothing."""
+        """Frees the instances. A second call does nothing."""
+        self._check_asking()
         self._is_open = False
         self._controller.close()
         self._plant.close()
@@ -360,6 +382,15 @@ class ClosedLoop:
     def _check_open(self) -> None:
         if not self._is_open:
             raise ValueError("the loop is closed: its instances are freed")
+
+    def _check_idle(self) -> None:
+        self._check_open()
+        self._check_asking()
+
+    def _check_asking(self) -> None:
+        if self._is_asking:
+            problem = "a law does not step, run, reset or close the loop that asks it"
+            raise RuntimeError(f"{problem}: it returns the moment, and the loop makes the step")
 
     def __enter__(self) -> ClosedLoop:
         return self

@@ -5,13 +5,15 @@ from __future__ import annotations
 import json
 import os
 import re
+import signal
 import subprocess
 import tempfile
 import warnings
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -42,18 +44,53 @@ def orchestrate(
     """Runs the orchestrator. Returns its exit code, the text of its error, and what it printed.
     Its warnings are Python warnings, as many levels of calls further up as `stacklevel` says; with
     the level "error" there are none."""
-    done = subprocess.run(
+    with subprocess.Popen(
         [str(program()), *arguments],
-        capture_output=True,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
         text=True,
         encoding="utf-8",
         env={**os.environ, "RUST_LOG": level},
-        check=False,
-    )
-    messages, _, error = done.stderr.partition("error: ")
+    ) as process:
+        try:
+            printed, said = process.communicate()
+        except BaseException:
+            end(process)
+            raise
+    messages, _, error = said.partition("error: ")
     for text in re.findall(r"^ *WARN (.+)$", messages, re.MULTILINE):
         warnings.warn(text, OrchestratorWarning, stacklevel=stacklevel)
-    return done.returncode, error.strip() or done.stderr.strip(), done.stdout
+    return process.returncode, reason(process.returncode, error, said), printed
+
+
+PATIENCE = 2.0
+"""Time that the orchestrator gets to end by itself, s."""
+
+
+def end(process: subprocess.Popen[Any]) -> None:
+    """Waits for the end of the orchestrator, which then removes its folders. It ends by itself when
+    its standard input ends, or when Ctrl-C has reached it, too; else it is asked to."""
+    for ask in (None, process.terminate, process.kill):
+        if ask is not None:
+            ask()
+        with suppress(subprocess.TimeoutExpired):
+            process.wait(PATIENCE)
+            return
+
+
+def reason(exit_code: int, error: str, said: str) -> str:
+    """Returns why the orchestrator has ended."""
+    return error.strip() or said.strip() or f"the orchestrator {manner(exit_code)}"
+
+
+def manner(exit_code: int) -> str:
+    """Says how a process has ended."""
+    if exit_code >= 0:
+        return f"ended with exit code {exit_code}"
+    try:
+        return f"was ended by {signal.Signals(-exit_code).name}"
+    except ValueError:
+        return f"was ended by signal {-exit_code}"
 
 
 @dataclass(frozen=True)
@@ -76,8 +113,8 @@ def serve(arguments: Sequence[str], fly: Callable[[dict[str, Any]], Rows]) -> tu
             stderr=messages,
             env={**os.environ, "RUST_LOG": "error"},
         ) as process:
+            assert process.stdin is not None and process.stdout is not None
             try:
-                assert process.stdin is not None and process.stdout is not None
                 for line in process.stdout:
                     rows = fly(json.loads(line))
                     head = {"rows": len(rows.values), "failure": rows.failure}
@@ -88,11 +125,20 @@ def serve(arguments: Sequence[str], fly: Callable[[dict[str, Any]], Rows]) -> tu
                 # The orchestrator has ended, and its messages say why.
                 pass
             except BaseException:
-                process.kill()
+                close(process.stdin)
+                end(process)
                 raise
+            # What an orchestrator that has ended did not read is not written at the end.
+            close(process.stdin)
         messages.seek(0)
         text = messages.read().decode(errors="replace")
-        return process.returncode, (text.partition("error: ")[2] or text).strip()
+        return process.returncode, reason(process.returncode, text.partition("error: ")[2], text)
+
+
+def close(pipe: IO[bytes]) -> None:
+    """Closes a pipe, also if nobody reads what is left in it."""
+    with suppress(OSError):
+        pipe.close()
 
 
 def missing_parts(campaign: Callable[..., str], folder: Path) -> list[tuple[int, int]]:

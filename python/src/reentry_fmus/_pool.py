@@ -5,49 +5,61 @@ from __future__ import annotations
 import os
 import pickle
 import queue
+import signal
 import subprocess
 import sys
+import time
 from concurrent.futures import ThreadPoolExecutor, as_completed
+from contextlib import suppress
+from pathlib import Path
 from typing import Any
 
-from ._law import LawError, PickledLaw
-from ._orchestrator import OrchestratorError
+from ._law import PickledLaw, Progress
+from ._orchestrator import OrchestratorError, close, manner
+from ._state import LawError, instant
+from ._unpacked import Folder
+
+PATIENCE = 2.0
+"""Time that what a worker has started gets to end by itself, s."""
 
 
 class Worker:
-    """A process that flies parts, one after the other."""
+    """A process that flies parts, one after the other. Its temporary files are in a folder that is
+    removed with the pool."""
 
-    def __init__(self, law: PickledLaw, command: list[str]) -> None:
+    def __init__(self, law: PickledLaw, command: list[str], folder: Path, number: int) -> None:
         # Ctrl-C is for this process, which then ends the others.
         apart: dict[str, Any] = {"start_new_session": True}
         if os.name == "nt":
             apart = {"creationflags": 0x200}  # CREATE_NEW_PROCESS_GROUP
+        self._law = law
+        notes = folder / f"progress-{number}"
+        self._progress = Progress(notes)
+        temporary = dict.fromkeys(("TMPDIR", "TMP", "TEMP"), str(folder))
+        # A law that crashes shows its lines.
         self._process = subprocess.Popen(
-            [sys.executable, "-m", "reentry_fmus._worker"],
+            [sys.executable, "-X", "faulthandler", "-m", "reentry_fmus._worker"],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
+            env={**os.environ, **temporary},
             **apart,
         )
-        self._file = law.file
-        self._send(sys.path)
-        self._send({"law": law.content, "command": command})
-
-    def _send(self, message: object) -> None:
-        assert self._process.stdin is not None
-        pickle.dump(message, self._process.stdin)
-        self._process.stdin.flush()
+        begin = {"law": law.content, "command": command, "progress": notes}
+        self._unsent: list[object] = [sys.path, begin]
 
     def fly(self, arguments: list[str]) -> None:
         """Flies what further arguments of the command say, and waits for the end."""
-        assert self._process.stdout is not None
+        assert self._process.stdin is not None and self._process.stdout is not None
         try:
-            self._send(arguments)
+            for message in (*self._unsent, arguments):
+                pickle.dump(message, self._process.stdin)
+            self._process.stdin.flush()
+            self._unsent.clear()
             kind, error = pickle.load(self._process.stdout)
-        except (BrokenPipeError, EOFError, pickle.UnpicklingError):
-            code = self._process.wait()
-            raise RuntimeError(f"a process that flew cases has ended, exit code {code}") from None
+        except (OSError, EOFError, pickle.UnpicklingError):
+            raise self._failure() from None
         if kind == "law":
-            raise LawError(*error).in_file(self._file)
+            raise LawError(*error).in_file(self._law.file)
         if kind == "orchestrator":
             raise OrchestratorError(error[0], error[1], None)
         if kind == "value":
@@ -55,13 +67,36 @@ class Worker:
         if kind == "other":
             raise RuntimeError(error)
 
+    def _failure(self) -> RuntimeError:
+        """Says how the process has ended, and what it was about to do."""
+        with suppress(subprocess.TimeoutExpired):
+            self._process.wait(PATIENCE)
+        self._process.kill()
+        how = manner(self._process.wait())
+        is_asked, case, at = self._progress.read()
+        if is_asked:
+            problem = f"the law {self._law.name} failed {instant(case, at)}: its process {how}"
+            return LawError(problem, [], case, at)
+        where = "before its first case" if case is None else f"in case {case}, outside the law"
+        return RuntimeError(f"a process that flies the law {self._law.name} {how} {where}")
+
     def end(self) -> None:
-        """Ends the process. The orchestrator that it has started ends with it."""
+        """Ends the process and all that it has started. An orchestrator ends by itself, and leaves
+        no half of a file."""
         self._process.kill()
         self._process.wait()
         for pipe in (self._process.stdin, self._process.stdout):
-            if pipe is not None:
-                pipe.close()
+            assert pipe is not None
+            close(pipe)
+        self._progress.close()
+        if os.name != "nt":
+            end = time.monotonic() + PATIENCE
+            # The group has the number of the process. It may be gone, or have other users' programs.
+            with suppress(OSError):
+                while time.monotonic() < end:
+                    os.killpg(self._process.pid, 0)
+                    time.sleep(0.01)
+                os.killpg(self._process.pid, signal.SIGKILL)
 
 
 class Pool:
@@ -70,17 +105,22 @@ class Pool:
     def __init__(self, law: PickledLaw, command: list[str], jobs: int | None) -> None:
         if jobs is not None and jobs < 1:
             raise ValueError(f"jobs = {jobs}, but at least one process is needed")
-        self._arguments: Any = (law, command)
+        self._law, self._command = law, command
         self._jobs = jobs or cores()
+        self._folder: Folder | None = None
         self._workers: list[Worker] = []
+
+    def _begin(self, count: int) -> None:
+        self._folder = self._folder or Folder()
+        for number in range(len(self._workers), count):
+            self._workers.append(Worker(self._law, self._command, self._folder.path, number))
 
     def fly(self, parts: list[tuple[int, int]]) -> None:
         """Flies parts of the campaign. The first error ends the others."""
         left: queue.SimpleQueue[tuple[int, int]] = queue.SimpleQueue()
         for part in parts:
             left.put(part)
-        while len(self._workers) < min(self._jobs, len(parts)):
-            self._workers.append(Worker(*self._arguments))
+        self._begin(min(self._jobs, len(parts)))
 
         def fly(worker: Worker) -> None:
             while not left.empty():
@@ -100,15 +140,17 @@ class Pool:
 
     def finish(self) -> None:
         """Lets the orchestrator merge the parts, and fly the cases that the page shows."""
-        if not self._workers:
-            self._workers.append(Worker(*self._arguments))
+        self._begin(1)
         self._workers[0].fly([])
 
     def end(self) -> None:
-        """Ends all processes."""
+        """Ends all processes, and removes their files."""
         for worker in self._workers:
             worker.end()
         self._workers.clear()
+        if self._folder is not None:
+            self._folder.remove()
+            self._folder = None
 
     def __enter__(self) -> Pool:
         return self

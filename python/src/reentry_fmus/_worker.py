@@ -8,8 +8,10 @@ from __future__ import annotations
 
 import os
 import pickle
+import signal
 import sys
 import warnings
+from pathlib import Path
 from typing import Any, BinaryIO
 
 Answer = tuple[str, Any]
@@ -18,10 +20,14 @@ Answer = tuple[str, Any]
 
 def main() -> None:
     """Serves until standard input ends."""
-    # What the law prints must not be taken for an answer.
-    answers = os.fdopen(os.dup(1), "wb")
+    tasks, answers = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
+    # The law reads an empty input, and what it prints must not be taken for an answer.
+    nothing = os.open(os.devnull, os.O_RDONLY)
+    os.dup2(nothing, 0)
+    os.close(nothing)
     os.dup2(2, 1)
-    tasks = sys.stdin.buffer
+    # Who interrupts the work ends this process.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
     # The law may be in a module that the other process has found.
     sys.path[:] = pickle.load(tasks)
     begun: dict[str, Any] = pickle.load(tasks)
@@ -33,29 +39,35 @@ def main() -> None:
         pass
 
 
-def serve(tasks: BinaryIO, answers: BinaryIO, law: bytes, command: list[str]) -> None:
+def serve(
+    tasks: BinaryIO, answers: BinaryIO, law: bytes, command: list[str], progress: Path
+) -> None:
     """Flies part after part."""
-    from ._law import Flyer, LawError
+    from ._law import Flyer, Progress
     from ._orchestrator import serve as orchestrate
+    from ._state import LawError
 
-    with Flyer(lambda: pickle.loads(law)) as fly:
-        while True:
-            try:
-                arguments: list[str] = pickle.load(tasks)
-            except EOFError:
-                return
-            answer: Answer
-            try:
-                exit_code, error = orchestrate([*command, *arguments], fly)
-                answer = ("orchestrator", (error, exit_code)) if exit_code else ("done", None)
-            except LawError as failed:
-                answer = ("law", failed.args)
-            except ValueError as failed:
-                answer = ("value", str(failed))
-            except Exception as failed:
-                answer = ("other", f"{type(failed).__name__}: {failed}")
-            pickle.dump(answer, answers)
-            answers.flush()
+    fly: Flyer | None = None
+    while True:
+        try:
+            arguments: list[str] = pickle.load(tasks)
+        except EOFError:
+            break
+        answer: Answer
+        try:
+            fly = fly or Flyer(lambda: pickle.loads(law), progress=Progress(progress))
+            exit_code, error = orchestrate([*command, *arguments], fly)
+            answer = ("orchestrator", (error, exit_code)) if exit_code else ("done", None)
+        except LawError as failed:
+            answer = ("law", failed.args)
+        except ValueError as failed:
+            answer = ("value", str(failed))
+        except BaseException as failed:
+            answer = ("other", f"{type(failed).__name__}: {failed}")
+        pickle.dump(answer, answers)
+        answers.flush()
+    if fly is not None:
+        fly.close()
 
 
 if __name__ == "__main__":

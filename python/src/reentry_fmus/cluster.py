@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import asyncio
 import concurrent.futures
-import hashlib
 import io
 import os
 import shutil
@@ -19,11 +18,13 @@ import uuid
 import zipfile
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
+from contextlib import suppress
 from importlib.metadata import version
 from pathlib import Path
 
 from ._data import need, program
 from ._orchestrator import missing_parts
+from ._unpacked import Folder
 
 need("distributed", "cluster")
 
@@ -63,10 +64,12 @@ class ClusterError(RuntimeError):
 
 
 class Bundle(WorkerPlugin):  # type: ignore[misc]
-    """Sends the files of a campaign to every worker, also to those that come later."""
+    """Sends the files of a campaign to every worker, also to those that come later. Its name is that
+    of one flight: Dask knows plugins by their names, and another driver, or another thread of this
+    one, may fly the same campaign on the same workers and end first."""
 
-    def __init__(self, name: str, content: bytes) -> None:
-        self.name = name
+    def __init__(self, content: bytes) -> None:
+        self.name = f"reentry-fmus-{uuid.uuid4().hex}"
         self.content = content
 
     def setup(self, worker: Worker) -> None:
@@ -128,7 +131,9 @@ def fly(campaign: Command, client: Client, folder: Path, address: str | None = N
             flown.update(flight.fly(missing))
     finally:
         if is_sent and client.status == "running":
-            client.unregister_worker_plugin(bundle.name)
+            # A scheduler that was started anew does not know it.
+            with suppress(ValueError):
+                client.unregister_worker_plugin(bundle.name)
     campaign("--out", str(folder))
     if store is not None:
         for name in ("cases.parquet", "summary.json", "report.html"):
@@ -137,15 +142,14 @@ def fly(campaign: Command, client: Client, folder: Path, address: str | None = N
 
 def pack(campaign: Command) -> Bundle:
     """Packs campaign, experiment and FMUs, with all that they extend."""
-    with tempfile.TemporaryDirectory(prefix="reentry-") as temporary:
-        campaign("--bundle", temporary)
+    with Folder() as temporary:
+        campaign("--bundle", str(temporary))
         content = io.BytesIO()
         with zipfile.ZipFile(content, "w", zipfile.ZIP_STORED) as archive:
-            for path in sorted(path for path in Path(temporary).rglob("*") if path.is_file()):
+            for path in sorted(path for path in temporary.rglob("*") if path.is_file()):
                 name = path.relative_to(temporary).as_posix()
                 archive.writestr(zipfile.ZipInfo(name), path.read_bytes())
-    digest = hashlib.sha256(content.getvalue()).hexdigest()[:16]
-    return Bundle(f"reentry-fmus-{digest}", content.getvalue())
+    return Bundle(content.getvalue())
 
 
 class Flight:
@@ -289,7 +293,7 @@ def fly_cases(
 
 def put(path: Path, content: bytes) -> None:
     """Writes a file that is either there as a whole or not at all."""
-    unfinished = path.with_suffix(".unfinished")
+    unfinished = path.with_suffix(f".unfinished-{uuid.uuid4().hex}")
     unfinished.write_bytes(content)
     os.replace(unfinished, path)
 

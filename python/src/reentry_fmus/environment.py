@@ -105,12 +105,11 @@ class AttitudeEnv(gymnasium.Env[Observation, npt.NDArray[np.float32]]):
         self._parameters = dict(parameters or {})
         self._moment_limit = moment_limit
         self._rate_limit = rate_limit
-        self._loop = ClosedLoop(parameters=self._parameters)
         self._step = 0.04
-        self._steps = round(stop / self._step)
+        self._steps = round(stop / self._step) if np.isfinite(stop) else 0
         if self._steps < 1 or abs(self._steps * self._step - stop) > 1e-9 * stop:
-            self._loop.close()
             raise ValueError(f"stop = {stop} s is no positive multiple of {self._step} s")
+        self._loop = ClosedLoop(parameters=self._parameters)
         self._tick = 0
         self._action = np.zeros(3)
         self._seed = 0

@@ -1,0 +1,415 @@
+"""However a law, a process or the work ends: the error says so, no result comes of it, and nothing
+is left behind."""
+
+import ctypes
+import multiprocessing
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import leaks
+import pytest
+from reentry_fmus import ClosedLoop, LawError, OrchestratorError, campaign, experiment
+from reentry_fmus._data import experiment_path
+from reentry_fmus._unpacked import PREFIX, Folder, remove_left
+
+SHORT = """
+title = "Short"
+experiment = "short.toml"
+cases = 50
+metrics = ["ems_deg"]
+
+[[vary]]
+parameter = "plant.disturbance.seed"
+case = 1
+"""
+KINDS = ["memory", "mappings", "descriptors", "children", "folders"]
+linux = pytest.mark.skipif(sys.platform != "linux", reason="counts what a process holds by /proc")
+
+
+@pytest.fixture
+def short(tmp_path):
+    """A campaign of two parts, which are flown in no time."""
+    (tmp_path / "short.toml").write_text(
+        f"title = 'LQR for 1 s'\nextends = '{experiment_path('lqr')}'\n[simulation]\nstop = 1.0\n"
+    )
+    (tmp_path / "campaign.toml").write_text(SHORT)
+    return tmp_path / "campaign.toml"
+
+
+# How a law ends
+
+
+def raises(state):
+    raise ZeroDivisionError("so")
+
+
+def exits(state):
+    sys.exit(0)
+
+
+def interrupts(state):
+    raise KeyboardInterrupt
+
+
+def stops(state):
+    return next(iter(()))
+
+
+def reads(state):
+    return [float(number) for number in input().split()]
+
+
+def reads_all(state):
+    return [float(number) for number in sys.stdin.read().split()]
+
+
+def debugs(state):
+    breakpoint()
+    return [0.0, 0.0, 0.0]
+
+
+def gives_nothing(state):
+    pass
+
+
+def gives_texts(state):
+    return ["0.0", "0.0", "0.0"]
+
+
+def gives_complex_numbers(state):
+    return [1j, 0.0, 0.0]
+
+
+def leaves(state):
+    os._exit(0)
+
+
+def aborts(state):
+    os.abort()
+
+
+def crashes(state):
+    ctypes.string_at(0)
+
+
+def is_killed(state):
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+ENDS = {
+    raises: "ZeroDivisionError: so",
+    exits: "SystemExit: 0",
+    interrupts: "KeyboardInterrupt",
+    stops: "StopIteration",
+    reads: "EOFError",
+    reads_all: "three finite numbers",
+    debugs: "BdbQuit",
+    gives_nothing: "three finite numbers, x, y and z in N m, but this is None",
+    gives_texts: "three finite numbers",
+    gives_complex_numbers: "three finite numbers",
+}
+"""Ends that Python sees, and what the error says."""
+CRASHES = {
+    leaves: "its process ended with exit code 0",
+    aborts: "its process was ended by SIGABRT",
+    crashes: "its process was ended by SIGSEGV",
+    is_killed: "its process was ended by SIGKILL",
+}
+
+
+def at_last(end):
+    """A law that ends so at 0.52 s, in some cases."""
+
+    def law(state):
+        if state.time > 0.5 and state.attitude[0] > 0.1309:
+            return end(state)
+        return [0.0, 0.0, 0.0]
+
+    law.__name__ = end.__name__
+    return law
+
+
+@pytest.mark.parametrize("end", [*ENDS, *CRASHES], ids=lambda end: end.__name__)
+def test_every_end_of_a_law_names_law_case_and_time(end, short, tmp_path, temporary):
+    if end in CRASHES and os.name == "nt":
+        pytest.skip("Windows has other codes")
+    with pytest.raises(LawError) as caught:
+        campaign(short, law=at_last(end)).run(out=tmp_path / "out", jobs=1)
+    error = caught.value
+    assert error.case in range(50) and error.time == pytest.approx(0.52)
+    where = f"the law {end.__name__} failed in case {error.case} at t = 0.52 s: "
+    assert str(error).startswith(where) and {**ENDS, **CRASHES}[end] in str(error)
+    # Its part is not kept, and nothing else stays.
+    first = 25 * (error.case // 25)
+    assert not list(tmp_path.glob(f"out/parts/*{first:010}-*"))
+    assert not list(temporary.iterdir())
+    assert not children()
+
+
+@pytest.mark.parametrize("end", [e for e in ENDS if e not in (reads, reads_all, debugs, interrupts)])
+def test_every_end_of_a_law_in_this_process_names_law_and_time(end):
+    with ClosedLoop() as loop:
+        with pytest.raises(LawError, match=rf"the law {end.__name__} failed at t = 0 s: ") as caught:
+            loop.run(1.0, end)
+        assert ENDS[end] in str(caught.value) and caught.value.case is None
+        # The loop goes on as if nothing had been asked.
+        assert loop.step([0.0, 0.0, 0.0]).time == 0.04
+    with pytest.raises(LawError, match=rf"the law {end.__name__} failed at t = 0 s: "):
+        experiment("lqr", stop=1.0, law=end)
+
+
+def test_ctrl_c_in_a_law_is_no_failure_of_the_law(temporary):
+    with ClosedLoop() as loop, pytest.raises(KeyboardInterrupt):
+        loop.run(1.0, interrupts)
+    with pytest.raises(KeyboardInterrupt):
+        experiment("lqr", stop=1.0, law=interrupts)
+    assert not list(temporary.glob(f"{PREFIX}*/out")) and not children()
+
+
+@pytest.mark.parametrize("use", ["step", "run", "reset", "close"])
+def test_a_law_does_not_step_its_own_loop(use):
+    with ClosedLoop() as loop:
+        uses = {
+            "step": lambda: loop.step([0.0, 0.0, 0.0]),
+            "run": lambda: loop.run(2.0, lambda state: [0.0, 0.0, 0.0]),
+            "reset": loop.reset,
+            "close": loop.close,
+        }
+        with pytest.raises(LawError, match="at t = 0 s: RuntimeError: a law does not step, run"):
+            loop.run(1.0, lambda state: uses[use]())
+        # It may read, and set inputs that are not connected.
+        def law(state):
+            loop.set("plant.disturbanceMoment.x", 1e3)
+            return [loop.get("plant.rate.p"), 0.0, 0.0]
+
+        assert len(loop.run(1.0, law).table) == 26
+
+
+def test_a_law_that_cannot_be_sent_is_named(short, tmp_path):
+    with ClosedLoop() as loop, pytest.raises(TypeError, match="the law law cannot be sent"):
+
+        def law(state):
+            return loop.state.moment
+
+        campaign(short, law=law)
+    with pytest.raises(TypeError, match="a law is a function from the state to the moment, not 3"):
+        campaign(short, law=3)
+
+
+# Failures are not results
+
+
+class Worker:
+    """A law in whose process something happens that is not the law's doing."""
+
+    def __init__(self, act):
+        self.act = act
+
+    def __call__(self, state):
+        if state.time > 0.5:
+            self.act()
+        return [0.0, 0.0, 0.0]
+
+
+def killed_between_two_laws():
+    """The process is killed where the FMUs are stepped."""
+    from reentry_fmus._instance import Instance
+
+    def step(self, time, step):
+        os.kill(os.getpid(), signal.SIGKILL)
+
+    Instance.step = step
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows has other codes")
+def test_a_process_that_is_killed_is_no_result(short, tmp_path, temporary):
+    with pytest.raises(RuntimeError, match="Worker was ended by SIGKILL in case [0-9]+, outside") as caught:
+        campaign(short, law=Worker(killed_between_two_laws)).run(out=tmp_path / "out", jobs=1)
+    assert not isinstance(caught.value, LawError)
+    assert not list(tmp_path.glob("out/parts/*")) and not list(temporary.iterdir())
+
+
+def fmu_that_cannot_be_opened():
+    from reentry_fmus import _law
+
+    def _with_law(paths, step):
+        raise _law.InstanceError("ReentryPlant", "fmi2Instantiate", "no memory")
+
+    _law.ClosedLoop._with_law = _with_law
+    _law.FMUS = None
+
+
+def test_an_fmu_that_cannot_be_opened_is_no_result(short, tmp_path):
+    with pytest.raises(RuntimeError, match="ReentryPlant: no memory"):
+        campaign(short, law=Worker(fmu_that_cannot_be_opened)).run(out=tmp_path / "out", jobs=1)
+    assert not list(tmp_path.glob("out/parts/*"))
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows has other codes")
+def test_an_orchestrator_that_is_killed_is_no_result(short, tmp_path, temporary):
+    def kill_orchestrator():
+        os.kill(int(Path(f"/proc/{os.getpid()}/task/{os.getpid()}/children").read_text()), 9)
+
+    if sys.platform == "linux":
+        with pytest.raises(OrchestratorError, match="was ended by SIGKILL"):
+            campaign(short, law=Worker(kill_orchestrator)).run(out=tmp_path / "out", jobs=1)
+        assert not list(tmp_path.glob("out/parts/*.parquet"))
+        with pytest.raises(OrchestratorError, match="was ended by SIGKILL"):
+            experiment("lqr", stop=1.0, law=Worker(kill_orchestrator))
+
+
+# Nothing is left behind
+
+
+def children():
+    if sys.platform != "linux":
+        return []
+    return Path(f"/proc/{os.getpid()}/task/{os.getpid()}/children").read_text().split()
+
+
+@linux
+@pytest.mark.parametrize(("loops", "campaigns"), [(50, 0), (0, 4)])
+def test_loops_and_campaigns_leave_nothing_behind(loops, campaigns):
+    """As `python leaks.py`, which takes 1,000 and 100, in a process of its own."""
+    command = [sys.executable, leaks.__file__, str(loops), str(campaigns)]
+    said = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    found = re.findall(r": (\w+) after 10: (\S+), after \d+: (\S+)", said)
+    assert [kind for kind, _, _ in found] == KINDS
+    for kind, first, last in found:
+        # A loop that loads its libraries anew keeps 4 MB and 8 mappings.
+        allowed = {"memory": 10.0, "mappings": 8}.get(kind, 0)
+        assert float(last) - float(first) <= allowed, said
+
+
+def test_what_a_law_starts_and_writes_ends_with_the_campaign(short, tmp_path, temporary):
+    def law(state):
+        import subprocess
+        import tempfile
+
+        if state.time == 0.0:
+            process = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(60)"])
+            (tmp_path / f"{process.pid}.started").touch()
+            tempfile.mkdtemp()
+        return [0.0, 0.0, 0.0]
+
+    short.write_text(SHORT.replace("cases = 50", "cases = 2"))
+    campaign(short, law=law).run(out=tmp_path / "out")
+    started = [int(path.stem) for path in tmp_path.glob("*.started")]
+    assert started and not list(temporary.iterdir())
+    if sys.platform == "linux":
+        assert not any(Path(f"/proc/{number}/exe").exists() for number in started)
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Ctrl-C goes another way under Windows")
+@pytest.mark.parametrize("law", ["time.sleep(100.0)", "sum(range(10**12))"])
+def test_ctrl_c_leaves_nothing_behind(law, short, tmp_path):
+    """Also if the law is busy. Here the process that called `run` gets Ctrl-C alone."""
+    temporary = tmp_path / "temporary"
+    temporary.mkdir()
+    program = tmp_path / "program.py"
+    program.write_text(
+        "import os, time\nfrom reentry_fmus import campaign\n"
+        f"def law(state):\n    open('begun', 'w').close()\n    {law}\n"
+        "campaign('campaign.toml', law=law).run(out='out')\n"
+    )
+    process = subprocess.Popen(
+        [sys.executable, program],
+        cwd=tmp_path,
+        env={**os.environ, "TMPDIR": str(temporary)},
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    end = time.monotonic() + 120.0
+    while not (tmp_path / "begun").exists():
+        assert time.monotonic() < end and process.poll() is None
+        time.sleep(0.05)
+    process.send_signal(signal.SIGINT)
+    _, error = process.communicate(timeout=60)
+    assert error.rstrip().endswith("KeyboardInterrupt")
+    assert not list(temporary.iterdir())
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="Windows has no fork")
+def test_a_forked_child_leaves_the_folder_of_its_parent(temporary):
+    """It may open loops of its own, and goes on with those that were open."""
+
+    def work(loop, end):
+        assert loop.step([0.0, 0.0, 0.0]).time == 0.04
+        with ClosedLoop() as own:
+            own.step([0.0, 0.0, 0.0])
+        end.send("done")
+        end.close()
+
+    with ClosedLoop() as loop:
+        before = sorted(temporary.rglob("*"))
+        here, there = multiprocessing.Pipe()
+        child = multiprocessing.get_context("fork").Process(target=work, args=(loop, there))
+        child.start()
+        child.join()
+        assert child.exitcode == 0 and here.recv() == "done"
+        assert sorted(temporary.rglob("*")) == before
+        number = os.fork()
+        if number == 0:
+            try:
+                work(loop, there)
+            finally:
+                # As if the child had ended by itself, but without pytest's report.
+                from multiprocessing.util import _exit_function
+
+                _exit_function()
+                os._exit(0)
+        os.waitpid(number, 0)
+        assert here.recv() == "done"
+        assert sorted(temporary.rglob("*")) == before
+        assert loop.step([0.0, 0.0, 0.0]).time == 0.04
+
+
+def test_folders_end_with_their_process(tmp_path):
+    program = (
+        "import os, sys\nfrom reentry_fmus import ClosedLoop\n"
+        "loop = ClosedLoop(controller='LQR')\nloop.step()\n"
+        "print(len(os.listdir(os.environ['TMPDIR'])))\n"
+        "if len(sys.argv) > 1: os.kill(os.getpid(), 9)\n"
+    )
+    environment = {**os.environ, "TMPDIR": str(tmp_path), "TEMP": str(tmp_path)}
+
+    def run(*arguments):
+        command = [sys.executable, "-c", program, *arguments]
+        return subprocess.run(command, env=environment, capture_output=True, text=True).stdout
+
+    assert run() == "1\n" and not list(tmp_path.iterdir())
+    if sys.platform == "linux":
+        # What a killed process has left is removed by the next one.
+        run("killed")
+        assert len(list(tmp_path.iterdir())) == 1
+        assert run() == "1\n" and not list(tmp_path.iterdir())
+
+
+@linux
+def test_only_what_nobody_holds_is_removed(temporary):
+    with Folder() as mine:
+        ended = temporary / f"{PREFIX}4194305-x"
+        other, link = temporary / f"{PREFIX}notes", temporary / f"{PREFIX}4194306-x"
+        ended.mkdir()
+        other.write_text("a file")
+        link.symlink_to(mine)
+        remove_left()
+        assert mine.is_dir() and other.is_file() and link.is_symlink() and not ended.exists()
+
+
+def test_an_archive_is_unpacked_once_by_its_content(tmp_path, temporary):
+    from reentry_fmus import fmu
+
+    copy = tmp_path / "Copy.fmu"
+    copy.write_bytes(fmu("LQR").read_bytes())
+    with ClosedLoop(controller="LQR") as one, ClosedLoop(controller=copy) as other:
+        unpacked = {loop._controller._unpacked.folder for loop in (one, other)}
+        assert len(unpacked) == 1
+        copy.write_bytes(fmu("FBL").read_bytes())
+        with ClosedLoop(controller=copy) as changed:
+            assert changed._controller.name == "FBL"
