@@ -34,7 +34,8 @@ impl Distribution {
     pub fn new(vary: &Vary, target: Target, system: &System) -> Result<Self, String> {
         let reader = Reader { system, target };
         let shape = reader.shape(vary)?;
-        let is_continuous = !matches!(shape, Shape::List(..) | Shape::Case(_) | Shape::Whole(_));
+        let is_continuous =
+            !matches!(shape, Shape::List(..) | Shape::Case { .. } | Shape::Whole(_));
         let mut distribution = Self {
             ends: shape.ends(),
             shape,
@@ -85,7 +86,7 @@ impl Distribution {
         match &self.shape {
             Shape::List(values, _) => Ok(values.len() as u64),
             Shape::Whole([low, high]) => Ok((i64::from(*high) - i64::from(*low) + 1) as u64),
-            Shape::Case(_) => {
+            Shape::Case { .. } => {
                 Err("a factorial design cannot vary a parameter by case, which has no levels"
                     .into())
             }
@@ -103,7 +104,7 @@ impl Distribution {
     /// Returns an error if it has none, so that there are no corners.
     pub fn check_ends(&self) -> Result<(), String> {
         match self.shape {
-            Shape::List(..) | Shape::Whole(_) | Shape::Case(_) => Ok(()),
+            Shape::List(..) | Shape::Whole(_) | Shape::Case { .. } => Ok(()),
             _ if self.ends.is_some() => Ok(()),
             _ => Err("the distribution is unbounded: corners and searches need within here".into()),
         }
@@ -139,7 +140,7 @@ impl Distribution {
                 let more = if values.len() > 6 { ", …" } else { "" };
                 format!("one of {}{more}", shown.collect::<Vec<_>>().join(", "))
             }
-            Shape::Case(first) => format!("number of the case + {first}"),
+            Shape::Case { first, .. } => format!("number of the case + {first}"),
         };
         match (self.ends, self.shape.ends()) {
             (Some(bounds), uncut) if uncut != Some(bounds) => {
@@ -152,14 +153,14 @@ impl Distribution {
     /// Returns whether values can be between any two of them, so that correlations and searches
     /// make sense.
     pub fn is_ordered(&self) -> bool {
-        !matches!(self.shape, Shape::Case(_))
+        !matches!(self.shape, Shape::Case { .. })
             && !matches!(&self.shape, Shape::List(values, _)
                 if !matches!(values.first(), Some(SettingValue::Real(_) | SettingValue::Integer(_))))
     }
 
     /// Returns whether the value is a function of the case's number instead of its place.
     pub fn is_counted(&self) -> bool {
-        matches!(self.shape, Shape::Case(_))
+        matches!(self.shape, Shape::Case { .. })
     }
 
     /// Returns the value at a place for the case with this number.
@@ -169,10 +170,12 @@ impl Distribution {
     pub fn value(&self, place: Place, case: u64) -> Result<SettingValue, String> {
         let last = |values: &[SettingValue]| values.len().saturating_sub(1);
         Ok(match (&self.shape, place) {
-            (Shape::Case(first), _) => {
-                let value = first.checked_add_unsigned(case);
+            (Shape::Case { first, most }, _) => {
+                let value =
+                    first.checked_add_unsigned(case).filter(|value| value <= &(*most).into());
                 let value = value.and_then(|value| i32::try_from(value).ok());
-                SettingValue::Integer(value.ok_or("case: the number is too large for an integer")?)
+                let problem = || format!("case: {first} + {case} is above the maximum {most}");
+                SettingValue::Integer(value.ok_or_else(problem)?)
             }
             (Shape::List(values, sums), Place::Quantile(unit)) => {
                 let index = sums.partition_point(|sum| *sum <= unit);

@@ -100,11 +100,11 @@ impl Reader<'_> {
             return weighted(vec![self.checked(-size)?, self.checked(size)?], None);
         }
         let first = vary.case.as_ref().map_or(0, |first| *first.get_ref());
-        if !matches!(kind, VariableKind::Integer { .. }) {
+        let VariableKind::Integer { max, .. } = kind else {
             return Err(format!("case is for parameters of type Integer, not {}", kind.name()));
-        }
+        };
         self.setting(&Value::Integer(first))?;
-        Ok(Shape::Case(first))
+        Ok(Shape::Case { first, most: max.unwrap_or(i32::MAX) })
     }
 
     fn uniform(&self, ends: &[Value; 2], kind: &VariableKind) -> Result<Shape, String> {

@@ -14,8 +14,11 @@ pub(super) enum Shape {
     Triangular(Triangular),
     /// Values with the probabilities up to and including each of them.
     List(Vec<SettingValue>, Vec<f64>),
-    /// This integer plus the number of the case.
-    Case(i64),
+    /// The first integer plus the number of the case, up to the largest one of the variable.
+    Case {
+        first: i64,
+        most: i32,
+    },
 }
 
 impl Shape {
@@ -37,7 +40,7 @@ impl Shape {
             Self::Normal(distribution) => distribution.cdf(value),
             Self::LogNormal(distribution) => distribution.cdf(value),
             Self::Triangular(distribution) => distribution.cdf(value),
-            Self::Whole(_) | Self::List(..) | Self::Case(_) => f64::NAN,
+            Self::Whole(_) | Self::List(..) | Self::Case { .. } => f64::NAN,
         }
     }
 
@@ -49,7 +52,7 @@ impl Shape {
             Self::Normal(distribution) => distribution.inverse_cdf(inside),
             Self::LogNormal(distribution) => distribution.inverse_cdf(inside),
             Self::Triangular(distribution) => distribution.inverse_cdf(unit),
-            Self::Whole(_) | Self::List(..) | Self::Case(_) => f64::NAN,
+            Self::Whole(_) | Self::List(..) | Self::Case { .. } => f64::NAN,
         }
     }
 }
