@@ -40,10 +40,17 @@ pub(crate) fn judge(
     }
     let mut meters = Meters::new(&mut system)?.ending_when_lost();
     let panels = Panel::resolve_all(&mut system)?;
-    let _folder = Folder::take(out)?;
+    let folder = Folder::take(out)?;
+    folder.clear()?;
     let mut recorder = system.recorder(out, Format::Csv, false)?;
     let mut curves = Curves::new(panels, system.clock.ticks());
     let outcome = outside::fly(&system, None, &[], &mut [&mut curves, &mut recorder, &mut meters]);
+    if matches!(outcome, Err(Error::Experiment { .. })) {
+        // The other program failed, which is no result of the run.
+        recorder.finish()?;
+        folder.clear()?;
+        return Ok(outcome?);
+    }
     let mut write = || -> Result<(), Failure> {
         recorder.finish()?;
         let mut master = system.start(&Interrupt::default())?;
