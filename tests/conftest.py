@@ -18,7 +18,7 @@ from fmi import Fmu
 
 ROOT = Path(__file__).resolve().parent.parent
 # The tests import what scripts/yardsticks and the examples run.
-sys.path += [str(ROOT / "scripts" / folder) for folder in ("oracles", "examples", "pages")]
+sys.path += [str(ROOT / "scripts" / folder) for folder in ("oracles", "examples", "pages", "benchmarks")]
 TARGET = ROOT / os.environ.get("CARGO_TARGET_DIR", "target")
 EXPERIMENTS = ROOT / "orchestrator" / "experiments" / "crmpc-2022"
 NAMES = [

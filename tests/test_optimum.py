@@ -1,5 +1,5 @@
-"""The controllers' results at t = 0 against other programs: IPOPT for CRMPC, the Riccati solver of
-scipy for LQR."""
+"""The controllers' results against other programs: IPOPT and CasADi's sqpmethod for CRMPC, the Riccati
+solver of scipy for LQR."""
 
 import casadi as ca
 import numpy as np
@@ -7,6 +7,8 @@ import pytest
 from scipy.linalg import solve_continuous_are
 
 import nlp
+import solvers
+from conftest import example
 from fmi import ANGLES, MOMENT, RATES, Instance
 
 
@@ -36,6 +38,25 @@ def test_oracle_first_optimisation_is_the_nonlinear_optimum(fmu, optimum):
         assert cost == pytest.approx(optimum.cost, rel=1e-5)
         moment = np.array(crmpc.get(MOMENT))
     assert np.linalg.norm(moment - optimum.moment) <= 1e-5 * np.linalg.norm(optimum.moment)
+
+
+@pytest.fixture(scope="module")
+def samples():
+    return solvers.taken(example("samples"), 1)
+
+
+@pytest.mark.parametrize("kind", ["robust", "paper"])
+def test_oracle_optimisations_of_a_flight_are_those_that_two_other_solvers_find(samples, kind):
+    of_kind = [sample for sample in samples if sample.kind == kind]
+    assert len(of_kind) == 250
+    for sample in of_kind:
+        assert all(np.isfinite(bounds.stages).all() for bounds in (sample.bounds, sample.point_bounds))
+        assert (sample.bounds.terminal is None) == (kind == "robust")
+    for name, solver in solvers.nonlinear(of_kind[0]).items():
+        # At the start, on the way, with the jump of the reference in the horizon, and after it.
+        for sample in (of_kind[index] for index in (0, 5, 10, 60, 160)):
+            cost = solver.solve(sample)[2]
+            assert cost == pytest.approx(sample.cost_of("riccati"), rel=solvers.SAME_COST), f"{name}, {sample.time} s"
 
 
 def test_oracle_lqr_is_the_riccati_feedback_with_the_drift_cancelled(fmu):

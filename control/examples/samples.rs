@@ -8,11 +8,11 @@
 #[path = "../tests/harness/mod.rs"]
 mod harness;
 
-use control::crmpc::{Constraints, Memory, Settings};
+use control::crmpc::{Constraints, Memory, Posed, Settings};
 use control::mpc::{Method, SolverSettings};
 use control::{Controller, Crmpc};
 use harness::{disturbance, settings, simulate};
-use serde_json::json;
+use serde_json::{Value, json};
 use std::hint::black_box;
 use std::io::{self, Write};
 use vehicle::disturbance::DisturbanceKind;
@@ -33,6 +33,30 @@ fn main() -> io::Result<()> {
         write_samples(&mut out, set, &settings(constraints), repetitions)?;
     }
     Ok(())
+}
+
+/// Returns the bounds on the stages' rates, on the intervals' inputs, and on the last error in the
+/// G-norm, which the robust set does not have.
+fn bounds(Posed { bounds, .. }: &Posed) -> Value {
+    json!({ "rate": bounds.rate, "input": bounds.input, "terminal": bounds.terminal })
+}
+
+/// Returns angles, rates and accelerations of the reference at each stage.
+fn references(posed: &Posed) -> Vec<[[f64; 3]; 3]> {
+    let rows = posed.references.iter();
+    rows.map(|at| [at.angles, at.rates, at.accelerations].map(<[f64; 3]>::from)).collect()
+}
+
+/// Returns the trajectory of the last linearisation: states (Θ̃, x̃_ω) and accelerations.
+fn nominal(posed: &Posed) -> Value {
+    let Posed { references, linearisation_point: motion, .. } = posed;
+    let states: Vec<_> = std::iter::zip(references, &motion.states)
+        .map(|(at, [angles, rates])| [at.angles + angles, at.rates + rates].map(<[f64; 3]>::from))
+        .collect();
+    let accelerations: Vec<_> = std::iter::zip(references, &motion.inputs)
+        .map(|(at, input)| <[f64; 3]>::from(at.accelerations + input))
+        .collect();
+    json!({ "states": states, "accelerations": accelerations })
 }
 
 fn write_samples(
@@ -86,11 +110,7 @@ fn write_samples(
                 reports[i] = memory.report;
             }
         }
-        let bounds = ways[1].1.bounds();
-        let references: Vec<_> = (0..=settings.horizon)
-            .map(|k| reference(time + k as f64 * settings.period_optimisation))
-            .map(|at| [at.angles, at.rates, at.accelerations].map(<[f64; 3]>::from))
-            .collect();
+        let posed = ways[1].1.posed();
         let by_way: serde_json::Map<_, _> = std::iter::zip(&ways, std::iter::zip(reports, best))
             .map(|((name, _), (report, seconds))| {
                 let figures = json!({
@@ -103,8 +123,7 @@ fn write_samples(
                 ((*name).to_string(), figures)
             })
             .collect();
-        let angle_rates = vehicle::kinematics::r(&measured.angles) * measured.rates;
-        let start = [measured.angles.as_slice(), angle_rates.as_slice()].concat();
+        let cone = ways[2].1.posed();
         let previous = before.started.then(|| {
             let plan = &before.plan;
             let states: Vec<_> = plan.states.iter().map(|x| <[f64; 6]>::from(*x)).collect();
@@ -112,15 +131,20 @@ fn write_samples(
                 plan.accelerations.iter().map(|a| <[f64; 3]>::from(*a)).collect();
             json!({ "states": states, "accelerations": accelerations })
         });
+        // The problem is that of the second way. The third linearises its norm constraints about a
+        // point, and its bounds are those about it.
         let sample = json!({
             "set": set,
             "time": time,
-            // The start is (Theta, x_omega).
-            "start": start,
-            "references": references,
-            // The bounds are on the stages' rates, on the intervals' inputs, and on the last error
-            // in the G-norm.
-            "bounds": { "rate": bounds.rate, "input": bounds.input, "terminal": bounds.terminal },
+            "start": posed.start.as_slice(),
+            "references": references(&posed),
+            "weights": {
+                "state": posed.cost.state.map(<[f64; 3]>::from),
+                "input": <[f64; 3]>::from(posed.cost.input),
+                "end": posed.cost.end.map(|row| row.map(<[f64; 3]>::from)),
+            },
+            "bounds": bounds(&posed),
+            "linearised": { "bounds": bounds(&cone), "point": nominal(&cone) },
             // This is the plan of the optimisation before, not shifted; it is empty at first.
             "previous": previous,
             "ways": by_way,

@@ -108,9 +108,10 @@ impl SampledInstance for GuidanceInstance {
     }
 
     fn warning(before: &Memory, after: &Memory) -> Option<&'static str> {
-        let (before, after) = (&before.command, &after.command);
-        (before.in_reach && !after.in_reach)
-            .then_some("the target is out of reach: the bank angle is at its limit (see miss)")
+        let was_in_reach = before.command.in_reach || !before.has_begun();
+        (was_in_reach && !after.command.in_reach).then_some(
+            "the target is out of reach: the predicted flight ends farther from it than target.tolerance, and no bank angle changes that (see miss)",
+        )
     }
 
     fn fits(guidance: &Guidance, memory: &Memory) -> bool {
@@ -192,7 +193,7 @@ fn outputs(table: Variables) -> Variables {
         .boolean(
             sampled(
                 "inReach",
-                "Whether the target is in reach of the largest and least bank angle",
+                "Whether a bank angle brings the predicted flight within target.tolerance of the target",
             ),
             |m| &mut m.output.command.in_reach,
         )

@@ -94,7 +94,8 @@ pub(crate) fn summary(system: &System, report: &RunReport, out: &mut impl Write)
         line("ended", end.clone())?;
     }
     if let Some(ended) = &report.ended {
-        line("ended early", ended.to_string())?;
+        let label = if matches!(ended, Error::Lost { .. }) { "failed" } else { "ended early" };
+        line(label, ended.to_string())?;
     }
     if let Some(real_time) = &metrics.real_time {
         real_time.print(&names, out)?;

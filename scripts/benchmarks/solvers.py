@@ -1,10 +1,11 @@
 """Times of CRMPC's optimisations over the 50 s scenario of Chai 2022: our solver, CasADi with
 IPOPT, CasADi's sqpmethod, QOCO.
 
-All solvers get the same samples, each from the same previous plan, shifted. IPOPT and sqpmethod
-solve the nonlinear problem as it is (multiple shooting, exact derivatives, warm-started in the
-primal unknowns). QOCO solves the cone problem linearised about that plan, with its data updated
-in place. Only the solve calls are timed; ours include the preview of the references, the
+All solvers get the same samples. IPOPT and sqpmethod solve the nonlinear problem as it is (multiple
+shooting, exact derivatives, warm-started with the previous plan, shifted). QOCO solves the cone
+problem of our cone solver's last pass, with its data updated in place. The program ends with an error
+if a cost differs from ours by more than SAME_COST: the problem would not be the same. Only the solve
+calls are timed; ours include the preview of the references, the
 linearisation and the certificate. The fastest repetition of each sample counts, as other load on
 the machine can only add time. This is no test: times differ from machine to machine, so only the
 ratios of one run count.
@@ -16,13 +17,14 @@ import argparse
 import csv
 import json
 import subprocess
+import sys
 import time
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import casadi as ca
 import matplotlib.pyplot as plt
 import numpy as np
-import qoco
 from scipy import sparse
 
 import nlp
@@ -32,9 +34,8 @@ N, H = nlp.HORIZON, nlp.STEP
 OURS = ["shortcuts, riccati", "riccati", "cone"]
 # The solvers get the cost in deg^2, so that their absolute tolerances make sense.
 SCALE = (180.0 / np.pi) ** 2
-# Our solver stops at the same step length.
-STANDSTILL = 1e-6
-FIRST_PASSES = 20
+# Largest relative difference of two costs of the same problem.
+SAME_COST = 1e-6
 # Time in seconds that another solver may take for one constraint set before it gets every k-th
 # sample only.
 PATIENCE = 60.0
@@ -64,18 +65,38 @@ def pieces(kind: str) -> ca.Function:
     return ca.Function("norm_constraints", [angles, rates, a], [rates, u] if kind == "paper" else [omega, m])
 
 
-@dataclass
+def flat(trajectory: dict) -> np.ndarray:
+    """The unknowns of a trajectory, in the order x_0 ... x_N, a_0 ... a_N-1."""
+    return np.concatenate([np.ravel(trajectory["states"]), np.ravel(trajectory["accelerations"])])
+
+
+@dataclass(frozen=True)
+class Bounds:
+    """Bounds on the rates of stages 1 ... N and on the inputs, and the radius of the terminal set, if
+    there is one."""
+
+    stages: np.ndarray
+    terminal: float | None
+
+    @staticmethod
+    def read(raw: dict) -> Bounds:
+        return Bounds(np.array([raw["rate"], raw["input"]], float), raw["terminal"])
+
+
+@dataclass(frozen=True)
 class Sample:
-    """Data of one optimisation. All other solvers share the order of unknowns x_0 ... x_N, a_0 ...
-    a_N-1."""
+    """Data of one optimisation: the problem, the last linearisation of our cone solver with its bounds, a
+    guess for the other solvers, and what ours found."""
 
     kind: str
     time: float
     start: np.ndarray
     references: np.ndarray
-    bounds: np.ndarray
+    bounds: Bounds
+    point: np.ndarray
+    point_bounds: Bounds
     guess: np.ndarray
-    first: bool
+    weights: tuple[np.ndarray, np.ndarray, np.ndarray]
     ways: dict
 
     @staticmethod
@@ -86,34 +107,39 @@ class Sample:
         if previous is None:
             states, inputs = references[:, :6], references[:N, 6:]
         else:
-            # By (31) the first interval is dropped and one under the terminal law is appended.
+            # By (31) the first interval is dropped. The last acceleration is repeated.
             states, inputs = np.array(previous["states"]), np.array(previous["accelerations"])
-            last = states[-1]
-            a = references[N - 1, 6:] - 5.0 * (last[:3] - references[N - 1, :3] + last[3:] - references[N - 1, 3:6])
+            last, a = states[-1], inputs[-1]
             end = np.concatenate([last[:3] + H * last[3:] + 0.5 * H * H * a, last[3:] + H * a])
             states, inputs = np.vstack([states[1:], end]), np.vstack([inputs[1:], a])
-        bounds = raw["bounds"]
+        weights, linearised = raw["weights"], raw["linearised"]
         return Sample(
-            raw["set"],
-            raw["time"],
-            np.array(raw["start"]),
-            references,
-            np.concatenate([bounds["rate"][1:], bounds["input"], [bounds["terminal"]]]),
-            np.concatenate([np.ravel(states), np.ravel(inputs)]),
-            previous is None,
-            raw["ways"],
+            kind=raw["set"],
+            time=raw["time"],
+            start=np.array(raw["start"]),
+            references=references,
+            bounds=Bounds.read(raw["bounds"]),
+            point=flat(linearised["point"]),
+            point_bounds=Bounds.read(linearised["bounds"]),
+            guess=flat({"states": states, "accelerations": inputs}),
+            weights=(
+                np.diag(np.ravel(weights["state"])),
+                np.diag(weights["input"]),
+                np.block([[np.diag(block) for block in row] for row in weights["end"]]),
+            ),
+            ways=raw["ways"],
         )
 
+    def cost_of(self, way: str) -> float | None:
+        """The cost that one of our solvers found; None if it found no optimum of its problem."""
+        found = self.ways[way]
+        is_other = found["status"] in ("Fallback", "Kept") or way == "riccati" and found["status"] == "Cone"
+        return None if is_other else found["cost"]
 
-def stage_weights() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Weights of (10), sampled: those of a state, of an input, and of the last state."""
-    g = nlp.printed_sets().weight
-    return H * nlp.P * np.eye(6), H * nlp.Q * np.eye(3), np.kron(g, np.eye(3))
 
-
-def hessian() -> sparse.csc_matrix:
+def hessian(sample: Sample) -> sparse.csc_matrix:
     """Matrix P of the cost z'Pz / 2, in deg^2."""
-    w, v, g = stage_weights()
+    w, v, g = sample.weights
     return sparse.csc_matrix(2.0 * SCALE * sparse.block_diag([w] * N + [g] + [v] * N))
 
 
@@ -123,14 +149,15 @@ def target(sample: Sample) -> np.ndarray:
 
 
 class Casadi:
-    """The nonlinear problem with start, references and bounds as its parameters."""
+    """The nonlinear problem with start, references and bounds as its parameters. Weights, and whether
+    there is a terminal set, are those of the first sample."""
 
-    def __init__(self, kind: str, plugin: str, options: dict):
-        norm_constraints = pieces(kind)
+    def __init__(self, sample: Sample, plugin: str, options: dict):
+        norm_constraints = pieces(sample.kind)
         x, a = ca.SX.sym("x", 6, N + 1), ca.SX.sym("a", 3, N)
         start, references = ca.SX.sym("start", 6), ca.SX.sym("references", 9, N + 1)
-        bounds = ca.SX.sym("bounds", 2 * N + 1)
-        w, v, g = (ca.DM(weight) for weight in stage_weights())
+        bounds, radius = ca.SX.sym("bounds", 2 * N), ca.SX.sym("radius")
+        w, v, g = (ca.DM(weight) for weight in sample.weights)
         cost = 0.0
         equal, below_one = [x[:, 0] - start], []
         for k in range(N):
@@ -141,13 +168,14 @@ class Casadi:
             _, moment = norm_constraints(angles, rates, a[:, k])
             below_one += [ca.sumsqr(after / bounds[k]), ca.sumsqr(moment / bounds[N + k])]
         terminal = ca.bilin(g, x[:, N] - references[:6, N])
-        below_one.append(terminal / bounds[2 * N] ** 2)
+        if sample.bounds.terminal is not None:
+            below_one.append(terminal / radius**2)
         equalities, inequalities = ca.vertcat(*equal), ca.vertcat(*below_one)
         problem = {
             "x": ca.veccat(x, a),
             "f": SCALE * (cost + terminal),
             "g": ca.vertcat(equalities, inequalities),
-            "p": ca.veccat(start, references, bounds),
+            "p": ca.veccat(start, references, bounds, radius),
         }
         self.solver = ca.nlpsol("solver", plugin, problem, {"print_time": False, "error_on_fail": False, **options})
         self.lower = ca.DM(np.concatenate([np.zeros(equalities.numel()), np.full(inequalities.numel(), -np.inf)]))
@@ -155,7 +183,10 @@ class Casadi:
 
     def solve(self, sample: Sample) -> tuple[float, int, float | None]:
         """Returns seconds, iterations and cost; the cost is None if the solver failed."""
-        parameters = ca.DM(np.concatenate([sample.start, sample.references.ravel(), sample.bounds]))
+        bounds = sample.bounds
+        parameters = ca.DM(
+            np.concatenate([sample.start, sample.references.ravel(), bounds.stages.ravel(), [bounds.terminal or 1.0]])
+        )
         guess = ca.DM(sample.guess)
         begin = time.perf_counter()
         solution = self.solver(x0=guess, p=parameters, lbg=self.lower, ubg=self.upper)
@@ -165,17 +196,16 @@ class Casadi:
 
 
 class Qoco:
-    """The cone problem, linearised about the previous plan. The first one is linearised about its
-    own solution until that converges, as in our solver."""
+    """The cone problem of the last pass of our cone solver."""
 
-    def __init__(self, kind: str):
-        norm_constraints = pieces(kind)
+    def __init__(self, sample: Sample):
+        norm_constraints = pieces(sample.kind)
         arguments = [ca.SX.sym(name, 3) for name in ("angles", "rates", "a")]
         rate, moment = norm_constraints(*arguments)
         point = ca.vertcat(*arguments)
         values = [rate, ca.jacobian(rate, point), moment, ca.jacobian(moment, point)]
         self.norm_constraints = ca.Function("linear", arguments, [ca.densify(value) for value in values]).map(N + 1)
-        self.p = hessian()
+        self.p = hessian(sample)
         e, b = sparse.eye(6), np.vstack([0.5 * H * H * np.eye(3), H * np.eye(3)])
         step = np.block([[np.eye(3), H * np.eye(3)], [np.zeros((3, 3)), np.eye(3)]])
         moved = sparse.kron(sparse.eye(N, N + 1, k=1), e) - sparse.kron(sparse.eye(N, N + 1), step)
@@ -191,82 +221,79 @@ class Qoco:
             for row, of_row in ((8 * k + 1, state), (8 * k + 5, both)):
                 rows.append(np.repeat(row + np.arange(3), len(of_row)))
                 columns.append(np.tile(of_row, 3))
-        self.root = np.linalg.cholesky(stage_weights()[2]).T
-        rows.append(np.repeat(8 * N + 1 + np.arange(6), 6))
-        columns.append(np.tile(column(N, "x"), 6))
+        self.cones = [4] * 2 * N
+        self.root = np.linalg.cholesky(sample.weights[2]).T
+        if sample.bounds.terminal is not None:
+            rows.append(np.repeat(8 * N + 1 + np.arange(6), 6))
+            columns.append(np.tile(column(N, "x"), 6))
+            self.cones.append(7)
         self.rows, self.at = np.concatenate(rows), np.concatenate(columns)
-        self.m, self.n = 8 * N + 7, 9 * N + 6
+        self.m, self.n = sum(self.cones), 9 * N + 6
         # Position of each entry in column-by-column storage.
         marked = sparse.csc_matrix((np.arange(1.0, len(self.rows) + 1.0), (self.rows, self.at)), (self.m, self.n))
         self.order = marked.data.astype(int) - 1
         self.marked = marked
         self.solver = None
 
-    def linearise(self, sample: Sample, point: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def linearise(self, sample: Sample) -> tuple[np.ndarray, np.ndarray]:
         """Returns the entries of G, column by column, and h, so that h - G z lies in the cones."""
+        point, (on_rates, on_inputs) = sample.point, sample.point_bounds.stages
         states, inputs = point[: 6 * (N + 1)].reshape(N + 1, 6), point[6 * (N + 1) :].reshape(N, 3)
         rate, by_rate, moment, by_moment = (
             np.array(value) for value in self.norm_constraints(states[:, :3].T, states[:, 3:].T, np.vstack([inputs, np.zeros(3)]).T)
         )
         entries, h = [], np.zeros(self.m)
         for k, (state, both) in enumerate(self.columns):
-            block = by_rate[:, 9 * (k + 1) : 9 * (k + 1) + 6] / sample.bounds[k]
+            block = by_rate[:, 9 * (k + 1) : 9 * (k + 1) + 6] / on_rates[k]
             entries.append(-block.ravel())
             h[8 * k] = h[8 * k + 4] = 1.0
-            h[8 * k + 1 : 8 * k + 4] = rate[:, k + 1] / sample.bounds[k] - block @ point[state]
-            block = by_moment[:, 9 * k : 9 * k + 9] / sample.bounds[N + k]
+            h[8 * k + 1 : 8 * k + 4] = rate[:, k + 1] / on_rates[k] - block @ point[state]
+            block = by_moment[:, 9 * k : 9 * k + 9] / on_inputs[k]
             entries.append(-block.ravel())
-            h[8 * k + 5 : 8 * k + 8] = moment[:, k] / sample.bounds[N + k] - block @ point[both]
-        root = self.root / sample.bounds[2 * N]
-        entries.append(-root.ravel())
-        h[8 * N] = 1.0
-        h[8 * N + 1 :] = -root @ sample.references[N, :6]
+            h[8 * k + 5 : 8 * k + 8] = moment[:, k] / on_inputs[k] - block @ point[both]
+        if sample.point_bounds.terminal is not None:
+            root = self.root / sample.point_bounds.terminal
+            entries.append(-root.ravel())
+            h[8 * N] = 1.0
+            h[8 * N + 1 :] = -root @ sample.references[N, :6]
         return np.concatenate(entries)[self.order], h
 
     def solve(self, sample: Sample) -> tuple[float, int, float | None]:
         """Returns seconds, iterations and cost; the cost is None if the solver failed."""
-        point, best = sample.guess.copy(), target(sample)
-        point[:6] = sample.start
+        best = target(sample)
         c = -self.p @ best
         b = np.concatenate([sample.start, np.zeros(6 * N)])
-        seconds, iterations = 0.0, 0
-        for _ in range(FIRST_PASSES if sample.first else 1):
-            g, h = self.linearise(sample, point)
-            if self.solver is None:
-                self.solver = qoco.QOCO()
-                tolerances = {"abstol": 1e-8, "reltol": 1e-8}
-                matrix = sparse.csc_matrix((g, self.marked.indices, self.marked.indptr), (self.m, self.n))
-                cones = np.array([4] * 2 * N + [7])
-                sizes = (self.n, self.m, 6 * (N + 1))
-                self.solver.setup(*sizes, self.p, c, self.a, b, matrix, h, 0, len(cones), cones, **tolerances)
-            else:
-                self.solver.update_vector_data(c=c, b=b, h=h)
-                self.solver.update_matrix_data(G=g)
-            begin = time.perf_counter()
-            result = self.solver.solve()
-            seconds += time.perf_counter() - begin
-            iterations += result.iters
-            if result.status != "QOCO_SOLVED":
-                return seconds, iterations, None
-            x = np.array(result.x)
-            moved = np.abs(x - point)[: 6 * (N + 1)].max()
-            point = x
-            if moved < STANDSTILL:
-                break
-        error = point - best
-        return seconds, iterations, float(0.5 * error @ (self.p @ error)) / SCALE
+        g, h = self.linearise(sample)
+        if self.solver is None:
+            # The tests do without it.
+            import qoco
+
+            self.solver = qoco.QOCO()
+            tolerances = {"abstol": 3e-10, "reltol": 3e-10}
+            matrix = sparse.csc_matrix((g, self.marked.indices, self.marked.indptr), (self.m, self.n))
+            sizes = (self.n, self.m, 6 * (N + 1))
+            self.solver.setup(*sizes, self.p, c, self.a, b, matrix, h, 0, len(self.cones), np.array(self.cones), **tolerances)
+        else:
+            self.solver.update_vector_data(c=c, b=b, h=h)
+            self.solver.update_matrix_data(G=g)
+        begin = time.perf_counter()
+        result = self.solver.solve()
+        seconds = time.perf_counter() - begin
+        if result.status != "QOCO_SOLVED":
+            return seconds, result.iters, None
+        error = np.array(result.x) - best
+        return seconds, result.iters, float(0.5 * error @ (self.p @ error)) / SCALE
 
 
-def others(kind: str) -> dict:
-    """The other solvers with which ours is compared."""
+def nonlinear(sample: Sample) -> dict:
+    """The other solvers of the nonlinear problem."""
     ipopt = {"print_level": 0, "sb": "yes", "tol": 1e-9, "bound_relax_factor": 0.0}
     quiet = {"print_header": False, "print_iteration": False, "print_status": False}
     qp = {"print_iter": False, "print_header": False, "print_info": False, "error_on_fail": False}
     sqp = {**quiet, "qpsol": "qrqp", "qpsol_options": qp, "tol_pr": 1e-8, "tol_du": 1e-6, "max_iter": 50}
     return {
-        "CasADi + IPOPT": Casadi(kind, "ipopt", {"ipopt": ipopt}),
-        "CasADi sqpmethod": Casadi(kind, "sqpmethod", sqp),
-        "QOCO": Qoco(kind),
+        "CasADi + IPOPT": Casadi(sample, "ipopt", {"ipopt": ipopt}),
+        "CasADi sqpmethod": Casadi(sample, "sqpmethod", sqp),
     }
 
 
@@ -296,9 +323,8 @@ def measure(kind: str, samples: list[Sample], every: int | None, repeat: int) ->
     for index, sample in enumerate(samples):
         for name in OURS:
             way = sample.ways[name]
-            cost = None if way["status"] == "Fallback" else way["cost"]
-            timed_by_solver[name].add(index, way["seconds"], way["iterations"], cost)
-    for name, solver in others(kind).items():
+            timed_by_solver[name].add(index, way["seconds"], way["iterations"], sample.cost_of(name))
+    for name, solver in {**nonlinear(samples[0]), "QOCO": Qoco(samples[0])}.items():
         step = every
         if step is None:
             trial = [solver.solve(sample)[0] for sample in samples[:: max(1, len(samples) // 8)]]
@@ -309,6 +335,13 @@ def measure(kind: str, samples: list[Sample], every: int | None, repeat: int) ->
         for index in range(0, len(samples), step):
             timed_by_solver[name].add(index, *min((solver.solve(samples[index]) for _ in range(repeat)), key=lambda result: result[0]))
     return timed_by_solver
+
+
+def difference(timed_by_solver: dict[str, Timed], name: str) -> float:
+    """Largest relative difference of a solver's costs from ours of the same problem."""
+    timed, other = timed_by_solver[name], timed_by_solver[SAME[name]].costs
+    pairs = [(cost, other[i]) for i, cost in zip(timed.samples, timed.costs)]
+    return max((abs(cost / ours - 1.0) for cost, ours in pairs if cost and ours), default=np.nan)
 
 
 def table(kind: str, timed_by_solver: dict[str, Timed]) -> None:
@@ -325,10 +358,7 @@ def table(kind: str, timed_by_solver: dict[str, Timed]) -> None:
         text = f"  {name:<18}" + "".join(f"{number:11.4f}" for number in numbers)
         text += f"{np.mean(timed.iterations):11.1f}{solved:>7}/{len(ms):<3}{ratio:11.1f}"
         if name in SAME:
-            other = timed_by_solver[SAME[name]].costs
-            pairs = [(cost, other[i]) for i, cost in zip(timed.samples, timed.costs) if cost and other[i]]
-            largest = max((abs(cost / reference - 1.0) for cost, reference in pairs), default=np.nan)
-            text += f"{largest:18.1e}"
+            text += f"{difference(timed_by_solver, name):18.1e}"
         print(text)
 
 
@@ -354,15 +384,19 @@ def draw(by_kind: dict[str, dict[str, Timed]]) -> None:
         figure.savefig(ROOT / "out" / "bench" / f"solvers.{suffix}", dpi=150)
 
 
+def taken(program: Path, repeat: int) -> list[Sample]:
+    """The samples that control/examples/samples.rs prints."""
+    done = subprocess.run([program, str(repeat)], check=True, capture_output=True, text=True)
+    return [Sample.read(line) for line in done.stdout.splitlines()]
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--repeat", type=int, default=20, help="repetitions of each sample by ours")
     parser.add_argument("--repeat-others", type=int, default=3, help="repetitions of each sample by the others")
     parser.add_argument("--every", type=int, help="solve every k-th sample by the others; all, unless they take minutes")
     arguments = parser.parse_args()
-    command = [TARGET / "release" / "examples" / "samples", str(arguments.repeat)]
-    lines = subprocess.run(command, check=True, capture_output=True, text=True).stdout.splitlines()
-    samples = [Sample.read(line) for line in lines]
+    samples = taken(TARGET / "release" / "examples" / "samples", arguments.repeat)
     out = ROOT / "out" / "bench"
     out.mkdir(parents=True, exist_ok=True)
     by_kind = {}
@@ -380,6 +414,9 @@ def main() -> None:
                     writer.writerow([kind, name, times[row[0]], *row[1:]])
     draw(by_kind)
     print(f"\n{out}: solvers.csv, solvers.png, solvers.svg")
+    others = [(kind, name, difference(by_kind[kind], name)) for kind in by_kind for name in SAME]
+    if far := [f"{kind}, {name}: {by:.1e}" for kind, name, by in others if not by <= SAME_COST]:
+        sys.exit(f"costs differ from ours by more than {SAME_COST}: {'; '.join(far)}")
 
 
 if __name__ == "__main__":

@@ -29,7 +29,7 @@ pub use guarantee::{Assessment, Carried, Deviation, Geometry, Onset, Switching, 
 pub use memory::{Margins, Memory};
 pub use observer::Observed;
 pub use plan::Plan;
-pub use set::Bounds;
+pub use set::{Bounds, Posed};
 pub use settings::Published;
 pub use settings::{Constraints, Guarantee, InitialState, ObserverSettings, Settings};
 pub use supervision::{Contradiction, GuaranteeStatus, Supervision};
@@ -92,10 +92,17 @@ impl Crmpc {
         &self.design
     }
 
-    /// Returns the bounds of the last optimisation, for benchmarks and tests that solve the same
-    /// problem by other means.
-    pub fn bounds(&self) -> Bounds {
-        self.set.bounds(self.planner.optimiser.bounds())
+    /// Returns the last optimisation as data.
+    pub fn posed(&mut self) -> Posed {
+        let Planner { optimiser, start, .. } = &self.planner;
+        let (held, point) = optimiser.last_pass();
+        Posed {
+            start: *start,
+            bounds: self.set.bounds(held),
+            references: self.set.stages_mut().references.clone(),
+            cost: *optimiser.cost(),
+            linearisation_point: point.clone(),
+        }
     }
 
     /// Runs one optimisation at `time` from the measured state (Θ, x_ω). The plan and the report

@@ -77,7 +77,7 @@ impl ConstraintSet for Paper {
     fn bounds(&self, _held: &mpc::Bounds) -> Bounds {
         let n = self.stages.horizon();
         Bounds {
-            rate: vec![self.x_tube; n + 1],
+            rate: vec![self.x_tube; n],
             input: vec![self.u_tube; n],
             terminal: Some(self.epsilon),
         }

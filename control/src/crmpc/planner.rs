@@ -46,6 +46,8 @@ pub(super) struct Planner {
     shift: Vector3<f64>,
     /// Distance from the measured angles beyond which a reference is replaced, rad.
     reach: f64,
+    /// State from which the last optimisation began.
+    pub start: Vector6<f64>,
 }
 
 impl Planner {
@@ -102,6 +104,7 @@ impl Planner {
             affine: vec![[Vector3::zeros(); 2]; n],
             shift: Vector3::zeros(),
             reach,
+            start: Vector6::zeros(),
         })
     }
 
@@ -146,6 +149,7 @@ impl Planner {
         start: &Vector6<f64>,
         first: bool,
     ) -> mpc::OptimiserReport {
+        self.start = *start;
         let references = &stages.references;
         let error = error(start, &references[0]);
         let previous = (!first).then(|| {

@@ -8,6 +8,7 @@ use crate::controller::{Explained, Measurement};
 use crate::linearise::Linear;
 use crate::mpc::{self, Bounded, NormConstraint};
 use nalgebra::{Matrix3, Vector3, Vector6};
+use vehicle::reference::Reference;
 
 /// Relative tolerance in checks of constraints, for rounding.
 pub(super) const ROUNDING: f64 = 1e-9;
@@ -104,12 +105,25 @@ pub(super) struct Command {
     pub moment: Vector3<f64>,
 }
 
-/// The bounds of an optimisation, for benchmarks and tests that solve the same problem by other
-/// means.
+/// An optimisation as data, for benchmarks and tests that solve the same problem by other means.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Posed {
+    /// First state (Θ̃, x̃_ω), rad and rad/s.
+    pub start: Vector6<f64>,
+    /// References at the prediction times, shifted by the observer.
+    pub references: Vec<Reference>,
+    /// Weights of the cost (10), sampled.
+    pub cost: mpc::Cost<2>,
+    /// Bounds of the last pass.
+    pub bounds: Bounds,
+    /// Trajectory of the errors about which the cone solver linearised the norm constraints.
+    pub linearisation_point: mpc::ErrorTrajectory<2>,
+}
+
+/// The bounds of an optimisation.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Bounds {
-    /// Bounds at stages 0..=N, of which the first has no effect: on ‖ω̃‖ with the robust set, on
-    /// ‖x̃_ω‖ with the paper's, rad/s.
+    /// Bounds at stages 1..=N: on ‖ω̃‖ with the robust set, on ‖x̃_ω‖ with the paper's, rad/s.
     pub rate: Vec<f64>,
     /// Bounds in intervals 0..N: on ‖m̃‖ (N m) with the robust set, on ‖ũ‖ (rad/s²) with the
     /// paper's.

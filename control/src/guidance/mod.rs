@@ -63,8 +63,8 @@ pub struct Command {
     pub heading_error: f64,
     /// By how much the predicted flight ends too far from the target, m.
     pub miss: f64,
-    /// Whether the target can be reached: the predicted flight comes down to its energy, and the
-    /// bank angle is not at its end.
+    /// Whether the target is in reach: the predicted flight comes down to the target's energy
+    /// within the tolerance, or another bank angle makes it do so and can still be flown.
     pub in_reach: bool,
 }
 
@@ -97,6 +97,13 @@ pub struct Memory {
 pub struct Guidance {
     settings: Settings,
     predictor: Predictor,
+}
+
+impl Memory {
+    /// Returns whether the guidance has been evaluated.
+    pub fn has_begun(&self) -> bool {
+        self.begun
+    }
 }
 
 impl Guidance {
@@ -235,17 +242,22 @@ impl Guidance {
         }
         let End { range, arrives } = fly(memory.magnitude);
         let here = wanted - range;
-        (command.miss, command.in_reach) = (here, arrives);
+        let tolerance = settings.target.tolerance;
+        command.miss = here;
+        command.in_reach = arrives && here.abs() <= tolerance;
         if left.abs() < FROZEN {
             return;
+        }
+        if !command.in_reach {
+            // The largest bank angle gives the shortest flight, and none the longest.
+            command.in_reach = miss(largest) >= -tolerance && miss(0.0) <= tolerance;
         }
         let slope = (miss(memory.magnitude + PROBE) - here) / PROBE;
         // A larger bank angle makes the flight shorter. Where it does not, the correction only has
         // the right sign.
         let change = if slope > 0.0 { -here / slope } else { -CORRECTION.copysign(here) };
-        let corrected = memory.magnitude + change.clamp(-CORRECTION, CORRECTION);
-        memory.magnitude = corrected.clamp(0.0, largest);
-        command.in_reach &= corrected == memory.magnitude;
+        let change = change.clamp(-CORRECTION, CORRECTION);
+        memory.magnitude = (memory.magnitude + change).clamp(0.0, largest);
     }
 
     /// Reverses the bank angle when the heading has left its dead band and still moves away.

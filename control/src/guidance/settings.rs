@@ -41,6 +41,9 @@ pub struct Target {
     /// Distance to the runway point at which the flight is to end.
     #[setting(unit = "m", min = 0.0, nominal = 1e5)]
     pub range: f64,
+    /// Largest difference from target.range with which the flight still ends at the target.
+    #[setting(unit = "m", above = 0.0, nominal = 1e3)]
+    pub tolerance: f64,
     /// Altitude at which the flight is to end.
     #[setting(unit = "m", min = 0.0, nominal = 1e4)]
     pub altitude: f64,

@@ -10,7 +10,7 @@ use super::constraints::LinearisedConstraints;
 use super::layout::Layout;
 use super::lq::Unconstrained;
 use super::problem::{
-    End, ErrorTrajectory, Multipliers, Outcome, Problem, Solution, Start, State, zero_state,
+    Cost, End, ErrorTrajectory, Multipliers, Outcome, Problem, Solution, Start, State, zero_state,
 };
 use super::riccati::{Rest, Riccati};
 use super::search::Search;
@@ -87,9 +87,15 @@ impl<const O: usize> Optimiser<O> {
         &self.solution.trajectory
     }
 
-    /// Returns the bounds of the last optimisation, if they depend on the trajectory.
-    pub fn bounds(&self) -> &Bounds {
-        &self.bounds
+    /// Returns the bounds of the last pass, if they depend on the trajectory, and the trajectory
+    /// about which the cone solver linearised the norm constraints in it.
+    pub fn last_pass(&self) -> (&Bounds, &ErrorTrajectory<O>) {
+        (&self.bounds, &self.linearisation_point)
+    }
+
+    /// Returns the weights of the cost.
+    pub fn cost(&self) -> &Cost<O> {
+        &self.layout.cost
     }
 
     /// Returns K of the first stage of the unconstrained optimum, negative.

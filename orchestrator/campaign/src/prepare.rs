@@ -105,6 +105,8 @@ pub(crate) fn observe(campaign: &Campaign, experiment: &Observe) -> Result<Obser
         guarantee: experiment.guarantee.clone().filter(|_| !of_guarantee.is_empty()),
         margins: experiment.margins.clone().filter(|_| !of_margins.is_empty()),
         loss: experiment.loss.clone(),
+        // The limits of a campaign judge its cases.
+        goal: None,
         panels: experiment.panels.clone(),
         readings: BTreeMap::new(),
     })

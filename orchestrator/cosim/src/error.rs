@@ -54,12 +54,13 @@ pub enum Error {
         /// Time from the deadline until the values were ready, ms.
         late_ms: f64,
     },
-    /// Signals exceeded the bound beyond which the experiment counts a run as lost.
-    #[error("{what} lost at t = {} s: {reason}", rounded(*time))]
+    /// Signals exceeded the bound beyond which the experiment counts a run as lost, or its goal as
+    /// missed.
+    #[error("{what} at t = {} s: {reason}", rounded(*time))]
     Lost {
-        /// Name of what was lost.
+        /// What was lost or missed, such as "attitude lost".
         what: String,
-        /// Time of the first communication point at which it was lost, s.
+        /// Time of the first communication point at which this was so, s.
         time: f64,
         /// Description of the bound that was exceeded.
         reason: String,

@@ -2,29 +2,21 @@
 
 use crate::Matrix;
 use crate::components::{Component, Dynamics};
-use crate::continuous::{Continuous, References};
-use crate::fitting::{AT_LENGTH, DESCRIBED, delayed, describes, deviation, reduced};
+use crate::fitting::deviation;
 use crate::model::Step;
 use crate::realisation::realise;
 use crate::replay::Recorded;
-use crate::responses::{Lags, Probe, Response, Scales};
+use crate::responses::{Lags, Probe, Response, Scales, beginning};
+use crate::windows::{
+    BLOCKS, COMPARED, LONGEST_TIME, MOST_BLOCKS, compared_steps, longest_period, longest_response,
+};
 use cosim::system::System;
 use cosim::wiring::Port;
 use fmu_import::instance::{CallFailure, Instance};
 use fmu_import::quantity::rounded;
 
-/// Longest period of a component that is looked for: a time in s, but so many of its steps at least
-/// and at most.
-const LONGEST_PERIOD: f64 = 0.25;
-const LONGEST: [usize; 2] = [25, 50];
-/// Time over which responses are looked at, s. It limits the longest period, too.
-const LONGEST_TIME: f64 = 1.0;
-/// Least number of steps whose responses a model reproduces twice over.
-const BLOCKS: usize = 24;
 /// Most steps of the next period whose responses are held against those of the first.
 const AGAIN: usize = 4;
-/// Lags that are compared to find the period.
-const COMPARED: usize = 6;
 /// Difference of two periods up to which they count as equal, relative to the largest response, and
 /// in relation to the least difference that any period leaves.
 const EQUAL: f64 = 1e-6;
@@ -34,7 +26,7 @@ const AS_EQUAL: f64 = 3.0;
 const REPEATS: f64 = 0.1;
 const DRIFTS: f64 = 0.01;
 /// Changes of an input that are tried, in relation to its typical magnitude.
-const CHANGES: [f64; 3] = [1e-5, 1e-7, 1e-9];
+pub(crate) const CHANGES: [f64; 3] = [1e-5, 1e-7, 1e-9];
 /// Difference between a model and the response over `LONGEST_TIME`, relative to the largest
 /// response of a variable, from which the model does not describe the motion.
 const DEVIATES: f64 = 0.05;
@@ -53,23 +45,8 @@ pub struct Found {
     pub sides: Option<[Component; 2]>,
     /// One line on how the model was found.
     pub note: String,
-}
-
-/// Returns the number of steps of which the inputs of a component must be known.
-pub fn needed_steps(length: f64) -> usize {
-    let longest = longest_period(length);
-    let shown = 2 * longest + 2 * BLOCKS.max(2 * longest);
-    shown.max(compared_steps(length))
-}
-
-/// Returns the number of steps over which a model is held against the motion of a vehicle.
-fn compared_steps(length: f64) -> usize {
-    (LONGEST_TIME / length).ceil() as usize
-}
-
-fn longest_period(length: f64) -> usize {
-    let steps = |time: f64| (time / length + 1e-9) as usize;
-    steps(LONGEST_PERIOD).clamp(LONGEST[0], LONGEST[1]).min(steps(LONGEST_TIME)).max(1)
+    /// Whether no output responds to an input, so that the model has none of its motion.
+    pub is_silent: bool,
 }
 
 /// Builds the model of a component.
@@ -89,11 +66,11 @@ pub struct Builder<'a> {
 }
 
 impl Builder<'_> {
-    fn scale(&self, port: &Port) -> f64 {
+    pub(crate) fn scale(&self, port: &Port) -> f64 {
         self.system.variable_at(*port).nominal()
     }
 
-    fn of_dynamics(&self, states: Vec<String>, dynamics: Dynamics) -> Component {
+    pub(crate) fn of_dynamics(&self, states: Vec<String>, dynamics: Dynamics) -> Component {
         let components = self.components.iter().map(|index| &self.system.components[*index]);
         let names: Vec<&str> = components.map(|component| component.name.as_str()).collect();
         Component {
@@ -136,7 +113,7 @@ impl Builder<'_> {
         if self.components.len() > 1 { SMALLEST_OF_PAIR } else { SMALLEST }
     }
 
-    fn scales(&self) -> Scales {
+    pub(crate) fn scales(&self) -> Scales {
         Scales {
             inputs: self.inputs.iter().map(|port| self.scale(port)).collect(),
             outputs: self.outputs.iter().map(|port| self.scale(port)).collect(),
@@ -166,6 +143,9 @@ impl Builder<'_> {
             scales: &scales,
             change,
         };
+        let Some(late) = self.late(&probe(CHANGES[0]), instance)? else {
+            return Ok(self.silent());
+        };
         // A law that is not smooth wants a small change, and one that iterates a larger one.
         let mut best: Option<(f64, usize, f64)> = None;
         let mut trials: Vec<Response> = Vec::new();
@@ -174,7 +154,7 @@ impl Builder<'_> {
             // tells whether the component is smooth.
             let is_found = best.is_some_and(|(_, _, least)| least <= EQUAL);
             let short: Vec<Response> = (0..if is_found { 1 } else { 2 * longest })
-                .map(|first| probe(change).responses(instance, first, COMPARED))
+                .map(|first| probe(change).responses(instance, first, late + COMPARED))
                 .collect::<Result<_, _>>()?;
             if !is_found {
                 let (period, difference) = period(&short, longest, self.smallest());
@@ -188,33 +168,43 @@ impl Builder<'_> {
         // The same response with every size of the change, if the component is smooth.
         let depends = trials.windows(2).map(|pair| difference(pair, 1)).fold(0.0, f64::max);
         let Some((change, period, _)) = best else { unreachable!("there are changes to try") };
-        let blocks = BLOCKS.max(2 * period);
-        let phases: Vec<Response> = (0..period + period.min(AGAIN))
-            .map(|first| probe(change).responses(instance, first, 2 * blocks))
-            .collect::<Result<_, _>>()?;
-        let error = phases.iter().map(|phase| phase.error).fold(0.0, f64::max);
-        let drift = difference(&phases, period);
-        if drift > REPEATS {
-            return Err(CallFailure::new(
-                "linearise",
-                format!(
-                    "responses to a change of its inputs do not repeat within {longest} steps of {} s, but differ by {:.0} %: it has no linear model here, or a longer period than that, which takes fewer of a longer step",
-                    self.recorded.length,
-                    1e2 * drift
-                ),
-            ));
-        }
-        let tolerance = self.smallest().max(drift).max(error * 10.0);
-        let realised = |lags: &dyn Fn(&Response) -> &Lags| {
-            let lags: Vec<Lags> =
-                phases[..period].iter().map(|phase| lags(phase).clone()).collect();
-            realise(&lags, blocks, tolerance)
-        };
-        if self.moves() {
-            let count = compared_steps(self.recorded.length);
-            let measured = probe(change).responses(instance, 0, count)?;
-            let deviation = deviation(&realised(&|phase| &phase.central), &measured.central);
-            if deviation > DEVIATES {
+        let central = |phase: &Response| &phase.central;
+        let again = period + period.min(AGAIN);
+        let count = compared_steps(self.recorded.length).max(late + COMPARED);
+        let measured = probe(change).responses(instance, 0, count)?;
+        // What a component remembers of its inputs takes as many steps to show as it remembers.
+        let may_grow = late > 0 || !self.moves();
+        let most = ((self.recorded.rows.len() - again) / 2).min(MOST_BLOCKS);
+        let mut blocks = BLOCKS.max(2 * period);
+        let (phases, tolerance, drift) = loop {
+            let phases: Vec<Response> = (0..again)
+                .map(|first| probe(change).responses(instance, first, 2 * blocks))
+                .collect::<Result<_, _>>()?;
+            let error = phases.iter().map(|phase| phase.error).fold(0.0, f64::max);
+            let drift = difference(&phases, period);
+            if drift > REPEATS {
+                return Err(CallFailure::new(
+                    "linearise",
+                    format!(
+                        "responses to a change of its inputs do not repeat within {longest} steps of {} s, but differ by {:.0} %: it has no linear model here, or a longer period than that, which takes fewer of a longer step",
+                        self.recorded.length,
+                        1e2 * drift
+                    ),
+                ));
+            }
+            let tolerance = self.smallest().max(drift).max(error * 10.0);
+            let deviation = deviation(
+                &realised(&phases[..period], &central, blocks, tolerance),
+                &measured.central,
+            );
+            eprintln!(
+                "DEBUG {:?} blocks {blocks} late {late} period {period} dev {deviation:e} drift {drift:e} change {change:e}",
+                self.components
+            );
+            if deviation <= DEVIATES {
+                break (phases, tolerance, drift);
+            }
+            if !may_grow || blocks >= most {
                 return Err(CallFailure::new(
                     "linearise",
                     format!(
@@ -224,9 +214,10 @@ impl Builder<'_> {
                     ),
                 ));
             }
-        }
+            blocks = (2 * blocks).min(most);
+        };
         let model = |lags: &dyn Fn(&Response) -> &Lags| {
-            let steps = realised(lags);
+            let steps = realised(&phases[..period], lags, blocks, tolerance);
             let steps = steps.into_iter().map(|step| scaled(step, &scales)).collect();
             self.of_dynamics(Vec::new(), Dynamics::Sampled(steps))
         };
@@ -234,7 +225,7 @@ impl Builder<'_> {
         let side = |side: usize| {
             model(&move |phase| phase.sides.as_ref().map_or(&phase.central, |sides| &sides[side]))
         };
-        let found = model(&|phase| &phase.central);
+        let found = model(&central);
         let Dynamics::Sampled(steps) = &found.dynamics else { unreachable!("built above") };
         let states = steps.iter().map(|step| step.a.ncols()).max().unwrap_or(0);
         let mut note = format!(
@@ -255,92 +246,63 @@ impl Builder<'_> {
                 CHANGES[CHANGES.len() - 1]
             );
         }
-        Ok(Found { model: found, sides: has_edge.then(|| [side(0), side(1)]), note })
+        let sides = has_edge.then(|| [side(0), side(1)]);
+        Ok(Found { model: found, sides, note, is_silent: false })
+    }
+
+    /// Returns the lag at which the last output responds to a change, 0 if it is soon; `None` if
+    /// none of them responds.
+    fn late(
+        &self,
+        probe: &Probe,
+        instance: &mut dyn Instance,
+    ) -> Result<Option<usize>, CallFailure> {
+        let length = self.recorded.length;
+        // A component may look at its inputs at some steps only.
+        for first in 0..longest_period(length) {
+            let response = probe.responses(instance, first, longest_response(length))?;
+            if let Some(lag) = beginning(&response.central) {
+                return Ok(Some(if lag < COMPARED { 0 } else { lag }));
+            }
+        }
+        Ok(None)
+    }
+
+    /// Returns the model of a component that does not respond.
+    fn silent(&self) -> Found {
+        let none = Matrix::zeros(0, 0);
+        let (outputs, inputs) = (self.outputs.len(), self.inputs.len());
+        let step = Step {
+            b: Matrix::zeros(0, inputs),
+            c: Matrix::zeros(outputs, 0),
+            d: Matrix::zeros(outputs, inputs),
+            a: none,
+        };
+        let model = self.of_dynamics(Vec::new(), Dynamics::Sampled(vec![step]));
+        let note = format!(
+            "{}: does not respond to changes of its inputs within {} s: it may delay them for longer, or round or hold its outputs",
+            model.name,
+            rounded(longest_response(self.recorded.length) as f64 * self.recorded.length)
+        );
+        Found { model, sides: None, note, is_silent: true }
     }
 
     /// Returns the places of the inputs among the recorded ones.
-    fn places(&self) -> Vec<usize> {
+    pub(crate) fn places(&self) -> Vec<usize> {
         let place = |port: &Port| self.recorded.ports.iter().position(|other| other == port);
         self.inputs.iter().filter_map(place).collect()
     }
+}
 
-    /// Returns the model by derivatives, if the component gives them and they describe what it
-    /// does.
-    fn continuous(&self, instance: &mut dyn Instance) -> Result<Option<Found>, CallFailure> {
-        let [component] = self.components else { return Ok(None) };
-        let description = &self.system.components[*component].fmu.description;
-        let offers = description.co_simulation.as_ref();
-        if !offers.is_some_and(|interface| interface.has("providesDirectionalDerivative")) {
-            return Ok(None);
-        }
-        let variables = &description.variables;
-        let (states, derivatives): (Vec<usize>, Vec<usize>) = description.states().unzip();
-        if states.is_empty() {
-            return Ok(None);
-        }
-        let of = |positions: &[usize]| -> Vec<u32> {
-            positions.iter().map(|position| variables[*position].reference).collect()
-        };
-        let (states_at, derivatives_at) = (of(&states), of(&derivatives));
-        let inputs: Vec<u32> = self.inputs.iter().map(|port| port.reference).collect();
-        let outputs: Vec<u32> = self.outputs.iter().map(|port| port.reference).collect();
-        let references = References {
-            states: &states_at,
-            derivatives: &derivatives_at,
-            inputs: &inputs,
-            outputs: &outputs,
-        };
-        instance.restore(0)?;
-        let Ok(found) = Continuous::of(instance, &references) else { return Ok(None) };
-        // The states may be read, so that each of their responses can be held against it.
-        let scales = Scales {
-            inputs: self.inputs.iter().map(|port| self.scale(port)).collect(),
-            outputs: states
-                .iter()
-                .map(|position| variables[*position].nominal())
-                .chain(self.outputs.iter().map(|port| self.scale(port)))
-                .collect(),
-        };
-        let read: Vec<u32> = states_at.iter().chain(&outputs).copied().collect();
-        let places = self.places();
-        let probe = Probe {
-            recorded: self.recorded,
-            inputs: &places,
-            outputs: &read,
-            scales: &scales,
-            change: CHANGES[0],
-        };
-        let response =
-            probe.responses(instance, 0, COMPARED + longest_period(self.recorded.length))?;
-        if response.sides.is_some() {
-            return Ok(None);
-        }
-        let (lags, length) = (&response.central, self.recorded.length);
-        let at_once = lags.len().min(COMPARED);
-        let found = if describes(&found, &lags[..at_once], &scales, length, DESCRIBED)
-            && describes(&found, lags, &scales, length, AT_LENGTH)
-        {
-            found
-        } else {
-            let (found, whole) = delayed(found, lags, &scales, length);
-            let compared = lags.len().min(whole + COMPARED);
-            if !describes(&found, &lags[..compared], &scales, length, DESCRIBED) {
-                return Ok(None);
-            }
-            found
-        };
-        let found = reduced(found, &states);
-        let names = found.1.iter().map(|place| variables[states[*place]].name.clone()).collect();
-        let note = format!(
-            "{}: derivatives by fmi2GetDirectionalDerivative, {} of {} states, inputs act after {} s",
-            self.system.components[*component].name,
-            found.1.len(),
-            states.len(),
-            rounded(found.0.delay)
-        );
-        let model = self.of_dynamics(names, Dynamics::Continuous(found.0));
-        Ok(Some(Found { model, sides: None, note }))
-    }
+/// Realises the steps of a period from their responses.
+fn realised(
+    phases: &[Response],
+    lags: &dyn Fn(&Response) -> &Lags,
+    blocks: usize,
+    tolerance: f64,
+) -> Vec<Step> {
+    let lags: Vec<Lags> = phases.iter().map(|phase| lags(phase).clone()).collect();
+    realise(&lags, blocks, tolerance)
 }
 
 /// Returns the difference of the responses at steps one period apart, relative to the largest.

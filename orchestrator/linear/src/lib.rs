@@ -11,6 +11,7 @@
 pub mod components;
 pub mod continuous;
 pub mod curves;
+mod derivatives;
 mod fitting;
 pub mod frequency;
 pub mod identification;
@@ -26,6 +27,7 @@ mod reduction;
 pub mod replay;
 pub mod responses;
 pub mod spectrum;
+mod windows;
 
 /// A real matrix.
 pub type Matrix = nalgebra::DMatrix<f64>;

@@ -2,13 +2,14 @@
 
 use crate::Matrix;
 use crate::components::Component;
-use crate::identification::{Builder, Found, needed_steps};
+use crate::identification::{Builder, Found};
 use crate::model::{OpenLoop, Signal};
 use crate::opening::{opened, tick_at};
 use crate::pair::{Joined, Pair};
 use crate::propagation::{Link, Net};
 use crate::replay::Recorded;
 use crate::spectrum::spectral_radius;
+use crate::windows::needed_steps;
 use cosim::clock::Clock;
 use cosim::delay::Reading;
 use cosim::error::Error;
@@ -144,8 +145,8 @@ impl Lineariser {
     /// Linearises a run of the system, given its master after initialisation.
     ///
     /// # Errors
-    /// Returns an error if an instance fails or keeps no states, if nothing comes back of what is
-    /// put in at the opened signals, or if the run was asked to end.
+    /// Returns an error if an instance fails or keeps no states, if the loop does not
+    /// respond to what is put in at the opened signals, or if the run was asked to end.
     pub fn linearise(
         &self,
         master: &mut Master,
@@ -195,11 +196,16 @@ impl Lineariser {
         let net = net(&|found| found.model.clone());
         let open = net.open();
         if open.step.b.amax().max(open.step.d.amax()) == 0.0 || open.step.c.amax() == 0.0 {
-            return Err(Error::experiment(format!(
-                "at t = {} s nothing comes back of what is put in at {}: a component may round its outputs, or hold them",
-                rounded(*time),
-                open.signals[0].name
-            )));
+            let silent: Vec<&str> =
+                found.iter().filter(|found| found.is_silent).map(|found| &*found.note).collect();
+            let message = format!(
+                "the loop does not respond to a change of {}. {}",
+                open.signals[0].name,
+                silent.join("; ")
+            );
+            let component = system.components[opened[0].component].name.clone();
+            let failure = CallFailure::new("linearise", message);
+            return Err(Error::Call { component, time: *time, failure });
         }
         if has_pair && let Some(growth) = noise(&open) {
             let names: Vec<&str> = models.iter().map(|model| model.name.as_str()).collect();

@@ -53,6 +53,12 @@ pub struct Probe<'a> {
     pub change: f64,
 }
 
+/// Returns the lag at which the last output of those that respond begins to; `None` if none does.
+pub(crate) fn beginning(lags: &Lags) -> Option<usize> {
+    let begins = |row: usize| lags.iter().position(|matrix| matrix.row(row).amax() > 0.0);
+    (0..lags[0].nrows()).filter_map(begins).max()
+}
+
 impl Probe<'_> {
     /// Takes the responses to changes at step `first`, up to `count` steps later.
     ///

@@ -4,7 +4,7 @@
 use crate::guarantee::{GuaranteeRecord, GuaranteeSignals};
 use crate::measure::{self, Gauge};
 use cosim::error::Error;
-use cosim::experiment::{Guarantee, Margins, Observe};
+use cosim::experiment::{self, Guarantee, Margins, Observe};
 use cosim::master::{Observer, Sample};
 use cosim::pacing::report::RealTime;
 use cosim::signal::{Resolved, Signal, common_unit};
@@ -53,8 +53,8 @@ pub struct Metrics {
     pub loop_delay_s: Option<f64>,
     /// Number of communication points that the run reached.
     pub samples: u64,
-    /// Whether the run reached its stop time. A loss ends a single run, but not the runs of a
-    /// study.
+    /// Whether the run reached its end and did not miss its goal. A loss ends a single run, but
+    /// not the runs of a study.
     pub completed: bool,
     /// First time at which the run was lost, s; null if it never was, or if the experiment does not
     /// say when it is.
@@ -160,20 +160,72 @@ pub struct Meters {
     /// variables.
     guarantee: (Option<Guarantee>, Option<GuaranteeRecord>),
     loss: Option<Loss>,
+    goal: Option<Loss>,
+    /// Communication point at which the run stops because its user asks for it, so that its goal
+    /// may be far.
+    cut_off: Option<u64>,
     samples: u64,
     completed: bool,
 }
 
-/// Bound beyond which a run counts as lost.
+/// Bound beyond which a run counts as lost, or its goal as missed.
 struct Loss {
     what: String,
-    /// Name of the list of signals.
+    /// Names of the list of signals and of the section that gives the bound.
     list: String,
+    section: String,
     signals: Vec<Resolved>,
     beyond: f64,
     ends_run: bool,
     /// First time at which the bound was exceeded, s.
     at: Option<f64>,
+}
+
+impl Loss {
+    /// Creates the bound of a section of the experiment; `None` if it has none, or if an FMU that
+    /// was exchanged lacks the signals.
+    fn new(
+        section: &str,
+        verb: &str,
+        observe: &Observe,
+        asked: Option<&experiment::Loss>,
+        system: &mut System,
+    ) -> Result<Option<Self>, Error> {
+        let section = format!("[observe.{section}]");
+        let fault = |problem| Error::experiment(format!("{section} {problem}"));
+        let Some(experiment::Loss { what, signals: list, beyond }) = asked else { return Ok(None) };
+        let (list, beyond) = (list.clone(), *beyond);
+        if beyond.is_nan() || beyond <= 0.0 {
+            return Err(fault(format!("beyond = {beyond}, but it must be above 0")));
+        }
+        let signals = observe.list(&list).map_err(fault)?;
+        if system.lost_by_exchange(signals.iter().flat_map(Signal::paths)) {
+            return Ok(None);
+        }
+        let signals = signals.iter().map(|signal| system.resolve(signal));
+        let signals: Vec<_> = signals.collect::<Result<_, _>>().map_err(fault)?;
+        common_unit(&signals).map_err(fault)?;
+        let what = format!("{what} {verb}");
+        Ok(Some(Self { what, list, section, signals, beyond, ends_run: false, at: None }))
+    }
+
+    /// Notes the first time at which the bound is exceeded.
+    fn observe(&mut self, sample: &Sample) -> Result<(), Error> {
+        let squares = self.signals.iter().map(|signal| signal.value(sample.values).powi(2));
+        let norm = squares.sum::<f64>().sqrt();
+        // A norm that is not a number also exceeds it.
+        if self.at.is_some() || norm <= self.beyond {
+            return Ok(());
+        }
+        self.at = Some(sample.time);
+        if !self.ends_run {
+            return Ok(());
+        }
+        let unit = self.signals.first().map_or("", |signal| &signal.unit);
+        let Self { list, section, beyond, .. } = self;
+        let reason = format!("the norm of \"{list}\" exceeds {beyond} {unit} ({section})");
+        Err(Error::Lost { what: self.what.clone(), time: sample.time, reason })
+    }
 }
 
 impl Meters {
@@ -208,30 +260,18 @@ impl Meters {
         let signals =
             guarantee.as_ref().map(|asked| GuaranteeSignals::find(asked, system)).transpose();
         let record = signals.map_err(fault)?.flatten().map(GuaranteeRecord::new);
-        let loss = observe.loss.as_ref().map(|loss| {
-            let fault = |problem| Error::experiment(format!("[observe.loss] {problem}"));
-            if loss.beyond.is_nan() || loss.beyond <= 0.0 {
-                return Err(fault(format!("beyond = {}, but it must be above 0", loss.beyond)));
-            }
-            let signals = observe.list(&loss.signals).map_err(fault)?;
-            let (what, list, beyond) = (loss.what.clone(), loss.signals.clone(), loss.beyond);
-            if system.lost_by_exchange(signals.iter().flat_map(Signal::paths)) {
-                return Ok(None);
-            }
-            let signals = signals.iter().map(|signal| system.resolve(signal));
-            let signals: Vec<_> = signals.collect::<Result<_, _>>().map_err(fault)?;
-            common_unit(&signals).map_err(fault)?;
-            Ok(Some(Loss { what, list, signals, beyond, ends_run: false, at: None }))
-        });
-        let loss = loss.transpose()?.flatten();
-        Ok(Self { gauges, guarantee: (guarantee, record), loss, samples: 0, completed: false })
+        let loss = Loss::new("loss", "lost", &observe, observe.loss.as_ref(), system)?;
+        let goal = Loss::new("goal", "missed", &observe, observe.goal.as_ref(), system)?;
+        let cut_off = system.experiment.given.has_stop().then(|| system.clock.ticks());
+        let guarantee = (guarantee, record);
+        Ok(Self { gauges, guarantee, loss, goal, cut_off, samples: 0, completed: false })
     }
 
-    /// Makes the run end when it is lost.
+    /// Makes the run end when it is lost, and fail when it has missed its goal.
     #[must_use]
     pub fn ending_when_lost(mut self) -> Self {
-        if let Some(loss) = &mut self.loss {
-            loss.ends_run = true;
+        for bound in self.loss.iter_mut().chain(&mut self.goal) {
+            bound.ends_run = true;
         }
         self
     }
@@ -242,8 +282,8 @@ impl Meters {
         if let Some(record) = &mut self.guarantee.1 {
             record.reset();
         }
-        if let Some(loss) = &mut self.loss {
-            loss.at = None;
+        for bound in self.loss.iter_mut().chain(&mut self.goal) {
+            bound.at = None;
         }
         (self.samples, self.completed) = (0, false);
     }
@@ -323,22 +363,13 @@ impl Observer for Meters {
         }
         self.samples += 1;
         self.completed |= sample.last;
-        if let Some(loss) = self.loss.as_mut().filter(|loss| loss.at.is_none()) {
-            let squares = loss.signals.iter().map(|signal| signal.value(sample.values).powi(2));
-            let norm = squares.sum::<f64>().sqrt();
-            // A norm that is not a number also counts as lost.
-            if norm.is_nan() || norm > loss.beyond {
-                loss.at = Some(sample.time);
-                if loss.ends_run {
-                    let unit = loss.signals.first().map_or("", |signal| &signal.unit);
-                    let Loss { list, beyond, .. } = loss;
-                    let reason =
-                        format!("the norm of \"{list}\" exceeds {beyond} {unit} ([observe.loss])");
-                    return Err(Error::Lost { what: loss.what.clone(), time: sample.time, reason });
-                }
-            }
+        let is_end = sample.last && self.cut_off != Some(sample.tick);
+        if let Some(goal) = self.goal.as_mut().filter(|_| is_end) {
+            let outcome = goal.observe(sample);
+            self.completed &= goal.at.is_none();
+            outcome?;
         }
-        Ok(())
+        self.loss.as_mut().map_or(Ok(()), |loss| loss.observe(sample))
     }
 }
 

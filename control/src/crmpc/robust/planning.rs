@@ -229,7 +229,8 @@ impl ConstraintSet for Robust {
     }
 
     fn bounds(&self, held: &mpc::Bounds) -> Bounds {
-        Bounds { rate: held.state.clone(), input: held.input.clone(), terminal: None }
+        // The first state is given.
+        Bounds { rate: held.state[1..].to_vec(), input: held.input.clone(), terminal: None }
     }
 
     fn moment_left(&self) -> f64 {

@@ -34,6 +34,9 @@ pub struct Observe {
     /// Condition under which a run counts as lost.
     #[serde(default)]
     pub loss: Option<Loss>,
+    /// Condition at the end of a run under which it has missed its goal and is not completed.
+    #[serde(default)]
+    pub goal: Option<Loss>,
     /// Panels of the figure of a run and of the live view.
     #[serde(default)]
     pub panels: Vec<Panel>,
@@ -209,15 +212,16 @@ pub struct Guarantee {
     pub optional: bool,
 }
 
-/// Condition under which a run is lost, and ends.
+/// Condition under which a run is lost and ends, or under which it has missed its goal.
 #[derive(Clone, Debug, Deserialize, JsonSchema, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Loss {
-    /// Name of the lost quantity, for the message.
+    /// Name of the lost quantity or of the goal, for the message.
     pub what: String,
     /// Name of the list of signals whose norm decides.
     pub signals: String,
-    /// Largest norm with which the run continues, in the display unit of the signals.
+    /// Largest norm with which the run continues or the goal is met, in the display unit of the
+    /// signals.
     pub beyond: f64,
 }
 

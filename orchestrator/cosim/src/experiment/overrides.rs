@@ -38,6 +38,13 @@ pub struct Given {
     fmu: Vec<String>,
 }
 
+impl Given {
+    /// Returns whether the command line gives the stop time.
+    pub fn has_stop(&self) -> bool {
+        self.stop.is_some()
+    }
+}
+
 impl Experiment {
     /// Returns the error for a fault of start, stop and step. It blames the option that gives the
     /// value, or the file if none does.

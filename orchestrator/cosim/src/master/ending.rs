@@ -30,10 +30,7 @@ impl Master {
         }
         self.row.fill(&self.values);
         let sample = Sample { tick: tick + 1, time, last: true, values: &self.row.values };
-        for observer in observers.iter_mut() {
-            observer.observe(&sample)?;
-        }
         self.end = Some(format!("by {}: {}", self.members[*index].name, failure.message));
-        Ok(())
+        observers.iter_mut().try_for_each(|observer| observer.observe(&sample))
     }
 }

@@ -22,8 +22,9 @@ fn meters() -> Meters {
         ("solves", gauge("kind = \"last\"", vec![count])),
     ];
     let loss = Loss {
-        what: "attitude".into(),
+        what: "attitude lost".into(),
         list: "error".into(),
+        section: "[observe.loss]".into(),
         signals: errors(),
         beyond: 5.5_f64.to_degrees(),
         ends_run: false,
@@ -33,6 +34,8 @@ fn meters() -> Meters {
         gauges: gauges.map(|(name, gauge)| (name.to_string(), gauge)).into(),
         guarantee: (None, None),
         loss: Some(loss),
+        goal: None,
+        cut_off: None,
         samples: 0,
         completed: false,
     }
@@ -99,6 +102,34 @@ fn a_run_is_lost_beyond_its_bound_or_where_the_signal_is_no_number() {
             .starts_with("attitude lost at t = 0.3 s: the norm of \"error\" exceeds 315.1"),
         "{error}"
     );
+}
+
+#[test]
+fn a_run_that_misses_its_goal_is_not_completed() {
+    let [near, far] = [0.5, 6.0].map(|alpha| {
+        let mut row = [0.0; 8];
+        row[0] = alpha;
+        row
+    });
+    let with_goal = |cut_off: Option<u64>| {
+        let bound = meters().loss.map(|loss| Loss { what: "target missed".into(), ..loss });
+        Meters { goal: bound, loss: None, cut_off, ..meters() }
+    };
+    // What is far on the way does not count.
+    for (last, cut_off, completed) in
+        [(near, None, true), (far, None, false), ([f64::NAN; 8], None, false), (far, Some(2), true)]
+    {
+        let mut meters = with_goal(cut_off);
+        feed(&mut meters, &[near, far, last]);
+        assert_eq!(meters.metrics().completed, completed, "{last:?} {cut_off:?}");
+        let mut ending = with_goal(cut_off).ending_when_lost();
+        let sample = Sample { tick: 2, time: 2.0, last: true, values: &last };
+        assert_eq!(ending.observe(&sample).is_ok(), completed);
+    }
+    let sample = Sample { tick: 2, time: 2.0, last: true, values: &far };
+    let error = with_goal(None).ending_when_lost().observe(&sample).unwrap_err();
+    assert!(error.to_string().starts_with("target missed at t = 2 s: the norm of"), "{error}");
+    assert_eq!(error.exit_code(), 3);
 }
 
 #[test]
