@@ -106,6 +106,15 @@ def test_the_modules_of_the_python_package_use_each_other_in_one_direction() -> 
     TopologicalSorter(graph).prepare()
 
 
+def test_what_the_orchestrator_knows_of_a_vehicle_is_what_the_architecture_says() -> None:
+    """Its crates name no quantity of a vehicle, but for the roles in the picture of one."""
+    words = re.compile(r"\b(attitude|sideslip|bank|deflections?|moments?|elevons?)\b", re.IGNORECASE)
+    crates = [ROOT / "orchestrator" / name / "src" for name in ("import", "cosim", "report", "sweep", "study", "campaign", "linear")]
+    files = [file for crate in crates for file in crate.rglob("*.rs") if file.stem != "tests"]
+    knowing = {file.relative_to(ROOT / "orchestrator").as_posix() for file in files if words.search(code(file))}
+    assert knowing == {"cosim/src/experiment/vehicle.rs", "report/src/run_page/data.rs", "report/src/run_page/mod.rs"}
+
+
 def test_no_file_is_too_long() -> None:
     tracked = subprocess.run(["git", "ls-files"], cwd=ROOT, check=True, capture_output=True, text=True)
     files = [Path(name) for name in tracked.stdout.splitlines() if (ROOT / name).is_file()]
