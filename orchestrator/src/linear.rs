@@ -190,7 +190,7 @@ fn figure(found: &Linearised, margins: &analysis::Margins) -> Result<Figure, Fai
     let excluded = line(&format!("disk margin {alpha:.3}"), Color::LIMIT, Shape::Dashed, x, y);
     let ratio = line(&worst.signal, Color::CURVES[0], Shape::Line, curves.phase, curves.gain);
     let sensitivity =
-        line("all together", Color(0, 0, 0), Shape::Line, curves.frequency, curves.sensitivity);
+        line("all together", Color::INK, Shape::Line, curves.frequency, curves.sensitivity);
     let panel = |x_label: &str, y_label: &str, log_x, curves| Panel {
         x_label: x_label.into(),
         y_label: y_label.into(),

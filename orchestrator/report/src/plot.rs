@@ -1,7 +1,10 @@
 //! The figure of one run, with one panel for each that the experiment asks for.
 
-use crate::figure::{self, Color, Figure, Legend, Shape, svg};
+use crate::figure::svg;
 use crate::panels::Panel;
+use crate::recording::Recording;
+use crate::recording::panels::{self, Role, symbols};
+use crate::run_page::figure::figure;
 use cosim::error::Error;
 use cosim::master::{Observer, Sample};
 use std::path::Path;
@@ -47,48 +50,33 @@ impl Curves {
         if self.panels.is_empty() || self.time.len() < 2 {
             return Ok(false);
         }
-        let panels = self.panels.iter().map(|track| self.panel(track)).collect();
-        svg::write(
-            &Figure { title: title.into(), columns: 1, legend: Legend::Beside, panels },
-            path,
-        )?;
+        let (title, time) = (title.into(), self.time.clone());
+        let run = Recording { title, time, ..Recording::default() };
+        let panels: Vec<_> = self.panels.iter().map(drawn).collect();
+        svg::write(&figure(&[run], &panels), path)?;
         Ok(true)
     }
+}
 
-    fn panel(&self, track: &Track) -> figure::Panel {
-        let Track { panel, values, references, limit } = track;
-        let colors = || Color::CURVES.iter().copied().cycle();
-        let pale = references.iter().zip(colors());
-        let mut curves: Vec<_> =
-            pale.map(|(y, color)| self.curve("reference", color, Shape::Pale, y.clone())).collect();
-        let named = panel.curves.iter().zip(values).zip(colors());
-        curves.extend(
-            named.map(|((curve, y), color)| self.curve(&curve.name, color, Shape::Line, y.clone())),
-        );
-        if let Some(limit) = *limit {
-            let norm = |k: usize| values.iter().map(|y| y[k] * y[k]).sum::<f64>().sqrt();
-            let norms = (0..self.time.len()).map(norm).collect();
-            curves.push(self.curve("norm", Color::GREY, Shape::Pale, norms));
-            curves.push(figure::Curve {
-                name: "limit of norm".into(),
-                color: Color::LIMIT,
-                shape: Shape::Horizontal,
-                x: vec![f64::NAN],
-                y: vec![limit],
-            });
-        }
-        let unit = if panel.unit.is_empty() { String::new() } else { format!(", {}", panel.unit) };
-        figure::Panel {
-            x_label: "time, s".into(),
-            y_label: format!("{}{unit}", panel.label),
-            curves,
-            ..figure::Panel::default()
+/// Returns a panel as those of recordings are.
+fn drawn(track: &Track) -> panels::Panel {
+    let Track { panel, values, references, limit } = track;
+    let mut drawn = panels::Panel::default();
+    (drawn.label, drawn.unit) = (panel.label.clone(), panel.unit.clone());
+    for (place, curve) in panel.curves.iter().enumerate() {
+        let mut add = |role, values: &[f64]| {
+            let (name, values) = (symbols(&curve.name), values.to_vec());
+            drawn.curves.push(panels::Curve { name, run: 0, place, role, values });
+        };
+        add(Role::Signal, &values[place]);
+        if curve.reference.is_some() {
+            add(Role::Reference, &references[place]);
         }
     }
-
-    fn curve(&self, name: &str, color: Color, shape: Shape, y: Vec<f64>) -> figure::Curve {
-        figure::Curve { name: name.into(), color, shape, x: self.time.clone(), y }
+    if limit.is_some() {
+        drawn.limit(0, *limit);
     }
+    drawn
 }
 
 impl Observer for Curves {

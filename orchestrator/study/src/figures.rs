@@ -85,7 +85,7 @@ fn panel(figure: &Figure, panel: &Panel, results: &Results) -> Result<figure::Pa
         }
         if let (Some(reference), Some((_, result))) = (&panel.reference, runs.first()) {
             let y = values(&result.series, reference, panel);
-            let (name, color) = ("reference".into(), Color(0, 0, 0));
+            let (name, color) = ("reference".into(), Color::INK);
             curves.push(Curve {
                 name,
                 color,

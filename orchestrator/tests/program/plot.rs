@@ -49,6 +49,14 @@ fn a_run_is_drawn_as_its_experiment_says_or_as_it_is_asked_for() {
     let picture = plotted(&bench, &["a"]);
     assert!(picture.starts_with("<svg") && picture.contains("limit of norm"), "{picture}");
     assert!(picture.contains("α") && picture.contains("gain and integrator"));
+    // The norm that has the limit is bold, and what it is the norm of is thin.
+    for picture in [picture, fs::read_to_string(bench.path("out/a/plot.svg")).unwrap()] {
+        let width = |name: &str| {
+            let path = picture.split(&format!("<path data-name=\"{name}\"")).nth(1).unwrap();
+            path.split("stroke-width=\"").nth(1).unwrap().split('"').next().unwrap().to_string()
+        };
+        assert_eq!((width("norm").as_str(), width("α").as_str()), ("3", "1"), "{picture}");
+    }
     let picture = plotted(&bench, &["a", "--signals", "plant.*", "--out", "p/other.svg"]);
     assert!(picture.contains("steps") && !picture.contains("limit of norm"));
     let named = ["--signals", "plant.steps", "--signals", "plant.output.integral", "a", "b"];

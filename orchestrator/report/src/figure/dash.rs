@@ -20,7 +20,7 @@ impl<'a> Dashes<'a> {
     pub fn new(panels: &'a [Panel]) -> Self {
         let mut names: Vec<&str> = Vec::new();
         let curves = panels.iter().flat_map(|panel| &panel.curves);
-        for curve in curves.filter(|curve| curve.shape == Shape::Line) {
+        for curve in curves.filter(|curve| matches!(curve.shape, Shape::Line | Shape::Thin)) {
             if !names.contains(&curve.name.as_str()) {
                 names.push(&curve.name);
             }
@@ -32,7 +32,7 @@ impl<'a> Dashes<'a> {
     pub fn of(&self, curve: &Curve) -> &'static [f64] {
         match curve.shape {
             Shape::Dashed | Shape::Horizontal | Shape::Vertical => &[6.0, 4.0],
-            Shape::Line => {
+            Shape::Line | Shape::Thin => {
                 let place = self.0.iter().position(|name| *name == curve.name).unwrap_or(0);
                 PATTERNS[place % PATTERNS.len()]
             }

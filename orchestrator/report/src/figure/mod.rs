@@ -17,7 +17,9 @@ use serde::Deserialize;
 pub struct Color(pub u8, pub u8, pub u8);
 
 impl Color {
-    /// Colour of references and norms, a grey.
+    /// Black, which pages draw in the colour of their text.
+    pub const INK: Self = Self(0, 0, 0);
+    /// Colour of what stands behind the rest, a grey.
     pub const GREY: Self = Self(110, 110, 110);
     /// Colour of limits, a neutral grey.
     pub const LIMIT: Self = Self(91, 104, 117);
@@ -115,6 +117,10 @@ pub struct Curve {
 pub enum Shape {
     /// A solid line through the points.
     Line,
+    /// A thin line through the points.
+    Thin,
+    /// A thick, solid line through the points, for the norm that a limit is for.
+    Bold,
     /// A thin, pale line through the points.
     Pale,
     /// A dashed line through the points.
@@ -137,6 +143,15 @@ impl Shape {
     /// Returns whether the shape is a straight line across the panel, such as a limit.
     pub fn is_straight(&self) -> bool {
         matches!(self, Self::Horizontal | Self::Vertical)
+    }
+
+    /// Returns the width of a line, px.
+    fn width(&self) -> f64 {
+        match self {
+            Self::Thin | Self::Pale => 1.0,
+            Self::Bold => 3.0,
+            _ => 1.8,
+        }
     }
 
     /// Returns the opacity of an area.
@@ -187,8 +202,11 @@ impl Panel {
             return (low / 1.3, high * 1.3);
         }
         // An axis of time needs no margin.
-        let is_time =
-            along_x && self.curves.iter().any(|c| matches!(c.shape, Shape::Line | Shape::Band(_)));
+        let is_time = along_x
+            && self
+                .curves
+                .iter()
+                .any(|c| matches!(c.shape, Shape::Line | Shape::Thin | Shape::Band(_)));
         let margin = if is_time { 0.0 } else { 0.06 * size(low, high) };
         let is_count = !along_x && self.curves.iter().any(|curve| curve.shape == Shape::Steps);
         (if is_count { 0.0 } else { low - margin }, high + margin)

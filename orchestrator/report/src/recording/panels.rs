@@ -126,15 +126,7 @@ fn of_experiment(
     let limit = asked.limit.as_ref().and_then(&mut drawn).flatten();
     panel.unit = unit.unwrap_or_default();
     if let (Some(limit), false) = (limit, panel.curves.is_empty()) {
-        let limit = limit.last().copied().filter(|limit| limit.is_finite());
-        panel.limits.extend(limit.map(|value| Limit { value, runs: vec![place] }));
-        let norm = |row: usize| {
-            let signals = panel.curves.iter().filter(|curve| curve.role == Role::Signal);
-            signals.map(|curve| curve.values[row].powi(2)).sum::<f64>().sqrt()
-        };
-        let values = (0..run.time.len()).map(norm).collect();
-        let name = "norm".to_string();
-        panel.curves.push(Curve { name, run: place, place: 0, role: Role::Norm, values });
+        panel.limit(place, limit.last().copied().filter(|limit| limit.is_finite()));
     }
     Ok(panel)
 }
@@ -276,6 +268,16 @@ impl Panel {
             1 => "limit of norm".into(),
             _ => iter::once("limit of norm").chain(runs).collect::<Vec<_>>().join(", "),
         }
+    }
+
+    /// Adds a limit of the norm of the signals of a run, and the norm.
+    pub fn limit(&mut self, run: usize, limit: Option<f64>) {
+        self.limits.extend(limit.map(|value| Limit { value, runs: vec![run] }));
+        let signals = || self.curves.iter().filter(|curve| curve.role == Role::Signal);
+        let rows = signals().map(|curve| curve.values.len()).min().unwrap_or(0);
+        let square = |row: usize| signals().map(|curve| curve.values[row].powi(2)).sum::<f64>();
+        let values = (0..rows).map(|row| square(row).sqrt()).collect();
+        self.curves.push(Curve { name: "norm".into(), run, place: 0, role: Role::Norm, values });
     }
 
     /// Takes the curves and limits of another run's panel.

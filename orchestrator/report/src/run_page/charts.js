@@ -3,7 +3,8 @@
 //   const chart = new Chart(parent, panel, runs, (time) => …);   // called when a pointer asks for a time
 //   chart.point(time);
 //
-// Curves differ by colour and by dashes. References are drawn in ink, norms and limits in grey.
+// Curves differ by colour and by dashes. References are drawn in ink, limits in grey. A norm that has a limit is bold, the
+// components that it is of are thin.
 "use strict";
 
 const svgElement = (name, attributes = {}, text) => {
@@ -67,11 +68,12 @@ class Chart {
   style(curve) {
     const single = this.runs.length === 1;
     if (curve.role === "reference") return { stroke: "var(--ink)", "stroke-width": 1, "stroke-dasharray": "1.5 2.5" };
-    if (curve.role === "norm" && single) return { stroke: "var(--limit)", "stroke-width": 1.2, "stroke-dasharray": "" };
+    if (curve.role === "norm" && single) return { stroke: "var(--ink)", "stroke-width": 3, "stroke-dasharray": "" };
     const colour = this.isAlone ? curve.run : curve.place;
     if (curve.role === "own reference") return { stroke: `var(--c${colour % 6})`, "stroke-width": 1, "stroke-dasharray": "1.5 2.5" };
     const dash = single ? curve.place : curve.run;
-    return { stroke: `var(--c${colour % 6})`, "stroke-width": 1.8, "stroke-dasharray": Chart.DASHES[dash % 6] };
+    const width = single && this.panel.limits.length ? 1 : 1.8;
+    return { stroke: `var(--c${colour % 6})`, "stroke-width": width, "stroke-dasharray": Chart.DASHES[dash % 6] };
   }
 
   list() {

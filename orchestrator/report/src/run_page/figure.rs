@@ -36,7 +36,7 @@ fn drawn(runs: &[Recording], names: &[String], panel: &Panel) -> figure::Panel {
     let mut curves: Vec<figure::Curve> =
         panel.curves.iter().map(|curve| one(runs, names, panel, curve)).collect();
     // What is drawn first lies lowest.
-    curves.sort_by_key(|curve| curve.shape != Shape::Pale);
+    curves.sort_by_key(|curve| !matches!(curve.shape, Shape::Pale | Shape::Bold));
     curves.extend(panel.limits.iter().map(|limit| figure::Curve {
         name: panel.limit_name(limit, names),
         color: Color::LIMIT,
@@ -60,9 +60,10 @@ fn one(runs: &[Recording], names: &[String], panel: &Panel, curve: &Curve) -> fi
     let place = if panel.has_one_signal() { curve.run } else { curve.place };
     let own = Color::CURVES[place % Color::CURVES.len()];
     let (color, shape) = match curve.role {
-        Role::Reference => (Color(0, 0, 0), Shape::Pale),
+        Role::Reference => (Color::INK, Shape::Pale),
         Role::OwnReference => (own, Shape::Pale),
-        Role::Norm if runs.len() == 1 => (Color::GREY, Shape::Pale),
+        Role::Norm if runs.len() == 1 => (Color::INK, Shape::Bold),
+        Role::Signal if !panel.limits.is_empty() => (own, Shape::Thin),
         _ => (own, Shape::Line),
     };
     let (x, y) = (thin::times(&run.time), thin::values(&curve.values));

@@ -6,15 +6,14 @@ use std::fmt::Write as _;
 
 /// Returns the attributes of a curve's line. Lines in black are drawn in the ink of the page.
 pub(super) fn stroke(curve: &Curve, dashes: &Dashes) -> String {
-    let width = if curve.shape == Shape::Pale { 1.0 } else { 1.8 };
     let mut text = if curve.shape.is_straight() {
         "class=\"limit\"".to_string()
-    } else if curve.color == Color(0, 0, 0) {
+    } else if curve.color == Color::INK {
         "class=\"ink\"".to_string()
     } else {
         format!("stroke=\"{}\"", curve.color)
     };
-    let _ = write!(text, " stroke-width=\"{width}\"");
+    let _ = write!(text, " stroke-width=\"{}\"", curve.shape.width());
     if curve.shape == Shape::Pale {
         text.push_str(" stroke-opacity=\"0.6\"");
     }

@@ -195,7 +195,7 @@ fn draw_curve(out: &mut String, curve: &Curve, dashes: &Dashes, axes: &Axes) {
     let first = |values: &[f64]| values.first().copied().unwrap_or(f64::NAN);
     let area = format!("fill=\"{}\" fill-opacity=\"{}\"", curve.color, curve.shape.opacity());
     match &curve.shape {
-        Shape::Line | Shape::Pale | Shape::Dashed => {
+        Shape::Line | Shape::Thin | Shape::Bold | Shape::Pale | Shape::Dashed => {
             for run in axes.runs(&curve.x, &curve.y) {
                 let data = path(&thinned(&run));
                 let _ = write!(
