@@ -82,6 +82,15 @@ def test_the_cursor_shows_what_is_recorded(runs, opened):
     assert len(places) == 4 and len(set(places)) == 1
 
 
+def test_a_norm_that_has_a_limit_is_bold_and_the_verdict_names_what_it_looked_at(runs, opened):
+    page = opened(runs / "crmpc-robust" / "page.html")
+    widths = "paths => paths.map(path => Number(path.getAttribute('stroke-width')))"
+    drawn = [panel.locator("path.curve").evaluate_all(widths) for panel in page.locator(".panel").all()]
+    assert drawn[2] == drawn[3] == [3, 1, 1, 1] and drawn[1] == [1.8, 1.8, 1.8]
+    assert page.inner_text(".verdict") == "Within the limit: largest rate, largest moment."
+    assert page.locator(".verdict .good").count() == 1
+
+
 def test_keys_play_and_seek(runs, opened):
     page = opened(runs / "crmpc-robust" / "page.html")
     assert shown_time(page) == 0 and page.get_attribute("#play", "aria-label") == "Play"

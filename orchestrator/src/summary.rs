@@ -5,6 +5,7 @@ use cosim::experiment::{Coupling, Observe};
 use cosim::system::System;
 use cosim_report::guarantee::margins_text;
 use cosim_report::metrics::{Metrics, Value};
+use cosim_report::recording::SummaryLine;
 use fmu_import::quantity::rounded;
 use std::io::{self, Write};
 use std::path::PathBuf;
@@ -48,8 +49,8 @@ pub(crate) fn summary(system: &System, report: &RunReport, out: &mut impl Write)
         names.join(", ")
     )?;
     let mut line = |label: &str, text: String| writeln!(out, "  {label:<17} {text}");
-    for (label, text) in lines(&experiment.observe, metrics) {
-        line(&label, text)?;
+    for told in lines(&experiment.observe, metrics) {
+        line(&told.heading, told.text)?;
     }
     if experiment.observe.metrics.is_empty() {
         line("metrics", "none: the experiment defines none ([observe.metrics])".into())?;
@@ -104,10 +105,9 @@ pub(crate) fn summary(system: &System, report: &RunReport, out: &mut impl Write)
     line("results", format!("{}: {}", report.out.display(), report.files.join(", ")))
 }
 
-/// Returns the headings and texts of the lines for the metrics of a run and for its guarantee.
-pub(crate) fn lines(observe: &Observe, metrics: &Metrics) -> Vec<(String, String)> {
-    let guarantee = guarantee(metrics).map(|text| ("guarantee".to_string(), text));
-    metric_lines(observe, metrics).into_iter().chain(guarantee).collect()
+/// Returns the lines for the metrics of a run and for its guarantee.
+pub(crate) fn lines(observe: &Observe, metrics: &Metrics) -> Vec<SummaryLine> {
+    metric_lines(observe, metrics).into_iter().chain(guarantee(metrics)).collect()
 }
 
 /// Prints the outcome of a reproduction.
@@ -134,15 +134,16 @@ pub(crate) fn reproduction(report: &StudyReport, out: &mut impl Write) -> io::Re
     writeln!(out, "  in the same folder: {}", report.files[1..].join("; "))
 }
 
-/// Formats the ratio of a value to its limit.
-fn against(ratio: f64, limit: &str) -> String {
+/// Formats the ratio of a value to its limit, and returns whether the limit is kept.
+fn against(ratio: f64, limit: &str) -> (String, bool) {
     // A value that is not a number is not within a limit. A limit counts as met up to rounding.
-    let verdict = if ratio <= 1.0 + 1e-9 { "within" } else { "EXCEEDS" };
-    format!("   {verdict} its limit {limit}: {:.1} %", ratio * 100.0)
+    let is_within = ratio <= 1.0 + 1e-9;
+    let verdict = if is_within { "within" } else { "EXCEEDS" };
+    (format!("   {verdict} its limit {limit}: {:.1} %", ratio * 100.0), is_within)
 }
 
 /// Describes how the controller's guarantee fared, if the controller gives one.
-fn guarantee(metrics: &Metrics) -> Option<String> {
+fn guarantee(metrics: &Metrics) -> Option<SummaryLine> {
     let number = |name: &str| metrics.number(&format!("guarantee_{name}"));
     let share = number("share")?;
     let status =
@@ -163,12 +164,14 @@ fn guarantee(metrics: &Metrics) -> Option<String> {
         None => format!("in force throughout{margins}"),
     };
     let broken = number("broken") == Some(1.0);
-    Some(text + if broken { "; DEFECT: a limit was EXCEEDED while it was in force" } else { "" })
+    let defect = if broken { "; DEFECT: a limit was EXCEEDED while it was in force" } else { "" };
+    let is_within = broken.then_some(false);
+    Some(SummaryLine { heading: "guarantee".into(), text: text + defect, is_within })
 }
 
-/// Returns the lines for the metrics that the experiment lists in `summary`, as headings and texts.
-fn metric_lines(observe: &Observe, metrics: &Metrics) -> Vec<(String, String)> {
-    let mut lines: Vec<(String, String)> = Vec::new();
+/// Returns the lines for the metrics that the experiment lists in `summary`.
+fn metric_lines(observe: &Observe, metrics: &Metrics) -> Vec<SummaryLine> {
+    let mut lines: Vec<SummaryLine> = Vec::new();
     for name in &observe.summary {
         let (Some(measure), Some(value)) = (observe.metrics.get(name), metrics.asked.get(name))
         else {
@@ -186,18 +189,24 @@ fn metric_lines(observe: &Observe, metrics: &Metrics) -> Vec<(String, String)> {
             Some(Value::Text(text)) => text.clone(),
         };
         let number = |name: &String| metrics.number(name);
-        let compared = match (number(name), measure.limit.as_ref().and_then(number)) {
+        let (compared, is_within) = match (number(name), measure.limit.as_ref().and_then(number)) {
             (Some(value), Some(limit)) => {
-                against(value / limit, &format!("{}{unit}", shown(factor * limit)))
+                let (text, is) =
+                    against(value / limit, &format!("{}{unit}", shown(factor * limit)));
+                (text, Some(is))
             }
-            _ => String::new(),
+            _ => (String::new(), None),
         };
         let part =
             if measure.part.is_empty() { String::new() } else { format!("{} ", measure.part) };
         let text = format!("{part}{text}{unit}{compared}");
-        match lines.last_mut().filter(|(label, _)| *label == measure.label) {
-            Some((_, line)) => line.extend([", ", &text]),
-            None => lines.push((measure.label.clone(), text)),
+        match lines.last_mut().filter(|line| line.heading == measure.label) {
+            Some(line) => {
+                line.text.extend([", ", &text]);
+                // One limit that is exceeded decides.
+                line.is_within = [line.is_within, is_within].into_iter().flatten().min();
+            }
+            None => lines.push(SummaryLine { heading: measure.label.clone(), text, is_within }),
         }
     }
     lines
@@ -217,9 +226,12 @@ mod tests {
 
     #[test]
     fn a_limit_is_met_up_to_rounding() {
-        assert_eq!(against(1.0000000000000004, "1 N m"), "   within its limit 1 N m: 100.0 %");
-        assert_eq!(against(1.001, "1 N m"), "   EXCEEDS its limit 1 N m: 100.1 %");
-        assert!(against(f64::NAN, "1 N m").contains("EXCEEDS"));
+        let told = |ratio| against(ratio, "1 N m");
+        let within = "   within its limit 1 N m: 100.0 %".to_string();
+        assert_eq!(told(1.0000000000000004), (within, true));
+        assert_eq!(told(1.001), ("   EXCEEDS its limit 1 N m: 100.1 %".into(), false));
+        let (text, is_within) = told(f64::NAN);
+        assert!(text.contains("EXCEEDS") && !is_within);
     }
 
     #[test]
@@ -233,8 +245,9 @@ mod tests {
         };
         let (number, text) = (Value::Number, |text: &str| Value::Text(text.into()));
         let margins = [("moment_margin_min", number(0.012)), ("rate_margin_min", number(0.031))];
-        let told =
-            |asked: &[(&str, Value)]| guarantee(&metrics(&[asked, &margins].concat())).unwrap();
+        let told = |asked: &[(&str, Value)]| {
+            guarantee(&metrics(&[asked, &margins].concat())).unwrap().text
+        };
         let throughout = [("share", number(1.0)), ("status", text("inForce"))];
         assert_eq!(told(&throughout), "in force throughout, margins 1.2 % (moment), 3.1 % (rate)");
         let broken = [("share", number(1.0)), ("broken", Value::Flag(true))];
@@ -255,8 +268,12 @@ mod tests {
         ];
         assert_eq!(told(&lost), "in force at 97.2 % of the ticks, lost at t = 12.4 s (exceeded)");
         let never = metrics(&[("share", number(0.0)), ("status", text("refused"))]);
-        assert_eq!(guarantee(&never).unwrap(), "never in force (refused)");
-        assert_eq!(guarantee(&metrics(&[("share", number(1.0))])).unwrap(), "in force throughout");
+        assert_eq!(guarantee(&never).unwrap().text, "never in force (refused)");
+        let without_margins = guarantee(&metrics(&[("share", number(1.0))])).unwrap();
+        assert_eq!(without_margins.text, "in force throughout");
+        // Only a defect is a verdict on the limits.
+        assert_eq!(without_margins.is_within, None);
+        assert_eq!(guarantee(&metrics(&broken)).unwrap().is_within, Some(false));
     }
 
     #[test]
@@ -283,11 +300,16 @@ mod tests {
         let asked = values.map(|(name, value)| (name.to_string(), value.map(Value::Number)));
         let units = ["mean", "largest"].map(|name| (name.to_string(), "ms".to_string()));
         let metrics = Metrics { asked: asked.into(), units: units.into(), ..Metrics::default() };
+        let line = |heading: &str, text: &str, is_within| SummaryLine {
+            heading: heading.into(),
+            text: text.into(),
+            is_within,
+        };
         assert_eq!(
             metric_lines(&observe, &metrics),
             [
-                ("time".to_string(), "mean 4.0000e-4 ms, max 2.0000 ms".to_string()),
-                ("largest rate".into(), "6.0000   EXCEEDS its limit 5.0000: 120.0 %".into()),
+                line("time", "mean 4.0000e-4 ms, max 2.0000 ms", None),
+                line("largest rate", "6.0000   EXCEEDS its limit 5.0000: 120.0 %", Some(false)),
             ]
         );
     }

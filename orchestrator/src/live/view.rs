@@ -243,7 +243,7 @@ fn bars(state: &State) -> Vec<LineGauge<'static>> {
             let ratio = norm / limit;
             let color = if ratio <= 0.9 {
                 Color::LightGreen
-            } else if ratio <= 1.0 {
+            } else if ratio <= 1.0 + 1e-9 {
                 Color::LightYellow
             } else {
                 Color::LightRed

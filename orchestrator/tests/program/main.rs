@@ -18,3 +18,4 @@ mod table;
 mod timing;
 mod together;
 mod usage;
+mod verdicts;

@@ -32,10 +32,21 @@ pub struct Recording {
     pub observe: Observe,
     /// Values of all parameters.
     pub parameters: Vec<Parameter>,
-    /// Headings and texts of the run's summary.
-    pub summary: Vec<(String, String)>,
+    /// Lines of the run's summary.
+    pub summary: Vec<SummaryLine>,
     /// Version of the program that flew the run, and similar facts, by heading.
     pub origin: Vec<(String, String)>,
+}
+
+/// A line of a run's summary.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct SummaryLine {
+    /// Heading, which names what was measured.
+    pub heading: String,
+    /// Values as text.
+    pub text: String,
+    /// Whether what was measured is within its limits; `None` if it has none.
+    pub is_within: Option<bool>,
 }
 
 /// A variable over time.

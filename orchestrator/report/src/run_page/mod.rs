@@ -6,7 +6,7 @@ pub mod figure;
 pub mod thin;
 
 use crate::recording::panels::Panel;
-use crate::recording::{Parameter, Recording};
+use crate::recording::{Parameter, Recording, SummaryLine};
 use cosim::error::Error;
 use cosim::files;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
@@ -82,24 +82,24 @@ fn page(runs: &[Recording], panels: &[Panel]) -> String {
     markup.into_string()
 }
 
-/// Returns the outcome of a run in one line.
+/// Returns the outcome of a run in one line: what was compared with a limit, and how the run ended.
 fn verdict(run: &Recording, named: bool) -> Markup {
-    let exceeded: Vec<&str> = run
-        .summary
-        .iter()
-        .filter(|(_, text)| text.contains("EXCEEDS") || text.contains("DEFECT"))
-        .map(|(heading, _)| heading.as_str())
-        .collect();
-    let limited = run.summary.iter().any(|(_, text)| text.contains("limit"));
+    let of = |verdict| {
+        let lines = run.summary.iter().filter(move |line| line.is_within == Some(verdict));
+        lines.map(|line| line.heading.as_str()).collect::<Vec<_>>().join(", ")
+    };
+    let (exceeded, kept) = (of(false), of(true));
+    let completed = run.status == "completed" || run.status.is_empty();
     html! {
         p.verdict {
             @if named { (run.name) ": " }
             @if !exceeded.is_empty() {
-                span.light.bad {} "Beyond a limit: " (exceeded.join(", ")) "."
-            } @else if limited {
-                span.light.good {} "Every limit is kept."
+                span.light.bad {} "Beyond a limit: " (exceeded) ". "
+            } @else if !kept.is_empty() && completed {
+                span.light.good {}
             }
-            @if run.status != "completed" && !run.status.is_empty() { " " (run.status) "." }
+            @if !kept.is_empty() { "Within the limit: " (kept) "." }
+            @if !completed { " " (run.status) "." }
         }
     }
 }
@@ -128,24 +128,26 @@ fn vehicle(place: usize, run: &Recording, named: bool) -> Markup {
 
 /// Returns the headings of all summaries with the texts of each run.
 fn summary(runs: &[Recording]) -> Markup {
-    let mut lines: Vec<(&str, Vec<&str>)> = Vec::new();
+    let mut lines: Vec<(&str, Vec<Option<&SummaryLine>>)> = Vec::new();
     for (place, run) in runs.iter().enumerate() {
-        for (heading, text) in &run.summary {
-            let there = lines.iter().position(|(other, _)| other == heading);
+        for line in &run.summary {
+            let there = lines.iter().position(|(other, _)| *other == line.heading);
             let position = there.unwrap_or(lines.len());
             if position == lines.len() {
-                lines.push((heading, vec![""; runs.len()]));
+                lines.push((&line.heading, vec![None; runs.len()]));
             }
-            lines[position].1[place] = text;
+            lines[position].1[place] = Some(line);
         }
     }
     html! {
         @if lines.is_empty() { p.note { "The experiment defines no metrics." } }
         div.scroll { table {
             @if runs.len() > 1 { thead { tr { th {} @for run in runs { th { (run.name) } } } } }
-            tbody { @for (heading, texts) in &lines { tr {
+            tbody { @for (heading, told) in &lines { tr {
                 th scope="row" { (heading) }
-                @for text in texts { td class=[text.contains("EXCEEDS").then_some("bad")] { (text.replace(" %", "\u{a0}%")) } }
+                @for line in told { td class=[line.filter(|line| line.is_within == Some(false)).map(|_| "bad")] {
+                    (line.map_or(String::new(), |line| line.text.replace(" %", "\u{a0}%")))
+                } }
             } } }
         } }
     }
@@ -190,4 +192,56 @@ fn origin(runs: &[Recording]) -> Markup {
             dl { @for (heading, text) in &run.origin { dt { (heading) } dd { (text) } } }
         }
     } }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn line(heading: &str, is_within: Option<bool>) -> SummaryLine {
+        SummaryLine { heading: heading.into(), text: "1.0".into(), is_within }
+    }
+
+    /// Returns the text of a verdict, and the lights in it.
+    fn told(lines: &[SummaryLine], status: &str) -> (String, Vec<&'static str>) {
+        let (summary, status) = (lines.to_vec(), status.to_string());
+        let markup = verdict(&Recording { summary, status, ..Recording::default() }, false);
+        let html = markup.into_string();
+        let lights = ["good", "bad"].into_iter().filter(|light| html.contains(*light)).collect();
+        let text = html.split('<').filter_map(|part| part.split_once('>'));
+        (text.map(|(_, text)| text).collect::<String>().trim().to_string(), lights)
+    }
+
+    #[test]
+    fn a_verdict_lists_what_it_looked_at_and_says_what_is_beyond_its_limit() {
+        let (rate, load) = (line("largest rate", Some(true)), line("largest load", None));
+        let within = "Within the limit: largest rate.".to_string();
+        let lines = [rate.clone(), load.clone()];
+        assert_eq!(told(&lines, "completed"), (within.clone(), vec!["good"]));
+        let both = [lines[0].clone(), line("largest moment", Some(false))];
+        assert_eq!(
+            told(&both, ""),
+            (format!("Beyond a limit: largest moment. {within}"), vec!["bad"])
+        );
+        // What is compared with no limit has no verdict.
+        assert_eq!(told(&[load], "completed"), (String::new(), vec![]));
+        // A run that was lost is not good, whatever it kept until then.
+        assert_eq!(
+            told(&[rate], "attitude lost at 3 s"),
+            (format!("{within} attitude lost at 3 s."), vec![])
+        );
+    }
+
+    #[test]
+    fn what_is_beyond_its_limit_stands_out_in_the_summary() {
+        let summary = |is_within| {
+            let run = Recording { summary: vec![line("rate", is_within)], ..Recording::default() };
+            super::summary(&[run]).into_string()
+        };
+        assert!(summary(Some(false)).contains("class=\"bad\""));
+        assert!(
+            !summary(Some(true)).contains("class=\"bad\"")
+                && !summary(None).contains("class=\"bad\"")
+        );
+    }
 }

@@ -187,6 +187,23 @@ fn the_guarantee_has_a_line_that_turns_red_when_it_is_lost() {
 }
 
 #[test]
+fn a_limit_that_is_exceeded_under_guarantee_is_a_defect_in_red() {
+    let mut state = State::new(Scene { span: [0.0, 1.0], ..Scene::default() });
+    let mut told = |broken: bool| {
+        let mut course = GuaranteeRecord::new(GuaranteeSignals::default());
+        course.broken = broken;
+        let (values, guarantee) = (vec![1.0], Some(course));
+        let snapshot = Snapshot { time: Some(0.0), values, guarantee, ..Snapshot::default() };
+        state.see_after(&snapshot, Duration::ZERO);
+        let line = super::guarantee(&state).unwrap();
+        (line.to_string(), line.spans[1].style.fg == Some(Color::LightRed))
+    };
+    assert_eq!(told(false), ("guarantee  in force".into(), false));
+    let defect = "guarantee  in force; DEFECT: a limit was EXCEEDED in force";
+    assert_eq!(told(true), (defect.into(), true));
+}
+
+#[test]
 fn without_panels_what_is_recorded_is_shown() {
     let recorded = vec![probed("gain.output", 0, "m", &[]), probed("plant.steps", 1, "", &[])];
     let mut state =

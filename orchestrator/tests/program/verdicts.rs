@@ -1,0 +1,178 @@
+//! Every verdict that the program prints, or writes on a page, where it is good and where it is
+//! not. The loop's integrator has the values (1 + gain)^k at tick k, up to 3.
+
+use crate::bench::{Bench, LOOP};
+use crate::campaign::{CAMPAIGN, RANDOM, bench};
+use std::fs;
+
+fn page(bench: &Bench, name: &str) -> String {
+    fs::read_to_string(bench.path(name)).unwrap()
+}
+
+fn told(bench: &Bench, arguments: &[&str]) -> String {
+    let (code, said, errors) = bench.call(arguments);
+    assert_eq!(code, 0, "{errors}");
+    said
+}
+
+#[test]
+fn a_run_names_what_is_within_and_what_is_beyond_its_limit() {
+    let section = r#"
+[observe]
+summary = ["largest", "first", "bound"]
+[observe.signals]
+out = ["plant.output.integral"]
+bound = ["gain.largest"]
+direct = ["gain.output.direct"]
+[observe.metrics]
+largest = { label = "largest value", kind = "largest", signals = "out", limit = "bound" }
+first = { label = "direct value", kind = "largest", signals = "direct", limit = "bound" }
+bound = { label = "bound", kind = "last", signals = "bound" }
+"#;
+    let bench = Bench::with(&format!("{LOOP}{section}"));
+    let outcome = |largest: &str| {
+        let set = format!("gain.largest={largest}");
+        let arguments = ["--page", "--set", "gain.gain=0.5", "--set", &set];
+        let (code, said, errors) = bench.run(&arguments);
+        assert_eq!(code, 0, "{errors}");
+        let page = page(&bench, "out/loop/page.html");
+        let verdict = page.split_once("<p class=\"verdict\">").unwrap().1;
+        (said, verdict.split_once("</p>").unwrap().0.to_string())
+    };
+    // The integral comes to 3.375; the gain responds last to 2.25, by half of it.
+    let (said, verdict) = outcome("4");
+    assert_eq!(said.matches("within its limit 4").count(), 2, "{said}");
+    assert!(!said.contains("EXCEEDS") && !said.contains("DEFECT"), "{said}");
+    assert!(verdict.contains("light good"), "{verdict}");
+    assert!(verdict.ends_with("Within the limit: largest value, direct value."), "{verdict}");
+    let (said, verdict) = outcome("3");
+    assert!(said.contains("3.3750 m   EXCEEDS its limit 3"), "{said}");
+    assert!(said.contains("1.1250 m   within its limit 3"), "{said}");
+    assert!(verdict.contains("light bad") && !verdict.contains("light good"), "{verdict}");
+    assert!(verdict.contains("Beyond a limit: largest value."), "{verdict}");
+    assert!(verdict.ends_with("Within the limit: direct value."), "{verdict}");
+    let (said, verdict) = outcome("1");
+    assert_eq!(said.matches("EXCEEDS its limit 1").count(), 2, "{said}");
+    assert!(!verdict.contains("Within"), "{verdict}");
+}
+
+#[test]
+fn a_limit_that_is_exceeded_under_a_guarantee_is_called_a_defect() {
+    let section = r#"
+[observe.signals]
+ratio = ["plant.output.integral / gain.gain"]
+[observe.guarantee]
+in_force = "gain.guarantee.inForce"
+keeps = "ratio"
+"#;
+    let bench = Bench::with(&format!("{LOOP}{section}"));
+    let outcome = |largest: &str| {
+        let largest = format!("gain.largest={largest}");
+        let (code, said, errors) =
+            bench.run(&["--page", "--set", "gain.gain=4", "--set", &largest]);
+        assert_eq!(code, 0, "{errors}");
+        let line = said.lines().find(|line| line.starts_with("  guarantee ")).unwrap();
+        (line.to_string(), page(&bench, "out/loop/page.html"))
+    };
+    // The integral is 1, 5, 25, and the limit is 4. The guarantee is in force up to `largest`.
+    let (line, page) = outcome("1000");
+    assert!(line.ends_with("DEFECT: a limit was EXCEEDED while it was in force"), "{line}");
+    assert!(page.contains("Beyond a limit: guarantee."), "{page}");
+    let (line, page) = outcome("1");
+    assert!(line.contains("lost at t = 1 s") && !line.contains("DEFECT"), "{line}");
+    assert!(!page.contains("Beyond a limit"), "{page}");
+}
+
+#[test]
+fn a_campaign_says_which_limits_are_kept_and_which_are_broken() {
+    let campaign = CAMPAIGN.replace("[1e9, 2.0]", "[1e9]");
+    let all_kept = bench(&campaign.replace("at_most = 8.0", "at_most = 27.0"));
+    let said = told(&all_kept, &["campaign", "c.toml"]);
+    assert!(said.contains("broken by 0 of 3, probability at most"), "{said}");
+    let text = page(&all_kept, "out/c/report.html");
+    assert!(text.contains("kept by all") && !text.contains("verdict not"), "{text}");
+    let broken = bench(&campaign);
+    let said = told(&broken, &["campaign", "c.toml"]);
+    assert!(said.contains("broken by 1 of 3, probability "), "{said}");
+    let text = page(&broken, "out/c/report.html");
+    assert!(!text.contains("kept by all"), "{text}");
+    assert!(text.contains("<span class=\"verdict not\">broken</span>"), "{text}");
+}
+
+#[test]
+fn a_question_is_answered_by_yes_by_no_or_not_at_all() {
+    // (1 + gain)^3 is above 7.9 with a probability of 0.0084.
+    for (below, cases, word, class) in [
+        (0.2, 1100, "yes", "verdict holds"),
+        (0.001, 20_000, "no", "verdict not"),
+        (0.008, 300, "not decided", "verdict partly"),
+    ] {
+        let text = format!("{RANDOM}[until]\nlimit = \"small\"\nbelow = {below}\n");
+        let bench = bench(&text.replace("cases = 1100", &format!("cases = {cases}")));
+        let said = told(&bench, &["campaign", "c.toml"]);
+        let line = format!("P(small broken) < {below} with 95 %: {word}\n");
+        assert!(said.contains(&line), "{said}");
+        let text = page(&bench, "out/c/report.html");
+        assert!(text.contains(&format!("<span class=\"{class}\">{word}</span>")), "{text}");
+    }
+}
+
+#[test]
+fn a_search_says_whether_the_worst_case_breaks_a_limit() {
+    for (bound, breaks) in [("9.0", false), ("7.0", true)] {
+        let text = format!("{RANDOM}[search]\nlargest = \"last\"\ncases = 60\n");
+        let bench = bench(&text.replace("at_most = 7.9", &format!("at_most = {bound}")));
+        let said = told(&bench, &["falsify", "c.toml", "--out", "w"]);
+        assert_eq!(said.contains("breaks small"), breaks, "{said}");
+        let text = page(&bench, "w/report.html");
+        let verdicts = |class: &str, word: &str| {
+            text.matches(&format!("<span class=\"{class}\">{word}</span>")).count()
+        };
+        // Once for the measure that was looked for, once for the limit.
+        let (kept, broken) = if breaks { (0, 2) } else { (2, 0) };
+        assert_eq!(verdicts("verdict holds", "kept"), kept, "{text}");
+        assert_eq!(verdicts("verdict not", "broken"), broken, "{text}");
+    }
+}
+
+#[test]
+fn a_study_says_of_each_claim_whether_it_holds() {
+    let bench = Bench::new();
+    let study = r##"
+title = "gains"
+paper = "-"
+summary = "-"
+values = []
+run = [{ id = "a", label = "a", color = "#000000", experiment = "loop.toml", measures = ["last", "never"], set = { "gain.gain" = 1.0 } }]
+signals.out = ["plant.output.integral"]
+measure = [
+    { id = "last", kind = "last", signals = "out" },
+    { id = "never", kind = "leaving", signals = "out", bound = 1e9 },
+]
+claim = [
+    { says = "It ends below nine.", source = "-", check = [{ label = "end", left = "a.measure.last", right = 9.0 }] },
+    { says = "It ends below eight.", source = "-", check = [{ label = "end", left = "a.measure.last", right = 8.0 }] },
+    { says = "It ends between.", source = "-", check = [
+        { label = "below", left = "a.measure.last", right = 9.0 },
+        { label = "above", relation = "above", left = "a.measure.last", right = 9.0 },
+    ] },
+    { says = "It leaves late.", source = "-", check = [{ label = "time", left = "a.measure.never", right = 9.0 }] },
+]
+"##;
+    fs::write(bench.path("study.toml"), study).unwrap();
+    let said = told(&bench, &["reproduce", "study.toml", "--out", "s", "--fmu-dir", "."]);
+    let text = page(&bench, "s/report.html");
+    for (verdict, class, claim) in [
+        ("holds", "verdict holds", "It ends below nine."),
+        ("does not hold", "verdict not", "It ends below eight."),
+        ("holds partly", "verdict partly", "It ends between."),
+        ("not judged", "verdict", "It leaves late."),
+    ] {
+        assert!(said.contains(&format!("  {verdict:<14} {claim}\n")), "{said}");
+        let line = format!("<span class=\"{class}\">{verdict}</span><span>{claim}</span>");
+        assert!(text.contains(&line), "{verdict}: {text}");
+    }
+    assert!(
+        text.contains("Of 4 claims, 1 holds, 1 holds in part, 1 does not hold, 1 is not judged.")
+    );
+}
