@@ -1,10 +1,13 @@
 //! Tables of numbers.
 
 use crate::comparisons::{ComparisonRow, ComparisonTable, Overview};
+use crate::definition::Study;
 use crate::results::{Numbers, Results};
 use crate::texts::{difference, several, shown, signed};
 use crate::values::{Quantity, ValueKind};
+use cosim_report::figure::Color;
 use maud::{Markup, html};
+use std::collections::BTreeSet;
 
 /// Rows and columns of the table on the first screen.
 const ROWS: usize = 9;
@@ -79,6 +82,21 @@ pub(super) fn overview(overview: &Overview, results: &Results) -> Markup {
     rows(overview, results, &several)
 }
 
+/// Returns what the figures draw in a colour: the names of runs, and of lines through runs.
+fn names(study: &Study, color: Color) -> BTreeSet<&String> {
+    let panels =
+        study.figures.iter().flat_map(|figure| figure.panels.iter().map(move |p| (figure, p)));
+    let curves = panels.flat_map(|(figure, panel)| {
+        let lines = panel.across.iter().flat_map(|across| &across.lines);
+        // Signals with names of their own have colours of their own.
+        let is_by_run = panel.signals.is_empty() && panel.across.is_none();
+        let runs = study.runs_of(figure, panel).filter(move |_| is_by_run);
+        let runs = runs.map(|run| (run.color, &run.label));
+        runs.chain(lines.map(|line| (line.color, &line.label)))
+    });
+    curves.filter(|(other, _)| *other == color).map(|(_, name)| name).collect()
+}
+
 fn mean(numbers: &Numbers) -> String {
     if numbers.0.is_empty() { "–".into() } else { shown(numbers.mean()) }
 }
@@ -104,7 +122,12 @@ fn rows(overview: &Overview, results: &Results, cell: &dyn Fn(&Numbers) -> Strin
                         tr.group { th colspan=(overview.metrics.len() + 1) { (run.group) } }
                     }
                     tr {
-                        td { span.swatch style=(format!("background:{}", run.color)) {} " " (run.label) }
+                        td {
+                            @if names(results.study, run.color).into_iter().eq([&run.label]) {
+                                span.swatch style=(format!("background:{}", run.color)) {} " "
+                            }
+                            (run.label)
+                        }
                         @for numbers in numbers { td { (cell(numbers)) } }
                     }
                 }
@@ -135,5 +158,77 @@ pub(super) fn all_values(results: &Results) -> Markup {
                 }
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::results::RunResult;
+    use std::fs;
+    use std::path::Path;
+
+    fn study(path: &Path) -> Study {
+        Study::load(path).unwrap()
+    }
+
+    #[test]
+    fn in_the_figures_of_a_shipped_study_a_run_has_one_colour_and_a_colour_one_run() {
+        let experiments = Path::new(env!("CARGO_MANIFEST_DIR")).join("../experiments");
+        let paths = fs::read_dir(experiments).unwrap().map(|entry| entry.unwrap().path());
+        let studies: Vec<_> =
+            paths.map(|folder| folder.join("study.toml")).filter(|p| p.is_file()).collect();
+        assert!(studies.len() >= 8);
+        for path in studies {
+            let study = study(&path);
+            let colors: BTreeSet<String> =
+                study.runs.iter().map(|run| run.color.to_string()).collect();
+            let mut seen: BTreeSet<&String> = BTreeSet::new();
+            for color in colors {
+                let names = names(&study, Color::try_from(color.clone()).unwrap());
+                assert!(names.len() < 2, "{}: {color} is {names:?}", path.display());
+                for name in names {
+                    assert!(seen.insert(name), "{}: {name} has two colours", path.display());
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_swatch_stands_beside_a_run_only_if_its_colour_names_this_run_in_the_figures() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("study.toml");
+        let swatches = |figure: &str| {
+            let text = format!(
+                r##"title = ""
+                paper = ""
+                summary = ""
+                values = []
+                run = [
+                    {{ id = "a", label = "light", color = "#e69f00", experiment = "x.toml" }},
+                    {{ id = "b", label = "heavy", color = "#e69f00", experiment = "x.toml" }},
+                ]
+                overview = [{{ title = "", runs = ["a", "b"], metrics = [{{ of = "x", label = "x" }}] }}]
+                {figure}"##
+            );
+            fs::write(&path, text).unwrap();
+            let study = study(&path);
+            let runs = vec![RunResult::default(); study.runs.len()];
+            let text =
+                overview(&study.overviews[0], &Results { study: &study, runs }).into_string();
+            let rows =
+                text.split("<td>").filter(|cell| cell.contains("light") || cell.contains("heavy"));
+            rows.map(|cell| cell.contains("swatch")).collect::<Vec<_>>()
+        };
+        let figure = |runs: &str| {
+            format!(
+                r#"figure = [{{ id = "f", title = "", runs = [{runs}], panel = [{{ label = "x", signal = "a.b" }}] }}]"#
+            )
+        };
+        assert_eq!(swatches(&figure(r#""a""#)), [true, false]);
+        assert_eq!(swatches(&figure(r#""b""#)), [false, true]);
+        // In the colour of both, neither can be told.
+        assert_eq!(swatches(&figure(r#""a", "b""#)), [false, false]);
+        assert_eq!(swatches(""), [false, false]);
     }
 }
