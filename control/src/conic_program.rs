@@ -41,7 +41,7 @@ impl Triplets {
 /// The program: minimise ½ xᵀP x + qᵀx subject to A x + s = b, with s in a product of cones. The
 /// vectors are the solver's data, which may be changed between solutions.
 pub(crate) struct ConicProgram {
-    solver: DefaultSolver<f64>,
+    solver: Box<DefaultSolver<f64>>,
     /// Values of P, upper triangle in compressed columns.
     pub(crate) cost: Vec<f64>,
     /// Linear cost vector q.
@@ -74,6 +74,7 @@ impl ConicProgram {
         let linear_cost = vec![0.0; cost.n];
         let settings = solver_settings(max_iterations);
         let solver = DefaultSolver::new(&cost, &linear_cost, &matrix, &right_side, cones, settings)
+            .map(Box::new)
             .map_err(|error| error.to_string())?;
         Ok(Self { solver, cost: cost.nzval, linear_cost, matrix: matrix.nzval, right_side })
     }

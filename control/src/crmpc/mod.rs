@@ -78,13 +78,19 @@ impl Crmpc {
     /// Returns an error that names the setting at fault.
     pub fn new(settings: Settings) -> Result<Self, DesignError> {
         let design = Design::new(&settings)?;
-        let set: Box<dyn ConstraintSet> = match settings.constraints {
-            Constraints::Robust => Box::new(Robust::new(&settings, &design)),
-            Constraints::Paper => Box::new(Paper::new(&settings, &design)?),
-        };
+        let set = Self::set(&settings, &design)?;
         let windows = (set.terminal_radius().is_some(), set.window_margin());
         let planner = Planner::new(&settings, &design, windows)?;
         Ok(Self { settings, design, set, planner })
+    }
+
+    /// Returns the constraints. What they need of the stack is not added to what the planner needs.
+    #[inline(never)]
+    fn set(settings: &Settings, design: &Design) -> Result<Box<dyn ConstraintSet>, DesignError> {
+        Ok(match settings.constraints {
+            Constraints::Robust => Box::new(Robust::new(settings, design)),
+            Constraints::Paper => Box::new(Paper::new(settings, design)?),
+        })
     }
 
     /// Returns the result of the offline design.

@@ -37,7 +37,7 @@ const SMALLEST_DISTURBANCE: f64 = 1e-5;
 /// The optimiser with its scratch memory.
 pub(super) struct Planner {
     pub settings: Settings,
-    pub optimiser: Optimiser<2>,
+    pub optimiser: Box<Optimiser<2>>,
     /// The plan as errors from the reference.
     pub previous: ErrorTrajectory<2>,
     chain: Chain<2>,
@@ -98,7 +98,7 @@ impl Planner {
         };
         Ok(Self {
             settings: *settings,
-            optimiser,
+            optimiser: Box::new(optimiser),
             previous: ErrorTrajectory::new(n),
             chain,
             affine: vec![[Vector3::zeros(); 2]; n],

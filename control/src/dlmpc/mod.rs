@@ -86,7 +86,7 @@ pub struct Dlmpc {
     /// Gains κ of the terminal law v = Θ̇_r − κ (Θ − Θ_r).
     gains: Vector3<f64>,
     rates: RateLimit,
-    optimiser: Optimiser<1>,
+    optimiser: Box<Optimiser<1>>,
     // Scratch memory of one optimisation.
     affine: Vec<State<1>>,
     previous: ErrorTrajectory<1>,
@@ -128,7 +128,7 @@ impl Dlmpc {
                 limit: settings.limit_rate,
                 references: vec![Reference::default(); n + 1],
             },
-            optimiser,
+            optimiser: Box::new(optimiser),
             affine: vec![[Vector3::zeros()]; n],
             previous: ErrorTrajectory::new(n),
             settings,

@@ -101,15 +101,16 @@ pub trait SampledInstance: Serialize + DeserializeOwned + Send + Sized + 'static
     }
 }
 
-/// An instance that works at ticks, in the form that FMI requires.
+/// An instance that works at ticks, in the form that FMI requires. Its parts are in boxes, as a host
+/// may have little stack.
 #[derive(Serialize, Deserialize)]
 #[serde(bound = "")]
 pub struct SampledFmu<I: SampledInstance> {
-    instance: I,
+    instance: Box<I>,
     /// Ticks of the instance; present from initialization on.
-    ticks: Option<Ticks<I>>,
+    ticks: Option<Box<Ticks<I>>>,
     #[serde(skip)]
-    device: Option<I::Device>,
+    device: Option<Box<I::Device>>,
 }
 
 impl<I: SampledInstance> Deref for SampledFmu<I> {
@@ -123,6 +124,22 @@ impl<I: SampledInstance> DerefMut for SampledFmu<I> {
     fn deref_mut(&mut self) -> &mut I {
         &mut self.instance
     }
+}
+
+/// Takes the device that is there, if the instance would build the same one, or builds it.
+fn designed<I: SampledInstance>(
+    instance: &I,
+    present: &mut Option<Box<I::Device>>,
+) -> Result<Box<I::Device>, Failure> {
+    let same = |device: &mut Box<I::Device>| instance.is_designed(device);
+    present.take_if(same).map_or_else(|| instance.design().map(Box::new), Ok)
+}
+
+/// Returns the state before the first tick. What it needs of the stack is not added to what the
+/// design needs.
+#[inline(never)]
+fn first<I: SampledInstance>(start: f64, device: &I::Device) -> Box<Ticks<I>> {
+    Box::new(Sampled::new(start, I::period(device), I::memory(device)))
 }
 
 /// Returns the error for a saved state that no instance can have been in.
@@ -146,7 +163,7 @@ impl<I: SampledInstance> Model for SampledFmu<I> {
     }
 
     fn new() -> Self {
-        Self { instance: I::new(), ticks: None, device: None }
+        Self { instance: Box::new(I::new()), ticks: None, device: None }
     }
 
     fn reset(&mut self) {
@@ -155,12 +172,10 @@ impl<I: SampledInstance> Model for SampledFmu<I> {
 
     fn initialize(&mut self, context: &Context) -> Result<(), Failure> {
         self.instance.load(context)?;
-        let same = |device: &mut I::Device| self.instance.is_designed(device);
-        let device = self.device.take_if(same).map_or_else(|| self.instance.design(), Ok)?;
+        let device = designed(&*self.instance, &mut self.device)?;
         vehicle::time::check_resolution(context.start_time, I::period(&device))
             .map_err(|error| Failure::Error(error.to_string()))?;
-        self.ticks = Some(Sampled::new(context.start_time, I::period(&device), I::memory(&device)));
-        self.device = Some(device);
+        (self.ticks, self.device) = (Some(first::<I>(context.start_time, &device)), Some(device));
         Ok(())
     }
 
@@ -213,8 +228,7 @@ impl<I: SampledInstance> Model for SampledFmu<I> {
         if let Some(problem) = self.instance.problem(&from.before.instance) {
             return misfit(problem);
         }
-        let same = |device: &mut I::Device| self.instance.is_designed(device);
-        let device = from.before.device.take_if(same).map_or_else(|| self.instance.design(), Ok)?;
+        let device = designed(&*self.instance, &mut from.before.device)?;
         let times = (from.start_time, from.time);
         if ticks.fits(times, I::period(&device), from.failed, |memory| I::fits(&device, memory)) {
             self.device = Some(device);
