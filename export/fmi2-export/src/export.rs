@@ -46,7 +46,7 @@ macro_rules! export_fmus {
                 shell::fmu_model_descriptions(&EXPORTS)
             }
             #[unsafe(no_mangle)]
-            pub unsafe extern "C" fn fmi2Instantiate(
+            pub unsafe extern "C-unwind" fn fmi2Instantiate(
                 name: *const c_char,
                 fmu_type: c_int,
                 guid: *const c_char,
@@ -117,13 +117,14 @@ macro_rules! export_fmus {
     };
 }
 
-/// Defines exported functions that call the shell's functions of the same name.
+/// Defines exported functions that call the shell's functions of the same name. An exception that
+/// the importer's logger throws may pass through them.
 #[doc(hidden)]
 #[macro_export]
 macro_rules! forward {
     ($($name:ident($($argument:ident: $type:ty),*) -> $result:ty;)*) => {$(
         #[unsafe(no_mangle)]
-        pub unsafe extern "C" fn $name($($argument: $type),*) -> $result {
+        pub unsafe extern "C-unwind" fn $name($($argument: $type),*) -> $result {
             unsafe { shell::$name($($argument),*) }
         }
     )*};

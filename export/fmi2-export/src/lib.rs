@@ -12,9 +12,11 @@
 //! | `pointer` | the checks of the importer's pointers |
 //! | `logger`, `resource`, `saved` | messages, the resource URI, the bytes of a saved state |
 //!
-//! Every entry point stops a panic: it returns `fmi2Fatal`, reports it in the log, and leaves the
-//! process and all other instances alone. The process-wide panic hook is not changed, so the
-//! standard hook writes one line to stderr, and a panic is always a defect.
+//! Every entry point works in the default floating-point environment, whatever that of the importer
+//! is, so that it gives the same bits in all of them. It stops a panic: it returns `fmi2Fatal`,
+//! reports it in the log, and leaves the process and all other instances alone. The process-wide
+//! panic hook is not changed, so the standard hook writes one line to stderr, and a panic is always
+//! a defect.
 #![cfg_attr(not(test), deny(clippy::disallowed_methods))]
 
 mod call;

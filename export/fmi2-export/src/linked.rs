@@ -45,7 +45,7 @@ impl Linked {
         let setting = Setting {
             guid: guid.clone(),
             interface: Interface::CoSimulation,
-            logger: Logger::listing(),
+            logger: Logger::of_warnings(),
             resources: None,
         };
         let instance = Instance::new(export, description.clone(), setting);
@@ -145,7 +145,7 @@ impl Linked {
 
     /// Returns the warnings since the last call of this function.
     pub fn take_warnings(&mut self) -> Vec<String> {
-        self.instance.logger().take_warnings()
+        self.instance.logger().take()
     }
 
     fn call(&mut self, call: &Call, body: impl FnOnce(&mut Instance) -> Outcome) -> Outcome {

@@ -1,14 +1,20 @@
 //! Messages to the importer, which leave the FMU through the importer's callback only.
 //!
-//! Errors and fatal errors are always reported, so that nobody has to repeat a run with logging on
-//! to find them. Everything else is reported only while logging is on (`loggingOn` of
-//! fmi2Instantiate, fmi2SetDebugLogging), and then only in the chosen categories.
+//! The reason of every failure is always reported, so that nobody has to repeat a run with logging
+//! on to find it: errors, discarded calls and the end of a simulation. FMI 2.0.4, section 2.1.3, has
+//! the logger called for these statuses whatever `loggingOn` is; for fmi2Discard the importer's
+//! logger decides whether to show the message. Everything else is reported only while logging is on
+//! (`loggingOn` of fmi2Instantiate, fmi2SetDebugLogging), and then only in the chosen categories.
+//!
+//! Messages are delivered at the end of a call, when the instance has done its work: an importer in
+//! C++ may throw an exception in its logger, which then passes through the call to the importer.
+//! Rust could not let it pass in the midst of the work, where panics are caught.
 #![allow(unsafe_code)]
 
 use crate::types::{Callbacks, FmiStatus, LogCallback};
 use model_description::LOG_CATEGORIES;
-use std::cell::RefCell;
 use std::ffi::{CString, c_void};
+use std::mem;
 
 /// Log category, one for each row of [`LOG_CATEGORIES`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -51,12 +57,13 @@ pub(crate) struct Logger {
     instance: CString,
     /// Bit set of the categories that are reported.
     active: u8,
-    /// Warnings for a program that is linked with the FMU.
-    warnings: Option<RefCell<Vec<String>>>,
+    /// Messages that are not delivered yet.
+    messages: Vec<(Category, String)>,
 }
 
 const EVERYTHING: u8 = u8::MAX;
-const ALWAYS: u8 = 1 << Category::Error as u8 | 1 << Category::Fatal as u8;
+const ALWAYS: u8 =
+    1 << Category::Discard as u8 | 1 << Category::Error as u8 | 1 << Category::Fatal as u8;
 
 impl Logger {
     /// Copies the parts of `callbacks` that are needed, because the importer may free them
@@ -68,19 +75,20 @@ impl Logger {
                 .map_or(std::ptr::null_mut(), |callbacks| callbacks.component_environment),
             instance,
             active: if on { EVERYTHING } else { ALWAYS },
-            warnings: None,
+            messages: Vec::new(),
         }
     }
 
-    /// Returns a logger that lists warnings until they are taken, and reports nothing else: who is
+    /// Returns a logger that keeps warnings until they are taken, and reports nothing else: who is
     /// linked with the FMU gets failures as results.
-    pub(crate) fn listing() -> Self {
-        Self { warnings: Some(RefCell::default()), ..Self::new(None, CString::default(), false) }
+    pub(crate) fn of_warnings() -> Self {
+        let active = 1 << Category::Warning as u8;
+        Self { active, ..Self::new(None, CString::default(), false) }
     }
 
-    /// Returns the listed warnings, which are then forgotten.
-    pub(crate) fn take_warnings(&mut self) -> Vec<String> {
-        self.warnings.as_mut().map(|list| std::mem::take(list.get_mut())).unwrap_or_default()
+    /// Returns the texts that are not delivered, which are then forgotten.
+    pub(crate) fn take(&mut self) -> Vec<String> {
+        mem::take(&mut self.messages).into_iter().map(|(_, text)| text).collect()
     }
 
     /// Switches the named categories on or off, or all if none is named. Returns a name that is not
@@ -101,27 +109,36 @@ impl Logger {
         unknown
     }
 
-    pub(crate) fn log(&self, category: Category, text: &str) {
-        if let (Category::Warning, Some(list)) = (category, &self.warnings) {
-            list.borrow_mut().push(text.into());
+    /// Keeps a message until it is delivered, if its category is reported.
+    pub(crate) fn log(&mut self, category: Category, text: &str) {
+        if self.active & (1 << category as u8) != 0 {
+            self.messages.push((category, text.into()));
         }
-        let Some(callback) = self.callback else { return };
-        if self.active & (1 << category as u8) == 0 {
+    }
+
+    /// Delivers all messages. An exception of the importer's logger passes through, and the
+    /// messages that follow are lost. So nothing that catches panics may call this.
+    pub(crate) fn deliver(&mut self) {
+        if self.messages.is_empty() {
             return;
         }
-        let message = to_c(text);
-        let category_name = to_c(category.name());
-        // SAFETY: the callback is the importer's function and gets its own environment. All strings
-        // live until it returns. The message holds no `%`, so the variadic function reads no
-        // further argument.
-        unsafe {
-            callback(
-                self.environment,
-                self.instance.as_ptr(),
-                category.status(),
-                category_name.as_ptr(),
-                message.as_ptr(),
-            );
+        let messages = mem::take(&mut self.messages);
+        let Some(callback) = self.callback else { return };
+        for (category, text) in messages {
+            let message = to_c(&text);
+            let category_name = to_c(category.name());
+            // SAFETY: the callback is the importer's function and gets its own environment. All
+            // strings live until it returns. The message holds no `%`, so the variadic function
+            // reads no further argument.
+            unsafe {
+                callback(
+                    self.environment,
+                    self.instance.as_ptr(),
+                    category.status(),
+                    category_name.as_ptr(),
+                    message.as_ptr(),
+                );
+            }
         }
     }
 }
@@ -152,9 +169,10 @@ mod tests {
     }
 
     #[test]
-    fn errors_are_heard_even_if_logging_is_off() {
+    fn reasons_of_failures_are_heard_even_if_logging_is_off() {
         let logger = silent(false);
         assert!(hears(&logger, Category::Error) && hears(&logger, Category::Fatal));
+        assert!(hears(&logger, Category::Discard));
         assert!(!hears(&logger, Category::Warning) && !hears(&logger, Category::Events));
     }
 
@@ -171,12 +189,12 @@ mod tests {
     }
 
     #[test]
-    fn warnings_are_listed_until_they_are_taken() {
-        let mut logger = Logger::listing();
+    fn warnings_are_kept_until_they_are_taken() {
+        let mut logger = Logger::of_warnings();
         logger.log(Category::Warning, "one");
         logger.log(Category::Events, "initialized");
-        assert_eq!(logger.take_warnings(), ["one"]);
-        assert_eq!(logger.take_warnings(), Vec::<String>::new());
+        assert_eq!(logger.take(), ["one"]);
+        assert_eq!(logger.take(), Vec::<String>::new());
     }
 
     #[test]

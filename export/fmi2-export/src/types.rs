@@ -41,8 +41,8 @@ pub struct CEventInfo {
 }
 
 /// C type `fmi2CallbackLogger`. It is variadic, but this crate passes no further arguments and
-/// messages without `%`. An importer in C++ may throw in it: the exception may then leave the
-/// callback, and ends the process at the border of the exported function, with a message.
+/// messages without `%`. An importer in C++ may throw in it: the exception passes through the call
+/// that it made, and the instance can be used further.
 pub type LogCallback = unsafe extern "C-unwind" fn(
     *mut c_void,
     *const c_char,

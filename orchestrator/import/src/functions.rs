@@ -3,6 +3,7 @@
 #![allow(unsafe_code)]
 
 use crate::fmi;
+use float_environment::in_default;
 use libloading::Library;
 use std::ffi::{CStr, c_int};
 use std::path::Path;
@@ -63,8 +64,9 @@ impl StateFunctions {
 impl Functions {
     pub(crate) fn load(file: &Path) -> Result<Self, libloading::Error> {
         // SAFETY: loading runs the library's own initializers, which are sound only if the library
-        // is. Whoever runs an FMU trusts its code.
-        let library = unsafe { Library::new(file) }?;
+        // is. Whoever runs an FMU trusts its code. Some leave flushing to zero behind, as those of
+        // gcc's option -ffast-math do.
+        let library = in_default(|| unsafe { Library::new(file) })?;
         // SAFETY: FMI 2.0 gives each function the type it is loaded as, and `_library` keeps the
         // code loaded as long as the pointers exist.
         unsafe {
@@ -103,7 +105,7 @@ impl Functions {
             return Some("its library has no fmi2GetVersion".into());
         };
         // SAFETY: FMI 2.0 gives the function this type and allows the call at any time.
-        let version = text_of(unsafe { get_version() });
+        let version = text_of(in_default(|| unsafe { get_version() }));
         let is_supported = version == "2.0" || version.starts_with("2.0.");
         (!is_supported)
             .then(|| format!("its library reports version \"{}\" of FMI", version.escape_default()))

@@ -15,6 +15,7 @@ use crate::instance::{CallFailure, Instance, Outcome};
 use crate::log::Log;
 use crate::logs::{self, Listed};
 use crate::quantity::rounded;
+use float_environment::in_default;
 use std::ffi::{CString, c_int, c_void};
 use std::rc::Rc;
 
@@ -39,7 +40,15 @@ unsafe extern "C" fn receive_message(
     let receive =
         || logs::receive(environment, fmi::status(status), &text_of(category), &text_of(message));
     // A panic must not reach the instance. It has been reported on standard error.
-    let _ = std::panic::catch_unwind(receive);
+    let _ = in_default(|| std::panic::catch_unwind(receive));
+}
+
+/// Calls a function of a library. Its name is recorded meanwhile, in case it crashes, and the
+/// floating-point environment that it leaves behind is not kept.
+#[inline]
+fn foreign<R>(log: &Log, name: &'static str, function: impl FnOnce() -> R) -> R {
+    let _calling = Calling::new(log, name);
+    in_default(function)
 }
 
 /// The data that must live as long as an instance.
@@ -90,10 +99,9 @@ impl FmuInstance {
         let callbacks = Rc::new(callbacks);
         let listed = Listed::new(&log);
 
-        let calling = Calling::new(&log, "instantiate");
         // SAFETY: FMI 2.0 gives the function this type; the texts outlive the call, and the
         // instance keeps callbacks and log alive as long as the instance, as FMI demands.
-        let handle = unsafe {
+        let handle = foreign(&log, "instantiate", || unsafe {
             (functions.instantiate)(
                 name.as_ptr(),
                 fmi::CO_SIMULATION,
@@ -103,8 +111,7 @@ impl FmuInstance {
                 fmi::FALSE,
                 fmi::TRUE,
             )
-        };
-        drop(calling);
+        });
         if handle.is_null() {
             let message =
                 log.take().unwrap_or_else(|| "fmi2Instantiate returned no instance".into());
@@ -115,17 +122,14 @@ impl FmuInstance {
         Ok(Self { handle, data, kept: Vec::new(), fatal: false, _folder: folder })
     }
 
-    /// Makes a call, whose name is recorded meanwhile in case it crashes.
     #[inline]
     fn call(
         &mut self,
         call: &'static str,
         function: impl FnOnce(&Functions, fmi::Handle) -> c_int,
     ) -> Outcome {
-        let calling = Calling::new(&self.data.log, call);
-        let status = function(&self.data.functions, self.handle);
-        drop(calling);
-        match fmi::status(status) {
+        let (data, handle) = (&self.data, self.handle);
+        match fmi::status(foreign(&data.log, call, || function(&data.functions, handle))) {
             Ok(Status::Ok | Status::Warning) => Ok(()),
             status => Err(self.failure(call, status)),
         }
@@ -157,16 +161,14 @@ impl FmuInstance {
     fn discarded(&mut self, message: Option<String>) -> CallFailure {
         let Functions { get_real_status, get_boolean_status, .. } = self.data.functions;
         let (mut time, mut terminated) = (f64::NAN, fmi::FALSE);
-        let calling = Calling::new(&self.data.log, "getStatus");
         // SAFETY: the instance is alive, both pointers are valid for the calls, and FMI allows
         // these calls after fmi2Discard.
-        let statuses = unsafe {
+        let statuses = foreign(&self.data.log, "getStatus", || unsafe {
             [
                 get_real_status(self.handle, fmi::LAST_SUCCESSFUL_TIME, &raw mut time),
                 get_boolean_status(self.handle, fmi::TERMINATED, &raw mut terminated),
             ]
-        };
-        drop(calling);
+        });
         let [knows_time, knows_end] = statuses.map(|status| fmi::status(status) == Ok(Status::Ok));
         let ends = knows_end && terminated != fmi::FALSE;
         let told = message.or_else(|| self.data.log.take_event().filter(|_| ends));
@@ -192,16 +194,17 @@ impl Drop for FmuInstance {
             // so the instance is leaked.
             std::mem::forget(Rc::clone(&self.data));
         } else {
-            if let Some(functions) = self.data.functions.states {
-                let _calling = Calling::new(&self.data.log, "freeFMUstate");
+            let Functions { states, free_instance, .. } = &self.data.functions;
+            if let Some(functions) = states {
                 for state in &mut self.kept {
-                    // SAFETY: the instance is alive, made this state, and frees it only here.
-                    unsafe { (functions.free)(self.handle, state) };
+                    foreign(&self.data.log, "freeFMUstate", || {
+                        // SAFETY: the instance is alive, made this state, and frees it only here.
+                        unsafe { (functions.free)(self.handle, state) }
+                    });
                 }
             }
-            let _calling = Calling::new(&self.data.log, "freeInstance");
             // SAFETY: the instance is alive, is freed only here, and is not used afterwards.
-            unsafe { (self.data.functions.free_instance)(self.handle) };
+            foreign(&self.data.log, "freeInstance", || unsafe { free_instance(self.handle) });
         }
     }
 }

@@ -169,7 +169,9 @@ impl Log {
     ) {
         let component = &self.component;
         match status {
-            Ok(Status::Ok | Status::Pending) if !tracing::enabled!(tracing::Level::INFO) => {
+            Ok(Status::Ok | Status::Pending | Status::Discard)
+                if !tracing::enabled!(tracing::Level::INFO) =>
+            {
                 return;
             }
             // Warnings are collected, each once.
@@ -186,11 +188,12 @@ impl Log {
             return;
         }
         match status {
-            Ok(Status::Ok | Status::Pending) => {
+            // What the discarded call says tells the reason, which may be the end of a simulation.
+            Ok(Status::Ok | Status::Pending | Status::Discard) => {
                 tracing::info!("{component}: [{category}] {message}");
             }
             Ok(Status::Warning) => tracing::warn!("{component}: [{category}] {message}"),
-            Ok(Status::Discard | Status::Error | Status::Fatal) | Err(_) => {
+            Ok(Status::Error | Status::Fatal) | Err(_) => {
                 if !self.instantiates.load(Ordering::Relaxed) {
                     tracing::error!("{component}: [{category}] {message}");
                 }

@@ -13,13 +13,17 @@
 #include <unistd.h>
 
 enum { NOWHERE, LOAD, INSTANTIATE, INITIALIZE, GET, STEP, FREE, UNLOAD };
-enum { EXIT, QUICK_EXIT, ABORT, SEGFAULT, DIVISION, ENDLESS, OVERWRITE, MEMORY, FLOOD, CHILDREN, SHARED, THREAD_EXIT, THREAD_SEGFAULT, LOGS };
+enum { EXIT, QUICK_EXIT, ABORT, SEGFAULT, DIVISION, ENDLESS, OVERWRITE, MEMORY, FLOOD, CHILDREN, SHARED, THREAD_EXIT, THREAD_SEGFAULT, LOGS, FLOATS };
 
 #ifndef PLACE
 #define PLACE NOWHERE
 #endif
 #ifndef HOW
 #define HOW EXIT
+#endif
+/* The floating-point environment that FLOATS leaves behind. */
+#ifndef MXCSR
+#define MXCSR 0x1f80
 #endif
 
 typedef void (*Logger)(void *, const char *, int, const char *, const char *, ...);
@@ -87,6 +91,14 @@ static void fault(int place, Logger logger, void *environment) {
             if (fork() == 0)
                 for (;;) pause();
         break;
+#endif
+#ifdef __x86_64__
+    case FLOATS: {
+        unsigned mxcsr = MXCSR;
+        unsigned short control = 0x37f & (mxcsr >> 7 | 0x340);
+        __asm__ volatile("ldmxcsr %0; fldcw %1" : : "m"(mxcsr), "m"(control));
+        break;
+    }
 #endif
     case FLOOD:
         for (int i = 0; i < 200000; i++) {

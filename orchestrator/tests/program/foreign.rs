@@ -321,3 +321,22 @@ fn a_check_makes_an_instance() {
     let says = "its instance could not be instantiated: it has another GUID than {u-2}";
     assert!(code == 1 && text.contains(says), "{text}{errors}");
 }
+
+/// Rounding upward, flushing to zero, and traps, left behind by each of the functions.
+#[test]
+#[cfg(target_arch = "x86_64")]
+fn the_floating_point_environment_that_an_fmu_leaves_behind_changes_nothing() {
+    let flown = |flags: &[&str]| {
+        let bench = Bench::made(LOOP, &Recipe { flags, ..Recipe::default() });
+        let (code, _, errors) = bench.run(&["--isolate=false", "--step", "0.1", "--quiet"]);
+        assert_eq!((code, errors.as_str()), (0, ""), "{flags:?}");
+        fs::read(bench.path("out/loop/results.csv")).unwrap()
+    };
+    let usual = flown(&[]);
+    for place in ["LOAD", "INSTANTIATE", "INITIALIZE", "GET", "STEP", "FREE"] {
+        for mxcsr in ["0x5f80", "0x9fc0", "0x1900"] {
+            let (place, mxcsr) = (format!("-DPLACE={place}"), format!("-DMXCSR={mxcsr}"));
+            assert!(flown(&[&place, "-DHOW=FLOATS", &mxcsr]) == usual, "{place} {mxcsr}");
+        }
+    }
+}

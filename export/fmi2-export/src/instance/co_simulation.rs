@@ -85,7 +85,7 @@ impl Instance {
         for input in &mut self.progress.extrapolations {
             input.base = *self.model.real(input.reference).expect("checked when it was set");
         }
-        let logger = &self.logger;
+        let logger = &mut self.logger;
         let mut log = |text: &str| logger.log(Category::Warning, text);
         match self.model.step(from, to, &self.progress.extrapolations, &mut log) {
             Ok(()) => {

@@ -106,7 +106,7 @@ impl Instance {
                 FmiStatus::Discard
             }
             Ok(Err(Failure::Ended { reason, .. })) => {
-                self.logger.log(Category::Events, &reason);
+                self.logger.log(Category::Discard, &reason);
                 FmiStatus::Discard
             }
             Ok(Err(Failure::Error(problem))) => {
@@ -146,7 +146,7 @@ impl Instance {
         &mut self.logger
     }
 
-    pub(crate) fn warn(&self, text: &str) {
+    pub(crate) fn warn(&mut self, text: &str) {
         self.logger.log(Category::Warning, text);
     }
 }

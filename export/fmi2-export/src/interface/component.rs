@@ -7,6 +7,7 @@ use crate::model_instance::{Described, Export};
 use crate::pointer::text;
 use crate::resource;
 use crate::types::{Callbacks, FmiStatus, Interface};
+use float_environment::in_default;
 use std::cell::UnsafeCell;
 use std::ffi::{CString, c_char, c_int, c_void};
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -42,7 +43,8 @@ impl Drop for Busy<'_> {
     }
 }
 
-/// Runs a call on the instance behind `component`. A null component has no logger, and the logger
+/// Runs a call on the instance behind `component`, in the default floating-point environment, and
+/// delivers its messages in that of the importer. A null component has no logger, and the logger
 /// of an instance that another call is using must not be touched, so both are refused without a
 /// message. The caller promises that `component` is null or came from [`fmi2Instantiate`] and was
 /// not freed.
@@ -60,7 +62,9 @@ pub(super) unsafe fn run(
     // SAFETY: `_busy` holds the flag, so no other call has a reference to the instance. The flag is
     // cleared when `_busy` is dropped, after the last use of this reference.
     let instance = unsafe { &mut *shared.instance.get() };
-    instance.run(call, body)
+    let status = in_default(|| instance.run(call, body));
+    instance.logger().deliver();
+    status
 }
 
 /// Runs a call that cannot fail once it is allowed. The caller promises what [`run`] asks.
@@ -134,18 +138,18 @@ pub unsafe fn fmi2Instantiate(
         let instance = UnsafeCell::new(Instance::new(export, description, setting));
         Ok(Box::into_raw(Box::new(Shared { busy: AtomicBool::new(false), instance })).cast())
     };
-    match catch_unwind(AssertUnwindSafe(instantiate)) {
-        Ok(Ok(component)) => component,
-        Ok(Err(problem)) => {
-            logger().log(Category::Error, &format!("fmi2Instantiate: {problem}"));
-            null_mut()
-        }
+    let (category, text) = match in_default(|| catch_unwind(AssertUnwindSafe(instantiate))) {
+        Ok(Ok(component)) => return component,
+        Ok(Err(problem)) => (Category::Error, format!("fmi2Instantiate: {problem}")),
         Err(panic) => {
-            logger().log(Category::Fatal, "fmi2Instantiate: defect in the FMU");
             std::mem::forget(panic);
-            null_mut()
+            (Category::Fatal, "fmi2Instantiate: defect in the FMU".into())
         }
-    }
+    };
+    let mut logger = logger();
+    logger.log(category, &text);
+    logger.deliver();
+    null_mut()
 }
 
 /// Frees the instance. It does nothing while another call uses the instance: a logger cannot free
@@ -160,7 +164,7 @@ pub unsafe fn fmi2FreeInstance(component: Component) {
     // SAFETY: `component` came from `Box::into_raw` in fmi2Instantiate and is freed once, as the
     // standard demands. The flag is set, so no call is under way that uses the instance.
     let instance = unsafe { Box::from_raw(component.cast::<Shared>()) };
-    if let Err(panic) = catch_unwind(AssertUnwindSafe(|| drop(instance))) {
+    if let Err(panic) = in_default(|| catch_unwind(AssertUnwindSafe(|| drop(instance)))) {
         std::mem::forget(panic);
     }
 }

@@ -1,6 +1,7 @@
 //! What a library says without an instance: its FMUs and the standard that it implements.
 
 use crate::model_instance::Export;
+use float_environment::in_default;
 use std::ffi::{CString, c_char};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::ptr::null_mut;
@@ -13,7 +14,8 @@ pub fn fmu_model_descriptions(exports: &[Export]) -> *mut c_char {
             exports.iter().map(|export| &*export.described().description).collect();
         CString::new(serde_json::to_vec(&descriptions).ok()?).ok()
     };
-    catch_unwind(AssertUnwindSafe(json)).ok().flatten().map_or(null_mut(), CString::into_raw)
+    let json = in_default(|| catch_unwind(AssertUnwindSafe(json)));
+    json.ok().flatten().map_or(null_mut(), CString::into_raw)
 }
 
 pub unsafe fn fmu_free_model_descriptions(descriptions: *mut c_char) {
