@@ -108,10 +108,17 @@ def test_fmpy_ends_with_the_flight(fmu):
     plant = fmu("ReentryPlant")
     values = {name: plant.item(name, value) if isinstance(value, str) else value for name, value in FLIGHT.items()}
     start = {**values, **INPUTS, "initial.altitude": 30e3, "initial.speed": 1200.0}
+    heard = []
+
+    def log(_environment, _name, status, _category, message):
+        heard.append((status, message.decode()))
+
     for kind in ("CoSimulation", "ModelExchange"):
-        rows = simulate_fmu(str(plant.path), fmi_type=kind, start_values=start, stop_time=500.0, output_interval=1.0, output=MOTION)
+        rows = simulate_fmu(str(plant.path), fmi_type=kind, start_values=start, stop_time=500.0, output_interval=1.0, output=MOTION, logger=log)
         assert 10 < rows["time"][-1] < 400, kind
         assert abs(rows["motion.altitude"][-1] - 24_384) < 300, kind
+    # FMPy leaves logging off.
+    assert [status for status, _ in heard] == [2] and "the entry flight ended" in heard[0][1]
 
 
 @pytest.mark.parametrize(

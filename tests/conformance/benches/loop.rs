@@ -109,6 +109,13 @@ fn loops(criterion: &mut Criterion) {
     }
     group.finish();
 
+    // A call that does nothing else shows what each call costs, as for its floating-point
+    // environment.
+    let moment = [plant.reference("moment.x")];
+    criterion.bench_function("fmi2GetReal of an input", |bencher| {
+        bencher.iter(|| get(&alone, &moment));
+    });
+
     let mut group = criterion.benchmark_group("50 s through two FMUs");
     group.sample_size(20);
     for (name, controller, constraints) in [
