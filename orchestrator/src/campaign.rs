@@ -187,7 +187,7 @@ pub(crate) fn fly(asked: &Fly, out: &mut impl Write, interrupt: &Interrupt) -> R
 /// Writes the experiment of a case.
 fn write_case(plan: &Plan, case: u64, folder: &Path) -> Result<PathBuf, Error> {
     let title = format!("{}, case {case}", plan.campaign.title);
-    let text = plan.sweep.experiment_of(&title, &plan.sweep.values(case)?)?;
+    let text = plan.sweep.experiment_of(&title, &plan.sweep.values(case))?;
     let path = folder.join("case.toml");
     files::write(&path, text)?;
     Ok(path)
@@ -283,11 +283,11 @@ pub(crate) fn falsify(
     if asked.common.quiet {
         return Ok(());
     }
-    let largest = outcome.largest.map_or("none".into(), |value| format!("{value:.6}"));
+    let largest = outcome.largest;
     writeln!(out, "{}", outcome.title)?;
     writeln!(
         out,
-        "  largest {}: {largest} {} ({} cases in {:.0} s, {} searches; {})",
+        "  largest {}: {largest:.6} {} ({} cases in {:.0} s, {} searches; {})",
         outcome.measure,
         outcome.unit,
         outcome.cases,

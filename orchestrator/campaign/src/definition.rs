@@ -199,6 +199,14 @@ impl Campaign {
                 return Err(whole(format!("there are two [[{what}]] with the id \"{id}\"")));
             }
         }
+        let mut names = self.metrics.iter().enumerate();
+        let is_twice = |(place, name): &(usize, &Spanned<String>)| {
+            self.metrics[..*place].iter().any(|other| other.get_ref() == name.get_ref())
+        };
+        if let Some((_, twice)) = names.find(is_twice) {
+            let problem = format!("metrics: \"{}\" is there twice", twice.get_ref());
+            return Err(self.source.error(&twice.span(), problem));
+        }
         for limit in &self.limits {
             let fault = |problem: &str| {
                 let span = limit.measure.span();
@@ -207,8 +215,8 @@ impl Campaign {
             if limit.at_most.is_some() == limit.at_least.is_some() {
                 return fault("one of at_most and at_least is needed");
             }
-            if limit.at_most.or(limit.at_least).is_some_and(f64::is_nan) {
-                return fault("the limit is not a number");
+            if !limit.at_most.or(limit.at_least).is_some_and(f64::is_finite) {
+                return fault("the limit is not a finite number");
             }
             if limit.ends && limit.at_most.is_none() {
                 return fault("ends needs an at_most, because the largest value only grows");
@@ -236,6 +244,12 @@ impl Campaign {
         }
         if self.keep.worst > 0 && self.keep.by.is_none() {
             return Err(whole("[keep] worst needs by, the measure that orders the cases".into()));
+        }
+        if let Some(Search { cases, enough, largest }) = &self.search
+            && (*cases == 0 || enough.is_some_and(f64::is_nan))
+        {
+            let problem = "[search] cases must be at least 1, and enough a number";
+            return Err(self.source.error(&largest.span(), problem));
         }
         if self.keep.every == Some(0) {
             return Err(whole("[keep] every = 0, but it must be at least 1".into()));

@@ -3,7 +3,7 @@
 use crate::definition::{Limit, Until};
 use crate::flight::{CaseStatus, kept_column};
 use crate::plan::Plan;
-use crate::sensitivity::{Sensitivity, sensitivities};
+use crate::sensitivity::{Estimate, Input, Sensitivity, sensitivities};
 use cosim::error::Error;
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
@@ -47,8 +47,10 @@ pub struct Measured {
     pub unit: String,
     /// Its distribution; none if no case has a value.
     pub summary: Option<Summary>,
-    /// Sensitivity of the measure to each parameter.
+    /// Sensitivity of the measure to each parameter that is no seed.
     pub sensitivities: Vec<Sensitivity>,
+    /// Share of the variance that the noise of the seeds makes by itself, if the design tells it.
+    pub noise: Option<Estimate>,
 }
 
 /// Answer to the question that ends a campaign.
@@ -90,20 +92,21 @@ pub(crate) fn findings(
             broken: Probability::new(broken, cases, CONFIDENCE),
         });
     }
-    let columns = plan
-        .sweep
-        .varied
-        .iter()
-        .map(|varied| Ok((varied.name.clone(), table.column(&varied.name)?.numbers())));
-    let columns = columns.collect::<Result<Vec<_>, Error>>()?;
+    let inputs = plan.sweep.varied.iter().map(|varied| {
+        let values = table.column(&varied.name)?.numbers();
+        Ok(Input { name: varied.name.clone(), is_seed: varied.is_seed(), values })
+    });
+    let inputs = inputs.collect::<Result<Vec<_>, Error>>()?;
     let mut measures = Vec::new();
     for recorded in &plan.recorded {
         let values = table.column(&recorded.name)?.numbers();
+        let (sensitivities, noise) = sensitivities(plan.campaign.design, &inputs, &values);
         measures.push(Measured {
             name: recorded.name.clone(),
             unit: recorded.unit.clone(),
             summary: summary(&values),
-            sensitivities: sensitivities(plan.campaign.design, &columns, &values),
+            sensitivities,
+            noise,
         });
     }
     Ok(Findings { title: plan.campaign.title.clone(), cases, status, limits, measures, answer })

@@ -124,10 +124,9 @@ impl<'a> Flight<'a> {
     /// Flies the case with this number.
     ///
     /// # Errors
-    /// Returns an error if the work was asked to end, or if the values of the case cannot be set.
-    /// An FMU that fails is a result.
+    /// The errors are those of [`sweep::flight::Flight::fly`].
     pub fn fly(&mut self, case: u64) -> Result<Row, Error> {
-        self.fly_with(case, self.plan.sweep.values(case)?, &mut [])
+        self.fly_with(case, self.plan.sweep.values(case), &mut [])
     }
 
     /// Flies a case with these values, seen by further observers.
@@ -140,9 +139,9 @@ impl<'a> Flight<'a> {
         values: Vec<SettingValue>,
         others: &mut [&mut dyn Observer],
     ) -> Result<Row, Error> {
-        let Flown { case, values, metrics, outcome, broken, time } =
+        let Flown { case, values, metrics, outcome, without_margins, broken, time } =
             self.instances.fly_with(case, values, others)?;
-        let (status, message) = match outcome {
+        let (status, message) = match outcome.and(without_margins.map_or(Ok(()), Err)) {
             Ok(()) => (CaseStatus::Completed, String::new()),
             Err(error) => match (&error, broken) {
                 (_, Some(bound)) => {
@@ -157,8 +156,7 @@ impl<'a> Flight<'a> {
         let numbers: Vec<Option<f64>> =
             self.plan.recorded.iter().map(|recorded| metrics.number(&recorded.name)).collect();
         let limits_kept = self.plan.limits().map(|(limit, place)| {
-            let measure = &self.plan.recorded[place];
-            let number = numbers[place].or(measure.is_never.then_some(f64::INFINITY));
+            let number = numbers[place].or(self.plan.recorded[place].missing);
             let within = number.is_some_and(|number| {
                 limit.at_most.is_none_or(|most| number <= most)
                     && limit.at_least.is_none_or(|least| number >= least)

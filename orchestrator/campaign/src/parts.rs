@@ -2,9 +2,10 @@
 
 use crate::flight::{Flight, Row, kept_column, table};
 use crate::plan::Plan;
-use cosim::error::Error;
+use cosim::error::Error as Single;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
+use sweep::error::Error;
 use sweep::parts::{self, PartResult, PartState};
 use sweep::table::{CaseTable, Values};
 
@@ -22,7 +23,8 @@ pub fn parts(cases: u64) -> impl Iterator<Item = Range<u64>> {
     parts::parts(cases.min(FEW), LENGTH / 10).chain(others)
 }
 
-fn folder(out: &Path) -> PathBuf {
+/// Returns the folder of the parts.
+pub fn folder(out: &Path) -> PathBuf {
     out.join("parts")
 }
 
@@ -34,9 +36,9 @@ pub fn find(plan: &Plan, out: &Path, part: &Range<u64>) -> PartState {
 /// Reads the rows of a part.
 ///
 /// # Errors
-/// Returns an error if the file is missing or damaged.
-pub fn rows(out: &Path, part: &Range<u64>) -> Result<CaseTable, Error> {
-    Ok(parts::read(&folder(out), part)?.rows)
+/// Returns an error if the file was changed since it was found.
+pub fn rows(plan: &Plan, out: &Path, part: &Range<u64>) -> Result<CaseTable, Single> {
+    Ok(parts::read(&folder(out), &plan.sweep.keys, part)?.rows)
 }
 
 /// Returns the number of cases that broke each limit.
@@ -53,7 +55,8 @@ pub fn broken(plan: &Plan, rows: &CaseTable) -> Vec<u64> {
 /// cases that broke each limit.
 ///
 /// # Errors
-/// Returns an error if the work was asked to end, or if the file cannot be written.
+/// Returns an error if the work was asked to end, if a case could not be flown, or if the file
+/// cannot be written.
 pub fn fly(
     plan: &Plan,
     out: &Path,
@@ -63,7 +66,10 @@ pub fn fly(
 ) -> Result<Vec<u64>, Error> {
     let mut rows = Vec::with_capacity((part.end - part.start) as usize);
     for case in part.clone() {
-        let row = flight.fly(case)?;
+        let row = flight.fly(case).map_err(|error| match error {
+            source @ Single::Call { .. } => Error::Case { case, more: 0, source },
+            error => error.into(),
+        })?;
         flown(&row);
         rows.push(row);
     }

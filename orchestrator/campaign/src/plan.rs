@@ -2,11 +2,13 @@
 
 use crate::changes::{Changes, Command};
 use crate::definition::{Campaign, Limit};
+use crate::flight::kept_column;
 use crate::prepare::{Recorded, keys, observe, read_experiment, recorded};
 use cosim::error::Error;
 use cosim::experiment;
 use cosim::system::Opened;
-use cosim_report::metrics::Meters;
+use cosim_report::metrics::{Meters, Metrics};
+use std::collections::BTreeSet;
 use std::path::PathBuf;
 use sweep::cases::Sweep;
 use sweep::vary::Variation;
@@ -39,6 +41,7 @@ impl Plan {
             design: campaign.design,
             seed: campaign.seed,
             cases: campaign.cases,
+            set: campaign.set.keys().map(String::as_str).collect(),
         };
         let mut opened = Opened::default();
         let mut sweep =
@@ -46,6 +49,7 @@ impl Plan {
         let mut system = sweep.system(&mut opened)?;
         let meters = Meters::new(&mut system)?;
         let recorded = recorded(&campaign, &system.experiment.observe, &meters);
+        let measured = meters.metrics();
         sweep.keys.insert("campaign".into(), keys(&campaign, changes)?);
         if let Some(law) = &changes.law {
             if system.experiment.observe.margins.is_some() {
@@ -63,6 +67,8 @@ impl Plan {
             recorded,
         };
         plan.check_limits()?;
+        plan.check_columns()?;
+        plan.check_measured(&measured)?;
         Ok(plan)
     }
 
@@ -86,6 +92,40 @@ impl Plan {
     pub fn units(&self) -> String {
         let recorded = self.recorded.iter().map(|entry| (&entry.name, &entry.unit));
         self.sweep.units(recorded)
+    }
+
+    /// Refuses columns of the table of cases that would have the same name.
+    fn check_columns(&self) -> Result<(), Error> {
+        let kept = self.campaign.limits.iter().map(|limit| kept_column(&limit.id));
+        let mut taken: BTreeSet<String> = kept.collect();
+        taken.extend(["case", "status", "time", "message"].map(String::from));
+        taken.extend(self.sweep.varied.iter().map(|varied| varied.name.clone()));
+        match self.recorded.iter().find(|recorded| !taken.insert(recorded.name.clone())) {
+            None => Ok(()),
+            Some(Recorded { name, .. }) => {
+                let problem = format!("the table of cases has two columns \"{name}\"");
+                Err(self.campaign.source.error(&(0..0), problem))
+            }
+        }
+    }
+
+    /// Refuses limits on measures that no case can have, because FMUs that the command line names
+    /// lack the variables.
+    fn check_measured(&self, measured: &Metrics) -> Result<(), Error> {
+        let is_missing = |name: &String| {
+            self.sweep.experiment().observe.metrics.contains_key(name)
+                && !measured.units.contains_key(name)
+        };
+        let mut limits = self.campaign.limits.iter();
+        match limits.find(|limit| is_missing(limit.measure.get_ref())) {
+            None => Ok(()),
+            Some(limit) => {
+                let problem = "has no value, because an FMU lacks its variables";
+                let message =
+                    format!("[[limit]] {}: \"{}\" {problem}", limit.id, limit.measure.get_ref());
+                Err(self.campaign.source.error(&limit.measure.span(), message))
+            }
+        }
     }
 
     fn check_limits(&self) -> Result<(), Error> {

@@ -18,8 +18,9 @@ pub struct Recorded {
     pub name: String,
     /// Unit of the number, or an empty text.
     pub unit: String,
-    /// Whether a missing value means that something never happened, as with a settling time.
-    pub is_never: bool,
+    /// Number that a missing value stands for, if it means that something never happened, as with a
+    /// settling time, or that there is no limit, as with a margin.
+    pub missing: Option<f64>,
 }
 
 /// Reads the experiment of a campaign, with the settings of the campaign and the command line.
@@ -120,15 +121,19 @@ pub(crate) fn recorded(campaign: &Campaign, observe: &Observe, meters: &Meters) 
     names
         .map(|name| Recorded {
             unit: units.get(&name).cloned().or_else(|| Margins::unit(&name)).unwrap_or_default(),
-            is_never: observe.metrics.get(&name).is_some_and(|measure| {
-                matches!(
-                    measure.kind,
-                    experiment::MeasureKind::Settling | experiment::MeasureKind::Leaving
-                )
-            }),
+            missing: missing(&name, observe),
             name,
         })
         .collect()
+}
+
+fn missing(name: &str, observe: &Observe) -> Option<f64> {
+    let never = [experiment::MeasureKind::Settling, experiment::MeasureKind::Leaving];
+    match observe.metrics.get(name) {
+        Some(measure) => never.contains(&measure.kind).then_some(f64::INFINITY),
+        None if name == "margin_gain_below" => Some(0.0),
+        None => (name == "lost_at" || Margins::is_metric(name)).then_some(f64::INFINITY),
+    }
 }
 
 /// Hashes what the campaign and the command line say about the cases.

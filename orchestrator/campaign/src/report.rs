@@ -7,7 +7,7 @@ mod figures;
 use crate::findings::{Answer, Findings, LimitFinding, Measured, chosen, worst};
 use crate::flight::Flight;
 use crate::plan::Plan;
-use crate::sensitivity::Sensitivity;
+use crate::sensitivity::{Estimate, Sensitivity};
 use cosim::error::Error;
 use cosim::files;
 use cosim::interrupt::Interrupt;
@@ -72,7 +72,7 @@ fn keep(plan: &Plan, flight: &mut Flight, cases: &BTreeSet<u64>, out: &Path) -> 
     for case in cases {
         let folder = out.join("cases").join(case.to_string());
         let title = format!("{}, case {case}", plan.campaign.title);
-        let values = plan.sweep.values(*case)?;
+        let values = plan.sweep.values(*case);
         let text = plan.sweep.experiment_of(&title, &values)?;
         files::write(&folder.join("case.toml"), text)?;
         flight.keep(*case, values, &folder, &title)?;
@@ -136,10 +136,7 @@ fn page(
                     section id="sensitivity" {
                         h2 { "Sensitivity" }
                         @for measure in &findings.measures { (tornado(measure)) }
-                        p.note {
-                            "Spearman's rank correlation is 1 or −1 if the measure only rises or only falls with the parameter. "
-                            "A small p-value says that a correlation this large would hardly arise by chance."
-                        }
+                        (sensitivity_note(plan))
                     }
                     section id="worst" {
                         h2 { "Worst cases" }
@@ -270,35 +267,84 @@ fn chance(p_value: f64) -> String {
     if p_value < 1e-4 { "< 0.0001".into() } else { short(p_value) }
 }
 
+/// Width of the scale of a bar, from -1 to 1, rem.
+const SCALE: f64 = 12.0;
+
+/// Returns a bar from the middle of a scale to a value from -1 to 1.
+fn bar(value: f64) -> Markup {
+    let (half, length) = (SCALE / 2.0, SCALE / 2.0 * value.abs());
+    let from = if value < 0.0 { half - length } else { half };
+    let scale = "display: inline-block; white-space: nowrap; background: linear-gradient(currentColor, currentColor) 50% / 1px 100% no-repeat";
+    html! {
+        span style=(format!("{scale}; width: {SCALE}rem")) {
+            span class=(if value < 0.0 { "bar negative" } else { "bar" })
+                style=(format!("margin-left: {from:.2}rem; width: {length:.2}rem")) {}
+        }
+    }
+}
+
+/// Returns a number with its interval below.
+fn estimated(estimate: Option<Estimate>) -> Markup {
+    let text = |value: f64| format!("{value:.3}").replace('-', "−");
+    html! {
+        @if let Some(Estimate { value, low, high }) = estimate {
+            (text(value)) br; span.note { (text(low)) " to " (text(high)) }
+        }
+    }
+}
+
 /// Returns the parameters in the order of their weight, as bars.
 fn tornado(measure: &Measured) -> Markup {
-    let weight = |row: &Sensitivity| row.total.or(row.rank_correlation).map_or(0.0, f64::abs);
+    let weight = |row: &Sensitivity| {
+        row.total.or(row.rank_correlation).map_or(0.0, |estimate| estimate.value.abs())
+    };
     let mut rows: Vec<&Sensitivity> =
         measure.sensitivities.iter().filter(|row| row.rank_correlation.is_some()).collect();
     rows.sort_by(|a, b| weight(b).total_cmp(&weight(a)));
-    let has_indices = rows.iter().any(|row| row.total.is_some());
+    let has_indices = measure.noise.is_some() || rows.iter().any(|row| row.total.is_some());
     html! {
-        @if !rows.is_empty() {
+        @if !rows.is_empty() || measure.noise.is_some() {
             h3 { (measure.name) }
             table.numbers {
                 thead { tr {
                     th { "Parameter" } th { "Rank correlation" } th { "" } th { "p-value" }
                     @if has_indices { th { "First-order index" } th { "Total index" } }
                 } }
-                tbody { @for row in rows.iter().take(20) { tr {
-                    @let correlation = row.rank_correlation.unwrap_or(0.0);
-                    td { code { (row.parameter) } }
-                    td { (format!("{correlation:.3}").replace('-', "−")) }
-                    td {
-                        span class=(if correlation < 0.0 { "bar negative" } else { "bar" })
-                            style=(format!("width: {:.1}rem", 12.0 * correlation.abs())) {}
-                    }
-                    td { (row.p_value.map_or(String::new(), chance)) }
-                    @if has_indices {
-                        td { (row.first_order.map_or(String::new(), |s| format!("{s:.3}"))) }
-                        td { (row.total.map_or(String::new(), |t| format!("{t:.3}"))) }
-                    }
-                } } }
+                tbody {
+                    @for row in rows.iter().take(20) { tr {
+                        td { code { (row.parameter) } }
+                        td { (estimated(row.rank_correlation)) }
+                        td { @if let Some(correlation) = row.rank_correlation { (bar(correlation.value)) } }
+                        td { (row.p_value.map_or(String::new(), chance)) }
+                        @if has_indices { td { (estimated(row.first_order)) } td { (estimated(row.total)) } }
+                    } }
+                    @if measure.noise.is_some() { tr {
+                        td { "noise of the seeds" } td { } td { } td { }
+                        td { (estimated(measure.noise)) } td { }
+                    } }
+                }
+            }
+        }
+    }
+}
+
+/// Says what the numbers of the sensitivities mean.
+fn sensitivity_note(plan: &Plan) -> Markup {
+    let seeds = plan.sweep.varied.iter().filter(|varied| varied.is_seed());
+    let seeds: Vec<&str> = seeds.map(|varied| varied.name.as_str()).collect();
+    let has_indices = plan.campaign.design == DesignKind::Sensitivity;
+    html! {
+        p.note {
+            "Spearman's rank correlation is 1 or −1 if the measure only rises or only falls with the parameter. "
+            "A small p-value says that a correlation this large would hardly arise by chance. Below a number stands its 95 % interval. "
+            @if has_indices {
+                "An index is a share of the variance of the measure: the first-order index is that which the parameter explains by itself, "
+                "the total index that in which it takes part. What all first-order indices leave is that of parameters together. "
+            }
+            @if !seeds.is_empty() {
+                "The seeds (" (seeds.join(", ")) ") have no sensitivity, because their order has no meaning. "
+                @if has_indices { "The share of their noise is what two points with the same seeds and nothing else in common share." }
+                @else { "Their noise is in what no parameter explains." }
             }
         }
     }

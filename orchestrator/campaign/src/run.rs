@@ -1,9 +1,10 @@
 //! Flies a campaign on all cores, merges its parts, and writes tables and the report.
 
 use crate::findings::{Answer, Findings, findings};
-use crate::flight::Flight;
+use crate::flight::{CaseStatus, Flight};
 use crate::parts;
 use crate::plan::Plan;
+use crate::prepare::Recorded;
 use crate::report;
 use cosim::error::Error as Single;
 use cosim::files;
@@ -244,10 +245,44 @@ pub fn fly(plan: &Plan, options: &Options) -> Result<CampaignReport, Error> {
     let notes = std::mem::take(&mut state.notes);
     let path = out.join("cases.parquet");
     merge(plan, &out, cases, options.csv)?;
-    let findings = findings(plan, &Reader::open(&path)?, answer)?;
+    let table = Reader::open(&path)?;
+    let findings = findings(plan, &table, answer)?;
+    if findings.status[CaseStatus::Failed.name()] == cases {
+        // What they all have in common may lie outside, so that none of them is kept.
+        let folder = parts::folder(&out);
+        fs::remove_dir_all(&folder).map_err(Single::file(&folder))?;
+        let first = match table.column("message")? {
+            Values::Text(messages) => messages.into_iter().next().unwrap_or_default(),
+            _ => String::new(),
+        };
+        return Err(Error::Failed(format!(
+            "all {cases} cases failed, which is no statistic: {first} ({} has every message, and the same command flies all cases again)",
+            path.display()
+        )));
+    }
+    check_values(plan, &table)?;
     files::write_json(&out.join("summary.json"), &findings)?;
     report::write(plan, &findings, &out, &options.interrupt)?;
     Ok(CampaignReport { findings, out, flown, elapsed: begin.elapsed().as_secs_f64(), notes })
+}
+
+/// Refuses limits on measures of which no completed case has a value.
+fn check_values(plan: &Plan, table: &Reader) -> Result<(), Error> {
+    let Values::Text(status) = table.column("status")? else { return Ok(()) };
+    let completed = status.iter().map(|name| name == CaseStatus::Completed.name());
+    let completed: Vec<bool> = completed.collect();
+    for (limit, place) in plan.limits() {
+        let Recorded { name, missing, .. } = &plan.recorded[place];
+        let values = table.column(name)?.numbers();
+        let is_seen = values.iter().zip(&completed).any(|(value, is)| *is && !value.is_nan());
+        if missing.is_none() && !is_seen && completed.contains(&true) {
+            return Err(Error::Failed(format!(
+                "no case has a value of {name}, so that nothing can be said of the limit {}",
+                limit.id
+            )));
+        }
+    }
+    Ok(())
 }
 
 fn remove_results(out: &Path) -> Result<(), Single> {
@@ -281,19 +316,25 @@ fn fly_parts(
     let Worked { results, failures } = work::on_parts(
         missing,
         threads,
-        || Flight::new(plan, resets, interrupt),
+        || Ok(Flight::new(plan, resets, interrupt)?),
         |flight, part| parts::fly(plan, out, part, flight, |_| progress.advance(1)),
-        |_| false,
+        // The other parts are flown and kept, so that little is left for the next time.
+        |error| matches!(error, Error::Case { .. }),
     );
     progress.finish();
     state.broken_counts.extend(results.into_iter().map(|(at, broken)| (missing[at].start, broken)));
-    match failures.into_values().next() {
+    let (cases, mut others): (Vec<Error>, Vec<Error>) =
+        failures.into_values().partition(|error| matches!(error, Error::Case { .. }));
+    let more = cases.len().saturating_sub(1);
+    others.extend(cases);
+    match others.into_iter().next() {
         None => Ok(()),
-        Some(Single::Interrupted { request, .. }) => {
+        Some(Error::Single(Single::Interrupted { request, .. })) => {
             let (what, done, total) = ("cases are flown", state.done(), plan.sweep.cases());
             Err(Error::Unfinished { what, done, total, out: out.to_path_buf(), request })
         }
-        Some(error) => Err(error.into()),
+        Some(Error::Case { case, source, .. }) => Err(Error::Case { case, more, source }),
+        Some(error) => Err(error),
     }
 }
 
@@ -307,7 +348,7 @@ fn merge(plan: &Plan, out: &Path, cases: u64, csv: bool) -> Result<(), Single> {
     let mut writer = Writer::create(&out.join("cases.parquet"), &metadata)?;
     let mut is_first = true;
     for part in parts::parts(plan.sweep.cases()).take_while(|part| part.start < cases) {
-        let rows = parts::rows(out, &part)?;
+        let rows = parts::rows(plan, out, &part)?;
         if let Some(text) = &mut text {
             if is_first {
                 let names = rows.columns.iter().map(|column| column.name.as_str());

@@ -17,6 +17,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 use serde::Serialize;
 use std::cmp::Ordering as CmpOrdering;
+use std::fs;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
@@ -30,6 +31,10 @@ use sweep::work;
 const STEP: f64 = 0.3;
 /// Number of the case that stands for all cases of a search, so that seeds stay the same.
 const CASE: u64 = 0;
+
+/// Names of the files of a search's results.
+const FILES: [&str; 5] =
+    ["search.json", "search.parquet", "worst.toml", "report.html", "history.svg"];
 
 /// Options of a search.
 #[derive(Clone, Debug, Default)]
@@ -58,7 +63,7 @@ pub struct SearchOutcome {
     /// Unit of the measure, or an empty text.
     pub unit: String,
     /// Largest value that was found.
-    pub largest: Option<f64>,
+    pub largest: f64,
     /// Limits that the worst case breaks.
     pub broken: Vec<String>,
     /// How the worst case ended.
@@ -130,6 +135,10 @@ pub fn search(plan: &Plan, options: &Options) -> Result<SearchOutcome, Error> {
         return Err(Single::experiment(message).into());
     }
     let _folder = Folder::take(&out)?;
+    // Those of an earlier search would not fit this one if it ends early.
+    for path in FILES.map(|name| out.join(name)).iter().filter(|path| path.exists()) {
+        fs::remove_file(path).map_err(Single::file(path))?;
+    }
     let progress = Parts::new("cases", &plan.campaign.title, search.cases, 0, options.quiet);
     let threads = work::threads(options.jobs, [&plan.sweep]);
     let (orders, waiting) = channel::<Order>();
@@ -165,12 +174,26 @@ pub fn search(plan: &Plan, options: &Options) -> Result<SearchOutcome, Error> {
     let worst = tried.iter().filter(|case| !case.value.is_nan());
     let worst = worst.max_by(|a, b| a.value.total_cmp(&b.value)).or(tried.first());
     let worst = worst.ok_or_else(|| Single::experiment("no case was flown"))?;
+    let rows: Vec<Row> = tried.iter().map(|case| case.row.clone()).collect();
+    let table_path = out.join("search.parquet");
+    let mut writer = Writer::create(&table_path, &[("units", plan.units())])?;
+    writer.add(table(plan, &rows))?;
+    writer.finish()?;
+    let named = &plan.recorded[measure];
+    if worst.value.is_nan() {
+        return Err(Error::Failed(format!(
+            "no case has a value of {}, so that there is no worst one: {} ({} has all cases)",
+            named.name,
+            if worst.row.message.is_empty() { worst.row.status.name() } else { &worst.row.message },
+            table_path.display()
+        )));
+    }
     let limits = plan.campaign.limits.iter().zip(&worst.row.limits_kept);
     let outcome = SearchOutcome {
         title: plan.campaign.title.clone(),
-        measure: plan.recorded[measure].name.clone(),
-        unit: plan.recorded[measure].unit.clone(),
-        largest: Some(worst.value).filter(|value| !value.is_nan()),
+        measure: named.name.clone(),
+        unit: named.unit.clone(),
+        largest: worst.value,
         broken: limits
             .filter(|(_, is_kept)| !**is_kept)
             .map(|(limit, _)| limit.id.clone())
@@ -187,10 +210,6 @@ pub fn search(plan: &Plan, options: &Options) -> Result<SearchOutcome, Error> {
     let title = format!("{}, the worst case that a search found", plan.campaign.title);
     let text = plan.sweep.experiment_of(&title, &worst.row.values)?;
     files::write(&path, text)?;
-    let rows: Vec<Row> = tried.iter().map(|case| case.row.clone()).collect();
-    let mut writer = Writer::create(&out.join("search.parquet"), &[("units", plan.units())])?;
-    writer.add(table(plan, &rows))?;
-    writer.finish()?;
     page::write(plan, &outcome, &tried, &worst.row)?;
     files::write_json(&out.join("search.json"), &outcome)?;
     Ok(outcome)
@@ -209,7 +228,7 @@ fn serve(plan: &Plan, interrupt: &Interrupt, waiting: &Mutex<Receiver<Order>>) {
             };
             flight.insert(current).fly_with(
                 CASE,
-                plan.sweep.values_at(&order.places, CASE)?,
+                plan.sweep.values_at(&order.places, CASE),
                 &mut [],
             )
         })();

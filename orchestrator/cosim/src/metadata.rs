@@ -95,7 +95,7 @@ pub fn metadata(
 }
 
 /// Returns whether a parameter is a seed. Its name decides, because FMI offers no other sign.
-pub(crate) fn is_seed(name: &str) -> bool {
+pub fn is_seed(name: &str) -> bool {
     name.rsplit('.').next() == Some("seed")
 }
 

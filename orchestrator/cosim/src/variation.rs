@@ -6,8 +6,9 @@ use crate::interrupt::Interrupt;
 use crate::master::Master;
 use crate::settings::{self, Setting};
 use crate::system::{Parameters, System};
-use fmu_import::description::Variable;
+use fmu_import::description::{Carrier, Variable, VariableKind};
 use fmu_import::names;
+use fmu_import::quantity;
 use toml::Value;
 
 pub use crate::settings::SettingValue;
@@ -49,6 +50,35 @@ impl System {
     /// unit that does not fit.
     pub fn value(&self, target: Target, written: &Value) -> Result<SettingValue, String> {
         settings::value(written, self.variable(target), self.parts()[target.component])
+    }
+
+    /// Converts a number with a unit to the unit of a target, whose limits it need not keep.
+    ///
+    /// # Errors
+    /// Returns an error if the text is no number with a unit that fits.
+    pub fn number(&self, target: Target, text: &str) -> Result<f64, String> {
+        let VariableKind::Real { unit, .. } = &self.variable(target).kind else {
+            return Err(format!("\"{text}\" is no number"));
+        };
+        let description = &self.components[target.component].fmu.description;
+        quantity::convert(text, unit.as_deref(), &description.units)
+    }
+
+    /// Returns the texts that are set, which may name files.
+    pub fn texts(&self) -> Vec<String> {
+        let settings = self.components.iter().flat_map(|component| &component.settings);
+        let text = |setting: &Setting| match &setting.value {
+            SettingValue::Text(text) => Some(text.clone()),
+            _ => None,
+        };
+        settings.filter_map(text).collect()
+    }
+
+    /// Returns what a target refers to in its instance, which is the same for all aliases of a
+    /// variable.
+    pub fn referent(&self, target: Target) -> impl PartialEq + use<> {
+        let variable = self.variable(target);
+        (target.component, variable.reference, Carrier::for_kind(&variable.kind))
     }
 
     /// Returns the value that a target has in this system: that of the experiment, or else the

@@ -82,7 +82,7 @@ impl Watched {
         );
         if !self.warns {
             let remedy = "with --on-invalid warn the run continues";
-            return Err(CallFailure::new(
+            return Err(CallFailure::answer(
                 call,
                 format!("{variable} is {value}, which is {what}; {remedy}"),
             ));

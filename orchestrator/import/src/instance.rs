@@ -14,12 +14,22 @@ pub struct CallFailure {
     pub call: Cow<'static, str>,
     /// Message of the instance, or its status if there is none.
     pub message: String,
+    /// Whether this is an answer of the instance, such as a status of FMI. Otherwise the call could
+    /// not be made or was not answered, for example because the process was killed, which says
+    /// nothing about the model.
+    pub is_answer: bool,
 }
 
 impl CallFailure {
-    /// Creates a failure of this call that does not end the simulation.
+    /// Creates a failure of this call that does not end the simulation and is no answer of the
+    /// instance.
     pub fn new(call: &'static str, message: impl Into<String>) -> Self {
-        Self { ends: None, call: call.into(), message: message.into() }
+        Self { ends: None, call: call.into(), message: message.into(), is_answer: false }
+    }
+
+    /// Creates a failure that is an answer of the instance, and does not end the simulation.
+    pub fn answer(call: &'static str, message: impl Into<String>) -> Self {
+        Self { is_answer: true, ..Self::new(call, message) }
     }
 }
 

@@ -153,7 +153,7 @@ impl FmuInstance {
             return CallFailure::new(call, format!("{message} ({:?})", Status::Pending));
         }
         let message = message.unwrap_or_else(|| "its log holds no message".into());
-        CallFailure::new(call, format!("{message} ({})", fmi::name_of(status)))
+        CallFailure::answer(call, format!("{message} ({})", fmi::name_of(status)))
     }
 
     /// Describes why a step was discarded. FMI 2.0, section 4.2.3, lets an FMU end the simulation
@@ -182,7 +182,7 @@ impl FmuInstance {
         }
         CallFailure {
             ends: ends.then_some(reached.unwrap_or(f64::NAN)),
-            ..CallFailure::new("doStep", format!("{} ({:?})", parts.join("; "), Status::Discard))
+            ..CallFailure::answer("doStep", format!("{} ({:?})", parts.join("; "), Status::Discard))
         }
     }
 }

@@ -183,7 +183,7 @@ impl Builder<'_> {
             let error = phases.iter().map(|phase| phase.error).fold(0.0, f64::max);
             let drift = difference(&phases, period);
             if drift > REPEATS {
-                return Err(CallFailure::new(
+                return Err(CallFailure::answer(
                     "linearise",
                     format!(
                         "responses to a change of its inputs do not repeat within {longest} steps of {} s, but differ by {:.0} %: it has no linear model here, or a longer period than that, which takes fewer of a longer step",
@@ -205,7 +205,7 @@ impl Builder<'_> {
                 break (phases, tolerance, drift);
             }
             if !may_grow || blocks >= most {
-                return Err(CallFailure::new(
+                return Err(CallFailure::answer(
                     "linearise",
                     format!(
                         "a linear model is {:.0} % off the response to a change within {LONGEST_TIME} s: steps of {} s show too little of the motion, or it is not linear here",

@@ -159,7 +159,11 @@ impl Lineariser {
                     let end = rounded(system.clock.time(ticks.end));
                     let message =
                         format!("{message}, but a linear model needs its motion until t = {end} s");
-                    Error::Call { component, time, failure: CallFailure::new("linearise", message) }
+                    Error::Call {
+                        component,
+                        time,
+                        failure: CallFailure::answer("linearise", message),
+                    }
                 }
                 error => error,
             })?;
@@ -212,7 +216,7 @@ impl Lineariser {
             return Err(Error::Call {
                 component: names.join(" with "),
                 time: *time,
-                failure: CallFailure::new(
+                failure: CallFailure::answer(
                     "linearise",
                     format!(
                         "whether the loop is stable cannot be told, as the allocator's noise hides a growth of {growth:.1e}/s"

@@ -109,6 +109,7 @@ impl Run {
             design: self.design,
             seed: self.seed,
             cases: Some(self.count()),
+            set: self.set.keys().map(String::as_str).collect(),
         }
     }
 

@@ -18,10 +18,10 @@ use serde_json::{Map, Value, json};
 use std::cmp::Ordering;
 use std::collections::BTreeMap;
 use std::fs;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Version of the files of parts, which must be raised when their content changes.
-const FORMAT: u32 = 2;
+const FORMAT: u32 = 3;
 
 /// Cases of one experiment that differ in the values of parameters, ready to be flown.
 pub struct Sweep {
@@ -39,8 +39,6 @@ pub struct Sweep {
     /// Whether another program flies the cases ([`crate::outside`]).
     pub is_flown_outside: bool,
     experiment: Experiment,
-    /// File that describes the variation, for errors.
-    source: Source,
     /// Paths of the archives, by component.
     archives: BTreeMap<String, PathBuf>,
     fmu_dirs: Vec<PathBuf>,
@@ -63,9 +61,10 @@ impl Sweep {
         let system = check(experiment.clone(), fmu_dirs, opened)?;
         let mut varied = Vec::new();
         for vary in variation.vary {
-            varied.extend(distributions(vary, source, &system)?);
+            varied.extend(distributions(vary, source, &system, variation.seed)?);
         }
-        check_twice(&varied, source)?;
+        check_twice(&varied, variation, source, &system)?;
+        check_design(&varied, variation, source)?;
         let by_name: Vec<_> =
             varied.iter().map(|entry| (entry.name.as_str(), &entry.distribution)).collect();
         let correlation = correlation(variation.correlations, source, &by_name)?;
@@ -82,6 +81,16 @@ impl Sweep {
         let levels = levels.collect::<Result<Vec<_>, _>>()?;
         let design = Design::new(variation.design, variation.seed, variation.cases, levels)
             .map_err(|problem| source.error(&(0..0), problem))?;
+        let samples = design.sample(design.cases().saturating_sub(1)) + 1;
+        let repeats = |entry: &&Varied| entry.distribution.seeds().is_some_and(|of| of < samples);
+        if let Some(entry) = varied.iter().find(repeats) {
+            let seeds = entry.distribution.seeds().unwrap_or_default();
+            let problem =
+                format!("case: {samples} cases need a seed each, but it takes {seeds} only");
+            return Err(
+                source.error(&entry.span, format!("[[vary]] \"{}\": {problem}", entry.name))
+            );
+        }
         let single = system.components.iter().find(|component| {
             let interface = component.fmu.description.co_simulation.as_ref();
             interface.is_some_and(|interface| interface.has("canBeInstantiatedOnlyOncePerProcess"))
@@ -90,11 +99,10 @@ impl Sweep {
         let sweep = Self {
             design,
             span: [system.clock.start(), system.clock.stop()],
-            keys: keys(&system)?,
+            keys: keys(&system, &varied)?,
             single: single.map(|component| component.fmu.path.clone()),
             is_flown_outside: false,
             varied,
-            source: source.clone(),
             archives: system.components.into_iter().map(|c| (c.name, c.fmu.path.clone())).collect(),
             experiment,
             fmu_dirs: fmu_dirs.to_vec(),
@@ -125,30 +133,19 @@ impl Sweep {
     }
 
     /// Returns the values of a case, one for each entry of [`Self::varied`].
-    ///
-    /// # Errors
-    /// Returns an error if a value cannot be that of its parameter.
-    pub fn values(&self, case: u64) -> Result<Vec<SettingValue>, Error> {
+    pub fn values(&self, case: u64) -> Vec<SettingValue> {
         self.values_at(&self.design.place(case), self.design.sample(case))
     }
 
     /// Returns the values at a place. Seeds that differ from case to case are those of this sample
     /// of the design.
-    ///
-    /// # Errors
-    /// Returns an error if a value cannot be that of its parameter.
-    pub fn values_at(&self, places: &[Place], sample: u64) -> Result<Vec<SettingValue>, Error> {
+    pub fn values_at(&self, places: &[Place], sample: u64) -> Vec<SettingValue> {
         let mut places = places.to_vec();
         if let Some(correlated) = &self.correlation {
             correlated.apply(&mut places);
         }
-        let values = self.varied.iter().zip(places).map(|(varied, place)| {
-            varied.distribution.value(place, sample).map_err(|problem| {
-                let message = format!("[[vary]] \"{}\", sample {sample}: {problem}", varied.name);
-                self.source.error(&varied.span, message)
-            })
-        });
-        let mut values = values.collect::<Result<Vec<_>, _>>()?;
+        let value = |(varied, place): (&Varied, Place)| varied.distribution.value(place, sample);
+        let mut values: Vec<SettingValue> = self.varied.iter().zip(places).map(value).collect();
         let groups = self.varied.iter().enumerate().filter(|(_, varied)| varied.sorted > 0);
         for (first, varied) in groups {
             values[first..first + varied.sorted].sort_by(|a, b| match (a, b) {
@@ -156,7 +153,7 @@ impl Sweep {
                 _ => Ordering::Equal,
             });
         }
-        Ok(values)
+        values
     }
 
     /// Returns the changes that these values make to the system.
@@ -227,22 +224,86 @@ impl Sweep {
     }
 }
 
-/// Refuses a parameter that varies twice.
-fn check_twice(varied: &[Varied], source: &Source) -> Result<(), Error> {
-    for (i, entry) in varied.iter().enumerate() {
-        let twice = entry.paths.iter().find(|path| {
-            varied[..i].iter().any(|other| other.paths.contains(path))
-                || entry.paths.iter().filter(|other| other == path).count() > 1
-        });
-        if let Some(path) = twice {
-            return Err(source.error(&entry.span, format!("[[vary]] \"{path}\" varies twice")));
+/// Refuses a parameter that varies twice, or that the file or the command line sets as well. An
+/// alias is the same parameter.
+fn check_twice(
+    varied: &[Varied],
+    variation: &Variation,
+    source: &Source,
+    system: &System,
+) -> Result<(), Error> {
+    let referents = |names: &[&str]| {
+        names.iter().filter_map(|name| Some(system.referent(system.target(name).ok()?))).collect()
+    };
+    let by_file: Vec<_> = referents(&variation.set);
+    let assigned: Vec<&str> = system.experiment.assigned.iter().map(String::as_str).collect();
+    let by_option: Vec<_> = referents(&assigned);
+    let mut seen = Vec::new();
+    for entry in varied {
+        for (path, target) in entry.paths.iter().zip(&entry.targets) {
+            let referent = system.referent(*target);
+            let problem = if seen.contains(&referent) {
+                "varies twice"
+            } else if by_option.contains(&referent) {
+                "varies, so that --set cannot give it one value"
+            } else if by_file.contains(&referent) {
+                "varies, but [set] gives it one value"
+            } else {
+                seen.push(referent);
+                continue;
+            };
+            return Err(source.error(&entry.span, format!("[[vary]] \"{path}\" {problem}")));
         }
     }
     Ok(())
 }
 
-/// Hashes what all cases depend on.
-fn keys(system: &System) -> Result<BTreeMap<String, String>, Error> {
+/// Refuses what the design of a sweep leaves without effect, or without meaning.
+fn check_design(varied: &[Varied], variation: &Variation, source: &Source) -> Result<(), Error> {
+    let design = json!(variation.design);
+    let design = design.as_str().unwrap_or_default();
+    let (is_factorial, is_sensitivity) =
+        (variation.design == DesignKind::Factorial, variation.design == DesignKind::Sensitivity);
+    if let Some(first) = variation.correlations.first()
+        && (is_factorial || is_sensitivity)
+    {
+        let problem = "takes its parameters to be independent";
+        let message = format!("[[correlation]] the design {design} {problem}");
+        return Err(source.error(&first.between.span(), message));
+    }
+    for vary in variation.vary {
+        let problem = if vary.sorted && (is_factorial || is_sensitivity) {
+            "sorted has no meaning in the design"
+        } else if vary.weights.is_some() && is_factorial {
+            "weights have no effect in the design"
+        } else if vary.levels.is_some() && !is_factorial {
+            "levels have no effect in the design"
+        } else {
+            continue;
+        };
+        let is_its = |entry: &&Varied| vary.names().any(|name| *name == entry.name);
+        let (name, span) = varied
+            .iter()
+            .find(is_its)
+            .map_or(("", 0..0), |entry| (entry.name.as_str(), entry.span.clone()));
+        return Err(source.error(&span, format!("[[vary]] \"{name}\": {problem} {design}")));
+    }
+    let sorted = varied.iter().enumerate().filter(|(_, entry)| entry.sorted > 0);
+    for (first, entry) in sorted {
+        let names: Vec<&String> =
+            varied[first..first + entry.sorted].iter().map(|entry| &entry.name).collect();
+        let mut correlations = variation.correlations.iter();
+        let both = correlations.find(|c| c.between.get_ref().iter().any(|n| names.contains(&n)));
+        if let Some(both) = both {
+            let message = "[[correlation]] sorted values cannot be correlated as well";
+            return Err(source.error(&both.between.span(), message));
+        }
+    }
+    Ok(())
+}
+
+/// Hashes what all cases depend on, with the files that text parameters name.
+fn keys(system: &System, varied: &[Varied]) -> Result<BTreeMap<String, String>, Error> {
     let mut keys = BTreeMap::from([
         ("experiment".to_string(), files::digest(system.experiment.source.whole())),
         ("program".to_string(), format!("{} {FORMAT}", env!("CARGO_PKG_VERSION"))),
@@ -250,6 +311,15 @@ fn keys(system: &System) -> Result<BTreeMap<String, String>, Error> {
     for CheckedComponent { name, fmu, .. } in &system.components {
         let bytes = fs::read(&fmu.path).map_err(Error::file(&fmu.path))?;
         keys.insert(format!("FMU of {name}"), files::digest(bytes));
+    }
+    let set = system.texts();
+    let listed = varied.iter().flat_map(|entry| entry.distribution.texts());
+    for text in set.iter().map(String::as_str).chain(listed) {
+        let path = Path::new(text);
+        if path.is_file() {
+            let bytes = fs::read(path).map_err(Error::file(path))?;
+            keys.insert(format!("file {text}"), files::digest(bytes));
+        }
     }
     Ok(keys)
 }

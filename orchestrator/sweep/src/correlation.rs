@@ -40,7 +40,7 @@ pub(crate) fn correlation(
     varied: &[(&str, &Distribution)],
 ) -> Result<Option<Correlated>, Error> {
     let mut dimensions: Vec<usize> = Vec::new();
-    let mut entries = Vec::new();
+    let mut entries: Vec<([usize; 2], f64)> = Vec::new();
     for correlation in correlations {
         let span = correlation.between.span();
         let fault = |problem: String| source.error(&span, format!("[[correlation]] {problem}"));
@@ -68,6 +68,11 @@ pub(crate) fn correlation(
             return Err(fault(format!(
                 "coefficient = {coefficient}: two different parameters and a value between -1 and 1 are needed"
             )));
+        }
+        pair.sort_unstable();
+        if entries.iter().any(|(other, _)| *other == pair) {
+            let [a, b] = correlation.between.get_ref();
+            return Err(fault(format!("\"{a}\" and \"{b}\" are correlated twice")));
         }
         entries.push((pair, coefficient));
     }

@@ -13,6 +13,9 @@ use shape::Shape;
 use statrs::distribution::ContinuousCDF;
 use statrs::statistics::{Distribution as _, Mode};
 
+/// Smallest part of a distribution that a truncation may leave, as a share of all up to there.
+const SMALLEST: f64 = 1e-9;
+
 /// Distribution of the values of a parameter.
 #[derive(Clone, Debug)]
 pub struct Distribution {
@@ -26,16 +29,16 @@ pub struct Distribution {
 }
 
 impl Distribution {
-    /// Reads the distribution of `vary` for a target.
+    /// Reads the distribution of `vary` for a target, in a sweep with this seed.
     ///
     /// # Errors
     /// Returns an error if there is not exactly one distribution, or if it cannot be that of the
     /// target.
-    pub fn new(vary: &Vary, target: Target, system: &System) -> Result<Self, String> {
-        let reader = Reader { system, target };
+    pub fn new(vary: &Vary, target: Target, system: &System, seed: u64) -> Result<Self, String> {
+        let reader = Reader { system, target, seed };
         let shape = reader.shape(vary)?;
         let is_continuous =
-            !matches!(shape, Shape::List(..) | Shape::Case { .. } | Shape::Whole(_));
+            !matches!(shape, Shape::List(..) | Shape::Case(_) | Shape::Whole(_));
         let mut distribution = Self {
             ends: shape.ends(),
             shape,
@@ -48,17 +51,19 @@ impl Distribution {
             }
             let [low, high] = within.get_ref();
             let (low, high) = (reader.number(low)?, reader.number(high)?);
-            if low.is_nan() || high.is_nan() || low >= high {
+            if low >= high {
                 return Err(format!(
                     "within = [{low}, {high}]: the second value must be larger than the first one"
                 ));
             }
-            distribution.between = [distribution.shape.below(low), distribution.shape.below(high)];
-            if distribution.between[0] >= distribution.between[1] {
+            let [from, to] = [distribution.shape.below(low), distribution.shape.below(high)];
+            // Of a smaller part of the upper tail, few values could be told apart.
+            if to - from <= SMALLEST * to {
                 return Err(format!(
-                    "within = [{low}, {high}]: the distribution has no values between them"
+                    "within = [{low}, {high}]: the distribution has next to no values between them"
                 ));
             }
+            distribution.between = [from, to];
             let [least, most] = distribution.ends.unwrap_or([f64::NEG_INFINITY, f64::INFINITY]);
             distribution.ends = Some([low.max(least), high.min(most)]);
         }
@@ -86,7 +91,7 @@ impl Distribution {
         match &self.shape {
             Shape::List(values, _) => Ok(values.len() as u64),
             Shape::Whole([low, high]) => Ok((i64::from(*high) - i64::from(*low) + 1) as u64),
-            Shape::Case { .. } => {
+            Shape::Case(_) => {
                 Err("a factorial design cannot vary a parameter by case, which has no levels"
                     .into())
             }
@@ -104,7 +109,7 @@ impl Distribution {
     /// Returns an error if it has none, so that there are no corners.
     pub fn check_ends(&self) -> Result<(), String> {
         match self.shape {
-            Shape::List(..) | Shape::Whole(_) | Shape::Case { .. } => Ok(()),
+            Shape::List(..) | Shape::Whole(_) | Shape::Case(_) => Ok(()),
             _ if self.ends.is_some() => Ok(()),
             _ => Err("the distribution is unbounded: corners and searches need within here".into()),
         }
@@ -140,7 +145,7 @@ impl Distribution {
                 let more = if values.len() > 6 { ", …" } else { "" };
                 format!("one of {}{more}", shown.collect::<Vec<_>>().join(", "))
             }
-            Shape::Case { first, .. } => format!("number of the case + {first}"),
+            Shape::Case(seeds) => format!("number of the case + {}", seeds.first),
         };
         match (self.ends, self.shape.ends()) {
             (Some(bounds), uncut) if uncut != Some(bounds) => {
@@ -153,30 +158,32 @@ impl Distribution {
     /// Returns whether values can be between any two of them, so that correlations and searches
     /// make sense.
     pub fn is_ordered(&self) -> bool {
-        !matches!(self.shape, Shape::Case { .. })
+        !matches!(self.shape, Shape::Case(_))
             && !matches!(&self.shape, Shape::List(values, _)
                 if !matches!(values.first(), Some(SettingValue::Real(_) | SettingValue::Integer(_))))
     }
 
-    /// Returns whether the value is a function of the case's number instead of its place.
-    pub fn is_counted(&self) -> bool {
-        matches!(self.shape, Shape::Case { .. })
+    /// Returns the texts among the values.
+    pub(crate) fn texts(&self) -> impl Iterator<Item = &str> {
+        let values = if let Shape::List(values, _) = &self.shape { &values[..] } else { &[] };
+        values.iter().filter_map(|value| match value {
+            SettingValue::Text(text) => Some(text.as_str()),
+            _ => None,
+        })
+    }
+
+    /// Returns the number of different seeds, if the value is a function of the case's number
+    /// instead of its place.
+    pub fn seeds(&self) -> Option<u64> {
+        if let Shape::Case(seeds) = &self.shape { Some(seeds.count()) } else { None }
     }
 
     /// Returns the value at a place for the case with this number.
-    ///
-    /// # Errors
-    /// Returns an error if the number of the case leads out of the range of an integer.
-    pub fn value(&self, place: Place, case: u64) -> Result<SettingValue, String> {
+    pub fn value(&self, place: Place, case: u64) -> SettingValue {
         let last = |values: &[SettingValue]| values.len().saturating_sub(1);
-        Ok(match (&self.shape, place) {
-            (Shape::Case { first, most }, _) => {
-                let value =
-                    first.checked_add_unsigned(case).filter(|value| value <= &(*most).into());
-                let value = value.and_then(|value| i32::try_from(value).ok());
-                let problem = || format!("case: {first} + {case} is above the maximum {most}");
-                SettingValue::Integer(value.ok_or_else(problem)?)
-            }
+        match (&self.shape, place) {
+            // The ends of the seeds are those of an integer.
+            (Shape::Case(seeds), _) => SettingValue::Integer(seeds.of(case) as i32),
             (Shape::List(values, sums), Place::Quantile(unit)) => {
                 let index = sums.partition_point(|sum| *sum <= unit);
                 values[index.min(last(values))].clone()
@@ -200,11 +207,11 @@ impl Distribution {
                 SettingValue::Real(self.ends.map_or(f64::NAN, |ends| ends[usize::from(is_last)]))
             }
             (_, Place::Level(level)) if level == 0 || level + 1 >= self.levels => {
-                self.value(Place::End(level > 0), case)?
+                self.value(Place::End(level > 0), case)
             }
             (_, Place::Level(level)) => {
                 let unit = level as f64 / (self.levels - 1) as f64;
-                self.value(Place::Quantile(unit), case)?
+                self.value(Place::Quantile(unit), case)
             }
             (shape, Place::Quantile(unit)) => {
                 let [from, to] = self.between;
@@ -212,6 +219,6 @@ impl Distribution {
                 let [low, high] = self.ends.unwrap_or([f64::NEG_INFINITY, f64::INFINITY]);
                 SettingValue::Real(value.clamp(low, high))
             }
-        })
+        }
     }
 }

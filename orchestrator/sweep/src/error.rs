@@ -18,6 +18,22 @@ pub enum Error {
         /// The error of that run.
         source: Single,
     },
+    /// Cases could not be flown, for a reason that says nothing about what was to be flown.
+    #[error(
+        "case {case} could not be flown: {source}{}; the same command flies what is missing",
+        if *more > 0 { format!(" ({more} more parts have such cases)") } else { String::new() }
+    )]
+    Case {
+        /// Number of the first of them.
+        case: u64,
+        /// Number of other parts with such cases.
+        more: usize,
+        /// Reason of the first of them.
+        source: Single,
+    },
+    /// Every case failed, so that there are no statistics.
+    #[error("{0}")]
+    Failed(String),
     /// The work was asked to end before it was complete.
     #[error(
         "ended by {request}: {done} of {total} {} and kept in {}; the same command continues from there",
@@ -44,7 +60,10 @@ impl Error {
             // A run that ends early has no result to compare, so that this is a failure of the
             // study.
             Self::Run { source: Single::EndedByInstance { .. }, .. } => 1,
-            Self::Single(source) | Self::Run { source, .. } => source.exit_code(),
+            Self::Failed(_) => 1,
+            Self::Single(source) | Self::Run { source, .. } | Self::Case { source, .. } => {
+                source.exit_code()
+            }
             Self::Unfinished { request, .. } => request.exit_code(),
         }
     }

@@ -8,10 +8,9 @@ use cosim::experiment::Margins;
 use cosim::interrupt::Interrupt;
 use cosim::master::{Master, Observer, Sample};
 use cosim::system::{Opened, Parameters, System};
-use cosim::variation::SettingValue;
+use cosim::variation::{SettingValue, Target};
 use cosim_report::metrics::{Meters, Metrics};
 use fmu_import::description::VariableKind as Type;
-use fmu_import::error::Error as Import;
 use linear::linearise::{Linearised, Lineariser};
 use linear::measures::{self, Measured};
 use std::collections::BTreeMap;
@@ -25,9 +24,11 @@ pub struct Flown {
     pub values: Vec<SettingValue>,
     /// Metrics of the case.
     pub metrics: Metrics,
-    /// How the case ended. An error is that of an instance, or the end of a case that was lost or
-    /// that broke a bound.
+    /// How the case ended. An error is an answer of an instance, or the end of a case that was lost
+    /// or that broke a bound.
     pub outcome: Result<(), Error>,
+    /// Why the loop has no margins although the experiment asks for them, if it has none.
+    pub without_margins: Option<Error>,
     /// Position of the bound that ended the case.
     pub broken: Option<usize>,
     /// Simulated time that the case reached, s.
@@ -142,10 +143,12 @@ impl<'a> Flight<'a> {
     /// Flies the case with this number, seen by further observers.
     ///
     /// # Errors
-    /// Returns an error if the work was asked to end, or if the values of the case cannot be set.
-    /// An FMU that fails is a result.
+    /// Returns an error if the work was asked to end, or if the case could not be flown: a library
+    /// that cannot be loaded, a process that is killed, uses too much memory or does not answer, a
+    /// file that cannot be read. That an instance refuses the values of the case, or answers a call
+    /// by a failure, is a result.
     pub fn fly(&mut self, case: u64, others: &mut [&mut dyn Observer]) -> Result<Flown, Error> {
-        self.fly_with(case, self.sweep.values(case)?, others)
+        self.fly_with(case, self.sweep.values(case), others)
     }
 
     /// Flies a case with these values, seen by further observers.
@@ -160,12 +163,8 @@ impl<'a> Flight<'a> {
     ) -> Result<Flown, Error> {
         let changes = self.sweep.changes(&values);
         self.meters.reset();
-        let mut watch = Watch {
-            meters: &mut self.meters,
-            bounds: &self.bounds,
-            broken: None,
-            time: self.sweep.span[0],
-        };
+        let mut watch =
+            Watch { meters: &mut self.meters, bounds: &self.bounds, broken: None, time: None };
         let mut observers: Vec<&mut dyn Observer> = Vec::with_capacity(1 + others.len());
         for other in others.iter_mut() {
             observers.push(&mut **other);
@@ -198,6 +197,12 @@ impl<'a> Flight<'a> {
         let Watch { broken, time, .. } = watch;
         let outcome = match outcome {
             Err(error) if !is_of_case(&error) => return Err(error),
+            // What an instance answers before the flight may have a reason beyond its values, such
+            // as a file that is not there: then it answers so without them, too.
+            Err(error @ Error::Call { .. }) if time.is_none() => {
+                self.start_without_numbers(&changes)?;
+                Err(error)
+            }
             outcome => outcome,
         };
         let mut metrics = Metrics {
@@ -205,22 +210,34 @@ impl<'a> Flight<'a> {
             loop_delay_s: self.system.loop_delay(),
             ..self.meters.metrics()
         };
-        metrics.asked.extend(self.margins(&values)?);
-        Ok(Flown { case, values, metrics, outcome, broken, time })
+        let (margins, without_margins) = self.margins(&changes)?;
+        metrics.asked.extend(margins);
+        let time = time.unwrap_or(self.sweep.span[0]);
+        Ok(Flown { case, values, metrics, outcome, without_margins, broken, time })
+    }
+
+    /// Starts new instances with the texts among these changes alone.
+    fn start_without_numbers(&self, changes: &[(Target, SettingValue)]) -> Result<(), Error> {
+        let is_text = |change: &&(Target, SettingValue)| matches!(change.1, SettingValue::Text(_));
+        let texts: Vec<_> = changes.iter().filter(is_text).cloned().collect();
+        self.system.start_varied(&texts, self.interrupt).map(drop)
     }
 }
 
 impl Flight<'_> {
-    /// Computes the margins of a case with these values, if the experiment asks for them. They have
-    /// no value if an instance fails.
-    fn margins(&mut self, values: &[SettingValue]) -> Result<Measured, Error> {
-        let Some(lineariser) = &self.lineariser else { return Ok(Measured::new()) };
-        let changes = self.sweep.changes(values);
+    /// Computes the margins of a case with these changes, if the experiment asks for them. They have
+    /// no value if an instance answers by a failure or has no linear model, which is the second
+    /// result.
+    fn margins(
+        &mut self,
+        changes: &[(Target, SettingValue)],
+    ) -> Result<(Measured, Option<Error>), Error> {
+        let Some(lineariser) = &self.lineariser else { return Ok((Measured::new(), None)) };
         self.found = None;
         let system = lineariser.system();
         let started = match self.linearised.take().filter(|_| self.resets) {
-            Some(mut master) => system.restart(&mut master, &changes).map(|()| master),
-            None => system.start_varied(&changes, self.interrupt),
+            Some(mut master) => system.restart(&mut master, changes).map(|()| master),
+            None => system.start_varied(changes, self.interrupt),
         };
         let found = started.and_then(|mut master| {
             let found = lineariser.linearise(&mut master, self.interrupt);
@@ -230,22 +247,21 @@ impl Flight<'_> {
             found
         });
         match found {
-            Ok(found) => Ok(measures::measure(self.found.insert(found))),
-            Err(error) if is_of_case(&error) => Ok(measures::none()),
+            Ok(found) => Ok((measures::measure(self.found.insert(found)), None)),
+            Err(error) if is_of_case(&error) => Ok((measures::none(), Some(error))),
             Err(error) => Err(error),
         }
     }
 }
 
-/// Returns whether an error is the end of one case, so that others can still be flown.
+/// Returns whether an error is the result of a case. Everything else says nothing about what was to
+/// be flown.
 fn is_of_case(error: &Error) -> bool {
-    matches!(
-        error,
-        Error::Lost { .. }
-            | Error::EndedByInstance { .. }
-            | Error::Call { .. }
-            | Error::Import(Import::Fmu { .. })
-    )
+    match error {
+        Error::Lost { .. } | Error::EndedByInstance { .. } => true,
+        Error::Call { failure, .. } => failure.is_answer,
+        _ => false,
+    }
 }
 
 /// Measures a case, and ends it as soon as it exceeds a bound.
@@ -253,12 +269,13 @@ struct Watch<'a> {
     meters: &'a mut Meters,
     bounds: &'a [Bound],
     broken: Option<usize>,
-    time: f64,
+    /// Time of the last communication point, if there was any.
+    time: Option<f64>,
 }
 
 impl Observer for Watch<'_> {
     fn observe(&mut self, sample: &Sample) -> Result<(), Error> {
-        self.time = sample.time;
+        self.time = Some(sample.time);
         self.meters.observe(sample)?;
         for (place, Bound { metric, at_most }) in self.bounds.iter().enumerate() {
             // A value that is not a number is not within the bound.
@@ -316,7 +333,7 @@ fn typed<'a>(kind: &Type, values: impl Iterator<Item = &'a SettingValue>) -> Val
 /// after another case gives the same result as with new ones.
 ///
 /// # Errors
-/// The errors are those of [`Flight::fly`].
+/// The errors are those of [`Flight::fly`] for the first case.
 pub fn can_reset(sweep: &Sweep, opened: &mut Opened, interrupt: &Interrupt) -> Result<bool, Error> {
     let mut flight = Flight::new(sweep, opened, true, interrupt)?;
     let mut result = |case| {
@@ -326,6 +343,10 @@ pub fn can_reset(sweep: &Sweep, opened: &mut Opened, interrupt: &Interrupt) -> R
         Ok::<_, Error>((reason, metrics, flown.time))
     };
     let first = result(0)?;
-    result(1.min(sweep.cases() - 1))?;
-    Ok(result(0)? == first)
+    match result(1.min(sweep.cases() - 1)).and_then(|_| result(0)) {
+        Ok(again) => Ok(again == first),
+        // A library may have no function for it.
+        Err(Error::Call { .. }) => Ok(false),
+        Err(error) => Err(error),
+    }
 }

@@ -138,7 +138,9 @@ fn show(
     }
     outcome?;
     answer.failure.map_or(Ok(()), |Failure { component, call, message }| {
-        let failure = CallFailure { ends: None, call: call.into(), message };
+        // What cannot be instantiated has no answer.
+        let is_answer = call != "instantiate";
+        let failure = CallFailure { ends: None, call: call.into(), message, is_answer };
         let time = system.clock.time(answer.rows.saturating_sub(1));
         Err(Error::Call { component, time, failure })
     })

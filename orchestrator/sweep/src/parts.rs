@@ -63,7 +63,7 @@ pub fn find(folder: &Path, keys: &BTreeMap<String, String>, part: &Range<u64>) -
     whole(&reader, part).map_or(PartState::Damaged, PartState::Whole)
 }
 
-/// Reads a part that is whole.
+/// Reads a part that is whole and holds each of its cases once.
 fn whole(reader: &Reader, part: &Range<u64>) -> Option<PartResult> {
     if reader.rows() != part.end - part.start {
         return None;
@@ -71,23 +71,28 @@ fn whole(reader: &Reader, part: &Range<u64>) -> Option<PartResult> {
     let text = |key| reader.metadata(key).unwrap_or_default().to_string();
     let (units, curves) = (text("units"), text("curves"));
     let result = PartResult { rows: reader.table().ok()?, units, curves };
-    let is_whole = reader.metadata("digest") == Some(&result.digest())
+    let is_whole = reader.metadata("digest") == Some(&result.digest(part))
+        && result.rows.has_cases(part)
         && result.rows.rows() as u64 == reader.rows();
     is_whole.then_some(result)
 }
 
-/// Reads a part.
+/// Reads a part that was found to be whole.
 ///
 /// # Errors
-/// Returns an error if the file is missing or damaged.
-pub fn read(folder: &Path, part: &Range<u64>) -> Result<PartResult, Error> {
-    let path = path(folder, part);
-    whole(&Reader::open(&path)?, part).ok_or_else(|| {
-        Error::experiment(format!(
-            "{} is damaged: remove it, and its cases are flown again",
-            path.display()
-        ))
-    })
+/// Returns an error if the file has been removed, damaged or replaced by another one since.
+pub fn read(
+    folder: &Path,
+    keys: &BTreeMap<String, String>,
+    part: &Range<u64>,
+) -> Result<PartResult, Error> {
+    match find(folder, keys, part) {
+        PartState::Whole(result) => Ok(result),
+        _ => Err(Error::experiment(format!(
+            "{} was changed while it was in use: the same command flies its cases again",
+            path(folder, part).display()
+        ))),
+    }
 }
 
 /// Keeps the results of a part, with the hashes of all its inputs.
@@ -101,7 +106,12 @@ pub fn write(
     result: PartResult,
 ) -> Result<(), Error> {
     let keys = serde_json::to_string(keys).map_err(|error| Error::experiment(error.to_string()))?;
-    let mut metadata = vec![("digest", result.digest()), ("units", result.units), ("keys", keys)];
+    if !result.rows.has_cases(part) {
+        let problem = "does not hold each of its cases once";
+        return Err(Error::experiment(format!("{} {problem}", path(folder, part).display())));
+    }
+    let mut metadata =
+        vec![("digest", result.digest(part)), ("units", result.units), ("keys", keys)];
     if !result.curves.is_empty() {
         metadata.push(("curves", result.curves));
     }
@@ -111,9 +121,12 @@ pub fn write(
 }
 
 impl PartResult {
-    /// Returns a hash of everything, so that no number is used that was changed later.
-    fn digest(&self) -> String {
-        files::digest([&self.rows.digest(), &self.units, &self.curves].map(files::digest).concat())
+    /// Returns a hash of everything, so that no number is used that was changed later, or as that
+    /// of another part.
+    fn digest(&self, part: &Range<u64>) -> String {
+        let range = format!("{}..{}", part.start, part.end);
+        let content = [&range, &self.rows.digest(), &self.units, &self.curves];
+        files::digest(content.map(files::digest).concat())
     }
 }
 
@@ -184,6 +197,14 @@ mod tests {
         }
         // The others lie in what readers skip, such as the name of the program that wrote it.
         assert!(2 * seen > sound.len(), "{seen} of {}", sound.len());
+        // The same bytes are not those of another part of this length.
+        fs::write(super::path(folder.path(), &(2..4)), &sound).unwrap();
+        assert_eq!(find(folder.path(), &keys, &(2..4)), PartState::Damaged);
+        let twice = Values::Count(vec![0, 0]);
+        let mut doubled = result.clone();
+        doubled.rows.columns[0].values = twice;
+        let error = write(folder.path(), &keys, &part, doubled).unwrap_err().to_string();
+        assert!(error.contains("each of its cases once"), "{error}");
         let other = BTreeMap::from([("experiment".to_string(), "abd".to_string())]);
         fs::write(&path, &sound).unwrap();
         assert_eq!(

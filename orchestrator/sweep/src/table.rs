@@ -12,6 +12,7 @@ use parquet::data_type::ByteArray;
 use parquet::errors::ParquetError;
 use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
+use std::ops::Range;
 
 /// Values of a column.
 #[derive(Clone, Debug, PartialEq)]
@@ -192,6 +193,12 @@ impl CaseTable {
     /// Returns the column with this name.
     pub fn column(&self, name: &str) -> Option<&Values> {
         self.columns.iter().find(|column| column.name == name).map(|column| &column.values)
+    }
+
+    /// Returns whether the rows are those of these cases, in order.
+    pub fn has_cases(&self, cases: &Range<u64>) -> bool {
+        let Some(Values::Count(numbers)) = self.column("case") else { return false };
+        numbers.iter().map(|number| number.cast_unsigned()).eq(cases.clone())
     }
 
     /// Returns a hash of names and values, as hexadecimal digits.

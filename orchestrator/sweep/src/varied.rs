@@ -4,6 +4,7 @@ use crate::distribution::Distribution;
 use crate::vary::Vary;
 use cosim::document::Source;
 use cosim::error::Error;
+use cosim::metadata::is_seed;
 use cosim::system::System;
 use cosim::variation::Target;
 use fmu_import::description::VariableKind as Type;
@@ -30,11 +31,19 @@ pub struct Varied {
     pub span: Range<usize>,
 }
 
-/// Makes the distributions of one `[[vary]]`.
+impl Varied {
+    /// Returns whether the values are seeds, which have no order and no effect of their own.
+    pub fn is_seed(&self) -> bool {
+        self.distribution.seeds().is_some() || is_seed(&self.name)
+    }
+}
+
+/// Makes the distributions of one `[[vary]]` of a sweep with this seed.
 pub(crate) fn distributions(
     vary: &Vary,
     source: &Source,
     system: &System,
+    seed: u64,
 ) -> Result<Vec<Varied>, Error> {
     let mut groups: Vec<(Range<usize>, Vec<String>)> = Vec::new();
     if let Some(parameter) = &vary.parameter {
@@ -63,7 +72,7 @@ pub(crate) fn distributions(
                 return Err(fault("parameters that share a value must be of the same type".into()));
             }
         }
-        let distribution = Distribution::new(vary, targets[0], system).map_err(&fault)?;
+        let distribution = Distribution::new(vary, targets[0], system, seed).map_err(&fault)?;
         let unit = match &variable.kind {
             Type::Real { unit, .. } => unit.clone().unwrap_or_default(),
             _ => String::new(),

@@ -171,7 +171,7 @@ pub struct Correlation {
 }
 
 /// Everything that differs between the cases of a sweep, as a file describes it.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Variation<'a> {
     /// Parameters that vary.
     pub vary: &'a [Vary],
@@ -183,4 +183,6 @@ pub struct Variation<'a> {
     pub seed: u64,
     /// Number of cases, which a factorial design may leave out.
     pub cases: Option<u64>,
+    /// Parameters that the file sets to one value in all cases.
+    pub set: Vec<&'a str>,
 }

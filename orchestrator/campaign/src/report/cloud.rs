@@ -64,7 +64,7 @@ pub(super) fn draw(
     let stride = (flight.system().clock.ticks() / POINTS).max(1);
     let mut track = |case: u64, stride: u64| {
         let mut watch = Watch { panels: &panels, stride, track: Track::default() };
-        flight.fly_with(case, plan.sweep.values(case)?, &mut [&mut watch])?;
+        flight.fly_with(case, plan.sweep.values(case), &mut [&mut watch])?;
         Ok::<Track, Error>(watch.track)
     };
     let bad = track(worst, 1)?;

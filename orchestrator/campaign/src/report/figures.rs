@@ -110,7 +110,7 @@ pub(super) fn scatters(plan: &Plan, table: &Reader) -> Result<Vec<Figure>, Error
             break;
         }
         let values = table.column(&varied.name)?.numbers();
-        if !varied.distribution.is_counted() && values.iter().any(|value| value.is_finite()) {
+        if !varied.is_seed() && values.iter().any(|value| value.is_finite()) {
             shown.push((place, values));
         }
     }

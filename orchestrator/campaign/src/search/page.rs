@@ -246,14 +246,11 @@ fn file(out: &Path, name: &str) -> String {
 
 fn answer(plan: &Plan, outcome: &SearchOutcome) -> Markup {
     let unit = if outcome.unit.is_empty() { String::new() } else { format!(" {}", outcome.unit) };
-    let against = outcome.largest.zip(bound(plan, &outcome.measure));
+    let largest = outcome.largest;
     html! {
         p {
-            @match outcome.largest {
-                Some(largest) => { "The largest " code { (outcome.measure) } " is " b { (short(largest)) (unit) } }
-                None => { "No case has a value of " code { (outcome.measure) } }
-            }
-            @if let Some((largest, (limit, is_upper))) = against {
+            "The largest " code { (outcome.measure) } " is " b { (short(largest)) (unit) }
+            @if let Some((limit, is_upper)) = bound(plan, &outcome.measure) {
                 @let kept = if is_upper { largest <= limit } else { largest >= limit };
                 ", its limit " (short(limit)) (unit) " "
                 @if limit > 0.0 { "(" (short(100.0 * largest / limit)) " % of it) " }

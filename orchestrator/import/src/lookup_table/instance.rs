@@ -98,7 +98,7 @@ impl LookupTableInstance {
     }
 
     fn set(&mut self, call: &'static str, reference: u32, value: f64) -> Outcome {
-        let refuse = |problem: String| Err(CallFailure::new(call, problem));
+        let refuse = |problem: String| Err(CallFailure::answer(call, problem));
         if self.is_running {
             return refuse("a lookup table can be set only before the run begins".into());
         }
@@ -176,7 +176,7 @@ impl Instance for LookupTableInstance {
     fn enter_initialization(&mut self, start: f64, stop: f64) -> Outcome {
         let times = &self.table.times;
         if let Some(row) = times.windows(2).position(|pair| pair[0] > pair[1]) {
-            return Err(CallFailure::new(
+            return Err(CallFailure::answer(
                 "enterInitializationMode",
                 format!(
                     "time[{}] = {} s is earlier than time[{}] = {} s",

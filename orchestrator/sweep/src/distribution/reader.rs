@@ -1,6 +1,6 @@
 //! Reads the distribution of a parameter, with units converted.
 
-use super::shape::Shape;
+use super::shape::{Seeds, Shape};
 use crate::vary::Vary;
 use cosim::system::System;
 use cosim::variation::{SettingValue, Target};
@@ -8,10 +8,15 @@ use fmu_import::description::VariableKind;
 use statrs::distribution::{LogNormal, Normal, Triangular};
 use toml::Value;
 
+/// Largest number of values of a range.
+const MOST: u32 = 1_000_000;
+
 /// Reads the values of a distribution for one target.
 pub(super) struct Reader<'a> {
     pub(super) system: &'a System,
     pub(super) target: Target,
+    /// Seed of the sweep.
+    pub(super) seed: u64,
 }
 
 impl Reader<'_> {
@@ -57,8 +62,8 @@ impl Reader<'_> {
         }
         if let Some(log_normal) = &vary.log_normal {
             let log_normal = log_normal.get_ref();
-            let (median, sigma) = (self.number(&log_normal.median)?, log_normal.sigma);
-            if median.is_nan() || median <= 0.0 {
+            let (median, sigma) = (self.number(&log_normal.median)?, finite(log_normal.sigma)?);
+            if median <= 0.0 {
                 return Err(format!("log_normal: median = {median}, but it must be above 0"));
             }
             return LogNormal::new(median.ln(), sigma)
@@ -77,6 +82,14 @@ impl Reader<'_> {
         if let Some(list) = &vary.list {
             let values = list.get_ref().iter().map(|value| self.setting(value));
             let values = values.collect::<Result<Vec<_>, _>>()?;
+            let is_twice =
+                |(place, value): &(usize, &SettingValue)| values[..*place].contains(value);
+            if let Some((_, twice)) = values.iter().enumerate().find(is_twice) {
+                return Err(format!(
+                    "list: {} is there twice; weights make a value more likely",
+                    twice.to_json()
+                ));
+            }
             return weighted(
                 values,
                 vary.weights.as_ref().map(|weights| weights.get_ref().as_slice()),
@@ -84,10 +97,14 @@ impl Reader<'_> {
         }
         if let Some(range) = &vary.range {
             let range = range.get_ref();
-            if range.count < 2 {
-                return Err(format!("range: count = {}, but it must be at least 2", range.count));
+            if !(2..=MOST).contains(&range.count) {
+                let count = range.count;
+                return Err(format!("range: count = {count}, but it must be from 2 to {MOST}"));
             }
             let (from, to) = (self.number(&range.from)?, self.number(&range.to)?);
+            if from >= to {
+                return Err(format!("range: from = {from} must be less than to = {to}"));
+            }
             let last = f64::from(range.count - 1);
             let value = |i: u32| {
                 let value = from + (to - from) * f64::from(i) / last;
@@ -97,17 +114,25 @@ impl Reader<'_> {
         }
         if let Some(sign) = &vary.sign {
             let size = self.number(sign.get_ref())?;
+            if size <= 0.0 {
+                return Err(format!("sign = {size}: it is a magnitude, which must be above 0"));
+            }
             return weighted(vec![self.checked(-size)?, self.checked(size)?], None);
         }
         let first = vary.case.as_ref().map_or(0, |first| *first.get_ref());
-        let VariableKind::Integer { max, .. } = kind else {
+        let VariableKind::Integer { min, max } = kind else {
             return Err(format!("case is for parameters of type Integer, not {}", kind.name()));
         };
         self.setting(&Value::Integer(first))?;
-        Ok(Shape::Case { first, most: max.unwrap_or(i32::MAX) })
+        let least = min.map_or(first.min(0), i64::from);
+        let most = max.map_or(i64::from(i32::MAX), i64::from);
+        Ok(Shape::Case(Seeds::new(first, [least, most], self.seed)))
     }
 
     fn uniform(&self, ends: &[Value; 2], kind: &VariableKind) -> Result<Shape, String> {
+        let reversed = |low: &dyn std::fmt::Display, high: &dyn std::fmt::Display| {
+            format!("uniform = [{low}, {high}]: the second value must be larger than the first one")
+        };
         let [low, high] = ends;
         if matches!(kind, VariableKind::Integer { .. }) {
             let whole = |value: &Value| match self.setting(value)? {
@@ -118,9 +143,7 @@ impl Reader<'_> {
             return if low < high {
                 Ok(Shape::Whole([low, high]))
             } else {
-                Err(format!(
-                    "uniform = [{low}, {high}]: the second value must be larger than the first one"
-                ))
+                Err(reversed(&low, &high))
             };
         }
         if !matches!(kind, VariableKind::Real { .. }) {
@@ -130,21 +153,24 @@ impl Reader<'_> {
         if low < high && (high - low).is_finite() {
             Ok(Shape::Uniform([low, high]))
         } else {
-            Err(format!(
-                "uniform = [{low}, {high}]: the second value must be larger than the first one"
-            ))
+            Err(reversed(&low, &high))
         }
     }
 
     /// Converts a value; text with a percent sign stands for percent of the experiment's value.
     fn setting(&self, written: &Value) -> Result<SettingValue, String> {
-        match self.percent(written)? {
-            Some(value) => self.checked(value),
-            None => self.system.value(self.target, written),
+        let value = match self.percent(written, |nominal| nominal)? {
+            Some(value) => self.checked(value)?,
+            None => self.system.value(self.target, written)?,
+        };
+        if let SettingValue::Real(number) = value {
+            finite(number)?;
         }
+        Ok(value)
     }
 
-    fn percent(&self, written: &Value) -> Result<Option<f64>, String> {
+    /// Computes the percentage that a text stands for, of a function of the experiment's value.
+    fn percent(&self, written: &Value, of: fn(f64) -> f64) -> Result<Option<f64>, String> {
         let Some(number) = written.as_str().and_then(|text| text.trim().strip_suffix('%')) else {
             return Ok(None);
         };
@@ -153,28 +179,37 @@ impl Reader<'_> {
         let nominal = self.system.nominal(self.target).ok_or_else(|| {
             format!("{written}: neither the experiment nor the FMU gives a value of which this could be a percentage")
         })?;
-        Ok(Some(nominal * percent / 100.0))
+        Ok(Some(of(nominal) * percent / 100.0))
     }
 
     /// Converts a number, without a check of the variable's limits: it may be a mean or a bound.
     pub(super) fn number(&self, written: &Value) -> Result<f64, String> {
-        if let Some(value) = self.percent(written)? {
-            return Ok(value);
+        if let Some(value) = self.percent(written, |nominal| nominal)? {
+            return finite(value);
         }
-        match written {
-            Value::Float(value) => Ok(*value),
-            Value::Integer(value) => Ok(*value as f64),
-            _ => match self.system.value(self.target, written)? {
-                SettingValue::Real(value) => Ok(value),
-                SettingValue::Integer(value) => Ok(f64::from(value)),
-                _ => Err(format!("{written} is no number")),
-            },
-        }
+        finite(match written {
+            Value::Float(value) => *value,
+            Value::Integer(value) => *value as f64,
+            Value::String(text) => self.system.number(self.target, text)?,
+            _ => return Err(format!("{written} is no number")),
+        })
     }
 
-    /// Converts a difference of two values. Units with an offset are not differences.
+    /// Converts a difference of two values. A unit whose zero is another one, such as that of
+    /// degrees Celsius, has none.
     fn difference(&self, written: &Value) -> Result<f64, String> {
-        self.number(written).map(f64::abs)
+        if let Some(value) = self.percent(written, f64::abs)? {
+            return finite(value);
+        }
+        let unit = written.as_str().and_then(|text| text.trim().split_once(char::is_whitespace));
+        if let Some((_, unit)) = unit
+            && self.system.number(self.target, &format!("0 {unit}"))? != 0.0
+        {
+            return Err(format!(
+                "{written} is no difference: the zero of its unit is not that of the parameter's"
+            ));
+        }
+        self.number(written)
     }
 
     /// Checks a number against the limits of the variable.
@@ -187,6 +222,10 @@ impl Reader<'_> {
         };
         self.system.value(self.target, &written)
     }
+}
+
+fn finite(number: f64) -> Result<f64, String> {
+    if number.is_finite() { Ok(number) } else { Err(format!("{number} is no finite number")) }
 }
 
 /// Makes a list whose values have these weights, or the same weight each.

@@ -14,11 +14,42 @@ pub(super) enum Shape {
     Triangular(Triangular),
     /// Values with the probabilities up to and including each of them.
     List(Vec<SettingValue>, Vec<f64>),
-    /// The first integer plus the number of the case, up to the largest one of the variable.
-    Case {
-        first: i64,
-        most: i32,
-    },
+    /// Consecutive integers, one for each case.
+    Case(Seeds),
+}
+
+/// Seeds that differ from case to case, and from one sweep to another.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Seeds {
+    /// Seed of case 0.
+    pub(super) first: i64,
+    /// Smallest and largest value of the parameter.
+    ends: [i64; 2],
+}
+
+impl Seeds {
+    /// Begins at `first` in a sweep with the seed 1, and elsewhere in others. Multiples of the
+    /// golden ratio keep the beginnings apart: of 1,000 sweeps whose seeds follow one another, two
+    /// begin at least 1/2,210 of the range from each other.
+    pub(super) fn new(first: i64, ends: [i64; 2], seed: u64) -> Self {
+        let turn = seed.wrapping_sub(1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+        let whole = Self { first, ends };
+        let shift = (u128::from(turn) * u128::from(whole.count())) >> 64;
+        Self { first: whole.of(shift as u64), ends }
+    }
+
+    /// Returns the number of different seeds.
+    pub(super) fn count(&self) -> u64 {
+        self.ends[1].abs_diff(self.ends[0]) + 1
+    }
+
+    /// Returns the seed of a case. The smallest follows the largest.
+    pub(super) fn of(&self, case: u64) -> i64 {
+        let [least, _] = self.ends;
+        let place =
+            (u128::from(self.first.abs_diff(least)) + u128::from(case)) % u128::from(self.count());
+        least + place as i64
+    }
 }
 
 impl Shape {
