@@ -1,6 +1,7 @@
 //! Search for contradictions in a description, so that they are detected before an importer meets
 //! them.
 
+use crate::condition;
 use crate::unit::Unit;
 use crate::variable::{Causality, EnumerationType, Variability, Variable, VariableKind};
 use crate::{Error, ModelDescription};
@@ -104,6 +105,9 @@ impl ModelDescription {
         };
         if let Some(name) = variable.dependencies.iter().find(|name| !is_input_or_state(name)) {
             return Some(format!("depends on '{name}', which is neither an input nor a state"));
+        }
+        if let Some(problem) = condition::problem(&variable.used_with, &self.variables) {
+            return Some(problem);
         }
         if let Some(state) = variable.derivative_of() {
             let continuous = |other: &Variable| {

@@ -2,6 +2,7 @@
 //! (feature `pack`). The crate knows no physics.
 
 pub mod check;
+pub mod condition;
 #[cfg(feature = "pack")]
 pub mod html;
 #[cfg(feature = "pack")]

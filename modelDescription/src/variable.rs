@@ -106,4 +106,6 @@ pub struct Variable {
     pub kind: VariableKind,
     /// Names of the inputs and states on which a calculated variable depends at the same instant.
     pub dependencies: Vec<String>,
+    /// [Condition](crate::condition) under which the variable has an effect; empty for always.
+    pub used_with: String,
 }

@@ -24,7 +24,15 @@ fn variable(
     kind: VariableKind,
 ) -> Variable {
     let description = format!("What <{name}> & co. are");
-    Variable { name: name.into(), description, causality, variability, kind, dependencies: vec![] }
+    Variable {
+        name: name.into(),
+        description,
+        causality,
+        variability,
+        kind,
+        dependencies: vec![],
+        used_with: String::new(),
+    }
 }
 
 fn real(start: Option<f64>) -> VariableKind {

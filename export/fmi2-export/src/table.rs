@@ -16,7 +16,6 @@ use std::sync::Arc;
 type Lens<M, T> = Box<dyn Fn(&mut M) -> &mut T + Send + Sync>;
 /// A part of the model with declared settings.
 type Part<M> = Arc<dyn Fn(&mut M) -> &mut (dyn Declared + 'static) + Send + Sync>;
-type Setter<M, T> = Box<dyn Fn(&mut M, T) + Send + Sync>;
 
 /// Access to the field that holds a variable's value.
 pub(crate) enum Access<M> {
@@ -31,7 +30,7 @@ pub(crate) enum Access<M> {
 pub(crate) struct Integer<M> {
     pub(crate) get: Box<dyn Fn(&mut M) -> i32 + Send + Sync>,
     /// Setter that is called only with values that the declaration allows.
-    pub(crate) set: Setter<M, i32>,
+    pub(crate) set: Box<dyn Fn(&mut M, i32) + Send + Sync>,
 }
 
 /// Says why a setting has no field, which cannot happen: its declaration and its field have the
@@ -57,6 +56,16 @@ fn numbered<M: 'static>(part: Part<M>, index: usize, first: i32) -> Access<M> {
 
 fn fmi_number(value: &dyn Numbered, first: i32) -> i32 {
     i32::try_from(value.number()).map_or(i32::MAX, |number| number.saturating_add(first))
+}
+
+/// Returns access to a setting whose field is of one variant of [`Field`].
+macro_rules! access {
+    ($variant:ident, $part:ident, $index:ident) => {
+        Box::new(move |model| match $part(model).field($index) {
+            Ok(Field::$variant(field)) => field,
+            _ => unreachable!("{NO_FIELD}"),
+        })
+    };
 }
 
 fn described(items: &settings::Items) -> VariableKind {
@@ -192,16 +201,12 @@ impl<M: 'static> VariableTable<M> {
 
     #[inline(never)]
     fn push_setting(&mut self, Setting { place, kind }: Setting, index: usize, part: Part<M>) {
-        let common = parameter(&place.name, &place.text);
+        let common = parameter(&place.name, &place.text).used_with(&place.used_with);
         let (min, max) = (place.min.or(place.above), place.max.or(place.below));
         match kind {
             settings::Kind::Real => {
                 let real = Real { min, max, nominal: place.nominal, ..common.real() };
-                let field: Lens<M, f64> = Box::new(move |model| match part(model).field(index) {
-                    Ok(Field::Real(field)) => field,
-                    _ => unreachable!("{NO_FIELD}"),
-                });
-                self.push_real(real.unit(&place.unit), field);
+                self.push_real(real.unit(&place.unit), access!(Real, part, index));
             }
             settings::Kind::Integer(is_signed) => {
                 let min = min.or((!is_signed).then_some(0.0)).map(|min| min as i32);
@@ -210,24 +215,15 @@ impl<M: 'static> VariableTable<M> {
                 self.push(common, kind, numbered(part, index, 0));
             }
             settings::Kind::Boolean => {
-                let field: Lens<M, bool> = Box::new(move |model| match part(model).field(index) {
-                    Ok(Field::Boolean(field)) => field,
-                    _ => unreachable!("{NO_FIELD}"),
-                });
                 let kind = VariableKind::Boolean { start: None };
-                self.push(common, kind, Access::Boolean(field));
+                self.push(common, kind, Access::Boolean(access!(Boolean, part, index)));
             }
             settings::Kind::Choice(items) => {
                 self.push(common, described(&items), numbered(part, index, 1));
             }
             settings::Kind::Text => {
-                let field: Lens<M, String> =
-                    Box::new(move |model| match part(model).field(index) {
-                        Ok(Field::Text(field)) => field,
-                        _ => unreachable!("{NO_FIELD}"),
-                    });
                 let kind = VariableKind::String { start: None };
-                self.push(common, kind, Access::String(field));
+                self.push(common, kind, Access::String(access!(Text, part, index)));
             }
         }
     }
@@ -271,8 +267,9 @@ impl<M: 'static> VariableTable<M> {
 
     #[inline(never)]
     fn push(&mut self, common: Common, kind: VariableKind, access: Access<M>) {
-        let Common { name, description, causality, variability, dependencies } = common;
-        let variable = Variable { name, description, causality, variability, kind, dependencies };
+        let Common { name, description, causality, variability, dependencies, used_with } = common;
+        let variable =
+            Variable { name, description, causality, variability, kind, dependencies, used_with };
         self.entries.push(Entry { variable, access });
     }
 }
@@ -285,6 +282,7 @@ pub struct Common {
     causality: Causality,
     variability: Variability,
     dependencies: Vec<String>,
+    used_with: String,
 }
 
 impl Common {
@@ -296,6 +294,7 @@ impl Common {
             causality,
             variability,
             dependencies: Vec::new(),
+            used_with: String::new(),
         }
     }
 
@@ -304,6 +303,17 @@ impl Common {
     #[must_use]
     pub fn depends_on<'a>(mut self, names: impl IntoIterator<Item = &'a str>) -> Self {
         self.dependencies.extend(names.into_iter().map(String::from));
+        self
+    }
+
+    /// Declares the [condition](model_description::condition) under which the variable has an
+    /// effect. The importer is warned if it sets the variable in vain.
+    #[must_use]
+    pub fn used_with(mut self, condition: &str) -> Self {
+        if !condition.is_empty() {
+            self.description += &format!("; used with {condition}");
+            self.used_with = condition.into();
+        }
         self
     }
 
@@ -332,8 +342,7 @@ pub fn discrete_input(name: &str, description: &str) -> Common {
 pub fn output(name: &str, description: &str) -> Common {
     Common::new(name, description, Causality::Output, Variability::Continuous)
 }
-/// Declares an output that changes only at events or communication points: anything sampled,
-/// integers, booleans.
+/// Declares an output that changes only at events or communication points.
 pub fn discrete_output(name: &str, description: &str) -> Common {
     Common::new(name, description, Causality::Output, Variability::Discrete)
 }

@@ -48,6 +48,7 @@
 //! | `each` | for arrays and vectors: a constant with the ending of each name, and what the entry is for |
 //! | `part` | the sentence continues that of the field that holds the structure |
 //! | `text` | sentence for users, where it has to differ from the documentation comment |
+//! | `used_with` | condition on other settings under which the setting has an effect, as `"profile = constant or sine"`; it is added to that of the structure, whose name `~` stands for |
 //! | `skip` | the field is no setting |
 //!
 //! What a field does not declare, it takes from the field that holds its structure.

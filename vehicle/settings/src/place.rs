@@ -29,6 +29,9 @@ pub struct About {
     pub nominal: Option<f64>,
     /// Value at the start, if no file has it.
     pub start: Option<f64>,
+    /// Condition on other settings under which this one has an effect; empty for always. In it `~`
+    /// stands for the name of the structure.
+    pub used_with: &'static str,
 }
 
 /// The place of a value among the settings.
@@ -52,6 +55,9 @@ pub struct Place {
     pub nominal: Option<f64>,
     /// Value at the start, if no file has it.
     pub start: Option<f64>,
+    /// Conditions on other settings under which this one has an effect, those of the structures
+    /// first; empty for always.
+    pub used_with: String,
     each: &'static [(&'static str, &'static str)],
 }
 
@@ -79,6 +85,11 @@ impl Place {
             below: about.below.or(self.below),
             nominal: about.nominal.or(self.nominal),
             start: about.start.or(self.start),
+            used_with: match (self.used_with.as_str(), about.used_with) {
+                ("", own) => own.replace('~', &self.name),
+                (structure, "") => structure.to_owned(),
+                (structure, own) => format!("{structure} and {}", own.replace('~', &self.name)),
+            },
             each: if about.each.is_empty() { self.each } else { about.each },
         }
     }

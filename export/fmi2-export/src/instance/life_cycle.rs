@@ -36,10 +36,12 @@ impl Instance {
     pub(crate) fn enter_initialization_mode(&mut self) {
         self.progress.state = State::InitializationMode;
         self.progress.initialized = false;
+        self.note_set_inputs();
     }
 
     pub(crate) fn exit_initialization_mode(&mut self) -> Outcome {
         self.initialize()?;
+        self.warn_of_unused();
         self.progress.state = match self.interface {
             Interface::ModelExchange => State::EventMode,
             Interface::CoSimulation => State::StepComplete,

@@ -7,6 +7,7 @@ mod co_simulation;
 mod life_cycle;
 mod model_exchange;
 mod saved_states;
+mod unused;
 mod variables;
 
 use crate::call::{Call, Outcome, State, error};
@@ -46,6 +47,8 @@ pub(crate) struct Instance {
     /// Saved states handed out by fmi2GetFMUstate; the importer holds their addresses.
     #[expect(clippy::vec_box, reason = "the address is the importer's handle and must not move")]
     saved: Vec<Box<Saved>>,
+    /// Inputs that were set before initialization mode.
+    set_inputs: Vec<usize>,
     /// Texts handed out by the last fmi2GetString.
     strings: Vec<CString>,
 }
@@ -81,6 +84,7 @@ impl Instance {
             last_step: FmiStatus::Ok,
             has_ended: false,
             saved: Vec::new(),
+            set_inputs: Vec::new(),
             strings: Vec::new(),
         }
     }

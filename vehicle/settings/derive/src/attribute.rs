@@ -16,6 +16,7 @@ pub(crate) struct Keys {
     rate: bool,
     pub(crate) name: Option<String>,
     text: Option<String>,
+    used_with: Option<LitStr>,
     unit: Option<LitStr>,
     min: Option<Expr>,
     max: Option<Expr>,
@@ -39,6 +40,7 @@ impl Keys {
                     "rate" => keys.rate = true,
                     "name" => keys.name = Some(meta.value()?.parse::<LitStr>()?.value()),
                     "text" => keys.text = Some(meta.value()?.parse::<LitStr>()?.value()),
+                    "used_with" => keys.used_with = Some(meta.value()?.parse()?),
                     "unit" => keys.unit = Some(meta.value()?.parse()?),
                     "min" => keys.min = Some(meta.value()?.parse()?),
                     "max" => keys.max = Some(meta.value()?.parse()?),
@@ -72,7 +74,8 @@ impl Keys {
         let [min, max, above, below, nominal, start] =
             [&self.min, &self.max, &self.above, &self.below, &self.nominal, &self.start]
                 .map(number);
-        let unit = self.unit.as_ref().map(LitStr::value).unwrap_or_default();
+        let [unit, used_with] = [&self.unit, &self.used_with]
+            .map(|text| text.as_ref().map(LitStr::value).unwrap_or_default());
         let (part, rate) = (self.part, self.rate);
         let each = self.each.as_ref().map_or(quote!([]), |each| quote!(#each));
         quote! {
@@ -89,6 +92,7 @@ impl Keys {
                 below: #below,
                 nominal: #nominal,
                 start: #start,
+                used_with: #used_with,
             }
         }
     }
