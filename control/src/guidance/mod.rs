@@ -12,7 +12,7 @@ mod settings;
 mod shaping;
 
 pub use predictor::{Beginning, End, Predictor};
-pub use settings::{Alpha, Bank, Filter, Initial, Reversal, Settings, Shaping, Target};
+pub use settings::{Alpha, Bank, Filter, Initial, Reversal, Settings, Shaping, Sphere, Target};
 pub use shaping::{Limits, Shaped};
 
 use crate::error::DesignError;
@@ -22,6 +22,7 @@ use vehicle::axes::nearest;
 use vehicle::entry::{Motion, great_circle};
 use vehicle::math::{cos, exp, sin_cos};
 use vehicle::reference::Reference;
+use vehicle::translation::Planet;
 
 /// Time between two ticks, s.
 pub const PERIOD: f64 = 0.04;
@@ -134,7 +135,8 @@ impl Guidance {
         let [_, _, _, speed, _, heading] = measured.motion.into();
         let target = [self.settings.target.longitude, self.settings.target.latitude];
         let here = [measured.motion[1], measured.motion[2]];
-        let (range, direction) = great_circle(&self.settings.planet, here, target);
+        let planet = Planet { radius: self.settings.planet.radius, ..Planet::EARTH };
+        let (range, direction) = great_circle(&planet, here, target);
         let heading_error = nearest(direction - heading, 0.0);
         let first = !memory.begun;
         if first {

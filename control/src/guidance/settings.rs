@@ -26,7 +26,7 @@ pub struct Settings {
     #[allow(missing_docs)]
     pub filter: Filter,
     #[allow(missing_docs)]
-    pub planet: Planet,
+    pub planet: Sphere,
 }
 
 /// Where the flight is to end.
@@ -143,6 +143,27 @@ pub struct Filter {
     pub drag: f64,
 }
 
+/// The planet as the guidance knows it: a sphere that rotates.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Declared)]
+pub struct Sphere {
+    /// Radius of the planet, from which altitudes are counted.
+    #[setting(unit = "m", min = 1e3, nominal = 1e6)]
+    pub radius: f64,
+    /// Gravitational parameter of the planet.
+    #[setting(unit = "m3/s2", min = 0.0, nominal = 1e14)]
+    pub gravitation: f64,
+    /// Angular rate of the planet's rotation.
+    #[setting(unit = "rad/s", min = 0.0, max = 1.0, nominal = 1e-4)]
+    pub rate: f64,
+}
+
+impl Sphere {
+    const EARTH: Self = {
+        let Planet { radius, gravitation, rate, .. } = Planet::EARTH;
+        Self { radius, gravitation, rate }
+    };
+}
+
 const FILE: &str = "guidance.toml";
 
 #[derive(Deserialize)]
@@ -163,7 +184,7 @@ impl Default for Settings {
                 reversal: Reversal::default(),
                 shaping: Shaping::default(),
                 filter: Filter::default(),
-                planet: Planet::EARTH,
+                planet: Sphere::EARTH,
             };
             data::set(&mut settings, FILE, &file.settings);
             settings
