@@ -214,10 +214,16 @@ fn moment(
     table
 }
 
+/// Returns the condition under which a surface is used.
+fn allowed(surface: usize) -> String {
+    format!("surfaceAllowed[{}] = true", surface + 1)
+}
+
 fn effectors(mut table: Variables) -> Variables {
     let names = Effectors::published().names;
     let limit = |name: &str, i: usize, text: &str| {
         parameter(&format!("limit.{name}[{}]", i + 1), &format!("{text} of the {}", names[i]))
+            .used_with(&allowed(i))
             .real()
     };
     for i in 0..SURFACES {
@@ -255,6 +261,7 @@ fn effectors(mut table: Variables) -> Variables {
             let text =
                 format!("{} moment per deflection of the {name} (matrix D_A)", capital(meaning));
             let common = parameter(&format!("surfaceMoment[{},{}]", i + 1, j + 1), &text);
+            let common = common.used_with(&allowed(j));
             table = table.real(common.real().unit("N.m/rad").nominal(1e5), move |m| {
                 &mut m.settings.effectors.effectiveness[(i, j)]
             });

@@ -33,17 +33,25 @@ pub(crate) enum Vehicle {
 pub(crate) struct EntryParameters {
     pub(crate) translation: Translation,
     #[setting(name = "initial")]
+    #[setting(used_with = "translation = entry")]
     pub(crate) start: Start,
+    #[setting(used_with = "translation = entry")]
     pub(crate) planet: Planet,
     #[setting(name = "aerodynamics.vehicle")]
+    #[setting(used_with = "translation = entry")]
     pub(crate) vehicle: Vehicle,
     #[setting(name = "aerodynamics.trim")]
+    #[setting(used_with = "translation = entry and aerodynamics.vehicle = papers")]
     pub(crate) trim: Trim,
     #[setting(name = "aerodynamics")]
+    #[setting(used_with = "translation = entry")]
     pub(crate) deviations: Deviations,
     #[setting(name = "")]
+    #[setting(used_with = "translation = entry")]
     pub(crate) air: Air,
+    #[setting(used_with = "translation = entry")]
     pub(crate) prescribed: Following,
+    #[setting(used_with = "translation = entry")]
     pub(crate) end: End,
 }
 

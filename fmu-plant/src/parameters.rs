@@ -64,53 +64,70 @@ pub(crate) struct Parameters {
     pub(crate) kind: DisturbanceKind,
     /// Bound on the disturbance of the second time derivative of each attitude angle.
     #[setting(name = "disturbance.bound", unit = "rad/s2", min = 0.0, max = 10.0, nominal = 0.03)]
+    #[setting(
+        used_with = "disturbance.kind = white or constant or square or alongRate or againstMoment or table"
+    )]
     pub(crate) bound: f64,
     /// Time for which disturbances of the kinds white, alongRate and againstMoment are held.
     #[setting(name = "disturbance.period", unit = "s", min = 1e-4, nominal = 0.04)]
+    #[setting(used_with = "disturbance.kind = white or alongRate or againstMoment")]
     pub(crate) period: f64,
     /// Seed of the white noise; the same seed gives the same noise.
     #[setting(name = "disturbance.seed", min = 0)]
+    #[setting(used_with = "disturbance.kind = white")]
     pub(crate) seed: u64,
-    /// Factor on disturbance.bound, used by the kinds constant and square.
+    /// Factor on disturbance.bound.
     #[setting(name = "disturbance.direction", each = ANGLES, min = -1, max = 1, nominal = 1)]
+    #[setting(used_with = "disturbance.kind = constant or square")]
     pub(crate) direction: Vector3<f64>,
     /// Period of the square wave, which starts with its positive half at disturbance.start.
     #[setting(name = "disturbance.square.period", unit = "s", min = 1e-3, nominal = 10.0)]
+    #[setting(used_with = "disturbance.kind = square")]
     pub(crate) square_period: f64,
     /// Constant part of the sine disturbance moment.
     #[setting(name = "disturbance.sine.offset", each = AXES, unit = "N.m", nominal = 1e4)]
+    #[setting(used_with = "disturbance.kind = sine")]
     pub(crate) sine_offset: Vector3<f64>,
     /// Sinusoidal part of the sine disturbance moment.
     #[setting(name = "disturbance.sine", each = WAVES)]
+    #[setting(used_with = "disturbance.kind = sine")]
     pub(crate) waves: [MomentWave; 2],
     /// Time at which the disturbance starts.
     #[setting(name = "disturbance.start", unit = "s")]
+    #[setting(used_with = "disturbance.kind != none")]
     pub(crate) start: f64,
     /// Time at which the disturbance ends.
     #[setting(name = "disturbance.end", unit = "s")]
+    #[setting(used_with = "disturbance.kind != none")]
     pub(crate) end: f64,
-    /// Maximum step size of the Runge-Kutta integration in co-simulation.
+    /// Maximum step size of the Runge-Kutta integration.
     #[setting(name = "integrator.step", unit = "s", min = 1e-5, max = 1.0, nominal = 0.01)]
+    #[setting(used_with = "co-simulation")]
     pub(crate) step: f64,
     pub(crate) actuation: Actuation,
+    #[setting(used_with = "translation = given")]
     pub(crate) flight: Flight,
     /// Ratio of the actual air density to that of the standard atmosphere: 0.9 means 10 % less.
     #[setting(name = "density.scale", min = 0.0, max = 10.0, nominal = 1.0)]
     pub(crate) density_scale: f64,
     /// Ratio of the actual to the nominal effectiveness of the surfaces: 0.9 means 10 % less.
     #[setting(name = "aerodynamics.scale", min = 0.0, max = 10.0, nominal = 1.0)]
+    #[setting(used_with = "actuation = surfacesAndJets")]
     pub(crate) aerodynamics_scale: f64,
     /// If true, jets give any thrust from 0 to 1; if false, they are fully on from a command of
     /// 0.5.
     #[setting(name = "jets.duty")]
+    #[setting(used_with = "actuation = surfacesAndJets")]
     pub(crate) jet_duty: bool,
     /// If true, jet 4 mirrors jet 8; if false, it is as printed in (64) of Wu 2015, which is not
     /// symmetric.
     #[setting(name = "jets.symmetric")]
+    #[setting(used_with = "actuation = surfacesAndJets")]
     pub(crate) jet_symmetric: bool,
     pub(crate) kinematics: Kinematics,
     /// Angular rate of the Earth: 7.2921e-5 rad/s, or 0 to neglect the rotation.
     #[setting(name = "trajectory.earthRate", unit = "rad/s", min = 0.0, max = 1.0, nominal = 1e-4)]
+    #[setting(used_with = "translation = given")]
     pub(crate) earth_rate: f64,
     #[setting(skip)]
     pub(crate) sensing: Sensing,
@@ -167,6 +184,7 @@ pub(crate) struct Sensing {
     pub(crate) line: Line,
     /// Seed of sensor noise and dropped samples; the same seed gives the same samples.
     #[setting(name = "sensor.seed", min = 0)]
+    #[setting(used_with = "sensor.set >= 1 and (sensor.set = 2 or sensor.drop.probability > 0)")]
     pub(crate) sensor_seed: u64,
     #[setting(name = "sensor")]
     pub(crate) triads: PerSensor<Triad>,
@@ -176,6 +194,7 @@ pub(crate) struct Sensing {
     #[setting(name = "calibration.active")]
     pub(crate) calibrates: bool,
     #[setting(name = "calibration")]
+    #[setting(used_with = "calibration.active = true")]
     pub(crate) sequence: Sequence,
     pub(crate) turntable: turntable::Config,
 }
@@ -183,26 +202,28 @@ pub(crate) struct Sensing {
 /// Parameters of the converter of the input moment.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Declared)]
 pub(crate) struct Converter {
-    /// Delay of the input moment, which is then held over each communication step; only for
-    /// co-simulation with actuation = moment.
+    /// Delay of the input moment, which is then held over each communication step.
     #[setting(name = "actuation.delay", unit = "s", min = 0.0, max = transport::LONGEST, nominal = 0.1)]
+    #[setting(used_with = "actuation = moment and co-simulation")]
     pub(crate) delay: f64,
     /// Quantization step of the input moment, which is then held over each communication step; 0
-    /// for none; only for co-simulation with actuation = moment.
+    /// for none.
     #[setting(name = "actuation.resolution", unit = "N.m", min = 0.0, nominal = 10.0)]
+    #[setting(used_with = "actuation = moment and co-simulation")]
     pub(crate) resolution: f64,
 }
 
 /// Lookup table of the disturbance.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Declared)]
 pub(crate) struct Table {
-    /// Number of rows of the disturbance's lookup table that are used; the rows after them are
-    /// ignored.
+    /// Number of rows of the disturbance's lookup table that are used.
     #[setting(name = "disturbance.table.rows", min = 0, max = TABLE_ROWS)]
+    #[setting(used_with = "disturbance.kind = table")]
     pub(crate) used: usize,
     /// Period with which the lookup table repeats from disturbance.start on; 0 holds the last row
     /// instead.
     #[setting(name = "disturbance.table.period", unit = "s", min = 0.0, nominal = 10.0)]
+    #[setting(used_with = "disturbance.kind = table and disturbance.table.rows > 0")]
     pub(crate) period: f64,
     /// The rows, whose variables are declared column by column.
     #[setting(skip)]

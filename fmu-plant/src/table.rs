@@ -20,6 +20,8 @@ const ANGLES: [(&str, &str); 3] =
     [("alpha", "angle of attack"), ("beta", "sideslip angle"), ("sigma", "bank angle")];
 const RATES: [(&str, &str); 3] = [("p", "roll"), ("q", "pitch"), ("r", "yaw")];
 const RATE_NAMES: [&str; 3] = ["rate.p", "rate.q", "rate.r"];
+/// Condition under which the commands to the effectors are used.
+const BY_SURFACES: &str = "actuation = surfacesAndJets";
 const AXES: [(&str, &str); 3] = [("x", "roll"), ("y", "pitch"), ("z", "yaw")];
 
 /// Returns the role of the variable at a position in the variable table.
@@ -183,11 +185,9 @@ fn outputs(variables: PlantVariables) -> PlantVariables {
 
 fn inputs(variables: PlantVariables) -> PlantVariables {
     let control = |axis: &str, meaning: &str| {
-        let common = input(
-            &format!("moment.{axis}"),
-            &format!("Control moment about the {meaning} axis, used if actuation = moment"),
-        );
-        common.real().unit("N.m").nominal(1e5)
+        let common =
+            input(&format!("moment.{axis}"), &format!("Control moment about the {meaning} axis"));
+        common.used_with("actuation = moment").real().unit("N.m").nominal(1e5)
     };
     let external = |axis: &str, meaning: &str| {
         let common = input(
@@ -242,13 +242,14 @@ fn commands(mut variables: PlantVariables) -> PlantVariables {
     for (i, name) in Effectors::published().names.iter().enumerate() {
         let text = format!("Commanded deflection of the {name}, trailing edge down positive");
         let common = discrete_input(&format!("surface[{}]", i + 1), &text);
-        let real = common.real().unit("rad").nominal(0.1);
+        let real = common.used_with(BY_SURFACES).real().unit("rad").nominal(0.1);
         variables =
             variables.real(real, move |m| &mut m.command.surfaces[i]).role(Known::Surface(i));
     }
     for j in 0..JETS {
         let text = format!("Command to jet {}: 0 for off, 1 for full thrust", j + 1);
-        let real = discrete_input(&format!("jet[{}]", j + 1), &text).real().nominal(1.0);
+        let common = discrete_input(&format!("jet[{}]", j + 1), &text);
+        let real = common.used_with(BY_SURFACES).real().nominal(1.0);
         variables = variables.real(real, move |m| &mut m.command.jets[j]).role(Known::Jet(j));
     }
     variables
@@ -274,12 +275,18 @@ fn trajectory_inputs(mut variables: PlantVariables) -> PlantVariables {
     for (i, Quantity { name, meaning, unit, nominal, field }) in
         trajectory::QUANTITIES.into_iter().enumerate()
     {
-        let real = input(name, meaning).real().unit(unit).nominal(nominal);
+        let common = input(name, meaning).used_with("translation = given");
+        let real = common.real().unit(unit).nominal(nominal);
         variables = variables
             .real(real, move |m| field(&mut m.input.trajectory))
             .role(Known::Trajectory(i));
     }
     variables
+}
+
+/// Returns the condition under which a row of the disturbance's lookup table is used.
+fn used_row(index: usize) -> String {
+    format!("disturbance.kind = table and disturbance.table.rows >= {}", index + 1)
 }
 
 /// Adds the rows of the disturbance's lookup table column by column, as FMI wants the elements of
@@ -289,14 +296,16 @@ fn disturbance_rows(mut variables: PlantVariables) -> PlantVariables {
         let name = format!("disturbance.table.time[{}]", i + 1);
         let text =
             format!("Time after disturbance.start at which a row takes effect (row {})", i + 1);
-        let real = parameter(&name, &text).real().unit("s").min(0.0).nominal(10.0);
+        let common = parameter(&name, &text).used_with(&used_row(i));
+        let real = common.real().unit("s").min(0.0).nominal(10.0);
         variables = variables.real(real, move |m| &mut m.parameters.table.rows[i].time);
     }
     for (component, (axis, meaning)) in ANGLES.into_iter().enumerate() {
         for i in 0..TABLE_ROWS {
             let name = format!("disturbance.table.{axis}[{}]", i + 1);
             let text = format!("Factor on disturbance.bound for the {meaning} (row {})", i + 1);
-            let real = parameter(&name, &text).real().min(-1.0).max(1.0).nominal(1.0);
+            let common = parameter(&name, &text).used_with(&used_row(i));
+            let real = common.real().min(-1.0).max(1.0).nominal(1.0);
             variables =
                 variables.real(real, move |m| &mut m.parameters.table.rows[i].direction[component]);
         }

@@ -32,11 +32,13 @@ pub struct Air {
     pub density: Density,
     /// Density at zero altitude of exponential air.
     #[setting(name = "air.seaLevelDensity", unit = "kg/m3", min = 0.0, nominal = 1.0)]
+    #[setting(used_with = "air.density = exponential")]
     pub sea_level_density: f64,
     /// Height over which the density of exponential air falls by the factor e.
     #[setting(name = "air.scaleHeight", unit = "m", min = 1.0, nominal = 1e4)]
+    #[setting(used_with = "air.density = exponential")]
     pub scale_height: f64,
-    /// Number of rows of the air's profile that are used; the rows after them are ignored.
+    /// Number of rows of the air's profile that are used.
     #[setting(name = "air.rows", min = 0, max = ROWS)]
     pub rows: usize,
     /// Rows of the profile, whose variables are declared column by column.
@@ -69,9 +71,11 @@ pub struct Gust {
     pub velocity: Vector3<f64>,
     /// Time at which the gust begins.
     #[setting(unit = "s", nominal = 100.0)]
+    #[setting(used_with = "(~.north != 0 or ~.east != 0 or ~.down != 0)")]
     pub start: f64,
     /// Time that the gust takes.
     #[setting(unit = "s", min = 1e-3, nominal = 10.0)]
+    #[setting(used_with = "(~.north != 0 or ~.east != 0 or ~.down != 0)")]
     pub duration: f64,
 }
 

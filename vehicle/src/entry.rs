@@ -42,9 +42,11 @@ pub struct Deviations {
     pub drag: f64,
     /// Ratio of the actual to the nominal moments of the air, without those of the surfaces.
     #[setting(name = "moment.scale", min = 0.0, max = 10.0, nominal = 1.0)]
+    #[setting(used_with = "aerodynamics.vehicle = papers")]
     pub moment: f64,
     /// Error of the coefficient of the pitch moment at trim.
     #[setting(name = "pitch.offset", min = -1.0, max = 1.0, nominal = 1e-3)]
+    #[setting(used_with = "aerodynamics.vehicle = papers")]
     pub pitch: f64,
 }
 
@@ -62,6 +64,7 @@ pub struct Following {
     pub active: bool,
     /// Natural frequency of this loop, which is critically damped.
     #[setting(unit = "rad/s", above = 0.0, max = 100.0, nominal = 1.0)]
+    #[setting(used_with = "~.active = true")]
     pub frequency: f64,
 }
 

@@ -78,17 +78,21 @@ pub struct Config {
 pub struct Line {
     /// Sampling period of the sensors.
     #[setting(unit = "s", min = 1e-4, nominal = 0.01)]
+    #[setting(used_with = "sensor.set >= 1")]
     pub period: f64,
     /// Delay between taking a sample and receiving it.
     #[setting(unit = "s", min = 0.0, max = 10.0, nominal = 0.01)]
+    #[setting(used_with = "sensor.set >= 1")]
     pub delay: f64,
     /// Probability that a sample is dropped in transmission.
     ///
     /// It is dropped if it is taken within `drop_window`.
     #[setting(name = "drop.probability", min = 0.0, max = 1.0, nominal = 1.0)]
+    #[setting(used_with = "sensor.set >= 1")]
     pub drop_probability: f64,
     /// Time window in which samples can be dropped.
     #[setting(name = "drop")]
+    #[setting(used_with = "sensor.set >= 1 and sensor.drop.probability > 0")]
     pub drop_window: Window,
 }
 

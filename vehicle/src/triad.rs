@@ -15,27 +15,35 @@ use std::f64::consts::TAU;
 pub struct Triad {
     /// Matrix of scale and misalignment; for the magnetometer with soft iron.
     #[setting(part, unit = "1", nominal = 1.0)]
+    #[setting(used_with = "sensor.set = 2")]
     pub matrix: Matrix3<f64>,
     /// Bias; for the magnetometer with hard iron.
     #[setting(part, each = AXES)]
+    #[setting(used_with = "sensor.set = 2")]
     pub bias: Vector3<f64>,
     /// Rate of change of the bias.
     #[setting(part, rate, each = AXES)]
+    #[setting(used_with = "sensor.set = 2")]
     pub drift: Vector3<f64>,
     /// Standard deviation of the white noise on the samples.
     #[setting(part, min = 0.0)]
+    #[setting(used_with = "sensor.set = 2")]
     pub noise: f64,
     /// Bandwidth (3 dB) of the first-order low-pass filter; 0 for no filter.
     #[setting(part, unit = "Hz", min = 0.0, nominal = 50.0)]
+    #[setting(used_with = "sensor.set = 2")]
     pub bandwidth: f64,
     /// Largest magnitude of a reading; 0 for no limit.
     #[setting(part, min = 0.0)]
+    #[setting(used_with = "sensor.set = 2")]
     pub range: f64,
     /// Quantization step of the reading; 0 for none.
     #[setting(part, min = 0.0)]
+    #[setting(used_with = "sensor.set = 2")]
     pub resolution: f64,
     /// Time window in which the sensor repeats its last value.
     #[setting(part)]
+    #[setting(used_with = "sensor.set >= 1")]
     pub freeze: Window,
 }
 
@@ -43,7 +51,7 @@ pub struct Triad {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Declared)]
 pub struct Window {
     /// Start, included.
-    #[setting(part, unit = "s", nominal = 1.0)]
+    #[setting(part, unit = "s", nominal = 1.0, used_with = "~.end != 0")]
     pub start: f64,
     /// End, excluded.
     #[setting(part, unit = "s", nominal = 1.0)]

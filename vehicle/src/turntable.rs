@@ -23,12 +23,15 @@ pub struct Config {
     /// Bandwidth of the first-order servo of a turntable that carries the sampled sensors; 0 for
     /// sensors on the vehicle.
     #[setting(unit = "Hz", min = 0.0, nominal = 10.0)]
+    #[setting(used_with = "sensor.set >= 1")]
     pub bandwidth: f64,
     /// Maximum rate of the turntable's angles; 0 for no limit.
     #[setting(unit = "rad/s", min = 0.0, nominal = 1.0)]
+    #[setting(used_with = "sensor.set >= 1 and turntable.bandwidth > 0")]
     pub rate: f64,
     /// Quantization step of the angles commanded to the turntable; 0 for none.
     #[setting(unit = "rad", min = 0.0, nominal = 1e-3)]
+    #[setting(used_with = "sensor.set >= 1 and turntable.bandwidth > 0")]
     pub resolution: f64,
 }
 

@@ -15,19 +15,33 @@ const PERIODS: u32 = 8;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Declared)]
 pub struct Pwpf {
     /// Gain K_m of the modulator's filter.
-    #[setting(name = "pwpf.gain", above = 0.0)]
+    #[setting(name = "pwpf.gain", used_with = "jets = pwpf", above = 0.0)]
     pub gain: f64,
     /// Time constant T_m of the modulator's filter.
-    #[setting(name = "pwpf.timeConstant", unit = "s", min = 1e-5, max = 10.0, nominal = 0.1)]
+    #[setting(
+        name = "pwpf.timeConstant",
+        used_with = "jets = pwpf",
+        unit = "s",
+        min = 1e-5,
+        max = 10.0,
+        nominal = 0.1
+    )]
     pub time_constant: f64,
     /// Filter output u_on at which a jet switches on.
-    #[setting(name = "pwpf.on", above = 0.0)]
+    #[setting(name = "pwpf.on", used_with = "jets = pwpf", above = 0.0)]
     pub on: f64,
     /// Filter output u_off at which a jet switches off.
-    #[setting(name = "pwpf.off", above = 0.0)]
+    #[setting(name = "pwpf.off", used_with = "jets = pwpf", above = 0.0)]
     pub off: f64,
     /// Sampling period of the modulator.
-    #[setting(name = "pwpf.period", unit = "s", min = 1e-5, max = 10.0, nominal = 1e-3)]
+    #[setting(
+        name = "pwpf.period",
+        used_with = "jets = pwpf",
+        unit = "s",
+        min = 1e-5,
+        max = 10.0,
+        nominal = 1e-3
+    )]
     pub period: f64,
 }
 

@@ -45,6 +45,7 @@ pub struct Settings {
     pub period: f64,
     /// Dynamic pressure above which method = blending uses the surfaces.
     #[setting(name = "threshold.dynamicPressure", unit = "Pa", min = 0.0, nominal = 1e3)]
+    #[setting(used_with = "method = blending")]
     pub threshold: f64,
     /// Maximum number of iterations of the cone solver.
     #[setting(name = "solver.maxIterations", min = 1, max = 1000)]

@@ -60,15 +60,18 @@ pub enum Guarantee {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Declared)]
 pub struct ObserverSettings {
     /// Whether the reference is shifted to cancel the steady deviation that the observed
-    /// disturbance causes; only with constraints = robust.
+    /// disturbance causes.
+    #[setting(used_with = "constraints = robust")]
     pub active: bool,
     /// Time constant of the disturbance observer's filter.
     #[setting(unit = "s", min = 1e-3, max = 100.0, nominal = 0.2)]
+    #[setting(used_with = "constraints = robust and observer.active = true")]
     pub time_constant: f64,
     /// Ratio of the estimated disturbance to the resulting shift of the reference angles.
     ///
     /// This is k in the shift −Δ̂/k.
     #[setting(unit = "1/s2", min = 1e-3, max = 1e3, nominal = 2.5)]
+    #[setting(used_with = "constraints = robust and observer.active = true")]
     pub stiffness: f64,
 }
 
@@ -115,6 +118,7 @@ pub struct Settings {
     /// Gain K~ of the terminal law (14).
     pub terminal: Gain,
     /// Gain for the paper's tube constant in (21).
+    #[setting(used_with = "constraints = paper")]
     pub tube: Gain,
     /// Bound on each component of the disturbance of the angles' second derivatives; the
     /// constraint sets are tightened for it.
@@ -123,25 +127,31 @@ pub struct Settings {
     /// Bound on the relative error of the inertia as a common factor of the tensor; the robust set
     /// is tightened for it.
     #[setting(name = "inertia.error", min = 0.0, max = 0.9, nominal = 0.05)]
+    #[setting(used_with = "constraints = robust")]
     pub inertia_error: f64,
     /// Bound on the relative error of the inertia tensor in all six entries, besides the common
     /// factor; the robust set is tightened for it.
     ///
     /// It bounds ‖I^−½ (I_v − I) I^−½‖.
     #[setting(name = "inertia.tensorError", min = 0.0, max = 0.9, nominal = 0.05)]
+    #[setting(used_with = "constraints = robust")]
     pub tensor_error: f64,
     /// Bound on the difference between the loop delay, which must be constant, and delay +
     /// measurement.age; the robust set is tightened for it.
     #[setting(unit = "s", min = 0.0, max = 1.0, nominal = 0.01)]
+    #[setting(used_with = "constraints = robust")]
     pub delay_error: f64,
     /// Largest magnitude of the sideslip angle for which the bounds of the paper's design hold.
     #[setting(name = "bound.sideslip", unit = "rad", min = 0.0, max = 1.5, nominal = 0.2)]
+    #[setting(used_with = "constraints = paper")]
     pub sideslip_bound: f64,
     /// Bound on the norm of the reference's first derivative in the paper's terminal set (13).
     #[setting(name = "bound.referenceRate", unit = "rad/s", min = 0.0, nominal = 0.05)]
+    #[setting(used_with = "constraints = paper")]
     pub reference_rate: f64,
     /// Bound on the norm of the reference's second derivative in the paper's terminal set (13).
     #[setting(name = "bound.referenceAcceleration", unit = "rad/s2", min = 0.0, nominal = 0.02)]
+    #[setting(used_with = "constraints = paper")]
     pub reference_acceleration: f64,
     /// Bound on the measurement error of each angle, which may change arbitrarily from tick to
     /// tick; the robust set is tightened for it.
@@ -152,6 +162,7 @@ pub struct Settings {
         below = 1.0,
         nominal = 0.003
     )]
+    #[setting(used_with = "constraints = robust")]
     pub angle_error: f64,
     /// Bound on the error of each angle's derivative as computed from the measurements, which may
     /// change arbitrarily from tick to tick; the robust set is tightened for it.
@@ -162,12 +173,15 @@ pub struct Settings {
         below = 1.0,
         nominal = 0.005
     )]
+    #[setting(used_with = "constraints = robust")]
     pub rate_error: f64,
     #[allow(missing_docs)]
     #[setting(name = "guarantee.policy")]
+    #[setting(used_with = "constraints = robust")]
     pub guarantee: Guarantee,
     /// Largest magnitude of the sideslip angle for which the guarantee is given.
     #[setting(name = "guarantee.sideslip", unit = "rad", min = 0.0, max = 0.8, nominal = 0.3)]
+    #[setting(used_with = "constraints = robust")]
     pub sideslip_domain: f64,
     #[allow(missing_docs)]
     pub observer: ObserverSettings,

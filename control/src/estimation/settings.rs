@@ -62,8 +62,9 @@ pub struct Settings {
     /// Whether the estimate is predicted forward over the delays of sensors, transmission and
     /// filter.
     pub prediction: bool,
-    /// Delay of the sensors' filters at low frequencies; used with sensor.set = 2.
+    /// Delay of the sensors' filters at low frequencies.
     #[setting(name = "sensor.delay", unit = "s", min = 0.0, nominal = 0.01)]
+    #[setting(used_with = "sensor.set = 2")]
     pub sensor_delay: f64,
     /// Gains of the nine-axis fusion.
     #[setting(name = "fusion")]
@@ -87,9 +88,11 @@ pub struct Settings {
     pub calibration: CalibrationMode,
     /// Time during which readings are collected for the fit.
     #[setting(name = "calibration.duration", unit = "s", above = 0.0, nominal = 10.0)]
+    #[setting(used_with = "calibration.mode = fit")]
     pub calibration_duration: f64,
     /// Corrections of the readings.
     #[setting(name = "")]
+    #[setting(used_with = "sensor.set = 2")]
     pub corrections: PerSensor<Correction>,
 }
 

@@ -33,6 +33,7 @@ pub struct SolverSettings {
     #[setting(name = "")]
     pub method: Method,
     #[allow(missing_docs)]
+    #[setting(used_with = "solver = riccati")]
     pub nonlinearity: Nonlinearity,
     /// Maximum number of iterations of each solver in each pass.
     #[setting(min = 1, max = 1000)]

@@ -31,9 +31,11 @@ pub struct Settings<R> {
     /// false in the paper.
     ///
     /// The reaching law's integral is then cleared as well.
+    #[setting(used_with = "achievedMoment.used = true")]
     pub anti_windup: bool,
     /// Norm of the missing angular acceleration above which the actuators count as saturated.
     #[setting(name = "antiWindupThreshold", unit = "rad/s2", above = 0.0, nominal = 0.01)]
+    #[setting(used_with = "achievedMoment.used = true and antiWindup = true")]
     pub threshold: f64,
     /// Disturbance observer, if there is one.
     #[setting(skip)]

@@ -90,11 +90,13 @@ pub struct TwoLoopSettings {
     #[setting(name = "commandFilter.frequency", unit = "1/s", min = 0.0)]
     pub filter: f64,
     /// Whether the integrals are held while the actuators saturate.
+    #[setting(used_with = "achievedMoment.used = true")]
     pub anti_windup: bool,
     /// Norm of the missing angular acceleration above which the actuators count as saturated.
     ///
     /// It is that of ‖R I⁻¹ (M_achieved − M)‖.
     #[setting(name = "antiWindupThreshold", unit = "rad/s2", above = 0.0, nominal = 0.01)]
+    #[setting(used_with = "achievedMoment.used = true and antiWindup = true")]
     pub threshold: f64,
     #[allow(missing_docs)] // Its type says what it is.
     pub form: Form,

@@ -40,20 +40,24 @@ pub enum Choice {
 pub struct Parameters {
     #[allow(missing_docs)] // Its type says what it is.
     pub profile: Choice,
-    /// Path of a CSV file with time and angles, or name of a file in the resources of the FMU;
-    /// used with reference.profile = table.
+    /// Path of a CSV file with time and angles, or name of a file in the resources of the FMU.
+    #[setting(used_with = "reference.profile = table")]
     pub file: String,
-    /// Constant part of the reference; used with reference.profile = constant or sine.
+    /// Constant part of the reference.
     #[setting(each = axes::ANGLES, unit = "rad", nominal = 0.1)]
+    #[setting(used_with = "reference.profile = constant or sine")]
     pub angle: Vector3<f64>,
-    /// Amplitude of the sine in the reference; used with reference.profile = sine.
+    /// Amplitude of the sine in the reference.
     #[setting(each = axes::ANGLES, unit = "rad", nominal = 0.1)]
+    #[setting(used_with = "reference.profile = sine")]
     pub amplitude: Vector3<f64>,
-    /// Angular frequency of the reference sine; used with reference.profile = sine.
+    /// Angular frequency of the reference sine.
     #[setting(unit = "rad/s", min = 0.0, nominal = 1.0)]
+    #[setting(used_with = "reference.profile = sine and reference.amplitude.* != 0")]
     pub frequency: f64,
-    /// Phase of the reference sine at t = 0; used with reference.profile = sine.
+    /// Phase of the reference sine at t = 0.
     #[setting(unit = "rad")]
+    #[setting(used_with = "reference.profile = sine and reference.amplitude.* != 0")]
     pub phase: f64,
 }
 

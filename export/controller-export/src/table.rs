@@ -5,6 +5,7 @@ use fmi2_export::table::{
     Common, Description, Real, VariableTable, discrete_output, input, output,
 };
 use model_description::DefaultExperiment;
+use model_description::condition::NEVER;
 use nalgebra::Vector3;
 use vehicle::Scenario;
 use vehicle::trajectory;
@@ -101,12 +102,14 @@ fn measured_rate(axis: &str, meaning: &str) -> Real {
     input(&format!("rate.{axis}"), &text).real().unit("rad/s").nominal(0.05)
 }
 
-fn achieved(axis: &str, meaning: &str) -> Real {
-    let text = format!(
-        "{meaning} moment achieved by the actuators; ignored by controllers without the parameter achievedMoment.used"
-    );
+/// Declares the achieved moment. All controllers have it, so that they can be exchanged.
+fn achieved<L: Law>(axis: &str, meaning: &str) -> Real {
+    let text = format!("{meaning} moment achieved by the actuators");
     let common = input(&format!("achievedMoment.{axis}"), &capital(&text));
-    common.real().unit("N.m").nominal(1e5)
+    let settings = settings::settings::<L::Settings>();
+    let is_used = settings.iter().any(|setting| setting.place.name == "achievedMoment.used");
+    let condition = if is_used { "achievedMoment.used = true" } else { NEVER };
+    common.used_with(condition).real().unit("N.m").nominal(1e5)
 }
 
 fn known_moment(axis: &str, meaning: &str) -> Real {
@@ -123,15 +126,16 @@ fn external(
     unit: &'static str,
 ) -> impl Fn(&str, &str) -> Real {
     move |axis, meaning| {
-        let text = format!("{quantity} {meaning}; used with reference.profile = external");
-        input(&format!("reference.{name}.{axis}"), &text).real().unit(unit).nominal(0.1)
+        let text = format!("{quantity} {meaning}");
+        let common = input(&format!("reference.{name}.{axis}"), &text);
+        common.used_with("reference.profile = external").real().unit(unit).nominal(0.1)
     }
 }
 
 fn inputs<L: Law>(table: VariableTable<ControllerFmu<L>>) -> VariableTable<ControllerFmu<L>> {
     let table = vector(table, ANGLES, measured_angle, |m| &mut m.input.measured.angles);
     let table = vector(table, RATES, measured_rate, |m| &mut m.input.measured.rates);
-    let table = vector(table, AXES, achieved, |m| &mut m.input.achieved_moment);
+    let table = vector(table, AXES, achieved::<L>, |m| &mut m.input.achieved_moment);
 
     let angles = external("external", "Reference", "rad");
     let rates = external("externalRate", FIRST_DERIVATIVE, "rad/s");

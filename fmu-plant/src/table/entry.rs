@@ -141,8 +141,9 @@ fn quantities(variables: PlantVariables) -> PlantVariables {
 fn inputs(variables: PlantVariables) -> PlantVariables {
     let prescribed = |name: &'static str, unit: &'static str, what: &'static str| {
         move |axis: &str, meaning: &str| {
-            let text = format!("{what} {meaning}, used if prescribed.active = true");
-            input(&format!("{name}.{axis}"), &text).real().unit(unit).nominal(0.1)
+            let common = input(&format!("{name}.{axis}"), &format!("{what} {meaning}"));
+            let common = common.used_with("translation = entry and prescribed.active = true");
+            common.real().unit(unit).nominal(0.1)
         }
     };
     let variables = vector(
@@ -159,9 +160,8 @@ fn inputs(variables: PlantVariables) -> PlantVariables {
         |i| Known::Prescribed(3 + i).into(),
         |m| &mut m.input.prescribed.rates,
     );
-    let trim = input(
-        "trim.alpha",
-        "Angle of attack at which the vehicle is trimmed, used if aerodynamics.trim = input",
+    let trim = input("trim.alpha", "Angle of attack at which the vehicle is trimmed").used_with(
+        "translation = entry and aerodynamics.vehicle = papers and aerodynamics.trim = input",
     );
     variables.real(trim.real().unit("rad").nominal(0.1), |m| &mut m.input.trim).role(Known::Trim)
 }
@@ -191,7 +191,11 @@ fn profile(mut variables: PlantVariables) -> PlantVariables {
     for (name, meaning, unit, least, nominal, field) in COLUMNS {
         for i in 0..ROWS {
             let text = format!("{meaning} (row {})", i + 1);
-            let mut real = parameter(&format!("{name}[{}]", i + 1), &text).real().nominal(nominal);
+            // The air of a single row is the same at all altitudes.
+            let rows = if name == "air.altitude" { (i + 1).max(2) } else { i + 1 };
+            let common = parameter(&format!("{name}[{}]", i + 1), &text)
+                .used_with(&format!("translation = entry and air.rows >= {rows}"));
+            let mut real = common.real().nominal(nominal);
             if !unit.is_empty() {
                 real = real.unit(unit);
             }
