@@ -6,7 +6,6 @@ use crate::failure::Failure;
 use crate::live::{self, Live, scene::Scene};
 use crate::summary::{self, RunReport};
 use cosim::check::check;
-use cosim::doubts::doubts;
 use cosim::error::Error;
 use cosim::experiment::{Experiment, Overrides};
 use cosim::files;
@@ -189,7 +188,7 @@ fn record(system: &mut System, options: &Options) -> Result<RunReport, Failure> 
     let mut meters = Meters::new(system)?.ending_when_lost();
     let panels = Panel::resolve_all(system)?;
     let mut watch = options.files.pictures.page.then(|| Watch::new(system)).transpose()?;
-    for doubt in doubts(system, &options.interrupt)? {
+    for doubt in system.doubts() {
         tracing::warn!("{doubt}");
     }
     let (clock, title) = (system.clock, system.experiment.title.clone());

@@ -50,6 +50,7 @@ pub fn check(
         return Err(Error::experiment(format!("--set {target}: {}", whereabouts(target, &parts))));
     }
     experiment.isolation.check().map_err(|problem| experiment.isolation_error(&problem))?;
+    warn_of_idle_keys(&experiment, &components);
     check_single_instances(&experiment, &components)?;
     if let Some(name) = &experiment.simulation.ends_with
         && !experiment.components.contains_key(name)
@@ -80,6 +81,37 @@ pub fn check(
         component.settings = settings;
     }
     Ok(System { experiment, clock, components, loops, wires, columns, probes })
+}
+
+/// Warns of keys that have no effect beside the others.
+fn warn_of_idle_keys(experiment: &Experiment, components: &[CheckedComponent]) {
+    let Experiment { isolation, simulation, source, .. } = experiment;
+    let warn = |keys: &str, why: &str| {
+        warnings::warn_once(format!("{}: {keys} has no effect {why}", source.path.display()));
+    };
+    let has_processes = components.iter().any(|component| component.is_isolated);
+    for key in isolation.idle(has_processes) {
+        let why = match key {
+            "isolate" => "beside sandbox = true",
+            _ => "where no instance has a process of its own: it is used with isolate = true",
+        };
+        warn(&format!("[isolation] {key}"), why);
+    }
+    for CheckedComponent { name, fmu, .. } in components {
+        let key = format!("[components.{name}] isolate");
+        if experiment.components[name].isolate.is_none() {
+        } else if isolation.sandbox == Some(true) {
+            warn(&key, "beside sandbox = true");
+        } else if fmu.is_lookup_table() {
+            warn(&key, "on a lookup table");
+        }
+    }
+    if simulation.coupling == Coupling::Jacobi
+        && !simulation.order.is_empty()
+        && !experiment.given.coupling
+    {
+        warn("[simulation] order", "with coupling = \"jacobi\"");
+    }
 }
 
 /// Opens an archive, and warns if its description has a fault.

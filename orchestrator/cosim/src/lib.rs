@@ -11,7 +11,6 @@ pub mod check;
 pub mod clock;
 pub mod delay;
 pub mod document;
-pub mod doubts;
 pub mod error;
 pub mod experiment;
 pub mod files;

@@ -226,18 +226,9 @@ impl System {
         readings.iter().any(|(_, reading)| *reading == Reading::AfterStep)
     }
 
-    /// Returns the indices, among a sample's values, of the computing times, which differ from run
-    /// to run.
-    pub(crate) fn timings(&self) -> Vec<usize> {
-        let observe = &self.experiment.observe;
-        let timed = observe.metrics.values().filter(|measure| measure.timing);
-        timed
-            .filter_map(|measure| observe.list(measure.signals.get_ref()).ok())
-            .flatten()
-            .flat_map(Signal::paths)
-            .filter_map(|path| self.find(path))
-            .filter_map(|port| self.probes.iter().position(|probe| *probe == port))
-            .collect()
+    /// Returns one warning for each component whose control law is designed for another loop delay.
+    pub fn doubts(&self) -> Vec<String> {
+        delay::warnings(&self.parts(), &self.settings(), &self.loops, self.clock.step())
     }
 
     /// Returns the full names of the probed variables, in the order of a sample's values, and

@@ -157,9 +157,11 @@ pub(crate) fn wires(experiment: &Experiment, parts: &[Part]) -> Result<Vec<Wire>
                 )));
             }
         };
+        let mut converts = false;
         for (output, input) in pairs {
             let (start, end) = (from.port(&output, "output")?, to.port(&input, "input")?);
             let conversion = check_match(start, end, &from, &output, &to, &input)?;
+            converts |= conversion != Scaling::default();
             if conversion != Scaling::default() && !connection.convert_units {
                 return Err(to.refuse(format!(
                     "the units of \"{}.{output}\" and \"{}.{input}\" measure the same quantity on another scale: \
@@ -180,6 +182,14 @@ pub(crate) fn wires(experiment: &Experiment, parts: &[Part]) -> Result<Vec<Wire>
                 );
             }
             wires.push(wire);
+        }
+        // An SSP archive has no such key.
+        if connection.convert_units && !converts && !connection.to.span().is_empty() {
+            warn_once(format!(
+                "{}: convert_units has no effect on the connection to \"{}\", whose units are equal",
+                experiment.source.path.display(),
+                to.text
+            ));
         }
     }
     if !experiment.leaves_inputs_open {

@@ -349,6 +349,16 @@ impl Measure {
             && !(self.band.xor(self.bound).is_some_and(|band| band > 0.0) && self.hold >= 0.0)
         {
             "settling needs either a band or a bound above 0, and a hold of at least 0"
+        } else if matches!(
+            self.kind,
+            MeasureKind::Settling
+                | MeasureKind::Pulses
+                | MeasureKind::Leaving
+                | MeasureKind::Rises
+                | MeasureKind::Share
+        ) && self.unit.is_some()
+        {
+            "settling, pulses, leaving, rises and share have no unit of the signals to replace: leave unit out"
         } else if !is(MeasureKind::Settling) && self.band.is_some() {
             "band is for settling only"
         } else if !is(MeasureKind::Settling) && self.hold != 0.0 {

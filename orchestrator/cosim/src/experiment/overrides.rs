@@ -34,6 +34,8 @@ pub struct Given {
     stop: Option<f64>,
     step: Option<f64>,
     call_timeout: Option<f64>,
+    /// Whether the coupling is given.
+    pub(crate) coupling: bool,
     /// Components whose FMU is given.
     fmu: Vec<String>,
 }
@@ -91,6 +93,7 @@ impl Experiment {
         self.simulation.coupling = overrides.coupling.unwrap_or(self.simulation.coupling);
         self.simulation.on_invalid = overrides.on_invalid.unwrap_or(self.simulation.on_invalid);
         self.isolation.apply(&overrides.isolation);
+        self.given.coupling |= overrides.coupling.is_some();
         self.given.stop = overrides.stop.or(self.given.stop);
         self.given.step = overrides.step.or(self.given.step);
         self.given.call_timeout = overrides.isolation.call_timeout.or(self.given.call_timeout);

@@ -54,6 +54,18 @@ impl Protection {
         }
     }
 
+    /// Returns the keys of `[isolation]` that are given and have no effect, provided that some
+    /// instance has a process of its own, or that none has.
+    pub(crate) fn idle(&self, has_processes: bool) -> Vec<&'static str> {
+        let keys = [
+            ("isolate", self.isolate.is_some() && self.sandbox == Some(true)),
+            ("call_timeout", self.call_timeout.is_some() && !has_processes),
+            ("memory", self.memory.is_some() && !has_processes),
+            ("cpu", self.cpu.is_some() && !has_processes),
+        ];
+        keys.into_iter().filter(|(_, is_idle)| *is_idle).map(|(key, _)| key).collect()
+    }
+
     /// Returns whether a component gets a process of its own. By default FMUs share the process of
     /// the program if this project's fmu-pack made them, as they say, and if they lie in a folder
     /// of the program or in one of `fmu_dirs`, which the command line names: what an archive says
