@@ -5,6 +5,8 @@
 mod arguments;
 mod calls;
 mod derivatives;
+#[cfg(target_arch = "x86_64")]
+mod environment;
 mod finite;
 mod libraries;
 mod platform;
