@@ -9,6 +9,7 @@ import sys
 import threading
 import time
 import uuid
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
@@ -137,6 +138,31 @@ def test_workers_give_the_bytes_of_one_machine(file, expected, client, tmp_path)
 def list_of_files(worker):
     folder = Path(worker.local_directory)
     return [path.name for path in folder.iterdir() if path.name.startswith(("reentry", "cases"))]
+
+
+@pytest.mark.parametrize("shares_client", [False, True])
+def test_two_drivers_share_a_cluster(shares_client, file, expected, tmp_path):
+    """They fly the same campaign at once, with clients of their own or with one. Neither of them takes
+    away what the other one needs."""
+    with workers() as client, Client(client.scheduler.address, set_as_default=False) as second:
+        clients = [client, client if shares_client else second]
+
+        def drive(number):
+            # The first one has less to do, and ends before the other one.
+            out = tmp_path / f"out-{number}"
+            if number == 0:
+                campaign(file).run(jobs=2, out=out)
+                for part in sorted((out / "parts").iterdir())[:10]:
+                    part.unlink()
+            return campaign(file).run(clients[number], out=out).folder
+
+        with ThreadPoolExecutor(2) as threads:
+            folders = list(threads.map(drive, range(2)))
+        assert [content(folder) for folder in folders] == [expected] * 2
+        # Nothing stays with the workers.
+        assert not any(client.run(lambda dask_worker: list_of_files(dask_worker)).values())
+        plugins = client.run(lambda dask_worker: list(dask_worker.plugins))
+        assert not [name for names in plugins.values() for name in names if "reentry" in name]
 
 
 @pytest.mark.parametrize("kind", ["file", "memory"])
