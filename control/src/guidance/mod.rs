@@ -64,8 +64,8 @@ pub struct Command {
     pub heading_error: f64,
     /// By how much the predicted flight ends too far from the target, m.
     pub miss: f64,
-    /// Whether the target is in reach: the predicted flight comes down to the target's energy
-    /// within the tolerance, or another bank angle makes it do so and can still be flown.
+    /// Whether a plan reaches the target within the tolerance: the present one, or, as long as the
+    /// bank angle is corrected, one between those with the least and the largest bank angle.
     pub in_reach: bool,
 }
 
@@ -251,7 +251,7 @@ impl Guidance {
             return;
         }
         if !command.in_reach {
-            // The largest bank angle gives the shortest flight, and none the longest.
+            // The plan with the largest bank angle is the shortest one, that with none the longest.
             command.in_reach = miss(largest) >= -tolerance && miss(0.0) <= tolerance;
         }
         let slope = (miss(memory.magnitude + PROBE) - here) / PROBE;
