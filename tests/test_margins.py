@@ -11,6 +11,7 @@ import pytest
 import slycot
 from scipy.optimize import brentq
 
+import margins_in_flight
 from conftest import EXPERIMENTS, TARGET, program
 
 FOLDER = EXPERIMENTS.parent
@@ -264,6 +265,29 @@ def test_where_there_is_no_linear_model_none_is_given(experiment, arguments, cod
     command = [program("orchestrator"), "margins", FOLDER / experiment, "--fmu-dir", TARGET / "fmu", *arguments]
     done = subprocess.run(command, capture_output=True, text=True, timeout=120)
     assert done.returncode == code and problem in done.stderr and done.stdout == "", done.stderr
+
+
+@pytest.mark.parametrize("command", [("margins", "--json"), ("linearise",), ("response", "--json", "--count", "2")])
+def test_a_refusal_is_json_where_the_answer_would_be(command):
+    arguments = [FOLDER / "crmpc-2022" / "crmpc-robust.toml", "--at", "1", "--open", SIGNALS, "--fmu-dir", TARGET / "fmu"]
+    done = subprocess.run([program("orchestrator"), *command, *arguments], capture_output=True, text=True, timeout=120)
+    answer = json.loads(done.stdout)
+    assert "do not repeat" in answer["error"] and answer["error"] in done.stderr
+    assert answer["exit_code"] == done.returncode == 1
+
+
+# scripts/oracles/margins_in_flight.py holds all delays up to 1 s against flights.
+@pytest.mark.parametrize("law", ["LQR", "FBL"])
+@pytest.mark.parametrize("delay", [0.0, 0.25, 0.3, 0.31, 0.355, 0.5, 0.995, 1.0])
+def test_oracle_the_verdict_on_a_delayed_loop_is_that_of_a_flight(law, delay):
+    found, decays = margins_in_flight.judged(["--fmu", f"controller={law}.fmu", "--set", f"plant.actuation.delay={delay}"])
+    assert found is decays is (delay < 0.4)
+
+
+def test_a_loop_that_does_not_respond_has_no_verdict():
+    # The readings are rounded.
+    found = margins_in_flight.verdict(["--fmu", "controller=LQR.fmu", "--set", "plant.sensor.set=2"], FOLDER / "margins" / "measured.toml")
+    assert "does not respond" in found
 
 
 @pytest.mark.parametrize("law", ["LQR", "CRMPC", "TwoLoopSMC"])

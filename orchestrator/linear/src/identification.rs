@@ -168,7 +168,6 @@ impl Builder<'_> {
         // The same response with every size of the change, if the component is smooth.
         let depends = trials.windows(2).map(|pair| difference(pair, 1)).fold(0.0, f64::max);
         let Some((change, period, _)) = best else { unreachable!("there are changes to try") };
-        let central = |phase: &Response| &phase.central;
         let again = period + period.min(AGAIN);
         let count = compared_steps(self.recorded.length).max(late + COMPARED);
         let measured = probe(change).responses(instance, 0, count)?;
@@ -196,10 +195,6 @@ impl Builder<'_> {
             let deviation = deviation(
                 &realised(&phases[..period], &central, blocks, tolerance),
                 &measured.central,
-            );
-            eprintln!(
-                "DEBUG {:?} blocks {blocks} late {late} period {period} dev {deviation:e} drift {drift:e} change {change:e}",
-                self.components
             );
             if deviation <= DEVIATES {
                 break (phases, tolerance, drift);
@@ -292,6 +287,10 @@ impl Builder<'_> {
         let place = |port: &Port| self.recorded.ports.iter().position(|other| other == port);
         self.inputs.iter().filter_map(place).collect()
     }
+}
+
+fn central(response: &Response) -> &Lags {
+    &response.central
 }
 
 /// Realises the steps of a period from their responses.
