@@ -247,6 +247,19 @@ pub(crate) enum Command {
     },
 }
 
+impl Command {
+    /// Returns whether standard output is to hold JSON, errors included.
+    pub(crate) fn answers_in_json(&self) -> bool {
+        match self {
+            Self::Linearise(asked) => asked.out.is_none(),
+            Self::Margins(asked) => asked.json,
+            Self::Response(asked) => asked.json,
+            Self::Inspect { json, .. } | Self::List { json, .. } => *json,
+            _ => false,
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

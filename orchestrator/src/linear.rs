@@ -75,7 +75,7 @@ impl Instant {
 pub(crate) struct Linearise {
     /// File for the model [default: standard output].
     #[arg(long, value_name = "FILE")]
-    out: Option<PathBuf>,
+    pub(crate) out: Option<PathBuf>,
     #[command(flatten)]
     instant: Instant,
 }
@@ -85,7 +85,7 @@ pub(crate) struct Linearise {
 pub(crate) struct PrintMargins {
     /// Print JSON, for other programs.
     #[arg(long)]
-    json: bool,
+    pub(crate) json: bool,
     /// File for a Nichols plot of the return ratio and a plot of the sensitivity (.svg, .png).
     #[arg(long, value_name = "FILE")]
     plot: Option<PathBuf>,

@@ -34,6 +34,7 @@ use fmu_import::crash;
 use live::log::Messages;
 use plain::{Plain, plain};
 use run::Options;
+use serde_json::json;
 use std::io::{BufWriter, IsTerminal, Write, stderr, stdout};
 use std::process::ExitCode;
 use study::definition::Study;
@@ -64,6 +65,7 @@ fn main() -> ExitCode {
 
     let mut out = Plain(BufWriter::new(stdout()));
     let interrupt = Interrupt::default();
+    let answers_in_json = arguments.command.answers_in_json();
     let outcome = execute(arguments.command, &mut out, &interrupt)
         .and_then(|()| out.flush().map_err(Failure::from));
     let all_freed = isolated::all_freed();
@@ -78,6 +80,11 @@ fn main() -> ExitCode {
             ExitCode::SUCCESS
         }
         Err(error) => {
+            if answers_in_json {
+                let (message, code) = (error.to_string(), error.exit_code());
+                let answer = json!({ "error": plain(&message), "exit_code": code });
+                let _ = writeln!(out, "{answer:#}");
+            }
             // If standard error cannot be written either, there is nobody left to tell.
             let _ = writeln!(stderr(), "error: {}", plain(&error.to_string()));
             ExitCode::from(error.exit_code())

@@ -12,6 +12,7 @@ use linear::curves::decibel;
 use linear::frequency::{self, Complex, Point, return_ratio};
 use linear::linearise::Lineariser;
 use linear::model::OpenLoop;
+use serde_json::{Value, json};
 use std::f64::consts::PI;
 use std::io::Write;
 use std::path::PathBuf;
@@ -35,6 +36,9 @@ pub(crate) struct Response {
     /// typical magnitude].
     #[arg(long, value_name = "NUMBER", help_heading = "Sine")]
     amplitude: Option<f64>,
+    /// Print JSON, for other programs.
+    #[arg(long)]
+    pub(crate) json: bool,
     /// File for a plot of both responses (.svg, .png).
     #[arg(long, value_name = "FILE")]
     plot: Option<PathBuf>,
@@ -73,11 +77,13 @@ pub(crate) fn respond(
     let frequencies: Vec<f64> = (0..asked.count)
         .map(|k| asked.from * (to / asked.from).powf(f64::from(k) / f64::from(asked.count - 1)))
         .collect();
-    writeln!(
-        out,
-        "{:<24} {:>9} {:>12} {:>12} {:>12} {:>12}",
-        "signal", "rad/s", "in flight dB", "deg", "predicted dB", "deg"
-    )?;
+    if !asked.json {
+        writeln!(
+            out,
+            "{:<24} {:>9} {:>12} {:>12} {:>12} {:>12}",
+            "signal", "rad/s", "in flight dB", "deg", "predicted dB", "deg"
+        )?;
+    }
     let mut all: Vec<Vec<Point>> = Vec::new();
     for (channel, signal) in found.open.signals.iter().enumerate() {
         let input = lineariser.system().variable_at(lineariser.opened()[channel]);
@@ -86,24 +92,36 @@ pub(crate) fn respond(
         for &frequency in &frequencies {
             let point =
                 frequency::measure(&lineariser, &found, channel, frequency, amplitude, interrupt)?;
-            let [measured, predicted] = [point.measured, point.predicted];
-            writeln!(
-                out,
-                "{:<24} {frequency:>9.4} {:>12.3} {:>12.2} {:>12.3} {:>12.2}",
-                signal.name,
-                decibel(measured.norm()),
-                measured.arg().to_degrees(),
-                decibel(predicted.norm()),
-                predicted.arg().to_degrees()
-            )?;
+            if !asked.json {
+                let [[measured, at], [predicted, at_predicted]] = shown(&point);
+                writeln!(
+                    out,
+                    "{:<24} {frequency:>9.4} {measured:>12.3} {at:>12.2} {predicted:>12.3} {at_predicted:>12.2}",
+                    signal.name,
+                )?;
+            }
             points.push(point);
         }
         all.push(points);
+    }
+    if asked.json {
+        let rows = std::iter::zip(&found.open.signals, &all).flat_map(|(signal, points)| {
+            points.iter().map(|point| {
+                let [in_flight, predicted] = shown(point).map(|[db, deg]| json!({ "db": db, "deg": deg }));
+                json!({ "signal": signal.name, "frequency": point.frequency, "in_flight": in_flight, "predicted": predicted })
+            })
+        });
+        writeln!(out, "{:#}", Value::from_iter(rows))?;
     }
     if let Some((path, form)) = plot {
         picture::write(&figure(&title, &found.open, &all, [asked.from, to]), form, path)?;
     }
     Ok(())
+}
+
+/// Returns magnitude (dB) and phase (deg) of the return ratio in flight and of the predicted one.
+fn shown(point: &Point) -> [[f64; 2]; 2] {
+    [point.measured, point.predicted].map(|l| [decibel(l.norm()), l.arg().to_degrees()])
 }
 
 /// Draws magnitude and phase of the return ratios: the models' as lines, and those in flight as
