@@ -258,13 +258,12 @@ def test_a_case_that_an_fmu_refuses_has_failed(file, tmp_path):
     patient = lqr_file.stdout.replace("beyond = 60.0", "beyond = 1e6")
     assert patient != lqr_file.stdout
     (tmp_path / "patient.toml").write_text(patient)
-    failed = campaign(tmp_path / "spin.toml", law=lambda state: [0.0, 3e7, 3e7]).run(
-        out=tmp_path / "out"
-    )
-    assert (failed.table["status"] == "failed").all()
-    message = failed.table["message"][0]
-    assert message.startswith("plant failed at t = ") and "singular" in message
-    assert message.count("in doStep: ") == 1
+    with pytest.raises(OrchestratorError, match="all 2 cases failed.*singular") as caught:
+        campaign(tmp_path / "spin.toml", law=lambda state: [0.0, 3e7, 3e7]).run(
+            out=tmp_path / "out"
+        )
+    assert "plant failed at t = " in str(caught.value)
+    assert str(caught.value).count("in doStep: ") == 1
 
 
 def test_values_that_an_fmu_refuses_fail_their_cases_alone(short, tmp_path):

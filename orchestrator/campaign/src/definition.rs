@@ -151,6 +151,11 @@ pub struct Search {
     pub enough: Option<f64>,
 }
 
+/// Returns the name of the column that says whether a limit was kept.
+pub fn kept_column(limit: &str) -> String {
+    format!("kept.{limit}")
+}
+
 fn one() -> u64 {
     1
 }

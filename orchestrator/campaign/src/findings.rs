@@ -1,7 +1,7 @@
 //! Findings of a campaign.
 
-use crate::definition::{Limit, Until};
-use crate::flight::{CaseStatus, kept_column};
+use crate::definition::{Limit, Until, kept_column};
+use crate::flight::CaseStatus;
 use crate::plan::Plan;
 use crate::sensitivity::{Estimate, Input, Sensitivity, sensitivities};
 use cosim::error::Error;

@@ -1,5 +1,6 @@
 //! Flies cases one after the other with the same instances, which are reset between cases.
 
+use crate::definition::kept_column;
 use crate::plan::Plan;
 use cosim::error::Error;
 use cosim::interrupt::Interrupt;
@@ -187,9 +188,4 @@ pub fn table(plan: &Plan, rows: &[Row]) -> CaseTable {
     columns.push(Column { name: "time".into(), values: Values::Real(times) });
     columns.push(Column { name: "message".into(), values: text(|row| row.message.clone()) });
     CaseTable { columns }
-}
-
-/// Returns the name of the column that says whether a limit was kept.
-pub fn kept_column(limit: &str) -> String {
-    format!("kept.{limit}")
 }

@@ -1,6 +1,7 @@
 //! Parts of a campaign, which are kept as those of any sweep.
 
-use crate::flight::{Flight, Row, kept_column, table};
+use crate::definition::kept_column;
+use crate::flight::{Flight, Row, table};
 use crate::plan::Plan;
 use cosim::error::Error as Single;
 use std::ops::Range;
@@ -51,6 +52,14 @@ pub fn broken(plan: &Plan, rows: &CaseTable) -> Vec<u64> {
     broken.collect()
 }
 
+/// Names the case in which a unit could not be flown.
+pub fn of_case(case: u64, error: Single) -> Error {
+    match error {
+        source @ Single::Call { .. } => Error::Case { case, more: 0, source: Box::new(source) },
+        error => error.into(),
+    }
+}
+
 /// Flies a part and keeps its results. `flown` is called after each case. Returns the number of
 /// cases that broke each limit.
 ///
@@ -66,10 +75,7 @@ pub fn fly(
 ) -> Result<Vec<u64>, Error> {
     let mut rows = Vec::with_capacity((part.end - part.start) as usize);
     for case in part.clone() {
-        let row = flight.fly(case).map_err(|error| match error {
-            source @ Single::Call { .. } => Error::Case { case, more: 0, source },
-            error => error.into(),
-        })?;
+        let row = flight.fly(case).map_err(|error| of_case(case, error))?;
         flown(&row);
         rows.push(row);
     }

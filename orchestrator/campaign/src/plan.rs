@@ -1,8 +1,7 @@
 //! A campaign that is ready to be flown: its cases, and the numbers that are recorded of each.
 
 use crate::changes::{Changes, Command};
-use crate::definition::{Campaign, Limit};
-use crate::flight::kept_column;
+use crate::definition::{Campaign, Limit, kept_column};
 use crate::prepare::{Recorded, keys, observe, read_experiment, recorded};
 use cosim::error::Error;
 use cosim::experiment;
@@ -66,8 +65,8 @@ impl Plan {
             sweep,
             recorded,
         };
-        plan.check_limits()?;
         plan.check_columns()?;
+        plan.check_limits()?;
         plan.check_measured(&measured)?;
         Ok(plan)
     }

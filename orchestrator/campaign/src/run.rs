@@ -306,7 +306,7 @@ fn fly_parts(
         return Ok(());
     }
     let interrupt = &options.interrupt;
-    let resets = state.resets(interrupt)?;
+    let resets = state.resets(interrupt).map_err(|error| parts::of_case(0, error))?;
     let left: u64 = missing.iter().map(|part| part.end - part.start).sum();
     let done = state.done();
     let progress = Parts::new("cases", &plan.campaign.title, done + left, done, options.quiet);

@@ -18,7 +18,7 @@ use rand_chacha::rand_core::{Rng, SeedableRng};
 use serde::Serialize;
 use std::cmp::Ordering as CmpOrdering;
 use std::fs;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::time::{Duration, Instant};
@@ -135,10 +135,7 @@ pub fn search(plan: &Plan, options: &Options) -> Result<SearchOutcome, Error> {
         return Err(Single::experiment(message).into());
     }
     let _folder = Folder::take(&out)?;
-    // Those of an earlier search would not fit this one if it ends early.
-    for path in FILES.map(|name| out.join(name)).iter().filter(|path| path.exists()) {
-        fs::remove_file(path).map_err(Single::file(path))?;
-    }
+    remove_results(&out)?;
     let progress = Parts::new("cases", &plan.campaign.title, search.cases, 0, options.quiet);
     let threads = work::threads(options.jobs, [&plan.sweep]);
     let (orders, waiting) = channel::<Order>();
@@ -174,20 +171,8 @@ pub fn search(plan: &Plan, options: &Options) -> Result<SearchOutcome, Error> {
     let worst = tried.iter().filter(|case| !case.value.is_nan());
     let worst = worst.max_by(|a, b| a.value.total_cmp(&b.value)).or(tried.first());
     let worst = worst.ok_or_else(|| Single::experiment("no case was flown"))?;
-    let rows: Vec<Row> = tried.iter().map(|case| case.row.clone()).collect();
-    let table_path = out.join("search.parquet");
-    let mut writer = Writer::create(&table_path, &[("units", plan.units())])?;
-    writer.add(table(plan, &rows))?;
-    writer.finish()?;
     let named = &plan.recorded[measure];
-    if worst.value.is_nan() {
-        return Err(Error::Failed(format!(
-            "no case has a value of {}, so that there is no worst one: {} ({} has all cases)",
-            named.name,
-            if worst.row.message.is_empty() { worst.row.status.name() } else { &worst.row.message },
-            table_path.display()
-        )));
-    }
+    write_tried(plan, &tried, worst, &named.name, &out)?;
     let limits = plan.campaign.limits.iter().zip(&worst.row.limits_kept);
     let outcome = SearchOutcome {
         title: plan.campaign.title.clone(),
@@ -213,6 +198,38 @@ pub fn search(plan: &Plan, options: &Options) -> Result<SearchOutcome, Error> {
     page::write(plan, &outcome, &tried, &worst.row)?;
     files::write_json(&out.join("search.json"), &outcome)?;
     Ok(outcome)
+}
+
+/// Removes the results of an earlier search, which would not fit another one that ends early.
+fn remove_results(out: &Path) -> Result<(), Single> {
+    for path in FILES.map(|name| out.join(name)).iter().filter(|path| path.exists()) {
+        fs::remove_file(path).map_err(Single::file(path))?;
+    }
+    Ok(())
+}
+
+/// Writes the table of all cases, of which the worst must have a value of the measure.
+fn write_tried(
+    plan: &Plan,
+    tried: &[Tried],
+    worst: &Tried,
+    measure: &str,
+    out: &Path,
+) -> Result<(), Error> {
+    let rows: Vec<Row> = tried.iter().map(|case| case.row.clone()).collect();
+    let path = out.join("search.parquet");
+    let mut writer = Writer::create(&path, &[("units", plan.units())])?;
+    writer.add(table(plan, &rows))?;
+    writer.finish()?;
+    if !worst.value.is_nan() {
+        return Ok(());
+    }
+    let Row { message, status, .. } = &worst.row;
+    let reason = if message.is_empty() { status.name() } else { message };
+    Err(Error::Failed(format!(
+        "no case has a value of {measure}, so that there is no worst one: {reason} ({} has all cases)",
+        path.display()
+    )))
 }
 
 /// Flies the ordered cases until no more can be ordered.

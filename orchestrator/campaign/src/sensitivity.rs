@@ -120,7 +120,7 @@ pub fn indices(measure: &[f64], parameters: usize) -> Option<Indices> {
     let mean = samples.iter().flat_map(|sample| &sample[..2]).sum::<f64>() / (2.0 * n);
     let share = |part: &dyn Fn(&[f64]) -> f64| {
         let square =
-            |sample: &[f64]| ((sample[0] - mean).powi(2) + (sample[1] - mean).powi(2)) / 2.0;
+            |sample: &[f64]| f64::midpoint((sample[0] - mean).powi(2), (sample[1] - mean).powi(2));
         ratio(samples.iter().map(|sample| (part(sample), square(sample))))
     };
     // The mean is taken off, which changes nothing in theory and much of the noise.
@@ -162,8 +162,16 @@ pub fn sensitivities(
 ) -> (Vec<Sensitivity>, Option<Estimate>) {
     let indices =
         (design == DesignKind::Sensitivity).then(|| indices(measure, inputs.len())).flatten();
+    // Of the points of a sample, the first two share no parameter: the others repeat theirs.
+    let block = inputs.len() + 2;
+    let independent = |values: &[f64]| -> Vec<f64> {
+        let values = values.iter().enumerate();
+        let own = values.filter(|(case, _)| indices.is_none() || case % block < 2);
+        own.map(|(_, value)| *value).collect()
+    };
+    let measured = independent(measure);
     let sensitivity = |(place, input): (usize, &Input)| {
-        let ranks = rank_correlation(&input.values, measure);
+        let ranks = rank_correlation(&independent(&input.values), &measured);
         let index = indices.as_ref().map(|indices| indices.parameters[place]);
         Sensitivity {
             parameter: input.name.clone(),
@@ -256,6 +264,9 @@ mod tests {
         assert!(noise.low <= share && share <= noise.high, "{noise:?} {share}");
         assert!(noise.high - noise.low < 0.1, "{noise:?}");
         assert_eq!(rows.len(), 3);
+        // Places of cases say nothing of the function, and are as many as independent points.
+        let ranks = rows[0].rank_correlation.unwrap();
+        assert!((ranks.high - ranks.low - 2.0 * 1.96 / 8000_f64.sqrt()).abs() < 1e-3, "{ranks:?}");
         for (row, published) in rows.iter().zip(PUBLISHED) {
             let first = row.first_order.unwrap();
             let expected = published[0] * (1.0 - share);

@@ -97,7 +97,7 @@ impl<'a> Preparation<'a> {
         isolation: &Protection,
         opened: &mut Opened,
     ) -> Result<Self, Error> {
-        let failed = |source| Error::Run { run: run.id.get_ref().clone(), source };
+        let failed = |source| Error::Run { run: run.id.get_ref().as_str().into(), source };
         let fault = |message: String| {
             study.source.error(&run.id.span(), format!("[[run]] {}: {message}", run.id.get_ref()))
         };

@@ -262,7 +262,7 @@ impl<'a> Work<'a> {
         let (run, preparation) = (&self.study.runs[part.run], &self.preparations[part.run]);
         let result = bench.fly(part, preparation, self.interrupt).map_err(|error| match error {
             Single::Interrupted { .. } => Error::Single(error),
-            source => Error::Run { run: run.id.get_ref().clone(), source },
+            source => Error::Run { run: run.id.get_ref().as_str().into(), source },
         })?;
         let folder = (self.folder)(part);
         parts::write(&folder, &preparation.sweep.keys, &part.range, result.clone())?;

@@ -14,7 +14,7 @@ pub enum Error {
     #[error("run {run}: {source}")]
     Run {
         /// Id of the run in the study.
-        run: String,
+        run: Box<str>,
         /// The error of that run.
         source: Single,
     },
@@ -29,7 +29,7 @@ pub enum Error {
         /// Number of other parts with such cases.
         more: usize,
         /// Reason of the first of them.
-        source: Single,
+        source: Box<Single>,
     },
     /// Every case failed, so that there are no statistics.
     #[error("{0}")]
@@ -59,11 +59,9 @@ impl Error {
         match self {
             // A run that ends early has no result to compare, so that this is a failure of the
             // study.
-            Self::Run { source: Single::EndedByInstance { .. }, .. } => 1,
-            Self::Failed(_) => 1,
-            Self::Single(source) | Self::Run { source, .. } | Self::Case { source, .. } => {
-                source.exit_code()
-            }
+            Self::Run { source: Single::EndedByInstance { .. }, .. } | Self::Failed(_) => 1,
+            Self::Single(source) | Self::Run { source, .. } => source.exit_code(),
+            Self::Case { source, .. } => source.exit_code(),
             Self::Unfinished { request, .. } => request.exit_code(),
         }
     }

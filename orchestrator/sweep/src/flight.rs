@@ -225,9 +225,9 @@ impl<'a> Flight<'a> {
 }
 
 impl Flight<'_> {
-    /// Computes the margins of a case with these changes, if the experiment asks for them. They have
-    /// no value if an instance answers by a failure or has no linear model, which is the second
-    /// result.
+    /// Computes the margins of a case with these changes, if the experiment asks for them. They
+    /// have no value if an instance answers by a failure or has no linear model; then the second
+    /// result is the reason.
     fn margins(
         &mut self,
         changes: &[(Target, SettingValue)],

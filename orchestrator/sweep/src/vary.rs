@@ -53,7 +53,7 @@ pub struct Vary {
     #[schemars(with = "Option<cosim::experiment::Scalar>")]
     pub sign: Option<Spanned<Value>>,
     /// First of consecutive integers: the parameter is this number plus that of the case, as for
-    /// seeds.
+    /// seeds. With another `seed` of the file than 1 they begin elsewhere.
     #[serde(default)]
     #[schemars(with = "Option<i64>")]
     pub case: Option<Spanned<i64>>,

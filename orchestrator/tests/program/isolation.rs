@@ -319,23 +319,20 @@ fn a_campaign_is_the_same_with_instances_in_processes_of_their_own() {
 }
 
 #[test]
-fn a_campaign_goes_on_after_an_instance_that_does_harm() {
+fn a_campaign_goes_on_after_an_instance_that_does_harm_but_has_no_result() {
     let bench =
         Bench::made(LOOP, &Recipe { flags: &["-DHARM_BY_GAIN", "-w"], ..Recipe::default() });
-    let campaign = CAMPAIGN.replace("[0.5, 1.0, 2.0]", "[0.5, 13.0, 1.0]");
-    let campaign = campaign.replace("[1e9, 2.0]", "[1e9]");
-    fs::write(bench.path("c.toml"), campaign).unwrap();
-    let (code, _, errors) = bench.call(&["campaign", "c.toml", "--csv"]);
-    assert_eq!(code, 0, "{errors}");
-    let table = fs::read_to_string(bench.path("out/c/cases.csv")).unwrap();
-    let lines: Vec<&str> = table.lines().collect();
-    assert!(lines[1].starts_with("0,0.5,1000000000,3.375,3.375,true,completed,3"), "{table}");
-    assert!(lines[2].starts_with("1,13,") && lines[2].contains(",false,failed,"), "{table}");
-    assert!(
-        lines[2].contains("gain failed at t = 0 s in doStep: its process was killed"),
-        "{table}"
-    );
-    assert!(lines[3].starts_with("2,1,1000000000,8,8,true,completed,3"), "{table}");
+    let gains = "range = { from = 1.0, to = 60.0, count = 60 }";
+    let campaign = CAMPAIGN.replace("list = [0.5, 1.0, 2.0]", gains);
+    fs::write(bench.path("c.toml"), campaign.replace("[1e9, 2.0]", "[1e9]")).unwrap();
+    let (code, out, errors) = bench.call(&["campaign", "c.toml", "--csv"]);
+    let says =
+        "case 12 could not be flown: gain failed at t = 0 s in doStep: its process was killed";
+    assert!(code == 1 && errors.contains(says) && out.is_empty(), "{errors}");
+    assert!(!bench.path("out/c/summary.json").exists() && !bench.path("out/c/cases.csv").exists());
+    // The parts without such a case are kept.
+    let (code, out, _) = bench.call(&["campaign", "c.toml", "--work"]);
+    assert!(code == 0 && out.contains("\"missing\":[[0,25]]"), "{out}");
 }
 
 #[test]

@@ -14,6 +14,7 @@ mod names;
 mod plot;
 mod results;
 mod search;
+mod sense;
 mod table;
 mod timing;
 mod together;

@@ -1,7 +1,7 @@
 //! Histograms, empirical distributions and scatter plots of a campaign's cases.
 
+use crate::definition::kept_column;
 use crate::findings::Findings;
-use crate::flight::kept_column;
 use crate::plan::Plan;
 use crate::prepare::Recorded;
 use cosim::error::Error;

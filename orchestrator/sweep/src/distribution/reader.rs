@@ -1,7 +1,7 @@
 //! Reads the distribution of a parameter, with units converted.
 
 use super::shape::{Seeds, Shape};
-use crate::vary::Vary;
+use crate::vary::{Range, Vary};
 use cosim::system::System;
 use cosim::variation::{SettingValue, Target};
 use fmu_import::description::VariableKind;
@@ -96,21 +96,7 @@ impl Reader<'_> {
             );
         }
         if let Some(range) = &vary.range {
-            let range = range.get_ref();
-            if !(2..=MOST).contains(&range.count) {
-                let count = range.count;
-                return Err(format!("range: count = {count}, but it must be from 2 to {MOST}"));
-            }
-            let (from, to) = (self.number(&range.from)?, self.number(&range.to)?);
-            if from >= to {
-                return Err(format!("range: from = {from} must be less than to = {to}"));
-            }
-            let last = f64::from(range.count - 1);
-            let value = |i: u32| {
-                let value = from + (to - from) * f64::from(i) / last;
-                self.checked(value)
-            };
-            return weighted((0..range.count).map(value).collect::<Result<_, _>>()?, None);
+            return self.range(range.get_ref());
         }
         if let Some(sign) = &vary.sign {
             let size = self.number(sign.get_ref())?;
@@ -119,7 +105,25 @@ impl Reader<'_> {
             }
             return weighted(vec![self.checked(-size)?, self.checked(size)?], None);
         }
-        let first = vary.case.as_ref().map_or(0, |first| *first.get_ref());
+        self.seeds(vary.case.as_ref().map_or(0, |first| *first.get_ref()))
+    }
+
+    fn range(&self, range: &Range) -> Result<Shape, String> {
+        if !(2..=MOST).contains(&range.count) {
+            let count = range.count;
+            return Err(format!("range: count = {count}, but it must be from 2 to {MOST}"));
+        }
+        let (from, to) = (self.number(&range.from)?, self.number(&range.to)?);
+        if from >= to {
+            return Err(format!("range: from = {from} must be less than to = {to}"));
+        }
+        let last = f64::from(range.count - 1);
+        let value = |i: u32| self.checked(from + (to - from) * f64::from(i) / last);
+        weighted((0..range.count).map(value).collect::<Result<_, _>>()?, None)
+    }
+
+    fn seeds(&self, first: i64) -> Result<Shape, String> {
+        let kind = &self.system.variable(self.target).kind;
         let VariableKind::Integer { min, max } = kind else {
             return Err(format!("case is for parameters of type Integer, not {}", kind.name()));
         };

@@ -1,0 +1,327 @@
+//! Campaigns that make no sense are refused, seeds separate campaigns, and what fails for a reason
+//! outside the unit is no result.
+
+use crate::bench::{Bench, LOOP, Recipe};
+use crate::campaign::{CAMPAIGN, RANDOM, bench};
+use std::collections::BTreeSet;
+use std::fs;
+
+/// A campaign in which a text of [`RANDOM`] is replaced.
+fn refusal(from: &str, to: &str) -> String {
+    assert!(RANDOM.contains(from), "{from}");
+    let bench = bench(&RANDOM.replacen(from, to, 1));
+    let (code, _, errors) = bench.call(&["campaign", "c.toml", "--work"]);
+    assert_eq!(code, 2, "{to}: {errors}");
+    assert_eq!(errors.lines().count(), 1, "{errors}");
+    errors
+}
+
+const UNIFORM: &str = "uniform = [0.0, \"1000 mm\"]";
+
+#[test]
+fn distributions_that_make_no_sense_are_refused_with_the_parameter() {
+    for (distribution, said) in [
+        ("normal = { mean = 1.0, deviation = -0.1 }", "deviation = -0.1, but it must be above 0"),
+        ("normal = { mean = 1.0, deviation = \"-5 %\" }", "deviation = -0.1"),
+        ("normal = { mean = 1.0, deviation = 0.0 }", "deviation = 0"),
+        ("normal = { mean = 1.0, deviation = inf }", "inf is no finite number"),
+        ("normal = { mean = nan, deviation = 1.0 }", "NaN is no finite number"),
+        ("normal = { mean = \"inf %\", deviation = 1.0 }", "inf is no finite number"),
+        ("log_normal = { median = 0.0, sigma = 0.1 }", "median = 0, but it must be above 0"),
+        ("log_normal = { median = 1.0, sigma = -0.1 }", "sigma = -0.1, but it must be above 0"),
+        ("log_normal = { median = 1.0, sigma = inf }", "inf is no finite number"),
+        ("triangular = [1.0, 0.5, 2.0]", "the smallest, the most likely and the largest"),
+        ("triangular = [1.0, 1.0, 1.0]", "the smallest, the most likely and the largest"),
+        ("triangular = [-inf, 0.0, 1.0]", "-inf is no finite number"),
+        ("uniform = [1.0, 0.0]", "must be larger than the first one"),
+        ("uniform = [1.0, 1.0]", "must be larger than the first one"),
+        ("uniform = [0.0, inf]", "inf is no finite number"),
+        ("uniform = [nan, 1.0]", "NaN is no finite number"),
+        ("list = [1.0, nan]", "NaN is no finite number"),
+        ("list = [1.0, 2.0, 1.0]", "1.0 is there twice"),
+        ("list = [1.0, 2.0]\nweights = [1.0, -1.0]", "must not be negative"),
+        ("list = [1.0, 2.0]\nweights = [0.0, 0.0]", "not all zero"),
+        ("list = [1.0, 2.0]\nweights = [1.0, inf]", "weights must not be"),
+        ("list = [1.0, 2.0]\nweights = [1.0]", "1 weights for 2 values"),
+        ("range = { from = 1.0, to = 2.0, count = 1 }", "count = 1, but it must be from 2"),
+        ("range = { from = 1.0, to = 2.0, count = 4000000000 }", "must be from 2 to 1000000"),
+        ("range = { from = 2.0, to = 1.0, count = 3 }", "from = 2 must be less than to = 1"),
+        ("range = { from = 1.0, to = inf, count = 3 }", "inf is no finite number"),
+        ("sign = 0.0", "a magnitude, which must be above 0"),
+        ("sign = -1.0", "a magnitude, which must be above 0"),
+        ("uniform = [0.0, 1.0]\nwithin = [2.0, 3.0]", "next to no values between them"),
+        ("uniform = [0.0, 1.0]\nwithin = [0.7, 0.2]", "must be larger than the first one"),
+        ("normal = { mean = 0.0, deviation = 1.0 }\nwithin = [9.0, 10.0]", "next to no values"),
+        ("normal = { mean = 0.0, deviation = 1.0 }\nwithin = [8.0, 8.1]", "next to no values"),
+        ("normal = { mean = 0.0, deviation = 1.0 }\nwithin = [-inf, 1.0]", "no finite number"),
+        ("list = [1.0, 2.0]\nwithin = [0.0, 3.0]", "within is for continuous distributions"),
+        ("uniform = [0.0, 1.0]\nweights = [1.0]", "weights are for a list only"),
+        ("uniform = [0.0, 1.0]\nsign = 1.0", "but there is uniform and sign"),
+        ("uniform = [0.0, 1.0]\nlevels = 3", "levels have no effect in the design random"),
+        ("uniform = [0.0, 1.0]\nsorted = true", "sorted is for several real parameters"),
+        ("case = 1", "case is for parameters of type Integer"),
+    ] {
+        let errors = refusal(UNIFORM, distribution);
+        assert!(errors.contains(said), "{distribution}: {errors}");
+        assert!(errors.contains("gain.gain") || errors.contains("sorted"), "{errors}");
+    }
+    // A small part at the lower end can be told apart.
+    let tail = "normal = { mean = 0.0, deviation = 1.0 }\nwithin = [-8.1, -8.0]";
+    let (code, _, errors) =
+        bench(&RANDOM.replace(UNIFORM, tail)).call(&["campaign", "c.toml", "--work"]);
+    assert_eq!(code, 0, "{errors}");
+}
+
+#[test]
+fn a_deviation_keeps_no_limit_of_the_parameter() {
+    // It is of a parameter that must not be below 0, about a mean of 1 s.
+    let normal = "parameter = \"plant.delay\"\nnormal = { mean = 1.0, deviation = \"0.1 s\" }";
+    let text = RANDOM.replace(&format!("parameter = \"gain.gain\"\n{UNIFORM}"), normal);
+    let (code, _, errors) = bench(&text).call(&["campaign", "c.toml", "--work"]);
+    assert_eq!(code, 0, "{errors}");
+}
+
+#[test]
+fn keys_that_contradict_each_other_are_refused_with_the_name() {
+    let vary = |text: &str| format!("{UNIFORM}\n[[vary]]\n{text}");
+    let both = |coefficient: &str| {
+        let pair = "[[correlation]]\nbetween = [\"gain.gain\", \"plant.delay\"]\n";
+        let turned = "[[correlation]]\nbetween = [\"plant.delay\", \"gain.gain\"]\n";
+        let vary = vary("parameter = \"plant.delay\"\nuniform = [0.0, 1.0]");
+        format!("{vary}\n{pair}coefficient = 0.5\n{turned}coefficient = {coefficient}")
+    };
+    let one = |coefficient: &str| {
+        let vary = vary("parameter = \"plant.delay\"\nuniform = [0.0, 1.0]");
+        format!(
+            "{vary}\n[[correlation]]\nbetween = [\"gain.gain\", \"plant.delay\"]\ncoefficient = {coefficient}"
+        )
+    };
+    for (to, said) in [
+        (both("-0.5"), "\"plant.delay\" and \"gain.gain\" are correlated twice"),
+        (both("0.5"), "are correlated twice"),
+        (one("1.0"), "a value between -1 and 1"),
+        (one("nan"), "a value between -1 and 1"),
+        (vary("parameter = \"gain.gain\"\nlist = [1.0]"), "\"gain.gain\" varies twice"),
+        (
+            vary("each = [\"plant.gain\", \"plant.gain\"]\nlist = [1.0]"),
+            "\"plant.gain\" varies twice",
+        ),
+        (vary("parameter = [\"plant.gain\", \"plant.gain\"]\nlist = [1.0]"), "varies twice"),
+        (vary("parameter = \"plant.output.integral\"\nlist = [1.0]"), "is of causality output"),
+        (vary("parameter = \"plant.*\"\nlist = [1.0]"), "there is no such parameter"),
+    ] {
+        let errors = refusal(UNIFORM, &to);
+        assert!(errors.contains(said), "{to}: {errors}");
+    }
+    for (from, to, said) in [
+        ("cases = 1100", "cases = 0", "cases = 0"),
+        (
+            "cases = 1100",
+            "cases = 1100\nset = { \"gain.gain\" = 0.5 }",
+            "\"gain.gain\" varies, but [set]",
+        ),
+        (
+            "cases = 1100",
+            "cases = 1100\nmetrics = [\"samples\", \"samples\"]",
+            "\"samples\" is there twice",
+        ),
+        ("at_most = 7.9", "at_most = inf", "not a finite number"),
+        ("at_most = 7.9", "at_most = nan", "not a finite number"),
+        ("at_most = 7.9", "at_most = 7.9\nat_least = 1.0", "one of at_most and at_least"),
+        (
+            "at_most = 7.9",
+            "at_most = 7.9\n[[limit]]\nid = \"small\"\nmeasure = \"last\"\nat_most = 1.0",
+            "two [[limit]] with the id \"small\"",
+        ),
+        (
+            "at_most = 7.9",
+            "at_most = 7.9\n[until]\nlimit = \"small\"\nbelow = 1.5",
+            "between 0 and 1",
+        ),
+        ("at_most = 7.9", "at_most = 7.9\n[search]\nlargest = \"last\"\ncases = 0", "at least 1"),
+        (
+            "at_most = 7.9",
+            "at_most = 7.9\n[search]\nlargest = \"last\"\nenough = nan",
+            "enough a number",
+        ),
+        ("id = \"last\"", "id = \"time\"", "two columns \"time\""),
+        ("id = \"last\"", "id = \"gain.gain\"", "two columns \"gain.gain\""),
+        ("id = \"last\"", "id = \"kept.small\"", "two columns \"kept.small\""),
+        ("case = 7", "case = 3000000000", "is not between"),
+    ] {
+        let errors = refusal(from, to);
+        assert!(errors.contains(said), "{to}: {errors}");
+    }
+    let bench = bench(RANDOM);
+    let (code, _, errors) = bench.call(&["campaign", "c.toml", "--set", "gain.gain=0.5"]);
+    assert!(code == 2 && errors.contains("\"gain.gain\" varies, so that --set"), "{errors}");
+}
+
+#[test]
+fn an_alias_is_the_same_parameter() {
+    let alias = |text: String| {
+        let variable = "<ScalarVariable name=\"k\" valueReference=\"3\" causality=\"parameter\" variability=\"fixed\"><Real unit=\"m\" start=\"2\"/></ScalarVariable>";
+        text.replace("  </ModelVariables>", &format!("{variable}</ModelVariables>"))
+    };
+    let bench = Bench::made(LOOP, &Recipe { description: &alias, ..Recipe::default() });
+    let refused = |text: String| {
+        fs::write(bench.path("c.toml"), text).unwrap();
+        let (code, _, errors) = bench.call(&["campaign", "c.toml", "--work"]);
+        assert_eq!(code, 2, "{errors}");
+        errors
+    };
+    let twice = format!("{UNIFORM}\n[[vary]]\nparameter = \"gain.k\"\nlist = [1.0, 2.0]");
+    let errors = refused(RANDOM.replace(UNIFORM, &twice));
+    assert!(errors.contains("\"gain.k\" varies twice"), "{errors}");
+    let set = "cases = 1100\nset = { \"gain.k\" = 0.5 }";
+    let errors = refused(RANDOM.replace("cases = 1100", set));
+    assert!(errors.contains("\"gain.gain\" varies, but [set]"), "{errors}");
+}
+
+#[test]
+fn what_a_design_leaves_without_meaning_is_refused() {
+    let delays = "each = [\"gain.delay\", \"plant.delay\"]\nuniform = [0.0, 1.0]";
+    let pair = "[[correlation]]\nbetween = [\"gain.delay\", \"plant.delay\"]\ncoefficient = 0.5\n";
+    for (design, cases, rest, said) in [
+        ("factorial", "", format!("levels = 2\n{pair}"), "takes its parameters to be independent"),
+        ("sensitivity", "cases = 40\n", pair.to_string(), "takes its parameters to be independent"),
+        ("factorial", "", "levels = 2\nsorted = true\n".to_string(), "sorted has no meaning"),
+        ("sensitivity", "cases = 40\n", "sorted = true\n".to_string(), "sorted has no meaning"),
+        ("random", "cases = 40\n", format!("sorted = true\n{pair}"), "sorted values cannot be correlated"),
+        ("random", "cases = 40\n", "levels = 2\n".to_string(), "levels have no effect"),
+        ("factorial", "", "levels = 2\n[[vary]]\nparameter = \"gain.kind\"\nlist = [\"calm\", \"rough\"]\nweights = [1.0, 2.0]\n".to_string(), "weights have no effect"),
+        ("factorial", "", "levels = 2\n[[vary]]\nparameter = \"gain.noise.seed\"\ncase = 1\n".to_string(), "which has no levels"),
+        ("sensitivity", "cases = 41\n", String::new(), "a multiple of 4"),
+    ] {
+        let text = format!("title = \"x\"\nexperiment = \"loop.toml\"\nmetrics = [\"samples\"]\ndesign = \"{design}\"\n{cases}[[vary]]\n{delays}\n{rest}");
+        let (code, _, errors) = bench(&text).call(&["campaign", "c.toml", "--work"]);
+        assert!(code == 2 && errors.contains(said), "{text}: {errors}");
+    }
+}
+
+/// Returns the seeds of the cases of a campaign.
+fn seeds(bench: &Bench, text: &str) -> Vec<i64> {
+    fs::write(bench.path("c.toml"), text).unwrap();
+    let (code, _, errors) = bench.call(&["campaign", "c.toml", "--csv", "--quiet"]);
+    assert_eq!(code, 0, "{errors}");
+    let table = fs::read_to_string(bench.path("out/c/cases.csv")).unwrap();
+    let (heading, rows) = table.split_once('\n').unwrap();
+    let place = heading.split(',').position(|name| name == "plant.noise.seed").unwrap();
+    rows.lines().map(|row| row.split(',').nth(place).unwrap().parse().unwrap()).collect()
+}
+
+#[test]
+fn campaigns_of_different_seeds_have_no_case_in_common() {
+    let bench = bench(RANDOM);
+    let varied = "parameter = \"gain.gain\"\nuniform = [0.0, \"1000 mm\"]\n[[vary]]\nparameter = \"gain.kind\"\nlist = [\"calm\", \"rough\"]\nweights = [3.0, 1.0]\n[[vary]]\n";
+    let alone = RANDOM.replace(varied, "").replace("cases = 1100", "cases = 50");
+    let mut all = BTreeSet::new();
+    for seed in [1, 2, 3, 0, 1_000_000_007] {
+        let text = alone.replace("cases = 50", &format!("cases = 50\nseed = {seed}"));
+        let found = seeds(&bench, &text);
+        let expected: Vec<i64> = (found[0]..).take(50).collect();
+        assert_eq!(found, expected);
+        assert!(seed != 1 || found[0] == 7, "{found:?}");
+        assert!(found.iter().all(|seed| i32::try_from(*seed).is_ok_and(|seed| seed >= 0)));
+        assert!(found.into_iter().all(|seed| all.insert(seed)), "{seed}");
+    }
+}
+
+#[test]
+fn more_cases_than_seeds_are_refused() {
+    let few = |text: String| {
+        let (from, to) = (
+            "variability=\"fixed\"><Integer start=\"0\"/>",
+            "variability=\"fixed\"><Integer start=\"0\" min=\"0\" max=\"59\"/>",
+        );
+        assert!(text.contains(from));
+        text.replace(from, to)
+    };
+    let bench = Bench::made(LOOP, &Recipe { description: &few, ..Recipe::default() });
+    let text = RANDOM.replace("cases = 1100", "cases = 60\nseed = 5");
+    let found = seeds(&bench, &text);
+    assert_eq!(found.iter().collect::<BTreeSet<_>>().len(), 60);
+    assert!(found.iter().all(|seed| (0..60).contains(seed)), "{found:?}");
+    fs::write(bench.path("c.toml"), text.replace("cases = 60", "cases = 61")).unwrap();
+    let (code, _, errors) = bench.call(&["campaign", "c.toml"]);
+    assert!(code == 2 && errors.contains("61 cases need a seed each"), "{errors}");
+}
+
+#[test]
+fn a_campaign_in_which_all_cases_failed_is_no_statistic() {
+    let bench = bench(&CAMPAIGN.replace("[1e9, 2.0]", "[1.0, 2.0]"));
+    let (code, out, errors) = bench.call(&["campaign", "c.toml", "--csv"]);
+    assert!(code == 1 && errors.contains("all 6 cases failed, which is no statistic"), "{errors}");
+    assert!(errors.contains("out of propellant at 1") && out.is_empty(), "{errors}{out}");
+    assert!(!bench.path("out/c/summary.json").exists() && !bench.path("out/c/parts").exists());
+    let table = fs::read_to_string(bench.path("out/c/cases.csv")).unwrap();
+    assert_eq!(table.matches(",failed,").count(), 6, "{table}");
+    let search = format!("{CAMPAIGN}[search]\nlargest = \"largest\"\ncases = 10\n");
+    // The first step fails, before anything is measured.
+    let search = search
+        .replace("[1e9, 2.0]", "[-1.0, -2.0]")
+        .replace("kind = \"last\"", "kind = \"last\"\nover = [2.5, 3.0]");
+    let search = search.replace("largest = \"largest\"", "largest = \"last\"");
+    fs::write(bench.path("c.toml"), search).unwrap();
+    let (code, out, errors) = bench.call(&["falsify", "c.toml"]);
+    assert!(code == 1 && errors.contains("no case has a value of last"), "{errors}");
+    assert!(!out.contains("worst.toml") && !bench.path("out/c-worst/worst.toml").exists());
+}
+
+#[test]
+fn an_instance_that_refuses_values_fails_and_one_that_lacks_a_file_is_an_error() {
+    // The model refuses gains above 100.
+    let bench = bench(&CAMPAIGN.replace("[0.5, 1.0, 2.0]", "[0.5, 500.0]"));
+    let (code, _, errors) = bench.call(&["campaign", "c.toml", "--csv"]);
+    assert_eq!(code, 0, "{errors}");
+    let table = fs::read_to_string(bench.path("out/c/cases.csv")).unwrap();
+    assert_eq!(table.matches("gain too large: 500").count(), 2, "{table}");
+    // It refuses that of the experiment as well: something else is wrong than what was drawn.
+    let set = "set = { \"plant.gain\" = 500.0 }\n[signals]";
+    fs::write(bench.path("c.toml"), CAMPAIGN.replace("[signals]", set)).unwrap();
+    let (code, _, errors) = bench.call(&["campaign", "c.toml"]);
+    assert!(code == 1 && errors.contains("gain too large: 500"), "{errors}");
+    assert!(!bench.path("out/c/summary.json").exists());
+}
+
+#[test]
+fn a_file_that_a_text_parameter_names_counts() {
+    let text = "cases = 30\nset = { \"gain.text\" = \"profile.csv\" }";
+    let bench = bench(&RANDOM.replace("cases = 1100", text));
+    let flown = |content: &str| {
+        fs::write(bench.path("profile.csv"), content).unwrap();
+        let (code, out, errors) = bench.call(&["campaign", "c.toml"]);
+        assert_eq!(code, 0, "{errors}");
+        out
+    };
+    assert!(flown("1").contains("30 flown now"));
+    assert!(flown("1").contains("0 flown now"));
+    let again = flown("2");
+    assert!(again.contains("this has changed: file profile.csv (2 parts)"), "{again}");
+}
+
+#[test]
+fn seeds_have_no_sensitivity_but_the_noise_has_a_share() {
+    let text = RANDOM.replace("cases = 1100", "cases = 100\ndesign = \"sensitivity\"");
+    let bench = bench(&text);
+    let (code, _, errors) = bench.call(&["campaign", "c.toml"]);
+    assert_eq!(code, 0, "{errors}");
+    let measure = &bench.json("out/c/summary.json")["measures"][0];
+    let rows = measure["sensitivities"].as_array().unwrap();
+    let names: Vec<&str> = rows.iter().map(|row| row["parameter"].as_str().unwrap()).collect();
+    assert_eq!(names, ["gain.gain", "gain.kind"]);
+    for estimate in [&rows[0]["rank_correlation"], &rows[0]["total"], &measure["noise"]] {
+        let number = |key: &str| estimate[key].as_f64().unwrap();
+        assert!(number("low") <= number("value") && number("value") <= number("high"));
+    }
+    // The gain alone decides the last value.
+    assert!(rows[0]["total"]["high"].as_f64().unwrap() > 0.8, "{measure}");
+    let page = fs::read_to_string(bench.path("out/c/report.html")).unwrap();
+    assert!(page.contains("noise of the seeds") && page.contains("(plant.noise.seed)"), "{page}");
+    let random = RANDOM.replace("uniform = [0.0, \"1000 mm\"]", "uniform = [-1.9, -1.0]");
+    fs::write(bench.path("c.toml"), random).unwrap();
+    let (code, _, errors) = bench.call(&["campaign", "c.toml"]);
+    assert_eq!(code, 0, "{errors}");
+    let page = fs::read_to_string(bench.path("out/c/report.html")).unwrap();
+    assert!(!page.contains("noise of the seeds") && page.contains("have no sensitivity"));
+}
