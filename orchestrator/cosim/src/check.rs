@@ -97,10 +97,10 @@ fn warn_of_idle_keys(experiment: &Experiment, components: &[CheckedComponent]) {
         };
         warn(&format!("[isolation] {key}"), why);
     }
-    for CheckedComponent { name, fmu, .. } in components {
+    let asked = |part: &&CheckedComponent| experiment.components[&part.name].isolate.is_some();
+    for CheckedComponent { name, fmu, .. } in components.iter().filter(asked) {
         let key = format!("[components.{name}] isolate");
-        if experiment.components[name].isolate.is_none() {
-        } else if isolation.sandbox == Some(true) {
+        if isolation.sandbox == Some(true) {
             warn(&key, "beside sandbox = true");
         } else if fmu.is_lookup_table() {
             warn(&key, "on a lookup table");
