@@ -63,12 +63,32 @@ def pattern(name):
     return (stem, last) if any(last in axes for axes in AXES) else (name, "")
 
 
+def without_index(condition, ending):
+    """Returns a condition for the entry k of a vector, or for column k of a matrix."""
+    index = ending.strip("[]").rpartition(",")[2]
+    return re.sub(rf"(\[|>= ){index}(?=\]|$)", r"\1k", condition) if index.isdigit() else condition
+
+
+def shared(text, ending):
+    """Returns the part of a description that the entries of a vector share."""
+    own, _, condition = text.partition("; used with ")
+    own = re.sub(r" \([^()]*\)$", "", own) if ending else own
+    return f"{own}; used with {without_index(condition, ending)}" if condition else own
+
+
+def joined(stem, endings):
+    """Returns the name for the entries of a vector with these endings."""
+    if endings[0] and not endings[0].startswith("["):
+        return f"`{stem}.{'/'.join(endings)}`"
+    return f"`{stem}{endings[0]}`" + (f"…`{endings[-1]}`" if len(endings) > 1 else "")
+
+
 def grouped(variables):
     """Joins the entries of vectors: returns what they share, and the ending and start of each."""
     groups = []
     for name, start, span, unit, text in variables:
         stem, ending = pattern(name)
-        meaning = re.sub(r" \([^()]*\)$", "", text) if ending else text
+        meaning = shared(text, ending)
         key = (stem, span, unit, meaning, bool(ending))
         if ending and groups and groups[-1][0] == key:
             groups[-1][1].append((ending, start))
@@ -82,10 +102,7 @@ def table(root, leaves_out_common):
     chosen = [row for row in rows(root) if not (leaves_out_common and COMMON.match(row[0]))]
     for (stem, span, unit, meaning, _), entries in grouped(chosen):
         endings, starts = zip(*entries)
-        if not endings[0].startswith("[") and endings[0]:
-            name = f"`{stem}.{'/'.join(endings)}`"
-        else:
-            name = f"`{stem}{endings[0]}`" + (f"…`{endings[-1]}`" if len(endings) > 1 else "")
+        name = joined(stem, endings)
         start = starts[0] if len(set(starts)) == 1 else ", ".join(starts) if len(starts) <= 10 else "various"
         start += f" {unit}" if unit and start != "various" else ""
         span += f" {unit}" if unit and span else ""
