@@ -101,8 +101,8 @@ pub(crate) fn problem(condition: &str, variables: &[Variable]) -> Option<String>
             Err("" | CO_SIMULATION | NEVER) => continue,
             Err(part) => return Some(format!("is used with '{part}', which is no comparison")),
         };
-        for Comparison { name, value, operator } in alternatives {
-            let comparison = Comparison { name, value, operator };
+        for comparison in alternatives {
+            let Comparison { name, operator, value } = comparison;
             let mut named = variables.iter().filter(|variable| comparison.names(variable));
             let fits = |variable: &Variable| {
                 let allowed = match &variable.kind {

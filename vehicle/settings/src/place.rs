@@ -146,3 +146,18 @@ fn rate(unit: &str) -> String {
         _ => format!("{unit}/s"),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn conditions_are_joined_from_the_structure_to_the_field() {
+        let about = |name, used_with| About { name, used_with, ..About::default() };
+        let gust = Place::default().at(&about("gust", "translation = entry"));
+        assert_eq!(gust.used_with, "translation = entry");
+        assert_eq!(gust.at(&about("north", "")).used_with, "translation = entry");
+        let start = gust.at(&about("start", "~.north != 0"));
+        assert_eq!(start.used_with, "translation = entry and gust.north != 0");
+    }
+}
