@@ -123,7 +123,7 @@ def test_every_experiment_has_the_same_results_by_every_face(flown, face, path):
         assert "keeps no states: --isolate=false" in refused.read_text()
         return
     expected = results(flown / "program" / named(path))
-    assert expected[0].count(b"\n") > 10 and len(expected[1]) > 5 and expected[2]
+    assert expected[0].count(b"\n") > 2 and len(expected[1]) > 5 and expected[2]
     assert results(flown / face / named(path)) == expected
 
 

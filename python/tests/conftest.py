@@ -8,11 +8,32 @@ from pathlib import Path
 
 import pytest
 import reentry_fmus
+from reentry_fmus._data import experiment_path
 
 ROOT = Path(__file__).resolve().parents[2]
 assert ROOT / "python" / "src" not in Path(reentry_fmus.__file__).parents, "install the wheel"
 # The pages are checked as they are in the repository: a page, and how many blocks it has at least.
 PAGES = {ROOT / "docs" / "python.md": 5, ROOT / "python" / "README.md": 4, ROOT / "README.md": 1}
+SHORT = """
+title = "Short"
+experiment = "short.toml"
+cases = 50
+metrics = ["ems_deg"]
+
+[[vary]]
+parameter = "plant.disturbance.seed"
+case = 1
+"""
+
+
+@pytest.fixture
+def short(tmp_path):
+    """A campaign of two parts, which are flown in no time."""
+    (tmp_path / "short.toml").write_text(
+        f"title = 'LQR for 1 s'\nextends = '{experiment_path('lqr')}'\n[simulation]\nstop = 1.0\n"
+    )
+    (tmp_path / "campaign.toml").write_text(SHORT)
+    return tmp_path / "campaign.toml"
 
 
 @pytest.fixture

@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from conftest import SHORT
 from laws import lqr
 from laws import pd as pd_law
 from reentry_fmus import LawError, OrchestratorError, campaign
@@ -26,16 +27,6 @@ TEXT = (
     .replace('metrics = ["ems_deg"]', 'metrics = ["ems_deg", "cms", "max_moment_ratio"]')
     .replace("at_most = 6.0", "at_most = 6.3")
 )
-SHORT = """
-title = "Short"
-experiment = "short.toml"
-cases = 50
-metrics = ["ems_deg"]
-
-[[vary]]
-parameter = "plant.disturbance.seed"
-case = 1
-"""
 
 
 class Integrating:
@@ -64,23 +55,6 @@ def by_law(file, tmp_path_factory):
 @pytest.fixture(scope="module")
 def by_fmu(file, tmp_path_factory):
     return campaign(file).run(out=tmp_path_factory.mktemp("fmu"))
-
-
-@pytest.fixture
-def short(tmp_path):
-    """A campaign of two parts, which are flown in no time."""
-    (tmp_path / "short.toml").write_text(
-        "title = 'LQR for 1 s'\nextends = 'lqr.toml'\n[simulation]\nstop = 1.0\n"
-    )
-    show = subprocess.run(
-        [sys.executable, "-c", "from reentry_fmus._command import main; main()", "show", "lqr"],
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    (tmp_path / "lqr.toml").write_text(show.stdout)
-    (tmp_path / "campaign.toml").write_text(SHORT)
-    return tmp_path / "campaign.toml"
 
 
 # The same as an FMU
@@ -336,11 +310,15 @@ def test_an_interruption_keeps_what_is_flown(tmp_path):
     ],
 )
 def test_the_orchestrator_says_what_is_wrong_with_an_answer(answer, says, tmp_path):
-    """A program of another's may speak to it, too."""
+    """A program of another's may speak to it, too. Its failure is no result, and earlier results do not
+    pass for one."""
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "metrics.json").write_text("{}")
     command = [program(), "judge", experiment_path("lqr"), "--stop", "1", "--out", tmp_path / "out"]
     done = subprocess.run([*command, "--fmu-dir", FMUS], input=answer, capture_output=True)
     assert done.returncode == 2
     assert done.stderr.decode().startswith(f"error: {says}")
+    assert not list((tmp_path / "out").glob("*.json")) and not list((tmp_path / "out").glob("*.csv"))
     request = json.loads(done.stdout)
     assert request["steps"] == 25 and request["order"] == ["controller", "plant"]
     assert ["controller.moment.x", True] in request["variables"]

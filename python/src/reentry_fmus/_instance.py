@@ -246,3 +246,26 @@ class Instance:
         if instance is not None:
             instance.freeInstance()
         self._unpacked.release()
+
+
+def parted(name: str, components: Mapping[str, object]) -> tuple[str, str]:
+    """Splits "component.variable"."""
+    component, _, variable = name.partition(".")
+    if component not in components:
+        raise ValueError(
+            f'{name}: there is no component "{component}"{hint(component, components)}'
+        )
+    return component, variable
+
+
+def split(parameters: Mapping[str, Value], has_controller: bool) -> dict[str, dict[str, Value]]:
+    """Sorts parameters by component."""
+    by_component: dict[str, dict[str, Value]] = {"plant": {}, "controller": {}}
+    for name, value in parameters.items():
+        component, variable = parted(name, by_component)
+        if component == "controller" and not has_controller:
+            if not variable.startswith(("reference.", "limit.")):
+                problem = "the loop has no controller, only a reference and limits"
+                raise ValueError(f"{name}: {problem}")
+        by_component[component][variable] = value
+    return by_component

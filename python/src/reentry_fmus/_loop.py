@@ -12,8 +12,8 @@ import numpy as np
 import numpy.typing as npt
 import pandas as pd
 
-from ._data import fmu_path, hint
-from ._instance import Instance, InstanceError, Value
+from ._data import fmu_path
+from ._instance import Instance, InstanceError, Value, parted, split
 from ._judged import Flown, judged, observed
 from ._recording import ATTITUDE, ATTITUDE_RATE, MOMENT, RATE, RECORDED, REFERENCES
 from ._recording import Probes, Variable
@@ -346,11 +346,7 @@ class ClosedLoop:
 
     def _component(self, name: str) -> tuple[Instance, str]:
         components = {"plant": self._plant, "controller": self._controller}
-        component, _, variable = name.partition(".")
-        if component not in components:
-            raise ValueError(
-                f'{name}: there is no component "{component}"{hint(component, components)}'
-            )
+        component, variable = parted(name, components)
         return components[component], variable
 
     def reset(self, parameters: Mapping[str, Value] | None = None) -> State:
@@ -402,20 +398,3 @@ class ClosedLoop:
         trace: TracebackType | None,
     ) -> None:
         self.close()
-
-
-def split(parameters: Mapping[str, Value], has_controller: bool) -> dict[str, dict[str, Value]]:
-    """Sorts parameters by component."""
-    by_component: dict[str, dict[str, Value]] = {"plant": {}, "controller": {}}
-    for name, value in parameters.items():
-        component, _, variable = name.partition(".")
-        if component not in by_component:
-            raise ValueError(
-                f'{name}: there is no component "{component}"{hint(component, by_component)}'
-            )
-        if component == "controller" and not has_controller:
-            if not variable.startswith(("reference.", "limit.")):
-                problem = "the loop has no controller, only a reference and limits"
-                raise ValueError(f"{name}: {problem}")
-        by_component[component][variable] = value
-    return by_component
