@@ -6,6 +6,7 @@ from __future__ import annotations
 import base64
 import json
 import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -16,8 +17,15 @@ from playwright.sync_api import Browser, Page
 from browsing import in_chromium
 from conftest import ROOT, program
 
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
+
 PAGE = ROOT / "out" / "browser" / "index.html"
-CONTROLLERS = ["crmpc", "crmpc-paper", "dlmpc", "lqr", "fbl", "btvsmc", "btvsmc-do", "sotvsmc-do", "two-loop"]
+# The controllers that the page offers: those of the studies.
+STUDIES = ROOT / "orchestrator" / "experiments" / "base" / "studies.toml"
+CONTROLLERS = [entry["id"] for entry in tomllib.loads(STUDIES.read_text(encoding="utf-8"))["lists"]["controllers"]]
 # Another flight than the scenario's: text with a unit, integer, number, and both delays.
 CHANGED = "plant.disturbance.bound=1.7+deg/s2&plant.disturbance.seed=7&plant.initial.alpha=12+deg&plant.inertia.scale=0.97"
 DELAYED = f"{CHANGED}&plant.actuation.delay=0.04&controller.delay=0.04&controller.limit.moment=150000"
