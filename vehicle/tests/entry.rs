@@ -3,8 +3,10 @@
 
 use nalgebra::{SVector, Vector3};
 use proptest::prelude::*;
-use vehicle::aerodynamics::{Aerodynamics, FOOT, LiftAndDrag};
+use vehicle::aerodynamics::{Aerodynamics, FOOT, Flow, LiftAndDrag};
 use vehicle::integrator::rk4;
+use vehicle::kinematics::r;
+use vehicle::scenario::Scenario;
 use vehicle::translation::{AirAcceleration, Motion, Planet, State, derivative};
 
 /// East, north and up at a position.
@@ -225,5 +227,29 @@ fn oracle_a_steep_ballistic_entry_by_allen_and_eggers() {
         let expected = speed * speed * path.sin().abs() / (2.0 * e * height);
         assert!((greatest / expected - 1.0).abs() < 1e-3, "{greatest} {expected}");
         assert!((at / (speed * (-0.5_f64).exp()) - 1.0).abs() < 2e-3, "{at}");
+    }
+}
+
+/// What docs/entry.md says of the bound on the disturbance: the largest acceleration of an angle by
+/// what may be unknown of the air.
+#[test]
+fn oracle_what_is_unknown_of_the_air_takes_of_the_disturbance_bound() {
+    let papers = Aerodynamics::papers();
+    let body = Scenario::crmpc2022().inertia.body(1.0).unwrap();
+    let alpha = 17.3_f64.to_radians();
+    let flow = |beta: f64| Flow { dynamic_pressure: 12.5e3, speed: 762.0, alpha, beta, mach: 2.5 };
+    let rest = Vector3::zeros();
+    let acceleration = |moment: &Vector3<f64>| {
+        let angles = Vector3::new(alpha, 0.0, 0.0);
+        (r(&angles) * body.angular_acceleration(&rest, moment)).map(f64::to_degrees).amax()
+    };
+    let sideslip = |beta: f64| papers.moment(&flow(beta), &rest, alpha);
+    let trim = Vector3::new(0.0, papers.pitch_moment(&flow(0.0), 0.001), 0.0);
+    for (what, found, told) in [
+        ("a tenth of the derivatives", acceleration(&(sideslip(2_f64.to_radians()) * 0.1)), 0.76),
+        ("trim", acceleration(&trim), 1.58),
+        ("crosswind", acceleration(&sideslip((5.0_f64 / 762.0).atan())), 1.43),
+    ] {
+        assert!((found - told).abs() <= 0.005, "{what}: {found} deg/s2");
     }
 }
