@@ -66,7 +66,9 @@ def test_an_item_is_complete_and_what_shows_it_exists(name, item):
     assert item.keys() <= claims.KEYS and {"place", "says", "verdict"} <= item.keys()
     assert item["verdict"] in claims.VERDICTS
     assert ("reason" in item) == (item["verdict"] in claims.NEED_REASON)
-    assert item["verdict"] in claims.NEED_NO_EVIDENCE or item.get("shown") or item.get("study"), "nothing shows it"
+    # Computing times have studies only: a test of them would depend on the machine.
+    is_time = (name, item["place"]) in {("chai-2022", "Remark 3"), ("chai-2022", "section 5.2, Fig. 7")}
+    assert item["verdict"] in claims.NEED_NO_EVIDENCE or item.get("shown") or is_time and item.get("study"), "no test shows it"
     for test in item.get("shown", []):
         assert named.exists(test), f"there is no test {test}"
     for reference in item.get("study", []):

@@ -174,6 +174,26 @@ fn a_nominal_motion_that_starts_from_its_own_plan_knows_no_disturbance() {
 }
 
 #[test]
+fn published_the_nominal_error_converges_to_zero() {
+    // Proof of Theorem 2, without disturbance and with the exact model. The reference jumps at
+    // 25 s, which the plan prepares for 20 s before, so that the error converges a second time.
+    let reference = Scenario::crmpc2022().reference;
+    for constraints in [Constraints::Robust, Constraints::Paper] {
+        let (nominal, _) = around_the_nominal_trajectory(constraints, 1.0, Disturbance::default());
+        let error_deg = |tick: usize| {
+            let angles = Vector3::from_fn(|i, _| f64::from_bits(nominal[tick][i]));
+            let time = tick as f64 * harness::FEEDBACK;
+            (angles - reference.at(time).angles).amax().to_degrees()
+        };
+        assert!(error_deg(0) > 9.9 && error_deg(650) > 1.0, "the start and the jump");
+        // To a thousandth of the start after 10 s, and to 1e-5 of it after the jump.
+        assert!(error_deg(250) < 1e-2, "{}", error_deg(250));
+        let late = (1000..1250).map(error_deg).fold(0.0, f64::max);
+        assert!(late < 1e-4, "{late}");
+    }
+}
+
+#[test]
 fn oracle_deviation_from_the_nominal_motion_obeys_the_error_dynamics() {
     // Chai 2022, (22): O_e under a constant Δ settles at Δ/|k1|, and never leaves the reach of the
     // sampled dynamics. A square wave drives its rate to twice the value that (26) permits.

@@ -188,3 +188,27 @@ fn published_54_with_the_greatest_chi_is_violated() {
     assert!(sum(f64::min) < 0.0, "(55) with the minimum");
     assert!(sum(f64::max) > 0.0, "(55) with the maximum");
 }
+
+#[test]
+fn published_near_the_surface_the_powers_converge_faster_and_far_from_it_the_linear_terms() {
+    // Remark 11. Both terms of ṡ are equal at |s| = (k₁/k₂)^m, those of τ̇ at (k₃/k₄)^(m/2).
+    let law = Settings::sotvsmc_do().reaching;
+    let none = [0.0; 3];
+    let powers = SecondOrder { k2: none, k4: none, ..law };
+    let linear = SecondOrder { k1: none, k3: none, ..law };
+    let m = law.m;
+    for axis in 0..3 {
+        let edges =
+            [(law.k1[axis] / law.k2[axis]).powf(m), (law.k3[axis] / law.k4[axis]).powf(m / 2.0)];
+        for s in [1e-6, 1e-3, 0.1, 10.0, 1e3] {
+            let [by_powers, by_linear] =
+                [powers, linear].map(|law| Axis { law, axis }.rates(s, 0.0));
+            let ratios = [by_powers.0 / by_linear.0, by_powers.1 / by_linear.1];
+            for ((ratio, edge), power) in ratios.into_iter().zip(edges).zip([1.0 / m, 2.0 / m]) {
+                let expected = (edge / s).powf(power);
+                assert!((ratio / expected - 1.0).abs() < 1e-12, "{s}: {ratio} {expected}");
+                assert_eq!(ratio > 1.0, s < edge);
+            }
+        }
+    }
+}
