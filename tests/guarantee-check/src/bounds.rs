@@ -54,7 +54,7 @@ impl Bounds {
         let report =
             CheckReport::new(&self.settings()?, self.gap).map_err(|error| error.to_string())?;
         for (title, findings) in report.sections() {
-            section(title, findings);
+            print!("{}", section(title, findings));
         }
         for (axis, printed) in report.printed_terminal.iter().enumerate() {
             println!(
@@ -65,9 +65,7 @@ impl Bounds {
             );
         }
         println!("\nThe horizon may end with ‖x‖ ≤ {:.6} rad/s.", report.terminal_rate);
-        let verdict = if report.holds() { "Every" } else { "NOT every" };
-        let shown = if report.holds() { "holds" } else { "is shown to hold" };
-        println!("{verdict} bound {shown}.");
+        println!("{}", verdict(report.holds()));
         Ok(report.holds())
     }
 
@@ -91,10 +89,15 @@ impl Bounds {
     }
 }
 
-/// Prints the findings of one section.
-fn section(title: &str, findings: &[Finding]) {
-    println!(
-        "\n{title}\n{:52} {:>15} {:>33} {:>10}",
+/// Returns what the checks of all bounds say together.
+fn verdict(holds: bool) -> &'static str {
+    if holds { "Every bound holds." } else { "NOT every bound is shown to hold." }
+}
+
+/// Returns the findings of one section as lines.
+fn section(title: &str, findings: &[Finding]) -> String {
+    let mut lines = format!(
+        "\n{title}\n{:52} {:>15} {:>33} {:>10}\n",
         "", "bound b", "smallest true bound within", "margin"
     );
     for finding in findings {
@@ -104,11 +107,52 @@ fn section(title: &str, findings: &[Finding]) {
             _ => "  NOT SHOWN",
         };
         let (low, high) = (finding.truth.low, finding.truth.high);
-        println!(
-            "{:52} {:15.8e} [{low:15.8e}, {high:15.8e}] {:8.3} %{verdict}",
+        lines += &format!(
+            "{:52} {:15.8e} [{low:15.8e}, {high:15.8e}] {:8.3} %{verdict}\n",
             finding.statement,
             finding.bound,
             100.0 * finding.margin()
         );
+    }
+    lines
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use guarantee_check::interval::Interval;
+
+    #[test]
+    fn a_bound_that_is_false_or_not_shown_is_named_as_that() {
+        let finding = |bound: f64, low: f64, high: f64| {
+            let truth = Interval { low, high };
+            let text = section("", &[Finding { statement: "a ≤ b".into(), bound, truth }]);
+            text.lines().last().unwrap().rsplit_once('%').unwrap().1.trim().to_string()
+        };
+        assert_eq!(finding(1.0, 0.8, 0.9), "");
+        assert_eq!(finding(1.0, 0.9, 1.1), "NOT SHOWN");
+        assert_eq!(finding(1.0, 1.1, 1.2), "FALSE");
+        assert_eq!(finding(1.0, f64::NAN, f64::NAN), "NOT SHOWN");
+        assert_eq!(verdict(true), "Every bound holds.");
+        assert_eq!(verdict(false), "NOT every bound is shown to hold.");
+    }
+
+    #[test]
+    fn findings_that_are_missing_or_not_shown_are_no_proof() {
+        let truth = |high: f64| Interval { low: 0.0, high };
+        let finding =
+            |high: f64| vec![Finding { statement: String::new(), bound: 1.0, truth: truth(high) }];
+        let report = |assessment: Option<Vec<Finding>>, terminal: f64| CheckReport {
+            lemmas: finding(1.0),
+            dynamics: finding(1.0),
+            assessment,
+            terminal: finding(terminal),
+            printed_terminal: [truth(0.0); 3],
+            terminal_rate: 0.0,
+        };
+        assert!(report(Some(finding(1.0)), 1.0).holds());
+        assert!(!report(None, 1.0).holds());
+        assert!(!report(Some(finding(1.1)), 1.0).holds());
+        assert!(!report(Some(finding(1.0)), 1.1).holds());
     }
 }

@@ -40,8 +40,7 @@ impl Plans {
                 let Some(settings) = draws::accepted(seed) else { continue };
                 let tally = self.fly(&settings, seed)?;
                 if !tally.confirmed() {
-                    println!("draw {seed}: {settings:?}");
-                    report("", &tally);
+                    print!("draw {seed}: {settings:?}\n{}", report("", &tally));
                 }
                 total.lock().unwrap_or_else(PoisonError::into_inner).add(tally);
             }
@@ -55,7 +54,7 @@ impl Plans {
         });
         outcomes.into_iter().collect::<Result<(), String>>()?;
         let total = total.into_inner().unwrap_or_else(PoisonError::into_inner);
-        report("all draws", &total);
+        print!("{}", report("all draws", &total));
         // A draw may leave no accepted plan.
         Ok(total.confirmed())
     }
@@ -67,18 +66,19 @@ impl Plans {
     }
 }
 
-/// Prints the outcomes of the checks of plans.
-pub(crate) fn report(title: &str, tally: &Tally) {
-    println!(
-        "{title}: {} plans ({} kept from the previous optimisation, {} on an older trajectory), {} not confirmed",
+/// Returns the outcomes of the checks of plans as lines.
+pub(crate) fn report(title: &str, tally: &Tally) -> String {
+    let mut lines = format!(
+        "{title}: {} plans ({} kept from the previous optimisation, {} on an older trajectory), {} not confirmed\n",
         tally.plans, tally.kept_plans, tally.aged, tally.not_confirmed
     );
     if tally.outside > 0 {
-        println!("  {} begin outside of the set of `tube`", tally.outside);
+        lines +=
+            &format!("  NOT CONFIRMED: {} begin outside of the set of `tube`\n", tally.outside);
     }
     if let Some(left) = &tally.left {
-        println!(
-            "  least left: sideslip {:.3} %, rate {:.3} %, moment {:.3} %",
+        lines += &format!(
+            "  least left: sideslip {:.3} %, rate {:.3} %, moment {:.3} %\n",
             100.0 * left.sideslip,
             100.0 * left.rate,
             100.0 * left.moment
@@ -86,9 +86,50 @@ pub(crate) fn report(title: &str, tally: &Tally) {
     }
     for refuted in &tally.refuted {
         let (recorded, verdict) = (&refuted.recorded, &refuted.verdict);
-        println!(
-            "  NOT CONFIRMED: flight {}, {:.2} s, age {}: {verdict:?}",
+        lines += &format!(
+            "  NOT CONFIRMED: flight {}, {:.2} s, age {}: {verdict:?}\n",
             refuted.seed, recorded.time, recorded.age
         );
+    }
+    lines
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use control::crmpc::Constraints;
+    use guarantee_check::flights::Flight;
+    use guarantee_check::plan::PlanCheck;
+    use guarantee_check::tally::Refuted;
+
+    #[test]
+    fn a_plan_that_is_not_confirmed_is_named_with_its_flight() {
+        let good = Tally { plans: 3, ..Tally::default() };
+        assert!(good.confirmed() && !report("all", &good).contains("NOT"));
+        assert!(report("all", &good).starts_with("all: 3 plans (0 kept"));
+        // A plan whose states do not follow from its accelerations is none.
+        let settings = Settings::new(Constraints::Robust);
+        let check = PlanCheck::new(&settings).unwrap();
+        let mut refuted = Vec::new();
+        let flight = Flight::random(&settings, 0, 1.0).unwrap();
+        let observe = |recorded: &guarantee_check::flights::Recorded| {
+            let mut recorded = recorded.clone();
+            recorded.plan.states[1][0] += 1e-6;
+            let verdict = check.check(&recorded.plan, recorded.age);
+            refuted.push(Refuted { seed: 7, recorded, verdict });
+        };
+        flight.record(observe).unwrap();
+        assert!(!refuted.is_empty() && refuted.iter().all(|one| !one.verdict.confirmed()));
+        let bad = Tally { plans: 3, not_confirmed: 1, refuted: refuted[..1].to_vec(), ..good };
+        let text = report("all", &bad);
+        assert!(!bad.confirmed() && text.contains("1 not confirmed"), "{text}");
+        assert!(
+            text.contains("  NOT CONFIRMED: flight 7, 0.") && text.contains("consistent: false")
+        );
+        let outside = Tally { plans: 3, outside: 2, ..Tally::default() };
+        assert!(!outside.confirmed());
+        assert!(report("", &outside).contains("NOT CONFIRMED: 2 begin outside"));
+        // Nothing was checked.
+        assert!(!Tally::default().confirmed());
     }
 }

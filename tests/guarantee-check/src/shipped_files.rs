@@ -41,14 +41,17 @@ impl ShippedFiles {
             match &tally {
                 None => println!("{title}: no guarantee is given"),
                 Some(_) if !new => println!("{title}: as above"),
-                Some(tally) => report(&title, tally),
+                Some(tally) => print!("{}", report(&title, tally)),
             }
             confirmed &= tally.as_ref().is_none_or(Tally::confirmed);
             if new {
                 done.push((*settings, tally));
             }
         }
-        Ok(confirmed)
+        // A folder without a guarantee confirms nothing.
+        let is_any = done.iter().any(|(_, tally)| tally.is_some());
+        println!("{}", verdict(confirmed, is_any));
+        Ok(confirmed && is_any)
     }
 
     /// Checks the plans of settings whose guarantee can be in force, and of no others.
@@ -56,5 +59,31 @@ impl ShippedFiles {
         let given = settings.constraints == Constraints::Robust
             && Design::new(settings).is_ok_and(|design| design.accepted_share >= 1.0);
         given.then(|| check_flights(settings, 0..self.flights, self.duration)).transpose()
+    }
+}
+
+/// Returns what the checks say together.
+fn verdict(confirmed: bool, is_any: bool) -> &'static str {
+    match (is_any, confirmed) {
+        (false, _) => "No guarantee is given, so that NO plan was checked.",
+        (_, true) => "Every plan is confirmed.",
+        (_, false) => "NOT every plan is confirmed.",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_folder_without_a_guarantee_and_a_plan_that_is_not_confirmed_are_told() {
+        assert_eq!(verdict(true, true), "Every plan is confirmed.");
+        assert_eq!(verdict(false, true), "NOT every plan is confirmed.");
+        assert!(verdict(true, false).contains("NO plan was checked"));
+        let folder = std::env::temp_dir().join(format!("no-guarantee-{}", std::process::id()));
+        std::fs::create_dir_all(&folder).unwrap();
+        let files = ShippedFiles { folder: folder.clone(), flights: 1, duration: 1.0 };
+        assert_eq!(files.run(), Ok(false));
+        std::fs::remove_dir(folder).unwrap();
     }
 }
