@@ -96,7 +96,7 @@ impl Sweep {
             interface.is_some_and(|interface| interface.has("canBeInstantiatedOnlyOncePerProcess"))
                 && !component.is_isolated
         });
-        let sweep = Self {
+        Ok(Self {
             design,
             span: [system.clock.start(), system.clock.stop()],
             keys: keys(&system, &varied)?,
@@ -107,10 +107,7 @@ impl Sweep {
             experiment,
             fmu_dirs: fmu_dirs.to_vec(),
             correlation,
-        };
-        // Integers that are counted by the case grow until the last one.
-        sweep.values(sweep.cases().saturating_sub(1))?;
-        Ok(sweep)
+        })
     }
 
     /// Returns the number of cases.
