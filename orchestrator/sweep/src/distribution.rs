@@ -37,8 +37,7 @@ impl Distribution {
     pub fn new(vary: &Vary, target: Target, system: &System, seed: u64) -> Result<Self, String> {
         let reader = Reader { system, target, seed };
         let shape = reader.shape(vary)?;
-        let is_continuous =
-            !matches!(shape, Shape::List(..) | Shape::Case(_) | Shape::Whole(_));
+        let is_continuous = !matches!(shape, Shape::List(..) | Shape::Case(_) | Shape::Whole(_));
         let mut distribution = Self {
             ends: shape.ends(),
             shape,
