@@ -219,11 +219,21 @@ fn allowed(surface: usize) -> String {
     format!("surfaceAllowed[{}] = true", surface + 1)
 }
 
+/// Returns the condition under which a surface has an effect if it is used.
+fn gives_moment(surface: usize) -> String {
+    let axes = [1, 2, 3].map(|axis| format!("surfaceMoment[{axis},{}] != 0", surface + 1));
+    format!("({})", axes.join(" or "))
+}
+
 fn effectors(mut table: Variables) -> Variables {
     let names = Effectors::published().names;
     let limit = |name: &str, i: usize, text: &str| {
+        let mut condition = allowed(i);
+        if name == "surfaceRate" {
+            condition = format!("{condition} and {}", gives_moment(i));
+        }
         parameter(&format!("limit.{name}[{}]", i + 1), &format!("{text} of the {}", names[i]))
-            .used_with(&allowed(i))
+            .used_with(&condition)
             .real()
     };
     for i in 0..SURFACES {
@@ -249,6 +259,7 @@ fn effectors(mut table: Variables) -> Variables {
     for (i, name) in names.iter().enumerate() {
         let text = format!("Whether the {name} may be used; otherwise it is kept at zero");
         let common = parameter(&format!("surfaceAllowed[{}]", i + 1), &text);
+        let common = common.used_with(&gives_moment(i));
         table = table.boolean(common, move |m| &mut m.settings.effectors.allowed[i]);
     }
     let pressure =

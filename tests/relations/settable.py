@@ -163,7 +163,7 @@ class Driven:
             if variable.causality == "output" and variable.name not in NOT_REPRODUCIBLE:
                 kind = {"Real": 0, "Boolean": 2}.get(variable.type, 1)
                 self.references[kind].append(variable.valueReference)
-        self.bases: dict[tuple[str, float], list] = {}
+        self.bases: dict[tuple, list] = {}
         self.file = folder / "reference.csv"
         self.file.write_text(FILE)
 
@@ -218,7 +218,7 @@ class Driven:
     def tried(self, place: Place, name: str, value, is_set: bool = True) -> str:
         """What comes of a value: it `acts`, is `refused`, the FMU has `warned`, or nothing. An input that is not
         set like a parameter, but connected, has the value added to its signal."""
-        key = (place.name, place.times[-1])
+        key = (place.times[-1], place.name, *sorted(place.settings.items(), key=str))
         if key not in self.bases:
             self.bases[key] = list(self.rows(place, {}, {}))
         rows = self.rows(place, {name: value}, {}) if is_set else self.rows(place, {}, {name: value})
@@ -270,7 +270,7 @@ class Driven:
                 # A time lies within the run.
                 others = [0.8 * place.times[-1]] if self.variables[one].unit == "s" else self.values(place, one)
                 settings[one] = value if operator in ("=", ">=") else others[0]
-        return replace(place, name=f"{place.name} with {text}", settings=settings)
+        return replace(place, name=f"{place.name}, with this condition", settings=settings)
 
     def unfulfilled(self, place: Place, text: str) -> Place:
         """The place with a setting that contradicts the condition."""
@@ -287,16 +287,20 @@ class Driven:
         # An input is changed where it is connected, and then set to a constant.
         ways = [False, True] if self.is_input(name) and name in places[0].inputs else [True]
         shown = [place.name for place in places if name in place.observed]
+        refused = None
         # Most variables act at once. The others are tried with more values, over all communication points.
         for length, few in ((SHORT, 2), (DRIVEN + 1, None)):
             for place in fits:
                 place = replace(place, times=place.times[:length])
                 for value in self.values(place, name)[:few]:
-                    if any(self.tried(place, name, value, is_set) == "acts" for is_set in ways):
+                    outcomes = [self.tried(place, name, value, is_set) for is_set in ways]
+                    if "acts" in outcomes:
                         return place.name
+                    if "refused" in outcomes:
+                        refused = f"{place.name}: the value decides whether the settings are accepted"
             if shown:
                 return f"measures and pictures of {shown[0]}"
-        return None
+        return refused
 
     def in_vain(self, variable, places: list[Place]) -> str:
         """What comes of setting a variable where its condition does not hold."""
@@ -343,7 +347,7 @@ def table(rows: list[tuple[str, str, str]]) -> str:
             groups.append((key, [ending]))
     lines = ["| variable | used with | acts in |", "|---|---|---|"]
     for (stem, text, place, _), endings in groups:
-        lines.append(f"| {joined(stem, endings)} | {text} | {place} |")
+        lines.append(f"| {joined(stem, endings)} | {f'`{text}`' if text else ''} | {place} |")
     return "\n".join(lines)
 
 
