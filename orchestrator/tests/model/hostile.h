@@ -93,7 +93,7 @@ static int users_folder(void) { return opens("loop.toml", O_RDONLY); }
 static int deep_folders(void) {
     if (chdir(getenv("TMPDIR")) != 0) return 1;
     mkdir("closed", 0700), mkdir("closed/inner", 0), mkdir("last", 0);
-    for (int depth = 0; depth < 15000; depth++)
+    for (int depth = 0; depth < 5000; depth++)
         if (mkdir("d", 0700) != 0 || chdir("d") != 0) break;
     return 0;
 }
