@@ -100,8 +100,8 @@ def test_a_flight_has_the_bits_of_the_orchestrator(chromium, tmp_path, controlle
     shown = signals(page)
     table, metrics = flown(saved(page, tmp_path), tmp_path / "out")
     assert table["time"].iloc[-1] == 50.0
-    # Only CRMPC has the status of a guarantee.
-    assert_same_bits(shown, table, missing="crmpc" not in controller)
+    # Only CRMPC says something of a guarantee.
+    assert_same_bits(shown, table, missing=0 if "crmpc" in controller else 2)
     assert_same_figures(page, metrics)
 
 
@@ -121,7 +121,7 @@ def test_a_lost_attitude_ends_the_flight_as_in_the_orchestrator(chromium, tmp_pa
     shown, end = signals(page), page.evaluate("flight.summary.end")
     table, metrics = flown(saved(page, tmp_path), tmp_path / "out", code=3)
     assert end["time"] == table["time"].iloc[-1] == metrics["lost_at"] < 5.0
-    assert_same_bits(shown, table, missing=1)
+    assert_same_bits(shown, table, missing=2)
     assert_same_figures(page, metrics)
     assert "loses the attitude" in page.inner_text("#verdict")
     # Time stands where the flight ended.
@@ -131,8 +131,8 @@ def test_a_lost_attitude_ends_the_flight_as_in_the_orchestrator(chromium, tmp_pa
 def test_the_page_opens_with_the_published_scenario(chromium, tmp_path):
     experiment = ROOT / "orchestrator" / "experiments" / "crmpc-2022" / "crmpc-robust.toml"
     table, _ = flown(experiment, tmp_path)
-    # That experiment does not record the status of the guarantee.
-    assert_same_bits(signals(opened(chromium)), table, missing=1)
+    # That experiment does not record what the controller says of its guarantee.
+    assert_same_bits(signals(opened(chromium)), table, missing=2)
 
 
 def test_the_guarantee_is_told_as_the_orchestrator_tells_it(chromium):
@@ -141,11 +141,40 @@ def test_the_guarantee_is_told_as_the_orchestrator_tells_it(chromium):
     assert "keeps both limits" in page.inner_text("#verdict")
     # Three times the disturbance that the design provides for.
     page = opened(chromium, "plant.disturbance.bound=6+deg/s2")
-    assert "an assumption is contradicted" in page.inner_text("#figures")
+    assert "void: the disturbance is larger than assumed" in page.inner_text("#figures")
     assert page.inner_text("#messages summary")
+    # Limits that are kept are never beside a word that says one was not.
+    assert "exceeded" not in page.inner_text("#flight") and "exceeded" not in page.evaluate("view.state.light.text")
     page = opened(chromium, "controller=lqr")
     assert "LQR gives none" in page.inner_text("#figures")
     assert "exceeds the rate limit (129 %) and the moment limit (446 %)" in page.inner_text("#verdict")
+
+
+def test_a_limit_is_drawn_with_the_norm_that_it_is_for(chromium):
+    page = opened(chromium, "controller=lqr")
+    drawn = "(id) => charts[id].drawn().map((curve) => [curve.name, curve.width])"
+    assert page.evaluate(drawn, "rate") == [["‖ω‖", 3], ["p", 1], ["q", 1], ["r", 1]]
+    assert page.evaluate(drawn, "moment") == [["‖m‖", 3], ["x", 1], ["y", 1], ["z", 1]]
+    assert [name for name, _ in page.evaluate(drawn, "error")] == ["α", "β", "σ"]
+    for limit in ("rate", "moment"):
+        largest = page.evaluate(f"Math.max(...charts.{limit}.data.norm) / charts.{limit}.data.limit")
+        assert largest == pytest.approx(page.evaluate(f"flight.summary.{limit}_ratio"), rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("address", "text", "verdict"),
+    [
+        ("", "in force throughout", "CRMPC with robust sets keeps both limits, of rate and moment"),
+        ("plant.disturbance.bound=6+deg/s2", "void: the disturbance is larger than assumed", None),
+        ("controller=crmpc-paper", "not given: these constraint sets give none", None),
+        ("controller=lqr", "LQR gives none", "LQR exceeds the rate limit (129 %) and the moment limit (446 %)"),
+    ],
+)
+def test_what_is_told_of_guarantee_and_limits(chromium, address, text, verdict):
+    page = opened(chromium, address)
+    figures = page.inner_text("#figures")
+    assert text in figures and (verdict is None or page.inner_text("#verdict") == verdict), figures
+    assert not ("keeps both limits" in page.inner_text("#verdict") and "exceed" in page.inner_text("#flight"))
 
 
 def test_a_slider_changes_flight_and_address_and_the_address_holds_everything(chromium):

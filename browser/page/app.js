@@ -9,9 +9,20 @@ const DEG = 180 / Math.PI;
 const PANELS = [
   ["attitude", { title: "Attitude", unit: "deg", names: ["α", "β", "σ"], digits: 2 }],
   ["error", { title: "Tracking error", unit: "deg", names: ["α", "β", "σ"], digits: 2 }],
-  ["rate", { title: "Body rates", unit: "deg/s", names: ["p", "q", "r"], digits: 2 }],
-  ["moment", { title: "Control moment", unit: "kN m", names: ["x", "y", "z"], digits: 1, axis: true }],
+  ["rate", { title: "Body rates", unit: "deg/s", norm: "‖ω‖", names: ["p", "q", "r"], digits: 2 }],
+  ["moment", { title: "Control moment", unit: "kN m", norm: "‖m‖", names: ["x", "y", "z"], digits: 1, axis: true }],
 ];
+// What contradicts an assumption of the guarantee, by the item of guarantee.contradiction.
+const VOID = {
+  step: "measurements are older than assumed", delay: "the delay is another than assumed",
+  disturbance: "the disturbance is larger than assumed", deviation: "the vehicle is further from its plan than assumed",
+  limit: "the law needs more than a limit allows",
+};
+// Why a guarantee is not in force, by the item of its status.
+const MEANING = {
+  none: "not given: these constraint sets give none", refused: "refused: not possible with these settings",
+  uncertified: "not in force: no plan satisfies its conditions",
+};
 // Items of the guarantee's status by what they mean for whoever looks.
 const LIGHTS = { inForce: "good", pending: "good", exceeded: "bad", uncertified: "warn", stale: "warn", refused: "warn" };
 // Playback is five times as fast as the flight.
@@ -75,16 +86,20 @@ function read({ text, signals, ms }) {
   const errors = angles.map((angle, i) => angle.map((value, row) => value - reference[i][row]));
   return {
     summary, signals, columns, ms, rows, width, name: sent.name, time: column(0, 1), angles, reference, errors,
-    rates: three(4, DEG), moment: three(10, 1e-3), status: column(13, 1),
+    rates: three(4, DEG), moment: three(10, 1e-3), status: column(13, 1), contradiction: column(14, 1),
   };
 }
 
+function norm([x, y, z]) {
+  return x.map((_, row) => Math.hypot(x[row], y[row], z[row]));
+}
+
 // Times between which a norm exceeds its limit.
-function exceeded([x, y, z], limit) {
+function exceeded(values, limit) {
   const spans = [];
   let from = null;
   for (let row = 0; row < flight.rows; row++) {
-    const over = Math.hypot(x[row], y[row], z[row]) > limit * MET;
+    const over = values[row] > limit * MET;
     if (over && from === null) from = flight.time[row];
     if (!over && from !== null) spans.push([from, flight.time[row]]);
     if (!over) from = null;
@@ -99,8 +114,10 @@ function show() {
   const limits = { rate: summary.limits.rate * DEG, moment: summary.limits.moment * 1e-3 };
   charts.attitude.show({ stop, time: at, curves: angles, references: reference }, time);
   charts.error.show({ stop, time: at, curves: errors }, time);
-  charts.rate.show({ stop, time: at, curves: rates, limit: limits.rate, exceeded: exceeded(rates, limits.rate) }, time);
-  charts.moment.show({ stop, time: at, curves: moment, limit: limits.moment, exceeded: exceeded(moment, limits.moment) }, time);
+  for (const [id, curves] of [["rate", rates], ["moment", moment]]) {
+    const [size, limit] = [norm(curves), limits[id]];
+    charts[id].show({ stop, time: at, curves, norm: size, limit, exceeded: exceeded(size, limit) }, time);
+  }
   judge(limits);
   clock();
   pose(time);
@@ -111,31 +128,36 @@ function show() {
 
 // --- The verdict ----------------------------------------------------------------------------------------------------
 
-function item(row) {
-  return flight.summary.guarantee[flight.status[row] - 1]?.[0];
+// Item of the guarantee's status at a row, and why the guarantee is not in force there; nothing if there is none or it is.
+function standing(row) {
+  const [statuses, contradictions] = flight.summary.guarantee;
+  const status = statuses[flight.status[row] - 1]?.[0];
+  if (status === undefined || LIGHTS[status] === "good") return [status, null];
+  const why = VOID[contradictions[flight.contradiction[row] - 1]?.[0]];
+  return [status, MEANING[status] ?? `void: ${why ?? "an assumption is contradicted"}`];
 }
 
 function guarantee() {
-  if (!flight.summary.guarantee.length) return ["none", `${flight.name} gives none`];
-  const counts = {};
+  if (!flight.summary.guarantee[0].length) return ["none", `${flight.name} gives none`];
   const rows = Math.max(1, flight.rows - 1);
-  for (let row = 0; row < rows; row++) counts[item(row)] = (counts[item(row)] ?? 0) + 1;
-  const share = ((counts.inForce ?? 0) + (counts.pending ?? 0)) / rows;
-  if (share === 1) return ["good", "in force throughout"];
-  const [worst] = Object.entries(counts).filter(([name]) => LIGHTS[name] !== "good").sort((a, b) => b[1] - a[1])[0];
-  const meaning = {
-    none: "these constraint sets give none", refused: "refused: not possible with these settings",
-    uncertified: "no plan satisfies its conditions", exceeded: "an assumption is contradicted", stale: "measurements are stale",
-  };
-  if (share === 0) return [LIGHTS[worst] ?? "none", meaning[worst] ?? worst];
-  return [LIGHTS[worst] ?? "warn", `in force ${(share * 100).toFixed(0)} % of the time; ${meaning[worst] ?? worst}`];
+  // Rows by why the guarantee is not in force, each with the light of the status.
+  const reasons = new Map();
+  let good = 0;
+  for (let row = 0; row < rows; row++) {
+    const [status, why] = standing(row);
+    if (!why) good++;
+    else reasons.set(why, { light: LIGHTS[status] ?? "none", rows: (reasons.get(why)?.rows ?? 0) + 1 });
+  }
+  if (good === rows) return ["good", "in force throughout"];
+  const [[why, { light }]] = [...reasons].sort((a, b) => b[1].rows - a[1].rows);
+  return [light, good ? `in force ${((100 * good) / rows).toFixed(0)} % of the time; ${why}` : why];
 }
 
 function judge(limits) {
   const { summary, name } = flight;
   const over = [["rate", summary.rate_ratio], ["moment", summary.moment_ratio]].filter(([, ratio]) => ratio > MET);
   const percent = (ratio) => `${(100 * ratio).toFixed(0)} %`;
-  let verdict = `${name} keeps both limits`;
+  let verdict = `${name} keeps both limits, of rate and moment`;
   if (over.length) verdict = `${name} exceeds the ${over.map(([limit, ratio]) => `${limit} limit (${percent(ratio)})`).join(" and the ")}`;
   if (summary.end) verdict = `${summary.lost ? `${name} loses the attitude` : "The flight ends"} at ${summary.end.time.toFixed(1)} s`;
   $("verdict").textContent = verdict[0].toUpperCase() + verdict.slice(1);
@@ -184,9 +206,8 @@ function pose(at) {
   const row = Math.min(flight.rows - 1, Math.round(at / flight.summary.step));
   const from = row * flight.width;
   const part = (first) => Array.from(flight.signals.subarray(from + first, from + first + 3));
-  const now = item(row);
-  const words = { inForce: "guarantee in force", pending: "guarantee pending", none: "no guarantee" };
-  const text = now === undefined ? "no guarantee" : (words[now] ?? `guarantee ${now}`);
+  const [now, why] = standing(row);
+  const text = now === undefined ? "no guarantee" : `guarantee ${why?.split(":")[0] ?? (now === "pending" ? "pending" : "in force")}`;
   view.show({
     angles: part(1), reference: part(7), rates: part(4), moment: part(10),
     rateLimit: flight.summary.limits.rate, momentLimit: flight.summary.limits.moment,

@@ -1,11 +1,12 @@
 // Curves over time on a canvas: one panel with its limits, drawn again at once when settings change.
 //
 //   const chart = new Chart(canvas, { title: "Body rates", unit: "deg/s", names: ["p", "q", "r"], digits: 2 }, (time) => …);
-//   chart.show({ stop, time, curves: [[…], …], references: [[…], …], limit, exceeded: [[from, to], …] }, cursor);
+//   chart.show({ stop, time, curves: [[…], …], references: [[…], …], norm: […], limit, exceeded: [[from, to], …] }, cursor);
 //   chart.point(cursor);    // time, s
 //
 // The three curves differ by colour and by dashes: --x, --y, --z of the canvas. References are drawn in --ink,
-// limits in --muted with their name at the line.
+// limits in --muted with their name at the line. A limit is one of the norm, which is then drawn bold in --ink below the
+// three, and those thin.
 "use strict";
 
 class Chart {
@@ -49,9 +50,9 @@ class Chart {
   }
 
   range() {
-    const { curves, references = [], limit } = this.data;
-    let [low, high] = limit ? [-limit, limit] : [Infinity, -Infinity];
-    for (const curve of [...curves, ...references]) {
+    const { curves, references = [], norm = [], limit } = this.data;
+    let [low, high] = limit ? [0, limit] : [Infinity, -Infinity];
+    for (const curve of [...curves, ...references, norm]) {
       for (const value of curve) {
         if (value < low) low = value;
         if (value > high) high = value;
@@ -122,24 +123,29 @@ class Chart {
     context.clip();
     context.lineJoin = "round";
     for (const curve of data.references || []) this.trace(curve, this.colour("ink"), 1, []);
-    data.curves.forEach((curve, i) => {
-      this.trace(curve, this.colour("xyz"[i]), 1.7, Chart.DASHES[i]);
-    });
+    for (const { values, colour, width, dash } of this.drawn()) this.trace(values, this.colour(colour), width, dash);
     context.restore();
     if (!data.limit) return;
     context.strokeStyle = context.fillStyle = this.colour("muted");
-    for (const value of [data.limit, -data.limit]) {
-      context.setLineDash([10, 4]);
-      context.beginPath();
-      context.moveTo(box.left, this.y(value));
-      context.lineTo(box.right, this.y(value));
-      context.stroke();
-    }
+    context.setLineDash([10, 4]);
+    context.beginPath();
+    context.moveTo(box.left, this.y(data.limit));
+    context.lineTo(box.right, this.y(data.limit));
+    context.stroke();
     context.setLineDash([]);
     context.textAlign = "right";
     context.textBaseline = "bottom";
     const digits = data.limit < 20 ? 1 : 0;
-    context.fillText(`limit of the norm ${data.limit.toFixed(digits)}`, box.right - 2, this.y(-data.limit) - 2);
+    context.fillText(`limit of ${this.panel.norm} ${data.limit.toFixed(digits)}`, box.right - 2, this.y(data.limit) - 2);
+  }
+
+  // Curves with their names and strokes; the first one lies lowest.
+  drawn() {
+    const { data: { curves, norm }, panel } = this;
+    const drawn = curves.map((values, i) => ({
+      name: panel.names[i], values, colour: "xyz"[i], width: norm ? 1 : 1.7, dash: Chart.DASHES[i],
+    }));
+    return norm ? [{ name: panel.norm, values: norm, colour: "ink", width: 3, dash: [] }, ...drawn] : drawn;
   }
 
   // A curve, thinned to its first, least, largest and last value in each column of pixels.
@@ -183,31 +189,33 @@ class Chart {
 
   // Title on the left; names and values at the cursor on the right, each beside a piece of its line.
   heading(left, right) {
-    const { context, panel, data } = this;
+    const { context, panel } = this;
     const row = this.row();
-    const roomy = right - left > 400;
+    const drawn = this.drawn();
+    const roomy = right - left > 100 * drawn.length + 130;
+    const sample = roomy ? 20 : 14;
     context.textBaseline = "middle";
     context.textAlign = "left";
     context.fillStyle = this.colour("ink");
     context.fillText(`${panel.title}, ${panel.unit}`, left, 11);
     let x = right;
-    for (let i = panel.names.length - 1; i >= 0; i--) {
-      const value = data.curves[i][row] ?? 0;
+    for (const { name, values, colour, width, dash } of drawn.reverse()) {
+      const value = values[row] ?? 0;
       const number = value.toFixed(Math.abs(value) < 1000 ? panel.digits : 0).replace("-", "−");
       context.textAlign = "right";
       if (roomy) context.fillText(number, x, 11);
       x -= roomy ? 50 : 0;
-      context.fillText(panel.names[i], x, 11);
-      x -= 14;
+      context.fillText(name, x, 11);
+      x -= 4 + context.measureText(name).width;
       context.beginPath();
-      context.moveTo(x - 20, 11);
+      context.moveTo(x - sample, 11);
       context.lineTo(x, 11);
-      context.strokeStyle = this.colour("xyz"[i]);
-      context.lineWidth = 2;
-      context.setLineDash(Chart.DASHES[i]);
+      context.strokeStyle = this.colour(colour);
+      context.lineWidth = Math.max(1.5, width);
+      context.setLineDash(dash);
       context.stroke();
       context.setLineDash([]);
-      x -= 34;
+      x -= sample + 10;
     }
   }
 

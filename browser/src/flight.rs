@@ -20,7 +20,7 @@ struct Wires {
     reference: Vec<u32>,
     moment: Vec<u32>,
     applied: Vec<u32>,
-    guarantee: Option<u32>,
+    guarantee: Vec<u32>,
     limits: Vec<u32>,
 }
 
@@ -46,7 +46,7 @@ impl Wires {
             reference: references(controller, &of("controller.", 7, 10))?,
             moment: references(controller, &moment)?,
             applied: references(plant, &moment)?,
-            guarantee: controller.find(GUARANTEE).map(|(reference, _)| reference),
+            guarantee: GUARANTEE.iter().filter_map(|name| Some(controller.find(name)?.0)).collect(),
             limits: references(controller, &["limit.rate", "limit.moment"])?,
         })
     }
@@ -109,8 +109,8 @@ fn point(
     controller.set_reals(&wires.measured, &row[1..=STATES])?;
     controller.step(row[0], step)?;
     controller.reals(&wires.moment, &mut row[10..13])?;
-    if let Some(reference) = wires.guarantee {
-        row[13] = f64::from(controller.integer(reference)?);
+    for (value, reference) in row[13..].iter_mut().zip(&wires.guarantee) {
+        *value = f64::from(controller.integer(*reference)?);
     }
     plant.set_reals(&wires.applied, &row[10..13])?;
     plant.step(row[0], step)

@@ -11,8 +11,8 @@ use toml::Table;
 
 /// Parameter of every controller by which the loop is stepped, s.
 const PERIOD: &str = "period.feedback";
-/// Output of the controllers that guarantee limits.
-pub const GUARANTEE: &str = "guarantee.status";
+/// Outputs of the controllers that guarantee limits: the status, and what contradicts an assumption.
+pub const GUARANTEE: [&str; 2] = ["guarantee.status", "guarantee.contradiction"];
 
 /// A request of the page.
 #[derive(Debug, Deserialize)]
@@ -121,13 +121,12 @@ fn apply(experiment: &mut Table, component: &str, instance: &mut Linked) -> Resu
     Ok(())
 }
 
-/// Has the status of the guarantee recorded, if the controller has one.
+/// Has what the controller says of its guarantee recorded, if it gives one.
 fn record_guarantee(experiment: &mut Table, controller: &Linked) {
     let variables = experiment.get_mut("record").and_then(|record| record.get_mut("variables"));
-    if let Some(toml::Value::Array(variables)) = variables
-        && controller.find(GUARANTEE).is_some()
-    {
-        variables.push(format!("controller.{GUARANTEE}").into());
+    if let Some(toml::Value::Array(variables)) = variables {
+        let given = GUARANTEE.into_iter().filter(|name| controller.find(name).is_some());
+        variables.extend(given.map(|name| toml::Value::from(format!("controller.{name}"))));
     }
 }
 

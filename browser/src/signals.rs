@@ -1,7 +1,7 @@
 //! The signals that a flight records.
 
-/// Columns of the signals, in this order; in SI units, the status as the number of its item.
-pub const COLUMNS: [&str; 14] = [
+/// Columns of the signals, in this order; in SI units, what the guarantee says as numbers of items.
+pub const COLUMNS: [&str; 15] = [
     "time",
     "plant.attitude.alpha",
     "plant.attitude.beta",
@@ -16,6 +16,7 @@ pub const COLUMNS: [&str; 14] = [
     "controller.moment.y",
     "controller.moment.z",
     "controller.guarantee.status",
+    "controller.guarantee.contradiction",
 ];
 
 /// Values of all columns at one communication point.

@@ -41,8 +41,9 @@ pub struct Summary {
     rate_ratio: f64,
     /// Largest ‖m‖ as a share of its limit.
     moment_ratio: f64,
-    /// Items of the guarantee's status, counted from 1; none if the controller gives no guarantee.
-    guarantee: Vec<(String, String)>,
+    /// Items of the guarantee's status and of what contradicts it, counted from 1; none if the
+    /// controller gives no guarantee.
+    guarantee: [Vec<(String, String)>; 2],
     /// Warnings of the FMUs.
     warnings: Vec<Message>,
     /// Why the flight ended early, if it did.
@@ -58,12 +59,13 @@ fn squared(values: impl Iterator<Item = f64>) -> f64 {
 impl Summary {
     /// Returns the summary of a flight that has not begun.
     pub fn new(limits: Limits, step: f64, controller: &Linked) -> Self {
-        let guarantee = match controller.find(GUARANTEE).map(|(_, variable)| &variable.kind) {
+        let items = |name| match controller.find(name).map(|(_, variable)| &variable.kind) {
             Some(VariableKind::Enumeration { enumeration_type, .. }) => {
                 enumeration_type.items.clone()
             }
             _ => vec![],
         };
+        let guarantee = GUARANTEE.map(items);
         Self {
             rows: 0,
             step,
