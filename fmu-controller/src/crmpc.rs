@@ -87,7 +87,7 @@ impl Law for CrmpcLaw {
                     "the guarantee is no longer in force: the observed disturbance is larger than disturbance.bound, inertia.error and estimation.rateError allow with the given delay"
                 }
                 Contradiction::Limit => {
-                    "the guarantee is no longer in force: a guaranteed limit is exceeded"
+                    "the guarantee is no longer in force: a guaranteed limit is exceeded, or the law requires a moment beyond limit.moment"
                 }
                 Contradiction::Deviation | Contradiction::None => {
                     "the guarantee is no longer in force: the deviation from the plan is larger than disturbance.bound, inertia.error, estimation.*, measurement.age and delay allow"
