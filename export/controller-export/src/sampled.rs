@@ -101,8 +101,8 @@ pub trait SampledInstance: Serialize + DeserializeOwned + Send + Sized + 'static
     }
 }
 
-/// An instance that works at ticks, in the form that FMI requires. Its parts are in boxes, as a host
-/// may have little stack.
+/// An instance that works at ticks, in the form that FMI requires. Its parts are in boxes, because
+/// a host may have little stack.
 #[derive(Serialize, Deserialize)]
 #[serde(bound = "")]
 pub struct SampledFmu<I: SampledInstance> {

@@ -1,8 +1,8 @@
 //! Messages to the importer, which leave the FMU through the importer's callback only.
 //!
 //! The reason of every failure is always reported, so that nobody has to repeat a run with logging
-//! on to find it: errors, discarded calls and the end of a simulation. FMI 2.0.4, section 2.1.3, has
-//! the logger called for these statuses whatever `loggingOn` is; for fmi2Discard the importer's
+//! on to find it: errors, discarded calls and the end of a simulation. FMI 2.0.4, section 2.1.3,
+//! has the logger called for these statuses whatever `loggingOn` is; for fmi2Discard the importer's
 //! logger decides whether to show the message. Everything else is reported only while logging is on
 //! (`loggingOn` of fmi2Instantiate, fmi2SetDebugLogging), and then only in the chosen categories.
 //!

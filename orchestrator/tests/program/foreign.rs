@@ -322,7 +322,8 @@ fn a_check_makes_an_instance() {
     assert!(code == 1 && text.contains(says), "{text}{errors}");
 }
 
-/// Rounding upward, flushing to zero, and traps, left behind by each function that computes nothing.
+/// Rounding upward, flushing to zero, and traps, left behind by each function that computes
+/// nothing.
 #[test]
 #[cfg(target_arch = "x86_64")]
 fn the_floating_point_environment_that_an_fmu_leaves_behind_changes_nothing() {
