@@ -50,7 +50,7 @@ fn a_run_is_drawn_as_its_experiment_says_or_as_it_is_asked_for() {
     assert!(picture.starts_with("<svg") && picture.contains("limit of norm"), "{picture}");
     assert!(picture.contains("α") && picture.contains("gain and integrator"));
     // The norm that has the limit is bold, and what it is the norm of is thin.
-    for picture in [picture, fs::read_to_string(bench.path("out/a/plot.svg")).unwrap()] {
+    for picture in [picture, fs::read_to_string(bench.path("a/plot.svg")).unwrap()] {
         let width = |name: &str| {
             let path = picture.split(&format!("<path data-name=\"{name}\"")).nth(1).unwrap();
             path.split("stroke-width=\"").nth(1).unwrap().split('"').next().unwrap().to_string()
