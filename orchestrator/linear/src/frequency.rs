@@ -14,8 +14,8 @@ use cosim::system::System;
 use fmu_import::quantity::rounded;
 use std::f64::consts::TAU;
 
-/// Share of a transient that is left when the response is taken, the longest wait for it, s, and the
-/// largest share that may be left then.
+/// Share of a transient that is left when the response is taken, the longest wait for it, s, and
+/// the largest share that may be left then.
 const LEFT: f64 = 1e-6;
 const LONGEST: f64 = 300.0;
 const MOST_LEFT: f64 = 0.01;
