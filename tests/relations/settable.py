@@ -274,9 +274,13 @@ class Driven:
 
     def unfulfilled(self, place: Place, text: str) -> Place:
         """The place with a setting that contradicts the condition."""
-        [name, _, _], *_ = next(parts(text))
-        others = (replace(place, name=f"{place.name} without {text}", settings=place.settings | {name: value}) for value in self.values(place, name))
-        return next(other for other in others if not self.holds(other, text))
+        settings = dict(place.settings)
+        for name, operator, written in next(parts(text)):
+            for one in self.named(name):
+                values = [written] if operator == "!=" else self.values(place, one)
+                tries = (replace(place, settings=settings | {one: value}) for value in values)
+                settings = next(other for other in tries if not self.compares(other, one, operator, written)).settings
+        return replace(place, name=f"{place.name}, without this condition", settings=settings)
 
     def place_of(self, variable, places: list[Place]) -> str | None:
         """Where a variable acts: an experiment or a scene, or the condition that no experiment fulfils."""
