@@ -79,7 +79,7 @@ impl Jump {
         let mut scenario = Scenario::crmpc2022();
         (scenario.initial_angles, scenario.initial_rates) = (self.before, self.rates);
         scenario.disturbance.kind = self.disturbance;
-        scenario.disturbance.seed = self.seed.into();
+        scenario.disturbance.seed = self.seed;
         scenario.reference = Profile::constant(self.before);
         let mut plant = Plant::new(&scenario.config(0.01), 0.0).unwrap();
         let mut memory = law.memory();

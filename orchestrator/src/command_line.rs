@@ -248,6 +248,21 @@ pub(crate) enum Command {
 }
 
 impl Command {
+    /// Returns whether the command may take so long that it can be interrupted.
+    pub(crate) fn takes_long(&self) -> bool {
+        matches!(
+            self,
+            Self::Run { .. }
+                | Self::Reproduce { .. }
+                | Self::Campaign(_)
+                | Self::Falsify(_)
+                | Self::Linearise(_)
+                | Self::Margins(_)
+                | Self::Response(_)
+                | Self::Pack { .. }
+        )
+    }
+
     /// Returns whether standard output is to hold JSON, errors included.
     pub(crate) fn answers_in_json(&self) -> bool {
         match self {

@@ -93,18 +93,7 @@ fn main() -> ExitCode {
 }
 
 fn execute(command: Command, out: &mut impl Write, interrupt: &Interrupt) -> Result<(), Failure> {
-    let takes_long = matches!(
-        command,
-        Command::Run { .. }
-            | Command::Reproduce { .. }
-            | Command::Campaign(_)
-            | Command::Falsify(_)
-            | Command::Linearise(_)
-            | Command::Margins(_)
-            | Command::Response(_)
-            | Command::Pack { .. }
-    );
-    if takes_long {
+    if command.takes_long() {
         interrupt.listen()?;
     }
     match command {

@@ -111,7 +111,7 @@ pub(crate) fn respond(
                 json!({ "signal": signal.name, "frequency": point.frequency, "in_flight": in_flight, "predicted": predicted })
             })
         });
-        writeln!(out, "{:#}", Value::from_iter(rows))?;
+        writeln!(out, "{:#}", rows.collect::<Value>())?;
     }
     if let Some((path, form)) = plot {
         picture::write(&figure(&title, &found.open, &all, [asked.from, to]), form, path)?;

@@ -228,14 +228,7 @@ fn record(system: &mut System, options: &Options) -> Result<RunReport, Failure> 
     // Requested after the drawing threads have started, because later threads would inherit the
     // scheduling.
     let scheduling = Scheduling::request(options.real_time.and_then(|settings| settings.priority));
-    let isolated = system.components.iter().filter(|component| component.is_isolated);
-    let isolated: Vec<&str> = isolated.map(|component| component.name.as_str()).collect();
-    if matches!(scheduling.priority, Priority::Fifo { .. }) && !isolated.is_empty() {
-        tracing::warn!(
-            "--priority: the processes of {} keep the usual priority; --isolate=false runs these instances in this process",
-            isolated.join(", ")
-        );
-    }
+    warn_of_priority(system, &scheduling.priority);
 
     let begin = Instant::now();
     let mut observers: Vec<&mut dyn Observer> = vec![&mut curves, &mut progress];
@@ -297,6 +290,18 @@ fn record(system: &mut System, options: &Options) -> Result<RunReport, Failure> 
     let (metrics, files) = written?;
     let end = master.end().map(String::from);
     Ok(RunReport { metrics, out, files, ended, end })
+}
+
+/// Warns of instances that do not get the priority, as they run in processes of their own.
+fn warn_of_priority(system: &System, priority: &Priority) {
+    let isolated = system.components.iter().filter(|component| component.is_isolated);
+    let isolated: Vec<&str> = isolated.map(|component| component.name.as_str()).collect();
+    if matches!(priority, Priority::Fifo { .. }) && !isolated.is_empty() {
+        tracing::warn!(
+            "--priority: the processes of {} keep the usual priority; --isolate=false runs these instances in this process",
+            isolated.join(", ")
+        );
+    }
 }
 
 /// Computes the margins that an experiment asks for. A loop that cannot be linearised has none,

@@ -138,6 +138,7 @@ fn designed<I: SampledInstance>(
 /// Returns the state before the first tick. What it needs of the stack is not added to what the
 /// design needs.
 #[inline(never)]
+#[expect(clippy::unnecessary_box_returns, reason = "a caller would hold it on its stack")]
 fn first<I: SampledInstance>(start: f64, device: &I::Device) -> Box<Ticks<I>> {
     Box::new(Sampled::new(start, I::period(device), I::memory(device)))
 }

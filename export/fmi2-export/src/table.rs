@@ -13,6 +13,8 @@ use model_description::variable::{
 use settings::{Choice, Declared, Field, Numbered, Setting};
 use std::sync::Arc;
 
+type Getter<M> = Box<dyn Fn(&mut M) -> i32 + Send + Sync>;
+type Setter<M> = Box<dyn Fn(&mut M, i32) + Send + Sync>;
 type Lens<M, T> = Box<dyn Fn(&mut M) -> &mut T + Send + Sync>;
 /// A part of the model with declared settings.
 type Part<M> = Arc<dyn Fn(&mut M) -> &mut (dyn Declared + 'static) + Send + Sync>;
@@ -28,9 +30,9 @@ pub(crate) enum Access<M> {
 
 /// Access to a field of some type that FMI sees as an integer.
 pub(crate) struct Integer<M> {
-    pub(crate) get: Box<dyn Fn(&mut M) -> i32 + Send + Sync>,
+    pub(crate) get: Getter<M>,
     /// Setter that is called only with values that the declaration allows.
-    pub(crate) set: Box<dyn Fn(&mut M, i32) + Send + Sync>,
+    pub(crate) set: Setter<M>,
 }
 
 /// Says why a setting has no field, which cannot happen: its declaration and its field have the
@@ -311,7 +313,8 @@ impl Common {
     #[must_use]
     pub fn used_with(mut self, condition: &str) -> Self {
         if !condition.is_empty() {
-            self.description += &format!("; used with {condition}");
+            self.description.push_str("; used with ");
+            self.description.push_str(condition);
             self.used_with = condition.into();
         }
         self

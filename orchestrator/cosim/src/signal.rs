@@ -305,7 +305,7 @@ mod tests {
             assert_eq!(Relation::Near.combine(a, b, 360.0), near, "{a} {b}");
         }
         assert_eq!(
-            Relation::Turn.combine(0.3, 0.1, 6.28),
+            Relation::Turn.combine(0.3, 0.1, 360.0),
             0.3 - 0.1,
             "the same bits without turns"
         );

@@ -223,24 +223,11 @@ impl Builder<'_> {
         let found = model(&central);
         let Dynamics::Sampled(steps) = &found.dynamics else { unreachable!("built above") };
         let states = steps.iter().map(|step| step.a.ncols()).max().unwrap_or(0);
-        let mut note = format!(
+        let repeats = format!(
             "{}: responses to changes of inputs, which repeat after {period} steps of {} s, {states} states",
             found.name, self.recorded.length
         );
-        if drift > DRIFTS {
-            let share = 1e2 * drift;
-            note = format!(
-                "{note}; those of the next {period} differ by {share:.1} %, and states that count for less are left out"
-            );
-        }
-        if depends > DRIFTS {
-            note = format!(
-                "{note}; they depend on the size of the change, by {:.1} % from {:.0e} to {:.0e} of the typical magnitudes: the model is that of {change:.0e}",
-                1e2 * depends,
-                CHANGES[0],
-                CHANGES[CHANGES.len() - 1]
-            );
-        }
+        let note = note(repeats, period, drift, (depends, change));
         let sides = has_edge.then(|| [side(0), side(1)]);
         Ok(Found { model: found, sides, note, is_silent: false })
     }
@@ -287,6 +274,26 @@ impl Builder<'_> {
         let place = |port: &Port| self.recorded.ports.iter().position(|other| other == port);
         self.inputs.iter().filter_map(place).collect()
     }
+}
+
+/// Continues the note on a model with what it leaves out: responses `drift` by a share from one
+/// period to the next, and differ by the share `depends` with the size of the `change`.
+fn note(mut note: String, period: usize, drift: f64, (depends, change): (f64, f64)) -> String {
+    if drift > DRIFTS {
+        let share = 1e2 * drift;
+        note = format!(
+            "{note}; those of the next {period} differ by {share:.1} %, and states that count for less are left out"
+        );
+    }
+    if depends > DRIFTS {
+        note = format!(
+            "{note}; they depend on the size of the change, by {:.1} % from {:.0e} to {:.0e} of the typical magnitudes: the model is that of {change:.0e}",
+            1e2 * depends,
+            CHANGES[0],
+            CHANGES[CHANGES.len() - 1]
+        );
+    }
+    note
 }
 
 fn central(response: &Response) -> &Lags {

@@ -107,12 +107,12 @@ fn section(title: &str, findings: &[Finding]) -> String {
             _ => "  NOT SHOWN",
         };
         let (low, high) = (finding.truth.low, finding.truth.high);
-        lines += &format!(
+        lines.extend([format!(
             "{:52} {:15.8e} [{low:15.8e}, {high:15.8e}] {:8.3} %{verdict}\n",
             finding.statement,
             finding.bound,
             100.0 * finding.margin()
-        );
+        )]);
     }
     lines
 }

@@ -73,23 +73,25 @@ pub(crate) fn report(title: &str, tally: &Tally) -> String {
         tally.plans, tally.kept_plans, tally.aged, tally.not_confirmed
     );
     if tally.outside > 0 {
-        lines +=
-            &format!("  NOT CONFIRMED: {} begin outside of the set of `tube`\n", tally.outside);
+        lines.extend([format!(
+            "  NOT CONFIRMED: {} begin outside of the set of `tube`\n",
+            tally.outside
+        )]);
     }
     if let Some(left) = &tally.left {
-        lines += &format!(
+        lines.extend([format!(
             "  least left: sideslip {:.3} %, rate {:.3} %, moment {:.3} %\n",
             100.0 * left.sideslip,
             100.0 * left.rate,
             100.0 * left.moment
-        );
+        )]);
     }
     for refuted in &tally.refuted {
         let (recorded, verdict) = (&refuted.recorded, &refuted.verdict);
-        lines += &format!(
+        lines.extend([format!(
             "  NOT CONFIRMED: flight {}, {:.2} s, age {}: {verdict:?}\n",
             refuted.seed, recorded.time, recorded.age
-        );
+        )]);
     }
     lines
 }

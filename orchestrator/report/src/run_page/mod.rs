@@ -205,7 +205,7 @@ mod tests {
     /// Returns the text of a verdict, and the lights in it.
     fn told(lines: &[SummaryLine], status: &str) -> (String, Vec<&'static str>) {
         let (summary, status) = (lines.to_vec(), status.to_string());
-        let markup = verdict(&Recording { summary, status, ..Recording::default() }, false);
+        let markup = verdict(&Recording { status, summary, ..Recording::default() }, false);
         let html = markup.into_string();
         let lights = ["good", "bad"].into_iter().filter(|light| html.contains(*light)).collect();
         let text = html.split('<').filter_map(|part| part.split_once('>'));
