@@ -31,19 +31,13 @@ const DEGREE: f64 = std::f64::consts::PI / 180.0;
 
 impl LookupTable {
     /// Makes the spline through `angles` (rad) at strictly increasing `times` (s); both have the
-    /// same length. From point to point α and σ turn the shorter way: a table that counts them from
-    /// −180° to 180° has no jump.
+    /// same length.
     ///
     /// # Errors
     /// Refuses a table without points, with unequal lengths, with a value that is not finite, or
     /// with times that do not increase.
-    pub fn new(times: Vec<f64>, mut angles: Vec<Vector3<f64>>) -> Result<Self, Error> {
+    pub fn new(times: Vec<f64>, angles: Vec<Vector3<f64>>) -> Result<Self, Error> {
         check(&times, &angles)?;
-        for k in 1..angles.len() {
-            for i in (0..3).filter(|i| REPEATS[*i]) {
-                angles[k][i] = nearest(angles[k][i], angles[k - 1][i]);
-            }
-        }
         let curvatures = curvatures(&times, &angles);
         Ok(Self { times, angles, curvatures })
     }
@@ -64,7 +58,9 @@ impl LookupTable {
     }
 
     /// Reads a CSV file with the headings `time_s` and, in any order, `alpha_deg` or `alpha_rad`,
-    /// and likewise `beta_…` and `sigma_…`. Lines that begin with `#` are comments.
+    /// and likewise `beta_…` and `sigma_…`. Lines that begin with `#` are comments. From point to
+    /// point α and σ turn the shorter way, so that a file which counts them from −180° to 180° has
+    /// no jump.
     ///
     /// # Errors
     /// Names the file, line and column at fault.
@@ -136,7 +132,7 @@ impl LookupTable {
             ));
         }
 
-        let (mut times, mut angles) = (Vec::new(), Vec::new());
+        let (mut times, mut angles) = (Vec::new(), Vec::<Vector3<f64>>::new());
         for record in reader.records() {
             let record = record.map_err(|error| {
                 refuse(error.position().map(csv::Position::line), None, error.to_string())
@@ -167,8 +163,13 @@ impl LookupTable {
             if times.len() == MOST_POINTS {
                 return Err(refuse(line, None, too_many()));
             }
+            let before = angles.last().copied().unwrap_or_default();
+            let point = Vector3::new(alpha, beta, sigma);
             times.push(time);
-            angles.push(Vector3::new(alpha, beta, sigma));
+            angles.push(Vector3::from_fn(|i, _| {
+                let turns = REPEATS[i] && times.len() > 1;
+                if turns { nearest(point[i], before[i]) } else { point[i] }
+            }));
         }
         if times.is_empty() {
             return Err(refuse(None, None, "no points below the headings".into()));

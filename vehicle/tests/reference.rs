@@ -203,3 +203,19 @@ fn a_table_of_more_points_than_anybody_needs_is_refused() {
     let text = LookupTable::from_csv("it.csv", csv.as_bytes()).unwrap_err().to_string();
     assert!(text.contains("it.csv, line 100002") && text.contains("points"), "{text}");
 }
+
+#[test]
+fn oracle_a_file_that_counts_from_one_end_to_the_other_has_no_jump() {
+    let rows = (0..40).map(|k| {
+        let sigma = f64::from(k) * 20.0;
+        format!("{k},5,0,{}\n", (sigma + 180.0).rem_euclid(360.0) - 180.0)
+    });
+    let text = format!("time_s,alpha_deg,beta_deg,sigma_deg\n{}", rows.collect::<String>());
+    let table = LookupTable::from_csv("turns.csv", text.as_bytes()).unwrap();
+    for k in 0..390 {
+        let time = 0.1 * f64::from(k);
+        let reference = table.at(time);
+        assert!((reference.angles.z.to_degrees() - 20.0 * time).abs() < 1e-9, "{time}");
+        assert!((reference.rates.z.to_degrees() - 20.0).abs() < 1e-9, "{time}");
+    }
+}
