@@ -83,14 +83,12 @@ def test_an_integer_that_fmi_does_not_have_is_refused_with_its_name(way, number,
     assert not list(tmp_path.rglob("*.parquet"))
 
 
-@pytest.mark.parametrize("way", [way for way in WAYS if way not in ("uniform", "case")])
+@pytest.mark.parametrize("way", [way for way in WAYS if way not in ("uniform", "range", "case")])
 def test_the_largest_integer_is_taken(way, tmp_path):
     done = WAYS[way](tmp_path, 2**31 - 1)
     assert done.returncode == 0, done.stderr
 
 
-def test_an_integer_that_is_counted_by_the_case_is_one_in_the_last_case(tmp_path):
+def test_of_the_integers_that_are_counted_by_the_case_the_smallest_follows_the_largest(tmp_path):
     done = WAYS["case"](tmp_path, 2**31 - 3)
-    assert done.returncode == 2 and "2147483645 + 3 is above the maximum 2147483647" in done.stderr
-    assert not list(tmp_path.rglob("*.parquet"))
-    assert WAYS["case"](tmp_path, 2**31 - 4).returncode == 0
+    assert done.returncode == 0, done.stderr

@@ -11,7 +11,8 @@ use toml::Table;
 
 /// Parameter of every controller by which the loop is stepped, s.
 const PERIOD: &str = "period.feedback";
-/// Outputs of the controllers that guarantee limits: the status, and what contradicts an assumption.
+/// Outputs of the controllers that guarantee limits: the status, and what contradicts an
+/// assumption.
 pub const GUARANTEE: [&str; 2] = ["guarantee.status", "guarantee.contradiction"];
 
 /// A request of the page.
@@ -130,8 +131,8 @@ fn record_guarantee(experiment: &mut Table, controller: &Linked) {
     }
 }
 
-/// Returns the length of a step (s), which is the period of the controller, the number of steps, and
-/// the stop time (s).
+/// Returns the length of a step (s), which is the period of the controller, the number of steps,
+/// and the stop time (s).
 fn clock(experiment: &mut Table, controller: &Linked) -> Result<(f64, usize, f64), Error> {
     let wrong = |problem: &str| Error::Setting {
         name: format!("controller.{PERIOD}"),

@@ -21,8 +21,8 @@ const HYSTERESIS: f64 = 2.0 * PI / 180.0;
 const PATIENCE: f64 = 1.0;
 const ONCE: f64 = 0.5;
 const ROUNDING: f64 = 1e-6;
-/// Difference between rates and derivatives that is no contradiction: a rate (rad/s), and a share of
-/// the rates.
+/// Difference between rates and derivatives that is no contradiction: a rate (rad/s), and a share
+/// of the rates.
 const NEGLIGIBLE: f64 = 1e-3;
 const SHARE: f64 = 0.25;
 
@@ -80,8 +80,8 @@ impl Turns {
         chosen
     }
 
-    /// Compares the change of the reference's angles with its rates, from change to change: an input
-    /// may be held for some ticks. A single jump is no contradiction.
+    /// Compares the change of the reference's angles with its rates, from change to change: an
+    /// input may be held for some ticks. A single jump is no contradiction.
     fn look(&mut self, time: f64, reference: &Reference) {
         let Some((then, before)) = self.last else {
             self.last = Some((time, *reference));

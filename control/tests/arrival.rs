@@ -20,8 +20,8 @@ const PERIOD: f64 = 0.04;
 const JUMP: f64 = 5.0;
 /// Distance at which the vehicle has arrived, rad.
 const NEAR: f64 = 2.0 * PI / 180.0;
-/// Largest rate of the turn, which the tube leaves, rad/s, and an acceleration that the moment allows
-/// about any axis, rad/s².
+/// Largest rate of the turn, which the tube leaves, rad/s, and an acceleration that the moment
+/// allows about any axis, rad/s².
 const RATE: f64 = 4.29 * PI / 180.0;
 const ACCELERATION: f64 = 2.0 * PI / 180.0;
 
@@ -59,7 +59,7 @@ impl Jump {
         let kinds = [DisturbanceKind::None, DisturbanceKind::White, DisturbanceKind::Constant];
         let size = random.between(0.0, 1f64.to_radians());
         Self {
-            horizon: random.between(25.0, 250.0) as usize,
+            horizon: random.between(5.0, 250.0) as usize,
             before: attitude(random),
             after: attitude(random),
             rates: random.direction(size),

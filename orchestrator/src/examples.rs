@@ -104,7 +104,7 @@ const EXAMPLES: [(&str, [Example; 3]); 15] = [
             ],
             [
                 "Print those of another controller as JSON",
-                "orchestrator margins rest --fmu controller=DLMPC --json",
+                "orchestrator margins rest --fmu controller=FBL --json",
             ],
         ],
     ),

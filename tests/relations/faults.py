@@ -168,7 +168,7 @@ def noexec(trial: Trial, _: random.Random) -> None:
     temporary.mkdir()
     script = 'mount -t tmpfs -o noexec none "$0" && TMPDIR="$0" exec "$@"'
     done = trial.call(around=("unshare", "-rm", "sh", "-c", script, str(temporary)))
-    trial.must_be_told(done, 2, "Operation not permitted", "failed to map")
+    trial.must_be_told(done, 2, "may not be run (noexec)", "failed to map")
 
 
 def no_folder(trial: Trial, _: random.Random) -> None:

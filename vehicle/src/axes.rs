@@ -1,5 +1,5 @@
-//! Endings of the names of vectors' entries, each with what the entry is for; and which angles repeat
-//! after a whole turn.
+//! Endings of the names of vectors' entries, each with what the entry is for; and which angles
+//! repeat after a whole turn.
 
 use std::f64::consts::TAU;
 

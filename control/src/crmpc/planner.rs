@@ -24,12 +24,10 @@ use vehicle::reference::Reference;
 const STANDSTILL: f64 = 1e-8;
 /// Typical angle error, by which the cone solver's unknowns are scaled, rad.
 const ANGLE_SCALE: f64 = 0.1;
-/// Largest distance at which a reference is followed as it is: a share of the way that the rate limit
-/// leaves within the horizon, and an angle, rad.
+/// Largest distance at which a reference is followed as it is: a share of the way that the rate
+/// limit leaves within the horizon, between two angles, rad.
 const SHARE_OF_THE_WAY: f64 = 0.8;
-const FURTHEST: f64 = 50.0 * PI / 180.0;
-/// Smallest share of the rate limit for that way; below it no guarantee is given anyway.
-const SMALLEST_RATE_LEFT: f64 = 0.1;
+const DISTANCES: [f64; 2] = [20.0 * PI / 180.0, 50.0 * PI / 180.0];
 /// Smallest disturbance bound for which the invariant set is computed, rad/s², so that the set has
 /// an interior.
 const SMALLEST_DISTURBANCE: f64 = 1e-5;
@@ -92,8 +90,8 @@ impl Planner {
         let reach = match settings.constraints {
             Constraints::Paper => f64::INFINITY,
             Constraints::Robust => {
-                let left = design.assessment.rate_left.max(SMALLEST_RATE_LEFT);
-                (SHARE_OF_THE_WAY * left * settings.limit_rate * n as f64 * h).min(FURTHEST)
+                let way = design.assessment.rate_left * settings.limit_rate * n as f64 * h;
+                (SHARE_OF_THE_WAY * way).clamp(DISTANCES[0], DISTANCES[1])
             }
         };
         Ok(Self {

@@ -13,7 +13,6 @@ use model_description::variable::{
 use settings::{Choice, Declared, Field, Numbered, Setting};
 use std::sync::Arc;
 
-type Getter<M> = Box<dyn Fn(&mut M) -> i32 + Send + Sync>;
 type Setter<M> = Box<dyn Fn(&mut M, i32) + Send + Sync>;
 type Lens<M, T> = Box<dyn Fn(&mut M) -> &mut T + Send + Sync>;
 /// A part of the model with declared settings.
@@ -30,13 +29,12 @@ pub(crate) enum Access<M> {
 
 /// Access to a field of some type that FMI sees as an integer.
 pub(crate) struct Integer<M> {
-    pub(crate) get: Getter<M>,
+    pub(crate) get: Box<dyn Fn(&mut M) -> i32 + Send + Sync>,
     /// Setter that is called only with values that the declaration allows.
     pub(crate) set: Setter<M>,
 }
 
-/// Says why a setting has no field, which cannot happen: its declaration and its field have the
-/// same source.
+/// Says what cannot happen, as the declaration of a setting and its field have one source.
 const NO_FIELD: &str = "a setting has a field of its declared type";
 
 /// Returns access to a setting with numbered values, which FMI numbers from `first` on where the
@@ -313,8 +311,7 @@ impl Common {
     #[must_use]
     pub fn used_with(mut self, condition: &str) -> Self {
         if !condition.is_empty() {
-            self.description.push_str("; used with ");
-            self.description.push_str(condition);
+            self.description = format!("{}; used with {condition}", self.description);
             self.used_with = condition.into();
         }
         self

@@ -109,10 +109,13 @@ impl Fmu {
     }
 
     /// Returns whether the last step may have a length of its own, so that it ends exactly at the
-    /// stop time.
+    /// stop time. Lookup tables and the FMUs of this project tolerate the rounding of whole steps,
+    /// and their results are those of whole steps, in every importer.
     pub fn fits_last_step(&self) -> bool {
         let interface = self.description.co_simulation.as_ref();
         interface.is_some_and(|i| i.has("canHandleVariableCommunicationStepSize"))
+            && !self.is_lookup_table()
+            && !self.is_made_by_fmu_pack()
     }
 
     /// Finds the shared library of the FMU, and its name in the archive.

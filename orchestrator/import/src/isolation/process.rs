@@ -75,8 +75,8 @@ enum NoAnswer {
 impl Process {
     /// Starts a process, which then waits for [`Self::set_up`].
     ///
-    /// In a sandbox it works in the `folder` of the archive, which is also its home and its place for
-    /// temporary files. Of the environment it has language, time zone and where libraries are.
+    /// In a sandbox it works in the `folder` of the archive, which is also its home and its place
+    /// for temporary files. Of the environment it has language, time zone and where libraries are.
     pub(super) fn start(
         program: &Path,
         name: &str,
