@@ -17,6 +17,7 @@ from conftest import SHORT
 from reentry_fmus import ClosedLoop, LawError, OrchestratorError, campaign, experiment
 from reentry_fmus._unpacked import PREFIX, Folder, remove_left
 
+EARLIER: list[str] = []  # Children that other tests of this process have left.
 KINDS = ["memory", "mappings", "descriptors", "children", "folders"]
 linux = pytest.mark.skipif(sys.platform != "linux", reason="counts what a process holds by /proc")
 
@@ -246,21 +247,14 @@ def test_an_orchestrator_that_is_killed_is_no_result(short, tmp_path, temporary)
 # Nothing is left behind
 
 
-EARLIER = []
-
-
 @pytest.fixture(autouse=True)
 def earlier_children():
-    """Other tests of the same process may have started programs that go on."""
-    EARLIER[:] = []
-    EARLIER[:] = children()
+    EARLIER.extend(children())
 
 
 def children():
-    if sys.platform != "linux":
-        return []
-    started = Path(f"/proc/{os.getpid()}/task/{os.getpid()}/children").read_text().split()
-    return [child for child in started if child not in EARLIER]
+    path = Path(f"/proc/{os.getpid()}/task/{os.getpid()}/children")
+    return [child for child in path.read_text().split() if child not in EARLIER] if path.exists() else []
 
 
 @linux
