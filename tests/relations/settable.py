@@ -37,6 +37,7 @@ else:
     import tomli as tomllib
 
 PAGE = ROOT / "docs" / "settings.md"
+TIMED = {"solver.timeBudget"}
 # Communication points of a run, unless its FMUs end it, and those at which an FMU is driven.
 FLOWN, DRIVEN = 3000, 60
 # Communication points of a flight that is flown to its end as well.
@@ -371,7 +372,8 @@ def looked_at(job: tuple[str, list[Place], Path]) -> tuple[list[tuple[str, str, 
             faults.append(f"{name}: {variable.name} is used with {text}, but elsewhere it {outcome or 'says nothing'}")
         if place is None and text != NEVER:
             faults.append(f"{name}: {variable.name} acts nowhere")
-        rows.append((variable.name, text, place or ""))
+        # How long a computation takes, and so where a budget acts, differs from run to run.
+        rows.append((variable.name, text, "wherever computing takes longer" if variable.name in TIMED else place or ""))
     driven.instance.close()
     return rows, faults
 
