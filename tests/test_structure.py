@@ -20,9 +20,8 @@ CRATES = sorted(
     if (path.parent / "src").is_dir() and not {"target", ".venv", "out"} & set(path.relative_to(ROOT).parts)
 )
 LONGEST = 400
-# Lists of tests about one subject each: the studies, the platforms and the importers. And one list of
-# solvers with what they have in common.
-LONGER = {"tests/test_importers.py", "tests/test_platforms.py", "tests/test_reproduce.py", "scripts/benchmarks/solvers.py"}
+# Lists of tests about one subject each: the studies, the platforms and the importers.
+LONGER = {"tests/test_importers.py", "tests/test_platforms.py", "tests/test_reproduce.py"}
 
 
 def module(file: Path, source: Path) -> tuple[str, ...]:
