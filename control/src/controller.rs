@@ -11,8 +11,11 @@ use vehicle::reference::Reference;
 pub struct Measurement {
     /// Angles of attack, sideslip and bank, Θ = [α, β, σ], rad.
     pub angles: Vector3<f64>,
-    /// Body rates, ω = [p, q, r], rad/s.
+    /// Body rates, ω = [p, q, r], rad/s; relative to the axes that turn with the trajectory, if
+    /// [`Measurement::relative_to`] has been told of its turn.
     pub rates: Vector3<f64>,
+    /// Part of `rates` that the turn of these axes adds, w = R⁻¹ Δ_f, rad/s.
+    pub turn: Vector3<f64>,
     /// The moment that acted since the last tick, N m, if it is measured. Without it a controller
     /// assumes that its command acted.
     pub achieved_moment: Option<Vector3<f64>>,
@@ -26,6 +29,8 @@ pub struct Measurement {
     pub has_other_delay: bool,
     /// Whether the acceleration over the last period is larger than [`Controller::explained`].
     pub is_unexplained: bool,
+    /// Whether the measurement has been the same at three ticks although the vehicle moves.
+    pub is_frozen: bool,
 }
 
 impl Measurement {
@@ -42,7 +47,8 @@ impl Measurement {
             return self;
         }
         let known = Kinematics::Printed.turn(&self.angles) * turn_rate;
-        Self { rates: self.rates + r_inverse(&self.angles) * known, ..self }
+        let turn = r_inverse(&self.angles) * known;
+        Self { rates: self.rates + turn, turn, ..self }
     }
 }
 

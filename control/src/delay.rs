@@ -15,6 +15,7 @@
 
 use crate::controller::{Controller, Measurement, ReferenceAt};
 use crate::error::{DesignError, invalid};
+use crate::frozen::Frozen;
 use crate::loop_delay::{LoopDelay, LoopDelaySettings};
 use crate::turns::{Turns, turned_reference};
 use nalgebra::Vector3;
@@ -100,13 +101,13 @@ impl Predictor {
     }
 
     /// Returns the state after the delay. `under_way` ends with the last [`Predictor::count`]
-    /// moments that were commanded before this tick, oldest first, N m; missing ones count as zero.
-    /// The achieved moment is passed on unchanged.
+    /// moments that were commanded before this tick, oldest first, N m. Before the first of them
+    /// only the known moment acts. The achieved moment is passed on unchanged.
     pub fn predict(&self, under_way: &[Vector3<f64>], measured: &Measurement) -> Measurement {
         let mut state = plant::state(&measured.angles, &measured.rates);
         for age in (1..=self.count).rev() {
-            let moment =
-                under_way.len().checked_sub(age).map_or_else(Vector3::zeros, |i| under_way[i]);
+            let index = under_way.len().checked_sub(age);
+            let moment = index.map_or(measured.known_moment, |i| under_way[i]);
             let load = Load { moment, ..Load::default() };
             // The newest command, of age 1, acts for the last period of the delay.
             let begin = (self.delay - age as f64 * self.period).max(0.0);
@@ -129,13 +130,15 @@ impl Predictor {
 pub struct Memory<M> {
     /// Memory of the law behind the prediction.
     pub inner: M,
-    /// Commands whose action has not ended yet, oldest first, N m. They are zero until enough ticks
-    /// have passed.
+    /// Moments whose action has not ended yet, oldest first, N m: those that were commanded, and
+    /// the known moment until enough ticks have passed. Empty before the first tick.
     pub under_way: Vec<Vector3<f64>>,
     /// Estimate of the actual delay of the loop.
     pub loop_delay: LoopDelay,
     /// Turns of the measured angles and of the reference.
     pub turns: Turns,
+    /// Last measurement, and how often it has come.
+    pub frozen: Frozen,
 }
 
 impl<M: Clone> Clone for Memory<M> {
@@ -145,6 +148,7 @@ impl<M: Clone> Clone for Memory<M> {
             under_way: self.under_way.clone(),
             loop_delay: self.loop_delay.clone(),
             turns: self.turns,
+            frozen: self.frozen,
         }
     }
 
@@ -154,6 +158,7 @@ impl<M: Clone> Clone for Memory<M> {
         self.under_way.clone_from(&source.under_way);
         self.loop_delay.clone_from(&source.loop_delay);
         self.turns = source.turns;
+        self.frozen = source.frozen;
     }
 }
 
@@ -234,14 +239,15 @@ impl<C: Controller> Controller for Delayed<C> {
     fn memory(&self) -> Self::Memory {
         Memory {
             inner: self.inner.memory(),
-            under_way: vec![Vector3::zeros(); self.predictor.count],
+            under_way: Vec::with_capacity(self.predictor.count),
             loop_delay: self.loop_delay.memory(),
             turns: Turns::default(),
+            frozen: Frozen::default(),
         }
     }
 
     fn fits(&self, memory: &Self::Memory) -> bool {
-        memory.under_way.len() == self.predictor.count
+        [0, self.predictor.count].contains(&memory.under_way.len())
             && self.loop_delay.fits(&memory.loop_delay)
             && memory.turns.fits()
             && self.inner.fits(&memory.inner)
@@ -255,22 +261,23 @@ impl<C: Controller> Controller for Delayed<C> {
         measured: &Measurement,
         reference: ReferenceAt,
     ) -> Vector3<f64> {
-        let Memory { inner, under_way, loop_delay, turns } = memory;
+        let Memory { inner, under_way, loop_delay, turns, frozen } = memory;
+        let is_frozen = frozen.observe(measured);
         let measured = turns.continued(measured);
         self.loop_delay.observe(loop_delay, &measured);
         let measured = Measurement {
             has_other_delay: loop_delay.is_other,
             is_unexplained: loop_delay.is_unexplained,
+            is_frozen,
             ..measured
         };
         let measured = self.predictor.predict(under_way, &measured);
+        under_way.resize(self.predictor.count, measured.known_moment);
         let time = time + self.latency.action;
         let added = turns.follow(time, &measured.angles, &reference(time));
         let nearest = |time: f64| turned_reference(reference(time), &added);
         let moment = self.inner.command(inner, tick, time, &measured, &nearest);
         self.loop_delay.remember(loop_delay, &moment);
-        // A default memory has no room yet.
-        under_way.resize(self.predictor.count, Vector3::zeros());
         under_way.rotate_left(self.predictor.count.min(1));
         if let Some(newest) = under_way.last_mut() {
             *newest = moment;

@@ -13,6 +13,7 @@ pub mod dlmpc;
 pub mod error;
 pub mod error_dynamics;
 pub mod estimation;
+mod frozen;
 pub mod guidance;
 pub mod linearise;
 pub mod loop_delay;

@@ -115,7 +115,8 @@ pub struct LoopDelaySettings {
     /// Acceleration that the law's assumptions explain with that delay, if it has any.
     pub explained: Option<Explained>,
     /// Whether measurements are old when they arrive. They come through a filter then, and their
-    /// noise would be taken for a response: no estimate is made.
+    /// noise would be taken for a response: no estimate is made. What the law's assumptions explain
+    /// is judged all the same.
     pub is_filtered: bool,
 }
 
@@ -154,7 +155,7 @@ impl LoopDelaySettings {
     /// Takes the measured rates of a tick, before its command is known.
     pub fn observe(&self, memory: &mut LoopDelay, measured: &Measurement) {
         memory.is_unexplained = false;
-        if self.is_filtered || measured.stale || measured.achieved_moment.is_some() {
+        if measured.stale || measured.achieved_moment.is_some() {
             (memory.rates, memory.available) = (None, 0);
             return;
         }
@@ -175,23 +176,32 @@ impl LoopDelaySettings {
             } else {
                 memory.unexplained.saturating_sub(1)
             };
-            self.weigh(memory);
+            if !self.is_filtered {
+                self.weigh(memory);
+            }
         }
     }
 
     /// Returns whether the law's assumptions explain the acceleration over the last period with the
-    /// declared delay or with one at the ends of its interval.
+    /// declared delay or with one in its interval.
     fn explains(&self, explained: Explained, memory: &LoopDelay, angles: &Vector3<f64>) -> bool {
         let Explained { disturbance, share, delay_error } = explained;
         let r = kinematics::r(angles);
         let last = (self.candidates() - 1) as f64;
-        let explains = |delay: f64| {
-            let place = (delay / self.period - self.first() as f64).clamp(0.0, last);
-            let command = self.command(memory, place);
-            let (left, command) = (r * (memory.accelerations[0] - command), r * command);
-            (0..3).all(|i| left[i].abs() <= disturbance + share * command[i].abs() + FLOOR)
+        let place = |delay: f64| (delay / self.period - self.first() as f64).clamp(0.0, last);
+        let command = self.command(memory, place(self.declared));
+        // With another delay the mean is one of the commands that act then, or lies between them.
+        let [newest, oldest] = [-delay_error, delay_error].map(|s| place(self.declared + s));
+        let others = &memory.commands[self.first()..][newest as usize..=oldest.ceil() as usize];
+        let beside = match delay_error {
+            0.0 => Vector3::zeros(),
+            _ => others.iter().fold(Vector3::zeros(), |largest: Vector3<f64>, other| {
+                largest.sup(&(r * (other - command)).abs())
+            }),
         };
-        [0.0, -delay_error, delay_error].into_iter().any(|error| explains(self.declared + error))
+        let (left, command) = (r * (memory.accelerations[0] - command), (r * command).abs());
+        let explained = (command + beside) * share + beside;
+        (0..3).all(|i| left[i].abs() <= disturbance + explained[i] + FLOOR)
     }
 
     /// Returns the acceleration by the moment that acts over the last period if the delay is the

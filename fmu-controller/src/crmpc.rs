@@ -86,6 +86,15 @@ impl Law for CrmpcLaw {
                 Contradiction::Disturbance => {
                     "the guarantee is no longer in force: the observed disturbance is larger than disturbance.bound, inertia.error and estimation.rateError allow with the given delay"
                 }
+                Contradiction::Frozen => {
+                    "the guarantee is no longer in force: the measured angles and rates have been the same at three ticks, although the vehicle moves"
+                }
+                Contradiction::KnownMoment => {
+                    "the guarantee is no longer in force: knownMoment.* is larger than knownMoment.bound, or has changed by more than knownMoment.change while a plan was followed"
+                }
+                Contradiction::Turn => {
+                    "the guarantee is no longer in force: the trajectory turns faster than trajectory.turnBound"
+                }
                 Contradiction::Limit => {
                     "the guarantee is no longer in force: a guaranteed limit is exceeded, or the law requires a moment beyond limit.moment"
                 }

@@ -5,18 +5,14 @@ use super::observer::Observed;
 use super::settings::Settings;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
-use vehicle::math::exp_m1;
 
-/// Changes of the commanded acceleration that the newest measurement may not show yet, and what the
-/// observer's filter makes of the pulses that they cause.
+/// Changes of the commanded acceleration that the newest measurement may not show yet.
 #[derive(Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Commands {
     /// Sizes of the changes, the oldest first, rad/s².
     changes: Vec<f64>,
     /// Acceleration commanded before the last tick, rad/s²; `None` before the second tick.
     before: Option<Vector3<f64>>,
-    /// Mean acceleration by the pulses, filtered like the observed disturbance, rad/s².
-    filtered: f64,
 }
 
 impl Commands {
@@ -33,14 +29,15 @@ impl Commands {
         &self.changes
     }
 
-    /// Returns the mean acceleration by pulses as the observer's filter shows it, rad/s².
-    pub(super) fn filtered(&self) -> f64 {
-        self.filtered
-    }
-
-    /// Takes the acceleration that was commanded at the last tick, before the next command.
-    pub(super) fn observe(&mut self, s: &Settings, switching: &Switching, observed: &Observed) {
-        let Some(commanded) = observed.commanded() else { return };
+    /// Takes the acceleration that was commanded at the last tick, before the next command. Returns
+    /// the mean acceleration over a period by the pulse that its change causes, rad/s².
+    pub(super) fn observe(
+        &mut self,
+        s: &Settings,
+        switching: &Switching,
+        observed: &Observed,
+    ) -> f64 {
+        let Some(commanded) = observed.commanded() else { return 0.0 };
         let before = self.before.or_else(|| observed.without_moment(&s.body));
         let change = before.map_or(0.0, |before| (commanded - before).norm());
         self.before = Some(commanded);
@@ -48,20 +45,18 @@ impl Commands {
             *oldest = change;
             self.changes.rotate_left(1);
         }
-        let weight = -exp_m1(-s.period_feedback / s.observer.time_constant);
-        let mean = switching.pulse_of_command(change) / s.period_feedback;
-        self.filtered += (mean - self.filtered) * weight;
+        switching.pulse_of_command(change) / s.period_feedback
     }
 }
 
 impl Clone for Commands {
     fn clone(&self) -> Self {
-        Self { changes: self.changes.clone(), ..*self }
+        Self { changes: self.changes.clone(), before: self.before }
     }
 
     // The derived version would allocate at every tick.
     fn clone_from(&mut self, source: &Self) {
         self.changes.clone_from(&source.changes);
-        (self.before, self.filtered) = (source.before, source.filtered);
+        self.before = source.before;
     }
 }

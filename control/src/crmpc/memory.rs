@@ -5,7 +5,7 @@ use super::observer::Observed;
 use super::plan::Plan;
 use super::supervision::{GuaranteeStatus, Supervision};
 use crate::report::SolverReport;
-use nalgebra::Vector6;
+use nalgebra::{Vector3, Vector6};
 use serde::{Deserialize, Serialize};
 
 /// The state that CRMPC carries from tick to tick.
@@ -17,6 +17,8 @@ pub struct Memory {
     pub started: bool,
     /// Outcome of the last optimisation.
     pub report: SolverReport,
+    /// Known moment at the last tick, N m.
+    pub known: Vector3<f64>,
     /// Nominal state (Θ̃, x̃_ω) at the last tick.
     pub nominal: Vector6<f64>,
     /// Whether the plan in force gives the guarantee, or the reason why not.
@@ -60,6 +62,7 @@ impl Clone for Memory {
             plan,
             started,
             report,
+            known,
             nominal,
             guarantee,
             margins,
@@ -73,6 +76,7 @@ impl Clone for Memory {
         self.plan.clone_from(plan);
         self.started = *started;
         self.report = *report;
+        self.known = *known;
         self.nominal = *nominal;
         self.guarantee = *guarantee;
         self.margins = *margins;

@@ -22,6 +22,8 @@ pub struct Plan {
     pub braking: f64,
     /// Shift of the reference's angles by the observer when the plan was made, rad.
     pub shift: Vector3<f64>,
+    /// Known moment with which the plan was certified, N m.
+    pub known: Vector3<f64>,
     /// What was commanded before the plan, if the delay is not exact.
     pub onset: Onset,
 }
@@ -34,6 +36,7 @@ impl Clone for Plan {
             multipliers: self.multipliers.clone(),
             braking: self.braking,
             shift: self.shift,
+            known: self.known,
             onset: self.onset,
         }
     }
@@ -45,6 +48,7 @@ impl Clone for Plan {
         self.multipliers.clone_from(&source.multipliers);
         self.braking = source.braking;
         self.shift = source.shift;
+        self.known = source.known;
         self.onset = source.onset;
     }
 }
@@ -58,6 +62,7 @@ impl Plan {
             multipliers: vec![[0.0; 2]; horizon],
             braking: 0.0,
             shift: Vector3::zeros(),
+            known: Vector3::zeros(),
             onset: Onset::default(),
         }
     }

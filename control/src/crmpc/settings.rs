@@ -175,6 +175,20 @@ pub struct Settings {
     )]
     #[setting(used_with = "constraints = robust")]
     pub rate_error: f64,
+    /// Bound on the norm of the part of the body rates that the turn of the trajectory's axes adds,
+    /// which the inputs trajectory.* tell; the robust set is tightened for it.
+    #[setting(name = "trajectory.turnBound", unit = "rad/s", min = 0.0, nominal = 0.01)]
+    #[setting(used_with = "constraints = robust")]
+    pub turn_bound: f64,
+    /// Bound on the norm of the known moment; the robust set is tightened for it.
+    #[setting(name = "knownMoment.bound", unit = "N.m", min = 0.0, nominal = 1e4)]
+    #[setting(used_with = "constraints = robust")]
+    pub known_bound: f64,
+    /// Bound on the norm of the change of the known moment while a plan is followed, which is one
+    /// period.optimisation or longer; the robust set is tightened for it.
+    #[setting(name = "knownMoment.change", unit = "N.m", min = 0.0, nominal = 1e3)]
+    #[setting(used_with = "constraints = robust")]
+    pub known_change: f64,
     #[allow(missing_docs)]
     #[setting(name = "guarantee.policy")]
     #[setting(used_with = "constraints = robust")]
@@ -226,6 +240,28 @@ fn embedded() -> &'static File {
 }
 
 impl Settings {
+    /// Returns the settings for rates relative to the axes that turn with the trajectory: ‖ω‖ keeps
+    /// limit.rate if ‖ω + w‖ keeps it less the bound on ‖w‖.
+    #[must_use]
+    pub fn relative(&self) -> Self {
+        match self.constraints {
+            Constraints::Paper => *self,
+            Constraints::Robust => {
+                Self { limit_rate: self.limit_rate - self.turn_bound, turn_bound: 0.0, ..*self }
+            }
+        }
+    }
+
+    /// Returns the largest moment of the actuators and the known moment together, N m.
+    pub fn limit_total(&self) -> f64 {
+        self.limit_moment + self.known_bound
+    }
+
+    /// Returns the part of limit.moment that the known moment may need at any time, N m.
+    pub fn needed_by_known(&self) -> f64 {
+        self.known_bound + self.known_change
+    }
+
     /// Returns the settings of Chai 2022, section 5.1, with its vehicle at the nominal inertia and
     /// measured initial state. With the robust set, K is ours.
     #[allow(clippy::missing_panics_doc)]

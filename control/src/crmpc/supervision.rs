@@ -55,6 +55,13 @@ pub enum Contradiction {
     Deviation,
     /// a limit is exceeded, or the law requires a moment beyond limit.moment.
     Limit,
+    /// Measured angles and rates have been the same at three ticks, although the vehicle moves.
+    Frozen,
+    /// knownMoment.* is larger than knownMoment.bound, or has changed by more than
+    /// knownMoment.change since the plan in force was made.
+    KnownMoment,
+    /// The turn that the inputs trajectory.* tell is larger than trajectory.turnBound.
+    Turn,
 }
 
 /// Status of the guarantee that is shown.

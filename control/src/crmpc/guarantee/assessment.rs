@@ -44,16 +44,17 @@ pub(super) fn left(
     (x, a): (f64, f64),
 ) -> (f64, f64) {
     let mut deviation = *tightening.forever();
-    let mut of_moment = *tightening.moment_loss(usize::MAX);
+    let mut moment_loss = *tightening.moment_loss(usize::MAX);
     if let Some(more) = more {
         deviation = deviation.plus(more);
-        of_moment =
+        moment_loss =
             MomentLoss::new(dynamics, &deviation, tightening.bearing, s.period_optimisation);
     }
     let Deviation { angle, rate, .. } = deviation;
     let of_rates = s.limit_rate - RateLoss::new(angle, rate, 0.0, 0.0).at(TURN_OF_RATES * x, x);
-    let loss = of_moment.at(tightening.bearing, dynamics.slopes(x, a), (x, a));
-    (of_rates - x, s.limit_moment - loss - dynamics.nominal_moment(x, a))
+    let loss = moment_loss.at(tightening.bearing, dynamics.slopes(x, a), (x, a));
+    let of_moment = s.limit_moment - s.needed_by_known();
+    (of_rates - x, of_moment - loss - dynamics.nominal_moment(x, a))
 }
 
 /// Returns the rate κ (1/s) at which the sideslip has to brake beyond a horizon that ends with the

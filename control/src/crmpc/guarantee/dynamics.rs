@@ -10,7 +10,7 @@ use std::f64::consts::SQRT_2;
 use vehicle::math::{exp, powi};
 
 /// Bounds on the dynamics ẋ_ω = F(Θ, x_ω, m) = R (I⁻¹ (m − ω × I ω) − Ẇ x_ω) in the domain, with
-/// ‖m‖ ≤ M̄. The domain contains the vehicle's states, and their predictions.
+/// ‖m‖ ≤ M̄ plus the bound of the known moment. The domain contains the vehicle's states, and their predictions.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(in crate::crmpc) struct Dynamics {
     /// States of the vehicle itself.
@@ -63,7 +63,7 @@ impl Dynamics {
         let mut vehicle = Domain { rate: s.limit_rate, sideslip: s.sideslip_domain };
         for _ in 0..DOMAINS {
             let dynamics = Self::around(s, vehicle);
-            let spin = s.limit_moment / smallest
+            let spin = s.limit_total() / smallest
                 + 0.5 * (largest - smallest) / smallest * powi(vehicle.rate, 2);
             let rate = s.limit_rate + (spin + dynamics.drive(s).all) * s.delay;
             let sideslip = s.sideslip_domain + vehicle.rate * s.delay;
@@ -141,7 +141,7 @@ impl Dynamics {
         let rate = r * domain.rate;
         let (gyroscopic, spinning) = gyroscopic(s);
         // Gyroscopic term: ‖ω × I ω‖ ≤ ½ (I_max − I_min) ‖ω‖².
-        let spin = s.limit_moment / smallest + 0.5 * spread * powi(domain.rate, 2);
+        let spin = s.limit_total() / smallest + 0.5 * spread * powi(domain.rate, 2);
         let acceleration = r * (spin + drift * rate * rate);
         let by_rates = r * (drift_by_rates * rate + spinning * domain.rate);
         // The derivative of R is ∂R = −R ∂W R; that of Ẇ x by the angles takes second derivatives

@@ -25,8 +25,7 @@ impl Drive {
     pub(super) fn new(s: &Settings, vehicle: &Domain, principal: (f64, f64)) -> Self {
         let root3 = 3.0_f64.sqrt();
         let (along, any) = inertia_moments(s, vehicle, principal);
-        // ‖R‖ = sec β at the vehicle's own attitude.
-        let of_inertia = (along + any) / (cos(vehicle.sideslip) * principal.0);
+        let of_inertia = (along + any) / smallest_in_rates(vehicle, principal.0);
         Self {
             of_inertia,
             all: root3 * s.disturbance_bound + of_inertia,
@@ -36,6 +35,12 @@ impl Drive {
             angle_error: SQRT_2 * s.angle_error,
         }
     }
+}
+
+/// Returns the smallest ratio of ‖m‖ to ‖R I⁻¹ m‖, with ‖R‖ = sec β at the vehicle's own attitude
+/// and the `smallest` moment of inertia, kg m².
+pub(super) fn smallest_in_rates(vehicle: &Domain, smallest: f64) -> f64 {
+    cos(vehicle.sideslip) * smallest
 }
 
 /// How F differs from the acceleration that the law intended, besides
@@ -76,7 +81,8 @@ pub(super) fn inertia_moments(
     let common = s.inertia_error / (1.0 - s.inertia_error);
     let tensor = s.tensor_error / (1.0 - s.tensor_error);
     let gyroscopic = (0.5 * (largest - smallest) + largest) * powi(vehicle.rate, 2);
-    (common * s.limit_moment, tensor * (s.limit_moment / (1.0 - s.inertia_error) + gyroscopic))
+    let moment = s.limit_total();
+    (common * moment, tensor * (moment / (1.0 - s.inertia_error) + gyroscopic))
 }
 
 /// Returns bounds on ‖∂(ω × I ω)/∂ω‖ / ‖ω‖ and on the same ratio for I⁻¹ (ω × I ω). In principal

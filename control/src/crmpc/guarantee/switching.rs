@@ -15,7 +15,7 @@ use crate::error::DesignError;
 use crate::error_dynamics::{SampledError, response, transition};
 use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
 use serde::{Deserialize, Serialize};
-use vehicle::math::{exp, powi};
+use vehicle::math::powi;
 
 /// Bound on the part of the deviation that the plan's own changes of acceleration cause, at a tick,
 /// rad/s: its components along the slower and the faster eigenvector of Φ as the law sees them, and
@@ -52,9 +52,6 @@ pub struct Switching {
     modes: [Mode; 2],
     /// Feedback period, s.
     period: f64,
-    /// Growth of what the observer's filter holds of a pulse between the command and the
-    /// measurement that shows it.
-    held: f64,
     /// Uncertainty of the delay, s.
     delay_error: f64,
     /// Optimisation period, s.
@@ -170,7 +167,6 @@ impl Switching {
             limit,
             modes,
             period: tau,
-            held: exp(longest / s.observer.time_constant),
             delay_error,
             h,
         }))
@@ -197,12 +193,6 @@ impl Switching {
     /// in all, rad/s.
     pub fn pulse_of_command(&self, change: f64) -> f64 {
         self.pulse(change + self.turn)
-    }
-
-    /// Returns the largest disturbance that the observer shows because of pulses, rad/s², if its
-    /// filter makes `filtered` of the pulses of the commands.
-    pub fn observed(&self, filtered: f64) -> f64 {
-        filtered * self.held
     }
 
     /// Adds the change of the plan's acceleration at the beginning of a stage (rad/s²).

@@ -4,6 +4,7 @@ use super::assessment::{Assessment, assess};
 use super::deviation::Deviation;
 use super::dynamics::Dynamics;
 use super::losses::{MomentLoss, RateLoss, bearing};
+use super::observable::Observable;
 use super::parts::{Parts, Pulse, Reaches};
 use super::switching::Switching;
 use super::tightening::Tightening;
@@ -11,6 +12,7 @@ use crate::controller::Explained;
 use crate::crmpc::settings::{InitialState, Settings};
 use crate::error::DesignError;
 use crate::error_dynamics::SampledError;
+use vehicle::math::powi;
 
 /// Computes tightening and assessment of `settings`.
 ///
@@ -66,21 +68,16 @@ pub(in crate::crmpc) fn tighten(s: &Settings) -> Result<(Tightening, Assessment)
     });
     let angle_bulge = (0..at.len()).map(|n| bulge(n, |d| d.angle)).collect();
     let (moment, rate) = (moment.collect(), rate.collect());
-    // The observer uses predicted rates, and each prediction has its own error. The first-order
-    // filter amplifies the differences of these errors by no more than this.
-    let predicted =
-        3.0_f64.sqrt() * s.rate_error + parts.mismatch.mispredicted * (1.0 + parts.early[1].excess);
-    let observable = s.disturbance_bound + parts.norm - 3.0_f64.sqrt() * s.disturbance_bound
-        + parts.mismatch.mean * parts.early[0].excess
-        + 2.0 * predicted / s.observer.time_constant;
+    // The measured rates become x_ω at an attitude that is wrong: ‖∂R[o]‖ ≤ √2 sec²β ‖o‖.
+    let Dynamics { domain, geometry, .. } = &dynamics;
+    let of_angles = 2.0 * powi(geometry.r, 2) * domain.rate * s.angle_error;
     let tightening = Tightening {
         switching,
         pulse,
-        growth: dynamics.growth(s.delay + s.period_feedback),
         explained: Explained {
             disturbance: s.disturbance_bound
                 + parts.any_moment * dynamics.geometry.r / dynamics.smallest
-                + 2.0 * s.rate_error / s.period_feedback,
+                + 2.0 * (s.rate_error + of_angles) / s.period_feedback,
             share: s.inertia_error / (1.0 - s.inertia_error),
             delay_error: s.delay_error,
         },
@@ -90,7 +87,7 @@ pub(in crate::crmpc) fn tighten(s: &Settings) -> Result<(Tightening, Assessment)
         bearing,
         norm: parts.norm,
         mismatch: parts.mismatch.mean,
-        observable,
+        observable: Observable::new(s, &dynamics, &parts),
         at,
     };
     let assessment = assess(s, &dynamics, &tightening);
@@ -162,6 +159,8 @@ pub(in crate::crmpc) fn with_share(s: &Settings, share: f64) -> Settings {
         angle_error: share * s.angle_error,
         rate_error: share * s.rate_error,
         delay_error: share * s.delay_error,
+        known_bound: share * s.known_bound,
+        known_change: share * s.known_change,
         ..*s
     }
 }

@@ -2,6 +2,7 @@
 
 use super::deviation::Deviation;
 use super::losses::{MomentLoss, RateLoss};
+use super::observable::Observable;
 use super::switching::Switching;
 use crate::controller::Explained;
 
@@ -27,17 +28,14 @@ pub struct Tightening {
     /// Part of `norm` by which F differs between two ticks from the acceleration that the law
     /// intended, rad/s².
     pub mismatch: f64,
-    /// Largest component of an explained disturbance estimate, rad/s²: Δ̄, the part of the inertia
-    /// error, the mismatch and the errors of the rates.
-    pub observable: f64,
+    /// What the assumptions explain of an observed disturbance.
+    pub(in crate::crmpc) observable: Observable,
     /// What the assumptions explain of the mean acceleration over a period.
     pub explained: Explained,
     /// What an unknown part of the delay adds; `None` if the delay is exact.
     pub switching: Option<Box<Switching>>,
     /// Largest jump of the rates that a change of K ô causes, rad/s, by feedback ticks.
     pub(super) pulse: Vec<f64>,
-    /// Growth of a disturbance in what is observed of it.
-    pub growth: f64,
 }
 
 impl Tightening {

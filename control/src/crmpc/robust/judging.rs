@@ -2,7 +2,7 @@
 
 use super::Robust;
 use crate::controller::Measurement;
-use crate::crmpc::guarantee::{Carried, Deviation, Switching, Tightening};
+use crate::crmpc::guarantee::{Carried, Deviation};
 use crate::crmpc::memory::Memory;
 use crate::crmpc::set::{ROUNDING, Tick};
 use crate::crmpc::settings::Settings;
@@ -36,11 +36,7 @@ impl Robust {
 
     /// Returns whether the assumptions explain the observed disturbance.
     pub(super) fn credible(&self, memory: &Memory) -> bool {
-        let Tightening { observable, switching, growth, .. } = &self.design.tightening;
-        let by_pulses =
-            |switching: &Switching| switching.observed(memory.commands.filtered()) * growth;
-        let explained = observable + switching.as_deref().map_or(0.0, by_pulses);
-        memory.observed.disturbance.amax() <= explained
+        memory.observed.is_explained(&self.settings, &self.design.tightening.observable)
     }
 
     /// Returns what contradicts the assumptions at a tick. As long as no plan was certified, a
@@ -54,8 +50,20 @@ impl Robust {
     ) -> Contradiction {
         let certified = memory.supervision.status.is_assured()
             || memory.supervision.contradiction != Contradiction::None;
+        let Settings { known_bound, known_change, .. } = self.settings;
+        let slack = |bound: f64| bound * (1.0 + ROUNDING) + 1e-12;
+        let known = measured.known_moment;
+        let changed = known - memory.plan.known;
         if measured.stale {
             Contradiction::Step
+        } else if measured.is_frozen {
+            Contradiction::Frozen
+        } else if measured.turn.norm() > slack(self.turn_bound) {
+            Contradiction::Turn
+        } else if known.norm() > slack(known_bound)
+            || memory.assured() && changed.norm() > slack(known_change)
+        {
+            Contradiction::KnownMoment
         } else if measured.has_other_delay {
             Contradiction::Delay
         } else if measured.is_unexplained || !self.credible(memory) {

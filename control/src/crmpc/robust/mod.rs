@@ -32,6 +32,10 @@ pub(super) struct Robust {
     pub share: f64,
     /// What the motion follows on.
     pub onset: Onset,
+    /// Bound on ‖w‖, the part of the rates that the turn of the trajectory adds, rad/s.
+    turn_bound: f64,
+    /// Known moment at the optimisation, N m.
+    known: Vector3<f64>,
     /// What changes of the acceleration leave at the stages of the motion that was carried along
     /// last; empty if the delay is exact.
     carried: RefCell<Vec<Carried>>,
@@ -51,7 +55,8 @@ pub(super) struct Interval {
     /// Norm of the body rates at the interval's end, ‖ω̃‖, and its bound, rad/s.
     pub rate: f64,
     pub rate_bound: f64,
-    /// Norm of the moment at the interval's start, ‖m̃‖, and its bound, N m.
+    /// Norm of the moment that is asked of the actuators at the interval's start, and its bound,
+    /// N m.
     pub moment: f64,
     pub moment_bound: f64,
 }
@@ -67,9 +72,11 @@ impl Robust {
     pub(super) fn new(settings: &Settings, design: &Design) -> Self {
         let Settings { horizon, body, period_optimisation, .. } = *settings;
         Self {
-            settings: *settings,
+            settings: settings.relative(),
+            turn_bound: settings.turn_bound,
+            known: Vector3::zeros(),
             design: design.clone(),
-            dynamics: Dynamics::new(settings),
+            dynamics: Dynamics::new(&settings.relative()),
             stages: Stages::new(horizon, body, period_optimisation),
             age: 0,
             share: 1.0,
@@ -125,9 +132,9 @@ impl Robust {
     pub(super) fn interval(&self, k: usize, here: &Point, next: &Point) -> Interval {
         let body = &self.settings.body;
         let a = &here.acceleration;
-        let before = here.turned().linearise(body, &here.rates, a).moment;
+        let before = self.asked(here.turned().linearise(body, &here.rates, a).moment);
         let after = next.turned().linearise(body, &next.rates, a);
-        let ends = [end(&before, here.size), end(&after.moment, next.size)];
+        let ends = [end(&before, here.size), end(&self.asked(after.moment), next.size)];
         let by_angles = after.rates.by_angles.norm();
         Interval {
             rate: after.rates.value.norm(),
@@ -135,6 +142,11 @@ impl Robust {
             moment: ends[0].moment,
             moment_bound: self.moment_bound(k, &ends, here.pull),
         }
+    }
+
+    /// Returns the part of a moment that is asked of the actuators.
+    pub(super) fn asked(&self, moment: Linear) -> Linear {
+        Linear { value: moment.value - self.known, ..moment }
     }
 
     /// Returns the feedback ticks from the beginning of the nominal motion to prediction step `k`.
@@ -215,7 +227,8 @@ impl Robust {
         });
         let loss = more.as_ref().unwrap_or_else(|| tightening.moment_loss(self.tick(k)));
         let needed = loss.largest_moment(&self.dynamics, ends, held);
-        self.settings.limit_moment - self.reserves().1 - (needed - ends[0].moment)
+        let limit = self.settings.limit_moment - self.settings.known_change;
+        limit - self.reserves().1 - (needed - ends[0].moment)
     }
 }
 

@@ -48,7 +48,7 @@ impl Bounded<2> for Robust {
         let (rate, moment) = self.nonempty(bounds);
         StageConstraints {
             state: norm_constraint(&at.rates, rate),
-            input: norm_constraint(&at.moment, moment),
+            input: norm_constraint(&self.asked(at.moment), moment),
         }
     }
 
@@ -63,7 +63,7 @@ impl Bounded<2> for Robust {
         let kinematics = InverseKinematics::at(&angles);
         let (rate, moment) = self.nonempty(bounds);
         let state = kinematics.body_rates(&rates).0 / rate;
-        let input = kinematics.moment(&self.stages.body, &rates, &a) / moment;
+        let input = (kinematics.moment(&self.stages.body, &rates, &a) - self.known) / moment;
         (state.norm_squared(), input.norm_squared())
     }
 
@@ -116,10 +116,10 @@ impl Bounded<2> for Robust {
     fn out_of_reach(&self, start: &State<2>) -> bool {
         let [angles, rates, _] = self.stages.nominal(0, start, &Vector3::zeros());
         let (body, h) = (&self.stages.body, self.stages.step);
-        let Settings { limit_rate, limit_moment, .. } = self.settings;
+        let Settings { limit_rate, .. } = self.settings;
         let at_rest = InverseKinematics::at(&angles).motion(body, &rates).moment_at_rest;
         let secant = 1.0 / cos(angles.y);
-        let most = secant * limit_moment / self.design.smallest_inertia;
+        let most = secant * self.settings.limit_total() / self.design.smallest_inertia;
         let drift = vehicle::kinematics::r(&angles) * (body.inverse * -at_rest);
         // The sideslip will have changed by then.
         let beta = angles.y.abs() + h * (rates.norm() + h * (drift.norm() + most));

@@ -144,6 +144,7 @@ impl Robust {
             memory.guarantee = self.without_guarantee(memory);
             return;
         };
+        memory.plan.known = self.known;
         (memory.margins, memory.plan.braking) = (margins, braking);
         if !memory.assured() {
             memory.guarantee = GuaranteeStatus::Pending;
@@ -239,10 +240,13 @@ impl ConstraintSet for Robust {
 
     fn observe(&self, memory: &mut Memory, angle_rates: &Vector3<f64>) {
         memory.pending = memory.pending.saturating_sub(1);
-        memory.observed.observe(&self.settings, angle_rates);
-        if let Some(switching) = &self.design.tightening.switching {
-            memory.commands.observe(&self.settings, switching, &memory.observed);
-        }
+        let Memory { commands, observed, .. } = memory;
+        let (settings, tightening) = (&self.settings, &self.design.tightening);
+        let pulse = tightening
+            .switching
+            .as_ref()
+            .map_or(0.0, |switching| commands.observe(settings, switching, observed));
+        observed.observe(settings, &tightening.observable, angle_rates, pulse);
     }
 
     /// Without guarantee the command compensates for the disturbance instead.
@@ -258,6 +262,7 @@ impl ConstraintSet for Robust {
         first: bool,
     ) -> Planned {
         let was_assured = memory.assured();
+        self.known = memory.known;
         if !first {
             memory.age = memory.age.saturating_add(self.design.ratio as u32);
         }

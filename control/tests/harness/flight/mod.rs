@@ -4,6 +4,7 @@
 
 mod drawing;
 mod eyes;
+mod fault;
 mod moving;
 mod random;
 mod settings;
@@ -14,6 +15,7 @@ use control::crmpc::{Crmpc, GuaranteeStatus, Memory, Settings};
 use control::delay::{Delayed, Latency};
 use control::{Controller, Measurement};
 use eyes::Eyes;
+use fault::Faulty;
 use moving::Vehicle;
 use nalgebra::{Matrix3, Vector3};
 use vehicle::profile::Profile;
@@ -21,6 +23,7 @@ use vehicle::reference::Reference;
 use vehicle::scenario::Scenario;
 use waveform::Progress;
 
+pub use fault::{BEGIN, Fault};
 pub use random::Random;
 pub use settings::{Tried, optimised_every, random_settings, tried};
 pub use waveform::Waveform;
@@ -74,6 +77,8 @@ pub struct Flight {
     pub age: f64,
     /// Amount by which commands act later than the settings say, s.
     pub late: f64,
+    /// Fault that the assumptions exclude.
+    pub fault: Fault,
     /// Seed of all random numbers of the flight.
     pub seed: u64,
     /// Duration of the flight, s.
@@ -141,6 +146,7 @@ impl Flight {
             sight: Sight::Exact,
             age: 0.0,
             late: 0.0,
+            fault: Fault::None,
             seed: 0,
             duration: scenario.duration,
         }
@@ -180,6 +186,7 @@ impl Flight {
         let mut vehicle = Vehicle::new(self);
         let mut disturbance = Progress::new(&self.disturbance, self.seed);
         let mut eyes = Eyes::new(self);
+        let mut faulty = Faulty::new(self.fault);
         let reference = |time: f64| self.reference.at(self.reference_start + time);
         let (ticks, checks) =
             ((self.duration / period).round() as u64, (period / CHECK).round() as u64);
@@ -188,14 +195,14 @@ impl Flight {
         let mut delta = Vector3::zeros();
         for tick in 0..ticks {
             let time = tick as f64 * period;
-            let measured = eyes.look(time, &vehicle);
+            let measured = faulty.measured(time, eyes.look(time, &vehicle));
             let off = vehicle.angles() - reference(time).angles;
             error += off.norm_squared();
             shown.lost |= off.norm() > LOST;
             let moment = controller.update(&mut memory, tick, time, &measured, &reference);
-            vehicle.command(time, moment);
+            vehicle.command(time, faulty.moment(tick, time, moment));
             observe(&memory.inner, tick, &measured, &reference(time));
-            let now = memory.inner.guarantee == GuaranteeStatus::InForce;
+            let now = memory.inner.supervision.status == GuaranteeStatus::InForce;
             if before && !now && shown.withdrawn.is_none() {
                 shown.withdrawn = Some(time);
             }
@@ -208,7 +215,8 @@ impl Flight {
                 let at = |i: u64| time + i as f64 * CHECK;
                 let check = tick * checks + i;
                 if check % holds == 0 {
-                    delta = disturbance.at(at(i), &vehicle) * s.disturbance_bound;
+                    let size = s.disturbance_bound * faulty.of_disturbance(at(i));
+                    delta = disturbance.at(at(i), &vehicle) * size;
                 }
                 let fine = |j: u32| at(i) + f64::from(j) * (CHECK / f64::from(FINE));
                 for j in 0..FINE {
