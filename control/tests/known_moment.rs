@@ -2,7 +2,8 @@
 
 use control::Crmpc;
 use control::controller::{Controller, Measurement};
-use control::crmpc::{Constraints, Guarantee, GuaranteeStatus, Settings};
+use control::crmpc::{Constraints, GuaranteeStatus, Settings};
+use control::delay::{self, Delayed, Latency};
 use control::lqr::{Lqr, LqrSettings};
 use nalgebra::Vector3;
 use vehicle::Scenario;
@@ -52,10 +53,16 @@ fn fly<C: Controller>(
 }
 
 /// Share of the ticks with the guarantee in force, and largest rate and moment over their limits
-/// while it is.
+/// while it is. The known moment is declared as large as it becomes, and with the change from one
+/// optimisation to the next.
 fn guaranteed(scenario: &Scenario, size: f64, is_told: bool) -> [f64; 3] {
-    let settings =
-        Settings { guarantee: Guarantee::BestEffort, ..Settings::new(Constraints::Robust) };
+    let published = Settings::new(Constraints::Robust);
+    let settings = Settings {
+        known_bound: 0.8 * size * published.limit_moment,
+        known_change: 0.1 * size * published.limit_moment,
+        disturbance_bound: scenario.disturbance.bound,
+        ..published
+    };
     let mut law = Crmpc::new(settings).unwrap();
     let (mut in_force, mut ticks) = (0_u32, 0_u32);
     let (mut rate, mut effort) = (0.0_f64, 0.0_f64);
@@ -93,16 +100,108 @@ fn oracle_a_known_moment_leaves_no_error() {
 }
 
 #[test]
-fn regress_what_crmpc_guarantees_under_static_moments() {
+fn oracle_static_moments_that_are_told_leave_the_guarantee_in_force() {
     for kind in [DisturbanceKind::None, DisturbanceKind::White] {
-        let mut scenario = Scenario::crmpc2022();
-        scenario.disturbance.kind = kind;
-        for size in [0.25, 0.5, 1.0] {
-            let (told, untold) =
-                (guaranteed(&scenario, size, true), guaranteed(&scenario, size, false));
-            eprintln!("{kind:?} {size}: told {told:?}, untold {untold:?}");
-            assert!(told[0] >= untold[0], "{kind:?} {size}: {told:?} {untold:?}");
+        for (size, bound) in [(0.25, 1.5), (0.5, 1.0), (0.8, 0.3)] {
+            let mut scenario = Scenario::crmpc2022();
+            scenario.disturbance.kind = kind;
+            scenario.disturbance.bound = f64::to_radians(bound);
+            let told = guaranteed(&scenario, size, true);
+            assert!(told[0] == 1.0, "{kind:?} {size}: {told:?}");
             assert!(told[1] <= 1.0 && told[2] <= 1.0 + 1e-9, "{kind:?} {size}: {told:?}");
+            let untold = guaranteed(&scenario, size, false);
+            assert!(untold[0] < 1.0 || size < 0.5, "{kind:?} {size}: {untold:?}");
         }
     }
+}
+
+/// A constant known moment (N m) in a loop with this delay (s), and the bounds that are declared.
+#[derive(Clone, Copy, Debug)]
+struct Constant {
+    moment: Vector3<f64>,
+    delay: f64,
+    disturbance_bound: f64,
+    kind: DisturbanceKind,
+}
+
+impl Constant {
+    fn settings(&self) -> Settings {
+        Settings {
+            known_bound: self.moment.norm(),
+            delay: self.delay,
+            disturbance_bound: self.disturbance_bound,
+            ..Settings::new(Constraints::Robust)
+        }
+    }
+
+    /// Returns the number of ticks at which the guarantee is not in force, and the largest moment
+    /// of the actuators and rate over their limits.
+    fn fly(&self, settings: Settings) -> (u32, [f64; 2]) {
+        let mut scenario = Scenario::crmpc2022();
+        scenario.disturbance.kind = self.kind;
+        scenario.disturbance.bound = self.disturbance_bound;
+        let mut config = scenario.config(0.01);
+        config.moment_delay = self.delay;
+        let mut plant = Plant::new(&config, 0.0).unwrap();
+        let law = Crmpc::new(settings).unwrap();
+        let latency = Latency::of_action(self.delay);
+        let (body, limit) = (settings.body, settings.limit_moment);
+        let mut law = Delayed::new(law, body, PERIOD, latency, limit).unwrap();
+        let mut memory = law.memory();
+        let (mut lost, mut largest) = (0, [0.0_f64; 2]);
+        for tick in 0..1000 {
+            let time = tick as f64 * PERIOD;
+            let (angles, rates) = (plant.angles(), plant.rates());
+            let measured =
+                Measurement { angles, rates, known_moment: self.moment, ..Measurement::default() };
+            let reference = |time: f64| scenario.reference.at(time);
+            let moment = law.update(&mut memory, tick, time, &measured, &reference);
+            let input = |_| Input { moment, disturbance_moment: self.moment, ..Input::default() };
+            plant.advance_with(time, time + PERIOD, &Command::default(), input).unwrap();
+            let status = memory.inner.supervision.status;
+            let begins = tick as usize >= delay::ticks(self.delay, PERIOD);
+            lost += u32::from(begins && status != GuaranteeStatus::InForce);
+            largest[0] = largest[0].max(moment.norm() / settings.limit_moment);
+            largest[1] = largest[1].max(plant.rates().norm() / settings.limit_rate);
+        }
+        (lost, largest)
+    }
+}
+
+#[test]
+fn oracle_a_constant_known_moment_leaves_the_guarantee_in_force_where_there_is_room() {
+    let limit = Scenario::crmpc2022().limit_moment;
+    for delay in [0.0, 0.04, 0.117] {
+        for (share, bound) in [(0.1, 1.8), (0.3, 1.3), (0.5, 0.8)] {
+            for (i, direction) in
+                [[1.0, 0.0, 0.0], [0.0, -1.0, 0.0], [0.6, 0.5, -0.6]].iter().enumerate()
+            {
+                let kinds =
+                    [DisturbanceKind::White, DisturbanceKind::Constant, DisturbanceKind::Square];
+                let moment = Vector3::from(*direction).normalize() * (share * limit);
+                let disturbance_bound = f64::to_radians(bound);
+                let constant = Constant { moment, delay, disturbance_bound, kind: kinds[i] };
+                let (lost, largest) = constant.fly(constant.settings());
+                assert!(
+                    lost == 0 && largest[0] <= 1.0 + 1e-9 && largest[1] <= 1.0,
+                    "{constant:?}: {lost}, {largest:?}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn a_known_moment_is_refused_without_room_and_contradicts_its_bound() {
+    let limit = Scenario::crmpc2022().limit_moment;
+    let constant = Constant {
+        moment: Vector3::x() * 0.5 * limit,
+        delay: 0.04,
+        disturbance_bound: f64::to_radians(2.0),
+        kind: DisturbanceKind::None,
+    };
+    assert!(Crmpc::new(constant.settings()).is_err());
+    let undeclared =
+        Settings { known_bound: 0.49 * limit, disturbance_bound: 0.01, ..constant.settings() };
+    assert_eq!(constant.fly(undeclared).0, 1000 - 1);
 }

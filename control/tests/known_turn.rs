@@ -2,7 +2,7 @@
 
 use control::Crmpc;
 use control::controller::{Controller, Measurement};
-use control::crmpc::{Constraints, Guarantee, GuaranteeStatus, Settings};
+use control::crmpc::{Constraints, Contradiction, GuaranteeStatus, Settings};
 use control::lqr::{Lqr, LqrSettings};
 use vehicle::Scenario;
 use vehicle::actuators::Command;
@@ -48,6 +48,27 @@ fn fly<C: Controller>(
     }
 }
 
+/// Flies CRMPC with this bound on the turn (deg/s). Returns the share of ticks in force, the largest
+/// ‖ω‖ over its limit while it was, and the last contradiction.
+fn guaranteed(scenario: &Scenario, turn: f64, is_known: bool, bound: f64) -> (f64, f64, String) {
+    let turn_bound = bound.to_radians();
+    let settings = Settings { turn_bound, ..Settings::new(Constraints::Robust) };
+    let mut law = Crmpc::new(settings).unwrap();
+    let (mut in_force, mut ticks, mut largest) = (0_u32, 0_u32, 0.0_f64);
+    let mut contradiction = Contradiction::None;
+    fly(&mut law, scenario, turn, is_known, |memory, _, plant| {
+        ticks += 1;
+        if memory.supervision.contradiction != Contradiction::None {
+            contradiction = memory.supervision.contradiction;
+        }
+        if memory.supervision.status == GuaranteeStatus::InForce {
+            in_force += 1;
+            largest = largest.max(plant.rates().norm() / scenario.limit_rate);
+        }
+    });
+    (f64::from(in_force) / f64::from(ticks), largest, format!("{contradiction:?}"))
+}
+
 #[test]
 fn oracle_a_turn_that_is_known_leaves_the_guarantee_in_force() {
     for kind in [DisturbanceKind::White, DisturbanceKind::Constant, DisturbanceKind::Square] {
@@ -55,23 +76,14 @@ fn oracle_a_turn_that_is_known_leaves_the_guarantee_in_force() {
         for turn in [0.1, 0.35, 0.6] {
             let mut scenario = Scenario::crmpc2022();
             scenario.disturbance.kind = kind;
-            let share = |is_known| {
-                let settings = Settings {
-                    guarantee: Guarantee::BestEffort,
-                    ..Settings::new(Constraints::Robust)
-                };
-                let mut law = Crmpc::new(settings).unwrap();
-                let (mut in_force, mut ticks) = (0_u32, 0_u32);
-                fly(&mut law, &scenario, turn, is_known, |memory, _, plant| {
-                    in_force += u32::from(memory.guarantee == GuaranteeStatus::InForce);
-                    ticks += 1;
-                    let rate = plant.rates().norm() / scenario.limit_rate;
-                    assert!(!is_known || rate <= 1.0, "{kind:?} {turn}: {rate}");
-                });
-                f64::from(in_force) / f64::from(ticks)
-            };
-            assert!(share(true) >= 0.999, "{kind:?} {turn}: {}", share(true));
-            assert!(share(false) < 0.6, "{kind:?} {turn}: {}", share(false));
+            // What is left of the turn is a part of Δ.
+            scenario.disturbance.bound -= 0.15_f64.to_radians() * turn / 0.6;
+            let (share, rate, why) = guaranteed(&scenario, turn, true, turn + 0.05);
+            assert!(share == 1.0 && rate <= 1.0, "{kind:?} {turn}: {share} {rate} {why}");
+            let (share, _, _) = guaranteed(&scenario, turn, false, turn + 0.05);
+            assert!(share < 0.7, "{kind:?} {turn}: {share}");
+            let (share, _, why) = guaranteed(&scenario, turn, true, 0.8 * turn);
+            assert!(share < 0.9 && why == "Turn", "{kind:?} {turn}: {share} {why}");
         }
     }
 }
