@@ -25,12 +25,19 @@ pub struct Measurement {
     /// Whether the measurement was made at an earlier instant than the tick, because the
     /// communication step is longer than the period or no multiple of it.
     pub stale: bool,
-    /// Whether the measurements show another delay of the loop than the declared one.
-    pub has_other_delay: bool,
-    /// Whether the acceleration over the last period is larger than [`Controller::explained`].
-    pub is_unexplained: bool,
-    /// Whether the measurement has been the same at three ticks although the vehicle moves.
-    pub is_frozen: bool,
+    /// What the measurements up to this one contradict, as far as no law is needed to see it.
+    pub doubt: Option<Doubt>,
+}
+
+/// What measurements show without knowledge of the law.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Doubt {
+    /// Angles and rates have been the same at three ticks, although the vehicle moves.
+    Frozen,
+    /// The delay of the loop is another one than the declared one.
+    OtherDelay,
+    /// The acceleration over the last period is larger than [`Controller::explained`].
+    Unexplained,
 }
 
 impl Measurement {

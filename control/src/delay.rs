@@ -13,7 +13,7 @@
 //! Artstein, "Linear systems with delayed controls: a reduction", IEEE Transactions on Automatic
 //! Control 27 (1982), with the nonlinear equations of motion in place of the linear ones.
 
-use crate::controller::{Controller, Measurement, ReferenceAt};
+use crate::controller::{Controller, Doubt, Measurement, ReferenceAt};
 use crate::error::{DesignError, invalid};
 use crate::frozen::Frozen;
 use crate::loop_delay::{LoopDelay, LoopDelaySettings};
@@ -265,12 +265,13 @@ impl<C: Controller> Controller for Delayed<C> {
         let is_frozen = frozen.observe(measured);
         let measured = turns.continued(measured);
         self.loop_delay.observe(loop_delay, &measured);
-        let measured = Measurement {
-            has_other_delay: loop_delay.is_other,
-            is_unexplained: loop_delay.is_unexplained,
-            is_frozen,
-            ..measured
+        let doubt = match loop_delay {
+            _ if is_frozen => Some(Doubt::Frozen),
+            LoopDelay { is_other: true, .. } => Some(Doubt::OtherDelay),
+            LoopDelay { is_unexplained: true, .. } => Some(Doubt::Unexplained),
+            _ => None,
         };
+        let measured = Measurement { doubt, ..measured };
         let measured = self.predictor.predict(under_way, &measured);
         under_way.resize(self.predictor.count, measured.known_moment);
         let time = time + self.latency.action;

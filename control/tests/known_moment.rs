@@ -136,14 +136,14 @@ impl Constant {
 
     /// Returns the number of ticks at which the guarantee is not in force, and the largest moment
     /// of the actuators and rate over their limits.
-    fn fly(&self, settings: Settings) -> (u32, [f64; 2]) {
+    fn fly(&self, settings: &Settings) -> (u32, [f64; 2]) {
         let mut scenario = Scenario::crmpc2022();
         scenario.disturbance.kind = self.kind;
         scenario.disturbance.bound = self.disturbance_bound;
         let mut config = scenario.config(0.01);
         config.moment_delay = self.delay;
         let mut plant = Plant::new(&config, 0.0).unwrap();
-        let law = Crmpc::new(settings).unwrap();
+        let law = Crmpc::new(*settings).unwrap();
         let latency = Latency::of_action(self.delay);
         let (body, limit) = (settings.body, settings.limit_moment);
         let mut law = Delayed::new(law, body, PERIOD, latency, limit).unwrap();
@@ -181,7 +181,7 @@ fn oracle_a_constant_known_moment_leaves_the_guarantee_in_force_where_there_is_r
                 let moment = Vector3::from(*direction).normalize() * (share * limit);
                 let disturbance_bound = f64::to_radians(bound);
                 let constant = Constant { moment, delay, disturbance_bound, kind: kinds[i] };
-                let (lost, largest) = constant.fly(constant.settings());
+                let (lost, largest) = constant.fly(&constant.settings());
                 assert!(
                     lost == 0 && largest[0] <= 1.0 + 1e-9 && largest[1] <= 1.0,
                     "{constant:?}: {lost}, {largest:?}"
@@ -203,5 +203,5 @@ fn a_known_moment_is_refused_without_room_and_contradicts_its_bound() {
     assert!(Crmpc::new(constant.settings()).is_err());
     let undeclared =
         Settings { known_bound: 0.49 * limit, disturbance_bound: 0.01, ..constant.settings() };
-    assert_eq!(constant.fly(undeclared).0, 1000 - 1);
+    assert_eq!(constant.fly(&undeclared).0, 1000 - 1);
 }

@@ -93,7 +93,7 @@ impl Law for CrmpcLaw {
                     "the guarantee is no longer in force: knownMoment.* is larger than knownMoment.bound, or has changed by more than knownMoment.change while a plan was followed"
                 }
                 Contradiction::Turn => {
-                    "the guarantee is no longer in force: the trajectory turns faster than trajectory.turnBound"
+                    "the guarantee is no longer in force: the turn that trajectory.* tell has changed by more than trajectory.turnChange while a plan was followed"
                 }
                 Contradiction::Limit => {
                     "the guarantee is no longer in force: a guaranteed limit is exceeded, or the law requires a moment beyond limit.moment"

@@ -4,7 +4,7 @@
 use super::guarantee::{self, Assessment, Tightening};
 use super::settings::{Constraints, Guarantee, InitialState, Settings};
 use crate::delay;
-use crate::error::{DesignError, invalid, positive};
+use crate::error::{DesignError, positive};
 use crate::error_dynamics::{Gain, InvariantSet, Reach, SampledError};
 use nalgebra::{Matrix2, Vector2};
 use serde::{Deserialize, Serialize};
@@ -130,7 +130,6 @@ impl Design {
     /// with its spectral radius.
     pub fn new(s: &Settings) -> Result<Self, DesignError> {
         let ratio = ratio(s)?;
-        let s = &s.relative();
         for (name, gain) in [("feedback", s.feedback), ("terminal", s.terminal), ("tube", s.tube)] {
             if gain.eigenvalues().is_none() && name != "feedback" {
                 return Err(DesignError::NotReal { name });
@@ -210,10 +209,6 @@ fn ratio(s: &Settings) -> Result<usize, DesignError> {
     settings::check(s)?;
     positive("limit.rate", s.limit_rate)?;
     positive("limit.moment", s.limit_moment)?;
-    if s.relative().limit_rate <= 0.0 {
-        let problem = "must be smaller than limit.rate";
-        return Err(invalid("trajectory.turnBound", s.turn_bound, problem));
-    }
     if !(0.0..=delay::LONGEST).contains(&s.delay) {
         return Err(DesignError::Delay { value: s.delay, longest: delay::LONGEST });
     }

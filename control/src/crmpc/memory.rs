@@ -19,6 +19,8 @@ pub struct Memory {
     pub report: SolverReport,
     /// Known moment at the last tick, N m.
     pub known: Vector3<f64>,
+    /// Rates that the turn of the trajectory adds at the last tick, rad/s.
+    pub turn: Vector3<f64>,
     /// Nominal state (Θ̃, x̃_ω) at the last tick.
     pub nominal: Vector6<f64>,
     /// Whether the plan in force gives the guarantee, or the reason why not.
@@ -63,6 +65,7 @@ impl Clone for Memory {
             started,
             report,
             known,
+            turn,
             nominal,
             guarantee,
             margins,
@@ -76,7 +79,7 @@ impl Clone for Memory {
         self.plan.clone_from(plan);
         self.started = *started;
         self.report = *report;
-        self.known = *known;
+        (self.known, self.turn) = (*known, *turn);
         self.nominal = *nominal;
         self.guarantee = *guarantee;
         self.margins = *margins;

@@ -80,7 +80,7 @@ impl Crmpc {
         let design = Design::new(&settings)?;
         let set = Self::set(&settings, &design)?;
         let windows = (set.terminal_radius().is_some(), set.window_margin());
-        let planner = Planner::new(&settings.relative(), &design, windows)?;
+        let planner = Planner::new(&settings, &design, windows)?;
         Ok(Self { settings, design, set, planner })
     }
 
@@ -174,7 +174,7 @@ impl Controller for Crmpc {
         reference: ReferenceAt,
     ) -> Vector3<f64> {
         let angle_rates = kinematics::r(&measured.angles) * measured.rates;
-        memory.known = measured.known_moment;
+        (memory.known, memory.turn) = (measured.known_moment, measured.turn);
         self.set.observe(memory, &angle_rates);
         let within = tick % self.design.ratio as u64;
         let state = join(&measured.angles, &angle_rates);

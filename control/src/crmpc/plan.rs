@@ -24,6 +24,8 @@ pub struct Plan {
     pub shift: Vector3<f64>,
     /// Known moment with which the plan was certified, N m.
     pub known: Vector3<f64>,
+    /// Rates that the turn of the trajectory added when the plan was certified, rad/s.
+    pub turn: Vector3<f64>,
     /// What was commanded before the plan, if the delay is not exact.
     pub onset: Onset,
 }
@@ -37,6 +39,7 @@ impl Clone for Plan {
             braking: self.braking,
             shift: self.shift,
             known: self.known,
+            turn: self.turn,
             onset: self.onset,
         }
     }
@@ -48,7 +51,7 @@ impl Clone for Plan {
         self.multipliers.clone_from(&source.multipliers);
         self.braking = source.braking;
         self.shift = source.shift;
-        self.known = source.known;
+        (self.known, self.turn) = (source.known, source.turn);
         self.onset = source.onset;
     }
 }
@@ -63,6 +66,7 @@ impl Plan {
             braking: 0.0,
             shift: Vector3::zeros(),
             known: Vector3::zeros(),
+            turn: Vector3::zeros(),
             onset: Onset::default(),
         }
     }

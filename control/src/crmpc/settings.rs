@@ -175,11 +175,12 @@ pub struct Settings {
     )]
     #[setting(used_with = "constraints = robust")]
     pub rate_error: f64,
-    /// Bound on the norm of the part of the body rates that the turn of the trajectory's axes adds,
-    /// which the inputs trajectory.* tell; the robust set is tightened for it.
-    #[setting(name = "trajectory.turnBound", unit = "rad/s", min = 0.0, nominal = 0.01)]
+    /// Bound on the change of the trajectory's turn, as the inputs trajectory.* tell it, while a
+    /// plan is followed, which is one period.optimisation or longer. The plan reserves it and the
+    /// turn's own rate of limit.rate; without a turn it reserves nothing.
+    #[setting(name = "trajectory.turnChange", unit = "rad/s", min = 0.0, nominal = 0.002)]
     #[setting(used_with = "constraints = robust")]
-    pub turn_bound: f64,
+    pub turn_change: f64,
     /// Bound on the norm of the known moment; the robust set is tightened for it.
     #[setting(name = "knownMoment.bound", unit = "N.m", min = 0.0, nominal = 1e4)]
     #[setting(used_with = "constraints = robust")]
@@ -240,18 +241,6 @@ fn embedded() -> &'static File {
 }
 
 impl Settings {
-    /// Returns the settings for rates relative to the axes that turn with the trajectory: ‖ω‖ keeps
-    /// limit.rate if ‖ω + w‖ keeps it less the bound on ‖w‖.
-    #[must_use]
-    pub fn relative(&self) -> Self {
-        match self.constraints {
-            Constraints::Paper => *self,
-            Constraints::Robust => {
-                Self { limit_rate: self.limit_rate - self.turn_bound, turn_bound: 0.0, ..*self }
-            }
-        }
-    }
-
     /// Returns the largest moment of the actuators and the known moment together, N m.
     pub fn limit_total(&self) -> f64 {
         self.limit_moment + self.known_bound

@@ -60,7 +60,8 @@ pub enum Contradiction {
     /// knownMoment.* is larger than knownMoment.bound, or has changed by more than
     /// knownMoment.change since the plan in force was made.
     KnownMoment,
-    /// The turn that the inputs trajectory.* tell is larger than trajectory.turnBound.
+    /// The turn that the inputs trajectory.* tell has changed by more than trajectory.turnChange
+    /// since the plan in force was made.
     Turn,
 }
 

@@ -60,15 +60,15 @@ pub(super) fn left(
 /// Returns the rate κ (1/s) at which the sideslip has to brake beyond a horizon that ends with the
 /// angle `sideslip` and the rates `rates`. While braking, β travels by |β̇|/κ, and all limits must
 /// hold. `carried` is the deviation that the plan's changes of acceleration leave at the end of the
-/// horizon, and `last` the size of the acceleration before it. The result is `None` if that is
-/// impossible.
+/// horizon, `last` the size of the acceleration before it, and `turn` (rad/s) what the turn of the
+/// trajectory needs. The result is `None` if that is impossible.
 pub(in crate::crmpc) fn braking(
     s: &Settings,
     dynamics: &Dynamics,
     tightening: &Tightening,
     sideslip: f64,
     rates: &Vector3<f64>,
-    (carried, last): (&Carried, f64),
+    (carried, last, turn): (&Carried, f64, f64),
 ) -> Option<f64> {
     let with = |more: Option<&Deviation>| {
         let angle = tightening.forever().angle + more.map_or(0.0, |more| more.angle);
@@ -87,7 +87,7 @@ pub(in crate::crmpc) fn braking(
     }
     let sizes = (rates.norm(), braked(rates, braking).norm());
     let (rate, moment) = left(s, dynamics, tightening, more.as_ref(), sizes);
-    (rate >= 0.0 && moment >= 0.0).then_some(braking)
+    (rate >= turn && moment >= 0.0).then_some(braking)
 }
 
 /// Returns the acceleration, but for its sign, of a motion that brakes.
@@ -111,17 +111,23 @@ pub(super) fn while_braking(
     switching.forever(&first, most * s.period_optimisation * a)
 }
 
-/// Returns the largest ‖x̃_ω‖ at the end of the horizon from which the motion can brake if the
-/// delay is not exact, rad/s. The other arguments are those of [`while_braking`].
+/// Returns the largest ‖x̃_ω‖ at the end of the horizon from which the motion can brake while the
+/// trajectory's turn needs `turn` of the rate limit, rad/s. `switching` holds the other arguments of
+/// [`while_braking`] if the delay is not exact.
 pub(in crate::crmpc) fn terminal_rate(
     s: &Settings,
     dynamics: &Dynamics,
     tightening: &Tightening,
-    switching: &Switching,
-    (carried, last, rates): (&Carried, f64, &Vector3<f64>),
+    switching: Option<(&Switching, &Carried, f64, &Vector3<f64>)>,
+    turn: f64,
 ) -> f64 {
-    let more = while_braking(s, switching, carried, last, (rates, 2.0 * BRAKING));
-    largest_rate(s, |x| left(s, dynamics, tightening, Some(&more), (x, BRAKING * x)))
+    let more = switching.map(|(switching, carried, last, rates)| {
+        while_braking(s, switching, carried, last, (rates, 2.0 * BRAKING))
+    });
+    largest_rate(s, |x| {
+        let (rate, moment) = left(s, dynamics, tightening, more.as_ref(), (x, BRAKING * x));
+        (rate - turn, moment)
+    })
 }
 
 /// Returns the largest ‖x̃_ω‖ (rad/s) for which something is `left` of both limits.

@@ -55,7 +55,7 @@ impl Robust {
             &design.tightening,
             last.angles.y,
             &last.rates,
-            (&self.carried_to_the_end(), before.norm()),
+            (&self.carried_to_the_end(), before.norm(), self.turn),
         )?;
         Some(Certified { margins: self.margins_of_first(&first, &second), braking })
     }

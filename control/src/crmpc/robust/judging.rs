@@ -1,7 +1,7 @@
 //! What contradicts the assumptions of the theorem at a tick.
 
 use super::Robust;
-use crate::controller::Measurement;
+use crate::controller::{Doubt, Measurement};
 use crate::crmpc::guarantee::{Carried, Deviation};
 use crate::crmpc::memory::Memory;
 use crate::crmpc::set::{ROUNDING, Tick};
@@ -10,6 +10,11 @@ use crate::crmpc::supervision::{Contradiction, GuaranteeStatus};
 use crate::linearise;
 use nalgebra::Vector3;
 use vehicle::math::cos;
+
+/// Returns whether a value keeps its bound, but for rounding.
+fn keeps(value: f64, bound: f64) -> bool {
+    value <= bound * (1.0 + ROUNDING) + 1e-12
+}
 
 impl Robust {
     /// Judges the guarantee at a tick: by the state that was measured, and by the moment before its
@@ -50,31 +55,35 @@ impl Robust {
     ) -> Contradiction {
         let certified = memory.supervision.status.is_assured()
             || memory.supervision.contradiction != Contradiction::None;
-        let Settings { known_bound, known_change, .. } = self.settings;
-        let slack = |bound: f64| bound * (1.0 + ROUNDING) + 1e-12;
-        let known = measured.known_moment;
-        let changed = known - memory.plan.known;
-        if measured.stale {
-            Contradiction::Step
-        } else if measured.is_frozen {
-            Contradiction::Frozen
-        } else if measured.turn.norm() > slack(self.turn_bound) {
-            Contradiction::Turn
-        } else if known.norm() > slack(known_bound)
-            || memory.assured() && changed.norm() > slack(known_change)
-        {
-            Contradiction::KnownMoment
-        } else if measured.has_other_delay {
-            Contradiction::Delay
-        } else if measured.is_unexplained || !self.credible(memory) {
-            Contradiction::Disturbance
-        } else if certified && !explained {
-            Contradiction::Deviation
-        } else if certified && !limits_kept {
-            Contradiction::Limit
-        } else {
-            Contradiction::None
+        match measured.doubt {
+            _ if measured.stale => Contradiction::Step,
+            Some(Doubt::Frozen) => Contradiction::Frozen,
+            _ if !self.keeps_turn(memory, measured) => Contradiction::Turn,
+            _ if !self.keeps_known_moment(memory, measured) => Contradiction::KnownMoment,
+            Some(Doubt::OtherDelay) => Contradiction::Delay,
+            Some(Doubt::Unexplained) => Contradiction::Disturbance,
+            None if !self.credible(memory) => Contradiction::Disturbance,
+            None if certified && !explained => Contradiction::Deviation,
+            None if certified && !limits_kept => Contradiction::Limit,
+            None => Contradiction::None,
         }
+    }
+
+    /// Returns whether the trajectory's turn has changed by no more than a plan in force allows.
+    fn keeps_turn(&self, memory: &Memory, measured: &Measurement) -> bool {
+        let begun_with = memory.plan.turn;
+        let is_told = begun_with != Vector3::zeros();
+        let bound = if is_told { self.settings.turn_change } else { 0.0 };
+        !memory.assured() || keeps((measured.turn - begun_with).norm(), bound)
+    }
+
+    /// Returns whether the known moment keeps its bound, and has changed by no more than a plan in
+    /// force allows.
+    fn keeps_known_moment(&self, memory: &Memory, measured: &Measurement) -> bool {
+        let Settings { known_bound, known_change, .. } = self.settings;
+        let known = measured.known_moment;
+        keeps(known.norm(), known_bound)
+            && (!memory.assured() || keeps((known - memory.plan.known).norm(), known_change))
     }
 
     /// Returns whether the assumptions explain the deviation of the predicted state from the

@@ -32,8 +32,8 @@ pub(super) struct Robust {
     pub share: f64,
     /// What the motion follows on.
     pub onset: Onset,
-    /// Bound on ‖w‖, the part of the rates that the turn of the trajectory adds, rad/s.
-    turn_bound: f64,
+    /// Part of the rate limit that the turn of the trajectory needs, rad/s.
+    turn: f64,
     /// Known moment at the optimisation, N m.
     known: Vector3<f64>,
     /// What changes of the acceleration leave at the stages of the motion that was carried along
@@ -72,11 +72,11 @@ impl Robust {
     pub(super) fn new(settings: &Settings, design: &Design) -> Self {
         let Settings { horizon, body, period_optimisation, .. } = *settings;
         Self {
-            settings: settings.relative(),
-            turn_bound: settings.turn_bound,
+            settings: *settings,
+            turn: 0.0,
             known: Vector3::zeros(),
             design: design.clone(),
-            dynamics: Dynamics::new(&settings.relative()),
+            dynamics: Dynamics::new(settings),
             stages: Stages::new(horizon, body, period_optimisation),
             age: 0,
             share: 1.0,
@@ -172,7 +172,7 @@ impl Robust {
         let more = self.more_of_the_deviation(k, here, before).map(|more| loss.with(more, h));
         let loss = more.as_ref().unwrap_or(loss);
         let loss = loss.at(by_angles, here.size) + loss.within(size, a);
-        let bound = limit_rate - reserve - self.share * loss;
+        let bound = limit_rate - self.turn - reserve - self.share * loss;
         // This uses ‖x̃_ω‖ ≤ sec β ‖ω̃‖.
         if k == horizon {
             let terminal_rate = self.terminal_rate(here, before);
@@ -185,11 +185,14 @@ impl Robust {
     /// Returns the largest ‖x̃_ω‖ at the end of the horizon, rad/s.
     fn terminal_rate(&self, end: &Point, before: &Point) -> f64 {
         let Self { settings, dynamics, design, .. } = self;
-        let Some((switching, carried)) = self.switching(settings.horizon) else {
+        let switching = self.switching(settings.horizon);
+        if switching.is_none() && self.turn == 0.0 {
             return design.assessment.terminal_rate;
-        };
-        let from = (&carried, before.pull, &end.rates);
-        guarantee::terminal_rate(settings, dynamics, &design.tightening, switching, from)
+        }
+        let from = switching
+            .as_ref()
+            .map(|(switching, carried)| (*switching, carried, before.pull, &end.rates));
+        guarantee::terminal_rate(settings, dynamics, &design.tightening, from, self.turn)
     }
 
     /// Returns what the plan's changes of acceleration add to the deviation of angles and rates

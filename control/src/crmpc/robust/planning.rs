@@ -44,6 +44,13 @@ impl Robust {
         left
     }
 
+    /// Returns the part of the rate limit that the trajectory's turn needs while a plan is followed
+    /// that begins with these rates of it (rad/s): the theorem bounds ‖ω + w‖.
+    fn needed_by_turn(&self, turn: &Vector3<f64>) -> f64 {
+        let is_told = *turn != Vector3::zeros();
+        if is_told { turn.norm() + self.settings.turn_change } else { 0.0 }
+    }
+
     /// Returns what a nominal trajectory follows on that begins at the measured state.
     fn onset_anew(&self, memory: &Memory, measured: &Vector6<f64>) -> Onset {
         let Some(switching) = &self.design.tightening.switching else { return Onset::default() };
@@ -144,7 +151,7 @@ impl Robust {
             memory.guarantee = self.without_guarantee(memory);
             return;
         };
-        memory.plan.known = self.known;
+        (memory.plan.known, memory.plan.turn) = (memory.known, memory.turn);
         (memory.margins, memory.plan.braking) = (margins, braking);
         if !memory.assured() {
             memory.guarantee = GuaranteeStatus::Pending;
@@ -263,6 +270,7 @@ impl ConstraintSet for Robust {
     ) -> Planned {
         let was_assured = memory.assured();
         self.known = memory.known;
+        self.turn = self.needed_by_turn(&memory.turn);
         if !first {
             memory.age = memory.age.saturating_add(self.design.ratio as u32);
         }
