@@ -202,7 +202,8 @@ impl Flight {
             let moment = controller.update(&mut memory, tick, time, &measured, &reference);
             vehicle.command(time, faulty.moment(tick, time, moment));
             observe(&memory.inner, tick, &measured, &reference(time));
-            let now = memory.inner.supervision.status == GuaranteeStatus::InForce;
+            let now = memory.inner.supervision.status == GuaranteeStatus::InForce
+                && !faulty.is_unseen(time, self.age);
             if before && !now && shown.withdrawn.is_none() {
                 shown.withdrawn = Some(time);
             }
