@@ -202,8 +202,7 @@ impl Flight {
             let moment = controller.update(&mut memory, tick, time, &measured, &reference);
             vehicle.command(time, faulty.moment(tick, time, moment));
             observe(&memory.inner, tick, &measured, &reference(time));
-            let now = memory.inner.supervision.status == GuaranteeStatus::InForce
-                && !faulty.is_unseen(time, self.age);
+            let now = memory.inner.supervision.status == GuaranteeStatus::InForce;
             if before && !now && shown.withdrawn.is_none() {
                 shown.withdrawn = Some(time);
             }
@@ -224,7 +223,7 @@ impl Flight {
                     vehicle.advance(fine(j), fine(j + 1), &delta);
                     let rate = vehicle.rates().norm() / s.limit_rate;
                     shown.rate_at_all = shown.rate_at_all.max(rate);
-                    if now && rate > shown.rate {
+                    if now && rate > shown.rate && !faulty.is_unseen(time, self.age) {
                         (shown.rate, shown.rate_time) = (rate, fine(j + 1));
                     }
                     if now {
