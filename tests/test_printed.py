@@ -309,9 +309,9 @@ def test_published_data_of_the_vehicles():
 
 def test_published_settings_of_the_controllers():
     crmpc, dlmpc, wu = (data(f"control/data/{name}.toml") for name in ("crmpc-2022", "dlmpc-2022", "tvsmc-2015"))
-    paper, settings, double = crmpc["paper"], crmpc["settings"], dlmpc["settings"]
+    settings, double = crmpc["settings"], dlmpc["settings"]
     assert settings["weight"] == {"P": [50.0] * 6, "Q": [10.0] * 3}
-    assert paper["feedback"] == settings["terminal"] == {"k1": -5.0, "k2": -5.0}
+    assert crmpc["feedback"]["paper"] == [settings["terminal"]] == [{"k1": -5.0, "k2": -5.0}]
     assert settings["horizon"] * settings["period"]["optimisation"] == pytest.approx(20.0)
     assert double["horizon"] * double["period"]["optimisation"] == pytest.approx(20.0)
     assert double["period"] == {"optimisation": 0.2, "feedback": 0.04}

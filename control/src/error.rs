@@ -1,5 +1,6 @@
 //! Errors in the settings of a controller. They name settings as these are declared.
 
+use crate::error_dynamics::Gain;
 use settings::Invalid;
 
 /// A setting that the design refuses, by its declared name.
@@ -37,9 +38,21 @@ pub enum DesignError {
         /// Spectral radius of the held terminal law.
         radius: f64,
     },
+    /// Only one part of the gain K is set.
+    #[error(
+        "feedback.k1 = {k1} and feedback.k2 = {k2}: both must be negative, or both 0 for the gain by rule"
+    )]
+    HalfGain {
+        /// Gain on the angle, 1/s².
+        k1: f64,
+        /// Gain on the rate, 1/s.
+        k2: f64,
+    },
     /// The limits leave too little room for a guarantee.
     #[error("constraints = robust cannot be guaranteed: {}", no_guarantee(self))]
     NoGuarantee {
+        /// Gain K of the feedback law, the one that comes closest if it is left to the rule.
+        feedback: Gain,
         /// Unused share of the moment limit; negative if the limit is exceeded.
         moment_left: f64,
         /// Unused share of the rate limit; negative if the limit is exceeded.
@@ -169,6 +182,7 @@ pub enum DesignError {
 /// Returns why there is no guarantee, and which values would be accepted.
 fn no_guarantee(error: &DesignError) -> String {
     let DesignError::NoGuarantee {
+        feedback: Gain { k1, k2 },
         moment_left,
         rate_left,
         limit_moment,
@@ -224,7 +238,7 @@ fn no_guarantee(error: &DesignError) -> String {
         accepted.push(format!("at most delayError = {:.4} s", down(*error)));
     }
     format!(
-        "{}; accepted with the other settings unchanged: {}; guarantee.policy = bestEffort runs without a guarantee",
+        "with feedback.k1 = {k1} and feedback.k2 = {k2}, {}; accepted with the other settings unchanged: {}; guarantee.policy = bestEffort runs without a guarantee",
         reasons.join(" and "),
         accepted.join(", or ")
     )

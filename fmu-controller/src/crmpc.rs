@@ -5,6 +5,7 @@ use control::crmpc::{
     Constraints, Contradiction, Crmpc, GuaranteeStatus, Margins, Memory, Settings, Supervision,
 };
 use control::error::DesignError;
+use control::error_dynamics::Gain;
 use control::report::SolverReport;
 use controller_export::table::{self, ANGLES, sampled_output, shown, shown_vector, vector};
 use controller_export::{ControllerFmu, Law, Vehicle};
@@ -26,6 +27,7 @@ pub struct CrmpcLaw {
     supervision: Supervision,
     margins: Margins,
     moment_left: f64,
+    gain: Gain,
     disturbance: Vector3<f64>,
     report: SolverReport,
 }
@@ -67,6 +69,7 @@ impl Law for CrmpcLaw {
                 moment: shown(memory.margins.moment),
             },
             moment_left: shown(memory.moment_left),
+            gain: memory.gain,
             disturbance: shown_vector(&memory.observed.disturbance),
             report: solver::shown_report(&memory.report),
         };
@@ -145,6 +148,10 @@ fn outputs(table: Controller) -> Controller {
         "guarantee.momentLeft",
         "Share of limit.moment that remains for the plan at rest, after the reserve for disturbances, errors and delay",
     );
+    let gain = |name: &str, of: &str| {
+        let text = format!("Gain K of the feedback law in force: factor on the {of}");
+        sampled(&format!("feedback.gain.{name}"), &text).real().nominal(5.0)
+    };
     let disturbance =
         |axis: &str, meaning: &str| table::disturbance_estimate(axis, meaning).nominal(0.03);
     let table = table
@@ -163,7 +170,9 @@ fn outputs(table: Controller) -> Controller {
         })
         .real(margin("rateMargin", "limit.rate"), |m| &mut m.law.margins.rate)
         .real(margin("momentMargin", "limit.moment"), |m| &mut m.law.margins.moment)
-        .real(left.real(), |m| &mut m.law.moment_left);
+        .real(left.real(), |m| &mut m.law.moment_left)
+        .real(gain("k1", "angle").unit("1/s2"), |m| &mut m.law.gain.k1)
+        .real(gain("k2", "rate").unit("1/s"), |m| &mut m.law.gain.k2);
     let table = vector(table, ANGLES, disturbance, |m| &mut m.law.disturbance);
     solver::outputs(table, |law| &mut law.report)
 }

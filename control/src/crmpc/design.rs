@@ -2,6 +2,7 @@
 //! the `robust` set.
 
 use super::guarantee::{self, Assessment, Tightening};
+use super::rule::{self, Tightened};
 use super::settings::{Constraints, Guarantee, InitialState, Settings};
 use crate::delay;
 use crate::error::{DesignError, positive};
@@ -94,6 +95,8 @@ fn smallest_eigenvalue(m: &Matrix2<f64>) -> f64 {
 /// The result of the offline design.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Design {
+    /// Gain K of the feedback law: the one that is set, or the one that the rule takes.
+    pub feedback: Gain,
     /// Terminal weight G per axis.
     pub g: [Matrix2<f64>; 3],
     /// Constants of the paper; `None` if its assumptions (real distinct eigenvalues) do not hold.
@@ -130,11 +133,13 @@ impl Design {
     /// with its spectral radius.
     pub fn new(s: &Settings) -> Result<Self, DesignError> {
         let ratio = ratio(s)?;
-        for (name, gain) in [("feedback", s.feedback), ("terminal", s.terminal), ("tube", s.tube)] {
-            if gain.eigenvalues().is_none() && name != "feedback" {
+        for (name, gain) in [("terminal", s.terminal), ("tube", s.tube)] {
+            if gain.eigenvalues().is_none() {
                 return Err(DesignError::NotReal { name });
             }
         }
+        let (Tightened { settings, tightening, assessment }, accepted_share) = robust(s)?;
+        let s = &settings;
         let error = SampledError::delayed(s.feedback, s.period_feedback, s.delay);
         let reach = error.reach_forever().ok_or(DesignError::Unstable {
             k1: s.feedback.k1,
@@ -164,9 +169,9 @@ impl Design {
         let eigenvalues = s.body.inertia.symmetric_eigenvalues();
         let (smallest_inertia, largest_inertia) = (eigenvalues.min(), eigenvalues.max());
 
-        let (accepted_share, tightening, assessment) = robust(s)?;
         let invariant = error.invariant_set(guarantee::lateral(s));
         Ok(Self {
+            feedback: s.feedback,
             paper: paper_constants(s, smallest_inertia, largest_inertia),
             g,
             reach,
@@ -183,29 +188,27 @@ impl Design {
     }
 }
 
-/// Returns the share of the bounds that is included, the tightening, and what it leaves of the
-/// limits.
-fn robust(s: &Settings) -> Result<(f64, Tightening, Assessment), DesignError> {
-    let (tightening, assessment) = guarantee::tighten(s)?;
-    if s.constraints == Constraints::Paper || assessment.holds() {
-        return Ok((1.0, tightening, assessment));
+/// Returns the settings with their gain K, the tightening, what it leaves of the limits, and the
+/// share of the bounds that it includes.
+fn robust(s: &Settings) -> Result<(Tightened, f64), DesignError> {
+    let chosen = rule::chosen(s)?;
+    if s.constraints == Constraints::Paper || chosen.assessment.holds() {
+        return Ok((chosen, 1.0));
     }
     if s.guarantee == Guarantee::Required {
-        return Err(guarantee::refusal(s, &assessment));
+        return Err(guarantee::refusal(s, &chosen));
     }
-    let accepted_share = guarantee::largest_share(s).unwrap_or(0.0);
-    let whole = tightening;
-    let (mut tightening, within) = guarantee::tighten(&guarantee::with_share(s, accepted_share))?;
+    let share = guarantee::largest_share(&chosen.settings).unwrap_or(0.0);
+    let Tightened { mut tightening, assessment: within, .. } =
+        Tightened::new(&guarantee::with_share(&chosen.settings, share))?;
     // What contradicts the assumptions follows from the whole bounds all the same.
-    (tightening.observable, tightening.explained) = (whole.observable, whole.explained);
-    Ok((
-        accepted_share,
-        tightening,
-        Assessment { terminal_rate: within.terminal_rate, ..assessment },
-    ))
+    (tightening.observable, tightening.explained) =
+        (chosen.tightening.observable, chosen.tightening.explained);
+    let assessment = Assessment { terminal_rate: within.terminal_rate, ..chosen.assessment };
+    Ok((Tightened { tightening, assessment, ..chosen }, share))
 }
 
-fn ratio(s: &Settings) -> Result<usize, DesignError> {
+pub(super) fn ratio(s: &Settings) -> Result<usize, DesignError> {
     settings::check(s)?;
     positive("limit.rate", s.limit_rate)?;
     positive("limit.moment", s.limit_moment)?;

@@ -4,6 +4,7 @@ use super::commands::Commands;
 use super::observer::Observed;
 use super::plan::Plan;
 use super::supervision::{GuaranteeStatus, Supervision};
+use crate::error_dynamics::Gain;
 use crate::report::SolverReport;
 use nalgebra::{Vector3, Vector6};
 use serde::{Deserialize, Serialize};
@@ -32,6 +33,8 @@ pub struct Memory {
     /// Share of the moment limit that the design leaves to the plan at rest, see
     /// [`super::Assessment::moment_left`]; zero with the paper's set.
     pub moment_left: f64,
+    /// Gain K of the feedback law.
+    pub gain: Gain,
     /// Feedback ticks from the beginning of the nominal motion to the beginning of the plan in
     /// force.
     pub age: u32,
@@ -70,6 +73,7 @@ impl Clone for Memory {
             guarantee,
             margins,
             moment_left,
+            gain,
             age,
             pending,
             supervision,
@@ -84,6 +88,7 @@ impl Clone for Memory {
         self.guarantee = *guarantee;
         self.margins = *margins;
         self.moment_left = *moment_left;
+        self.gain = *gain;
         self.age = *age;
         self.pending = *pending;
         self.supervision = *supervision;

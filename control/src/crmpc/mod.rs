@@ -10,6 +10,7 @@ mod paper;
 mod plan;
 mod planner;
 mod robust;
+mod rule;
 mod set;
 mod settings;
 mod stages;
@@ -78,6 +79,7 @@ impl Crmpc {
     /// Returns an error that names the setting at fault.
     pub fn new(settings: Settings) -> Result<Self, DesignError> {
         let design = Design::new(&settings)?;
+        let settings = Settings { feedback: design.feedback, ..settings };
         let set = Self::set(&settings, &design)?;
         let windows = (set.terminal_radius().is_some(), set.window_margin());
         let planner = Planner::new(&settings, &design, windows)?;
@@ -149,6 +151,7 @@ impl Controller for Crmpc {
         Memory {
             plan: Plan::new(self.settings.horizon),
             moment_left: self.set.moment_left(),
+            gain: self.settings.feedback,
             commands: Commands::new(&self.settings),
             ..Memory::default()
         }

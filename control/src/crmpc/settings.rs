@@ -113,7 +113,7 @@ pub struct Settings {
     /// Weight Q on the second derivative of the tracking error, diagonal.
     #[setting(name = "weight.Q", each = NUMBERED_ANGLES, above = 0.0, nominal = 10.0)]
     pub q: [f64; 3],
-    /// Gain K of the feedback law (20).
+    /// Gain K of the feedback law (20), by rule if both factors are 0.
     pub feedback: Gain,
     /// Gain K~ of the terminal law (14).
     pub terminal: Gain,
@@ -224,11 +224,31 @@ pub struct Published {
     pub epsilon2: f64,
 }
 
+/// The gains K that are taken where none is set.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Rule {
+    paper: Vec<Gain>,
+    robust: Vec<Gain>,
+    /// Share of the moment that a gain has to leave, so that no further one is tried.
+    pub(super) reserve: f64,
+}
+
+impl Rule {
+    pub(super) fn candidates(&self, constraints: Constraints) -> &[Gain] {
+        match constraints {
+            Constraints::Robust => &self.robust,
+            Constraints::Paper => &self.paper,
+        }
+    }
+}
+
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct File {
     settings: Table,
     paper: Table,
+    feedback: Rule,
     published: Published,
 }
 
@@ -238,6 +258,10 @@ fn embedded() -> &'static File {
     static READ: LazyLock<File> =
         LazyLock::new(|| data::embedded(FILE, include_str!("../../data/crmpc-2022.toml")));
     &READ
+}
+
+pub(super) fn rule() -> &'static Rule {
+    &embedded().feedback
 }
 
 impl Settings {
@@ -252,7 +276,7 @@ impl Settings {
     }
 
     /// Returns the settings of Chai 2022, section 5.1, with its vehicle at the nominal inertia and
-    /// measured initial state. With the robust set, K is ours.
+    /// measured initial state. K is left to the rule, see [`Settings::resolved`].
     #[allow(clippy::missing_panics_doc)]
     pub fn new(constraints: Constraints) -> Self {
         let scenario = Scenario::crmpc2022();

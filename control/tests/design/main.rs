@@ -13,7 +13,7 @@ use control::error_dynamics::{Gain, SampledError};
 use nalgebra::{Matrix2, Vector2};
 
 fn settings() -> Settings {
-    Settings::new(Constraints::Paper)
+    Settings::new(Constraints::Paper).resolved().unwrap()
 }
 
 fn gain(k: f64) -> Gain {
@@ -88,7 +88,7 @@ fn a_terminal_gain_that_is_not_stable_when_held_is_refused_by_name() {
 #[test]
 fn a_disturbance_that_cannot_be_borne_is_refused_with_the_largest_that_can() {
     let settings =
-        Settings { disturbance_bound: 2.5f64.to_radians(), ..Settings::new(Constraints::Robust) };
+        Settings { disturbance_bound: 3f64.to_radians(), ..Settings::new(Constraints::Robust) };
     let error = Design::new(&settings).unwrap_err();
     let DesignError::NoGuarantee { moment_left, disturbance: Some(largest), .. } = error else {
         panic!("{error}")

@@ -20,9 +20,9 @@ use vehicle::scenario::Scenario;
 /// Time between two evaluations of every controller here, that of Chai 2022, section 5.1, s.
 pub const FEEDBACK: f64 = 0.04;
 
-/// Returns the settings of Chai 2022 with these sets.
+/// Returns the settings of Chai 2022 with these sets, and with the gain K that belongs to them.
 pub fn settings(constraints: Constraints) -> Settings {
-    Settings::new(constraints)
+    Settings::new(constraints).resolved().unwrap()
 }
 
 /// Returns the regulator of the comparison, with the weights of CRMPC.

@@ -56,6 +56,7 @@ impl CheckReport {
     /// # Errors
     /// Reports settings for which no controller can be designed.
     pub fn new(settings: &Settings, gap: f64) -> Result<Self, DesignError> {
+        let settings = &settings.resolved()?;
         let design = Design::new(settings)?;
         let bounds = Lemmas::new(settings);
         let (mut lemmas, suprema) = lemmas::check(settings, &bounds, gap);

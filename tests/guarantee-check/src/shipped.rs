@@ -183,7 +183,7 @@ fn settings(component: &Component) -> Result<Settings, String> {
             .map_err(|error| format!("{name}: {error}"))?;
     }
     s.body = inertia.body(1.0).map_err(|error| error.to_string())?;
-    Ok(s)
+    s.resolved().map_err(|error| error.to_string())
 }
 
 fn set(s: &mut Settings, inertia: &mut Inertia, name: &str, value: &Value) -> Result<(), String> {

@@ -48,7 +48,7 @@ fn bounds_of_the_geometry_hold_in_the_widest_domain_and_for_another_vehicle() {
         sideslip_domain: 0.799,
         body: inertia.body(1.0).unwrap(),
         guarantee: Guarantee::BestEffort,
-        ..Settings::new(Constraints::Robust)
+        ..Settings::new(Constraints::Robust).resolved().unwrap()
     };
     for initial_state in [InitialState::Measured, InitialState::Tube] {
         let settings = Settings { initial_state, ..settings };
@@ -61,7 +61,7 @@ fn bounds_of_the_geometry_hold_in_the_widest_domain_and_for_another_vehicle() {
 
 #[test]
 fn bounds_that_are_too_small_are_found_false() {
-    let settings = Settings::new(Constraints::Robust);
+    let settings = Settings::new(Constraints::Robust).resolved().unwrap();
     let mut bounds = Lemmas::new(&settings);
     // The first two bounds are attained; the others have margins of 2.4 % and 1.3 %.
     bounds.drift_by_rates *= 0.99;
@@ -89,7 +89,7 @@ fn bounds_that_are_too_small_are_found_false() {
 
 #[test]
 fn a_terminal_rate_that_is_too_large_is_found_false() {
-    let settings = Settings::new(Constraints::Robust);
+    let settings = Settings::new(Constraints::Robust).resolved().unwrap();
     let design = control::crmpc::Design::new(&settings).unwrap();
     let rate = design.assessment.terminal_rate;
     let at = |rate: f64| {

@@ -70,7 +70,7 @@ fn settings(experiment: &str) -> Settings {
             }
         }
     }
-    s
+    s.resolved().unwrap()
 }
 
 #[test]

@@ -10,7 +10,7 @@ use proptest::test_runner::{Config, RngAlgorithm, TestRng, TestRunner};
 use std::cell::Cell;
 
 fn robust() -> Robust {
-    let settings = Settings::new(Constraints::Robust);
+    let settings = Settings::new(Constraints::Robust).resolved().unwrap();
     Robust::new(&settings, &Design::new(&settings).unwrap())
 }
 
@@ -243,7 +243,7 @@ fn worst_of_random_stages(count: usize, samples: usize, period: f64) -> ([f64; 4
     let settings = Settings {
         period_optimisation: period,
         terminal: Gain { k1: -0.6, k2: -1.6 },
-        ..Settings::new(Constraints::Robust)
+        ..Settings::new(Constraints::Robust).resolved().unwrap()
     };
     let mut robust = Robust::new(&settings, &Design::new(&settings).unwrap());
     let random = &mut Random(0x9e37_79b9_7f4a_7c15 ^ count as u64);

@@ -115,6 +115,7 @@ impl PlanCheck {
         if settings.delay_error > 0.0 {
             return Err("a delay that is known within an interval is not covered".into());
         }
+        let settings = &settings.resolved().map_err(|error| error.to_string())?;
         let body = Body::new(settings).ok_or("the body is not symmetric about its x-z plane")?;
         let start = match settings.initial_state {
             InitialState::Measured | InitialState::Nominal => None,

@@ -9,7 +9,7 @@ use vehicle::kinematics::{self, Kinematics};
 use vehicle::plant::{self, Load};
 
 fn published() -> Settings {
-    Settings::new(Constraints::Robust)
+    Settings::new(Constraints::Robust).resolved().unwrap()
 }
 
 /// A plan from a state in degrees with these accelerations of the sideslip angle, deg/s².
