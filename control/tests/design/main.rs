@@ -2,6 +2,7 @@
 //! exact sampled bounds compared with simulation. Tolerances are half a unit of the last digit that
 //! is printed.
 
+mod gain;
 mod printed;
 mod sampled;
 
