@@ -182,7 +182,7 @@ pub(super) fn largest(tried: f64, closest: Gain, with: impl Fn(f64) -> Settings)
             return so_far;
         }
         let mut high = tried;
-        for _ in 0..30 {
+        for _ in 0..18 {
             let middle = 0.5 * (low + high);
             if holds(middle) { low = middle } else { high = middle }
         }
