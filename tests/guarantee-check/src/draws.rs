@@ -6,7 +6,7 @@ use control::crmpc::{Constraints, Design, InitialState, Settings};
 use control::error_dynamics::Gain;
 
 /// Number of kinds of draws; every kind also varies the share of the largest accepted disturbance.
-const KINDS: u64 = 8;
+const KINDS: u64 = 10;
 
 /// Returns the settings of draw `seed`, or `None` if the design accepts nothing near them.
 pub fn accepted(seed: u64) -> Option<Settings> {
@@ -36,6 +36,8 @@ fn drawn(kind: u64, random: &mut Random) -> Settings {
         4 => Settings { initial_state: InitialState::Tube, ..published },
         5 => erroneous(random, &published),
         6 => slow(random, &published),
+        7 => late(random, &published),
+        8 => turned(random, &published),
         _ => anything(random, &published),
     }
 }
@@ -66,21 +68,46 @@ fn slow(random: &mut Random, published: &Settings) -> Settings {
     }
 }
 
+/// A delay that is known within an interval.
+fn late(random: &mut Random, published: &Settings) -> Settings {
+    let delay = random.between(0.01, 0.12);
+    let initial_state = [InitialState::Measured, InitialState::Nominal][random.below(2) as usize];
+    let delay_error = random.between(0.0, 0.012_f64.min(delay));
+    Settings { delay, delay_error, initial_state, ..*published }
+}
+
+/// An error of the whole tensor of inertia.
+fn turned(random: &mut Random, published: &Settings) -> Settings {
+    Settings {
+        inertia_error: 0.05 * random.below(2) as f64,
+        tensor_error: random.between(0.0, 0.06),
+        delay: 0.04 * random.below(3) as f64,
+        ..*published
+    }
+}
+
 fn anything(random: &mut Random, published: &Settings) -> Settings {
     let period_feedback = [0.02, 0.04, 0.05, 0.1][random.below(4) as usize];
     let states = [InitialState::Measured, InitialState::Nominal, InitialState::Tube];
     let longest = (0.3 / period_feedback) as u64;
+    let initial_state = states[random.below(3) as usize];
+    let delay = random.between(0.0, 0.1);
+    // The set of `tube` has no room for a delay that is not exact.
+    let exact = initial_state == InitialState::Tube || random.below(2) == 0;
+    let most = delay.min(0.02).min(period_feedback);
     Settings {
         feedback: Gain { k1: -random.between(0.5, 8.0), k2: -random.between(1.0, 8.0) },
-        delay: random.between(0.0, 0.1),
+        delay,
+        delay_error: if exact { 0.0 } else { random.between(0.0, most) },
         inertia_error: random.between(0.0, 0.1),
+        tensor_error: random.between(-0.05, 0.05).max(0.0),
         horizon: 20 + random.below(81) as usize,
         period_feedback,
         period_optimisation: period_feedback * (1 + random.below(longest)) as f64,
         limit_rate: published.limit_rate * random.between(0.5, 2.0),
         limit_moment: published.limit_moment * random.between(0.5, 3.0),
         sideslip_domain: random.between(10.0, 35.0).to_radians(),
-        initial_state: states[random.below(3) as usize],
+        initial_state,
         ..*published
     }
 }

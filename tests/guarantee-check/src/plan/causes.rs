@@ -18,6 +18,39 @@ pub(super) struct Mismatch {
     pub(super) revised: Interval,
     /// Largest distance of the rates (rad/s) and of the angles α, β (rad) from their prediction.
     pub(super) apart: [Interval; 2],
+    /// The same between two successive predictions.
+    updated: [Interval; 2],
+}
+
+/// How the change of a command becomes a pulse if it begins to act up to δ early or late.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Switched {
+    /// Bound δ on the error of the delay, s.
+    pub(super) error: Interval,
+    /// Largest ratio of R I_v⁻¹ (m − m′) to R I⁻¹ (m − m′) at the predicted attitude, and its part
+    /// that keeps the direction.
+    pub(super) factor: Interval,
+    pub(super) straight: Interval,
+    /// Bound on ‖F(y, m) − F(y′, m)‖ for the predicted middles y and y′ of two periods, rad/s².
+    pub(super) turn: Interval,
+}
+
+impl Switched {
+    /// R I_v⁻¹ I W′ = R (1 + D) W′/(1 + c) with ‖D‖ ≤ √(I_max/I_min) ε/(1 − ε), and ‖R W′ − 1‖ ≤
+    /// ‖R‖ ‖W′ − W‖. From one middle to the next lie a period and what a measurement adds.
+    fn new(s: &Settings, bounds: &Smoothness, inertia: &InertiaError, later: &Mismatch) -> Self {
+        let [error, tau] = [s.delay_error, s.period_feedback].map(number);
+        let one = Interval::ONE;
+        let [common, tensor] = [s.inertia_error, s.tensor_error].map(number);
+        let straight = one / (one - common);
+        let away = bounds.angle_rate * (number(0.5) * tau + error) + later.apart[1];
+        let turned = number(3.0).sqrt() * away + inertia.root_condition * tensor / (one - tensor);
+        let swing = bounds.slope * tau.square();
+        let [rate, angle] = later.updated;
+        let turn = bounds.by_rates * (bounds.force * tau + swing + rate)
+            + bounds.by_angles * (bounds.angle_rate * tau + swing * tau + angle);
+        Self { error, factor: straight * (one + bounds.r[0] * turned), straight, turn }
+    }
 }
 
 /// Everything that drives the deviation.
@@ -25,13 +58,14 @@ pub(super) struct Causes {
     pub(super) disturbance: Interval,
     /// Bounds on the error of each measured angle and rate.
     pub(super) errors: Pair,
-    /// Bound on ‖ν‖, rad/s².
-    pub(super) inertia: Interval,
+    pub(super) inertia: InertiaError,
     pub(super) later: Mismatch,
     /// Mismatch while a part of the prediction lies before the nominal trajectory, where the rates
     /// may exceed their limit, and the number of such ticks.
     pub(super) first: (Mismatch, usize),
     pub(super) smoothness: Smoothness,
+    /// How changes of the command become pulses.
+    pub(super) switched: Switched,
     /// Difference of F at the predicted middle of the period from the intended acceleration,
     /// rad/s².
     pub(super) middle: Interval,
@@ -48,19 +82,69 @@ fn upper(value: Interval) -> Interval {
     Interval::point(value.high)
 }
 
+/// Effect ν of the inertia error. With I_v = (1 + c) S, S = I^½ (1 + E) I^½ and M = S⁻¹ − I⁻¹,
+///
+/// ν = R [−c/(1 + c) I⁻¹ m + M (m/(1 + c) − ω × S ω) − I⁻¹ (ω × (S − I) ω)].
+///
+/// ‖ω × X ω‖ is at most half the range of the eigenvalues of X times ‖ω‖². Those of S lie between
+/// (1 − ε) I_min and (1 + ε) I_max, those of S − I between −ε I_max and ε I_max.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct InertiaError {
+    /// Bound on ‖ν‖, rad/s².
+    pub(super) acceleration: Interval,
+    /// Moment that has the effect of the parts with I⁻¹, N m.
+    pub(super) direct: Interval,
+    /// Moment on which M acts, times ‖I^½ M I^½‖, N m.
+    pub(super) turned: Interval,
+    /// Change of the body rates by 2 δ of the largest moment, rad/s.
+    displaced: Interval,
+    /// √(I_max/I_min), by which the latter grows if it is expressed as a moment: I M = I^½ D I^−½
+    /// with ‖D‖ ≤ ε/(1 − ε).
+    pub(super) root_condition: Interval,
+}
+
+impl InertiaError {
+    /// Bounds the effect for ‖ω‖ ≤ `rate` and |β| ≤ `sideslip`.
+    fn new(s: &Settings, body: &Body, rate: f64, sideslip: f64) -> Self {
+        let [x, z, y] = body.principal();
+        let (smallest, largest) = (x.min(y).min(z), x.max(y).max(z));
+        let (one, half, square) = (Interval::ONE, number(0.5), number(rate).square());
+        let [common, tensor, limit] = [s.inertia_error, s.tensor_error, s.limit_moment].map(number);
+        let range = (one + tensor) * largest - (one - tensor) * smallest;
+        let direct = common / (one - common) * limit + tensor * largest * square;
+        let turned = tensor / (one - tensor) * (limit / (one - common) + half * range * square);
+        let secant = one / sin_cos(number(sideslip)).1;
+        Self {
+            acceleration: (direct + turned) * secant / smallest,
+            direct,
+            turned,
+            displaced: number(2.0) * number(s.delay_error) * limit
+                / ((one - common) * (one - tensor) * smallest),
+            root_condition: (largest / smallest).sqrt(),
+        }
+    }
+}
+
 /// Bounds how F differs along the true and the predicted trajectory. The distance z of the rates
 /// grows by what drives them apart and by the difference f of F itself, for which the function
 /// finds an upper bound.
-fn mismatch(s: &Settings, bounds: &Smoothness, inertia: Interval) -> Option<Mismatch> {
+///
+/// If commands begin to act early or late, the integral of the moment over any time differs by that
+/// at both ends of this time, so that the rates are displaced by no more than `jump`.
+fn mismatch(s: &Settings, bounds: &Smoothness, inertia: &InertiaError) -> Option<Mismatch> {
     let (d, tau, half) = (number(s.delay), number(s.period_feedback), number(0.5));
     let (root2, root3) = (number(2.0).sqrt(), number(3.0).sqrt());
     let (delta, eta, e) =
         (number(s.disturbance_bound), number(s.angle_error), number(s.rate_error));
     let Smoothness { by_rates, by_angles, .. } = *bounds;
     let end = d + tau;
+    let InertiaError { acceleration: inertia, displaced, .. } = *inertia;
     let (drive, drive_of_two) = (root3 * delta + inertia, root2 * delta + inertia);
-    let rates = |drive: Interval, t: Interval| root3 * e + drive * t;
-    let angles = |drive: Interval, t: Interval| root2 * (eta + e * t) + half * drive * t.square();
+    let jump = displaced * (bounds.r[0] + bounds.r[1] * end);
+    let rates = |drive: Interval, t: Interval| root3 * e + jump + drive * t;
+    let angles = |drive: Interval, t: Interval| {
+        root2 * (eta + e * t) + jump * t + half * drive * t.square()
+    };
     let slack = Interval::ONE - by_rates * end - half * by_angles * end.square();
     if slack.low <= 0.1 {
         return None;
@@ -70,9 +154,10 @@ fn mismatch(s: &Settings, bounds: &Smoothness, inertia: Interval) -> Option<Mism
     // Integrals over [0, t] of the two distances.
     let sixth = Interval::ONE / number(6.0);
     let sum = |t: Interval| {
-        let rates = root3 * e * t + half * drive * t.square();
-        let angles =
-            root2 * (eta * t + half * e * t.square()) + sixth * drive_of_two * t.square() * t;
+        let rates = (root3 * e + jump) * t + half * drive * t.square();
+        let angles = root2 * (eta * t + half * e * t.square())
+            + half * jump * t.square()
+            + sixth * drive_of_two * t.square() * t;
         by_rates * rates + by_angles * angles
     };
     let unseen = sum(d);
@@ -86,6 +171,7 @@ fn mismatch(s: &Settings, bounds: &Smoothness, inertia: Interval) -> Option<Mism
         unseen: [d * unseen, unseen],
         revised: upper(sum(tau) + since),
         apart: [rates(drive, end), angles(drive_of_two, end)],
+        updated: [rate, apart[1] + rate * d],
     })
 }
 
@@ -94,8 +180,6 @@ impl Causes {
     pub(super) fn new(s: &Settings) -> Option<Self> {
         let (d, tau) = (number(s.delay), number(s.period_feedback));
         let body = Body::new(s)?;
-        let [x, z, y] = body.principal();
-        let smallest = x.min(y).min(z);
         let mut margin = [0.01 * s.limit_rate + 1.5 * s.rate_error, 1e-3 + 1.5 * s.angle_error];
         for _ in 0..12 {
             let sideslip = s.sideslip_domain + margin[1];
@@ -103,23 +187,22 @@ impl Causes {
             if early > 0.95 {
                 return None;
             }
-            let secant = Interval::ONE / sin_cos(number(early)).1;
-            let iota = number(s.inertia_error) / (Interval::ONE - number(s.inertia_error));
-            let inertia = iota * number(s.limit_moment) * secant / smallest;
             let bounds = Smoothness::new(s, s.limit_rate + margin[0], sideslip)?;
-            let later = mismatch(s, &bounds, inertia)?;
+            let before = margin[0] + (bounds.turning * d).high;
+            let inertia = InertiaError::new(s, &body, s.limit_rate + before, early);
+            let later = mismatch(s, &bounds, &inertia)?;
             let [rate, angle] = later.apart;
             let swing = bounds.slope * tau.square();
             let outside = [rate + angle * bounds.angle_rate + swing, angle + swing * tau];
             if outside[0].high <= margin[0] && outside[1].high <= margin[1] {
-                let before = margin[0] + (bounds.turning * d).high;
                 let wider = Smoothness::new(s, s.limit_rate + before, early)?;
-                let first = mismatch(s, &wider, inertia)?;
+                let first = mismatch(s, &wider, &inertia)?;
                 let ticks = (s.delay / s.period_feedback).ceil() as usize;
                 let middle = middle(&bounds, tau);
                 return Some(Self {
                     disturbance: number(s.disturbance_bound),
                     errors: [number(s.angle_error), number(s.rate_error)],
+                    switched: Switched::new(s, &bounds, &inertia, &later),
                     inertia,
                     later,
                     first: (first, ticks),

@@ -5,21 +5,27 @@
 //! certificate uses. No number of the controller's design enters, only the settings, the plan and
 //! its age. docs/guarantee-check.md gives the derivation.
 
+mod around;
 mod body;
 mod causes;
+mod deviation;
 mod jet;
 mod law;
+mod pulses;
 mod reach;
 mod rest;
 mod smoothness;
 
 use crate::interval::Interval;
+use around::Around;
 use body::Body;
 use control::crmpc::{Constraints, Design, InitialState, Plan, Settings};
 use control::error_dynamics::InvariantSet;
+use deviation::Deviation;
 use law::Range;
+pub use pulses::Past;
 use nalgebra::Vector6;
-use reach::{Deviation, Reach};
+use reach::Reach;
 
 /// Smallest shares of the limits that a plan leaves unused; negative where the check does not
 /// confirm the limit.
@@ -103,17 +109,11 @@ impl PlanCheck {
     /// Prepares the check.
     ///
     /// # Errors
-    /// Says why no bound is available for these settings: for the paper's set, for an error of the
-    /// whole tensor of inertia or of the delay, and where the feedback is too slow.
+    /// Says why no bound is available for these settings: for the paper's set, and where the
+    /// feedback is too slow.
     pub fn new(settings: &Settings) -> Result<Self, String> {
         if settings.constraints != Constraints::Robust {
             return Err("only the robust set is checked".into());
-        }
-        if settings.tensor_error > 0.0 {
-            return Err("an error of the whole tensor of inertia is not covered".into());
-        }
-        if settings.delay_error > 0.0 {
-            return Err("a delay that is known within an interval is not covered".into());
         }
         let settings = &settings.resolved().map_err(|error| error.to_string())?;
         let body = Body::new(settings).ok_or("the body is not symmetric about its x-z plane")?;
@@ -130,19 +130,29 @@ impl PlanCheck {
 
     /// Checks a plan whose nominal trajectory began `age` feedback ticks before the plan.
     pub fn check(&self, plan: &Plan, age: usize) -> Verdict {
+        self.check_after(&Past::default(), plan, age, 0.0)
+    }
+
+    /// Checks a plan with what was commanded before it. The command that ends its first interval
+    /// changes the acceleration by `next` (rad/s²), if that is more than the plan itself does; it
+    /// may begin to act before that end.
+    pub fn check_after(&self, past: &Past, plan: &Plan, age: usize, next: f64) -> Verdict {
         let mut verdict =
             Verdict { left: Left::ALL, at: [0.0; 3], consistent: self.is_consistent(plan) };
+        let around = self.reach.around(&self.settings, plan, age, past);
         for k in 0..plan.accelerations.len() {
             let stage = Stage::new(&self.settings, plan, k);
-            let tick = age + k * self.ratio;
-            let of_moment = self.moment(&stage, tick);
+            let tick = k * self.ratio;
+            let of_moment = self.moment(&around, &stage, tick);
             for j in 0..self.ratio {
-                let time = (k * self.ratio + j) as f64 * self.settings.period_feedback;
-                let left = self.sideslip_and_rates(&stage, j, tick + j);
+                let time = (tick + j) as f64 * self.settings.period_feedback;
+                let last = tick + j + 1 == self.ratio;
+                let more = around.unforeseen(self.ratio, if last { next } else { 0.0 });
+                let left = self.sideslip_and_rates(&around, &stage, (j, tick + j), more);
                 verdict.record(time, &Left { moment: of_moment, ..left });
             }
         }
-        verdict.record(f64::INFINITY, &self.rest(plan));
+        verdict.record(f64::INFINITY, &self.rest(plan, &around.forever()));
         verdict
     }
 
@@ -173,10 +183,16 @@ impl PlanCheck {
     }
 
     /// Bounds sideslip and body rates from feedback tick `j` of a stage until the next.
-    fn sideslip_and_rates(&self, stage: &Stage, j: usize, tick: usize) -> Left {
-        let ends = [0, 1].map(|i| (stage.at((j + i) as f64), self.reach.at(tick + i)));
+    fn sideslip_and_rates(
+        &self,
+        around: &Around,
+        stage: &Stage,
+        (j, tick): (usize, usize),
+        more: [Interval; 2],
+    ) -> Left {
+        let ends = [0, 1].map(|i| (stage.at((j + i) as f64), around.at(tick + i)));
         let angle = ends[0].1.angle.max(ends[1].1.angle);
-        let off = angle.component() + self.reach.bulge.component();
+        let off = angle.component() + self.reach.bulge.component() + more[0];
         let swept = stage.sideslip(j).abs();
         // The plan's rates are straight lines, and the deviation is convex but for the swing, so
         // that ‖ω‖ is largest at an end.
@@ -185,7 +201,7 @@ impl PlanCheck {
         let rate = ends.map(|(state, deviation)| {
             let size = |i: usize| state[3 + i].abs() + deviation.rate.half;
             let squares = (cosine * size(0)).square() + size(1).square() + size(2).square();
-            squares.sqrt() + deviation.rate.norm + self.reach.swing
+            squares.sqrt() + deviation.rate.norm + self.reach.swing + more[1]
         });
         let size = swept + off;
         let Settings { sideslip_domain, limit_rate, .. } = self.settings;
@@ -197,13 +213,13 @@ impl PlanCheck {
     }
 
     /// Bounds the commands of a stage; the result is the smallest unused share of the limit.
-    fn moment(&self, stage: &Stage, tick: usize) -> f64 {
-        let ranges = (0..self.ratio).map(|j| Self::range(stage, j, self.reach.at(tick + j)));
+    fn moment(&self, around: &Around, stage: &Stage, tick: usize) -> f64 {
+        let ranges = (0..self.ratio).map(|j| Self::range(stage, j, &around.at(tick + j)));
         let Some(hull) = ranges.clone().reduce(|a, b| a.hull(&b)) else { return f64::NAN };
         let remainder = law::remainder(&self.body, &hull);
         let limit = self.settings.limit_moment;
         let largest = ranges.enumerate().map(|(j, range)| {
-            let added = self.added(self.reach.at(tick + j));
+            let added = self.added(&around.at(tick + j));
             let bound = (Interval::from(law::largest(&self.body, &range)) + remainder + added).high;
             if bound <= limit {
                 return bound;

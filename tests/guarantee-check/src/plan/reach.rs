@@ -12,7 +12,9 @@
 //! mismatch and φ are bounded as vectors.
 
 use super::body::Body;
-use super::causes::{Causes, Mismatch};
+use super::causes::{Causes, InertiaError, Mismatch};
+use super::deviation::{Deviation, Extent, upper};
+use super::pulses::Pulses;
 use super::smoothness::{Growth, Smoothness};
 use crate::interval::Interval;
 use crate::sums::{Axis, Matrix, Pair, integral_of_size, product};
@@ -20,65 +22,6 @@ use control::crmpc::Settings;
 use control::error_dynamics::InvariantSet;
 use nalgebra::Vector2;
 use std::collections::VecDeque;
-
-/// Bound on a vector with three components: the half width of the box that contains one part of it,
-/// and the norm of the other part.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Extent {
-    pub(super) half: Interval,
-    pub(super) norm: Interval,
-}
-
-impl Extent {
-    const NONE: Self = Self { half: Interval::ZERO, norm: Interval::ZERO };
-
-    pub(super) fn max(self, other: Self) -> Self {
-        Self { half: self.half.max(other.half), norm: self.norm.max(other.norm) }
-    }
-
-    fn more(self, half: Interval, norm: Interval) -> Self {
-        Self { half: upper(self.half + half), norm: upper(self.norm + norm) }
-    }
-
-    /// Bound on one component.
-    pub(super) fn component(self) -> Interval {
-        self.half + self.norm
-    }
-}
-
-/// Keeps the upper end of a bound.
-fn upper(value: Interval) -> Interval {
-    Interval::point(value.high)
-}
-
-/// Deviations at one tick: of the vehicle when the command begins to act, and of what the law
-/// computes from the predicted state.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Deviation {
-    /// Angles (rad) and rates (rad/s) of the vehicle.
-    pub(super) angle: Extent,
-    pub(super) rate: Extent,
-    /// Angles (rad) and rates (rad/s) at the predicted middle of the period.
-    pub(super) law_angle: Extent,
-    pub(super) law_rate: Extent,
-    /// Acceleration K ô, rad/s², without the part that compensates ν.
-    pub(super) feedback: Extent,
-    /// Moment that this part requires, N m.
-    pub(super) inertia: Interval,
-}
-
-impl Deviation {
-    pub(super) fn max(&self, other: &Self) -> Self {
-        Self {
-            angle: self.angle.max(other.angle),
-            rate: self.rate.max(other.rate),
-            law_angle: self.law_angle.max(other.law_angle),
-            law_rate: self.law_rate.max(other.law_rate),
-            feedback: self.feedback.max(other.feedback),
-            inertia: self.inertia.max(other.inertia),
-        }
-    }
-}
 
 fn number(value: f64) -> Interval {
     Interval::from(value)
@@ -97,18 +40,22 @@ struct Response {
     revised: Vec<Interval>,
     /// Part by φ of the first tick, which is the deviation of the vehicle there.
     begun: Vec<Interval>,
-    /// Part by the moment of the inertia error, relative to its bound.
+    /// Moment that compensates the inertia error, if the row is that of K ô, N m.
     inertia: Vec<Interval>,
 }
 
 /// The tube of deviations around any nominal trajectory for one set of settings.
 pub(super) struct Reach {
-    deviations: Vec<Deviation>,
-    forever: Deviation,
+    pub(super) deviations: Vec<Deviation>,
+    pub(super) forever: Deviation,
     /// Largest distance of an angle from the chord between two ticks, rad.
     pub(super) bulge: Extent,
     /// Largest additional deviation of the rates between two ticks, rad/s.
     pub(super) swing: Interval,
+    pub(super) pulses: Option<Pulses>,
+    /// Sizes of the pulses by changes of K ô at each tick, as a box and as a norm, rad/s.
+    pub(super) sizes: Vec<[Interval; 2]>,
+    pub(super) fades: [usize; 2],
 }
 
 struct Builder<'a> {
@@ -134,16 +81,6 @@ impl Reach {
     pub(super) fn new(s: &Settings, start: Option<(&InvariantSet, f64)>) -> Option<Self> {
         Builder::new(s)?.build(start)
     }
-
-    /// Returns the deviations `tick` feedback ticks after the nominal trajectory began.
-    pub(super) fn at(&self, tick: usize) -> &Deviation {
-        self.deviations.get(tick).unwrap_or(&self.forever)
-    }
-
-    /// Returns the deviation that is never exceeded.
-    pub(super) fn forever(&self) -> &Deviation {
-        &self.forever
-    }
 }
 
 impl<'a> Builder<'a> {
@@ -163,16 +100,20 @@ impl<'a> Builder<'a> {
         Some(Self { s, axis, causes, growth, errors, steps })
     }
 
-    /// Growth of a compensated moment while the vehicle turns for `age`, faster than its limit
-    /// before the nominal trajectory began, and the angles are measured with errors.
-    fn grown(&self, age: Interval) -> Interval {
+    /// Moment that compensates ν after the vehicle has turned for `age`, faster than its limit
+    /// before the nominal trajectory began, while the angles are measured with errors.
+    fn compensating(&self, age: Interval) -> Interval {
         let early = self.causes.smoothness.turning * number(self.s.delay).square();
         let jump = number(2.0).sqrt() * self.causes.errors[0] + early;
-        let rate = number(self.s.limit_rate) + self.causes.later.apart[0];
-        self.growth.after(rate * age + jump)
+        let (one, rate) =
+            (Interval::ONE, number(self.s.limit_rate) + self.causes.later.apart[0]);
+        let angle = rate * age + jump;
+        let InertiaError { direct, turned, root_condition, .. } = self.causes.inertia;
+        direct * self.growth.after(one, angle) + turned * self.growth.after(root_condition, angle)
     }
 
-    fn respond(&self, row: Pair) -> Response {
+    /// Sums the responses of a row, or the changes of its responses from tick to tick.
+    fn respond(&self, row: Pair, changes: bool) -> Response {
         let (zero, tau, d) = (Interval::ZERO, number(self.s.period_feedback), number(self.s.delay));
         let mut sums = [zero; 4];
         let mut response = Response {
@@ -185,8 +126,14 @@ impl<'a> Builder<'a> {
         };
         let mut excess = VecDeque::new();
         let mut earlier = zero;
+        let mut before = [zero; 2];
         for (i, power) in self.axis.transitions(self.steps).enumerate() {
-            let reached = [0, 1].map(|j| row[0] * power[0][j] + row[1] * power[1][j]);
+            let mut reached = [0, 1].map(|j| row[0] * power[0][j] + row[1] * power[1][j]);
+            if changes {
+                let now = reached;
+                reached = [0, 1].map(|j| now[j] - before[j]);
+                before = now;
+            }
             let wave = integral_of_size(&reached, d, tau);
             let small = self.mismatched(&reached, &self.causes.later);
             let first = self.mismatched(&reached, &self.causes.first.0);
@@ -196,7 +143,7 @@ impl<'a> Builder<'a> {
             }
             let age = number(i as f64) * tau + d + tau + number(0.5) * tau;
             response.begun.push(self.unseen(&reached));
-            let inertia = wave * self.grown(age);
+            let inertia = wave * self.compensating(age);
             sums = [sums[0] + wave, sums[1] + small[0], sums[2] + inertia, sums[3] + small[1]];
             response.seen.push(sums[0]);
             let more = |j: usize| excess.iter().fold(zero, |sum, part| sum + part[j]);
@@ -206,7 +153,8 @@ impl<'a> Builder<'a> {
             response.erred.push(earlier + self.erred(&reached, 1));
             earlier = earlier + self.erred(&reached, 0);
         }
-        let tail = self.axis.tails(self.steps).0 * (row[0].abs() + row[1].abs());
+        let times = number(if changes { 2.0 } else { 1.0 });
+        let tail = times * self.axis.tails(self.steps).0 * (row[0].abs() + row[1].abs());
         self.end(&mut response, tail, earlier);
         response
     }
@@ -222,7 +170,7 @@ impl<'a> Builder<'a> {
         let small = self.mismatched(&one, &self.causes.first.0);
         let revised = last(&response.revised) + more * small[1];
         let small = last(&response.mismatched) + more * small[0];
-        let inertia = last(&response.inertia) + more * tau * self.grown(number(1e9));
+        let inertia = last(&response.inertia) + more * tau * self.compensating(number(1e9));
         let erred = earlier + more * (self.erred(&one, 0) + self.erred(&one, 1));
         response.seen.push(seen);
         response.mismatched.push(small);
@@ -270,20 +218,58 @@ impl<'a> Builder<'a> {
             [half * tau * k1, one + half * tau * k2],
             [k1, k2],
         ];
-        let responses = rows.map(|row| self.respond(row));
+        let responses = rows.map(|row| self.respond(row, false));
         let starts = rows.map(|row| self.starts(row, start));
         let unseen = [half * number(self.s.delay).square(), number(self.s.delay)];
         let at = |n: usize| self.deviation(n, &rows, &responses, &starts, &unseen);
+        let (pulses, sizes) = self.pulses(&rows, &responses[4])?;
+        let at = |n: usize| match &pulses {
+            None => at(n),
+            // A command that begins to act early shows before its tick.
+            Some(pulses) => {
+                let next = sizes[(n + 1).min(self.steps + 1)];
+                let at = at(n).pulsed(sizes[n], pulses.sums(n));
+                Deviation { rate: at.rate.pulsed(next, 1.0), ..at }
+            }
+        };
         let deviations: Vec<Deviation> = (0..=self.steps).map(at).collect();
         let forever = deviations.iter().fold(at(self.steps + 1), |most, at| most.max(at));
-        let accelerated = forever.feedback.more(zero, self.causes.inertia * last(&responses[4]));
+        let accelerated = forever.feedback.more(zero, self.causes.inertia.acceleration * last(&responses[4]));
         let bulge = Extent::NONE.more(
             eighth * tau.square() * accelerated.half,
             eighth * tau.square() * accelerated.norm,
         );
         let Smoothness { slope, bend, .. } = self.causes.smoothness;
         let swing = eighth * tau.square() * (slope + bend * tau);
-        forever.rate.norm.high.is_finite().then_some(Reach { deviations, forever, bulge, swing })
+        let fades = [8, 16].map(|times| self.axis.halved(times));
+        let bounded = forever.rate.norm.high.is_finite();
+        bounded.then_some(Reach { deviations, forever, bulge, swing, pulses, sizes, fades })
+    }
+
+    /// Returns the responses to pulses, and the sizes at each tick of those by changes of K ô.
+    /// They grow with the tick, so that each may count for all before it.
+    fn pulses(
+        &self,
+        rows: &[Pair; 5],
+        feedback: &Response,
+    ) -> Option<(Option<Pulses>, Vec<[Interval; 2]>)> {
+        let (s, causes) = (self.s, &self.causes);
+        if s.delay_error == 0.0 {
+            return Some((None, vec![]));
+        }
+        let pulses = Pulses::new(s, &self.axis, rows, causes.switched, self.steps)?;
+        let changes = self.respond(rows[4], true);
+        let mut erred = Interval::ZERO;
+        let size = |n: usize| {
+            if n > 0 {
+                erred = erred.max(feedback.erred[n] + self.erred(&rows[4], 2));
+            }
+            let half = causes.disturbance * changes.seen[n] + number(2.0) * erred;
+            let norm = causes.inertia.acceleration * changes.seen[n] + changes.revised[n];
+            pulses.sizes(half, norm).map(upper)
+        };
+        let sizes = (0..=self.steps + 1).map(size).collect();
+        Some((Some(pulses), sizes))
     }
 
     /// Support of the start set along r Φⁿ for each n.
@@ -311,7 +297,8 @@ impl<'a> Builder<'a> {
         starts: &[Vec<Interval>; 5],
         unseen: &Pair,
     ) -> Deviation {
-        let Causes { disturbance, inertia, .. } = &self.causes;
+        let Causes { disturbance, inertia: InertiaError { acceleration: inertia, .. }, .. } =
+            &self.causes;
         let half = |i: usize| {
             let Response { seen, erred, .. } = &responses[i];
             *disturbance * seen[n] + erred[n] + starts[i][n]
@@ -336,15 +323,13 @@ impl<'a> Builder<'a> {
             let inertia = if compensated { *inertia * seen[n] } else { Interval::ZERO };
             Extent { half: upper(half), norm: upper(inertia + small) }
         };
-        let moment = number(self.s.inertia_error) / (Interval::ONE - number(self.s.inertia_error))
-            * number(self.s.limit_moment);
         Deviation {
             angle: vehicle(0),
             rate: vehicle(1),
             law_angle: law(2, true),
             law_rate: law(3, true),
             feedback: law(4, false),
-            inertia: upper(moment * responses[4].inertia[n]),
+            inertia: upper(responses[4].inertia[n]),
         }
     }
 

@@ -7,13 +7,13 @@
 //! plan's, so that the box of attitudes is divided as far as necessary.
 
 use super::law::{self, Range};
-use super::reach::Deviation;
+use super::deviation::Deviation;
 use super::{Left, PlanCheck};
 use crate::interval::Interval;
 use control::crmpc::Plan;
 
 /// Braking rate of angle of attack and bank, 1/s, by step 6 of docs/guarantee.md.
-const BRAKING: f64 = 0.01;
+pub(super) const BRAKING: f64 = 0.01;
 /// Width of the boxes of angles with which the search begins, rad.
 const WIDTH: f64 = 0.1;
 /// Smallest width of a box that is halved, rad.
@@ -26,7 +26,7 @@ fn down_to_zero(value: f64) -> Interval {
 
 impl PlanCheck {
     /// Bounds what happens after the horizon.
-    pub(super) fn rest(&self, plan: &Plan) -> Left {
+    pub(super) fn rest(&self, plan: &Plan, forever: &Deviation) -> Left {
         let nothing = Left { sideslip: f64::NAN, rate: f64::NAN, moment: f64::NAN };
         let Some(last) = plan.states.last() else { return nothing };
         let h = Interval::from(self.settings.period_optimisation);
@@ -42,12 +42,16 @@ impl PlanCheck {
         };
         let angles = [travelled(0), travelled(1)];
         let rates: [f64; 3] = std::array::from_fn(|i| last[3 + i]);
-        let left = self.sideslip_and_rates_at_rest(angles[1], &rates);
-        Left { moment: self.moment_at_rest(angles, &rates, &braking), ..left }
+        let left = self.sideslip_and_rates_at_rest(angles[1], &rates, forever);
+        Left { moment: self.moment_at_rest(angles, &rates, &braking, forever), ..left }
     }
 
-    fn sideslip_and_rates_at_rest(&self, sideslip: Interval, rates: &[f64; 3]) -> Left {
-        let forever = self.reach.forever();
+    fn sideslip_and_rates_at_rest(
+        &self,
+        sideslip: Interval,
+        rates: &[f64; 3],
+        forever: &Deviation,
+    ) -> Left {
         let off = forever.angle.component() + self.reach.bulge.component();
         let near = (sideslip.abs() - off).low.max(0.0);
         let cosine = super::body::sin_cos(Interval::from(near)).1;
@@ -68,14 +72,15 @@ impl PlanCheck {
         angles: [Interval; 2],
         rates: &[f64; 3],
         braking: &[Interval; 3],
+        forever: &Deviation,
     ) -> f64 {
         // The law evaluates the moment at the predicted attitude, which deviates from the plan's.
-        let off = self.reach.forever().law_angle.component().high;
+        let off = forever.law_angle.component().high;
         let mut boxes = divided(angles.map(|angle| angle + Interval::new(-off, off)));
         let mut least = 1.0_f64;
         while let Some(angles) = boxes.pop() {
-            let range = self.at_rest(angles, rates, braking);
-            let added = law::remainder(&self.body, &range) + self.added(self.reach.forever());
+            let range = at_rest(angles, rates, braking, forever);
+            let added = law::remainder(&self.body, &range) + self.added(forever);
             let left = self.left_of_moment(law::largest(&self.body, &range) + added.high);
             let wide = usize::from(angles[1].width() > angles[0].width());
             if left < 0.0 && angles[wide].width() > NARROWEST {
@@ -92,23 +97,28 @@ impl PlanCheck {
         }
         least
     }
+}
 
-    fn at_rest(&self, angles: [Interval; 2], rates: &[f64; 3], braking: &[Interval; 3]) -> Range {
-        let half = Interval::from(0.5);
-        let Deviation { law_rate, feedback, .. } = *self.reach.forever();
-        let middle = |side: Interval| Interval::from(side.middle());
-        let radius = |side: Interval| (side - middle(side)).abs();
-        let rates = rates.map(down_to_zero);
-        let sides = [angles[0], angles[1], rates[0], rates[1], rates[2]];
-        let deviation = |i: usize| if i < 2 { Interval::ZERO } else { law_rate.half };
-        let largest = |i: usize| half * braking[i] * rates[i].abs();
-        Range {
-            centre: sides.map(middle),
-            radii: std::array::from_fn(|i| Interval::from((radius(sides[i]) + deviation(i)).high)),
-            norms: [Interval::ZERO, law_rate.norm],
-            acceleration: std::array::from_fn(|i| -(braking[i] * middle(rates[i]))),
-            feedback: std::array::from_fn(|i| Interval::from((feedback.half + largest(i)).high)),
-        }
+fn at_rest(
+    angles: [Interval; 2],
+    rates: &[f64; 3],
+    braking: &[Interval; 3],
+    forever: &Deviation,
+) -> Range {
+    let half = Interval::from(0.5);
+    let Deviation { law_rate, feedback, .. } = *forever;
+    let middle = |side: Interval| Interval::from(side.middle());
+    let radius = |side: Interval| (side - middle(side)).abs();
+    let rates = rates.map(down_to_zero);
+    let sides = [angles[0], angles[1], rates[0], rates[1], rates[2]];
+    let deviation = |i: usize| if i < 2 { Interval::ZERO } else { law_rate.half };
+    let largest = |i: usize| half * braking[i] * rates[i].abs();
+    Range {
+        centre: sides.map(middle),
+        radii: std::array::from_fn(|i| Interval::from((radius(sides[i]) + deviation(i)).high)),
+        norms: [Interval::ZERO, law_rate.norm],
+        acceleration: std::array::from_fn(|i| -(braking[i] * middle(rates[i]))),
+        feedback: std::array::from_fn(|i| Interval::from((feedback.half + largest(i)).high)),
     }
 }
 

@@ -25,8 +25,12 @@ pub(super) struct Smoothness {
     pub(super) slope: Interval,
     /// Bound on ‖F″‖ along a trajectory with m held, rad/s⁴.
     pub(super) bend: Interval,
+    /// Bound on ‖F‖, rad/s².
+    pub(super) force: Interval,
     /// Bound on ‖ω̇‖, rad/s².
     pub(super) turning: Interval,
+    /// Bounds on ‖R‖ and on ‖Ṙ‖, 1/s.
+    pub(super) r: [Interval; 2],
     /// Bound on the rate of (α, β), rad/s.
     pub(super) angle_rate: Interval,
 }
@@ -115,7 +119,8 @@ impl Smoothness {
             + first * gamma
             + r * spin.bilinear * omega * number(3.0).sqrt() * size;
         let by_rates = (drift_by_rates(sideslip) + r * spin.bilinear) * omega;
-        Some(Self { by_rates, by_angles, slope, bend, turning: gamma, angle_rate })
+        let r = [r, first * angle_rate];
+        Some(Self { by_rates, by_angles, slope, bend, force, turning: gamma, r, angle_rate })
     }
 }
 
@@ -233,10 +238,11 @@ impl Growth {
         Self { exponential: upper(exponential), linear: upper(cap * turning), cap: upper(cap) }
     }
 
-    /// Upper bound of ‖I W R₀ I⁻¹‖ after turning by up to `angle` = ∫ ‖ω‖.
-    pub(super) fn after(&self, angle: Interval) -> Interval {
-        let exponential = large_exp(self.exponential * angle);
-        let linear = Interval::ONE + self.linear * angle;
+    /// Upper bound of ‖I W R₀ I⁻¹ X‖ after turning by up to `angle` = ∫ ‖ω‖, with ‖X‖ ≤ `size` and
+    /// ‖I⁻¹ X‖ ≤ ‖I⁻¹‖.
+    pub(super) fn after(&self, size: Interval, angle: Interval) -> Interval {
+        let exponential = size * large_exp(self.exponential * angle);
+        let linear = size + self.linear * angle;
         Interval::point(exponential.high.min(linear.high).min(self.cap.high))
     }
 }

@@ -138,7 +138,7 @@ fn oracle_no_adversary_exceeds_the_deviation_and_the_worst_one_comes_near() {
     let check = PlanCheck::new(&s).unwrap();
     let rows = [[1.0, 0.0], [0.0, 1.0], [s.feedback.k1, s.feedback.k2]];
     for ticks in [1, 2, 5, 25, 200] {
-        let deviation = check.reach.at(ticks);
+        let deviation = check.reach.around(&s, &Plan::new(0), ticks, &Past::default()).at(0);
         let bounds = [deviation.angle, deviation.rate, deviation.feedback];
         for inertia in [1.0 - s.inertia_error, 1.0, 1.0 + s.inertia_error] {
             for (i, row) in rows.into_iter().enumerate() {

@@ -1,0 +1,81 @@
+//! Bounds on the deviation from a nominal trajectory at one tick.
+
+use crate::interval::Interval;
+
+/// Bound on a vector with three components: the half width of the box that contains one part of it,
+/// and the norm of the other part.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Extent {
+    pub(super) half: Interval,
+    pub(super) norm: Interval,
+}
+
+impl Extent {
+    pub(super) const NONE: Self = Self { half: Interval::ZERO, norm: Interval::ZERO };
+
+    pub(super) fn max(self, other: Self) -> Self {
+        Self { half: self.half.max(other.half), norm: self.norm.max(other.norm) }
+    }
+
+    pub(super) fn more(self, half: Interval, norm: Interval) -> Self {
+        Self { half: upper(self.half + half), norm: upper(self.norm + norm) }
+    }
+
+    /// The same with more, of which `size` is per unit of each.
+    pub(super) fn pulsed(self, [half, norm]: [Interval; 2], size: f64) -> Self {
+        self.more(half * Interval::from(size), norm * Interval::from(size))
+    }
+
+    /// Bound on one component.
+    pub(super) fn component(self) -> Interval {
+        self.half + self.norm
+    }
+}
+
+/// Deviations at one tick: of the vehicle when the command begins to act, and of what the law
+/// computes from the predicted state.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Deviation {
+    /// Angles (rad) and rates (rad/s) of the vehicle.
+    pub(super) angle: Extent,
+    pub(super) rate: Extent,
+    /// Angles (rad) and rates (rad/s) at the predicted middle of the period.
+    pub(super) law_angle: Extent,
+    pub(super) law_rate: Extent,
+    /// Acceleration K ô, rad/s², without the part that compensates ν.
+    pub(super) feedback: Extent,
+    /// Moment that this part requires, N m.
+    pub(super) inertia: Interval,
+}
+
+impl Deviation {
+    pub(super) fn max(&self, other: &Self) -> Self {
+        Self {
+            angle: self.angle.max(other.angle),
+            rate: self.rate.max(other.rate),
+            law_angle: self.law_angle.max(other.law_angle),
+            law_rate: self.law_rate.max(other.law_rate),
+            feedback: self.feedback.max(other.feedback),
+            inertia: self.inertia.max(other.inertia),
+        }
+    }
+}
+
+impl Deviation {
+    /// The same with the effects of pulses of these sizes along each row.
+    pub(super) fn pulsed(&self, by: [Interval; 2], sums: &[f64; 6]) -> Self {
+        Self {
+            angle: self.angle.pulsed(by, sums[0]),
+            rate: self.rate.pulsed(by, sums[1]),
+            law_angle: self.law_angle.pulsed(by, sums[2]),
+            law_rate: self.law_rate.pulsed(by, sums[3]),
+            feedback: self.feedback.pulsed(by, sums[4]),
+            inertia: self.inertia,
+        }
+    }
+}
+
+/// Keeps the upper end of a bound.
+pub(super) fn upper(value: Interval) -> Interval {
+    Interval::point(value.high)
+}
