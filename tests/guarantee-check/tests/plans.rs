@@ -8,7 +8,7 @@ use guarantee_check::tally::{Tally, check_flights};
 #[test]
 fn recorded_plans_of_every_kind_of_settings_are_confirmed() {
     let mut total = Tally::default();
-    for seed in 0..8 {
+    for seed in 0..10 {
         let Some(settings) = draws::accepted(seed) else { continue };
         let tally = check_flights(&settings, seed..=seed, 1.0).unwrap();
         assert_eq!(tally.outside, 0, "draw {seed}");

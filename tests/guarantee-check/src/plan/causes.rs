@@ -31,6 +31,8 @@ pub(super) struct Switched {
     /// that keeps the direction.
     pub(super) factor: Interval,
     pub(super) straight: Interval,
+    /// Change of the rates by F, relative to a pulse, until the prediction contains the pulse.
+    pub(super) share: Interval,
     /// Bound on ‖F(y, m) − F(y′, m)‖ for the predicted middles y and y′ of two periods, rad/s².
     pub(super) turn: Interval,
 }
@@ -49,7 +51,9 @@ impl Switched {
         let [rate, angle] = later.updated;
         let turn = bounds.by_rates * (bounds.force * tau + swing + rate)
             + bounds.by_angles * (bounds.angle_rate * tau + swing * tau + angle);
-        Self { error, factor: straight * (one + bounds.r[0] * turned), straight, turn }
+        let end = number(s.delay) + tau;
+        let share = end * (bounds.by_rates + bounds.by_angles * end) / slack(bounds, end);
+        Self { error, factor: straight * (one + bounds.r[0] * turned), straight, share, turn }
     }
 }
 
@@ -131,21 +135,38 @@ impl InertiaError {
 ///
 /// If commands begin to act early or late, the integral of the moment over any time differs by that
 /// at both ends of this time, so that the rates are displaced by no more than `jump`.
+/// This counts for the distances; what it makes F differ by belongs to each pulse.
 fn mismatch(s: &Settings, bounds: &Smoothness, inertia: &InertiaError) -> Option<Mismatch> {
+    let end = number(s.delay) + number(s.period_feedback);
+    let jump = inertia.displaced * (bounds.r[0] + bounds.r[1] * end);
+    let Mismatch { apart, updated, .. } = mismatch_with(s, bounds, inertia, jump)?;
+    let without = mismatch_with(s, bounds, inertia, Interval::ZERO)?;
+    Some(Mismatch { apart, updated, ..without })
+}
+
+/// Part of one that remains when F drives two motions further apart in turn.
+fn slack(bounds: &Smoothness, end: Interval) -> Interval {
+    Interval::ONE - bounds.by_rates * end - number(0.5) * bounds.by_angles * end.square()
+}
+
+fn mismatch_with(
+    s: &Settings,
+    bounds: &Smoothness,
+    inertia: &InertiaError,
+    jump: Interval,
+) -> Option<Mismatch> {
     let (d, tau, half) = (number(s.delay), number(s.period_feedback), number(0.5));
     let (root2, root3) = (number(2.0).sqrt(), number(3.0).sqrt());
     let (delta, eta, e) =
         (number(s.disturbance_bound), number(s.angle_error), number(s.rate_error));
     let Smoothness { by_rates, by_angles, .. } = *bounds;
     let end = d + tau;
-    let InertiaError { acceleration: inertia, displaced, .. } = *inertia;
+    let InertiaError { acceleration: inertia, .. } = *inertia;
     let (drive, drive_of_two) = (root3 * delta + inertia, root2 * delta + inertia);
-    let jump = displaced * (bounds.r[0] + bounds.r[1] * end);
     let rates = |drive: Interval, t: Interval| root3 * e + jump + drive * t;
-    let angles = |drive: Interval, t: Interval| {
-        root2 * (eta + e * t) + jump * t + half * drive * t.square()
-    };
-    let slack = Interval::ONE - by_rates * end - half * by_angles * end.square();
+    let angles =
+        |drive: Interval, t: Interval| root2 * (eta + e * t) + jump * t + half * drive * t.square();
+    let slack = slack(bounds, end);
     if slack.low <= 0.1 {
         return None;
     }
@@ -202,7 +223,7 @@ impl Causes {
                 return Some(Self {
                     disturbance: number(s.disturbance_bound),
                     errors: [number(s.angle_error), number(s.rate_error)],
-                    switched: Switched::new(s, &bounds, &inertia, &later),
+                    switched: Switched::new(s, &wider, &inertia, &first),
                     inertia,
                     later,
                     first: (first, ticks),

@@ -23,8 +23,8 @@ use control::crmpc::{Constraints, Design, InitialState, Plan, Settings};
 use control::error_dynamics::InvariantSet;
 use deviation::Deviation;
 use law::Range;
-pub use pulses::Past;
 use nalgebra::Vector6;
+pub use pulses::Past;
 use reach::Reach;
 
 /// Smallest shares of the limits that a plan leaves unused; negative where the check does not

@@ -75,14 +75,19 @@ impl Pulses {
         let side = |q: usize| {
             let from = ((q - 1) as f64 * tau - d).max(-error);
             let to = (q as f64 * tau - d).min(error);
-            (q, responses(axis, rows, steps, (q, [from, to].map(number), number(tau))))
+            let times = [from, to, (q - 1) as f64 * tau - d, q as f64 * tau].map(number);
+            (q, responses(axis, rows, steps, (q, times, number(tau)), switched.share))
         };
         let sides: Vec<(usize, Vec<Sizes>)> = (first..=last.max(first)).map(side).collect();
-        let tail = axis.tails(steps).0 * number(d + error + tau).max(Interval::ONE);
+        let longest = number(d + error + tau).max(Interval::ONE);
+        let tail = axis.tails(steps).0 * longest * (Interval::ONE + switched.share);
         let size = |row: &Pair| ((row[0].abs() + row[1].abs()) * tail).high;
-        let rest: Sizes = std::array::from_fn(|i| {
-            if i == CHANGE { 2.0 * size(&rows[4]) } else { size(&rows[i]) }
-        });
+        let rest: Sizes =
+            std::array::from_fn(
+                |i| {
+                    if i == CHANGE { 2.0 * size(&rows[4]) } else { size(&rows[i]) }
+                },
+            );
         let largest = |l: usize| {
             sides.iter().fold([0.0; 6], |most, (_, side)| with(&most, &side[l], f64::max))
         };
@@ -114,7 +119,7 @@ impl Pulses {
     /// Returns the sizes of a pulse by changes of K ô within a box of this half width and by others
     /// with this norm (rad/s²), also of the form of a box and a norm (rad/s).
     pub(super) fn sizes(&self, half: Interval, norm: Interval) -> [Interval; 2] {
-        let Switched { error, factor, straight, turn } = self.switched;
+        let Switched { error, factor, straight, turn, .. } = self.switched;
         let again = self.sums.last().map_or(Interval::ALL, |sum| number(sum[CHANGE]));
         let one = Interval::ONE;
         let half = half / (one - error * straight * again);
@@ -141,30 +146,34 @@ impl Pulses {
     }
 }
 
-/// Responses after l ticks to a pulse at T_k + v, v between `from` and `to`, that tick k + q sees.
+/// Responses after l ticks to a pulse at T_k + v that tick k + q sees, with a `share` of it at any
+/// time until then. The limits of both times are `times`.
 fn responses(
     axis: &Axis,
     rows: &[Pair; 5],
     steps: usize,
-    (q, [from, to], tau): (usize, [Interval; 2], Interval),
+    (q, times, tau): (usize, [Interval; 4], Interval),
+    share: Interval,
 ) -> Vec<Sizes> {
     let unseen = (0..q).map(|l| {
         // The rate may jump anywhere about the tick.
-        let angle = (number(l as f64) * tau - from).max(Interval::ZERO).high;
-        [angle, 1.0, 0.0, 0.0, 0.0, 0.0]
+        let angle = (number(l as f64) * tau - times[0]).max(Interval::ZERO);
+        let more = Interval::ONE + share;
+        [(angle * more).high, more.high, 0.0, 0.0, 0.0, 0.0]
     });
     let mut before: Matrix = [[Interval::ZERO; 2]; 2];
     let seen = axis.transitions(steps.saturating_sub(q)).map(|power| {
-        let mut sizes = [0.0_f64; 6];
-        for v in [from, to] {
+        let response = |i: usize, v: Interval| {
             let pulse = [number(q as f64) * tau - v, Interval::ONE];
             let (now, old) = (applied(&power, &pulse), applied(&before, &pulse));
             let change = [now[0] - old[0], now[1] - old[1]];
-            for (i, size) in sizes.iter_mut().enumerate() {
-                let along = if i == CHANGE { along(&rows[4], &change) } else { along(&rows[i], &now) };
-                *size = size.max(along.abs().high);
-            }
-        }
+            (if i == CHANGE { along(&rows[4], &change) } else { along(&rows[i], &now) }).abs()
+        };
+        let sizes = std::array::from_fn(|i| {
+            let [itself, [first, last]] =
+                [[0, 1], [2, 3]].map(|pair| pair.map(|j| response(i, times[j])));
+            (itself[0].max(itself[1]) + share * first.max(last)).high
+        });
         before = power;
         sizes
     });
@@ -202,7 +211,11 @@ impl Carried {
             stages.push(a);
         }
         let change = |j: usize| {
-            if j % ratio == 0 { (stages[j / ratio] - stages[j / ratio - 1]).norm() } else { 0.0 }
+            if j.is_multiple_of(ratio) {
+                (stages[j / ratio] - stages[j / ratio - 1]).norm()
+            } else {
+                0.0
+            }
         };
         let each = pulses.per_change() * (1.0 + ROUNDING);
         let mut sizes: Vec<f64> = past.changes.iter().map(|change| each * change).collect();
@@ -233,7 +246,8 @@ impl Carried {
         }
         let more = braking.amax() * period * stages.last().map_or(0.0, nalgebra::Matrix::norm);
         let forever = endless(pulses, &sizes, each * more, fades[0]);
-        let forever = at[horizon - begin..].iter().fold(forever, |most, at| with(&most, at, f64::max));
+        let forever =
+            at[horizon - begin..].iter().fold(forever, |most, at| with(&most, at, f64::max));
         Self { at, forever, pulses: sizes.split_off(begin + early) }
     }
 

@@ -105,8 +105,7 @@ impl<'a> Builder<'a> {
     fn compensating(&self, age: Interval) -> Interval {
         let early = self.causes.smoothness.turning * number(self.s.delay).square();
         let jump = number(2.0).sqrt() * self.causes.errors[0] + early;
-        let (one, rate) =
-            (Interval::ONE, number(self.s.limit_rate) + self.causes.later.apart[0]);
+        let (one, rate) = (Interval::ONE, number(self.s.limit_rate) + self.causes.later.apart[0]);
         let angle = rate * age + jump;
         let InertiaError { direct, turned, root_condition, .. } = self.causes.inertia;
         direct * self.growth.after(one, angle) + turned * self.growth.after(root_condition, angle)
@@ -234,7 +233,8 @@ impl<'a> Builder<'a> {
         };
         let deviations: Vec<Deviation> = (0..=self.steps).map(at).collect();
         let forever = deviations.iter().fold(at(self.steps + 1), |most, at| most.max(at));
-        let accelerated = forever.feedback.more(zero, self.causes.inertia.acceleration * last(&responses[4]));
+        let accelerated =
+            forever.feedback.more(zero, self.causes.inertia.acceleration * last(&responses[4]));
         let bulge = Extent::NONE.more(
             eighth * tau.square() * accelerated.half,
             eighth * tau.square() * accelerated.norm,
@@ -299,6 +299,8 @@ impl<'a> Builder<'a> {
     ) -> Deviation {
         let Causes { disturbance, inertia: InertiaError { acceleration: inertia, .. }, .. } =
             &self.causes;
+        // What pulses change in F is summed along the predictions only.
+        let is_exact = self.s.delay_error == 0.0;
         let half = |i: usize| {
             let Response { seen, erred, .. } = &responses[i];
             *disturbance * seen[n] + erred[n] + starts[i][n]
@@ -306,8 +308,8 @@ impl<'a> Builder<'a> {
         let vehicle = |i: usize| {
             let Response { seen, mismatched, revised, begun, .. } = &responses[i];
             let erred = if n == 0 { self.erred(&rows[i], 2) } else { Interval::ZERO };
-            let along = mismatched[n] + begun[n];
-            let small = along.min(revised[n] + self.unseen(&rows[i]));
+            let (along, revised) = (mismatched[n] + begun[n], revised[n] + self.unseen(&rows[i]));
+            let small = if is_exact { along.min(revised) } else { revised };
             let pulses = seen[n] + unseen[i];
             let half = half(i) + *disturbance * unseen[i] + erred;
             Extent { half: upper(half), norm: upper(*inertia * pulses + small) }
@@ -318,7 +320,8 @@ impl<'a> Builder<'a> {
             let (mut half, mut small) = (half(i), Interval::ZERO);
             if n > 0 {
                 half = half + self.erred(&rows[i], 2);
-                small = (mismatched[n] + begun[n] + self.unseen(&rows[i])).min(revised[n]);
+                let along = mismatched[n] + begun[n] + self.unseen(&rows[i]);
+                small = if is_exact { along.min(revised[n]) } else { revised[n] };
             }
             let inertia = if compensated { *inertia * seen[n] } else { Interval::ZERO };
             Extent { half: upper(half), norm: upper(inertia + small) }

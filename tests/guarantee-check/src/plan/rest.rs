@@ -6,8 +6,8 @@
 //! is never exceeded. The moment depends on the attitude itself, and not on how far it is from the
 //! plan's, so that the box of attitudes is divided as far as necessary.
 
-use super::law::{self, Range};
 use super::deviation::Deviation;
+use super::law::{self, Range};
 use super::{Left, PlanCheck};
 use crate::interval::Interval;
 use control::crmpc::Plan;
