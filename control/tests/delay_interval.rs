@@ -1,9 +1,13 @@
 //! The deviation by commands that begin to act earlier or later than assumed, against simulations
 //! of one axis.
 
-use control::crmpc::{Carried, Constraints, Design, Settings, Switching};
+use control::crmpc::{Carried, Constraints, Design, Deviation, Settings, Switching};
 use control::error_dynamics::{Gain, response, transition};
-use nalgebra::Vector2;
+use control::linearise;
+use nalgebra::{Matrix3, Vector2, Vector3};
+use vehicle::kinematics;
+
+type V = Vector3<f64>;
 
 /// Parts of a feedback period in which an axis is simulated.
 const PARTS: i32 = 8;
@@ -190,5 +194,93 @@ fn oracle_changes_of_the_plan_leave_no_more_than_is_carried_along() {
             }
         }
         assert!(error == PARTS || closest > 0.5, "{delay} {error} {closest}");
+    }
+}
+
+/// Sizes of a deviation of which all but the moment are compared.
+fn sizes(deviation: &Deviation) -> [f64; 7] {
+    let Deviation {
+        angle,
+        rate,
+        seen_angle,
+        seen_rate,
+        middle_angle,
+        middle_rate,
+        feedback_norm,
+        ..
+    } = *deviation;
+    [angle, rate, seen_angle, seen_rate, middle_angle, middle_rate, feedback_norm]
+}
+
+#[test]
+fn oracle_changes_at_every_optimisation_leave_as_much_as_is_expected_for_ever() {
+    for (delay, error) in CASES {
+        let switching = Design::new(&settings(delay, error)).unwrap().tightening.switching.unwrap();
+        // What the motion begins with, and the size of each change later on.
+        for (first, each) in [(1.0, 0.0), (0.0, 1.0), (1.0, 0.1)] {
+            let mut carried = switching.begin(&Carried::zeros(), first);
+            let bounds = sizes(&switching.forever(&carried, each));
+            let mut largest = [0.0; 7];
+            for _ in 0..300 {
+                for (i, size) in sizes(&switching.deviation(&carried)).into_iter().enumerate() {
+                    assert!(size <= bounds[i] * (1.0 + 1e-9), "{delay} {error} {first} {i}");
+                    largest[i] = f64::max(largest[i], size);
+                }
+                carried = switching.begin(&switching.next(&carried), each);
+            }
+            // Changes of one size add up to the bound itself.
+            let near = |i: usize| largest[i] >= bounds[i] * (1.0 - 1e-6);
+            assert!(first > 0.0 || (0..7).all(near), "{delay} {error}: {largest:?} {bounds:?}");
+        }
+    }
+}
+
+/// Returns the acceleration of x_ω under a moment, from the moment that each acceleration needs.
+fn acceleration(s: &Settings, angles: &V, rates: &V, moment: &V) -> V {
+    let needed = |a: &V| linearise::moment(&s.body, angles, rates, a);
+    let without = needed(&V::zeros());
+    let columns = [V::x(), V::y(), V::z()].map(|unit| needed(&unit) - without);
+    Matrix3::from_columns(&columns).try_inverse().unwrap() * (moment - without)
+}
+
+#[test]
+fn oracle_a_pulse_is_as_large_as_inertia_and_turn_make_it() {
+    for share in [0.0, 0.1] {
+        let settings = Settings { inertia_error: share, disturbance_bound: 0.0, ..settings(8, 2) };
+        let switching = Design::new(&settings).unwrap().tightening.switching.unwrap();
+        let [none, one] = [0.0, 1.0].map(|change| switching.pulse_of_command(change));
+        let least = settings.delay_error / (1.0 - share);
+        assert!(one - none >= least && one - none < 1.5 * least, "{} {least}", one - none);
+        // The vehicle turns on under the older moment for a period. The worst state was sought.
+        let mut random = Random(7);
+        let mut largest: f64 = 0.0;
+        for _ in 0..20_000 {
+            let mut vector = |size: f64| random.direction() * size;
+            let (spin, moment) = (vector(settings.limit_rate), vector(settings.limit_moment));
+            let side = vector(settings.sideslip_domain).y.signum();
+            let angles = V::new(3.2 * vector(1.0).x, side * settings.sideslip_domain * 0.98, 0.0);
+            let rates = kinematics::r(&angles) * spin;
+            let at = |angles: &V, rates: &V| acceleration(&settings, angles, rates, &moment);
+            let (a, tau) = (at(&angles, &rates), settings.period_feedback);
+            let after = angles + (rates + a * (0.5 * tau)) * tau;
+            largest = largest.max((at(&after, &(rates + a * tau)) - a).norm());
+        }
+        assert!(largest <= switching.turn(), "{largest} {}", switching.turn());
+        assert!(largest > 0.3 * switching.turn(), "{largest} {}", switching.turn());
+    }
+}
+
+/// Random numbers of a repeatable sequence.
+struct Random(u64);
+
+impl Random {
+    fn between(&mut self, low: f64, high: f64) -> f64 {
+        self.0 =
+            self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        low + (high - low) * ((self.0 >> 11) as f64 / (1_u64 << 53) as f64)
+    }
+
+    fn direction(&mut self) -> V {
+        V::from_fn(|_, _| self.between(-1.0, 1.0)).normalize()
     }
 }

@@ -120,7 +120,7 @@ impl Robust {
     }
 
     /// Returns the largest measured ‖ω‖ that is compatible with the limit, rad/s.
-    fn rate_shown(&self) -> f64 {
+    pub(super) fn rate_shown(&self) -> f64 {
         let Settings { limit_rate, rate_error, angle_error, .. } = self.settings;
         let of_rates = 3.0_f64.sqrt() * rate_error;
         (limit_rate + of_rates + linearise::TURN_BY_ANGLES * 1.5 * limit_rate * angle_error)

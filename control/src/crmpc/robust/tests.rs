@@ -8,6 +8,7 @@ use crate::mpc::{self, Bounded};
 use proptest::prelude::*;
 use proptest::test_runner::{Config, RngAlgorithm, TestRng, TestRunner};
 use std::cell::Cell;
+use vehicle::kinematics;
 
 fn robust() -> Robust {
     let settings = Settings::new(Constraints::Robust).resolved().unwrap();
@@ -301,4 +302,30 @@ fn oracle_no_certified_stage_needs_more_than_its_limits_at_any_instant() {
 #[ignore = "a million stages take a minute; their numbers are in docs/guarantee.md"]
 fn oracle_no_certified_stage_of_a_million_needs_more_than_its_limits() {
     assert_stages_need_no_more_than_their_limits(250_000);
+}
+
+#[test]
+fn oracle_rates_at_their_limit_are_never_shown_beyond_what_errors_explain() {
+    let (settings, degree) = (Settings::new(Constraints::Robust), f64::to_radians(1.0));
+    let settings = Settings {
+        angle_error: 0.2 * degree,
+        rate_error: 0.2 * degree,
+        disturbance_bound: 0.2 * degree,
+        feedback: Gain { k1: -0.5, k2: -1.5 },
+        ..settings
+    };
+    let robust = Robust::new(&settings, &Design::new(&settings).unwrap());
+    let (random, mut largest) = (&mut Random(11), 0.0_f64);
+    for _ in 0..20_000 {
+        let edge = random.between(-1.0, 1.0) * settings.sideslip_domain;
+        let angles = Vector3::new(random.between(-3.2, 3.2), edge, 0.0);
+        let rates = random.direction() * settings.limit_rate;
+        let mut corner = |size: f64| random.direction().map(f64::signum) * size;
+        let seen = angles + corner(settings.angle_error);
+        let shown = kinematics::r(&angles) * rates + corner(settings.rate_error);
+        largest = largest.max((kinematics::r_inverse(&seen) * shown).norm());
+    }
+    let (beyond, explained) = (settings.limit_rate, robust.rate_shown());
+    assert!(largest <= explained, "{largest} {explained}");
+    assert!(largest - beyond > 0.8 * (explained - beyond), "{largest} {explained}");
 }
