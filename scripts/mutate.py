@@ -33,11 +33,11 @@ def copy_sources() -> None:
             shutil.copyfile(source, target)
 
 
-def failing(package: str, tests: list[str]) -> str | None:
+def failing(package: str, tests: list[str], options: list[str]) -> str | None:
     """Returns what fails in the tests within a package and in these of its other tests, or None if
-    all of them pass."""
+    all of them pass. The package may be another one than that of the fault."""
     chosen = [part for name in tests for part in ("--test", name)]
-    command = ["cargo", "test", "--locked", "--target-dir", BUILD, "-p", package, "--lib", *chosen]
+    command = ["cargo", "test", "--locked", "--target-dir", BUILD, "-p", package, *options, "--lib", *chosen]
     tested = subprocess.run(command, cwd=COPY, capture_output=True, text=True)
     if tested.returncode == 0:
         return None
@@ -60,7 +60,7 @@ def main() -> None:
             sys.exit(f"error: mutation {number}: {mutation['file']} has its text {text.count(mutation['from'])} times, not once")
         path.write_text(text.replace(mutation["from"], mutation["to"]), encoding="utf-8")
         try:
-            failed = failing(mutation["package"], mutation["tests"])
+            failed = failing(mutation["package"], mutation["tests"], mutation.get("options", []))
         finally:
             path.write_text(text, encoding="utf-8")
         survivors += failed is None
