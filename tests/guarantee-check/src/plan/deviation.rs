@@ -11,8 +11,6 @@ pub(super) struct Extent {
 }
 
 impl Extent {
-    pub(super) const NONE: Self = Self { half: Interval::ZERO, norm: Interval::ZERO };
-
     pub(super) fn max(self, other: Self) -> Self {
         Self { half: self.half.max(other.half), norm: self.norm.max(other.norm) }
     }
@@ -46,6 +44,8 @@ pub(super) struct Deviation {
     pub(super) feedback: Extent,
     /// Moment that this part requires, N m.
     pub(super) inertia: Interval,
+    /// Largest distance of an angle from the chord to the next tick, rad.
+    pub(super) bulge: Interval,
 }
 
 impl Deviation {
@@ -57,6 +57,7 @@ impl Deviation {
             law_rate: self.law_rate.max(other.law_rate),
             feedback: self.feedback.max(other.feedback),
             inertia: self.inertia.max(other.inertia),
+            bulge: self.bulge.max(other.bulge),
         }
     }
 }
@@ -70,7 +71,7 @@ impl Deviation {
             law_angle: self.law_angle.pulsed(by, sums[2]),
             law_rate: self.law_rate.pulsed(by, sums[3]),
             feedback: self.feedback.pulsed(by, sums[4]),
-            inertia: self.inertia,
+            ..*self
         }
     }
 }

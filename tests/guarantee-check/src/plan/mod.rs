@@ -191,8 +191,8 @@ impl PlanCheck {
         more: [Interval; 2],
     ) -> Left {
         let ends = [0, 1].map(|i| (stage.at((j + i) as f64), around.at(tick + i)));
-        let angle = ends[0].1.angle.max(ends[1].1.angle);
-        let off = angle.component() + self.reach.bulge.component() + more[0];
+        let angles = ends.map(|(_, deviation)| deviation.angle.component());
+        let off = angles[0].max(angles[1]) + ends[0].1.bulge + more[0];
         let swept = stage.sideslip(j).abs();
         // The plan's rates are straight lines, and the deviation is convex but for the swing, so
         // that ‖ω‖ is largest at an end.
@@ -203,7 +203,7 @@ impl PlanCheck {
             let squares = (cosine * size(0)).square() + size(1).square() + size(2).square();
             squares.sqrt() + deviation.rate.norm + self.reach.swing + more[1]
         });
-        let size = swept + off;
+        let size = stage.farthest_sideslip(j, angles) + ends[0].1.bulge + more[0];
         let Settings { sideslip_domain, limit_rate, .. } = self.settings;
         Left {
             sideslip: (sideslip_domain - size.high) / sideslip_domain,
@@ -290,6 +290,21 @@ impl Stage {
                 self.state[i] + t * self.acceleration[i - 3]
             }
         })
+    }
+
+    /// Largest |β| from feedback tick `j` until the next, with a deviation below the straight line
+    /// between these values at both ends: a parabola is largest at an end or at its vertex.
+    fn farthest_sideslip(&self, j: usize, off: [Interval; 2]) -> Interval {
+        let [from, to] = [j, j + 1].map(|j| self.at(j as f64));
+        let largest = |side: fn(Interval) -> Interval| {
+            let (rate, a) =
+                (side(from[4]) + (off[1] - off[0]) / self.period, side(self.acceleration[1]));
+            let (begin, end) = (side(from[1]) + off[0], side(to[1]) + off[1]);
+            let turns = a.high < 0.0 && rate.high > 0.0 && (rate + a * self.period).low < 0.0;
+            let vertex = begin - Interval::from(0.5) * rate.square() / a;
+            begin.max(end).max(if turns { vertex } else { begin })
+        };
+        largest(|value| value).max(largest(|value| -value))
     }
 
     /// All sideslip angles from feedback tick `j` until the next, with the vertex of the parabola.

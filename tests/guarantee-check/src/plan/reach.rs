@@ -48,8 +48,6 @@ struct Response {
 pub(super) struct Reach {
     pub(super) deviations: Vec<Deviation>,
     pub(super) forever: Deviation,
-    /// Largest distance of an angle from the chord between two ticks, rad.
-    pub(super) bulge: Extent,
     /// Largest additional deviation of the rates between two ticks, rad/s.
     pub(super) swing: Interval,
     pub(super) pulses: Option<Pulses>,
@@ -231,19 +229,20 @@ impl<'a> Builder<'a> {
                 Deviation { rate: at.rate.pulsed(next, 1.0), ..at }
             }
         };
+        // K ô is held between two ticks.
+        let at = |n: usize| {
+            let at = at(n);
+            let held =
+                at.feedback.component() + self.causes.inertia.acceleration * responses[4].seen[n];
+            Deviation { bulge: upper(eighth * tau.square() * held), ..at }
+        };
         let deviations: Vec<Deviation> = (0..=self.steps).map(at).collect();
         let forever = deviations.iter().fold(at(self.steps + 1), |most, at| most.max(at));
-        let accelerated =
-            forever.feedback.more(zero, self.causes.inertia.acceleration * last(&responses[4]));
-        let bulge = Extent::NONE.more(
-            eighth * tau.square() * accelerated.half,
-            eighth * tau.square() * accelerated.norm,
-        );
         let Smoothness { slope, bend, .. } = self.causes.smoothness;
         let swing = eighth * tau.square() * (slope + bend * tau);
         let fades = [8, 16].map(|times| self.axis.halved(times));
         let bounded = forever.rate.norm.high.is_finite();
-        bounded.then_some(Reach { deviations, forever, bulge, swing, pulses, sizes, fades })
+        bounded.then_some(Reach { deviations, forever, swing, pulses, sizes, fades })
     }
 
     /// Returns the responses to pulses, and the sizes at each tick of those by changes of K ô.
@@ -333,6 +332,7 @@ impl<'a> Builder<'a> {
             law_rate: law(3, true),
             feedback: law(4, false),
             inertia: upper(responses[4].inertia[n]),
+            bulge: Interval::ZERO,
         }
     }
 
@@ -341,8 +341,4 @@ impl<'a> Builder<'a> {
         let [angle, rate] = self.causes.first.0.unseen;
         row[0].abs() * angle + row[1].abs() * rate
     }
-}
-
-fn last(response: &Response) -> Interval {
-    response.seen.last().copied().unwrap_or(Interval::ALL)
 }

@@ -52,7 +52,7 @@ impl PlanCheck {
         rates: &[f64; 3],
         forever: &Deviation,
     ) -> Left {
-        let off = forever.angle.component() + self.reach.bulge.component();
+        let off = forever.angle.component() + forever.bulge;
         let near = (sideslip.abs() - off).low.max(0.0);
         let cosine = super::body::sin_cos(Interval::from(near)).1;
         let size = |i: usize| Interval::from(rates[i].abs()) + forever.rate.half;
