@@ -329,3 +329,33 @@ fn oracle_rates_at_their_limit_are_never_shown_beyond_what_errors_explain() {
     assert!(largest <= explained, "{largest} {explained}");
     assert!(largest - beyond > 0.8 * (explained - beyond), "{largest} {explained}");
 }
+
+#[test]
+fn oracle_rates_between_two_stages_exceed_their_line_by_no_more_than_is_counted() {
+    let robust = robust();
+    let Settings { limit_rate, limit_moment, sideslip_domain, period_optimisation: h, .. } =
+        robust.settings;
+    let most = limit_moment / robust.design.smallest_inertia;
+    let (random, mut largest) = (&mut Random(5), 0.0_f64);
+    for _ in 0..5_000 {
+        let edge = random.between(-1.0, 1.0) * sideslip_domain;
+        let stage = Stage {
+            angles: Vector3::new(random.between(-3.2, 3.2), edge, 0.0),
+            rates: random.within_ball(limit_rate),
+            acceleration: random.within_ball(most),
+        };
+        let rate = |share: f64| {
+            let (angles, rates) = stage.at(share * h);
+            (InverseKinematics::at(&angles).body_rates(&rates).0.norm(), rates.norm())
+        };
+        let [(from, x), (to, y)] = [rate(0.0), rate(1.0)];
+        let counted =
+            robust.design.tightening.rate_loss(0).within(x.max(y), stage.acceleration.norm());
+        for share in [0.25, 0.5, 0.75] {
+            let beyond = rate(share).0 - (from + share * (to - from));
+            assert!(beyond <= counted, "{beyond} {counted}");
+            largest = largest.max(beyond / counted);
+        }
+    }
+    assert!(largest > 0.02, "{largest}");
+}
