@@ -359,3 +359,24 @@ fn oracle_rates_between_two_stages_exceed_their_line_by_no_more_than_is_counted(
     }
     assert!(largest > 0.02, "{largest}");
 }
+
+#[test]
+fn oracle_a_sideslip_that_falls_as_the_deviation_grows_keeps_its_domain_at_every_tick() {
+    let mut robust = robust();
+    let Settings { period_feedback: tau, period_optimisation: h, .. } = robust.settings;
+    let domain = robust.settings.sideslip_domain;
+    for age in 0..40 {
+        robust.age = age;
+        let off = |i: usize| robust.design.tightening.at(age + i).angle;
+        let rate = (off(0) - off(robust.design.ratio)) / h;
+        let keeps = |from: f64| robust.keeps_sideslip(0, [from, rate], 0.0, from + rate * h);
+        let (mut low, mut high) = (0.0, domain);
+        for _ in 0..50 {
+            let middle = 0.5 * (low + high);
+            if keeps(middle) { low = middle } else { high = middle }
+        }
+        let at = |i: usize| low + rate * i as f64 * tau + off(i);
+        let largest = (0..=robust.design.ratio).map(at).fold(0.0, f64::max);
+        assert!((largest - domain).abs() < 1e-9, "{age}: {largest} {domain}");
+    }
+}
