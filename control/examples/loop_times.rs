@@ -167,11 +167,12 @@ fn print(delay: f64, flown: &mut Flown, base: f64) {
     let largest = |value: fn(&Shown) -> f64| shown.iter().map(value).fold(0.0, f64::max);
     let flights = shown.len() as f64;
     println!(
-        "delay {delay} s: ms mean {mean_ms:.4} ({:.2} of the first loop), median {:.4}, p99 {:.3}, worst {:.3}; \
+        "delay {delay} s: ms mean {mean_ms:.4} ({:.2} of the first loop), median {:.4}, p99 {:.3}, p99.9 {:.3}, worst {:.3}; \
          iterations per flight {:.1} in {:.1} optimisations, most {}",
         mean_ms / base,
         place(0.5),
         place(0.99),
+        place(0.999),
         place(1.0),
         f64::from(iterations) / flights,
         active as f64 / flights,
