@@ -134,6 +134,12 @@ pub trait Bounded<const O: usize> {
         false
     }
 
+    /// Returns whether another optimisation follows if this one finds no optimum. A search that
+    /// makes no progress is then ended early, and not begun anew from another guess.
+    fn has_another_start(&self) -> bool {
+        false
+    }
+
     /// Returns the radius ε of the terminal constraint, if there is one.
     fn terminal_radius(&self) -> Option<f64> {
         None
@@ -152,6 +158,10 @@ pub(super) struct Within<'a, const O: usize> {
 impl<const O: usize> Constraints<O> for Within<'_, O> {
     fn follows(&self) -> bool {
         self.follows
+    }
+
+    fn has_another_start(&self) -> bool {
+        self.bounded.has_another_start()
     }
 
     fn renew(&self, k: usize, stage: StagePoint<O>, next: StagePoint<O>) {

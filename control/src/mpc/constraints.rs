@@ -58,6 +58,11 @@ pub trait Constraints<const O: usize> {
         false
     }
 
+    /// Returns whether another optimisation follows if this one finds no optimum.
+    fn has_another_start(&self) -> bool {
+        false
+    }
+
     /// Computes the bounds of the input constraint of stage `k` and of the state constraint of the
     /// next stage anew from these two stages, if they depend on the trajectory. Until then they are
     /// held.

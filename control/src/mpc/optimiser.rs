@@ -138,12 +138,14 @@ impl<const O: usize> Optimiser<O> {
         if outcome.solved() {
             return Some(SolverStatus::Constrained);
         }
-        if search.is_warm() && !self.is_exhausted() {
+        let is_hopeless =
+            outcome.hopeless() && (!search.is_warm() || sample.bounded.has_another_start());
+        if search.is_warm() && !is_hopeless && !self.is_exhausted() {
             // The first guess was misleading.
             self.begin_cold(sample, search);
             return self.by_riccati(sample, search);
         }
-        if outcome.hopeless() && !search.is_warm() {
+        if is_hopeless {
             search.give_up();
         }
         None

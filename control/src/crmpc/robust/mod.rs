@@ -30,6 +30,8 @@ pub(super) struct Robust {
     pub age: usize,
     /// Applied share of the tightening; below 1 only for best effort.
     pub share: f64,
+    /// Whether another optimisation follows if this one finds no optimum.
+    pub another: bool,
     /// What the motion follows on.
     pub onset: Onset,
     /// Part of the rate limit that the turn of the trajectory needs, rad/s.
@@ -80,6 +82,7 @@ impl Robust {
             stages: Stages::new(horizon, body, period_optimisation),
             age: 0,
             share: 1.0,
+            another: false,
             onset: Onset::default(),
             carried: RefCell::new(Vec::with_capacity(settings.horizon + 1)),
         }
@@ -89,6 +92,7 @@ impl Robust {
     /// ticks ago and follows on `onset`, with the given share of the tightening.
     pub(super) fn begin(&mut self, age: usize, share: f64, onset: &Onset) {
         (self.age, self.share, self.onset) = (age, share, *onset);
+        self.another = false;
     }
 
     /// Returns what an unknown part of the delay adds, with what is carried along at stage `k`.

@@ -111,6 +111,10 @@ impl Bounded<2> for Robust {
         true
     }
 
+    fn has_another_start(&self) -> bool {
+        self.another
+    }
+
     /// Returns whether the full moment over one interval cannot bring the rates down to the bound
     /// at its end.
     fn out_of_reach(&self, start: &State<2>) -> bool {

@@ -101,6 +101,9 @@ impl Robust {
         let mut iterations = 0;
         for (start, age, onset) in starts.into_iter().flatten() {
             self.begin(age as usize, 1.0, &onset);
+            // If the last optimisation has not begun at the measured state either, this one will
+            // hardly find an optimum there.
+            self.another = assured && age == 0 && memory.age > self.design.ratio as u32;
             let (report, certified) = self.certified(planner, memory, &start, anew);
             iterations += report.iterations;
             let solved = report.status != SolverStatus::Fallback;

@@ -43,7 +43,9 @@ impl<const O: usize> Riccati<O> {
     ) -> Outcome {
         let problem = &mut Problem { ..*problem };
         self.begin(problem, solution, first, warm);
-        let mut progress = Progress::new(problem.constraints.follows(), warm);
+        let constraints = problem.constraints;
+        let mut progress =
+            Progress::new(constraints.follows(), warm, constraints.has_another_start());
         for iteration in 0..=self.max_iterations {
             let residuals = self.residuals(problem);
             if residuals.converged(progress.feasibility) {

@@ -18,10 +18,18 @@ const STALLED_STEPS: u32 = 4;
 /// trajectory.
 const PATIENCE: (u32, f64) = (30, 1e3);
 const PATIENCE_FOLLOWING: (u32, f64) = (16, f64::INFINITY);
+/// Patience of a search, cold or warm, behind which another one begins from another start: it ends
+/// in time for that one, with bounds of any kind.
+const PATIENCE_ANOTHER: (u32, u32) = (10, 8);
 /// A search runs in a cycle when its residual has not been halved in `CIRCLING` iterations; its
 /// steps are then multiplied by `DAMPING`.
 const CIRCLING: u32 = 8;
 const DAMPING: f64 = 0.5;
+/// Where only the bounds still move, a step that leaves more than this share of the residual
+/// overshoots: the bounds answer the trajectory by almost as much in the other direction. Every
+/// other step is then multiplied by `DAMPING`, which ends that; the whole steps between them end
+/// what does not answer.
+const OVERSHOOTING: f64 = 0.5;
 /// A first guess is misleading when the residual of the norm constraints exceeds the least one so
 /// far by this factor; least values below 1 count as 1.
 const ASTRAY: f64 = 1e3;
@@ -42,17 +50,39 @@ pub(super) struct Progress {
     best: (f64, u32),
     /// Least residual of the norm constraints so far, at least 1.
     least_outside: f64,
+    /// Whether the bounds follow the trajectory.
+    follows: bool,
+    /// Whether steps have overshot the bounds, and whether the last one was damped for that.
+    overshoots: bool,
+    damped: bool,
+    /// Residual of the last iterate.
+    last: f64,
 }
 
 impl Progress {
-    pub(super) fn new(follows: bool, warm: bool) -> Self {
-        let (feasibility, patience) = if follows {
+    /// Begins a search, from the solution of a similar problem if it is `warm`. `another` says that
+    /// a search from another start follows if this one fails.
+    pub(super) fn new(follows: bool, warm: bool, another: bool) -> Self {
+        let (feasibility, mut patience) = if follows {
             (FEASIBILITY_FOLLOWING, PATIENCE_FOLLOWING)
         } else {
             (FEASIBILITY, PATIENCE)
         };
-        let best = (f64::INFINITY, 0);
-        Self { feasibility, patience, warm, short_steps: 0, best, least_outside: f64::INFINITY }
+        if another {
+            patience.0 = if warm { PATIENCE_ANOTHER.1 } else { PATIENCE_ANOTHER.0 };
+        }
+        Self {
+            feasibility,
+            patience,
+            warm,
+            short_steps: 0,
+            best: (f64::INFINITY, 0),
+            least_outside: f64::INFINITY,
+            follows,
+            overshoots: false,
+            damped: false,
+            last: f64::INFINITY,
+        }
     }
 
     /// Returns the length of the step to take from an iterate with these residuals, whose direction
@@ -79,7 +109,17 @@ impl Progress {
         if self.warm && residuals.feasibility > ASTRAY * self.least_outside {
             return Err(Outcome::Failed(iteration + 1));
         }
-        Ok(if since >= CIRCLING { DAMPING * length } else { length })
+        let is_damped = self.overshoots_bounds(residual, residuals.is_closed());
+        Ok(if is_damped || since >= CIRCLING { DAMPING * length } else { length })
+    }
+
+    /// Returns whether the next step is to be damped because the bounds answer the steps.
+    fn overshoots_bounds(&mut self, residual: f64, closed: bool) -> bool {
+        let answers = self.follows && closed && residual > OVERSHOOTING * self.last;
+        self.overshoots |= answers;
+        self.damped = self.overshoots && !self.damped;
+        self.last = residual;
+        self.damped
     }
 }
 

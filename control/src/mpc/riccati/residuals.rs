@@ -28,9 +28,12 @@ pub(super) struct Residuals {
 
 impl Residuals {
     pub(super) fn converged(&self, feasibility: f64) -> bool {
-        self.stationarity <= STATIONARITY
-            && self.feasibility <= feasibility
-            && self.gap <= GAP * self.cost
+        self.stationarity <= STATIONARITY && self.feasibility <= feasibility && self.is_closed()
+    }
+
+    /// Returns whether complementarity has converged.
+    pub(super) fn is_closed(&self) -> bool {
+        self.gap <= GAP * self.cost
     }
 
     /// Returns the mean μ of sλ.

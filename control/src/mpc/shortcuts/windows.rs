@@ -40,8 +40,9 @@ fn in_windows<const O: usize>(
         let outcome = optimiser.interior_point(sample, search, window.clone());
         if !outcome.solved() {
             // If no trajectory satisfies the norm constraints within the window, none does over the
-            // horizon, unless the first guess was misleading.
-            let is_hopeless = outcome.hopeless() && !search.is_warm();
+            // horizon, unless the first guess was misleading. Another start is then the better one.
+            let is_hopeless =
+                outcome.hopeless() && (!search.is_warm() || sample.bounded.has_another_start());
             optimiser.begin_cold(sample, search);
             if is_hopeless {
                 search.give_up();
