@@ -100,6 +100,12 @@ impl Crmpc {
         &self.design
     }
 
+    /// Returns the distance from the measured angles beyond which a reference is replaced by one on
+    /// the way to it, rad; infinite with the paper's sets.
+    pub fn reach(&self) -> f64 {
+        self.planner.reach
+    }
+
     /// Returns the last optimisation as data.
     pub fn posed(&mut self) -> Posed {
         let Planner { optimiser, start, .. } = &self.planner;

@@ -43,7 +43,7 @@ pub(super) struct Planner {
     /// Shift of the reference's angles by the observer, rad.
     shift: Vector3<f64>,
     /// Distance from the measured angles beyond which a reference is replaced, rad.
-    reach: f64,
+    pub reach: f64,
     /// State from which the last optimisation began.
     pub start: Vector6<f64>,
 }
