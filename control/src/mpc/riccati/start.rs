@@ -20,9 +20,6 @@ const WARM: (f64, f64) = (3e-4, 1e-6);
 /// First guess that violates a norm constraint by far: smallest slack, and Σ sλ relative to half
 /// the cost.
 const FAR: (f64, f64) = (3.0, 10.0);
-/// The same for a constraint that a warm start violates by far. Only this constraint begins anew,
-/// as the multipliers of the others are still those of a similar problem.
-const FAR_WARM: (f64, f64) = (1.0, 1.0);
 /// A first guess violates a norm constraint by far when c exceeds this value.
 const FAR_OUTSIDE: f64 = 1.5;
 
@@ -80,16 +77,9 @@ impl<const O: usize> Riccati<O> {
         let pairs = self.stages[..=self.horizon]
             .iter()
             .flat_map(|stage| [&stage.state_pair, &stage.input_pair]);
-        if !pairs.filter(|pair| pair.watched).any(|pair| pair.c > FAR_OUTSIDE) {
-            return;
+        if pairs.filter(|pair| pair.watched).any(|pair| pair.c > FAR_OUTSIDE) {
+            self.each_pair(problem, |pair| pair.begin(FAR.0, FAR.1 * share, 0.0));
         }
-        self.each_pair(problem, |pair| {
-            if !warm {
-                pair.begin(FAR.0, FAR.1 * share, 0.0);
-            } else if pair.c > FAR_OUTSIDE {
-                pair.begin(FAR_WARM.0, FAR_WARM.1 * share, pair.multiplier);
-            }
-        });
     }
 
     /// Includes the norm constraints that a step to sλ = `centre` has come near.
