@@ -50,8 +50,8 @@ pub(super) struct Progress {
     best: (f64, u32),
     /// Least residual of the norm constraints so far, at least 1.
     least_outside: f64,
-    /// Whether the bounds follow the trajectory.
-    follows: bool,
+    /// Share of the residual above which a step overshoots; infinite if the bounds are held.
+    overshooting: f64,
     /// Whether steps have overshot the bounds, and whether the last one was damped for that.
     overshoots: bool,
     damped: bool,
@@ -78,7 +78,7 @@ impl Progress {
             short_steps: 0,
             best: (f64::INFINITY, 0),
             least_outside: f64::INFINITY,
-            follows,
+            overshooting: if follows { OVERSHOOTING } else { f64::INFINITY },
             overshoots: false,
             damped: false,
             last: f64::INFINITY,
@@ -115,7 +115,7 @@ impl Progress {
 
     /// Returns whether the next step is to be damped because the bounds answer the steps.
     fn overshoots_bounds(&mut self, residual: f64, closed: bool) -> bool {
-        let answers = self.follows && closed && residual > OVERSHOOTING * self.last;
+        let answers = closed && residual > self.overshooting * self.last;
         self.overshoots |= answers;
         self.damped = self.overshoots && !self.damped;
         self.last = residual;
