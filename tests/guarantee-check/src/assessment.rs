@@ -52,7 +52,7 @@ fn drive(s: &Settings, lemmas: &Lemmas) -> Drive {
     let number = Interval::from;
     let (root2, root3) = (number(2.0).sqrt(), number(3.0).sqrt());
     let [limit, smallest, largest, disturbance] =
-        [s.limit_moment, lemmas.smallest, lemmas.largest, s.disturbance_bound].map(number);
+        [s.limit_total(), lemmas.smallest, lemmas.largest, s.disturbance_bound].map(number);
     let (common, tensor) = (number(s.inertia_error), number(s.tensor_error));
     let (rate, sideslip) = lemmas.vehicle;
     let square = number(rate).square();
@@ -149,7 +149,7 @@ fn driven(s: &Settings, lemmas: &Lemmas, before: &Lemmas) -> Driven {
     let by_turn = largest / smallest * number(lemmas.turn) * number(before.r);
     let (rate, _) = before.vehicle;
     let spin =
-        (number(s.limit_moment) + half * (largest - smallest) * number(rate).square()) / smallest;
+        (number(s.limit_total()) + half * (largest - smallest) * number(rate).square()) / smallest;
     Driven {
         early,
         between: first.slope * tau.square() / number(8.0)
@@ -381,7 +381,7 @@ pub fn check(
     note("deviation at every tick, share of its bound", 1.0, share);
     let [rates, moment] = needed(lemmas, forever, terminal_rate);
     note("rate needed beyond the horizon", s.limit_rate, rates);
-    note("moment needed beyond the horizon", s.limit_moment, moment);
+    note("moment needed beyond the horizon", s.limit_moment - s.needed_by_known(), moment);
     Some(findings)
 }
 

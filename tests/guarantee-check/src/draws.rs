@@ -106,6 +106,8 @@ fn anything(random: &mut Random, published: &Settings) -> Settings {
         period_optimisation: period_feedback * (1 + random.below(longest)) as f64,
         limit_rate: published.limit_rate * random.between(0.5, 2.0),
         limit_moment: published.limit_moment * random.between(0.5, 3.0),
+        known_bound: published.limit_moment * random.between(-0.2, 0.2).max(0.0),
+        known_change: published.limit_moment * random.between(-0.05, 0.05).max(0.0),
         sideslip_domain: random.between(10.0, 35.0).to_radians(),
         initial_state,
         ..*published

@@ -19,6 +19,7 @@ fn the_sums_hold_for_every_kind_of_drawn_settings() {
             guarantee: Guarantee::BestEffort,
             ..drawn
         };
+        let settings = settings.resolved().unwrap();
         let design = Design::new(&settings).unwrap();
         if design.accepted_share < 1.0 || settings.initial_state == InitialState::Tube {
             continue;

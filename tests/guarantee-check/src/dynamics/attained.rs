@@ -69,7 +69,7 @@ pub(super) fn attained(s: &Settings, sizes: (f64, f64), curved: (f64, f64)) -> [
     // This gives the state (α, β), x and m, with x = R ω.
     let state = |z: &[f64; COORDINATES]| {
         let [alpha, beta] = angles(z);
-        let (omega, m) = (ball(&z[2..5], s.limit_rate), ball(&z[5..8], s.limit_moment));
+        let (omega, m) = (ball(&z[2..5], s.limit_rate), ball(&z[5..8], s.limit_total()));
         let x = Turn::new(beta.sin(), beta.cos()).r(&turned(alpha.sin(), alpha.cos(), &omega));
         ([alpha, beta], x, m)
     };

@@ -18,7 +18,7 @@ pub(super) fn from_lemmas(
         [sup.drift, sup.curvature, sup.turn, sup.mixed, sup.twice, sup.fourth, sup.r].map(upper);
     let [largest, inverse, bilinear, bilinear_inverse] =
         [sup.largest, sup.inverse, two * sup.spin, two * sup.spin_inverse].map(upper);
-    let (limit, moment) = (number(s.limit_rate), number(s.limit_moment));
+    let (limit, moment) = (number(s.limit_rate), number(s.limit_total()));
     let rate = r * limit;
     // These are the bounds of ‖G‖ and ‖∂G/∂(α, β)‖.
     let inner = inverse * moment + half * bilinear_inverse * limit.square() + drift * rate.square();

@@ -113,7 +113,8 @@ impl InertiaError {
         let [x, z, y] = body.principal();
         let (smallest, largest) = (x.min(y).min(z), x.max(y).max(z));
         let (one, half, square) = (Interval::ONE, number(0.5), number(rate).square());
-        let [common, tensor, limit] = [s.inertia_error, s.tensor_error, s.limit_moment].map(number);
+        let [common, tensor, limit] =
+            [s.inertia_error, s.tensor_error, s.limit_total()].map(number);
         let range = (one + tensor) * largest - (one - tensor) * smallest;
         let direct = common / (one - common) * limit + tensor * largest * square;
         let turned = tensor / (one - tensor) * (limit / (one - common) + half * range * square);

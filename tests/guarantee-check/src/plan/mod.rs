@@ -217,7 +217,8 @@ impl PlanCheck {
         let ranges = (0..self.ratio).map(|j| Self::range(stage, j, &around.at(tick + j)));
         let Some(hull) = ranges.clone().reduce(|a, b| a.hull(&b)) else { return f64::NAN };
         let remainder = law::remainder(&self.body, &hull);
-        let limit = self.settings.limit_moment;
+        // The flights have no known moment, but one might begin to act while the plan is followed.
+        let limit = self.settings.limit_moment - self.settings.known_change;
         let largest = ranges.enumerate().map(|(j, range)| {
             let added = self.added(&around.at(tick + j));
             let bound = (Interval::from(law::largest(&self.body, &range)) + remainder + added).high;
@@ -227,11 +228,7 @@ impl PlanCheck {
             let rest = (Interval::from(limit) - added).low;
             (Interval::from(law::divided(&self.body, &range, rest, HALVINGS)) + added).high
         });
-        self.left_of_moment(largest.fold(0.0, f64::max))
-    }
-
-    fn left_of_moment(&self, moment: f64) -> f64 {
-        (self.settings.limit_moment - moment) / self.settings.limit_moment
+        (limit - largest.fold(0.0, f64::max)) / self.settings.limit_moment
     }
 
     /// Moment by the parts of K ô that are bounded in norm, N m: ‖I W k‖ ≤ λ_max(I) ‖k‖.

@@ -81,7 +81,9 @@ impl PlanCheck {
         while let Some(angles) = boxes.pop() {
             let range = at_rest(angles, rates, braking, forever);
             let added = law::remainder(&self.body, &range) + self.added(forever);
-            let left = self.left_of_moment(law::largest(&self.body, &range) + added.high);
+            let limit = self.settings.limit_moment;
+            let moment = law::largest(&self.body, &range) + added.high;
+            let left = (limit - self.settings.needed_by_known() - moment) / limit;
             let wide = usize::from(angles[1].width() > angles[0].width());
             if left < 0.0 && angles[wide].width() > NARROWEST {
                 let middle = angles[wide].middle();

@@ -96,7 +96,7 @@ impl Smoothness {
         let [r, first, second, third] = kinematics.turns;
         let omega = number(rate);
         let spin = Spin::new(&body);
-        let gamma = number(s.limit_moment) / spin.smallest + spin.quadratic * omega.square();
+        let gamma = number(s.limit_total()) / spin.smallest + spin.quadratic * omega.square();
         let (drift, drift_by_sideslip) = drift(&kinematics);
         let (drift, drift_by_sideslip) =
             (drift * omega.square(), drift_by_sideslip * omega.square());
