@@ -33,7 +33,7 @@ const HELD_OUT: u64 = 1051;
 /// Most iterations of an optimisation in the few jumps of the test that is not ignored, from rest and
 /// in motion.
 const MOST: u32 = 60;
-const MOST_IN_MOTION: u32 = 90;
+const MOST_IN_MOTION: u32 = 130;
 
 /// A jump of the reference, with the vehicle's start and what disturbs it.
 #[derive(Clone, Copy, Debug)]

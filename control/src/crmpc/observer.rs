@@ -12,7 +12,7 @@ use vehicle::math::exp_m1;
 const BEYOND: f64 = 2.0;
 /// Time constants of the filters whose means are judged, besides that of the observer, s. Errors of
 /// the measured rates have the less effect, the longer the filter is.
-const LONGER: [f64; 3] = [1.0, 3.0, 8.0];
+const LONGER: [f64; 4] = [0.5, 1.0, 3.0, 8.0];
 /// Largest size of a judged mean relative to what the assumptions explain. It is above 1, so that
 /// they can be contradicted, and bounded, so that the mean returns soon after a fault.
 const ABOVE: f64 = 1.5;
@@ -38,8 +38,9 @@ impl Mean {
 }
 
 /// Returns the time constants of the judged means, s.
-fn time_constants(s: &Settings) -> [f64; 4] {
-    [s.observer.time_constant, LONGER[0], LONGER[1], LONGER[2]]
+fn time_constants(s: &Settings) -> [f64; 5] {
+    let [first, second, third, fourth] = LONGER;
+    [s.observer.time_constant, first, second, third, fourth]
 }
 
 /// Returns the weight of the newest value in a filter with this time constant (s).
@@ -53,7 +54,7 @@ pub struct Observed {
     /// Estimated disturbance Δ̂, rad/s².
     pub disturbance: Vector3<f64>,
     /// Means by which the assumptions are judged, see [`time_constants`].
-    means: [Mean; 4],
+    means: [Mean; 5],
     /// Angles and rates x_ω at the last tick and the acceleration commanded there; `None` before
     /// the first tick.
     last: Option<[Vector3<f64>; 3]>,
