@@ -30,8 +30,8 @@ const MOMENT_LEFT: f64 = 0.146;
 /// Seed of the draws that set the constants of the planner, and one of draws that have set none.
 const SEED: u64 = 51;
 const HELD_OUT: u64 = 1051;
-/// Most iterations of an optimisation in the few jumps of the test that is not ignored, from rest and
-/// in motion.
+/// Most iterations of an optimisation in the few jumps of the test that is not ignored, from rest
+/// and in motion.
 const MOST: u32 = 60;
 const MOST_IN_MOTION: u32 = 130;
 

@@ -48,8 +48,8 @@ fn fly<C: Controller>(
     }
 }
 
-/// Flies CRMPC with this bound on the change of the turn (deg/s). Returns the share of ticks in force, the largest
-/// ‖ω‖ over its limit while it was, and the last contradiction.
+/// Flies CRMPC with this bound on the change of the turn (deg/s). Returns the share of ticks in
+/// force, the largest ‖ω‖ over its limit while it was, and the last contradiction.
 fn guaranteed(scenario: &Scenario, turn: f64, is_known: bool, bound: f64) -> (f64, f64, String) {
     let turn_change = bound.to_radians();
     let settings = Settings { turn_change, ..Settings::new(Constraints::Robust) };

@@ -2,6 +2,7 @@
 //! the `robust` set.
 
 use super::guarantee::{self, Assessment, Tightening};
+use super::refusal;
 use super::rule::{self, Tightened};
 use super::settings::{Constraints, Guarantee, InitialState, Settings};
 use crate::delay;
@@ -196,9 +197,9 @@ fn robust(s: &Settings) -> Result<(Tightened, f64), DesignError> {
         return Ok((chosen, 1.0));
     }
     if s.guarantee == Guarantee::Required {
-        return Err(guarantee::refusal(s, &chosen));
+        return Err(refusal::refusal(s, &chosen));
     }
-    let share = guarantee::largest_share(&chosen.settings).unwrap_or(0.0);
+    let share = refusal::largest_share(&chosen.settings).unwrap_or(0.0);
     let Tightened { mut tightening, assessment: within, .. } =
         Tightened::new(&guarantee::with_share(&chosen.settings, share))?;
     // What contradicts the assumptions follows from the whole bounds all the same.
@@ -208,7 +209,7 @@ fn robust(s: &Settings) -> Result<(Tightened, f64), DesignError> {
     Ok((Tightened { tightening, assessment, ..chosen }, share))
 }
 
-pub(super) fn ratio(s: &Settings) -> Result<usize, DesignError> {
+fn ratio(s: &Settings) -> Result<usize, DesignError> {
     settings::check(s)?;
     positive("limit.rate", s.limit_rate)?;
     positive("limit.moment", s.limit_moment)?;
@@ -276,4 +277,15 @@ fn paper_constants(s: &Settings, smallest: f64, largest: f64) -> Option<PaperCon
         angle_tube: s.disturbance_bound / s.feedback.k1.abs(),
         rate_tube: s.disturbance_bound * step_response_peak(s.feedback)?,
     })
+}
+
+impl Settings {
+    /// Returns these settings with the gain K that the controller uses, if it is left to the rule.
+    ///
+    /// # Errors
+    /// Returns an error that names the setting at fault.
+    pub fn resolved(&self) -> Result<Self, DesignError> {
+        ratio(self)?;
+        Ok(rule::chosen(self)?.settings)
+    }
 }

@@ -9,6 +9,7 @@ mod observer;
 mod paper;
 mod plan;
 mod planner;
+mod refusal;
 mod robust;
 mod rule;
 mod set;

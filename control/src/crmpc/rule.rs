@@ -1,7 +1,6 @@
 //! The gain K of the feedback law where none is set: only as stiff as the declared bounds need.
 
-use super::design::ratio;
-use super::guarantee::{Assessment, Tightening, tighten};
+use super::guarantee::{self, Assessment, Tightening};
 use super::settings::{Settings, rule};
 use crate::error::DesignError;
 use crate::error_dynamics::Gain;
@@ -15,7 +14,7 @@ pub(super) struct Tightened {
 
 impl Tightened {
     pub(super) fn new(settings: &Settings) -> Result<Self, DesignError> {
-        let (tightening, assessment) = tighten(settings)?;
+        let (tightening, assessment) = guarantee::tighten(settings)?;
         Ok(Self { settings: *settings, tightening, assessment })
     }
 
@@ -65,15 +64,4 @@ pub(super) fn chosen(s: &Settings) -> Result<Tightened, DesignError> {
         }
     }
     best
-}
-
-impl Settings {
-    /// Returns these settings with the gain K that the controller uses, if it is left to the rule.
-    ///
-    /// # Errors
-    /// Returns an error that names the setting at fault.
-    pub fn resolved(&self) -> Result<Self, DesignError> {
-        ratio(self)?;
-        Ok(chosen(self)?.settings)
-    }
 }

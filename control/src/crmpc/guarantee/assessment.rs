@@ -112,8 +112,8 @@ pub(super) fn while_braking(
 }
 
 /// Returns the largest ‖x̃_ω‖ at the end of the horizon from which the motion can brake while the
-/// trajectory's turn needs `turn` of the rate limit, rad/s. `switching` holds the other arguments of
-/// [`while_braking`] if the delay is not exact.
+/// trajectory's turn needs `turn` of the rate limit, rad/s. `switching` holds the other arguments
+/// of [`while_braking`] if the delay is not exact.
 pub(in crate::crmpc) fn terminal_rate(
     s: &Settings,
     dynamics: &Dynamics,

@@ -10,7 +10,8 @@ use std::f64::consts::SQRT_2;
 use vehicle::math::{exp, powi};
 
 /// Bounds on the dynamics ẋ_ω = F(Θ, x_ω, m) = R (I⁻¹ (m − ω × I ω) − Ẇ x_ω) in the domain, with
-/// ‖m‖ ≤ M̄ plus the bound of the known moment. The domain contains the vehicle's states, and their predictions.
+/// ‖m‖ ≤ M̄ plus the bound of the known moment. The domain contains the vehicle's states, and their
+/// predictions.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(in crate::crmpc) struct Dynamics {
     /// States of the vehicle itself.

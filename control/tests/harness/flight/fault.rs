@@ -70,8 +70,8 @@ impl Faulty {
         self.moment
     }
 
-    /// Returns whether the fault has begun at `time` (s), but no measurement can show it yet, because
-    /// the commands since then act after `delay` (s) only.
+    /// Returns whether the fault has begun at `time` (s), but no measurement can show it yet,
+    /// because the commands since then act after `delay` (s) only.
     pub(super) fn is_unseen(&self, time: f64, delay: f64) -> bool {
         self.fault != Fault::None && time > BEGIN - 0.01 && time < BEGIN + 0.01 + delay
     }

@@ -10,7 +10,7 @@
 //! m_k−1) at the predicted middle y_k of the period. The pulses change ô in turn, so that their
 //! sizes follow one from another. All sums here have only positive parts.
 
-use super::causes::Switched;
+use super::causes::{BRAKING, Switched};
 use crate::interval::Interval;
 use crate::sums::{Axis, Matrix, Pair, along, applied};
 use control::crmpc::{Plan, Settings};
@@ -203,7 +203,7 @@ impl Carried {
         let end = horizon + fades[1];
         let mut stages = [&past.accelerations[..], &plan.accelerations[..]].concat();
         let last = plan.states.last().map_or_else(Vector3::zeros, |x| x.fixed_rows::<3>(3).into());
-        let braking = Vector3::new(super::rest::BRAKING, plan.braking, super::rest::BRAKING);
+        let braking = Vector3::new(BRAKING, plan.braking, BRAKING);
         let mut rates: Vector3<f64> = last;
         while stages.len() * ratio <= end + 1 {
             let a = -rates.component_mul(&braking);

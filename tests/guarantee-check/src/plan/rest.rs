@@ -6,14 +6,13 @@
 //! is never exceeded. The moment depends on the attitude itself, and not on how far it is from the
 //! plan's, so that the box of attitudes is divided as far as necessary.
 
+use super::causes::BRAKING;
 use super::deviation::Deviation;
 use super::law::{self, Range};
 use super::{Left, PlanCheck};
 use crate::interval::Interval;
 use control::crmpc::Plan;
 
-/// Braking rate of angle of attack and bank, 1/s, by step 6 of docs/guarantee.md.
-pub(super) const BRAKING: f64 = 0.01;
 /// Width of the boxes of angles with which the search begins, rad.
 const WIDTH: f64 = 0.1;
 /// Smallest width of a box that is halved, rad.
