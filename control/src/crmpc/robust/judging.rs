@@ -26,11 +26,13 @@ impl Robust {
             && measured.rates.norm() <= self.rate_shown();
         let feedback = command.commanded - command.nominal;
         let explained = self.explains(memory, tick.within, angles, rates, &feedback);
-        if memory.assured() && !(explained && self.credible(memory) && limits_kept) {
-            memory.guarantee = GuaranteeStatus::Exceeded;
-        }
         let contradiction =
             self.contradiction(memory, measured, explained && !tick.left_behind, limits_kept);
+        let keeps_told =
+            self.keeps_turn(memory, measured) && self.keeps_known_moment(memory, measured);
+        if memory.assured() && !(explained && self.credible(memory) && limits_kept && keeps_told) {
+            memory.guarantee = GuaranteeStatus::Exceeded;
+        }
         if memory.guarantee == GuaranteeStatus::Pending && memory.pending == 0 {
             memory.guarantee = GuaranteeStatus::InForce;
         }
