@@ -265,7 +265,8 @@ def test_the_scheduler_is_started_anew(file, expected, tmp_path):
         address = f"tcp://127.0.0.1:{free.getsockname()[1]}"
     scheduler = command_of("scheduler", "--host", address, "--no-dashboard")
     worker = command_of("worker", address, "--nthreads", "1", "--no-dashboard")
-    worker += ["--local-directory", str(tmp_path), "--death-timeout", "5"]
+    # It waits for the scheduler, which a busy machine starts late.
+    worker += ["--local-directory", str(tmp_path), "--death-timeout", f"{LONG:.0f}"]
     out = tmp_path / "out"
     with started(*scheduler) as first, started(*worker), Client(address, timeout=LONG) as client:
         with meanwhile(out, lambda: os.kill(first.pid, signal.SIGKILL), parts=3):
