@@ -4,10 +4,12 @@ use control::Crmpc;
 use control::controller::{Controller, Measurement};
 use control::crmpc::{Constraints, Contradiction, GuaranteeStatus, Settings};
 use control::lqr::{Lqr, LqrSettings};
+use nalgebra::Vector3;
 use vehicle::Scenario;
 use vehicle::actuators::Command;
 use vehicle::disturbance::DisturbanceKind;
 use vehicle::plant::{Input, Plant};
+use vehicle::profile::Profile;
 use vehicle::trajectory::Trajectory;
 
 const PERIOD: f64 = 0.04;
@@ -86,6 +88,25 @@ fn oracle_a_turn_that_is_known_leaves_the_guarantee_in_force() {
             assert!(share < 0.9 && why == "Turn", "{kind:?} {turn}: {share} {why}");
         }
     }
+}
+
+#[test]
+fn oracle_the_rate_itself_keeps_its_limit_while_the_trajectory_turns() {
+    // With the wings upright a turn of the heading adds to the rate of the angle of attack.
+    let mut largest = 0.0_f64;
+    for (sign, turn) in [(1.0, 0.6), (-1.0, 0.6), (1.0, -0.6), (-1.0, -0.6)] {
+        let alpha = |alpha: f64| Vector3::new(alpha, 0.0, 80.0).map(f64::to_radians);
+        let mut scenario = Scenario::crmpc2022();
+        let (from, to) = (alpha(25.0 - 20.0 * sign), alpha(25.0 + 20.0 * sign));
+        scenario.reference = Profile::step(from, to, 0.4);
+        scenario.initial_angles = from;
+        scenario.disturbance.kind = DisturbanceKind::AlongRate;
+        scenario.disturbance.bound -= 0.15_f64.to_radians();
+        let (share, rate, why) = guaranteed(&scenario, turn, true, 0.1);
+        assert!(share == 1.0 && rate <= 1.0, "{turn}: {share} {rate} {why}");
+        largest = largest.max(rate);
+    }
+    assert!(largest > 0.9, "{largest}");
 }
 
 #[test]

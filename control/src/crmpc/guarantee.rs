@@ -25,7 +25,7 @@ pub(super) use geometry::BRAKING;
 pub use geometry::Geometry;
 pub use lemmas::Lemmas;
 pub(super) use losses::{End, Held, MomentLoss};
-pub(super) use observable::Observable;
+pub(super) use observable::{MEANS, Observable};
 pub(super) use switching::unseen;
 pub use switching::{Carried, Onset, Switching};
 pub(super) use tighten::{lateral, tighten, with_share};

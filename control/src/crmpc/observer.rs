@@ -1,18 +1,14 @@
 //! Observer that estimates the disturbance from the rates, and what the assumptions explain of it.
 
-use super::guarantee::Observable;
+use super::guarantee::{MEANS, Observable};
 use super::settings::{InitialState, Settings};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 use vehicle::dynamics::RigidBody;
 use vehicle::kinematics;
-use vehicle::math::exp_m1;
 
 /// Largest size of the estimate, relative to the bound of the disturbance.
 const BEYOND: f64 = 2.0;
-/// Time constants of the filters whose means are judged, besides that of the observer, s. Errors of
-/// the measured rates have the less effect, the longer the filter is.
-const LONGER: [f64; 4] = [0.5, 1.0, 3.0, 8.0];
 /// Largest size of a judged mean relative to what the assumptions explain. It is above 1, so that
 /// they can be contradicted, and bounded, so that the mean returns soon after a fault.
 const ABOVE: f64 = 1.5;
@@ -29,23 +25,9 @@ struct Mean {
 }
 
 impl Mean {
-    /// Returns the largest residual that the assumptions explain, rad/s².
-    fn explained(&self, observable: &Observable, time_constant: f64) -> Vector3<f64> {
-        let of_moment = self.by_moment * observable.of_moment(time_constant);
-        let others = observable.of_others(time_constant, self.by_pulses);
-        of_moment.add_scalar(others)
+    fn explained(&self, observable: &Observable) -> Vector3<f64> {
+        observable.largest(&self.by_moment, self.by_pulses)
     }
-}
-
-/// Returns the time constants of the judged means, s.
-fn time_constants(s: &Settings) -> [f64; 5] {
-    let [first, second, third, fourth] = LONGER;
-    [s.observer.time_constant, first, second, third, fourth]
-}
-
-/// Returns the weight of the newest value in a filter with this time constant (s).
-fn weight(s: &Settings, time_constant: f64) -> f64 {
-    -exp_m1(-s.period_feedback / time_constant)
 }
 
 /// Estimate of the disturbance Δ, with the data for the next one.
@@ -53,8 +35,8 @@ fn weight(s: &Settings, time_constant: f64) -> f64 {
 pub struct Observed {
     /// Estimated disturbance Δ̂, rad/s².
     pub disturbance: Vector3<f64>,
-    /// Means by which the assumptions are judged, see [`time_constants`].
-    means: [Mean; 5],
+    /// Means by which the assumptions are judged, the one with the observer's time constant first.
+    means: [Mean; MEANS],
     /// Angles and rates x_ω at the last tick and the acceleration commanded there; `None` before
     /// the first tick.
     last: Option<[Vector3<f64>; 3]>,
@@ -70,30 +52,30 @@ impl Observed {
     pub(super) fn observe(
         &mut self,
         s: &Settings,
-        observable: &Observable,
+        observable: &[Observable; MEANS],
         rates: &Vector3<f64>,
         pulse: f64,
     ) {
         let Some([angles, before, commanded]) = self.last else { return };
         let residual = (rates - before) / s.period_feedback - commanded;
-        self.disturbance += (residual - self.disturbance) * weight(s, s.observer.time_constant);
+        self.disturbance += (residual - self.disturbance) * observable[0].weight;
         let bound = BEYOND * s.disturbance_bound;
         self.disturbance.apply(|value| *value = value.clamp(-bound, bound));
         let by_moment = (commanded - s.body.drift(&angles, &before)).abs();
-        for (mean, time_constant) in self.means.iter_mut().zip(time_constants(s)) {
-            let weight = weight(s, time_constant);
+        for (mean, observable) in self.means.iter_mut().zip(observable) {
+            let weight = observable.weight;
             mean.by_moment += (by_moment - mean.by_moment) * weight;
             mean.by_pulses += (pulse - mean.by_pulses) * weight;
             mean.residual += (residual - mean.residual) * weight;
-            let bound = mean.explained(observable, time_constant) * ABOVE;
+            let bound = mean.explained(observable) * ABOVE;
             mean.residual = mean.residual.sup(&-bound).inf(&bound);
         }
     }
 
     /// Returns whether the assumptions explain all that was observed.
-    pub(super) fn is_explained(&self, s: &Settings, observable: &Observable) -> bool {
-        self.means.iter().zip(time_constants(s)).all(|(mean, time_constant)| {
-            let explained = mean.explained(observable, time_constant);
+    pub(super) fn is_explained(&self, observable: &[Observable; MEANS]) -> bool {
+        self.means.iter().zip(observable).all(|(mean, observable)| {
+            let explained = mean.explained(observable);
             (0..3).all(|i| mean.residual[i].abs() <= explained[i])
         })
     }

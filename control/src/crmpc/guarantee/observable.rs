@@ -5,56 +5,66 @@ use super::mismatch::smallest_in_rates;
 use super::parts::Parts;
 use crate::crmpc::settings::Settings;
 use crate::delay::ticks;
-use vehicle::math::exp;
+use nalgebra::Vector3;
+use vehicle::math::{exp, exp_m1};
+
+/// Time constants of the means that are judged besides that of the observer, s. Errors of the
+/// measured rates have the less effect, the longer the time is.
+const LONGER: [f64; 4] = [0.5, 1.0, 3.0, 8.0];
+/// Number of means that are judged.
+pub(in crate::crmpc) const MEANS: usize = 1 + LONGER.len();
 
 /// Largest component of a first-order mean of the change of x_ω beyond the commanded acceleration,
 /// as the assumptions explain it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(in crate::crmpc) struct Observable {
-    /// Part that may last: Δ̄, the mismatch, and what the inertia error does in any direction,
-    /// rad/s².
-    lasting: f64,
-    /// Part by the errors of predicted rates, rad/s. Each prediction has its own error, and a mean
-    /// over the time T shows their differences by no more than this over T.
-    of_errors: f64,
-    /// Share of the acceleration by the moment that the common factor of the inertia causes.
-    share: f64,
-    /// Growth of a disturbance in what is observed of it.
-    growth: f64,
-    /// Longest time from the tick of a command to the last measurement that shows what it does, s.
-    late: f64,
+    /// Weight of the newest value in the mean.
+    pub(in crate::crmpc) weight: f64,
+    /// Part that may last, Δ̄, the mismatch, and what the inertia error does in any direction, and
+    /// the part by the errors of predicted rates, rad/s².
+    others: f64,
+    /// Share of the mean acceleration by the commanded moments, by the common factor of the
+    /// inertia.
+    of_moment: f64,
+    /// Factor of the mean acceleration by pulses.
+    of_pulses: f64,
 }
 
 impl Observable {
-    pub(super) fn new(s: &Settings, dynamics: &Dynamics, parts: &Parts) -> Self {
+    /// Returns what is explained of each mean, the one with the observer's time constant first.
+    pub(super) fn all(s: &Settings, dynamics: &Dynamics, parts: &Parts) -> [Self; MEANS] {
+        let [first, second, third, fourth] = LONGER;
+        [s.observer.time_constant, first, second, third, fourth]
+            .map(|time_constant| Self::new(s, dynamics, parts, time_constant))
+    }
+
+    fn new(s: &Settings, dynamics: &Dynamics, parts: &Parts, time_constant: f64) -> Self {
         let Parts { mismatch, early, .. } = parts;
-        let predicted = s.rate_error + mismatch.mispredicted * (1.0 + early[1].excess);
         let elapsed = s.delay + s.period_feedback;
+        let predicted = s.rate_error + mismatch.mispredicted * (1.0 + early[1].excess);
+        let lasting = s.disturbance_bound
+            + parts.any_moment / smallest_in_rates(&dynamics.vehicle, dynamics.smallest)
+            + mismatch.mean * (1.0 + early[0].excess);
+        // What a command does shows later than the command, and is forgotten later.
+        let late = ticks(s.delay + s.delay_error, s.period_feedback) + 1;
+        let remembered = exp(late as f64 * s.period_feedback / time_constant);
         let common = s.inertia_error / (1.0 - s.inertia_error);
-        let ticks = ticks(s.delay + s.delay_error, s.period_feedback) + 1;
         Self {
-            lasting: s.disturbance_bound
-                + parts.any_moment / smallest_in_rates(&dynamics.vehicle, dynamics.smallest)
-                + mismatch.mean * (1.0 + early[0].excess),
-            of_errors: 2.0 * predicted,
-            share: common * (1.0 + parts.turning * elapsed),
-            growth: dynamics.growth(elapsed),
-            late: ticks as f64 * s.period_feedback,
+            weight: -exp_m1(-s.period_feedback / time_constant),
+            // Each prediction has its own error, and the mean shows their differences by no more.
+            others: lasting + 2.0 * predicted / time_constant,
+            of_moment: common * (1.0 + parts.turning * elapsed) * remembered,
+            of_pulses: dynamics.growth(elapsed) * remembered,
         }
     }
 
-    /// Returns the share of the mean acceleration by the commanded moments that is explained, if
-    /// the means have this time constant (s). What a moment does shows later than the command, and
-    /// is forgotten later.
-    pub(in crate::crmpc) fn of_moment(&self, time_constant: f64) -> f64 {
-        self.share * exp(self.late / time_constant)
-    }
-
-    /// Returns all else that is explained, rad/s², if the mean acceleration by pulses is
-    /// `by_pulses`.
-    pub(in crate::crmpc) fn of_others(&self, time_constant: f64, by_pulses: f64) -> f64 {
-        self.lasting
-            + self.of_errors / time_constant
-            + by_pulses * self.growth * exp(self.late / time_constant)
+    /// Returns the largest explained mean, rad/s², with the means of the acceleration by the
+    /// commanded moments in each component, and by pulses.
+    pub(in crate::crmpc) fn largest(
+        &self,
+        by_moment: &Vector3<f64>,
+        by_pulses: f64,
+    ) -> Vector3<f64> {
+        (by_moment * self.of_moment).add_scalar(self.others + by_pulses * self.of_pulses)
     }
 }

@@ -87,7 +87,7 @@ pub(in crate::crmpc) fn tighten(s: &Settings) -> Result<(Tightening, Assessment)
         bearing,
         norm: parts.norm,
         mismatch: parts.mismatch.mean,
-        observable: Observable::new(s, &dynamics, &parts),
+        observable: Observable::all(s, &dynamics, &parts),
         at,
     };
     let assessment = assess(s, &dynamics, &tightening);

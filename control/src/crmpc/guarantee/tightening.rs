@@ -2,7 +2,7 @@
 
 use super::deviation::Deviation;
 use super::losses::{MomentLoss, RateLoss};
-use super::observable::Observable;
+use super::observable::{MEANS, Observable};
 use super::switching::Switching;
 use crate::controller::Explained;
 
@@ -28,8 +28,8 @@ pub struct Tightening {
     /// Part of `norm` by which F differs between two ticks from the acceleration that the law
     /// intended, rad/s².
     pub mismatch: f64,
-    /// What the assumptions explain of an observed disturbance.
-    pub(in crate::crmpc) observable: Observable,
+    /// What the assumptions explain of the means of an observed disturbance.
+    pub(in crate::crmpc) observable: [Observable; MEANS],
     /// What the assumptions explain of the mean acceleration over a period.
     pub explained: Explained,
     /// What an unknown part of the delay adds; `None` if the delay is exact.

@@ -16,6 +16,22 @@ fn keeps(value: f64, bound: f64) -> bool {
     value <= bound * (1.0 + ROUNDING) + 1e-12
 }
 
+/// Returns what the measurements contradict, as far as no plan is needed to see it.
+fn shown(measured: &Measurement) -> Option<Contradiction> {
+    match measured.doubt {
+        _ if measured.stale => Some(Contradiction::Step),
+        Some(Doubt::Frozen) => Some(Contradiction::Frozen),
+        Some(Doubt::OtherDelay) => Some(Contradiction::Delay),
+        Some(Doubt::Unexplained) => Some(Contradiction::Disturbance),
+        None => None,
+    }
+}
+
+/// Returns the first that does not hold.
+fn first(found: &[(bool, Contradiction)]) -> Option<Contradiction> {
+    found.iter().find(|(holds, _)| !holds).map(|(_, what)| *what)
+}
+
 impl Robust {
     /// Judges the guarantee at a tick: by the state that was measured, and by the moment before its
     /// limit.
@@ -23,14 +39,27 @@ impl Robust {
         let Tick { measured, angle_rates, deviation: [angles, rates], command, .. } = tick;
         let asked = command.moment - measured.known_moment;
         let limits_kept = asked.norm() <= self.settings.limit_moment * (1.0 + ROUNDING)
-            && measured.rates.norm() <= self.rate_shown();
+            && (measured.rates - measured.turn).norm() <= self.rate_shown();
         let feedback = command.commanded - command.nominal;
         let explained = self.explains(memory, tick.within, angles, rates, &feedback);
-        let contradiction =
-            self.contradiction(memory, measured, explained && !tick.left_behind, limits_kept);
-        let keeps_told =
-            self.keeps_turn(memory, measured) && self.keeps_known_moment(memory, measured);
-        if memory.assured() && !(explained && self.credible(memory) && limits_kept && keeps_told) {
+        let assumed = [
+            (self.keeps_turn(memory, measured), Contradiction::Turn),
+            (self.keeps_known_moment(memory, measured), Contradiction::KnownMoment),
+            (self.credible(memory), Contradiction::Disturbance),
+        ];
+        let seen = [
+            (explained && !tick.left_behind, Contradiction::Deviation),
+            (limits_kept, Contradiction::Limit),
+        ];
+        // As long as no plan was certified, a motion beyond the limits, or away from the plan,
+        // contradicts nothing.
+        let certified = memory.supervision.status.is_assured()
+            || memory.supervision.contradiction != Contradiction::None;
+        let contradiction = shown(measured)
+            .or_else(|| first(&assumed))
+            .or_else(|| first(&seen).filter(|_| certified))
+            .unwrap_or_default();
+        if memory.assured() && !(first(&assumed).is_none() && explained && limits_kept) {
             memory.guarantee = GuaranteeStatus::Exceeded;
         }
         if memory.guarantee == GuaranteeStatus::Pending && memory.pending == 0 {
@@ -43,32 +72,7 @@ impl Robust {
 
     /// Returns whether the assumptions explain the observed disturbance.
     pub(super) fn credible(&self, memory: &Memory) -> bool {
-        memory.observed.is_explained(&self.settings, &self.design.tightening.observable)
-    }
-
-    /// Returns what contradicts the assumptions at a tick. As long as no plan was certified, a
-    /// motion beyond the limits, or away from the plan, contradicts nothing.
-    fn contradiction(
-        &self,
-        memory: &Memory,
-        measured: &Measurement,
-        explained: bool,
-        limits_kept: bool,
-    ) -> Contradiction {
-        let certified = memory.supervision.status.is_assured()
-            || memory.supervision.contradiction != Contradiction::None;
-        match measured.doubt {
-            _ if measured.stale => Contradiction::Step,
-            Some(Doubt::Frozen) => Contradiction::Frozen,
-            _ if !self.keeps_turn(memory, measured) => Contradiction::Turn,
-            _ if !self.keeps_known_moment(memory, measured) => Contradiction::KnownMoment,
-            Some(Doubt::OtherDelay) => Contradiction::Delay,
-            Some(Doubt::Unexplained) => Contradiction::Disturbance,
-            None if !self.credible(memory) => Contradiction::Disturbance,
-            None if certified && !explained => Contradiction::Deviation,
-            None if certified && !limits_kept => Contradiction::Limit,
-            None => Contradiction::None,
-        }
+        memory.observed.is_explained(&self.design.tightening.observable)
     }
 
     /// Returns whether the trajectory's turn has changed by no more than a plan in force allows.
