@@ -71,7 +71,7 @@ fn row(name: &str, settings: impl IntoIterator<Item = Settings>) {
 /// none, or not the gain.
 fn largest(settings: &Settings) -> Option<f64> {
     match Design::new(&Settings { disturbance_bound: TOO_LARGE, ..*settings }) {
-        Err(DesignError::NoGuarantee { disturbance, .. }) => disturbance,
+        Err(DesignError::NoGuarantee(refusal)) => refusal.disturbance,
         _ => None,
     }
 }

@@ -49,28 +49,8 @@ pub enum DesignError {
         k2: f64,
     },
     /// The limits leave too little room for a guarantee.
-    #[error("constraints = robust cannot be guaranteed: {}", no_guarantee(self))]
-    NoGuarantee {
-        /// Gain K of the feedback law, the one that comes closest if it is left to the rule.
-        feedback: Gain,
-        /// Unused share of the moment limit; negative if the limit is exceeded.
-        moment_left: f64,
-        /// Unused share of the rate limit; negative if the limit is exceeded.
-        rate_left: f64,
-        /// Limit on the moment, N m.
-        limit_moment: f64,
-        /// Limit on the rate, rad/s.
-        limit_rate: f64,
-        /// Largest accepted disturbance.bound with the other settings unchanged, rad/s²; `None`
-        /// if not even 0 is accepted.
-        disturbance: Option<f64>,
-        /// Largest accepted errors of angles (rad) and rates (rad/s) in the given proportion.
-        errors: Option<(f64, f64)>,
-        /// Largest accepted delay, s.
-        delay: Option<f64>,
-        /// Largest accepted error of the delay, s.
-        delay_error: Option<f64>,
-    },
+    #[error("constraints = robust cannot be guaranteed: {0}")]
+    NoGuarantee(Box<Refusal>),
     /// The delay could be negative, or a command could begin to act after the next one should.
     #[error(
         "delayError = {value} s must be at most {largest} s, the smaller of the delay and the period of the feedback law"
@@ -179,22 +159,52 @@ pub enum DesignError {
     Solver(String),
 }
 
+/// Why there is no guarantee, and which values would be accepted.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Refusal {
+    /// Gain K of the feedback law, the one that comes closest if it is left to the rule.
+    pub feedback: Gain,
+    /// Unused share of the moment limit; negative if the limit is exceeded.
+    pub moment_left: f64,
+    /// Unused share of the rate limit; negative if the limit is exceeded.
+    pub rate_left: f64,
+    /// Limit on the moment, N m.
+    pub limit_moment: f64,
+    /// Limit on the rate, rad/s.
+    pub limit_rate: f64,
+    /// Largest accepted disturbance.bound with the other settings unchanged, rad/s²; `None`
+    /// if not even 0 is accepted.
+    pub disturbance: Option<f64>,
+    /// Largest accepted knownMoment.bound, N m.
+    pub known_bound: Option<f64>,
+    /// Largest accepted errors of angles (rad) and rates (rad/s) in the given proportion.
+    pub errors: Option<(f64, f64)>,
+    /// Largest accepted delay, s.
+    pub delay: Option<f64>,
+    /// Largest accepted error of the delay, s.
+    pub delay_error: Option<f64>,
+}
+
+impl std::fmt::Display for Refusal {
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        f.write_str(&no_guarantee(self))
+    }
+}
+
 /// Returns why there is no guarantee, and which values would be accepted.
-fn no_guarantee(error: &DesignError) -> String {
-    let DesignError::NoGuarantee {
+fn no_guarantee(refusal: &Refusal) -> String {
+    let Refusal {
         feedback: Gain { k1, k2 },
         moment_left,
         rate_left,
         limit_moment,
         limit_rate,
         disturbance,
+        known_bound,
         errors,
         delay,
         delay_error,
-    } = error
-    else {
-        return String::new();
-    };
+    } = refusal;
     let mut reasons = Vec::new();
     for (what, left, limit) in [
         ("moment", *moment_left, format!("limit.moment = {limit_moment} N m")),
@@ -215,6 +225,9 @@ fn no_guarantee(error: &DesignError) -> String {
         ));
     }
     let mut accepted = Vec::new();
+    if let Some(bound) = known_bound {
+        accepted.push(format!("at most knownMoment.bound = {} N m", bound.floor()));
+    }
     match disturbance {
         Some(bound) => {
             accepted.push(format!(

@@ -233,7 +233,8 @@ fn a_known_moment_is_refused_without_room_and_contradicts_its_bound() {
         disturbance_bound: f64::to_radians(2.0),
         kind: DisturbanceKind::None,
     };
-    assert!(Crmpc::new(constant.settings()).is_err());
+    let refused = Crmpc::new(constant.settings()).err().unwrap().to_string();
+    assert!(refused.contains("at most knownMoment.bound = "), "{refused}");
     let undeclared =
         Settings { known_bound: 0.49 * limit, disturbance_bound: 0.01, ..constant.settings() };
     assert_eq!(constant.fly(&undeclared).0, 1000 - 1);

@@ -3,7 +3,7 @@
 use super::guarantee;
 use super::rule::{self, Tightened};
 use super::settings::Settings;
-use crate::error::DesignError;
+use crate::error::{DesignError, Refusal};
 use crate::error_dynamics::Gain;
 
 /// Returns the largest value of a setting between 0 and `tried` for which the design holds with the
@@ -47,7 +47,7 @@ pub(super) fn refusal(s: &Settings, closest: &Tightened) -> DesignError {
         ..*s
     });
     let errors = (s.rate_error > 0.0 || s.angle_error > 0.0).then_some(error_share).flatten();
-    DesignError::NoGuarantee {
+    DesignError::NoGuarantee(Box::new(Refusal {
         feedback: *feedback,
         moment_left: assessment.moment_left,
         rate_left: assessment.rate_left,
@@ -57,6 +57,9 @@ pub(super) fn refusal(s: &Settings, closest: &Tightened) -> DesignError {
             disturbance_bound,
             ..*s
         }),
+        known_bound: (s.known_bound > 0.0)
+            .then(|| largest(s.known_bound, &|known_bound| Settings { known_bound, ..*s }))
+            .flatten(),
         delay: (s.delay > 0.0)
             .then(|| largest(s.delay, &|delay| Settings { delay, ..*s }))
             .flatten()
@@ -65,5 +68,5 @@ pub(super) fn refusal(s: &Settings, closest: &Tightened) -> DesignError {
             .then(|| largest(s.delay_error, &|delay_error| Settings { delay_error, ..*s }))
             .flatten(),
         errors: errors.map(|share| (share * s.angle_error, share * s.rate_error)),
-    }
+    }))
 }

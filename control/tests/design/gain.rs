@@ -65,9 +65,8 @@ fn published_the_papers_sets_take_the_printed_gain() {
 fn a_refusal_names_the_gain_that_comes_closest_and_a_bound_that_the_rule_accepts() {
     let settings = with_bound(3.0);
     let error = Design::new(&settings).unwrap_err();
-    let DesignError::NoGuarantee { feedback, disturbance: Some(largest), .. } = error else {
-        panic!("{error}")
-    };
+    let DesignError::NoGuarantee(refusal) = &error else { panic!("{error}") };
+    let (feedback, largest) = (refusal.feedback, refusal.disturbance.unwrap());
     let text = format!("feedback.k1 = {} and feedback.k2 = {}", feedback.k1, feedback.k2);
     assert!(error.to_string().contains(&text), "{error}");
     let accepted = Settings { disturbance_bound: largest, ..settings };

@@ -91,9 +91,8 @@ fn a_disturbance_that_cannot_be_borne_is_refused_with_the_largest_that_can() {
     let settings =
         Settings { disturbance_bound: 3f64.to_radians(), ..Settings::new(Constraints::Robust) };
     let error = Design::new(&settings).unwrap_err();
-    let DesignError::NoGuarantee { moment_left, disturbance: Some(largest), .. } = error else {
-        panic!("{error}")
-    };
+    let DesignError::NoGuarantee(refusal) = &error else { panic!("{error}") };
+    let (moment_left, largest) = (refusal.moment_left, refusal.disturbance.unwrap());
     assert!(moment_left < 0.0 && error.to_string().contains("disturbance.bound"), "{error}");
     Design::new(&Settings { disturbance_bound: largest, ..settings }).unwrap();
     Design::new(&Settings { disturbance_bound: 1.01 * largest, ..settings }).unwrap_err();

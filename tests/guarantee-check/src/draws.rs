@@ -15,7 +15,8 @@ pub fn accepted(seed: u64) -> Option<Settings> {
     for _ in 0..3 {
         match Design::new(&settings) {
             Ok(design) if design.accepted_share >= 1.0 => return Some(settings),
-            Err(DesignError::NoGuarantee { disturbance: Some(bound), .. }) => {
+            Err(DesignError::NoGuarantee(refusal)) => {
+                let bound = refusal.disturbance?;
                 // Near the largest value little of the moment is left, and previous plans are kept
                 // more often.
                 settings.disturbance_bound = bound * random.between(0.5, 1.0);

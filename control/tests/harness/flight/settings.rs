@@ -3,7 +3,7 @@
 use super::random::Random;
 use super::{Flight, Shown};
 use control::crmpc::{Constraints, Crmpc, InitialState, Settings};
-use control::error::DesignError;
+use control::error::{DesignError, Refusal};
 use control::error_dynamics::Gain;
 
 /// Returns the settings of Chai 2022 with another period of the optimisation (s), and with a
@@ -71,9 +71,10 @@ pub fn tried(settings: &Settings, seed: u64) -> Tried {
     let Err(error) = Crmpc::new(*settings) else {
         return Tried::Flown(Flight { duration: 15.0, ..Flight::random(settings, seed) }.fly());
     };
-    let DesignError::NoGuarantee { disturbance, errors, delay, delay_error, .. } = error else {
+    let DesignError::NoGuarantee(bounds) = &error else {
         return Tried::Invalid(error.to_string());
     };
+    let Refusal { disturbance, errors, delay, delay_error, .. } = **bounds;
     // The bounds are rounded as the message prints them.
     let down = |value: f64| (value * 1e4).floor() / 1e4;
     let down_angle = |value: f64| down(value.to_degrees()).to_radians();
