@@ -22,11 +22,30 @@ pub struct Measurement {
     /// Moment that acts besides that of the actuators and is known, such as the air's static
     /// moment, N m. A law commands the sum of both, and the actuators are asked for the rest.
     pub known_moment: Vector3<f64>,
+    /// Limits that hold at present.
+    pub scheduled: Scheduled,
     /// Whether the measurement was made at an earlier instant than the tick, because the
     /// communication step is longer than the period or no multiple of it.
     pub stale: bool,
     /// What the measurements up to this one contradict, as far as no law is needed to see it.
     pub doubt: Option<Doubt>,
+}
+
+/// Limits that change during a flight, for example with dynamic pressure, as far as they are
+/// smaller than those of the settings.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Scheduled {
+    /// Limit on ‖m‖ of the actuators, N m.
+    pub limit_moment: f64,
+    /// Bound on each component of the disturbance of the angles' second derivatives, rad/s².
+    pub disturbance_bound: f64,
+}
+
+impl Default for Scheduled {
+    /// Returns limits that are larger than any of a vehicle.
+    fn default() -> Self {
+        Self { limit_moment: 1e9, disturbance_bound: 1e3 }
+    }
 }
 
 /// What measurements show without knowledge of the law.
@@ -163,7 +182,7 @@ pub trait Controller {
 
     /// Evaluates a tick, and returns the moment to hold until the next one, N m: the command less
     /// what is known to act already. It is limited here alone, except that the inner law of
-    /// [`Dlmpc`](crate::Dlmpc) also limits its moment.
+    /// [`Dlmpc`](crate::Dlmpc) also limits its moment. A limit that is scheduled always holds.
     fn update(
         &mut self,
         memory: &mut Self::Memory,
@@ -174,15 +193,16 @@ pub trait Controller {
     ) -> Vector3<f64> {
         let commanded = self.command(memory, tick, time, measured, reference);
         let known = measured.known_moment;
+        let limit = self.limit(memory).min(measured.scheduled.limit_moment);
         if known == Vector3::zeros() {
-            let applied = saturated(commanded, self.limit(memory));
+            let applied = saturated(commanded, limit);
             if applied != commanded {
                 self.limited(memory, &applied);
             }
             return applied;
         }
         let asked = commanded - known;
-        let given = saturated(asked, self.limit(memory));
+        let given = saturated(asked, limit);
         if given != asked {
             self.limited(memory, &(given + known));
         }

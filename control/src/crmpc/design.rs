@@ -109,6 +109,8 @@ pub struct Design {
     pub invariant: Option<InvariantSet>,
     /// Tightening of the robust set.
     pub tightening: Tightening,
+    /// Tightenings for smaller bounds on the disturbance, by equal parts of it.
+    lower: Vec<Tightening>,
     /// Remainder of the limits after the tightening.
     pub assessment: Assessment,
     /// Share of the disturbance bound and the errors that the tightening includes; 1 if the
@@ -127,6 +129,11 @@ pub struct Design {
 }
 
 impl Design {
+    /// Returns the tightening for `level` parts less than the whole bound on the disturbance.
+    pub fn at_level(&self, level: usize) -> &Tightening {
+        level.checked_sub(1).and_then(|i| self.lower.get(i)).unwrap_or(&self.tightening)
+    }
+
     /// Computes the design from the settings.
     ///
     /// # Errors
@@ -141,6 +148,7 @@ impl Design {
         }
         let (Tightened { settings, tightening, assessment }, accepted_share) = robust(s)?;
         let s = &settings;
+        let lower = if accepted_share < 1.0 { Vec::new() } else { lower(s)? };
         let error = SampledError::delayed(s.feedback, s.period_feedback, s.delay);
         let reach = error.reach_forever().ok_or(DesignError::Unstable {
             k1: s.feedback.k1,
@@ -178,6 +186,7 @@ impl Design {
             reach,
             invariant,
             tightening,
+            lower,
             assessment,
             accepted_share,
             ratio,
@@ -187,6 +196,16 @@ impl Design {
             inertia_ratio: largest_inertia / smallest_inertia,
         })
     }
+}
+
+/// Returns the tightenings for smaller bounds on the disturbance.
+fn lower(s: &Settings) -> Result<Vec<Tightening>, DesignError> {
+    let parts = s.disturbance_parts;
+    let part = |part: usize| {
+        let disturbance_bound = s.disturbance_bound * (part as f64 / parts as f64);
+        Ok(guarantee::tighten(&Settings { disturbance_bound, ..*s })?.0)
+    };
+    (1..parts).rev().map(part).collect()
 }
 
 /// Returns the settings with their gain K, the tightening, what it leaves of the limits, and the

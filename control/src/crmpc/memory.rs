@@ -4,6 +4,7 @@ use super::commands::Commands;
 use super::observer::Observed;
 use super::plan::Plan;
 use super::supervision::{GuaranteeStatus, Supervision};
+use crate::controller::Scheduled;
 use crate::error_dynamics::Gain;
 use crate::report::SolverReport;
 use nalgebra::{Vector3, Vector6};
@@ -22,6 +23,10 @@ pub struct Memory {
     pub known: Vector3<f64>,
     /// Rates that the turn of the trajectory adds at the last tick, rad/s.
     pub turn: Vector3<f64>,
+    /// Limits that are scheduled at the last tick.
+    pub scheduled: Scheduled,
+    /// Largest bound on the disturbance of late, see [`Scheduled::disturbance_bound`], rad/s².
+    pub recent_bound: f64,
     /// Nominal state (Θ̃, x̃_ω) at the last tick.
     pub nominal: Vector6<f64>,
     /// Whether the plan in force gives the guarantee, or the reason why not.
@@ -69,6 +74,8 @@ impl Clone for Memory {
             report,
             known,
             turn,
+            scheduled,
+            recent_bound,
             nominal,
             guarantee,
             margins,
@@ -83,7 +90,8 @@ impl Clone for Memory {
         self.plan.clone_from(plan);
         self.started = *started;
         self.report = *report;
-        (self.known, self.turn) = (*known, *turn);
+        (self.known, self.turn, self.scheduled) = (*known, *turn, *scheduled);
+        self.recent_bound = *recent_bound;
         self.nominal = *nominal;
         self.guarantee = *guarantee;
         self.margins = *margins;

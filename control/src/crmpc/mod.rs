@@ -30,7 +30,7 @@ pub use guarantee::Lemmas;
 pub use guarantee::{Assessment, Carried, Deviation, Geometry, Onset, Switching, Tightening};
 pub use memory::{Margins, Memory};
 pub use observer::Observed;
-pub use plan::Plan;
+pub use plan::{Plan, Terms};
 pub use set::{Bounds, Posed};
 pub use settings::Published;
 pub use settings::{Constraints, Guarantee, InitialState, ObserverSettings, Settings};
@@ -185,6 +185,7 @@ impl Controller for Crmpc {
     ) -> Vector3<f64> {
         let angle_rates = kinematics::r(&measured.angles) * measured.rates;
         (memory.known, memory.turn) = (measured.known_moment, measured.turn);
+        memory.scheduled = measured.scheduled;
         self.set.observe(memory, &angle_rates);
         let within = tick % self.design.ratio as u64;
         let state = join(&measured.angles, &angle_rates);

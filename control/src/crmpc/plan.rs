@@ -8,6 +8,20 @@ use nalgebra::{Vector3, Vector6};
 use serde::{Deserialize, Serialize};
 use vehicle::reference::Reference;
 
+/// What a plan takes for granted of its inputs while it is followed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Terms {
+    /// Known moment at its optimisation, N m.
+    pub known: Vector3<f64>,
+    /// Rates that the turn of the trajectory added at its optimisation, rad/s.
+    pub turn: Vector3<f64>,
+    /// Least limit on ‖m‖ while it is followed, N m.
+    pub limit_moment: f64,
+    /// Bound on the disturbance while it is followed, as the number of the design's
+    /// [tightening](super::Design::tightening).
+    pub level: usize,
+}
+
 /// Nominal trajectory: states x̃_0 … x̃_N and the accelerations a_0 … a_{N−1} held between them.
 #[derive(Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Plan {
@@ -22,10 +36,8 @@ pub struct Plan {
     pub braking: f64,
     /// Shift of the reference's angles by the observer when the plan was made, rad.
     pub shift: Vector3<f64>,
-    /// Known moment with which the plan was certified, N m.
-    pub known: Vector3<f64>,
-    /// Rates that the turn of the trajectory added when the plan was certified, rad/s.
-    pub turn: Vector3<f64>,
+    /// What the plan was certified for.
+    pub terms: Terms,
     /// What was commanded before the plan, if the delay is not exact.
     pub onset: Onset,
 }
@@ -38,8 +50,7 @@ impl Clone for Plan {
             multipliers: self.multipliers.clone(),
             braking: self.braking,
             shift: self.shift,
-            known: self.known,
-            turn: self.turn,
+            terms: self.terms,
             onset: self.onset,
         }
     }
@@ -51,7 +62,7 @@ impl Clone for Plan {
         self.multipliers.clone_from(&source.multipliers);
         self.braking = source.braking;
         self.shift = source.shift;
-        (self.known, self.turn) = (source.known, source.turn);
+        self.terms = source.terms;
         self.onset = source.onset;
     }
 }
@@ -65,8 +76,7 @@ impl Plan {
             multipliers: vec![[0.0; 2]; horizon],
             braking: 0.0,
             shift: Vector3::zeros(),
-            known: Vector3::zeros(),
-            turn: Vector3::zeros(),
+            terms: Terms::default(),
             onset: Onset::default(),
         }
     }

@@ -190,6 +190,17 @@ pub struct Settings {
     #[setting(name = "knownMoment.change", unit = "N.m", min = 0.0, nominal = 1e3)]
     #[setting(used_with = "constraints = robust")]
     pub known_change: f64,
+    /// Bound on the fall of scheduled.limitMoment while a plan is followed, which is one
+    /// period.optimisation or longer; the plan reserves it of that limit.
+    #[setting(name = "scheduled.limitMomentFall", unit = "N.m", min = 0.0, nominal = 1e3)]
+    #[setting(used_with = "constraints = robust")]
+    pub limit_fall: f64,
+    /// Number of bounds on the disturbance for which the robust set is designed: disturbance.bound
+    /// times 1, and equal parts of it. A plan takes one that leaves scheduled.disturbanceBound room
+    /// to rise by one part while it is followed.
+    #[setting(name = "scheduled.disturbanceParts", min = 1, max = 16)]
+    #[setting(used_with = "constraints = robust")]
+    pub disturbance_parts: usize,
     #[allow(missing_docs)]
     #[setting(name = "guarantee.policy")]
     #[setting(used_with = "constraints = robust")]
@@ -268,6 +279,12 @@ impl Settings {
     /// Returns the largest moment of the actuators and the known moment together, N m.
     pub fn limit_total(&self) -> f64 {
         self.limit_moment + self.known_bound
+    }
+
+    /// Returns the number of equal parts of disturbance.bound by which a scheduled bound may rise
+    /// while a plan is followed, and by which it may have fallen over the delay before.
+    pub fn parts_to_spare(&self) -> f64 {
+        (self.delay / self.period_optimisation).ceil().max(1.0)
     }
 
     /// Returns the part of limit.moment that the known moment may need at any time, N m.

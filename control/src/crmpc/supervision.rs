@@ -63,6 +63,9 @@ pub enum Contradiction {
     /// The turn that the inputs trajectory.* tell has changed by more than trajectory.turnChange
     /// since the plan in force was made.
     Turn,
+    /// scheduled.limitMoment has fallen, or scheduled.disturbanceBound risen, by more than the plan
+    /// in force reserves.
+    Schedule,
 }
 
 /// Status of the guarantee that is shown.

@@ -22,7 +22,7 @@ impl Robust {
     ///
     /// `checked` says that [`crate::mpc::Bounded::violated`] has already found no violation in it.
     pub(super) fn certify(&self, motion: &ErrorTrajectory<2>, checked: bool) -> Option<Certified> {
-        let Self { settings, dynamics, design, stages, .. } = self;
+        let Self { dynamics, design, stages, .. } = self;
         let n = motion.inputs.len();
         if design.accepted_share < 1.0
             || self.share < 1.0
@@ -50,9 +50,9 @@ impl Robust {
         }
         let before = stages.references[n - 1].accelerations + motion.inputs[n - 1];
         let braking = guarantee::braking(
-            settings,
+            &self.settings_of_plan(),
             dynamics,
-            &design.tightening,
+            self.tightening(),
             last.angles.y,
             &last.rates,
             (&self.carried_to_the_end(), before.norm(), self.turn),
@@ -92,7 +92,7 @@ impl Robust {
     /// is β̃ at the end.
     pub(super) fn keeps_sideslip(&self, k: usize, here: [f64; 2], a: f64, end: f64) -> bool {
         let Settings { period_optimisation: h, sideslip_domain, .. } = self.settings;
-        let tightening = &self.design.tightening;
+        let tightening = self.tightening();
         let more = self.switching(k).map_or(0.0, |(switching, carried)| {
             let next = self.carried.borrow().get(k + 1).copied().unwrap_or_default();
             switching.deviation(&carried).angle + switching.early(&next).0

@@ -77,7 +77,7 @@ impl Robust {
         let (by_angles, by_rates) =
             (largest_inertia * slopes.by_angles, largest_inertia * slopes.by_rates);
         let turn = (here.angles - anchor.angles).xy().norm();
-        let moment = (anchor.motion.moment(a) - self.known).norm()
+        let moment = (anchor.motion.moment(a) - self.terms.known).norm()
             + by_angles * turn
             + by_rates * (here.rates - anchor.rates).norm();
         let turn_within = (next.angles - here.angles).xy().norm();

@@ -1,9 +1,10 @@
 //! What contradicts the assumptions of the theorem at a tick.
 
 use super::Robust;
-use crate::controller::{Doubt, Measurement};
+use crate::controller::{Doubt, Measurement, Scheduled};
 use crate::crmpc::guarantee::{Carried, Deviation};
 use crate::crmpc::memory::Memory;
+use crate::crmpc::plan::Terms;
 use crate::crmpc::set::{ROUNDING, Tick};
 use crate::crmpc::settings::Settings;
 use crate::crmpc::supervision::{Contradiction, GuaranteeStatus};
@@ -38,13 +39,15 @@ impl Robust {
     pub(super) fn judge(&self, memory: &mut Memory, tick: &Tick) {
         let Tick { measured, angle_rates, deviation: [angles, rates], command, .. } = tick;
         let asked = command.moment - measured.known_moment;
-        let limits_kept = asked.norm() <= self.settings.limit_moment * (1.0 + ROUNDING)
+        let limit_moment = self.settings.limit_moment.min(measured.scheduled.limit_moment);
+        let limits_kept = asked.norm() <= limit_moment * (1.0 + ROUNDING)
             && (measured.rates - measured.turn).norm() <= self.rate_shown();
         let feedback = command.commanded - command.nominal;
         let explained = self.explains(memory, tick.within, angles, rates, &feedback);
         let assumed = [
             (self.keeps_turn(memory, measured), Contradiction::Turn),
             (self.keeps_known_moment(memory, measured), Contradiction::KnownMoment),
+            (self.keeps_schedule(memory), Contradiction::Schedule),
             (self.credible(memory), Contradiction::Disturbance),
         ];
         let seen = [
@@ -77,7 +80,7 @@ impl Robust {
 
     /// Returns whether the trajectory's turn has changed by no more than a plan in force allows.
     fn keeps_turn(&self, memory: &Memory, measured: &Measurement) -> bool {
-        let begun_with = memory.plan.turn;
+        let begun_with = memory.plan.terms.turn;
         let is_told = begun_with != Vector3::zeros();
         let bound = if is_told { self.settings.turn_change } else { 0.0 };
         !memory.assured() || keeps((measured.turn - begun_with).norm(), bound)
@@ -89,7 +92,49 @@ impl Robust {
         let Settings { known_bound, known_change, .. } = self.settings;
         let known = measured.known_moment;
         keeps(known.norm(), known_bound)
-            && (!memory.assured() || keeps((known - memory.plan.known).norm(), known_change))
+            && (!memory.assured() || keeps((known - memory.plan.terms.known).norm(), known_change))
+    }
+
+    /// Returns whether the scheduled limits are still those that a plan in force takes for granted.
+    fn keeps_schedule(&self, memory: &Memory) -> bool {
+        let (terms, Scheduled { limit_moment, disturbance_bound }) =
+            (memory.plan.terms, memory.scheduled);
+        !memory.assured()
+            || keeps(terms.limit_moment, limit_moment)
+                && (terms.level == 0 || keeps(disturbance_bound, self.bound_at(terms.level)))
+    }
+
+    /// Returns the bound on the disturbance at this level, rad/s².
+    fn bound_at(&self, level: usize) -> f64 {
+        let Settings { disturbance_bound, disturbance_parts: parts, .. } = self.settings;
+        disturbance_bound * (parts.saturating_sub(level) as f64 / parts as f64)
+    }
+
+    /// Returns the bound on the disturbance that still has an effect after the one told at a tick,
+    /// rad/s². It falls by no more than one part of the whole bound in each optimisation period.
+    pub(super) fn recent_bound(&self, memory: &Memory) -> f64 {
+        let Settings { disturbance_bound, disturbance_parts, .. } = self.settings;
+        let told = memory.scheduled.disturbance_bound.min(disturbance_bound);
+        if !memory.started {
+            return told;
+        }
+        let part = disturbance_bound / disturbance_parts as f64;
+        told.max(memory.recent_bound - part / self.design.ratio as f64)
+    }
+
+    /// Returns what a plan takes for granted that is certified now.
+    pub(super) fn terms(&self, memory: &Memory) -> Terms {
+        let Settings { limit_moment, limit_fall, disturbance_bound, disturbance_parts, .. } =
+            self.settings;
+        let parts = disturbance_parts as f64;
+        let needed = memory.recent_bound / disturbance_bound * parts;
+        let level = parts - needed - self.settings.parts_to_spare();
+        Terms {
+            known: memory.known,
+            turn: memory.turn,
+            limit_moment: limit_moment.min(memory.scheduled.limit_moment - limit_fall).max(0.0),
+            level: level.max(0.0) as usize,
+        }
     }
 
     /// Returns whether the assumptions explain the deviation of the predicted state from the
@@ -105,7 +150,8 @@ impl Robust {
         let carried = self.design.tightening.switching.as_ref();
         let carried = carried.map(|switching| memory.plan.begins_with(switching));
         let tick = memory.age as usize + tick as usize;
-        let bounds = self.explained_deviation(tick, &carried.unwrap_or_default());
+        let bounds =
+            self.explained_deviation(memory.plan.terms.level, tick, &carried.unwrap_or_default());
         let slack = 1.0 + ROUNDING;
         let r = 1.0 / cos(self.settings.sideslip_domain);
         let norm_part =
@@ -117,11 +163,10 @@ impl Robust {
     }
 
     /// Returns the largest deviations that the assumptions explain `tick` ticks after a nominal
-    /// trajectory began, in a stage that begins with `carried`.
-    fn explained_deviation(&self, tick: usize, carried: &Carried) -> Deviation {
-        let tightening = &self.design.tightening;
-        let explained = *tightening.at(tick);
-        let Some(switching) = &tightening.switching else { return explained };
+    /// trajectory began that takes this level for granted, in a stage that begins with `carried`.
+    fn explained_deviation(&self, level: usize, tick: usize, carried: &Carried) -> Deviation {
+        let explained = *self.design.at_level(level).at(tick);
+        let Some(switching) = &self.design.tightening.switching else { return explained };
         explained.plus(&switching.deviation(carried))
     }
 

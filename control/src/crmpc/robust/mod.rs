@@ -10,7 +10,10 @@ mod planning;
 mod tests;
 
 use super::design::Design;
-use super::guarantee::{self, Carried, Dynamics, End, Held, MomentLoss, Onset, Switching};
+use super::guarantee::{
+    self, Carried, Dynamics, End, Held, MomentLoss, Onset, Switching, Tightening,
+};
+use super::plan::Terms;
 use super::settings::Settings;
 use super::stages::{Point, Stages};
 use crate::linearise::Linear;
@@ -34,10 +37,10 @@ pub(super) struct Robust {
     pub another: bool,
     /// What the motion follows on.
     pub onset: Onset,
+    /// What the plan takes for granted.
+    terms: Terms,
     /// Part of the rate limit that the turn of the trajectory needs, rad/s.
     turn: f64,
-    /// Known moment at the optimisation, N m.
-    known: Vector3<f64>,
     /// What changes of the acceleration leave at the stages of the motion that was carried along
     /// last; empty if the delay is exact.
     carried: RefCell<Vec<Carried>>,
@@ -76,7 +79,7 @@ impl Robust {
         Self {
             settings: *settings,
             turn: 0.0,
-            known: Vector3::zeros(),
+            terms: Terms { limit_moment: settings.limit_moment, ..Terms::default() },
             design: design.clone(),
             dynamics: Dynamics::new(settings),
             stages: Stages::new(horizon, body, period_optimisation),
@@ -89,10 +92,22 @@ impl Robust {
     }
 
     /// Prepares the bounds for a nominal trajectory that began at the measured state `age` feedback
-    /// ticks ago and follows on `onset`, with the given share of the tightening.
-    pub(super) fn begin(&mut self, age: usize, share: f64, onset: &Onset) {
+    /// ticks ago and follows on `onset`, with the given share of the tightening at this level of
+    /// the disturbance.
+    pub(super) fn begin(&mut self, age: usize, share: f64, onset: &Onset, level: usize) {
         (self.age, self.share, self.onset) = (age, share, *onset);
+        self.terms.level = level;
         self.another = false;
+    }
+
+    /// Returns the tightening for the bound on the disturbance that the plan takes for granted.
+    fn tightening(&self) -> &Tightening {
+        self.design.at_level(self.terms.level)
+    }
+
+    /// Returns the settings with the limit that the plan takes for granted.
+    fn settings_of_plan(&self) -> Settings {
+        Settings { limit_moment: self.terms.limit_moment, ..self.settings }
     }
 
     /// Returns what an unknown part of the delay adds, with what is carried along at stage `k`.
@@ -150,7 +165,7 @@ impl Robust {
 
     /// Returns the part of a moment that is asked of the actuators.
     pub(super) fn asked(&self, moment: Linear) -> Linear {
-        Linear { value: moment.value - self.known, ..moment }
+        Linear { value: moment.value - self.terms.known, ..moment }
     }
 
     /// Returns the feedback ticks from the beginning of the nominal motion to prediction step `k`.
@@ -172,7 +187,7 @@ impl Robust {
         let typical = limit_moment / self.design.largest_inertia;
         let a = here.pull.max(before.pull).max(typical);
         let size = here.size + 2.0 * h * a;
-        let loss = self.design.tightening.rate_loss(self.tick(k));
+        let loss = self.tightening().rate_loss(self.tick(k));
         let more = self.more_of_the_deviation(k, here, before).map(|more| loss.with(more, h));
         let loss = more.as_ref().unwrap_or(loss);
         let loss = loss.at(by_angles, here.size) + loss.within(size, a);
@@ -188,15 +203,17 @@ impl Robust {
 
     /// Returns the largest ‖x̃_ω‖ at the end of the horizon, rad/s.
     fn terminal_rate(&self, end: &Point, before: &Point) -> f64 {
-        let Self { settings, dynamics, design, .. } = self;
+        let Self { settings, dynamics, design, terms, .. } = self;
         let switching = self.switching(settings.horizon);
-        if switching.is_none() && self.turn == 0.0 {
+        let is_scheduled = terms.level > 0 || terms.limit_moment < settings.limit_moment;
+        if switching.is_none() && self.turn == 0.0 && !is_scheduled {
             return design.assessment.terminal_rate;
         }
         let from = switching
             .as_ref()
             .map(|(switching, carried)| (*switching, carried, before.pull, &end.rates));
-        guarantee::terminal_rate(settings, dynamics, &design.tightening, from, self.turn)
+        let settings = self.settings_of_plan();
+        guarantee::terminal_rate(&settings, dynamics, self.tightening(), from, self.turn)
     }
 
     /// Returns what the plan's changes of acceleration add to the deviation of angles and rates
@@ -225,7 +242,7 @@ impl Robust {
     /// an acceleration of this norm, for which ‖m‖ keeps its limit at each of its feedback ticks.
     pub(super) fn moment_bound(&self, k: usize, ends: &[End; 2], acceleration: f64) -> f64 {
         let held = Held { acceleration, ratio: self.design.ratio, share: self.share };
-        let tightening = &self.design.tightening;
+        let tightening = self.tightening();
         let more = self.switching(k).map(|(switching, carried)| {
             let deviation = tightening.within(self.tick(k), self.design.ratio);
             let deviation = deviation.plus(&switching.deviation(&carried));
@@ -234,7 +251,7 @@ impl Robust {
         });
         let loss = more.as_ref().unwrap_or_else(|| tightening.moment_loss(self.tick(k)));
         let needed = loss.largest_moment(&self.dynamics, ends, held);
-        let limit = self.settings.limit_moment - self.settings.known_change;
+        let limit = self.terms.limit_moment - self.settings.known_change;
         limit - self.reserves().1 - (needed - ends[0].moment)
     }
 }

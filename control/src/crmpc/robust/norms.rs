@@ -63,7 +63,7 @@ impl Bounded<2> for Robust {
         let kinematics = InverseKinematics::at(&angles);
         let (rate, moment) = self.nonempty(bounds);
         let state = kinematics.body_rates(&rates).0 / rate;
-        let input = (kinematics.moment(&self.stages.body, &rates, &a) - self.known) / moment;
+        let input = (kinematics.moment(&self.stages.body, &rates, &a) - self.terms.known) / moment;
         (state.norm_squared(), input.norm_squared())
     }
 

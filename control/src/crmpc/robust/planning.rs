@@ -59,7 +59,7 @@ impl Robust {
             self.settings.body.drift(&angles, &rates)
         };
         let allowed = memory.plan.begins_with(switching).z
-            + self.design.tightening.pulse(memory.age as usize);
+            + self.design.at_level(memory.plan.terms.level).pulse(memory.age as usize);
         Onset {
             carried: switching.unseen(memory.commands.changes()),
             before: memory.observed.commanded().unwrap_or_else(at_rest),
@@ -73,6 +73,14 @@ impl Robust {
         let Some(switching) = &self.design.tightening.switching else { return *onset };
         let allowed = switching.pulse_of_command(memory.plan.first_change());
         Onset { allowed: if memory.assured() { allowed } else { f64::INFINITY }, ..*onset }
+    }
+
+    /// Returns where the present plan is, since how many ticks it has been followed, what it follows
+    /// on, and the level of the disturbance: not less of it than what drives the deviation already.
+    fn goes_on(&self, memory: &Memory) -> (Vector6<f64>, u32, Onset, usize) {
+        let Plan { states, terms, .. } = &memory.plan;
+        let level = self.terms.level.min(terms.level);
+        (states[0], memory.age, self.onset_going_on(memory), level)
     }
 
     /// Finds a plan that satisfies the conditions of the theorem. The first choice is the optimum
@@ -91,16 +99,17 @@ impl Robust {
         if !self.credible(memory) {
             return self.violate_least(planner, memory, measured, 0);
         }
-        let anew_from = (*measured, 0, self.onset_anew(memory, measured));
-        let goes_on = (memory.plan.states[0], memory.age, self.onset_going_on(memory));
+        let level = self.terms.level;
+        let anew_from = (*measured, 0, self.onset_anew(memory, measured), level);
+        let goes_on = self.goes_on(memory);
         let starts = match self.settings.initial_state {
             InitialState::Nominal if assured => [Some(goes_on), None],
             InitialState::Measured if assured => [Some(anew_from), Some(goes_on)],
             _ => [Some(anew_from), None],
         };
         let mut iterations = 0;
-        for (start, age, onset) in starts.into_iter().flatten() {
-            self.begin(age as usize, 1.0, &onset);
+        for (start, age, onset, level) in starts.into_iter().flatten() {
+            self.begin(age as usize, 1.0, &onset, level);
             // If the last optimisation has not begun at the measured state either, this one will
             // hardly find an optimum there.
             self.another = assured && age == 0 && memory.age > self.design.ratio as u32;
@@ -149,12 +158,12 @@ impl Robust {
 
     /// Follows the trajectory that has just become the plan, under guarantee if it is certified.
     fn take_over(&self, planner: &Planner, memory: &mut Memory, certified: Option<Certified>) {
+        memory.plan.terms = self.terms;
         let Some(Certified { margins, braking }) = certified else {
             memory.margins = self.margins(planner.optimiser.trajectory());
             memory.guarantee = self.without_guarantee(memory);
             return;
         };
-        (memory.plan.known, memory.plan.turn) = (memory.known, memory.turn);
         (memory.margins, memory.plan.braking) = (margins, braking);
         if !memory.assured() {
             memory.guarantee = GuaranteeStatus::Pending;
@@ -165,7 +174,8 @@ impl Robust {
     /// Moves the certified plan towards the optimum without constraints as far as that is
     /// certified, so that a plan that is kept repeatedly still leads to the reference.
     fn go_towards_the_optimum(&mut self, planner: &mut Planner, memory: &mut Memory) {
-        self.begin(memory.age as usize, 1.0, &self.onset_going_on(memory));
+        let (_, age, onset, level) = self.goes_on(memory);
+        self.begin(age as usize, 1.0, &onset, level);
         planner.solve_without_constraints(&self.stages, &memory.plan);
         for _ in 0..HALVINGS {
             planner.optimiser.halve_the_way_to(&planner.previous);
@@ -175,6 +185,12 @@ impl Robust {
                 self.take_over(planner, memory, Some(certified));
                 return;
             }
+        }
+        // The plan itself may serve for what its inputs have become since it was certified.
+        if memory.plan.terms != self.terms
+            && let Some(certified) = self.certify(&planner.previous, false)
+        {
+            self.take_over(planner, memory, Some(certified));
         }
     }
 
@@ -189,13 +205,15 @@ impl Robust {
     ) -> mpc::OptimiserReport {
         memory.guarantee = self.without_guarantee(memory);
         let onset = self.onset_anew(memory, measured);
-        (memory.age, memory.plan.onset) = (0, onset);
+        self.terms = self.terms(memory);
+        let level = self.terms.level;
+        (memory.age, memory.plan.onset, memory.plan.terms) = (0, onset, self.terms);
         let mut iterations = tried;
         for share in LESS {
             if planner.optimiser.is_exhausted() {
                 break;
             }
-            self.begin(0, share, &onset);
+            self.begin(0, share, &onset, level);
             let report = planner.solve((self, &self.stages), memory, measured, true);
             iterations += report.iterations;
             if report.status != SolverStatus::Fallback {
@@ -204,8 +222,9 @@ impl Robust {
                 return mpc::OptimiserReport { iterations, ..report };
             }
         }
+        let settings = self.settings_of_plan();
         let law = |state: &_, reference: &_| {
-            terminal::acceleration_within_limits(&self.settings, state, reference)
+            terminal::acceleration_within_limits(&settings, state, reference)
         };
         memory.plan.roll_out(*measured, &self.stages, law);
         let report = planner.keep(
@@ -250,6 +269,7 @@ impl ConstraintSet for Robust {
 
     fn observe(&self, memory: &mut Memory, angle_rates: &Vector3<f64>) {
         memory.pending = memory.pending.saturating_sub(1);
+        memory.recent_bound = self.recent_bound(memory);
         let Memory { commands, observed, .. } = memory;
         let (settings, tightening) = (&self.settings, &self.design.tightening);
         let pulse = tightening
@@ -272,7 +292,7 @@ impl ConstraintSet for Robust {
         first: bool,
     ) -> Planned {
         let was_assured = memory.assured();
-        self.known = memory.known;
+        self.terms = self.terms(memory);
         self.turn = self.needed_by_turn(&memory.turn);
         if !first {
             memory.age = memory.age.saturating_add(self.design.ratio as u32);

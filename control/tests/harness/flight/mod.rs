@@ -11,6 +11,7 @@ mod settings;
 mod waveform;
 
 use super::CHECK;
+use control::controller::Scheduled;
 use control::crmpc::{Crmpc, GuaranteeStatus, Memory, Settings};
 use control::delay::{Delayed, Latency};
 use control::{Controller, Measurement};
@@ -77,6 +78,8 @@ pub struct Flight {
     pub age: f64,
     /// Amount by which commands act later than the settings say, s.
     pub late: f64,
+    /// Limits that are scheduled over time (s).
+    pub scheduled: fn(&Settings, f64) -> Scheduled,
     /// Fault that the assumptions exclude.
     pub fault: Fault,
     /// Seed of all random numbers of the flight.
@@ -146,6 +149,7 @@ impl Flight {
             sight: Sight::Exact,
             age: 0.0,
             late: 0.0,
+            scheduled: |_, _| Scheduled::default(),
             fault: Fault::None,
             seed: 0,
             duration: scenario.duration,
@@ -195,7 +199,9 @@ impl Flight {
         let mut delta = Vector3::zeros();
         for tick in 0..ticks {
             let time = tick as f64 * period;
+            let scheduled = (self.scheduled)(s, time);
             let measured = faulty.measured(time, eyes.look(time, &vehicle));
+            let measured = Measurement { scheduled, ..measured };
             let off = vehicle.angles() - reference(time).angles;
             error += off.norm_squared();
             shown.lost |= off.norm() > LOST;
@@ -209,13 +215,15 @@ impl Flight {
             before = now;
             in_force += u64::from(now);
             if now {
-                shown.moment = shown.moment.max(moment.norm() / s.limit_moment);
+                let limit = s.limit_moment.min(scheduled.limit_moment);
+                shown.moment = shown.moment.max(moment.norm() / limit);
             }
             for i in 0..checks {
                 let at = |i: u64| time + i as f64 * CHECK;
                 let check = tick * checks + i;
                 if check % holds == 0 {
-                    let size = s.disturbance_bound * faulty.of_disturbance(at(i));
+                    let bound = (self.scheduled)(s, at(i)).disturbance_bound;
+                    let size = s.disturbance_bound.min(bound) * faulty.of_disturbance(at(i));
                     delta = disturbance.at(at(i), &vehicle) * size;
                 }
                 let fine = |j: u32| at(i) + f64::from(j) * (CHECK / f64::from(FINE));
