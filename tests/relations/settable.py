@@ -51,7 +51,10 @@ FILE = "time_s,alpha_rad,beta_rad,sigma_rad\n0,0.1,0.0,-0.3\n100,0.2,0.1,-0.4\n"
 # Settings in which some variables act and no experiment has them, with an experiment's inputs.
 ROWS = range(1, 9)
 SCENES = {
-    "CRMPC": {"settings without guarantee": ("crmpc-2022/crmpc-robust", {"disturbance.bound": 0.2})},
+    "CRMPC": {
+        "settings without guarantee": ("crmpc-2022/crmpc-robust", {"disturbance.bound": 0.2}),
+        "limits that are scheduled": ("crmpc-2022/crmpc-robust", {"scheduled.limitMoment": 1.3e5, "scheduled.disturbanceBound": 0.01, "scheduled.disturbanceParts": 2}),
+    },
     "AttitudeEstimator": {"a gyroscope that is stuck": ("crmpc-2022/estimator", {f"measured.gyroscope.{axis}": 0.01 for axis in "xyz"})},
     "ReentryPlant": {
         "rotating Earth": ("crmpc-2022/lqr", {"trajectory.earthRate": 7.292115e-5}),
@@ -298,7 +301,7 @@ class Driven:
             for place in fits:
                 place = replace(place, times=place.times[:length])
                 for value in self.values(place, name)[:few]:
-                    outcomes = [self.tried(place, name, value, is_set) for is_set in ways]
+                    outcomes = [self.tried(place, name, value, is_set) for is_set in ways if is_set or name not in place.settings]
                     if "acts" in outcomes:
                         return place.name
                     if "refused" in outcomes:

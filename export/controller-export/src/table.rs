@@ -38,10 +38,12 @@ const EXTERNAL: [&str; 9] = [
 ];
 
 const KNOWN_MOMENT: [&str; 3] = ["knownMoment.x", "knownMoment.y", "knownMoment.z"];
+const SCHEDULED: [&str; 2] = ["scheduled.limitMoment", "scheduled.disturbanceBound"];
 
 /// Returns the names of the inputs on which a sampled output depends.
 fn sampled_inputs() -> impl Iterator<Item = &'static str> {
-    MEASURED.into_iter().chain(EXTERNAL).chain(trajectory::NAMES).chain(KNOWN_MOMENT)
+    let known = trajectory::NAMES.into_iter().chain(KNOWN_MOMENT).chain(SCHEDULED);
+    MEASURED.into_iter().chain(EXTERNAL).chain(known)
 }
 
 /// Declares an output of a law, which changes at its ticks only.
@@ -119,6 +121,22 @@ fn known_moment(axis: &str, meaning: &str) -> Real {
     input(&format!("knownMoment.{axis}"), &capital(&text)).real().unit("N.m").nominal(1e5)
 }
 
+fn scheduled_limit() -> Real {
+    let text = "Limit on the norm of the control moment that holds at present; the command is scaled down to it";
+    input(SCHEDULED[0], text).real().unit("N.m").min(0.0).nominal(1e5)
+}
+
+/// Declares the bound on the disturbance. All controllers have it, so that they can be exchanged.
+fn scheduled_bound<L: Law>() -> Real {
+    let text = "Bound on each component of the disturbance of the angles' second derivatives that holds at present, if it is smaller than disturbance.bound";
+    let parts = "scheduled.disturbanceParts";
+    let settings = settings::settings::<L::Settings>();
+    let is_used = settings.iter().any(|setting| setting.place.name == parts);
+    let condition = "constraints = robust and scheduled.disturbanceParts > 1";
+    let common = input(SCHEDULED[1], text).used_with(if is_used { condition } else { NEVER });
+    common.real().unit("rad/s2").min(0.0).nominal(0.03)
+}
+
 /// Declares inputs for a reference from outside.
 fn external(
     name: &'static str,
@@ -143,7 +161,9 @@ fn inputs<L: Law>(table: VariableTable<ControllerFmu<L>>) -> VariableTable<Contr
     let table = vector(table, ANGLES, angles, |m| &mut m.input.reference.angles);
     let table = vector(table, ANGLES, rates, |m| &mut m.input.reference.rates);
     let table = vector(table, ANGLES, accelerations, |m| &mut m.input.reference.accelerations);
-    let table = vector(table, AXES, known_moment, |m| &mut m.input.known_moment);
+    let table = vector(table, AXES, known_moment, |m| &mut m.input.known_moment)
+        .real(scheduled_limit(), |m| &mut m.input.measured.scheduled.limit_moment)
+        .real(scheduled_bound::<L>(), |m| &mut m.input.measured.scheduled.disturbance_bound);
     known_trajectory().into_iter().zip(trajectory::QUANTITIES).fold(
         table,
         |table, (real, quantity)| {

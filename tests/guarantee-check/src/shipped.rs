@@ -206,6 +206,7 @@ fn set(s: &mut Settings, inertia: &mut Inertia, name: &str, value: &Value) -> Re
         "limit.moment" => &mut s.limit_moment,
         "knownMoment.bound" => &mut s.known_bound,
         "knownMoment.change" => &mut s.known_change,
+        "scheduled.limitMomentFall" => &mut s.limit_fall,
         "trajectory.turnChange" => &mut s.turn_change,
         "guarantee.sideslip" => &mut s.sideslip_domain,
         "period.feedback" => &mut s.period_feedback,
@@ -230,9 +231,10 @@ fn set_other(s: &mut Settings, name: &str, value: &Value) -> Result<(), String> 
         ("initialState", Some("tube")) => s.initial_state = InitialState::Tube,
         ("guarantee.policy", Some("required")) => s.guarantee = Guarantee::Required,
         ("guarantee.policy", Some("bestEffort")) => s.guarantee = Guarantee::BestEffort,
-        ("horizon", _) => {
-            let steps = value.as_integer().and_then(|steps| usize::try_from(steps).ok());
-            s.horizon = steps.ok_or("is no number of steps")?;
+        ("horizon" | "scheduled.disturbanceParts", _) => {
+            let number = value.as_integer().and_then(|number| usize::try_from(number).ok());
+            let number = number.ok_or("is no whole number")?;
+            *(if name == "horizon" { &mut s.horizon } else { &mut s.disturbance_parts }) = number;
         }
         _ => {
             // No bound depends on these.

@@ -75,8 +75,9 @@ impl Robust {
         Onset { allowed: if memory.assured() { allowed } else { f64::INFINITY }, ..*onset }
     }
 
-    /// Returns where the present plan is, since how many ticks it has been followed, what it follows
-    /// on, and the level of the disturbance: not less of it than what drives the deviation already.
+    /// Returns where the present plan is, since how many ticks it has been followed, what it
+    /// follows on, and the level of the disturbance: not less of it than what drives the deviation
+    /// already.
     fn goes_on(&self, memory: &Memory) -> (Vector6<f64>, u32, Onset, usize) {
         let Plan { states, terms, .. } = &memory.plan;
         let level = self.terms.level.min(terms.level);
