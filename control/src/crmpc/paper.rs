@@ -9,7 +9,6 @@ use super::settings::{InitialState, Settings};
 use super::stages::{Point, Stages};
 use super::supervision::Contradiction;
 use super::terminal;
-use crate::controller::Explained;
 use crate::error::DesignError;
 use crate::linearise::{self, InverseKinematics};
 use crate::mpc::{self, Bounded, ErrorTrajectory, NormConstraint, StageConstraints, State};
@@ -83,16 +82,6 @@ impl ConstraintSet for Paper {
         }
     }
 
-    fn moment_left(&self) -> f64 {
-        0.0
-    }
-
-    fn observe(&self, _memory: &mut Memory, _angle_rates: &Vector3<f64>) {}
-
-    fn shift(&self, _memory: &Memory) -> Vector3<f64> {
-        Vector3::zeros()
-    }
-
     /// Plans by the optimum of (10), or by the shifted previous plan (31).
     fn plan(
         &mut self,
@@ -128,10 +117,6 @@ impl ConstraintSet for Paper {
         self.terminal_law(&plan.states[n], &self.stages.references[n - 1])
     }
 
-    fn compensation(&self, _memory: &Memory) -> Vector3<f64> {
-        Vector3::zeros()
-    }
-
     fn moment(
         &self,
         angles: &Vector3<f64>,
@@ -153,10 +138,6 @@ impl ConstraintSet for Paper {
         } else {
             f64::INFINITY
         }
-    }
-
-    fn explained(&self) -> Option<Explained> {
-        None
     }
 }
 

@@ -14,7 +14,8 @@ use vehicle::reference::Reference;
 pub(super) const ROUNDING: f64 = 1e-9;
 
 /// The sets of the nominal trajectory, and all that depends on their choice: how a plan is found,
-/// how it goes on beyond the horizon, and how the command is limited and supervised.
+/// how it goes on beyond the horizon, and how the command is limited and supervised. What has a
+/// default belongs to the guarantee, which the paper's sets do not give.
 pub(super) trait ConstraintSet: Bounded<2> + Send {
     /// Stages of the horizon, into which the preview writes the references.
     fn stages_mut(&mut self) -> &mut Stages;
@@ -27,13 +28,17 @@ pub(super) trait ConstraintSet: Bounded<2> + Send {
     fn bounds(&self, held: &mpc::Bounds) -> Bounds;
 
     /// Returns the share of the moment limit that the design leaves to the plan at rest.
-    fn moment_left(&self) -> f64;
+    fn moment_left(&self) -> f64 {
+        0.0
+    }
 
     /// Takes the rates x_ω (rad/s) that were measured at a tick, before it is planned.
-    fn observe(&self, memory: &mut Memory, angle_rates: &Vector3<f64>);
+    fn observe(&self, _memory: &mut Memory, _angle_rates: &Vector3<f64>) {}
 
     /// Returns the shift of the reference's angles, rad.
-    fn shift(&self, memory: &Memory) -> Vector3<f64>;
+    fn shift(&self, _memory: &Memory) -> Vector3<f64> {
+        Vector3::zeros()
+    }
 
     /// Finds the plan that is followed from the measured state (Θ, x_ω) on. `first` says that there
     /// is no earlier plan.
@@ -53,7 +58,9 @@ pub(super) trait ConstraintSet: Bounded<2> + Send {
     fn move_on(&self, _plan: &mut Plan) {}
 
     /// Returns the acceleration that is commanded against the estimated disturbance, rad/s².
-    fn compensation(&self, memory: &Memory) -> Vector3<f64>;
+    fn compensation(&self, _memory: &Memory) -> Vector3<f64> {
+        Vector3::zeros()
+    }
 
     /// Returns the moment for an acceleration at angles and rates x_ω, N m.
     fn moment(
@@ -70,7 +77,9 @@ pub(super) trait ConstraintSet: Bounded<2> + Send {
     fn limit(&self, memory: &Memory) -> f64;
 
     /// Returns the largest changes of the rates that the assumptions explain.
-    fn explained(&self) -> Option<Explained>;
+    fn explained(&self) -> Option<Explained> {
+        None
+    }
 }
 
 /// Outcome of planning.
