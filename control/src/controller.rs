@@ -27,7 +27,7 @@ pub struct Measurement {
     /// Whether the measurement was made at an earlier instant than the tick, because the
     /// communication step is longer than the period or no multiple of it.
     pub stale: bool,
-    /// What the measurements up to this one contradict, as far as no law is needed to see it.
+    /// Fault that the measurements up to this one show without knowledge of the law.
     pub doubt: Option<Doubt>,
 }
 
@@ -48,7 +48,7 @@ impl Default for Scheduled {
     }
 }
 
-/// What measurements show without knowledge of the law.
+/// Fault that measurements show without knowledge of the law.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Doubt {
     /// Angles and rates have been the same at three ticks, although the vehicle moves.
@@ -94,7 +94,7 @@ pub struct Explained {
 /// future.
 pub type ReferenceAt<'a> = &'a dyn Fn(f64) -> Reference;
 
-/// What is known of the reference at a tick.
+/// Knowledge of the reference at a tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Preview<'a> {
     /// The whole reference is known in advance and does not change during an experiment.

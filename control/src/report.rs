@@ -28,7 +28,7 @@ pub enum SolverStatus {
     Kept,
 }
 
-/// What an optimisation reports.
+/// Report of an optimisation.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct SolverReport {
     /// Origin of the plan in force.

@@ -133,7 +133,7 @@ pub(crate) enum Command {
         isolation: arguments::Protection,
     },
     /// Fly thousands of cases of an experiment in which parameters vary, and write cases.parquet,
-    /// summary.json and report.html: how often limits are broken, with which confidence, and the
+    /// summary.json and report.html: how often limits are broken, with what confidence, and the
     /// worst cases.
     ///
     /// Finished cases are kept. After an interruption the same command continues where it stopped.

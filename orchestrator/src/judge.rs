@@ -65,7 +65,7 @@ pub(crate) fn judge(
         Ok(())
     };
     let written = write();
-    // What ended the run is told first, as by `run`.
+    // The reason why the run ended comes first, as in `run`.
     outcome?;
     written
 }

@@ -21,7 +21,7 @@ use std::fs;
 use std::io::Write;
 use std::path::PathBuf;
 
-/// What is linearised, when, and where the loop is opened.
+/// The loop to linearise, the instant, and where the loop is opened.
 #[derive(Args)]
 pub(crate) struct Instant {
     /// Experiment: a file, an SSP archive, or the name of an experiment that `list` shows.

@@ -132,7 +132,7 @@ mod tests {
     fn the_pages_explain_every_key() {
         let pages = [
             (FileKind::Experiment, &["experiments"][..]),
-            // What varies is explained once, and so are signals and measures.
+            // Variations, signals and measures are explained once.
             (FileKind::Study, &["studies", "campaigns"]),
             (FileKind::Campaign, &["campaigns", "studies"]),
         ];

@@ -60,7 +60,7 @@ pub enum Error {
     NoCourse {
         /// Time at which this happened, s.
         time: f64,
-        /// What the flight does.
+        /// Behaviour of the flight.
         problem: &'static str,
     },
     /// A state or an input is no longer a finite number.

@@ -43,7 +43,7 @@ pub use flight::Entering;
 pub use holding::Held;
 pub use loads::Input;
 
-/// Time (s) over which a parabola stands for the standard atmosphere.
+/// Time (s) over which the standard atmosphere is approximated by a parabola.
 const AIR_WAY: f64 = 0.05;
 
 /// Plant: the vehicle with its state.
@@ -121,7 +121,7 @@ impl Plant {
         // constant.
         let begin = input(from).moment;
         let mut parts = [1.0 / 3.0, 2.0 / 3.0, 1.0].into_iter();
-        // What is not finite is reported as such where it is used.
+        // Values that are not finite are reported where they are used.
         let finite = begin.iter().all(|value| value.is_finite());
         if !finite || parts.all(|part| input(from + part * (to - from)).moment == begin) {
             return Ok(());

@@ -92,7 +92,7 @@ impl From<Motion> for State {
     }
 }
 
-/// What the air does to the motion, and the bank angle about which its lift is turned.
+/// Effect of the air on the motion, and the bank angle about which its lift is turned.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct AirAcceleration {
     /// Lift L/m per mass, perpendicular to the velocity, m/s².

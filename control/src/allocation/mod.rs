@@ -40,7 +40,7 @@ pub enum AllocationStatus {
     Fallback,
 }
 
-/// What an allocation reports.
+/// Report of an allocation.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct AllocationReport {
     /// Origin of the allocation in force.

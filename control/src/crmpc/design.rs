@@ -221,7 +221,7 @@ fn robust(s: &Settings) -> Result<(Tightened, f64), DesignError> {
     let share = refusal::largest_share(&chosen.settings).unwrap_or(0.0);
     let Tightened { mut tightening, assessment: within, .. } =
         Tightened::new(&guarantee::with_share(&chosen.settings, share))?;
-    // What contradicts the assumptions follows from the whole bounds all the same.
+    // Contradictions of the assumptions still follow from the whole bounds.
     (tightening.observable, tightening.explained) =
         (chosen.tightening.observable, chosen.tightening.explained);
     let assessment = Assessment { terminal_rate: within.terminal_rate, ..chosen.assessment };

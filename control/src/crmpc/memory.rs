@@ -31,7 +31,7 @@ pub struct Memory {
     pub nominal: Vector6<f64>,
     /// Whether the plan in force gives the guarantee, or the reason why not.
     pub guarantee: GuaranteeStatus,
-    /// What is said of the guarantee, which takes into account what contradicts its assumptions.
+    /// Reported status of the guarantee, which includes contradictions of its assumptions.
     pub supervision: Supervision,
     /// Margins to the limits that the plan in force leaves in its first interval.
     pub margins: Margins,

@@ -8,7 +8,7 @@ use nalgebra::{Vector3, Vector6};
 use serde::{Deserialize, Serialize};
 use vehicle::reference::Reference;
 
-/// What a plan takes for granted of its inputs while it is followed.
+/// Terms under which a plan was certified; they bound its inputs while it is followed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Terms {
     /// Known moment at its optimisation, N m.
@@ -36,9 +36,9 @@ pub struct Plan {
     pub braking: f64,
     /// Shift of the reference's angles by the observer when the plan was made, rad.
     pub shift: Vector3<f64>,
-    /// What the plan was certified for.
+    /// Terms under which the plan was certified.
     pub terms: Terms,
-    /// What was commanded before the plan, if the delay is not exact.
+    /// History of commands before the plan, if the delay is not exact.
     pub onset: Onset,
 }
 

@@ -1,4 +1,4 @@
-//! What the two constraint sets, `robust` and `paper`, have in common.
+//! The common interface of the two constraint sets, `robust` and `paper`.
 
 use super::memory::Memory;
 use super::plan::Plan;
@@ -90,7 +90,7 @@ pub(super) struct Planned {
     pub left_behind: bool,
 }
 
-/// What happened at a tick.
+/// Events of a tick.
 pub(super) struct Tick<'a> {
     pub measured: &'a Measurement,
     /// Measured rates x_ω, rad/s.

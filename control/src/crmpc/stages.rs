@@ -8,7 +8,7 @@ use std::ops::Range;
 use vehicle::dynamics::RigidBody;
 use vehicle::reference::Reference;
 
-/// What turns tracking errors at the prediction times into nominal states.
+/// Conversion of tracking errors at the prediction times into nominal states.
 #[derive(Clone, Debug)]
 pub(super) struct Stages {
     /// References at the prediction times 0 … N.

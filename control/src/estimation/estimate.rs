@@ -1,4 +1,4 @@
-//! What the estimator receives, shows, and carries from tick to tick.
+//! Inputs, outputs and memory of the estimator.
 
 use super::ellipsoid::{Correction, Scatter};
 use super::fusion::Fusion;

@@ -38,7 +38,7 @@ const BISECTIONS: u32 = 20;
 /// orbit: a bank angle has hardly any influence on where the flight ends then.
 const FROZEN: f64 = 0.01;
 
-/// What the guidance measures.
+/// Measurements of the guidance.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Navigation {
     /// Motion relative to the rotating planet.

@@ -16,7 +16,7 @@ const STEP: f64 = 4.0;
 /// Steps after which a prediction is given up: the flight does not come down.
 const MOST_STEPS: usize = 1500;
 
-/// What the guidance knows of vehicle, air and planet.
+/// Model of vehicle, air and planet in the guidance.
 #[derive(Clone, Debug)]
 pub struct Predictor {
     aerodynamics: Aerodynamics,

@@ -58,7 +58,7 @@ pub(crate) fn start([altitude, longitude, latitude, speed, path, heading]: [f64;
     Motion::new(altitude, degrees[0], degrees[1], speed, degrees[2], degrees[3])
 }
 
-/// What became of a flight.
+/// Result of a flight.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Outcome {
     pub(crate) end: Motion,

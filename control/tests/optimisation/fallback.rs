@@ -1,4 +1,4 @@
-//! What is flown where no optimum is found: the fallback (31), and the plan that is kept.
+//! Flights without an optimum: the fallback (31), and the plan that is kept.
 
 use super::{controller, optimisations};
 use crate::harness::recording::{Interrupted, Recorded, reference};

@@ -55,7 +55,7 @@ pub mod table;
 pub use law::{ControllerFmu, ControllerInstance, Law, Vehicle};
 pub use sampled::{SampledFmu, SampledInstance};
 
-/// What the crate of a law needs, besides dependencies on `serde` and `settings`.
+/// Items that the crate of a law needs, besides dependencies on `serde` and `settings`.
 pub mod prelude {
     pub use crate::{ControllerFmu, Law, Vehicle};
     pub use control::controller::{Controller, Measurement, ReferenceAt};

@@ -20,7 +20,7 @@ pub enum Failure {
     Ended {
         /// Time at which the simulation ends, s.
         time: f64,
-        /// What ends it.
+        /// Reason of the end.
         reason: String,
     },
 }

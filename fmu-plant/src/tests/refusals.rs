@@ -1,4 +1,4 @@
-//! What the instance refuses, and the names in its messages.
+//! Values that the instance refuses, and the names in its messages.
 
 use super::{
     CONTEXT, Ramp, STATE_COUNT, actuate, delayed, in_model_exchange, started, step, tabulate,

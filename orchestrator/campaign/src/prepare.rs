@@ -92,7 +92,7 @@ pub(crate) fn observe(campaign: &Campaign, experiment: &Observe) -> Result<Obser
     for measure in metrics.values_mut() {
         measure.limit = None;
     }
-    // What no measure of the experiment computes is a metric of its guarantee or of its margins.
+    // Metrics that no measure computes belong to the guarantee or to the margins.
     let others = campaign.metrics.iter().map(Spanned::get_ref);
     let others = others.filter(|name| !experiment.metrics.contains_key(*name));
     let (of_margins, of_guarantee): (Vec<&String>, Vec<&String>) =

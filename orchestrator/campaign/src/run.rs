@@ -248,7 +248,7 @@ pub fn fly(plan: &Plan, options: &Options) -> Result<CampaignReport, Error> {
     let table = Reader::open(&path)?;
     let findings = findings(plan, &table, answer)?;
     if findings.status[CaseStatus::Failed.name()] == cases {
-        // What they all have in common may lie outside, so that none of them is kept.
+        // Their common cause may lie outside, so none of them is kept.
         let folder = parts::folder(&out);
         fs::remove_dir_all(&folder).map_err(Single::file(&folder))?;
         let first = match table.column("message")? {

@@ -21,7 +21,7 @@ const AGAIN: usize = 4;
 /// in relation to the least difference that any period leaves.
 const EQUAL: f64 = 1e-6;
 const AS_EQUAL: f64 = 3.0;
-/// Difference of two periods, relative to the largest response, from which nothing repeats itself
+/// Difference of two periods, relative to the largest response, above which it is not periodic
 /// and there is no model, and from which it is told.
 const REPEATS: f64 = 0.1;
 const DRIFTS: f64 = 0.01;

@@ -319,7 +319,7 @@ fn wired(system: &mut System, first: u64) -> Result<Vec<Wired>, Error> {
                 outputs.push(wire.from);
             }
         }
-        // What responds to nothing does not change.
+        // A signal that responds to nothing does not change.
         if ports.is_empty() || outputs.is_empty() {
             continue;
         }

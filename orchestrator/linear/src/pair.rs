@@ -19,7 +19,7 @@ struct Inner {
     reading: Reading,
 }
 
-/// What two components are connected with, apart from one another. The references of the ports are
+/// Connections of two components to others. The references of the ports are
 /// places in `table`, because the components' own may be equal.
 #[derive(Clone, Debug)]
 pub(crate) struct Joined {

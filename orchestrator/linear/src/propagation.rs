@@ -73,7 +73,7 @@ struct Rows<'a> {
     states: Vec<Matrix>,
     latest: Vec<Matrix>,
     before: Vec<Matrix>,
-    /// What arrives at each opened signal.
+    /// Value that arrives at each opened signal.
     arriving: Matrix,
     /// Where what is put in at a communication point begins among the columns; `None` if the loop
     /// is closed.
@@ -193,7 +193,7 @@ impl Net {
         }
         let end = rows.end();
         let a = end.columns(0, names.len()).into_owned();
-        // What nothing depends on cannot make the loop unstable.
+        // A state on which nothing depends cannot make the loop unstable.
         let kept: Vec<usize> = (0..a.ncols()).filter(|i| a.column(*i).amax() > 0.0).collect();
         merged(a.select_rows(&kept).select_columns(&kept))
     }
@@ -330,7 +330,7 @@ impl<'a> Rows<'a> {
         let model = &self.net.components[component];
         let delays = &self.delays[component];
         let state = &self.states[component];
-        // What acts on each input over the part of the step that begins at `from`.
+        // Value of each input over the part of the step that begins at `from`.
         let acting = |from: f64| {
             let mut acting = inputs.clone();
             for (row, delay) in delays.iter().enumerate() {

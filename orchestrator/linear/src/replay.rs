@@ -23,7 +23,7 @@ pub struct Recorded {
 pub struct Change {
     /// Place of the input among the recorded ones.
     pub place: usize,
-    /// What is added to its value.
+    /// Change of its value.
     pub by: f64,
 }
 

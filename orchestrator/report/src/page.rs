@@ -1,4 +1,4 @@
-//! What the pages of studies and campaigns have in common.
+//! The common parts of the pages of studies and campaigns.
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;

@@ -358,7 +358,7 @@ mod tests {
                 assert_eq!(mixed[other], if other == dimension { b[other] } else { a[other] });
             }
         }
-        // What differs from case to case otherwise, such as a seed, is the same within a sample.
+        // Within a sample everything else that varies by case, such as a seed, stays the same.
         let samples: Vec<u64> = (0..12).map(|case| design.sample(case)).collect();
         assert_eq!(samples, [0, 0, 0, 0, 0, 1, 1, 1, 1, 1, 2, 2]);
         let error = Design::new(DesignKind::Sensitivity, 1, Some(21), vec![0; 3]).unwrap_err();

@@ -75,7 +75,7 @@ impl Distribution {
         if vary.weights.is_some() && vary.list.is_none() {
             return Err("weights are for a list only".into());
         }
-        // What can be drawn must be within the limits of the variable.
+        // All values that can be drawn must be within the limits of the variable.
         for end in distribution.ends.into_iter().flatten() {
             reader.checked(end)?;
         }

@@ -40,7 +40,7 @@ pub enum Error {
         what, out.display()
     )]
     Unfinished {
-        /// What is counted, for example `cases are flown`.
+        /// Noun and verb of the count, for example `cases are flown`.
         what: &'static str,
         /// Number that is complete and kept.
         done: u64,

@@ -56,7 +56,7 @@ pub struct Flight<'a> {
     /// Whether computing times of components are measured.
     times: bool,
     bounds: Vec<Bound>,
-    /// What linearises each case, if the experiment asks for margins, and its instances.
+    /// Linearisation of each case with its instances, if the experiment asks for margins.
     lineariser: Option<Lineariser>,
     linearised: Option<Master>,
     /// The loop of the last case, linearised.

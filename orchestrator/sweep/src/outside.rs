@@ -44,7 +44,7 @@ struct Component<'a> {
     set: BTreeMap<String, Value>,
 }
 
-/// What came of a run.
+/// Result of a run.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Answer {
@@ -138,7 +138,7 @@ fn show(
     }
     outcome?;
     answer.failure.map_or(Ok(()), |Failure { component, call, message }| {
-        // What cannot be instantiated has no answer.
+        // Without an instance there is no answer.
         let is_answer = call != "instantiate";
         let failure = CallFailure { ends: None, call: call.into(), message, is_answer };
         let time = system.clock.time(answer.rows.saturating_sub(1));

@@ -7,7 +7,7 @@ use std::num::NonZero;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread;
 
-/// What came of the parts, by their position.
+/// Results of the parts, by their position.
 #[derive(Debug)]
 pub struct Worked<R, E> {
     /// Results of the parts that are finished.

@@ -1,4 +1,4 @@
-//! FMUs of other makers, imitated by an FMU in C. What they do differently must run, and their
+//! Third-party FMUs, imitated by an FMU in C. What they do differently must run, and their
 //! faults must be reported.
 
 use crate::bench::{Bench, LOOP, Recipe};

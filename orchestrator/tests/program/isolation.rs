@@ -1,4 +1,4 @@
-//! Instances that do harm to the process they are in.
+//! Instances that harm the process they are in.
 
 use crate::bench::{Bench, LOOP, Recipe};
 use crate::campaign::CAMPAIGN;

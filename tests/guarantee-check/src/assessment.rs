@@ -7,7 +7,7 @@ use crate::sums::{Axis, Bounds};
 use control::crmpc::{Deviation, InitialState, Lemmas, Settings, Tightening};
 use control::error_dynamics::{Early, SampledError};
 
-/// What drives the vehicle off its prediction, apart from the mismatch.
+/// Causes that drive the vehicle off its prediction, apart from the mismatch.
 struct Drive {
     of_three: Interval,
     of_two: Interval,

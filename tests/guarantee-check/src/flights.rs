@@ -283,7 +283,7 @@ impl Flight {
     }
 }
 
-/// What has been commanded and planned.
+/// Commands and plans so far.
 struct History {
     moment: Vector3<f64>,
     /// Sizes of the last changes of the command, the oldest first, rad/s².

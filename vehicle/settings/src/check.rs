@@ -10,7 +10,7 @@ pub struct Invalid {
     pub name: String,
     /// Value of the setting.
     pub value: f64,
-    /// What the value must satisfy.
+    /// Condition that the value must satisfy.
     pub problem: String,
 }
 

@@ -7,7 +7,7 @@ use crate::{Kind, Place, Setting};
 pub trait Choice: Copy + PartialEq + Send + Sync + 'static {
     /// Name of the enumeration.
     const NAME: &'static str;
-    /// What is chosen, in one sentence.
+    /// Subject of the choice, in one sentence.
     const TEXT: &'static str;
     /// The variants, each with its name and its meaning.
     const ITEMS: &'static [(Self, &'static str, &'static str)];
@@ -33,7 +33,7 @@ pub trait Choice: Copy + PartialEq + Send + Sync + 'static {
 pub struct Items {
     /// Name of the enumeration.
     pub name: &'static str,
-    /// What is chosen, in one sentence.
+    /// Subject of the choice, in one sentence.
     pub text: &'static str,
     /// Name and meaning of each item.
     pub items: Vec<(&'static str, &'static str)>,

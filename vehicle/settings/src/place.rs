@@ -2,7 +2,7 @@
 
 use std::borrow::Cow;
 
-/// What the attribute of a field declares.
+/// Declarations in the attribute of a field.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct About {
     /// Name; empty for a structure whose fields are named by themselves.

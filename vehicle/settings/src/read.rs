@@ -9,7 +9,7 @@ use toml::{Table, Value};
 pub struct Misread {
     /// Name in the file.
     pub name: String,
-    /// What is wrong.
+    /// Description of the fault.
     pub problem: String,
 }
 

@@ -21,7 +21,7 @@ use units::{Area, BTU_PER_SQUARE_FOOT, Length, Mass, SLUG};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Aerodynamics {
-    /// What the vehicle is, and what the data are good for.
+    /// Description of the vehicle and of the validity of the data.
     title: String,
     reference: Reference,
     forces: Forces,

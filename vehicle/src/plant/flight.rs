@@ -21,7 +21,7 @@ pub(super) type Step = (f64, f64, f64);
 /// The entry flight at one instant.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Entering {
-    /// What the air does to the vehicle.
+    /// Effect of the air on the vehicle.
     pub passage: Passage,
     /// Time derivative of the motion.
     pub derivative: Motion,

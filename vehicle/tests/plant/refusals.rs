@@ -1,4 +1,4 @@
-//! What the plant refuses, and why.
+//! Values that the plant refuses, and the reasons.
 
 use super::{actuated, config, flaps, on_a_turntable, undisturbed};
 use nalgebra::{Vector3, Vector6};

@@ -1,4 +1,4 @@
-//! What the tightening leaves of the limits at rest and beyond the horizon.
+//! Room that the tightening leaves within the limits at rest and beyond the horizon.
 
 use super::deviation::Deviation;
 use super::dynamics::Dynamics;

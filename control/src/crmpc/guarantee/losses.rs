@@ -1,4 +1,4 @@
-//! What a deviation takes of the limits on ‖ω‖ and ‖m‖.
+//! Parts of the limits on ‖ω‖ and ‖m‖ that a deviation uses.
 
 use super::deviation::Deviation;
 use super::dynamics::Dynamics;

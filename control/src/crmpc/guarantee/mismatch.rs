@@ -1,4 +1,4 @@
-//! What drives the trajectory off its prediction.
+//! Causes that drive the trajectory off its prediction.
 
 use super::geometry::Domain;
 use crate::crmpc::settings::Settings;

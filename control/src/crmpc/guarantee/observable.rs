@@ -1,4 +1,4 @@
-//! What the assumptions explain of the disturbance that is observed.
+//! Largest observed disturbance that the assumptions explain.
 
 use super::dynamics::Dynamics;
 use super::mismatch::smallest_in_rates;
@@ -45,7 +45,7 @@ impl Observable {
         let lasting = s.disturbance_bound
             + parts.any_moment / smallest_in_rates(&dynamics.vehicle, dynamics.smallest)
             + mismatch.mean * (1.0 + early[0].excess);
-        // What a command does shows later than the command, and is forgotten later.
+        // The effect of a command shows later than the command, and is forgotten later.
         let late = ticks(s.delay + s.delay_error, s.period_feedback) + 1;
         let remembered = exp(late as f64 * s.period_feedback / time_constant);
         let common = s.inertia_error / (1.0 - s.inertia_error);

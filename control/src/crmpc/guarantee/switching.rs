@@ -22,7 +22,7 @@ use vehicle::math::powi;
 /// the pulse of the command that begins at the tick.
 pub type Carried = Vector3<f64>;
 
-/// What a plan's beginning follows on, where commands begin to act earlier or later than assumed.
+/// History before a plan's beginning, where commands begin to act earlier or later than assumed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Onset {
     /// Deviation that earlier changes of the acceleration have left, see [`Carried`].

@@ -28,11 +28,11 @@ pub struct Tightening {
     /// Part of `norm` by which F differs between two ticks from the acceleration that the law
     /// intended, rad/s².
     pub mismatch: f64,
-    /// What the assumptions explain of the means of an observed disturbance.
+    /// Largest means of an observed disturbance that the assumptions explain.
     pub(in crate::crmpc) observable: [Observable; MEANS],
-    /// What the assumptions explain of the mean acceleration over a period.
+    /// Largest mean acceleration over a period that the assumptions explain.
     pub explained: Explained,
-    /// What an unknown part of the delay adds; `None` if the delay is exact.
+    /// Addition for an unknown part of the delay; `None` if the delay is exact.
     pub switching: Option<Box<Switching>>,
     /// Largest jump of the rates that a change of K ô causes, rad/s, by feedback ticks.
     pub(super) pulse: Vec<f64>,

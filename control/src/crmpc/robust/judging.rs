@@ -1,4 +1,4 @@
-//! What contradicts the assumptions of the theorem at a tick.
+//! Contradictions of the assumptions of the theorem at a tick.
 
 use super::Robust;
 use crate::controller::{Doubt, Measurement, Scheduled};

@@ -35,9 +35,9 @@ pub(super) struct Robust {
     pub share: f64,
     /// Whether another optimisation follows if this one finds no optimum.
     pub another: bool,
-    /// What the motion follows on.
+    /// History before the motion.
     pub onset: Onset,
-    /// What the plan takes for granted.
+    /// Terms of the plan.
     terms: Terms,
     /// Part of the rate limit that the turn of the trajectory needs, rad/s.
     turn: f64,

@@ -1,4 +1,4 @@
-//! What the controller sees of the vehicle.
+//! Measurements that the controller receives of the vehicle.
 
 use super::super::{CHECK, platform};
 use super::moving::Vehicle;

@@ -1,4 +1,4 @@
-//! What a library says without an instance: its FMUs and the standard that it implements.
+//! Functions that need no instance: the FMUs of a library and its version of the standard.
 
 use crate::model_instance::Export;
 use float_environment::in_default;

@@ -123,7 +123,7 @@ impl Observer for Watch {
 /// Flies the worst case again and draws the signals of the measure that was looked for, and of all
 /// others that have a limit.
 fn worst_case(plan: &Plan, outcome: &SearchOutcome, worst: &Row) -> Result<Figure, Error> {
-    // What interrupted the search must not end this flight.
+    // An interrupt of the search must not end this flight.
     let interrupt = Interrupt::default();
     let mut flight = Flight::new(plan, false, &interrupt)?.without_ends();
     let limited = plan.campaign.limits.iter().map(|limit| limit.measure.get_ref());

@@ -41,7 +41,7 @@ pub fn balanced(mut matrix: ComplexMatrix) -> ComplexMatrix {
             if row > 0.0 && column > 0.0 {
                 scale(&mut matrix, i, (column / row).powf(0.25));
             } else if row > 0.0 || column > 0.0 {
-                // What leads nowhere, or comes from nowhere, can be made as small as one likes.
+                // Rows and columns without a counterpart can be scaled arbitrarily small.
                 scale(&mut matrix, i, if row > 0.0 { SMALL } else { 1.0 / SMALL });
             }
         }

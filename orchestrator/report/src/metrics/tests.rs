@@ -115,7 +115,7 @@ fn a_run_that_misses_its_goal_is_not_completed() {
         let bound = meters().loss.map(|loss| Loss { what: "target missed".into(), ..loss });
         Meters { goal: bound, loss: None, cut_off, ..meters() }
     };
-    // What is far on the way does not count.
+    // A large error on the way does not count.
     for (last, cut_off, completed) in
         [(near, None, true), (far, None, false), ([f64::NAN; 8], None, false), (far, Some(2), true)]
     {

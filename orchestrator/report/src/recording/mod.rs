@@ -28,7 +28,7 @@ pub struct Recording {
     pub recorded: Vec<String>,
     /// Recorded variables and parameters by name.
     pub tracks: BTreeMap<String, Track>,
-    /// What the experiment measures and draws.
+    /// Measures and pictures of the experiment.
     pub observe: Observe,
     /// Values of all parameters.
     pub parameters: Vec<Parameter>,

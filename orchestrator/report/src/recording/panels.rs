@@ -44,13 +44,13 @@ pub struct Curve {
     pub run: usize,
     /// Place of the signal in the panel, by which it has its colour.
     pub place: usize,
-    /// What the curve stands for.
+    /// The quantity that the curve shows.
     pub role: Role,
     /// Values, one for each row of the recording.
     pub values: Vec<f64>,
 }
 
-/// What a curve stands for.
+/// The quantity that a curve shows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Role {
     /// A signal.
@@ -111,7 +111,7 @@ fn of_experiment(
     let mixed = || format!("panel \"{}\" mixes units", asked.name);
     for (position, curve) in asked.curves.iter().enumerate() {
         let reference = curve.reference.as_ref().and_then(&mut drawn);
-        // What is not recorded cannot be drawn.
+        // Only recorded signals can be drawn.
         let Some(values) = drawn(&curve.of) else { continue };
         let mut add = |role, values: Option<Vec<f64>>| {
             let (name, values) = (symbols(&curve.name), values.ok_or_else(mixed)?);
@@ -142,7 +142,7 @@ pub fn of_signals(runs: &[Recording], asked: &[String]) -> Result<Vec<Panel>, St
     for asked in asked {
         for name in matching(runs, asked)? {
             if seen.insert(name.clone()) {
-                // What is named one by one is to be compared.
+                // Signals that are named one by one are compared.
                 let group = if asked.contains('*') { stem(&name) } else { "" };
                 names.push((group.to_string(), name));
             }

@@ -35,7 +35,7 @@ fn names(runs: &[Recording]) -> Vec<String> {
 fn drawn(runs: &[Recording], names: &[String], panel: &Panel) -> figure::Panel {
     let mut curves: Vec<figure::Curve> =
         panel.curves.iter().map(|curve| one(runs, names, panel, curve)).collect();
-    // What is drawn first lies lowest.
+    // Later curves cover earlier ones.
     curves.sort_by_key(|curve| !matches!(curve.shape, Shape::Pale | Shape::Bold));
     curves.extend(panel.limits.iter().map(|limit| figure::Curve {
         name: panel.limit_name(limit, names),

@@ -223,7 +223,7 @@ mod tests {
             told(&both, ""),
             (format!("Beyond a limit: largest moment. {within}"), vec!["bad"])
         );
-        // What is compared with no limit has no verdict.
+        // Without a limit there is no verdict.
         assert_eq!(told(&[load], "completed"), (String::new(), vec![]));
         // A run that was lost is not good, whatever it kept until then.
         assert_eq!(
