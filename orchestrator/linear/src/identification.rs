@@ -6,7 +6,7 @@ use crate::fitting::deviation;
 use crate::model::Step;
 use crate::realisation::realise;
 use crate::replay::Recorded;
-use crate::responses::{Lags, Probe, Response, Scales, beginning};
+use crate::responses::{Lags, Probe, Response, Scales, beginning, difference};
 use crate::windows::{
     BLOCKS, COMPARED, LONGEST_TIME, MOST_BLOCKS, compared_steps, longest_period, longest_response,
 };
@@ -14,6 +14,7 @@ use cosim::system::System;
 use cosim::wiring::Port;
 use fmu_import::instance::{CallFailure, Instance};
 use fmu_import::quantity::rounded;
+use std::ops::Range;
 
 /// Most steps of the next period whose responses are held against those of the first.
 const AGAIN: usize = 4;
@@ -21,8 +22,8 @@ const AGAIN: usize = 4;
 /// in relation to the least difference that any period leaves.
 const EQUAL: f64 = 1e-6;
 const AS_EQUAL: f64 = 3.0;
-/// Difference of two periods, relative to the largest response, above which it is not periodic
-/// and there is no model, and from which it is told.
+/// Difference of two periods, relative to the largest response, above which the response is not
+/// periodic and there is no model, and above which the difference is mentioned.
 const REPEATS: f64 = 0.1;
 const DRIFTS: f64 = 0.01;
 /// Changes of an input that are tried, in relation to its typical magnitude.
@@ -30,14 +31,13 @@ pub(crate) const CHANGES: [f64; 3] = [1e-5, 1e-7, 1e-9];
 /// Difference between a model and the response over `LONGEST_TIME`, relative to the largest
 /// response of a variable, from which the model does not describe the motion.
 const DEVIATES: f64 = 0.05;
-/// What a state of a model must add to the responses, relative to the largest.
+/// Least share of the largest response that a state of a model must add.
 const SMALLEST: f64 = 1e-9;
 /// The same for a pair. An allocator ends its iterations anywhere near the optimum, and what the
 /// effectors do on their way from one end to the next is noise.
 const SMALLEST_OF_PAIR: f64 = 1e-3;
 
-/// What is found of a component: its model, those for changes to one side, if they differ, and what
-/// to know of it.
+/// The model of a component, those for changes to one side, if they differ, and a note on them.
 pub struct Found {
     /// The model of the component.
     pub model: Component,
@@ -47,6 +47,33 @@ pub struct Found {
     pub note: String,
     /// Whether no output responds to an input, so that the model has none of its motion.
     pub is_silent: bool,
+}
+
+/// Returns the responses to a change of this size at each of some steps, with so many lags.
+type Respond<'r> = dyn FnMut(f64, Range<usize>, usize) -> Result<Vec<Response>, CallFailure> + 'r;
+
+/// The change that fits a component.
+struct Trial {
+    /// Its size, in relation to the typical magnitude of an input.
+    change: f64,
+    /// Number of steps after which the responses repeat.
+    period: usize,
+    /// Largest error of the responses, with the difference that the period leaves.
+    error: f64,
+    /// Share by which a response depends on the size of the change.
+    depends: f64,
+}
+
+/// The responses from which a model is built.
+struct Measured {
+    /// Responses to changes at each step of the period.
+    phases: Vec<Response>,
+    /// Number of blocks of the Hankel matrix.
+    blocks: usize,
+    /// Size of responses, relative to the largest, that does not count.
+    tolerance: f64,
+    /// Share by which the responses of the next period differ.
+    drift: f64,
 }
 
 /// Builds the model of a component.
@@ -146,90 +173,117 @@ impl Builder<'_> {
         let Some(late) = self.late(&probe(CHANGES[0]), instance)? else {
             return Ok(self.silent());
         };
-        // A law that is not smooth wants a small change, and one that iterates a larger one.
-        let mut best: Option<(f64, usize, f64)> = None;
-        let mut trials: Vec<Response> = Vec::new();
+        let mut respond = |change: f64, steps: Range<usize>, count: usize| {
+            steps.map(|first| probe(change).responses(instance, first, count)).collect()
+        };
+        let trial = self.trial(&mut respond, longest, late + COMPARED)?;
+        let measured = self.measured(&mut respond, &trial, longest, late)?;
+        Ok(self.sampled(&measured, &trial, &scales))
+    }
+
+    /// Finds the size of the change that fits the component, from `count` lags after each step, and
+    /// the period after which its responses repeat, which is at most `longest`. A law that is not
+    /// smooth wants a small change, and one that iterates a larger one.
+    fn trial(
+        &self,
+        respond: &mut Respond,
+        longest: usize,
+        count: usize,
+    ) -> Result<Trial, CallFailure> {
+        let mut best = Trial { change: 0.0, period: 1, error: f64::INFINITY, depends: 0.0 };
+        let mut firsts: Vec<Response> = Vec::new();
         for change in CHANGES {
             // A change that leaves next to nothing is as good as any. Of the others one response
             // tells whether the component is smooth.
-            let is_found = best.is_some_and(|(_, _, least)| least <= EQUAL);
-            let short: Vec<Response> = (0..if is_found { 1 } else { 2 * longest })
-                .map(|first| probe(change).responses(instance, first, late + COMPARED))
-                .collect::<Result<_, _>>()?;
+            let is_found = best.error <= EQUAL;
+            let responses = respond(change, 0..if is_found { 1 } else { 2 * longest }, count)?;
             if !is_found {
-                let (period, difference) = period(&short, longest, self.smallest());
-                let worst = short.iter().map(|response| response.error).fold(difference, f64::max);
-                if best.is_none_or(|(_, _, least)| worst < least) {
-                    best = Some((change, period, worst));
+                let (period, difference) = period(&responses, longest, self.smallest());
+                let error = responses.iter().map(|one| one.error).fold(difference, f64::max);
+                if error < best.error || best.change == 0.0 {
+                    best = Trial { change, period, error, ..best };
                 }
             }
-            trials.extend(short.into_iter().next());
+            firsts.extend(responses.into_iter().next());
         }
         // The same response with every size of the change, if the component is smooth.
-        let depends = trials.windows(2).map(|pair| difference(pair, 1)).fold(0.0, f64::max);
-        let Some((change, period, _)) = best else { unreachable!("there are changes to try") };
+        let depends = firsts.windows(2).map(|pair| difference(pair, 1)).fold(0.0, f64::max);
+        Ok(Trial { depends, ..best })
+    }
+
+    /// Measures the responses of a period, with as many lags as a model needs that describes the
+    /// motion.
+    fn measured(
+        &self,
+        respond: &mut Respond,
+        &Trial { change, period, .. }: &Trial,
+        longest: usize,
+        late: usize,
+    ) -> Result<Measured, CallFailure> {
         let again = period + period.min(AGAIN);
         let count = compared_steps(self.recorded.length).max(late + COMPARED);
-        let measured = probe(change).responses(instance, 0, count)?;
+        let long = respond(change, 0..1, count)?;
         // What a component remembers of its inputs takes as many steps to show as it remembers.
         let may_grow = late > 0 || !self.moves();
         let most = ((self.recorded.rows.len() - again) / 2).min(MOST_BLOCKS);
         let mut blocks = BLOCKS.max(2 * period);
-        let (phases, tolerance, drift) = loop {
-            let phases: Vec<Response> = (0..again)
-                .map(|first| probe(change).responses(instance, first, 2 * blocks))
-                .collect::<Result<_, _>>()?;
+        loop {
+            let mut phases = respond(change, 0..again, 2 * blocks)?;
             let error = phases.iter().map(|phase| phase.error).fold(0.0, f64::max);
             let drift = difference(&phases, period);
             if drift > REPEATS {
-                return Err(CallFailure::answer(
-                    "linearise",
-                    format!(
-                        "responses to a change of its inputs do not repeat within {longest} steps of {} s, but differ by {:.0} %: it has no linear model here, or a longer period than that, which takes fewer of a longer step",
-                        self.recorded.length,
-                        1e2 * drift
-                    ),
-                ));
+                return Err(without_model(format!(
+                    "responses to a change of its inputs do not repeat within {longest} steps of {} s, but differ by {:.0} %: it has no linear model here, or a longer period than that, which takes fewer of a longer step",
+                    self.recorded.length,
+                    1e2 * drift
+                )));
             }
+            phases.truncate(period);
             let tolerance = self.smallest().max(drift).max(error * 10.0);
-            let deviation = deviation(
-                &realised(&phases[..period], &central, blocks, tolerance),
-                &measured.central,
-            );
+            let measured = Measured { phases, blocks, tolerance, drift };
+            let deviation = deviation(&measured.realised(&central), central(&long[0]));
             if deviation <= DEVIATES {
-                break (phases, tolerance, drift);
+                return Ok(measured);
             }
             if !may_grow || blocks >= most {
-                return Err(CallFailure::answer(
-                    "linearise",
-                    format!(
-                        "a linear model is {:.0} % off the response to a change within {LONGEST_TIME} s: steps of {} s show too little of the motion, or it is not linear here",
-                        1e2 * deviation,
-                        self.recorded.length
-                    ),
-                ));
+                return Err(without_model(format!(
+                    "a linear model is {:.0} % off the response to a change within {LONGEST_TIME} s: steps of {} s show too little of the motion, or it is not linear here",
+                    1e2 * deviation,
+                    self.recorded.length
+                )));
             }
             blocks = (2 * blocks).min(most);
-        };
+        }
+    }
+
+    /// Builds the model from the measured responses, and those for increases and for decreases of
+    /// the inputs if they differ.
+    fn sampled(&self, measured: &Measured, trial: &Trial, scales: &Scales) -> Found {
         let model = |lags: &dyn Fn(&Response) -> &Lags| {
-            let steps = realised(&phases[..period], lags, blocks, tolerance);
-            let steps = steps.into_iter().map(|step| scaled(step, &scales)).collect();
-            self.of_dynamics(Vec::new(), Dynamics::Sampled(steps))
+            let steps = measured.realised(lags);
+            steps.into_iter().map(|step| scaled(step, scales)).collect::<Vec<Step>>()
         };
-        let has_edge = phases[..period].iter().any(|phase| phase.sides.is_some());
+        let component = |steps| self.of_dynamics(Vec::new(), Dynamics::Sampled(steps));
         let side = |side: usize| {
-            model(&move |phase| phase.sides.as_ref().map_or(&phase.central, |sides| &sides[side]))
+            component(model(&move |phase| {
+                phase.sides.as_ref().map_or(&phase.central, |sides| &sides[side])
+            }))
         };
-        let found = model(&central);
-        let Dynamics::Sampled(steps) = &found.dynamics else { unreachable!("built above") };
+        let steps = model(&central);
         let states = steps.iter().map(|step| step.a.ncols()).max().unwrap_or(0);
+        let found = component(steps);
+        let Trial { period, .. } = trial;
         let repeats = format!(
             "{}: responses to changes of inputs, which repeat after {period} steps of {} s, {states} states",
             found.name, self.recorded.length
         );
-        let note = note(repeats, period, drift, (depends, change));
-        let sides = has_edge.then(|| [side(0), side(1)]);
-        Ok(Found { model: found, sides, note, is_silent: false })
+        let has_edge = measured.phases.iter().any(|phase| phase.sides.is_some());
+        Found {
+            model: found,
+            sides: has_edge.then(|| [side(0), side(1)]),
+            note: note(repeats, trial, measured.drift),
+            is_silent: false,
+        }
     }
 
     /// Returns the lag at which the last output responds to a change, 0 if it is soon; `None` if
@@ -276,9 +330,9 @@ impl Builder<'_> {
     }
 }
 
-/// Continues the note on a model with what it leaves out: responses `drift` by a share from one
-/// period to the next, and differ by the share `depends` with the size of the `change`.
-fn note(mut note: String, period: usize, drift: f64, (depends, change): (f64, f64)) -> String {
+/// Continues the note on a model with what it leaves out: responses that `drift` by a share from
+/// one period to the next, and that depend on the size of the change.
+fn note(mut note: String, &Trial { change, period, depends, .. }: &Trial, drift: f64) -> String {
     if drift > DRIFTS {
         let share = 1e2 * drift;
         note = format!(
@@ -300,27 +354,16 @@ fn central(response: &Response) -> &Lags {
     &response.central
 }
 
-/// Realises the steps of a period from their responses.
-fn realised(
-    phases: &[Response],
-    lags: &dyn Fn(&Response) -> &Lags,
-    blocks: usize,
-    tolerance: f64,
-) -> Vec<Step> {
-    let lags: Vec<Lags> = phases.iter().map(|phase| lags(phase).clone()).collect();
-    realise(&lags, blocks, tolerance)
+impl Measured {
+    /// Realises the steps of the period from these of their responses.
+    fn realised(&self, lags: &dyn Fn(&Response) -> &Lags) -> Vec<Step> {
+        let lags: Vec<Lags> = self.phases.iter().map(|phase| lags(phase).clone()).collect();
+        realise(&lags, self.blocks, self.tolerance)
+    }
 }
 
-/// Returns the difference of the responses at steps one period apart, relative to the largest.
-fn difference(phases: &[Response], period: usize) -> f64 {
-    let norm = |lags: &Lags| lags.iter().map(Matrix::amax).fold(0.0, f64::max);
-    let largest = phases.iter().map(|phase| norm(&phase.central)).fold(f64::MIN_POSITIVE, f64::max);
-    let pairs = phases.iter().zip(&phases[period..]);
-    let differences = pairs.map(|(a, b)| {
-        let lags = a.central.iter().zip(&b.central);
-        lags.map(|(a, b)| (a - b).amax()).fold(0.0, f64::max)
-    });
-    differences.fold(0.0, f64::max) / largest
+fn without_model(message: String) -> CallFailure {
+    CallFailure::answer("linearise", message)
 }
 
 /// Finds the period after which the responses repeat, in steps, and the difference that it leaves.

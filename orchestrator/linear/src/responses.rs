@@ -53,6 +53,18 @@ pub struct Probe<'a> {
     pub change: f64,
 }
 
+/// Returns the difference of the responses at steps one period apart, relative to the largest.
+pub(crate) fn difference(phases: &[Response], period: usize) -> f64 {
+    let norm = |lags: &Lags| lags.iter().map(Matrix::amax).fold(0.0, f64::max);
+    let largest = phases.iter().map(|phase| norm(&phase.central)).fold(f64::MIN_POSITIVE, f64::max);
+    let pairs = phases.iter().zip(&phases[period..]);
+    let differences = pairs.map(|(a, b)| {
+        let lags = a.central.iter().zip(&b.central);
+        lags.map(|(a, b)| (a - b).amax()).fold(0.0, f64::max)
+    });
+    differences.fold(0.0, f64::max) / largest
+}
+
 /// Returns the lag at which the last output of those that respond begins to; `None` if none does.
 pub(crate) fn beginning(lags: &Lags) -> Option<usize> {
     let begins = |row: usize| lags.iter().position(|matrix| matrix.row(row).amax() > 0.0);
