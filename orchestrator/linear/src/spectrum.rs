@@ -18,7 +18,7 @@ pub fn spectral_radius<T: ComplexField<RealField = f64>>(a: &DMatrix<T>) -> f64 
 
 /// Returns whether all eigenvalues lie within the unit circle. Far from it, few squarings tell.
 pub fn is_stable<T: ComplexField<RealField = f64>>(a: &DMatrix<T>) -> bool {
-    let mut power = a.clone();
+    let (mut power, mut square) = (a.clone(), a.clone());
     // ln ‖Aᴺ‖ for N = 2ᵏ, and before.
     let (mut logarithm, mut before) = (0.0, 0.0);
     for squaring in 0..=SQUARINGS {
@@ -37,7 +37,8 @@ pub fn is_stable<T: ComplexField<RealField = f64>>(a: &DMatrix<T>) -> bool {
         before = logarithm;
         power.unscale_mut(size);
         if squaring < SQUARINGS {
-            power = &power * &power;
+            power.mul_to(&power, &mut square);
+            std::mem::swap(&mut power, &mut square);
         }
     }
     false
@@ -73,7 +74,7 @@ pub fn dominant<T: ComplexField<RealField = f64>>(a: &DMatrix<T>) -> Complex<f64
 
 /// Returns the spectral radius and a high power of the matrix, scaled.
 fn power<T: ComplexField<RealField = f64>>(a: &DMatrix<T>) -> (f64, DMatrix<T>) {
-    let mut power = a.clone();
+    let (mut power, mut square) = (a.clone(), a.clone());
     let mut logarithm = 0.0;
     for squaring in 0..=SQUARINGS {
         let size = power.norm();
@@ -83,7 +84,8 @@ fn power<T: ComplexField<RealField = f64>>(a: &DMatrix<T>) -> (f64, DMatrix<T>) 
         logarithm += size.ln() / f64::powi(2.0, squaring);
         power.unscale_mut(size);
         if squaring < SQUARINGS {
-            power = &power * &power;
+            power.mul_to(&power, &mut square);
+            std::mem::swap(&mut power, &mut square);
         }
     }
     (logarithm.exp(), power)

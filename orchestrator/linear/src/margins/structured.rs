@@ -6,7 +6,7 @@
 //! value is exact for up to three numbers. For more of them a balancing D is taken. A margin that
 //! follows from an upper bound is a safe one.
 
-use nalgebra::{Complex, DMatrix};
+use nalgebra::{Complex, DMatrix, Matrix2, Matrix3};
 
 /// A complex matrix.
 pub type ComplexMatrix = DMatrix<Complex<f64>>;
@@ -18,14 +18,27 @@ const SMALL: f64 = 1e-10;
 
 /// Returns the largest singular value of a matrix.
 pub fn largest_singular_value(matrix: &ComplexMatrix) -> f64 {
-    match matrix.nrows() {
+    let n = matrix.nrows();
+    match n {
         0 => 0.0,
         1 => matrix[(0, 0)].norm(),
-        _ => {
-            let values = (matrix.adjoint() * matrix).symmetric_eigenvalues();
-            values.iter().copied().fold(0.0, f64::max).sqrt()
-        }
+        2 | 3 => scaled_singular_value(matrix, [1.0; 3]),
+        _ => (matrix.adjoint() * matrix).symmetric_eigenvalues().max().max(0.0).sqrt(),
     }
+}
+
+/// Returns the largest singular value of D M D⁻¹ for two or three numbers. Nothing is allocated,
+/// since this takes most of the time of a disk margin.
+fn scaled_singular_value(matrix: &ComplexMatrix, d: [f64; 3]) -> f64 {
+    let scaled = |i: usize, j: usize| matrix[(i, j)] * (d[i] / d[j]);
+    let largest = if matrix.nrows() == 2 {
+        let scaled = Matrix2::from_fn(scaled);
+        (scaled.adjoint() * scaled).symmetric_eigenvalues().max()
+    } else {
+        let scaled = Matrix3::from_fn(scaled);
+        (scaled.adjoint() * scaled).symmetric_eigenvalues().max()
+    };
+    largest.max(0.0).sqrt()
 }
 
 /// Scales a matrix to D M D⁻¹ in which each row is as large as its column (E. E. Osborne, Journal
@@ -58,24 +71,13 @@ fn scale(matrix: &mut ComplexMatrix, i: usize, factor: f64) {
 /// numbers, and that of the balanced matrix for more.
 pub fn upper_bound(matrix: &ComplexMatrix) -> f64 {
     let matrix = balanced(matrix.clone());
-    if (2..=3).contains(&matrix.nrows()) {
-        // One number of D is free; all others follow one inside the other.
-        least_over(&matrix, 1)
-    } else {
-        largest_singular_value(&matrix)
+    // One number of D is free; all others follow one inside the other.
+    let with = |x: f64, y: f64| scaled_singular_value(&matrix, [1.0, x.exp(), y.exp()]);
+    match matrix.nrows() {
+        2 => golden(&mut |x| with(x, 0.0), RANGE).1,
+        3 => golden(&mut |x| golden(&mut |y| with(x, y), RANGE).1, RANGE).1,
+        _ => largest_singular_value(&matrix),
     }
-}
-
-fn least_over(matrix: &ComplexMatrix, i: usize) -> f64 {
-    if i == matrix.nrows() {
-        return largest_singular_value(matrix);
-    }
-    let value = |x: f64| {
-        let mut scaled = matrix.clone();
-        scale(&mut scaled, i, x.exp());
-        least_over(&scaled, i + 1)
-    };
-    golden(&mut { value }, RANGE).1
 }
 
 /// Finds the least value of a convex function between −`range` and `range` by golden sections.
