@@ -282,11 +282,8 @@ def test_a_part_in_which_a_bit_has_changed_is_run_again(report, tmp_path):
     assert ours["members"][0]["metrics"]["ems_deg"] == theirs["members"][0]["metrics"]["ems_deg"]
 
 
-def test_texts_count_the_runs_that_there_are(report, results):
-    page = (report[1] / "report.html").read_text()
-    labels = [check["label"] for claim in results["claims"] for check in claim["checks"]]
-    assert f"K = −5, white noise, {MEMBERS} seeds: largest angle in deg" in labels
-    assert "500 seeds" not in page and "{runs:" not in page
+def test_a_quick_look_says_that_it_is_one(report):
+    assert f"A quick look: of each run, at most {MEMBERS} cases were flown" in (report[1] / "report.html").read_text()
 
 
 def test_a_claim_without_its_numbers_is_not_judged_and_a_seed_that_changes_nothing_is_told(tmp_path):
@@ -311,7 +308,7 @@ cases = 3
 says = "LQR solves fast."
 source = "nowhere"
 [[claim.check]]
-label = "mean of {runs:lqr}"
+label = "mean"
 left = "lqr.solver_ms_mean"
 relation = "below"
 right = 1.0
@@ -321,7 +318,7 @@ right = 1.0
     assert finished.returncode == 0, finished.stderr
     assert "not judged" in finished.stdout
     (claim,) = json.loads((tmp_path / "out" / "results.json").read_text())["claims"]
-    assert claim["verdict"] == "not-judged" and claim["checks"][0]["label"] == "mean of 3"
+    assert claim["verdict"] == "not-judged" and claim["checks"][0]["label"] == "mean"
     assert "lqr: plant.disturbance.seed has no effect, all 3 runs are the same" in finished.stdout
     assert re.search(r"lqr: the attitude is lost in 3 of 3 runs, at t = \S+ s or later", finished.stdout)
 
@@ -385,19 +382,19 @@ def test_a_changed_experiment_is_run_again(report, tmp_path):
 @pytest.mark.parametrize(
     ("old", "new", "culprit"),
     [
-        ('experiment = "{id}.toml", measures', 'experiment = "{id}q.toml", measures', "run crmpc-paper"),
+        ('experiment = "{id}.toml"', 'experiment = "{id}q.toml"', "run crmpc-paper"),
         ('runs = ["lqr", "dlmpc"', 'runs = ["lqq", "dlmpc"', 'did you mean "lqr"'),
-        ('signal = "estimator.attitude.{angle} ', 'signal = "estimator.attitude.{angle}a ', 'did you mean "estimator.attitude.alpha"'),
+        ('signal = "estimator.attitude.alpha ', 'signal = "estimator.attitude.alphaa ', 'did you mean "estimator.attitude.alpha"'),
         ('paper = "ems.dlmpc"', 'paper = "ems.dlmp"', 'did you mean "ems.dlmpc"'),
         ('ours = "dlmpc-est.cms"', 'ours = "dlmpc-est.cmss"', 'did you mean "cms"'),
         ('beside = "dlmpc.cms"', 'beside = "dlmpc.cmss"', 'did you mean "cms"'),
         ('left = "crmpc-paper.cms"', 'left = "crmpc-papr.cms"', 'did you mean "crmpc-paper"'),
         ('parameter = "plant.disturbance.seed"', 'parameter = "plant.disturbance.sed"', "disturbance.seed"),
-        ('bound = "tube.case{case}"', 'bound = "tube.cas{case}"', "tube.cas1"),
-        ('within = ["angle-{case}-printed"', 'within = ["angle-{case}-prnted"', 'did you mean "angle-1-printed"'),
+        ('bound = "tube.case1"', 'bound = "tube.cas1"', "tube.cas1"),
+        ('within = ["angle-1-printed"', 'within = ["angle-1-prnted"', 'did you mean "angle-1-printed"'),
         ("columns = 2", "colums = 2", "colums"),
-        ('use = "calm"', 'use = "clam"', 'did you mean "calm"'),
-        ('each = "optimising"', 'each = "optimizing"', 'did you mean "optimising"'),
+        ('extends = "dlmpc-est"', 'extends = "dlmpc-ets"', 'did you mean "dlmpc-est"'),
+        ('for = "optimising"', 'for = "optimizing"', 'did you mean "optimising"'),
         ('id = "{id}-calm"', 'id = "{di}-calm"', "{di}"),
     ],
 )

@@ -52,7 +52,7 @@ def test_every_study_keeps_to_its_schema_and_names_it(path):
     assert WRITTEN[path].startswith("#:schema ../../schema/study.json\n")
     check("study", WRITTEN[path])
     shown = subprocess.run([program("orchestrator"), "show", path], capture_output=True, text=True, check=True).stdout
-    assert re.findall(r"^(?:extends|use|each)\b|^\[+(?:templates|lists)\b|\{\w+\}", shown, re.MULTILINE) == []
+    assert re.findall(r"^(?:extends|for)\b|^\[+lists\b|\{\w+\}", shown, re.MULTILINE) == []
     check("study", shown)
 
 

@@ -6,7 +6,6 @@ use fmi2_export::Export;
 use fmu_controller::{Btvsmc, BtvsmcDo, Crmpc, Dlmpc, Fbl, Lqr, SotvsmcDo, TwoLoopSmc};
 use fmu_plant::ReentryPlant;
 use serde::Deserialize;
-use std::collections::BTreeMap;
 use toml::{Table, Value};
 
 /// Experiment that all flights extend: any controller in the scenario of Chai 2022.
@@ -65,7 +64,6 @@ pub struct Choice {
 #[derive(Deserialize)]
 struct Listed {
     lists: Lists,
-    templates: BTreeMap<String, Value>,
 }
 
 #[derive(Deserialize)]
@@ -78,7 +76,7 @@ struct Entry {
     id: String,
     name: String,
     fmu: String,
-    fit: String,
+    set: Table,
 }
 
 /// Returns the controllers, in the order of the studies.
@@ -87,15 +85,13 @@ struct Entry {
 /// Says what is wrong with the list.
 pub fn choices() -> Result<Vec<Choice>, Error> {
     let file = "base/studies.toml";
-    let Listed { lists, templates } =
+    let Listed { lists } =
         toml::from_str(CONTROLLERS).map_err(|error| problem(file, &error.to_string()))?;
     let choice = |entry: Entry| {
-        let template = templates.get(&entry.fit).and_then(|fit| fit.get("set"));
-        let set = template.and_then(Value::as_table).into_iter().flatten();
-        let set = set.map(|(name, value)| {
+        let set = entry.set.into_iter().map(|(name, value)| {
             let name = name.strip_prefix("controller.");
             let name = name.ok_or_else(|| problem(file, "a parameter is of another component"))?;
-            Ok((name.to_string(), value.clone()))
+            Ok((name.to_string(), value))
         });
         let fmu = entry.fmu.trim_end_matches(".fmu").to_string();
         Ok(Choice { id: entry.id, name: entry.name, fmu, set: set.collect::<Result<_, Error>>()? })

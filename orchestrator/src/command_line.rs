@@ -209,7 +209,7 @@ pub(crate) enum Command {
         #[command(flatten)]
         isolation: arguments::Protection,
     },
-    /// Print an experiment, a study or a campaign with all that it extends, templates and lists
+    /// Print an experiment, a study or a campaign with all that it extends, and with lists
     /// expanded.
     Show {
         /// What to print: a file, or the name of an experiment, a study or a campaign.

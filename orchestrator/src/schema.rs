@@ -1,9 +1,8 @@
 //! JSON Schemas of experiment and study files, made from the types that read them, so that editors
 //! can complete and check these files.
 //!
-//! Keys that a file leaves out may come from one that it extends, or from a template. A schema
-//! therefore knows every key and its type but requires none; missing keys are reported when the
-//! file is read.
+//! Keys that a file leaves out may come from one that it extends. A schema therefore knows
+//! every key and its type but requires none; missing keys are reported when the file is read.
 
 use campaign::definition::Campaign;
 use cosim::experiment::Experiment;
@@ -37,18 +36,18 @@ pub(crate) fn text(kind: FileKind) -> String {
         FileKind::Study => {
             let mut schema = schema_of::<Study>(json!({
                 "extends": texts("Files that this one extends, with paths relative to this file. A later file takes precedence over earlier ones."),
-                "templates": {
-                    "description": "Templates by name, upon which other tables build with `use`.",
-                    "type": "object",
-                    "additionalProperties": { "type": "object" },
-                },
                 "lists": {
-                    "description": "Lists of rows by name. A table with `each` is repeated for each row of a list.",
+                    "description": "Lists of rows by name. A table with `for` is repeated for each row of a list.",
                     "type": "object",
                     "additionalProperties": { "type": "array", "items": { "type": "object" } },
                 },
             }));
-            RecursiveTransform(with_templates).transform(&mut schema);
+            if let Some(Value::Object(run)) = schema.pointer_mut("/definitions/Run/properties") {
+                let extends =
+                    "Id of a run before this one, whose keys this one has as far as it lacks them.";
+                run.insert("extends".into(), json!({ "description": extends, "type": "string" }));
+            }
+            RecursiveTransform(with_rows).transform(&mut schema);
             schema
         }
     };
@@ -74,25 +73,24 @@ fn texts(description: &str) -> Value {
     json!({ "description": description, "type": ["string", "array"], "items": { "type": "string" } })
 }
 
-/// Allows what templates need: `use` and `each` in every table, and the name of a row's value in
-/// braces in place of a number, a truth value or a list.
-fn with_templates(schema: &mut Schema) {
+/// Allows what lists of rows need: `for` in every table, and the name of a row's value in braces in
+/// place of a number, a truth value, a list or values by name.
+fn with_rows(schema: &mut Schema) {
     if let Some(properties) =
-        properties(schema).filter(|properties| !properties.contains_key("templates"))
+        properties(schema).filter(|properties| !properties.contains_key("lists"))
     {
-        properties.insert(
-            "use".into(),
-            texts("Names of templates that this table builds upon. With several names the table is repeated for each of them."),
-        );
         let each = json!({
-            "description": "A list of rows, or its name. The table is repeated for each row, and each name in braces is replaced by the row's value.",
+            "description": "A list of rows, or its name, or several names. The table is repeated for each row, or for each combination of rows, and each name in braces is replaced by the row's value.",
             "type": ["string", "array"],
-            "items": { "type": "object" },
+            "items": { "type": ["string", "object"] },
         });
-        properties.insert("each".into(), each);
+        properties.insert("for".into(), each);
     }
-    let is_replaced =
-        |name: &Value| ["number", "integer", "boolean", "array"].iter().any(|kind| name == kind);
+    let is_map = schema.get("properties").is_none();
+    let is_replaced = |name: &Value| {
+        ["number", "integer", "boolean", "array"].iter().any(|kind| name == kind)
+            || is_map && name == "object"
+    };
     let kinds = match schema.get("type") {
         Some(Value::Array(kinds)) if !kinds.contains(&json!("string")) => kinds.clone(),
         Some(kind @ Value::String(_)) => vec![kind.clone()],

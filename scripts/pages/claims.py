@@ -94,7 +94,7 @@ def kind(place: str) -> str:
 
 
 def spelled_out(study: str) -> dict:
-    """A study with all that it extends and with its templates, by the orchestrator."""
+    """A study with all that it extends and with its lists spelled out, by the orchestrator."""
     target = ROOT / os.environ.get("CARGO_TARGET_DIR", "target")
     programs = [target / profile / "orchestrator" for profile in ("release", "debug")]
     built = [program for program in programs if program.is_file()]

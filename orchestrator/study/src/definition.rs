@@ -68,6 +68,10 @@ pub struct Study {
     /// Claims of the paper, with the checks that decide on them.
     #[serde(default, rename = "claim")]
     pub claims: Vec<Claim>,
+    /// Largest number of cases of a run, if it is smaller than the file says. This is no key of a
+    /// study file.
+    #[serde(skip)]
+    pub(crate) most_cases: Option<u64>,
     /// Values that were read from the files. This is no key of a study file.
     #[serde(skip)]
     pub values: Values,

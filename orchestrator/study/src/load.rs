@@ -3,34 +3,23 @@
 use crate::definition::Study;
 use crate::drawings::{Figure, Panel};
 use crate::runs::Run;
-use crate::{grid, template};
+use crate::{grid, rows};
 use cosim::document::Source;
 use cosim::error::Error;
 use cosim::experiment::{Experiment, Observe};
 use fmu_import::names;
+use serde::de::DeserializeOwned;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// Replaces each `{runs:ID}` in a text by the number of runs; `None` if there is none to replace.
-fn counted(text: &str, runs: &[Run], cases: Option<u64>) -> Result<Option<String>, String> {
-    let mut parts = text.split("{runs:");
-    let mut counted = parts.next().unwrap_or_default().to_string();
-    for part in parts {
-        let (id, rest) = part.split_once('}').ok_or("\"{runs:\" is not closed by a brace")?;
-        let run = runs.iter().find(|run| run.id.get_ref() == id).ok_or_else(|| {
-            let hint = names::hint(id, runs.iter().map(|run| run.id.get_ref().as_str()));
-            format!("\"{{runs:{id}}}\": there is no [[run]] \"{id}\"{hint}")
-        })?;
-        counted += &limited(run, cases).to_string();
-        counted += rest;
-    }
-    Ok((counted != text).then_some(counted))
-}
-
-/// Returns the number of cases of a run if there may be at most this many, of which one always
-/// remains.
-fn limited(run: &Run, cases: Option<u64>) -> u64 {
-    cases.map_or(run.count(), |limit| run.count().min(limit.max(1)))
+/// Reads a study in which no table stands for several, and no run extends another one.
+fn spelled_out<T: DeserializeOwned>(source: &Source) -> Result<T, Error> {
+    source.read_with(|mut table| {
+        let study = table.get_mut();
+        let expanded = rows::expand(study).and_then(|()| rows::inherit(study));
+        expanded.map_err(|(span, message)| source.error(&span, message))?;
+        source.take(table)
+    })
 }
 
 impl Study {
@@ -43,22 +32,13 @@ impl Study {
         Self::load_with(path, None)
     }
 
-    /// Reads a study with at most `cases` cases of each run, and its files of values. The text
-    /// `{runs:ID}` becomes the number of cases of the run ID.
+    /// Reads a study with at most `cases` cases of each run, and its files of values.
     ///
     /// # Errors
     /// The errors are those of [`Self::load`].
     pub fn load_with(path: &Path, cases: Option<u64>) -> Result<Self, Error> {
         let source = Source::load(path)?;
-        let fault = |(span, message): template::Fault| source.error(&span, message);
-        let mut study: Self = source.read_with(|mut table| {
-            template::expand(table.get_mut()).map_err(fault)?;
-            let Self { runs, .. } = source.take(table.clone())?;
-            let counted = |text: &str| counted(text, &runs, cases);
-            let mut values = table.get_mut().iter_mut();
-            values.try_for_each(|(_, value)| template::rewrite(value, &counted)).map_err(fault)?;
-            source.take(table)
-        })?;
+        let mut study: Self = spelled_out(&source)?;
         study.source = source;
         for grid in std::mem::take(&mut study.grids) {
             let runs = grid.runs(&study.source)?;
@@ -69,27 +49,22 @@ impl Study {
             study.values.load(&study.source.beside(file))?;
         }
         study.check()?;
+        let most = cases.unwrap_or(u64::MAX).max(1);
+        study.most_cases = study.runs.iter().any(|run| run.count() > most).then_some(most);
         for run in &mut study.runs {
-            run.cases = Some(limited(run, cases));
+            run.cases = Some(run.count().min(most));
         }
         study.learn_metrics();
         Ok(study)
     }
 
-    /// Returns the text of a study with all that it extends, and with every template and list
-    /// spelled out.
+    /// Returns the text of a study with all that it extends, and with every list spelled out.
     ///
     /// # Errors
-    /// Returns an error if a file cannot be read, is not TOML, or names a template or list that
-    /// does not exist.
+    /// Returns an error if a file cannot be read, is not TOML, or names a list or a run that does
+    /// not exist.
     pub fn spelled_out(path: &Path) -> Result<String, Error> {
-        let source = Source::load(path)?;
-        let study: toml::Table = source.read_with(|mut table| {
-            template::expand(table.get_mut())
-                .map_err(|(span, message)| source.error(&span, message))?;
-            source.take(table)
-        })?;
-        Ok(study.to_string())
+        Ok(spelled_out::<toml::Table>(&Source::load(path)?)?.to_string())
     }
 
     /// Reads the metrics that the experiments define. An experiment that cannot be read is reported

@@ -58,6 +58,9 @@ pub(crate) fn page(
                     section id="about" {
                         h2 { "What was compared" }
                         @for paragraph in paragraphs(&study.summary) { p { (paragraph) } }
+                        @if let Some(most) = study.most_cases {
+                            p.note { "A quick look: of each run, at most " (most) " cases were flown. Texts name the full numbers." }
+                        }
                     }
                     @if has_more_figures(results) { (figures(results, drawn)) }
                     section id="tables" {
