@@ -29,9 +29,6 @@ pub struct Study {
     /// Files of published and computed values, with paths relative to the study.
     #[serde(rename = "values")]
     pub value_files: Vec<PathBuf>,
-    /// Id of the figure that stands at the top of the page; the first one if it is left out.
-    #[serde(default)]
-    pub lead: Option<String>,
     /// Abbreviations that the page uses, with their meaning.
     #[serde(default)]
     pub terms: BTreeMap<String, String>,
@@ -56,7 +53,7 @@ pub struct Study {
     /// Numbers that are computed from the signals of runs.
     #[serde(default, rename = "measure")]
     pub measures: Vec<Measure>,
-    /// Figures of the report.
+    /// Figures of the report, of which the first stands at the top of the page.
     #[serde(default, rename = "figure")]
     pub figures: Vec<Figure>,
     /// Tables that compare numbers of the paper with ours.

@@ -90,6 +90,51 @@ pub struct Panel {
     pub y_range: Option<[f64; 2]>,
 }
 
+/// What a panel draws beside its points and straight lines.
+#[derive(Clone, Copy, Debug)]
+pub enum Drawn<'a> {
+    /// Signals over time.
+    Signals,
+    /// The single values of a metric.
+    Histogram(&'a str),
+    /// Two metrics as one dot for each case.
+    Scatter(&'a Scatter),
+    /// Two metrics as lines through several runs.
+    Across(&'a Across),
+    /// Frequency responses.
+    Response(Response),
+    /// Nothing.
+    Points,
+}
+
+impl Panel {
+    /// Returns what the panel draws.
+    ///
+    /// # Errors
+    /// Returns an error unless the panel has exactly one key that says so, or points alone.
+    pub fn drawn(&self) -> Result<Drawn<'_>, String> {
+        let keys = [
+            self.signal.as_ref().map(|_| Drawn::Signals),
+            (!self.signals.is_empty()).then_some(Drawn::Signals),
+            self.histogram.as_deref().map(Drawn::Histogram),
+            self.scatter.as_ref().map(Drawn::Scatter),
+            self.across.as_ref().map(Drawn::Across),
+            self.response.map(Drawn::Response),
+            (!self.points.is_empty()).then_some(Drawn::Points),
+        ];
+        let mut given = keys.into_iter().flatten();
+        match (given.next(), given.next()) {
+            (Some(drawn), None | Some(Drawn::Points)) => Ok(drawn),
+            _ => Err("a panel needs exactly one of signal, signals, histogram, scatter, across and response, or points alone".into()),
+        }
+    }
+
+    /// Returns the lines through runs that the panel draws.
+    pub fn lines_across(&self) -> &[Through] {
+        self.across.as_ref().map(|across| across.lines.as_slice()).unwrap_or_default()
+    }
+}
+
 /// A curve with a name and a colour of its own.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]

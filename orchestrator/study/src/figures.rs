@@ -1,175 +1,132 @@
 //! Draws the figures of a study from the results of its runs.
 
-use crate::curves::Series;
-use crate::drawings::{Across, Axis, Figure, Panel, Response, Through};
+use crate::drawings::{
+    Across, Axis, Drawn, Figure, Line, Panel, Point, Response, Scatter, Through,
+};
 use crate::results::{Metric, Results, RunResult};
 use crate::runs::Run;
-use cosim::experiment::Scaled;
+use crate::values::Quantity;
 use cosim::signal::Signal;
 use cosim_report::figure::{self, Color, Curve, Legend, Shape};
-use linear::curves::excluded;
+use linear::curves::{ResponseCurves, excluded};
 use toml::Spanned;
 
 /// Number of columns of a histogram for each decade.
 const COLUMNS_PER_DECADE: f64 = 12.0;
+
+/// A run whose curves a panel shows, with its results.
+type Shown<'a> = (&'a Run, &'a RunResult);
 
 /// Draws a figure from the results of a study.
 ///
 /// # Errors
 /// Returns an error if the figure names an item that does not exist.
 pub(crate) fn figure(figure: &Figure, results: &Results) -> Result<figure::Figure, String> {
-    let panels =
-        figure.panels.iter().map(|p| panel(figure, p, results)).collect::<Result<_, _>>()?;
+    let panels = figure.panels.iter().map(|drawn| panel(figure, drawn, results));
     Ok(figure::Figure {
         title: figure.title.clone(),
         columns: figure.columns,
         legend: Legend::Above,
-        panels,
+        panels: panels.collect::<Result<_, _>>()?,
     })
 }
 
 fn panel(figure: &Figure, panel: &Panel, results: &Results) -> Result<figure::Panel, String> {
-    let study = results.study;
-    let runs: Vec<(&Run, &RunResult)> = study
+    let with_results = |run: &'_ Run| results.run(run.id.get_ref());
+    let runs: Vec<Shown> = results
+        .study
         .runs_of(figure, panel)
-        .filter_map(|run| Some((run, results.run(run.id.get_ref())?)))
+        .filter_map(|run| Some((run, with_results(run)?)))
         .collect();
-    let mut curves = Vec::new();
-    let mut x_label = "time, s".to_string();
-    if let Some(metric) = &panel.histogram {
-        x_label.clone_from(metric);
-        let samples = runs.iter().filter_map(|(run, r)| Some((run, r.series.samples.get(metric)?)));
-        curves.extend(samples.map(|(run, samples)| histogram(run, samples)));
-    } else if let Some(scatter) = &panel.scatter {
-        for (run, result) in &runs {
-            let numbers = |metric: &str| {
-                Metric::parse(metric, study, run)?;
-                results.numbers(&format!("{}.{metric}", run.id.get_ref()))
-            };
-            let (x, y) = (numbers(&scatter.x)?.0, numbers(&scatter.y)?.0);
-            debug_assert_eq!(x.len(), result.cases());
-            curves.push(Curve {
-                name: run.label.clone(),
-                color: run.color,
-                shape: Shape::Dots,
-                x,
-                y,
-            });
-        }
-    } else if let Some(response) = panel.response {
-        x_label = match response {
-            Response::Nichols => "phase of L, deg".into(),
-            Response::Sensitivity => "frequency, rad/s".into(),
-        };
-        curves.extend(responses(response, panel, &runs));
-    } else if let Some(across) = &panel.across {
-        x_label.clone_from(&across.x.metric);
-        for line in &across.lines {
-            curves.push(through(across, line, results)?);
-        }
-    } else {
-        let bands = if panel.spread { &runs[..] } else { &[] };
-        for (run, result) in bands {
-            for (signal, name, color) in drawn(panel, run) {
-                if let Some(spread) = result.spread.get(signal) {
-                    let scale = |values: &[f64]| scaled(values, panel.unit.as_ref());
-                    curves.push(Curve {
-                        name: format!("{name}, {} runs", result.cases()),
-                        color,
-                        shape: Shape::Band(scale(&spread.low)),
-                        x: result.series.time.clone(),
-                        y: scale(&spread.high),
-                    });
-                }
-            }
-        }
-        if let (Some(reference), Some((_, result))) = (&panel.reference, runs.first()) {
-            let y = values(&result.series, reference, panel);
-            let (name, color) = ("reference".into(), Color::INK);
-            curves.push(Curve {
-                name,
-                color,
-                shape: Shape::Dashed,
-                x: result.series.time.clone(),
-                y,
-            });
-        }
-        for (run, result) in &runs {
-            for (signal, name, color) in drawn(panel, run) {
-                let y = values(&result.series, signal, panel);
-                // The line over a band of the same colour is pale, and shows the first run only.
-                let shape = if panel.spread { Shape::Pale } else { Shape::Line };
-                let name = if panel.spread { format!("{name}, first run") } else { name };
-                curves.push(Curve { name, color, shape, x: result.series.time.clone(), y });
-            }
-        }
-    }
-    for point in &panel.points {
-        let at = |quantity| study.values.number(quantity).map(|number| vec![number]);
-        let (x, y) = (at(&point.x)?, at(&point.y)?);
-        curves.push(Curve {
-            name: point.label.clone(),
-            color: point.color,
-            shape: Shape::Crosses,
-            x,
-            y,
-        });
-    }
-    curves.extend(straight(panel, results)?);
+    let drawn = panel.drawn()?;
+    let (x_label, mut curves) = match drawn {
+        Drawn::Signals => ("time, s", over_time(panel, &runs)),
+        Drawn::Histogram(metric) => (metric, histograms(metric, &runs)),
+        Drawn::Scatter(scatter) => ("time, s", scattered(scatter, &runs, results)?),
+        Drawn::Across(across) => (across.x.metric.as_str(), lines_across(across, results)?),
+        Drawn::Response(Response::Nichols) => ("phase of L, deg", nichols(panel.disk, &runs)),
+        Drawn::Response(Response::Sensitivity) => ("frequency, rad/s", sensitivities(&runs)),
+        Drawn::Points => ("time, s", Vec::new()),
+    };
+    curves.extend(points(panel, results)?);
+    curves.extend(straight_lines(panel, results)?);
     Ok(figure::Panel {
         title: panel.title.clone(),
-        x_label: panel.x_label.clone().unwrap_or(x_label),
+        x_label: panel.x_label.as_deref().unwrap_or(x_label).to_string(),
         y_label: panel.label.clone(),
-        log_x: panel.histogram.is_some() || panel.response == Some(Response::Sensitivity),
+        log_x: matches!(drawn, Drawn::Histogram(_) | Drawn::Response(Response::Sensitivity)),
         x_range: panel.x_range,
         y_range: panel.y_range,
         curves,
     })
 }
 
-/// The frequency responses of runs, with the set that a disk margin excludes.
-fn responses(response: Response, panel: &Panel, runs: &[(&Run, &RunResult)]) -> Vec<Curve> {
+/// Returns a curve with the name and the colour of a run.
+fn of_run(run: &Run, shape: Shape, x: Vec<f64>, y: Vec<f64>) -> Curve {
+    Curve { name: run.label.clone(), color: run.color, shape, x, y }
+}
+
+/// Draws signals over time: first the bands, then the reference, then the lines of the first cases.
+fn over_time(panel: &Panel, runs: &[Shown]) -> Vec<Curve> {
+    let factor = panel.unit.as_ref().map_or(1.0, |unit| unit.factor);
+    let scaled = |values: &Vec<f64>| values.iter().map(|value| value * factor).collect();
+    let line = |result: &RunResult, signal: &Signal, name: String, color: Color, shape: Shape| {
+        let x = result.series.time.clone();
+        let y = result.series.signals.get(signal).map(scaled).unwrap_or_default();
+        Curve { name, color, shape, x, y }
+    };
     let mut curves = Vec::new();
-    if let (Response::Nichols, Some(alpha)) = (response, panel.disk) {
-        let (x, y) = excluded(alpha);
-        let name = format!("disk margin {alpha}");
-        curves.push(Curve { name, color: Color::LIMIT, shape: Shape::Dashed, x, y });
+    for (run, result) in runs.iter().filter(|_| panel.spread) {
+        for (signal, name, color) in signals(panel, run) {
+            if let Some(band) = result.spread.get(signal) {
+                curves.push(Curve {
+                    name: format!("{name}, {} runs", result.cases()),
+                    color,
+                    shape: Shape::Band(scaled(&band.low)),
+                    x: result.series.time.clone(),
+                    y: scaled(&band.high),
+                });
+            }
+        }
+    }
+    if let (Some(reference), Some((_, result))) = (&panel.reference, runs.first()) {
+        curves.push(line(result, reference, "reference".into(), Color::INK, Shape::Dashed));
     }
     for (run, result) in runs {
-        let Some(curve) = &result.series.response else { continue };
-        let (x, y) = match response {
-            Response::Nichols => (&curve.phase, &curve.gain),
-            Response::Sensitivity => (&curve.frequency, &curve.sensitivity),
-        };
-        let (name, x, y) = (run.label.clone(), x.clone(), y.clone());
-        curves.push(Curve { name, color: run.color, shape: Shape::Line, x, y });
+        for (signal, name, color) in signals(panel, run) {
+            // The line over a band of the same colour is pale, and shows the first run only.
+            curves.push(if panel.spread {
+                line(result, signal, format!("{name}, first run"), color, Shape::Pale)
+            } else {
+                line(result, signal, name, color, Shape::Line)
+            });
+        }
     }
     curves
 }
 
-/// The straight lines of a panel: its bounds and its marks.
-fn straight(panel: &Panel, results: &Results) -> Result<Vec<Curve>, String> {
-    let mut curves = Vec::new();
-    for (lines, shape) in [(&panel.bounds, Shape::Horizontal), (&panel.marks, Shape::Vertical)] {
-        for line in lines {
-            let at = results.study.values.number(&line.at)?;
-            let sides = if line.symmetric { vec![at, -at] } else { vec![at] };
-            for side in sides {
-                let (x, y) = match shape {
-                    Shape::Horizontal => (f64::NAN, side),
-                    _ => (side, f64::NAN),
-                };
-                let (name, shape) = (line.label.clone(), shape.clone());
-                curves.push(Curve { name, color: Color::LIMIT, shape, x: vec![x], y: vec![y] });
-            }
-        }
-    }
-    Ok(curves)
+/// Returns the signals that a panel draws for a run, each with the name and colour of its curve.
+fn signals<'a>(panel: &'a Panel, run: &Run) -> Vec<(&'a Signal, String, Color)> {
+    let by_run = panel.signal.iter().map(|signal| (signal, run.label.clone(), run.color));
+    let named = panel.signals.iter().map(|curve| (&curve.signal, curve.label.clone(), curve.color));
+    by_run.chain(named).collect()
 }
 
-/// Returns a line through the means of several runs.
-fn through(across: &Across, line: &Through, results: &Results) -> Result<Curve, String> {
-    let along = |axis: &Axis| {
+/// Draws each case of a run as a dot.
+fn scattered(scatter: &Scatter, runs: &[Shown], results: &Results) -> Result<Vec<Curve>, String> {
+    let dots = |(run, _): &Shown| {
+        let numbers = |metric: &str| {
+            Metric::parse(metric, results.study, run)?;
+            Ok::<_, String>(results.numbers(&format!("{}.{metric}", run.id.get_ref()))?.0)
+        };
+        Ok(of_run(run, Shape::Dots, numbers(&scatter.x)?, numbers(&scatter.y)?))
+    };
+    runs.iter().map(dots).collect()
+}
+
+/// Draws lines through the means of several runs.
+fn lines_across(across: &Across, results: &Results) -> Result<Vec<Curve>, String> {
+    let means = |line: &Through, axis: &Axis| {
         let mean = |run: &Spanned<String>| {
             let numbers = results.numbers(&format!("{}.{}", run.get_ref(), axis.metric))?;
             // A run without this metric leaves a gap.
@@ -177,43 +134,90 @@ fn through(across: &Across, line: &Through, results: &Results) -> Result<Curve, 
         };
         line.runs.iter().map(mean).collect::<Result<Vec<_>, String>>()
     };
-    let (x, y) = (along(&across.x)?, along(&across.y)?);
-    Ok(Curve { name: line.label.clone(), color: line.color, shape: Shape::Line, x, y })
+    let curve = |line: &Through| {
+        let (x, y) = (means(line, &across.x)?, means(line, &across.y)?);
+        Ok(Curve { name: line.label.clone(), color: line.color, shape: Shape::Line, x, y })
+    };
+    across.lines.iter().map(curve).collect()
 }
 
-/// Returns the curves that a panel draws for a run, each with its signal, name and colour.
-fn drawn<'a>(panel: &'a Panel, run: &'a Run) -> Vec<(&'a Signal, String, Color)> {
-    let for_run = panel.signal.iter().map(|signal| (signal, run.label.clone(), run.color));
-    for_run
-        .chain(panel.signals.iter().map(|curve| (&curve.signal, curve.label.clone(), curve.color)))
-        .collect()
+/// Draws a frequency response of each run that has one.
+fn responses(runs: &[Shown], xy: fn(&ResponseCurves) -> (&Vec<f64>, &Vec<f64>)) -> Vec<Curve> {
+    let curve = |(run, result): &Shown| {
+        let (x, y) = xy(result.series.response.as_ref()?);
+        Some(of_run(run, Shape::Line, x.clone(), y.clone()))
+    };
+    runs.iter().filter_map(curve).collect()
 }
 
-fn values(series: &Series, signal: &Signal, panel: &Panel) -> Vec<f64> {
-    series.signals.get(signal).map(|values| scaled(values, panel.unit.as_ref())).unwrap_or_default()
+/// Draws return ratios, with the set that a disk margin excludes.
+fn nichols(disk: Option<f64>, runs: &[Shown]) -> Vec<Curve> {
+    let limit = disk.map(|alpha| {
+        let (x, y) = excluded(alpha);
+        let name = format!("disk margin {alpha}");
+        Curve { name, color: Color::LIMIT, shape: Shape::Dashed, x, y }
+    });
+    limit.into_iter().chain(responses(runs, |curves| (&curves.phase, &curves.gain))).collect()
 }
 
-fn scaled(values: &[f64], unit: Option<&Scaled>) -> Vec<f64> {
-    values.iter().map(|value| value * unit.map_or(1.0, |unit| unit.factor)).collect()
+fn sensitivities(runs: &[Shown]) -> Vec<Curve> {
+    responses(runs, |curves| (&curves.frequency, &curves.sensitivity))
 }
 
-/// Returns a histogram of durations: shares, in per cent, in columns of equal width on a
-/// logarithmic axis.
-fn histogram(run: &Run, values: &[f64]) -> Curve {
+fn points(panel: &Panel, results: &Results) -> Result<Vec<Curve>, String> {
+    let at = |quantity: &Quantity| results.study.values.number(quantity).map(|number| vec![number]);
+    let cross = |point: &Point| {
+        let (name, color) = (point.label.clone(), point.color);
+        Ok(Curve { name, color, shape: Shape::Crosses, x: at(&point.x)?, y: at(&point.y)? })
+    };
+    panel.points.iter().map(cross).collect()
+}
+
+/// Draws the straight lines of a panel: its bounds, and then its marks.
+fn straight_lines(panel: &Panel, results: &Results) -> Result<Vec<Curve>, String> {
+    let mut curves = Vec::new();
+    let mut draw = |line: &Line, shape: &Shape, place: fn(f64) -> (f64, f64)| {
+        let at = results.study.values.number(&line.at)?;
+        for side in [at, -at].into_iter().take(if line.symmetric { 2 } else { 1 }) {
+            let (x, y) = place(side);
+            let (name, shape) = (line.label.clone(), shape.clone());
+            curves.push(Curve { name, color: Color::LIMIT, shape, x: vec![x], y: vec![y] });
+        }
+        Ok::<_, String>(())
+    };
+    for line in &panel.bounds {
+        draw(line, &Shape::Horizontal, |y| (f64::NAN, y))?;
+    }
+    for line in &panel.marks {
+        draw(line, &Shape::Vertical, |x| (x, f64::NAN))?;
+    }
+    Ok(curves)
+}
+
+/// Draws the durations of each run as a histogram: shares, in per cent, in columns of equal width
+/// on a logarithmic axis.
+fn histograms(metric: &str, runs: &[Shown]) -> Vec<Curve> {
+    let histogram = |(run, result): &Shown| {
+        let (x, y) = columns(result.series.samples.get(metric)?);
+        Some(of_run(run, Shape::Steps, x, y))
+    };
+    runs.iter().filter_map(histogram).collect()
+}
+
+fn columns(durations: &[f64]) -> (Vec<f64>, Vec<f64>) {
     let column = |value: f64| (value.log10() * COLUMNS_PER_DECADE).floor();
-    let timed: Vec<f64> = values.iter().copied().filter(|value| *value > 0.0).collect();
-    let (first, last) = timed
-        .iter()
-        .map(|&value| column(value))
-        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), c| (low.min(c), high.max(c)));
+    let timed: Vec<f64> =
+        durations.iter().copied().filter(|value| *value > 0.0).map(column).collect();
+    let first = timed.iter().copied().fold(f64::INFINITY, f64::min);
+    let last = timed.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     let (mut x, mut y) = (Vec::new(), Vec::new());
     let mut edge = first;
     // A further, empty column ends the last one.
     while edge <= last + 1.0 {
         x.push(10_f64.powf(edge / COLUMNS_PER_DECADE));
-        let inside = timed.iter().filter(|&&value| column(value) == edge).count();
+        let inside = timed.iter().filter(|column| **column == edge).count();
         y.push(100.0 * inside as f64 / timed.len() as f64);
         edge += 1.0;
     }
-    Curve { name: run.label.clone(), color: run.color, shape: Shape::Steps, x, y }
+    (x, y)
 }

@@ -1,13 +1,12 @@
 //! Reads a study and checks everything that can be checked without running anything.
 
 use crate::definition::Study;
-use crate::drawings::{Figure, Panel};
+use crate::drawings::{Drawn, Figure, Panel};
 use crate::runs::Run;
 use crate::{grid, rows};
 use cosim::document::Source;
 use cosim::error::Error;
 use cosim::experiment::{Experiment, Observe};
-use fmu_import::names;
 use serde::de::DeserializeOwned;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -48,13 +47,13 @@ impl Study {
         for file in &study.value_files {
             study.values.load(&study.source.beside(file))?;
         }
+        study.learn_metrics();
         study.check()?;
         let most = cases.unwrap_or(u64::MAX).max(1);
         study.most_cases = study.runs.iter().any(|run| run.count() > most).then_some(most);
         for run in &mut study.runs {
             run.cases = Some(run.count().min(most));
         }
-        study.learn_metrics();
         Ok(study)
     }
 
@@ -83,54 +82,29 @@ impl Study {
     /// Replaces patterns by the ids of runs.
     fn expand(&mut self) -> Result<(), Error> {
         let ids: Vec<&str> = self.runs.iter().map(|run| run.id.get_ref().as_str()).collect();
-        let panels = self.figures.iter_mut().flat_map(|figure| {
-            let of_panels = figure.panels.iter_mut().flat_map(|panel| {
+        let mut lists = Vec::new();
+        for figure in &mut self.figures {
+            lists.push(&mut figure.runs);
+            for panel in &mut figure.panels {
+                lists.extend(&mut panel.runs);
                 let lines = panel.across.iter_mut().flat_map(|across| &mut across.lines);
-                lines.map(|line| &mut line.runs).chain(&mut panel.runs)
-            });
-            of_panels.chain([&mut figure.runs])
-        });
-        for names in panels.chain(self.overviews.iter_mut().map(|overview| &mut overview.runs)) {
+                lists.extend(lines.map(|line| &mut line.runs));
+            }
+        }
+        lists.extend(self.overviews.iter_mut().map(|overview| &mut overview.runs));
+        for names in lists {
             *names = grid::expand(names, &ids).map_err(|name| {
                 self.source.error(&name.span(), format!("no [[run]] fits \"{}\"", name.get_ref()))
             })?;
+            self.source.check_names(&*names, "[[run]]", ids.iter().copied())?;
         }
         Ok(())
     }
 
     /// Checks everything that can be wrong without running anything.
     fn check(&self) -> Result<(), Error> {
-        let ids: Vec<&str> = self.runs.iter().map(|run| run.id.get_ref().as_str()).collect();
         for (place, run) in self.runs.iter().enumerate() {
-            let id = run.id.get_ref();
-            let fault = |message: &str| {
-                Err(self.source.error(&run.id.span(), format!("[[run]] id = \"{id}\": {message}")))
-            };
-            if id.is_empty() || !id.chars().all(|c| c.is_ascii_alphanumeric() || c == '-') {
-                return fault("an id consists of letters, digits and -");
-            }
-            if ids[..place].contains(&id.as_str()) {
-                return fault("there is another run with this id");
-            }
-            match run.cases {
-                Some(0) => return fault("cases = 0, but it must be at least 1"),
-                Some(_) if run.vary.is_empty() => return fault("cases needs vary"),
-                None if !run.vary.is_empty() => return fault("vary needs cases, their number"),
-                _ => {}
-            }
-            self.source.check_names(
-                &run.within,
-                "[[within]]",
-                self.within.iter().map(|within| within.id.as_str()),
-            )?;
-            self.source.check_names(
-                &run.measures,
-                "[[measure]]",
-                self.measures.iter().map(|measure| measure.id.as_str()),
-            )?;
-        }
-        for within in &self.within {
-            self.number(&within.bound)?;
+            self.check_run(run, &self.runs[..place])?;
         }
         for (place, measure) in self.measures.iter().enumerate() {
             let id = &measure.id;
@@ -142,85 +116,69 @@ impl Study {
                 fault => fault,
             };
             if let Some(fault) = fault {
-                let fault = format!("[[measure]] id = \"{}\": {fault}", measure.id);
+                let fault = format!("[[measure]] id = \"{id}\": {fault}");
                 return Err(self.source.error(&(0..0), fault));
             }
         }
         let bounded = self.within.iter().map(|within| &within.signals);
-        for list in bounded.chain(self.measures.iter().map(|measure| &measure.signals)) {
-            self.source.check_names(
-                [list],
-                "[signals]",
-                self.signals.keys().map(String::as_str),
-            )?;
+        let lists = bounded.chain(self.measures.iter().map(|measure| &measure.signals));
+        self.source.check_names(lists, "[signals]", self.signals.keys().map(String::as_str))?;
+        for figure in &self.figures {
+            for panel in &figure.panels {
+                self.check_panel(figure, panel).map_err(|problem| {
+                    let (id, label) = (&figure.id, &panel.label);
+                    let message = format!("[[figure]] id = \"{id}\", panel \"{label}\": {problem}");
+                    self.source.error(&(0..0), message)
+                })?;
+            }
         }
-        self.check_figures(&ids)?;
-        for overview in &self.overviews {
-            self.source.check_names(&overview.runs, "[[run]]", ids.iter().copied())?;
-        }
-        for quantity in
-            self.tables.iter().flat_map(|table| &table.rows).filter_map(|row| row.paper.as_ref())
-        {
+        let papers = self.tables.iter().flat_map(|table| &table.rows);
+        let papers = papers.filter_map(|row| row.paper.as_ref());
+        for quantity in self.within.iter().map(|within| &within.bound).chain(papers) {
             self.number(quantity)?;
         }
         Ok(())
     }
 
-    fn check_figures(&self, ids: &[&str]) -> Result<(), Error> {
-        if let Some(lead) = &self.lead
-            && !self.figures.iter().any(|figure| figure.id == *lead)
-        {
-            let hint = names::hint(lead, self.figures.iter().map(|figure| figure.id.as_str()));
-            let problem = format!("lead: there is no [[figure]] \"{lead}\"{hint}");
-            return Err(self.source.error(&(0..0), problem));
-        }
-        for figure in &self.figures {
-            self.source.check_names(&figure.runs, "[[run]]", ids.iter().copied())?;
-            for panel in &figure.panels {
-                let across = panel.across.iter().flat_map(|across| &across.lines);
-                let through = across.flat_map(|line| &line.runs);
-                let named = panel.runs.iter().flatten().chain(through);
-                self.source.check_names(named, "[[run]]", ids.iter().copied())?;
-                if let Some(problem) = self.fault_of(figure, panel) {
-                    let place =
-                        format!("[[figure]] id = \"{}\", panel \"{}\"", figure.id, panel.label);
-                    return Err(self.source.error(&(0..0), format!("{place}: {problem}")));
-                }
-                let lines = panel.bounds.iter().chain(&panel.marks).map(|line| &line.at);
-                let points = panel.points.iter().flat_map(|point| [&point.x, &point.y]);
-                for quantity in lines.chain(points) {
-                    self.number(quantity)?;
-                }
+    fn check_run(&self, run: &Run, before: &[Run]) -> Result<(), Error> {
+        let id = run.id.get_ref();
+        let fault = if id.is_empty() || !id.chars().all(|c| c.is_ascii_alphanumeric() || c == '-') {
+            Some("an id consists of letters, digits and -")
+        } else if before.iter().any(|other| other.id.get_ref() == id) {
+            Some("there is another run with this id")
+        } else {
+            match run.cases {
+                Some(0) => Some("cases = 0, but it must be at least 1"),
+                Some(_) if run.vary.is_empty() => Some("cases needs vary"),
+                None if !run.vary.is_empty() => Some("vary needs cases, their number"),
+                _ => None,
             }
+        };
+        if let Some(fault) = fault {
+            let message = format!("[[run]] id = \"{id}\": {fault}");
+            return Err(self.source.error(&run.id.span(), message));
         }
-        Ok(())
+        let bounds = self.within.iter().map(|within| within.id.as_str());
+        self.source.check_names(&run.within, "[[within]]", bounds)?;
+        let measures = self.measures.iter().map(|measure| measure.id.as_str());
+        self.source.check_names(&run.measures, "[[measure]]", measures)
     }
 
-    /// Returns what is wrong with a panel by itself.
-    fn fault_of(&self, figure: &Figure, panel: &Panel) -> Option<String> {
-        let drawn = [
-            panel.signal.is_some(),
-            !panel.signals.is_empty(),
-            panel.histogram.is_some(),
-            panel.scatter.is_some(),
-            panel.response.is_some(),
-            panel.across.is_some(),
-        ];
-        let count = drawn.iter().filter(|is| **is).count();
-        if count != 1 && (count > 1 || panel.points.is_empty()) {
-            return Some("a panel needs exactly one of signal, signals, histogram, scatter, across and response, or points alone".into());
-        }
-        let without = |run: &&Run| run.observe.margins.is_none();
-        if panel.response.is_some()
-            && let Some(run) = self.runs_of(figure, panel).find(without)
+    fn check_panel(&self, figure: &Figure, panel: &Panel) -> Result<(), String> {
+        if let Drawn::Response(_) = panel.drawn()?
+            && let Some(run) = self.runs_of(figure, panel).find(|run| run.observe.margins.is_none())
         {
             let id = run.id.get_ref();
-            return Some(format!(
+            return Err(format!(
                 "response needs [observe.margins], which the experiment of the run \"{id}\" does not have"
             ));
         }
-        let is_disk = |alpha: f64| alpha > 0.0 && alpha < 2.0;
-        panel.disk.filter(|alpha| !is_disk(*alpha)).map(|_| "disk must lie between 0 and 2".into())
+        if panel.disk.is_some_and(|alpha| !(alpha > 0.0 && alpha < 2.0)) {
+            return Err("disk must lie between 0 and 2".into());
+        }
+        let lines = panel.bounds.iter().chain(&panel.marks).map(|line| &line.at);
+        let points = panel.points.iter().flat_map(|point| [&point.x, &point.y]);
+        lines.chain(points).try_for_each(|quantity| self.values.number(quantity).map(drop))
     }
 }
 

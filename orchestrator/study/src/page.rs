@@ -105,7 +105,7 @@ fn answer(judged: &[Judged]) -> String {
 /// they use.
 fn lead(results: &Results, drawn: &[figure::Figure]) -> Markup {
     let study = results.study;
-    let pictured = lead_figure(results).map(|place| (&study.figures[place], &drawn[place]));
+    let pictured = study.figures.first().zip(drawn.first());
     let first: Option<&Overview> = study.overviews.first();
     let uses = |term: &str| {
         let titles = study.overviews.iter().flat_map(|o| o.metrics.iter().map(|m| &m.label));
@@ -136,14 +136,6 @@ fn lead(results: &Results, drawn: &[figure::Figure]) -> Markup {
     }
 }
 
-fn lead_figure(results: &Results) -> Option<usize> {
-    let figures = &results.study.figures;
-    match &results.study.lead {
-        Some(lead) => figures.iter().position(|figure| figure.id == *lead),
-        None => (!figures.is_empty()).then_some(0),
-    }
-}
-
 fn caption(figure: &Figure) -> Markup {
     html! {
         figcaption {
@@ -166,8 +158,7 @@ fn has_more_figures(results: &Results) -> bool {
 
 /// Returns the section of the page that holds the other figures, folded.
 fn figures(results: &Results, drawn: &[figure::Figure]) -> Markup {
-    let first = lead_figure(results);
-    let others = results.study.figures.iter().zip(drawn).enumerate();
+    let others = results.study.figures.iter().zip(drawn).skip(1);
     html! {
         section id="figures" {
             h2 { "Figures" }
@@ -175,7 +166,7 @@ fn figures(results: &Results, drawn: &[figure::Figure]) -> Markup {
                 "A pointer shows values, a dragged rectangle is enlarged, a double-click returns to the whole view, and a click on a name in a "
                 "legend hides its curve. The folder " code { "figures" } " beside this page holds each figure as SVG and PNG."
             }
-            @for (_, (figure, picture)) in others.filter(|(place, _)| Some(*place) != first) {
+            @for (figure, picture) in others {
                 details.figure {
                     summary { h3 { (figure.title) } }
                     figure id=(figure.id) {

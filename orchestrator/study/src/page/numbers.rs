@@ -87,12 +87,12 @@ fn names(study: &Study, color: Color) -> BTreeSet<&String> {
     let panels =
         study.figures.iter().flat_map(|figure| figure.panels.iter().map(move |p| (figure, p)));
     let curves = panels.flat_map(|(figure, panel)| {
-        let lines = panel.across.iter().flat_map(|across| &across.lines);
+        let lines = panel.lines_across();
         // Signals with names of their own have colours of their own.
         let is_by_run = panel.signals.is_empty() && panel.across.is_none();
         let runs = study.runs_of(figure, panel).filter(move |_| is_by_run);
         let runs = runs.map(|run| (run.color, &run.label));
-        runs.chain(lines.map(|line| (line.color, &line.label)))
+        runs.chain(lines.iter().map(|line| (line.color, &line.label)))
     });
     curves.filter(|(other, _)| *other == color).map(|(_, name)| name).collect()
 }
