@@ -26,22 +26,20 @@ pub(crate) enum FileKind {
 /// Returns the schema of a kind of file as text.
 pub(crate) fn text(kind: FileKind) -> String {
     let mut schema = match kind {
-        FileKind::Campaign => schema_of::<Campaign>(json!({
-            "extends": texts("Files that this one extends, with paths relative to this file. A later file takes precedence over earlier ones."),
-        })),
-        FileKind::Experiment => schema_of::<Experiment>(json!({
-            "extends": texts("Files that this one extends, with paths relative to this file. A later file takes precedence over earlier ones."),
-            "unset": texts("Parameters, as component.parameter, that an extended file sets and that are left at the FMU's start value here."),
-        })),
+        FileKind::Campaign => schema_of::<Campaign>(&[]),
+        FileKind::Experiment => schema_of::<Experiment>(&[(
+            "unset",
+            texts(
+                "Parameters, as component.parameter, that an extended file sets and that are left at the FMU's start value here.",
+            ),
+        )]),
         FileKind::Study => {
-            let mut schema = schema_of::<Study>(json!({
-                "extends": texts("Files that this one extends, with paths relative to this file. A later file takes precedence over earlier ones."),
-                "lists": {
-                    "description": "Lists of rows by name. A table with `for` is repeated for each row of a list.",
-                    "type": "object",
-                    "additionalProperties": { "type": "array", "items": { "type": "object" } },
-                },
-            }));
+            let lists = json!({
+                "description": "Lists of rows by name. A table with `for` is repeated for each row of a list.",
+                "type": "object",
+                "additionalProperties": { "type": "array", "items": { "type": "object" } },
+            });
+            let mut schema = schema_of::<Study>(&[("lists", lists)]);
             if let Some(Value::Object(run)) = schema.pointer_mut("/definitions/Run/properties") {
                 let extends =
                     "Id of a run before this one, whose keys this one has as far as it lacks them.";
@@ -57,10 +55,14 @@ pub(crate) fn text(kind: FileKind) -> String {
     serde_json::to_string_pretty(&schema).unwrap_or_default() + "\n"
 }
 
-fn schema_of<T: JsonSchema>(further: Value) -> Schema {
+fn schema_of<T: JsonSchema>(further: &[(&str, Value)]) -> Schema {
     let mut schema = SchemaSettings::draft07().into_generator().into_root_schema_for::<T>();
-    if let (Some(properties), Value::Object(further)) = (properties(&mut schema), further) {
-        properties.extend(further);
+    let extends = texts(
+        "Files that this one extends, with paths relative to this file. A later file takes precedence over earlier ones.",
+    );
+    if let Some(properties) = properties(&mut schema) {
+        properties.insert("extends".into(), extends);
+        properties.extend(further.iter().map(|(key, value)| ((*key).to_string(), value.clone())));
     }
     schema
 }

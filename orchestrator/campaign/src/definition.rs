@@ -70,7 +70,6 @@ pub struct Campaign {
     #[serde(default)]
     pub keep: Keep,
     /// Search for the worst case, for `orchestrator falsify`.
-    #[serde(default)]
     pub search: Option<Search>,
     /// The campaign file, together with the files that it extends. This is no key of the file.
     #[serde(skip)]
@@ -91,10 +90,8 @@ pub struct Limit {
     #[schemars(with = "String")]
     pub measure: Spanned<String>,
     /// Largest value that keeps the limit, in the unit of the measure.
-    #[serde(default)]
     pub at_most: Option<f64>,
     /// Smallest value that keeps the limit, in the unit of the measure.
-    #[serde(default)]
     pub at_least: Option<f64>,
     /// Whether a case ends as soon as it breaks the limit. The measure must be of the kind
     /// `largest`, and the limit an `at_most`.
@@ -118,13 +115,11 @@ pub struct Until {
 
 /// Choice of the cases whose results are kept in full, as `orchestrator run` writes them.
 #[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
+#[serde(default, deny_unknown_fields)]
 pub struct Keep {
     /// Number of kept cases with the largest values of `by`.
-    #[serde(default)]
     pub worst: u32,
     /// Measure that orders the cases.
-    #[serde(default)]
     #[schemars(with = "Option<String>")]
     pub by: Option<Spanned<String>>,
     /// Largest number of kept cases that broke a limit, were lost or failed.

@@ -235,9 +235,7 @@ fn with_nearest(message: &str) -> String {
 ///
 /// # Errors
 /// The error is the place of an item that is not a text.
-pub fn texts<'a>(
-    value: &'a Spanned<DeValue>,
-) -> Result<Vec<(&'a str, Range<usize>)>, Range<usize>> {
+fn texts<'a>(value: &'a Spanned<DeValue>) -> Result<Vec<(&'a str, Range<usize>)>, Range<usize>> {
     let items = match value.get_ref() {
         DeValue::Array(items) => &items[..],
         _ => std::slice::from_ref(value),

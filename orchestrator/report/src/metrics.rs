@@ -58,7 +58,6 @@ pub struct Metrics {
     pub completed: bool,
     /// First time at which the run was lost, s; null if it never was, or if the experiment does not
     /// say when it is.
-    #[serde(default)]
     pub lost_at: Option<f64>,
     /// Mean computing time of each component per step of its own, µs, if it was measured.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]

@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 
 /// What a part keeps besides its numbers.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Curves {
+pub(crate) struct Curves {
     /// Signals of the run's first case, if it belongs to the part.
     pub series: Option<Series>,
     /// Parameters of all components in the first case, if it belongs to the part.
@@ -30,7 +30,6 @@ pub struct Series {
     /// Single values of the metrics that keep them, by name.
     pub samples: BTreeMap<String, Vec<f64>>,
     /// Frequency responses of the loop, if a figure draws them.
-    #[serde(default)]
     pub response: Option<ResponseCurves>,
 }
 

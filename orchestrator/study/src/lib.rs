@@ -5,10 +5,10 @@
 //! docs/studies.md explains all keys; `orchestrator/schema/study.json` describes them for editors.
 
 pub mod claims;
-pub mod comparisons;
-pub mod curves;
+mod comparisons;
+mod curves;
 pub mod definition;
-pub mod drawings;
+mod drawings;
 mod figures;
 mod grid;
 mod load;

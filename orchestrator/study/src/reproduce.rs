@@ -23,6 +23,7 @@ use std::time::Instant;
 use sweep::error::Error;
 use sweep::parts::{self, PartResult, PartState, Remarks};
 use sweep::work::{self, Worked};
+use toml::Spanned;
 
 /// Number of cases of a run that make up one part.
 const CASES_PER_PART: u64 = 25;
@@ -174,30 +175,25 @@ fn check(study: &Study) -> Result<(), Error> {
             resolve(study, name).map_err(fault)?;
         }
     }
+    let number = |run: &Spanned<String>, metric: &str| {
+        resolve(study, &format!("{}.{metric}", run.get_ref())).map(drop).map_err(fault)
+    };
     for overview in &study.overviews {
         for column in &overview.metrics {
             // One run with this metric is enough; the other rows stay empty.
-            let mut tried = overview
-                .runs
-                .iter()
-                .map(|run| {
-                    resolve(study, &format!("{}.{}", run.get_ref(), column.metric)).map(drop)
-                })
-                .collect::<Vec<_>>();
-            if let Some(Err(message)) =
-                tried.iter().all(Result::is_err).then(|| tried.pop()).flatten()
+            let mut numbers = overview.runs.iter().map(|run| number(run, &column.metric));
+            if let Some(first) = numbers.next()
+                && !numbers.any(|number| number.is_ok())
             {
-                return Err(fault(message).into());
+                first?;
             }
         }
     }
-    for across in
-        study.figures.iter().flat_map(|f| &f.panels).filter_map(|panel| panel.across.as_ref())
-    {
+    let panels = study.figures.iter().flat_map(|figure| &figure.panels);
+    for across in panels.filter_map(|panel| panel.across.as_ref()) {
         for run in across.lines.iter().flat_map(|line| &line.runs) {
-            for axis in [&across.x, &across.y] {
-                resolve(study, &format!("{}.{}", run.get_ref(), axis.metric)).map_err(fault)?;
-            }
+            number(run, &across.x.metric)?;
+            number(run, &across.y.metric)?;
         }
     }
     Ok(())

@@ -55,9 +55,7 @@ impl RunResult {
         };
         self.parts.iter().flat_map(of_part).collect()
     }
-}
 
-impl RunResult {
     /// Returns the number of each case that a metric stands for, or all parameters that it names.
     pub(crate) fn numbers(&self, metric: &Metric) -> Vec<Option<f64>> {
         match metric {

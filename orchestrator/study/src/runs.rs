@@ -66,7 +66,6 @@ pub struct Run {
     #[serde(default, rename = "correlation")]
     pub correlations: Vec<Correlation>,
     /// Number of cases of the run, which `vary` needs.
-    #[serde(default)]
     pub cases: Option<u64>,
     /// Design that places the cases in the space of the varied parameters.
     #[serde(default)]

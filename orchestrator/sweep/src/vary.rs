@@ -12,7 +12,6 @@ use toml::{Spanned, Value};
 pub struct Vary {
     /// Parameter, or input without a connection, as `component.parameter`. Several in a list all
     /// get the same value.
-    #[serde(default)]
     #[schemars(with = "Option<OneOrMore>")]
     pub parameter: Option<Spanned<OneOrMore>>,
     /// Parameters that each get a value of their own from the same distribution.
@@ -24,11 +23,9 @@ pub struct Vary {
     pub sorted: bool,
     /// Smallest and largest value of a uniform distribution. An integer parameter gets integers,
     /// both ends included.
-    #[serde(default)]
     #[schemars(with = "Option<[cosim::experiment::Scalar; 2]>")]
     pub uniform: Option<Spanned<[Value; 2]>>,
     /// Mean and standard deviation of a normal distribution.
-    #[serde(default)]
     #[schemars(with = "Option<Normal>")]
     pub normal: Option<Spanned<Normal>>,
     /// Median and spread of a log-normal distribution.
@@ -41,7 +38,6 @@ pub struct Vary {
     pub triangular: Option<Spanned<[Value; 3]>>,
     /// Values that are equally likely, unless `weights` are given: numbers, texts, items of an
     /// enumeration or truth values.
-    #[serde(default)]
     #[schemars(with = "Option<Vec<cosim::experiment::Scalar>>")]
     pub list: Option<Spanned<Vec<Value>>>,
     /// Equally spaced values, equally likely.
@@ -49,12 +45,10 @@ pub struct Vary {
     #[schemars(with = "Option<Range>")]
     pub range: Option<Spanned<Range>>,
     /// Magnitude of a value whose sign is plus or minus.
-    #[serde(default)]
     #[schemars(with = "Option<cosim::experiment::Scalar>")]
     pub sign: Option<Spanned<Value>>,
     /// First of consecutive integers: the parameter is this number plus that of the case, as for
     /// seeds. With another `seed` of the file than 1 they begin elsewhere.
-    #[serde(default)]
     #[schemars(with = "Option<i64>")]
     pub case: Option<Spanned<i64>>,
     /// Lower and upper bound at which a continuous distribution is truncated.
@@ -62,7 +56,6 @@ pub struct Vary {
     #[schemars(with = "Option<[cosim::experiment::Scalar; 2]>")]
     pub within: Option<Spanned<[Value; 2]>>,
     /// Probabilities of the values of `list`, which are scaled to a sum of 1.
-    #[serde(default)]
     #[schemars(with = "Option<Vec<f64>>")]
     pub weights: Option<Spanned<Vec<f64>>>,
     /// Number of levels of a continuous distribution in a factorial design, equally spaced in

@@ -322,8 +322,8 @@ fn a_campaign_is_the_same_with_instances_in_processes_of_their_own() {
 fn a_campaign_goes_on_after_an_instance_that_does_harm_but_has_no_result() {
     let bench =
         Bench::made(LOOP, &Recipe { flags: &["-DHARM_BY_GAIN", "-w"], ..Recipe::default() });
-    let gains = "range = { from = 1.0, to = 60.0, count = 60 }";
-    let campaign = CAMPAIGN.replace("list = [0.5, 1.0, 2.0]", gains);
+    let gains: Vec<String> = (1..=60).map(|gain| format!("{gain}.0")).collect();
+    let campaign = CAMPAIGN.replace("[0.5, 1.0, 2.0]", &format!("[{}]", gains.join(", ")));
     fs::write(bench.path("c.toml"), campaign.replace("[1e9, 2.0]", "[1e9]")).unwrap();
     let (code, out, errors) = bench.call(&["campaign", "c.toml", "--csv"]);
     let says =

@@ -47,7 +47,7 @@ const COMMANDS: [(&[&str], &str); 5] = [
 
 fn bench() -> Bench {
     let bench = Bench::new();
-    let vary = "[[vary]]\nparameter = \"gain.pause\"\nuniform = [0.0, 0.004]\nlevels = 2\n";
+    let vary = "[[vary]]\nparameter = \"gain.pause\"\nlist = [0.0, 0.004]\n";
     let search = "[search]\nlargest = \"largest\"\ncases = 60\n";
     // A list has ends, and so has a search over it.
     let campaign = CAMPAIGN.replace("[1e9, 2.0]", "[1e9, 1e8]");

@@ -11,40 +11,29 @@ use toml::Spanned;
 /// The section `[observe]` of an experiment: the signals of a run that are measured, watched and
 /// drawn.
 #[derive(Clone, Debug, Default, Deserialize, JsonSchema, Serialize)]
-#[serde(deny_unknown_fields)]
+#[serde(default, deny_unknown_fields)]
 pub struct Observe {
     /// Lists of signals that the other keys refer to, by name.
-    #[serde(default)]
     pub signals: BTreeMap<String, Vec<Signal>>,
     /// Metrics that are computed from the signals of a run, by their names in `metrics.json`.
-    #[serde(default)]
     pub metrics: BTreeMap<String, Measure>,
     /// Units in which the summary and the panels show values, by the unit of the values.
-    #[serde(default)]
     pub units: BTreeMap<String, Scaled>,
     /// Names of the metrics that the summary prints, in this order.
-    #[serde(default)]
     pub summary: Vec<String>,
     /// Variables in which a component reports whether it guarantees that limits are kept.
-    #[serde(default)]
     pub guarantee: Option<Guarantee>,
     /// Instant and signals at which the stability margins of the loop are computed.
-    #[serde(default)]
     pub margins: Option<Margins>,
     /// Condition under which a run counts as lost.
-    #[serde(default)]
     pub loss: Option<Loss>,
     /// Condition at the end of a run under which it has missed its goal and is not completed.
-    #[serde(default)]
     pub goal: Option<Loss>,
     /// Panels of the figure of a run and of the live view.
-    #[serde(default)]
     pub panels: Vec<Panel>,
     /// Variables by which the page of a run shows the vehicle.
-    #[serde(default)]
     pub vehicle: Option<Vehicle>,
     /// Further lines of the live view: lists of variables, by the heading of the line.
-    #[serde(default)]
     pub readings: BTreeMap<String, Vec<String>>,
 }
 
@@ -96,11 +85,9 @@ pub struct Measure {
     #[schemars(with = "String")]
     pub signals: Spanned<String>,
     /// Start and end of the part of the run that counts, s. Without this the whole run counts.
-    #[serde(default)]
     pub over: Option<[f64; 2]>,
     /// Name of a variable that counts events. Only those communication points are used at which it
     /// has grown.
-    #[serde(default)]
     pub each: Option<String>,
     /// Number n, if only every n-th communication point from the start is used.
     #[serde(default = "super::one")]
@@ -110,7 +97,6 @@ pub struct Measure {
     #[serde(default)]
     pub steps: bool,
     /// Unit of the number, in place of the display unit of the signals.
-    #[serde(default)]
     pub unit: Option<Scaled>,
     /// Heading of the number's line in the summary. Metrics with the same heading share a line.
     #[serde(default)]
@@ -119,7 +105,6 @@ pub struct Measure {
     #[serde(default)]
     pub part: String,
     /// Name of the metric that is the limit of this one.
-    #[serde(default)]
     pub limit: Option<String>,
     /// Whether the number may be null because the FMUs lack a variable.
     #[serde(default)]
@@ -128,7 +113,6 @@ pub struct Measure {
     #[serde(default)]
     pub timing: bool,
     /// For `settling`, the width of the band as a fraction of a signal's first magnitude.
-    #[serde(default)]
     pub band: Option<f64>,
     /// For `settling`, the shortest time for which the signals must have been observed within the
     /// band, s.
@@ -137,10 +121,8 @@ pub struct Measure {
     /// For `leaving`, the magnitude that a signal must exceed. For `settling`, in place of `band`,
     /// the magnitude within which every signal must stay. For `rises`, the least rise that counts.
     /// For `share`, the magnitude within which all signals must lie.
-    #[serde(default)]
     pub bound: Option<f64>,
     /// For `rms-above`, the frequency above which the signals count, Hz.
-    #[serde(default)]
     pub frequency: Option<f64>,
 }
 
@@ -197,7 +179,6 @@ pub struct Guarantee {
     /// Variable that tells whether the guarantee is in force.
     pub in_force: String,
     /// Variable that tells why the guarantee is or is not in force, of an enumeration type.
-    #[serde(default)]
     pub status: Option<String>,
     /// Variables with the unused share of each limit after the reserve for disturbances, by the
     /// names of the limits.
@@ -205,7 +186,6 @@ pub struct Guarantee {
     pub margins: BTreeMap<String, String>,
     /// Name of a list of signals that must not exceed 1 while the guarantee is in force. If one
     /// does, the guarantee is broken.
-    #[serde(default)]
     pub keeps: Option<String>,
     /// Whether the FMUs may lack `in_force`, `status` and the margins.
     #[serde(default)]
@@ -235,12 +215,10 @@ pub struct Panel {
     #[serde(default)]
     pub label: String,
     /// Unit of the vertical axis, in place of the display unit of the signals.
-    #[serde(default)]
     pub unit: Option<Scaled>,
     /// Curves of the panel, with their names and signals.
     pub curves: Vec<Curve>,
     /// Limit of the norm of all curves.
-    #[serde(default)]
     pub limit: Option<Signal>,
 }
 
@@ -253,7 +231,6 @@ pub struct Curve {
     /// Signal that is drawn as the curve.
     pub of: Signal,
     /// Signal that the curve is to follow, drawn as a pale line.
-    #[serde(default)]
     pub reference: Option<Signal>,
 }
 

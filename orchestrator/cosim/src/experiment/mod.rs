@@ -86,7 +86,6 @@ pub struct Simulation {
     pub order: Vec<String>,
     /// Component whose FMU may end the simulation before the stop time, for example a vehicle that
     /// arrives. The run is then complete, and its last values are those of that moment.
-    #[serde(default)]
     pub ends_with: Option<String>,
     /// Action taken if an instance gives a value that is not finite, or not valid for its type.
     #[serde(default)]
@@ -127,7 +126,6 @@ pub struct Component {
     #[schemars(with = "BTreeMap<String, Scalar>")]
     pub parameters: BTreeMap<String, Spanned<Value>>,
     /// Whether the instance runs in a process of its own, whatever `[isolation]` says.
-    #[serde(default)]
     pub isolate: Option<bool>,
     /// Whether the FMU takes the place of another one, as after `--fmu`: settings, recorded
     /// variables and unconnected inputs that it does not have are left out.

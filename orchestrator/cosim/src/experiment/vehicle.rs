@@ -11,25 +11,19 @@ pub struct Vehicle {
     /// Angle of attack, sideslip angle and bank angle.
     pub attitude: [String; 3],
     /// The angles that they are to follow.
-    #[serde(default)]
     pub reference: Option<[String; 3]>,
     /// Angular rates about the body axes x, y and z.
-    #[serde(default)]
     pub rate: Option<[String; 3]>,
     /// Limit of the norm of the angular rates.
-    #[serde(default)]
     pub rate_limit: Option<String>,
     /// Control moments about the body axes x, y and z.
-    #[serde(default)]
     pub moment: Option<[String; 3]>,
     /// Limit of the norm of the control moments.
-    #[serde(default)]
     pub moment_limit: Option<String>,
     /// Deflections of all surfaces.
     #[serde(default)]
     pub deflections: Vec<String>,
     /// Deflections that the flaps of the picture show, left and right, positive downwards.
-    #[serde(default)]
     pub flaps: Option<[String; 2]>,
     /// Commands of all jets, from 0 (off) to 1 (on).
     #[serde(default)]
