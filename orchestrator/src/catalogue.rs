@@ -2,9 +2,9 @@
 //! JSON.
 
 use cosim::error::Error;
-use fmu_import::description::{Interface, ModelDescription, Variable, VariableKind};
+use fmi_master::description::{Interface, ModelDescription, Variable, VariableKind};
+use fmi_master::names;
 use fmu_import::fmu::Fmu;
-use fmu_import::names;
 use serde_json::{Value, json};
 use std::io::{self, Write};
 

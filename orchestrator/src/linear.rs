@@ -10,7 +10,7 @@ use cosim::interrupt::Interrupt;
 use cosim::search::named::{Kind, find};
 use cosim::system::System;
 use cosim_report::figure::{Color, Curve, Figure, Legend, Panel, Shape};
-use fmu_import::quantity::rounded;
+use fmi_master::quantity::rounded;
 use linear::curves::{ResponseCurves, excluded};
 use linear::linearise::Linearised;
 use linear::margins::{Crossing, LoopMargins};

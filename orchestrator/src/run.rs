@@ -10,13 +10,13 @@ use cosim::error::Error;
 use cosim::experiment::{Experiment, Overrides};
 use cosim::files;
 use cosim::interrupt::{Interrupt, Request};
-use cosim::master::Observer;
 use cosim::metadata;
 use cosim::pacing;
 use cosim::pacing::priority::{Priority, Scheduling};
 use cosim::pacing::report::RealTime;
 use cosim::pacing::timer::{self, Monotonic};
 use cosim::recorder::Format;
+use cosim::run::Observer;
 use cosim::ssp;
 use cosim::system::{Opened, System};
 use cosim_report::folder::Folder;
@@ -202,8 +202,8 @@ fn record(system: &mut System, options: &Options) -> Result<RunReport, Failure> 
     warnings::at(clock.start());
     let factor = options.real_time.map(|settings| settings.factor.get());
     let scene = options.live.then(|| Scene::new(system, panels.clone(), factor)).transpose()?;
-    let mut master = system.start(&options.interrupt)?;
-    let parameters = system.parameters(&mut master)?;
+    let mut run = system.start(&options.interrupt)?;
+    let parameters = system.parameters(&mut run)?;
 
     if let Some(request) = options.interrupt.asked() {
         return Err(Error::Interrupted { time: clock.start(), request }.into());
@@ -221,7 +221,7 @@ fn record(system: &mut System, options: &Options) -> Result<RunReport, Failure> 
 
     let tally = options.real_time.map(|settings| {
         timer::wake_up_sharply();
-        master.pace(settings, Rc::new(Monotonic)).tally()
+        run.pace(settings, Rc::new(Monotonic)).tally()
     });
     let live = scene.map(|scene| Live::start(scene, tally, options.interrupt.clone()));
     let mut live = live.transpose()?;
@@ -237,7 +237,7 @@ fn record(system: &mut System, options: &Options) -> Result<RunReport, Failure> 
     observers.extend(live.as_mut().map(|live| live as &mut dyn Observer));
     // The meters come last, because they may end the run.
     observers.push(&mut meters);
-    let outcome = master.run(&mut observers);
+    let outcome = run.run(&mut observers);
     let wall = begin.elapsed().as_secs_f64();
     let priority = scheduling.priority.clone();
     drop((scheduling, live, progress, warnings));
@@ -261,7 +261,7 @@ fn record(system: &mut System, options: &Options) -> Result<RunReport, Failure> 
         if outcome.is_ok() {
             metrics.asked.extend(margins(system, &options.interrupt)?);
         }
-        if let Some(pacer) = master.take_pacer() {
+        if let Some(pacer) = run.take_pacer() {
             let (mut real_time, wake_ups, steps) = pacer.report();
             real_time.priority = priority;
             warn(&real_time, options.quiet);
@@ -288,7 +288,7 @@ fn record(system: &mut System, options: &Options) -> Result<RunReport, Failure> 
     // What ended the run is told first: a disk that its results filled has no room for the rest.
     let ended = early(outcome, &out)?;
     let (metrics, files) = written?;
-    let end = master.end().map(String::from);
+    let end = run.master.end().map(String::from);
     Ok(RunReport { metrics, out, files, ended, end })
 }
 

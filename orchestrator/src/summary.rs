@@ -6,7 +6,7 @@ use cosim::system::System;
 use cosim_report::guarantee::margins_text;
 use cosim_report::metrics::{Metrics, Value};
 use cosim_report::recording::SummaryLine;
-use fmu_import::quantity::rounded;
+use fmi_master::quantity::rounded;
 use std::io::{self, Write};
 use std::path::PathBuf;
 use study::reproduce::StudyReport;

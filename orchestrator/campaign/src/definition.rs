@@ -7,7 +7,7 @@ use cosim::document::Source;
 use cosim::error::Error;
 use cosim::experiment::Measure;
 use cosim::signal::Signal;
-use fmu_import::names;
+use fmi_master::names;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};

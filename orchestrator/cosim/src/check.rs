@@ -1,18 +1,19 @@
 //! Checks an experiment in one pass: every name in it is looked up, and whatever cannot be run is
 //! refused. After that only the instances themselves can fail.
 
-use crate::clock::Clock;
-use crate::delay;
 use crate::error::Error;
 use crate::experiment::{Coupling, Experiment};
 use crate::search;
 use crate::settings;
 use crate::system::{CheckedComponent, Opened, System, parts};
-use crate::wiring::{self, Part};
+use crate::wiring;
+use fmi_master::clock::Clock;
+use fmi_master::delay;
+use fmi_master::names;
+use fmi_master::wiring::Part;
 use fmu_import::faults;
 use fmu_import::fmu::Fmu;
 use fmu_import::lookup_table::is_lookup_table;
-use fmu_import::names;
 use fmu_import::warnings;
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -11,7 +11,7 @@
 //! extended in several ways counts once, where it is named first.
 
 use crate::error::Error;
-use fmu_import::names;
+use fmi_master::names;
 use serde::de::DeserializeOwned;
 use std::ops::Range;
 use std::path::{Path, PathBuf};

@@ -2,9 +2,10 @@
 //! it.
 
 use crate::interrupt::Request;
+use fmi_master::instance::CallFailure;
+use fmi_master::master::Failed;
+use fmi_master::quantity::rounded;
 use fmu_import::error::Error as Import;
-use fmu_import::instance::CallFailure;
-use fmu_import::quantity::rounded;
 use std::path::PathBuf;
 
 /// An error that occurs between reading an experiment and writing its results.
@@ -84,6 +85,16 @@ pub enum Error {
         /// Reason that the system gave.
         source: std::io::Error,
     },
+}
+
+impl From<Failed> for Error {
+    fn from(Failed { component, time, failure }: Failed) -> Self {
+        if failure.ends.is_some() {
+            Self::EndedByInstance { component, time, message: failure.message }
+        } else {
+            Self::Call { component, time, failure }
+        }
+    }
 }
 
 impl Error {

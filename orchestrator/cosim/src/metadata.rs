@@ -5,7 +5,7 @@ use crate::error::Error;
 use crate::files::digest;
 use crate::pacing;
 use crate::system::{CheckedComponent, Parameters, System};
-use fmu_import::description::VariableKind;
+use fmi_master::description::VariableKind;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 

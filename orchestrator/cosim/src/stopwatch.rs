@@ -2,7 +2,7 @@
 //! step only when its outputs are read.
 
 use crate::pacing::timer::Timer;
-use fmu_import::instance::{Instance, Outcome};
+use fmi_master::instance::{Instance, Outcome};
 use std::cell::Cell;
 use std::rc::Rc;
 use std::time::Duration;

@@ -1,20 +1,22 @@
 //! A checked experiment that is ready to run: observers request the signals that they want to see,
 //! and then the instances are initialized and stepped.
 
-use crate::clock::Clock;
-use crate::delay::{self, FeedbackLoop, Reading};
 use crate::error::Error;
 use crate::experiment::Experiment;
 use crate::interrupt::Interrupt;
-use crate::master::{Master, Member, Observer};
 use crate::recorder::{self, Format, Recorder};
-use crate::settings::{self, Setting};
+use crate::run::{Observer, Run};
 use crate::signal::{Resolved, Signal, Term};
 use crate::watch::Watched;
-use crate::wiring::{self, Column, Part, Port, Wire};
-use fmu_import::description::{ModelDescription, VariableKind};
+use crate::wiring::Column;
+use fmi_master::clock::Clock;
+use fmi_master::delay::{self, FeedbackLoop, Reading};
+use fmi_master::description::{ModelDescription, VariableKind};
+use fmi_master::master::{Failed, Master, Member};
+use fmi_master::names;
+use fmi_master::settings::{self, Setting};
+use fmi_master::wiring::{self, Part, Port, Wire};
 use fmu_import::fmu::Fmu;
-use fmu_import::names;
 use serde_json::Value;
 use std::collections::{BTreeMap, HashMap};
 use std::path::{Path, PathBuf};
@@ -280,7 +282,7 @@ impl System {
     ///
     /// # Errors
     /// Returns an error if an instance cannot be made or initialized.
-    pub fn start(&self, interrupt: &Interrupt) -> Result<Master, Error> {
+    pub fn start(&self, interrupt: &Interrupt) -> Result<Run, Error> {
         self.start_with(&self.settings(), interrupt)
     }
 
@@ -289,7 +291,7 @@ impl System {
         &self,
         settings: &[Vec<Setting>],
         interrupt: &Interrupt,
-    ) -> Result<Master, Error> {
+    ) -> Result<Run, Error> {
         let mut members = Vec::new();
         for (component, settings) in self.components.iter().zip(settings) {
             let CheckedComponent { name, fmu, every, is_isolated, .. } = component;
@@ -297,7 +299,7 @@ impl System {
             let instance = fmu.instantiate(name, limits.as_ref())?;
             let on_invalid = self.experiment.simulation.on_invalid;
             let mut instance = Watched::around(instance, name, fmu, on_invalid);
-            settings::apply(settings, instance.as_mut()).map_err(|failure| Error::Call {
+            settings::apply(settings, instance.as_mut()).map_err(|failure| Failed {
                 component: name.clone(),
                 time: self.clock.start(),
                 failure,
@@ -310,18 +312,17 @@ impl System {
         let wires = delay::readings_of_wires(&parts, &self.wires, coupling);
         let probes = delay::readings_of_probes(&parts, &self.wires, &self.probes);
         let mut master = Master::new(self.clock, coupling, members, &wires, &probes);
-        master.set_interrupt(interrupt);
         let ender = self.experiment.simulation.ends_with.as_ref();
         master.set_ender(ender.and_then(|ender| self.names().iter().position(|n| n == ender)));
         master.initialize()?;
-        Ok(master)
+        Ok(Run::new(master, interrupt))
     }
 
     /// Reads the values of all parameters after initialization, except those of type String.
     ///
     /// # Errors
     /// Returns an error if an instance cannot be read.
-    pub fn parameters(&self, master: &mut Master) -> Result<Parameters, Error> {
+    pub fn parameters(&self, run: &mut Run) -> Result<Parameters, Error> {
         let mut parameters = Parameters::new();
         for (component, part) in self.parts().iter().enumerate() {
             let variables = part.description.variables.iter().enumerate();
@@ -329,7 +330,7 @@ impl System {
                 .filter(|(_, variable)| variable.causality == "parameter")
                 .filter_map(|(position, variable)| wiring::port(component, position, variable))
                 .collect();
-            let values = master.read(&ports)?;
+            let values = run.master.read(&ports)?;
             let named = ports.iter().zip(values).map(|(port, value)| {
                 let name = part.description.variables[port.variable].name.clone();
                 (name, plain_value(part.description, *port, value))

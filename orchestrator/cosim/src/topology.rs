@@ -1,11 +1,11 @@
 //! What a system consists of, for those who look into it: variables, and connections with the time
 //! at which their values are read.
 
-use crate::delay::{self, Reading};
 use crate::system::System;
-use crate::wiring::{self, Port, Wire};
-use fmu_import::description::Variable;
-use fmu_import::names;
+use fmi_master::delay::{self, Reading};
+use fmi_master::description::Variable;
+use fmi_master::names;
+use fmi_master::wiring::{self, Port, Wire};
 
 impl System {
     /// Returns the connections, and when the source of each is read.

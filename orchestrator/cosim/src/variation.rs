@@ -3,15 +3,15 @@
 
 use crate::error::Error;
 use crate::interrupt::Interrupt;
-use crate::master::Master;
-use crate::settings::{self, Setting};
+use crate::run::Run;
 use crate::system::{Parameters, System};
-use fmu_import::description::{Carrier, Variable, VariableKind};
-use fmu_import::names;
-use fmu_import::quantity;
+use fmi_master::description::{Carrier, Variable, VariableKind};
+use fmi_master::names;
+use fmi_master::quantity;
+use fmi_master::settings::{self, Setting};
 use toml::Value;
 
-pub use crate::settings::SettingValue;
+pub use fmi_master::settings::SettingValue;
 
 /// A parameter, or an input without a connection, of a system's component.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -104,23 +104,19 @@ impl System {
         &self,
         changes: &[(Target, SettingValue)],
         interrupt: &Interrupt,
-    ) -> Result<Master, Error> {
+    ) -> Result<Run, Error> {
         self.start_with(&self.varied(changes), interrupt)
     }
 
-    /// Resets the instances of a master that this system has made, and sets and initializes them
-    /// for another run.
+    /// Resets the instances of a run that this system has made, and sets and initializes them for
+    /// another one.
     ///
     /// # Errors
     /// Returns an error if a call of an instance fails.
-    pub fn restart(
-        &self,
-        master: &mut Master,
-        changes: &[(Target, SettingValue)],
-    ) -> Result<(), Error> {
+    pub fn restart(&self, run: &mut Run, changes: &[(Target, SettingValue)]) -> Result<(), Error> {
         let settings = self.varied(changes);
-        master.reset(|index, instance| settings::apply(&settings[index], instance))?;
-        master.initialize()
+        run.master.reset(|index, instance| settings::apply(&settings[index], instance))?;
+        Ok(run.master.initialize()?)
     }
 
     /// Returns the values that are set in all components with the changes made to them.

@@ -2,9 +2,9 @@
 //! enumeration, or neither true nor false would otherwise spread through the loop and look like a
 //! result.
 
-use fmu_import::description::{Carrier, Variable, VariableKind};
+use fmi_master::description::{Carrier, Variable, VariableKind};
+use fmi_master::instance::{CallFailure, Instance, Outcome};
 use fmu_import::fmu::Fmu;
-use fmu_import::instance::{CallFailure, Instance, Outcome};
 use fmu_import::warnings;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

@@ -4,48 +4,16 @@
 use crate::document::Source;
 use crate::error::Error;
 use crate::experiment::Experiment;
-use fmu_import::description::{Carrier, ModelDescription, Variable, VariableKind};
-use fmu_import::names;
-use fmu_import::quantity::Scaling;
+use fmi_master::description::Carrier;
+use fmi_master::names;
+use fmi_master::quantity::Scaling;
+use fmi_master::wiring::{Fault, Part, Port, Wire, Written, connect, port};
 use fmu_import::warnings::warn_once;
 use std::collections::{BTreeSet, HashSet};
 use std::fmt::Write as _;
 use std::ops::Range;
 use std::path::Path;
 use toml::Spanned;
-
-/// A component's name and its FMU's description. Its position in the list of parts is its index.
-#[derive(Clone, Copy)]
-pub struct Part<'a> {
-    /// Name of the component in the experiment.
-    pub name: &'a str,
-    /// Model description of the component's FMU.
-    pub description: &'a ModelDescription,
-}
-
-/// A variable of a component.
-#[derive(Clone, Copy, Debug, Eq, Hash, PartialEq)]
-pub struct Port {
-    /// Index of the component.
-    pub component: usize,
-    /// Position of the variable in the model description.
-    pub variable: usize,
-    /// Value reference of the variable.
-    pub reference: u32,
-    /// Type in which the value of the variable is transferred.
-    pub carrier: Carrier,
-}
-
-/// A connection of one output with one input.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Wire {
-    /// Output that the connection starts from.
-    pub from: Port,
-    /// Input that the connection ends at.
-    pub to: Port,
-    /// Conversion of real values on the way.
-    pub scaling: Scaling,
-}
 
 /// A column of the results, which records one variable.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -56,16 +24,13 @@ pub(crate) struct Column {
     pub port: Port,
 }
 
-/// One side of a connection, or a recorded variable, with its component.
+/// One side of a connection, or a recorded variable, with its place in the file.
 struct Reference<'a> {
     source: &'a Source,
     span: Range<usize>,
-    text: &'a str,
-    component: usize,
-    part: Part<'a>,
+    written: Written<'a>,
     /// FMU that replaces the experiment's one, if the command line names one.
     exchanged: Option<&'a str>,
-    rest: &'a str,
 }
 
 impl<'a> Reference<'a> {
@@ -76,64 +41,21 @@ impl<'a> Reference<'a> {
     ) -> Result<Self, Error> {
         let source = &experiment.source;
         let span = text.span();
-        let text = text.get_ref().as_str();
-        let refuse = |message: String| source.error(&span, message);
-        let (name, rest) = names::split(text).ok_or_else(|| {
-            refuse(format!("\"{text}\" names no variable: write component.variable"))
-        })?;
-        let component = parts.iter().position(|part| part.name == name).ok_or_else(|| {
-            let hint = names::hint(name, parts.iter().map(|part| part.name));
-            refuse(format!("there is no component \"{name}\"{hint}"))
-        })?;
-        let used = experiment.components.get(name).filter(|used| used.is_exchanged);
+        let written = Written::new(text.get_ref(), parts);
+        let written = written.map_err(|message| source.error(&span, message))?;
+        let used = experiment.components.get(written.part.name).filter(|used| used.is_exchanged);
         let exchanged = used.map(|used| used.fmu.get_ref().as_str());
-        let part = parts[component];
-        Ok(Self { source, span: span.clone(), text, component, part, exchanged, rest })
+        Ok(Self { source, span, written, exchanged })
     }
 
-    fn refuse(&self, message: impl Into<String>) -> Error {
-        let mut message = message.into();
+    fn refuse(&self, mut message: String) -> Error {
         // The line of the experiment was right for its own FMU.
         if let Some(fmu) = self.exchanged.and_then(|fmu| Path::new(fmu).file_stem()) {
-            let (component, fmu) = (self.part.name, fmu.display());
+            let (component, fmu) = (self.written.part.name, fmu.display());
             let _ = write!(message, "; --fmu {component}={fmu} replaces the experiment's FMU");
         }
         self.source.error(&self.span, message)
     }
-
-    fn prefix(&self) -> Option<&'a str> {
-        self.rest.strip_suffix('*')
-    }
-
-    fn unknown(&self, causality: &'a str) -> Error {
-        let hint = names::hint(self.rest, self.part.description.names(causality));
-        self.refuse(format!("\"{}\" has no {causality} \"{}\"{hint}", self.part.name, self.rest))
-    }
-
-    /// Finds the variable called `name`, which must have this causality.
-    fn port(&self, name: &str, causality: &'a str) -> Result<Port, Error> {
-        let (position, variable) =
-            self.part.description.find(name).ok_or_else(|| self.unknown(causality))?;
-        if variable.causality != causality {
-            let hint = names::nearest(name, self.part.description.names(causality))
-                .map_or(String::new(), |near| format!("; did you mean \"{near}\"?"));
-            return Err(self.refuse(format!(
-                "\"{}.{name}\" is of causality {}, not an {causality}{hint}",
-                self.part.name, variable.causality
-            )));
-        }
-        port(self.component, position, variable).ok_or_else(|| {
-            self.refuse(format!(
-                "\"{}.{name}\" is a text, which cannot be connected",
-                self.part.name
-            ))
-        })
-    }
-}
-
-pub(crate) fn port(component: usize, position: usize, variable: &Variable) -> Option<Port> {
-    let carrier = Carrier::for_kind(&variable.kind)?;
-    Some(Port { component, variable: position, reference: variable.reference, carrier })
 }
 
 /// Resolves the connections of an experiment.
@@ -144,42 +66,33 @@ pub(crate) fn port(component: usize, position: usize, variable: &Variable) -> Op
 /// value, nor declared to stay unconnected.
 pub(crate) fn wires(experiment: &Experiment, parts: &[Part]) -> Result<Vec<Wire>, Error> {
     let mut wires: Vec<Wire> = Vec::new();
+    let name = |port: Port| {
+        let Part { name, description } = parts[port.component];
+        format!("\"{name}.{}\"", description.variables[port.variable].name)
+    };
     for connection in &experiment.connections {
         let from = Reference::new(&connection.from, parts, experiment)?;
         let to = Reference::new(&connection.to, parts, experiment)?;
-        let pairs: Vec<(String, String)> = match (from.prefix(), to.prefix()) {
-            (None, None) => vec![(from.rest.to_string(), to.rest.to_string())],
-            (Some(from_prefix), Some(to_prefix)) => expand(&from, from_prefix, &to, to_prefix)?,
-            _ => {
+        let connected = connect(&from.written, &to.written).map_err(|fault| match fault {
+            Fault::From(message) => from.refuse(message),
+            Fault::To(message) => to.refuse(message),
+        })?;
+        let converts = connected.iter().any(|wire| wire.scaling != Scaling::default());
+        for mut wire in connected {
+            let input = name(wire.to);
+            if wire.scaling != Scaling::default() && !connection.convert_units {
                 return Err(to.refuse(format!(
-                    "\"{}\" and \"{}\" must both end in * or neither",
-                    from.text, to.text
-                )));
-            }
-        };
-        let mut converts = false;
-        for (output, input) in pairs {
-            let (start, end) = (from.port(&output, "output")?, to.port(&input, "input")?);
-            let conversion = check_match(start, end, &from, &output, &to, &input)?;
-            converts |= conversion != Scaling::default();
-            if conversion != Scaling::default() && !connection.convert_units {
-                return Err(to.refuse(format!(
-                    "the units of \"{}.{output}\" and \"{}.{input}\" measure the same quantity on another scale: \
+                    "the units of {} and {input} measure the same quantity on another scale: \
                      write convert_units = true in this connection",
-                    from.part.name, to.part.name
+                    name(wire.from)
                 )));
             }
-            let wire = Wire { from: start, to: end, scaling: conversion.then(connection.scaling) };
-            if wire.scaling != Scaling::default() && start.carrier != Carrier::Real {
-                return Err(to.refuse(format!(
-                    "\"{}.{input}\" is no real number: it cannot be scaled",
-                    to.part.name
-                )));
+            wire.scaling = wire.scaling.then(connection.scaling);
+            if wire.scaling != Scaling::default() && wire.from.carrier != Carrier::Real {
+                return Err(to.refuse(format!("{input} is no real number: it cannot be scaled")));
             }
             if wires.iter().any(|other| other.to == wire.to) {
-                return Err(
-                    to.refuse(format!("the input \"{}.{input}\" is connected twice", to.part.name))
-                );
+                return Err(to.refuse(format!("the input {input} is connected twice")));
             }
             wires.push(wire);
         }
@@ -188,7 +101,7 @@ pub(crate) fn wires(experiment: &Experiment, parts: &[Part]) -> Result<Vec<Wire>
             warn_once(format!(
                 "{}: convert_units has no effect on the connection to \"{}\", whose units are equal",
                 experiment.source.path.display(),
-                to.text
+                to.written.text
             ));
         }
     }
@@ -196,76 +109,6 @@ pub(crate) fn wires(experiment: &Experiment, parts: &[Part]) -> Result<Vec<Wire>
         check_unconnected(experiment, parts, &wires)?;
     }
     Ok(wires)
-}
-
-/// Lists the pairs of names that two patterns stand for: an output behind the first prefix is
-/// paired with the variable of the same name behind the second prefix, if there is one.
-fn expand(
-    from: &Reference,
-    from_prefix: &str,
-    to: &Reference,
-    to_prefix: &str,
-) -> Result<Vec<(String, String)>, Error> {
-    let outputs: Vec<&str> = from
-        .part
-        .description
-        .names("output")
-        .filter_map(|name| name.strip_prefix(from_prefix))
-        .collect();
-    if outputs.is_empty() {
-        return Err(from.unknown("output"));
-    }
-    let pairs: Vec<_> = outputs
-        .iter()
-        .map(|rest| (format!("{from_prefix}{rest}"), format!("{to_prefix}{rest}")))
-        .filter(|(_, input)| to.part.description.find(input).is_some())
-        .collect();
-    if pairs.is_empty() {
-        return Err(
-            if to.part.description.names("input").any(|name| name.starts_with(to_prefix)) {
-                to.refuse(format!("\"{}\" and \"{}\" have no name in common", from.text, to.text))
-            } else {
-                to.unknown("input")
-            },
-        );
-    }
-    Ok(pairs)
-}
-
-/// Determines how values of the output are converted to values of the input, by their units.
-fn check_match(
-    start: Port,
-    end: Port,
-    from: &Reference,
-    output: &str,
-    to: &Reference,
-    input: &str,
-) -> Result<Scaling, Error> {
-    let names = format!("\"{}.{output}\" and \"{}.{input}\"", from.part.name, to.part.name);
-    let (a, b) = (
-        &from.part.description.variables[start.variable].kind,
-        &to.part.description.variables[end.variable].kind,
-    );
-    match (a, b) {
-        (VariableKind::Real { unit: a, .. }, VariableKind::Real { unit: b, .. }) => from
-            .part
-            .description
-            .conversion(a.as_deref(), to.part.description, b.as_deref())
-            .map_err(|difference| {
-                to.refuse(format!("the units of {names} do not match: {difference}"))
-            }),
-        (VariableKind::Enumeration { items: a }, VariableKind::Enumeration { items: b })
-            if a != b =>
-        {
-            Err(to.refuse(format!("{names} are enumerations of different items")))
-        }
-        _ if a.name() == b.name() => Ok(Scaling::default()),
-        _ => Err(to.refuse(format!(
-            "the types of {names} do not match: {} against {}",
-            a.name(),
-            b.name()
-        ))),
-    }
 }
 
 fn check_unconnected(experiment: &Experiment, parts: &[Part], wires: &[Wire]) -> Result<(), Error> {
@@ -347,12 +190,12 @@ pub(crate) fn columns(experiment: &Experiment, parts: &[Part]) -> Result<Vec<Col
     let mut seen: HashSet<Port> = HashSet::new();
     for text in &experiment.record.variables {
         let reference = Reference::new(text, parts, experiment)?;
-        let (component, part) = (reference.component, reference.part);
-        let is_pattern = reference.prefix().is_some();
+        let Written { component, part, rest, .. } = reference.written;
+        let is_pattern = reference.written.prefix().is_some();
         let before = columns.len();
         let mut meant = 0;
         for (position, variable) in part.description.variables.iter().enumerate() {
-            if !names::matches(reference.rest, &variable.name)
+            if !names::matches(rest, &variable.name)
                 || (is_pattern && !matches!(&*variable.causality, "input" | "output" | "local"))
             {
                 continue;
@@ -365,7 +208,7 @@ pub(crate) fn columns(experiment: &Experiment, parts: &[Part]) -> Result<Vec<Col
             } else if !is_pattern {
                 return Err(reference.refuse(format!(
                     "\"{}\" is a text, which cannot be recorded",
-                    reference.text
+                    reference.written.text
                 )));
             }
         }
@@ -375,11 +218,10 @@ pub(crate) fn columns(experiment: &Experiment, parts: &[Part]) -> Result<Vec<Col
                 continue;
             }
             let names = part.description.variables.iter().map(|v| v.name.as_str());
-            let hint = names::hint(reference.rest.trim_end_matches(".*"), names);
-            return Err(reference.refuse(format!(
-                "\"{}\" has no variable \"{}\"{hint}",
-                part.name, reference.rest
-            )));
+            let hint = names::hint(rest.trim_end_matches(".*"), names);
+            return Err(
+                reference.refuse(format!("\"{}\" has no variable \"{}\"{hint}", part.name, rest))
+            );
         }
     }
     if !missing.is_empty() {
@@ -389,12 +231,4 @@ pub(crate) fn columns(experiment: &Experiment, parts: &[Part]) -> Result<Vec<Col
         ));
     }
     Ok(columns)
-}
-
-/// Finds one variable by its full name, if it exists.
-pub(crate) fn find(path: &str, parts: &[Part]) -> Option<Port> {
-    let (name, rest) = names::split(path)?;
-    let component = parts.iter().position(|part| part.name == name)?;
-    let (position, variable) = parts[component].description.find(rest)?;
-    port(component, position, variable)
 }

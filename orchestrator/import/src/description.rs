@@ -1,15 +1,13 @@
-//! The parts of `modelDescription.xml` that the orchestrator needs: variables, units of measure,
-//! enumerations, and the dependencies of outputs on inputs. (The reader in `fmi-rs` drops unit
-//! definitions and all types but the first.)
+//! Reads `modelDescription.xml`. (The reader in `fmi-rs` drops unit definitions and all types but
+//! the first.)
 
-mod read;
-
-use crate::quantity::{self, Scaling, UnitDefinition};
 use crate::xml::Element;
-use serde::{Deserialize, Serialize};
+use fmi_master::description::{
+    ByName, DefaultExperiment, Interface, ModelDescription, Variable, VariableKind,
+};
+use fmi_master::quantity::UnitDefinition;
 use std::borrow::Cow;
 use std::collections::BTreeMap;
-use std::sync::OnceLock;
 
 /// Values of `causality` that FMI 2.0, section 2.2.7, allows.
 pub const CAUSALITIES: [&str; 6] =
@@ -17,237 +15,282 @@ pub const CAUSALITIES: [&str; 6] =
 /// Values of `variability` that the same section allows.
 pub const VARIABILITIES: [&str; 5] = ["constant", "fixed", "tunable", "discrete", "continuous"];
 
-/// The model description of an FMU.
-#[derive(Clone, Debug, Default)]
-pub struct ModelDescription {
-    /// FMI version, from the attribute `fmiVersion`.
-    pub fmi_version: String,
-    /// Name of the model, from the attribute `modelName`.
-    pub model_name: String,
-    /// Identifier of the build, from the attribute `guid`.
-    pub guid: String,
-    /// Description of the model, from the attribute `description`.
-    pub description: String,
-    /// Version of the model, from the attribute `version`.
-    pub version: String,
-    /// Tool that exported the FMU, from the attribute `generationTool`.
-    pub generation_tool: String,
-    /// Co-simulation capabilities, if the FMU offers co-simulation.
-    pub co_simulation: Option<Interface>,
-    /// Model exchange capabilities, if the FMU offers model exchange.
-    pub model_exchange: Option<Interface>,
-    /// Simulation settings that the FMU proposes.
-    pub default_experiment: DefaultExperiment,
-    /// Unit definitions of the FMU.
-    pub units: Vec<UnitDefinition>,
-    /// All variables, in the order of the file.
-    pub variables: Vec<Variable>,
-    /// Positions, in `variables`, of the variables that each output depends on at the same instant;
-    /// only for outputs that declare them.
-    pub dependencies: BTreeMap<usize, Vec<usize>>,
-    /// Whether this describes a lookup table, which only names its units.
-    pub is_lookup_table: bool,
-    /// Whether the file has a `ModelStructure`, which FMI requires.
-    pub has_structure: bool,
-    /// Index of the variables by name.
-    pub by_name: ByName,
+/// Flags of an interface, in the order in which they are shown.
+const FLAGS: [&str; 10] = [
+    "needsExecutionTool",
+    "canHandleVariableCommunicationStepSize",
+    "canInterpolateInputs",
+    "canRunAsynchronuously",
+    "canBeInstantiatedOnlyOncePerProcess",
+    "canNotUseMemoryManagementFunctions",
+    "canGetAndSetFMUstate",
+    "canSerializeFMUstate",
+    "providesDirectionalDerivative",
+    "completedIntegratorStepNotNeeded",
+];
+/// Names that the standard gives to the exponents of a base unit.
+const BASE: [&str; 8] = ["kg", "m", "s", "A", "K", "mol", "cd", "rad"];
+
+/// Parses the text of `modelDescription.xml`.
+///
+/// # Errors
+/// Returns a line that says what is wrong with the text, and where.
+pub fn parse(text: &str) -> Result<ModelDescription, String> {
+    let mut variables = Variables::default();
+    let take = |root: &Element, parent: &str, element| variables.take(root, parent, element);
+    let root = Element::parse_with(text, take)?;
+    description(&root, variables)
 }
 
-/// Positions of variables in the order of their names, put in order by the first search. The
-/// variables must not change afterwards.
-#[derive(Clone, Debug, Default)]
-pub struct ByName(OnceLock<Vec<u32>>);
+type Types = BTreeMap<String, Element>;
 
-/// An interface's model identifier and its capability flags.
-#[derive(Clone, Debug, Default)]
-pub struct Interface {
-    /// Name of the library in the archive, without file extension.
-    pub model_identifier: String,
-    /// Attributes that are set to `true`, as `name`, and attributes with a number, as `name=value`.
-    pub capabilities: Vec<String>,
+/// Variables that are taken from the file as it is read, so that their elements need not be stored.
+#[derive(Default)]
+struct Variables {
+    listed: Vec<Variable>,
+    /// Definitions of types by name, once the first variable is read.
+    types: Option<Types>,
+    /// Variables that come before the definition of their type, with their places.
+    early: Vec<(usize, Element)>,
 }
 
-impl Interface {
-    /// Returns whether a capability flag is set.
-    pub fn has(&self, capability: &str) -> bool {
-        self.capabilities.iter().any(|name| name == capability)
-    }
-}
-
-/// Simulation settings that the FMU proposes.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct DefaultExperiment {
-    /// Start time of the simulation, s.
-    pub start: Option<f64>,
-    /// Stop time of the simulation, s.
-    pub stop: Option<f64>,
-    /// Length of the communication step, s.
-    pub step: Option<f64>,
-    /// Relative tolerance of the integration.
-    pub tolerance: Option<f64>,
-}
-
-/// A scalar variable of an FMU.
-#[derive(Clone, Debug, Default)]
-pub struct Variable {
-    /// Name of the variable.
-    pub name: String,
-    /// Value reference, which identifies the variable in the get and set calls of its type.
-    pub reference: u32,
-    /// Description of the variable's meaning.
-    pub description: String,
-    /// Causality: `parameter`, `input`, `output`, `local`, ….
-    pub causality: Cow<'static, str>,
-    /// Variability: `fixed`, `discrete`, `continuous`, ….
-    pub variability: Cow<'static, str>,
-    /// Type of the variable, with its attributes.
-    pub kind: VariableKind,
-    /// Start value as the file writes it.
-    pub start: Option<String>,
-    /// Position of the continuous state whose derivative by time this variable is.
-    pub derivative_of: Option<usize>,
-}
-
-impl Variable {
-    /// Returns the typical magnitude of the value, in the variable's unit: 1 if none is declared,
-    /// as FMI says.
-    pub fn nominal(&self) -> f64 {
-        match self.kind {
-            VariableKind::Real { nominal: Some(nominal), .. } if nominal > 0.0 => nominal,
-            _ => 1.0,
+impl Variables {
+    /// Takes an element if it is a variable.
+    fn take(
+        &mut self,
+        root: &Element,
+        parent: &str,
+        element: Element,
+    ) -> Result<Option<Element>, String> {
+        if parent != "ModelVariables" || element.name != "ScalarVariable" {
+            return Ok(Some(element));
         }
-    }
-}
-
-/// Type of a variable, with the attributes of that type.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub enum VariableKind {
-    /// A real number, held as a 64-bit float.
-    Real {
-        /// Name of the unit, if any.
-        unit: Option<String>,
-        /// Unit in which the value is displayed.
-        display_unit: Option<String>,
-        /// Smallest allowed value, in the variable's unit.
-        min: Option<f64>,
-        /// Largest allowed value, in the variable's unit.
-        max: Option<f64>,
-        /// Typical magnitude of the value, in the variable's unit.
-        nominal: Option<f64>,
-    },
-    /// An integer number of 32 bits.
-    Integer {
-        /// Smallest allowed value, if any.
-        min: Option<i32>,
-        /// Largest allowed value, if any.
-        max: Option<i32>,
-    },
-    /// A truth value, true or false.
-    #[default]
-    Boolean,
-    /// A choice among named items.
-    Enumeration {
-        /// Names of the items, with their values.
-        items: Vec<(String, i32)>,
-    },
-    /// A text of any length.
-    String,
-}
-
-impl VariableKind {
-    /// Returns the name of the type in FMI.
-    pub fn name(&self) -> &'static str {
-        match self {
-            Self::Real { .. } => "Real",
-            Self::Integer { .. } => "Integer",
-            Self::Boolean => "Boolean",
-            Self::Enumeration { .. } => "Enumeration",
-            Self::String => "String",
+        if self.types.is_none() {
+            version(root)?;
         }
-    }
-}
-
-impl ModelDescription {
-    /// Parses the text of `modelDescription.xml`.
-    ///
-    /// # Errors
-    /// Returns a line that says what is wrong with the text, and where.
-    pub fn parse(text: &str) -> Result<Self, String> {
-        let mut variables = read::Variables::default();
-        let take = |root: &Element, parent: &str, element| variables.take(root, parent, element);
-        let root = Element::parse_with(text, take)?;
-        read::description(&root, variables)
-    }
-
-    /// Returns the scaling that converts values in a unit of this FMU to values in a unit of
-    /// another.
-    ///
-    /// # Errors
-    /// Returns an error that says how the units differ, if they do not measure the same quantity.
-    pub fn conversion(
-        &self,
-        unit: Option<&str>,
-        to: &Self,
-        to_unit: Option<&str>,
-    ) -> Result<Scaling, String> {
-        if self.is_lookup_table {
-            quantity::named(unit, to_unit, &to.units)
+        let types = self.types.get_or_insert_with(|| types(root));
+        let is_early = |kind: &Element| {
+            kind.attribute("declaredType").is_some_and(|name| !types.contains_key(name))
+        };
+        if element.children.iter().any(is_early) {
+            self.early.push((self.listed.len(), element));
+            self.listed.push(Variable::default());
         } else {
-            quantity::conversion(unit, &self.units, to_unit, &to.units)
+            self.listed.push(variable(&element, types)?);
         }
+        Ok(None)
     }
 
-    /// Finds the variable with this name and returns it with its position.
-    pub fn find(&self, name: &str) -> Option<(usize, &Variable)> {
-        let name_of = |position: &u32| self.variables[*position as usize].name.as_str();
-        // Of two variables with this name, the first one is meant.
-        let ordered = self.by_name.0.get_or_init(|| {
-            let mut positions: Vec<u32> = (0..).take(self.variables.len()).collect();
-            positions.sort_by(|a, b| name_of(a).cmp(name_of(b)));
-            positions
+    /// Returns all variables, in the order of the file.
+    fn finish(mut self, root: &Element) -> Result<Vec<Variable>, String> {
+        if !self.early.is_empty() {
+            let types = types(root);
+            for (place, element) in self.early {
+                self.listed[place] = variable(&element, &types)?;
+            }
+        }
+        Ok(self.listed)
+    }
+}
+
+fn types(root: &Element) -> Types {
+    let types = root.list("TypeDefinitions", "SimpleType");
+    types.filter_map(|kind| Some((kind.attribute("name")?.to_string(), kind.clone()))).collect()
+}
+
+/// Returns the version of FMI, which must be one that can be read.
+fn version(root: &Element) -> Result<String, String> {
+    if root.name != "fmiModelDescription" {
+        return Err(format!("is not an FMI description: it begins with {}", root.title()));
+    }
+    let version = root.required("fmiVersion")?.to_string();
+    if version != "2.0" && !version.starts_with("2.0.") {
+        return Err(format!("is an FMU for FMI {version}, this program runs FMI 2.0"));
+    }
+    Ok(version)
+}
+
+fn description(root: &Element, variables: Variables) -> Result<ModelDescription, String> {
+    let fmi_version = version(root)?;
+    let variables = variables.finish(root)?;
+    let text = |name: &str| root.attribute(name).unwrap_or_default().to_string();
+    let experiment = root.child("DefaultExperiment");
+    let proposed = |name: &str| experiment.map_or(Ok(None), |element| element.number(name));
+    let units = root.list("UnitDefinitions", "Unit");
+    Ok(ModelDescription {
+        model_name: text("modelName"),
+        guid: text("guid"),
+        description: text("description"),
+        version: text("version"),
+        generation_tool: text("generationTool"),
+        co_simulation: root.child("CoSimulation").map(interface).transpose()?,
+        model_exchange: root.child("ModelExchange").map(interface).transpose()?,
+        default_experiment: DefaultExperiment {
+            start: proposed("startTime")?,
+            stop: proposed("stopTime")?,
+            step: proposed("stepSize")?,
+            tolerance: proposed("tolerance")?,
+        },
+        units: units.map(unit).collect::<Result<_, _>>()?,
+        dependencies: dependencies(root, variables.len())?,
+        is_lookup_table: false,
+        has_structure: root.child("ModelStructure").is_some(),
+        variables,
+        by_name: ByName::default(),
+        fmi_version,
+    })
+}
+
+fn interface(element: &Element) -> Result<Interface, String> {
+    let mut capabilities = Vec::new();
+    for name in FLAGS {
+        if element.truth(name)? == Some(true) {
+            capabilities.push(name.to_string());
+        }
+    }
+    let order: Option<u32> =
+        element.parsed("maxOutputDerivativeOrder", "a whole number from 0 on")?;
+    if let Some(order) = order.filter(|&order| order > 0) {
+        capabilities.push(format!("maxOutputDerivativeOrder={order}"));
+    }
+    Ok(Interface {
+        model_identifier: element.required("modelIdentifier")?.to_string(),
+        capabilities,
+    })
+}
+
+fn unit(element: &Element) -> Result<UnitDefinition, String> {
+    let scale = |element: &Element| -> Result<(f64, f64), String> {
+        Ok((element.number("factor")?.unwrap_or(1.0), element.number("offset")?.unwrap_or(0.0)))
+    };
+    let base = element.child("BaseUnit");
+    let (factor, offset) = base.map_or(Ok((1.0, 0.0)), scale)?;
+    let exponents = |base: &Element| -> Result<[i32; 8], String> {
+        let mut exponents = [0; 8];
+        for (exponent, name) in exponents.iter_mut().zip(BASE) {
+            *exponent = base.parsed(name, "a whole number")?.unwrap_or(0);
+        }
+        Ok(exponents)
+    };
+    let displays =
+        element.children.iter().filter(|child| child.name == "DisplayUnit").map(|display| {
+            let (factor, offset) = scale(display)?;
+            Ok((display.required("name")?.to_string(), factor, offset))
         });
-        let place = ordered.partition_point(|position| name_of(position) < name);
-        let position = *ordered.get(place).filter(|position| name_of(position) == name)?;
-        Some((position as usize, &self.variables[position as usize]))
-    }
-
-    /// Returns the positions of the continuous states, each with that of its derivative.
-    pub fn states(&self) -> impl Iterator<Item = (usize, usize)> {
-        let variables = self.variables.iter().enumerate();
-        variables.filter_map(|(position, variable)| {
-            let state = variable.derivative_of.filter(|state| *state < self.variables.len())?;
-            Some((state, position))
-        })
-    }
-
-    /// Returns the names of the variables with this causality.
-    pub fn names<'a>(&'a self, causality: &'a str) -> impl Iterator<Item = &'a str> + Clone {
-        self.variables.iter().filter(move |v| v.causality == causality).map(|v| v.name.as_str())
-    }
+    Ok(UnitDefinition {
+        name: element.required("name")?.to_string(),
+        exponents: base.map(exponents).transpose()?,
+        factor,
+        offset,
+        displays: displays.collect::<Result<_, String>>()?,
+    })
 }
 
-/// Type in which a value is transferred.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
-pub enum Carrier {
-    /// A real number as `f64`.
-    Real,
-    /// An integer or an enumeration's value as `i32`.
-    Integer,
-    /// A truth value as `i32`, 0 or 1.
-    Boolean,
+fn variable(element: &Element, types: &Types) -> Result<Variable, String> {
+    let kinds = ["Real", "Integer", "Boolean", "String", "Enumeration"];
+    let typed = kinds.iter().find_map(|kind| element.child(kind));
+    let typed = typed.ok_or_else(|| format!("{} has no type", element.title()))?;
+    // An attribute of the variable itself takes precedence over that of its declared type.
+    let declared =
+        typed.attribute("declaredType").and_then(|name| types.get(name)?.child(&typed.name));
+    let text = |name: &str| {
+        typed.attribute(name).or_else(|| declared?.attribute(name)).map(ToString::to_string)
+    };
+    let kind = match typed.name.as_str() {
+        "Real" => {
+            let bound = |name: &str| match typed.number(name)? {
+                None => declared.map_or(Ok(None), |declared| declared.number(name)),
+                bound => Ok(bound),
+            };
+            VariableKind::Real {
+                unit: text("unit"),
+                display_unit: text("displayUnit"),
+                min: bound("min")?,
+                max: bound("max")?,
+                nominal: bound("nominal")?,
+            }
+        }
+        "Integer" => {
+            let bound = |name: &str| match typed.parsed(name, "a whole number")? {
+                None => {
+                    declared.map_or(Ok(None), |declared| declared.parsed(name, "a whole number"))
+                }
+                bound => Ok::<_, String>(bound),
+            };
+            VariableKind::Integer { min: bound("min")?, max: bound("max")? }
+        }
+        "Boolean" => VariableKind::Boolean,
+        "String" => VariableKind::String,
+        _ => {
+            let declared =
+                declared.ok_or_else(|| format!("{} has no type definition", element.title()))?;
+            let item = |item: &Element| {
+                let value = item.parsed("value", "a whole number")?;
+                let value =
+                    value.ok_or_else(|| format!("{} has no attribute value", item.title()))?;
+                Ok((item.required("name")?.to_string(), value))
+            };
+            let items = declared.children.iter().filter(|child| child.name == "Item");
+            VariableKind::Enumeration { items: items.map(item).collect::<Result<_, String>>()? }
+        }
+    };
+    let reference = element.parsed("valueReference", "a whole number from 0 to 4294967295")?;
+    let keyword = |name: &str, default: &'static str| {
+        let text = element.attribute(name).unwrap_or(default);
+        let keyword = CAUSALITIES.iter().chain(&VARIABILITIES).find(|keyword| **keyword == text);
+        // Keywords of the standard are not copied for each variable.
+        keyword.map_or_else(|| Cow::Owned(text.to_string()), |keyword| Cow::Borrowed(*keyword))
+    };
+    Ok(Variable {
+        name: element.required("name")?.to_string(),
+        reference: reference
+            .ok_or_else(|| format!("{} has no attribute valueReference", element.title()))?,
+        description: element.attribute("description").unwrap_or_default().to_string(),
+        causality: keyword("causality", "local"),
+        variability: keyword("variability", "continuous"),
+        kind,
+        start: typed.attribute("start").map(ToString::to_string),
+        // Indices in the file count from 1.
+        derivative_of: typed
+            .parsed::<usize>("derivative", "an index from 1 on")?
+            .and_then(|index| index.checked_sub(1)),
+    })
 }
 
-impl Carrier {
-    /// Returns the type in which values of variables of this kind are transferred; `None` for
-    /// texts, which are not transferred.
-    pub fn for_kind(kind: &VariableKind) -> Option<Self> {
-        match kind {
-            VariableKind::Real { .. } => Some(Self::Real),
-            VariableKind::Integer { .. } | VariableKind::Enumeration { .. } => Some(Self::Integer),
-            VariableKind::Boolean => Some(Self::Boolean),
-            VariableKind::String => None,
+/// Returns the positions of the inputs that each output depends on, by the position of the
+/// output. Only outputs that declare their dependencies have an entry.
+fn dependencies(root: &Element, variables: usize) -> Result<BTreeMap<usize, Vec<usize>>, String> {
+    let unknowns = root
+        .child("ModelStructure")
+        .into_iter()
+        .flat_map(|structure| structure.list("Outputs", "Unknown"));
+    let mut dependencies = BTreeMap::new();
+    for unknown in unknowns {
+        // Indices in the file count from 1.
+        let position = |index: usize| {
+            let position = index.checked_sub(1).filter(|&position| position < variables);
+            position.ok_or_else(|| {
+                format!(
+                    "{} refers to variable {index}, but there are only {variables}",
+                    unknown.title()
+                )
+            })
+        };
+        let index = unknown.parsed("index", "a whole number from 1 on")?;
+        let output =
+            position(index.ok_or_else(|| format!("{} has no attribute index", unknown.title()))?)?;
+        if let Some(text) = unknown.attribute("dependencies") {
+            let parse = |text: &str| {
+                let fault = || {
+                    format!("\"{}\" in {} is not an index", text.escape_default(), unknown.title())
+                };
+                text.parse().map_err(|_| fault()).and_then(position)
+            };
+            dependencies
+                .insert(output, text.split_whitespace().map(parse).collect::<Result<Vec<_>, _>>()?);
         }
     }
+    Ok(dependencies)
 }
 
 #[cfg(test)]

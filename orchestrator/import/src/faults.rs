@@ -1,9 +1,8 @@
 //! Faults of a model description that do not keep it from being read. FMUs run with most of them,
 //! but not in every importer, and not always as intended.
 
-use crate::description::{
-    CAUSALITIES, Carrier, ModelDescription, VARIABILITIES, Variable, VariableKind,
-};
+use crate::description::{CAUSALITIES, VARIABILITIES};
+use fmi_master::description::{Carrier, ModelDescription, Variable, VariableKind};
 use std::collections::{BTreeSet, HashMap, HashSet};
 
 /// Lists the faults of a description, one line for each, in the order of the file.
@@ -138,7 +137,7 @@ mod tests {
 
     #[test]
     fn each_fault_is_named_by_its_variable() {
-        let faults_of = |text: &str| faults(&ModelDescription::parse(text).unwrap());
+        let faults_of = |text: &str| faults(&crate::description::parse(text).unwrap());
         assert_eq!(faults_of(GOOD), Vec::<String>::new());
         for (from, to, fault) in [
             (

@@ -3,18 +3,19 @@
 
 use crate::archive;
 use crate::crash;
-use crate::description::ModelDescription;
+use crate::description;
 use crate::error::{Error, with_causes};
 use crate::faults;
 use crate::folder::TemporaryFolder;
 use crate::functions::Functions;
-use crate::instance::Instance;
 use crate::isolation::{self, Isolation, Library, Loaded};
 use crate::library::FmuInstance;
 use crate::log::Log;
 use crate::lookup_table::{self, LookupTable, LookupTableInstance};
 use crate::warnings;
 use crate::xml;
+use fmi_master::description::ModelDescription;
+use fmi_master::instance::Instance;
 use fmi_rs::SHARED_LIBRARY_EXTENSION;
 use fmi_rs::fmi2::PLATFORM;
 use object::{Architecture, BinaryFormat, FileKind, Object, ObjectSegment};
@@ -68,7 +69,7 @@ impl Fmu {
                 ))
             })?;
         let description = xml::decode(&bytes)
-            .and_then(|text| ModelDescription::parse(&text))
+            .and_then(|text| description::parse(&text))
             .map_err(|reason| refuse(format!("modelDescription.xml: {reason}")))?;
         let archive = Archive { folder: Rc::new(folder), is_sound: Cell::new(false) };
         Ok(Self { path: path.to_path_buf(), description, content: Content::Archive(archive) })

@@ -1,7 +1,7 @@
 //! Imports FMI 2.0 FMUs. An [`fmu::Fmu`] is unpacked ([`archive`]), its description is read
-//! ([`description`], [`xml`], [`quantity`]), and the description is searched for [`faults`]. Its
-//! instances are called through the trait [`instance::Instance`]. A [`lookup_table`] is opened and
-//! called in the same way.
+//! ([`description`], [`xml`]), and the description is searched for [`faults`]. Its instances are
+//! called through the trait [`Instance`](fmi_master::instance::Instance) of the master. A
+//! [`lookup_table`] is opened and called in the same way.
 
 pub mod archive;
 pub mod crash;
@@ -12,13 +12,10 @@ mod fmi;
 pub mod fmu;
 pub mod folder;
 mod functions;
-pub mod instance;
 pub mod isolation;
 mod library;
 mod log;
 mod logs;
 pub mod lookup_table;
-pub mod names;
-pub mod quantity;
 pub mod warnings;
 pub mod xml;

@@ -11,11 +11,11 @@ use crate::crash::Calling;
 use crate::fmi::{self, Status};
 use crate::folder::TemporaryFolder;
 use crate::functions::{Functions, text_of};
-use crate::instance::{CallFailure, Instance, Outcome};
 use crate::log::Log;
 use crate::logs::{self, Listed};
-use crate::quantity::rounded;
 use float_environment::in_default;
+use fmi_master::instance::{CallFailure, Instance, Outcome};
+use fmi_master::quantity::rounded;
 use std::ffi::{CString, c_int, c_void};
 use std::rc::Rc;
 

@@ -93,7 +93,7 @@ pub fn warn_once(text: String) {
 
 impl Warning {
     fn text(&self) -> String {
-        let time = crate::quantity::rounded(self.first);
+        let time = fmi_master::quantity::rounded(self.first);
         match self.count {
             1 => format!("{} (at t = {time} s)", self.text),
             count => format!("{} (first at t = {time} s, {count} times)", self.text),

@@ -2,7 +2,7 @@
 
 use crate::continuous::Continuous;
 use crate::model::Step;
-use cosim::wiring::Port;
+use fmi_master::wiring::Port;
 
 /// How a component answers to its inputs.
 #[derive(Clone, Debug)]

@@ -3,7 +3,7 @@
 
 use crate::Matrix;
 use crate::model::Step;
-use fmu_import::instance::{CallFailure, Instance};
+use fmi_master::instance::{CallFailure, Instance};
 
 /// A continuous linear system: ẋ = A x + B u, y = C x + D u.
 #[derive(Clone, Debug, PartialEq)]

@@ -6,8 +6,8 @@ use crate::fitting::{AT_LENGTH, DESCRIBED, delayed, describes, reduced};
 use crate::identification::{Builder, CHANGES, Found};
 use crate::responses::{Probe, Response, Scales, beginning};
 use crate::windows::{COMPARED, longest_period, longest_response};
-use fmu_import::instance::{CallFailure, Instance};
-use fmu_import::quantity::rounded;
+use fmi_master::instance::{CallFailure, Instance};
+use fmi_master::quantity::rounded;
 
 impl Builder<'_> {
     /// Returns the model by derivatives, if the component gives them and they describe what it

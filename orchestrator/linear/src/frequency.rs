@@ -7,11 +7,11 @@ use crate::margins::disk::sensitivity;
 use crate::model::OpenLoop;
 use crate::realisation::least_squares;
 use crate::spectrum::spectral_radius;
-use cosim::clock::Clock;
 use cosim::error::Error;
 use cosim::interrupt::Interrupt;
 use cosim::system::System;
-use fmu_import::quantity::rounded;
+use fmi_master::clock::Clock;
+use fmi_master::quantity::rounded;
 use std::f64::consts::TAU;
 
 /// Share of a transient that is left when the response is taken, and the longest wait for it, s.
@@ -91,13 +91,13 @@ pub fn measure(
         amplitude * (frequency * since as f64 * step).sin()
     };
     let fly = |system: &System, adds: bool| {
-        let mut master = system.start(interrupt)?;
+        let mut run = system.start(interrupt)?;
         let mut received = Vec::new();
         for tick in 0..=last {
             if adds && tick >= lineariser.first() {
-                master.add(input, sine(tick));
+                run.master.add(input, sine(tick));
             }
-            let value = master.advance(tick)?[place];
+            let value = run.advance(tick)?[place];
             if tick >= last - count {
                 received.push(value);
             }

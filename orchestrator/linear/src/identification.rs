@@ -11,9 +11,9 @@ use crate::windows::{
     BLOCKS, COMPARED, LONGEST_TIME, MOST_BLOCKS, compared_steps, longest_period, longest_response,
 };
 use cosim::system::System;
-use cosim::wiring::Port;
-use fmu_import::instance::{CallFailure, Instance};
-use fmu_import::quantity::rounded;
+use fmi_master::instance::{CallFailure, Instance};
+use fmi_master::quantity::rounded;
+use fmi_master::wiring::Port;
 use std::ops::Range;
 
 /// Most steps of the next period whose responses are held against those of the first.

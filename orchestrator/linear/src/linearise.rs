@@ -10,16 +10,16 @@ use crate::propagation::{Link, Net};
 use crate::replay::Recorded;
 use crate::spectrum::spectral_radius;
 use crate::windows::needed_steps;
-use cosim::clock::Clock;
-use cosim::delay::Reading;
 use cosim::error::Error;
 use cosim::interrupt::Interrupt;
-use cosim::master::Master;
+use cosim::run::Run;
 use cosim::system::System;
-use cosim::wiring::{Port, Wire};
-use fmu_import::description::Carrier;
-use fmu_import::instance::CallFailure;
-use fmu_import::quantity::rounded;
+use fmi_master::clock::Clock;
+use fmi_master::delay::Reading;
+use fmi_master::description::Carrier;
+use fmi_master::instance::CallFailure;
+use fmi_master::quantity::rounded;
+use fmi_master::wiring::{Port, Wire};
 use fmu_import::warnings;
 use std::ops::Range;
 
@@ -83,8 +83,8 @@ pub fn linearise(
 ) -> Result<Linearised, Error> {
     let lineariser = Lineariser::new(system, time, open)?;
     let collection = warnings::collect();
-    let mut master = lineariser.system.start(interrupt)?;
-    let found = lineariser.linearise(&mut master, interrupt);
+    let mut run = lineariser.system.start(interrupt)?;
+    let found = lineariser.linearise(&mut run, interrupt);
     drop(collection);
     found
 }
@@ -127,7 +127,7 @@ impl Lineariser {
         Ok(Self { system, time, ticks: first..last, wired, signals, opened })
     }
 
-    /// Returns the system, from which masters are started.
+    /// Returns the system, from which runs are started.
     pub fn system(&self) -> &System {
         &self.system
     }
@@ -142,31 +142,22 @@ impl Lineariser {
         &self.opened
     }
 
-    /// Linearises a run of the system, given its master after initialisation.
+    /// Linearises a run of the system after its initialisation.
     ///
     /// # Errors
     /// Returns an error if an instance fails or keeps no states, if the loop does not
     /// respond to what is put in at the opened signals, or if the run was asked to end.
-    pub fn linearise(
-        &self,
-        master: &mut Master,
-        interrupt: &Interrupt,
-    ) -> Result<Linearised, Error> {
+    pub fn linearise(&self, run: &mut Run, interrupt: &Interrupt) -> Result<Linearised, Error> {
         let Self { system, time, ticks, wired, signals, opened } = self;
-        let recorded =
-            record(system, wired, ticks.clone(), master).map_err(|error| match error {
-                Error::EndedByInstance { component, time, message } => {
-                    let end = rounded(system.clock.time(ticks.end));
-                    let message =
-                        format!("{message}, but a linear model needs its motion until t = {end} s");
-                    Error::Call {
-                        component,
-                        time,
-                        failure: CallFailure::answer("linearise", message),
-                    }
-                }
-                error => error,
-            })?;
+        let recorded = record(system, wired, ticks.clone(), run).map_err(|error| match error {
+            Error::EndedByInstance { component, time, message } => {
+                let end = rounded(system.clock.time(ticks.end));
+                let message =
+                    format!("{message}, but a linear model needs its motion until t = {end} s");
+                Error::Call { component, time, failure: CallFailure::answer("linearise", message) }
+            }
+            error => error,
+        })?;
         let _silence = warnings::silence();
         let mut found: Vec<Found> = Vec::new();
         let (mut next, mut has_pair) = (0, false);
@@ -174,11 +165,11 @@ impl Lineariser {
             if let Some(request) = interrupt.asked() {
                 return Err(Error::Interrupted { time: *time, request });
             }
-            if let Some(pair) = self.pair(next, &recorded, master)? {
+            if let Some(pair) = self.pair(next, &recorded, run)? {
                 found.push(pair);
                 (next, has_pair) = (next + 2, true);
             } else {
-                found.push(self.alone(next, &recorded[next], master)?);
+                found.push(self.alone(next, &recorded[next], run)?);
                 next += 1;
             }
         }
@@ -231,15 +222,10 @@ impl Lineariser {
 
 impl Lineariser {
     /// Finds the model of a component by itself.
-    fn alone(
-        &self,
-        place: usize,
-        recorded: &Recorded,
-        master: &mut Master,
-    ) -> Result<Found, Error> {
+    fn alone(&self, place: usize, recorded: &Recorded, run: &mut Run) -> Result<Found, Error> {
         let one = &self.wired[place];
         let builder = self.builder(one, recorded);
-        master.call(one.component, self.time, |instance| builder.find(instance))
+        Ok(run.master.call(one.component, self.time, |instance| builder.find(instance))?)
     }
 
     fn builder<'a>(&'a self, one: &'a Wired, recorded: &'a Recorded) -> Builder<'a> {
@@ -259,7 +245,7 @@ impl Lineariser {
         &self,
         place: usize,
         recorded: &[Recorded],
-        master: &mut Master,
+        run: &mut Run,
     ) -> Result<Option<Found>, Error> {
         let [first, second] = match self.wired.get(place..place + 2) {
             Some([first, second]) if first.every == second.every => [first, second],
@@ -275,7 +261,7 @@ impl Lineariser {
         );
         let Some(joined) = joined else { return Ok(None) };
         let builder = self.builder(first, &recorded[place]);
-        if !master.call(first.component, self.time, |instance| builder.has_edge(instance))? {
+        if !run.master.call(first.component, self.time, |instance| builder.has_edge(instance))? {
             return Ok(None);
         }
         let builder = Builder {
@@ -286,7 +272,7 @@ impl Lineariser {
             inputs: joined.inputs.clone(),
             outputs: joined.outputs.clone(),
         };
-        let found = master.call_both(components, self.time, |instances| {
+        let found = run.master.call_both(components, self.time, |instances| {
             let mut pair = Pair::new(&joined, instances);
             builder.find(&mut pair).map_err(|failure| (pair.last, failure))
         })?;
@@ -349,18 +335,18 @@ fn record(
     system: &System,
     wired: &[Wired],
     ticks: Range<u64>,
-    master: &mut Master,
+    run: &mut Run,
 ) -> Result<Vec<Recorded>, Error> {
     for tick in 0..ticks.start {
-        master.advance(tick)?;
+        run.advance(tick)?;
     }
     let time = system.clock.time(ticks.start);
     for one in wired {
-        master.call(one.component, time, |instance| instance.save(0))?;
+        run.master.call(one.component, time, |instance| instance.save(0))?;
     }
     let mut all: Vec<Recorded> = wired.iter().map(|one| one.recorded.clone()).collect();
     for tick in ticks {
-        let values = master.advance(tick)?;
+        let values = run.advance(tick)?;
         for (one, recorded) in wired.iter().zip(&mut all) {
             if tick.is_multiple_of(one.every) {
                 recorded.rows.push(one.places.iter().map(|place| values[*place]).collect());

@@ -1,11 +1,11 @@
 //! When a loop is linearised, and where it is opened.
 
 use crate::model::Signal;
-use cosim::clock::Clock;
 use cosim::error::Error;
 use cosim::system::System;
-use cosim::wiring::Port;
-use fmu_import::description::{Carrier, VariableKind};
+use fmi_master::clock::Clock;
+use fmi_master::description::{Carrier, VariableKind};
+use fmi_master::wiring::Port;
 
 /// Finds the communication point at a time (s).
 pub(crate) fn tick_at(clock: &Clock, time: f64) -> Result<u64, Error> {
@@ -39,7 +39,7 @@ pub(crate) fn opened(
             for port in wires.iter().flat_map(|(wire, _)| [wire.to, wire.from]) {
                 names.push(system.name(port));
             }
-            let hint = fmu_import::names::hint(pattern, names.iter().map(String::as_str));
+            let hint = fmi_master::names::hint(pattern, names.iter().map(String::as_str));
             return Err(Error::experiment(format!(
                 "--open {pattern}: there is no such connected input or output{hint}"
             )));

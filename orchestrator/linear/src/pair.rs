@@ -4,11 +4,11 @@
 //! changes; what they do together is smooth all the same. So the response of both is taken.
 
 use crate::replay::Recorded;
-use cosim::delay::Reading;
 use cosim::system::System;
-use cosim::wiring::{Port, Wire};
-use fmu_import::description::Carrier;
-use fmu_import::instance::{CallFailure, Instance, Outcome};
+use fmi_master::delay::Reading;
+use fmi_master::description::Carrier;
+use fmi_master::instance::{CallFailure, Instance, Outcome};
+use fmi_master::wiring::{Port, Wire};
 
 /// A connection within a pair, by places of its members.
 #[derive(Clone, Copy, Debug)]

@@ -1,15 +1,15 @@
 //! The master's algorithm on matrices: every value is a row of factors, by which it follows from
 //! the states at the beginning of a period and from what is put in at the opened signals.
 //!
-//! The order of the calls is that of [`cosim::master`], so that the delays are those of a run.
+//! The order of the calls is that of [`fmi_master::master`], so that the delays are those of a run.
 
 use crate::Matrix;
 use crate::components::{Component, Dynamics};
 use crate::continuous::Steps;
 use crate::model::{OpenLoop, Signal, Step};
 use crate::reduction::{held, merged, reduced};
-use cosim::delay::Reading;
 use cosim::experiment::Coupling;
+use fmi_master::delay::Reading;
 
 /// A connection between components, by places of components and of their outputs and inputs.
 #[derive(Clone, Copy, Debug)]

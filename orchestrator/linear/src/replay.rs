@@ -1,9 +1,9 @@
 //! Running one component alone, from a state that it kept and with the inputs that it had in the
 //! loop.
 
-use cosim::wiring::Port;
-use fmu_import::description::Carrier;
-use fmu_import::instance::{CallFailure, Instance, Outcome};
+use fmi_master::description::Carrier;
+use fmi_master::instance::{CallFailure, Instance, Outcome};
+use fmi_master::wiring::Port;
 
 /// The inputs of a component at its steps, as they were in the loop.
 #[derive(Clone, Debug, Default)]

@@ -7,7 +7,7 @@
 
 use crate::Matrix;
 use crate::replay::{Change, Recorded};
-use fmu_import::instance::{CallFailure, Instance};
+use fmi_master::instance::{CallFailure, Instance};
 
 /// Share of the difference between the slopes to both sides that is left when the change is halved,
 /// above which there is an edge. A smooth component leaves a half, one with an edge all of it.

@@ -4,7 +4,7 @@
 use crate::measure::larger;
 use cosim::error::Error;
 use cosim::experiment::Guarantee;
-use cosim::master::{Observer, Sample};
+use cosim::run::{Observer, Sample};
 use cosim::signal::Resolved;
 use cosim::system::{Probed, System};
 use std::sync::Arc;

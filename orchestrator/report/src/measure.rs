@@ -4,7 +4,7 @@ mod spectrum;
 
 use cosim::error::Error;
 use cosim::experiment::{Measure, MeasureKind, Observe};
-use cosim::master::{Observer, Sample};
+use cosim::run::{Observer, Sample};
 use cosim::signal::{Resolved, Signal, common_unit};
 use cosim::system::System;
 

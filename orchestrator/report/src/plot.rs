@@ -6,7 +6,7 @@ use crate::recording::Recording;
 use crate::recording::panels::{self, Role, symbols};
 use crate::run_page::figure::figure;
 use cosim::error::Error;
-use cosim::master::{Observer, Sample};
+use cosim::run::{Observer, Sample};
 use std::path::Path;
 
 /// Approximate largest number of points of a curve.

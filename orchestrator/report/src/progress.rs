@@ -1,7 +1,7 @@
 //! Shows the progress of a run: a moving bar on a terminal, and a plain line otherwise.
 
 use cosim::error::Error;
-use cosim::master::{Observer, Sample};
+use cosim::run::{Observer, Sample};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 use std::fmt::Arguments;
 use std::io::{IsTerminal, Write, stderr};

@@ -5,7 +5,7 @@ use cosim::pacing::pacer::Tally;
 use cosim::system::Probed;
 use cosim_report::figure;
 use cosim_report::panels::Panel;
-use fmu_import::quantity::rounded;
+use fmi_master::quantity::rounded;
 use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::style::{Color, Style, Stylize};

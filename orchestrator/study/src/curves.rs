@@ -1,6 +1,6 @@
 //! Signals of a run that the figures of a study draw.
 
-use cosim::master::{Observer, Sample};
+use cosim::run::{Observer, Sample};
 use cosim::signal::{Resolved, Signal};
 use cosim::system::Parameters;
 use linear::curves::ResponseCurves;

@@ -9,7 +9,7 @@ use cosim::document::Source;
 use cosim::error::Error;
 use cosim::experiment::{Experiment, Measure, Record};
 use cosim::signal::Signal;
-use fmu_import::names;
+use fmi_master::names;
 use schemars::JsonSchema;
 use serde::Deserialize;
 use std::collections::BTreeMap;

@@ -6,7 +6,7 @@ use cosim::document::Source;
 use cosim::error::Error;
 use cosim::experiment::Experiment;
 use cosim_report::figure::Color;
-use fmu_import::names;
+use fmi_master::names;
 use schemars::JsonSchema;
 use serde::Deserialize;
 use std::collections::BTreeMap;

@@ -8,7 +8,7 @@ use crate::{figures, origin, page};
 use cosim::error::Error;
 use cosim::files;
 use cosim_report::figure::{png, svg};
-use fmu_import::quantity::rounded;
+use fmi_master::quantity::rounded;
 use serde_json::{Value, json};
 use std::collections::BTreeSet;
 use std::path::Path;

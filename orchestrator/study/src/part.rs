@@ -8,7 +8,7 @@ use cosim::error::Error as Single;
 use cosim::experiment::{Experiment, Measure, MeasureKind, Observe, Overrides, Protection};
 use cosim::files;
 use cosim::interrupt::Interrupt;
-use cosim::master::Observer;
+use cosim::run::Observer;
 use cosim::signal::Signal;
 use cosim::system::Opened;
 use cosim_report::metrics::{Meters, Metrics, Value};

@@ -7,7 +7,7 @@ use crate::values::Quantity;
 use cosim::signal::Signal;
 use cosim::system::Parameters;
 use cosim_report::metrics::Metrics;
-use fmu_import::names;
+use fmi_master::names;
 use std::collections::BTreeMap;
 use sweep::parts::PartResult;
 use sweep::table::CaseTable;

@@ -12,7 +12,7 @@
 
 use cosim::document::Source;
 use cosim::error::Error;
-use fmu_import::names;
+use fmi_master::names;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::Path;

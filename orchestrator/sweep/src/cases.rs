@@ -13,7 +13,7 @@ use cosim::files;
 use cosim::search;
 use cosim::system::{CheckedComponent, Opened, System};
 use cosim::variation::{SettingValue, Target};
-use fmu_import::names;
+use fmi_master::names;
 use serde_json::{Map, Value, json};
 use std::cmp::Ordering;
 use std::collections::BTreeMap;

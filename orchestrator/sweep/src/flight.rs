@@ -6,11 +6,11 @@ use crate::table::{Column, Values};
 use cosim::error::Error;
 use cosim::experiment::Margins;
 use cosim::interrupt::Interrupt;
-use cosim::master::{Master, Observer, Sample};
+use cosim::run::{Observer, Run, Sample};
 use cosim::system::{Opened, Parameters, System};
 use cosim::variation::{SettingValue, Target};
 use cosim_report::metrics::{Meters, Metrics};
-use fmu_import::description::VariableKind as Type;
+use fmi_master::description::VariableKind as Type;
 use linear::linearise::{Linearised, Lineariser};
 use linear::measures::{self, Measured};
 use std::collections::BTreeMap;
@@ -49,7 +49,7 @@ pub struct Flight<'a> {
     sweep: &'a Sweep,
     system: System,
     meters: Meters,
-    master: Option<Master>,
+    run: Option<Run>,
     interrupt: &'a Interrupt,
     /// Whether instances are reset instead of created again.
     resets: bool,
@@ -58,7 +58,7 @@ pub struct Flight<'a> {
     bounds: Vec<Bound>,
     /// Linearisation of each case with its instances, if the experiment asks for margins.
     lineariser: Option<Lineariser>,
-    linearised: Option<Master>,
+    linearised: Option<Run>,
     /// The loop of the last case, linearised.
     found: Option<Linearised>,
 }
@@ -85,7 +85,7 @@ impl<'a> Flight<'a> {
             sweep,
             system,
             meters,
-            master: None,
+            run: None,
             interrupt,
             resets,
             times: false,
@@ -124,8 +124,8 @@ impl<'a> Flight<'a> {
     /// # Errors
     /// Returns an error if an instance does not give a value.
     pub fn parameters(&mut self) -> Result<Parameters, Error> {
-        match &mut self.master {
-            Some(master) => self.system.parameters(master),
+        match &mut self.run {
+            Some(run) => self.system.parameters(run),
             None => Ok(Parameters::default()),
         }
     }
@@ -175,20 +175,20 @@ impl<'a> Flight<'a> {
         let outcome = if self.sweep.is_flown_outside {
             outside::fly(&self.system, Some(case), &changes, &mut observers)
         } else {
-            let started = match self.master.take().filter(|_| self.resets) {
-                Some(mut master) => self.system.restart(&mut master, &changes).map(|()| master),
+            let started = match self.run.take().filter(|_| self.resets) {
+                Some(mut run) => self.system.restart(&mut run, &changes).map(|()| run),
                 None => self.system.start_varied(&changes, self.interrupt),
             };
-            started.and_then(|mut master| {
+            started.and_then(|mut run| {
                 if self.times {
-                    master.measure_time();
+                    run.measure_time();
                 }
-                let outcome = master.run(&mut observers);
-                let times = master.step_seconds();
+                let outcome = run.run(&mut observers);
+                let times = run.step_seconds();
                 step_us = times.map(|(name, seconds)| (name.to_string(), seconds * 1e6)).collect();
                 // An instance that failed is not used again.
                 if !matches!(outcome, Err(Error::Call { .. })) {
-                    self.master = Some(master);
+                    self.run = Some(run);
                 }
                 outcome
             })
@@ -236,13 +236,13 @@ impl Flight<'_> {
         self.found = None;
         let system = lineariser.system();
         let started = match self.linearised.take().filter(|_| self.resets) {
-            Some(mut master) => system.restart(&mut master, changes).map(|()| master),
+            Some(mut run) => system.restart(&mut run, changes).map(|()| run),
             None => system.start_varied(changes, self.interrupt),
         };
-        let found = started.and_then(|mut master| {
-            let found = lineariser.linearise(&mut master, self.interrupt);
+        let found = started.and_then(|mut run| {
+            let found = lineariser.linearise(&mut run, self.interrupt);
             if found.is_ok() {
-                self.linearised = Some(master);
+                self.linearised = Some(run);
             }
             found
         });

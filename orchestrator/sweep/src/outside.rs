@@ -6,10 +6,10 @@
 
 use cosim::error::Error;
 use cosim::experiment::Coupling;
-use cosim::master::{Observer, Sample};
+use cosim::run::{Observer, Sample};
 use cosim::system::System;
 use cosim::variation::{SettingValue, Target};
-use fmu_import::instance::CallFailure;
+use fmi_master::instance::CallFailure;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::collections::BTreeMap;

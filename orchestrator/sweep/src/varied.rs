@@ -7,7 +7,7 @@ use cosim::error::Error;
 use cosim::metadata::is_seed;
 use cosim::system::System;
 use cosim::variation::Target;
-use fmu_import::description::VariableKind as Type;
+use fmi_master::description::VariableKind as Type;
 use std::ops::Range;
 use toml::Spanned;
 

@@ -13,10 +13,11 @@ pub use state::state;
 use campaign::definition::Campaign;
 use cosim::experiment::{Experiment, Overrides};
 use cosim::ssp;
-use fmu_import::description::ModelDescription;
+use fmi_master::quantity;
+use fmu_import::description;
 use fmu_import::faults::faults;
 use fmu_import::fmu::Fmu;
-use fmu_import::{quantity, xml};
+use fmu_import::xml;
 use std::io::{Cursor, Write};
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
@@ -43,7 +44,7 @@ fn file(name: &str, data: &[u8]) -> PathBuf {
 /// Reads a model description, and lists its faults.
 pub fn description(data: &[u8]) {
     let Ok(text) = xml::decode(data) else { return };
-    let Ok(description) = ModelDescription::parse(&text) else { return };
+    let Ok(description) = description::parse(&text) else { return };
     for fault in faults(&description) {
         assert!(!fault.is_empty() && !fault.contains('\n'), "{fault}");
     }

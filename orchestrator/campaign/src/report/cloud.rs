@@ -4,7 +4,7 @@
 use crate::flight::Flight;
 use crate::plan::Plan;
 use cosim::error::Error;
-use cosim::master::{Observer, Sample};
+use cosim::run::{Observer, Sample};
 use cosim_report::figure::{self, Color, Curve, Figure, Legend, Shape};
 use cosim_report::panels::Panel;
 

@@ -7,7 +7,7 @@ use cosim::error::Error;
 use cosim::experiment::MeasureKind;
 use cosim::files;
 use cosim::interrupt::Interrupt;
-use cosim::master::{Observer, Sample};
+use cosim::run::{Observer, Sample};
 use cosim::signal::{Resolved, Signal};
 use cosim::variation::SettingValue;
 use cosim_report::figure::{Color, Curve, Figure, Legend, Panel, Shape, svg};

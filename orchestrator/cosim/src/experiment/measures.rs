@@ -2,7 +2,7 @@
 
 use super::Vehicle;
 use crate::signal::Signal;
-use fmu_import::names;
+use fmi_master::names;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;

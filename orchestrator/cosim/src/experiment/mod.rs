@@ -10,6 +10,7 @@ mod protection;
 mod vehicle;
 
 pub use crate::watch::OnInvalid;
+pub use fmi_master::wiring::Coupling;
 pub use measures::{Curve, Guarantee, Loss, Margins, Measure, MeasureKind, Observe, Panel, Scaled};
 pub use overrides::{Given, Overrides};
 pub use protection::Protection;
@@ -17,8 +18,8 @@ pub use vehicle::Vehicle;
 
 use crate::document::Source;
 use crate::error::Error;
-use fmu_import::names;
-use fmu_import::quantity::Scaling;
+use fmi_master::names;
+use fmi_master::quantity::Scaling;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
@@ -90,21 +91,6 @@ pub struct Simulation {
     /// Action taken if an instance gives a value that is not finite, or not valid for its type.
     #[serde(default)]
     pub on_invalid: OnInvalid,
-}
-
-/// Way in which components are stepped and values are passed on.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema, Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Coupling {
-    /// One after the other, each component gets its inputs, is stepped, and passes its outputs on:
-    /// later components receive its responses to these inputs. Earlier versions called this
-    /// "gauss-seidel".
-    #[default]
-    #[serde(alias = "gauss-seidel")]
-    Sequential,
-    /// All components get their inputs, and then all are stepped: each receives the outputs of the
-    /// others after their last step.
-    Jacobi,
 }
 
 /// A component of the experiment: an FMU or a lookup table with its settings.

@@ -3,7 +3,7 @@
 use super::{Coupling, Experiment, Protection};
 use crate::error::Error;
 use crate::watch::OnInvalid;
-use fmu_import::names;
+use fmi_master::names;
 use std::collections::BTreeMap;
 use std::path::Path;
 use toml::{Spanned, Value};

@@ -3,7 +3,7 @@
 use super::distribution::Summary;
 use super::priority::Priority;
 use super::{Factor, OnMiss};
-use fmu_import::quantity::rounded;
+use fmi_master::quantity::rounded;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::io::{self, Write};

@@ -1,6 +1,6 @@
 //! Description of a recorded variable.
 
-use fmu_import::description::Carrier;
+use fmi_master::description::Carrier;
 
 /// A variable that is recorded, with its type and unit.
 #[derive(Clone, Debug)]

@@ -2,7 +2,7 @@
 
 use super::column::Column;
 use crate::error::Error;
-use fmu_import::description::Carrier;
+use fmi_master::description::Carrier;
 use parquet::basic::{Repetition, Type as Physical};
 use parquet::column::writer::ColumnWriter;
 use parquet::errors::ParquetError;

@@ -6,7 +6,7 @@ mod columnar;
 mod text;
 
 use crate::error::Error;
-use crate::master::{Observer, Sample};
+use crate::run::{Observer, Sample};
 pub use column::Column;
 use columnar::Columnar;
 use schemars::JsonSchema;

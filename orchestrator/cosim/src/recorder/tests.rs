@@ -1,7 +1,7 @@
 use super::*;
 use ::parquet::file::reader::{FileReader, SerializedFileReader};
 use ::parquet::record::Field;
-use fmu_import::description::Carrier;
+use fmi_master::description::Carrier;
 use std::fs::File;
 use std::path::PathBuf;
 

@@ -2,7 +2,7 @@
 
 use super::column::Column;
 use crate::error::Error;
-use fmu_import::description::Carrier;
+use fmi_master::description::Carrier;
 use std::fs::File;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};

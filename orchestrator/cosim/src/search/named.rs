@@ -7,7 +7,7 @@
 use super::{files, folders, has_extension};
 use crate::document::Source;
 use crate::error::Error;
-use fmu_import::names;
+use fmi_master::names;
 use std::collections::BTreeSet;
 use std::ffi::OsString;
 use std::fs;

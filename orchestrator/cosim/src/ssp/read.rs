@@ -2,14 +2,15 @@
 
 use super::structure::{Structure, SystemComponent};
 use super::{OPEN_MODELICA, RUN_SETTINGS, STRUCTURE};
-use crate::delay;
 use crate::document::Source;
 use crate::error::Error;
 use crate::experiment::{
     Coupling, Experiment, Given, Observe, OnInvalid, Overrides, Protection, Record, Simulation,
 };
 use crate::system::Opened;
-use crate::wiring::{self, Part};
+use crate::wiring::wires;
+use fmi_master::delay;
+use fmi_master::wiring::{self, Part};
 use fmu_import::archive;
 use fmu_import::error::Error as Import;
 use fmu_import::fmu::Fmu;
@@ -225,7 +226,7 @@ pub fn load(path: &Path, overrides: &Overrides) -> Result<Loaded, Error> {
         source: Source::plain(path, text),
     };
     let parts = parts(&structure.components, &opened, &structure.folder);
-    let wires = wiring::wires(&experiment, &parts)?;
+    let wires = wires(&experiment, &parts)?;
     experiment.simulation.order = delay::order(&parts, &wires)
         .into_iter()
         .map(|index| parts[index].name.to_string())

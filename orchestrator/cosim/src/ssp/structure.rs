@@ -3,8 +3,8 @@
 
 use super::FMU;
 use crate::experiment::{Component, Connection};
+use fmi_master::quantity::Scaling;
 use fmu_import::archive;
-use fmu_import::quantity::Scaling;
 use fmu_import::xml::{self, Element};
 use percent_encoding::percent_decode_str;
 use std::collections::BTreeMap;

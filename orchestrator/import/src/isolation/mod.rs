@@ -26,7 +26,7 @@ pub use host::serve;
 pub use process::late_failures;
 pub use settings::{COMMAND, Isolation};
 
-use crate::instance::Instance;
+use fmi_master::instance::Instance;
 use process::Process;
 use protocol::{InstanceArguments, Limits, Ready, Setup};
 use remote::RemoteInstance;

@@ -1,8 +1,8 @@
 //! Messages between the master and the process of an instance.
 
-use crate::description::Carrier;
-use crate::instance::CallFailure;
 use crate::log::LogMessage;
+use fmi_master::description::Carrier;
+use fmi_master::instance::CallFailure;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 

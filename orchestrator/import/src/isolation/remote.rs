@@ -7,8 +7,8 @@
 
 use super::process::Process;
 use super::protocol::{Action, List, Request, Set};
-use crate::description::Carrier;
-use crate::instance::{CallFailure, Instance, Outcome};
+use fmi_master::description::Carrier;
+use fmi_master::instance::{CallFailure, Instance, Outcome};
 
 /// Number of values that are set or read by one message; longer lists are cut.
 const CHUNK: usize = 4096;

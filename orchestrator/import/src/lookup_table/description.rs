@@ -1,8 +1,8 @@
 //! The model description of a lookup table.
 
 use super::{Column, Form, LookupTable, MOST_PARAMETERS};
-use crate::description::{Interface, ModelDescription, Variable, VariableKind};
-use crate::quantity::UnitDefinition;
+use fmi_master::description::{Interface, ModelDescription, Variable, VariableKind};
+use fmi_master::quantity::UnitDefinition;
 use std::collections::BTreeSet;
 
 /// Items of the parameter `interpolation`.

@@ -2,9 +2,9 @@
 
 use super::description::{HOLD, LINEAR, Place};
 use super::{Form, LONGEST, LookupTable};
-use crate::instance::{CallFailure, Instance, Outcome};
-use crate::quantity::rounded;
 use crate::warnings;
+use fmi_master::instance::{CallFailure, Instance, Outcome};
+use fmi_master::quantity::rounded;
 use std::sync::Arc;
 
 /// Part of a time by which two times may differ and still be the same.
@@ -107,7 +107,7 @@ impl LookupTableInstance {
         }
         match self.place(call, reference)? {
             Place::Output(_) => return refuse("an output cannot be set".into()),
-            Place::Interpolation if value == HOLD.into() || value == LINEAR.into() => {
+            Place::Interpolation if value == f64::from(HOLD) || value == f64::from(LINEAR) => {
                 self.interpolation = value as i32;
             }
             Place::Interpolation => {

@@ -1,6 +1,6 @@
 use super::*;
-use crate::description::VariableKind;
-use crate::instance::Instance;
+use fmi_master::description::VariableKind;
+use fmi_master::instance::Instance;
 use proptest::prelude::*;
 
 const FILE: &str = "\u{feff}time,gust.x [N.m],count [Integer],open [Boolean],plain\r\n\
@@ -10,7 +10,7 @@ const FILE: &str = "\u{feff}time,gust.x [N.m],count [Integer],open [Boolean],pla
                     2,-20,5,1,1.5\r\n\
                     4,0,6,false,2.5\r\n";
 
-fn opened(text: &str) -> (LookupTableInstance, crate::description::ModelDescription) {
+fn opened(text: &str) -> (LookupTableInstance, fmi_master::description::ModelDescription) {
     let table = LookupTable::parse(text.as_bytes()).unwrap();
     let description = table.description("gusts").unwrap();
     (LookupTableInstance::new("gusts", table), description)
@@ -25,7 +25,7 @@ fn at(instance: &mut LookupTableInstance, time: f64) -> (f64, i32, i32, f64) {
     (reals[0], count[0], open[0], reals[1])
 }
 
-fn reference(description: &crate::description::ModelDescription, name: &str) -> u32 {
+fn reference(description: &fmi_master::description::ModelDescription, name: &str) -> u32 {
     description.find(name).unwrap_or_else(|| panic!("{name}")).1.reference
 }
 

@@ -6,10 +6,10 @@ use crate::components::{Component, Dynamics};
 use crate::continuous::Continuous;
 use crate::model::{Signal, Step};
 use crate::propagation::Link;
-use cosim::delay::Reading;
 use cosim::experiment::Coupling;
-use cosim::wiring::Port;
-use fmu_import::description::Carrier;
+use fmi_master::delay::Reading;
+use fmi_master::description::Carrier;
+use fmi_master::wiring::Port;
 
 /// Period, s, and gains of the angle and of the rate.
 const STEP: f64 = 0.05;

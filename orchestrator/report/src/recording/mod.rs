@@ -7,7 +7,7 @@ pub mod watch;
 
 use cosim::experiment::Observe;
 use cosim::signal::{Signal, Term};
-use fmu_import::names;
+use fmi_master::names;
 use serde::Deserialize;
 use serde_json::Value;
 use std::collections::BTreeMap;

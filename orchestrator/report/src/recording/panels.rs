@@ -4,7 +4,7 @@ use super::cover::covers;
 use super::{Recording, Series};
 use cosim::experiment::{self, Scaled};
 use cosim::signal::{Signal, Term};
-use fmu_import::names;
+use fmi_master::names;
 use std::collections::BTreeSet;
 use std::iter;
 

@@ -4,7 +4,7 @@ use super::panels::UNASKED;
 use super::{Recording, Track};
 use cosim::error::Error;
 use cosim::experiment::{Observe, Vehicle};
-use cosim::master::{Observer, Sample};
+use cosim::run::{Observer, Sample};
 use cosim::signal::Signal;
 use cosim::system::System;
 use serde_json::Value;

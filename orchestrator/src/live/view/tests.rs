@@ -1,6 +1,6 @@
 use super::*;
-use cosim::master::{Observer, Sample};
 use cosim::pacing::pacer::{Miss, Step};
+use cosim::run::{Observer, Sample};
 use cosim::signal::Resolved;
 use cosim_report::guarantee::{GuaranteeRecord, GuaranteeSignals};
 use cosim_report::panels::Curve;

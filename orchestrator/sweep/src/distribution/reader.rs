@@ -4,7 +4,7 @@ use super::shape::{Seeds, Shape};
 use crate::vary::{Range, Vary};
 use cosim::system::System;
 use cosim::variation::{SettingValue, Target};
-use fmu_import::description::VariableKind;
+use fmi_master::description::VariableKind;
 use statrs::distribution::{LogNormal, Normal, Triangular};
 use toml::Value;
 

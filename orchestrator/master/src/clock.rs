@@ -1,6 +1,6 @@
 //! Simulation time, counted in integer ticks.
 
-use fmu_import::quantity::rounded;
+use crate::quantity::rounded;
 
 /// A clock with the communication points `start + k · step`, which are never accumulated; the last
 /// one is `stop` itself.

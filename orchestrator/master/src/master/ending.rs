@@ -1,7 +1,6 @@
 //! The end of a run by an instance that may do so, before the stop time.
 
-use super::{Culprit, Master, Observer, Sample};
-use crate::error::Error;
+use super::{Culprit, Master, Sample, Watcher};
 
 impl Master {
     /// Lets an instance end the run before the stop time, by its index.
@@ -14,23 +13,23 @@ impl Master {
         self.end.as_deref()
     }
 
-    /// Shows the observers the values at the moment at which an instance ended the run, within the
+    /// Shows the watcher the values at the moment at which an instance ended the run, within the
     /// step from `tick`.
-    pub(super) fn observe_end(
+    pub(super) fn show_end<W: Watcher>(
         &mut self,
         tick: u64,
         (index, failure): &Culprit,
-        observers: &mut [&mut dyn Observer],
-    ) -> Result<(), Error> {
+        watcher: &mut W,
+    ) -> Result<(), W::Error> {
         let reached = failure.ends.filter(|time| time.is_finite());
         let time = reached.unwrap_or_else(|| self.clock.time(tick));
-        self.read_instance(*index, true).map_err(|culprit| self.error(time, culprit))?;
+        self.read_instance(*index, true).map_err(|culprit| self.failed(time, culprit))?;
         for index in 0..self.members.len() {
             self.values.arrive(index);
         }
         self.row.fill(&self.values);
         let sample = Sample { tick: tick + 1, time, last: true, values: &self.row.values };
         self.end = Some(format!("by {}: {}", self.members[*index].name, failure.message));
-        observers.iter_mut().try_for_each(|observer| observer.observe(&sample))
+        watcher.after(&sample, Ok(()))
     }
 }

@@ -18,22 +18,12 @@ pub use transfer::Member;
 
 use crate::clock::Clock;
 use crate::delay::Reading;
-use crate::error::Error;
-use crate::experiment::Coupling;
-use crate::interrupt::Interrupt;
-use crate::pacing::Settings;
-use crate::pacing::pacer::Pacer;
-use crate::pacing::timer::{Monotonic, Timer};
-use crate::stopwatch::{Spent, Stopwatch};
-use crate::wiring::{Port, Wire};
-use fmu_import::instance::{CallFailure, Instance, Outcome};
-use fmu_import::warnings;
-use std::rc::Rc;
+use crate::instance::{CallFailure, Instance, Outcome};
+use crate::wiring::{Coupling, Port, Wire};
 use transfer::{Inputs, Row, Values};
 
-/// The values that an observer sees at a communication point. Those that respond to the inputs set
-/// there were read after the step; at the last point, where no step begins, they are those of the
-/// step before.
+/// The values at a communication point. Those that respond to the inputs set there were read after
+/// the step; at the last point, where no step begins, they are those of the step before.
 pub struct Sample<'a> {
     /// Number of the communication point, counted from 0.
     pub tick: u64,
@@ -46,14 +36,36 @@ pub struct Sample<'a> {
     pub values: &'a [f64],
 }
 
-/// An observer is called at every communication point, for example to record results, to accumulate
-/// the figures of merit, or to show progress.
-pub trait Observer {
-    /// Processes the values of one communication point.
+/// What accompanies a run: it may hold each tick until it is due, and sees its values.
+pub trait Watcher {
+    /// Error by which it ends the run.
+    type Error: From<Failed>;
+
+    /// Called before the steps of a tick, whose time (s) is given.
     ///
     /// # Errors
-    /// An error that the observer returns ends the run.
-    fn observe(&mut self, sample: &Sample) -> Result<(), Error>;
+    /// An error ends the run before this tick.
+    fn before(&mut self, _tick: u64, _time: f64) -> Result<(), Self::Error> {
+        Ok(())
+    }
+
+    /// Called with the values of a communication point. If an instance has failed there, they are
+    /// what could be read, and the failure comes with them.
+    ///
+    /// # Errors
+    /// An error ends the run. The failure is to be passed on.
+    fn after(&mut self, sample: &Sample, outcome: Result<(), Failed>) -> Result<(), Self::Error>;
+}
+
+/// A call that an instance did not carry out, or by which it ended the simulation.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Failed {
+    /// Name of the component.
+    pub component: String,
+    /// Simulated time of the communication point, s.
+    pub time: f64,
+    /// The call, with the instance's own message.
+    pub failure: CallFailure,
 }
 
 /// Index of an instance whose call failed, with the failure.
@@ -61,18 +73,15 @@ type Culprit = (usize, CallFailure);
 
 /// The instances with their connections, ready to run.
 pub struct Master {
+    /// The instances, which may be wrapped but must stay in this order.
+    pub members: Vec<Member>,
     clock: Clock,
     coupling: Coupling,
-    members: Vec<Member>,
     /// Instances that are stepping in a process of their own, while others work.
     stepping: Vec<bool>,
     inputs: Vec<Inputs>,
     values: Values,
     row: Row,
-    /// Accumulated computing time of each instance; empty unless it is measured.
-    spent: Vec<Rc<Spent>>,
-    pacer: Option<Pacer>,
-    interrupt: Interrupt,
     /// Instance that may end the run before the stop time.
     ender: Option<usize>,
     /// How it ended the run.
@@ -100,58 +109,14 @@ impl Master {
             row: Row::new(&values, probes),
             members,
             values,
-            spent: Vec::new(),
-            pacer: None,
-            interrupt: Interrupt::default(),
             ender: None,
             end: None,
         }
     }
 
-    /// Sets the interrupt through which the run can be ended from outside. It must be set before
-    /// [`Self::pace`] is called.
-    pub fn set_interrupt(&mut self, interrupt: &Interrupt) {
-        self.interrupt = interrupt.clone();
-    }
-
-    /// Paces the run from now on, so that it keeps in step with the timer.
-    pub fn pace(&mut self, settings: Settings, timer: Rc<dyn Timer>) -> &Pacer {
-        self.measure(&timer);
-        let spent = self.members.iter().zip(&self.spent);
-        let components =
-            spent.map(|(member, spent)| (member.name.clone(), member.every, Rc::clone(spent)));
-        let pacer = Pacer::new(settings, self.clock, timer, self.interrupt.clone(), components);
-        self.pacer.insert(pacer)
-    }
-
-    /// Removes the pacer that kept the run in step and returns it; `None` if the run was not paced.
-    pub fn take_pacer(&mut self) -> Option<Pacer> {
-        self.pacer.take()
-    }
-
-    /// Measures the computing time of each instance from now on.
-    pub fn measure_time(&mut self) {
-        let timer: Rc<dyn Timer> = Rc::new(Monotonic);
-        self.measure(&timer);
-    }
-
-    fn measure(&mut self, timer: &Rc<dyn Timer>) {
-        let members = std::mem::take(&mut self.members).into_iter();
-        (self.members, self.spent) = members
-            .map(|member| {
-                let (instance, spent) = Stopwatch::new(member.instance, Rc::clone(timer));
-                // Computing times of two instances that work at the same time could not be told
-                // apart.
-                (Member { ahead: false, instance: Box::new(instance), ..member }, spent)
-            })
-            .unzip();
-    }
-
-    /// Returns the mean wall-clock time that each instance took per step, s, by name. There are no
-    /// entries if it was not measured.
-    pub fn step_seconds(&self) -> impl Iterator<Item = (&str, f64)> {
-        let spent = self.members.iter().zip(&self.spent);
-        spent.filter_map(|(member, spent)| Some((member.name.as_str(), spent.seconds_per_step()?)))
+    /// Returns the clock of the run.
+    pub fn clock(&self) -> Clock {
+        self.clock
     }
 
     /// Initializes all instances; their inputs are transferred in initialization mode, in the
@@ -159,27 +124,31 @@ impl Master {
     ///
     /// # Errors
     /// Returns an error if a call of an instance fails.
-    pub fn initialize(&mut self) -> Result<(), Error> {
+    pub fn initialize(&mut self) -> Result<(), Failed> {
         let start = self.clock.start();
-        for index in 0..self.members.len() {
-            let Member { every, varies, instance, .. } = &mut self.members[index];
-            let stop = if *varies { self.clock.stop() } else { self.clock.end(*every) };
-            let outcome = instance.enter_initialization(start, stop);
-            outcome.map_err(|failure| self.error(start, (index, failure)))?;
-        }
+        self.each(start, |master, index| {
+            let Member { every, varies, instance, .. } = &mut master.members[index];
+            let stop = if *varies { master.clock.stop() } else { master.clock.end(*every) };
+            instance.enter_initialization(start, stop).map_err(|failure| (index, failure))
+        })?;
         // Whatever the coupling, inputs are transferred one after the other here, so that the
         // simulation starts from consistent values. Reading after setting is allowed in this mode.
-        for index in 0..self.members.len() {
-            self.pass_on(index).map_err(|culprit| self.error(start, culprit))?;
-        }
-        for index in 0..self.members.len() {
-            let outcome = self.members[index].instance.exit_initialization();
-            outcome.map_err(|failure| self.error(start, (index, failure)))?;
-        }
-        for index in 0..self.members.len() {
-            self.read_instance(index, true).map_err(|culprit| self.error(start, culprit))?;
-        }
-        Ok(())
+        self.each(start, Self::pass_on)?;
+        self.each(start, |master, index| {
+            let outcome = master.members[index].instance.exit_initialization();
+            outcome.map_err(|failure| (index, failure))
+        })?;
+        self.each(start, |master, index| master.read_instance(index, true))
+    }
+
+    /// Makes calls of each instance, in their order.
+    fn each(
+        &mut self,
+        time: f64,
+        mut calls: impl FnMut(&mut Self, usize) -> Result<(), Culprit>,
+    ) -> Result<(), Failed> {
+        let outcome = (0..self.members.len()).try_for_each(|index| calls(self, index));
+        outcome.map_err(|culprit| self.failed(time, culprit))
     }
 
     fn pass_on(&mut self, index: usize) -> Result<(), Culprit> {
@@ -199,27 +168,25 @@ impl Master {
     pub fn reset(
         &mut self,
         mut prepare: impl FnMut(usize, &mut dyn Instance) -> Outcome,
-    ) -> Result<(), Error> {
-        let start = self.clock.start();
+    ) -> Result<(), Failed> {
         self.end = None;
-        for index in 0..self.members.len() {
-            let instance = self.members[index].instance.as_mut();
+        self.each(self.clock.start(), |master, index| {
+            let instance = master.members[index].instance.as_mut();
             let outcome = instance.reset().and_then(|()| prepare(index, instance));
-            outcome.map_err(|failure| self.error(start, (index, failure)))?;
-        }
-        Ok(())
+            outcome.map_err(|failure| (index, failure))
+        })
     }
 
     /// Reads variables of an instance once, for example parameters after initialization.
     ///
     /// # Errors
     /// Returns an error if a call of the instance fails.
-    pub fn read(&mut self, ports: &[Port]) -> Result<Vec<f64>, Error> {
+    pub fn read(&mut self, ports: &[Port]) -> Result<Vec<f64>, Failed> {
         let mut values = Values::new(self.members.len(), &[], ports);
-        for index in 0..self.members.len() {
-            let outcome = values.read(index, self.members[index].instance.as_mut(), true);
-            outcome.map_err(|failure| self.error(self.clock.start(), (index, failure)))?;
-        }
+        self.each(self.clock.start(), |master, index| {
+            let outcome = values.read(index, master.members[index].instance.as_mut(), true);
+            outcome.map_err(|failure| (index, failure))
+        })?;
         let latest: Vec<_> = ports.iter().map(|port| (*port, Reading::AfterStep)).collect();
         let mut row = Row::new(&values, &latest);
         row.fill(&values);
@@ -229,70 +196,46 @@ impl Master {
     /// Runs from the start time to the stop time.
     ///
     /// # Errors
-    /// Returns an error if an instance or an observer fails, if a missed deadline is to end the
-    /// run, or if the run was asked to end. The observers have seen all communication points up to
-    /// then.
-    pub fn run(&mut self, observers: &mut [&mut dyn Observer]) -> Result<(), Error> {
-        let outcome = self.pass_through(observers);
-        if let Some(pacer) = &mut self.pacer {
-            pacer.finish();
-        }
-        outcome
-    }
-
-    fn pass_through(&mut self, observers: &mut [&mut dyn Observer]) -> Result<(), Error> {
+    /// Returns an error if an instance fails, or if the watcher ends the run. It has seen all
+    /// communication points up to then.
+    pub fn run<W: Watcher>(&mut self, watcher: &mut W) -> Result<(), W::Error> {
         for tick in 0..=self.clock.ticks() {
-            if let Some(pacer) = &mut self.pacer {
-                pacer.wait(tick);
-            }
             let time = self.clock.time(tick);
-            if let Some(request) = self.interrupt.asked() {
-                return Err(Error::Interrupted { time, request });
-            }
+            watcher.before(tick, time)?;
             let (outcome, end) = match self.round(tick) {
                 Err((index, failure)) if failure.ends.is_some() && self.ender == Some(index) => {
                     (Ok(()), Some((index, failure)))
                 }
-                outcome => (outcome.map_err(|culprit| self.error(time, culprit)), None),
+                outcome => (outcome.map_err(|culprit| self.failed(time, culprit)), None),
             };
-            let deadlines = self.pacer.as_mut().map_or(Ok(()), |pacer| pacer.check(tick));
             let last = tick == self.clock.ticks();
             let sample = Sample { tick, time, last, values: &self.row.values };
-            for observer in observers.iter_mut() {
-                observer.observe(&sample)?;
-            }
-            outcome.and(deadlines)?;
+            watcher.after(&sample, outcome)?;
             if let Some(end) = end {
-                self.observe_end(tick, &end, observers)?;
+                self.show_end(tick, &end, watcher)?;
                 break;
             }
         }
-        for index in 0..self.members.len() {
-            let outcome = self.members[index].instance.terminate();
-            outcome.map_err(|failure| self.error(self.clock.stop(), (index, failure)))?;
-        }
-        Ok(())
+        let terminated = self.each(self.clock.stop(), |master, index| {
+            master.members[index].instance.terminate().map_err(|failure| (index, failure))
+        });
+        Ok(terminated?)
     }
 
     /// Does the steps of this tick, which must follow the last one; tick 0 follows initialization.
     /// Returns the probed values at this tick, in the order in which the probes were requested.
     ///
     /// # Errors
-    /// Returns an error if an instance fails, or if the run was ended from outside.
-    pub fn advance(&mut self, tick: u64) -> Result<&[f64], Error> {
-        if let Some(request) = self.interrupt.asked() {
-            return Err(Error::Interrupted { time: self.clock.time(tick), request });
-        }
+    /// Returns an error if an instance fails.
+    pub fn advance(&mut self, tick: u64) -> Result<&[f64], Failed> {
         let outcome = self.round(tick);
-        outcome.map_err(|culprit| self.error(self.clock.time(tick), culprit))?;
+        outcome.map_err(|culprit| self.failed(self.clock.time(tick), culprit))?;
         Ok(&self.row.values)
     }
 
     /// Sets and steps the instances whose communication point is this tick, and fills the row. If
     /// one fails, the row shows what could be read.
     fn round(&mut self, tick: u64) -> Result<(), Culprit> {
-        let time = self.clock.time(tick);
-        warnings::at(time);
         for index in 0..self.members.len() {
             if tick.is_multiple_of(u64::from(self.members[index].every)) {
                 self.values.arrive(index);
@@ -386,13 +329,8 @@ impl Master {
     }
 
     #[cold]
-    fn error(&self, time: f64, (index, failure): Culprit) -> Error {
-        let component = self.members[index].name.clone();
-        if failure.ends.is_some() {
-            Error::EndedByInstance { component, time, message: failure.message }
-        } else {
-            Error::Call { component, time, failure }
-        }
+    fn failed(&self, time: f64, (index, failure): Culprit) -> Failed {
+        Failed { component: self.members[index].name.clone(), time, failure }
     }
 }
 

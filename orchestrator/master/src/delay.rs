@@ -8,11 +8,10 @@
 //! its steps. An output that depends on states alone is never delayed. A loop in which every output
 //! is direct is algebraic: no order of calls solves it.
 
-use crate::experiment::Coupling;
+use crate::description::VariableKind;
+use crate::quantity::rounded;
 use crate::settings::{Setting, SettingValue};
-use crate::wiring::{Part, Port, Wire};
-use fmu_import::description::VariableKind;
-use fmu_import::quantity::rounded;
+use crate::wiring::{Coupling, Part, Port, Wire};
 use std::collections::BTreeSet;
 
 /// Time at which an output is read for a round of steps.
@@ -326,7 +325,7 @@ pub fn warnings(
 
 /// Returns the value of a real parameter in s, from the experiment or otherwise its start value;
 /// `None` if there is no such parameter.
-fn duration(name: &str, part: Part, settings: &[Setting]) -> Option<f64> {
+pub fn duration(name: &str, part: Part, settings: &[Setting]) -> Option<f64> {
     let (_, variable) = part.description.find(name)?;
     let is_duration =
         matches!(&variable.kind, VariableKind::Real { unit: Some(unit), .. } if unit == "s");

@@ -1,7 +1,7 @@
 use super::*;
-use fmu_import::description::Carrier;
-use fmu_import::instance::{Instance, Outcome};
-use fmu_import::quantity::Scaling;
+use crate::description::Carrier;
+use crate::instance::{Instance, Outcome};
+use crate::quantity::Scaling;
 use std::cell::RefCell;
 use std::rc::Rc;
 
@@ -102,10 +102,12 @@ fn wire(from: usize, to: usize) -> Wire {
 #[derive(Default)]
 struct Rows(Vec<Vec<f64>>);
 
-impl Observer for Rows {
-    fn observe(&mut self, sample: &Sample) -> Result<(), Error> {
+impl Watcher for Rows {
+    type Error = Failed;
+
+    fn after(&mut self, sample: &Sample, outcome: Result<(), Failed>) -> Result<(), Failed> {
         self.0.push([&[sample.time], sample.values].concat());
-        Ok(())
+        outcome
     }
 }
 
@@ -117,7 +119,7 @@ fn run(
     every: [u32; 2],
     [step, stop]: [f64; 2],
     fails_after: f64,
-) -> (Result<(), Error>, Vec<Vec<f64>>, Vec<String>) {
+) -> (Result<(), Failed>, Vec<Vec<f64>>, Vec<String>) {
     run_on(Clock::new(0.0, stop, step).unwrap(), coupling, order, every, fails_after, true)
 }
 
@@ -128,7 +130,7 @@ fn run_on(
     every: [u32; 2],
     fails_after: f64,
     varies: bool,
-) -> (Result<(), Error>, Vec<Vec<f64>>, Vec<String>) {
+) -> (Result<(), Failed>, Vec<Vec<f64>>, Vec<String>) {
     let journal = Journal::default();
     let members = order
         .iter()
@@ -164,7 +166,7 @@ fn run_on(
     ];
     let mut master = Master::new(clock, coupling, members, &wires, &probes);
     let mut rows = Rows::default();
-    let outcome = master.initialize().and_then(|()| master.run(&mut [&mut rows]));
+    let outcome = master.initialize().and_then(|()| master.run(&mut rows));
     let journal = journal.borrow().clone();
     (outcome, rows.0, journal)
 }
@@ -257,9 +259,8 @@ fn oracle_a_slow_unit_holds_its_outputs_and_shows_nothing_early() {
 fn a_failing_unit_is_named_with_time_and_words_and_the_rows_stay() {
     let (outcome, rows, _) =
         run(Coupling::Sequential, ["gain", "integrator"], [1, 1], [1.0, 5.0], 2.0);
-    let error = outcome.unwrap_err();
-    assert_eq!(error.to_string(), "gain failed at t = 2 s in doStep: out of propellant");
-    assert_eq!(error.exit_code(), 1);
+    let failure = CallFailure::new("doStep", "out of propellant");
+    assert_eq!(outcome, Err(Failed { component: "gain".into(), time: 2.0, failure }));
     assert_eq!(rows.len(), 3);
 }
 

@@ -1,8 +1,8 @@
 use super::*;
+use crate::description::Carrier;
+use crate::description::{ModelDescription, Variable};
+use crate::quantity::Scaling;
 use crate::wiring::Port;
-use fmu_import::description::Carrier;
-use fmu_import::description::{ModelDescription, Variable};
-use fmu_import::quantity::Scaling;
 
 /// Variable 0 is an input; outputs 1, 2, … depend on it directly, not at all, or without a
 /// declaration.

@@ -2,10 +2,10 @@
 //! type.
 
 use crate::delay::Reading;
+use crate::description::Carrier;
+use crate::instance::{Instance, Outcome};
+use crate::quantity::Scaling;
 use crate::wiring::{Port, Wire};
-use fmu_import::description::Carrier;
-use fmu_import::instance::{Instance, Outcome};
-use fmu_import::quantity::Scaling;
 use std::collections::BTreeSet;
 
 /// An instance together with what the master must know to step it. Members are kept in the order in

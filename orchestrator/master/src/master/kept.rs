@@ -1,10 +1,9 @@
 //! Calls of one instance between two ticks, and values added on the way, for those who look into a
 //! run.
 
-use super::Master;
-use crate::error::Error;
+use super::{Failed, Master};
+use crate::instance::{CallFailure, Instance};
 use crate::wiring::Port;
-use fmu_import::instance::{CallFailure, Instance};
 
 impl Master {
     /// Calls an instance, given its index, between two ticks.
@@ -16,9 +15,9 @@ impl Master {
         index: usize,
         time: f64,
         calls: impl FnOnce(&mut dyn Instance) -> Result<T, CallFailure>,
-    ) -> Result<T, Error> {
+    ) -> Result<T, Failed> {
         let instance = self.members[index].instance.as_mut();
-        calls(instance).map_err(|failure| self.error(time, (index, failure)))
+        calls(instance).map_err(|failure| self.failed(time, (index, failure)))
     }
 
     /// Calls two instances, given their indices, between two ticks. A failure comes with the place
@@ -34,11 +33,11 @@ impl Master {
         indices: [usize; 2],
         time: f64,
         calls: impl FnOnce([&mut dyn Instance; 2]) -> Result<T, (usize, CallFailure)>,
-    ) -> Result<T, Error> {
+    ) -> Result<T, Failed> {
         let members = self.members.get_disjoint_mut(indices);
         let [first, second] = members.expect("two different members");
         let outcome = calls([first.instance.as_mut(), second.instance.as_mut()]);
-        outcome.map_err(|(place, failure)| self.error(time, (indices[place], failure)))
+        outcome.map_err(|(place, failure)| self.failed(time, (indices[place], failure)))
     }
 
     /// Adds a value to what a connected real input receives, from now on.

@@ -1,0 +1,230 @@
+//! What a master must know of an FMU, as its `modelDescription.xml` says it: variables, units of
+//! measure, enumerations, and the dependencies of outputs on inputs.
+
+use crate::quantity::{self, Scaling, UnitDefinition};
+use serde::{Deserialize, Serialize};
+use std::borrow::Cow;
+use std::collections::BTreeMap;
+use std::sync::OnceLock;
+
+/// The model description of an FMU.
+#[derive(Clone, Debug, Default)]
+pub struct ModelDescription {
+    /// FMI version, from the attribute `fmiVersion`.
+    pub fmi_version: String,
+    /// Name of the model, from the attribute `modelName`.
+    pub model_name: String,
+    /// Identifier of the build, from the attribute `guid`.
+    pub guid: String,
+    /// Description of the model, from the attribute `description`.
+    pub description: String,
+    /// Version of the model, from the attribute `version`.
+    pub version: String,
+    /// Tool that exported the FMU, from the attribute `generationTool`.
+    pub generation_tool: String,
+    /// Co-simulation capabilities, if the FMU offers co-simulation.
+    pub co_simulation: Option<Interface>,
+    /// Model exchange capabilities, if the FMU offers model exchange.
+    pub model_exchange: Option<Interface>,
+    /// Simulation settings that the FMU proposes.
+    pub default_experiment: DefaultExperiment,
+    /// Unit definitions of the FMU.
+    pub units: Vec<UnitDefinition>,
+    /// All variables, in the order of the file.
+    pub variables: Vec<Variable>,
+    /// Positions, in `variables`, of the variables that each output depends on at the same instant;
+    /// only for outputs that declare them.
+    pub dependencies: BTreeMap<usize, Vec<usize>>,
+    /// Whether this describes a lookup table, which only names its units.
+    pub is_lookup_table: bool,
+    /// Whether the file has a `ModelStructure`, which FMI requires.
+    pub has_structure: bool,
+    /// Index of the variables by name.
+    pub by_name: ByName,
+}
+
+/// Positions of variables in the order of their names, put in order by the first search. The
+/// variables must not change afterwards.
+#[derive(Clone, Debug, Default)]
+pub struct ByName(OnceLock<Vec<u32>>);
+
+/// An interface's model identifier and its capability flags.
+#[derive(Clone, Debug, Default)]
+pub struct Interface {
+    /// Name of the library in the archive, without file extension.
+    pub model_identifier: String,
+    /// Attributes that are set to `true`, as `name`, and attributes with a number, as `name=value`.
+    pub capabilities: Vec<String>,
+}
+
+impl Interface {
+    /// Returns whether a capability flag is set.
+    pub fn has(&self, capability: &str) -> bool {
+        self.capabilities.iter().any(|name| name == capability)
+    }
+}
+
+/// Simulation settings that the FMU proposes.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct DefaultExperiment {
+    /// Start time of the simulation, s.
+    pub start: Option<f64>,
+    /// Stop time of the simulation, s.
+    pub stop: Option<f64>,
+    /// Length of the communication step, s.
+    pub step: Option<f64>,
+    /// Relative tolerance of the integration.
+    pub tolerance: Option<f64>,
+}
+
+/// A scalar variable of an FMU.
+#[derive(Clone, Debug, Default)]
+pub struct Variable {
+    /// Name of the variable.
+    pub name: String,
+    /// Value reference, which identifies the variable in the get and set calls of its type.
+    pub reference: u32,
+    /// Description of the variable's meaning.
+    pub description: String,
+    /// Causality: `parameter`, `input`, `output`, `local`, ….
+    pub causality: Cow<'static, str>,
+    /// Variability: `fixed`, `discrete`, `continuous`, ….
+    pub variability: Cow<'static, str>,
+    /// Type of the variable, with its attributes.
+    pub kind: VariableKind,
+    /// Start value as the file writes it.
+    pub start: Option<String>,
+    /// Position of the continuous state whose derivative by time this variable is.
+    pub derivative_of: Option<usize>,
+}
+
+impl Variable {
+    /// Returns the typical magnitude of the value, in the variable's unit: 1 if none is declared,
+    /// as FMI says.
+    pub fn nominal(&self) -> f64 {
+        match self.kind {
+            VariableKind::Real { nominal: Some(nominal), .. } if nominal > 0.0 => nominal,
+            _ => 1.0,
+        }
+    }
+}
+
+/// Type of a variable, with the attributes of that type.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub enum VariableKind {
+    /// A real number, held as a 64-bit float.
+    Real {
+        /// Name of the unit, if any.
+        unit: Option<String>,
+        /// Unit in which the value is displayed.
+        display_unit: Option<String>,
+        /// Smallest allowed value, in the variable's unit.
+        min: Option<f64>,
+        /// Largest allowed value, in the variable's unit.
+        max: Option<f64>,
+        /// Typical magnitude of the value, in the variable's unit.
+        nominal: Option<f64>,
+    },
+    /// An integer number of 32 bits.
+    Integer {
+        /// Smallest allowed value, if any.
+        min: Option<i32>,
+        /// Largest allowed value, if any.
+        max: Option<i32>,
+    },
+    /// A truth value, true or false.
+    #[default]
+    Boolean,
+    /// A choice among named items.
+    Enumeration {
+        /// Names of the items, with their values.
+        items: Vec<(String, i32)>,
+    },
+    /// A text of any length.
+    String,
+}
+
+impl VariableKind {
+    /// Returns the name of the type in FMI.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Real { .. } => "Real",
+            Self::Integer { .. } => "Integer",
+            Self::Boolean => "Boolean",
+            Self::Enumeration { .. } => "Enumeration",
+            Self::String => "String",
+        }
+    }
+}
+
+impl ModelDescription {
+    /// Returns the scaling that converts values in a unit of this FMU to values in a unit of
+    /// another.
+    ///
+    /// # Errors
+    /// Returns an error that says how the units differ, if they do not measure the same quantity.
+    pub fn conversion(
+        &self,
+        unit: Option<&str>,
+        to: &Self,
+        to_unit: Option<&str>,
+    ) -> Result<Scaling, String> {
+        if self.is_lookup_table {
+            quantity::named(unit, to_unit, &to.units)
+        } else {
+            quantity::conversion(unit, &self.units, to_unit, &to.units)
+        }
+    }
+
+    /// Finds the variable with this name and returns it with its position.
+    pub fn find(&self, name: &str) -> Option<(usize, &Variable)> {
+        let name_of = |position: &u32| self.variables[*position as usize].name.as_str();
+        // Of two variables with this name, the first one is meant.
+        let ordered = self.by_name.0.get_or_init(|| {
+            let mut positions: Vec<u32> = (0..).take(self.variables.len()).collect();
+            positions.sort_by(|a, b| name_of(a).cmp(name_of(b)));
+            positions
+        });
+        let place = ordered.partition_point(|position| name_of(position) < name);
+        let position = *ordered.get(place).filter(|position| name_of(position) == name)?;
+        Some((position as usize, &self.variables[position as usize]))
+    }
+
+    /// Returns the positions of the continuous states, each with that of its derivative.
+    pub fn states(&self) -> impl Iterator<Item = (usize, usize)> {
+        let variables = self.variables.iter().enumerate();
+        variables.filter_map(|(position, variable)| {
+            let state = variable.derivative_of.filter(|state| *state < self.variables.len())?;
+            Some((state, position))
+        })
+    }
+
+    /// Returns the names of the variables with this causality.
+    pub fn names<'a>(&'a self, causality: &'a str) -> impl Iterator<Item = &'a str> + Clone {
+        self.variables.iter().filter(move |v| v.causality == causality).map(|v| v.name.as_str())
+    }
+}
+
+/// Type in which a value is transferred.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+pub enum Carrier {
+    /// A real number as `f64`.
+    Real,
+    /// An integer or an enumeration's value as `i32`.
+    Integer,
+    /// A truth value as `i32`, 0 or 1.
+    Boolean,
+}
+
+impl Carrier {
+    /// Returns the type in which values of variables of this kind are transferred; `None` for
+    /// texts, which are not transferred.
+    pub fn for_kind(kind: &VariableKind) -> Option<Self> {
+        match kind {
+            VariableKind::Real { .. } => Some(Self::Real),
+            VariableKind::Integer { .. } | VariableKind::Enumeration { .. } => Some(Self::Integer),
+            VariableKind::Boolean => Some(Self::Boolean),
+            VariableKind::String => None,
+        }
+    }
+}
