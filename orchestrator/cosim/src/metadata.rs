@@ -5,7 +5,6 @@ use crate::error::Error;
 use crate::files::digest;
 use crate::pacing;
 use crate::system::{CheckedComponent, Parameters, System};
-use fmi_master::description::VariableKind;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 
@@ -36,27 +35,15 @@ pub fn metadata(
         .map(|column| {
             let variable =
                 &parts[column.port.component].description.variables[column.port.variable];
-            let unit = if let VariableKind::Real { unit, .. } = &variable.kind {
-                unit.clone()
-            } else {
-                None
-            };
-            let items = match &variable.kind {
-                VariableKind::Enumeration { items } => Some(
-                    items
-                        .iter()
-                        .map(|(name, item)| (item.to_string(), name))
-                        .collect::<BTreeMap<_, _>>(),
-                ),
-                _ => None,
-            };
+            let items = variable.kind.items().iter().map(|(name, item)| (item.to_string(), name));
+            let items: BTreeMap<_, _> = items.collect();
             let component = &system.components[column.port.component];
             json!({
                 "name": column.name,
                 "type": variable.kind.name(),
-                "unit": unit,
+                "unit": variable.kind.unit(),
                 "display_unit": display_unit(component, column.port.variable),
-                "items": items,
+                "items": (!items.is_empty()).then_some(items),
                 "description": variable.description,
             })
         })

@@ -2,6 +2,7 @@
 //! step only when its outputs are read.
 
 use crate::pacing::timer::Timer;
+use fmi_master::forward;
 use fmi_master::instance::{Instance, Outcome};
 use std::cell::Cell;
 use std::rc::Rc;
@@ -54,6 +55,10 @@ impl Stopwatch {
         (Self { instance, timer, spent: Rc::clone(&spent) }, spent)
     }
 
+    fn inside(&mut self, call: impl FnOnce(&mut dyn Instance) -> Outcome) -> Outcome {
+        call(self.instance.as_mut())
+    }
+
     fn time(&mut self, call: impl FnOnce(&mut dyn Instance) -> Outcome) -> Outcome {
         let begin = self.timer.now();
         let outcome = call(self.instance.as_mut());
@@ -63,70 +68,35 @@ impl Stopwatch {
 }
 
 impl Instance for Stopwatch {
-    fn get_real(&mut self, references: &[u32], values: &mut [f64]) -> Outcome {
-        self.time(|instance| instance.get_real(references, values))
+    forward! {
+        time:
+        get_real(references: &[u32], values: &mut [f64]);
+        get_integer(references: &[u32], values: &mut [i32]);
+        get_boolean(references: &[u32], values: &mut [i32]);
+        set_real(references: &[u32], values: &[f64]);
+        set_integer(references: &[u32], values: &[i32]);
+        set_boolean(references: &[u32], values: &[i32]);
+        set_string(reference: u32, value: &str);
     }
 
-    fn get_integer(&mut self, references: &[u32], values: &mut [i32]) -> Outcome {
-        self.time(|instance| instance.get_integer(references, values))
-    }
-
-    fn get_boolean(&mut self, references: &[u32], values: &mut [i32]) -> Outcome {
-        self.time(|instance| instance.get_boolean(references, values))
-    }
-
-    fn set_real(&mut self, references: &[u32], values: &[f64]) -> Outcome {
-        self.time(|instance| instance.set_real(references, values))
-    }
-
-    fn set_integer(&mut self, references: &[u32], values: &[i32]) -> Outcome {
-        self.time(|instance| instance.set_integer(references, values))
-    }
-
-    fn set_boolean(&mut self, references: &[u32], values: &[i32]) -> Outcome {
-        self.time(|instance| instance.set_boolean(references, values))
-    }
-
-    fn set_string(&mut self, reference: u32, value: &str) -> Outcome {
-        self.time(|instance| instance.set_string(reference, value))
-    }
-
-    fn enter_initialization(&mut self, start: f64, stop: f64) -> Outcome {
-        self.instance.enter_initialization(start, stop)
-    }
-
-    fn exit_initialization(&mut self) -> Outcome {
-        self.instance.exit_initialization()
+    forward! {
+        inside:
+        enter_initialization(start: f64, stop: f64);
+        exit_initialization();
+        terminate();
+        reset();
+        save(number: usize);
+        restore(number: usize);
+        directional_derivative(
+            unknown: &[u32],
+            known: &[u32],
+            seed: &[f64],
+            added: &mut [f64]
+        );
     }
 
     fn do_step(&mut self, time: f64, step: f64) -> Outcome {
         self.spent.steps.set(self.spent.steps.get() + 1);
         self.time(|instance| instance.do_step(time, step))
-    }
-
-    fn terminate(&mut self) -> Outcome {
-        self.instance.terminate()
-    }
-
-    fn reset(&mut self) -> Outcome {
-        self.instance.reset()
-    }
-
-    fn save(&mut self, number: usize) -> Outcome {
-        self.instance.save(number)
-    }
-
-    fn restore(&mut self, number: usize) -> Outcome {
-        self.instance.restore(number)
-    }
-
-    fn directional_derivative(
-        &mut self,
-        unknown: &[u32],
-        known: &[u32],
-        seed: &[f64],
-        added: &mut [f64],
-    ) -> Outcome {
-        self.instance.directional_derivative(unknown, known, seed, added)
     }
 }

@@ -12,9 +12,9 @@ use crate::wiring::Column;
 use fmi_master::clock::Clock;
 use fmi_master::delay::{self, FeedbackLoop, Reading};
 use fmi_master::description::{ModelDescription, VariableKind};
-use fmi_master::master::{Failed, Master, Member};
+use fmi_master::master::{Master, Member};
 use fmi_master::names;
-use fmi_master::settings::{self, Setting};
+use fmi_master::settings::Setting;
 use fmi_master::wiring::{self, Part, Port, Wire};
 use fmu_import::fmu::Fmu;
 use serde_json::Value;
@@ -165,11 +165,9 @@ impl System {
             format!("there is no variable \"{path}\"{hint}")
         })?;
         let place = self.place(port);
-        let unit = match self.kind(port) {
-            VariableKind::Real { unit, .. } => unit.clone().unwrap_or_default(),
-            _ => String::new(),
-        };
-        Ok(Probed { name: path.into(), place, unit, items: self.items(port) })
+        let kind = &self.variable_at(port).kind;
+        let unit = kind.unit().unwrap_or_default().into();
+        Ok(Probed { name: path.into(), place, unit, items: kind.items().to_vec() })
     }
 
     /// Requests that the variables of a signal are seen at every communication point.
@@ -216,7 +214,7 @@ impl System {
             (factor, unit) = (factor / divisor, String::new());
         }
         let is_integer = matches!(terms[..], [Term { value, with: None }]
-            if !matches!(self.kind(self.probes[value]), VariableKind::Real { .. }));
+            if !matches!(self.variable_at(self.probes[value]).kind, VariableKind::Real { .. }));
         let responds = terms.iter().flat_map(Term::variables).any(|place| self.is_response(*place));
         let norm = signal.norm;
         Ok(Resolved { terms, norm, over, whole_turn, factor, unit, is_integer, responds })
@@ -237,28 +235,12 @@ impl System {
     /// whether each responds to the inputs of the communication point.
     pub fn probed(&self) -> Vec<(String, bool)> {
         let named = self.probes.iter().enumerate();
-        named.map(|(place, port)| (self.path(*port), self.is_response(place))).collect()
+        named.map(|(place, port)| (self.name(*port), self.is_response(place))).collect()
     }
 
     /// Returns the full names of the connected outputs and inputs.
     pub fn connections(&self) -> Vec<(String, String)> {
-        self.wires.iter().map(|wire| (self.path(wire.from), self.path(wire.to))).collect()
-    }
-
-    fn path(&self, port: Port) -> String {
-        let component = &self.components[port.component];
-        format!("{}.{}", component.name, component.fmu.description.variables[port.variable].name)
-    }
-
-    fn kind(&self, port: Port) -> &VariableKind {
-        &self.components[port.component].fmu.description.variables[port.variable].kind
-    }
-
-    fn items(&self, port: Port) -> Vec<(String, i32)> {
-        match self.kind(port) {
-            VariableKind::Enumeration { items } => items.clone(),
-            _ => Vec::new(),
-        }
+        self.wires.iter().map(|wire| (self.name(wire.from), self.name(wire.to))).collect()
     }
 
     fn display(&self, port: Port) -> (f64, String) {
@@ -293,17 +275,11 @@ impl System {
         interrupt: &Interrupt,
     ) -> Result<Run, Error> {
         let mut members = Vec::new();
-        for (component, settings) in self.components.iter().zip(settings) {
-            let CheckedComponent { name, fmu, every, is_isolated, .. } = component;
+        for CheckedComponent { name, fmu, every, is_isolated, .. } in &self.components {
             let limits = is_isolated.then(|| self.experiment.isolation.limits());
             let instance = fmu.instantiate(name, limits.as_ref())?;
             let on_invalid = self.experiment.simulation.on_invalid;
-            let mut instance = Watched::around(instance, name, fmu, on_invalid);
-            settings::apply(settings, instance.as_mut()).map_err(|failure| Failed {
-                component: name.clone(),
-                time: self.clock.start(),
-                failure,
-            })?;
+            let instance = Watched::around(instance, name, fmu, on_invalid);
             let (name, every, ahead) = (name.clone(), *every, *is_isolated);
             members.push(Member { name, every, ahead, varies: fmu.fits_last_step(), instance });
         }
@@ -314,6 +290,7 @@ impl System {
         let mut master = Master::new(self.clock, coupling, members, &wires, &probes);
         let ender = self.experiment.simulation.ends_with.as_ref();
         master.set_ender(ender.and_then(|ender| self.names().iter().position(|n| n == ender)));
+        master.set_parameters(settings)?;
         master.initialize()?;
         Ok(Run::new(master, interrupt))
     }
@@ -349,13 +326,11 @@ impl System {
             self.probes.iter().enumerate().rev().map(|(place, port)| (*port, place)).collect();
         let column = |column: &Column| {
             let port = column.port;
-            let unit = match self.kind(port) {
-                VariableKind::Real { unit, .. } => unit.clone(),
-                _ => None,
-            };
+            let kind = &self.variable_at(port).kind;
+            let (unit, items) = (kind.unit().map(String::from), kind.items().to_vec());
             let (name, carrier) = (column.name.clone(), port.carrier);
             let place = *places.get(&port)?;
-            Some(recorder::Column { name, place, carrier, unit, items: self.items(port) })
+            Some(recorder::Column { name, place, carrier, unit, items })
         };
         let columns: Vec<_> = self.columns.iter().filter_map(column).collect();
         let path = folder.join(format.file());

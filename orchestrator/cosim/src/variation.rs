@@ -114,8 +114,8 @@ impl System {
     /// # Errors
     /// Returns an error if a call of an instance fails.
     pub fn restart(&self, run: &mut Run, changes: &[(Target, SettingValue)]) -> Result<(), Error> {
-        let settings = self.varied(changes);
-        run.master.reset(|index, instance| settings::apply(&settings[index], instance))?;
+        run.master.reset()?;
+        run.master.set_parameters(&self.varied(changes))?;
         Ok(run.master.initialize()?)
     }
 

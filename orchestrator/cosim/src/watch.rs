@@ -3,6 +3,7 @@
 //! result.
 
 use fmi_master::description::{Carrier, Variable, VariableKind};
+use fmi_master::forward;
 use fmi_master::instance::{CallFailure, Instance, Outcome};
 use fmu_import::fmu::Fmu;
 use fmu_import::warnings;
@@ -46,14 +47,12 @@ impl Watched {
         if on_invalid == OnInvalid::Allow {
             return instance;
         }
-        let of_items = |variable: &Variable| match &variable.kind {
-            VariableKind::Enumeration { items } => {
-                Some((variable.reference, items.iter().map(|(_, value)| *value).collect()))
-            }
-            _ => None,
+        let of_items = |variable: &Variable| {
+            let items: Vec<i32> = variable.kind.items().iter().map(|(_, value)| *value).collect();
+            matches!(variable.kind, VariableKind::Enumeration { .. })
+                .then_some((variable.reference, items))
         };
-        let mut items: Vec<(u32, Vec<i32>)> =
-            fmu.description.variables.iter().filter_map(of_items).collect();
+        let mut items: Vec<_> = fmu.description.variables.iter().filter_map(of_items).collect();
         items.sort();
         Box::new(Self {
             instance,
@@ -62,6 +61,10 @@ impl Watched {
             items,
             warns: on_invalid == OnInvalid::Warn,
         })
+    }
+
+    fn inside(&mut self, call: impl FnOnce(&mut dyn Instance) -> Outcome) -> Outcome {
+        call(self.instance.as_mut())
     }
 
     #[cold]
@@ -135,61 +138,25 @@ impl Instance for Watched {
         Ok(())
     }
 
-    fn set_real(&mut self, references: &[u32], values: &[f64]) -> Outcome {
-        self.instance.set_real(references, values)
-    }
-
-    fn set_integer(&mut self, references: &[u32], values: &[i32]) -> Outcome {
-        self.instance.set_integer(references, values)
-    }
-
-    fn set_boolean(&mut self, references: &[u32], values: &[i32]) -> Outcome {
-        self.instance.set_boolean(references, values)
-    }
-
-    fn set_string(&mut self, reference: u32, value: &str) -> Outcome {
-        self.instance.set_string(reference, value)
-    }
-
-    fn enter_initialization(&mut self, start: f64, stop: f64) -> Outcome {
-        self.instance.enter_initialization(start, stop)
-    }
-
-    fn exit_initialization(&mut self) -> Outcome {
-        self.instance.exit_initialization()
-    }
-
-    fn begin_step(&mut self, time: f64, step: f64) -> Outcome {
-        self.instance.begin_step(time, step)
-    }
-
-    fn do_step(&mut self, time: f64, step: f64) -> Outcome {
-        self.instance.do_step(time, step)
-    }
-
-    fn terminate(&mut self) -> Outcome {
-        self.instance.terminate()
-    }
-
-    fn reset(&mut self) -> Outcome {
-        self.instance.reset()
-    }
-
-    fn save(&mut self, number: usize) -> Outcome {
-        self.instance.save(number)
-    }
-
-    fn restore(&mut self, number: usize) -> Outcome {
-        self.instance.restore(number)
-    }
-
-    fn directional_derivative(
-        &mut self,
-        unknown: &[u32],
-        known: &[u32],
-        seed: &[f64],
-        added: &mut [f64],
-    ) -> Outcome {
-        self.instance.directional_derivative(unknown, known, seed, added)
+    forward! {
+        inside:
+        set_real(references: &[u32], values: &[f64]);
+        set_integer(references: &[u32], values: &[i32]);
+        set_boolean(references: &[u32], values: &[i32]);
+        set_string(reference: u32, value: &str);
+        enter_initialization(start: f64, stop: f64);
+        exit_initialization();
+        begin_step(time: f64, step: f64);
+        do_step(time: f64, step: f64);
+        terminate();
+        reset();
+        save(number: usize);
+        restore(number: usize);
+        directional_derivative(
+            unknown: &[u32],
+            known: &[u32],
+            seed: &[f64],
+            added: &mut [f64]
+        );
     }
 }

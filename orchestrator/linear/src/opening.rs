@@ -4,7 +4,7 @@ use crate::model::Signal;
 use cosim::error::Error;
 use cosim::system::System;
 use fmi_master::clock::Clock;
-use fmi_master::description::{Carrier, VariableKind};
+use fmi_master::description::Carrier;
 use fmi_master::wiring::Port;
 
 /// Finds the communication point at a time (s).
@@ -49,10 +49,7 @@ pub(crate) fn opened(
     let signal = |port: &Port| Signal {
         name: system.name(*port),
         size: system.variable_at(*port).nominal(),
-        unit: match &system.variable_at(*port).kind {
-            VariableKind::Real { unit: Some(unit), .. } => unit.clone(),
-            _ => String::new(),
-        },
+        unit: system.variable_at(*port).kind.unit().unwrap_or_default().into(),
     };
     Ok((ports.iter().map(signal).collect(), ports))
 }

@@ -232,12 +232,4 @@ impl Instance for Pair<'_, '_> {
     fn exit_initialization(&mut self) -> Outcome {
         Err(CallFailure::new("exitInitializationMode", "not of a pair"))
     }
-
-    fn terminate(&mut self) -> Outcome {
-        Err(CallFailure::new("terminate", "not of a pair"))
-    }
-
-    fn reset(&mut self) -> Outcome {
-        Err(CallFailure::new("reset", "not of a pair"))
-    }
 }

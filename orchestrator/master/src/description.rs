@@ -145,6 +145,22 @@ pub enum VariableKind {
 }
 
 impl VariableKind {
+    /// Returns the name of the unit, if there is one.
+    pub fn unit(&self) -> Option<&str> {
+        match self {
+            Self::Real { unit, .. } => unit.as_deref(),
+            _ => None,
+        }
+    }
+
+    /// Returns the items of an enumeration; none for other types.
+    pub fn items(&self) -> &[(String, i32)] {
+        match self {
+            Self::Enumeration { items } => items,
+            _ => &[],
+        }
+    }
+
     /// Returns the name of the type in FMI.
     pub fn name(&self) -> &'static str {
         match self {

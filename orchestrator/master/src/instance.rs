@@ -103,12 +103,16 @@ pub trait Instance {
     ///
     /// # Errors
     /// Returns an error if the instance reports a failure.
-    fn terminate(&mut self) -> Outcome;
+    fn terminate(&mut self) -> Outcome {
+        Ok(())
+    }
     /// Sets all variables back to their start values, so that the instance is as if it were new.
     ///
     /// # Errors
-    /// Returns an error if the instance reports a failure.
-    fn reset(&mut self) -> Outcome;
+    /// Returns an error if the instance reports a failure or cannot be reset.
+    fn reset(&mut self) -> Outcome {
+        Err(CallFailure::new("reset", "the instance cannot be reset"))
+    }
     /// Keeps the present state under a number, counted from 0 without gaps. A state that was kept
     /// under this number before is lost.
     ///
@@ -139,4 +143,15 @@ pub trait Instance {
         let call = "getDirectionalDerivative";
         Err(CallFailure::new(call, "the instance computes no derivatives"))
     }
+}
+
+/// Makes calls of [`Instance`] those of another instance, which the method `through` hands to a
+/// closure.
+#[macro_export]
+macro_rules! forward {
+    ($through:ident: $($call:ident($($argument:ident: $type:ty),*);)*) => {$(
+        fn $call(&mut self, $($argument: $type),*) -> $crate::instance::Outcome {
+            self.$through(|instance| instance.$call($($argument),*))
+        }
+    )*};
 }

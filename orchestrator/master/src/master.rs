@@ -19,6 +19,7 @@ pub use transfer::Member;
 use crate::clock::Clock;
 use crate::delay::Reading;
 use crate::instance::{CallFailure, Instance, Outcome};
+use crate::settings::{self, Setting};
 use crate::wiring::{Coupling, Port, Wire};
 use transfer::{Inputs, Row, Values};
 
@@ -125,30 +126,33 @@ impl Master {
     /// # Errors
     /// Returns an error if a call of an instance fails.
     pub fn initialize(&mut self) -> Result<(), Failed> {
-        let start = self.clock.start();
-        self.each(start, |master, index| {
-            let Member { every, varies, instance, .. } = &mut master.members[index];
-            let stop = if *varies { master.clock.stop() } else { master.clock.end(*every) };
-            instance.enter_initialization(start, stop).map_err(|failure| (index, failure))
+        let clock = self.clock;
+        let (start, all) = (clock.start(), 0..self.members.len());
+        self.each(start, |_, Member { every, varies, instance, .. }| {
+            let stop = if *varies { clock.stop() } else { clock.end(*every) };
+            instance.enter_initialization(start, stop)
         })?;
         // Whatever the coupling, inputs are transferred one after the other here, so that the
         // simulation starts from consistent values. Reading after setting is allowed in this mode.
-        self.each(start, Self::pass_on)?;
-        self.each(start, |master, index| {
-            let outcome = master.members[index].instance.exit_initialization();
-            outcome.map_err(|failure| (index, failure))
-        })?;
-        self.each(start, |master, index| master.read_instance(index, true))
+        let passed = all.clone().try_for_each(|index| self.pass_on(index));
+        passed.map_err(|culprit| self.failed(start, culprit))?;
+        self.each(start, |_, member| member.instance.exit_initialization())?;
+        let read = all.clone().try_for_each(|index| self.read_instance(index, true));
+        read.map_err(|culprit| self.failed(start, culprit))
     }
 
     /// Makes calls of each instance, in their order.
     fn each(
         &mut self,
         time: f64,
-        mut calls: impl FnMut(&mut Self, usize) -> Result<(), Culprit>,
+        mut calls: impl FnMut(usize, &mut Member) -> Outcome,
     ) -> Result<(), Failed> {
-        let outcome = (0..self.members.len()).try_for_each(|index| calls(self, index));
-        outcome.map_err(|culprit| self.failed(time, culprit))
+        for (index, member) in self.members.iter_mut().enumerate() {
+            let outcome = calls(index, member);
+            let component = &member.name;
+            outcome.map_err(|failure| Failed { component: component.clone(), time, failure })?;
+        }
+        Ok(())
     }
 
     fn pass_on(&mut self, index: usize) -> Result<(), Culprit> {
@@ -160,21 +164,24 @@ impl Master {
         self.set(index)
     }
 
-    /// Sets all instances back to their start values, after which [`Self::initialize`] begins
-    /// another run. `prepare` is called with the index of each instance to set its parameters.
+    /// Sets the parameters of each instance, before its initialization.
     ///
     /// # Errors
     /// Returns an error if a call of an instance fails.
-    pub fn reset(
-        &mut self,
-        mut prepare: impl FnMut(usize, &mut dyn Instance) -> Outcome,
-    ) -> Result<(), Failed> {
-        self.end = None;
-        self.each(self.clock.start(), |master, index| {
-            let instance = master.members[index].instance.as_mut();
-            let outcome = instance.reset().and_then(|()| prepare(index, instance));
-            outcome.map_err(|failure| (index, failure))
+    pub fn set_parameters(&mut self, settings: &[Vec<Setting>]) -> Result<(), Failed> {
+        self.each(self.clock.start(), |index, member| {
+            settings::apply(&settings[index], member.instance.as_mut())
         })
+    }
+
+    /// Sets all instances back to their start values, after which [`Self::set_parameters`] and
+    /// [`Self::initialize`] begin another run.
+    ///
+    /// # Errors
+    /// Returns an error if a call of an instance fails.
+    pub fn reset(&mut self) -> Result<(), Failed> {
+        self.end = None;
+        self.each(self.clock.start(), |_, member| member.instance.reset())
     }
 
     /// Reads variables of an instance once, for example parameters after initialization.
@@ -183,9 +190,8 @@ impl Master {
     /// Returns an error if a call of the instance fails.
     pub fn read(&mut self, ports: &[Port]) -> Result<Vec<f64>, Failed> {
         let mut values = Values::new(self.members.len(), &[], ports);
-        self.each(self.clock.start(), |master, index| {
-            let outcome = values.read(index, master.members[index].instance.as_mut(), true);
-            outcome.map_err(|failure| (index, failure))
+        self.each(self.clock.start(), |index, member| {
+            values.read(index, member.instance.as_mut(), true)
         })?;
         let latest: Vec<_> = ports.iter().map(|port| (*port, Reading::AfterStep)).collect();
         let mut row = Row::new(&values, &latest);
@@ -216,10 +222,7 @@ impl Master {
                 break;
             }
         }
-        let terminated = self.each(self.clock.stop(), |master, index| {
-            master.members[index].instance.terminate().map_err(|failure| (index, failure))
-        });
-        Ok(terminated?)
+        Ok(self.each(self.clock.stop(), |_, member| member.instance.terminate())?)
     }
 
     /// Does the steps of this tick, which must follow the last one; tick 0 follows initialization.

@@ -152,10 +152,8 @@ pub fn connect(from: &Written, to: &Written) -> Result<Vec<Wire>, Fault> {
         }
     };
     let wire = |(output, input): (String, String)| {
-        let (start, end) = (
-            from.port(&output, "output").map_err(Fault::From)?,
-            to.port(&input, "input").map_err(Fault::To)?,
-        );
+        let start = from.port(&output, "output").map_err(Fault::From)?;
+        let end = to.port(&input, "input").map_err(Fault::To)?;
         let names = format!("\"{}.{output}\" and \"{}.{input}\"", from.part.name, to.part.name);
         let scaling = conversion(from.part.description, start, to.part.description, end, &names);
         Ok(Wire { from: start, to: end, scaling: scaling.map_err(Fault::To)? })

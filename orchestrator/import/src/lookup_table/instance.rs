@@ -214,10 +214,6 @@ impl Instance for LookupTableInstance {
         Ok(())
     }
 
-    fn terminate(&mut self) -> Outcome {
-        Ok(())
-    }
-
     fn reset(&mut self) -> Outcome {
         *self = Self::new(&self.name, self.file.clone());
         Ok(())
