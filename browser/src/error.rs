@@ -1,6 +1,6 @@
 //! What can be wrong with a request of the page.
 
-use fmi2_export::Failure;
+use fmi_master::master::Failed;
 
 /// Reason why a request is refused or a flight ends early.
 #[derive(Debug, thiserror::Error)]
@@ -11,23 +11,22 @@ pub enum Error {
     /// There is no controller with this name.
     #[error("there is no controller '{0}'")]
     Controller(String),
-    /// An experiment that is built in contradicts itself.
-    #[error("{file}: {problem}")]
-    Experiment {
-        /// File of the experiment.
-        file: String,
+    /// A parameter cannot have the value that it is given, or an experiment that is built in
+    /// contradicts itself.
+    #[error("{what}: {problem}")]
+    Wrong {
+        /// Name of the parameter with that of its component, or place in the experiment.
+        what: String,
         /// What is wrong with it.
         problem: String,
     },
-    /// A parameter cannot have the value that it is given.
-    #[error("{name}: {problem}")]
-    Setting {
-        /// Name of the parameter, with that of its component.
-        name: String,
-        /// What is wrong with its value.
-        problem: String,
-    },
-    /// An FMU refused a call.
+    /// An FMU refused a call, in its own words.
     #[error("{0}")]
-    Fmu(#[from] Failure),
+    Fmu(String),
+}
+
+impl From<Failed> for Error {
+    fn from(failed: Failed) -> Self {
+        Self::Fmu(failed.failure.message)
+    }
 }

@@ -19,12 +19,13 @@
 //! function that is not named after what it returns.
 #![cfg_attr(not(test), deny(clippy::disallowed_methods))]
 
+pub mod closed_loop;
 pub mod description;
 pub mod error;
 pub mod flight;
+pub mod fmu;
 pub mod request;
 pub mod scenario;
-pub mod setting;
 pub mod signals;
 pub mod summary;
 #[cfg(test)]
@@ -62,12 +63,12 @@ fn described(_: &mut Shared) -> Result<String, Error> {
 
 fn flown(shared: &mut Shared) -> Result<String, Error> {
     shared.signals.clear();
-    let prepared = Request::read(&shared.request)?.prepare()?;
-    Ok(serde_json::to_string(&flight::fly(prepared, &mut shared.signals)?)?)
+    let (_, closed_loop) = Request::read(&shared.request)?.prepare()?;
+    Ok(serde_json::to_string(&flight::fly(closed_loop, &mut shared.signals)?)?)
 }
 
 fn written(shared: &mut Shared) -> Result<String, Error> {
-    let experiment = Request::read(&shared.request)?.prepare()?.experiment;
+    let (experiment, _) = Request::read(&shared.request)?.prepare()?;
     let text = toml::to_string(&experiment);
     text.map_err(|error| scenario::problem("the experiment", &error.to_string()))
 }

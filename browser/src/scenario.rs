@@ -2,10 +2,13 @@
 //! files that the orchestrator runs; nothing of them is said again here.
 
 use crate::error::Error;
+use crate::fmu::Fmu;
 use fmi2_export::Export;
 use fmu_controller::{Btvsmc, BtvsmcDo, Crmpc, Dlmpc, Fbl, Lqr, SotvsmcDo, TwoLoopSmc};
 use fmu_plant::ReentryPlant;
-use serde::Deserialize;
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 use toml::{Table, Value};
 
 /// Experiment that all flights extend: any controller in the scenario of Chai 2022.
@@ -28,27 +31,32 @@ const FILES: &[(&str, &str)] = embedded!(
     "base/crmpc-2022.toml"
 );
 
-/// The FMU of the vehicle.
-pub static PLANT: Export = Export::new::<ReentryPlant>();
+/// Name of the vehicle's FMU.
+pub const PLANT: &str = "ReentryPlant";
 
-static LAWS: [(&str, Export); 8] = [
-    ("CRMPC", Export::new::<Crmpc>()),
-    ("DLMPC", Export::new::<Dlmpc>()),
-    ("LQR", Export::new::<Lqr>()),
-    ("FBL", Export::new::<Fbl>()),
-    ("BTVSMC", Export::new::<Btvsmc>()),
-    ("BTVSMC_DO", Export::new::<BtvsmcDo>()),
-    ("SOTVSMC_DO", Export::new::<SotvsmcDo>()),
-    ("TwoLoopSMC", Export::new::<TwoLoopSmc>()),
+static FMUS: [Fmu; 9] = [
+    Fmu::new(PLANT, Export::new::<ReentryPlant>()),
+    Fmu::new("CRMPC", Export::new::<Crmpc>()),
+    Fmu::new("DLMPC", Export::new::<Dlmpc>()),
+    Fmu::new("LQR", Export::new::<Lqr>()),
+    Fmu::new("FBL", Export::new::<Fbl>()),
+    Fmu::new("BTVSMC", Export::new::<Btvsmc>()),
+    Fmu::new("BTVSMC_DO", Export::new::<BtvsmcDo>()),
+    Fmu::new("SOTVSMC_DO", Export::new::<SotvsmcDo>()),
+    Fmu::new("TwoLoopSMC", Export::new::<TwoLoopSmc>()),
 ];
 
-/// Returns the FMU of a control law.
-pub fn law(name: &str) -> Option<&'static Export> {
-    LAWS.iter().find(|(other, _)| *other == name).map(|(_, export)| export)
+/// Finds an FMU by its name.
+///
+/// # Errors
+/// Says that it is not linked into the module.
+pub fn fmu(name: &str) -> Result<&'static Fmu, Error> {
+    let fmu = FMUS.iter().find(|fmu| fmu.name == name);
+    fmu.ok_or_else(|| problem(name, "the FMU is not built in"))
 }
 
 /// A controller that can be chosen: an FMU with settings of its own.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize)]
 pub struct Choice {
     /// Short name for addresses and files.
     pub id: String,
@@ -145,7 +153,19 @@ fn merge(table: &mut Table, over: Table) {
     }
 }
 
-/// Returns the error that an experiment or list contradicts itself.
-pub fn problem(file: &str, problem: &str) -> Error {
-    Error::Experiment { file: file.into(), problem: problem.into() }
+/// Returns the error that something is wrong with a parameter or a place in an experiment.
+pub fn problem(what: &str, problem: &str) -> Error {
+    Error::Wrong { what: what.into(), problem: problem.into() }
+}
+
+/// Reads a part of an experiment, given the keys that lead to it.
+///
+/// # Errors
+/// Says which part is missing or has another type.
+pub fn read<T: DeserializeOwned>(experiment: &Table, keys: &str) -> Result<T, Error> {
+    let mut keys_left = keys.split('.');
+    let first = keys_left.next().and_then(|key| experiment.get(key));
+    let part = keys_left.try_fold(first, |part, key| Some(part?.get(key)));
+    let part = part.flatten().ok_or_else(|| problem(keys, "the experiment has no such part"))?;
+    part.clone().try_into().map_err(|error| problem(keys, &error.to_string()))
 }

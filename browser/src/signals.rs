@@ -19,5 +19,9 @@ pub const COLUMNS: [&str; 15] = [
     "controller.guarantee.contradiction",
 ];
 
+/// What the controllers that guarantee limits say of it: the status, and what contradicts an
+/// assumption.
+pub const GUARANTEE: [&str; 2] = [COLUMNS[13], COLUMNS[14]];
+
 /// Values of all columns at one communication point.
 pub type Row = [f64; COLUMNS.len()];

@@ -1,9 +1,8 @@
 //! Figures of merit of a flight, as docs/symbols.md defines them.
 
-use crate::request::GUARANTEE;
+use crate::closed_loop::Items;
 use crate::signals::Row;
-use fmi2_export::linked::Linked;
-use model_description::variable::VariableKind;
+use fmi_master::master::Failed;
 use serde::Serialize;
 
 /// Limits of the norms.
@@ -19,9 +18,15 @@ pub struct Limits {
 #[derive(Clone, Debug, Serialize)]
 pub struct Message {
     /// Communication point at which it appeared, s.
-    time: f64,
+    pub time: f64,
     /// What it says.
-    text: String,
+    pub text: String,
+}
+
+impl From<Failed> for Message {
+    fn from(Failed { time, failure, .. }: Failed) -> Self {
+        Self { time, text: failure.message }
+    }
 }
 
 /// Result of a flight, apart from its signals.
@@ -41,15 +46,15 @@ pub struct Summary {
     rate_ratio: f64,
     /// Largest ‖m‖ as a share of its limit.
     moment_ratio: f64,
-    /// Items of the guarantee's status and of what contradicts it, counted from 1; none if the
-    /// controller gives no guarantee.
-    guarantee: [Vec<(String, String)>; 2],
+    /// Items of the guarantee's status and of what contradicts it; none if the controller gives no
+    /// guarantee.
+    guarantee: [Items; 2],
     /// Warnings of the FMUs.
-    warnings: Vec<Message>,
+    pub warnings: Vec<Message>,
     /// Why the flight ended early, if it did.
-    end: Option<Message>,
+    pub end: Option<Message>,
     /// Whether it ended because the attitude was lost.
-    lost: bool,
+    pub lost: bool,
 }
 
 fn squared(values: impl Iterator<Item = f64>) -> f64 {
@@ -58,14 +63,7 @@ fn squared(values: impl Iterator<Item = f64>) -> f64 {
 
 impl Summary {
     /// Returns the summary of a flight that has not begun.
-    pub fn new(limits: Limits, step: f64, controller: &Linked) -> Self {
-        let items = |name| match controller.find(name).map(|(_, variable)| &variable.kind) {
-            Some(VariableKind::Enumeration { enumeration_type, .. }) => {
-                enumeration_type.items.clone()
-            }
-            _ => vec![],
-        };
-        let guarantee = GUARANTEE.map(items);
+    pub fn new(limits: Limits, step: f64, guarantee: [Items; 2]) -> Self {
         Self {
             rows: 0,
             step,
@@ -98,21 +96,5 @@ impl Summary {
         self.ems = mean(self.ems, error);
         self.cms = mean(self.cms, effort * effort);
         error.sqrt()
-    }
-
-    /// Says that the attitude is lost at `time` (s), as its error exceeds this bound (deg).
-    pub fn lose(&mut self, time: f64, beyond: f64) {
-        self.lost = true;
-        self.end(time, format!("attitude lost: its error exceeds {beyond} deg"));
-    }
-
-    /// Adds a warning of an FMU.
-    pub fn warn(&mut self, time: f64, text: String) {
-        self.warnings.push(Message { time, text });
-    }
-
-    /// Says why the flight ends at `time` (s).
-    pub fn end(&mut self, time: f64, text: String) {
-        self.end = Some(Message { time, text });
     }
 }

@@ -12,7 +12,7 @@ fn flown(request: &Value) -> Result<(Value, Vec<f64>), String> {
     let mut signals = vec![];
     let request = Request::read(request.to_string().as_bytes());
     let prepared = request.and_then(Request::prepare);
-    let summary = prepared.and_then(|prepared| fly(prepared, &mut signals));
+    let summary = prepared.and_then(|(_, closed_loop)| fly(closed_loop, &mut signals));
     let summary = summary.map_err(|error| error.to_string())?;
     Ok((serde_json::to_value(summary).unwrap(), signals))
 }
@@ -79,13 +79,16 @@ fn wrong_requests_are_refused_by_name() {
     let unknown = flown(&json!({"controller": "pid"})).unwrap_err();
     assert!(unknown.contains("'pid'"), "{unknown}");
     for (set, words) in [
-        (json!({"plant.nothing": 1}), "plant.nothing: ReentryPlant has no such parameter"),
+        (json!({"plant.nothing": 1}), "plant.nothing: there is no such parameter"),
         (json!({"planet.x": 1}), "planet: the experiment has no such component"),
-        (json!({"plant.disturbance.kind": "pink"}), "one of none, white"),
-        (json!({"plant.disturbance.bound": "2 kg"}), "'2 kg' is not in rad/s2"),
+        (json!({"plant.disturbance.kind": "pink"}), "has no item \"pink\""),
+        (
+            json!({"plant.disturbance.bound": "2 kg"}),
+            "plant.disturbance.bound: the FMU defines no unit",
+        ),
         (json!({"plant.disturbance.bound": -1}), "disturbance.bound"),
         (json!({"plant.disturbance.seed": 1.5}), "must be an integer"),
-        (json!({"controller.period.feedback": 0.03}), "a whole number of periods"),
+        (json!({"controller.period.feedback": 0.03}), "controller.period.feedback: stop = 50 s"),
     ] {
         assert!(refused(&set).contains(words), "{set}: {}", refused(&set));
     }

@@ -45,13 +45,9 @@ impl ModelDescription {
     pub fn directional_derivatives(&self) -> bool {
         self.variables.iter().any(|variable| variable.derivative_of().is_some())
     }
-}
-
-#[cfg(feature = "pack")]
-impl ModelDescription {
     /// Value references, ascending, of the inputs and states on which the variable at `reference`
     /// depends at the same instant. A state depends on itself alone.
-    pub(crate) fn dependencies(&self, reference: usize, states: &[(usize, usize)]) -> Vec<usize> {
+    pub fn dependencies(&self, reference: usize, states: &[(usize, usize)]) -> Vec<usize> {
         if states.iter().any(|&(state, _)| state == reference) {
             return vec![reference];
         }
@@ -61,7 +57,10 @@ impl ModelDescription {
         references.dedup();
         references
     }
+}
 
+#[cfg(feature = "pack")]
+impl ModelDescription {
     /// Value references, ascending, of the inputs and parameters on which the variable at
     /// `reference` depends at initialization, where the states follow from the parameters.
     pub(crate) fn initial_dependencies(

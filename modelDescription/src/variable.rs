@@ -19,6 +19,19 @@ pub enum Causality {
     Independent,
 }
 
+impl Causality {
+    /// Returns the value of the attribute `causality`.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Parameter => "parameter",
+            Self::Input => "input",
+            Self::Output => "output",
+            Self::Local => "local",
+            Self::Independent => "independent",
+        }
+    }
+}
+
 /// Times at which a variable may change, FMI 2.0 section 2.2.7.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Variability {
@@ -28,6 +41,17 @@ pub enum Variability {
     Discrete,
     /// It may change at any time.
     Continuous,
+}
+
+impl Variability {
+    /// Returns the value of the attribute `variability`.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Fixed => "fixed",
+            Self::Discrete => "discrete",
+            Self::Continuous => "continuous",
+        }
+    }
 }
 
 /// Enumeration type with its items, which are counted from 1 as in FMI.

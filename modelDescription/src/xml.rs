@@ -1,7 +1,7 @@
 //! Text of an FMU's `modelDescription.xml`, FMI 2.0 section 2.2.
 
 use crate::unit::Unit;
-use crate::variable::{Causality, EnumerationType, Variability, Variable, VariableKind};
+use crate::variable::{Causality, EnumerationType, VariableKind};
 use crate::{AUTHOR, Error, LICENSE, LOG_CATEGORIES, ModelDescription};
 use quick_xml::Writer;
 use quick_xml::events::{BytesDecl, Event};
@@ -188,8 +188,8 @@ impl ModelDescription {
             ("name", variable.name.clone()),
             ("valueReference", reference.to_string()),
             ("description", variable.description.clone()),
-            ("causality", causality(variable).into()),
-            ("variability", variability(variable).into()),
+            ("causality", variable.causality.name().into()),
+            ("variability", variable.variability.name().into()),
         ];
         parent(xml, "ScalarVariable", attributes, |xml| match &variable.kind {
             VariableKind::Real { unit, min, max, nominal, start, derivative_of } => {
@@ -268,24 +268,6 @@ fn unknowns(
             )
         })
     })
-}
-
-pub(crate) fn causality(variable: &Variable) -> &'static str {
-    match variable.causality {
-        Causality::Parameter => "parameter",
-        Causality::Input => "input",
-        Causality::Output => "output",
-        Causality::Local => "local",
-        Causality::Independent => "independent",
-    }
-}
-
-fn variability(variable: &Variable) -> &'static str {
-    match variable.variability {
-        Variability::Fixed => "fixed",
-        Variability::Discrete => "discrete",
-        Variability::Continuous => "continuous",
-    }
 }
 
 /// Returns the shortest text that reads back as the same number.

@@ -1,35 +1,49 @@
 //! An instance of an FMU that is linked into the same program: the same calls with the same checks
-//! as through the C interface, but by name and without pointers. It is what a program uses that
-//! cannot open libraries, such as one in a browser.
+//! as through the C interface, but without pointers. It is what a program uses that cannot open
+//! libraries, such as one in a browser.
 //!
 //! ```ignore
 //! let mut plant = Linked::new(&Export::new::<ReentryPlant>());
-//! plant.set("disturbance.seed", &Value::Integer(2))?;
-//! plant.initialize(0.0, 50.0)?;
-//! plant.step(0.0, 0.04)?;
+//! plant.set_integer(&[SEED], &[2])?;
+//! plant.enter_initialization(0.0, 50.0)?;
+//! plant.exit_initialization()?;
+//! plant.do_step(0.0, 0.04)?;
 //! ```
 
-use crate::call::{Call, Outcome, error, table};
+use crate::call::{Call, Outcome, table};
 use crate::instance::{Instance, Setting};
 use crate::logger::Logger;
 use crate::model::Failure;
 use crate::model_instance::{Described, Export};
 use crate::types::Interface;
 use model_description::ModelDescription;
-use model_description::variable::Variable;
 use std::sync::Arc;
 
-/// Value of a variable.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Value {
-    /// Value of a Real variable, in its unit.
-    Real(f64),
-    /// Value of an Integer variable, or number of an item of an Enumeration, counted from 1.
-    Integer(i32),
-    /// Value of a Boolean variable.
-    Boolean(bool),
-    /// Value of a String variable.
-    Text(String),
+/// Defines how variables of a type are read and set: type of the values in a call, and of those in
+/// the model, with the conversion to it.
+macro_rules! access {
+    ($($type:ty: $get:ident $get_call:ident, $set:ident $set_call:ident, $model:ty = $into:expr;)*) => {$(
+        /// Reads variables of this type by their value references.
+        ///
+        /// # Errors
+        /// Names a variable that has another type or no valid value, or says what could not be
+        /// computed.
+        pub fn $get(&mut self, references: &[u32], values: &mut [$type]) -> Result<(), Failure> {
+            self.call(&table::$get_call, |instance| {
+                instance.get::<$model>(references, |i, value| values[i] = (*value).into())
+            })
+        }
+
+        /// Sets variables of this type by their value references: all of them, or none if one is
+        /// refused.
+        ///
+        /// # Errors
+        /// Names a variable that has another type, may not be set now, or does not allow the value.
+        pub fn $set(&mut self, references: &[u32], values: &[$type]) -> Result<(), Failure> {
+            let into: fn($type) -> $model = $into;
+            self.call(&table::$set_call, |instance| instance.set(references, |i| Ok(into(values[i]))))
+        }
+    )*};
 }
 
 /// An instance for co-simulation.
@@ -57,81 +71,42 @@ impl Linked {
         &self.description
     }
 
-    /// Returns the value reference of the variable with this name, and the variable.
-    pub fn find(&self, name: &str) -> Option<(u32, &Variable)> {
-        let mut numbered = (0..).zip(&self.description.variables);
-        numbered.find(|(_, variable)| variable.name == name)
+    access! {
+        f64: get_real GET_REAL, set_real SET_REAL, f64 = |value| value;
+        i32: get_integer GET_INTEGER, set_integer SET_INTEGER, i32 = |value| value;
+        // 0 and 1, as FMI transfers them.
+        i32: get_boolean GET_BOOLEAN, set_boolean SET_BOOLEAN, bool = |value| value != 0;
     }
 
-    /// Sets a parameter or an input.
+    /// Sets a String variable by its value reference.
     ///
     /// # Errors
-    /// Names the variable if it does not exist, has another type, may not be set now, or does not
-    /// allow the value.
-    pub fn set(&mut self, name: &str, value: &Value) -> Result<(), Failure> {
-        let Some((reference, _)) = self.find(name) else {
-            return error(format!("{} has no variable '{name}'", self.description.name));
-        };
-        let one = &[reference];
-        match value {
-            Value::Real(value) => {
-                self.call(&table::SET_REAL, |instance| instance.set(one, |_| Ok(*value)))
-            }
-            Value::Integer(value) => {
-                self.call(&table::SET_INTEGER, |instance| instance.set(one, |_| Ok(*value)))
-            }
-            Value::Boolean(value) => {
-                self.call(&table::SET_BOOLEAN, |instance| instance.set(one, |_| Ok(*value)))
-            }
-            Value::Text(value) => {
-                self.call(&table::SET_STRING, |instance| instance.set(one, |_| Ok(value.clone())))
-            }
-        }
-    }
-
-    /// Sets Real variables by their value references.
-    ///
-    /// # Errors
-    /// As [`Self::set`].
-    pub fn set_reals(&mut self, references: &[u32], values: &[f64]) -> Result<(), Failure> {
-        self.call(&table::SET_REAL, |instance| instance.set(references, |i| Ok(values[i])))
-    }
-
-    /// Reads Real variables by their value references.
-    ///
-    /// # Errors
-    /// Names a variable that has another type or no finite value, or says what could not be
-    /// computed.
-    pub fn reals(&mut self, references: &[u32], values: &mut [f64]) -> Result<(), Failure> {
-        self.call(&table::GET_REAL, |instance| {
-            instance.get::<f64>(references, |i, value| values[i] = *value)
+    /// Names a variable that has another type or may not be set now.
+    pub fn set_string(&mut self, reference: u32, value: &str) -> Result<(), Failure> {
+        self.call(&table::SET_STRING, |instance| {
+            instance.set(&[reference], |_| Ok(value.to_string()))
         })
     }
 
-    /// Reads an Integer or Enumeration variable by its value reference.
+    /// Enters initialization mode for an experiment from `start` to `stop` (both s).
     ///
     /// # Errors
-    /// As [`Self::reals`].
-    pub fn integer(&mut self, reference: u32) -> Result<i32, Failure> {
-        let mut read = 0;
-        self.call(&table::GET_INTEGER, |instance| {
-            instance.get::<i32>(&[reference], |_, value| read = *value)
-        })?;
-        Ok(read)
-    }
-
-    /// Initializes the instance for an experiment from `start` to `stop` (both s).
-    ///
-    /// # Errors
-    /// Names the parameter at fault.
-    pub fn initialize(&mut self, start: f64, stop: f64) -> Result<(), Failure> {
+    /// Says which of the times cannot be.
+    pub fn enter_initialization(&mut self, start: f64, stop: f64) -> Result<(), Failure> {
         self.call(&table::SETUP_EXPERIMENT, |instance| {
             instance.setup_experiment(start, Some(stop), None)
         })?;
         self.call(&table::ENTER_INITIALIZATION_MODE, |instance| {
             instance.enter_initialization_mode();
             Ok(())
-        })?;
+        })
+    }
+
+    /// Leaves initialization mode, after which steps can be performed.
+    ///
+    /// # Errors
+    /// Names the parameter at fault.
+    pub fn exit_initialization(&mut self) -> Result<(), Failure> {
         self.call(&table::EXIT_INITIALIZATION_MODE, Instance::exit_initialization_mode)
     }
 
@@ -139,7 +114,7 @@ impl Linked {
     ///
     /// # Errors
     /// Says why the step failed, or why the simulation ends within it.
-    pub fn step(&mut self, point: f64, size: f64) -> Result<(), Failure> {
+    pub fn do_step(&mut self, point: f64, size: f64) -> Result<(), Failure> {
         self.call(&table::DO_STEP, |instance| instance.do_step(point, size))
     }
 

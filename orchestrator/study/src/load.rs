@@ -7,7 +7,6 @@ use crate::{grid, rows};
 use cosim::document::Source;
 use cosim::error::Error;
 use cosim::experiment::{Experiment, Observe};
-use fmi_master::names;
 use serde::de::DeserializeOwned;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

@@ -15,7 +15,7 @@
 //! a row apply in everything inside the table, and in the rows that are named there.
 
 use cosim::document::overlay;
-use fmu_import::names;
+use fmi_master::names;
 use std::borrow::Cow;
 use std::ops::Range;
 use toml::Spanned;
