@@ -8,7 +8,6 @@ use fmu_controller::{Btvsmc, BtvsmcDo, Crmpc, Dlmpc, Fbl, Lqr, SotvsmcDo, TwoLoo
 use fmu_plant::ReentryPlant;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
 use toml::{Table, Value};
 
 /// Experiment that all flights extend: any controller in the scenario of Chai 2022.
