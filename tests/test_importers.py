@@ -109,7 +109,7 @@ unconnected = ["disturbanceMoment.*", "surface*", "jet*", "trajectory.*", "presc
 "disturbance.seed" = 3
 [components.controller]
 fmu = "{0}.fmu"
-unconnected = ["achievedMoment.*", "knownMoment.*", "reference.*", "scheduled.*", "trajectory.*"]
+unconnected = ["achievedMoment.*", "knownMoment.*", "reference.*", "trajectory.*"]
 [[connections]]
 from = "plant.attitude.*"
 to = "controller.attitude.*"
@@ -388,7 +388,7 @@ def expected(fmu):
 def test_oracle_the_orchestrator_steps_a_controller_by_pythonfmu(foreign, expected, agree, libpython, tmp_path, monkeypatch):
     monkeypatch.setenv("LD_PRELOAD", libpython)
     shutil.copy(foreign, tmp_path)
-    text = EXPERIMENT.format("PdController", SECONDS, STEP).replace('unconnected = ["achievedMoment.*", "knownMoment.*", "reference.*", "scheduled.*", "trajectory.*"]', "")
+    text = EXPERIMENT.format("PdController", SECONDS, STEP).replace('unconnected = ["achievedMoment.*", "knownMoment.*", "reference.*", "trajectory.*"]', "")
     found = orchestrate(tmp_path, text.replace("rate.*", "attitudeRate.*"))
     names = [f"plant.{name}" for name in ANGLES + TURNS] + [f"controller.{name}" for name in MOMENT]
     agree(np.array([found[name] for name in names]).T, expected)

@@ -173,6 +173,7 @@ mod tests {
             },
             dependencies: vec![],
             used_with: String::new(),
+            is_optional: false,
         }
     }
 

@@ -8,6 +8,9 @@ use quick_xml::events::{BytesDecl, Event};
 use std::borrow::Cow;
 use std::io;
 
+/// Name of the tool whose annotation marks the inputs that may stay unconnected.
+pub const OPTIONAL: &str = "re-entry-fmus";
+
 type Xml = Writer<Vec<u8>>;
 /// Attributes of an element in the order of the schema.
 type Attributes = Vec<(&'static str, String)>;
@@ -191,7 +194,21 @@ impl ModelDescription {
             ("causality", variable.causality.name().into()),
             ("variability", variable.variability.name().into()),
         ];
-        parent(xml, "ScalarVariable", attributes, |xml| match &variable.kind {
+        parent(xml, "ScalarVariable", attributes, |xml| {
+            self.write_kind(xml, &variable.kind)?;
+            if !variable.is_optional {
+                return Ok(());
+            }
+            // FMI has no word for it, and importers pass over annotations that they do not know.
+            parent(xml, "Annotations", vec![], |xml| {
+                let tool = vec![("name", OPTIONAL.into())];
+                parent(xml, "Tool", tool, |xml| leaf(xml, "Optional", vec![]))
+            })
+        })
+    }
+
+    fn write_kind(&self, xml: &mut Xml, kind: &VariableKind) -> io::Result<()> {
+        match kind {
             VariableKind::Real { unit, min, max, nominal, start, derivative_of } => {
                 let index =
                     derivative_of.as_deref().and_then(|name| self.position(name)).map(|i| i + 1);
@@ -228,7 +245,7 @@ impl ModelDescription {
             VariableKind::String { start } => {
                 leaf(xml, "String", given([("start", start.clone())]))
             }
-        })
+        }
     }
 
     fn write_structure(&self, xml: &mut Xml) -> io::Result<()> {

@@ -32,6 +32,7 @@ fn variable(
         kind,
         dependencies: vec![],
         used_with: String::new(),
+        is_optional: false,
     }
 }
 

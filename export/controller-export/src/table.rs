@@ -123,7 +123,7 @@ fn known_moment(axis: &str, meaning: &str) -> Real {
 
 fn scheduled_limit() -> Real {
     let text = "Limit on the norm of the control moment that holds at present; the command is scaled down to it";
-    input(SCHEDULED[0], text).real().unit("N.m").min(0.0).nominal(1e5)
+    input(SCHEDULED[0], text).optional().real().unit("N.m").min(0.0).nominal(1e5)
 }
 
 /// Declares the bound on the disturbance. All controllers have it, so that they can be exchanged.
@@ -133,7 +133,8 @@ fn scheduled_bound<L: Law>() -> Real {
     let settings = settings::settings::<L::Settings>();
     let is_used = settings.iter().any(|setting| setting.place.name == parts);
     let condition = "constraints = robust and scheduled.disturbanceParts > 1";
-    let common = input(SCHEDULED[1], text).used_with(if is_used { condition } else { NEVER });
+    let common =
+        input(SCHEDULED[1], text).optional().used_with(if is_used { condition } else { NEVER });
     common.real().unit("rad/s2").min(0.0).nominal(0.03)
 }
 

@@ -161,7 +161,7 @@ impl<M: 'static> VariableTable<M> {
     where
         I: Copy + TryFrom<i32> + TryInto<i32>,
     {
-        let is_set = matches!(common.causality, Causality::Parameter | Causality::Input);
+        let is_set = matches!(common.0.causality, Causality::Parameter | Causality::Input);
         let min = min.or((is_set && I::try_from(-1).is_err()).then_some(0));
         let access = Integer {
             get: Box::new(move |model| (*field(model)).try_into().unwrap_or(i32::MAX)),
@@ -267,42 +267,42 @@ impl<M: 'static> VariableTable<M> {
 
     #[inline(never)]
     fn push(&mut self, common: Common, kind: VariableKind, access: Access<M>) {
-        let Common { name, description, causality, variability, dependencies, used_with } = common;
-        let variable =
-            Variable { name, description, causality, variability, kind, dependencies, used_with };
-        self.entries.push(Entry { variable, access });
+        self.entries.push(Entry { variable: Variable { kind, ..common.0 }, access });
     }
 }
 
 /// Common part of every declaration: name, description and role.
 #[derive(Clone, Debug)]
-pub struct Common {
-    name: String,
-    description: String,
-    causality: Causality,
-    variability: Variability,
-    dependencies: Vec<String>,
-    used_with: String,
-}
+pub struct Common(Variable);
 
 impl Common {
     #[inline(never)]
     fn new(name: &str, description: &str, causality: Causality, variability: Variability) -> Self {
-        Self {
+        Self(Variable {
             name: name.into(),
             description: description.into(),
             causality,
             variability,
+            // The declaration of the type follows.
+            kind: VariableKind::Boolean { start: None },
             dependencies: Vec::new(),
             used_with: String::new(),
-        }
+            is_optional: false,
+        })
+    }
+
+    /// Declares that an input may stay unconnected without a word about it.
+    #[must_use]
+    pub fn optional(mut self) -> Self {
+        self.0.is_optional = true;
+        self
     }
 
     /// Declares the inputs and states on which the value of a calculated variable depends at the
     /// same instant.
     #[must_use]
     pub fn depends_on<'a>(mut self, names: impl IntoIterator<Item = &'a str>) -> Self {
-        self.dependencies.extend(names.into_iter().map(String::from));
+        self.0.dependencies.extend(names.into_iter().map(String::from));
         self
     }
 
@@ -311,8 +311,8 @@ impl Common {
     #[must_use]
     pub fn used_with(mut self, condition: &str) -> Self {
         if !condition.is_empty() {
-            self.description = format!("{}; used with {condition}", self.description);
-            self.used_with = condition.into();
+            self.0.description = format!("{}; used with {condition}", self.0.description);
+            self.0.used_with = condition.into();
         }
         self
     }

@@ -147,6 +147,7 @@ fn check_unconnected(experiment: &Experiment, parts: &[Part], wires: &[Wire]) ->
 
         let open = |(position, name): &&(usize, &str)| {
             !connected.contains(position)
+                && !part.description.variables[*position].is_optional
                 && !component.parameters.contains_key(*name)
                 && !component
                     .unconnected

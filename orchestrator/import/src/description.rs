@@ -254,6 +254,9 @@ fn variable(element: &Element, types: &Types) -> Result<Variable, String> {
         derivative_of: typed
             .parsed::<usize>("derivative", "an index from 1 on")?
             .and_then(|index| index.checked_sub(1)),
+        is_optional: element.child("Annotations").is_some_and(|annotations| {
+            annotations.children.iter().any(|tool| tool.child("Optional").is_some())
+        }),
     })
 }
 

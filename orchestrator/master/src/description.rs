@@ -96,6 +96,8 @@ pub struct Variable {
     pub start: Option<String>,
     /// Position of the continuous state whose derivative by time this variable is.
     pub derivative_of: Option<usize>,
+    /// Whether an annotation says that an input may stay unconnected.
+    pub is_optional: bool,
 }
 
 impl Variable {

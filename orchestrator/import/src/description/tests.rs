@@ -16,7 +16,7 @@ const TEXT: &str = r#"<?xml version="1.0" encoding="UTF-8"?>
   <VendorAnnotations><Tool name="x"><y/></Tool></VendorAnnotations>
   <ModelVariables>
 <!-- index 1 -->
-<ScalarVariable name="u" valueReference="7" causality="input"><Real declaredType="Angle" start="0.5"/></ScalarVariable>
+<ScalarVariable name="u" valueReference="7" causality="input"><Real declaredType="Angle" start="0.5"/><Annotations><Tool name="any"><Optional/></Tool></Annotations></ScalarVariable>
 <ScalarVariable name="y" valueReference="8" causality="output"><Real unit="m"/><Annotations><Tool name="z"/></Annotations></ScalarVariable>
 <ScalarVariable name="kind" valueReference="9" causality="parameter" variability="fixed"><Enumeration declaredType="Kind" start="2"/></ScalarVariable>
 <ScalarVariable name="z" valueReference="10" causality="output"><Real/></ScalarVariable>
@@ -47,6 +47,8 @@ fn everything_needed_is_read() {
         nominal: None,
     };
     assert_eq!((u.reference, &u.kind, u.start.as_deref()), (7, &real, Some("0.5")));
+    let optional = description.variables.iter().filter(|variable| variable.is_optional);
+    assert_eq!(optional.map(|variable| &variable.name).collect::<Vec<_>>(), ["u"]);
     let items = vec![("none".to_string(), 1), ("white".to_string(), 2)];
     assert_eq!(description.find("kind").unwrap().1.kind, VariableKind::Enumeration { items });
     // A declaration of no dependencies is distinguished from a missing declaration.

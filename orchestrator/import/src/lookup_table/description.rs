@@ -128,6 +128,7 @@ impl LookupTable {
             kind,
             start,
             derivative_of: None,
+            is_optional: false,
         }
     }
 }

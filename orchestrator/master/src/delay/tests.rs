@@ -16,6 +16,7 @@ fn description(outputs: &[Option<bool>]) -> ModelDescription {
         kind: VariableKind::Boolean,
         start: None,
         derivative_of: None,
+        is_optional: false,
     };
     let causalities = std::iter::once("input").chain(outputs.iter().map(|_| "output"));
     let mut description = ModelDescription {
