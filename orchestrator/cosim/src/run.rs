@@ -1,5 +1,5 @@
-//! A run of an experiment's instances: it can be paced by the wall clock and ended from outside, and
-//! observers see it.
+//! A run of an experiment's instances: it can be paced by the wall clock and ended from outside,
+//! and observers see it.
 
 use crate::error::Error;
 use crate::interrupt::Interrupt;
