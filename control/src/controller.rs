@@ -193,7 +193,7 @@ pub trait Controller {
     ) -> Vector3<f64> {
         let commanded = self.command(memory, tick, time, measured, reference);
         let known = measured.known_moment;
-        let limit = self.limit(memory).min(measured.scheduled.limit_moment);
+        let limit = self.limit(memory).min(measured.scheduled.limit_moment).max(0.0);
         if known == Vector3::zeros() {
             let applied = saturated(commanded, limit);
             if applied != commanded {

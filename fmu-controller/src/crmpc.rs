@@ -96,7 +96,7 @@ impl Law for CrmpcLaw {
                     "the guarantee is no longer in force: knownMoment.* is larger than knownMoment.bound, or has changed by more than knownMoment.change while a plan was followed"
                 }
                 Contradiction::Schedule => {
-                    "the guarantee is no longer in force: scheduled.limitMoment has fallen by more than scheduled.limitMomentFall, or scheduled.disturbanceBound risen by more than one part, while a plan was followed"
+                    "the guarantee is no longer in force: scheduled.limitMoment has fallen, or scheduled.disturbanceBound risen, by more than the plan reserves"
                 }
                 Contradiction::Turn => {
                     "the guarantee is no longer in force: the turn that trajectory.* tell has changed by more than trajectory.turnChange while a plan was followed"

@@ -27,6 +27,8 @@ pub struct Memory {
     pub scheduled: Scheduled,
     /// Largest bound on the disturbance of late, see [`Scheduled::disturbance_bound`], rad/s².
     pub recent_bound: f64,
+    /// Bound on the disturbance of an earlier plan whose commands still act.
+    pub acting: Acting,
     /// Nominal state (Θ̃, x̃_ω) at the last tick.
     pub nominal: Vector6<f64>,
     /// Whether the plan in force gives the guarantee, or the reason why not.
@@ -76,6 +78,7 @@ impl Clone for Memory {
             turn,
             scheduled,
             recent_bound,
+            acting,
             nominal,
             guarantee,
             margins,
@@ -91,7 +94,7 @@ impl Clone for Memory {
         self.started = *started;
         self.report = *report;
         (self.known, self.turn, self.scheduled) = (*known, *turn, *scheduled);
-        self.recent_bound = *recent_bound;
+        (self.recent_bound, self.acting) = (*recent_bound, *acting);
         self.nominal = *nominal;
         self.guarantee = *guarantee;
         self.margins = *margins;
@@ -102,6 +105,24 @@ impl Clone for Memory {
         self.supervision = *supervision;
         self.observed = *observed;
         self.commands.clone_from(commands);
+    }
+}
+
+/// Bound on the disturbance that holds until other commands act.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Acting {
+    /// Its [level](super::plan::Terms::level).
+    pub level: usize,
+    /// Ticks left, the present one included.
+    pub ticks: u32,
+}
+
+impl Acting {
+    pub(super) fn next(&mut self) {
+        self.ticks = self.ticks.saturating_sub(1);
+        if self.ticks == 0 {
+            self.level = 0;
+        }
     }
 }
 

@@ -28,7 +28,7 @@ pub use design::{
 #[doc(hidden)]
 pub use guarantee::Lemmas;
 pub use guarantee::{Assessment, Carried, Deviation, Geometry, Onset, Switching, Tightening};
-pub use memory::{Margins, Memory};
+pub use memory::{Acting, Margins, Memory};
 pub use observer::Observed;
 pub use plan::{Plan, Terms};
 pub use set::{Bounds, Posed};

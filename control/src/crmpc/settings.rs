@@ -282,9 +282,12 @@ impl Settings {
     }
 
     /// Returns the number of equal parts of disturbance.bound by which a scheduled bound may rise
-    /// while a plan is followed, and by which it may have fallen over the delay before.
+    /// while a plan is followed, and by which it may have fallen over the time before that has an
+    /// effect: the mismatch of a command that was measured up to `delay` + `period.feedback` before
+    /// the measurement of a plan, which is up to `delay` old.
     pub fn parts_to_spare(&self) -> f64 {
-        (self.delay / self.period_optimisation).ceil().max(1.0)
+        let past = 2.0 * self.delay + self.period_feedback;
+        (past / self.period_optimisation).ceil().max(1.0)
     }
 
     /// Returns the part of limit.moment that the known moment may need at any time, N m.

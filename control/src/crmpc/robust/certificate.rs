@@ -4,6 +4,7 @@
 use super::{Interval, RESERVE, Robust, norm_of_columns};
 use crate::crmpc::guarantee::{self, Dynamics, Onset};
 use crate::crmpc::memory::Margins;
+use crate::crmpc::set::ROUNDING;
 use crate::crmpc::settings::Settings;
 use crate::crmpc::stages::Point;
 use crate::mpc::ErrorTrajectory;
@@ -70,7 +71,7 @@ impl Robust {
         let Some((switching, carried)) = self.switching(0) else { return true };
         let Onset { before, allowed, .. } = self.onset;
         let change = (first.acceleration - before).norm();
-        if switching.pulse_of_command(change) <= allowed {
+        if switching.pulse_of_command(change) <= allowed * (1.0 + ROUNDING) {
             return true;
         }
         let tightening = &self.design.tightening;

@@ -3,10 +3,10 @@
 use super::Robust;
 use crate::controller::{Doubt, Measurement, Scheduled};
 use crate::crmpc::guarantee::{Carried, Deviation};
-use crate::crmpc::memory::Memory;
+use crate::crmpc::memory::{Acting, Memory};
 use crate::crmpc::plan::Terms;
 use crate::crmpc::set::{ROUNDING, Tick};
-use crate::crmpc::settings::Settings;
+use crate::crmpc::settings::{InitialState, Settings};
 use crate::crmpc::supervision::{Contradiction, GuaranteeStatus};
 use crate::linearise;
 use nalgebra::Vector3;
@@ -97,11 +97,22 @@ impl Robust {
 
     /// Returns whether the scheduled limits are still those that a plan in force takes for granted.
     fn keeps_schedule(&self, memory: &Memory) -> bool {
-        let (terms, Scheduled { limit_moment, disturbance_bound }) =
-            (memory.plan.terms, memory.scheduled);
+        let Memory { plan, scheduled: Scheduled { limit_moment, disturbance_bound }, .. } = memory;
+        let level = plan.terms.level.max(memory.acting.level);
         !memory.assured()
-            || keeps(terms.limit_moment, limit_moment)
-                && (terms.level == 0 || keeps(disturbance_bound, self.bound_at(terms.level)))
+            || keeps(plan.terms.limit_moment, *limit_moment)
+                && (level == 0 || keeps(*disturbance_bound, self.bound_at(level)))
+    }
+
+    /// Notes that a plan with other terms takes over at a tick. Until its first command acts, the
+    /// bound on the disturbance of the plan before holds as well.
+    pub(super) fn note_terms(&self, memory: &mut Memory) {
+        let before = memory.plan.terms.level;
+        if memory.assured() && before > self.terms.level {
+            let level = before.max(memory.acting.level);
+            memory.acting = Acting { level, ticks: self.design.delay_ticks + 1 };
+        }
+        memory.plan.terms = self.terms;
     }
 
     /// Returns the bound on the disturbance at this level, rad/s².
@@ -128,7 +139,11 @@ impl Robust {
             self.settings;
         let parts = disturbance_parts as f64;
         let needed = memory.recent_bound / disturbance_bound * parts;
-        let level = parts - needed - self.settings.parts_to_spare();
+        // A nominal state in the invariant set belongs to the whole bound.
+        let level = match self.settings.initial_state {
+            InitialState::Tube => 0.0,
+            _ => parts - needed - self.settings.parts_to_spare(),
+        };
         Terms {
             known: memory.known,
             turn: memory.turn,

@@ -129,6 +129,7 @@ impl Robust {
         }
         if assured {
             self.go_towards_the_optimum(planner, memory);
+            self.terms = memory.plan.terms;
             let report = planner.keep(
                 (self, &self.stages),
                 memory,
@@ -159,7 +160,7 @@ impl Robust {
 
     /// Follows the trajectory that has just become the plan, under guarantee if it is certified.
     fn take_over(&self, planner: &Planner, memory: &mut Memory, certified: Option<Certified>) {
-        memory.plan.terms = self.terms;
+        self.note_terms(memory);
         let Some(Certified { margins, braking }) = certified else {
             memory.margins = self.margins(planner.optimiser.trajectory());
             memory.guarantee = self.without_guarantee(memory);
@@ -271,6 +272,7 @@ impl ConstraintSet for Robust {
     fn observe(&self, memory: &mut Memory, angle_rates: &Vector3<f64>) {
         memory.pending = memory.pending.saturating_sub(1);
         memory.recent_bound = self.recent_bound(memory);
+        memory.acting.next();
         let Memory { commands, observed, .. } = memory;
         let (settings, tightening) = (&self.settings, &self.design.tightening);
         let pulse = tightening
