@@ -51,7 +51,7 @@ fn fly<C: Controller>(
 }
 
 /// Flies CRMPC with this bound on the change of the turn (deg/s). Returns the share of ticks in
-/// force, the largest ‖ω‖ over its limit while it was, and the last contradiction.
+/// force, the largest ‖ω‖ over its limit while it was, and the first contradiction.
 fn guaranteed(scenario: &Scenario, turn: f64, is_known: bool, bound: f64) -> (f64, f64, String) {
     let turn_change = bound.to_radians();
     let settings = Settings { turn_change, ..Settings::new(Constraints::Robust) };
@@ -60,7 +60,7 @@ fn guaranteed(scenario: &Scenario, turn: f64, is_known: bool, bound: f64) -> (f6
     let mut contradiction = Contradiction::None;
     fly(&mut law, scenario, turn, is_known, |memory, _, plant| {
         ticks += 1;
-        if memory.supervision.contradiction != Contradiction::None {
+        if contradiction == Contradiction::None {
             contradiction = memory.supervision.contradiction;
         }
         if memory.supervision.status == GuaranteeStatus::InForce {
@@ -130,4 +130,25 @@ fn oracle_a_turn_that_is_known_leaves_little_of_the_error() {
     };
     let (calm, known, untold) = (largest(0.0, true), largest(0.35, true), largest(0.35, false));
     assert!(known - calm < 0.1 * (untold - calm), "{calm} {known} {untold}");
+}
+
+#[test]
+fn a_turn_that_jumps_at_an_optimisation_ends_the_guarantee() {
+    let settings = Settings { delay: 0.04, ..Settings::new(Constraints::Robust) };
+    let mut law = Crmpc::new(settings).unwrap();
+    let mut memory = law.memory();
+    let scenario = Scenario::crmpc2022();
+    let reference = |_: f64| vehicle::reference::Reference {
+        angles: scenario.initial_angles,
+        ..Default::default()
+    };
+    // The vehicle rests, and is told of turns from tick 20 on, which is an optimisation.
+    for (tick, jump) in (0..=20).map(|tick| (tick, if tick < 20 { 0.2 } else { 0.35 })) {
+        let turn = Vector3::z() * f64::to_radians(jump);
+        let measured =
+            Measurement { angles: scenario.initial_angles, turn, ..Measurement::default() };
+        law.update(&mut memory, tick, tick as f64 * PERIOD, &measured, &reference);
+        let expected = if tick < 20 { Contradiction::None } else { Contradiction::Turn };
+        assert_eq!(memory.supervision.contradiction, expected, "{tick}");
+    }
 }

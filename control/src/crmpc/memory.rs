@@ -2,7 +2,7 @@
 
 use super::commands::Commands;
 use super::observer::Observed;
-use super::plan::Plan;
+use super::plan::{Plan, Terms};
 use super::supervision::{GuaranteeStatus, Supervision};
 use crate::controller::Scheduled;
 use crate::error_dynamics::Gain;
@@ -27,7 +27,7 @@ pub struct Memory {
     pub scheduled: Scheduled,
     /// Largest bound on the disturbance of late, see [`Scheduled::disturbance_bound`], rad/s².
     pub recent_bound: f64,
-    /// Bound on the disturbance of an earlier plan whose commands still act.
+    /// Terms of an earlier plan whose commands still act.
     pub acting: Acting,
     /// Nominal state (Θ̃, x̃_ω) at the last tick.
     pub nominal: Vector6<f64>,
@@ -108,21 +108,18 @@ impl Clone for Memory {
     }
 }
 
-/// Bound on the disturbance that holds until other commands act.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+/// Terms of a plan that hold until the commands of the next one act.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Acting {
-    /// Its [level](super::plan::Terms::level).
-    pub level: usize,
+    /// The terms.
+    pub terms: Terms,
     /// Ticks left, the present one included.
     pub ticks: u32,
 }
 
 impl Acting {
-    pub(super) fn next(&mut self) {
-        self.ticks = self.ticks.saturating_sub(1);
-        if self.ticks == 0 {
-            self.level = 0;
-        }
+    pub(super) fn terms(&self) -> Option<Terms> {
+        (self.ticks > 0).then_some(self.terms)
     }
 }
 

@@ -80,10 +80,14 @@ impl Robust {
 
     /// Returns whether the trajectory's turn has changed by no more than a plan in force allows.
     fn keeps_turn(&self, memory: &Memory, measured: &Measurement) -> bool {
-        let begun_with = memory.plan.terms.turn;
-        let is_told = begun_with != Vector3::zeros();
-        let bound = if is_told { self.settings.turn_change } else { 0.0 };
-        !memory.assured() || keeps((measured.turn - begun_with).norm(), bound)
+        let keeps_to = |begun_with: Vector3<f64>| {
+            let is_told = begun_with != Vector3::zeros();
+            let bound = if is_told { self.settings.turn_change } else { 0.0 };
+            keeps((measured.turn - begun_with).norm(), bound)
+        };
+        !memory.assured()
+            || keeps_to(memory.plan.terms.turn)
+                && memory.acting.terms().is_none_or(|terms| keeps_to(terms.turn))
     }
 
     /// Returns whether the known moment keeps its bound, and has changed by no more than a plan in
@@ -98,19 +102,20 @@ impl Robust {
     /// Returns whether the scheduled limits are still those that a plan in force takes for granted.
     fn keeps_schedule(&self, memory: &Memory) -> bool {
         let Memory { plan, scheduled: Scheduled { limit_moment, disturbance_bound }, .. } = memory;
-        let level = plan.terms.level.max(memory.acting.level);
+        let level = memory.acting.terms().map_or(0, |terms| terms.level).max(plan.terms.level);
         !memory.assured()
             || keeps(plan.terms.limit_moment, *limit_moment)
                 && (level == 0 || keeps(*disturbance_bound, self.bound_at(level)))
     }
 
     /// Notes that a plan with other terms takes over at a tick. Until its first command acts, the
-    /// bound on the disturbance of the plan before holds as well.
+    /// turn and the bound on the disturbance of the plan before count as well.
     pub(super) fn note_terms(&self, memory: &mut Memory) {
-        let before = memory.plan.terms.level;
-        if memory.assured() && before > self.terms.level {
-            let level = before.max(memory.acting.level);
-            memory.acting = Acting { level, ticks: self.design.delay_ticks + 1 };
+        let before = memory.plan.terms;
+        if memory.assured() && (before.level > self.terms.level || before.turn != self.terms.turn) {
+            let acting = memory.acting.terms().map_or(0, |terms| terms.level);
+            let terms = Terms { level: before.level.max(acting), ..before };
+            memory.acting = Acting { terms, ticks: self.design.delay_ticks + 1 };
         }
         memory.plan.terms = self.terms;
     }

@@ -272,7 +272,7 @@ impl ConstraintSet for Robust {
     fn observe(&self, memory: &mut Memory, angle_rates: &Vector3<f64>) {
         memory.pending = memory.pending.saturating_sub(1);
         memory.recent_bound = self.recent_bound(memory);
-        memory.acting.next();
+        memory.acting.ticks = memory.acting.ticks.saturating_sub(1);
         let Memory { commands, observed, .. } = memory;
         let (settings, tightening) = (&self.settings, &self.design.tightening);
         let pulse = tightening
