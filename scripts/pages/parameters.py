@@ -35,7 +35,7 @@ def rows(root, causality="parameter"):
     for variable in root.iter("ScalarVariable"):
         if variable.get("causality") != causality:
             continue
-        [kind] = list(variable)
+        kind = variable[0]
         unit, text = kind.get("unit", ""), variable.get("description")
         ends = [kind.get("min"), kind.get("max")]
         shown = unit.replace("rad", "deg", 1) if unit.startswith("rad") else unit
