@@ -90,6 +90,7 @@ fn variable((reference, variable): (u32, &exported::Variable)) -> Variable {
         variability: variable.variability.name().into(),
         kind,
         start: written,
+        is_optional: variable.is_optional,
         ..Variable::default()
     }
 }

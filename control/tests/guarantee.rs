@@ -20,17 +20,8 @@ use vehicle::plant::{self, Load};
 /// Returns flights with disturbances of every kind and both inertia errors, from the start of Chai
 /// 2022.
 fn flights(settings: &Settings, sights: &[Sight]) -> Vec<Flight> {
-    let corner = Vector3::new(1.0, -1.0, 1.0);
-    let waveforms = [
-        Waveform::White,
-        Waveform::Constant(corner),
-        Waveform::Square(2.5, corner),
-        Waveform::Switching(1.0),
-        Waveform::AlongRate(1.0),
-        Waveform::AlongMoment(-1.0),
-    ];
     let mut flights = Vec::new();
-    for (i, disturbance) in waveforms.into_iter().enumerate() {
+    for (i, disturbance) in Waveform::all().into_iter().enumerate() {
         flights.push(Flight {
             disturbance,
             inertia_scale: harness::INERTIA_SCALES[i % 2],

@@ -45,16 +45,7 @@ fn settings(delay: f64) -> Settings {
 
 /// Returns flights with disturbances of every kind, from the start of Chai 2022 and from others.
 fn flights(settings: &Settings) -> Vec<Flight> {
-    let corner = Vector3::new(1.0, -1.0, 1.0);
-    let waveforms = [
-        Waveform::White,
-        Waveform::Constant(corner),
-        Waveform::Square(2.5, corner),
-        Waveform::Switching(1.0),
-        Waveform::AlongRate(1.0),
-        Waveform::AlongMoment(-1.0),
-    ];
-    let all = waveforms.into_iter().enumerate().map(|(i, disturbance)| Flight {
+    let all = Waveform::all().into_iter().enumerate().map(|(i, disturbance)| Flight {
         disturbance,
         inertia_scale: INERTIA_SCALES[i % 2],
         scheduled: up_and_down,

@@ -27,6 +27,19 @@ pub enum Waveform {
 }
 
 impl Waveform {
+    /// Returns disturbances of every kind.
+    pub fn all() -> [Self; 6] {
+        let corner = Vector3::new(1.0, -1.0, 1.0);
+        [
+            Self::White,
+            Self::Constant(corner),
+            Self::Square(2.5, corner),
+            Self::Switching(1.0),
+            Self::AlongRate(1.0),
+            Self::AlongMoment(-1.0),
+        ]
+    }
+
     /// Draws any waveform except segments.
     pub fn random(random: &mut Random) -> Self {
         let sign = if random.below(2) == 0 { 1.0 } else { -1.0 };
