@@ -30,6 +30,10 @@ def listed() -> list[dict]:
     return json.loads(done.stdout)
 
 
+# Experiments whose description announces the warning.
+MEANT_TO_WARN = {"entry/told": ["less than a tenth of limit.moment"]}
+
+
 def test_no_experiment_warns_about_itself(tmp_path):
     experiments = {row["name"]: row["path"] for row in listed() if row["kind"] == "experiment"}
     assert len(experiments) == 33
@@ -40,7 +44,9 @@ def test_no_experiment_warns_about_itself(tmp_path):
         done = call("run", name, "--stop", round(100 * step, 9), "--out", out, "--fmu-dir", TARGET / "fmu")
         # Some of these flights lose the attitude, and margins are taken later than the flight ends.
         assert done.returncode in (0, 3) or "[observe.margins]" in done.stderr, name + done.stderr
-        assert "WARN" not in done.stderr, name + done.stderr
+        warnings = [line for line in done.stderr.splitlines() if "WARN" in line]
+        said = [part for part in MEANT_TO_WARN.get(name, []) if any(part in line for line in warnings)]
+        assert said == MEANT_TO_WARN.get(name, []) and len(warnings) == len(said), name + done.stderr
 
 
 def test_the_list_fits_80_columns_and_has_nothing_of_the_fuzzers():
