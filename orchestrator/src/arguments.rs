@@ -35,6 +35,10 @@ pub(crate) struct Overrides {
     /// type.
     #[arg(long, value_parser = choice::<OnInvalid>(&[]))]
     on_invalid: Option<OnInvalid>,
+    /// Let the program at the other end of standard input and output give the moment in place of
+    /// the controller: the law's name, and what identifies it. The Python package does so.
+    #[arg(long, value_name = "NAME HASH", hide = true)]
+    pub(crate) law: Option<String>,
     #[command(flatten)]
     isolation: Protection,
 }
@@ -57,8 +61,8 @@ pub(crate) struct Protection {
 
 impl From<Overrides> for experiment::Overrides {
     fn from(overrides: Overrides) -> Self {
-        let Overrides { set, fmu, stop, step, coupling, on_invalid, isolation } = overrides;
-        Self { set, fmu, stop, step, coupling, on_invalid, isolation: isolation.into() }
+        let Overrides { set, fmu, stop, step, coupling, on_invalid, law, isolation } = overrides;
+        Self { set, fmu, stop, step, coupling, on_invalid, law, isolation: isolation.into() }
     }
 }
 

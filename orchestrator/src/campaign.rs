@@ -2,7 +2,6 @@
 
 use crate::arguments;
 use crate::failure::Failure;
-use crate::judge;
 use campaign::bundle;
 use campaign::changes::Changes;
 use campaign::definition::Campaign;
@@ -16,6 +15,7 @@ use cosim::experiment::Overrides;
 use cosim::files;
 use cosim::interrupt::Interrupt;
 use cosim::search::named::{Kind, find};
+use fmu_import::law;
 use std::io::Write;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -45,7 +45,7 @@ pub(crate) struct Common {
     quiet: bool,
     // Its heading holds for all that would follow.
     #[command(flatten)]
-    overrides: arguments::Overrides,
+    pub(crate) overrides: arguments::Overrides,
 }
 
 /// Options of `campaign`.
@@ -66,10 +66,6 @@ pub(crate) struct Fly {
     /// which then flies DIR/campaign.toml with --fmu-dir DIR/fmu. No case is flown here.
     #[arg(long, value_name = "DIR", help_heading = "Part of the campaign", conflicts_with_all = ["case", "cases", "work", "fresh", "csv"])]
     bundle: Option<PathBuf>,
-    /// Let the program at the other end of standard input and output fly the cases, with a control
-    /// law of this name and hash, as the Python package does.
-    #[arg(long, value_name = "NAME HASH", hide = true, conflicts_with_all = ["bundle", "csv"])]
-    law: Option<String>,
     /// Fly all cases again, including those that are finished.
     #[arg(long, help_heading = "Results")]
     fresh: bool,
@@ -77,7 +73,7 @@ pub(crate) struct Fly {
     #[arg(long, help_heading = "Results")]
     csv: bool,
     #[command(flatten)]
-    common: Common,
+    pub(crate) common: Common,
 }
 
 /// Options of `falsify`.
@@ -90,7 +86,7 @@ pub(crate) struct Falsify {
     #[arg(long, help_heading = "Results")]
     force: bool,
     #[command(flatten)]
-    common: Common,
+    pub(crate) common: Common,
 }
 
 fn range(text: &str) -> Result<Range<u64>, String> {
@@ -100,11 +96,11 @@ fn range(text: &str) -> Result<Range<u64>, String> {
     Ok(first..last)
 }
 
-fn prepare(common: &Common, law: Option<&String>) -> Result<Plan, Error> {
+fn prepare(common: &Common) -> Result<Plan, Error> {
     let campaign = Campaign::load(&find(&common.campaign, Kind::Campaign)?)?;
     let overrides = common.overrides.clone().into();
     let experiment = common.experiment.clone();
-    let changes = Changes { experiment, overrides, law: law.cloned() };
+    let changes = Changes { experiment, overrides };
     Plan::new(campaign, &changes, &common.fmu_dir)
 }
 
@@ -113,7 +109,7 @@ fn prepare(common: &Common, law: Option<&String>) -> Result<Plan, Error> {
 /// # Errors
 /// Returns an error if the campaign is faulty, or if a file cannot be written.
 pub(crate) fn fly(asked: &Fly, out: &mut impl Write, interrupt: &Interrupt) -> Result<(), Failure> {
-    let plan = prepare(&asked.common, asked.law.as_ref())?;
+    let plan = prepare(&asked.common)?;
     let folder = run::folder(&plan, asked.common.out.as_deref());
     if let Some(folder) = &asked.bundle {
         let overrides = Overrides::from(asked.common.overrides.clone());
@@ -143,15 +139,6 @@ pub(crate) fn fly(asked: &Fly, out: &mut impl Write, interrupt: &Interrupt) -> R
             None => folder.join("cases").join(case.to_string()),
         };
         let experiment = write_case(&plan, case, &folder)?;
-        if asked.law.is_some() {
-            return judge::judge(
-                &experiment,
-                &Overrides::default(),
-                None,
-                &asked.common.fmu_dir,
-                &folder,
-            );
-        }
         let options = crate::run::Options {
             out: Some(folder),
             quiet: asked.common.quiet,
@@ -160,13 +147,16 @@ pub(crate) fn fly(asked: &Fly, out: &mut impl Write, interrupt: &Interrupt) -> R
             ..Default::default()
         };
         let fmu_dirs = &asked.common.fmu_dir;
-        return crate::run::run(&experiment, &Overrides::default(), fmu_dirs, &options, out);
+        let law = Overrides::from(asked.common.overrides.clone()).law;
+        let overrides = Overrides { law, ..Overrides::default() };
+        law::in_case(Some(case));
+        return crate::run::run(&experiment, &overrides, fmu_dirs, &options, out);
     }
     let options = Options {
         out: asked.common.out.clone(),
         jobs: asked.common.jobs,
         fresh: asked.fresh,
-        quiet: asked.common.quiet || asked.law.is_some(),
+        quiet: asked.common.quiet,
         csv: asked.csv,
         interrupt: interrupt.clone(),
     };
@@ -270,7 +260,7 @@ pub(crate) fn falsify(
     out: &mut impl Write,
     interrupt: &Interrupt,
 ) -> Result<(), Failure> {
-    let plan = prepare(&asked.common, None)?;
+    let plan = prepare(&asked.common)?;
     let options = search::Options {
         out: asked.common.out.clone(),
         jobs: asked.common.jobs,

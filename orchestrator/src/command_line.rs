@@ -129,6 +129,9 @@ pub(crate) enum Command {
         /// Show neither progress nor summary.
         #[arg(long)]
         quiet: bool,
+        /// As that of `run`.
+        #[arg(long, hide = true)]
+        law: Option<String>,
         #[command(flatten)]
         isolation: arguments::Protection,
     },
@@ -153,23 +156,18 @@ pub(crate) enum Command {
     /// Measure the frequency response of an experiment's loop in flight, with a sine added at each
     /// opened signal, and compare it with that of the linear model.
     Response(response::Response),
-    /// Judge a run that the program at the other end of standard input and output flies, as the
-    /// Python package does, and write the files that `run` writes.
+    /// Judge a run that the program at the other end of standard input and output has flown, as
+    /// the Python package does, and write the files that `run` writes.
     #[command(hide = true)]
     Judge {
-        /// Experiment that is flown: a file, or the name of an experiment.
+        /// Experiment that was flown.
         experiment: PathBuf,
-        /// Name of the law that is flown in place of the last FMU of --fmu.
-        #[arg(long)]
-        law: Option<String>,
         /// Folder for the results.
         #[arg(long, value_name = "DIR")]
         out: PathBuf,
         /// Also look for FMUs in this folder.
         #[arg(long, value_name = "DIR")]
         fmu_dir: Vec<PathBuf>,
-        #[command(flatten)]
-        overrides: arguments::Overrides,
     },
     /// Write an experiment as an SSP archive (System Structure and Parameterization 1.0), FMUs
     /// included.
@@ -261,6 +259,21 @@ impl Command {
                 | Self::Response(_)
                 | Self::Pack { .. }
         )
+    }
+
+    /// Returns the law in another program that gives the moment.
+    pub(crate) fn law(&self) -> Option<&str> {
+        let overrides = match self {
+            Self::Run { overrides, .. } | Self::Pack { overrides, .. } => overrides,
+            Self::Campaign(asked) => &asked.common.overrides,
+            Self::Falsify(asked) => &asked.common.overrides,
+            Self::Linearise(asked) => &asked.instant.overrides,
+            Self::Margins(asked) => &asked.instant.overrides,
+            Self::Response(asked) => &asked.instant.overrides,
+            Self::Reproduce { law, .. } => return law.as_deref(),
+            _ => return None,
+        };
+        overrides.law.as_deref()
     }
 
     /// Returns whether standard output is to hold JSON, errors included.

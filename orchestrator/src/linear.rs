@@ -39,7 +39,7 @@ pub(crate) struct Instant {
     #[arg(long, value_name = "DIR")]
     fmu_dir: Vec<PathBuf>,
     #[command(flatten)]
-    overrides: arguments::Overrides,
+    pub(crate) overrides: arguments::Overrides,
 }
 
 impl Instant {
@@ -77,7 +77,7 @@ pub(crate) struct Linearise {
     #[arg(long, value_name = "FILE")]
     pub(crate) out: Option<PathBuf>,
     #[command(flatten)]
-    instant: Instant,
+    pub(crate) instant: Instant,
 }
 
 /// Arguments of `margins`.
@@ -90,7 +90,7 @@ pub(crate) struct PrintMargins {
     #[arg(long, value_name = "FILE")]
     plot: Option<PathBuf>,
     #[command(flatten)]
-    instant: Instant,
+    pub(crate) instant: Instant,
 }
 
 /// Writes the open loop of an experiment.

@@ -25,12 +25,13 @@ mod summary;
 
 use command_line::{Command, definition};
 use cosim::error::Error;
-use cosim::experiment::Protection;
+use cosim::experiment::{Overrides, Protection};
 use cosim::interrupt::Interrupt;
 use cosim::pacing;
 use cosim::search::named::{Kind, find};
 use failure::Failure;
 use fmu_import::crash;
+use fmu_import::law::Printed;
 use live::log::Messages;
 use plain::{Plain, plain};
 use run::Options;
@@ -63,7 +64,11 @@ fn main() -> ExitCode {
         .with_target(false)
         .init();
 
-    let mut out = Plain(BufWriter::new(stdout()));
+    let out: Box<dyn Write> = match arguments.command.law() {
+        Some(_) => Box::new(Printed),
+        None => Box::new(stdout()),
+    };
+    let mut out = Plain(BufWriter::new(out));
     let interrupt = Interrupt::default();
     let answers_in_json = arguments.command.answers_in_json();
     let outcome = execute(arguments.command, &mut out, &interrupt)
@@ -131,6 +136,7 @@ fn execute(command: Command, out: &mut impl Write, interrupt: &Interrupt) -> Res
             members,
             fresh,
             quiet,
+            law,
             isolation,
         } => {
             let study = Study::load_with(&find(&study, Kind::Study)?, members)?;
@@ -138,7 +144,7 @@ fn execute(command: Command, out: &mut impl Write, interrupt: &Interrupt) -> Res
             let options = reproduce::Options {
                 out: folder,
                 fmu_dirs: fmu_dir,
-                isolation: isolation.into(),
+                overrides: Overrides { law, isolation: isolation.into(), ..Default::default() },
                 jobs,
                 fresh,
                 quiet,
@@ -156,9 +162,8 @@ fn execute(command: Command, out: &mut impl Write, interrupt: &Interrupt) -> Res
         Command::Linearise(asked) => linear::linearise(&asked, out, interrupt),
         Command::Margins(asked) => linear::margins(&asked, out, interrupt),
         Command::Response(asked) => response::respond(&asked, out, interrupt),
-        Command::Judge { experiment, law, out: folder, fmu_dir, overrides } => {
-            let experiment = find(&experiment, Kind::Experiment)?;
-            judge::judge(&experiment, &overrides.into(), law.as_deref(), &fmu_dir, &folder)
+        Command::Judge { experiment, out: folder, fmu_dir } => {
+            judge::judge(&experiment, &fmu_dir, &folder)
         }
         Command::Pack { experiment, out: archive, fmu_dir, overrides, no_enumerations, force } => {
             let archive = pack::Archive { path: archive, enumerations: !no_enumerations, force };

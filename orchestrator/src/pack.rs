@@ -33,6 +33,9 @@ pub(crate) fn pack(
     out: &mut impl Write,
     interrupt: &Interrupt,
 ) -> Result<(), Failure> {
+    if overrides.law.is_some() {
+        return Err(Error::experiment("an archive cannot hold a law in another program").into());
+    }
     let path = find(experiment, Kind::Experiment)?;
     let Archive { path: archive, enumerations, force } = archive;
     let archive = archive.unwrap_or_else(|| {

@@ -43,7 +43,7 @@ pub(crate) struct Response {
     #[arg(long, value_name = "FILE")]
     plot: Option<PathBuf>,
     #[command(flatten)]
-    instant: Instant,
+    pub(crate) instant: Instant,
 }
 
 /// Measures the frequency response of a loop, and compares it with that of the linear model.

@@ -92,21 +92,17 @@ def test_a_law_replaces_the_controller_of_an_experiment():
     with ClosedLoop(parameters={**quiet, "plant.inertia.scale": 1.05}) as loop:
         usual = loop.run(4.0, pd_law)
     assert run.title == f"law pd in place of CRMPC: {experiments()['crmpc-robust']}"
-    assert by_law.title == f"law lqr in place of the controller: {by_fmu.title}"
+    assert by_law.title == f"law lqr in place of LQR: {by_fmu.title}"
     assert run.description["law"] == usual.description["law"] == "pd"
     shared = run.table.columns.intersection(usual.table.columns)
     assert len(shared) >= 12 and run.table[shared].equals(usual.table[shared])
     assert run.metrics["rate_limit_deg_s"] == pytest.approx(np.degrees(0.1))
 
 
-def test_laws_fly_direct_loops_alone():
+def test_an_error_of_a_law_names_its_line():
     def wrong(state):
         return state.attitud
 
-    with pytest.raises(ValueError, match="connected directly.*allocator"):
-        experiment("two-loop-smc/allocated", law=pd_law)
-    with pytest.raises(TypeError, match="leave out its FMU"):
-        experiment("lqr", law=pd_law, fmu={"controller": "FBL"})
     with pytest.raises(LawError, match="the law wrong failed at t = 0 s: AttributeError") as caught:
         experiment("lqr", law=wrong)
     assert "return state.attitud" in str(caught.value)

@@ -1,7 +1,7 @@
 //! Changes that the command line makes to a campaign.
 
 use crate::definition::Campaign;
-use cosim::experiment::Overrides;
+use cosim::experiment::{Overrides, name_of};
 use serde::Serialize;
 use std::path::PathBuf;
 
@@ -12,19 +12,12 @@ pub struct Changes {
     pub experiment: Option<PathBuf>,
     /// Changes to the experiment.
     pub overrides: Overrides,
-    /// Law in another program that flies the cases: its name, and a hash of what it consists of.
-    pub law: Option<String>,
 }
 
 impl Changes {
-    /// Returns the name of the law in another program.
-    pub(crate) fn law_name(&self) -> Option<&str> {
-        self.law.as_ref().and_then(|law| law.split_whitespace().next())
-    }
-
     /// Returns the command that runs a case of a campaign with these changes.
     pub(crate) fn command(&self, campaign: &Campaign) -> Command {
-        if let Some(name) = self.law_name() {
+        if let Some(name) = self.overrides.law.as_deref().map(name_of) {
             let path = campaign.source.path.display();
             return Command::Python(format!("campaign(\"{path}\", law={name})"));
         }
@@ -35,7 +28,7 @@ impl Changes {
     fn arguments(&self, campaign: &Campaign) -> String {
         let mut words = vec![campaign.source.path.display().to_string()];
         // A case is the same in whichever process its instances run.
-        let Overrides { set, fmu, stop, step, coupling, on_invalid, isolation: _ } =
+        let Overrides { set, fmu, stop, step, coupling, on_invalid, isolation: _, law: _ } =
             &self.overrides;
         let experiment = self.experiment.as_ref().map(|path| path.display().to_string());
         let single = [

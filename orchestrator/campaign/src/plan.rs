@@ -50,14 +50,6 @@ impl Plan {
         let recorded = recorded(&campaign, &system.experiment.observe, &meters);
         let measured = meters.metrics();
         sweep.keys.insert("campaign".into(), keys(&campaign, changes)?);
-        if let Some(law) = &changes.law {
-            if system.experiment.observe.margins.is_some() {
-                let problem = "metrics: margins are those of FMUs, not of a law in another program";
-                return Err(campaign.source.error(&(0..0), problem));
-            }
-            sweep.keys.insert("law".into(), law.clone());
-            sweep.is_flown_outside = true;
-        }
         let plan = Self {
             command: changes.command(&campaign),
             replaced: changes.experiment.clone(),

@@ -49,9 +49,6 @@ pub(crate) fn read_experiment(campaign: &Campaign, changes: &Changes) -> Result<
         outcome.map_err(|problem| source.error(&value.span(), format!("[set] {problem}")))?;
     }
     experiment.apply(&changes.overrides)?;
-    if let Some(name) = changes.law_name() {
-        experiment.name_law(name, &changes.overrides);
-    }
     Ok(experiment)
 }
 

@@ -127,9 +127,7 @@ impl<'a> State<'a> {
         if let Some(resets) = self.resets {
             return Ok(resets);
         }
-        // The program that flies the cases outside looks after its instances.
-        let is_outside = self.plan.sweep.is_flown_outside;
-        let resets = is_outside || can_reset(&self.plan.sweep, &mut Opened::default(), interrupt)?;
+        let resets = can_reset(&self.plan.sweep, &mut Opened::default(), interrupt)?;
         if !resets {
             tracing::warn!(
                 "a case gave another result after fmi2Reset than with a new instance: each case gets new instances"
@@ -310,12 +308,9 @@ fn fly_parts(
     let left: u64 = missing.iter().map(|part| part.end - part.start).sum();
     let done = state.done();
     let progress = Parts::new("cases", &plan.campaign.title, done + left, done, options.quiet);
-    // All requests to another program go through one standard output.
-    let is_outside = plan.sweep.is_flown_outside;
-    let threads = if is_outside { 1 } else { work::threads(options.jobs, [&plan.sweep]) };
     let Worked { results, failures } = work::on_parts(
         missing,
-        threads,
+        work::threads(options.jobs, [&plan.sweep]),
         || Ok(Flight::new(plan, resets, interrupt)?),
         |flight, part| parts::fly(plan, out, part, flight, |_| progress.advance(1)),
         // The other parts are flown and kept, so that little is left for the next time.

@@ -2,7 +2,7 @@
 //! refused. After that only the instances themselves can fail.
 
 use crate::error::Error;
-use crate::experiment::{Coupling, Experiment};
+use crate::experiment::{CONTROLLER, Coupling, Experiment};
 use crate::search;
 use crate::settings;
 use crate::system::{CheckedComponent, Opened, System, parts};
@@ -41,6 +41,8 @@ pub fn check(
             None => Rc::new(open(&path)?),
         };
         opened.insert(path, Rc::clone(&fmu));
+        let is_law = experiment.law.is_some() && name == CONTROLLER;
+        let fmu = if is_law { Rc::new(fmu.flown_by_law()?) } else { fmu };
         let component = &experiment.components[&name];
         let is_isolated = experiment.isolation.isolates(component, &fmu, fmu_dirs);
         let (every, settings) = (component.every, Vec::new());

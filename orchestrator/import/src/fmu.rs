@@ -9,6 +9,7 @@ use crate::faults;
 use crate::folder::TemporaryFolder;
 use crate::functions::Functions;
 use crate::isolation::{self, Isolation, Library, Loaded};
+use crate::law::{LawInstance, Ports};
 use crate::library::FmuInstance;
 use crate::log::Log;
 use crate::lookup_table::{self, LookupTable, LookupTableInstance};
@@ -36,6 +37,8 @@ pub struct Fmu {
 enum Content {
     Archive(Archive),
     LookupTable(LookupTable),
+    /// A law in another program, for which a controller stands in.
+    Law(Rc<Fmu>, Ports),
 }
 
 /// An unpacked archive.
@@ -75,11 +78,28 @@ impl Fmu {
         Ok(Self { path: path.to_path_buf(), description, content: Content::Archive(archive) })
     }
 
+    /// Puts the law of another program into the place of that of this controller.
+    ///
+    /// # Errors
+    /// Returns an error if the FMU lacks a variable that a law needs.
+    pub fn flown_by_law(self: &Rc<Self>) -> Result<Self, Error> {
+        let path = self.path.clone();
+        let mut description = self.description.clone();
+        let ports = Ports::find(&description)
+            .map_err(|message| Error::Fmu { path: path.clone(), message })?;
+        // Derivatives would be those of the FMU's own law.
+        if let Some(interface) = &mut description.co_simulation {
+            interface.capabilities.retain(|name| name != "providesDirectionalDerivative");
+        }
+        Ok(Self { path, description, content: Content::Law(Rc::clone(self), ports) })
+    }
+
     /// Returns the platforms for which the archive has libraries, by FMI's names.
     pub fn platforms(&self) -> Vec<String> {
         match &self.content {
             Content::Archive(archive) => archive.platforms(),
             Content::LookupTable(_) => Vec::new(),
+            Content::Law(stand_in, _) => stand_in.platforms(),
         }
     }
 
@@ -171,6 +191,10 @@ impl Fmu {
             Content::Archive(archive) => archive,
             Content::LookupTable(table) => {
                 return Ok(Box::new(LookupTableInstance::new(name, table.clone())));
+            }
+            Content::Law(stand_in, ports) => {
+                let stand_in = stand_in.instantiate(name, isolation)?;
+                return Ok(Box::new(LawInstance::new(stand_in, ports.clone())));
             }
         };
         let of_component = format!("the component \"{name}\"");

@@ -1,7 +1,7 @@
 //! Imports FMI 2.0 FMUs. An [`fmu::Fmu`] is unpacked ([`archive`]), its description is read
 //! ([`description`], [`xml`]), and the description is searched for [`faults`]. Its instances are
 //! called through the trait [`Instance`](fmi_master::instance::Instance) of the master. A
-//! [`lookup_table`] is opened and called in the same way.
+//! [`lookup_table`] and a [`law`] in another program are opened and called in the same way.
 
 pub mod archive;
 pub mod crash;
@@ -13,6 +13,7 @@ pub mod fmu;
 pub mod folder;
 mod functions;
 pub mod isolation;
+pub mod law;
 mod library;
 mod log;
 mod logs;

@@ -5,7 +5,7 @@ use crate::definition::Study;
 use crate::runs::Run;
 use crate::table::table;
 use cosim::error::Error as Single;
-use cosim::experiment::{Experiment, Measure, MeasureKind, Observe, Overrides, Protection};
+use cosim::experiment::{Experiment, Measure, MeasureKind, Observe, Overrides};
 use cosim::files;
 use cosim::interrupt::Interrupt;
 use cosim::run::Observer;
@@ -94,7 +94,7 @@ impl<'a> Preparation<'a> {
         study: &'a Study,
         run: &'a Run,
         fmu_dirs: &[PathBuf],
-        isolation: &Protection,
+        overrides: &Overrides,
         opened: &mut Opened,
     ) -> Result<Self, Error> {
         let failed = |source| Error::Run { run: run.id.get_ref().as_str().into(), source };
@@ -102,8 +102,7 @@ impl<'a> Preparation<'a> {
             study.source.error(&run.id.span(), format!("[[run]] {}: {message}", run.id.get_ref()))
         };
         let mut experiment = study.experiment(run).map_err(failed)?;
-        let isolation = isolation.clone();
-        experiment.apply(&Overrides { isolation, ..Overrides::default() }).map_err(failed)?;
+        experiment.apply(overrides).map_err(failed)?;
         let drawn = DrawnSignals::collect(study, run);
         measure(study, run, &mut experiment)?;
         let mut sweep = Sweep::new(experiment, &run.variation(), &study.source, fmu_dirs, opened)

@@ -11,7 +11,7 @@ use crate::part::{Bench, Part, Preparation};
 use crate::results::{Results, RunResult, resolve};
 use crate::runs::Run;
 use cosim::error::Error as Single;
-use cosim::experiment::Protection;
+use cosim::experiment::Overrides;
 use cosim::interrupt::Interrupt;
 use cosim::system::Opened;
 use cosim_report::folder::Folder;
@@ -35,8 +35,8 @@ pub struct Options {
     pub out: Option<PathBuf>,
     /// Further folders in which FMUs are looked for.
     pub fmu_dirs: Vec<PathBuf>,
-    /// Processes of instances and their limits, in place of those of the experiments.
-    pub isolation: Protection,
+    /// Changes of the command line to all experiments.
+    pub overrides: Overrides,
     /// Number of threads; 0 means one for each core.
     pub jobs: usize,
     /// Whether parts that are complete already are run again.
@@ -78,8 +78,8 @@ pub fn reproduce(study: &Study, options: &Options) -> Result<StudyReport, Error>
     let begin = Instant::now();
     let out = options.out.clone().unwrap_or_else(|| Path::new("out").join(name(study)));
     let mut opened = Opened::default();
-    let Options { fmu_dirs, isolation, .. } = options;
-    let prepare = |run| Preparation::new(study, run, fmu_dirs, isolation, &mut opened);
+    let Options { fmu_dirs, overrides, .. } = options;
+    let prepare = |run| Preparation::new(study, run, fmu_dirs, overrides, &mut opened);
     let preparations = study.runs.iter().map(prepare).collect::<Result<Vec<_>, _>>()?;
     check(study)?;
     if out.join("metrics.json").exists() || (out.exists() && !out.is_dir()) {

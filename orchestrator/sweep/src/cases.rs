@@ -36,8 +36,6 @@ pub struct Sweep {
     pub keys: BTreeMap<String, String>,
     /// Archive of an FMU that can be instantiated only once per process, if there is one.
     pub single: Option<PathBuf>,
-    /// Whether another program flies the cases ([`crate::outside`]).
-    pub is_flown_outside: bool,
     experiment: Experiment,
     /// Paths of the archives, by component.
     archives: BTreeMap<String, PathBuf>,
@@ -101,7 +99,6 @@ impl Sweep {
             span: [system.clock.start(), system.clock.stop()],
             keys: keys(&system, &varied)?,
             single: single.map(|component| component.fmu.path.clone()),
-            is_flown_outside: false,
             varied,
             archives: system.components.into_iter().map(|c| (c.name, c.fmu.path.clone())).collect(),
             experiment,
@@ -308,6 +305,9 @@ fn keys(system: &System, varied: &[Varied]) -> Result<BTreeMap<String, String>, 
     for CheckedComponent { name, fmu, .. } in &system.components {
         let bytes = fs::read(&fmu.path).map_err(Error::file(&fmu.path))?;
         keys.insert(format!("FMU of {name}"), files::digest(bytes));
+    }
+    if let Some(law) = &system.experiment.law {
+        keys.insert("law".into(), law.clone());
     }
     let set = system.texts();
     let listed = varied.iter().flat_map(|entry| entry.distribution.texts());

@@ -1,7 +1,6 @@
 //! Flies cases one after the other with the same instances, which are reset between cases.
 
 use crate::cases::Sweep;
-use crate::outside;
 use crate::table::{Column, Values};
 use cosim::error::Error;
 use cosim::experiment::Margins;
@@ -11,6 +10,7 @@ use cosim::system::{Opened, Parameters, System};
 use cosim::variation::{SettingValue, Target};
 use cosim_report::metrics::{Meters, Metrics};
 use fmi_master::description::VariableKind as Type;
+use fmu_import::law;
 use linear::linearise::{Linearised, Lineariser};
 use linear::measures::{self, Measured};
 use std::collections::BTreeMap;
@@ -172,27 +172,24 @@ impl<'a> Flight<'a> {
         // The watch comes last, because it may end the case.
         observers.push(&mut watch);
         let mut step_us = Vec::new();
-        let outcome = if self.sweep.is_flown_outside {
-            outside::fly(&self.system, Some(case), &changes, &mut observers)
-        } else {
-            let started = match self.run.take().filter(|_| self.resets) {
-                Some(mut run) => self.system.restart(&mut run, &changes).map(|()| run),
-                None => self.system.start_varied(&changes, self.interrupt),
-            };
-            started.and_then(|mut run| {
-                if self.times {
-                    run.measure_time();
-                }
-                let outcome = run.run(&mut observers);
-                let times = run.step_seconds();
-                step_us = times.map(|(name, seconds)| (name.to_string(), seconds * 1e6)).collect();
-                // An instance that failed is not used again.
-                if !matches!(outcome, Err(Error::Call { .. })) {
-                    self.run = Some(run);
-                }
-                outcome
-            })
+        law::in_case(Some(case));
+        let started = match self.run.take().filter(|_| self.resets) {
+            Some(mut run) => self.system.restart(&mut run, &changes).map(|()| run),
+            None => self.system.start_varied(&changes, self.interrupt),
         };
+        let outcome = started.and_then(|mut run| {
+            if self.times {
+                run.measure_time();
+            }
+            let outcome = run.run(&mut observers);
+            let times = run.step_seconds();
+            step_us = times.map(|(name, seconds)| (name.to_string(), seconds * 1e6)).collect();
+            // An instance that failed is not used again.
+            if !matches!(outcome, Err(Error::Call { .. })) {
+                self.run = Some(run);
+            }
+            outcome
+        });
         drop(observers);
         let Watch { broken, time, .. } = watch;
         let outcome = match outcome {
@@ -335,6 +332,11 @@ fn typed<'a>(kind: &Type, values: impl Iterator<Item = &'a SettingValue>) -> Val
 /// # Errors
 /// The errors are those of [`Flight::fly`] for the first case.
 pub fn can_reset(sweep: &Sweep, opened: &mut Opened, interrupt: &Interrupt) -> Result<bool, Error> {
+    if sweep.experiment().law.is_some() {
+        // A trial would ask the law for flights that nobody wants.
+        let components = sweep.system(opened)?.components;
+        return Ok(components.iter().all(|component| component.fmu.is_made_by_fmu_pack()));
+    }
     let mut flight = Flight::new(sweep, opened, true, interrupt)?;
     let mut result = |case| {
         let flown = flight.fly(case, &mut [])?;

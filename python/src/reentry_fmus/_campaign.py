@@ -5,6 +5,8 @@ from __future__ import annotations
 import html
 import json
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,9 +14,9 @@ from typing import TYPE_CHECKING, Any
 import pandas as pd
 
 from ._arrays import dataset
-from ._data import FMUS, fmu, need
+from ._data import FMUS, need
 from ._experiment import recorded
-from ._law import REFERENCE, Flyer, PickledLaw
+from ._law import Laws, PickledLaw
 from ._orchestrator import OrchestratorError, missing_parts, orchestrate
 from ._pool import Pool
 from ._run import Figure, Run
@@ -168,8 +170,7 @@ class Campaign:
             OrchestratorError: The campaign was refused, or flying it failed.
             ClusterError: The cluster failed. Finished parts are kept.
             LawError: The law failed. Finished parts are kept.
-            ValueError: The loop is none that a law can fly.
-        """
+            """
         check_units(units)
         is_address = out is not None and "://" in os.fspath(out)
         if is_address and client is None:
@@ -210,18 +211,14 @@ class Campaign:
         """
         check_units(units)
         command = [*self.command("campaign"), "--case", str(number)]
-        if self.law is None:
-            return recorded(command, out, units)
-        with Flyer(self.law, number) as fly:
-            try:
-                return recorded(command, out, units, fly=fly)
-            except LawError as error:
-                raise error.in_file(self.law.file) from error.__cause__
+        with self._laws(number) as laws:
+            return recorded(command, out, units, laws=laws)
 
     def _fly(self, law: PickledLaw, folder: Path, jobs: int | None) -> None:
         """Flies the missing parts with a law, and lets the orchestrator merge and judge them."""
         flown: set[int] = set()
-        command = [*self.command("campaign"), "--out", str(folder.absolute())]
+        # The workers share the cores.
+        command = [*self.command("campaign"), "--out", str(folder.absolute()), "--jobs", "1"]
         with Pool(law, command, jobs) as pool:
             # A campaign that ends with an answer needs more cases at each look.
             while missing := missing_parts(self.call, folder):
@@ -234,16 +231,22 @@ class Campaign:
     def command(self, name: str) -> list[str]:
         """Returns the arguments of a command of the orchestrator for this campaign."""
         command = [name, self.path, "--fmu-dir", str(FMUS), "--quiet"]
-        if self.law is not None:
-            command += ["--law", self.law.key, "--fmu", f"controller={fmu(REFERENCE)}"]
         return command
+
+    @contextmanager
+    def _laws(self, case: int | None = None) -> Iterator[Laws | None]:
+        """Gives the laws of flights in this process, whose errors name the file of the law."""
+        try:
+            yield None if self.law is None else self.law.laws(case)
+        except LawError as error:
+            assert self.law is not None
+            raise error.in_file(self.law.file) from error.__cause__
 
     def call(self, *arguments: str, command: str = "campaign") -> str:
         """Calls the orchestrator with this campaign, and returns what it prints."""
         command_line = [*self.command(command), *arguments]
-        # What the FMU that stands for a law lacks is no matter of the law.
-        level = "warn" if self.law is None else "error"
-        exit_code, error, printed = orchestrate(command_line, stacklevel=4, level=level)
+        with self._laws() as laws:
+            exit_code, error, printed = orchestrate(command_line, stacklevel=4, laws=laws)
         if exit_code != 0:
             raise OrchestratorError(error, exit_code, None)
         return printed
@@ -255,9 +258,8 @@ def campaign(name: str | os.PathLike[str], law: Law | None = None) -> Campaign:
     Args:
         name: Path of a campaign file (TOML), or the name of a campaign of this package.
         law: Law in Python that replaces the controller, a function from the state to the moment as
-            in `ClosedLoop.run`, in a loop in which the moment acts directly. It is sent to
-            processes by cloudpickle, and each case begins with a fresh copy of it, so that it may
-            be an object with a memory.
+            in `experiment`. It is sent to processes by cloudpickle, and each case begins with a
+            fresh copy of it, so that it may be an object with a memory.
 
     Raises:
         ModuleNotFoundError: pyarrow, which reads the results, or cloudpickle is not installed.
@@ -274,6 +276,7 @@ def falsify(
     jobs: int | None = None,
     *,
     units: Units = "si",
+    law: Law | None = None,
 ) -> Search:
     """Looks for the worst case of a campaign that has a [search].
 
@@ -284,12 +287,15 @@ def falsify(
         time: Time after which no further cases are begun, s.
         jobs: Number of threads, by default one for each core.
         units: "deg" gives angles and angular rates of the table in degrees.
+        law: Law in Python that replaces the controller, as in `campaign`. `experiment` takes it
+            together with the worst case.
 
     Raises:
         OrchestratorError: The campaign was refused, or the search failed.
+        LawError: The law failed.
     """
     check_units(units)
-    searched = campaign(name)
+    searched = campaign(name, law)
     folder = Path("out", f"{searched.name}-worst") if out is None else Path(out)
     arguments = ["--out", str(folder), "--force"]
     for option, value in (("--time", time), ("--jobs", jobs)):

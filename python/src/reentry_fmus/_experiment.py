@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 
 from ._data import FMUS, experiment_path, fmu_path
-from ._law import REFERENCE, Flyer
-from ._orchestrator import OrchestratorError, orchestrate, serve
+from ._law import Laws, laws_of
+from ._orchestrator import OrchestratorError, orchestrate
 from ._run import Run, read
-from ._state import Law, name_of
+from ._state import Law
 from ._table import Units, check_units
 from ._unpacked import Folder
 
@@ -52,30 +52,37 @@ def experiment(
         out: Folder that keeps the files of the run; earlier results in it are replaced. Without
             it they are removed.
         law: Law that replaces the controller, a function from the state to the moment as in
-            `ClosedLoop.run`, in a loop in which the moment acts directly.
+            `ClosedLoop.run`. LQR.fmu stands in for everything else: it computes the reference, has
+            the limits, and its period says when the law is asked.
 
     Raises:
         OrchestratorError: The experiment was refused, or its run failed.
         LawError: The law failed.
     """
     check_units(units)
-    if law is not None:
-        if "controller" in (fmu or {}):
-            raise TypeError("the law replaces the controller: leave out its FMU")
-        fmu = {**(fmu or {}), "controller": REFERENCE}
-    begin = ["run", "--quiet", "--force"] if law is None else ["judge", "--law", name_of(law)]
-    command = [*begin, experiment_path(name), "--fmu-dir", str(FMUS)]
+    command = ["run", "--quiet", "--force", experiment_path(name)]
+    command += changes(set, fmu, law, stop=stop, step=step)
+    return recorded(command, out, units, laws=None if law is None else laws_of(law, is_first=True))
+
+
+def changes(
+    set: Mapping[str, Value] | None,
+    fmu: Mapping[str, str | os.PathLike[str]] | None,
+    law: Law | None,
+    **numbers: float | None,
+) -> list[str]:
+    """Returns the arguments of the orchestrator for changes of an experiment."""
+    if law is not None and "controller" in (fmu or {}):
+        raise TypeError("the law replaces the controller: leave out its FMU")
+    arguments = ["--fmu-dir", str(FMUS)]
     for component, replacement in (fmu or {}).items():
-        command += ["--fmu", f"{component}={fmu_path(replacement)}"]
+        arguments += ["--fmu", f"{component}={fmu_path(replacement)}"]
     for parameter, value in (set or {}).items():
-        command += ["--set", f"{parameter}={written(parameter, value)}"]
-    for option, number in (("--stop", stop), ("--step", step)):
+        arguments += ["--set", f"{parameter}={written(parameter, value)}"]
+    for option, number in numbers.items():
         if number is not None:
-            command += [option, repr(float(number))]
-    if law is None:
-        return recorded(command, out, units)
-    with Flyer(lambda: law) as fly:
-        return recorded(command, out, units, fly=fly)
+            arguments += [f"--{option}", repr(float(number))]
+    return arguments
 
 
 def recorded(
@@ -83,24 +90,20 @@ def recorded(
     out: str | os.PathLike[str] | None,
     units: Units,
     stacklevel: int = 4,
-    fly: Flyer | None = None,
+    laws: Laws | None = None,
 ) -> Run:
-    """Calls the orchestrator for one run, and reads what it recorded. With `fly` it asks for the
-    run."""
+    """Calls the orchestrator for one run, and reads what it recorded."""
     with Folder() as temporary:
         folder = temporary / "out" if out is None else Path(out)
         command = [*arguments, "--out", str(folder)]
         # A folder of earlier results must not pass for those of a run that was refused.
         stale = folder / "results.json"
         before = stale.stat().st_mtime_ns if stale.exists() else None
-        if fly is None:
-            exit_code, error, _ = orchestrate(command, stacklevel)
-        else:
-            exit_code, error = serve(command, fly)
+        exit_code, error, _ = orchestrate(command, stacklevel, laws=laws)
         is_new = stale.exists() and stale.stat().st_mtime_ns != before
         run = read(folder, units) if is_new else None
-    if run is not None and fly is not None:
-        run.description["law"] = fly.name
+    if run is not None and laws is not None:
+        run.description["law"] = laws.key.split()[0]
     if exit_code != 0 or run is None:
         raise OrchestratorError(error, exit_code, run)
     return run

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import json
+import os
 import re
-from collections.abc import Mapping
+import subprocess
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -13,9 +16,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ._data import EXPERIMENTS, FMUS
+from ._data import EXPERIMENTS, FMUS, program
 from ._instance import Value
-from ._orchestrator import OrchestratorError, Rows, serve
+from ._orchestrator import OrchestratorError
 from ._recording import RECORDED, Variable
 from ._run import Judgement, read_judgement
 from ._unpacked import Folder
@@ -46,45 +49,52 @@ def judged(flown: Flown) -> Judgement:
     Raises:
         OrchestratorError: The orchestrator refused the FMUs.
     """
-
-    def rows(request: dict[str, Any]) -> Rows:
-        return Rows(np.column_stack([flown.columns[name] for name, _ in request["variables"]]))
-
     with Folder() as temporary:
         out = temporary / "out"
-        exit_code, error = serve(command(flown, temporary, out), rows)
+        with asked(flown, temporary, out) as (process, variables):
+            rows = np.column_stack([flown.columns[name] for name, _ in variables] or [[]])
+            _, said = process.communicate(rows.astype("<f8").tobytes())
         # A run in which the attitude was lost is judged up to then.
-        if exit_code not in (0, LOST):
+        if process.returncode not in (0, LOST):
+            error = said.decode(errors="replace").partition("error: ")[2]
             # The experiment's file was made here, and nobody has seen it.
-            problem = re.sub(r"^\S*closed_loop\.toml:(\d+:)? ", "", error)
-            raise OrchestratorError(problem, exit_code, None)
+            problem = re.sub(r"^\S*closed_loop\.toml:(\d+:)? ", "", error.strip())
+            raise OrchestratorError(problem, process.returncode, None)
         judgement = read_judgement(out)
     if flown.law is not None:
         judgement.description["law"] = flown.law
     return judgement
 
 
-class Noted(Exception):
-    """Nothing but the request was wanted."""
+@contextmanager
+def asked(
+    flown: Flown, folder: Path, out: Path
+) -> Iterator[tuple[subprocess.Popen[bytes], list[Variable]]]:
+    """Starts the orchestrator, and gives it with the variables whose values it asks for; there are
+    none if it refuses the FMUs."""
+    path = folder / "closed_loop.toml"
+    path.write_text(experiment_of(flown), encoding="utf-8")
+    command = [str(program()), "judge", str(path), "--out", str(out), "--fmu-dir", str(FMUS)]
+    with subprocess.Popen(
+        command,
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        env={**os.environ, "RUST_LOG": "error"},
+    ) as process:
+        assert process.stdout is not None
+        found = json.loads(process.stdout.readline() or "[]")
+        yield process, [(str(name), bool(responds)) for name, responds in found]
 
 
 @lru_cache
 def observed_by(plant: Path, controller: Path, changed: Any) -> tuple[Variable, ...]:
-    found: list[Variable] = []
-
-    def note(request: dict[str, Any]) -> Rows:
-        found.extend((str(name), bool(responds)) for name, responds in request["variables"])
-        raise Noted
-
     paths = {"plant": plant, "controller": controller}
     nothing = Flown("", (0.0, 1.0, 1.0), paths, {"plant": {}, "controller": {}}, {})
-    with Folder() as temporary:
-        try:
-            serve(command(nothing, temporary, temporary / "out"), note)
-        except Noted:
-            pass
+    with Folder() as folder, asked(nothing, folder, folder / "out") as (process, variables):
+        process.communicate()
     # The loop runs also if these FMUs are refused. Whoever asks for its metrics gets the reason.
-    return tuple(found)
+    return tuple(variables)
 
 
 def observed(paths: Mapping[str, Path]) -> tuple[Variable, ...]:
@@ -92,13 +102,6 @@ def observed(paths: Mapping[str, Path]) -> tuple[Variable, ...]:
     up once, as long as no file changes."""
     changed = tuple(path.stat().st_mtime_ns for path in paths.values() if path.exists())
     return observed_by(paths["plant"], paths["controller"], changed)
-
-
-def command(flown: Flown, folder: Path, out: Path) -> list[str]:
-    """Writes the experiment of a run, and returns the command that judges it."""
-    path = folder / "closed_loop.toml"
-    path.write_text(experiment_of(flown), encoding="utf-8")
-    return ["judge", str(path), "--out", str(out), "--fmu-dir", str(FMUS)]
 
 
 def experiment_of(flown: Flown) -> str:

@@ -1,10 +1,12 @@
-"""Laws in Python that fly what the orchestrator asks for."""
+"""Laws in Python that the orchestrator asks for moments."""
 
 from __future__ import annotations
 
+import copy
 import functools
 import hashlib
 import inspect
+import math
 import pickle
 import sys
 from collections.abc import Callable
@@ -14,94 +16,141 @@ from struct import Struct
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from ._data import FMUS, need
-from ._instance import InstanceError
-from ._loop import ClosedLoop
-from ._orchestrator import Rows
-from ._recording import ATTITUDE, COMMAND, RATE
-from ._state import Law, State, moment_of, name_of
-
-REFERENCE = "LQR"
-"""FMU that computes the reference of a law and has the limits that it is judged by."""
-
-DIRECT = {
-    *((f"plant.{name}", f"controller.{name}") for name in ATTITUDE + RATE),
-    *((name, name.replace("controller", "plant")) for name in COMMAND),
-}
-"""Connections of the loops that a law can fly."""
+from ._data import need
+from ._recording import ATTITUDE, RATE
+from ._state import Inputs, Law, State, Vector, moment_of, name_of
 
 
-class Flyer:
-    """Flies runs of the vehicle with a law in Python. The instances are reset between two
-    runs, as far as they are FMUs of this package."""
+class Flight:
+    """A law and what it is told in a flight."""
+
+    def __init__(self, law: Law, case: int | None, names: list[str]) -> None:
+        self.law = law
+        self.case = case
+        self.names = names
+        self._places = {name: place for place, name in enumerate(names[:-12])}
+        self._attitude = [self._places[name] for name in ATTITUDE]
+        self._rate = [self._places[name] for name in RATE]
+
+    def state(self, time: float, told: bytes) -> State:
+        """Reads what the law is told: the inputs, nine numbers of the reference, and the moment."""
+        values = np.frombuffer(told).copy()
+        attitude, rate = values[self._attitude], values[self._rate]
+        return State(
+            time=time,
+            attitude=attitude,
+            attitude_rate=attitude_rate(attitude, rate),
+            rate=rate,
+            reference=values[-12:-9],
+            reference_rate=values[-9:-6],
+            reference_acceleration=values[-6:-3],
+            moment=values[-3:],
+            inputs=Inputs(self._places, values),
+        )
+
+
+def attitude_rate(attitude: Vector, rate: Vector) -> Vector:
+    """Returns the time derivative of the attitude that body rates give: Chai 2022, (2)."""
+    alpha, beta, _ = attitude.tolist()
+    p, q, r = rate.tolist()
+    sa, ca, sb, cb = math.sin(alpha), math.cos(alpha), math.sin(beta), math.cos(beta)
+    tb = sb / cb if cb else math.nan
+    return np.array(
+        [
+            -ca * tb * p + q - sa * tb * r,
+            sa * p - ca * r,
+            -ca * cb * p - sb * q - cb * sa * r,
+        ]
+    )
+
+
+class Laws:
+    """The laws of all flights of an orchestrator, which it asks by messages (its module `law`)."""
+
+    HEAD = Struct("<cQdI")
+    """Kind of a message, number of the law, time in s, length of what follows."""
 
     def __init__(
-        self, make: Callable[[], Law], case: int | None = None, progress: Progress | None = None
+        self,
+        make: Callable[[], Law],
+        key: str,
+        case: int | None = None,
+        progress: Progress | None = None,
     ) -> None:
-        self.name = name_of(make())
-        """Name of the law."""
+        self.key = key
+        """Name and hash, under which the orchestrator keeps what the law has flown."""
+        self.printed = bytearray()
+        """What the orchestrator has printed."""
         self._make = make
         self._case = case
         self._progress = progress
-        self._loop: ClosedLoop | None = None
-        self._opened: tuple[Any, ...] = ()
+        self._flights: dict[int, Flight] = {}
 
-    def __call__(self, request: dict[str, Any]) -> Rows:
-        """Flies a run that the orchestrator asks for. `make` gives each run a law.
+    def answer(self, kind: bytes, number: int, time: float, told: bytes) -> bytes | None:
+        """Does what a message asks for, and returns the answer if there is one.
 
         Raises:
             LawError: The law ended in another way than by returning a moment.
-            InstanceError: An FMU cannot be opened, which is no matter of the run.
-            ValueError: The loop is none that a law can fly.
         """
-        check(request)
-        loop = self._opened_for(request)
-        case = self._case if request["case"] is None else request["case"]
-        if self._progress is not None:
-            self._progress.begin(case)
-        try:
-            loop._restart({name: found["set"] for name, found in request["components"].items()})
-        except InstanceError as refusal:
-            # An FMU may refuse the values of one case and take those of others.
-            self.close()
-            return Rows(np.empty((0, len(request["variables"]))), described(refusal))
-        law, progress = self._make(), self._progress
+        if kind == b"a":
+            return self._ask(self._flights[number], time, told)
+        if kind == b"b":
+            case, *names = told.decode().split("\n")
+            flight = Flight(self._make(), int(case) if case else self._case, names)
+            self._flights[number] = flight
+            if self._progress is not None:
+                self._progress.begin(flight.case)
+        elif kind == b"c":
+            source = self._flights[int.from_bytes(told, "little")]
+            self._flights[number] = Flight(copied(source.law), source.case, source.names)
+        elif kind == b"e":
+            self._flights.pop(number, None)
+        elif kind == b"p":
+            self.printed += told
+        return None
 
-        def moment(state: State) -> npt.ArrayLike:
-            if progress is None:
-                return moment_of(law, state, case)
-            progress.ask(state.time)
-            answer = moment_of(law, state, case)
+    def _ask(self, flight: Flight, time: float, told: bytes) -> bytes:
+        state, progress = flight.state(time, told), self._progress
+        if progress is not None:
+            progress.ask(time)
+        moment = moment_of(flight.law, state, flight.case)
+        if progress is not None:
             progress.answer()
-            return answer
+        return moment.tobytes()
 
-        variables = [(str(name), bool(responds)) for name, responds in request["variables"]]
-        rows, failure = loop._fly(request["steps"], moment, variables)
-        return Rows(rows, None if failure is None else described(failure))
 
-    def _opened_for(self, request: dict[str, Any]) -> ClosedLoop:
-        paths = {name: Path(found["fmu"]) for name, found in request["components"].items()}
-        wanted = (paths, request["step"])
-        is_ours = all(path.parent == FMUS for path in paths.values())
-        if self._loop is None or self._opened != wanted or not is_ours:
-            self.close()
-            self._loop = ClosedLoop._with_law(paths, request["step"])
-            self._opened = wanted
-        return self._loop
+def copied(law: Law) -> Law:
+    """Returns a law with a memory of its own. A function has none, unless it encloses variables,
+    which cloudpickle can copy."""
+    if not inspect.isfunction(law):
+        return copy.deepcopy(law)
+    try:
+        import cloudpickle
+    except ModuleNotFoundError:
+        return law
+    again: Law = pickle.loads(cloudpickle.dumps(law)) if law.__closure__ else law
+    return again
 
-    def close(self) -> None:
-        """Frees the instances."""
-        if self._loop is not None:
-            self._loop.close()
-            self._loop = None
 
-    def __enter__(self) -> Flyer:
-        return self
+def laws_of(law: Law, is_first: bool = False) -> Laws:
+    """Returns the laws of flights in this process, each a copy of a law; the first one is the law
+    itself if `is_first` says so.
 
-    def __exit__(self, *_: object) -> None:
-        self.close()
+    Raises:
+        TypeError: The law cannot be called.
+    """
+    if not callable(law):
+        raise TypeError(f"a law is a function from the state to the moment, not {law!r}")
+    left = [law] if is_first else []
+    try:
+        fresh = copied(law)
+    except Exception as error:
+        if not is_first:
+            raise TypeError(f"the law {name_of(law)} cannot be copied: {error}") from error
+        # Most runs need no second one.
+        fresh = law
+    return Laws(lambda: left.pop() if left else copied(fresh), name_of(law))
 
 
 class Progress:
@@ -141,32 +190,6 @@ class Progress:
         self._map.close()
 
 
-def described(failure: InstanceError) -> dict[str, str]:
-    """Describes a failure as the orchestrator describes those of its own instances."""
-    component = "controller" if failure.fmu == REFERENCE else "plant"
-    call = failure.call.removeprefix("fmi2")
-    message = str(failure).removeprefix(f"{failure.fmu}: ")
-    return {"component": component, "call": call[:1].lower() + call[1:], "message": message}
-
-
-def check(request: dict[str, Any]) -> None:
-    """Refuses loops that are not those of `ClosedLoop`."""
-    connections = {(source, target) for source, target in request["connections"]}
-    is_direct = (
-        request["order"] == ["controller", "plant"]
-        and request["coupling"] == "sequential"
-        and all(component["every"] == 1 for component in request["components"].values())
-        and connections == DIRECT
-        and request["start"] == 0.0
-    )
-    if not is_direct:
-        raise ValueError(
-            "a law in Python flies a plant and a controller that are connected directly, as in the "
-            f'experiment "lqr", from t = 0; here {", ".join(request["order"])} are stepped '
-            f"({request['coupling']}), with {len(connections)} connections"
-        )
-
-
 class PickledLaw:
     """A law that can be sent to other processes, in which each run gets a fresh copy of it."""
 
@@ -196,6 +219,6 @@ class PickledLaw:
         self.key = f"{self.name} {digest.hexdigest()[:32]}"
         """Name and hash, under which the orchestrator keeps what the law has flown."""
 
-    def __call__(self) -> Law:
-        law: Law = pickle.loads(self.content)
-        return law
+    def laws(self, case: int | None = None) -> Laws:
+        """Returns the laws of flights in this process."""
+        return Laws(lambda: pickle.loads(self.content), self.key, case)

@@ -13,9 +13,11 @@ import numpy as np
 import numpy.typing as npt
 import pandas as pd
 
-from ._data import FMUS, experiment_path, fmu_path
-from ._experiment import Value, written
+from ._data import experiment_path
+from ._experiment import Value, changes
+from ._law import laws_of
 from ._orchestrator import OrchestratorError, orchestrate
+from ._state import Law
 
 if TYPE_CHECKING:
     import control
@@ -80,6 +82,7 @@ def linearise(
     *,
     fmu: Mapping[str, str | os.PathLike[str]] | None = None,
     step: float | None = None,
+    law: Law | None = None,
 ) -> OpenLoop:
     """Linearises an experiment at an instant of its run.
 
@@ -94,11 +97,14 @@ def linearise(
         set: Parameters by component.parameter.
         fmu: FMUs that replace those of components.
         step: Length of the communication step, s.
+        law: Law in Python that replaces the controller, as in `experiment`. Its memory is copied
+            with the state of the loop (`copy.deepcopy`; a function that encloses variables by
+            cloudpickle, if that is installed).
 
     Raises:
         OrchestratorError: The experiment was refused, or its run failed.
     """
-    found = answer(["linearise"], name, at, open, set, fmu, step)
+    found = answer(["linearise"], name, at, open, set, fmu, step, law)
     sides = found.get("sides")
     return open_loop(
         found,
@@ -117,6 +123,7 @@ def margins(
     *,
     fmu: Mapping[str, str | os.PathLike[str]] | None = None,
     step: float | None = None,
+    law: Law | None = None,
 ) -> pd.DataFrame:
     """Computes the stability margins of an experiment at an instant of its run.
 
@@ -131,6 +138,9 @@ def margins(
         set: Parameters by component.parameter.
         fmu: FMUs that replace those of components.
         step: Length of the communication step, s.
+        law: Law in Python that replaces the controller, as in `experiment`. Its memory is copied
+            with the state of the loop (`copy.deepcopy`; a function that encloses variables by
+            cloudpickle, if that is installed).
 
     Returns:
         One row for each signal, with the loops of the others closed, and one for all together:
@@ -143,7 +153,7 @@ def margins(
     Raises:
         OrchestratorError: The experiment was refused, or its run failed.
     """
-    found = answer(["margins", "--json"], name, at, open, set, fmu, step)
+    found = answer(["margins", "--json"], name, at, open, set, fmu, step, law)
     rows = found["loops"] + ([found["together"]] if found["together"] else [])
 
     def value(crossing: dict[str, float] | None) -> float:
@@ -174,18 +184,14 @@ def answer(
     set: Mapping[str, Value] | None,
     fmu: Mapping[str, str | os.PathLike[str]] | None,
     step: float | None,
+    law: Law | None,
 ) -> dict[str, Any]:
     """The orchestrator's answer."""
-    arguments = [*command, experiment_path(name), "--at", repr(float(at)), "--fmu-dir", str(FMUS)]
+    arguments = [*command, experiment_path(name), *changes(set, fmu, law, at=at, step=step)]
     for signal in [open] if isinstance(open, str) else open:
         arguments += ["--open", signal]
-    for component, replacement in (fmu or {}).items():
-        arguments += ["--fmu", f"{component}={fmu_path(replacement)}"]
-    for parameter, value in (set or {}).items():
-        arguments += ["--set", f"{parameter}={written(parameter, value)}"]
-    if step is not None:
-        arguments += ["--step", repr(float(step))]
-    exit_code, error, text = orchestrate(arguments, 4)
+    laws = None if law is None else laws_of(law)
+    exit_code, error, text = orchestrate(arguments, 4, laws=laws)
     if exit_code != 0:
         raise OrchestratorError(error, exit_code, None)
     found: dict[str, Any] = json.loads(text)

@@ -1,4 +1,4 @@
-"""The orchestrator as another process: it is run, or it asks for runs that are flown here."""
+"""The orchestrator as another process, which may ask laws of this one for moments."""
 
 from __future__ import annotations
 
@@ -11,14 +11,11 @@ import tempfile
 import warnings
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Any
 
-import numpy as np
-import numpy.typing as npt
-
 from ._data import program
+from ._law import Laws
 from ._run import Run
 
 
@@ -39,18 +36,22 @@ class OrchestratorWarning(UserWarning):
 
 
 def orchestrate(
-    arguments: Sequence[str], stacklevel: int, level: str = "warn"
+    arguments: Sequence[str], stacklevel: int, level: str = "warn", laws: Laws | None = None
 ) -> tuple[int, str, str]:
     """Runs the orchestrator. Returns its exit code, the text of its error, and what it printed.
     Its warnings are Python warnings, as many levels of calls further up as `stacklevel` says; with
-    the level "error" there are none."""
+    the level "error" there are none. With `laws`, these give the moment in place of the controller;
+    an error of them ends the orchestrator and is raised."""
+    environment = {**os.environ, "RUST_LOG": level if laws is None else "error"}
+    if laws is not None:
+        return converse([str(program()), *arguments, "--law", laws.key], environment, laws)
     with subprocess.Popen(
         [str(program()), *arguments],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
         encoding="utf-8",
-        env={**os.environ, "RUST_LOG": level},
+        env=environment,
     ) as process:
         try:
             printed, said = process.communicate()
@@ -61,6 +62,43 @@ def orchestrate(
     for text in re.findall(r"^ *WARN (.+)$", messages, re.MULTILINE):
         warnings.warn(text, OrchestratorWarning, stacklevel=stacklevel)
     return process.returncode, reason(process.returncode, error, said), printed
+
+
+def converse(command: list[str], environment: dict[str, str], laws: Laws) -> tuple[int, str, str]:
+    """Runs the orchestrator, and lets laws answer its messages."""
+    head = laws.HEAD
+    with tempfile.TemporaryFile() as messages:
+        with subprocess.Popen(
+            command,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=messages,
+            env=environment,
+        ) as process:
+            assert process.stdin is not None and process.stdout is not None
+            try:
+                # What is shorter was cut off by the end of the orchestrator.
+                while len(message := process.stdout.read(head.size)) == head.size:
+                    kind, number, time, length = head.unpack(message)
+                    if len(told := process.stdout.read(length)) < length:
+                        break
+                    answer = laws.answer(kind, number, time, told)
+                    if answer is not None:
+                        process.stdin.write(answer)
+                        process.stdin.flush()
+            except BrokenPipeError:
+                # The orchestrator has ended, and its messages say why.
+                pass
+            except BaseException:
+                close(process.stdin)
+                end(process)
+                raise
+            # What an orchestrator that has ended did not read is not written at the end.
+            close(process.stdin)
+        messages.seek(0)
+        said = messages.read().decode(errors="replace")
+    error = reason(process.returncode, said.partition("error: ")[2], said)
+    return process.returncode, error, laws.printed.decode()
 
 
 PATIENCE = 2.0
@@ -91,48 +129,6 @@ def manner(exit_code: int) -> str:
         return f"was ended by {signal.Signals(-exit_code).name}"
     except ValueError:
         return f"was ended by signal {-exit_code}"
-
-
-@dataclass(frozen=True)
-class Rows:
-    """Values of the variables of a run that was flown here, a row for each communication point."""
-
-    values: npt.NDArray[np.float64]
-    failure: dict[str, str] | None = None
-    """Failure of an FMU that ended the run at the last row: "component", "call", "message"."""
-
-
-def serve(arguments: Sequence[str], fly: Callable[[dict[str, Any]], Rows]) -> tuple[int, str]:
-    """Runs the orchestrator, and flies the runs that it asks for. Returns its exit code and the
-    text of its error. An error of `fly` ends the orchestrator and is raised."""
-    with tempfile.TemporaryFile() as messages:
-        with subprocess.Popen(
-            [str(program()), *arguments],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=messages,
-            env={**os.environ, "RUST_LOG": "error"},
-        ) as process:
-            assert process.stdin is not None and process.stdout is not None
-            try:
-                for line in process.stdout:
-                    rows = fly(json.loads(line))
-                    head = {"rows": len(rows.values), "failure": rows.failure}
-                    process.stdin.write(json.dumps(head).encode() + b"\n")
-                    process.stdin.write(rows.values.astype("<f8").tobytes())
-                    process.stdin.flush()
-            except BrokenPipeError:
-                # The orchestrator has ended, and its messages say why.
-                pass
-            except BaseException:
-                close(process.stdin)
-                end(process)
-                raise
-            # What an orchestrator that has ended did not read is not written at the end.
-            close(process.stdin)
-        messages.seek(0)
-        text = messages.read().decode(errors="replace")
-        return process.returncode, reason(process.returncode, text.partition("error: ")[2], text)
 
 
 def close(pipe: IO[bytes]) -> None:

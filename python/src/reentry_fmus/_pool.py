@@ -44,7 +44,7 @@ class Worker:
             env={**os.environ, **temporary},
             **apart,
         )
-        begin = {"law": law.content, "command": command, "progress": notes}
+        begin = {"law": law.content, "key": law.key, "command": command, "progress": notes}
         self._unsent: list[object] = [sys.path, begin]
 
     def fly(self, arguments: list[str]) -> None:
@@ -62,8 +62,6 @@ class Worker:
             raise LawError(*error).in_file(self._law.file)
         if kind == "orchestrator":
             raise OrchestratorError(error[0], error[1], None)
-        if kind == "value":
-            raise ValueError(error)
         if kind == "other":
             raise RuntimeError(error)
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import signal
 import traceback
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from traceback import FrameSummary
 
@@ -17,9 +17,27 @@ Law = Callable[["State"], npt.ArrayLike]
 """Function from the state to the moment: roll, pitch and yaw, shape (3,), N m."""
 
 
+class Inputs(Mapping[str, float]):
+    """Values by the names of variables."""
+
+    def __init__(self, places: Mapping[str, int], values: Vector) -> None:
+        self._places = places
+        self._values = values
+
+    def __getitem__(self, name: str) -> float:
+        return float(self._values[self._places[name]])
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._places)
+
+    def __len__(self) -> int:
+        return len(self._places)
+
+
 @dataclass(frozen=True, eq=False)
 class State:
-    """State of the loop at one communication point. All arrays have the shape (3,)."""
+    """State of the loop at one communication point, as the controller knows it: attitude and rate
+    may be measured or estimated. All arrays have the shape (3,)."""
 
     time: float
     """Time, s."""
@@ -28,7 +46,8 @@ class State:
     """Angle of attack, sideslip angle and bank angle, rad."""
 
     attitude_rate: Vector
-    """Time derivative of the attitude, rad/s."""
+    """Time derivative of the attitude, rad/s. In an experiment it is that of body rates and
+    attitude, without the turn of the trajectory."""
 
     rate: Vector
     """Body rates p, q, r, rad/s."""
@@ -45,6 +64,10 @@ class State:
     moment: Vector
     """Roll, pitch and yaw moment of the last step, N m. Before the first step it is the
     controller's initial moment, or zero without a controller."""
+
+    inputs: Mapping[str, float] = field(default_factory=dict)
+    """In an experiment, all inputs of the controller by name, such as "knownMoment.x" (N m) or
+    "trajectory.headingRate" (rad/s). One that is not connected has its start value."""
 
 
 SENT = "<dynamic-code>"

@@ -40,14 +40,14 @@ def main() -> None:
 
 
 def serve(
-    tasks: BinaryIO, answers: BinaryIO, law: bytes, command: list[str], progress: Path
+    tasks: BinaryIO, answers: BinaryIO, law: bytes, key: str, command: list[str], progress: Path
 ) -> None:
     """Flies part after part."""
-    from ._law import Flyer, Progress
-    from ._orchestrator import serve as orchestrate
+    from ._law import Laws, Progress
+    from ._orchestrator import orchestrate
     from ._state import LawError
 
-    fly: Flyer | None = None
+    laws = Laws(lambda: pickle.loads(law), key, progress=Progress(progress))
     while True:
         try:
             arguments: list[str] = pickle.load(tasks)
@@ -55,19 +55,14 @@ def serve(
             break
         answer: Answer
         try:
-            fly = fly or Flyer(lambda: pickle.loads(law), progress=Progress(progress))
-            exit_code, error = orchestrate([*command, *arguments], fly)
+            exit_code, error, _ = orchestrate([*command, *arguments], 1, laws=laws)
             answer = ("orchestrator", (error, exit_code)) if exit_code else ("done", None)
         except LawError as failed:
             answer = ("law", failed.args)
-        except ValueError as failed:
-            answer = ("value", str(failed))
         except BaseException as failed:
             answer = ("other", f"{type(failed).__name__}: {failed}")
         pickle.dump(answer, answers)
         answers.flush()
-    if fly is not None:
-        fly.close()
 
 
 if __name__ == "__main__":

@@ -12,7 +12,8 @@ mod vehicle;
 pub use crate::watch::OnInvalid;
 pub use fmi_master::wiring::Coupling;
 pub use measures::{Curve, Guarantee, Loss, Margins, Measure, MeasureKind, Observe, Panel, Scaled};
-pub use overrides::{Given, Overrides};
+pub(crate) use overrides::CONTROLLER;
+pub use overrides::{Given, Overrides, name_of};
 pub use protection::Protection;
 pub use vehicle::Vehicle;
 
@@ -57,6 +58,10 @@ pub struct Experiment {
     /// Parameters that the command line sets, as `component.parameter`.
     #[serde(skip)]
     pub assigned: BTreeSet<String>,
+    /// Law in another program that takes the place of that of the controller: its name, and what
+    /// identifies it.
+    #[serde(skip)]
+    pub law: Option<String>,
     /// Settings of the command line that name no component of the experiment.
     #[serde(skip)]
     pub unplaced: Vec<String>,

@@ -8,6 +8,16 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use toml::{Spanned, Value};
 
+/// Component whose law another program may replace.
+pub(crate) const CONTROLLER: &str = "controller";
+/// FMU that stands in for such a law: it gives reference, sampling period and limits.
+const STAND_IN: &str = "LQR";
+
+/// Returns the name of a law in another program: the first word of what identifies it.
+pub fn name_of(law: &str) -> &str {
+    law.split_whitespace().next().unwrap_or_default()
+}
+
 /// Settings of an experiment that the command line may change.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Overrides {
@@ -15,6 +25,9 @@ pub struct Overrides {
     pub set: Vec<String>,
     /// FMUs in place of those of components, as `component=file`.
     pub fmu: Vec<String>,
+    /// Law in another program that takes the place of that of the controller: its name, and what
+    /// identifies it.
+    pub law: Option<String>,
     /// Stop time of the simulation, s.
     pub stop: Option<f64>,
     /// Length of the communication step, s.
@@ -101,7 +114,8 @@ impl Experiment {
             // The command line decides for components that decide for themselves, too.
             self.components.values_mut().for_each(|component| component.isolate = None);
         }
-        for assignment in &overrides.fmu {
+        let stand_in = overrides.law.is_some().then(|| format!("{CONTROLLER}={STAND_IN}"));
+        for assignment in overrides.fmu.iter().chain(&stand_in) {
             let refuse =
                 |message: String| Error::experiment(format!("--fmu {assignment}: {message}"));
             let (name, fmu) = assignment.split_once('=').ok_or_else(|| {
@@ -121,13 +135,16 @@ impl Experiment {
                 |file| file.to_string_lossy().into_owned(),
             );
             let (new, old) = (stem(&file), stem(component.fmu.get_ref()));
-            if new != old {
+            if let Some(law) = overrides.law.as_deref().filter(|_| name == CONTROLLER) {
+                self.title = format!("law {} in place of {old}: {}", name_of(law), self.title);
+            } else if new != old {
                 // The title of the file is about another FMU.
                 self.title = format!("{new} in place of {old}: {}", self.title);
             }
             self.given.fmu.push(name.to_string());
             (component.fmu, component.is_exchanged) = (Spanned::new(0..0, file), true);
         }
+        self.law = overrides.law.clone().or(self.law.take());
         for assignment in &overrides.set {
             let malformed = || {
                 Error::experiment(format!(
@@ -155,18 +172,6 @@ impl Experiment {
             }
         }
         Ok(())
-    }
-}
-
-impl Experiment {
-    /// Puts the name of a law that another program flies into the title, in place of the FMU that
-    /// stands for it: the last one of the command line.
-    pub fn name_law(&mut self, law: &str, overrides: &Overrides) {
-        let stand_in = overrides.fmu.last().and_then(|assignment| assignment.split_once('='));
-        let prefix = stand_in.map(|(_, fmu)| format!("{} in place of ", stem(fmu)));
-        let rest = prefix.and_then(|prefix| self.title.strip_prefix(&prefix).map(String::from));
-        let rest = rest.unwrap_or_else(|| format!("the controller: {}", self.title));
-        self.title = format!("law {law} in place of {rest}");
     }
 }
 

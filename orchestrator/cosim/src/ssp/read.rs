@@ -221,6 +221,7 @@ pub fn load(path: &Path, overrides: &Overrides) -> Result<Loaded, Error> {
         isolation: Protection::default(),
         leaves_inputs_open: true,
         assigned: BTreeSet::new(),
+        law: None,
         unplaced: Vec::new(),
         given: Given::default(),
         source: Source::plain(path, text),

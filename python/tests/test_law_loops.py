@@ -1,0 +1,234 @@
+"""Laws in Python in every loop and by every function that flies one, against LQR.fmu."""
+
+import subprocess
+
+import numpy as np
+import pytest
+from laws import lqr
+from laws import pd as pd_law
+from reentry_fmus import LawError, OrchestratorError, experiment, falsify, linearise, margins, reproduce
+from reentry_fmus._data import experiment_path, program
+from test_campaign import CAMPAIGN
+
+ANGLES = [f"plant.attitude.{axis}" for axis in ("alpha", "beta", "sigma")]
+STUDY = """
+title = "LQR with another start"
+paper = "none"
+summary = "One run of three cases."
+values = []
+
+[[run]]
+id = "start"
+label = "LQR"
+color = "#0072b2"
+experiment = "{lqr}"
+cases = 3
+
+[[run.vary]]
+parameter = "plant.disturbance.seed"
+case = 1
+"""
+# The law in Python knows no turn of the trajectory, so that the FMU is not told of it either.
+ENTRY = """
+extends = '{base}'
+
+connections = [
+    {{ from = "plant.motion.*", to = "guidance.motion.*" }},
+    {{ from = "plant.load.*", to = "guidance.load.*" }},
+    {{ from = "guidance.reference.*", to = "controller.reference.external.*" }},
+    {{ from = "guidance.referenceRate.*", to = "controller.reference.externalRate.*" }},
+    {{ from = "guidance.referenceAcceleration.*", to = "controller.reference.externalAcceleration.*" }},
+    {{ from = "guidance.reference.alpha", to = "plant.trim.alpha" }},
+    {{ from = "plant.airMoment.*", to = "controller.knownMoment.*" }},
+    {{ from = "plant.attitude.*", to = "controller.attitude.*" }},
+    {{ from = "plant.rate.*", to = "controller.rate.*" }},
+    {{ from = "controller.moment.*", to = "plant.moment.*" }},
+]
+
+[components.controller]
+unconnected = ["achievedMoment.*", "trajectory.*"]
+
+[components.controller.parameters]
+"trajectory.earthRate" = 0.0
+"""
+
+
+def without_known_moment(state):
+    """LQR as its FMU flies with `knownMoment.*`: the moment that it asks for less the known one."""
+    known = [state.inputs[f"knownMoment.{axis}"] for axis in "xyz"]
+    return lqr(state) - np.array(known)
+
+
+@pytest.fixture
+def entry(tmp_path):
+    path = tmp_path / "entry.toml"
+    path.write_text(ENTRY.format(base=experiment_path("from-120km")))
+    return path
+
+
+@pytest.mark.filterwarnings("ignore")
+@pytest.mark.parametrize(
+    ("name", "changes", "stop", "within"),
+    [
+        ("lqr", {}, None, 1e-12),
+        ("crmpc-robust", {}, None, 1e-12),
+        # Several steps in a period of the law, and angles and rates that are estimated.
+        ("estimator", {"controller.measurement.age": 0.0}, None, 1e-12),
+        # Jets that are switched let roundings grow.
+        ("two-loop-smc/allocated", {}, 2.0, 1e-7),
+    ],
+)
+def test_oracle_a_law_flies_every_loop_as_its_fmu(name, changes, stop, within):
+    inertia = {"Ixx": 588791.0, "Iyy": 1303212.0, "Izz": 1534163.0, "Ixz": 24242.0}
+    changes |= {f"controller.inertia.{key}": value for key, value in inertia.items()}
+    by_law = experiment(name, set=changes, stop=stop, law=lqr)
+    by_fmu = experiment(name, set=changes, stop=stop, fmu={"controller": "LQR"})
+    assert np.abs(by_law.table[ANGLES].to_numpy() - by_fmu.table[ANGLES].to_numpy()).max() < within
+    assert by_law.table.shape == by_fmu.table.shape and len(by_law.table) > 100
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_oracle_a_law_flies_an_entry_as_its_fmu(entry):
+    by_law = experiment(entry, stop=400.0, law=without_known_moment)
+    by_fmu = experiment(entry, stop=400.0, fmu={"controller": "LQR"})
+    assert np.abs(by_law.table[ANGLES].to_numpy() - by_fmu.table[ANGLES].to_numpy()).max() < 1e-12
+    assert np.ptp(by_law.table["guidance.command.bank"]) > 0.05
+
+
+def test_a_law_sees_every_input_of_its_controller(entry):
+    seen = []
+
+    def law(state):
+        seen.append((state.time, dict(state.inputs), state.attitude, state.reference))
+        return lqr(state)
+
+    run = experiment(entry, stop=40.0, law=law)
+    assert len(seen) == 1000 and [time for time, *_ in seen[:2]] == [0.0, 0.04]
+    for row, (_, inputs, attitude, reference) in zip(range(0, 40), seen[::25], strict=True):
+        recorded = run.table.iloc[row]
+        assert inputs["attitude.alpha"] == attitude[0] == recorded["plant.attitude.alpha"]
+        assert inputs["reference.external.sigma"] == reference[2] == recorded["controller.reference.sigma"]
+        assert inputs["rate.q"] == recorded["plant.rate.q"]
+    assert seen[-1][1]["knownMoment.y"] != 0.0 and seen[0][1]["trajectory.headingRate"] == 0.0
+
+
+def test_a_law_is_asked_once_in_its_period():
+    times = []
+
+    def law(state):
+        times.append(state.time)
+        return pd_law(state)
+
+    for step, period, asked in [(0.04, 0.04, 50), (0.01, 0.04, 50), (0.01, 0.02, 100), (0.2, 0.04, 10)]:
+        times.clear()
+        experiment("lqr", set={"controller.period.feedback": period}, step=step, stop=2.0, law=law)
+        assert len(times) == asked and np.allclose(np.diff(times), max(step, period))
+
+
+# Linear models
+
+
+class Filtered:
+    """A law with a memory: the error is filtered before it acts."""
+
+    def __init__(self):
+        self.error = np.zeros(3)
+
+    def __call__(self, state):
+        self.error += 0.2 * (state.attitude - state.reference - self.error)
+        a = -0.25 * self.error - 0.8 * state.attitude_rate
+        return np.array([0.6e6 * -a[2], 1.3e6 * a[0], 1.5e6 * -a[1]])
+
+
+def enclosed():
+    law = Filtered()
+    return lambda state: law(state)
+
+
+def test_oracle_margins_of_a_law_are_those_of_its_fmu():
+    at = {"at": 10.0, "open": "plant.moment.*", "set": {"plant.disturbance.kind": "none"}}
+    mine, packaged = margins("lqr", law=lqr, **at), margins("lqr", **at)
+    assert np.allclose(mine, packaged, rtol=1e-5, equal_nan=True) and mine.attrs["stable"]
+
+
+@pytest.mark.parametrize("make", [Filtered, enclosed])
+def test_oracle_the_memory_of_a_law_is_part_of_its_linear_model(make):
+    """The model has the pole of the filter, and the law itself is as it was."""
+    law = make()
+    loop = linearise("lqr", at=10.0, open="plant.moment.*", law=law, set={"plant.disturbance.kind": "none"})
+    assert len(loop.states) == 9
+    assert np.sum(np.isclose(np.linalg.eigvals(loop.a), 0.8, atol=1e-4)) == 3
+    if make is Filtered:
+        assert not law.error.any()
+
+
+# Other functions
+
+
+def test_a_search_flies_a_law(tmp_path):
+    (tmp_path / "gusts.toml").write_text(CAMPAIGN)
+    by_law = falsify(tmp_path / "gusts.toml", out=tmp_path / "law", jobs=1, law=lqr)
+    by_fmu = falsify(tmp_path / "gusts.toml", out=tmp_path / "fmu", jobs=1)
+    assert by_law.outcome["largest"] == pytest.approx(by_fmu.outcome["largest"], rel=1e-9)
+    assert not by_law.table["rate"].equals(by_fmu.table["rate"])
+    run = experiment(by_law.worst, law=lqr)
+    rate = [run.table[f"plant.rate.{axis}"] for axis in "pqr"]
+    largest = np.degrees(np.sqrt(np.square(rate).sum(axis=0))).max()
+    assert largest == pytest.approx(by_law.outcome["largest"], rel=1e-9)
+
+
+def test_a_study_flies_a_law(tmp_path):
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "study.toml").write_text(STUDY.format(lqr=experiment_path("lqr")))
+    by_law = reproduce(tmp_path / "mine", out=tmp_path / "law", law=lqr)
+    by_fmu = reproduce(tmp_path / "mine", out=tmp_path / "fmu")
+    both = [study.runs["start"]["ems_deg"].to_numpy() for study in (by_law, by_fmu)]
+    assert len(both[0]) == 3 and np.allclose(*both, rtol=1e-9)
+    # What one law has flown is not taken for another's.
+    other = reproduce(tmp_path / "mine", out=tmp_path / "law", law=pd_law)
+    assert not np.allclose(other.runs["start"]["ems_deg"], both[0])
+
+
+# Failure
+
+
+def fails(state):
+    if state.time > 0.5:
+        raise ZeroDivisionError("so")
+    return [0.0, 0.0, 0.0]
+
+
+@pytest.mark.parametrize(
+    "fly",
+    [
+        lambda folder, law: experiment("lqr", law=law),
+        lambda folder, law: experiment("estimator", law=law),
+        lambda folder, law: margins("lqr", at=10.0, open="plant.moment.*", law=law),
+        lambda folder, law: linearise("lqr", at=10.0, open="plant.moment.*", law=law),
+        lambda folder, law: falsify(folder / "gusts.toml", out=folder / "out", law=law),
+        lambda folder, law: reproduce(folder, out=folder / "out", law=law),
+    ],
+)
+def test_an_error_of_a_law_is_one_wherever_it_flies(fly, tmp_path):
+    (tmp_path / "gusts.toml").write_text(CAMPAIGN)
+    (tmp_path / "study.toml").write_text(STUDY.format(lqr=experiment_path("lqr")))
+    with pytest.raises(LawError, match="the law fails failed .*at t = 0.52 s: ZeroDivisionError: so") as caught:
+        fly(tmp_path, fails)
+    assert caught.value.time == pytest.approx(0.52) and 'raise ZeroDivisionError("so")' in str(caught.value)
+
+
+def test_what_a_law_cannot_fly_is_refused(tmp_path):
+    with pytest.raises(TypeError, match="leave out its FMU"):
+        experiment("lqr", law=pd_law, fmu={"controller": "FBL"})
+    with pytest.raises(TypeError, match="a law is a function from the state to the moment, not 3"):
+        margins("lqr", at=10.0, open="plant.moment.*", law=3)
+    law = Filtered()
+    law.lock = (value for value in ())
+    with pytest.raises(TypeError, match="the law Filtered cannot be copied"):
+        margins("lqr", at=10.0, open="plant.moment.*", law=law)
+    # A single run needs no copy.
+    assert experiment("lqr", stop=1.0, law=law).metrics["samples"] == 26
+    show = subprocess.run([program(), "show", experiment_path("lqr")], capture_output=True, text=True, check=True)
+    (tmp_path / "other.toml").write_text(show.stdout.replace("controller", "autopilot"))
+    with pytest.raises(OrchestratorError, match='there is no component "controller"; there are: autopilot'):
+        experiment(tmp_path / "other.toml", law=pd_law)
