@@ -52,8 +52,8 @@ def judged(flown: Flown) -> Judgement:
     with Folder() as temporary:
         out = temporary / "out"
         with asked(flown, temporary, out) as (process, variables):
-            rows = np.column_stack([flown.columns[name] for name, _ in variables] or [[]])
-            _, said = process.communicate(rows.astype("<f8").tobytes())
+            rows = [flown.columns[name] for name, _ in variables]
+            _, said = process.communicate(np.array(rows, "<f8").T.tobytes())
         # A run in which the attitude was lost is judged up to then.
         if process.returncode not in (0, LOST):
             error = said.decode(errors="replace").partition("error: ")[2]
