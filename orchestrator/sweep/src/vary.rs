@@ -24,44 +24,46 @@ pub struct Vary {
     /// Smallest and largest value of a uniform distribution. An integer parameter gets integers,
     /// both ends included.
     #[schemars(with = "Option<[cosim::experiment::Scalar; 2]>")]
-    pub uniform: Option<Spanned<[Value; 2]>>,
+    pub uniform: Option<[Value; 2]>,
     /// Mean and standard deviation of a normal distribution.
-    #[schemars(with = "Option<Normal>")]
-    pub normal: Option<Spanned<Normal>>,
+    pub normal: Option<Normal>,
     /// Median and spread of a log-normal distribution.
-    #[serde(default)]
-    #[schemars(with = "Option<LogNormal>")]
-    pub log_normal: Option<Spanned<LogNormal>>,
+    pub log_normal: Option<LogNormal>,
     /// Smallest, most likely and largest value of a triangular distribution.
-    #[serde(default)]
     #[schemars(with = "Option<[cosim::experiment::Scalar; 3]>")]
-    pub triangular: Option<Spanned<[Value; 3]>>,
+    pub triangular: Option<[Value; 3]>,
     /// Values that are equally likely, unless `weights` are given: numbers, texts, items of an
     /// enumeration or truth values.
     #[schemars(with = "Option<Vec<cosim::experiment::Scalar>>")]
-    pub list: Option<Spanned<Vec<Value>>>,
+    pub list: Option<Vec<Value>>,
     /// Equally spaced values, equally likely.
-    #[serde(default)]
-    #[schemars(with = "Option<Range>")]
-    pub range: Option<Spanned<Range>>,
+    pub range: Option<Range>,
     /// Magnitude of a value whose sign is plus or minus.
     #[schemars(with = "Option<cosim::experiment::Scalar>")]
-    pub sign: Option<Spanned<Value>>,
+    pub sign: Option<Value>,
     /// First of consecutive integers: the parameter is this number plus that of the case, as for
     /// seeds. With another `seed` of the file than 1 they begin elsewhere.
-    #[schemars(with = "Option<i64>")]
-    pub case: Option<Spanned<i64>>,
+    pub case: Option<i64>,
     /// Lower and upper bound at which a continuous distribution is truncated.
-    #[serde(default)]
     #[schemars(with = "Option<[cosim::experiment::Scalar; 2]>")]
-    pub within: Option<Spanned<[Value; 2]>>,
+    pub within: Option<[Value; 2]>,
     /// Probabilities of the values of `list`, which are scaled to a sum of 1.
-    #[schemars(with = "Option<Vec<f64>>")]
-    pub weights: Option<Spanned<Vec<f64>>>,
+    pub weights: Option<Vec<f64>>,
     /// Number of levels of a continuous distribution in a factorial design, equally spaced in
     /// probability, ends included.
-    #[serde(default)]
     pub levels: Option<u32>,
+}
+
+/// The one distribution that a [`Vary`] asks for.
+pub(crate) enum Asked<'a> {
+    Uniform(&'a [Value; 2]),
+    Normal(&'a Normal),
+    LogNormal(&'a LogNormal),
+    Triangular(&'a [Value; 3]),
+    List { values: &'a [Value], weights: Option<&'a [f64]> },
+    Range(&'a Range),
+    Sign(&'a Value),
+    Case(i64),
 }
 
 impl Vary {
@@ -69,6 +71,38 @@ impl Vary {
     pub fn names(&self) -> impl Iterator<Item = &String> {
         let shared = self.parameter.iter().flat_map(|names| names.get_ref().names());
         self.each.iter().map(Spanned::get_ref).chain(shared)
+    }
+
+    /// Returns the distribution that the keys ask for.
+    ///
+    /// # Errors
+    /// Returns an error if there is not exactly one, or if it is no list but has weights.
+    pub(crate) fn asked(&self) -> Result<Asked<'_>, String> {
+        let list = |values| Asked::List { values, weights: self.weights.as_deref() };
+        let keys = [
+            ("uniform", self.uniform.as_ref().map(Asked::Uniform)),
+            ("normal", self.normal.as_ref().map(Asked::Normal)),
+            ("log_normal", self.log_normal.as_ref().map(Asked::LogNormal)),
+            ("triangular", self.triangular.as_ref().map(Asked::Triangular)),
+            ("list", self.list.as_deref().map(list)),
+            ("range", self.range.as_ref().map(Asked::Range)),
+            ("sign", self.sign.as_ref().map(Asked::Sign)),
+            ("case", self.case.map(Asked::Case)),
+        ];
+        let names = keys.each_ref().map(|(name, _)| *name).join(", ");
+        let given = keys.into_iter().filter_map(|(name, asked)| Some((name, asked?)));
+        let (given, mut asked): (Vec<&str>, Vec<Asked>) = given.unzip();
+        match asked.pop() {
+            Some(asked) if given.len() == 1 => match asked {
+                Asked::List { .. } => Ok(asked),
+                _ if self.weights.is_some() => Err("weights are for a list only".into()),
+                _ => Ok(asked),
+            },
+            none => {
+                let said = none.map_or("none".into(), |_| given.join(" and "));
+                Err(format!("one distribution is needed ({names}), but there is {said}"))
+            }
+        }
     }
 }
 

@@ -1,11 +1,12 @@
 //! Reads the distribution of a parameter, with units converted.
 
-use super::shape::{Seeds, Shape};
-use crate::vary::{Range, Vary};
+use super::shape::{Seeds, Shape, Whole};
+use crate::vary::{Asked, LogNormal, Normal, Range};
 use cosim::system::System;
 use cosim::variation::{SettingValue, Target};
 use fmi_master::description::VariableKind;
-use statrs::distribution::{LogNormal, Normal, Triangular};
+use statrs::distribution as statrs;
+use std::fmt::Display;
 use toml::Value;
 
 /// Largest number of values of a range.
@@ -20,92 +21,108 @@ pub(super) struct Reader<'a> {
 }
 
 impl Reader<'_> {
-    pub(super) fn shape(&self, vary: &Vary) -> Result<Shape, String> {
-        let given = [
-            ("uniform", vary.uniform.is_some()),
-            ("normal", vary.normal.is_some()),
-            ("log_normal", vary.log_normal.is_some()),
-            ("triangular", vary.triangular.is_some()),
-            ("list", vary.list.is_some()),
-            ("range", vary.range.is_some()),
-            ("sign", vary.sign.is_some()),
-            ("case", vary.case.is_some()),
-        ];
-        let chosen: Vec<&str> =
-            given.iter().filter(|(_, is_given)| *is_given).map(|(name, _)| *name).collect();
-        if chosen.len() != 1 {
-            let names = given.map(|(name, _)| name).join(", ");
-            let said = if chosen.is_empty() { "none".into() } else { chosen.join(" and ") };
-            return Err(format!("one distribution is needed ({names}), but there is {said}"));
+    pub(super) fn shape(&self, asked: &Asked) -> Result<Shape, String> {
+        match asked {
+            Asked::Uniform(ends) => self.uniform(ends),
+            Asked::Normal(normal) => self.normal(normal),
+            Asked::LogNormal(log_normal) => self.log_normal(log_normal),
+            Asked::Triangular(corners) => self.triangular(corners),
+            Asked::List { values, weights } => self.list(values, *weights),
+            Asked::Range(range) => self.range(range),
+            Asked::Sign(size) => self.sign(size),
+            Asked::Case(first) => self.seeds(*first),
         }
-        let kind = &self.system.variable(self.target).kind;
-        if !matches!(kind, VariableKind::Real { .. })
-            && matches!(chosen[0], "normal" | "log_normal" | "triangular")
-        {
-            return Err(format!(
-                "{} is for parameters of type Real, not {}",
-                chosen[0],
-                kind.name()
-            ));
-        }
-        if let Some(uniform) = &vary.uniform {
-            return self.uniform(uniform.get_ref(), kind);
-        }
-        if let Some(normal) = &vary.normal {
-            let normal = normal.get_ref();
-            let (mean, deviation) =
-                (self.number(&normal.mean)?, self.difference(&normal.deviation)?);
-            let normal = Normal::new(mean, deviation);
-            return normal
-                .map(Shape::Normal)
-                .map_err(|_| format!("normal: deviation = {deviation}, but it must be above 0"));
-        }
-        if let Some(log_normal) = &vary.log_normal {
-            let log_normal = log_normal.get_ref();
-            let (median, sigma) = (self.number(&log_normal.median)?, finite(log_normal.sigma)?);
-            if median <= 0.0 {
-                return Err(format!("log_normal: median = {median}, but it must be above 0"));
+    }
+
+    fn kind(&self) -> &VariableKind {
+        &self.system.variable(self.target).kind
+    }
+
+    /// Refuses a distribution of real numbers for a parameter of another type.
+    fn check_real(&self, distribution: &str) -> Result<(), String> {
+        match self.kind() {
+            VariableKind::Real { .. } => Ok(()),
+            kind => {
+                Err(format!("{distribution} is for parameters of type Real, not {}", kind.name()))
             }
-            return LogNormal::new(median.ln(), sigma)
-                .map(Shape::LogNormal)
-                .map_err(|_| format!("log_normal: sigma = {sigma}, but it must be above 0"));
         }
-        if let Some(triangular) = &vary.triangular {
-            let [low, mode, high] = triangular.get_ref();
-            let [low, mode, high] = [self.number(low)?, self.number(mode)?, self.number(high)?];
-            return Triangular::new(low, high, mode).map(Shape::Triangular).map_err(|_| {
+    }
+
+    fn uniform(&self, [low, high]: &[Value; 2]) -> Result<Shape, String> {
+        match self.kind() {
+            VariableKind::Integer { .. } => {
+                let whole = |value: &Value| match self.setting(value)? {
+                    SettingValue::Integer(value) => Ok(value),
+                    other => Err(format!("uniform: {} is no integer", other.to_json())),
+                };
+                let (low, high) = (whole(low)?, whole(high)?);
+                if low < high { Ok(Shape::Whole([low, high])) } else { Err(reversed(low, high)) }
+            }
+            VariableKind::Real { .. } => {
+                let (low, high) = (self.number(low)?, self.number(high)?);
+                match statrs::Uniform::new(low, high) {
+                    Ok(uniform) if low < high && (high - low).is_finite() => {
+                        Ok(Whole::Uniform(uniform).into())
+                    }
+                    _ => Err(reversed(low, high)),
+                }
+            }
+            kind => Err(format!("uniform is for numbers, not for {}: use a list", kind.name())),
+        }
+    }
+
+    fn normal(&self, normal: &Normal) -> Result<Shape, String> {
+        self.check_real("normal")?;
+        let mean = self.number(&normal.mean)?;
+        let deviation = self.difference(&normal.deviation)?;
+        statrs::Normal::new(mean, deviation)
+            .map(|normal| Whole::Normal(normal).into())
+            .map_err(|_| format!("normal: deviation = {deviation}, but it must be above 0"))
+    }
+
+    fn log_normal(&self, log_normal: &LogNormal) -> Result<Shape, String> {
+        self.check_real("log_normal")?;
+        let median = self.number(&log_normal.median)?;
+        let sigma = finite(log_normal.sigma)?;
+        if median <= 0.0 {
+            return Err(format!("log_normal: median = {median}, but it must be above 0"));
+        }
+        statrs::LogNormal::new(median.ln(), sigma)
+            .map(|log_normal| Whole::LogNormal(log_normal).into())
+            .map_err(|_| format!("log_normal: sigma = {sigma}, but it must be above 0"))
+    }
+
+    fn triangular(&self, [low, mode, high]: &[Value; 3]) -> Result<Shape, String> {
+        self.check_real("triangular")?;
+        let [low, mode, high] = [self.number(low)?, self.number(mode)?, self.number(high)?];
+        statrs::Triangular::new(low, high, mode)
+            .map(|triangular| Whole::Triangular(triangular).into())
+            .map_err(|_| {
                 format!(
                     "triangular = [{low}, {mode}, {high}]: the values must be the smallest, the most likely and the largest one"
                 )
-            });
+            })
+    }
+
+    fn list(&self, values: &[Value], weights: Option<&[f64]>) -> Result<Shape, String> {
+        let values =
+            values.iter().map(|value| self.setting(value)).collect::<Result<Vec<_>, _>>()?;
+        let is_twice = |place: &usize| values[..*place].contains(&values[*place]);
+        if let Some(twice) = (0..values.len()).find(is_twice) {
+            return Err(format!(
+                "list: {} is there twice; weights make a value more likely",
+                values[twice].to_json()
+            ));
         }
-        if let Some(list) = &vary.list {
-            let values = list.get_ref().iter().map(|value| self.setting(value));
-            let values = values.collect::<Result<Vec<_>, _>>()?;
-            let is_twice =
-                |(place, value): &(usize, &SettingValue)| values[..*place].contains(value);
-            if let Some((_, twice)) = values.iter().enumerate().find(is_twice) {
-                return Err(format!(
-                    "list: {} is there twice; weights make a value more likely",
-                    twice.to_json()
-                ));
-            }
-            return weighted(
-                values,
-                vary.weights.as_ref().map(|weights| weights.get_ref().as_slice()),
-            );
+        weighted(values, weights)
+    }
+
+    fn sign(&self, size: &Value) -> Result<Shape, String> {
+        let size = self.number(size)?;
+        if size <= 0.0 {
+            return Err(format!("sign = {size}: it is a magnitude, which must be above 0"));
         }
-        if let Some(range) = &vary.range {
-            return self.range(range.get_ref());
-        }
-        if let Some(sign) = &vary.sign {
-            let size = self.number(sign.get_ref())?;
-            if size <= 0.0 {
-                return Err(format!("sign = {size}: it is a magnitude, which must be above 0"));
-            }
-            return weighted(vec![self.checked(-size)?, self.checked(size)?], None);
-        }
-        self.seeds(vary.case.as_ref().map_or(0, |first| *first.get_ref()))
+        weighted(vec![self.checked(-size)?, self.checked(size)?], None)
     }
 
     fn range(&self, range: &Range) -> Result<Shape, String> {
@@ -123,42 +140,14 @@ impl Reader<'_> {
     }
 
     fn seeds(&self, first: i64) -> Result<Shape, String> {
-        let kind = &self.system.variable(self.target).kind;
-        let VariableKind::Integer { min, max } = kind else {
-            return Err(format!("case is for parameters of type Integer, not {}", kind.name()));
+        let VariableKind::Integer { min, max } = self.kind() else {
+            let kind = self.kind().name();
+            return Err(format!("case is for parameters of type Integer, not {kind}"));
         };
         self.setting(&Value::Integer(first))?;
         let least = min.map_or(first.min(0), i64::from);
         let most = max.map_or(i64::from(i32::MAX), i64::from);
         Ok(Shape::Case(Seeds::new(first, [least, most], self.seed)))
-    }
-
-    fn uniform(&self, ends: &[Value; 2], kind: &VariableKind) -> Result<Shape, String> {
-        let reversed = |low: &dyn std::fmt::Display, high: &dyn std::fmt::Display| {
-            format!("uniform = [{low}, {high}]: the second value must be larger than the first one")
-        };
-        let [low, high] = ends;
-        if matches!(kind, VariableKind::Integer { .. }) {
-            let whole = |value: &Value| match self.setting(value)? {
-                SettingValue::Integer(value) => Ok(value),
-                other => Err(format!("uniform: {} is no integer", other.to_json())),
-            };
-            let (low, high) = (whole(low)?, whole(high)?);
-            return if low < high {
-                Ok(Shape::Whole([low, high]))
-            } else {
-                Err(reversed(&low, &high))
-            };
-        }
-        if !matches!(kind, VariableKind::Real { .. }) {
-            return Err(format!("uniform is for numbers, not for {}: use a list", kind.name()));
-        }
-        let (low, high) = (self.number(low)?, self.number(high)?);
-        if low < high && (high - low).is_finite() {
-            Ok(Shape::Uniform([low, high]))
-        } else {
-            Err(reversed(&low, &high))
-        }
     }
 
     /// Converts a value; text with a percent sign stands for percent of the experiment's value.
@@ -218,7 +207,7 @@ impl Reader<'_> {
 
     /// Checks a number against the limits of the variable.
     pub(super) fn checked(&self, value: f64) -> Result<SettingValue, String> {
-        let is_real = matches!(self.system.variable(self.target).kind, VariableKind::Real { .. });
+        let is_real = matches!(self.kind(), VariableKind::Real { .. });
         let written = if is_real || value.fract() != 0.0 {
             Value::Float(value)
         } else {
@@ -226,6 +215,10 @@ impl Reader<'_> {
         };
         self.system.value(self.target, &written)
     }
+}
+
+fn reversed(low: impl Display, high: impl Display) -> String {
+    format!("uniform = [{low}, {high}]: the second value must be larger than the first one")
 }
 
 fn finite(number: f64) -> Result<f64, String> {
@@ -254,5 +247,5 @@ fn weighted(values: Vec<SettingValue>, weights: Option<&[f64]>) -> Result<Shape,
         reached += weight / sum;
         reached
     });
-    Ok(Shape::List(values, sums.collect()))
+    Ok(Shape::List { sums: sums.collect(), values })
 }

@@ -1,21 +1,32 @@
 //! The shapes of distributions, and their quantile functions.
 
+use crate::design::Place;
+use crate::texts::short;
 use cosim::variation::SettingValue;
-use statrs::distribution::{ContinuousCDF, LogNormal, Normal, Triangular};
+use statrs::distribution::{ContinuousCDF, LogNormal, Normal, Triangular, Uniform};
+use statrs::statistics::{Distribution as _, Max, Min, Mode};
+
+/// Smallest part of a distribution that a truncation may leave, as a share of all up to there.
+const SMALLEST: f64 = 1e-9;
 
 /// Shape of a distribution.
 #[derive(Clone, Debug)]
 pub(super) enum Shape {
-    Uniform([f64; 2]),
+    Continuous(Continuous),
     /// Integers, both ends included.
     Whole([i32; 2]),
-    Normal(Normal),
-    LogNormal(LogNormal),
-    Triangular(Triangular),
     /// Values with the probabilities up to and including each of them.
-    List(Vec<SettingValue>, Vec<f64>),
+    List {
+        values: Vec<SettingValue>,
+        sums: Vec<f64>,
+    },
     /// Consecutive integers, one for each case.
     Case(Seeds),
+}
+
+/// Returns the number of integers between two, both included.
+pub(super) fn count([low, high]: [i32; 2]) -> u64 {
+    u64::from(high.abs_diff(low)) + 1
 }
 
 /// Seeds that differ from case to case, and from one sweep to another.
@@ -52,38 +63,123 @@ impl Seeds {
     }
 }
 
-impl Shape {
-    pub(super) fn ends(&self) -> Option<[f64; 2]> {
+/// A continuous distribution, which may be truncated.
+#[derive(Clone, Debug)]
+pub(super) struct Continuous {
+    whole: Whole,
+    /// Probabilities between which the quantiles lie.
+    between: [f64; 2],
+    /// Smallest and largest value, if there are any.
+    pub(super) ends: Option<[f64; 2]>,
+    /// Number of levels in a factorial design.
+    pub(super) levels: Option<u64>,
+}
+
+/// A continuous distribution before a truncation.
+#[derive(Clone, Debug)]
+pub(super) enum Whole {
+    Uniform(Uniform),
+    Normal(Normal),
+    LogNormal(LogNormal),
+    Triangular(Triangular),
+}
+
+impl Whole {
+    fn function(&self) -> &dyn ContinuousCDF<f64, f64> {
         match self {
-            Self::Uniform(ends) => Some(*ends),
-            Self::Whole(ends) => Some(ends.map(f64::from)),
-            Self::Triangular(distribution) => {
-                Some([distribution.inverse_cdf(0.0), distribution.inverse_cdf(1.0)])
+            Self::Uniform(distribution) => distribution,
+            Self::Normal(distribution) => distribution,
+            Self::LogNormal(distribution) => distribution,
+            Self::Triangular(distribution) => distribution,
+        }
+    }
+
+    fn ends(&self) -> Option<[f64; 2]> {
+        let ends = [self.function().min(), self.function().max()];
+        ends.iter().all(|end| end.is_finite()).then_some(ends)
+    }
+}
+
+impl From<Whole> for Shape {
+    fn from(whole: Whole) -> Self {
+        let ends = whole.ends();
+        Self::Continuous(Continuous { whole, between: [0.0, 1.0], ends, levels: None })
+    }
+}
+
+impl Continuous {
+    /// Cuts off what lies outside two values.
+    ///
+    /// # Errors
+    /// Returns an error if next to nothing is left.
+    pub(super) fn truncate(&mut self, low: f64, high: f64) -> Result<(), String> {
+        if low >= high {
+            return Err(format!(
+                "within = [{low}, {high}]: the second value must be larger than the first one"
+            ));
+        }
+        let [from, to] = [low, high].map(|value| self.whole.function().cdf(value));
+        // Of a smaller part of the upper tail, few values could be told apart.
+        if to - from <= SMALLEST * to {
+            return Err(format!(
+                "within = [{low}, {high}]: the distribution has next to no values between them"
+            ));
+        }
+        self.between = [from, to];
+        let [least, most] = self.bounds();
+        self.ends = Some([low.max(least), high.min(most)]);
+        Ok(())
+    }
+
+    /// Returns the ends, which are infinite if there are none.
+    fn bounds(&self) -> [f64; 2] {
+        self.ends.unwrap_or([f64::NEG_INFINITY, f64::INFINITY])
+    }
+
+    pub(super) fn value(&self, place: Place) -> f64 {
+        let last_level = self.levels.map_or(0, |levels| levels - 1);
+        match place {
+            Place::End(is_last) => self.ends.map_or(f64::NAN, |ends| ends[usize::from(is_last)]),
+            Place::Level(level) if level == 0 || level >= last_level => {
+                self.value(Place::End(level > 0))
             }
-            _ => None,
+            Place::Level(level) => self.value(Place::Quantile(level as f64 / last_level as f64)),
+            Place::Quantile(unit) => {
+                let [from, to] = self.between;
+                let mut unit = from + unit * (to - from);
+                if self.whole.ends().is_none() {
+                    // The ends of an unbounded distribution are infinite.
+                    unit = unit.clamp(f64::MIN_POSITIVE, 1.0 - f64::EPSILON / 2.0);
+                }
+                let [low, high] = self.bounds();
+                self.whole.function().inverse_cdf(unit).clamp(low, high)
+            }
         }
     }
 
-    /// Returns the probability of values up to this one.
-    pub(super) fn below(&self, value: f64) -> f64 {
-        match self {
-            Self::Uniform([low, high]) => ((value - low) / (high - low)).clamp(0.0, 1.0),
-            Self::Normal(distribution) => distribution.cdf(value),
-            Self::LogNormal(distribution) => distribution.cdf(value),
-            Self::Triangular(distribution) => distribution.cdf(value),
-            Self::Whole(_) | Self::List(..) | Self::Case { .. } => f64::NAN,
-        }
-    }
-
-    pub(super) fn quantile(&self, unit: f64) -> f64 {
-        // The ends of an unbounded distribution are infinite.
-        let inside = unit.clamp(f64::MIN_POSITIVE, 1.0 - f64::EPSILON / 2.0);
-        match self {
-            Self::Uniform([low, high]) => low + unit * (high - low),
-            Self::Normal(distribution) => distribution.inverse_cdf(inside),
-            Self::LogNormal(distribution) => distribution.inverse_cdf(inside),
-            Self::Triangular(distribution) => distribution.inverse_cdf(unit),
-            Self::Whole(_) | Self::List(..) | Self::Case { .. } => f64::NAN,
+    pub(super) fn in_words(&self) -> String {
+        let ends = |[low, high]: [f64; 2]| format!("{} to {}", short(low), short(high));
+        let number = |number: Option<f64>| short(number.unwrap_or(f64::NAN));
+        let whole = match &self.whole {
+            Whole::Uniform(uniform) => format!("uniform, {}", ends([uniform.min(), uniform.max()])),
+            Whole::Normal(normal) => {
+                let (mean, deviation) = (number(normal.mean()), number(normal.std_dev()));
+                format!("normal, mean {mean}, deviation {deviation}")
+            }
+            Whole::LogNormal(log_normal) => {
+                format!("log-normal, median {}", short(log_normal.inverse_cdf(0.5)))
+            }
+            Whole::Triangular(triangular) => format!(
+                "triangular, {}, most likely {}",
+                ends([triangular.min(), triangular.max()]),
+                number(triangular.mode())
+            ),
+        };
+        match self.ends {
+            Some(bounds) if self.whole.ends() != Some(bounds) => {
+                format!("{whole}, within {}", ends(bounds))
+            }
+            _ => whole,
         }
     }
 }
