@@ -1,6 +1,7 @@
 //! Formats numbers for a page.
 
 use crate::results::Numbers;
+use sweep::texts::trimmed;
 
 /// Formats a number with as many digits as papers print.
 pub(crate) fn shown(value: f64) -> String {
@@ -17,12 +18,7 @@ pub(crate) fn shown(value: f64) -> String {
         let digits =
             (4 - magnitude.log10().floor() as i32).clamp(0, if magnitude < 0.1 { 6 } else { 4 });
         let digits = if magnitude < 0.1 { digits - 2 } else { digits } as usize;
-        let text = format!("{value:.digits$}");
-        if text.contains('.') {
-            text.trim_end_matches('0').trim_end_matches('.').into()
-        } else {
-            text
-        }
+        trimmed(value, digits)
     };
     // A line is not broken at this sign.
     text.replace('-', "−")
@@ -58,16 +54,15 @@ pub(crate) fn difference(fractions: &Numbers) -> String {
 
 fn percent(fractions: &Numbers) -> String {
     let one = |fraction: f64| {
-        let percent = 100.0 * fraction;
-        let sign = if percent < 0.0 { "−" } else { "+" };
-        format!("{sign}{:.1}", percent.abs())
+        let sign = if fraction < 0.0 { "−" } else { "+" };
+        format!("{sign}{:.1}", 100.0 * fraction.abs())
     };
-    if fractions.vary() {
-        let (low, high) = fractions.extent();
-        format!("{}\u{a0}% [{},\u{a0}{}]", one(fractions.mean()), one(low), one(high))
-    } else {
-        format!("{}\u{a0}%", one(fractions.mean()))
+    let mean = format!("{}\u{a0}%", one(fractions.mean()));
+    if !fractions.vary() {
+        return mean;
     }
+    let (low, high) = fractions.extent();
+    format!("{mean} [{},\u{a0}{}]", one(low), one(high))
 }
 
 #[cfg(test)]

@@ -4,7 +4,7 @@
 use crate::correlation::{Correlated, correlation};
 use crate::design::{Design, Place};
 use crate::varied::{Varied, distributions};
-use crate::vary::{DesignKind, Variation};
+use crate::vary::{Correlation, DesignKind, Variation};
 use cosim::check::check;
 use cosim::document::Source;
 use cosim::error::Error;
@@ -63,31 +63,25 @@ impl Sweep {
         }
         check_twice(&varied, variation, source, &system)?;
         check_design(&varied, variation, source)?;
-        let by_name: Vec<_> =
-            varied.iter().map(|entry| (entry.name.as_str(), &entry.distribution)).collect();
-        let correlation = correlation(variation.correlations, source, &by_name)?;
+        let correlation = correlation(variation.correlations, source, &varied)?;
         let levels = varied.iter().map(|entry| {
-            let fault = |problem| {
-                source.error(&entry.span, format!("[[vary]] \"{}\": {problem}", entry.name))
-            };
-            match variation.design {
-                DesignKind::Factorial => entry.distribution.levels().map_err(fault),
-                DesignKind::Corners => entry.distribution.check_ends().map(|()| 0).map_err(fault),
+            let levels = match variation.design {
+                DesignKind::Factorial => entry.distribution.levels(),
+                DesignKind::Corners => entry.distribution.check_ends().map(|()| 0),
                 _ => Ok(0),
-            }
+            };
+            levels.map_err(|problem| entry.refusal(&problem, source))
         });
         let levels = levels.collect::<Result<Vec<_>, _>>()?;
         let design = Design::new(variation.design, variation.seed, variation.cases, levels)
             .map_err(|problem| source.error(&(0..0), problem))?;
         let samples = design.sample(design.cases().saturating_sub(1)) + 1;
-        let repeats = |entry: &&Varied| entry.distribution.seeds().is_some_and(|of| of < samples);
-        if let Some(entry) = varied.iter().find(repeats) {
-            let seeds = entry.distribution.seeds().unwrap_or_default();
-            let problem =
-                format!("case: {samples} cases need a seed each, but it takes {seeds} only");
-            return Err(
-                source.error(&entry.span, format!("[[vary]] \"{}\": {problem}", entry.name))
-            );
+        for entry in &varied {
+            if let Some(seeds) = entry.distribution.seeds().filter(|seeds| *seeds < samples) {
+                let problem =
+                    format!("case: {samples} cases need a seed each, but it takes {seeds} only");
+                return Err(entry.refusal(&problem, source));
+            }
         }
         let single = system.components.iter().find(|component| {
             let interface = component.fmu.description.co_simulation.as_ref();
@@ -153,10 +147,10 @@ impl Sweep {
     /// Returns the changes that these values make to the system.
     pub fn changes(&self, values: &[SettingValue]) -> Vec<(Target, SettingValue)> {
         let each = self.varied.iter().zip(values);
-        each.flat_map(|(varied, value)| {
+        let changes = each.flat_map(|(varied, value)| {
             varied.targets.iter().map(|target| (*target, value.clone()))
-        })
-        .collect()
+        });
+        changes.collect()
     }
 
     /// Writes a case as the text of an experiment that extends the one of the campaign.
@@ -164,36 +158,36 @@ impl Sweep {
     /// # Errors
     /// Returns an error if the text cannot be written as TOML.
     pub fn experiment_of(&self, title: &str, values: &[SettingValue]) -> Result<String, Error> {
+        let fault = |error: toml::ser::Error| Error::experiment(error.to_string());
         let mut table: toml::Table = toml::from_str(self.experiment.source.whole())
             .map_err(|error| Error::experiment(error.to_string()))?;
         table.remove("extends");
         table.remove("unset");
         table.insert("title".into(), title.into());
         // The command line may have changed it.
-        let simulation = toml::Value::try_from(&self.experiment.simulation);
-        let simulation = simulation.map_err(|error| Error::experiment(error.to_string()))?;
+        let simulation = toml::Value::try_from(&self.experiment.simulation).map_err(fault)?;
         table.insert("simulation".into(), simulation);
         let components = table.entry("components").or_insert_with(|| toml::Table::new().into());
         for (name, component) in &self.experiment.components {
-            let entry = components.as_table_mut().and_then(|table| table.get_mut(name));
-            let Some(entry) = entry.and_then(toml::Value::as_table_mut) else { continue };
+            let entry = components.get_mut(name).and_then(toml::Value::as_table_mut);
+            let Some(entry) = entry else { continue };
             entry.insert("fmu".into(), self.archive(name).into());
             if component.is_exchanged {
                 entry.insert("exchanged".into(), true.into());
             }
-            let parameters = component.parameters.iter();
+            let set = component.parameters.iter();
             let mut parameters: toml::Table =
-                parameters.map(|(name, value)| (name.clone(), value.get_ref().clone())).collect();
+                set.map(|(name, value)| (name.clone(), value.get_ref().clone())).collect();
             for (varied, value) in self.varied.iter().zip(values) {
-                for path in &varied.paths {
-                    if let Some((_, rest)) = names::split(path).filter(|(owner, _)| owner == name) {
-                        parameters.insert(rest.into(), written(value));
-                    }
+                let paths = varied.paths.iter().filter_map(|path| names::split(path));
+                for (_, parameter) in paths.filter(|(owner, _)| owner == name) {
+                    let value = toml::Value::try_from(value.to_json()).map_err(fault)?;
+                    parameters.insert(parameter.into(), value);
                 }
             }
             entry.insert("parameters".into(), parameters.into());
         }
-        toml::to_string(&table).map_err(|error| Error::experiment(error.to_string()))
+        toml::to_string(&table).map_err(fault)
     }
 
     /// Returns what an experiment in another folder calls the archive of a component: its file name
@@ -256,41 +250,33 @@ fn check_twice(
 fn check_design(varied: &[Varied], variation: &Variation, source: &Source) -> Result<(), Error> {
     let design = json!(variation.design);
     let design = design.as_str().unwrap_or_default();
-    let (is_factorial, is_sensitivity) =
-        (variation.design == DesignKind::Factorial, variation.design == DesignKind::Sensitivity);
-    if let Some(first) = variation.correlations.first()
-        && (is_factorial || is_sensitivity)
-    {
-        let problem = "takes its parameters to be independent";
-        let message = format!("[[correlation]] the design {design} {problem}");
-        return Err(source.error(&first.between.span(), message));
+    let is_factorial = variation.design == DesignKind::Factorial;
+    let draws_all = !is_factorial && variation.design != DesignKind::Sensitivity;
+    let refused = |correlation: &Correlation, problem: &str| {
+        source.error(&correlation.between.span(), format!("[[correlation]] {problem}"))
+    };
+    if let Some(first) = variation.correlations.first().filter(|_| !draws_all) {
+        let problem = format!("the design {design} takes its parameters to be independent");
+        return Err(refused(first, &problem));
     }
     for vary in variation.vary {
-        let problem = if vary.sorted && (is_factorial || is_sensitivity) {
-            "sorted has no meaning in the design"
-        } else if vary.weights.is_some() && is_factorial {
-            "weights have no effect in the design"
-        } else if vary.levels.is_some() && !is_factorial {
-            "levels have no effect in the design"
-        } else {
-            continue;
-        };
-        let is_its = |entry: &&Varied| vary.names().any(|name| *name == entry.name);
-        let (name, span) = varied
-            .iter()
-            .find(is_its)
-            .map_or(("", 0..0), |entry| (entry.name.as_str(), entry.span.clone()));
-        return Err(source.error(&span, format!("[[vary]] \"{name}\": {problem} {design}")));
+        let faults = [
+            (vary.sorted && !draws_all, "sorted has no meaning in the design"),
+            (vary.weights.is_some() && is_factorial, "weights have no effect in the design"),
+            (vary.levels.is_some() && !is_factorial, "levels have no effect in the design"),
+        ];
+        let fault = faults.iter().find(|(is_there, _)| *is_there);
+        let entry = varied.iter().find(|entry| vary.names().any(|name| *name == entry.name));
+        if let Some(((_, problem), entry)) = fault.zip(entry) {
+            return Err(entry.refusal(&format!("{problem} {design}"), source));
+        }
     }
-    let sorted = varied.iter().enumerate().filter(|(_, entry)| entry.sorted > 0);
-    for (first, entry) in sorted {
-        let names: Vec<&String> =
-            varied[first..first + entry.sorted].iter().map(|entry| &entry.name).collect();
+    for (first, entry) in varied.iter().enumerate() {
+        let group = &varied[first..first + entry.sorted];
+        let is_sorted = |name: &String| group.iter().any(|entry| entry.name == *name);
         let mut correlations = variation.correlations.iter();
-        let both = correlations.find(|c| c.between.get_ref().iter().any(|n| names.contains(&n)));
-        if let Some(both) = both {
-            let message = "[[correlation]] sorted values cannot be correlated as well";
-            return Err(source.error(&both.between.span(), message));
+        if let Some(both) = correlations.find(|c| c.between.get_ref().iter().any(is_sorted)) {
+            return Err(refused(both, "sorted values cannot be correlated as well"));
         }
     }
     Ok(())
@@ -319,14 +305,4 @@ fn keys(system: &System, varied: &[Varied]) -> Result<BTreeMap<String, String>, 
         }
     }
     Ok(keys)
-}
-
-/// Converts a value to TOML.
-fn written(value: &SettingValue) -> toml::Value {
-    match value {
-        SettingValue::Real(value) => (*value).into(),
-        SettingValue::Integer(value) => (*value).into(),
-        SettingValue::Boolean(value) => (*value).into(),
-        SettingValue::Item(text, _) | SettingValue::Text(text) => text.as_str().into(),
-    }
 }

@@ -1,7 +1,7 @@
 //! Correlations among the parameters that vary, as a Gaussian copula.
 
 use crate::design::Place;
-use crate::distribution::Distribution;
+use crate::varied::Varied;
 use crate::vary::Correlation;
 use cosim::document::Source;
 use cosim::error::Error;
@@ -37,7 +37,7 @@ impl Correlated {
 pub(crate) fn correlation(
     correlations: &[Correlation],
     source: &Source,
-    varied: &[(&str, &Distribution)],
+    varied: &[Varied],
 ) -> Result<Option<Correlated>, Error> {
     let mut dimensions: Vec<usize> = Vec::new();
     let mut entries: Vec<([usize; 2], f64)> = Vec::new();
@@ -46,14 +46,11 @@ pub(crate) fn correlation(
         let fault = |problem: String| source.error(&span, format!("[[correlation]] {problem}"));
         let mut pair = [0; 2];
         for (place, name) in pair.iter_mut().zip(correlation.between.get_ref()) {
-            let names = varied.iter().map(|(name, _)| *name);
-            source.check_names(
-                [&Spanned::new(span.clone(), name.clone())],
-                "parameter that varies",
-                names,
-            )?;
-            let dimension = varied.iter().position(|(other, _)| other == name).unwrap_or(0);
-            if !varied[dimension].1.is_ordered() {
+            let names = varied.iter().map(|entry| entry.name.as_str());
+            let located = Spanned::new(span.clone(), name.clone());
+            source.check_names([&located], "parameter that varies", names)?;
+            let dimension = varied.iter().position(|entry| entry.name == *name).unwrap_or(0);
+            if !varied[dimension].distribution.is_ordered() {
                 return Err(fault(format!(
                     "\"{name}\" cannot be correlated, because its values have no order"
                 )));

@@ -45,12 +45,9 @@ impl Design {
         levels: Vec<u64>,
     ) -> Result<Self, String> {
         let dimensions = levels.len() as u64;
-        let required_cases =
-            cases.ok_or_else(|| "cases is missing: it is the number of cases to fly".to_string());
         let cases = match kind {
             DesignKind::Factorial => {
-                let product =
-                    levels.iter().try_fold(1_u64, |product, count| product.checked_mul(*count));
+                let product = levels.iter().try_fold(1_u64, |product, n| product.checked_mul(*n));
                 let product = product.filter(|product| u32::try_from(*product).is_ok());
                 let product =
                     product.ok_or("the levels have more combinations than can be flown")?;
@@ -61,18 +58,15 @@ impl Design {
                 }
                 product
             }
-            DesignKind::Sensitivity => {
-                let (cases, block) = (required_cases?, dimensions + 2);
-                if cases % block != 0 || cases / block < 2 {
-                    return Err(format!(
-                        "cases = {cases}: for {dimensions} parameters this design needs a multiple of {block}, at least {}",
-                        2 * block
-                    ));
-                }
-                cases
-            }
-            _ => required_cases?,
+            _ => cases.ok_or("cases is missing: it is the number of cases to fly")?,
         };
+        let block = dimensions + 2;
+        if kind == DesignKind::Sensitivity && (cases % block != 0 || cases / block < 2) {
+            return Err(format!(
+                "cases = {cases}: for {dimensions} parameters this design needs a multiple of {block}, at least {}",
+                2 * block
+            ));
+        }
         if cases > u64::from(u32::MAX) {
             return Err(format!("cases = {cases}, but there can be at most {}", u32::MAX));
         }
@@ -100,71 +94,68 @@ impl Design {
 
     /// Returns the place of a case in each dimension.
     pub fn place(&self, case: u64) -> Vec<Place> {
-        let dimensions = self.dimensions();
         match self.kind {
-            DesignKind::Random => quantiles(&self.random(case, 0)),
-            DesignKind::LatinHypercube => {
-                let within = self.random(case, 0);
-                let stratum = |(dimension, within): (usize, &f64)| {
-                    let key = mixed(self.seed, dimension as u64);
-                    let stratum = permuted(case, self.cases, key);
-                    Place::Quantile(below_one((stratum as f64 + within) / self.cases as f64))
-                };
-                within.iter().enumerate().map(stratum).collect()
-            }
-            DesignKind::Sobol => {
-                let rest = self.random(case, 0);
-                let point = |dimension: usize| {
-                    let bits = self.sobol(case as u32, dimension);
-                    let unit = f64::from(bits) + rest[dimension];
-                    Place::Quantile(below_one(unit / 2.0_f64.powi(BITS)))
-                };
-                (0..dimensions).map(point).collect()
-            }
-            DesignKind::Factorial => {
-                let mut rest = case;
-                // The last parameter changes fastest.
-                let mut places: Vec<Place> = self
-                    .levels
-                    .iter()
-                    .rev()
-                    .map(|count| {
-                        let level = rest % count;
-                        rest /= count;
-                        Place::Level(level)
-                    })
-                    .collect();
-                places.reverse();
-                places
-            }
-            DesignKind::Corners => {
-                let corners = u32::try_from(dimensions).ok().and_then(|n| 1_u64.checked_shl(n));
-                match corners.filter(|corners| *corners <= self.cases) {
-                    Some(corners) if case < corners => {
-                        (0..dimensions).map(|i| Place::End(case >> i & 1 == 1)).collect()
-                    }
-                    None if case.is_multiple_of(2) => {
-                        self.random(case, 0).iter().map(|u| Place::End(*u >= 0.5)).collect()
-                    }
-                    _ => quantiles(&self.random(case, 0)),
-                }
-            }
-            DesignKind::Sensitivity => {
-                let (sample, member) = (self.sample(case), case % self.block());
-                let (a, b) = (self.random(sample, 0), self.random(sample, 1));
-                // Members: A, B, and A with one coordinate of B each.
-                match member {
-                    0 => quantiles(&a),
-                    1 => quantiles(&b),
-                    exchanged => {
-                        let mut mixed = a;
-                        let dimension = (exchanged - 2) as usize;
-                        mixed[dimension] = b[dimension];
-                        quantiles(&mixed)
-                    }
-                }
-            }
+            DesignKind::Random => quantiles(self.random(case, 0)),
+            DesignKind::LatinHypercube => self.latin(case),
+            DesignKind::Sobol => self.sobol(case),
+            DesignKind::Factorial => self.combination(case),
+            DesignKind::Corners => self.corner(case),
+            DesignKind::Sensitivity => self.exchanged(case),
         }
+    }
+
+    fn latin(&self, case: u64) -> Vec<Place> {
+        let within = self.random(case, 0).into_iter().enumerate();
+        quantiles(within.map(|(dimension, within)| {
+            let stratum = permuted(case, self.cases, mixed(self.seed, dimension as u64));
+            below_one((stratum as f64 + within) / self.cases as f64)
+        }))
+    }
+
+    fn sobol(&self, case: u64) -> Vec<Place> {
+        let within = self.random(case, 0).into_iter().enumerate();
+        quantiles(within.map(|(dimension, within)| {
+            let bits = self.sobol_bits(case as u32, dimension);
+            below_one((f64::from(bits) + within) / 2.0_f64.powi(BITS))
+        }))
+    }
+
+    fn combination(&self, case: u64) -> Vec<Place> {
+        let mut rest = case;
+        let mut places: Vec<u64> = self.levels.clone();
+        // The last parameter changes fastest.
+        for place in places.iter_mut().rev() {
+            let count = *place;
+            *place = rest % count;
+            rest /= count;
+        }
+        places.into_iter().map(Place::Level).collect()
+    }
+
+    fn corner(&self, case: u64) -> Vec<Place> {
+        let dimensions = self.dimensions();
+        let corners = u32::try_from(dimensions).ok().and_then(|n| 1_u64.checked_shl(n));
+        let random = self.random(case, 0);
+        match corners.filter(|corners| *corners <= self.cases) {
+            Some(corners) if case < corners => {
+                (0..dimensions).map(|i| Place::End(case >> i & 1 == 1)).collect()
+            }
+            None if case.is_multiple_of(2) => {
+                random.into_iter().map(|unit| Place::End(unit >= 0.5)).collect()
+            }
+            _ => quantiles(random),
+        }
+    }
+
+    /// Returns a member of a sample: A, B, or A with one coordinate of B.
+    fn exchanged(&self, case: u64) -> Vec<Place> {
+        let sample = self.sample(case);
+        let member = (case % self.block()) as usize;
+        let mut point = self.random(sample, u64::from(member == 1));
+        if let Some(dimension) = member.checked_sub(2) {
+            point[dimension] = self.random(sample, 1)[dimension];
+        }
+        quantiles(point)
     }
 
     /// Returns the number of the sample that a case belongs to. The cases of a sample of a
@@ -191,7 +182,7 @@ impl Design {
     }
 
     /// Returns a coordinate of a point of Sobol's sequence, scrambled by Owen's method.
-    fn sobol(&self, index: u32, dimension: usize) -> u32 {
+    fn sobol_bits(&self, index: u32, dimension: usize) -> u32 {
         let gray = index ^ (index >> 1);
         let directions = self.directions[dimension].iter().enumerate();
         let point = directions
@@ -201,8 +192,8 @@ impl Design {
     }
 }
 
-fn quantiles(units: &[f64]) -> Vec<Place> {
-    units.iter().copied().map(Place::Quantile).collect()
+fn quantiles(units: impl IntoIterator<Item = f64>) -> Vec<Place> {
+    units.into_iter().map(Place::Quantile).collect()
 }
 
 /// Rounding must not turn a number below 1 into 1.

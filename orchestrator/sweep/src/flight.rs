@@ -166,9 +166,7 @@ impl<'a> Flight<'a> {
         let mut watch =
             Watch { meters: &mut self.meters, bounds: &self.bounds, broken: None, time: None };
         let mut observers: Vec<&mut dyn Observer> = Vec::with_capacity(1 + others.len());
-        for other in others.iter_mut() {
-            observers.push(&mut **other);
-        }
+        observers.extend(others.iter_mut().map(|other| &mut **other as &mut dyn Observer));
         // The watch comes last, because it may end the case.
         observers.push(&mut watch);
         let mut step_us = Vec::new();
@@ -301,28 +299,18 @@ pub fn columns(sweep: &Sweep, cases: &[(u64, &[SettingValue])]) -> Vec<Column> {
 }
 
 fn typed<'a>(kind: &Type, values: impl Iterator<Item = &'a SettingValue>) -> Values {
+    let values = values.map(SettingValue::to_json);
     match kind {
-        Type::Real { .. } => Values::Real(
-            values
-                .map(|value| if let SettingValue::Real(value) = value { *value } else { f64::NAN })
-                .collect(),
-        ),
-        Type::Integer { .. } => Values::Integer(
-            values
-                .map(|value| if let SettingValue::Integer(value) = value { *value } else { 0 })
-                .collect(),
-        ),
-        Type::Boolean => {
-            Values::Flag(values.map(|value| matches!(value, SettingValue::Boolean(true))).collect())
+        Type::Real { .. } => {
+            Values::Real(values.map(|value| value.as_f64().unwrap_or(f64::NAN)).collect())
         }
-        Type::Enumeration { .. } | Type::String => Values::Text(
-            values
-                .map(|value| match value {
-                    SettingValue::Item(text, _) | SettingValue::Text(text) => text.clone(),
-                    _ => String::new(),
-                })
-                .collect(),
-        ),
+        Type::Integer { .. } => {
+            Values::Integer(values.map(|value| value.as_i64().unwrap_or(0) as i32).collect())
+        }
+        Type::Boolean => Values::Flag(values.map(|value| value == true).collect()),
+        Type::Enumeration { .. } | Type::String => {
+            Values::Text(values.map(|value| value.as_str().unwrap_or_default().into()).collect())
+        }
     }
 }
 

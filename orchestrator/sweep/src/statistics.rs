@@ -2,7 +2,6 @@
 
 use serde::Serialize;
 use statrs::distribution::{Beta, Binomial, ContinuousCDF, DiscreteCDF};
-use std::ops::RangeInclusive;
 
 /// Confidence of the intervals in a report.
 pub const CONFIDENCE: f64 = 0.95;
@@ -130,16 +129,15 @@ fn quantile(sorted: &[f64], probability: f64) -> Quantile {
     let tail = (1.0 - CONFIDENCE) / 2.0;
     // Largest r with P(fewer than r values below) <= tail, and smallest s with P(at least s values
     // below) <= tail; the values with these ranks are the ends.
-    let ranks = 0..=n as u64;
-    let r = first(&ranks, |count| below.cdf(count) > tail);
-    let s = first(&ranks, |count| below.sf(count) <= tail) + 1;
+    let r = first(n as u64, |count| below.cdf(count) > tail);
+    let s = first(n as u64, |count| below.sf(count) <= tail) + 1;
     let value_at = |rank: u64| sorted.get((rank as usize).checked_sub(1)?).copied();
     Quantile { low: value_at(r), high: value_at(s), ..none }
 }
 
-/// Returns the first number in a range from which on a condition holds, or the last one.
-fn first(range: &RangeInclusive<u64>, holds: impl Fn(u64) -> bool) -> u64 {
-    let (mut low, mut high) = (*range.start(), *range.end());
+/// Returns the first number from which on a condition holds, or `high` if there is none below.
+fn first(mut high: u64, holds: impl Fn(u64) -> bool) -> u64 {
+    let mut low = 0;
     while low < high {
         let middle = low + (high - low) / 2;
         if holds(middle) {

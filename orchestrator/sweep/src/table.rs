@@ -6,7 +6,7 @@ mod guard;
 pub use file::{Reader, Writer};
 
 use cosim::files;
-use parquet::basic::{Repetition, Type as Physical};
+use parquet::basic::Type as Physical;
 use parquet::column::writer::ColumnWriter;
 use parquet::data_type::ByteArray;
 use parquet::errors::ParquetError;
@@ -31,17 +31,24 @@ pub enum Values {
     Text(Vec<String>),
 }
 
+/// Evaluates the same expression for the values of a column, whatever their type.
+macro_rules! for_any {
+    ($column:expr, $values:ident => $result:expr) => {
+        match $column {
+            Values::Real($values) => $result,
+            Values::Optional($values) => $result,
+            Values::Count($values) => $result,
+            Values::Integer($values) => $result,
+            Values::Flag($values) => $result,
+            Values::Text($values) => $result,
+        }
+    };
+}
+
 impl Values {
     /// Returns the number of values.
     pub fn len(&self) -> usize {
-        match self {
-            Self::Real(values) => values.len(),
-            Self::Optional(values) => values.len(),
-            Self::Count(values) => values.len(),
-            Self::Integer(values) => values.len(),
-            Self::Flag(values) => values.len(),
-            Self::Text(values) => values.len(),
-        }
+        for_any!(self, values => values.len())
     }
 
     /// Returns whether there are no values.
@@ -69,80 +76,57 @@ impl Values {
 
     /// Returns a value as JSON.
     pub fn json(&self, row: usize) -> Value {
-        match self {
-            Self::Real(values) => json!(values[row]),
-            Self::Optional(values) => json!(values[row]),
-            Self::Count(values) => json!(values[row]),
-            Self::Integer(values) => json!(values[row]),
-            Self::Flag(values) => json!(values[row]),
-            Self::Text(values) => json!(values[row]),
-        }
+        for_any!(self, values => json!(values[row]))
     }
 
     /// Moves the values of another column of the same type behind these.
     fn append(&mut self, other: Self) -> Result<(), ParquetError> {
         match (self, other) {
-            (Self::Real(values), Self::Real(mut more)) => values.append(&mut more),
-            (Self::Optional(values), Self::Optional(mut more)) => values.append(&mut more),
-            (Self::Count(values), Self::Count(mut more)) => values.append(&mut more),
-            (Self::Integer(values), Self::Integer(mut more)) => values.append(&mut more),
-            (Self::Flag(values), Self::Flag(mut more)) => values.append(&mut more),
-            (Self::Text(values), Self::Text(mut more)) => values.append(&mut more),
+            (Self::Real(values), Self::Real(more)) => values.extend(more),
+            (Self::Optional(values), Self::Optional(more)) => values.extend(more),
+            (Self::Count(values), Self::Count(more)) => values.extend(more),
+            (Self::Integer(values), Self::Integer(more)) => values.extend(more),
+            (Self::Flag(values), Self::Flag(more)) => values.extend(more),
+            (Self::Text(values), Self::Text(more)) => values.extend(more),
             _ => return Err(ParquetError::General("columns of different types".into())),
         }
         Ok(())
     }
 
-    /// Splits off the first `count` values.
-    fn take(&mut self, count: usize) -> Self {
-        fn first<T>(values: &mut Vec<T>, count: usize) -> Vec<T> {
-            let rest = values.split_off(count.min(values.len()));
-            std::mem::replace(values, rest)
-        }
+    fn physical(&self) -> Physical {
         match self {
-            Self::Real(values) => Self::Real(first(values, count)),
-            Self::Optional(values) => Self::Optional(first(values, count)),
-            Self::Count(values) => Self::Count(first(values, count)),
-            Self::Integer(values) => Self::Integer(first(values, count)),
-            Self::Flag(values) => Self::Flag(first(values, count)),
-            Self::Text(values) => Self::Text(first(values, count)),
+            Self::Real(_) | Self::Optional(_) => Physical::DOUBLE,
+            Self::Count(_) => Physical::INT64,
+            Self::Integer(_) => Physical::INT32,
+            Self::Flag(_) => Physical::BOOLEAN,
+            Self::Text(_) => Physical::BYTE_ARRAY,
         }
     }
 
-    fn physical(&self) -> (Physical, Repetition) {
-        match self {
-            Self::Real(_) => (Physical::DOUBLE, Repetition::REQUIRED),
-            Self::Optional(_) => (Physical::DOUBLE, Repetition::OPTIONAL),
-            Self::Count(_) => (Physical::INT64, Repetition::REQUIRED),
-            Self::Integer(_) => (Physical::INT32, Repetition::REQUIRED),
-            Self::Flag(_) => (Physical::BOOLEAN, Repetition::REQUIRED),
-            Self::Text(_) => (Physical::BYTE_ARRAY, Repetition::REQUIRED),
-        }
-    }
-
-    fn write(&self, writer: &mut ColumnWriter) -> Result<usize, ParquetError> {
+    /// Writes the first `count` values.
+    fn write(&self, count: usize, writer: &mut ColumnWriter) -> Result<usize, ParquetError> {
         match (self, writer) {
             (Self::Real(values), ColumnWriter::DoubleColumnWriter(writer)) => {
-                writer.write_batch(values, None, None)
+                writer.write_batch(&values[..count], None, None)
             }
             (Self::Optional(values), ColumnWriter::DoubleColumnWriter(writer)) => {
+                let values = &values[..count];
                 let present: Vec<f64> = values.iter().copied().flatten().collect();
                 let levels: Vec<i16> = values.iter().map(|v| i16::from(v.is_some())).collect();
                 writer.write_batch(&present, Some(&levels), None)
             }
             (Self::Count(values), ColumnWriter::Int64ColumnWriter(writer)) => {
-                writer.write_batch(values, None, None)
+                writer.write_batch(&values[..count], None, None)
             }
             (Self::Integer(values), ColumnWriter::Int32ColumnWriter(writer)) => {
-                writer.write_batch(values, None, None)
+                writer.write_batch(&values[..count], None, None)
             }
             (Self::Flag(values), ColumnWriter::BoolColumnWriter(writer)) => {
-                writer.write_batch(values, None, None)
+                writer.write_batch(&values[..count], None, None)
             }
             (Self::Text(values), ColumnWriter::ByteArrayColumnWriter(writer)) => {
-                let bytes: Vec<ByteArray> =
-                    values.iter().map(|text| ByteArray::from(text.as_str())).collect();
-                writer.write_batch(&bytes, None, None)
+                let bytes = values[..count].iter().map(|text| ByteArray::from(text.as_str()));
+                writer.write_batch(&bytes.collect::<Vec<_>>(), None, None)
             }
             _ => Err(ParquetError::General("a column is of another type than its values".into())),
         }
@@ -223,12 +207,10 @@ impl CaseTable {
         Ok(())
     }
 
-    fn take(&mut self, rows: usize) -> Self {
-        let column = |column: &mut Column| Column {
-            name: column.name.clone(),
-            values: column.values.take(rows),
-        };
-        Self { columns: self.columns.iter_mut().map(column).collect() }
+    fn remove_first(&mut self, rows: usize) {
+        for column in &mut self.columns {
+            for_any!(&mut column.values, values => drop(values.drain(..rows)));
+        }
     }
 }
 

@@ -12,14 +12,19 @@ pub fn short(value: f64) -> String {
     }
     let text = if (1e-3..1e6).contains(&value.abs()) {
         let digits = (3 - value.abs().log10().floor() as i32).max(0) as usize;
-        let text = format!("{value:.digits$}");
-        if text.contains('.') {
-            text.trim_end_matches('0').trim_end_matches('.').to_string()
-        } else {
-            text
-        }
+        trimmed(value, digits)
     } else {
         format!("{value:.3e}")
     };
     text.replace('-', "−")
+}
+
+/// Formats a number with at most so many digits after the point.
+pub fn trimmed(value: f64, digits: usize) -> String {
+    let text = format!("{value:.digits$}");
+    if text.contains('.') {
+        text.trim_end_matches('0').trim_end_matches('.').to_string()
+    } else {
+        text
+    }
 }

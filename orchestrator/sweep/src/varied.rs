@@ -36,6 +36,15 @@ impl Varied {
     pub fn is_seed(&self) -> bool {
         self.distribution.seeds().is_some() || is_seed(&self.name)
     }
+
+    /// Returns the error that refuses this entry of the file `source`.
+    pub fn refusal(&self, problem: &str, source: &Source) -> Error {
+        refusal(&self.name, &self.span, problem, source)
+    }
+}
+
+fn refusal(name: &str, span: &Range<usize>, problem: &str, source: &Source) -> Error {
+    source.error(span, format!("[[vary]] \"{name}\": {problem}"))
 }
 
 /// Makes the distributions of one `[[vary]]` of a sweep with this seed.
@@ -57,31 +66,27 @@ pub(crate) fn distributions(
     }
     let mut varied = Vec::new();
     for (span, paths) in groups {
-        let name = paths[0].clone();
-        let fault =
-            |problem: String| source.error(&span, format!("[[vary]] \"{name}\": {problem}"));
-        let targets = paths.iter().map(|path| {
-            system
-                .target(path)
-                .map_err(|problem| source.error(&span, format!("[[vary]] \"{path}\": {problem}")))
-        });
-        let targets = targets.collect::<Result<Vec<_>, _>>()?;
-        let variable = system.variable(targets[0]);
-        for other in &targets[1..] {
-            if system.variable(*other).kind.name() != variable.kind.name() {
-                return Err(fault("parameters that share a value must be of the same type".into()));
-            }
+        let mut targets = Vec::new();
+        for path in &paths {
+            let target = system.target(path);
+            targets.push(target.map_err(|problem| refusal(path, &span, &problem, source))?);
         }
-        let distribution = Distribution::new(vary, targets[0], system, seed).map_err(&fault)?;
-        let unit = match &variable.kind {
-            Type::Real { unit, .. } => unit.clone().unwrap_or_default(),
-            _ => String::new(),
+        let kind = &system.variable(targets[0]).kind;
+        let is_other = |target: &Target| system.variable(*target).kind.name() != kind.name();
+        let distribution = if targets.iter().any(is_other) {
+            Err("parameters that share a value must be of the same type".into())
+        } else {
+            Distribution::new(vary, targets[0], system, seed)
         };
         varied.push(Varied {
-            name: name.clone(),
-            unit,
-            kind: variable.kind.clone(),
-            distribution,
+            distribution: distribution
+                .map_err(|problem| refusal(&paths[0], &span, &problem, source))?,
+            name: paths[0].clone(),
+            unit: match kind {
+                Type::Real { unit, .. } => unit.clone().unwrap_or_default(),
+                _ => String::new(),
+            },
+            kind: kind.clone(),
             sorted: 0,
             targets,
             paths,
@@ -90,13 +95,12 @@ pub(crate) fn distributions(
     }
     if vary.sorted {
         let is_real = varied.iter().all(|entry| matches!(entry.kind, Type::Real { .. }));
-        let Some(first) = varied.first_mut().filter(|_| is_real && vary.each.len() > 1) else {
+        if !is_real || vary.each.len() < 2 {
             let span = vary.each.first().map_or(0..0, Spanned::span);
-            return Err(
-                source.error(&span, "[[vary]] sorted is for several real parameters in each")
-            );
-        };
-        first.sorted = vary.each.len();
+            let problem = "[[vary]] sorted is for several real parameters in each";
+            return Err(source.error(&span, problem));
+        }
+        varied[0].sorted = varied.len();
     }
     Ok(varied)
 }

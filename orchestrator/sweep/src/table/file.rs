@@ -4,7 +4,7 @@ use super::guard::guarded;
 use super::{CaseTable, Column, Values};
 use cosim::error::Error;
 use cosim::files::PartialFile;
-use parquet::basic::{LogicalType, Type as Physical};
+use parquet::basic::{LogicalType, Repetition, Type as Physical};
 use parquet::column::reader::{ColumnReader, ColumnReaderImpl};
 use parquet::data_type::{ByteArray, DataType};
 use parquet::errors::ParquetError;
@@ -54,8 +54,7 @@ impl Writer {
     pub fn add(&mut self, rows: CaseTable) -> Result<(), Error> {
         self.waiting.append(rows).map_err(failed(&self.path))?;
         while self.waiting.rows() >= GROUP {
-            let group = self.waiting.take(GROUP);
-            self.write(&group)?;
+            self.write(GROUP)?;
         }
         Ok(())
     }
@@ -65,9 +64,9 @@ impl Writer {
     /// # Errors
     /// Returns an error if the file cannot be written.
     pub fn finish(mut self) -> Result<(), Error> {
-        let rest = std::mem::take(&mut self.waiting);
-        if rest.rows() > 0 || self.file.is_none() {
-            self.write(&rest)?;
+        let rest = self.waiting.rows();
+        if rest > 0 || self.file.is_none() {
+            self.write(rest)?;
         }
         if let Some(mut writer) = self.file.take() {
             writer.finish().map_err(failed(&self.path))?;
@@ -75,21 +74,24 @@ impl Writer {
         self.partial.finish()
     }
 
-    fn write(&mut self, rows: &CaseTable) -> Result<(), Error> {
+    /// Writes the first rows that wait as a group.
+    fn write(&mut self, rows: usize) -> Result<(), Error> {
         let mut write = || {
-            let writer = match &mut self.file {
-                Some(writer) => writer,
-                None => self.file.insert(begin(self.partial.file(), rows, &self.metadata)?),
-            };
+            if self.file.is_none() {
+                self.file = Some(begin(self.partial.file(), &self.waiting, &self.metadata)?);
+            }
+            let Some(writer) = &mut self.file else { return Ok(()) };
             let mut group = writer.next_row_group()?;
-            for column in &rows.columns {
+            for column in &self.waiting.columns {
                 let Some(mut open) = group.next_column()? else { break };
-                column.values.write(open.untyped())?;
+                column.values.write(rows, open.untyped())?;
                 open.close()?;
             }
             group.close().map(drop)
         };
-        write().map_err(failed(&self.path))
+        write().map_err(failed(&self.path))?;
+        self.waiting.remove_first(rows);
+        Ok(())
     }
 }
 
@@ -105,7 +107,11 @@ fn begin(
         .set_key_value_metadata(Some(metadata.to_vec()));
     let mut fields = Vec::new();
     for column in &table.columns {
-        let (physical, repetition) = column.values.physical();
+        let physical = column.values.physical();
+        let repetition = match column.values {
+            Values::Optional(_) => Repetition::OPTIONAL,
+            _ => Repetition::REQUIRED,
+        };
         let is_text = physical == Physical::BYTE_ARRAY;
         if is_text {
             // Texts repeat: items of enumerations, and messages that are mostly empty.
