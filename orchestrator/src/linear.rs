@@ -183,14 +183,14 @@ fn figure(found: &Linearised, margins: &analysis::Margins) -> Result<Figure, Fai
         let problem = format!("--plot: the loop is unstable at t = {} s", rounded(found.time));
         return Err(Error::experiment(problem).into());
     };
-    let line = |name: &str, color, shape, x, y| Curve { name: name.into(), color, shape, x, y };
     // From 2 on the set has no edge.
     let alpha = worst.disk.alpha.min(1.999);
     let (x, y) = excluded(alpha);
-    let excluded = line(&format!("disk margin {alpha:.3}"), Color::LIMIT, Shape::Dashed, x, y);
-    let ratio = line(&worst.signal, Color::CURVES[0], Shape::Line, curves.phase, curves.gain);
+    let excluded =
+        Curve::new(&format!("disk margin {alpha:.3}"), Color::LIMIT, Shape::Dashed, x, y);
+    let ratio = Curve::new(&worst.signal, Color::CURVES[0], Shape::Line, curves.phase, curves.gain);
     let sensitivity =
-        line("all together", Color::INK, Shape::Line, curves.frequency, curves.sensitivity);
+        Curve::new("all together", Color::INK, Shape::Line, curves.frequency, curves.sensitivity);
     let panel = |x_label: &str, y_label: &str, log_x, curves| Panel {
         x_label: x_label.into(),
         y_label: y_label.into(),

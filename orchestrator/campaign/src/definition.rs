@@ -39,7 +39,6 @@ pub struct Campaign {
     #[serde(default = "one")]
     pub seed: u64,
     /// Number of cases, and with `until` the largest number. A factorial design needs none.
-    #[serde(default)]
     pub cases: Option<u64>,
     /// Design that places the cases in the space of the varied parameters.
     #[serde(default)]
@@ -64,7 +63,6 @@ pub struct Campaign {
     #[serde(default, rename = "limit")]
     pub limits: Vec<Limit>,
     /// Question that ends the campaign as soon as it is answered.
-    #[serde(default)]
     pub until: Option<Until>,
     /// Choice of the cases whose results are kept in full.
     #[serde(default)]
@@ -123,10 +121,8 @@ pub struct Keep {
     #[schemars(with = "Option<String>")]
     pub by: Option<Spanned<String>>,
     /// Largest number of kept cases that broke a limit, were lost or failed.
-    #[serde(default)]
     pub failed: u32,
     /// Interval m, so that every m-th case is kept.
-    #[serde(default)]
     pub every: Option<u64>,
 }
 
@@ -142,7 +138,6 @@ pub struct Search {
     #[serde(default = "thousand")]
     pub cases: u64,
     /// Value of the measure at which the search ends.
-    #[serde(default)]
     pub enough: Option<f64>,
 }
 
@@ -170,13 +165,15 @@ impl Campaign {
     /// Returns an error if a file cannot be read, is not TOML, holds an unknown key, or contradicts
     /// itself.
     pub fn load(path: &Path) -> Result<Self, Error> {
-        Self::read(Source::load(path)?)
-    }
-
-    fn read(source: Source) -> Result<Self, Error> {
+        let source = Source::load(path)?;
         let mut campaign: Self = source.read()?;
         campaign.source = source;
-        campaign.check()?;
+        campaign.check_ids()?;
+        campaign.limits.iter().try_for_each(|limit| campaign.check_limit(limit))?;
+        if let Some(until) = &campaign.until {
+            campaign.check_until(until)?;
+        }
+        campaign.check_numbers()?;
         Ok(campaign)
     }
 
@@ -186,77 +183,90 @@ impl Campaign {
         stem.map_or("campaign".into(), |stem| stem.to_string_lossy().into_owned())
     }
 
-    /// Checks what can be checked without the experiment.
-    fn check(&self) -> Result<(), Error> {
-        let whole = |message: String| self.source.error(&(0..0), message);
+    /// Returns an error that says what is wrong with a limit.
+    pub(crate) fn limit_fault(&self, limit: &Limit, problem: &str) -> Error {
+        let message = format!("[[limit]] {}: {problem}", limit.id);
+        self.source.error(&limit.measure.span(), message)
+    }
+
+    /// Returns an error that says nothing of a line of the file.
+    pub(crate) fn fault(&self, message: impl Into<String>) -> Error {
+        self.source.error(&(0..0), message)
+    }
+
+    fn check_ids(&self) -> Result<(), Error> {
         let mut ids = BTreeSet::new();
         let measures = self.measures.iter().map(|measure| ("measure", &measure.id));
         for (what, id) in measures.chain(self.limits.iter().map(|limit| ("limit", &limit.id))) {
             if id.is_empty() {
-                return Err(whole(format!("[[{what}]] has no id, which names it in the results")));
+                let problem = format!("[[{what}]] has no id, which names it in the results");
+                return Err(self.fault(problem));
             }
             if !ids.insert((what, id)) {
-                return Err(whole(format!("there are two [[{what}]] with the id \"{id}\"")));
+                return Err(self.fault(format!("there are two [[{what}]] with the id \"{id}\"")));
             }
         }
-        let mut names = self.metrics.iter().enumerate();
-        let is_twice = |(place, name): &(usize, &Spanned<String>)| {
-            self.metrics[..*place].iter().any(|other| other.get_ref() == name.get_ref())
+        let mut metrics = BTreeSet::new();
+        match self.metrics.iter().find(|name| !metrics.insert(name.get_ref())) {
+            None => Ok(()),
+            Some(twice) => {
+                let problem = format!("metrics: \"{}\" is there twice", twice.get_ref());
+                Err(self.source.error(&twice.span(), problem))
+            }
+        }
+    }
+
+    fn check_limit(&self, limit: &Limit) -> Result<(), Error> {
+        let problem = if limit.at_most.is_some() == limit.at_least.is_some() {
+            "one of at_most and at_least is needed"
+        } else if !limit.at_most.or(limit.at_least).is_some_and(f64::is_finite) {
+            "the limit is not a finite number"
+        } else if limit.ends && limit.at_most.is_none() {
+            "ends needs an at_most, because the largest value only grows"
+        } else {
+            return Ok(());
         };
-        if let Some((_, twice)) = names.find(is_twice) {
-            let problem = format!("metrics: \"{}\" is there twice", twice.get_ref());
-            return Err(self.source.error(&twice.span(), problem));
+        Err(self.limit_fault(limit, problem))
+    }
+
+    fn check_until(&self, until: &Until) -> Result<(), Error> {
+        let ids = self.limits.iter().map(|limit| limit.id.as_str());
+        if !ids.clone().any(|id| id == until.limit) {
+            let hint = names::hint(&until.limit, ids);
+            let problem = format!("[until] there is no limit \"{}\"{hint}", until.limit);
+            return Err(self.fault(problem));
         }
-        for limit in &self.limits {
-            let fault = |problem: &str| {
-                let span = limit.measure.span();
-                Err(self.source.error(&span, format!("[[limit]] {}: {problem}", limit.id)))
-            };
-            if limit.at_most.is_some() == limit.at_least.is_some() {
-                return fault("one of at_most and at_least is needed");
-            }
-            if !limit.at_most.or(limit.at_least).is_some_and(f64::is_finite) {
-                return fault("the limit is not a finite number");
-            }
-            if limit.ends && limit.at_most.is_none() {
-                return fault("ends needs an at_most, because the largest value only grows");
+        for (key, value) in [("below", until.below), ("confidence", until.confidence)] {
+            if !(value > 0.0 && value < 1.0) {
+                let problem = format!("[until] {key} = {value}, but it must be between 0 and 1");
+                return Err(self.fault(problem));
             }
         }
-        if let Some(until) = &self.until {
-            let ids = self.limits.iter().map(|limit| limit.id.as_str());
-            if !ids.clone().any(|id| id == until.limit) {
-                let hint = names::hint(&until.limit, ids);
-                return Err(whole(format!("[until] there is no limit \"{}\"{hint}", until.limit)));
-            }
-            for (key, value) in [("below", until.below), ("confidence", until.confidence)] {
-                if !(value > 0.0 && value < 1.0) {
-                    return Err(whole(format!(
-                        "[until] {key} = {value}, but it must be between 0 and 1"
-                    )));
-                }
-            }
-            if self.design != DesignKind::Random {
-                return Err(whole("[until] needs independent cases: design = \"random\"".into()));
-            }
+        if self.design != DesignKind::Random {
+            return Err(self.fault("[until] needs independent cases: design = \"random\""));
         }
-        if self.cases == Some(0) {
-            return Err(whole("cases = 0, but it must be at least 1".into()));
-        }
-        if self.keep.worst > 0 && self.keep.by.is_none() {
-            return Err(whole("[keep] worst needs by, the measure that orders the cases".into()));
-        }
+        Ok(())
+    }
+
+    fn check_numbers(&self) -> Result<(), Error> {
         if let Some(Search { cases, enough, largest }) = &self.search
             && (*cases == 0 || enough.is_some_and(f64::is_nan))
         {
             let problem = "[search] cases must be at least 1, and enough a number";
             return Err(self.source.error(&largest.span(), problem));
         }
-        if self.keep.every == Some(0) {
-            return Err(whole("[keep] every = 0, but it must be at least 1".into()));
+        let faults = [
+            (self.cases == Some(0), "cases = 0, but it must be at least 1"),
+            (
+                self.keep.worst > 0 && self.keep.by.is_none(),
+                "[keep] worst needs by, the measure that orders the cases",
+            ),
+            (self.keep.every == Some(0), "[keep] every = 0, but it must be at least 1"),
+            (self.vary.is_empty(), "nothing varies: add a [[vary]]"),
+        ];
+        match faults.into_iter().find(|(is_there, _)| *is_there) {
+            None => Ok(()),
+            Some((_, problem)) => Err(self.fault(problem)),
         }
-        if self.vary.is_empty() {
-            return Err(whole("nothing varies: add a [[vary]]".into()));
-        }
-        Ok(())
     }
 }

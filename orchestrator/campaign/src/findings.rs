@@ -84,8 +84,7 @@ pub(crate) fn findings(
     }
     let mut limits = Vec::new();
     for limit in &plan.campaign.limits {
-        let flags = table.column(&kept_column(&limit.id))?.numbers();
-        let broken = flags.iter().filter(|is_kept| **is_kept == 0.0).count() as u64;
+        let broken = breaking(table, limit)?.len() as u64;
         limits.push(LimitFinding {
             id: limit.id.clone(),
             says: says(plan, limit),
@@ -110,6 +109,13 @@ pub(crate) fn findings(
         });
     }
     Ok(Findings { title: plan.campaign.title.clone(), cases, status, limits, measures, answer })
+}
+
+/// Returns the numbers of the cases that broke a limit.
+pub(crate) fn breaking(table: &Reader, limit: &Limit) -> Result<Vec<u64>, Error> {
+    let kept = table.column(&kept_column(&limit.id))?.numbers();
+    let broke = kept.iter().enumerate().filter(|(_, is_kept)| **is_kept == 0.0);
+    Ok(broke.map(|(case, _)| case as u64).collect())
 }
 
 /// Returns the wording of a limit.
@@ -137,15 +143,12 @@ pub(crate) fn chosen(plan: &Plan, table: &Reader) -> Result<BTreeSet<u64>, Error
     if keep.failed > 0 {
         let mut broken: BTreeSet<u64> = BTreeSet::new();
         for limit in &plan.campaign.limits {
-            let flags = table.column(&kept_column(&limit.id))?.numbers();
-            broken.extend(
-                flags.iter().enumerate().filter(|(_, k)| **k == 0.0).map(|(i, _)| i as u64),
-            );
+            broken.extend(breaking(table, limit)?);
         }
         if let Values::Text(names) = table.column("status")? {
             let bad = [CaseStatus::Lost.name(), CaseStatus::Failed.name()];
-            let bad = names.iter().enumerate().filter(|(_, name)| bad.contains(&name.as_str()));
-            broken.extend(bad.map(|(i, _)| i as u64));
+            let is_bad = |case: &u64| bad.contains(&names[*case as usize].as_str());
+            broken.extend((0..table.rows()).filter(is_bad));
         }
         chosen.extend(broken.into_iter().take(keep.failed as usize));
     }

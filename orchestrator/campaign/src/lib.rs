@@ -17,3 +17,4 @@ pub mod report;
 pub mod run;
 pub mod search;
 pub mod sensitivity;
+mod track;

@@ -5,9 +5,9 @@ use crate::flight::{Flight, Row, table};
 use crate::plan::Plan;
 use cosim::error::Error as Single;
 use std::ops::Range;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use sweep::error::Error;
-use sweep::parts::{self, PartResult, PartState};
+use sweep::parts::{self, PartResult, Store};
 use sweep::table::{CaseTable, Values};
 
 /// Number of cases in a part beyond the first `FEW` cases.
@@ -24,31 +24,18 @@ pub fn parts(cases: u64) -> impl Iterator<Item = Range<u64>> {
     parts::parts(cases.min(FEW), LENGTH / 10).chain(others)
 }
 
-/// Returns the folder of the parts.
-pub fn folder(out: &Path) -> PathBuf {
-    out.join("parts")
-}
-
-/// Looks for a part.
-pub fn find(plan: &Plan, out: &Path, part: &Range<u64>) -> PartState {
-    parts::find(&folder(out), &plan.sweep.keys, part)
-}
-
-/// Reads the rows of a part.
-///
-/// # Errors
-/// Returns an error if the file was changed since it was found.
-pub fn rows(plan: &Plan, out: &Path, part: &Range<u64>) -> Result<CaseTable, Single> {
-    Ok(parts::read(&folder(out), &plan.sweep.keys, part)?.rows)
+/// Returns the parts that are kept in the folder of the results.
+pub fn store<'a>(plan: &'a Plan, out: &Path) -> Store<'a> {
+    Store { folder: out.join("parts"), keys: &plan.sweep.keys }
 }
 
 /// Returns the number of cases that broke each limit.
 pub fn broken(plan: &Plan, rows: &CaseTable) -> Vec<u64> {
-    let broken =
-        plan.campaign.limits.iter().map(|limit| match rows.column(&kept_column(&limit.id)) {
-            Some(Values::Flag(flags)) => flags.iter().filter(|is_kept| !**is_kept).count() as u64,
-            _ => 0,
-        });
+    let limits = plan.campaign.limits.iter();
+    let broken = limits.map(|limit| match rows.column(&kept_column(&limit.id)) {
+        Some(Values::Flag(flags)) => flags.iter().filter(|is_kept| !**is_kept).count() as u64,
+        _ => 0,
+    });
     broken.collect()
 }
 
@@ -82,7 +69,7 @@ pub fn fly(
     let rows = table(plan, &rows);
     let broken = broken(plan, &rows);
     let result = PartResult { rows, units: plan.units(), curves: String::new() };
-    parts::write(&folder(out), &plan.sweep.keys, part, result)?;
+    store(plan, out).write(part, result)?;
     Ok(broken)
 }
 

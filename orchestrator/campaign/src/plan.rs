@@ -4,7 +4,7 @@ use crate::changes::{Changes, Command};
 use crate::definition::{Campaign, Limit, kept_column};
 use crate::prepare::{Recorded, keys, observe, read_experiment, recorded};
 use cosim::error::Error;
-use cosim::experiment;
+use cosim::experiment::MeasureKind;
 use cosim::system::Opened;
 use cosim_report::metrics::{Meters, Metrics};
 use std::collections::BTreeSet;
@@ -58,8 +58,7 @@ impl Plan {
             recorded,
         };
         plan.check_columns()?;
-        plan.check_limits()?;
-        plan.check_measured(&measured)?;
+        plan.check_limits(&measured)?;
         Ok(plan)
     }
 
@@ -94,50 +93,31 @@ impl Plan {
         match self.recorded.iter().find(|recorded| !taken.insert(recorded.name.clone())) {
             None => Ok(()),
             Some(Recorded { name, .. }) => {
-                let problem = format!("the table of cases has two columns \"{name}\"");
-                Err(self.campaign.source.error(&(0..0), problem))
+                Err(self.campaign.fault(format!("the table of cases has two columns \"{name}\"")))
             }
         }
     }
 
-    /// Refuses limits on measures that no case can have, because FMUs that the command line names
-    /// lack the variables.
-    fn check_measured(&self, measured: &Metrics) -> Result<(), Error> {
-        let is_missing = |name: &String| {
-            self.sweep.experiment().observe.metrics.contains_key(name)
-                && !measured.units.contains_key(name)
-        };
-        let mut limits = self.campaign.limits.iter();
-        match limits.find(|limit| is_missing(limit.measure.get_ref())) {
-            None => Ok(()),
-            Some(limit) => {
-                let problem = "has no value, because an FMU lacks its variables";
-                let message =
-                    format!("[[limit]] {}: \"{}\" {problem}", limit.id, limit.measure.get_ref());
-                Err(self.campaign.source.error(&limit.measure.span(), message))
+    /// Refuses names of measures that are not recorded, and limits on measures that no case can
+    /// have, because FMUs that the command line names lack the variables.
+    fn check_limits(&self, measured: &Metrics) -> Result<(), Error> {
+        let Campaign { limits, keep, search, source, .. } = &self.campaign;
+        let referred = limits.iter().map(|limit| &limit.measure).chain(&keep.by);
+        let referred = referred.chain(search.as_ref().map(|search| &search.largest));
+        let names = self.recorded.iter().map(|recorded| recorded.name.as_str());
+        source.check_names(referred, "metric or measure", names)?;
+        for limit in limits {
+            let name = limit.measure.get_ref();
+            let measure = self.sweep.experiment().observe.metrics.get(name);
+            let is_largest = measure.is_some_and(|measure| measure.kind == MeasureKind::Largest);
+            if limit.ends && !is_largest {
+                let problem = "ends needs a measure of the kind largest, because it only grows";
+                return Err(self.campaign.limit_fault(limit, problem));
             }
-        }
-    }
-
-    fn check_limits(&self) -> Result<(), Error> {
-        let names = || self.recorded.iter().map(|recorded| recorded.name.as_str());
-        let source = &self.campaign.source;
-        let referred = self
-            .campaign
-            .limits
-            .iter()
-            .map(|limit| &limit.measure)
-            .chain(&self.campaign.keep.by)
-            .chain(self.campaign.search.as_ref().map(|search| &search.largest));
-        source.check_names(referred, "metric or measure", names())?;
-        for limit in self.campaign.limits.iter().filter(|limit| limit.ends) {
-            let measure = self.sweep.experiment().observe.metrics.get(limit.measure.get_ref());
-            if measure.is_none_or(|measure| measure.kind != experiment::MeasureKind::Largest) {
-                let message = format!(
-                    "[[limit]] {}: ends needs a measure of the kind largest, because it only grows",
-                    limit.id
-                );
-                return Err(source.error(&limit.measure.span(), message));
+            if measure.is_some() && !measured.units.contains_key(name) {
+                let problem =
+                    format!("\"{name}\" has no value, because an FMU lacks its variables");
+                return Err(self.campaign.limit_fault(limit, &problem));
             }
         }
         Ok(())

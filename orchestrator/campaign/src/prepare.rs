@@ -3,7 +3,9 @@
 use crate::changes::Changes;
 use crate::definition::Campaign;
 use cosim::error::Error;
-use cosim::experiment::{self, Experiment, Given, Margins, Observe, Overrides, Protection};
+use cosim::experiment::{
+    Experiment, Given, Margins, Measure, MeasureKind, Observe, Overrides, Protection,
+};
 use cosim::files;
 use cosim::search::named::{Kind, find};
 use cosim_report::metrics::{Meters, Metrics};
@@ -73,18 +75,14 @@ pub(crate) fn observe(campaign: &Campaign, experiment: &Observe) -> Result<Obser
         metrics.insert(name.get_ref().clone(), measure.clone());
     }
     for measure in &campaign.measures {
-        source.check_names(
-            [&measure.signals],
-            "list of signals",
-            signals.keys().map(String::as_str),
-        )?;
-        let mut measure = measure.clone();
-        let id = std::mem::take(&mut measure.id);
-        if metrics.contains_key(&id) || names().any(|name| name == id) {
+        let lists = signals.keys().map(String::as_str);
+        source.check_names([&measure.signals], "list of signals", lists)?;
+        let id = &measure.id;
+        if metrics.contains_key(id) || names().any(|name| name == id) {
             let message = format!("[[measure]] {id}: the experiment has a metric of this name");
             return Err(source.error(&measure.signals.span(), message));
         }
-        metrics.insert(id, measure);
+        metrics.insert(id.clone(), Measure { id: String::new(), ..measure.clone() });
     }
     for measure in metrics.values_mut() {
         measure.limit = None;
@@ -98,15 +96,13 @@ pub(crate) fn observe(campaign: &Campaign, experiment: &Observe) -> Result<Obser
         vehicle: None,
         signals,
         metrics,
-        units: experiment.units.clone(),
         summary: Vec::new(),
         guarantee: experiment.guarantee.clone().filter(|_| !of_guarantee.is_empty()),
         margins: experiment.margins.clone().filter(|_| !of_margins.is_empty()),
-        loss: experiment.loss.clone(),
         // The limits of a campaign judge its cases.
         goal: None,
-        panels: experiment.panels.clone(),
         readings: BTreeMap::new(),
+        ..experiment.clone()
     })
 }
 
@@ -125,7 +121,7 @@ pub(crate) fn recorded(campaign: &Campaign, observe: &Observe, meters: &Meters) 
 }
 
 fn missing(name: &str, observe: &Observe) -> Option<f64> {
-    let never = [experiment::MeasureKind::Settling, experiment::MeasureKind::Leaving];
+    let never = [MeasureKind::Settling, MeasureKind::Leaving];
     match observe.metrics.get(name) {
         Some(measure) => never.contains(&measure.kind).then_some(f64::INFINITY),
         None if name == "margin_gain_below" => Some(0.0),

@@ -48,15 +48,13 @@ pub fn write(
     if let Some(worst) = ranked.first() {
         pictures.extend(cloud::draw(plan, flight.without_ends(), *worst, table.rows())?);
     }
-    let drawn: Vec<_> = pictures.iter().map(drawn).collect();
-    let page = page(plan, findings, &drawn, &kept_cases, ranking.zip(Some(ranked)).as_ref());
+    let page = page(plan, findings, &pictures, &kept_cases, ranking.zip(Some(ranked)).as_ref());
     files::write(&out.join("report.html"), page)
 }
 
-fn drawn(figure: &Figure) -> (String, String) {
-    // The page writes the heading.
-    let bare = Figure { title: String::new(), ..figure.clone() };
-    (figure.title.clone(), svg::element(&bare))
+/// Returns a figure as an element of a page that writes the heading.
+pub(crate) fn untitled(figure: &Figure) -> String {
+    svg::element(&Figure { title: String::new(), ..figure.clone() })
 }
 
 /// Returns the measure that orders the cases: the one that is asked for, or that of the first
@@ -83,13 +81,11 @@ fn keep(plan: &Plan, flight: &mut Flight, cases: &BTreeSet<u64>, out: &Path) -> 
 fn page(
     plan: &Plan,
     findings: &Findings,
-    figures: &[(String, String)],
+    figures: &[Figure],
     kept_cases: &BTreeSet<u64>,
     ranked: Option<&(String, Vec<u64>)>,
 ) -> String {
     let campaign = &plan.campaign;
-    let design = serde_json::json!(campaign.design);
-    let ended = |name: &str| findings.status.get(name).copied().unwrap_or(0);
     let markup = html! {
         (DOCTYPE)
         html lang="en" {
@@ -111,26 +107,14 @@ fn page(
                     @for paragraph in campaign.description.split("\n\n").filter(|text| !text.trim().is_empty()) {
                         p { (paragraph) }
                     }
-                    section id="limits" {
-                        h2 { "Limits" }
-                        p {
-                            (cases(ended("completed"))) " completed"
-                            @for (status, words) in [("ended", "ended early by a limit or an FMU"), ("lost", "lost"), ("failed", "failed")] {
-                                @if ended(status) > 0 { ", " (ended(status)) " " (words) }
-                            }
-                            "."
-                        }
-                        @if let Some(answer) = &findings.answer { (answered(answer)) }
-                        @if findings.limits.is_empty() { p { "The campaign defines no limits." } }
-                        @else { (limits(&findings.limits, campaign.design)) }
-                    }
+                    (limits(plan, findings))
                     section id="measures" {
                         h2 { "Measures" }
                         (measures(&findings.measures))
                     }
                     div id="figures" {
-                        @for (title, svg) in figures {
-                            figure { h3 { (title) } div.plot { (PreEscaped(svg)) } }
+                        @for figure in figures {
+                            figure { h3 { (figure.title) } div.plot { (PreEscaped(untitled(figure))) } }
                         }
                     }
                     section id="sensitivity" {
@@ -138,42 +122,59 @@ fn page(
                         @for measure in &findings.measures { (tornado(measure)) }
                         (sensitivity_note(plan))
                     }
-                    section id="worst" {
-                        h2 { "Worst cases" }
-                        @if let Some((name, cases)) = ranked {
-                            p { "These cases have the largest values of " code { (name) } ", in descending order. Each command runs a case again and records all of its variables:" }
-                            ul { @for case in cases { li { code { (plan.command.of_case(*case)) } } } }
-                        }
-                        @if !kept_cases.is_empty() {
-                            p {
-                                "The folder " code { "cases" } " holds the full results of "
-                                (if kept_cases.len() == 1 { "case " } else { "the cases " })
-                                @for (i, case) in kept_cases.iter().take(200).enumerate() { @if i > 0 { ", " } (case) }
-                                @if kept_cases.len() > 200 { ", …" }
-                            }
-                        }
-                    }
-                    section id="varied" {
-                        h2 { "Varied parameters" }
-                        table {
-                            thead { tr { th { "Parameter" } th { "Unit" } th { "Distribution" } } }
-                            tbody { @for varied in &plan.sweep.varied {
-                                tr { td { code { (varied.name) } } td { (varied.unit) } td { (varied.distribution.in_words()) } }
-                            } }
-                        }
-                        p.note {
-                            "Design: " (design.as_str().unwrap_or_default()) ", seed " (campaign.seed)
-                            ". A case depends on the seed and its number alone. "
-                            code { "cases.parquet" } " holds all cases, and " code { "summary.json" } " the numbers of this page. "
-                            "Written by orchestrator " (env!("CARGO_PKG_VERSION")) "."
-                        }
-                    }
+                    (worst_cases(plan, kept_cases, ranked))
+                    (varied(plan))
                 }
                 (script())
             }
         }
     };
     markup.into_string()
+}
+
+fn worst_cases(
+    plan: &Plan,
+    kept_cases: &BTreeSet<u64>,
+    ranked: Option<&(String, Vec<u64>)>,
+) -> Markup {
+    html! {
+        section id="worst" {
+            h2 { "Worst cases" }
+            @if let Some((name, cases)) = ranked {
+                p { "These cases have the largest values of " code { (name) } ", in descending order. Each command runs a case again and records all of its variables:" }
+                ul { @for case in cases { li { code { (plan.command.of_case(*case)) } } } }
+            }
+            @if !kept_cases.is_empty() {
+                p {
+                    "The folder " code { "cases" } " holds the full results of "
+                    (if kept_cases.len() == 1 { "case " } else { "the cases " })
+                    @for (i, case) in kept_cases.iter().take(200).enumerate() { @if i > 0 { ", " } (case) }
+                    @if kept_cases.len() > 200 { ", …" }
+                }
+            }
+        }
+    }
+}
+
+fn varied(plan: &Plan) -> Markup {
+    let design = serde_json::json!(plan.campaign.design);
+    html! {
+        section id="varied" {
+            h2 { "Varied parameters" }
+            table {
+                thead { tr { th { "Parameter" } th { "Unit" } th { "Distribution" } } }
+                tbody { @for varied in &plan.sweep.varied {
+                    tr { td { code { (varied.name) } } td { (varied.unit) } td { (varied.distribution.in_words()) } }
+                } }
+            }
+            p.note {
+                "Design: " (design.as_str().unwrap_or_default()) ", seed " (plan.campaign.seed)
+                ". A case depends on the seed and its number alone. "
+                code { "cases.parquet" } " holds all cases, and " code { "summary.json" } " the numbers of this page. "
+                "Written by orchestrator " (env!("CARGO_PKG_VERSION")) "."
+            }
+        }
+    }
 }
 
 fn answered(answer: &Answer) -> Markup {
@@ -192,7 +193,26 @@ fn answered(answer: &Answer) -> Markup {
     }
 }
 
-fn limits(limits: &[LimitFinding], design: DesignKind) -> Markup {
+fn limits(plan: &Plan, findings: &Findings) -> Markup {
+    let ended = |name: &str| findings.status.get(name).copied().unwrap_or(0);
+    html! {
+        section id="limits" {
+            h2 { "Limits" }
+            p {
+                (cases(ended("completed"))) " completed"
+                @for (status, words) in [("ended", "ended early by a limit or an FMU"), ("lost", "lost"), ("failed", "failed")] {
+                    @if ended(status) > 0 { ", " (ended(status)) " " (words) }
+                }
+                "."
+            }
+            @if let Some(answer) = &findings.answer { (answered(answer)) }
+            @if findings.limits.is_empty() { p { "The campaign defines no limits." } }
+            @else { (limit_table(&findings.limits, plan.campaign.design)) }
+        }
+    }
+}
+
+fn limit_table(limits: &[LimitFinding], design: DesignKind) -> Markup {
     html! {
         table.numbers {
             thead { tr {

@@ -97,7 +97,7 @@ impl<'a> State<'a> {
             if self.broken_counts.contains_key(&part.start) {
                 continue;
             }
-            match parts::find(self.plan, self.out, &part) {
+            match parts::store(self.plan, self.out).find(&part) {
                 PartState::Whole(PartResult { rows, .. }) => {
                     self.broken_counts.insert(part.start, parts::broken(self.plan, &rows));
                 }
@@ -144,7 +144,8 @@ impl<'a> State<'a> {
         let Some(until) = &self.plan.campaign.until else {
             return (total, self.missing(total), None);
         };
-        let limit = self.plan.campaign.limits.iter().position(|limit| limit.id == until.limit);
+        let mut limits = self.plan.campaign.limits.iter();
+        let limit = limits.position(|limit| limit.id == until.limit).unwrap_or(0);
         let (counts, each) = looks(until.below, until.confidence, total, parts::LENGTH);
         let mut answer = None;
         for cases in counts {
@@ -152,21 +153,16 @@ impl<'a> State<'a> {
             if !missing.is_empty() {
                 return (cases, missing, None);
             }
-            let broken = Probability::new(self.broken(limit.unwrap_or(0), cases), cases, each);
-            let holds = if broken.high <= until.below {
-                Some(true)
-            } else if broken.low > until.below {
-                Some(false)
-            } else {
-                None
-            };
+            let broken = Probability::new(self.broken(limit, cases), cases, each);
+            let is_decided = broken.high <= until.below || broken.low > until.below;
+            let holds = is_decided.then_some(broken.high <= until.below);
             answer = Some(Answer {
                 question: until.clone(),
                 holds,
                 broken,
                 confidence_of_each_look: each,
             });
-            if holds.is_some() {
+            if is_decided {
                 return (cases, Vec::new(), answer);
             }
         }
@@ -214,17 +210,10 @@ pub fn fly_range(plan: &Plan, range: &Range<u64>, options: &Options) -> Result<u
 pub fn fly(plan: &Plan, options: &Options) -> Result<CampaignReport, Error> {
     let begin = Instant::now();
     let out = folder(plan, options.out.as_deref());
-    if out.join("metrics.json").exists() || (out.exists() && !out.is_dir()) {
-        let message =
-            format!("{} holds other results: take another folder by --out", out.display());
-        return Err(Single::experiment(message).into());
-    }
-    let _folder = Folder::take(&out)?;
-    if options.fresh {
-        let old = out.join("parts");
-        if old.is_dir() {
-            fs::remove_dir_all(&old).map_err(Single::file(&old))?;
-        }
+    let locked = Folder::take_for_many(&out)?;
+    let parts = parts::store(plan, &out).folder;
+    if options.fresh && parts.is_dir() {
+        fs::remove_dir_all(&parts).map_err(Single::file(&parts))?;
     }
     let mut state = State::new(plan, &out);
     let mut flown = 0;
@@ -235,7 +224,7 @@ pub fn fly(plan: &Plan, options: &Options) -> Result<CampaignReport, Error> {
         }
         if flown == 0 {
             // An earlier report would not fit the new cases if the work is ended early.
-            remove_results(&out)?;
+            locked.remove(&FILES)?;
         }
         flown += missing.iter().map(|part| part.end - part.start).sum::<u64>();
         fly_parts(plan, &out, &missing, options, &mut state)?;
@@ -247,8 +236,7 @@ pub fn fly(plan: &Plan, options: &Options) -> Result<CampaignReport, Error> {
     let findings = findings(plan, &table, answer)?;
     if findings.status[CaseStatus::Failed.name()] == cases {
         // Their common cause may lie outside, so none of them is kept.
-        let folder = parts::folder(&out);
-        fs::remove_dir_all(&folder).map_err(Single::file(&folder))?;
+        fs::remove_dir_all(&parts).map_err(Single::file(&parts))?;
         let first = match table.column("message")? {
             Values::Text(messages) => messages.into_iter().next().unwrap_or_default(),
             _ => String::new(),
@@ -267,8 +255,8 @@ pub fn fly(plan: &Plan, options: &Options) -> Result<CampaignReport, Error> {
 /// Refuses limits on measures of which no completed case has a value.
 fn check_values(plan: &Plan, table: &Reader) -> Result<(), Error> {
     let Values::Text(status) = table.column("status")? else { return Ok(()) };
-    let completed = status.iter().map(|name| name == CaseStatus::Completed.name());
-    let completed: Vec<bool> = completed.collect();
+    let completed: Vec<bool> =
+        status.iter().map(|name| name == CaseStatus::Completed.name()).collect();
     for (limit, place) in plan.limits() {
         let Recorded { name, missing, .. } = &plan.recorded[place];
         let values = table.column(name)?.numbers();
@@ -278,15 +266,6 @@ fn check_values(plan: &Plan, table: &Reader) -> Result<(), Error> {
                 "no case has a value of {name}, so that nothing can be said of the limit {}",
                 limit.id
             )));
-        }
-    }
-    Ok(())
-}
-
-fn remove_results(out: &Path) -> Result<(), Single> {
-    for path in FILES.map(|name| out.join(name)) {
-        if path.exists() {
-            fs::remove_file(&path).map_err(Single::file(&path))?;
         }
     }
     Ok(())
@@ -335,27 +314,24 @@ fn fly_parts(
 
 /// Merges the parts of the first `cases` cases into one table.
 fn merge(plan: &Plan, out: &Path, cases: u64, csv: bool) -> Result<(), Single> {
-    let mut text = csv.then(|| csv::Writer::from_path(out.join("cases.csv"))).transpose();
+    let path = out.join("cases.csv");
     let fault = |error: csv::Error| Single::experiment(format!("cases.csv: {error}"));
-    let mut text =
-        text.as_mut().map_err(|error| Single::experiment(format!("cases.csv: {error}")))?;
-    let metadata = [("units", plan.units())];
-    let mut writer = Writer::create(&out.join("cases.parquet"), &metadata)?;
-    let mut is_first = true;
+    let mut text = csv.then(|| csv::Writer::from_path(&path)).transpose().map_err(fault)?;
+    let mut writer = Writer::create(&out.join("cases.parquet"), &[("units", plan.units())])?;
+    let store = parts::store(plan, out);
     for part in parts::parts(plan.sweep.cases()).take_while(|part| part.start < cases) {
-        let rows = parts::rows(plan, out, &part)?;
+        let rows = store.read(&part)?.rows;
         if let Some(text) = &mut text {
-            if is_first {
+            if part.start == 0 {
                 let names = rows.columns.iter().map(|column| column.name.as_str());
                 text.write_record(names).map_err(fault)?;
             }
             write_csv(text, &rows).map_err(fault)?;
         }
-        is_first = false;
         writer.add(rows)?;
     }
     if let Some(text) = &mut text {
-        text.flush().map_err(Single::file(out.join("cases.csv")))?;
+        text.flush().map_err(Single::file(&path))?;
     }
     writer.finish()
 }

@@ -6,6 +6,7 @@ mod page;
 use crate::definition::Search;
 use crate::flight::{CaseStatus, Flight, Row, table};
 use crate::plan::Plan;
+use crate::prepare::Recorded;
 use cmaes::{CMAESOptions, DVector};
 use cosim::error::Error as Single;
 use cosim::files;
@@ -17,7 +18,6 @@ use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 use serde::Serialize;
 use std::cmp::Ordering as CmpOrdering;
-use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
@@ -105,28 +105,16 @@ struct Tried {
 /// if the first generation was ended.
 pub fn search(plan: &Plan, options: &Options) -> Result<SearchOutcome, Error> {
     let begin = Instant::now();
+    let source = &plan.campaign.source;
     let search = plan.campaign.search.as_ref().ok_or_else(|| {
-        plan.campaign.source.error(
-            &(0..0),
-            "[search] is missing: it names the measure whose largest value is looked for",
-        )
+        let problem = "[search] is missing: it names the measure whose largest value is looked for";
+        source.error(&(0..0), problem)
     })?;
-    let measure = plan
-        .recorded
-        .iter()
-        .position(|recorded| recorded.name == *search.largest.get_ref())
-        .unwrap_or_default();
     for varied in &plan.sweep.varied {
-        let problem = varied.distribution.check_ends().err();
-        if let Some(problem) = problem {
-            let message = format!("[[vary]] \"{}\": {problem}", varied.name);
-            return Err(plan.campaign.source.error(&varied.span, message).into());
-        }
+        varied.distribution.check_ends().map_err(|problem| varied.refusal(&problem, source))?;
     }
-    let out = options
-        .out
-        .clone()
-        .unwrap_or_else(|| PathBuf::from("out").join(format!("{}-worst", plan.name())));
+    let out = options.out.clone();
+    let out = out.unwrap_or_else(|| PathBuf::from("out").join(format!("{}-worst", plan.name())));
     if out.join("search.json").exists() && !options.force {
         let message = format!(
             "{} holds the results of an earlier search: --force replaces them, --out chooses another folder",
@@ -134,10 +122,61 @@ pub fn search(plan: &Plan, options: &Options) -> Result<SearchOutcome, Error> {
         );
         return Err(Single::experiment(message).into());
     }
-    let _folder = Folder::take(&out)?;
-    remove_results(&out)?;
+    let folder = Folder::take(&out)?;
+    // Results of an earlier search would not fit this one if it ends early.
+    folder.remove(&FILES)?;
+    let mut names = plan.recorded.iter().map(|recorded| &recorded.name);
+    let measure = names.position(|name| name == search.largest.get_ref()).unwrap_or_default();
+    let is_late = || options.time.is_some_and(|time| begin.elapsed() >= time);
+    let Found { searches, ended, tried } =
+        look_in_threads(plan, search, measure, options, &is_late)?;
+    let worst = tried.iter().filter(|case| !case.value.is_nan());
+    let worst = worst.max_by(|a, b| a.value.total_cmp(&b.value)).or(tried.first());
+    let worst = worst.ok_or_else(|| Single::experiment("no case was flown"))?;
+    let Recorded { name, unit, .. } = &plan.recorded[measure];
+    write_tried(plan, &tried, worst, name, &out)?;
+    let limits = plan.campaign.limits.iter().zip(&worst.row.limits_kept);
+    let broken = limits.filter(|(_, is_kept)| !**is_kept).map(|(limit, _)| limit.id.clone());
+    let outcome = SearchOutcome {
+        title: plan.campaign.title.clone(),
+        measure: name.clone(),
+        unit: unit.clone(),
+        largest: worst.value,
+        broken: broken.collect(),
+        status: worst.row.status.name(),
+        cases: tried.len() as u64,
+        searches,
+        failed: tried.iter().filter(|case| case.row.status == CaseStatus::Failed).count() as u64,
+        ended,
+        out,
+        elapsed: begin.elapsed().as_secs_f64(),
+    };
+    let title = format!("{}, the worst case that a search found", plan.campaign.title);
+    let text = plan.sweep.experiment_of(&title, &worst.row.values)?;
+    files::write(&outcome.out.join("worst.toml"), text)?;
+    page::write(plan, &outcome, &tried, &worst.row)?;
+    files::write_json(&outcome.out.join("search.json"), &outcome)?;
+    Ok(outcome)
+}
+
+/// All cases of a search.
+struct Found {
+    /// Number of searches from different starts.
+    searches: u64,
+    /// Why the last one ended.
+    ended: &'static str,
+    tried: Vec<Tried>,
+}
+
+/// Searches with threads that fly the cases.
+fn look_in_threads(
+    plan: &Plan,
+    search: &Search,
+    measure: usize,
+    options: &Options,
+    is_late: &dyn Fn() -> bool,
+) -> Result<Found, Single> {
     let progress = Parts::new("cases", &plan.campaign.title, search.cases, 0, options.quiet);
-    let threads = work::threads(options.jobs, [&plan.sweep]);
     let (orders, waiting) = channel::<Order>();
     let waiting = Mutex::new(waiting);
     let searched = Searched {
@@ -149,12 +188,10 @@ pub fn search(plan: &Plan, options: &Options) -> Result<SearchOutcome, Error> {
         failure: Mutex::default(),
     };
     let result = std::thread::scope(|scope| {
-        for _ in 0..threads {
+        for _ in 0..work::threads(options.jobs, [&plan.sweep]) {
             scope.spawn(|| serve(plan, &options.interrupt, &waiting));
         }
-        let result = look(&searched, search, &orders, &|| {
-            options.time.is_some_and(|time| begin.elapsed() >= time)
-        });
+        let result = look(&searched, search, &orders, is_late);
         // The threads end when nobody can order anything any more.
         drop(orders);
         result
@@ -164,48 +201,13 @@ pub fn search(plan: &Plan, options: &Options) -> Result<SearchOutcome, Error> {
     let mut tried = searched.tried.into_inner();
     // Within a generation, the threads finish in any order.
     tried.sort_by(|a, b| {
-        let points = || a.point.iter().zip(&b.point).map(|(a, b)| a.total_cmp(b));
-        let differing = || points().find(|order| order.is_ne()).unwrap_or(CmpOrdering::Equal);
-        a.generation.cmp(&b.generation).then_with(differing)
+        let by_point = || {
+            let mut orders = a.point.iter().zip(&b.point).map(|(a, b)| a.total_cmp(b));
+            orders.find(|order| order.is_ne()).unwrap_or(CmpOrdering::Equal)
+        };
+        a.generation.cmp(&b.generation).then_with(by_point)
     });
-    let worst = tried.iter().filter(|case| !case.value.is_nan());
-    let worst = worst.max_by(|a, b| a.value.total_cmp(&b.value)).or(tried.first());
-    let worst = worst.ok_or_else(|| Single::experiment("no case was flown"))?;
-    let named = &plan.recorded[measure];
-    write_tried(plan, &tried, worst, &named.name, &out)?;
-    let limits = plan.campaign.limits.iter().zip(&worst.row.limits_kept);
-    let outcome = SearchOutcome {
-        title: plan.campaign.title.clone(),
-        measure: named.name.clone(),
-        unit: named.unit.clone(),
-        largest: worst.value,
-        broken: limits
-            .filter(|(_, is_kept)| !**is_kept)
-            .map(|(limit, _)| limit.id.clone())
-            .collect(),
-        status: worst.row.status.name(),
-        cases: tried.len() as u64,
-        searches,
-        failed: tried.iter().filter(|case| case.row.status == CaseStatus::Failed).count() as u64,
-        ended,
-        out: out.clone(),
-        elapsed: begin.elapsed().as_secs_f64(),
-    };
-    let path = out.join("worst.toml");
-    let title = format!("{}, the worst case that a search found", plan.campaign.title);
-    let text = plan.sweep.experiment_of(&title, &worst.row.values)?;
-    files::write(&path, text)?;
-    page::write(plan, &outcome, &tried, &worst.row)?;
-    files::write_json(&out.join("search.json"), &outcome)?;
-    Ok(outcome)
-}
-
-/// Removes the results of an earlier search, which would not fit another one that ends early.
-fn remove_results(out: &Path) -> Result<(), Single> {
-    for path in FILES.map(|name| out.join(name)).iter().filter(|path| path.exists()) {
-        fs::remove_file(path).map_err(Single::file(path))?;
-    }
-    Ok(())
+    Ok(Found { searches, ended, tried })
 }
 
 /// Writes the table of all cases, of which the worst must have a value of the measure.
@@ -237,20 +239,17 @@ fn serve(plan: &Plan, interrupt: &Interrupt, waiting: &Mutex<Receiver<Order>>) {
     let mut flight: Option<Flight> = None;
     loop {
         let Ok(order) = waiting.lock().recv() else { return };
-        let result = (|| {
+        let mut fly = || {
             let current = match flight.take() {
                 Some(flight) => flight,
                 // A case that ends at its limit would hide how much worse it becomes.
                 None => Flight::new(plan, false, interrupt)?.without_ends(),
             };
-            flight.insert(current).fly_with(
-                CASE,
-                plan.sweep.values_at(&order.places, CASE),
-                &mut [],
-            )
-        })();
+            let values = plan.sweep.values_at(&order.places, CASE);
+            flight.insert(current).fly_with(CASE, values, &mut [])
+        };
         // If nobody waits for the result any more, it is of no use.
-        let _ = order.reply.send(result);
+        let _ = order.reply.send(fly());
     }
 }
 

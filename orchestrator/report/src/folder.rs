@@ -48,6 +48,21 @@ impl Folder {
         }
     }
 
+    /// Creates and locks a folder for the results of many runs.
+    ///
+    /// # Errors
+    /// The errors are those of [`Self::take`]; a folder with the results of a single run is
+    /// refused, too.
+    pub fn take_for_many(path: &Path) -> Result<Self, Error> {
+        if path.join("metrics.json").exists() || (path.exists() && !path.is_dir()) {
+            return Err(Error::experiment(format!(
+                "{} holds other results: take another folder by --out",
+                path.display()
+            )));
+        }
+        Self::take(path)
+    }
+
     /// Creates the folder and locks it. Files that it already holds are left alone.
     ///
     /// # Errors
@@ -82,7 +97,15 @@ impl Folder {
     /// # Errors
     /// Returns an error if a file cannot be removed.
     pub fn clear(&self) -> Result<(), Error> {
-        for path in RESULTS.map(|name| self.path.join(name)) {
+        self.remove(&RESULTS)
+    }
+
+    /// Removes files of this folder, as far as they exist.
+    ///
+    /// # Errors
+    /// Returns an error if a file cannot be removed.
+    pub fn remove(&self, names: &[&str]) -> Result<(), Error> {
+        for path in names.iter().map(|name| self.path.join(name)) {
             if path.exists() {
                 fs::remove_file(&path).map_err(Error::file(&path))?;
             }

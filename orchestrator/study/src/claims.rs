@@ -65,8 +65,8 @@ impl Checked {
     /// Returns the probability that the relation holds for a pair, with 95 % confidence; `None` for
     /// a single pair, or none. It holds for pairs that were drawn independently.
     pub fn probability(&self) -> Option<Probability> {
-        let count = |count: usize| count as u64;
-        (self.pairs > 1).then(|| Probability::new(count(self.held), count(self.pairs), CONFIDENCE))
+        let (held, pairs) = (self.held as u64, self.pairs as u64);
+        (pairs > 1).then(|| Probability::new(held, pairs, CONFIDENCE))
     }
 
     /// Returns the verdict of this check alone.
@@ -84,32 +84,23 @@ pub struct Judged {
     pub checks: Vec<Checked>,
 }
 
-/// Rejects checks that refer to missing items or compare runs that cannot be paired.
+/// Rejects checks that compare runs which cannot be paired.
 ///
 /// # Errors
 /// Returns an error that describes the first faulty check.
-pub fn check(study: &Study) -> Result<(), String> {
+pub(crate) fn check_pairs(study: &Study) -> Result<(), String> {
+    let cases = |reference: &str| Ok::<_, String>(study.runs[resolve(study, reference)?.0].count());
     for check in study.claims.iter().flat_map(|claim| &claim.checks) {
-        let cases = |place: usize| study.runs[place].count();
-        let (left, _) = resolve(study, &check.left)?;
-        if let Quantity::Named(name) = &check.right
-            && is_reference(study, &check.right)
-        {
-            let (right, _) = resolve(study, name)?;
-            if cases(left) != cases(right) && cases(left) != 1 && cases(right) != 1 {
-                return Err(format!(
-                    "check \"{}\": {} has {} cases, {name} has {}: they cannot be paired",
-                    check.label,
-                    check.left,
-                    cases(left),
-                    cases(right)
-                ));
-            }
-        } else {
-            study.values.number(&check.right)?;
+        let Quantity::Named(right) = &check.right else { continue };
+        if !is_reference(study, &check.right) {
+            continue;
         }
-        if let Some(by) = &check.by {
-            study.values.number(by)?;
+        let counts = [cases(&check.left)?, cases(right)?];
+        if counts[0] != counts[1] && !counts.contains(&1) {
+            return Err(format!(
+                "check \"{}\": {} has {} cases, {right} has {}: they cannot be paired",
+                check.label, check.left, counts[0], counts[1]
+            ));
         }
     }
     Ok(())
@@ -122,9 +113,9 @@ pub fn check(study: &Study) -> Result<(), String> {
 pub fn judge(claim: &Claim, results: &Results) -> Result<Judged, String> {
     let checks =
         claim.checks.iter().map(|check| compare(check, results)).collect::<Result<Vec<_>, _>>()?;
-    let any_left_open = checks.iter().any(|check| check.verdict() == Verdict::NotJudged);
+    let is_open = |checked: &Checked| checked.verdict() == Verdict::NotJudged;
     let every_check = |verdict| checks.iter().all(|check| check.verdict() == verdict);
-    let verdict = if any_left_open || checks.is_empty() {
+    let verdict = if checks.is_empty() || checks.iter().any(is_open) {
         Verdict::NotJudged
     } else if every_check(Verdict::Holds) {
         Verdict::Holds

@@ -42,30 +42,18 @@ pub struct Spread {
     pub high: Vec<f64>,
 }
 
-impl Spread {
-    /// Extends the band so that it also covers another one.
-    pub fn widen(&mut self, other: &Self) {
-        for (least, value) in self.low.iter_mut().zip(&other.low) {
-            *least = least.min(*value);
-        }
-        for (most, value) in self.high.iter_mut().zip(&other.high) {
-            *most = most.max(*value);
-        }
-    }
-}
-
 /// Extends the bands of signals so that they also cover others.
 pub(crate) fn widen(
     bands: &mut BTreeMap<Signal, Spread>,
     others: impl IntoIterator<Item = (Signal, Spread)>,
 ) {
-    for (signal, spread) in others {
-        match bands.get_mut(&signal) {
-            Some(band) => band.widen(&spread),
-            None => {
-                bands.insert(signal, spread);
-            }
-        }
+    for (signal, other) in others {
+        let Some(band) = bands.get_mut(&signal) else {
+            bands.insert(signal, other);
+            continue;
+        };
+        band.low.iter_mut().zip(other.low).for_each(|(least, low)| *least = least.min(low));
+        band.high.iter_mut().zip(other.high).for_each(|(most, high)| *most = most.max(high));
     }
 }
 

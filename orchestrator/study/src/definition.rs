@@ -93,6 +93,26 @@ impl Study {
         ids.iter().filter_map(|id| self.run(id.get_ref()))
     }
 
+    /// Returns the panels that show a run.
+    pub(crate) fn panels_of(&self, run: &Run) -> impl Iterator<Item = &Panel> {
+        self.figures.iter().flat_map(|figure| {
+            let shows =
+                |panel: &&Panel| self.runs_of(figure, panel).any(|shown| shown.id == run.id);
+            figure.panels.iter().filter(shows)
+        })
+    }
+
+    /// Returns an error that says nothing of a line of the file.
+    pub(crate) fn fault(&self, message: impl Into<String>) -> Error {
+        self.source.error(&(0..0), message)
+    }
+
+    /// Returns an error that says what is wrong with a run.
+    pub(crate) fn run_fault(&self, run: &Run, message: &str) -> Error {
+        let message = format!("[[run]] {}: {message}", run.id.get_ref());
+        self.source.error(&run.id.span(), message)
+    }
+
     fn list(&self, name: &Spanned<String>) -> &[Signal] {
         self.signals.get(name.get_ref()).map(Vec::as_slice).unwrap_or_default()
     }
@@ -122,7 +142,7 @@ impl Study {
     /// # Errors
     /// Returns an error if there is no such value.
     pub fn number(&self, quantity: &Quantity) -> Result<f64, Error> {
-        self.values.number(quantity).map_err(|message| self.source.error(&(0..0), message))
+        self.values.number(quantity).map_err(|message| self.fault(message))
     }
 
     /// Returns the experiment of a run with the changes that the run makes to it. It records
@@ -132,9 +152,7 @@ impl Study {
     /// Returns an error if the experiment cannot be read, or lacks what the run changes in it.
     pub fn experiment(&self, run: &Run) -> Result<Experiment, Error> {
         let mut experiment = Experiment::load(&self.source.beside(&run.experiment))?;
-        let fault = |message: String| {
-            self.source.error(&run.id.span(), format!("[[run]] {}: {message}", run.id.get_ref()))
-        };
+        let fault = |message: String| self.run_fault(run, &message);
         for (name, fmu) in &run.fmu {
             let hint = names::hint(name, experiment.components.keys().map(String::as_str));
             match experiment.components.get_mut(name) {

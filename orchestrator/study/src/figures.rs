@@ -32,12 +32,9 @@ pub(crate) fn figure(figure: &Figure, results: &Results) -> Result<figure::Figur
 }
 
 fn panel(figure: &Figure, panel: &Panel, results: &Results) -> Result<figure::Panel, String> {
-    let with_results = |run: &'_ Run| results.run(run.id.get_ref());
-    let runs: Vec<Shown> = results
-        .study
-        .runs_of(figure, panel)
-        .filter_map(|run| Some((run, with_results(run)?)))
-        .collect();
+    let runs = results.study.runs_of(figure, panel);
+    let runs: Vec<Shown> =
+        runs.filter_map(|run| Some((run, results.run(run.id.get_ref())?))).collect();
     let drawn = panel.drawn()?;
     let (x_label, mut curves) = match drawn {
         Drawn::Signals => ("time, s", over_time(panel, &runs)),
@@ -63,40 +60,35 @@ fn panel(figure: &Figure, panel: &Panel, results: &Results) -> Result<figure::Pa
 
 /// Returns a curve with the name and the colour of a run.
 fn of_run(run: &Run, shape: Shape, x: Vec<f64>, y: Vec<f64>) -> Curve {
-    Curve { name: run.label.clone(), color: run.color, shape, x, y }
+    Curve::new(&run.label, run.color, shape, x, y)
 }
 
 /// Draws signals over time: first the bands, then the reference, then the lines of the first cases.
 fn over_time(panel: &Panel, runs: &[Shown]) -> Vec<Curve> {
     let factor = panel.unit.as_ref().map_or(1.0, |unit| unit.factor);
     let scaled = |values: &Vec<f64>| values.iter().map(|value| value * factor).collect();
-    let line = |result: &RunResult, signal: &Signal, name: String, color: Color, shape: Shape| {
-        let x = result.series.time.clone();
+    let line = |result: &RunResult, signal: &Signal, name: &str, color: Color, shape: Shape| {
         let y = result.series.signals.get(signal).map(scaled).unwrap_or_default();
-        Curve { name, color, shape, x, y }
+        Curve::new(name, color, shape, result.series.time.clone(), y)
     };
     let mut curves = Vec::new();
     for (run, result) in runs.iter().filter(|_| panel.spread) {
         for (signal, name, color) in signals(panel, run) {
             if let Some(band) = result.spread.get(signal) {
-                curves.push(Curve {
-                    name: format!("{name}, {} runs", result.cases()),
-                    color,
-                    shape: Shape::Band(scaled(&band.low)),
-                    x: result.series.time.clone(),
-                    y: scaled(&band.high),
-                });
+                let name = format!("{name}, {} runs", result.cases());
+                let (time, shape) = (result.series.time.clone(), Shape::Band(scaled(&band.low)));
+                curves.push(Curve::new(&name, color, shape, time, scaled(&band.high)));
             }
         }
     }
     if let (Some(reference), Some((_, result))) = (&panel.reference, runs.first()) {
-        curves.push(line(result, reference, "reference".into(), Color::INK, Shape::Dashed));
+        curves.push(line(result, reference, "reference", Color::INK, Shape::Dashed));
     }
     for (run, result) in runs {
         for (signal, name, color) in signals(panel, run) {
             // The line over a band of the same colour is pale, and shows the first run only.
             curves.push(if panel.spread {
-                line(result, signal, format!("{name}, first run"), color, Shape::Pale)
+                line(result, signal, &format!("{name}, first run"), color, Shape::Pale)
             } else {
                 line(result, signal, name, color, Shape::Line)
             });
@@ -106,9 +98,9 @@ fn over_time(panel: &Panel, runs: &[Shown]) -> Vec<Curve> {
 }
 
 /// Returns the signals that a panel draws for a run, each with the name and colour of its curve.
-fn signals<'a>(panel: &'a Panel, run: &Run) -> Vec<(&'a Signal, String, Color)> {
-    let by_run = panel.signal.iter().map(|signal| (signal, run.label.clone(), run.color));
-    let named = panel.signals.iter().map(|curve| (&curve.signal, curve.label.clone(), curve.color));
+fn signals<'a>(panel: &'a Panel, run: &'a Run) -> Vec<(&'a Signal, &'a str, Color)> {
+    let by_run = panel.signal.iter().map(|signal| (signal, run.label.as_str(), run.color));
+    let named = panel.signals.iter().map(|curve| (&curve.signal, &curve.label[..], curve.color));
     by_run.chain(named).collect()
 }
 
@@ -136,7 +128,7 @@ fn lines_across(across: &Across, results: &Results) -> Result<Vec<Curve>, String
     };
     let curve = |line: &Through| {
         let (x, y) = (means(line, &across.x)?, means(line, &across.y)?);
-        Ok(Curve { name: line.label.clone(), color: line.color, shape: Shape::Line, x, y })
+        Ok(Curve::new(&line.label, line.color, Shape::Line, x, y))
     };
     across.lines.iter().map(curve).collect()
 }
@@ -154,8 +146,7 @@ fn responses(runs: &[Shown], xy: fn(&ResponseCurves) -> (&Vec<f64>, &Vec<f64>)) 
 fn nichols(disk: Option<f64>, runs: &[Shown]) -> Vec<Curve> {
     let limit = disk.map(|alpha| {
         let (x, y) = excluded(alpha);
-        let name = format!("disk margin {alpha}");
-        Curve { name, color: Color::LIMIT, shape: Shape::Dashed, x, y }
+        Curve::new(&format!("disk margin {alpha}"), Color::LIMIT, Shape::Dashed, x, y)
     });
     limit.into_iter().chain(responses(runs, |curves| (&curves.phase, &curves.gain))).collect()
 }
@@ -167,8 +158,7 @@ fn sensitivities(runs: &[Shown]) -> Vec<Curve> {
 fn points(panel: &Panel, results: &Results) -> Result<Vec<Curve>, String> {
     let at = |quantity: &Quantity| results.study.values.number(quantity).map(|number| vec![number]);
     let cross = |point: &Point| {
-        let (name, color) = (point.label.clone(), point.color);
-        Ok(Curve { name, color, shape: Shape::Crosses, x: at(&point.x)?, y: at(&point.y)? })
+        Ok(Curve::new(&point.label, point.color, Shape::Crosses, at(&point.x)?, at(&point.y)?))
     };
     panel.points.iter().map(cross).collect()
 }
@@ -180,8 +170,7 @@ fn straight_lines(panel: &Panel, results: &Results) -> Result<Vec<Curve>, String
         let at = results.study.values.number(&line.at)?;
         for side in [at, -at].into_iter().take(if line.symmetric { 2 } else { 1 }) {
             let (x, y) = place(side);
-            let (name, shape) = (line.label.clone(), shape.clone());
-            curves.push(Curve { name, color: Color::LIMIT, shape, x: vec![x], y: vec![y] });
+            curves.push(Curve::new(&line.label, Color::LIMIT, shape.clone(), vec![x], vec![y]));
         }
         Ok::<_, String>(())
     };

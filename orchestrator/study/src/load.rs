@@ -8,7 +8,7 @@ use cosim::document::Source;
 use cosim::error::Error;
 use cosim::experiment::{Experiment, Observe};
 use serde::de::DeserializeOwned;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 /// Reads a study in which no table stands for several, and no run extends another one.
@@ -106,18 +106,18 @@ impl Study {
         for (place, run) in self.runs.iter().enumerate() {
             self.check_run(run, &self.runs[..place])?;
         }
-        for (place, measure) in self.measures.iter().enumerate() {
+        let mut ids = BTreeSet::new();
+        for measure in &self.measures {
             let id = &measure.id;
-            let fault = match measure.fault() {
-                _ if id.is_empty() => Some("a measure of a study needs an id".into()),
-                _ if self.measures[..place].iter().any(|other| other.id == *id) => {
-                    Some("there is another measure with this id".into())
-                }
-                fault => fault,
+            let fault = if id.is_empty() {
+                Some("a measure of a study needs an id".into())
+            } else if !ids.insert(id) {
+                Some("there is another measure with this id".into())
+            } else {
+                measure.fault()
             };
             if let Some(fault) = fault {
-                let fault = format!("[[measure]] id = \"{id}\": {fault}");
-                return Err(self.source.error(&(0..0), fault));
+                return Err(self.fault(format!("[[measure]] id = \"{id}\": {fault}")));
             }
         }
         let bounded = self.within.iter().map(|within| &within.signals);
@@ -127,8 +127,7 @@ impl Study {
             for panel in &figure.panels {
                 self.check_panel(figure, panel).map_err(|problem| {
                     let (id, label) = (&figure.id, &panel.label);
-                    let message = format!("[[figure]] id = \"{id}\", panel \"{label}\": {problem}");
-                    self.source.error(&(0..0), message)
+                    self.fault(format!("[[figure]] id = \"{id}\", panel \"{label}\": {problem}"))
                 })?;
             }
         }

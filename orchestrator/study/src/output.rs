@@ -1,14 +1,17 @@
 //! Writes the figures, the numbers and the page of a study.
 
-use crate::claims;
+use crate::claims::{self, Checked};
+use crate::comparisons::{Check, Claim};
 use crate::definition::Study;
+use crate::drawings::Figure;
 use crate::results::{Metric, Results, RunResult};
 use crate::runs::Run;
 use crate::{figures, origin, page};
 use cosim::error::Error;
 use cosim::files;
-use cosim_report::figure::{png, svg};
+use cosim_report::figure::{self, png, svg};
 use fmi_master::quantity::rounded;
+use maud::Markup;
 use serde_json::{Value, json};
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -17,79 +20,84 @@ use sweep::table::Column;
 /// A claim in our words, with its verdict.
 pub(crate) type Judgement = (String, claims::Verdict);
 
-/// Writes the figures, the numbers and the page. Returns the verdicts and the names of the files.
-pub(crate) fn write(results: &Results, out: &Path) -> Result<(Vec<Judgement>, Vec<String>), Error> {
-    let study = results.study;
-    let fault = |message: String| study.source.error(&(0..0), message);
-    let mut files = vec!["report.html".to_string(), "results.json".to_string()];
-    let mut drawn = Vec::new();
-    for figure in &study.figures {
-        let picture = figures::figure(figure, results).map_err(fault)?;
-        let path = out.join("figures").join(format!("{}.svg", figure.id));
-        let text = svg::text(&picture);
-        files::write(&path, &text)?;
-        png::write(&text, &path.with_extension("png"))?;
-        files.push(format!("figures/{}.svg, .png", figure.id));
-        drawn.push(picture);
+/// Everything that a report says of results.
+pub(crate) struct Report {
+    /// Outcomes of the claims.
+    pub judged: Vec<claims::Judged>,
+    pub figures: Vec<figure::Figure>,
+    /// Tables that compare with the paper.
+    pub tables: Vec<Markup>,
+}
+
+impl Report {
+    /// Judges, draws and tabulates the results.
+    ///
+    /// # Errors
+    /// Returns an error if the study names an item that does not exist.
+    pub(crate) fn new(results: &Results) -> Result<Self, String> {
+        let Study { claims, figures, tables, .. } = results.study;
+        let judged = claims.iter().map(|claim| claims::judge(claim, results));
+        let tables = tables.iter().map(|table| page::table(table, results));
+        let figures = figures.iter().map(|figure| figures::figure(figure, results));
+        Ok(Self {
+            judged: judged.collect::<Result<_, _>>()?,
+            tables: tables.collect::<Result<_, _>>()?,
+            figures: figures.collect::<Result<_, _>>()?,
+        })
     }
-    let judged = study
-        .claims
-        .iter()
-        .map(|claim| claims::judge(claim, results))
-        .collect::<Result<Vec<_>, _>>()
-        .map_err(fault)?;
-    files::write(&out.join("results.json"), numbers(results, &judged))?;
-    let page = page::page(results, &judged, &drawn, &origin::origin(study)).map_err(fault)?;
-    files::write(&out.join("report.html"), page)?;
-    let verdicts =
-        study.claims.iter().zip(&judged).map(|(c, j)| (c.says.clone(), j.verdict)).collect();
-    Ok((verdicts, files))
+
+    /// Writes the figures, the numbers and the page. Returns the names of the files.
+    ///
+    /// # Errors
+    /// Returns an error if a file cannot be written.
+    pub(crate) fn write(&self, results: &Results, out: &Path) -> Result<Vec<String>, Error> {
+        let mut files = vec!["report.html".to_string(), "results.json".to_string()];
+        for (Figure { id, .. }, drawn) in results.study.figures.iter().zip(&self.figures) {
+            let path = out.join("figures").join(format!("{id}.svg"));
+            let text = svg::text(drawn);
+            files::write(&path, &text)?;
+            png::write(&text, &path.with_extension("png"))?;
+            files.push(format!("figures/{id}.svg, .png"));
+        }
+        files::write(&out.join("results.json"), numbers(results, &self.judged))?;
+        let page = page::page(results, self, &origin::origin(results.study));
+        files::write(&out.join("report.html"), page)?;
+        Ok(files)
+    }
 }
 
 /// Returns all numbers as JSON for other programs.
 fn numbers(results: &Results, judged: &[claims::Judged]) -> String {
     let study = results.study;
-    let runs: serde_json::Map<String, Value> = study
-        .runs
-        .iter()
-        .zip(&results.runs)
-        .map(|(run, result)| {
-            let entry = json!({
-                "label": run.label,
-                "experiment": run.experiment,
-                "fmu": run.fmu,
-                "set": run.set,
-                "unset": run.unset,
-                "members": members(study, run, result),
-                "samples": result.series.samples,
-            });
-            (run.id.get_ref().clone(), entry)
+    let run = |(run, result): (&Run, &RunResult)| {
+        let entry = json!({
+            "label": run.label,
+            "experiment": run.experiment,
+            "fmu": run.fmu,
+            "set": run.set,
+            "unset": run.unset,
+            "members": members(study, run, result),
+            "samples": result.series.samples,
+        });
+        (run.id.get_ref().clone(), entry)
+    };
+    let check = |(check, checked): (&Check, &Checked)| {
+        json!({
+            "label": check.label,
+            "left": checked.left.0,
+            "right": checked.right.0,
+            "difference": checked.difference.0,
+            "held": checked.held,
+            "of": checked.pairs,
+            "probability": checked.probability(),
         })
-        .collect();
-    let claims: Vec<Value> = study
-        .claims
-        .iter()
-        .zip(judged)
-        .map(|(claim, judged)| {
-            let checks: Vec<Value> = claim
-                .checks
-                .iter()
-                .zip(&judged.checks)
-                .map(|(check, checked)| {
-                    json!({
-                        "label": check.label,
-                        "left": checked.left.0,
-                        "right": checked.right.0,
-                        "difference": checked.difference.0,
-                        "held": checked.held,
-                        "of": checked.pairs,
-                        "probability": checked.probability(),
-                    })
-                })
-                .collect();
-            json!({ "says": claim.says, "verdict": judged.verdict, "checks": checks })
-        })
-        .collect();
+    };
+    let claim = |(claim, judged): (&Claim, &claims::Judged)| {
+        let checks: Vec<Value> = claim.checks.iter().zip(&judged.checks).map(check).collect();
+        json!({ "says": claim.says, "verdict": judged.verdict, "checks": checks })
+    };
+    let runs: serde_json::Map<String, Value> = results.pairs().map(run).collect();
+    let claims: Vec<Value> = study.claims.iter().zip(judged).map(claim).collect();
     let document =
         json!({ "title": study.title, "values": study.values.0, "runs": runs, "claims": claims });
     let mut text = serde_json::to_string_pretty(&document).unwrap_or_default();
@@ -135,7 +143,7 @@ fn members(study: &Study, run: &Run, result: &RunResult) -> Vec<Value> {
 /// effect, for example the seed of a constant disturbance.
 pub(crate) fn notes(results: &Results) -> Vec<String> {
     let mut notes = Vec::new();
-    for (run, result) in results.study.runs.iter().zip(&results.runs) {
+    for (run, result) in results.pairs() {
         let (id, count) = (run.id.get_ref(), result.cases());
         let lost: Vec<f64> = result.column("lost_at").into_iter().flatten().collect();
         if let Some(first) = lost.iter().copied().reduce(f64::min) {

@@ -5,31 +5,26 @@ mod evidence;
 mod numbers;
 
 use crate::claims::{Judged, Verdict};
-use crate::comparisons::Overview;
+use crate::definition::Study;
 use crate::drawings::Figure;
+use crate::output::Report;
 use crate::results::{Results, RunResult};
 use cosim_report::figure::{self, svg};
 use cosim_report::page::{folded, head, script};
 use evidence::claim;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
-use numbers::{all_values, overview, small, table};
+use numbers::{all_values, overview, small};
 
-/// Returns the text of the page. `judged` belongs to the study's claims in order, `drawn` to its
-/// figures, and `origin` says where and how the runs were made.
-///
-/// # Errors
-/// Returns an error if the study names an item that does not exist.
-pub(crate) fn page(
-    results: &Results,
-    judged: &[Judged],
-    drawn: &[figure::Figure],
-    origin: &[(String, String)],
-) -> Result<String, String> {
+pub(crate) use numbers::table;
+
+/// Returns the text of the page. `origin` says where and how the runs were made.
+pub(crate) fn page(results: &Results, report: &Report, origin: &[(String, String)]) -> String {
     let study = results.study;
-    let claims = study.claims.iter().zip(judged).map(|(c, j)| claim(c, j)).collect::<Vec<_>>();
-    let tables = study.tables.iter().map(|t| table(t, results)).collect::<Result<Vec<_>, _>>()?;
+    let Report { judged, figures: drawn, tables } = report;
+    let claims: Vec<_> = study.claims.iter().zip(judged).map(|(c, j)| claim(c, j)).collect();
     let overviews = study.overviews.iter().map(|o| (&o.title, overview(o, results)));
-    let tables = study.tables.iter().map(|table| &table.title).zip(tables).chain(overviews);
+    let tables = study.tables.iter().map(|table| &table.title).zip(tables.iter().cloned());
+    let tables = tables.chain(overviews);
     let markup = html! {
         (DOCTYPE)
         html lang="en" {
@@ -67,14 +62,14 @@ pub(crate) fn page(
                         h2 { "Numbers" }
                         @for (title, table) in tables { details { summary { h3 { (title) } } div.scroll { (table) } } }
                     }
-                    (scenario(results))
+                    (scenario(study))
                     (origins(results, origin))
                 }
                 (script())
             }
         }
     };
-    Ok(markup.into_string())
+    markup.into_string()
 }
 
 /// Returns how many claims hold, in a sentence.
@@ -106,7 +101,7 @@ fn answer(judged: &[Judged]) -> String {
 fn lead(results: &Results, drawn: &[figure::Figure]) -> Markup {
     let study = results.study;
     let pictured = study.figures.first().zip(drawn.first());
-    let first: Option<&Overview> = study.overviews.first();
+    let first = study.overviews.first();
     let uses = |term: &str| {
         let titles = study.overviews.iter().flat_map(|o| o.metrics.iter().map(|m| &m.label));
         titles.chain(pictured.iter().map(|(_, picture)| &picture.panels[0].y_label)).any(|label| {
@@ -182,28 +177,25 @@ fn figures(results: &Results, drawn: &[figure::Figure]) -> Markup {
 }
 
 /// Returns the parts with the scenario and the assumptions, folded.
-fn scenario(results: &Results) -> Markup {
+fn scenario(study: &Study) -> Markup {
+    let facts = study.scenario.iter().map(|fact| vec![&fact.what, &fact.value, &fact.source]);
+    let assumed = study.assumptions.iter().map(|assumed| vec![&assumed.silent, &assumed.taken]);
+    let title = "Assumptions where the paper is incomplete or in error";
+    let heads = ["Gap or error in the paper", "Assumption made here"];
     html! {
-        @if !results.study.scenario.is_empty() { details id="scenario" {
-            summary { h2 { "Scenario" } }
+        (folded_table("scenario", "Scenario", &["Quantity", "Value", "Source"], facts.collect()))
+        (folded_table("assumptions", title, &heads, assumed.collect()))
+    }
+}
+
+/// Returns a table with its heading, or nothing if it has no rows.
+fn folded_table(id: &str, title: &str, heads: &[&str], rows: Vec<Vec<&String>>) -> Markup {
+    html! {
+        @if !rows.is_empty() { details id=(id) {
+            summary { h2 { (title) } }
             div.scroll { table {
-                thead { tr { th { "Quantity" } th { "Value" } th { "Source" } } }
-                tbody {
-                    @for fact in &results.study.scenario {
-                        tr { td { (fact.what) } td { (fact.value) } td { (fact.source) } }
-                    }
-                }
-            } }
-        } }
-        @if !results.study.assumptions.is_empty() { details id="assumptions" {
-            summary { h2 { "Assumptions where the paper is incomplete or in error" } }
-            div.scroll { table {
-                thead { tr { th { "Gap or error in the paper" } th { "Assumption made here" } } }
-                tbody {
-                    @for assumption in &results.study.assumptions {
-                        tr { td { (assumption.silent) } td { (assumption.taken) } }
-                    }
-                }
+                thead { tr { @for head in heads { th { (head) } } } }
+                tbody { @for row in rows { tr { @for cell in row { td { (cell) } } } } }
             } }
         } }
     }
@@ -258,7 +250,7 @@ fn all_runs(results: &Results) -> Markup {
         table {
             thead { tr { th { "Run" } th { "Experiment" } th { "Changes to it" } th { "Number of runs" } } }
             tbody {
-                @for (run, result) in results.study.runs.iter().zip(&results.runs) {
+                @for (run, result) in results.pairs() {
                     tr {
                         td {
                             (run.label)

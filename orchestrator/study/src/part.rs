@@ -52,24 +52,17 @@ pub(crate) struct DrawnSignals {
 impl DrawnSignals {
     /// Collects the signals of a run that the study's figures draw.
     fn collect(study: &Study, run: &Run) -> Self {
-        let mut signals = Self::default();
-        for figure in &study.figures {
-            for panel in &figure.panels {
-                if !study.runs_of(figure, panel).any(|drawn| drawn.id == run.id) {
-                    continue;
-                }
-                let drawn =
-                    panel.signal.iter().chain(panel.signals.iter().map(|curve| &curve.signal));
-                let drawn: Vec<Signal> = drawn.cloned().collect();
-                signals.response |= panel.response.is_some();
-                if panel.spread {
-                    signals.spread.extend(drawn.iter().cloned());
-                }
-                signals.series.extend(drawn);
-                signals.series.extend(panel.reference.clone());
+        let mut drawn = Self::default();
+        for panel in study.panels_of(run) {
+            let named = panel.signals.iter().map(|curve| &curve.signal);
+            let signals = panel.signal.iter().chain(named);
+            drawn.response |= panel.response.is_some();
+            if panel.spread {
+                drawn.spread.extend(signals.clone().cloned());
             }
+            drawn.series.extend(signals.chain(&panel.reference).cloned());
         }
-        signals
+        drawn
     }
 }
 
@@ -97,10 +90,7 @@ impl<'a> Preparation<'a> {
         overrides: &Overrides,
         opened: &mut Opened,
     ) -> Result<Self, Error> {
-        let failed = |source| Error::Run { run: run.id.get_ref().as_str().into(), source };
-        let fault = |message: String| {
-            study.source.error(&run.id.span(), format!("[[run]] {}: {message}", run.id.get_ref()))
-        };
+        let failed = |source| run.failed(source);
         let mut experiment = study.experiment(run).map_err(failed)?;
         experiment.apply(overrides).map_err(failed)?;
         let drawn = DrawnSignals::collect(study, run);
@@ -112,7 +102,7 @@ impl<'a> Preparation<'a> {
         let measured = study.measures_of(run).filter(|(measure, _)| !measure.optional);
         let measured = measured.flat_map(|(_, signals)| signals);
         for signal in drawn.series.iter().chain(bounded).chain(measured) {
-            system.resolve(signal).map_err(fault)?;
+            system.resolve(signal).map_err(|message| study.run_fault(run, &message))?;
         }
         Meters::new(&mut system).map_err(failed)?;
         sweep.keys.insert("study".into(), key(run, &drawn, &sweep.experiment().observe));
@@ -144,11 +134,7 @@ impl<'a> Preparation<'a> {
         }
         let resolved = self.drawn.series.iter().map(|signal| {
             let resolved = flight.system().resolve(signal);
-            let id = &self.run.id;
-            let fault = |message| {
-                let message = format!("[[run]] {}: {message}", id.get_ref());
-                self.study.source.error(&id.span(), message)
-            };
+            let fault = |message: String| self.study.run_fault(self.run, &message);
             Ok((signal.clone(), resolved.map_err(fault)?))
         });
         let resolved = resolved.collect::<Result<Vec<_>, Single>>()?;
@@ -160,25 +146,22 @@ impl<'a> Preparation<'a> {
 /// Adds the measures and bounds of a run to the metrics of its experiment, under the names by which
 /// the study refers to them.
 fn measure(study: &Study, run: &Run, experiment: &mut Experiment) -> Result<(), Error> {
-    let observe = &mut experiment.observe;
-    let mut add = |name: String, measure: Measure, signals: &[Signal]| {
+    let Observe { signals: lists, metrics, .. } = &mut experiment.observe;
+    let mut add = |name: String, measure: &Measure, signals: &[Signal]| {
         let list = format!("signals of {name}");
-        observe.signals.insert(list.clone(), signals.to_vec());
-        let signals = Spanned::new(0..0, list);
-        observe
-            .metrics
-            .insert(name, Measure { id: String::new(), limit: None, signals, ..measure });
+        lists.insert(list.clone(), signals.to_vec());
+        let (id, signals) = (String::new(), Spanned::new(0..0, list));
+        metrics.insert(name, Measure { id, limit: None, signals, ..measure.clone() });
     };
     for (measure, signals) in study.measures_of(run) {
-        add(format!("measure.{}", measure.id), measure.clone(), signals);
+        add(format!("measure.{}", measure.id), measure, signals);
     }
     for (within, signals) in study.bounds_of(run) {
-        let bound = study.number(&within.bound)?;
-        let share = Measure::new(MeasureKind::Share);
-        let share = Measure { bound: Some(bound), ..share };
-        add(format!("within.{}.share", within.id), share, signals);
+        let bound = Some(study.number(&within.bound)?);
+        let share = Measure { bound, ..Measure::new(MeasureKind::Share) };
+        add(format!("within.{}.share", within.id), &share, signals);
         let largest = Measure::new(MeasureKind::Largest);
-        add(format!("within.{}.largest", within.id), largest, signals);
+        add(format!("within.{}.largest", within.id), &largest, signals);
     }
     Ok(())
 }
@@ -254,15 +237,11 @@ impl Instances<'_> {
                 // Computing times are only meaningful if the run has the machine for itself, and
                 // what interrupts a run can only lengthen them.
                 for _ in 1..REPETITIONS {
-                    let again = self.one(case)?;
-                    keep_least_times(
-                        &mut flown.metrics,
-                        &again.metrics,
-                        &sweep.experiment().observe,
-                    );
-                    for (name, times) in &mut samples {
-                        let others = self.flight.samples().remove(name).unwrap_or_default();
-                        times.iter_mut().zip(others).for_each(|(time, o)| *time = time.min(o));
+                    let again = self.one(case)?.metrics;
+                    keep_least_times(&mut flown.metrics, &again, &sweep.experiment().observe);
+                    for (name, times) in self.flight.samples() {
+                        let least = samples.entry(name).or_default();
+                        least.iter_mut().zip(times).for_each(|(time, o)| *time = time.min(o));
                     }
                 }
             }
@@ -276,8 +255,8 @@ impl Instances<'_> {
             }
             cases.push(flown);
         }
-        let fault = |error: serde_json::Error| study.source.error(&(0..0), error.to_string());
-        let curves = serde_json::to_string(&curves).map_err(fault)?;
+        let curves = serde_json::to_string(&curves);
+        let curves = curves.map_err(|error| study.fault(error.to_string()))?;
         let units = cases.first().map(|flown| sweep.units(flown.metrics.units.iter()));
         Ok(PartResult { rows: table(sweep, &cases), units: units.unwrap_or_default(), curves })
     }
@@ -286,12 +265,9 @@ impl Instances<'_> {
     fn one(&mut self, case: u64) -> Result<Flown, Single> {
         self.watch.clear();
         let is_drawn = case == 0 || !self.preparation.drawn.spread.is_empty();
-        let watch: &mut dyn Observer = &mut self.watch;
-        let mut flown = if is_drawn {
-            self.flight.fly(case, &mut [watch])?
-        } else {
-            self.flight.fly(case, &mut [])?
-        };
+        let mut watch: [&mut dyn Observer; 1] = [&mut self.watch];
+        let seen = if is_drawn { &mut watch[..] } else { &mut [] };
+        let mut flown = self.flight.fly(case, seen)?;
         std::mem::replace(&mut flown.outcome, Ok(()))?;
         Ok(flown)
     }

@@ -6,9 +6,9 @@
 
 use crate::claims;
 use crate::definition::Study;
-use crate::output::{Judgement, notes, write};
+use crate::output::{Judgement, Report, notes};
 use crate::part::{Bench, Part, Preparation};
-use crate::results::{Results, RunResult, resolve};
+use crate::results::{Results, RunResult};
 use crate::runs::Run;
 use cosim::error::Error as Single;
 use cosim::experiment::Overrides;
@@ -17,11 +17,10 @@ use cosim::system::Opened;
 use cosim_report::folder::Folder;
 use cosim_report::progress::Parts;
 use std::collections::BTreeMap;
-use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 use sweep::error::Error;
-use sweep::parts::{self, PartResult, PartState, Remarks};
+use sweep::parts::{self, PartResult, PartState, Remarks, Store};
 use sweep::work::{self, Worked};
 use toml::Spanned;
 
@@ -81,56 +80,46 @@ pub fn reproduce(study: &Study, options: &Options) -> Result<StudyReport, Error>
     let Options { fmu_dirs, overrides, .. } = options;
     let prepare = |run| Preparation::new(study, run, fmu_dirs, overrides, &mut opened);
     let preparations = study.runs.iter().map(prepare).collect::<Result<Vec<_>, _>>()?;
-    check(study)?;
-    if out.join("metrics.json").exists() || (out.exists() && !out.is_dir()) {
-        let message =
-            format!("{} holds other results: take another folder by --out", out.display());
-        return Err(Single::experiment(message).into());
-    }
-    let _folder = Folder::take(&out)?;
+    check(study).map_err(|message| study.fault(message))?;
+    let locked = Folder::take_for_many(&out)?;
     let all_parts = all_parts(study);
-    let folder = |part: &Part| out.join("runs").join(study.runs[part.run].id.get_ref());
-    let (mut done, mut missing) = (Done::new(), Vec::new());
-    let mut remarks = Remarks::default();
-    for part in &all_parts {
-        let keys = &preparations[part.run].sweep.keys;
-        match parts::find(&folder(part), keys, &part.range) {
-            PartState::Whole(result) if !options.fresh => {
-                done.insert((part.run, part.range.start), result);
-            }
-            state => {
-                remarks.add(&state);
-                missing.push(part.clone());
-            }
-        }
-    }
+    let store = |part: &Part| Store {
+        folder: out.join("runs").join(study.runs[part.run].id.get_ref()),
+        keys: &preparations[part.run].sweep.keys,
+    };
+    let Found { mut done, missing, remarks } = look(&all_parts, &store, options.fresh);
     if !missing.is_empty() {
         // An earlier report is removed, because it would not fit the new results if the work is
         // ended early.
-        for path in [out.join("report.html"), out.join("results.json")] {
-            if path.exists() {
-                fs::remove_file(&path).map_err(Single::file(&path))?;
-            }
-        }
+        locked.remove(&["report.html", "results.json"])?;
     }
 
     let interrupt = &options.interrupt;
     let (total, before) = (all_parts.len(), done.len());
     let progress = Parts::new("parts", &study.title, total as u64, before as u64, options.quiet);
-    let all_work = Work {
-        study,
-        preparations: &preparations,
-        folder: &folder,
-        progress: &progress,
-        interrupt,
-    };
     let is_timed = |part: &Part| study.runs[part.run].timed && part.range.start == 0;
     let (timed, others): (Vec<Part>, Vec<Part>) = missing.into_iter().partition(is_timed);
     let sweeps = preparations.iter().map(|preparation| &preparation.sweep);
     let threads = work::threads(options.jobs, sweeps);
     // Timed parts have the machine for themselves.
     for (parts, threads) in [(timed, 1), (others, threads)] {
-        done.extend(all_work.run(&parts, threads)?);
+        let worked = work::on_parts(
+            &parts,
+            threads,
+            || Ok(Bench::default()),
+            |bench, part| {
+                let run = &study.runs[part.run];
+                let preparation = &preparations[part.run];
+                let result = bench.fly(part, preparation, interrupt);
+                let result = result.map_err(|error| run.failed(error))?;
+                store(part).write(&part.range, result.clone())?;
+                progress.finished(&run.label);
+                Ok(result)
+            },
+            // An FMU that failed does not concern the other runs, which are kept.
+            |error| matches!(error, Error::Run { source: Single::Call { .. }, .. }),
+        );
+        done.extend(finished(&parts, worked)?);
         if let Some(request) = interrupt.asked() {
             progress.finish();
             let (done, total) = (done.len() as u64, total as u64);
@@ -142,11 +131,12 @@ pub fn reproduce(study: &Study, options: &Options) -> Result<StudyReport, Error>
 
     let mut runs = vec![RunResult::default(); study.runs.len()];
     for ((run, _), result) in done {
-        let fault = |error: serde_json::Error| study.source.error(&(0..0), error.to_string());
-        runs[run].push(result).map_err(fault)?;
+        runs[run].push(result).map_err(|error| study.fault(error.to_string()))?;
     }
     let results = Results { study, runs };
-    let (verdicts, files) = write(&results, &out)?;
+    let report = Report::new(&results).map_err(|message| study.fault(message))?;
+    let files = report.write(&results, &out)?;
+    let judged = study.claims.iter().zip(report.judged);
     Ok(StudyReport {
         title: study.title.clone(),
         page: out.join("report.html"),
@@ -154,9 +144,32 @@ pub fn reproduce(study: &Study, options: &Options) -> Result<StudyReport, Error>
         runs: results.runs.iter().map(RunResult::cases).sum(),
         elapsed: begin.elapsed().as_secs_f64(),
         notes: remarks.texts().into_iter().chain(notes(&results)).collect(),
-        verdicts,
+        verdicts: judged.map(|(claim, judged)| (claim.says.clone(), judged.verdict)).collect(),
         files,
     })
+}
+
+/// Parts that are finished, and those that are not.
+struct Found {
+    done: Done,
+    missing: Vec<Part>,
+    remarks: Remarks,
+}
+
+fn look<'a>(parts: &[Part], store: &dyn Fn(&Part) -> Store<'a>, fresh: bool) -> Found {
+    let mut found = Found { done: Done::new(), missing: Vec::new(), remarks: Remarks::default() };
+    for part in parts {
+        match store(part).find(&part.range) {
+            PartState::Whole(result) if !fresh => {
+                found.done.insert((part.run, part.range.start), result);
+            }
+            state => {
+                found.remarks.add(&state);
+                found.missing.push(part.clone());
+            }
+        }
+    }
+    found
 }
 
 /// Returns the name of a study, which is that of its folder.
@@ -167,33 +180,22 @@ fn name(study: &Study) -> String {
 }
 
 /// Checks everything that can be checked before anything is run.
-fn check(study: &Study) -> Result<(), Error> {
-    let fault = |message: String| study.source.error(&(0..0), message);
-    claims::check(study).map_err(fault)?;
-    for row in study.tables.iter().flat_map(|table| &table.rows) {
-        for name in [Some(&row.ours), row.beside.as_ref()].into_iter().flatten() {
-            resolve(study, name).map_err(fault)?;
-        }
-    }
-    let number = |run: &Spanned<String>, metric: &str| {
-        resolve(study, &format!("{}.{metric}", run.get_ref())).map(drop).map_err(fault)
-    };
+fn check(study: &Study) -> Result<(), String> {
+    let results = Results::empty(study);
+    Report::new(&results)?;
+    claims::check_pairs(study)?;
     for overview in &study.overviews {
         for column in &overview.metrics {
             // One run with this metric is enough; the other rows stay empty.
-            let mut numbers = overview.runs.iter().map(|run| number(run, &column.metric));
+            let numbers = |run: &Spanned<String>| {
+                results.numbers(&format!("{}.{}", run.get_ref(), column.metric))
+            };
+            let mut numbers = overview.runs.iter().map(numbers);
             if let Some(first) = numbers.next()
                 && !numbers.any(|number| number.is_ok())
             {
                 first?;
             }
-        }
-    }
-    let panels = study.figures.iter().flat_map(|figure| &figure.panels);
-    for across in panels.filter_map(|panel| panel.across.as_ref()) {
-        for run in across.lines.iter().flat_map(|line| &line.runs) {
-            number(run, &across.x.metric)?;
-            number(run, &across.y.metric)?;
         }
     }
     Ok(())
@@ -214,55 +216,23 @@ fn all_parts(study: &Study) -> Vec<Part> {
 /// Number of failures that are reported besides the first one, which ends the study.
 const FAILURES_REPORTED: usize = 9;
 
-/// Parts of a study's work, shared by several threads.
-struct Work<'a> {
-    study: &'a Study,
-    preparations: &'a [Preparation<'a>],
-    folder: &'a (dyn Fn(&Part) -> PathBuf + Sync),
-    progress: &'a Parts,
-    interrupt: &'a Interrupt,
-}
-
 /// Results of parts, by the position of the run and the number of the part's first case.
 type Done = BTreeMap<(usize, u64), PartResult>;
 
-impl<'a> Work<'a> {
-    fn run(&self, parts: &[Part], threads: usize) -> Result<Done, Error> {
-        let is_of_fmu = |error: &Error| {
-            // An FMU that failed does not concern the other runs, which are kept.
-            matches!(error, Error::Run { source: Single::Call { .. }, .. })
-        };
-        let Worked { results, mut failures } = work::on_parts(
-            parts,
-            threads,
-            || Ok(Bench::default()),
-            |bench, part| self.part(part, bench),
-            is_of_fmu,
-        );
-        failures.retain(|_, error| !matches!(error, Error::Single(Single::Interrupted { .. })));
-        let mut failures = failures.into_values();
-        let Some(first) = failures.next() else {
-            let place = |place: usize| (parts[place].run, parts[place].range.start);
-            return Ok(results.into_iter().map(|(at, result)| (place(at), result)).collect());
-        };
-        for error in failures.by_ref().take(FAILURES_REPORTED) {
-            tracing::error!("{error}");
-        }
-        if failures.len() > 0 {
-            tracing::error!("{} further parts failed", failures.len());
-        }
-        Err(first)
+/// Returns the results of parts, unless one has failed.
+fn finished(parts: &[Part], worked: Worked<PartResult, Error>) -> Result<Done, Error> {
+    let Worked { results, mut failures } = worked;
+    failures.retain(|_, error| !matches!(error, Error::Single(Single::Interrupted { .. })));
+    let mut failures = failures.into_values();
+    let Some(first) = failures.next() else {
+        let place = |place: usize| (parts[place].run, parts[place].range.start);
+        return Ok(results.into_iter().map(|(at, result)| (place(at), result)).collect());
+    };
+    for error in failures.by_ref().take(FAILURES_REPORTED) {
+        tracing::error!("{error}");
     }
-
-    fn part(&self, part: &Part, bench: &mut Bench<'a>) -> Result<PartResult, Error> {
-        let (run, preparation) = (&self.study.runs[part.run], &self.preparations[part.run]);
-        let result = bench.fly(part, preparation, self.interrupt).map_err(|error| match error {
-            Single::Interrupted { .. } => Error::Single(error),
-            source => Error::Run { run: run.id.get_ref().as_str().into(), source },
-        })?;
-        let folder = (self.folder)(part);
-        parts::write(&folder, &preparation.sweep.keys, &part.range, result.clone())?;
-        self.progress.finished(&run.label);
-        Ok(result)
+    if failures.len() > 0 {
+        tracing::error!("{} further parts failed", failures.len());
     }
+    Err(first)
 }

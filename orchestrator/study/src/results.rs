@@ -101,26 +101,26 @@ impl Metric {
     /// # Errors
     /// Returns an error if there is no such metric.
     pub(crate) fn parse(text: &str, study: &Study, run: &Run) -> Result<Self, String> {
-        let id = run.id.get_ref();
-        let column =
-            |name: &str, bound, is_time| Self::Column { name: name.into(), bound, is_time };
+        let column = |is_time| Ok(Self::Column { name: text.to_string(), bound: 1.0, is_time });
         let has = |what: &str, ids: &[Spanned<String>], name: &str| {
-            let mut ids = ids.iter().map(|id| id.get_ref().as_str());
-            let hint = names::hint(name, ids.clone());
-            let message = || format!("the run \"{id}\" has no {what} \"{name}\"{hint}");
-            ids.any(|other| other == name).then_some(()).ok_or_else(message)
+            let mut names = ids.iter().map(|id| id.get_ref().as_str());
+            let hint = names::hint(name, names.clone());
+            let run = run.id.get_ref();
+            let missing = || format!("the run \"{run}\" has no {what} \"{name}\"{hint}");
+            names.any(|other| other == name).then_some(()).ok_or_else(missing)
         };
         if let Some((id, what)) =
             text.strip_prefix("within.").and_then(|rest| rest.rsplit_once('.'))
         {
             has("within", &run.within, id)?;
             return match what {
-                "share" | "largest" => Ok(column(text, 1.0, false)),
+                "share" | "largest" => column(false),
                 "ratio" => {
                     let within = study.within.iter().find(|within| within.id == id);
                     let bound = within.map(|within| study.values.number(&within.bound));
                     let bound = bound.transpose()?.unwrap_or(f64::NAN);
-                    Ok(column(&format!("within.{id}.largest"), bound, false))
+                    let name = format!("within.{id}.largest");
+                    Ok(Self::Column { name, bound, is_time: false })
                 }
                 _ => {
                     Err(format!("\"{text}\": within.{id} has the metrics share, largest and ratio"))
@@ -129,25 +129,21 @@ impl Metric {
         }
         if let Some(id) = text.strip_prefix("measure.") {
             has("measure", &run.measures, id)?;
-            return Ok(column(text, 1.0, false));
+            return column(false);
         }
         if let Some((component, name)) = text.strip_prefix("parameter.").and_then(names::split) {
             return Ok(Self::Parameter(component.into(), name.into()));
         }
         if text.starts_with("step_us.") {
-            return if run.timed {
-                Ok(column(text, 1.0, true))
-            } else {
-                Err(format!("\"{text}\": the run \"{id}\" is not timed"))
-            };
+            let problem = || format!("\"{text}\": the run \"{}\" is not timed", run.id.get_ref());
+            return if run.timed { column(true) } else { Err(problem()) };
         }
         let metrics = Metrics::reproducible_names(&run.observe);
-        let names: Vec<&str> = metrics.iter().map(String::as_str).collect();
-        if names.contains(&text) {
-            let is_time = run.observe.metrics.get(text).is_some_and(|measure| measure.timing);
-            return Ok(column(text, 1.0, is_time));
+        if metrics.iter().any(|name| name == text) {
+            return column(run.observe.metrics.get(text).is_some_and(|measure| measure.timing));
         }
-        Err(format!("there is no metric \"{text}\"{}", names::hint(text, names.iter().copied())))
+        let hint = names::hint(text, metrics.iter().map(String::as_str));
+        Err(format!("there is no metric \"{text}\"{hint}"))
     }
 }
 
@@ -207,10 +203,20 @@ pub(crate) fn is_reference(study: &Study, quantity: &Quantity) -> bool {
     }
 }
 
-impl Results<'_> {
+impl<'a> Results<'a> {
+    /// Returns results in which no run has been flown, to check what refers to them.
+    pub fn empty(study: &'a Study) -> Self {
+        Self { study, runs: vec![RunResult::default(); study.runs.len()] }
+    }
+
+    /// Returns all runs with their results.
+    pub fn pairs(&self) -> impl Iterator<Item = (&'a Run, &RunResult)> {
+        self.study.runs.iter().zip(&self.runs)
+    }
+
     /// Returns the results of the run with this id.
     pub fn run(&self, id: &str) -> Option<&RunResult> {
-        self.study.runs.iter().position(|run| run.id.get_ref() == id).map(|place| &self.runs[place])
+        self.pairs().find(|(run, _)| run.id.get_ref() == id).map(|(_, result)| result)
     }
 
     /// Returns the numbers that `run.metric` refers to. There are none if the run has no such
@@ -231,12 +237,17 @@ impl Results<'_> {
         let (place, metric) = resolve(self.study, reference)?;
         let result = &self.runs[place];
         let numbers = result.numbers(&metric);
-        if let (Metric::Parameter(component, pattern), true) = (&metric, numbers.is_empty()) {
-            let parameters = result.parameters.get(component).into_iter().flatten();
-            let hint = names::hint(pattern, parameters.map(|(name, _)| name.as_str()));
-            return Err(format!("\"{reference}\": there is no such parameter{hint}"));
+        match &metric {
+            // Before its first case the parameters of a run are not known.
+            Metric::Parameter(component, pattern)
+                if numbers.is_empty() && !result.parameters.is_empty() =>
+            {
+                let parameters = result.parameters.get(component).into_iter().flatten();
+                let hint = names::hint(pattern, parameters.map(|(name, _)| name.as_str()));
+                Err(format!("\"{reference}\": there is no such parameter{hint}"))
+            }
+            _ => Ok(numbers),
         }
-        Ok(numbers)
     }
 
     /// Returns the number of each case that a reference stands for, or the single number of a

@@ -1,12 +1,14 @@
 //! The part of a study that describes its scenario and its runs.
 
 use crate::values::Quantity;
+use cosim::error::Error as Single;
 use cosim::experiment::Observe;
 use cosim_report::figure::Color;
 use schemars::JsonSchema;
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
+use sweep::error::Error;
 use sweep::vary::{Correlation, DesignKind, Variation, Vary};
 use toml::{Spanned, Value};
 
@@ -109,6 +111,14 @@ impl Run {
             seed: self.seed,
             cases: Some(self.count()),
             set: self.set.keys().map(String::as_str).collect(),
+        }
+    }
+
+    /// Names the run in an error. An interrupt concerns no single run.
+    pub(crate) fn failed(&self, source: Single) -> Error {
+        match source {
+            Single::Interrupted { .. } => Error::Single(source),
+            source => Error::Run { run: self.id.get_ref().as_str().into(), source },
         }
     }
 

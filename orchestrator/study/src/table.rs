@@ -37,25 +37,25 @@ fn row(flown: &Flown) -> BTreeMap<String, Option<Value>> {
 /// Returns the values of a column. If they are of different kinds, they become numbers.
 fn values(cells: &[Option<&Value>]) -> Values {
     if cells.iter().any(|cell| matches!(cell, Some(Value::Text(_)))) {
-        let text = |cell: Option<&Value>| match cell {
+        let texts = cells.iter().map(|cell| match cell {
             Some(Value::Text(text)) => text.clone(),
             _ => String::new(),
-        };
-        return Values::Text(cells.iter().copied().map(text).collect());
+        });
+        return Values::Text(texts.collect());
     }
-    let flag = |cell: Option<&Value>| match cell {
+    let flags = cells.iter().map(|cell| match cell {
         Some(Value::Flag(is)) => Some(*is),
         _ => None,
-    };
-    let count = |cell: Option<&Value>| match cell {
+    });
+    let counts = cells.iter().map(|cell| match cell {
         Some(Value::Count(count)) => i64::try_from(*count).ok(),
         _ => None,
-    };
-    if let Some(flags) = cells.iter().copied().map(flag).collect() {
-        return Values::Flag(flags);
+    });
+    if let Some(flags) = flags.collect() {
+        Values::Flag(flags)
+    } else if let Some(counts) = counts.collect() {
+        Values::Count(counts)
+    } else {
+        Values::Optional(cells.iter().map(|cell| cell.and_then(Value::number)).collect())
     }
-    if let Some(counts) = cells.iter().copied().map(count).collect() {
-        return Values::Count(counts);
-    }
-    Values::Optional(cells.iter().map(|cell| cell.and_then(Value::number)).collect())
 }

@@ -6,16 +6,19 @@ use cosim::error::Error;
 use cosim::files;
 use std::collections::BTreeMap;
 use std::ops::Range;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Returns the parts of the cases below `cases`, each of `length` cases but the last.
 pub fn parts(cases: u64, length: u64) -> impl Iterator<Item = Range<u64>> {
     (0..cases.div_ceil(length)).map(move |i| i * length..cases.min((i + 1) * length))
 }
 
-/// Returns the path of a part's file in a folder.
-pub fn path(folder: &Path, part: &Range<u64>) -> PathBuf {
-    folder.join(format!("{:010}-{:010}.parquet", part.start, part.end))
+/// Folder of the parts that are made from inputs with these hashes.
+pub struct Store<'a> {
+    /// Folder of the files.
+    pub folder: PathBuf,
+    /// Hashes of all inputs, by their names.
+    pub keys: &'a BTreeMap<String, String>,
 }
 
 /// Results of a part.
@@ -42,25 +45,66 @@ pub enum PartState {
     Other(Vec<String>),
 }
 
-/// Looks for a part that was made from inputs with these hashes.
-pub fn find(folder: &Path, keys: &BTreeMap<String, String>, part: &Range<u64>) -> PartState {
-    let path = path(folder, part);
-    if !path.exists() {
-        return PartState::Missing;
+impl Store<'_> {
+    /// Returns the path of a part's file.
+    fn path(&self, part: &Range<u64>) -> PathBuf {
+        self.folder.join(format!("{:010}-{:010}.parquet", part.start, part.end))
     }
-    let Ok(reader) = Reader::open(&path) else { return PartState::Damaged };
-    let stored = reader.metadata("keys").map(serde_json::from_str::<BTreeMap<String, String>>);
-    let Some(Ok(stored)) = stored else { return PartState::Damaged };
-    let mut others: Vec<String> = keys
-        .iter()
-        .filter(|(name, key)| stored.get(*name) != Some(key))
-        .map(|(name, _)| name.clone())
-        .collect();
-    others.extend(stored.keys().filter(|name| !keys.contains_key(*name)).cloned());
-    if !others.is_empty() {
-        return PartState::Other(others);
+
+    /// Looks for a part.
+    pub fn find(&self, part: &Range<u64>) -> PartState {
+        let path = self.path(part);
+        if !path.exists() {
+            return PartState::Missing;
+        }
+        let Ok(reader) = Reader::open(&path) else { return PartState::Damaged };
+        let stored = reader.metadata("keys").map(serde_json::from_str::<BTreeMap<String, String>>);
+        let Some(Ok(stored)) = stored else { return PartState::Damaged };
+        let differing = self.keys.iter().filter(|(name, key)| stored.get(*name) != Some(key));
+        let superfluous = stored.iter().filter(|(name, _)| !self.keys.contains_key(*name));
+        let others: Vec<String> =
+            differing.chain(superfluous).map(|(name, _)| name.clone()).collect();
+        if !others.is_empty() {
+            return PartState::Other(others);
+        }
+        whole(&reader, part).map_or(PartState::Damaged, PartState::Whole)
     }
-    whole(&reader, part).map_or(PartState::Damaged, PartState::Whole)
+
+    /// Reads a part that was found to be whole.
+    ///
+    /// # Errors
+    /// Returns an error if the file has been removed, damaged or replaced by another one since.
+    pub fn read(&self, part: &Range<u64>) -> Result<PartResult, Error> {
+        match self.find(part) {
+            PartState::Whole(result) => Ok(result),
+            _ => Err(Error::experiment(format!(
+                "{} was changed while it was in use: the same command flies its cases again",
+                self.path(part).display()
+            ))),
+        }
+    }
+
+    /// Keeps the results of a part, with the hashes of all its inputs.
+    ///
+    /// # Errors
+    /// Returns an error if the file cannot be written.
+    pub fn write(&self, part: &Range<u64>, result: PartResult) -> Result<(), Error> {
+        let path = self.path(part);
+        if !result.rows.has_cases(part) {
+            let problem = "does not hold each of its cases once";
+            return Err(Error::experiment(format!("{} {problem}", path.display())));
+        }
+        let keys = serde_json::to_string(self.keys);
+        let keys = keys.map_err(|error| Error::experiment(error.to_string()))?;
+        let mut metadata =
+            vec![("digest", result.digest(part)), ("units", result.units), ("keys", keys)];
+        if !result.curves.is_empty() {
+            metadata.push(("curves", result.curves));
+        }
+        let mut writer = Writer::create(&path, &metadata)?;
+        writer.add(result.rows)?;
+        writer.finish()
+    }
 }
 
 /// Reads a part that is whole and holds each of its cases once.
@@ -75,49 +119,6 @@ fn whole(reader: &Reader, part: &Range<u64>) -> Option<PartResult> {
         && result.rows.has_cases(part)
         && result.rows.rows() as u64 == reader.rows();
     is_whole.then_some(result)
-}
-
-/// Reads a part that was found to be whole.
-///
-/// # Errors
-/// Returns an error if the file has been removed, damaged or replaced by another one since.
-pub fn read(
-    folder: &Path,
-    keys: &BTreeMap<String, String>,
-    part: &Range<u64>,
-) -> Result<PartResult, Error> {
-    match find(folder, keys, part) {
-        PartState::Whole(result) => Ok(result),
-        _ => Err(Error::experiment(format!(
-            "{} was changed while it was in use: the same command flies its cases again",
-            path(folder, part).display()
-        ))),
-    }
-}
-
-/// Keeps the results of a part, with the hashes of all its inputs.
-///
-/// # Errors
-/// Returns an error if the file cannot be written.
-pub fn write(
-    folder: &Path,
-    keys: &BTreeMap<String, String>,
-    part: &Range<u64>,
-    result: PartResult,
-) -> Result<(), Error> {
-    let keys = serde_json::to_string(keys).map_err(|error| Error::experiment(error.to_string()))?;
-    if !result.rows.has_cases(part) {
-        let problem = "does not hold each of its cases once";
-        return Err(Error::experiment(format!("{} {problem}", path(folder, part).display())));
-    }
-    let mut metadata =
-        vec![("digest", result.digest(part)), ("units", result.units), ("keys", keys)];
-    if !result.curves.is_empty() {
-        metadata.push(("curves", result.curves));
-    }
-    let mut writer = Writer::create(&path(folder, part), &metadata)?;
-    writer.add(result.rows)?;
-    writer.finish()
 }
 
 impl PartResult {
@@ -181,16 +182,17 @@ mod tests {
         let keys = BTreeMap::from([("experiment".to_string(), "abc".to_string())]);
         let folder = tempfile::tempdir().unwrap();
         let part = 0..2;
-        write(folder.path(), &keys, &part, result.clone()).unwrap();
-        let path = path(folder.path(), &part);
+        let store = Store { folder: folder.path().to_path_buf(), keys: &keys };
+        store.write(&part, result.clone()).unwrap();
+        let path = store.path(&part);
         let sound = fs::read(&path).unwrap();
-        assert_eq!(find(folder.path(), &keys, &part), PartState::Whole(result.clone()));
+        assert_eq!(store.find(&part), PartState::Whole(result.clone()));
         let mut seen = 0;
         for byte in 0..sound.len() {
             let mut broken = sound.clone();
             broken[byte] ^= 0x10;
             fs::write(&path, &broken).unwrap();
-            match find(folder.path(), &keys, &part) {
+            match store.find(&part) {
                 PartState::Whole(read) => assert_eq!(read, result, "byte {byte}"),
                 _ => seen += 1,
             }
@@ -198,18 +200,16 @@ mod tests {
         // The others lie in what readers skip, such as the name of the program that wrote it.
         assert!(2 * seen > sound.len(), "{seen} of {}", sound.len());
         // The same bytes are not those of another part of this length.
-        fs::write(super::path(folder.path(), &(2..4)), &sound).unwrap();
-        assert_eq!(find(folder.path(), &keys, &(2..4)), PartState::Damaged);
+        fs::write(store.path(&(2..4)), &sound).unwrap();
+        assert_eq!(store.find(&(2..4)), PartState::Damaged);
         let twice = Values::Count(vec![0, 0]);
         let mut doubled = result.clone();
         doubled.rows.columns[0].values = twice;
-        let error = write(folder.path(), &keys, &part, doubled).unwrap_err().to_string();
+        let error = store.write(&part, doubled).unwrap_err().to_string();
         assert!(error.contains("each of its cases once"), "{error}");
         let other = BTreeMap::from([("experiment".to_string(), "abd".to_string())]);
         fs::write(&path, &sound).unwrap();
-        assert_eq!(
-            find(folder.path(), &other, &part),
-            PartState::Other(vec!["experiment".to_string()])
-        );
+        let changed = Store { folder: folder.path().to_path_buf(), keys: &other };
+        assert_eq!(changed.find(&part), PartState::Other(vec!["experiment".to_string()]));
     }
 }

@@ -3,9 +3,9 @@
 
 use crate::flight::Flight;
 use crate::plan::Plan;
+use crate::track::Track;
 use cosim::error::Error;
-use cosim::run::{Observer, Sample};
-use cosim_report::figure::{self, Color, Curve, Figure, Legend, Shape};
+use cosim_report::figure::{self, Color, Curve, Figure, Legend, Shape, with_unit};
 use cosim_report::panels::Panel;
 
 /// Number of cases that the band is made of.
@@ -19,36 +19,6 @@ const PANELS: usize = 12;
 const BAND: Color = Color::CURVES[0];
 const WORST: Color = Color::CURVES[1];
 
-/// Values of all curves of all panels over time.
-#[derive(Default)]
-struct Track {
-    time: Vec<f64>,
-    values: Vec<Vec<f64>>,
-}
-
-struct Watch<'a> {
-    panels: &'a [Panel],
-    stride: u64,
-    track: Track,
-}
-
-impl Observer for Watch<'_> {
-    fn observe(&mut self, sample: &Sample) -> Result<(), Error> {
-        if !sample.tick.is_multiple_of(self.stride) {
-            return Ok(());
-        }
-        self.track.time.push(sample.time);
-        let values = self.panels.iter().flat_map(|panel| panel.values(sample.values));
-        for (place, value) in values.enumerate() {
-            if place == self.track.values.len() {
-                self.track.values.push(Vec::new());
-            }
-            self.track.values[place].push(value);
-        }
-        Ok(())
-    }
-}
-
 /// Draws the worst case over the band of the first cases, flown with these instances. There is no
 /// figure if the experiment draws nothing.
 pub(super) fn draw(
@@ -58,54 +28,42 @@ pub(super) fn draw(
     cases: u64,
 ) -> Result<Option<Figure>, Error> {
     let panels = Panel::resolve_all(flight.system())?;
-    if panels.is_empty() {
+    let curves = panels.iter().flat_map(|panel| panel.curves.iter().map(move |c| (panel, c)));
+    let curves: Vec<_> = curves.take(PANELS).collect();
+    if curves.is_empty() {
         return Ok(None);
     }
+    let signals: Vec<_> = curves.iter().map(|(p, c)| (p.factor, c.signal.clone())).collect();
     let stride = (flight.system().clock.ticks() / POINTS).max(1);
     let mut track = |case: u64, stride: u64| {
-        let mut watch = Watch { panels: &panels, stride, track: Track::default() };
-        flight.fly_with(case, plan.sweep.values(case), &mut [&mut watch])?;
-        Ok::<Track, Error>(watch.track)
+        let mut track = Track::new(signals.clone(), stride);
+        flight.fly_with(case, plan.sweep.values(case), &mut [&mut track])?;
+        Ok::<Track, Error>(track)
     };
-    let bad = track(worst, 1)?;
+    let mut bad = track(worst, 1)?;
     let others =
         (0..cases.min(CASES)).map(|case| track(case, stride)).collect::<Result<Vec<_>, _>>()?;
     let Some(longest) = others.iter().max_by_key(|track| track.time.len()) else { return Ok(None) };
     let time = &longest.time;
-    let mut drawn = Vec::new();
-    let mut place = 0;
-    for panel in &panels {
-        for curve in &panel.curves {
-            if drawn.len() < PANELS {
-                let [low, median, high] = bands(&others, place, time.len());
-                let name = |text: &str| text.to_string();
-                let line = |text: &str, color, shape, x: &[f64], y: Vec<f64>| Curve {
-                    name: name(text),
-                    color,
-                    shape,
-                    x: x.to_vec(),
-                    y,
-                };
-                let worst_values = bad.values.get(place).cloned().unwrap_or_default();
-                let unit =
-                    if panel.unit.is_empty() { String::new() } else { format!(", {}", panel.unit) };
-                drawn.push(figure::Panel {
-                    x_label: "time, s".into(),
-                    y_label: format!("{} {}{unit}", panel.label, curve.name),
-                    curves: vec![
-                        line("5 % to 95 %", BAND, Shape::Band(high), time, low),
-                        line("median", BAND, Shape::Line, time, median),
-                        line(&format!("case {worst}"), WORST, Shape::Line, &bad.time, worst_values),
-                    ],
-                    ..figure::Panel::default()
-                });
-            }
-            place += 1;
+    let name = format!("case {worst}");
+    let panels = curves.iter().enumerate().map(|(place, (panel, curve))| {
+        let [low, median, high] = bands(&others, place, time.len());
+        let values = std::mem::take(&mut bad.values[place]);
+        figure::Panel {
+            x_label: "time, s".into(),
+            y_label: with_unit(&format!("{} {}", panel.label, curve.name), &panel.unit),
+            curves: vec![
+                Curve::new("5 % to 95 %", BAND, Shape::Band(high), time.clone(), low),
+                Curve::new("median", BAND, Shape::Line, time.clone(), median),
+                Curve::new(&name, WORST, Shape::Line, bad.time.clone(), values),
+            ],
+            ..figure::Panel::default()
         }
-    }
+    });
+    let panels: Vec<_> = panels.collect();
     let title =
         format!("The worst case, over the median and the band of the first {} cases", others.len());
-    Ok(Some(Figure { title, columns: 3.min(drawn.len()), legend: Legend::Above, panels: drawn }))
+    Ok(Some(Figure { title, columns: 3.min(panels.len()), legend: Legend::Above, panels }))
 }
 
 /// Returns the 5 %, 50 % and 95 % quantiles of a curve at each time, over the cases that got there.
@@ -129,7 +87,12 @@ mod tests {
 
     #[test]
     fn oracle_bands_by_hand() {
-        let track = |value: f64| Track { time: vec![0.0, 1.0], values: vec![vec![value, -value]] };
+        let track = |value: f64| {
+            let mut track = Track::new(Vec::new(), 1);
+            track.time = vec![0.0, 1.0];
+            track.values = vec![vec![value, -value]];
+            track
+        };
         let tracks: Vec<Track> = (1..=20).map(|i| track(f64::from(i))).collect();
         assert_eq!(bands(&tracks, 0, 2), [vec![1.0, -20.0], vec![10.0, -11.0], vec![19.0, -2.0]]);
     }

@@ -1,12 +1,13 @@
 //! Histograms, empirical distributions and scatter plots of a campaign's cases.
 
-use crate::definition::kept_column;
-use crate::findings::Findings;
+use crate::findings::{Findings, breaking};
 use crate::plan::Plan;
 use crate::prepare::Recorded;
 use cosim::error::Error;
-use cosim_report::figure::{Color, Curve, Figure, Legend, Panel, Shape};
+use cosim_report::figure::{Color, Curve, Figure, Legend, Panel, Shape, with_unit};
+use std::collections::BTreeSet;
 use sweep::table::Reader;
+use sweep::varied::Varied;
 
 const FIRST: Color = Color::CURVES[0];
 const SECOND: Color = Color::CURVES[1];
@@ -21,15 +22,7 @@ const PARAMETERS: usize = 12;
 const MEASURES: usize = 3;
 
 fn label(measure: &Recorded) -> String {
-    if measure.unit.is_empty() {
-        measure.name.clone()
-    } else {
-        format!("{}, {}", measure.name, measure.unit)
-    }
-}
-
-fn curve(name: &str, color: Color, shape: Shape, x: Vec<f64>, y: Vec<f64>) -> Curve {
-    Curve { name: name.into(), color, shape, x, y }
+    with_unit(&measure.name, &measure.unit)
 }
 
 fn panel(x_label: &str, y_label: &str, curves: Vec<Curve>) -> Panel {
@@ -58,12 +51,12 @@ pub(super) fn distributions(
             limits.filter_map(|(limit, _)| limit.at_most.or(limit.at_least)).collect();
         let marks = || {
             let mark = |limit: &f64| {
-                curve("limit", Color::LIMIT, Shape::Vertical, vec![*limit], vec![f64::NAN])
+                Curve::new("limit", Color::LIMIT, Shape::Vertical, vec![*limit], vec![f64::NAN])
             };
             limits.iter().map(mark)
         };
         let (edges, counts) = histogram(&values, low, high);
-        let mut bars = vec![curve("cases", FIRST, Shape::Steps, edges, counts)];
+        let mut bars = vec![Curve::new("cases", FIRST, Shape::Steps, edges, counts)];
         bars.extend(marks());
         let mut panels = vec![panel(&label(measure), "number of cases", bars)];
         let n = values.len();
@@ -73,7 +66,8 @@ pub(super) fn distributions(
         let places = || (0..tail).step_by(stride).chain(tail..n);
         let x = places().map(|i| values[i]).collect();
         let y = places().map(|i| (i + 1) as f64 / n as f64).collect();
-        let mut steps = vec![curve("share of cases up to this value", SECOND, Shape::Line, x, y)];
+        let mut steps =
+            vec![Curve::new("share of cases up to this value", SECOND, Shape::Line, x, y)];
         steps.extend(marks());
         panels.push(panel(&label(measure), "share of cases", steps));
         let title =
@@ -99,19 +93,15 @@ fn histogram(sorted: &[f64], low: f64, high: f64) -> (Vec<f64>, Vec<f64>) {
 /// Draws measures against the parameters that vary, with the cases marked that broke a limit, were
 /// lost or failed.
 pub(super) fn scatters(plan: &Plan, table: &Reader) -> Result<Vec<Figure>, Error> {
-    let mut bad = vec![false; table.rows() as usize];
+    let mut bad = BTreeSet::new();
     for limit in &plan.campaign.limits {
-        let flags = table.column(&kept_column(&limit.id))?.numbers();
-        bad.iter_mut().zip(flags).for_each(|(bad, is_kept)| *bad |= is_kept == 0.0);
+        bad.extend(breaking(table, limit)?.into_iter().map(|case| case as usize));
     }
-    let mut shown: Vec<(usize, Vec<f64>)> = Vec::new();
-    for (place, varied) in plan.sweep.varied.iter().enumerate() {
-        if shown.len() == PARAMETERS {
-            break;
-        }
+    let mut shown: Vec<(&Varied, Vec<f64>)> = Vec::new();
+    for varied in plan.sweep.varied.iter().filter(|varied| !varied.is_seed()) {
         let values = table.column(&varied.name)?.numbers();
-        if !varied.is_seed() && values.iter().any(|value| value.is_finite()) {
-            shown.push((place, values));
+        if shown.len() < PARAMETERS && values.iter().any(|value| value.is_finite()) {
+            shown.push((varied, values));
         }
     }
     let limited = |measure: &&Recorded| {
@@ -119,7 +109,7 @@ pub(super) fn scatters(plan: &Plan, table: &Reader) -> Result<Vec<Figure>, Error
     };
     let mut measures: Vec<&Recorded> = plan.recorded.iter().filter(limited).collect();
     measures.extend(plan.recorded.iter().filter(|measure| !limited(measure)));
-    let stride = bad.len().div_ceil(POINTS).max(1);
+    let stride = (table.rows() as usize).div_ceil(POINTS).max(1);
     let mut figures = Vec::new();
     for measure in measures.into_iter().take(MEASURES) {
         let y = table.column(&measure.name)?.numbers();
@@ -127,33 +117,24 @@ pub(super) fn scatters(plan: &Plan, table: &Reader) -> Result<Vec<Figure>, Error
         if finite().all(|value| Some(value) == finite().next()) {
             continue;
         }
-        let panels = shown.iter().map(|(place, x)| {
-            let parameter = &plan.sweep.varied[*place];
-            let x_label = if parameter.unit.is_empty() {
-                parameter.name.clone()
-            } else {
-                format!("{}, {}", parameter.name, parameter.unit)
-            };
+        let panels = shown.iter().map(|(varied, x)| {
             let pick = |cases: &mut dyn Iterator<Item = usize>| -> (Vec<f64>, Vec<f64>) {
                 cases.filter(|i| y[*i].is_finite()).map(|i| (x[i], y[i])).unzip()
             };
             let (all_x, all_y) = pick(&mut (0..y.len()).step_by(stride));
-            let (bad_x, bad_y) = pick(&mut (0..y.len()).filter(|i| bad[*i]).take(MARKED));
-            let mut curves = vec![curve("cases", FIRST, Shape::Dots, all_x, all_y)];
+            let (bad_x, bad_y) = pick(&mut bad.iter().copied().take(MARKED));
+            let mut curves = vec![Curve::new("cases", FIRST, Shape::Dots, all_x, all_y)];
             if !bad_x.is_empty() {
-                curves.push(curve("broke a limit", SECOND, Shape::Dots, bad_x, bad_y));
+                curves.push(Curve::new("broke a limit", SECOND, Shape::Dots, bad_x, bad_y));
             }
-            Panel { title: x_label, ..panel("", &label(measure), curves) }
+            let title = with_unit(&varied.name, &varied.unit);
+            Panel { title, ..panel("", &label(measure), curves) }
         });
         let panels: Vec<Panel> = panels.collect();
         if !panels.is_empty() {
             let title = format!("{} against the varied parameters", measure.name);
-            figures.push(Figure {
-                title,
-                columns: 3.min(panels.len()),
-                legend: Legend::Above,
-                panels,
-            });
+            let columns = 3.min(panels.len());
+            figures.push(Figure { title, columns, legend: Legend::Above, panels });
         }
     }
     Ok(figures)

@@ -3,14 +3,15 @@
 use super::{CASE, SearchOutcome, Tried};
 use crate::flight::{Flight, Row};
 use crate::plan::Plan;
+use crate::report::untitled;
+use crate::track::Track;
 use cosim::error::Error;
 use cosim::experiment::MeasureKind;
 use cosim::files;
 use cosim::interrupt::Interrupt;
-use cosim::run::{Observer, Sample};
 use cosim::signal::{Resolved, Signal};
 use cosim::variation::SettingValue;
-use cosim_report::figure::{Color, Curve, Figure, Legend, Panel, Shape, svg};
+use cosim_report::figure::{Color, Curve, Figure, Legend, Panel, Shape, svg, with_unit};
 use cosim_report::page::head;
 use cosim_report::recording::panels::{CURVES, symbols};
 use cosim_report::run_page::thin;
@@ -35,13 +36,8 @@ pub(super) fn write(
     let history = history(plan, outcome, tried);
     svg::write(&history, &out.join("history.svg"))?;
     let worst_case = worst_case(plan, outcome, worst)?;
-    let text = |figure: &Figure| {
-        // The page writes the heading.
-        let bare = Figure { title: String::new(), ..figure.clone() };
-        svg::element(&bare)
-    };
-    let drawn = if worst_case.panels.is_empty() { None } else { Some(text(&worst_case)) };
-    let page = page(plan, outcome, worst, drawn.as_deref(), &text(&history));
+    let drawn = (!worst_case.panels.is_empty()).then(|| untitled(&worst_case));
+    let page = page(plan, outcome, worst, drawn.as_deref(), &untitled(&history));
     files::write(&out.join("report.html"), page)
 }
 
@@ -51,16 +47,8 @@ fn bound(plan: &Plan, measure: &str) -> Option<(f64, bool)> {
     limit.at_most.map(|most| (most, true)).or(limit.at_least.map(|least| (least, false)))
 }
 
-fn with_unit(name: &str, unit: &str) -> String {
-    if unit.is_empty() { name.to_string() } else { format!("{name}, {unit}") }
-}
-
-fn line(name: &str, color: Color, shape: Shape, x: Vec<f64>, y: Vec<f64>) -> Curve {
-    Curve { name: name.into(), color, shape, x, y }
-}
-
 fn limit_line(limit: f64) -> Curve {
-    line("limit", Color::LIMIT, Shape::Horizontal, vec![f64::NAN], vec![limit])
+    Curve::new("limit", Color::LIMIT, Shape::Horizontal, vec![f64::NAN], vec![limit])
 }
 
 fn panel(title: &str, x_label: &str, y_label: String, curves: Vec<Curve>) -> Panel {
@@ -71,16 +59,16 @@ fn panel(title: &str, x_label: &str, y_label: String, curves: Vec<Curve>) -> Pan
 /// Draws the values that were tried, and the largest one so far.
 fn history(plan: &Plan, outcome: &SearchOutcome, tried: &[Tried]) -> Figure {
     let number: Vec<f64> = (1..=tried.len()).map(|i| i as f64).collect();
+    let values: Vec<f64> = tried.iter().map(|case| case.value).collect();
     let mut largest = f64::NEG_INFINITY;
-    let so_far = tried.iter().map(|case| {
-        largest = largest.max(case.value);
+    let so_far = values.iter().map(|value| {
+        largest = largest.max(*value);
         largest
     });
     let so_far = so_far.collect();
-    let values = tried.iter().map(|case| case.value).collect();
     let mut curves = vec![
-        line("case", Color::CURVES[0], Shape::Dots, number.clone(), values),
-        line("largest so far", Color::CURVES[1], Shape::Line, number, so_far),
+        Curve::new("case", Color::CURVES[0], Shape::Dots, number.clone(), values),
+        Curve::new("largest so far", Color::CURVES[1], Shape::Line, number, so_far),
     ];
     curves.extend(bound(plan, &outcome.measure).map(|(limit, _)| limit_line(limit)));
     let label = with_unit(&outcome.measure, &outcome.unit);
@@ -92,32 +80,13 @@ fn history(plan: &Plan, outcome: &SearchOutcome, tried: &[Tried]) -> Figure {
     }
 }
 
-/// Signals that a limit judges, with what is seen of them.
+/// Signals that a limit judges.
 struct Judged {
     measure: String,
     unit: String,
     factor: f64,
     limit: Option<f64>,
     signals: Vec<(String, Resolved)>,
-    values: Vec<Vec<f64>>,
-}
-
-#[derive(Default)]
-struct Watch {
-    judged: Vec<Judged>,
-    time: Vec<f64>,
-}
-
-impl Observer for Watch {
-    fn observe(&mut self, sample: &Sample) -> Result<(), Error> {
-        self.time.push(sample.time);
-        for Judged { factor, signals, values, .. } in &mut self.judged {
-            for ((_, signal), values) in signals.iter().zip(values) {
-                values.push(*factor * signal.value(sample.values));
-            }
-        }
-        Ok(())
-    }
 }
 
 /// Flies the worst case again and draws the signals of the measure that was looked for, and of all
@@ -133,22 +102,28 @@ fn worst_case(plan: &Plan, outcome: &SearchOutcome, worst: &Row) -> Result<Figur
             measures.push(measure);
         }
     }
-    let mut watch = Watch::default();
+    let mut drawn = Vec::new();
     for measure in measures {
-        watch.judged.extend(judged(plan, &mut flight, measure)?);
+        drawn.extend(judged(plan, &mut flight, measure)?);
     }
-    flight.fly_with(CASE, worst.values.clone(), &mut [&mut watch])?;
-    let time = thin::times(&watch.time);
-    let panels = watch.judged.iter().map(|judged| {
-        let signals = judged.signals.iter().zip(&judged.values).zip(Color::CURVES);
+    let signals = drawn.iter().flat_map(|Judged { factor, signals, .. }| {
+        signals.iter().map(|(_, signal)| (*factor, signal.clone()))
+    });
+    let mut track = Track::new(signals.collect(), 1);
+    flight.fly_with(CASE, worst.values.clone(), &mut [&mut track])?;
+    let time = thin::times(&track.time);
+    let mut values = track.values.iter().map(|values| thin::values(values));
+    let panels = drawn.iter().map(|judged| {
         // A single signal is named by the title, because its name may be long.
         let (alone, title) = match &judged.signals[..] {
             [(name, _)] => (true, format!("{}: {name}", judged.measure)),
             _ => (false, judged.measure.clone()),
         };
+        let own: Vec<_> = values.by_ref().take(judged.signals.len()).collect();
+        let signals = judged.signals.iter().zip(own).zip(Color::CURVES);
         let curves = signals.map(|(((name, _), values), color)| {
             let name = if alone { "worst case" } else { name };
-            line(name, color, Shape::Line, time.clone(), thin::values(values))
+            Curve::new(name, color, Shape::Line, time.clone(), values)
         });
         let mut curves: Vec<Curve> = curves.collect();
         curves.extend(judged.limit.map(limit_line));
@@ -164,23 +139,21 @@ fn judged(plan: &Plan, flight: &mut Flight, name: &str) -> Result<Option<Judged>
     let observe = &plan.sweep.experiment().observe;
     let Some(measure) = observe.metrics.get(name) else { return Ok(None) };
     let list = observe.list(measure.signals.get_ref()).map_err(Error::experiment)?;
-    let mut signals: Vec<(String, Resolved)> = Vec::new();
-    for signal in list.iter().take(CURVES) {
+    let signals = list.iter().take(CURVES).map(|signal| {
         let resolved = flight.system().resolve(signal).map_err(Error::experiment)?;
-        signals.push((symbols(&Signal::to_string(signal)), resolved));
-    }
+        Ok((symbols(&Signal::to_string(signal)), resolved))
+    });
+    let signals: Vec<(String, Resolved)> = signals.collect::<Result<_, Error>>()?;
     // Only the largest value has its limit in the same picture as the signals.
     let is_largest = measure.kind == MeasureKind::Largest;
     let own = signals.first().map(|(_, signal)| signal.unit.clone()).unwrap_or_default();
     let shown = measure.unit.as_ref().filter(|_| is_largest);
-    let values = vec![Vec::new(); signals.len()];
     Ok(Some(Judged {
         measure: name.into(),
         unit: shown.map_or(own, |shown| shown.name.clone()),
         factor: shown.map_or(1.0, |shown| shown.factor),
         limit: bound(plan, name).map(|(limit, _)| limit).filter(|_| is_largest),
         signals,
-        values,
     }))
 }
 

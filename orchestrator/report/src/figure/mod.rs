@@ -112,6 +112,18 @@ pub struct Curve {
     pub y: Vec<f64>,
 }
 
+impl Curve {
+    /// Creates a curve through points.
+    pub fn new(name: &str, color: Color, shape: Shape, x: Vec<f64>, y: Vec<f64>) -> Self {
+        Self { name: name.into(), color, shape, x, y }
+    }
+}
+
+/// Returns a name with its unit, if it has one, as labels and headings write them.
+pub fn with_unit(name: &str, unit: &str) -> String {
+    if unit.is_empty() { name.to_string() } else { format!("{name}, {unit}") }
+}
+
 /// Shape in which the points of a curve are drawn.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Shape {
