@@ -9,6 +9,7 @@ use crate::error_dynamics::Gain;
 use crate::report::SolverReport;
 use nalgebra::{Vector3, Vector6};
 use serde::{Deserialize, Serialize};
+use std::mem::take;
 
 /// The state that CRMPC carries from tick to tick.
 #[derive(Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -59,6 +60,12 @@ impl Memory {
     pub fn assured(&self) -> bool {
         self.guarantee.is_assured()
     }
+
+    /// Makes room for the first plan, over `horizon` intervals.
+    pub(super) fn start(&mut self, horizon: usize) {
+        self.plan.resize(horizon);
+        self.started = true;
+    }
 }
 
 impl Clone for Memory {
@@ -70,41 +77,10 @@ impl Clone for Memory {
 
     // The derived version would allocate memory for a plan at every tick.
     fn clone_from(&mut self, source: &Self) {
-        let Self {
-            plan,
-            started,
-            report,
-            known,
-            turn,
-            scheduled,
-            recent_bound,
-            acting,
-            nominal,
-            guarantee,
-            margins,
-            moment_left,
-            gain,
-            age,
-            pending,
-            supervision,
-            observed,
-            commands,
-        } = source;
-        self.plan.clone_from(plan);
-        self.started = *started;
-        self.report = *report;
-        (self.known, self.turn, self.scheduled) = (*known, *turn, *scheduled);
-        (self.recent_bound, self.acting) = (*recent_bound, *acting);
-        self.nominal = *nominal;
-        self.guarantee = *guarantee;
-        self.margins = *margins;
-        self.moment_left = *moment_left;
-        self.gain = *gain;
-        self.age = *age;
-        self.pending = *pending;
-        self.supervision = *supervision;
-        self.observed = *observed;
-        self.commands.clone_from(commands);
+        let (mut plan, mut commands) = (take(&mut self.plan), take(&mut self.commands));
+        plan.clone_from(&source.plan);
+        commands.clone_from(&source.commands);
+        *self = Self { plan, commands, ..*source };
     }
 }
 

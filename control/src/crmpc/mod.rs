@@ -3,6 +3,7 @@
 
 mod commands;
 mod design;
+mod feedback;
 mod guarantee;
 mod memory;
 mod observer;
@@ -19,7 +20,6 @@ mod state;
 mod supervision;
 mod terminal;
 
-use crate::clock::Instant;
 pub use crate::report::{SolverReport, SolverStatus};
 pub use commands::Commands;
 pub use design::{
@@ -38,13 +38,11 @@ pub use supervision::{Contradiction, GuaranteeStatus, Supervision};
 
 use crate::controller::{Controller, Explained, Measurement, ReferenceAt};
 use crate::error::DesignError;
-use nalgebra::{Vector3, Vector6};
+use feedback::Tick;
+use nalgebra::Vector3;
 use paper::Paper;
 use planner::Planner;
 use robust::Robust;
-use set::{Command, ConstraintSet, Planned, Tick};
-use state::{join, split};
-use vehicle::kinematics;
 
 /// The controller: settings, offline design, solvers and scratch memory. All state that later ticks
 /// depend on is in [`Memory`].
@@ -69,8 +67,26 @@ use vehicle::kinematics;
 pub struct Crmpc {
     settings: Settings,
     design: Design,
-    set: Box<dyn ConstraintSet>,
     planner: Planner,
+    law: Law,
+}
+
+/// The two laws that follow the planner's nominal trajectories: by the sets that the limits need,
+/// with their guarantee, and by those of the paper.
+enum Law {
+    Robust(Box<Robust>),
+    Paper(Box<Paper>),
+}
+
+impl Law {
+    // What the sets need of the stack is not added to what the planner needs.
+    #[inline(never)]
+    fn new(settings: &Settings, design: &Design) -> Result<Self, DesignError> {
+        Ok(match settings.constraints {
+            Constraints::Robust => Self::Robust(Box::new(Robust::new(settings, design))),
+            Constraints::Paper => Self::Paper(Box::new(Paper::new(settings, design)?)),
+        })
+    }
 }
 
 impl Crmpc {
@@ -81,19 +97,9 @@ impl Crmpc {
     pub fn new(settings: Settings) -> Result<Self, DesignError> {
         let design = Design::new(&settings)?;
         let settings = Settings { feedback: design.feedback, ..settings };
-        let set = Self::set(&settings, &design)?;
-        let windows = (set.terminal_radius().is_some(), set.window_margin());
-        let planner = Planner::new(&settings, &design, windows)?;
-        Ok(Self { settings, design, set, planner })
-    }
-
-    /// Returns the constraints. What they need of the stack is not added to what the planner needs.
-    #[inline(never)]
-    fn set(settings: &Settings, design: &Design) -> Result<Box<dyn ConstraintSet>, DesignError> {
-        Ok(match settings.constraints {
-            Constraints::Robust => Box::new(Robust::new(settings, design)),
-            Constraints::Paper => Box::new(Paper::new(settings, design)?),
-        })
+        let law = Law::new(&settings, &design)?;
+        let planner = Planner::new(&settings, &design)?;
+        Ok(Self { settings, design, planner, law })
     }
 
     /// Returns the result of the offline design.
@@ -108,46 +114,28 @@ impl Crmpc {
     }
 
     /// Returns the last optimisation as data.
-    pub fn posed(&mut self) -> Posed {
+    pub fn posed(&self) -> Posed {
         let Planner { optimiser, start, .. } = &self.planner;
-        let (held, point) = optimiser.last_pass();
+        let (held, linearisation_point) = optimiser.last_pass();
+        let (bounds, stages) = match &self.law {
+            // The first state is given, so that it has no bound.
+            Law::Robust(law) => (
+                Bounds {
+                    rate: held.state[1..].to_vec(),
+                    input: held.input.clone(),
+                    terminal: None,
+                },
+                &law.stages,
+            ),
+            Law::Paper(law) => (law.bounds(), &law.stages),
+        };
         Posed {
             start: *start,
-            bounds: self.set.bounds(held),
-            references: self.set.stages_mut().references.clone(),
+            bounds,
+            references: stages.references.clone(),
             cost: *optimiser.cost(),
-            linearisation_point: point.clone(),
+            linearisation_point: linearisation_point.clone(),
         }
-    }
-
-    /// Runs one optimisation at `time` from the measured state (Θ, x_ω). The plan and the report
-    /// are left in `memory`. Returns whether the vehicle was further from the plan before than the
-    /// assumptions explain, although a guarantee was given.
-    fn optimise(
-        &mut self,
-        memory: &mut Memory,
-        time: f64,
-        measured: &Vector6<f64>,
-        reference: ReferenceAt,
-    ) -> bool {
-        let clock = Instant::now();
-        let Self { settings, set, planner, .. } = self;
-        planner.optimiser.begin();
-        let shift = set.shift(memory);
-        let (angles, _) = split(measured);
-        planner.preview(set.stages_mut(), time, reference, (shift, &angles));
-        let first = !memory.started;
-        if first {
-            memory.plan.resize(settings.horizon);
-            memory.started = true;
-        } else {
-            let a = set.beyond_the_horizon(&memory.plan);
-            set.move_on(&mut memory.plan);
-            memory.plan.shift(&a, settings.period_optimisation);
-        }
-        let Planned { report, left_behind } = set.plan(planner, memory, measured, first);
-        memory.report.record(&report, planner.optimiser.is_exhausted(), clock);
-        left_behind
     }
 }
 
@@ -157,7 +145,10 @@ impl Controller for Crmpc {
     fn memory(&self) -> Memory {
         Memory {
             plan: Plan::new(self.settings.horizon),
-            moment_left: self.set.moment_left(),
+            moment_left: match self.law {
+                Law::Robust(_) => self.design.assessment.moment_left,
+                Law::Paper(_) => 0.0,
+            },
             gain: self.settings.feedback,
             commands: Commands::new(&self.settings),
             ..Memory::default()
@@ -173,8 +164,6 @@ impl Controller for Crmpc {
             && memory.commands.fits(&self.settings)
     }
 
-    /// The feedback law (20) about the nominal trajectory: with ũ* = a − f(x̃*),
-    /// u = K O_e − f(x) + a and m = I R⁻¹ u.
     fn command(
         &mut self,
         memory: &mut Memory,
@@ -183,36 +172,29 @@ impl Controller for Crmpc {
         measured: &Measurement,
         reference: ReferenceAt,
     ) -> Vector3<f64> {
-        let angle_rates = kinematics::r(&measured.angles) * measured.rates;
         (memory.known, memory.turn) = (measured.known_moment, measured.turn);
         memory.scheduled = measured.scheduled;
-        self.set.observe(memory, &angle_rates);
-        let within = tick % self.design.ratio as u64;
-        let state = join(&measured.angles, &angle_rates);
-        let left_behind = within == 0 && self.optimise(memory, time, &state, reference);
-
-        let (k, nominal) = (self.settings.feedback, memory.plan.accelerations[0]);
-        let elapsed = within as f64 * self.settings.period_feedback;
-        memory.nominal = plan::advance(&memory.plan.states[0], &nominal, elapsed);
-        let (angles, rates) = split(&(state - memory.nominal)); // O_e
-        let commanded = nominal + angles * k.k1 + rates * k.k2 + self.set.compensation(memory);
-        let moment = self.set.moment(&measured.angles, &angle_rates, &commanded);
-
-        let deviation = [angles, rates];
-        let command = Command { nominal, commanded, moment };
-        let tick = Tick { measured, angle_rates, within, deviation, command, left_behind };
-        self.set.supervise(memory, &tick);
-        moment
+        let tick = Tick::new(tick % self.design.ratio as u64, time, measured, reference);
+        match &mut self.law {
+            Law::Robust(law) => law.command(&mut self.planner, memory, &tick),
+            Law::Paper(law) => law.command(&mut self.planner, memory, &tick),
+        }
     }
 
     fn explained(&self) -> Option<Explained> {
-        self.set.explained()
+        match self.law {
+            Law::Robust(_) => Some(self.design.tightening.explained),
+            Law::Paper(_) => None,
+        }
     }
 
     /// The paper's sets leave the limit to the optimisation. Without a solution, and with the
     /// robust set, the command is limited as well.
     fn limit(&self, memory: &Memory) -> f64 {
-        self.set.limit(memory)
+        match self.law {
+            Law::Paper(_) if memory.report.status != SolverStatus::Fallback => f64::INFINITY,
+            _ => self.settings.limit_moment,
+        }
     }
 
     fn limited(&mut self, memory: &mut Memory, applied: &Vector3<f64>) {

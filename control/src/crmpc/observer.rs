@@ -80,9 +80,9 @@ impl Observed {
         })
     }
 
-    /// Stores angles, rates and command for the next tick.
-    pub(super) fn remember(&mut self, state: [&Vector3<f64>; 2], commanded: &Vector3<f64>) {
-        self.last = Some([*state[0], *state[1], *commanded]);
+    /// Stores angles, rates and commanded acceleration for the next tick.
+    pub(super) fn remember(&mut self, last: [Vector3<f64>; 3]) {
+        self.last = Some(last);
     }
 
     /// Returns the acceleration commanded at the last tick, rad/s²; `None` before the first.

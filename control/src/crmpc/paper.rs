@@ -1,10 +1,10 @@
 //! The sets of Chai 2022 as printed: ‖x̃_ω‖ ≤ x̄_tube, ‖ũ‖ ≤ ū_tube (21) and ‖Ẽ_N‖_G ≤ ε (13).
 
 use super::design::Design;
+use super::feedback::{Feedback, Tick};
 use super::memory::Memory;
-use super::plan::Plan;
 use super::planner::Planner;
-use super::set::{Bounds, ConstraintSet, Planned, ROUNDING, Tick, norm_constraint};
+use super::set::{Bounds, ROUNDING, norm_constraint};
 use super::settings::{InitialState, Settings};
 use super::stages::{Point, Stages};
 use super::supervision::Contradiction;
@@ -17,14 +17,11 @@ use nalgebra::{Matrix3, Vector3, Vector6};
 use std::ops::Range;
 use vehicle::reference::Reference;
 
-/// Share by which a window of the horizon is wider than the violated intervals, at each end.
-const WINDOW_MARGIN: f64 = 0.5;
-
 /// The paper's sets, whose bounds are constants.
 #[derive(Clone, Debug)]
 pub(super) struct Paper {
     settings: Settings,
-    stages: Stages,
+    pub stages: Stages,
     /// Bound x̄_tube of (21), rad/s.
     x_tube: f64,
     /// Bound ū_tube of (21), rad/s².
@@ -64,17 +61,10 @@ impl Paper {
     }
 }
 
-impl ConstraintSet for Paper {
-    fn stages_mut(&mut self) -> &mut Stages {
-        &mut self.stages
-    }
-
-    fn window_margin(&self) -> f64 {
-        WINDOW_MARGIN
-    }
-
-    fn bounds(&self, _held: &mpc::Bounds) -> Bounds {
-        let n = self.stages.horizon();
+impl Paper {
+    /// Returns the bounds of every optimisation.
+    pub(super) fn bounds(&self) -> Bounds {
+        let n = self.settings.horizon;
         Bounds {
             rate: vec![self.x_tube; n],
             input: vec![self.u_tube; n],
@@ -82,62 +72,49 @@ impl ConstraintSet for Paper {
         }
     }
 
-    /// Plans by the optimum of (10), or by the shifted previous plan (31).
-    fn plan(
+    /// Evaluates the law at a tick. Returns the moment that it commands, N m.
+    pub(super) fn command(
         &mut self,
         planner: &mut Planner,
         memory: &mut Memory,
-        measured: &Vector6<f64>,
-        first: bool,
-    ) -> Planned {
-        let start = match self.settings.initial_state {
-            InitialState::Nominal if !first => memory.plan.states[0],
-            _ => *measured,
-        };
-        let report = planner.solve((self, &self.stages), memory, &start, first);
-        if report.status != SolverStatus::Fallback {
-            planner.follow_optimum(&self.stages, memory, &start);
-            return Planned { report, left_behind: false };
-        }
-        if first {
-            let law = |state: &_, reference: &_| self.terminal_law(state, reference);
-            memory.plan.roll_out(start, &self.stages, law);
-        }
-        let report = planner.keep(
-            (self, &self.stages),
-            memory,
-            &start,
-            (SolverStatus::Fallback, report.iterations),
-        );
-        Planned { report, left_behind: false }
-    }
-
-    fn beyond_the_horizon(&self, plan: &Plan) -> Vector3<f64> {
-        let n = self.stages.horizon();
-        self.terminal_law(&plan.states[n], &self.stages.references[n - 1])
-    }
-
-    fn moment(
-        &self,
-        angles: &Vector3<f64>,
-        angle_rates: &Vector3<f64>,
-        acceleration: &Vector3<f64>,
+        tick: &Tick,
     ) -> Vector3<f64> {
-        linearise::moment(&self.settings.body, angles, angle_rates, acceleration)
-    }
-
-    fn supervise(&self, memory: &mut Memory, _tick: &Tick) {
-        let period = self.settings.period_feedback;
-        memory.supervision.judge(memory.guarantee, Contradiction::None, period);
-    }
-
-    /// The limit is left to the optimisation, unless it has no solution.
-    fn limit(&self, memory: &Memory) -> f64 {
-        if memory.report.status == SolverStatus::Fallback {
-            self.settings.limit_moment
-        } else {
-            f64::INFINITY
+        if tick.within == 0 {
+            self.optimise(planner, memory, tick);
         }
+        let Feedback { commanded, .. } =
+            Feedback::new(&self.settings, memory, tick, &Vector3::zeros());
+        let Settings { body, period_feedback, .. } = &self.settings;
+        memory.supervision.judge(memory.guarantee, Contradiction::None, *period_feedback);
+        linearise::moment(body, &tick.measured.angles, &tick.angle_rates, &commanded)
+    }
+
+    /// Plans by the optimum of (10), or by the shifted previous plan (31).
+    fn optimise(&mut self, planner: &mut Planner, memory: &mut Memory, tick: &Tick) {
+        planner.begin(&mut self.stages, tick, Vector3::zeros());
+        let Settings { horizon: n, initial_state, period_optimisation: h, .. } = self.settings;
+        let first = !memory.started;
+        if first {
+            memory.start(n);
+        } else {
+            let a = self.terminal_law(&memory.plan.states[n], &self.stages.references[n - 1]);
+            memory.plan.shift(&a, h);
+        }
+        let start = match initial_state {
+            InitialState::Nominal if !first => memory.plan.states[0],
+            _ => tick.state,
+        };
+        let mut report = planner.solve(self, &self.stages, memory, &start, first);
+        if report.status == SolverStatus::Fallback {
+            if first {
+                let law = |state: &_, reference: &_| self.terminal_law(state, reference);
+                memory.plan.roll_out(start, &self.stages, law);
+            }
+            report = planner.keep(self, &self.stages, memory, &start, report);
+        } else {
+            planner.follow_optimum(&self.stages, memory, &start);
+        }
+        planner.end(memory, &report);
     }
 }
 

@@ -6,6 +6,7 @@ use super::state::{self, join};
 use crate::mpc::ErrorTrajectory;
 use nalgebra::{Vector3, Vector6};
 use serde::{Deserialize, Serialize};
+use std::mem::take;
 use vehicle::reference::Reference;
 
 /// Terms under which a plan was certified; they bound its inputs while it is followed.
@@ -44,41 +45,27 @@ pub struct Plan {
 
 impl Clone for Plan {
     fn clone(&self) -> Self {
-        Self {
-            states: self.states.clone(),
-            accelerations: self.accelerations.clone(),
-            multipliers: self.multipliers.clone(),
-            braking: self.braking,
-            shift: self.shift,
-            terms: self.terms,
-            onset: self.onset,
-        }
+        let mut clone = Self::default();
+        clone.clone_from(self);
+        clone
     }
 
     // This keeps the allocated memory.
     fn clone_from(&mut self, source: &Self) {
-        self.states.clone_from(&source.states);
-        self.accelerations.clone_from(&source.accelerations);
-        self.multipliers.clone_from(&source.multipliers);
-        self.braking = source.braking;
-        self.shift = source.shift;
-        self.terms = source.terms;
-        self.onset = source.onset;
+        let Self { mut states, mut accelerations, mut multipliers, .. } = take(self);
+        states.clone_from(&source.states);
+        accelerations.clone_from(&source.accelerations);
+        multipliers.clone_from(&source.multipliers);
+        *self = Self { states, accelerations, multipliers, ..*source };
     }
 }
 
 impl Plan {
     /// Returns a plan of `horizon` intervals at rest at the origin.
     pub fn new(horizon: usize) -> Self {
-        Self {
-            states: vec![Vector6::zeros(); horizon + 1],
-            accelerations: vec![Vector3::zeros(); horizon],
-            multipliers: vec![[0.0; 2]; horizon],
-            braking: 0.0,
-            shift: Vector3::zeros(),
-            terms: Terms::default(),
-            onset: Onset::default(),
-        }
+        let mut plan = Self::default();
+        plan.resize(horizon);
+        plan
     }
 
     pub(super) fn resize(&mut self, horizon: usize) {

@@ -5,16 +5,16 @@
 //! reference is seen in the preview and never enters the dynamics.
 
 use super::design::Design;
+use super::feedback::Tick;
 use super::memory::Memory;
 use super::plan::Plan;
 use super::settings::{Constraints, InitialState, Settings};
 use super::stages::Stages;
 use super::state::error;
-use crate::controller::ReferenceAt;
+use crate::clock::Instant;
 use crate::error::DesignError;
 use crate::error_dynamics::InvariantSet;
 use crate::mpc::{self, Bounded, Chain, Cost, ErrorTrajectory, Layout, Optimiser, State, per_axis};
-use crate::report::SolverStatus;
 use nalgebra::{Vector3, Vector6};
 use std::f64::consts::PI;
 use vehicle::reference::Reference;
@@ -31,6 +31,10 @@ const DISTANCES: [f64; 2] = [20.0 * PI / 180.0, 50.0 * PI / 180.0];
 /// Smallest disturbance bound for which the invariant set is computed, rad/s², so that the set has
 /// an interior.
 const SMALLEST_DISTURBANCE: f64 = 1e-5;
+/// Share by which a window of the horizon is wider than the violated intervals, at each end. With
+/// the robust set most intervals of a window are near their bounds, and an iteration costs more.
+const PAPER_MARGIN: f64 = 0.5;
+const ROBUST_MARGIN: f64 = 0.25;
 
 /// The optimiser with its scratch memory.
 pub(super) struct Planner {
@@ -46,20 +50,16 @@ pub(super) struct Planner {
     pub reach: f64,
     /// State from which the last optimisation began.
     pub start: Vector6<f64>,
+    /// Beginning of the present optimisation.
+    clock: Instant,
 }
 
 impl Planner {
-    /// Sets up the optimisation (10). `terminal` says whether there is a terminal set, and `margin`
-    /// is the share by which a window of the horizon is wider than the violated intervals, at each
-    /// end.
+    /// Sets up the optimisation (10).
     ///
     /// # Errors
     /// Returns the solver's message if it refuses the data.
-    pub(super) fn new(
-        settings: &Settings,
-        design: &Design,
-        (terminal, margin): (bool, f64),
-    ) -> Result<Self, DesignError> {
+    pub(super) fn new(settings: &Settings, design: &Design) -> Result<Self, DesignError> {
         let Settings { horizon: n, period_optimisation: h, p, q, .. } = *settings;
         let start = (settings.initial_state == InitialState::Tube).then(|| {
             let normals = design.invariant.as_ref().map(InvariantSet::normals).unwrap_or_default();
@@ -74,26 +74,22 @@ impl Planner {
             input: Vector3::from(q) * h,
             end: per_axis(&design.g),
         };
+        // With the paper's sets the problem is that of the paper, whatever the reference.
+        let is_of_paper = settings.constraints == Constraints::Paper;
         let layout = Layout {
             chain,
             cost,
             horizon: n,
             constrains_states: true,
-            terminal,
+            terminal: is_of_paper,
             start,
-            margin,
+            margin: if is_of_paper { PAPER_MARGIN } else { ROBUST_MARGIN },
             scale: [ANGLE_SCALE, settings.limit_rate],
             standstill: STANDSTILL,
         };
         let optimiser = Optimiser::new(layout, settings.solver).map_err(DesignError::Solver)?;
-        // With the paper's sets the problem is that of the paper, whatever the reference.
-        let reach = match settings.constraints {
-            Constraints::Paper => f64::INFINITY,
-            Constraints::Robust => {
-                let way = design.assessment.rate_left * settings.limit_rate * n as f64 * h;
-                (SHARE_OF_THE_WAY * way).clamp(DISTANCES[0], DISTANCES[1])
-            }
-        };
+        let way = design.assessment.rate_left * settings.limit_rate * n as f64 * h;
+        let reach = (SHARE_OF_THE_WAY * way).clamp(DISTANCES[0], DISTANCES[1]);
         Ok(Self {
             settings: *settings,
             optimiser: Box::new(optimiser),
@@ -101,29 +97,27 @@ impl Planner {
             chain,
             affine: vec![[Vector3::zeros(); 2]; n],
             shift: Vector3::zeros(),
-            reach,
+            reach: if is_of_paper { f64::INFINITY } else { reach },
             start: Vector6::zeros(),
+            clock: Instant::now(),
         })
     }
 
-    /// Computes the references at the prediction times, with angles shifted by `shift` (rad), and
-    /// d_k = A x_r,k + B Θ̈_r,k − x_r,k+1.
+    /// Begins an optimisation: computes the references at the prediction times, with angles shifted
+    /// by `shift` (rad), and d_k = A x_r,k + B Θ̈_r,k − x_r,k+1.
     ///
-    /// A reference that is too far from the `measured` angles (rad) is replaced by one at rest on
-    /// the way to it: an artificial reference as in Limon et al., "MPC for tracking piecewise
-    /// constant references", Automatica 44 (2008). From the far one the optimum without constraints
-    /// would exceed the bounds by orders of magnitude, and no iteration would come back from there.
-    pub(super) fn preview(
-        &mut self,
-        stages: &mut Stages,
-        time: f64,
-        reference: ReferenceAt,
-        (shift, measured): (Vector3<f64>, &Vector3<f64>),
-    ) {
+    /// A reference that is too far from the measured angles is replaced by one at rest on the way
+    /// to it: an artificial reference as in Limon et al., "MPC for tracking piecewise constant
+    /// references", Automatica 44 (2008). From the far one the optimum without constraints would
+    /// exceed the bounds by orders of magnitude, and no iteration would come back from there.
+    pub(super) fn begin(&mut self, stages: &mut Stages, tick: &Tick, shift: Vector3<f64>) {
+        self.clock = Instant::now();
+        self.optimiser.begin();
         self.shift = shift;
         for (k, slot) in stages.references.iter_mut().enumerate() {
-            *slot = reference(time + k as f64 * stages.step);
+            *slot = (tick.reference)(tick.time + k as f64 * stages.step);
             slot.angles += shift;
+            let measured = &tick.measured.angles;
             let way = slot.angles - measured;
             let distance = way.norm();
             if distance > self.reach {
@@ -142,7 +136,8 @@ impl Planner {
     /// there is none (`first`).
     pub(super) fn solve(
         &mut self,
-        (set, stages): (&dyn Bounded<2>, &Stages),
+        set: &dyn Bounded<2>,
+        stages: &Stages,
         memory: &Memory,
         start: &Vector6<f64>,
         first: bool,
@@ -180,17 +175,22 @@ impl Planner {
         memory.plan.multipliers.extend(self.optimiser.multipliers());
     }
 
-    /// Keeps the present plan and returns a report on it.
+    /// Keeps the present plan after an optimisation that `ended` so, and returns the report on it.
     pub(super) fn keep(
         &mut self,
-        (set, stages): (&dyn Bounded<2>, &Stages),
+        set: &dyn Bounded<2>,
+        stages: &Stages,
         memory: &Memory,
         start: &Vector6<f64>,
-        ended: (SolverStatus, u32),
+        ended: mpc::OptimiserReport,
     ) -> mpc::OptimiserReport {
-        let references = &stages.references;
-        let error = error(start, &references[0]);
-        memory.plan.errors(references, &mut self.previous);
+        let error = error(start, &stages.references[0]);
+        memory.plan.errors(&stages.references, &mut self.previous);
         self.optimiser.fall_back(set, &error, &self.affine, &self.previous, ended)
+    }
+
+    /// Ends the optimisation with this report.
+    pub(super) fn end(&self, memory: &mut Memory, report: &mpc::OptimiserReport) {
+        memory.report.record(report, self.optimiser.is_exhausted(), self.clock);
     }
 }

@@ -23,11 +23,6 @@ impl Stages {
         Self { references: vec![Reference::default(); horizon + 1], body, step }
     }
 
-    /// Returns the number of intervals N.
-    pub(super) fn horizon(&self) -> usize {
-        self.references.len() - 1
-    }
-
     /// Returns (Θ̃, x̃_ω, a) for an error and its input at stage `k`.
     pub(super) fn nominal(
         &self,

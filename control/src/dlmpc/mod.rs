@@ -168,13 +168,7 @@ impl Dlmpc {
             self.track(&mut memory.plan, measured);
             memory.plan.errors(&self.rates.references, &mut self.previous);
             let Self { optimiser, rates, affine, previous, .. } = self;
-            report = optimiser.fall_back(
-                rates,
-                &start,
-                affine,
-                previous,
-                (SolverStatus::Fallback, report.iterations),
-            );
+            report = optimiser.fall_back(rates, &start, affine, previous, report);
         } else {
             let trajectory = self.optimiser.trajectory();
             memory.plan.follow(

@@ -270,22 +270,22 @@ impl<const O: usize> Optimiser<O> {
         self.solution.trajectory.halve_the_way_to(plan);
     }
 
-    /// Returns the report of a plan that is followed instead of an optimum, with the bounds
-    /// computed about the plan.
+    /// Returns the report of a plan that is followed instead of an optimum, after an optimisation
+    /// that `ended` so. The bounds are computed about the plan.
     pub fn fall_back(
         &mut self,
         bounded: &dyn Bounded<O>,
         start: &State<O>,
         affine: &[State<O>],
         plan: &ErrorTrajectory<O>,
-        (status, iterations): (SolverStatus, u32),
+        ended: OptimiserReport,
     ) -> OptimiserReport {
         self.solution.trajectory.clone_from(plan);
         self.solution.multipliers.clear();
         bounded.bounds_about(plan, 0..self.layout.horizon, &mut self.bounds);
         let sample = Sample { bounded, start, affine, previous: None };
         let certificate = self.certificate(&sample, false);
-        OptimiserReport { status, iterations, certificate, settled: false }
+        OptimiserReport { certificate, settled: false, ..ended }
     }
 
     /// Returns the residuals of the present trajectory. `is_checked` says that the intervals

@@ -2,10 +2,10 @@
 
 use super::Robust;
 use crate::controller::{Doubt, Measurement, Scheduled};
-use crate::crmpc::guarantee::{Carried, Deviation};
+use crate::crmpc::feedback::{Feedback, Tick};
 use crate::crmpc::memory::{Acting, Memory};
 use crate::crmpc::plan::Terms;
-use crate::crmpc::set::{ROUNDING, Tick};
+use crate::crmpc::set::ROUNDING;
 use crate::crmpc::settings::{InitialState, Settings};
 use crate::crmpc::supervision::{Contradiction, GuaranteeStatus};
 use crate::linearise;
@@ -34,32 +34,37 @@ fn first(found: &[(bool, Contradiction)]) -> Option<Contradiction> {
 }
 
 impl Robust {
-    /// Judges the guarantee at a tick: by the state that was measured, and by the moment before its
-    /// limit.
-    pub(super) fn judge(&self, memory: &mut Memory, tick: &Tick) {
-        let Tick { measured, angle_rates, deviation: [angles, rates], command, .. } = tick;
-        let asked = command.moment - measured.known_moment;
+    /// Judges the guarantee at a tick: by the state that was measured, by the feedback and the
+    /// moment (N m) before its limit, and by the contradiction that an optimisation has `found`.
+    pub(super) fn judge(
+        &self,
+        memory: &mut Memory,
+        tick: &Tick,
+        feedback: &Feedback,
+        moment: &Vector3<f64>,
+        found: Option<Contradiction>,
+    ) {
+        let measured = tick.measured;
+        let asked = moment - measured.known_moment;
         let limit_moment = self.settings.limit_moment.min(measured.scheduled.limit_moment);
         let limits_kept = asked.norm() <= limit_moment * (1.0 + ROUNDING)
             && (measured.rates - measured.turn).norm() <= self.rate_shown();
-        let feedback = command.commanded - command.nominal;
-        let explained = self.explains(memory, tick.within, angles, rates, &feedback);
+        let Feedback { deviation, nominal, commanded } = feedback;
+        let explained = self.explains(memory, tick.within, deviation, &(commanded - nominal));
         let assumed = [
             (self.keeps_turn(memory, measured), Contradiction::Turn),
             (self.keeps_known_moment(memory, measured), Contradiction::KnownMoment),
             (self.keeps_schedule(memory), Contradiction::Schedule),
             (self.credible(memory), Contradiction::Disturbance),
         ];
-        let seen = [
-            (explained && !tick.left_behind, Contradiction::Deviation),
-            (limits_kept, Contradiction::Limit),
-        ];
+        let seen = [(explained, Contradiction::Deviation), (limits_kept, Contradiction::Limit)];
         // As long as no plan was certified, a motion beyond the limits, or away from the plan,
         // contradicts nothing.
         let certified = memory.supervision.status.is_assured()
             || memory.supervision.contradiction != Contradiction::None;
         let contradiction = shown(measured)
             .or_else(|| first(&assumed))
+            .or(found)
             .or_else(|| first(&seen).filter(|_| certified))
             .unwrap_or_default();
         if memory.assured() && !(first(&assumed).is_none() && explained && limits_kept) {
@@ -68,7 +73,7 @@ impl Robust {
         if memory.guarantee == GuaranteeStatus::Pending && memory.pending == 0 {
             memory.guarantee = GuaranteeStatus::InForce;
         }
-        memory.observed.remember([&measured.angles, angle_rates], &command.commanded);
+        memory.observed.remember([measured.angles, tick.angle_rates, *commanded]);
         let period = self.settings.period_feedback;
         memory.supervision.judge(memory.guarantee, contradiction, period);
     }
@@ -163,31 +168,20 @@ impl Robust {
         &self,
         memory: &Memory,
         tick: u64,
-        angles: &Vector3<f64>,
-        rates: &Vector3<f64>,
+        [angles, rates]: &[Vector3<f64>; 2],
         feedback: &Vector3<f64>,
     ) -> bool {
-        let carried = self.design.tightening.switching.as_ref();
-        let carried = carried.map(|switching| memory.plan.begins_with(switching));
         let tick = memory.age as usize + tick as usize;
-        let bounds =
-            self.explained_deviation(memory.plan.terms.level, tick, &carried.unwrap_or_default());
-        let slack = 1.0 + ROUNDING;
+        let mut bounds = *self.design.at_level(memory.plan.terms.level).at(tick);
+        if let Some(switching) = &self.design.tightening.switching {
+            bounds = bounds.plus(&switching.deviation(&memory.plan.begins_with(switching)));
+        }
         let r = 1.0 / cos(self.settings.sideslip_domain);
         let norm_part =
             bounds.feedback_norm + bounds.feedback_moment * r / self.design.smallest_inertia;
-        let within = |i: usize| feedback[i].abs() <= (bounds.feedback + norm_part) * slack + 1e-12;
-        angles.xy().norm() <= bounds.seen_angle * slack + 1e-12
-            && rates.norm() <= bounds.seen_rate * slack + 1e-12
-            && (0..3).all(within)
-    }
-
-    /// Returns the largest deviations that the assumptions explain `tick` ticks after a nominal
-    /// trajectory began that takes this level for granted, in a stage that begins with `carried`.
-    fn explained_deviation(&self, level: usize, tick: usize, carried: &Carried) -> Deviation {
-        let explained = *self.design.at_level(level).at(tick);
-        let Some(switching) = &self.design.tightening.switching else { return explained };
-        explained.plus(&switching.deviation(carried))
+        keeps(angles.xy().norm(), bounds.seen_angle)
+            && keeps(rates.norm(), bounds.seen_rate)
+            && feedback.iter().all(|value| keeps(value.abs(), bounds.feedback + norm_part))
     }
 
     /// Returns the largest measured ‖ω‖ that is compatible with the limit, rad/s.

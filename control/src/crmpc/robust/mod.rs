@@ -19,6 +19,7 @@ use super::stages::{Point, Stages};
 use crate::linearise::Linear;
 use crate::mpc::ErrorTrajectory;
 use nalgebra::{Matrix3, Vector3};
+use planning::Beginning;
 use std::cell::RefCell;
 use vehicle::math::cos;
 
@@ -91,11 +92,11 @@ impl Robust {
         }
     }
 
-    /// Prepares the bounds for a nominal trajectory that began at the measured state `age` feedback
-    /// ticks ago and follows on `onset`, with the given share of the tightening at this level of
-    /// the disturbance.
-    pub(super) fn begin(&mut self, age: usize, share: f64, onset: &Onset, level: usize) {
-        (self.age, self.share, self.onset) = (age, share, *onset);
+    /// Prepares the bounds for a nominal trajectory that begins so, with this share of the
+    /// tightening.
+    fn begin(&mut self, beginning: &Beginning, share: f64) {
+        let Beginning { age, onset, level, .. } = *beginning;
+        (self.age, self.share, self.onset) = (age as usize, share, onset);
         self.terms.level = level;
         self.another = false;
     }

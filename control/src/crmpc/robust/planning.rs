@@ -1,21 +1,18 @@
-//! How a plan is found that satisfies the conditions of the theorem (docs/guarantee.md), and the
-//! rest of what CRMPC does with the robust set.
+//! The law over the robust set: how a plan is found that satisfies the conditions of the theorem
+//! (docs/guarantee.md), and what is commanded from it.
 
 use super::Robust;
 use super::certificate::Certified;
-use crate::controller::Explained;
-use crate::crmpc::guarantee::{self, Onset};
+use crate::crmpc::feedback::{Feedback, Tick};
+use crate::crmpc::guarantee::{BRAKING, Onset};
 use crate::crmpc::memory::Memory;
-use crate::crmpc::plan::Plan;
 use crate::crmpc::planner::Planner;
-use crate::crmpc::set::{Bounds, ConstraintSet, Planned, Tick};
-use crate::crmpc::settings::InitialState;
-use crate::crmpc::stages::Stages;
+use crate::crmpc::settings::{InitialState, Settings};
 use crate::crmpc::state::split;
-use crate::crmpc::supervision::GuaranteeStatus;
+use crate::crmpc::supervision::{Contradiction, GuaranteeStatus};
 use crate::crmpc::terminal;
 use crate::linearise;
-use crate::mpc::{self, Nonlinearity};
+use crate::mpc::{Nonlinearity, OptimiserReport};
 use crate::report::SolverStatus;
 use nalgebra::{Vector3, Vector6};
 
@@ -24,64 +21,184 @@ const LESS: [f64; 2] = [0.5, 0.0];
 /// Number of steps from a kept plan towards the optimum without constraints that are tried: the
 /// first covers half of the way, each further one half as much as the one before.
 const HALVINGS: usize = 12;
-/// Share by which a window of the horizon is wider than the violated intervals, at each end. Most
-/// intervals of a window are near their bounds, and an iteration costs more than with the paper's
-/// set.
-const WINDOW_MARGIN: f64 = 0.25;
+
+/// What the plan before is to an optimisation.
+#[derive(Clone, Copy, PartialEq)]
+enum Before {
+    /// There is none.
+    Nothing,
+    /// The vehicle is no further from it than the assumptions explain.
+    Followed,
+    /// The vehicle is further from it than the assumptions explain. The plan is then useless, and
+    /// bounds about it would be misleading.
+    LeftBehind,
+}
+
+/// How a nominal trajectory begins (docs/guarantee.md, "Where the nominal trajectory begins").
+#[derive(Clone, Copy)]
+pub(super) struct Beginning {
+    /// First state (Θ̃, x̃_ω), rad and rad/s.
+    pub state: Vector6<f64>,
+    /// Feedback ticks since the nominal motion began at a measured state.
+    pub age: u32,
+    pub onset: Onset,
+    /// Level of the bound on the disturbance, see [`crate::crmpc::Terms::level`].
+    pub level: usize,
+}
 
 impl Robust {
-    /// Returns whether the vehicle is further from the plan than the assumptions explain. The plan
-    /// is then useless: the guarantee ends, and bounds about the plan would be misleading. If the
-    /// design does not hold anyway, the plan still serves as a guess, and the result is `false`.
-    fn is_left_behind(&self, memory: &mut Memory, measured: &Vector6<f64>) -> bool {
-        let (angles, rates) = split(&(measured - memory.plan.states[0]));
-        let gain = self.settings.feedback;
-        let left = self.design.accepted_share >= 1.0
-            && !self.explains(memory, 0, &angles, &rates, &(angles * gain.k1 + rates * gain.k2));
-        if memory.assured() && left {
-            memory.guarantee = GuaranteeStatus::Exceeded;
-        }
-        left
+    /// Evaluates the law at a tick. Returns the moment that it commands, N m.
+    pub(in crate::crmpc) fn command(
+        &mut self,
+        planner: &mut Planner,
+        memory: &mut Memory,
+        tick: &Tick,
+    ) -> Vector3<f64> {
+        self.observe(memory, &tick.angle_rates);
+        let found = if tick.within == 0 { self.optimise(planner, memory, tick) } else { None };
+        // Without guarantee no plan reserves moment for the disturbance, so that the command
+        // compensates for it at once.
+        let compensates = self.settings.observer.active && !memory.assured();
+        let compensation =
+            if compensates { -memory.observed.disturbance } else { Vector3::zeros() };
+        let feedback = Feedback::new(&self.settings, memory, tick, &compensation);
+        let moment = self.moment(tick, &feedback.commanded);
+        self.judge(memory, tick, &feedback, &moment, found);
+        moment
     }
 
-    /// Returns the part of the rate limit that the trajectory's turn needs while a plan is followed
-    /// that begins with these rates of it (rad/s): the theorem bounds ‖ω + w‖.
+    /// Takes the rates x_ω (rad/s) that were measured at a tick, before it is planned.
+    fn observe(&self, memory: &mut Memory, angle_rates: &Vector3<f64>) {
+        memory.pending = memory.pending.saturating_sub(1);
+        memory.recent_bound = self.recent_bound(memory);
+        memory.acting.ticks = memory.acting.ticks.saturating_sub(1);
+        let Memory { commands, observed, .. } = memory;
+        let (settings, tightening) = (&self.settings, &self.design.tightening);
+        let pulse = tightening
+            .switching
+            .as_ref()
+            .map_or(0.0, |switching| commands.observe(settings, switching, observed));
+        observed.observe(settings, &tightening.observable, angle_rates, pulse);
+    }
+
+    /// Returns the moment for an acceleration, N m. It is exact in the middle of the period over
+    /// which the moment is held, so that the effects of a changing f on the rate cancel over the
+    /// period (docs/guarantee.md, "The law").
+    fn moment(&self, tick: &Tick, acceleration: &Vector3<f64>) -> Vector3<f64> {
+        let half = 0.5 * self.settings.period_feedback;
+        let angles = tick.measured.angles + (tick.angle_rates + acceleration * (0.5 * half)) * half;
+        let angle_rates = tick.angle_rates + acceleration * half;
+        linearise::moment(&self.settings.body, &angles, &angle_rates, acceleration)
+    }
+
+    /// Plans from the measured state on. Returns the contradiction if a guarantee was given and the
+    /// vehicle is further from the plan before than the assumptions explain.
+    fn optimise(
+        &mut self,
+        planner: &mut Planner,
+        memory: &mut Memory,
+        tick: &Tick,
+    ) -> Option<Contradiction> {
+        let assured = memory.assured();
+        let shift = if assured { memory.observed.shift(&self.settings) } else { Vector3::zeros() };
+        planner.begin(&mut self.stages, tick, shift);
+        self.terms = self.terms(memory);
+        self.turn = self.needed_by_turn(&memory.turn);
+        let before = if memory.started {
+            self.shift(memory);
+            self.before(memory, &tick.state)
+        } else {
+            memory.start(self.settings.horizon);
+            Before::Nothing
+        };
+        let contradicted = assured && before == Before::LeftBehind;
+        if contradicted {
+            memory.guarantee = GuaranteeStatus::Exceeded;
+        }
+        let report = self.plan(planner, memory, &tick.state, before);
+        planner.end(memory, &report);
+        contradicted.then_some(Contradiction::Deviation)
+    }
+
+    /// Shifts the plan by one step as in (31). Beyond the horizon it brakes, α̈ = −κ α̇, β̈ = −κ_β β̇
+    /// and σ̈ = −κ σ̇ (step 6 of the proof). What it carries is moved on to its new beginning.
+    fn shift(&self, memory: &mut Memory) {
+        let Settings { horizon, period_optimisation, .. } = self.settings;
+        let plan = &mut memory.plan;
+        let braking = Vector3::new(BRAKING, plan.braking, BRAKING);
+        let a = -plan.states[horizon].fixed_rows::<3>(3).component_mul(&braking);
+        if let Some(switching) = &self.design.tightening.switching {
+            plan.onset.carried = switching.next(&plan.begins_with(switching));
+            plan.onset.before = plan.accelerations[0];
+        }
+        plan.shift(&a, period_optimisation);
+        memory.age = memory.age.saturating_add(self.design.ratio as u32);
+    }
+
+    /// Returns what the shifted plan is to an optimisation from the measured state. If the design
+    /// does not hold anyway, the plan still serves as a guess.
+    fn before(&self, memory: &Memory, measured: &Vector6<f64>) -> Before {
+        let (angles, rates) = split(&(measured - memory.plan.states[0]));
+        let gain = self.settings.feedback;
+        let feedback = angles * gain.k1 + rates * gain.k2;
+        if self.design.accepted_share >= 1.0
+            && !self.explains(memory, 0, &[angles, rates], &feedback)
+        {
+            Before::LeftBehind
+        } else {
+            Before::Followed
+        }
+    }
+
+    /// Returns the part of the rate limit that the trajectory's turn w (rad/s) needs while a plan
+    /// is followed: ‖w‖ + c_w, as the theorem bounds ‖ω + w‖. Without a turn it needs nothing.
     fn needed_by_turn(&self, turn: &Vector3<f64>) -> f64 {
         let is_told = *turn != Vector3::zeros();
         if is_told { turn.norm() + self.settings.turn_change } else { 0.0 }
     }
 
-    /// Returns what a nominal trajectory follows on that begins at the measured state.
-    fn onset_anew(&self, memory: &Memory, measured: &Vector6<f64>) -> Onset {
-        let Some(switching) = &self.design.tightening.switching else { return Onset::default() };
+    /// Returns the beginning of a nominal trajectory at the measured state. It begins with the
+    /// pulses that the measurement may not show yet, and its first command may cause a pulse as
+    /// large as the one for which the plan before leaves room (step 7 of the proof).
+    fn anew(&self, memory: &Memory, measured: &Vector6<f64>) -> Beginning {
+        let begins = |onset| Beginning { state: *measured, age: 0, onset, level: self.terms.level };
+        let Some(switching) = &self.design.tightening.switching else {
+            return begins(Onset::default());
+        };
         let at_rest = || {
             let (angles, rates) = split(measured);
             self.settings.body.drift(&angles, &rates)
         };
         let allowed = memory.plan.begins_with(switching).z
             + self.design.at_level(memory.plan.terms.level).pulse(memory.age as usize);
-        Onset {
+        begins(Onset {
             carried: switching.unseen(memory.commands.changes()),
             before: memory.observed.commanded().unwrap_or_else(at_rest),
             allowed: if memory.assured() { allowed } else { f64::INFINITY },
+        })
+    }
+
+    /// Returns the beginning of the present plan, if it goes on. It takes no less of the
+    /// disturbance for granted than what drives the deviation already.
+    fn going_on(&self, memory: &Memory) -> Beginning {
+        let plan = &memory.plan;
+        let mut onset = plan.onset;
+        if let Some(switching) = &self.design.tightening.switching {
+            let allowed = switching.pulse_of_command(plan.first_change());
+            onset.allowed = if memory.assured() { allowed } else { f64::INFINITY };
         }
+        let level = self.terms.level.min(plan.terms.level);
+        Beginning { state: plan.states[0], age: memory.age, onset, level }
     }
 
-    /// Returns what the present plan follows on, if it goes on.
-    fn onset_going_on(&self, memory: &Memory) -> Onset {
-        let Plan { onset, .. } = &memory.plan;
-        let Some(switching) = &self.design.tightening.switching else { return *onset };
-        let allowed = switching.pulse_of_command(memory.plan.first_change());
-        Onset { allowed: if memory.assured() { allowed } else { f64::INFINITY }, ..*onset }
-    }
-
-    /// Returns where the present plan is, since how many ticks it has been followed, what it
-    /// follows on, and the level of the disturbance: not less of it than what drives the deviation
-    /// already.
-    fn goes_on(&self, memory: &Memory) -> (Vector6<f64>, u32, Onset, usize) {
-        let Plan { states, terms, .. } = &memory.plan;
-        let level = self.terms.level.min(terms.level);
-        (states[0], memory.age, self.onset_going_on(memory), level)
+    /// Returns the beginnings that are tried, in this order.
+    fn beginnings(&self, memory: &Memory, measured: &Vector6<f64>) -> [Option<Beginning>; 2] {
+        let (anew, going_on) = (self.anew(memory, measured), self.going_on(memory));
+        match self.settings.initial_state {
+            InitialState::Nominal if memory.assured() => [Some(going_on), None],
+            InitialState::Measured if memory.assured() => [Some(anew), Some(going_on)],
+            _ => [Some(anew), None],
+        }
     }
 
     /// Finds a plan that satisfies the conditions of the theorem. The first choice is the optimum
@@ -89,73 +206,63 @@ impl Robust {
     /// predicted. The last is the previous plan itself, which satisfies the conditions if it did
     /// before and the vehicle is no further from it than the assumptions explain. Without such a
     /// plan the limits are violated as little as possible.
-    fn plan_by_the_theorem(
+    fn plan(
         &mut self,
         planner: &mut Planner,
         memory: &mut Memory,
         measured: &Vector6<f64>,
-        anew: bool,
-    ) -> mpc::OptimiserReport {
-        let assured = memory.assured();
+        before: Before,
+    ) -> OptimiserReport {
         if !self.credible(memory) {
             return self.violate_least(planner, memory, measured, 0);
         }
-        let level = self.terms.level;
-        let anew_from = (*measured, 0, self.onset_anew(memory, measured), level);
-        let goes_on = self.goes_on(memory);
-        let starts = match self.settings.initial_state {
-            InitialState::Nominal if assured => [Some(goes_on), None],
-            InitialState::Measured if assured => [Some(anew_from), Some(goes_on)],
-            _ => [Some(anew_from), None],
-        };
+        let assured = memory.assured();
         let mut iterations = 0;
-        for (start, age, onset, level) in starts.into_iter().flatten() {
-            self.begin(age as usize, 1.0, &onset, level);
+        for beginning in self.beginnings(memory, measured).into_iter().flatten() {
+            self.begin(&beginning, 1.0);
             // If the last optimisation has not begun at the measured state either, this one will
             // hardly find an optimum there.
-            self.another = assured && age == 0 && memory.age > self.design.ratio as u32;
-            let (report, certified) = self.certified(planner, memory, &start, anew);
+            self.another = assured && beginning.age == 0 && memory.age > self.design.ratio as u32;
+            let report = self.optimum(planner, memory, &beginning, before);
             iterations += report.iterations;
-            let solved = report.status != SolverStatus::Fallback;
-            // Linearised constraints serve for comparison, so their optimum is accepted without
-            // guarantee.
-            let taken = !assured || self.settings.solver.nonlinearity == Nonlinearity::Frozen;
-            if certified.is_some() || solved && taken {
-                planner.follow_optimum(&self.stages, memory, &start);
-                (memory.age, memory.plan.onset) = (age, onset);
-                self.take_over(planner, memory, certified);
-                return mpc::OptimiserReport { iterations, ..report };
+            if report.status != SolverStatus::Fallback {
+                return OptimiserReport { iterations, ..report };
             }
         }
         if assured {
             self.go_towards_the_optimum(planner, memory);
             self.terms = memory.plan.terms;
-            let report = planner.keep(
-                (self, &self.stages),
-                memory,
-                measured,
-                (SolverStatus::Kept, iterations),
-            );
-            memory.margins = self.margins(&planner.previous);
-            return report;
+            return self.keep(planner, memory, measured, (SolverStatus::Kept, iterations));
         }
         self.violate_least(planner, memory, measured, iterations)
     }
 
-    /// Returns the optimum from `start`, with its certificate if it satisfies the conditions of the
-    /// theorem.
-    fn certified(
+    /// Follows the optimum from this beginning if it is certified, or if no guarantee ends by it.
+    /// Otherwise the report is that of a fallback.
+    fn optimum(
         &self,
         planner: &mut Planner,
-        memory: &Memory,
-        start: &Vector6<f64>,
-        first: bool,
-    ) -> (mpc::OptimiserReport, Option<Certified>) {
-        let report = planner.solve((self, &self.stages), memory, start, first);
+        memory: &mut Memory,
+        beginning: &Beginning,
+        before: Before,
+    ) -> OptimiserReport {
+        let Beginning { state, age, onset, .. } = beginning;
+        let about_itself = before != Before::Followed;
+        let report = planner.solve(self, &self.stages, memory, state, about_itself);
         if report.status == SolverStatus::Fallback {
-            return (report, None);
+            return report;
         }
-        (report, self.certify(planner.optimiser.trajectory(), report.settled))
+        let certified = self.certify(planner.optimiser.trajectory(), report.settled);
+        // Linearised constraints serve for comparison, so their optimum is accepted without
+        // guarantee.
+        let is_compared = self.settings.solver.nonlinearity == Nonlinearity::Frozen;
+        if certified.is_none() && memory.assured() && !is_compared {
+            return OptimiserReport { status: SolverStatus::Fallback, ..report };
+        }
+        planner.follow_optimum(&self.stages, memory, state);
+        (memory.age, memory.plan.onset) = (*age, *onset);
+        self.take_over(planner, memory, certified);
+        report
     }
 
     /// Follows the trajectory that has just become the plan, under guarantee if it is certified.
@@ -176,23 +283,24 @@ impl Robust {
     /// Moves the certified plan towards the optimum without constraints as far as that is
     /// certified, so that a plan that is kept repeatedly still leads to the reference.
     fn go_towards_the_optimum(&mut self, planner: &mut Planner, memory: &mut Memory) {
-        let (_, age, onset, level) = self.goes_on(memory);
-        self.begin(age as usize, 1.0, &onset, level);
+        let beginning = self.going_on(memory);
+        self.begin(&beginning, 1.0);
         planner.solve_without_constraints(&self.stages, &memory.plan);
         for _ in 0..HALVINGS {
             planner.optimiser.halve_the_way_to(&planner.previous);
-            if let Some(certified) = self.certify(planner.optimiser.trajectory(), false) {
-                let start = memory.plan.states[0];
-                planner.follow_optimum(&self.stages, memory, &start);
-                self.take_over(planner, memory, Some(certified));
+            let certified = self.certify(planner.optimiser.trajectory(), false);
+            if certified.is_some() {
+                planner.follow_optimum(&self.stages, memory, &beginning.state);
+                self.take_over(planner, memory, certified);
                 return;
             }
         }
         // The plan itself may serve for what its inputs have become since it was certified.
-        if memory.plan.terms != self.terms
-            && let Some(certified) = self.certify(&planner.previous, false)
-        {
-            self.take_over(planner, memory, Some(certified));
+        if memory.plan.terms != self.terms {
+            let certified = self.certify(&planner.previous, false);
+            if certified.is_some() {
+                self.take_over(planner, memory, certified);
+            }
         }
     }
 
@@ -204,24 +312,23 @@ impl Robust {
         memory: &mut Memory,
         measured: &Vector6<f64>,
         tried: u32,
-    ) -> mpc::OptimiserReport {
+    ) -> OptimiserReport {
         memory.guarantee = self.without_guarantee(memory);
-        let onset = self.onset_anew(memory, measured);
         self.terms = self.terms(memory);
-        let level = self.terms.level;
-        (memory.age, memory.plan.onset, memory.plan.terms) = (0, onset, self.terms);
+        let beginning = self.anew(memory, measured);
+        (memory.age, memory.plan.onset, memory.plan.terms) = (0, beginning.onset, self.terms);
         let mut iterations = tried;
         for share in LESS {
             if planner.optimiser.is_exhausted() {
                 break;
             }
-            self.begin(0, share, &onset, level);
-            let report = planner.solve((self, &self.stages), memory, measured, true);
+            self.begin(&beginning, share);
+            let report = planner.solve(self, &self.stages, memory, measured, true);
             iterations += report.iterations;
             if report.status != SolverStatus::Fallback {
                 planner.follow_optimum(&self.stages, memory, measured);
                 memory.margins = self.margins(planner.optimiser.trajectory());
-                return mpc::OptimiserReport { iterations, ..report };
+                return OptimiserReport { iterations, ..report };
             }
         }
         let settings = self.settings_of_plan();
@@ -229,12 +336,19 @@ impl Robust {
             terminal::acceleration_within_limits(&settings, state, reference)
         };
         memory.plan.roll_out(*measured, &self.stages, law);
-        let report = planner.keep(
-            (self, &self.stages),
-            memory,
-            measured,
-            (SolverStatus::Fallback, iterations),
-        );
+        self.keep(planner, memory, measured, (SolverStatus::Fallback, iterations))
+    }
+
+    /// Keeps the present plan, and returns the report on it with this status and these iterations.
+    fn keep(
+        &self,
+        planner: &mut Planner,
+        memory: &mut Memory,
+        measured: &Vector6<f64>,
+        (status, iterations): (SolverStatus, u32),
+    ) -> OptimiserReport {
+        let ended = OptimiserReport { status, iterations, ..OptimiserReport::default() };
+        let report = planner.keep(self, &self.stages, memory, measured, ended);
         memory.margins = self.margins(&planner.previous);
         report
     }
@@ -248,107 +362,5 @@ impl Robust {
         } else {
             GuaranteeStatus::Exceeded
         }
-    }
-}
-
-impl ConstraintSet for Robust {
-    fn stages_mut(&mut self) -> &mut Stages {
-        &mut self.stages
-    }
-
-    fn window_margin(&self) -> f64 {
-        WINDOW_MARGIN
-    }
-
-    fn bounds(&self, held: &mpc::Bounds) -> Bounds {
-        // The first state is given.
-        Bounds { rate: held.state[1..].to_vec(), input: held.input.clone(), terminal: None }
-    }
-
-    fn moment_left(&self) -> f64 {
-        self.design.assessment.moment_left
-    }
-
-    fn observe(&self, memory: &mut Memory, angle_rates: &Vector3<f64>) {
-        memory.pending = memory.pending.saturating_sub(1);
-        memory.recent_bound = self.recent_bound(memory);
-        memory.acting.ticks = memory.acting.ticks.saturating_sub(1);
-        let Memory { commands, observed, .. } = memory;
-        let (settings, tightening) = (&self.settings, &self.design.tightening);
-        let pulse = tightening
-            .switching
-            .as_ref()
-            .map_or(0.0, |switching| commands.observe(settings, switching, observed));
-        observed.observe(settings, &tightening.observable, angle_rates, pulse);
-    }
-
-    /// Without guarantee the command compensates for the disturbance instead.
-    fn shift(&self, memory: &Memory) -> Vector3<f64> {
-        if memory.assured() { memory.observed.shift(&self.settings) } else { Vector3::zeros() }
-    }
-
-    fn plan(
-        &mut self,
-        planner: &mut Planner,
-        memory: &mut Memory,
-        measured: &Vector6<f64>,
-        first: bool,
-    ) -> Planned {
-        let was_assured = memory.assured();
-        self.terms = self.terms(memory);
-        self.turn = self.needed_by_turn(&memory.turn);
-        if !first {
-            memory.age = memory.age.saturating_add(self.design.ratio as u32);
-        }
-        let anew = first || self.is_left_behind(memory, measured);
-        let report = self.plan_by_the_theorem(planner, memory, measured, anew);
-        Planned { report, left_behind: was_assured && anew && !first }
-    }
-
-    /// Beyond the horizon the trajectory brakes.
-    fn beyond_the_horizon(&self, plan: &Plan) -> Vector3<f64> {
-        let last = &plan.states[self.stages.horizon()];
-        let braking = Vector3::new(guarantee::BRAKING, plan.braking, guarantee::BRAKING);
-        -last.fixed_rows::<3>(3).component_mul(&braking)
-    }
-
-    fn move_on(&self, plan: &mut Plan) {
-        if let Some(switching) = &self.design.tightening.switching {
-            plan.onset.carried = switching.next(&plan.begins_with(switching));
-            plan.onset.before = plan.accelerations[0];
-        }
-    }
-
-    /// Without guarantee the command compensates for the disturbance at once, because no plan
-    /// reserves moment for it.
-    fn compensation(&self, memory: &Memory) -> Vector3<f64> {
-        let compensates = self.settings.observer.active && !memory.assured();
-        if compensates { -memory.observed.disturbance } else { Vector3::zeros() }
-    }
-
-    /// The acceleration is exact in the middle of the period over which the moment is held, so that
-    /// the effects of a changing f on the rate cancel over the period.
-    fn moment(
-        &self,
-        angles: &Vector3<f64>,
-        angle_rates: &Vector3<f64>,
-        acceleration: &Vector3<f64>,
-    ) -> Vector3<f64> {
-        let half = 0.5 * self.settings.period_feedback;
-        let angles = angles + (angle_rates + acceleration * (0.5 * half)) * half;
-        let angle_rates = angle_rates + acceleration * half;
-        linearise::moment(&self.settings.body, &angles, &angle_rates, acceleration)
-    }
-
-    fn supervise(&self, memory: &mut Memory, tick: &Tick) {
-        self.judge(memory, tick);
-    }
-
-    fn limit(&self, _memory: &Memory) -> f64 {
-        self.settings.limit_moment
-    }
-
-    fn explained(&self) -> Option<Explained> {
-        Some(self.design.tightening.explained)
     }
 }
