@@ -150,12 +150,7 @@ impl Design {
         let s = &settings;
         let lower = if accepted_share < 1.0 { Vec::new() } else { lower(s)? };
         let error = SampledError::delayed(s.feedback, s.period_feedback, s.delay);
-        let reach = error.reach_forever().ok_or(DesignError::Unstable {
-            k1: s.feedback.k1,
-            k2: s.feedback.k2,
-            period: s.period_feedback,
-            radius: error.spectral_radius(),
-        })?;
+        let reach = error.reach_forever().ok_or_else(|| guarantee::unstable(s, &error))?;
 
         let held = SampledError::new(s.terminal, s.period_optimisation);
         let g: [Matrix2<f64>; 3] = std::array::from_fn(|i| {

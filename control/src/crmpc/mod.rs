@@ -25,9 +25,11 @@ pub use commands::Commands;
 pub use design::{
     Design, PaperConstants, held_terminal_weight, step_response_peak, terminal_weight,
 };
+pub use guarantee::{Assessment, Carried, Deviation, Onset, Switching, Tightening};
 #[doc(hidden)]
-pub use guarantee::Lemmas;
-pub use guarantee::{Assessment, Carried, Deviation, Geometry, Onset, Switching, Tightening};
+pub use guarantee::{
+    BRAKING, CURVATURE, DRIFT_BY_ANGLES_TWICE, DRIFT_MIXED, Domain, FOURTH, Lemmas, TURN,
+};
 pub use memory::{Acting, Margins, Memory};
 pub use observer::Observed;
 pub use plan::{Plan, Terms};

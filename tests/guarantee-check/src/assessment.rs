@@ -4,8 +4,12 @@
 use crate::interval::Interval;
 use crate::lemmas::{Finding, ROUNDING};
 use crate::sums::{Axis, Bounds};
-use control::crmpc::{Deviation, InitialState, Lemmas, Settings, Tightening};
+use control::crmpc::{
+    BRAKING, CURVATURE, DRIFT_BY_ANGLES_TWICE, DRIFT_MIXED, Deviation, Domain, InitialState,
+    Lemmas, Settings, TURN, Tightening,
+};
 use control::error_dynamics::{Early, SampledError};
+use control::linearise::TURN_BY_ANGLES;
 
 /// Causes that drive the vehicle off its prediction, apart from the mismatch.
 struct Drive {
@@ -52,9 +56,10 @@ fn drive(s: &Settings, lemmas: &Lemmas) -> Drive {
     let number = Interval::from;
     let (root2, root3) = (number(2.0).sqrt(), number(3.0).sqrt());
     let [limit, smallest, largest, disturbance] =
-        [s.limit_total(), lemmas.smallest, lemmas.largest, s.disturbance_bound].map(number);
+        [s.limit_total(), lemmas.dynamics.smallest, lemmas.dynamics.largest, s.disturbance_bound]
+            .map(number);
     let (common, tensor) = (number(s.inertia_error), number(s.tensor_error));
-    let (rate, sideslip) = lemmas.vehicle;
+    let Domain { rate, sideslip } = lemmas.dynamics.vehicle;
     let square = number(rate).square();
     let of_tensor = tensor / (Interval::ONE - tensor);
     let spin = number(0.5) * (largest - smallest) * square;
@@ -81,12 +86,14 @@ fn mismatch(s: &Settings, lemmas: &Lemmas, drive: &Drive) -> Mismatch {
     let number = Interval::from;
     let (half, sixth) = (number(0.5), Interval::ONE / number(6.0));
     let [tau, d] = [s.period_feedback, s.delay].map(number);
-    let [by_rates, by_angles, jerk] = [lemmas.by_rates, lemmas.by_angles, lemmas.jerk].map(number);
+    let [by_rates, by_angles, jerk] =
+        [lemmas.dynamics.by_rates, lemmas.dynamics.by_angles, lemmas.dynamics.jerk].map(number);
     let Drive { of_three, of_two, errors: [rates, rates_of_two, angles], .. } = *drive;
     let end = d + tau;
     let growth = ((by_rates + by_angles * end) * end).exp();
     let square = tau.square();
-    let slope = by_rates * number(lemmas.acceleration) + by_angles * number(lemmas.rate);
+    let slope =
+        by_rates * number(lemmas.dynamics.acceleration) + by_angles * number(lemmas.dynamics.rate);
     // Distance of the vehicle, in the middle of the period, from its prediction with a constant
     // acceleration. F there drives it further off, which sums up to a geometric series.
     let in_turn = by_rates * half * tau + by_angles * square / number(8.0);
@@ -97,7 +104,7 @@ fn mismatch(s: &Settings, lemmas: &Lemmas, drive: &Drive) -> Mismatch {
     // drive causes. Up to τ it acts, and from then on both are predictions.
     let of_rates = half * of_three * square + of_three * tau * d;
     let of_angles = of_two * (sixth * square * tau + half * square * d + half * tau * d.square());
-    let ((inner, _), (outer, _)) = (lemmas.vehicle, lemmas.domain);
+    let [inner, outer] = [lemmas.dynamics.vehicle.rate, lemmas.dynamics.domain.rate];
     let halfway = half * (number(inner) + number(outer)) / number(outer);
     let revised = halfway * by_rates * of_rates + by_angles * of_angles;
     let erred =
@@ -110,8 +117,8 @@ fn mismatch(s: &Settings, lemmas: &Lemmas, drive: &Drive) -> Mismatch {
         rates + (of_three + f) * end + off,
         angles + rates_of_two * end + half * (of_two + f) * end.square() + off * tau,
     ];
-    let (vehicle_rate, vehicle_sideslip) = lemmas.vehicle;
-    let turned = number(lemmas.turn) * far[1] * number(lemmas.r) * number(vehicle_rate);
+    let Domain { rate: vehicle_rate, sideslip: vehicle_sideslip } = lemmas.dynamics.vehicle;
+    let turned = number(TURN) * far[1] * number(lemmas.dynamics.geometry.r) * number(vehicle_rate);
     Mismatch {
         mean: (revised + erred) * growth / tau + jerk * square / number(24.0) + beside,
         peak: f + beside + jerk * square / number(8.0) + half * slope * tau,
@@ -130,7 +137,7 @@ fn mismatch(s: &Settings, lemmas: &Lemmas, drive: &Drive) -> Mismatch {
 fn driven(s: &Settings, lemmas: &Lemmas, before: &Lemmas) -> Driven {
     let number = Interval::from;
     let (half, tau, d) = (number(0.5), number(s.period_feedback), number(s.delay));
-    let [smallest, largest] = [lemmas.smallest, lemmas.largest].map(number);
+    let [smallest, largest] = [lemmas.dynamics.smallest, lemmas.dynamics.largest].map(number);
     let (drive, larger) = (self::drive(s, lemmas), self::drive(s, before));
     let mut mismatch = self::mismatch(s, lemmas, &drive);
     let first = self::mismatch(s, before, &larger);
@@ -146,21 +153,22 @@ fn driven(s: &Settings, lemmas: &Lemmas, before: &Lemmas) -> Driven {
         early(first.swing, mismatch.swing),
     ];
     (mismatch.peak, mismatch.unseen_rate) = (first.peak + more, first.unseen_rate + more * d);
-    let by_turn = largest / smallest * number(lemmas.turn) * number(before.r);
-    let (rate, _) = before.vehicle;
+    let by_turn = largest / smallest * number(TURN) * number(before.dynamics.geometry.r);
+    let rate = before.dynamics.vehicle.rate;
     let spin =
         (number(s.limit_total()) + half * (largest - smallest) * number(rate).square()) / smallest;
     Driven {
         early,
         between: first.slope * tau.square() / number(8.0)
-            + number(before.jerk) * tau.square() * tau / (number(36.0) * number(12.0).sqrt()),
-        turning: by_turn * number(lemmas.rate),
+            + number(before.dynamics.jerk) * tau.square() * tau
+                / (number(36.0) * number(12.0).sqrt()),
+        turning: by_turn * number(lemmas.dynamics.rate),
         turned: [
             by_turn * drive.errors[2],
-            by_turn * (number(before.rate) - number(lemmas.rate)) * d,
+            by_turn * (number(before.dynamics.rate) - number(lemmas.dynamics.rate)) * d,
         ],
         early_moment: (larger.inertia[1] - drive.inertia[1]) * largest / smallest
-            * number(before.r),
+            * number(before.dynamics.geometry.r),
         root_condition: (largest / smallest).sqrt(),
         vehicle_before: [
             number(s.limit_rate) + (spin + larger.of_three) * d,
@@ -258,24 +266,25 @@ fn needed(lemmas: &Lemmas, forever: &Deviations, x: f64) -> [Interval; 2] {
     let [angle, rate, _, _, middle_angle, middle_rate, feedback, feedback_norm, feedback_moment] =
         *forever;
     let [largest, smallest, drift, curvature, mixed, twice, turn_by_angles] = [
-        lemmas.largest,
-        lemmas.smallest,
-        lemmas.drift,
-        lemmas.curvature,
-        lemmas.drift_mixed,
-        lemmas.drift_by_angles_twice,
-        lemmas.turn_by_angles,
+        lemmas.dynamics.largest,
+        lemmas.dynamics.smallest,
+        lemmas.dynamics.geometry.drift,
+        CURVATURE,
+        DRIFT_MIXED,
+        DRIFT_BY_ANGLES_TWICE,
+        TURN_BY_ANGLES,
     ]
     .map(number);
     let gyroscopic = number(lemmas.gyroscopic.0);
     let spread = largest - smallest;
     let x = number(x);
-    let a = number(lemmas.braking) * x;
+    let a = number(BRAKING) * x;
     let rates = rate + turn_by_angles * x * angle + half * curvature * x * angle.square() + x;
 
     let slope_by_angles = largest * (turn_by_angles * a + curvature * x.square())
         + turn_by_angles * gyroscopic * x.square();
-    let slope_by_rates = (largest * number(lemmas.drift_by_rates) + gyroscopic) * x;
+    let slope_by_rates =
+        (largest * number(lemmas.dynamics.geometry.drift_by_rates) + gyroscopic) * x;
     let by_feedback = feedback * number(lemmas.bearing) + feedback_norm * largest + feedback_moment;
     let (four, twelve, further) = (number(4.0), number(12.0), x + middle_rate);
     let second = half * largest * curvature * a * middle_angle.square()
@@ -329,20 +338,31 @@ pub fn check(
         findings.push(Finding { statement: statement.into(), bound, truth });
     };
     let Driven { mismatch, .. } = &driven;
-    note("mismatch of the cancellation, mean of a period", lemmas.mismatch, mismatch.mean);
-    note("mismatch at any time", lemmas.peak, mismatch.peak);
-    note("mismatch since a measurement", lemmas.unseen_rate, mismatch.unseen_rate);
-    note("mismatch of a prediction by errors", lemmas.mispredicted, mismatch.mispredicted);
-    note("swing of the cancelled drift", lemmas.swing, mismatch.swing);
-    note("‖drive‖", lemmas.norm, driven.drive.of_three + mismatch.mean);
-    let ((rate, sideslip), [of_rate, of_sideslip]) = (lemmas.domain, mismatch.domain);
+    note(
+        "mismatch of the cancellation, mean of a period",
+        lemmas.parts.mismatch.mean,
+        mismatch.mean,
+    );
+    note("mismatch at any time", lemmas.parts.mismatch.peak, mismatch.peak);
+    note("mismatch since a measurement", lemmas.parts.mismatch.unseen_rate, mismatch.unseen_rate);
+    note(
+        "mismatch of a prediction by errors",
+        lemmas.parts.mismatch.mispredicted,
+        mismatch.mispredicted,
+    );
+    note("swing of the cancelled drift", lemmas.parts.swing, mismatch.swing);
+    note("‖drive‖", lemmas.parts.norm, driven.drive.of_three + mismatch.mean);
+    let (Domain { rate, sideslip }, [of_rate, of_sideslip]) =
+        (lemmas.dynamics.domain, mismatch.domain);
     note("‖ω‖ of predictions", rate, of_rate);
     note("|β| of predictions", sideslip, of_sideslip);
     if s.delay > 0.0 {
-        let ((rate, sideslip), [of_rate, of_sideslip]) = (before.vehicle, driven.vehicle_before);
+        let (Domain { rate, sideslip }, [of_rate, of_sideslip]) =
+            (before.dynamics.vehicle, driven.vehicle_before);
         note("‖ω‖ before the trajectory began", rate, of_rate);
         note("|β| before the trajectory began", sideslip, of_sideslip);
-        let ((rate, sideslip), [of_rate, of_sideslip]) = (before.domain, driven.domain_before);
+        let (Domain { rate, sideslip }, [of_rate, of_sideslip]) =
+            (before.dynamics.domain, driven.domain_before);
         note("‖ω‖ of predictions before", rate, of_rate);
         note("|β| of predictions before", sideslip, of_sideslip);
     }

@@ -14,7 +14,10 @@ use crate::kinematics::{
     Turn, Vector, cross, dot, scaled, sine_cosine, square, sum, times, turned,
 };
 use crate::search::{Effort, supremum};
-use control::crmpc::{Lemmas, Settings};
+use control::crmpc::{
+    CURVATURE, DRIFT_BY_ANGLES_TWICE, DRIFT_MIXED, Domain, FOURTH, Lemmas, Settings, TURN,
+};
+use control::linearise::TURN_BY_ANGLES;
 use nalgebra::Matrix3;
 
 /// Relative rounding error that the bounds are allowed, as in the controller's own checks.
@@ -176,7 +179,7 @@ fn gyroscopic<const N: usize>(
 
 /// Returns settings whose limits are the domain of the bounds.
 pub(crate) fn over_the_domain(s: &Settings, lemmas: &Lemmas) -> Settings {
-    let (limit_rate, sideslip_domain) = lemmas.domain;
+    let Domain { rate: limit_rate, sideslip: sideslip_domain } = lemmas.dynamics.domain;
     Settings { limit_rate, sideslip_domain, ..*s }
 }
 
@@ -212,7 +215,7 @@ fn geometry(search: &mut Search, lemmas: &Lemmas) -> [Interval; 6] {
     let three = [u, SIDE, SIDE];
     let drift = search.check(
         "‖Ẇ x‖ ≤ b ‖x‖²",
-        lemmas.drift,
+        lemmas.dynamics.geometry.drift,
         1.0,
         3,
         three,
@@ -223,7 +226,7 @@ fn geometry(search: &mut Search, lemmas: &Lemmas) -> [Interval; 6] {
     );
     search.check(
         "‖∂(Ẇ x)/∂x‖ ≤ b ‖x‖ (Frobenius)",
-        lemmas.drift_by_rates,
+        lemmas.dynamics.geometry.drift_by_rates,
         1.0,
         3,
         three,
@@ -241,45 +244,37 @@ fn geometry(search: &mut Search, lemmas: &Lemmas) -> [Interval; 6] {
         },
     );
     let statement = "‖∂²(W y)/∂(α, β)²‖ ≤ b ‖y‖ (Frobenius)";
-    let curvature =
-        search.check(statement, lemmas.curvature, 1.0, 3, three, |chart, &[u, a, b]| {
-            let (y, turn) = (space(chart, a, b), turn(u));
-            let squared = |i, j| square(&turn.derivative(i, j, &y));
-            (squared(2, 0) + squared(1, 1) + squared(1, 1) + squared(0, 2)) / square(&y)
-        });
+    let curvature = search.check(statement, CURVATURE, 1.0, 3, three, |chart, &[u, a, b]| {
+        let (y, turn) = (space(chart, a, b), turn(u));
+        let squared = |i, j| square(&turn.derivative(i, j, &y));
+        (squared(2, 0) + squared(1, 1) + squared(1, 1) + squared(0, 2)) / square(&y)
+    });
     let statement = "‖∂(W y)/∂(α, β)‖ ≤ b ‖y‖ (Frobenius)";
-    search.check(statement, lemmas.turn_by_angles, 1.0, 3, three, |chart, &[u, a, b]| {
+    search.check(statement, TURN_BY_ANGLES, 1.0, 3, three, |chart, &[u, a, b]| {
         let (y, turn) = (space(chart, a, b), turn(u));
         (square(&turn.derivative(1, 0, &y)) + square(&turn.derivative(0, 1, &y))) / square(&y)
     });
     let four = [u, SIDE, SIDE, SIDE];
     let statement = "‖∂W[o]‖ ≤ b ‖o‖";
-    let by_turn = search.check(statement, lemmas.turn, 1.0, 6, four, |chart, &[u, o, a, b]| {
+    let by_turn = search.check(statement, TURN, 1.0, 6, four, |chart, &[u, o, a, b]| {
         let (o, y) = (plane(chart % 2, o), space(chart / 2, a, b));
         square(&turn(u).along(&[o], &y)) / (length(&o) * square(&y))
     });
     let statement = "‖∂²(Ẇ x)/∂(α, β)∂x‖ ≤ b ‖x‖";
-    let mixed =
-        search.check(statement, lemmas.drift_mixed, 1.0, 6, four, |chart, &[u, o, a, b]| {
-            let (o, x) = (plane(chart % 2, o), space(chart / 2, a, b));
-            let value = turn(u).along(&[o, [x[0], x[1]]], &x);
-            Dual::constant(4.0) * square(&value) / (length(&o) * square(&x).squared())
-        });
+    let mixed = search.check(statement, DRIFT_MIXED, 1.0, 6, four, |chart, &[u, o, a, b]| {
+        let (o, x) = (plane(chart % 2, o), space(chart / 2, a, b));
+        let value = turn(u).along(&[o, [x[0], x[1]]], &x);
+        Dual::constant(4.0) * square(&value) / (length(&o) * square(&x).squared())
+    });
     let statement = "‖∂²(Ẇ x)/∂(α, β)²‖ ≤ b ‖x‖²";
-    let twice = search.check(
-        statement,
-        lemmas.drift_by_angles_twice,
-        1.0,
-        6,
-        four,
-        |chart, &[u, o, a, b]| {
+    let twice =
+        search.check(statement, DRIFT_BY_ANGLES_TWICE, 1.0, 6, four, |chart, &[u, o, a, b]| {
             let (o, x) = (plane(chart % 2, o), space(chart / 2, a, b));
             let value = turn(u).along(&[o, o, [x[0], x[1]]], &x);
             square(&value) / (length(&o) * square(&x)).squared()
-        },
-    );
+        });
     let statement = "‖∂⁴(W y)/∂(α, β)⁴‖ ≤ b ‖y‖";
-    let fourth = search.check(statement, lemmas.fourth, 1.0, 6, four, |chart, &[u, o, a, b]| {
+    let fourth = search.check(statement, FOURTH, 1.0, 6, four, |chart, &[u, o, a, b]| {
         let (o, y) = (plane(chart % 2, o), space(chart / 2, a, b));
         let value = turn(u).along(&[o, o, o, o], &y);
         square(&value) / (length(&o).squared().squared() * square(&y))
@@ -302,7 +297,7 @@ fn lemma1(search: &mut Search, lemmas: &Lemmas, sideslip: f64) -> Interval {
     });
     search.findings.push(Finding {
         statement: "‖R‖ ≤ b (exact identity)".into(),
-        bound: lemmas.r,
+        bound: lemmas.dynamics.geometry.r,
         truth: r,
     });
     r
@@ -314,22 +309,34 @@ fn inertia(
     lemmas: &Lemmas,
 ) -> (Interval, Interval, Interval, Interval) {
     // The inertia is divided by its largest moment, so that all numbers are near one.
-    let unit = lemmas.largest;
+    let unit = lemmas.dynamics.largest;
     let rows = rows(&s.body.inertia, unit);
     let inverse = fixed::<2>(&inverse(&rows));
     let rows = fixed::<2>(&rows);
     let two = [SIDE, SIDE];
-    let largest =
-        search.check("‖I y‖ ≤ b ‖y‖", lemmas.largest, unit, 3, two, |chart, &[a, b]| {
+    let largest = search.check(
+        "‖I y‖ ≤ b ‖y‖",
+        lemmas.dynamics.largest,
+        unit,
+        3,
+        two,
+        |chart, &[a, b]| {
             let y = space(chart, a, b);
             square(&times(&rows, &y)) / square(&y)
-        });
+        },
+    );
     let statement = "‖I⁻¹ y‖ ≤ b ‖y‖";
-    let of_inverse =
-        search.check(statement, 1.0 / lemmas.smallest, 1.0 / unit, 3, two, |chart, &[a, b]| {
+    let of_inverse = search.check(
+        statement,
+        1.0 / lemmas.dynamics.smallest,
+        1.0 / unit,
+        3,
+        two,
+        |chart, &[a, b]| {
             let y = space(chart, a, b);
             square(&times(&inverse, &y)) / square(&y)
-        });
+        },
+    );
     let statement = "‖∂(ω × I ω)/∂ω‖ ≤ b ‖ω‖ (Frobenius)";
     search.check(statement, lemmas.gyroscopic.0, unit, 3, two, |chart, &[a, b]| {
         let omega = space(chart, a, b);
@@ -342,7 +349,7 @@ fn inertia(
         let [x, y, z] = gyroscopic(&rows, &omega).map(|column| square(&times(&inverse, &column)));
         (x + y + z) / square(&omega)
     });
-    let spread = lemmas.largest - lemmas.smallest;
+    let spread = lemmas.dynamics.largest - lemmas.dynamics.smallest;
     let gyroscopic_moment = |omega: &Vector<Dual<2>>| cross(omega, &times(&rows, omega));
     let statement = "‖ω × I ω‖ ≤ b ‖ω‖²";
     let spin = search.check(statement, 0.5 * spread, unit, 3, two, |chart, &[a, b]| {
@@ -350,7 +357,7 @@ fn inertia(
         square(&gyroscopic_moment(&omega)) / square(&omega).squared()
     });
     let statement = "‖I⁻¹ (ω × I ω)‖ ≤ b ‖ω‖²";
-    let bound = 0.5 * spread / lemmas.smallest;
+    let bound = 0.5 * spread / lemmas.dynamics.smallest;
     let spin_inverse = search.check(statement, bound, 1.0, 3, two, |chart, &[a, b]| {
         let omega = space(chart, a, b);
         square(&times(&inverse, &gyroscopic_moment(&omega))) / square(&omega).squared()
@@ -359,7 +366,7 @@ fn inertia(
 }
 
 fn bearing(search: &mut Search, s: &Settings, lemmas: &Lemmas) -> Interval {
-    let unit = lemmas.largest;
+    let unit = lemmas.dynamics.largest;
     let rows = fixed::<2>(&rows(&s.body.inertia, unit));
     // There are two charts of α, half a turn apart, and four corners up to their common sign.
     let sides = [search.u, SIDE];

@@ -64,12 +64,12 @@ fn bounds_that_are_too_small_are_found_false() {
     let settings = Settings::new(Constraints::Robust).resolved().unwrap();
     let mut bounds = Lemmas::new(&settings);
     // The first two bounds are attained; the others have margins of 2.4 % and 1.3 %.
-    bounds.drift_by_rates *= 0.99;
+    bounds.dynamics.geometry.drift_by_rates *= 0.99;
     bounds.gyroscopic.1 *= 0.99;
-    bounds.drift *= 0.97;
+    bounds.dynamics.geometry.drift *= 0.97;
     bounds.bearing *= 0.98;
     // At rest the moment alone accelerates the vehicle by more than 90 % of the bound.
-    bounds.acceleration *= 0.9;
+    bounds.dynamics.acceleration *= 0.9;
     let (mut findings, suprema) = lemmas::check(&settings, &bounds, GAP);
     findings.extend(dynamics::check(&settings, &bounds, &suprema, 0.05));
     let wrong: Vec<&str> = findings

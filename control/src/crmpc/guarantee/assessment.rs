@@ -44,7 +44,7 @@ pub(super) fn left(
     (x, a): (f64, f64),
 ) -> (f64, f64) {
     let mut deviation = *tightening.forever();
-    let mut moment_loss = *tightening.moment_loss(usize::MAX);
+    let mut moment_loss = tightening.tick(usize::MAX).moment_loss;
     if let Some(more) = more {
         deviation = deviation.plus(more);
         moment_loss =

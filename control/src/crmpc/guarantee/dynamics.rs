@@ -13,37 +13,41 @@ use vehicle::math::{exp, powi};
 /// ‖m‖ ≤ M̄ plus the bound of the known moment. The domain contains the vehicle's states, and their
 /// predictions.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(in crate::crmpc) struct Dynamics {
+pub struct Dynamics {
     /// States of the vehicle itself.
-    pub(super) vehicle: Domain,
+    pub vehicle: Domain,
+    /// States of the vehicle and their predictions.
     pub domain: Domain,
+    /// Bounds on the kinematics in the domain.
     pub geometry: Geometry,
-    /// Largest and smallest moment of inertia, kg m².
+    /// Largest moment of inertia, kg m².
     pub largest: f64,
+    /// Smallest moment of inertia, kg m².
     pub smallest: f64,
     /// Factor in the bound ‖∂(ω × I ω)/∂ω‖ ≤ `gyroscopic` ‖ω‖ (Frobenius), kg m².
     pub gyroscopic: f64,
     /// Bound on ‖x_ω‖ in the domain, rad/s.
     pub rate: f64,
     /// Bound on ‖F‖ in the domain, rad/s².
-    pub(super) acceleration: f64,
+    pub acceleration: f64,
     /// Bound on ‖∂F/∂x_ω‖ in the domain, 1/s.
-    pub(super) by_rates: f64,
+    pub by_rates: f64,
     /// Bound on ‖∂F/∂(α, β)‖ in the domain, 1/s².
-    pub(super) by_angles: f64,
+    pub by_angles: f64,
     /// Bound on ‖dF/dt‖ along the predicted motion with m held, rad/s³.
-    pub(super) slope: f64,
+    pub slope: f64,
     /// Bound on ‖d²F/dt²‖ along the predicted motion with m held, rad/s⁴.
-    pub(super) jerk: f64,
-    /// Coefficients of ‖a‖², ‖x_ω‖² ‖a‖ and ‖x_ω‖⁴ in [`Self::moment_curvature`].
-    pub(super) curvature: [f64; 3],
-    /// Coefficients of the same powers in the curvature of ∂m/∂(α, β), see
-    /// [`Self::slope_curvatures`].
-    pub(super) curvature_by_angles: [f64; 3],
-    /// Coefficients of ‖x_ω‖ ‖a‖ and ‖x_ω‖³ in the curvature of ∂m/∂x_ω.
-    pub(super) curvature_by_rates: [f64; 2],
-    /// Coefficients of ‖a‖ and ‖x_ω‖² in the curvature of the largest ‖I W s‖.
-    pub(super) curvature_of_bearing: [f64; 2],
+    pub jerk: f64,
+    /// Coefficients of ‖a‖², ‖x_ω‖² ‖a‖ and ‖x_ω‖⁴ in the bound on ‖d²m/dt²‖ of a nominal
+    /// motion with a held.
+    pub curvature: [f64; 3],
+    /// Coefficients of the same powers in the bound on ‖d²/dt² ∂m/∂(α, β)‖ (Frobenius).
+    pub curvature_by_angles: [f64; 3],
+    /// Coefficients of ‖x_ω‖ ‖a‖ and ‖x_ω‖³ in the bound on ‖d²/dt² ∂m/∂x_ω‖ (Frobenius).
+    pub curvature_by_rates: [f64; 2],
+    /// Coefficients of ‖a‖ and ‖x_ω‖² in the second derivative of the largest ‖I W s‖
+    /// over the corners s of the unit box.
+    pub curvature_of_bearing: [f64; 2],
 }
 
 impl Dynamics {
@@ -176,7 +180,7 @@ impl Dynamics {
         // With P = ∂W[o] x and the symmetric bilinear form B(ω, ω) = 2 ω × I ω, ∂m/∂(α, β) [o] is
         // I (∂W[o] a + ∂²W[x, o] x) + B(ω, P). Here ‖P‖ ≤ t x, ‖Ṗ‖ ≤ c x² + t a and ‖P̈‖ ≤ d x³ +
         // 3 c x a with the bounds t, c and d on the first three derivatives of W; ‖ω̇‖ ≤ t x² + a,
-        // and ω̈ is that of `rate_curvature`. Likewise ∂m/∂x_ω [v] is I (∂W[v] x + ∂W[x] v) +
+        // and ‖ω̈‖ ≤ 3 t x a + c x³. Likewise ∂m/∂x_ω [v] is I (∂W[v] x + ∂W[x] v) +
         // B(ω, W v). Two and three columns make the norm one of Frobenius.
         let root3 = 3.0_f64.sqrt();
         let curvature_by_angles = [

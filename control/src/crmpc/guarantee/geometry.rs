@@ -5,7 +5,7 @@ use vehicle::math::{powi, sin_cos};
 
 /// Part of the state space in which the dynamics are bounded.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(in crate::crmpc) struct Domain {
+pub struct Domain {
     /// Bound on ‖ω‖, rad/s.
     pub rate: f64,
     /// Bound on |β|, rad.
@@ -27,20 +27,20 @@ pub struct Geometry {
 }
 
 /// Bound on ‖∂²(W y)/∂(α, β)²‖ relative to ‖y‖.
-pub(super) const CURVATURE: f64 = 3.162_277_660_168_379_5;
+pub const CURVATURE: f64 = 3.162_277_660_168_379_5;
 /// Bound on ‖W(Θ + o) − W(Θ)‖ relative to ‖o‖: ∂W/∂α and ∂W/∂β are orthogonal and no longer than √2
 /// (Frobenius).
-pub(in crate::crmpc) const TURN: f64 = SQRT_2;
+pub const TURN: f64 = SQRT_2;
 /// Bound on the mixed second derivative of Ẇ x by angles and rates, relative to ‖x‖.
 /// Ẇ x = ∂W x α̇ + ∂W x β̇ takes one more derivative of W.
-pub(super) const DRIFT_MIXED: f64 = 2.0 * CURVATURE;
+pub const DRIFT_MIXED: f64 = 2.0 * CURVATURE;
 /// Bound on the second derivative of Ẇ x by the angles, relative to ‖x‖², from the third
 /// derivatives of W.
-pub(super) const DRIFT_BY_ANGLES_TWICE: f64 = 8.0;
+pub const DRIFT_BY_ANGLES_TWICE: f64 = 8.0;
 /// Bound on ‖∂⁴(W y)/∂(α, β)⁴‖ relative to ‖y‖. Along a line of unit speed in (α, β), W y is a sum
 /// of sines whose frequencies are at most |α̇| + 2 |β̇| ≤ √5. As ‖W y‖ ≤ ‖y‖ everywhere, Bernstein's
 /// inequality bounds the fourth derivative by √5⁴.
-pub(super) const FOURTH: f64 = 25.0;
+pub const FOURTH: f64 = 25.0;
 /// Largest z for which 1/(1 − z) ≤ exp(2 z) is used; it is true up to 0.79.
 pub(super) const LARGEST_IN_TURN: f64 = 0.75;
 /// Number of domains that are tried until one contains its predictions.
@@ -48,8 +48,8 @@ pub(super) const DOMAINS: usize = 50;
 /// Widest sideslip angle of a domain, rad.
 pub(super) const WIDEST: f64 = 0.95;
 /// Rate at which the nominal motion brakes beyond the horizon, a = −κ x̃_ω, 1/s; for the sideslip
-/// it is the smallest rate. See [`braking`].
-pub(in crate::crmpc) const BRAKING: f64 = 0.01;
+/// it is the smallest rate, see [`super::braking`].
+pub const BRAKING: f64 = 0.01;
 
 impl Geometry {
     /// Computes the bounds for |β| ≤ `sideslip` (rad, below π/2).

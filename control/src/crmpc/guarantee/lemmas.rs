@@ -1,55 +1,25 @@
 //! The numbers on which the guarantee rests, for its machine check.
 
 use super::dynamics::Dynamics;
-use super::geometry::{BRAKING, CURVATURE, DRIFT_BY_ANGLES_TWICE, DRIFT_MIXED, FOURTH, TURN};
+use super::geometry::{CURVATURE, TURN};
 use super::losses::bearing;
 use super::mismatch::gyroscopic;
 use super::parts::Parts;
 use crate::crmpc::settings::Settings;
-use crate::error_dynamics::Early;
-use crate::linearise::TURN_BY_ANGLES as TURN_OF_RATES;
+use vehicle::math::powi;
 
-/// Every bound that the proof uses, as this crate computes it. The lines that compute the bounds
+/// The bounds that the proof uses, as this crate computes them. The lines that compute the bounds
 /// explain them.
-#[doc(hidden)]
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[allow(missing_docs)]
 pub struct Lemmas {
-    /// Largest ‖ω‖ (rad/s) and |β| (rad) of the vehicle, and of the domain of the bounds.
-    pub vehicle: (f64, f64),
-    pub domain: (f64, f64),
-    pub drift: f64,
-    pub drift_by_rates: f64,
-    pub r: f64,
-    pub curvature: f64,
-    pub turn: f64,
-    pub turn_by_angles: f64,
-    pub drift_mixed: f64,
-    pub drift_by_angles_twice: f64,
-    pub fourth: f64,
+    /// Bounds on the dynamics.
+    pub dynamics: Dynamics,
+    /// Parts of the deviation.
+    pub parts: Parts,
     /// Bounds of ∂(ω × I ω)/∂ω, and of I⁻¹ times that derivative.
     pub gyroscopic: (f64, f64),
-    pub largest: f64,
-    pub smallest: f64,
-    pub rate: f64,
-    pub acceleration: f64,
-    pub by_rates: f64,
-    pub by_angles: f64,
-    pub jerk: f64,
-    pub mismatch: f64,
-    pub peak: f64,
-    pub unseen_rate: f64,
-    pub mispredicted: f64,
-    pub early: [Early; 3],
-    pub swing: f64,
+    /// Largest ‖I W s‖ over the corners s of the unit box in the domain, kg m².
     pub bearing: f64,
-    pub norm: f64,
-    pub turning: f64,
-    pub turned: f64,
-    pub turned_early: f64,
-    pub early_moment: f64,
-    pub braking: f64,
-    dynamics: Dynamics,
 }
 
 impl Lemmas {
@@ -65,52 +35,8 @@ impl Lemmas {
 
     fn of(s: &Settings, dynamics: Dynamics) -> Self {
         let parts = Parts::new(s, &dynamics);
-        let Dynamics {
-            geometry,
-            largest,
-            smallest,
-            rate,
-            acceleration,
-            by_rates,
-            by_angles,
-            jerk,
-            ..
-        } = dynamics;
-        Self {
-            vehicle: (dynamics.vehicle.rate, dynamics.vehicle.sideslip),
-            domain: (dynamics.domain.rate, dynamics.domain.sideslip),
-            drift: geometry.drift,
-            drift_by_rates: geometry.drift_by_rates,
-            r: geometry.r,
-            curvature: CURVATURE,
-            turn: TURN,
-            turn_by_angles: TURN_OF_RATES,
-            drift_mixed: DRIFT_MIXED,
-            drift_by_angles_twice: DRIFT_BY_ANGLES_TWICE,
-            fourth: FOURTH,
-            gyroscopic: gyroscopic(s),
-            largest,
-            smallest,
-            rate,
-            acceleration,
-            by_rates,
-            by_angles,
-            jerk,
-            mismatch: parts.mismatch.mean,
-            peak: parts.mismatch.peak,
-            unseen_rate: parts.mismatch.unseen_rate,
-            mispredicted: parts.mismatch.mispredicted,
-            early: parts.early,
-            swing: parts.swing,
-            bearing: bearing(s, dynamics.domain.sideslip),
-            norm: parts.norm,
-            turning: parts.turning,
-            turned: parts.turned,
-            turned_early: parts.turned_early,
-            early_moment: parts.early_moment,
-            braking: BRAKING,
-            dynamics,
-        }
+        let bearing = bearing(s, dynamics.domain.sideslip);
+        Self { dynamics, parts, gyroscopic: gyroscopic(s), bearing }
     }
 
     /// Returns bounds on ‖∂m/∂(α, β)‖, ‖∂m/∂x_ω‖ and ‖m‖ for ‖x_ω‖ ≤ x and ‖a‖ ≤ a.
@@ -119,14 +45,26 @@ impl Lemmas {
         [by_angles, by_rates, self.dynamics.nominal_moment(x, a)]
     }
 
-    /// Returns bounds on ‖d²m/dt²‖ and ‖d²ω/dt²‖ of a nominal motion with a held.
-    pub fn curvatures(&self, x: f64, a: f64) -> [f64; 2] {
-        [self.dynamics.moment_curvature(x, a), Dynamics::rate_curvature(x, a)]
-    }
-
-    /// Returns bounds on the norms (Frobenius) of d²/dt² ∂m/∂(α, β) and d²/dt² ∂m/∂x_ω, and on
-    /// the second derivative of the largest ‖I W s‖, of a nominal motion with a held.
-    pub fn slope_curvatures(&self, x: f64, a: f64) -> [f64; 3] {
-        self.dynamics.slope_curvatures(x, a)
+    /// Returns bounds on the second time derivatives of m, of ω (2 Ẇ a + ∂²W [x, x] x + ∂W [a] x),
+    /// of ∂m/∂(α, β) and ∂m/∂x_ω (Frobenius) and of the largest ‖I W s‖, along a nominal motion
+    /// with a held, for ‖x_ω‖ ≤ x and ‖a‖ ≤ a.
+    pub fn curvatures(&self, x: f64, a: f64) -> [f64; 5] {
+        let Dynamics {
+            curvature,
+            curvature_by_angles,
+            curvature_by_rates,
+            curvature_of_bearing,
+            ..
+        } = self.dynamics;
+        let square = x * x;
+        let ([aa, xxa, xxxx], [by_aa, by_xxa, by_xxxx]) = (curvature, curvature_by_angles);
+        let ([xa, xxx], [of_a, xx]) = (curvature_by_rates, curvature_of_bearing);
+        [
+            aa * a * a + x * x * (xxa * a + xxxx * x * x),
+            3.0 * TURN * x * a + CURVATURE * powi(x, 3),
+            by_aa * a * a + square * (by_xxa * a + by_xxxx * square),
+            x * (xa * a + xxx * square),
+            of_a * a + xx * square,
+        ]
     }
 }

@@ -245,32 +245,4 @@ impl Dynamics {
         let Self { largest, smallest, geometry, .. } = self;
         largest * (a + geometry.drift * x * x) + 0.5 * (largest - smallest) * x * x
     }
-
-    /// Returns a bound on ‖d²m/dt²‖ of a nominal motion with a held and these sizes, N m/s².
-    #[inline]
-    pub(in crate::crmpc) fn moment_curvature(&self, x: f64, a: f64) -> f64 {
-        let [aa, xxa, xxxx] = self.curvature;
-        aa * a * a + x * x * (xxa * a + xxxx * x * x)
-    }
-
-    /// Returns bounds on the second time derivatives of ∂m/∂(α, β) and ∂m/∂x_ω (Frobenius) and of
-    /// the largest ‖I W s‖ over the corners s of the unit box, of a nominal motion with a held and
-    /// these sizes.
-    pub(super) fn slope_curvatures(&self, x: f64, a: f64) -> [f64; 3] {
-        let [aa, xxa, xxxx] = self.curvature_by_angles;
-        let [xa, xxx] = self.curvature_by_rates;
-        let [of_a, xx] = self.curvature_of_bearing;
-        let square = x * x;
-        [
-            aa * a * a + square * (xxa * a + xxxx * square),
-            x * (xa * a + xxx * square),
-            of_a * a + xx * square,
-        ]
-    }
-
-    /// Returns a bound on ‖d²ω/dt²‖ of a nominal motion with a held and these sizes, rad/s³:
-    /// 2 Ẇ a + ∂²W [x, x] x + ∂W [a] x.
-    pub(in crate::crmpc) fn rate_curvature(x: f64, a: f64) -> f64 {
-        3.0 * TURN * x * a + CURVATURE * powi(x, 3)
-    }
 }

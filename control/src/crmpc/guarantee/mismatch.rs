@@ -5,26 +5,28 @@ use crate::crmpc::settings::Settings;
 use std::f64::consts::SQRT_2;
 use vehicle::math::{cos, powi};
 
-/// Everything that drives the motion off its prediction but for the mismatch.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Drive {
-    /// Bound on the norm of Δ and the effect of the inertia error, rad/s², and on that of two axes.
-    pub(super) all: f64,
-    pub(super) of_two: f64,
+/// All that pushes the vehicle off its prediction, but for the mismatch.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Drive {
+    /// Bound on the norm of Δ and the effect of the inertia error, rad/s².
+    pub all: f64,
+    /// The same bound for two axes, rad/s².
+    pub of_two: f64,
     /// Bound on the norm of the effect of the inertia error, rad/s².
-    pub(super) of_inertia: f64,
-    /// Bounds on the norm of the error of the measured rates, rad/s, and of two of them.
-    pub(super) rate_error: f64,
-    pub(super) rate_error_of_two: f64,
+    pub of_inertia: f64,
+    /// Bound on the norm of the error of the measured rates, rad/s.
+    pub rate_error: f64,
+    /// The same bound for two rates, rad/s.
+    pub rate_error_of_two: f64,
     /// Bound on the norm of the error of two measured angles, rad.
-    pub(super) angle_error: f64,
+    pub angle_error: f64,
 }
 
 impl Drive {
     /// `principal` are the smallest and the largest moment of inertia, kg m².
     pub(super) fn new(s: &Settings, vehicle: &Domain, principal: (f64, f64)) -> Self {
         let root3 = 3.0_f64.sqrt();
-        let (along, any) = inertia_moments(s, vehicle, principal);
+        let InertiaMoments { along, any } = InertiaMoments::new(s, vehicle, principal);
         let of_inertia = (along + any) / smallest_in_rates(vehicle, principal.0);
         Self {
             of_inertia,
@@ -45,16 +47,16 @@ pub(super) fn smallest_in_rates(vehicle: &Domain, smallest: f64) -> f64 {
 
 /// How F differs from the acceleration that the law intended, besides
 /// [`super::dynamics::Dynamics::swing`].
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Mismatch {
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Mismatch {
     /// Sum of all differences that belong to one tick, per period, rad/s².
-    pub(super) mean: f64,
+    pub mean: f64,
     /// Largest difference at any time, rad/s².
-    pub(super) peak: f64,
+    pub peak: f64,
     /// Change of the rates by it between a measurement and its tick, rad/s.
-    pub(super) unseen_rate: f64,
+    pub unseen_rate: f64,
     /// Change of the predicted rates by it because of errors of the measurement, rad/s.
-    pub(super) mispredicted: f64,
+    pub mispredicted: f64,
 }
 
 impl Mismatch {
@@ -66,23 +68,35 @@ impl Mismatch {
     };
 }
 
-/// Returns the moments that the inertia error amounts to while the largest moment acts, N m: along
-/// that moment, and in any direction.
-///
-/// The inertia is I_v = (1 + c) I^½ (1 + E) I^½. With D = 1 − (1 + E)⁻¹, I_v⁻¹ (m − ω × I_v ω)
-/// differs from I⁻¹ (m − ω × I ω) by −c/(1 + c) I⁻¹ m, by I^−½ D I^−½ (ω × I ω − m/(1 + c)), and by
-/// I^−½ (1 + E)⁻¹ I^−½ (ω × I^½ E I^½ ω). For the last one, ‖ω × S ω‖ is at most half the range of
-/// the eigenvalues of S.
-pub(super) fn inertia_moments(
-    s: &Settings,
-    vehicle: &Domain,
-    (smallest, largest): (f64, f64),
-) -> (f64, f64) {
-    let common = s.inertia_error / (1.0 - s.inertia_error);
-    let tensor = s.tensor_error / (1.0 - s.tensor_error);
-    let gyroscopic = (0.5 * (largest - smallest) + largest) * powi(vehicle.rate, 2);
-    let moment = s.limit_total();
-    (common * moment, tensor * (moment / (1.0 - s.inertia_error) + gyroscopic))
+/// Moments that the inertia error amounts to while the largest moment acts, N m.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct InertiaMoments {
+    /// Along the moment that acts.
+    pub along: f64,
+    /// In any direction.
+    pub any: f64,
+}
+
+impl InertiaMoments {
+    /// `smallest` and `largest` are moments of inertia, kg m².
+    ///
+    /// The inertia is I_v = (1 + c) I^½ (1 + E) I^½. With D = 1 − (1 + E)⁻¹, I_v⁻¹ (m − ω × I_v ω)
+    /// differs from I⁻¹ (m − ω × I ω) by −c/(1 + c) I⁻¹ m, by I^−½ D I^−½ (ω × I ω − m/(1 + c)),
+    /// and by I^−½ (1 + E)⁻¹ I^−½ (ω × I^½ E I^½ ω). For the last one, ‖ω × S ω‖ is at most half the
+    /// range of the eigenvalues of S.
+    pub(super) fn new(s: &Settings, vehicle: &Domain, (smallest, largest): (f64, f64)) -> Self {
+        let gyroscopic = (0.5 * (largest - smallest) + largest) * powi(vehicle.rate, 2);
+        let moment = s.limit_total();
+        Self {
+            along: relative(s.inertia_error) * moment,
+            any: relative(s.tensor_error) * (moment / (1.0 - s.inertia_error) + gyroscopic),
+        }
+    }
+}
+
+/// Returns the largest ‖1 − (1 + e)⁻¹‖ for relative errors of the inertia up to e, e/(1 − e).
+pub(super) fn relative(error: f64) -> f64 {
+    error / (1.0 - error)
 }
 
 /// Returns bounds on ‖∂(ω × I ω)/∂ω‖ / ‖ω‖ and on the same ratio for I⁻¹ (ω × I ω). In principal

@@ -1,7 +1,7 @@
 //! Largest observed disturbance that the assumptions explain.
 
 use super::dynamics::Dynamics;
-use super::mismatch::smallest_in_rates;
+use super::mismatch::{relative, smallest_in_rates};
 use super::parts::Parts;
 use crate::crmpc::settings::Settings;
 use crate::delay::ticks;
@@ -43,17 +43,18 @@ impl Observable {
         let elapsed = s.delay + s.period_feedback;
         let predicted = s.rate_error + mismatch.mispredicted * (1.0 + early[1].excess);
         let lasting = s.disturbance_bound
-            + parts.any_moment / smallest_in_rates(&dynamics.vehicle, dynamics.smallest)
+            + parts.inertia.moments.any / smallest_in_rates(&dynamics.vehicle, dynamics.smallest)
             + mismatch.mean * (1.0 + early[0].excess);
         // The effect of a command shows later than the command, and is forgotten later.
         let late = ticks(s.delay + s.delay_error, s.period_feedback) + 1;
         let remembered = exp(late as f64 * s.period_feedback / time_constant);
-        let common = s.inertia_error / (1.0 - s.inertia_error);
         Self {
             weight: -exp_m1(-s.period_feedback / time_constant),
             // Each prediction has its own error, and the mean shows their differences by no more.
             others: lasting + 2.0 * predicted / time_constant,
-            of_moment: common * (1.0 + parts.turning * elapsed) * remembered,
+            of_moment: relative(s.inertia_error)
+                * (1.0 + parts.inertia.turning * elapsed)
+                * remembered,
             of_pulses: dynamics.growth(elapsed) * remembered,
         }
     }

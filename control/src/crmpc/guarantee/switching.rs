@@ -118,9 +118,9 @@ impl Switching {
         });
         let (size, fast) = (values.map(f64::abs), values[0].abs().min(values[1].abs()));
         // The mismatch that a pulse causes shows later than the pulse itself.
-        let later = parts.pulse_mismatch / powi(fast, late + 1);
-        let revised = (1.0 - parts.pulse_revised) / (1.0 - parts.pulse_revised / fast);
-        let by_change = s.delay_error * parts.pulse_inertia * revised * (1.0 + later);
+        let later = parts.pulse.mismatch / powi(fast, late + 1);
+        let revised = (1.0 - parts.pulse.revised) / (1.0 - parts.pulse.revised / fast);
+        let by_change = s.delay_error * parts.pulse.inertia * revised * (1.0 + later);
         // A change that is seen late changes K ô late.
         let again = by_change / powi(fast, late);
         let [slow_mode, fast_mode] = &modes;
@@ -157,7 +157,7 @@ impl Switching {
             unbounded
         };
         let h = s.period_optimisation;
-        let (delay_error, turn) = (s.delay_error, parts.turn);
+        let (delay_error, turn) = (s.delay_error, parts.pulse.turn);
         Ok(Some(Self {
             by_change,
             turn,

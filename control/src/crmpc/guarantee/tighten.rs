@@ -1,13 +1,15 @@
-//! The tightening of the robust set, and the share of the disturbance that it can bear.
+//! How the tightening of the robust set is computed from the parts of the deviation.
 
 use super::assessment::{Assessment, assess};
 use super::deviation::Deviation;
 use super::dynamics::Dynamics;
 use super::losses::{MomentLoss, RateLoss, bearing};
+use super::mismatch::relative;
 use super::observable::Observable;
-use super::parts::{Parts, Pulse, Reaches};
+use super::parts::{Parts, Reaches};
+use super::pulse::Pulse;
 use super::switching::Switching;
-use super::tightening::Tightening;
+use super::tightening::{AtTick, Tightening};
 use crate::controller::Explained;
 use crate::crmpc::settings::{InitialState, Settings};
 use crate::error::DesignError;
@@ -21,129 +23,148 @@ use vehicle::math::powi;
 /// gain for which no invariant set can be computed.
 pub(in crate::crmpc) fn tighten(s: &Settings) -> Result<(Tightening, Assessment), DesignError> {
     let error = SampledError::delayed(s.feedback, s.period_feedback, s.delay);
-    let unstable = || DesignError::Unstable {
-        k1: s.feedback.k1,
-        k2: s.feedback.k2,
-        period: s.period_feedback,
-        radius: error.spectral_radius(),
-    };
-    let steps = error.settling().ok_or_else(unstable)?;
-    let ratio = (s.period_optimisation / s.period_feedback).round().max(1.0) as usize;
+    let steps = error.settling().ok_or_else(|| unstable(s, &error))?;
     let dynamics = Dynamics::new(s);
     let parts = Parts::new(s, &dynamics);
     let switching = Switching::new(s, &error, &parts)?.map(Box::new);
-    let (mut at, pulse) = deviations(s, &error, &parts, steps)?;
-    let last = at.len() - 1;
-    // Errors of the measurement may drive the vehicle further at first than later on.
-    at[last] = at.iter().fold(Deviation::default(), |largest, at| largest.or(at));
+    let sequence = Sequence::new(s, &error, &parts, steps)?;
     let bearing = bearing(s, dynamics.domain.sideslip);
-    let moment = (0..at.len()).map(|n| {
-        let within =
-            (n..n + ratio).fold(Deviation::default(), |largest, n| largest.or(&at[n.min(last)]));
-        MomentLoss::new(&dynamics, &within, bearing, s.period_optimisation)
-    });
-    // Between the ends of an optimisation period the deviation can exceed the straight line between
-    // its end values by this amount.
-    let bulge = |n: usize, value: fn(&Deviation) -> f64| {
-        let tick = |i: usize| value(&at[(n + i).min(last)]);
-        let (from, to) = (tick(0), tick(ratio));
-        let above = |i: usize| tick(i) - (from + (to - from) * i as f64 / ratio as f64);
-        (1..ratio).map(above).fold(0.0, f64::max)
+    let h = s.period_optimisation;
+    let at = |(n, (deviation, pulse)): (usize, &(Deviation, f64))| AtTick {
+        deviation: *deviation,
+        bulge: sequence.bulge(n, |d| d.angle),
+        moment_loss: MomentLoss::new(&dynamics, &sequence.within(n), bearing, h),
+        rate_loss: sequence.rate_loss(n, h),
+        pulse: *pulse,
     };
-    let rate = (0..at.len()).map(|n| {
-        let before = n.checked_sub(ratio);
-        let with_bulge = |value: fn(&Deviation) -> f64| {
-            let before = before.map_or(0.0, |before| bulge(before, value));
-            value(&at[n]) + before.max(bulge(n, value))
-        };
-        let angle = |n: usize| at[n.min(last)].angle;
-        let change = before.map_or(0.0, |before| (angle(n) - angle(before)).abs());
-        let change = change.max((angle(n + ratio) - angle(n)).abs());
-        RateLoss::new(
-            with_bulge(|d| d.angle),
-            with_bulge(|d| d.rate),
-            change,
-            s.period_optimisation,
-        )
-    });
-    let angle_bulge = (0..at.len()).map(|n| bulge(n, |d| d.angle)).collect();
-    let (moment, rate) = (moment.collect(), rate.collect());
-    // The measured rates become x_ω at an attitude that is wrong: ‖∂R[o]‖ ≤ √2 sec²β ‖o‖.
-    let Dynamics { domain, geometry, .. } = &dynamics;
-    let of_angles = 2.0 * powi(geometry.r, 2) * domain.rate * s.angle_error;
     let tightening = Tightening {
+        ticks: sequence.ticks.iter().enumerate().map(at).collect(),
         switching,
-        pulse,
-        explained: Explained {
-            disturbance: s.disturbance_bound
-                + parts.any_moment * dynamics.geometry.r / dynamics.smallest
-                + 2.0 * (s.rate_error + of_angles) / s.period_feedback,
-            share: s.inertia_error / (1.0 - s.inertia_error),
-            delay_error: s.delay_error,
-        },
-        angle_bulge,
-        moment,
-        rate,
+        explained: explained(s, &dynamics, &parts),
         bearing,
         norm: parts.norm,
         mismatch: parts.mismatch.mean,
         observable: Observable::all(s, &dynamics, &parts),
-        at,
     };
     let assessment = assess(s, &dynamics, &tightening);
     Ok((tightening, assessment))
 }
 
-/// Returns the deviation at each tick, and the jump of the rates by a change of K ô there, see
-/// [`Tightening::pulse`].
-pub(super) fn deviations(
-    s: &Settings,
-    error: &SampledError,
-    parts: &Parts,
-    steps: usize,
-) -> Result<(Vec<Deviation>, Vec<f64>), DesignError> {
-    let disturbance = error.reach(steps);
-    let [of_angles, of_rates] = error.errors(steps);
-    let changes = parts.early[0].count(&error.changes(steps));
-    let mispredictions = error.mispredictions(steps, parts.early[1]);
-    let shifts = parts.early[2].count(&error.shifts(steps));
-    let reaches = |n: usize| Reaches {
-        disturbance: disturbance[n],
-        early_feedback: disturbance[n].feedback
-            - disturbance[n - n.min(parts.early[0].ticks)].feedback,
-        errors: [of_angles[n], of_rates[n]],
-        changes: changes[n],
-        mispredictions: mispredictions[n],
-        shifts: shifts[n],
-    };
-    Ok(match s.initial_state {
-        InitialState::Measured | InitialState::Nominal => {
-            let pulses = error.pulses(steps);
-            let jumps: Vec<Pulse> =
-                (0..=steps).map(|n| parts.pulse(s, &reaches(n), &pulses[n])).collect();
-            let norms: Vec<f64> = jumps.iter().map(Pulse::norm).collect();
-            // Between two ticks the pulse of the next one may show already; pulses only grow.
-            let largest = norms.last().copied().unwrap_or_default();
-            let deviation = |n: usize| {
-                parts.deviation(s, &reaches(n)).plus(&jumps[n].deviation(s, &pulses[n], largest))
-            };
-            ((0..=steps).map(deviation).collect(), norms)
+/// Returns the error that says that the gain does not stabilise the error dynamics.
+pub(in crate::crmpc) fn unstable(s: &Settings, error: &SampledError) -> DesignError {
+    DesignError::Unstable {
+        k1: s.feedback.k1,
+        k2: s.feedback.k2,
+        period: s.period_feedback,
+        radius: error.spectral_radius(),
+    }
+}
+
+/// Returns the largest mean acceleration over one period that the assumptions explain, rad/s²: Δ̄,
+/// the tensor's error in any direction, and both errors of the rates at the period's ends. The
+/// measured rates become x_ω at an attitude that is wrong, with ‖∂R[o]‖ ≤ √2 sec²β ‖o‖.
+fn explained(s: &Settings, dynamics: &Dynamics, parts: &Parts) -> Explained {
+    let Dynamics { domain, geometry, smallest, .. } = dynamics;
+    let of_angles = 2.0 * powi(geometry.r, 2) * domain.rate * s.angle_error;
+    Explained {
+        disturbance: s.disturbance_bound
+            + parts.inertia.moments.any * geometry.r / smallest
+            + 2.0 * (s.rate_error + of_angles) / s.period_feedback,
+        share: relative(s.inertia_error),
+        delay_error: s.delay_error,
+    }
+}
+
+/// The deviation at each feedback tick since the nominal motion began, with the largest pulse
+/// (rad/s) by a change of K ô there. The last tick stands for all later ones.
+struct Sequence {
+    ticks: Vec<(Deviation, f64)>,
+    /// Feedback ticks per optimisation.
+    ratio: usize,
+}
+
+impl Sequence {
+    fn new(
+        s: &Settings,
+        error: &SampledError,
+        parts: &Parts,
+        steps: usize,
+    ) -> Result<Self, DesignError> {
+        // A plan of `tube` may begin anywhere in the set that Δ cannot drive the deviation out of,
+        // so that the deviation is fully grown from the start.
+        let is_tube = s.initial_state == InitialState::Tube;
+        let set = is_tube.then(|| {
+            let set = error.invariant_set(lateral(s));
+            set.ok_or(DesignError::NotReal { name: "feedback" })
+        });
+        let set = set.transpose()?.map(|set| set.reach());
+        let early = &parts.early;
+        let disturbance = error.reach(steps);
+        let [of_angles, of_rates] = error.errors(steps);
+        let changes = early[0].count(&error.changes(steps));
+        let mispredictions = error.mispredictions(steps, early[1]);
+        let shifts = early[2].count(&error.shifts(steps));
+        let pulses = error.pulses(steps);
+        let reaches = |n: usize| Reaches {
+            disturbance: set.map_or(disturbance[n], |set| disturbance[steps].or(&set)),
+            early_feedback: disturbance[n].feedback
+                - disturbance[n - n.min(early[0].ticks)].feedback,
+            errors: [of_angles[n], of_rates[n]],
+            changes: changes[n],
+            mispredictions: mispredictions[n],
+            shifts: shifts[n],
+            pulses: pulses[n],
+        };
+        // Between two ticks the pulse of the next one may show already; pulses only grow.
+        let largest = Pulse::new(s, parts, &reaches(steps)).norm();
+        let at = |n: usize| {
+            let (reaches, pulse) = (reaches(n), Pulse::new(s, parts, &reaches(n)));
+            let of_pulses = pulse.deviation(s, &reaches.pulses, largest);
+            (parts.deviation(s, &reaches).plus(&of_pulses), pulse.norm())
+        };
+        let mut ticks: Vec<(Deviation, f64)> = (0..=steps).map(at).collect();
+        // Errors of the measurement may drive the vehicle further at first than later on, and the
+        // first ticks of a motion in the tube count at any time.
+        ticks[steps].0 = ticks.iter().fold(Deviation::default(), |most, at| most.or(&at.0));
+        if is_tube {
+            ticks.drain(..steps);
         }
-        InitialState::Tube => {
-            // The deviation is fully grown from the start, because the plan may begin anywhere in
-            // the set that Δ cannot drive the deviation out of.
-            let set = error
-                .invariant_set(lateral(s))
-                .ok_or(DesignError::NotReal { name: "feedback" })?
-                .reach();
-            // The first ticks of a motion count at any time.
-            let grown = (0..=steps).map(|n| {
-                let all = reaches(n);
-                parts.deviation(s, &Reaches { disturbance: disturbance[steps].or(&set), ..all })
-            });
-            (vec![grown.fold(Deviation::default(), |largest, at| largest.or(&at))], vec![0.0])
-        }
-    })
+        let ratio = (s.period_optimisation / s.period_feedback).round().max(1.0) as usize;
+        Ok(Self { ticks, ratio })
+    }
+
+    fn at(&self, tick: usize) -> &Deviation {
+        &self.ticks[tick.min(self.ticks.len() - 1)].0
+    }
+
+    /// Returns the largest deviation within the optimisation period that begins at a tick.
+    fn within(&self, tick: usize) -> Deviation {
+        (tick..tick + self.ratio).fold(Deviation::default(), |most, n| most.or(self.at(n)))
+    }
+
+    /// Returns the bulge: the largest amount by which a deviation exceeds, within the optimisation
+    /// period that begins at a tick, the straight line between its values at both ends.
+    fn bulge(&self, tick: usize, of: fn(&Deviation) -> f64) -> f64 {
+        let ratio = self.ratio;
+        let value = |i: usize| of(self.at(tick + i));
+        let (from, to) = (value(0), value(ratio));
+        let above = |i: usize| value(i) - (from + (to - from) * i as f64 / ratio as f64);
+        (1..ratio).map(above).fold(0.0, f64::max)
+    }
+
+    /// Returns the loss of rate at a tick and in the optimisation periods (of `h` s) before and
+    /// after it, with the bulges of both.
+    fn rate_loss(&self, tick: usize, h: f64) -> RateLoss {
+        let before = tick.checked_sub(self.ratio);
+        let with_bulge = |of: fn(&Deviation) -> f64| {
+            let before = before.map_or(0.0, |before| self.bulge(before, of));
+            of(self.at(tick)) + before.max(self.bulge(tick, of))
+        };
+        let angle = |n: usize| self.at(n).angle;
+        let change = before.map_or(0.0, |before| (angle(tick) - angle(before)).abs());
+        let change = change.max((angle(tick + self.ratio) - angle(tick)).abs());
+        RateLoss::new(with_bulge(|d| d.angle), with_bulge(|d| d.rate), change, h)
+    }
 }
 
 /// Returns the largest shift of the angle by a disturbance that changes within a period, beyond the

@@ -10,17 +10,8 @@ use crate::controller::Explained;
 /// state.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tightening {
-    /// Deviation at each tick; the last one is never exceeded.
-    pub(super) at: Vec<Deviation>,
-    /// Largest amount by which the deviation of the angles exceeds the straight line between its
-    /// values at both ends of the optimisation period that begins at each tick, rad.
-    pub(super) angle_bulge: Vec<f64>,
-    /// Loss of moment by the largest deviation within the optimisation period that begins at each
-    /// tick.
-    pub(super) moment: Vec<MomentLoss>,
-    /// Loss of rate by the deviation at each tick, and in the intervals of the plan before and
-    /// after it.
-    pub(super) rate: Vec<RateLoss>,
+    /// What it takes at each tick; the last one stands for all later ticks.
+    pub(super) ticks: Vec<AtTick>,
     /// Largest ‖I W s‖ over the corners s of the unit box at any attitude of the domain, kg m².
     pub bearing: f64,
     /// Bound on the norm of everything that drives the deviation, rad/s².
@@ -34,41 +25,35 @@ pub struct Tightening {
     pub explained: Explained,
     /// Addition for an unknown part of the delay; `None` if the delay is exact.
     pub switching: Option<Box<Switching>>,
-    /// Largest jump of the rates that a change of K ô causes, rad/s, by feedback ticks.
-    pub(super) pulse: Vec<f64>,
+}
+
+/// What the deviation takes of the limits at a feedback tick.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(in crate::crmpc) struct AtTick {
+    /// Deviation at the tick.
+    pub deviation: Deviation,
+    /// Bulge of the angles' deviation: the largest amount by which it exceeds the straight line
+    /// between its values at both ends of the optimisation period that begins at the tick, rad.
+    pub bulge: f64,
+    /// Loss of moment by the largest deviation at the ticks of that optimisation period.
+    pub moment_loss: MomentLoss,
+    /// Loss of rate by the deviation at the tick, and in the intervals of the plan before and after
+    /// it.
+    pub rate_loss: RateLoss,
+    /// Pulse by a change of K ô at the tick: the largest jump of the rates if the command begins to
+    /// act earlier or later than assumed, rad/s.
+    pub pulse: f64,
 }
 
 impl Tightening {
-    pub(super) fn place(&self, tick: usize) -> usize {
-        tick.min(self.at.len() - 1)
+    /// Returns what is taken `tick` feedback ticks after the nominal motion began.
+    pub(in crate::crmpc) fn tick(&self, tick: usize) -> &AtTick {
+        &self.ticks[tick.min(self.ticks.len() - 1)]
     }
 
     /// Returns the deviation `tick` feedback ticks after the nominal motion began.
     pub fn at(&self, tick: usize) -> &Deviation {
-        &self.at[self.place(tick)]
-    }
-
-    /// Returns the loss of moment by the largest deviation at the feedback ticks of the
-    /// optimisation period that begins at `tick`.
-    pub(in crate::crmpc) fn moment_loss(&self, tick: usize) -> &MomentLoss {
-        &self.moment[self.place(tick)]
-    }
-
-    /// Returns the loss of rate at `tick` and in the intervals of the plan before and after it.
-    pub(in crate::crmpc) fn rate_loss(&self, tick: usize) -> &RateLoss {
-        &self.rate[self.place(tick)]
-    }
-
-    /// Returns the largest amount by which the deviation of the angles exceeds the straight line
-    /// between its values at both ends of the optimisation period that begins at `tick`, rad.
-    pub(in crate::crmpc) fn angle_bulge(&self, tick: usize) -> f64 {
-        self.angle_bulge[self.place(tick)]
-    }
-
-    /// Returns the largest jump of the rates that a change of K ô at `tick` causes if the command
-    /// begins to act earlier or later than assumed, rad/s.
-    pub(in crate::crmpc) fn pulse(&self, tick: usize) -> f64 {
-        self.pulse[self.place(tick)]
+        &self.tick(tick).deviation
     }
 
     /// Returns the largest deviation at the `ratio` ticks from `tick` on.

@@ -110,7 +110,7 @@ impl Robust {
             };
             at_top.max(after)
         };
-        largest(1.0).max(largest(-1.0)) + tightening.angle_bulge(self.tick(k)) <= sideslip_domain
+        largest(1.0).max(largest(-1.0)) + tightening.tick(self.tick(k)).bulge <= sideslip_domain
     }
 
     /// Returns the margins of a trajectory.

@@ -188,7 +188,7 @@ impl Robust {
         let typical = limit_moment / self.design.largest_inertia;
         let a = here.pull.max(before.pull).max(typical);
         let size = here.size + 2.0 * h * a;
-        let loss = self.tightening().rate_loss(self.tick(k));
+        let loss = &self.tightening().tick(self.tick(k)).rate_loss;
         let more = self.more_of_the_deviation(k, here, before).map(|more| loss.with(more, h));
         let loss = more.as_ref().unwrap_or(loss);
         let loss = loss.at(by_angles, here.size) + loss.within(size, a);
@@ -250,7 +250,7 @@ impl Robust {
             let h = self.settings.period_optimisation;
             MomentLoss::new(&self.dynamics, &deviation, tightening.bearing, h)
         });
-        let loss = more.as_ref().unwrap_or_else(|| tightening.moment_loss(self.tick(k)));
+        let loss = more.as_ref().unwrap_or_else(|| &tightening.tick(self.tick(k)).moment_loss);
         let needed = loss.largest_moment(&self.dynamics, ends, held);
         let limit = self.terms.limit_moment - self.settings.known_change;
         limit - self.reserves().1 - (needed - ends[0].moment)

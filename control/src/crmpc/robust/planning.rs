@@ -170,7 +170,7 @@ impl Robust {
             self.settings.body.drift(&angles, &rates)
         };
         let allowed = memory.plan.begins_with(switching).z
-            + self.design.at_level(memory.plan.terms.level).pulse(memory.age as usize);
+            + self.design.at_level(memory.plan.terms.level).tick(memory.age as usize).pulse;
         begins(Onset {
             carried: switching.unseen(memory.commands.changes()),
             before: memory.observed.commanded().unwrap_or_else(at_rest),

@@ -13,24 +13,28 @@ mod series;
 use crate::interval::Interval;
 use crate::lemmas::{Finding, Suprema, over_the_domain};
 use attained::attained;
-use control::crmpc::{Lemmas, Settings};
+use control::crmpc::{BRAKING, Lemmas, Settings};
 use inequalities::from_lemmas;
 
 /// Checks the bounds of F and m over their domain. Bounds that depend on the sizes of x and a are
 /// checked at the sizes with which the horizon may end, and at the largest ones.
 pub fn check(s: &Settings, lemmas: &Lemmas, sup: &Suprema, terminal_rate: f64) -> Vec<Finding> {
     let s = &over_the_domain(s, lemmas);
-    let sizes = (terminal_rate, lemmas.braking * terminal_rate);
-    let curved = (lemmas.rate, lemmas.acceleration);
+    let sizes = (terminal_rate, BRAKING * terminal_rate);
+    let curved = (lemmas.dynamics.rate, lemmas.dynamics.acceleration);
     let [moment_by_angles, moment_by_rates, moment] = lemmas.moment(sizes.0, sizes.1);
-    let [moment_curvature, rate_curvature] = lemmas.curvatures(curved.0, curved.1);
-    let [curvature_by_angles, curvature_by_rates, curvature_of_bearing] =
-        lemmas.slope_curvatures(curved.0, curved.1);
+    let [
+        moment_curvature,
+        rate_curvature,
+        curvature_by_angles,
+        curvature_by_rates,
+        curvature_of_bearing,
+    ] = lemmas.curvatures(curved.0, curved.1);
     let bounds = [
-        ("‖F‖ ≤ b", lemmas.acceleration),
-        ("‖∂F/∂x‖ ≤ b", lemmas.by_rates),
-        ("‖∂F/∂(α, β)‖ ≤ b", lemmas.by_angles),
-        ("‖d²F/dt²‖ ≤ b, m held", lemmas.jerk),
+        ("‖F‖ ≤ b", lemmas.dynamics.acceleration),
+        ("‖∂F/∂x‖ ≤ b", lemmas.dynamics.by_rates),
+        ("‖∂F/∂(α, β)‖ ≤ b", lemmas.dynamics.by_angles),
+        ("‖d²F/dt²‖ ≤ b, m held", lemmas.dynamics.jerk),
         ("‖∂m/∂(α, β)‖ ≤ b at the terminal sizes", moment_by_angles),
         ("‖∂m/∂x‖ ≤ b at the terminal sizes", moment_by_rates),
         ("‖m‖ ≤ b at the terminal sizes", moment),
