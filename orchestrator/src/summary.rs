@@ -3,8 +3,8 @@
 use cosim::error::Error;
 use cosim::experiment::{Coupling, Observe};
 use cosim::system::System;
-use cosim_report::guarantee::margins_text;
-use cosim_report::metrics::{Metrics, Value};
+use cosim_metrics::guarantee::margins_text;
+use cosim_metrics::metrics::{Metrics, Value};
 use cosim_report::recording::SummaryLine;
 use fmi_master::quantity::rounded;
 use std::io::{self, Write};

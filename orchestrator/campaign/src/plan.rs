@@ -6,7 +6,7 @@ use crate::prepare::{Recorded, keys, observe, read_experiment, recorded};
 use cosim::error::Error;
 use cosim::experiment::MeasureKind;
 use cosim::system::Opened;
-use cosim_report::metrics::{Meters, Metrics};
+use cosim_metrics::metrics::{Meters, Metrics};
 use std::collections::BTreeSet;
 use std::path::PathBuf;
 use sweep::cases::Sweep;

@@ -8,7 +8,7 @@ use cosim::experiment::{
 };
 use cosim::files;
 use cosim::search::named::{Kind, find};
-use cosim_report::metrics::{Meters, Metrics};
+use cosim_metrics::metrics::{Meters, Metrics};
 use std::collections::BTreeMap;
 use sweep::vary::DesignKind;
 use toml::Spanned;

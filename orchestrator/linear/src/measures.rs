@@ -6,7 +6,7 @@ use cosim::error::Error;
 use cosim::experiment;
 use cosim::interrupt::Interrupt;
 use cosim::system::System;
-use cosim_report::metrics::Value;
+use cosim_metrics::metrics::Value;
 use std::collections::BTreeMap;
 
 /// Metrics by name, as an experiment's `[observe.margins]` asks for them.

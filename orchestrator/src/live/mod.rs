@@ -13,7 +13,7 @@ use cosim::error::Error;
 use cosim::interrupt::{Interrupt, Request};
 use cosim::pacing::pacer::Tally;
 use cosim::run::{Observer, Sample};
-use cosim_report::guarantee::GuaranteeRecord;
+use cosim_metrics::guarantee::GuaranteeRecord;
 use fmu_import::crash;
 use ratatui::DefaultTerminal;
 use ratatui::crossterm::event::{self, Event, KeyCode, KeyEvent, KeyEventKind, KeyModifiers};
@@ -167,7 +167,7 @@ fn request(key: KeyEvent) -> Option<Request> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use cosim_report::guarantee::GuaranteeSignals;
+    use cosim_metrics::guarantee::GuaranteeSignals;
 
     #[test]
     fn q_and_control_c_end_the_run() {

@@ -4,7 +4,7 @@ use crate::failure::Failure;
 use cosim::error::Error;
 use cosim::pacing::pacer::Tally;
 use cosim::system::{Probed, System};
-use cosim_report::guarantee::{GuaranteeRecord, GuaranteeSignals};
+use cosim_metrics::guarantee::{GuaranteeRecord, GuaranteeSignals};
 use cosim_report::panels::Panel;
 
 /// Everything in the view that stays the same during the run.

@@ -3,7 +3,7 @@
 use crate::summary;
 use cosim::error::Error;
 use cosim::experiment::{MeasureKind, Observe};
-use cosim_report::metrics::Metrics;
+use cosim_metrics::metrics::Metrics;
 use cosim_report::recording::{Recording, Track, display_unit};
 use serde_json::{Map, Value};
 use std::collections::{BTreeMap, BTreeSet};

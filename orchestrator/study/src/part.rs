@@ -11,7 +11,7 @@ use cosim::interrupt::Interrupt;
 use cosim::run::Observer;
 use cosim::signal::Signal;
 use cosim::system::Opened;
-use cosim_report::metrics::{Meters, Metrics, Value};
+use cosim_metrics::metrics::{Meters, Metrics, Value};
 use linear::curves::ResponseCurves;
 use serde_json::json;
 use std::collections::BTreeSet;

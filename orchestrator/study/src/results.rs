@@ -6,7 +6,7 @@ use crate::runs::Run;
 use crate::values::Quantity;
 use cosim::signal::Signal;
 use cosim::system::Parameters;
-use cosim_report::metrics::Metrics;
+use cosim_metrics::metrics::Metrics;
 use fmi_master::names;
 use std::collections::BTreeMap;
 use sweep::parts::PartResult;

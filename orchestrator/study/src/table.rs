@@ -1,7 +1,7 @@
 //! The numbers of a run as a table with a row for each case. The columns have the names by which a
 //! study refers to them.
 
-use cosim_report::metrics::Value;
+use cosim_metrics::metrics::Value;
 use std::collections::{BTreeMap, BTreeSet};
 use sweep::cases::Sweep;
 use sweep::flight::{Flown, columns};

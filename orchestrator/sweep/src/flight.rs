@@ -8,7 +8,7 @@ use cosim::interrupt::Interrupt;
 use cosim::run::{Observer, Run, Sample};
 use cosim::system::{Opened, Parameters, System};
 use cosim::variation::{SettingValue, Target};
-use cosim_report::metrics::{Meters, Metrics};
+use cosim_metrics::metrics::{Meters, Metrics};
 use fmi_master::description::VariableKind as Type;
 use fmu_import::law;
 use linear::linearise::{Linearised, Lineariser};

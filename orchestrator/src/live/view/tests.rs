@@ -2,7 +2,7 @@ use super::*;
 use cosim::pacing::pacer::{Miss, Step};
 use cosim::run::{Observer, Sample};
 use cosim::signal::Resolved;
-use cosim_report::guarantee::{GuaranteeRecord, GuaranteeSignals};
+use cosim_metrics::guarantee::{GuaranteeRecord, GuaranteeSignals};
 use cosim_report::panels::Curve;
 use ratatui::Terminal;
 use ratatui::backend::TestBackend;
