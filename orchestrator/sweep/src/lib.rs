@@ -5,8 +5,8 @@
 //! lies; this depends on the seed and k alone, so that any case can be flown again by itself. A
 //! [`flight`] flies one case after the other with the same instances, which are reset between
 //! cases. The cases are divided into [`parts`] on which several threads [`work`]; the results of a
-//! finished part are kept in a file ([`table`]) and not computed again. Campaigns and studies are built
-//! on this: a campaign asks how often limits are broken, a study compares with a paper.
+//! finished part are kept in a file ([`table`]) and not computed again. Campaigns and studies are
+//! built on this: a campaign asks how often limits are broken, a study compares with a paper.
 
 pub mod cases;
 mod correlation;
