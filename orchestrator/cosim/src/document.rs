@@ -101,9 +101,12 @@ impl Source {
         Error::Experiment { at, message: message.into() }
     }
 
-    /// Returns the path of a file beside this one.
+    /// Returns the path of a file beside this one, or beside one that it extends, which may have
+    /// named it.
     pub fn beside(&self, file: &Path) -> PathBuf {
-        self.path.parent().unwrap_or_else(|| Path::new(".")).join(file)
+        let mut places = self.folders().map(|folder| folder.join(file));
+        let own = places.next().unwrap_or_default();
+        if own.exists() { own } else { places.find(|path| path.exists()).unwrap_or(own) }
     }
 
     /// Checks that all names are among the `available` ones. The message calls such a name a

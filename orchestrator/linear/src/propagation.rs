@@ -69,8 +69,10 @@ fn lcm(a: u64, b: u64) -> u64 {
 /// All values as rows of factors.
 struct Rows<'a> {
     net: &'a Net,
+    /// Number of states at the beginning of a period, which are the first columns.
+    states: usize,
     columns: usize,
-    states: Vec<Matrix>,
+    state: Vec<Matrix>,
     latest: Vec<Matrix>,
     before: Vec<Matrix>,
     /// Value that arrives at each opened signal.
@@ -150,8 +152,9 @@ impl Net {
     pub fn open(&self) -> OpenLoop {
         let channels = self.signals.len();
         let ticks = self.period();
-        let (mut rows, names) = Rows::start(self, ticks as usize * channels, None);
-        let states = names.len();
+        let mut rows = Rows::start(self, ticks as usize * channels, None);
+        let names = rows.names();
+        let states = rows.states;
         let mut arriving = Vec::new();
         for tick in 0..ticks {
             rows.put_in = Some(states + tick as usize * channels);
@@ -187,12 +190,11 @@ impl Net {
 
     /// Returns the matrix A of the closed loop over its period, with a delay.
     pub fn closed(&self, delay: Delay) -> Matrix {
-        let (mut rows, names) = Rows::start(self, 0, Some(delay));
+        let mut rows = Rows::start(self, 0, Some(delay));
         for tick in 0..self.period() {
             rows.round(self.first + tick);
         }
-        let end = rows.end();
-        let a = end.columns(0, names.len()).into_owned();
+        let a = rows.end();
         // A state on which nothing depends cannot make the loop unstable.
         let kept: Vec<usize> = (0..a.ncols()).filter(|i| a.column(*i).amax() > 0.0).collect();
         merged(a.select_rows(&kept).select_columns(&kept))
@@ -200,20 +202,17 @@ impl Net {
 }
 
 impl<'a> Rows<'a> {
-    /// Begins a period. Returns the names of the states.
-    fn start(net: &'a Net, inputs: usize, delay: Option<Delay>) -> (Self, Vec<String>) {
+    /// Begins a period.
+    fn start(net: &'a Net, inputs: usize, delay: Option<Delay>) -> Self {
         let delays: Vec<Vec<Steps>> =
             (0..net.components.len()).map(|component| net.delays(component, delay)).collect();
-        let mut names = Vec::new();
-        for (component, delays) in net.components.iter().zip(&delays) {
-            names.extend(component.names(net.first));
-            for age in 1..=remembered(delays) {
-                let past = (1..=component.inputs.len())
-                    .map(|input| format!("{}.input[{input}] ({age} steps ago)", component.name));
-                names.extend(past);
-            }
-        }
-        let columns = names.len() + inputs;
+        let counts = net.components.iter().zip(&delays).map(|(component, delays)| {
+            let held = if component.shows_states() { 0 } else { 2 * component.outputs.len() };
+            let past = remembered(delays) * component.inputs.len();
+            component.states_at(net.first) + held + past
+        });
+        let states = counts.sum();
+        let columns = states + inputs;
         let mut next = 0;
         let mut unity = |count: usize| {
             let mut rows = Matrix::zeros(count, columns);
@@ -225,8 +224,9 @@ impl<'a> Rows<'a> {
         };
         let mut rows = Self {
             net,
+            states,
             columns,
-            states: Vec::new(),
+            state: Vec::new(),
             latest: Vec::new(),
             before: Vec::new(),
             arriving: Matrix::zeros(net.signals.len(), columns),
@@ -247,28 +247,41 @@ impl<'a> Rows<'a> {
                 rows.latest.push(unity(component.outputs.len()));
                 rows.before.push(unity(component.outputs.len()));
             }
-            rows.states.push(state);
+            rows.state.push(state);
             rows.history
                 .push((0..remembered(delays)).map(|_| unity(component.inputs.len())).collect());
         }
-        (rows, names)
+        rows
+    }
+
+    /// Returns the names of the states.
+    fn names(&self) -> Vec<String> {
+        let mut names = Vec::with_capacity(self.states);
+        for (component, delays) in self.net.components.iter().zip(&self.delays) {
+            names.extend(component.names(self.net.first));
+            for age in 1..=remembered(delays) {
+                let past = (1..=component.inputs.len())
+                    .map(|input| format!("{}.input[{input}] ({age} steps ago)", component.name));
+                names.extend(past);
+            }
+        }
+        names
     }
 
     /// Returns the rows of all states at the end of the period, in the order of the names.
     fn end(self) -> Matrix {
-        let mut parts: Vec<Matrix> = Vec::new();
+        let mut parts: Vec<&Matrix> = Vec::new();
         for (place, component) in self.net.components.iter().enumerate() {
-            parts.push(self.states[place].clone());
+            parts.push(&self.state[place]);
             if !component.shows_states() {
-                parts.push(self.latest[place].clone());
-                parts.push(self.before[place].clone());
+                parts.extend([&self.latest[place], &self.before[place]]);
             }
-            parts.extend(self.history[place].iter().cloned());
+            parts.extend(&self.history[place]);
         }
-        let mut all = Matrix::zeros(parts.iter().map(Matrix::nrows).sum(), self.columns);
+        let mut all = Matrix::zeros(parts.iter().map(|part| part.nrows()).sum(), self.columns);
         let mut next = 0;
         for part in parts {
-            all.rows_mut(next, part.nrows()).copy_from(&part);
+            all.rows_mut(next, part.nrows()).copy_from(part);
             next += part.nrows();
         }
         all
@@ -329,7 +342,7 @@ impl<'a> Rows<'a> {
     fn step(&mut self, component: usize, tick: u64, inputs: Matrix) {
         let model = &self.net.components[component];
         let delays = &self.delays[component];
-        let state = &self.states[component];
+        let state = &self.state[component];
         // Value of each input over the part of the step that begins at `from`.
         let acting = |from: f64| {
             let mut acting = inputs.clone();
@@ -358,7 +371,7 @@ impl<'a> Rows<'a> {
                 (state, output)
             }
         };
-        (self.states[component], self.latest[component]) = (state, output);
+        (self.state[component], self.latest[component]) = (state, output);
         if let Some(oldest) = self.history[component].last_mut() {
             *oldest = inputs;
             self.history[component].rotate_right(1);

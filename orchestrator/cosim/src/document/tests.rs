@@ -85,3 +85,20 @@ fn faults_name_the_file_they_are_in() {
         "{message}"
     );
 }
+
+#[test]
+fn a_file_that_a_base_names_lies_beside_the_base() {
+    let folder = tempfile::tempdir().unwrap();
+    let place = |name: &str| folder.path().join(name);
+    fs::create_dir(place("own")).unwrap();
+    fs::write(place("base.toml"), "file = \"there.toml\"").unwrap();
+    fs::write(place("there.toml"), "").unwrap();
+    fs::write(place("own/own.toml"), "extends = \"../base.toml\"").unwrap();
+    let source = Source::load(&place("own/own.toml")).unwrap();
+    let there = |file: &str| source.beside(Path::new(file)).canonicalize().unwrap();
+    assert_eq!(there("there.toml"), place("there.toml").canonicalize().unwrap());
+    assert_eq!(source.beside(Path::new("nowhere.toml")), place("own/nowhere.toml"));
+    // One beside the file itself comes first.
+    fs::write(place("own/there.toml"), "").unwrap();
+    assert_eq!(there("there.toml"), place("own/there.toml").canonicalize().unwrap());
+}
