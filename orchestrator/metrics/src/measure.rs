@@ -3,7 +3,7 @@
 mod spectrum;
 
 use cosim::error::Error;
-use cosim::experiment::{Measure, MeasureKind, Observe};
+use cosim::experiment::{Band, Measure, Observe, Quantity};
 use cosim::run::{Observer, Sample};
 use cosim::signal::{Resolved, Signal, common_unit};
 use cosim::system::System;
@@ -19,6 +19,7 @@ const ROUNDING: f64 = 1e-9;
 /// A measure of a run whose value is still being computed.
 pub(crate) struct Gauge {
     measure: Measure,
+    quantity: Quantity,
     signals: Vec<Resolved>,
     /// Index of the variable that counts events, and its last value.
     each: Option<(usize, f64)>,
@@ -59,29 +60,28 @@ impl Gauge {
         signals: &[Signal],
         system: &mut System,
     ) -> Result<Self, String> {
-        if let Some(fault) = measure.fault() {
-            return Err(fault);
-        }
+        let quantity = measure.quantity()?;
         let signals: Vec<Resolved> =
             signals.iter().map(|signal| system.resolve(signal)).collect::<Result<_, _>>()?;
         common_unit(&signals)?;
         // At the stop time, responses to inputs are those of the step before; only an integral
         // needs them there.
         let responds = signals.iter().any(|signal| signal.responds);
-        let steps = measure.steps || responds && measure.kind != MeasureKind::Integral;
+        let steps = measure.steps || responds && quantity != Quantity::Integral;
         let each = measure.each.as_ref().map(|path| system.probe(path)).transpose()?;
-        let mut gauge = Self::empty(&Measure { steps, ..measure.clone() }, signals);
+        let mut gauge = Self::empty(&Measure { steps, ..measure.clone() }, quantity, signals);
         gauge.each = each.map(|probed| (probed.place, 0.0));
-        if measure.kind == MeasureKind::P99 {
+        if quantity == Quantity::P99 {
             // This is enough room for a usual run; a longer run allocates more.
             gauge.samples.reserve(system.clock.ticks().min(1 << 16) as usize + 1);
         }
         Ok(gauge)
     }
 
-    pub(crate) fn empty(measure: &Measure, signals: Vec<Resolved>) -> Self {
+    pub(crate) fn empty(measure: &Measure, quantity: Quantity, signals: Vec<Resolved>) -> Self {
         Self {
             measure: measure.clone(),
+            quantity,
             signals,
             each: None,
             now: Vec::new(),
@@ -108,7 +108,7 @@ impl Gauge {
     pub(crate) fn reset(&mut self) {
         let signals = std::mem::take(&mut self.signals);
         let each = self.each.map(|(place, _)| (place, 0.0));
-        *self = Self { each, ..Self::empty(&self.measure, signals) };
+        *self = Self { each, ..Self::empty(&self.measure, self.quantity, signals) };
     }
 
     /// Returns the value of the measure; `None` if it has none.
@@ -116,29 +116,28 @@ impl Gauge {
         let factor = self.measure.unit.as_ref().map_or(1.0, |unit| unit.factor);
         (self.count > 0).then_some(())?;
         let count = self.count as f64;
-        match self.measure.kind {
-            MeasureKind::Rms => Some(factor * (self.sum / count).sqrt()),
-            MeasureKind::Mean => Some(factor * (self.sum / count)),
-            MeasureKind::Integral => Some(factor * self.integral),
-            MeasureKind::P99 => {
+        match self.quantity {
+            Quantity::Rms => Some(factor * (self.sum / count).sqrt()),
+            Quantity::Mean => Some(factor * (self.sum / count)),
+            Quantity::Integral => Some(factor * self.integral),
+            Quantity::P99 => {
                 let mut samples = self.samples.clone();
                 samples.sort_by(f64::total_cmp);
                 let rank = (samples.len() * 99).div_ceil(100).checked_sub(1)?;
                 samples.get(rank).map(|sample| factor * sample)
             }
-            MeasureKind::Largest => Some(factor * self.largest),
-            MeasureKind::Last => self.before.first().map(|value| factor * value),
-            MeasureKind::Settling => {
-                self.settled.filter(|settled| self.last - settled >= self.measure.hold)
+            Quantity::Largest => Some(factor * self.largest),
+            Quantity::Last => self.before.first().map(|value| factor * value),
+            Quantity::Settling { hold, .. } => {
+                self.settled.filter(|settled| self.last - settled >= hold)
             }
-            MeasureKind::Pulses => Some(self.pulses as f64),
-            MeasureKind::Leaving => self.left,
-            MeasureKind::Rises => Some(self.rises as f64),
-            MeasureKind::Variation => Some(factor * self.variation),
-            MeasureKind::Share => Some(self.inside as f64 / count),
-            MeasureKind::RmsAbove => {
+            Quantity::Pulses => Some(self.pulses as f64),
+            Quantity::Leaving { .. } => self.left,
+            Quantity::Rises { .. } => Some(self.rises as f64),
+            Quantity::Variation => Some(factor * self.variation),
+            Quantity::Share { .. } => Some(self.inside as f64 / count),
+            Quantity::RmsAbove { frequency } => {
                 let step = (self.last - self.began) / (count - 1.0);
-                let frequency = self.measure.frequency.unwrap_or(0.0);
                 let signals = self.first.len();
                 spectrum::rms_above(&self.spectrum_samples, signals, step, frequency)
                     .map(|rms| factor * rms)
@@ -148,9 +147,9 @@ impl Gauge {
 
     /// Returns the unit of [`Self::value`], or an empty text if it has none.
     pub(crate) fn unit(&self) -> &str {
-        match (self.measure.kind, &self.measure.unit) {
-            (MeasureKind::Settling | MeasureKind::Leaving, _) => "s",
-            (MeasureKind::Share, _) => "",
+        match (self.quantity, &self.measure.unit) {
+            (Quantity::Settling { .. } | Quantity::Leaving { .. }, _) => "s",
+            (Quantity::Share { .. }, _) => "",
             (_, Some(unit)) => &unit.name,
             _ => self.signals.first().map_or("", |signal| &signal.unit),
         }
@@ -159,8 +158,8 @@ impl Gauge {
     /// Returns whether the number is always whole.
     pub(crate) fn counts(&self) -> bool {
         let is_integer = self.signals.first().is_some_and(|signal| signal.is_integer);
-        let is_count = matches!(self.measure.kind, MeasureKind::Pulses | MeasureKind::Rises);
-        is_count || self.measure.kind == MeasureKind::Last && is_integer
+        let is_count = matches!(self.quantity, Quantity::Pulses | Quantity::Rises { .. });
+        is_count || self.quantity == Quantity::Last && is_integer
     }
 
     /// Returns the single values of a percentile, in the order of time.
@@ -181,10 +180,11 @@ impl Gauge {
             let changes = values.iter().zip(&self.before).map(|(now, before)| (now - before).abs());
             self.variation += changes.sum::<f64>();
             let rise = values.first().zip(self.before.first()).map(|(now, before)| now - before);
-            let least = self.measure.bound.unwrap_or(0.0);
-            self.rises += u64::from(rise.is_some_and(|rise| rise > least));
+            if let Quantity::Rises { least } = self.quantity {
+                self.rises += u64::from(rise.is_some_and(|rise| rise > least));
+            }
         }
-        if self.measure.kind == MeasureKind::RmsAbove {
+        if matches!(self.quantity, Quantity::RmsAbove { .. }) {
             self.spectrum_samples.extend(values);
         }
         // By the trapezoidal rule. At the first sample, the values before it are zero and no time
@@ -196,27 +196,33 @@ impl Gauge {
         }
         self.count += 1;
         self.last = time;
-        self.sum += match self.measure.kind {
-            MeasureKind::Mean => values.first().copied().unwrap_or(f64::NAN),
+        self.sum += match self.quantity {
+            Quantity::Mean => values.first().copied().unwrap_or(f64::NAN),
             _ => values.iter().map(|value| value * value).sum(),
         };
-        if self.measure.kind == MeasureKind::P99 {
+        if self.quantity == Quantity::P99 {
             self.samples.extend(values.first());
         }
         self.largest = values.iter().map(|value| value.abs()).fold(self.largest, larger);
-        let band = |first: &f64| match (self.measure.bound, self.measure.band) {
-            (Some(bound), _) => bound,
-            (None, band) => band.unwrap_or(0.0) * first.abs(),
-        };
-        let inside =
-            values.iter().zip(&self.first).all(|(value, first)| value.abs() <= band(first));
-        self.settled = if inside { self.settled.or(Some(time)) } else { None };
-        if self.measure.bound.is_some_and(|bound| values.iter().any(|value| value.abs() > bound)) {
-            self.left = self.left.or(Some(time));
+        match self.quantity {
+            Quantity::Settling { within, .. } => {
+                let band = |first: &f64| match within {
+                    Band::Absolute(bound) => bound,
+                    Band::Relative(share) => share * first.abs(),
+                };
+                let inside =
+                    values.iter().zip(&self.first).all(|(value, first)| value.abs() <= band(first));
+                self.settled = if inside { self.settled.or(Some(time)) } else { None };
+            }
+            Quantity::Leaving { bound } if values.iter().any(|value| value.abs() > bound) => {
+                self.left = self.left.or(Some(time));
+            }
+            Quantity::Share { bound } => {
+                let bound = bound * (1.0 + ROUNDING);
+                self.inside += u64::from(values.iter().all(|value| value.abs() <= bound));
+            }
+            _ => {}
         }
-        let within = self.measure.bound.map(|bound| bound * (1.0 + ROUNDING));
-        let is_inside = within.is_some_and(|bound| values.iter().all(|value| value.abs() <= bound));
-        self.inside += u64::from(is_inside);
         let rises = values
             .iter()
             .zip(&self.before)

@@ -304,49 +304,4 @@ impl Measure {
             frequency: None,
         }
     }
-
-    /// Describes what is wrong with the measure, or returns `None` if nothing is.
-    pub fn fault(&self) -> Option<String> {
-        let is = |kind| self.kind == kind;
-        let fault = if self.every == 0 {
-            "every = 0: it must be at least 1"
-        } else if self.over.is_some_and(|[from, to]| from >= to) {
-            "over must be [from, to] with from below to"
-        } else if is(MeasureKind::Leaving) && !self.bound.is_some_and(|bound| bound > 0.0) {
-            "leaving needs a bound above 0"
-        } else if is(MeasureKind::Share) && !self.bound.is_some_and(|bound| bound >= 0.0) {
-            "share needs a bound of at least 0"
-        } else if !matches!(
-            self.kind,
-            MeasureKind::Leaving | MeasureKind::Settling | MeasureKind::Rises | MeasureKind::Share
-        ) && self.bound.is_some()
-        {
-            "bound is for leaving, settling, rises and share only"
-        } else if is(MeasureKind::Settling)
-            && !(self.band.xor(self.bound).is_some_and(|band| band > 0.0) && self.hold >= 0.0)
-        {
-            "settling needs either a band or a bound above 0, and a hold of at least 0"
-        } else if matches!(
-            self.kind,
-            MeasureKind::Settling
-                | MeasureKind::Pulses
-                | MeasureKind::Leaving
-                | MeasureKind::Rises
-                | MeasureKind::Share
-        ) && self.unit.is_some()
-        {
-            "settling, pulses, leaving, rises and share have no unit of the signals to replace: leave unit out"
-        } else if !is(MeasureKind::Settling) && self.band.is_some() {
-            "band is for settling only"
-        } else if !is(MeasureKind::Settling) && self.hold != 0.0 {
-            "hold is for settling only"
-        } else if is(MeasureKind::RmsAbove)
-            != self.frequency.is_some_and(|frequency| frequency > 0.0)
-        {
-            "rms-above needs a frequency above 0, and no other kind has one"
-        } else {
-            return None;
-        };
-        Some(fault.into())
-    }
 }

@@ -7,6 +7,7 @@
 mod measures;
 mod overrides;
 mod protection;
+mod quantity;
 mod vehicle;
 
 pub use crate::watch::OnInvalid;
@@ -15,6 +16,7 @@ pub use measures::{Curve, Guarantee, Loss, Margins, Measure, MeasureKind, Observ
 pub(crate) use overrides::CONTROLLER;
 pub use overrides::{Given, Overrides, name_of};
 pub use protection::Protection;
+pub use quantity::{Band, Quantity};
 pub use vehicle::Vehicle;
 
 use crate::document::Source;

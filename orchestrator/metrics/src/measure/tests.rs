@@ -1,4 +1,5 @@
 use super::*;
+use cosim::experiment::MeasureKind;
 use toml::Spanned;
 
 fn measured(
@@ -25,7 +26,7 @@ fn held(
     let signals = Spanned::new(0..0, "x".to_string());
     let (band, bound) = if kind == MeasureKind::Leaving { (None, size) } else { (size, None) };
     let measure = Measure { kind, signals, over, band, hold, bound, ..measure("kind = \"rms\"") };
-    let mut gauge = Gauge::empty(&measure, Vec::new());
+    let mut gauge = Gauge::empty(&measure, measure.quantity().unwrap(), Vec::new());
     for (time, row) in rows.iter().enumerate() {
         gauge.see(time as f64, row);
     }
@@ -80,7 +81,8 @@ fn a_measure_that_cannot_be_meant_is_refused() {
 /// Computes a measure of the first of two variables from rows of both.
 fn taken(text: &str, rows: &[[f64; 2]]) -> Option<f64> {
     let measure = measure(text);
-    let mut gauge = Gauge::empty(&measure, vec![Resolved::variable(0)]);
+    let mut gauge =
+        Gauge::empty(&measure, measure.quantity().unwrap(), vec![Resolved::variable(0)]);
     gauge.each = measure.each.as_ref().map(|_| (1, 0.0));
     for (tick, row) in rows.iter().enumerate() {
         let (time, last) = (tick as f64, tick + 1 == rows.len());

@@ -11,7 +11,7 @@ fn meters() -> Meters {
     };
     let gauge = |text: &str, signals: Vec<Resolved>| {
         let measure: Measure = toml::from_str(&format!("signals = \"x\"\n{text}")).unwrap();
-        Some(Gauge::empty(&measure, signals))
+        Some(Gauge::empty(&measure, measure.quantity().unwrap(), signals))
     };
     let errors = || vec![difference(0), difference(1), difference(2)];
     let count = Resolved { is_integer: true, ..Resolved::variable(7) };
