@@ -20,7 +20,7 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 use sweep::error::Error;
 use sweep::flight::can_reset;
-use sweep::parts::{PartResult, PartState, Remarks};
+use sweep::parts::Remarks;
 use sweep::statistics::{Probability, looks};
 use sweep::table::{CaseTable, Reader, Values, Writer};
 use sweep::work::{self, Worked};
@@ -92,19 +92,17 @@ impl<'a> State<'a> {
 
     /// Looks for the parts of the first `cases` cases, and returns those that are missing.
     fn missing(&mut self, cases: u64) -> Vec<Range<u64>> {
-        let (mut missing, mut remarks) = (Vec::new(), Remarks::default());
+        let store = parts::store(self.plan, self.out);
+        let mut missing = Vec::new();
+        let mut remarks = Remarks::default();
         for part in parts::parts(self.plan.sweep.cases()).take_while(|part| part.start < cases) {
             if self.broken_counts.contains_key(&part.start) {
                 continue;
             }
-            match parts::store(self.plan, self.out).find(&part) {
-                PartState::Whole(PartResult { rows, .. }) => {
-                    self.broken_counts.insert(part.start, parts::broken(self.plan, &rows));
-                }
-                state => {
-                    remarks.add(&state);
-                    missing.push(part);
-                }
+            if let Some(found) = remarks.take(store.find(&part)) {
+                self.broken_counts.insert(part.start, parts::broken(self.plan, &found.rows));
+            } else {
+                missing.push(part);
             }
         }
         self.notes.extend(remarks.texts());

@@ -86,11 +86,15 @@ impl Grid {
             let ids = self.candidates.iter().map(|candidate| candidate.id.as_str());
             source.check_names(scenario.set_for.keys(), "[[grid.candidate]]", ids)?;
             for candidate in &self.candidates {
-                let set_for = scenario.set_for.iter().find(|(id, _)| *id.get_ref() == candidate.id);
+                let Candidate { id, without, .. } = candidate;
+                let set_for = scenario.set_for.iter().find(|(other, _)| other.get_ref() == id);
                 let set_for = set_for.into_iter().flat_map(|(_, set)| set.clone());
-                let has = |name: &String| !candidate.without.contains(name);
-                let common = scenario.set.clone().into_iter().filter(|(name, _)| has(name));
-                let id = format!("{}-{}", scenario.id.get_ref(), candidate.id);
+                let mut set = scenario.set.clone();
+                set.retain(|name, _| !without.contains(name));
+                set.extend(candidate.set.clone());
+                set.extend(set_for);
+                let unset = without.iter().filter(|name| experiment.sets(name));
+                let id = format!("{}-{id}", scenario.id.get_ref());
                 runs.push(Run {
                     id: Spanned::new(scenario.id.span(), id),
                     label: candidate.label.clone(),
@@ -98,13 +102,8 @@ impl Grid {
                     group: scenario.label.clone(),
                     experiment: scenario.experiment.clone(),
                     fmu: candidate.fmu.clone(),
-                    set: common.chain(candidate.set.clone()).chain(set_for).collect(),
-                    unset: candidate
-                        .without
-                        .iter()
-                        .filter(|name| experiment.sets(name))
-                        .cloned()
-                        .collect(),
+                    set,
+                    unset: unset.cloned().collect(),
                     vary: Vec::new(),
                     correlations: Vec::new(),
                     cases: None,

@@ -103,8 +103,9 @@ impl Study {
 
     /// Checks everything that can be wrong without running anything.
     fn check(&self) -> Result<(), Error> {
-        for (place, run) in self.runs.iter().enumerate() {
-            self.check_run(run, &self.runs[..place])?;
+        let mut ids = BTreeSet::new();
+        for run in &self.runs {
+            self.check_run(run, ids.insert(run.id.get_ref()))?;
         }
         let mut ids = BTreeSet::new();
         for measure in &self.measures {
@@ -139,19 +140,17 @@ impl Study {
         Ok(())
     }
 
-    fn check_run(&self, run: &Run, before: &[Run]) -> Result<(), Error> {
+    fn check_run(&self, run: &Run, is_first: bool) -> Result<(), Error> {
         let id = run.id.get_ref();
-        let fault = if id.is_empty() || !id.chars().all(|c| c.is_ascii_alphanumeric() || c == '-') {
-            Some("an id consists of letters, digits and -")
-        } else if before.iter().any(|other| other.id.get_ref() == id) {
-            Some("there is another run with this id")
-        } else {
-            match run.cases {
-                Some(0) => Some("cases = 0, but it must be at least 1"),
-                Some(_) if run.vary.is_empty() => Some("cases needs vary"),
-                None if !run.vary.is_empty() => Some("vary needs cases, their number"),
-                _ => None,
+        let fault = match run.cases {
+            _ if id.is_empty() || !id.chars().all(|c| c.is_ascii_alphanumeric() || c == '-') => {
+                Some("an id consists of letters, digits and -")
             }
+            _ if !is_first => Some("there is another run with this id"),
+            Some(0) => Some("cases = 0, but it must be at least 1"),
+            Some(_) if run.vary.is_empty() => Some("cases needs vary"),
+            None if !run.vary.is_empty() => Some("vary needs cases, their number"),
+            _ => None,
         };
         if let Some(fault) = fault {
             let message = format!("[[run]] id = \"{id}\": {fault}");

@@ -20,7 +20,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 use sweep::error::Error;
-use sweep::parts::{self, PartResult, PartState, Remarks, Store};
+use sweep::parts::{self, PartResult, Remarks, Store};
 use sweep::work::{self, Worked};
 use toml::Spanned;
 
@@ -159,14 +159,11 @@ struct Found {
 fn look<'a>(parts: &[Part], store: &dyn Fn(&Part) -> Store<'a>, fresh: bool) -> Found {
     let mut found = Found { done: Done::new(), missing: Vec::new(), remarks: Remarks::default() };
     for part in parts {
-        match store(part).find(&part.range) {
-            PartState::Whole(result) if !fresh => {
-                found.done.insert((part.run, part.range.start), result);
-            }
-            state => {
-                found.remarks.add(&state);
-                found.missing.push(part.clone());
-            }
+        let state = store(part).find(&part.range);
+        if let Some(result) = found.remarks.take(state).filter(|_| !fresh) {
+            found.done.insert((part.run, part.range.start), result);
+        } else {
+            found.missing.push(part.clone());
         }
     }
     found

@@ -139,13 +139,15 @@ pub struct Remarks {
 }
 
 impl Remarks {
-    /// Notes why the file of a part is of no use.
-    pub fn add(&mut self, state: &PartState) {
+    /// Returns the results of a part, or notes why its file is of no use.
+    pub fn take(&mut self, state: PartState) -> Option<PartResult> {
         match state {
-            PartState::Whole(_) | PartState::Missing => {}
+            PartState::Whole(result) => return Some(result),
+            PartState::Missing => {}
             PartState::Damaged => self.damaged += 1,
             PartState::Other(names) => *self.others.entry(names.join(", ")).or_default() += 1,
         }
+        None
     }
 
     /// Returns the remarks in words.

@@ -38,7 +38,7 @@ fn oracle_each_kind_by_hand() {
     let rows = [[10.0, -1.0], [3.0, 0.0], [0.1, 0.6], [0.4, 0.015], [-0.15, 0.0], [0.0, 0.01]];
     assert_eq!(measured(MeasureKind::Largest, None, None, &rows), Some(10.0));
     assert_eq!(measured(MeasureKind::Largest, Some([1.0, 2.0]), None, &rows), Some(3.0));
-    assert_eq!(measured(MeasureKind::Rms, Some([1.0, 1.0]), None, &rows), Some(3.0));
+    assert_eq!(measured(MeasureKind::Rms, Some([0.5, 1.5]), None, &rows), Some(3.0));
     assert_eq!(measured(MeasureKind::Pulses, None, None, &rows), Some(2.0));
     // 6.5 + 1.55 + 0.25 + 0.125 - 0.075
     let integral = measured(MeasureKind::Integral, None, None, &rows).unwrap();

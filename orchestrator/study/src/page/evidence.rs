@@ -54,22 +54,16 @@ fn evidence(check: &Check, checked: &Checked) -> Markup {
     if pairs == 0 {
         return html! { span.verdict { (checked.verdict().text()) } " " (check.label) ": no run has this number" };
     }
-    let required = match (check.relation, checked.by) {
-        (Relation::Below, None) => "below".to_string(),
-        (Relation::Above, None) => "above".to_string(),
-        (Relation::AtMost, None) => "not above".to_string(),
-        (Relation::AtLeast, None) => "not below".to_string(),
-        (Relation::Below | Relation::AtMost, Some(by)) if by < 0.0 => {
-            format!("at most {}\u{a0}% above", shown(-100.0 * by))
-        }
-        (Relation::Above | Relation::AtLeast, Some(by)) if by < 0.0 => {
-            format!("at most {}\u{a0}% below", shown(-100.0 * by))
-        }
-        (Relation::Below | Relation::AtMost, Some(by)) => {
-            format!("at least {}\u{a0}% below", shown(100.0 * by))
-        }
-        (Relation::Above | Relation::AtLeast, Some(by)) => {
-            format!("at least {}\u{a0}% above", shown(100.0 * by))
+    let is_upper = matches!(check.relation, Relation::Below | Relation::AtMost);
+    let required = match (checked.by, check.relation) {
+        (None, Relation::Below) => "below".to_string(),
+        (None, Relation::Above) => "above".to_string(),
+        (None, Relation::AtMost) => "not above".to_string(),
+        (None, Relation::AtLeast) => "not below".to_string(),
+        (Some(by), _) => {
+            let size = if by < 0.0 { "at most" } else { "at least" };
+            let side = if is_upper == (by < 0.0) { "above" } else { "below" };
+            format!("{size} {}\u{a0}% {side}", shown(100.0 * by.abs()))
         }
     };
     let mut count = String::new();
