@@ -39,14 +39,13 @@ pub fn write(plan: &Plan, folder: &Path) -> Result<(), Error> {
         }
         fmus.insert(name.clone(), copies[fmu.path.as_path()].clone().into());
     }
-    let source = &plan.campaign.source;
-    let fault = |error: String| source.error(&(0..0), error);
-    let mut campaign: Table =
-        toml::from_str(source.whole()).map_err(|error| fault(error.to_string()))?;
+    let text = toml::from_str(plan.campaign.source.whole());
+    let mut campaign: Table = text.map_err(|error| plan.campaign.fault(error.to_string()))?;
     campaign.remove("extends");
     campaign.insert("experiment".into(), EXPERIMENT.into());
     campaign.insert("fmu".into(), fmus.into());
-    let campaign = toml::to_string(&campaign).map_err(|error| fault(error.to_string()))?;
+    let campaign = toml::to_string(&campaign);
+    let campaign = campaign.map_err(|error| plan.campaign.fault(error.to_string()))?;
     keep(EXPERIMENT, system.experiment.source.whole().as_bytes())?;
     keep(CAMPAIGN, campaign.as_bytes())
 }

@@ -1,9 +1,10 @@
 //! Parts of a campaign, which are kept as those of any sweep.
 
 use crate::definition::kept_column;
-use crate::flight::{Flight, Row, table};
+use crate::flight::{Flight, table};
 use crate::plan::Plan;
 use cosim::error::Error as Single;
+use cosim_report::progress::Parts;
 use std::ops::Range;
 use std::path::Path;
 use sweep::error::Error;
@@ -47,8 +48,7 @@ pub fn of_case(case: u64, error: Single) -> Error {
     }
 }
 
-/// Flies a part and keeps its results. `flown` is called after each case. Returns the number of
-/// cases that broke each limit.
+/// Flies a part and keeps its results. Returns the number of cases that broke each limit.
 ///
 /// # Errors
 /// Returns an error if the work was asked to end, if a case could not be flown, or if the file
@@ -58,13 +58,12 @@ pub fn fly(
     out: &Path,
     part: &Range<u64>,
     flight: &mut Flight,
-    mut flown: impl FnMut(&Row),
+    progress: &Parts,
 ) -> Result<Vec<u64>, Error> {
     let mut rows = Vec::with_capacity((part.end - part.start) as usize);
     for case in part.clone() {
-        let row = flight.fly(case).map_err(|error| of_case(case, error))?;
-        flown(&row);
-        rows.push(row);
+        rows.push(flight.fly(case).map_err(|error| of_case(case, error))?);
+        progress.advance(1);
     }
     let rows = table(plan, &rows);
     let broken = broken(plan, &rows);

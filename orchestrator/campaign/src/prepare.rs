@@ -144,7 +144,7 @@ pub(crate) fn keys(campaign: &Campaign, changes: &Changes) -> Result<String, Err
     let text = toml::to_string(&table).map_err(|error| Error::experiment(error.to_string()))?;
     // FMUs count by their content here as well, and it is the same for a case in which processes
     // its instances run.
-    let (fmu, isolation) = (Vec::new(), Protection::default());
-    let overrides = Overrides { fmu, isolation, ..changes.overrides.clone() };
+    let isolation = Protection::default();
+    let overrides = Overrides { fmu: Vec::new(), isolation, ..changes.overrides.clone() };
     Ok(files::digest(format!("{text}{overrides:?}")))
 }

@@ -289,7 +289,7 @@ fn fly_parts(
         missing,
         work::threads(options.jobs, [&plan.sweep]),
         || Ok(Flight::new(plan, resets, interrupt)?),
-        |flight, part| parts::fly(plan, out, part, flight, |_| progress.advance(1)),
+        |flight, part| parts::fly(plan, out, part, flight, &progress),
         // The other parts are flown and kept, so that little is left for the next time.
         |error| matches!(error, Error::Case { .. }),
     );
@@ -302,8 +302,9 @@ fn fly_parts(
     match others.into_iter().next() {
         None => Ok(()),
         Some(Error::Single(Single::Interrupted { request, .. })) => {
-            let (what, done, total) = ("cases are flown", state.done(), plan.sweep.cases());
-            Err(Error::Unfinished { what, done, total, out: out.to_path_buf(), request })
+            let what = "cases are flown";
+            let total = plan.sweep.cases();
+            Err(Error::Unfinished { what, done: state.done(), total, out: out.into(), request })
         }
         Some(Error::Case { case, source, .. }) => Err(Error::Case { case, more, source }),
         Some(error) => Err(error),

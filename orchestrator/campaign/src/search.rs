@@ -17,9 +17,8 @@ use parking_lot::Mutex;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 use serde::Serialize;
-use std::cmp::Ordering as CmpOrdering;
+use std::cmp::Ordering;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::time::{Duration, Instant};
 use sweep::design::Place;
@@ -92,7 +91,6 @@ struct Order {
 
 /// A case that was tried: its place and its result.
 struct Tried {
-    generation: u64,
     point: Vec<f64>,
     value: f64,
     row: Row,
@@ -183,7 +181,6 @@ fn look_in_threads(
         plan,
         measure,
         progress: &progress,
-        generation: AtomicU64::new(0),
         tried: Mutex::default(),
         failure: Mutex::default(),
     };
@@ -198,16 +195,7 @@ fn look_in_threads(
     });
     progress.finish();
     let (searches, ended) = result?;
-    let mut tried = searched.tried.into_inner();
-    // Within a generation, the threads finish in any order.
-    tried.sort_by(|a, b| {
-        let by_point = || {
-            let mut orders = a.point.iter().zip(&b.point).map(|(a, b)| a.total_cmp(b));
-            orders.find(|order| order.is_ne()).unwrap_or(CmpOrdering::Equal)
-        };
-        a.generation.cmp(&b.generation).then_with(by_point)
-    });
-    Ok(Found { searches, ended, tried })
+    Ok(Found { searches, ended, tried: searched.tried.into_inner() })
 }
 
 /// Writes the table of all cases, of which the worst must have a value of the measure.
@@ -259,7 +247,6 @@ struct Searched<'a> {
     /// Position of the measure among the recorded numbers.
     measure: usize,
     progress: &'a Parts,
-    generation: AtomicU64,
     tried: Mutex<Vec<Tried>>,
     failure: Mutex<Option<Single>>,
 }
@@ -284,9 +271,19 @@ impl Searched<'_> {
         };
         self.progress.advance(1);
         let value = row.numbers[self.measure].unwrap_or(f64::NAN);
-        let generation = self.generation.load(Ordering::Relaxed);
-        self.tried.lock().push(Tried { generation, point, value, row });
+        self.tried.lock().push(Tried { point, value, row });
         if value.is_nan() { f64::MAX } else { -value }
+    }
+
+    /// Sorts the cases of the last generation, which the threads finish in any order, behind those
+    /// before it. Returns the number of all cases.
+    fn sort(&self, before: usize) -> usize {
+        let mut tried = self.tried.lock();
+        tried[before..].sort_by(|a, b| {
+            let mut orders = a.point.iter().zip(&b.point).map(|(a, b)| a.total_cmp(b));
+            orders.find(|order| order.is_ne()).unwrap_or(Ordering::Equal)
+        });
+        tried.len()
     }
 
     /// Returns why the search is to end after this generation, if it is.
@@ -320,6 +317,7 @@ fn look(
 ) -> Result<(u64, &'static str), Single> {
     let plan = searched.plan;
     let dimensions = plan.sweep.varied.len();
+    let mut sorted = 0;
     let mut random = ChaCha8Rng::seed_from_u64(plan.campaign.seed);
     let mut unit = || (random.next_u64() >> 11) as f64 / 2.0_f64.powi(53);
     let usual = 4 + (3.0 * (dimensions as f64).ln()).floor() as usize;
@@ -336,7 +334,7 @@ fn look(
             .map_err(|error| Single::experiment(format!("[search] {error:?}")))?;
         loop {
             let is_over = strategy.next_parallel().is_some();
-            searched.generation.fetch_add(1, Ordering::Relaxed);
+            sorted = searched.sort(sorted);
             if let Some(ended) = searched.ended(search, is_late())? {
                 return Ok((number + 1, ended));
             }

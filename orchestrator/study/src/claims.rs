@@ -135,27 +135,26 @@ fn compare(check: &Check, results: &Results) -> Result<Checked, String> {
         Quantity::Number(_) => right,
     };
     let by = check.by.as_ref().map(|by| results.study.values.number(by)).transpose()?;
-    let numbers = |side: &[Option<f64>]| {
-        Numbers(side.iter().copied().flatten().filter(|number| number.is_finite()).collect())
-    };
     // If one side has no number at all, there is nothing to compare.
     let is_empty = [&left, &right].iter().any(|side| side.iter().flatten().next().is_none());
     let pairs = if is_empty { 0 } else { left.len().max(right.len()) };
     let at = |side: &[Option<f64>], k: usize| side[k % side.len()];
     let compared: Vec<(f64, f64)> =
         (0..pairs).filter_map(|k| Some((at(&left, k)?, at(&right, k)?))).collect();
-    let difference = compared.iter().map(|(left, right)| left / right - 1.0);
-    let difference = difference.filter(|difference| difference.is_finite()).collect();
     let held = compared.iter().filter(|(left, right)| stand(check.relation, *left, *right, by));
-    let held = held.count();
+    let difference = compared.iter().map(|(left, right)| left / right - 1.0);
     Ok(Checked {
-        left: numbers(&left),
-        right: numbers(&right),
-        difference: Numbers(difference),
+        held: held.count(),
+        difference: finite(difference),
+        left: finite(left.into_iter().flatten()),
+        right: finite(right.into_iter().flatten()),
         by,
         pairs,
-        held,
     })
+}
+
+fn finite(numbers: impl Iterator<Item = f64>) -> Numbers {
+    Numbers(numbers.filter(|number| number.is_finite()).collect())
 }
 
 /// Returns whether two numbers stand in a relation, with `by` as the least difference. What never

@@ -5,7 +5,7 @@ use cosim::signal::{Resolved, Signal};
 use cosim::system::Parameters;
 use linear::curves::ResponseCurves;
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// What a part keeps besides its numbers.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -81,13 +81,16 @@ impl Watch {
         self.values.iter_mut().for_each(Vec::clear);
     }
 
+    fn signals(&self) -> impl Iterator<Item = (&Signal, &Vec<f64>)> {
+        self.resolved.iter().map(|(signal, _)| signal).zip(&self.values)
+    }
+
     /// Returns the time series, to which the single values of metrics are added.
     pub(crate) fn series(&self, samples: BTreeMap<String, Vec<f64>>) -> Series {
-        let signals = self.resolved.iter().zip(&self.values);
         let units = self.resolved.iter().map(|(s, resolved)| (s.clone(), resolved.unit.clone()));
         Series {
             time: self.time.clone(),
-            signals: signals.map(|((s, _), values)| (s.clone(), values.clone())).collect(),
+            signals: self.signals().map(|(s, values)| (s.clone(), values.clone())).collect(),
             units: units.collect(),
             samples,
             response: None,
@@ -95,12 +98,11 @@ impl Watch {
     }
 
     /// Returns the bands of one run, which have no width.
-    pub(crate) fn bands(&self, drawn: impl Fn(&Signal) -> bool) -> Vec<(Signal, Spread)> {
-        let signals = self.resolved.iter().zip(&self.values);
-        let bands =
-            signals.filter(|((signal, _), _)| drawn(signal)).map(|((signal, _), values)| {
-                (signal.clone(), Spread { low: values.clone(), high: values.clone() })
-            });
+    pub(crate) fn bands(&self, drawn: &BTreeSet<Signal>) -> Vec<(Signal, Spread)> {
+        let signals = self.signals().filter(|(signal, _)| drawn.contains(signal));
+        let bands = signals.map(|(signal, values)| {
+            (signal.clone(), Spread { low: values.clone(), high: values.clone() })
+        });
         bands.collect()
     }
 }

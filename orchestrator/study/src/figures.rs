@@ -76,7 +76,8 @@ fn over_time(panel: &Panel, runs: &[Shown]) -> Vec<Curve> {
         for (signal, name, color) in signals(panel, run) {
             if let Some(band) = result.spread.get(signal) {
                 let name = format!("{name}, {} runs", result.cases());
-                let (time, shape) = (result.series.time.clone(), Shape::Band(scaled(&band.low)));
+                let shape = Shape::Band(scaled(&band.low));
+                let time = result.series.time.clone();
                 curves.push(Curve::new(&name, color, shape, time, scaled(&band.high)));
             }
         }

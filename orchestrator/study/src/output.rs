@@ -107,7 +107,8 @@ fn numbers(results: &Results, judged: &[claims::Judged]) -> String {
 
 /// Returns the numbers of each case, by the names of the study's references.
 fn members(study: &Study, run: &Run, result: &RunResult) -> Vec<Value> {
-    let (mut members, mut first) = (Vec::new(), 0);
+    let mut members = Vec::new();
+    let mut first = 0;
     for part in &result.parts {
         for row in 0..part.rows() {
             let mut member = json!({ "values": {}, "metrics": {}, "within": {}, "measures": {} });
@@ -144,7 +145,8 @@ fn members(study: &Study, run: &Run, result: &RunResult) -> Vec<Value> {
 pub(crate) fn notes(results: &Results) -> Vec<String> {
     let mut notes = Vec::new();
     for (run, result) in results.pairs() {
-        let (id, count) = (run.id.get_ref(), result.cases());
+        let id = run.id.get_ref();
+        let count = result.cases();
         let lost: Vec<f64> = result.column("lost_at").into_iter().flatten().collect();
         if let Some(first) = lost.iter().copied().reduce(f64::min) {
             let time = rounded(first);

@@ -150,8 +150,9 @@ fn measure(study: &Study, run: &Run, experiment: &mut Experiment) -> Result<(), 
     let mut add = |name: String, measure: &Measure, signals: &[Signal]| {
         let list = format!("signals of {name}");
         lists.insert(list.clone(), signals.to_vec());
-        let (id, signals) = (String::new(), Spanned::new(0..0, list));
-        metrics.insert(name, Measure { id, limit: None, signals, ..measure.clone() });
+        let signals = Spanned::new(0..0, list);
+        metrics
+            .insert(name, Measure { id: String::new(), limit: None, signals, ..measure.clone() });
     };
     for (measure, signals) in study.measures_of(run) {
         add(format!("measure.{}", measure.id), measure, signals);
@@ -229,7 +230,8 @@ impl<'a> Bench<'a> {
 impl Instances<'_> {
     fn fly(&mut self, range: &Range<u64>) -> Result<PartResult, Single> {
         let Preparation { study, sweep, drawn, .. } = self.preparation;
-        let (mut curves, mut cases) = (Curves::default(), Vec::new());
+        let mut curves = Curves::default();
+        let mut cases = Vec::new();
         for case in range.clone() {
             let mut flown = self.one(case)?;
             let mut samples = self.flight.samples();
@@ -245,7 +247,7 @@ impl Instances<'_> {
                     }
                 }
             }
-            widen(&mut curves.spread, self.watch.bands(|signal| drawn.spread.contains(signal)));
+            widen(&mut curves.spread, self.watch.bands(&drawn.spread));
             if case == 0 {
                 curves.parameters = self.flight.parameters()?;
                 samples.retain(|name, _| !name.starts_with("measure."));

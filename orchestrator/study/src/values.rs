@@ -84,9 +84,8 @@ impl Values {
         let File { value } = source.read()?;
         for value in value {
             if self.find(&value.id).is_some() {
-                return Err(
-                    source.error(&(0..0), format!("there is another value \"{}\"", value.id))
-                );
+                let problem = format!("there is another value \"{}\"", value.id);
+                return Err(source.error(&(0..0), problem));
             }
             self.0.push(value);
         }

@@ -277,8 +277,8 @@ impl Observer for Watch<'_> {
             let is_within = self.meters.number(metric).is_none_or(|number| number <= *at_most);
             if !is_within {
                 self.broken = Some(place);
-                let (what, reason) = (metric.clone(), String::new());
-                return Err(Error::Lost { what, time: sample.time, reason });
+                let what = metric.clone();
+                return Err(Error::Lost { what, time: sample.time, reason: String::new() });
             }
         }
         Ok(())

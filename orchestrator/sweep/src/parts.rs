@@ -113,8 +113,8 @@ fn whole(reader: &Reader, part: &Range<u64>) -> Option<PartResult> {
         return None;
     }
     let text = |key| reader.metadata(key).unwrap_or_default().to_string();
-    let (units, curves) = (text("units"), text("curves"));
-    let result = PartResult { rows: reader.table().ok()?, units, curves };
+    let rows = reader.table().ok()?;
+    let result = PartResult { rows, units: text("units"), curves: text("curves") };
     let is_whole = reader.metadata("digest") == Some(&result.digest(part))
         && result.rows.has_cases(part)
         && result.rows.rows() as u64 == reader.rows();

@@ -52,8 +52,7 @@ fn limit_line(limit: f64) -> Curve {
 }
 
 fn panel(title: &str, x_label: &str, y_label: String, curves: Vec<Curve>) -> Panel {
-    let (title, x_label) = (title.to_string(), x_label.to_string());
-    Panel { title, x_label, y_label, curves, ..Panel::default() }
+    Panel { title: title.into(), x_label: x_label.into(), y_label, curves, ..Panel::default() }
 }
 
 /// Draws the values that were tried, and the largest one so far.

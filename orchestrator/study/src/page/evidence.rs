@@ -50,7 +50,7 @@ fn class(verdict: Verdict) -> &'static str {
 }
 
 fn evidence(check: &Check, checked: &Checked) -> Markup {
-    let (held, pairs) = (checked.held, checked.pairs);
+    let Checked { held, pairs, .. } = *checked;
     if pairs == 0 {
         return html! { span.verdict { (checked.verdict().text()) } " " (check.label) ": no run has this number" };
     }
