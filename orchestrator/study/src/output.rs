@@ -60,7 +60,8 @@ impl Report {
             files.push(format!("figures/{id}.svg, .png"));
         }
         files::write(&out.join("results.json"), numbers(results, &self.judged))?;
-        let page = page::page(results, self, &origin::origin(results.study));
+        let origin = origin::origin(results.study);
+        let page = page::page(results, &self.judged, &self.figures, &self.tables, &origin);
         files::write(&out.join("report.html"), page)?;
         Ok(files)
     }

@@ -7,7 +7,6 @@ mod numbers;
 use crate::claims::{Judged, Verdict};
 use crate::definition::Study;
 use crate::drawings::Figure;
-use crate::output::Report;
 use crate::results::{Results, RunResult};
 use cosim_report::figure::{self, svg};
 use cosim_report::page::{folded, head, script};
@@ -17,10 +16,16 @@ use numbers::{all_values, overview, small};
 
 pub(crate) use numbers::table;
 
-/// Returns the text of the page. `origin` says where and how the runs were made.
-pub(crate) fn page(results: &Results, report: &Report, origin: &[(String, String)]) -> String {
+/// Returns the text of the page. `judged` belongs to the study's claims in order, `drawn` to its
+/// figures, and `tables` to its tables; `origin` says where and how the runs were made.
+pub(crate) fn page(
+    results: &Results,
+    judged: &[Judged],
+    drawn: &[figure::Figure],
+    tables: &[Markup],
+    origin: &[(String, String)],
+) -> String {
     let study = results.study;
-    let Report { judged, figures: drawn, tables } = report;
     let claims: Vec<_> = study.claims.iter().zip(judged).map(|(c, j)| claim(c, j)).collect();
     let overviews = study.overviews.iter().map(|o| (&o.title, overview(o, results)));
     let tables = study.tables.iter().map(|table| &table.title).zip(tables.iter().cloned());
