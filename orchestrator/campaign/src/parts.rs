@@ -4,7 +4,7 @@ use crate::definition::kept_column;
 use crate::flight::{Flight, table};
 use crate::plan::Plan;
 use cosim::error::Error as Single;
-use cosim_report::progress::Parts;
+use cosim_metrics::progress::Parts;
 use std::ops::Range;
 use std::path::Path;
 use sweep::error::Error;
