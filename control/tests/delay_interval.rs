@@ -265,8 +265,8 @@ fn oracle_a_pulse_is_as_large_as_inertia_and_turn_make_it() {
             let after = angles + (rates + a * (0.5 * tau)) * tau;
             largest = largest.max((at(&after, &(rates + a * tau)) - a).norm());
         }
-        assert!(largest <= switching.turn(), "{largest} {}", switching.turn());
-        assert!(largest > 0.3 * switching.turn(), "{largest} {}", switching.turn());
+        assert!(largest <= switching.turn, "{largest} {}", switching.turn);
+        assert!(largest > 0.3 * switching.turn, "{largest} {}", switching.turn);
     }
 }
 

@@ -3,12 +3,13 @@
 //! If a loop has the delay d + s with an unknown constant s, |s| ≤ δ, the moment that acts differs
 //! from the one assumed only between the assumed and the true beginning of each command. This is a
 //! pulse: it makes the rates jump by at most δ times the change of the commanded acceleration. The
-//! changes of K ô are bounded for all times in [`super::Parts`]. The changes of the plan's own
+//! changes of K ô are bounded for all times in [`super::pulse`]. The changes of the plan's own
 //! acceleration are known. What they leave is carried along from stage to stage here, since a bound
 //! on all of them would take too much of the limits.
 
 use super::deviation::Deviation;
 use super::parts::Parts;
+use super::pulse::PulseFactors;
 use crate::crmpc::settings::Settings;
 use crate::delay::ticks;
 use crate::error::DesignError;
@@ -34,27 +35,20 @@ pub struct Onset {
     pub allowed: f64,
 }
 
-/// How the deviation by pulses is carried along.
+/// How what the pulses leave is carried along.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Switching {
-    /// Jump of the rates per change of the commanded acceleration, s.
+    /// Pulse per change of the commanded acceleration, s.
     by_change: f64,
     /// Change of acceleration at every tick while the vehicle turns, rad/s².
-    turn: f64,
-    /// Transition over an optimisation period.
-    stage: Matrix3<f64>,
-    /// Largest entries of the transitions to the ticks of an optimisation period, and to any later
-    /// tick.
-    within: Matrix3<f64>,
-    ever: Matrix3<f64>,
-    /// Limit of what changes of acceleration by 1 rad/s² at each optimisation leave.
-    limit: Carried,
+    pub turn: f64,
+    transitions: Transitions,
     modes: [Mode; 2],
-    /// Feedback period, s.
+    /// Feedback period τ, s.
     period: f64,
-    /// Uncertainty of the delay, s.
+    /// Uncertainty δ of the delay, s.
     delay_error: f64,
-    /// Optimisation period, s.
+    /// Optimisation period h, s.
     h: f64,
 }
 
@@ -65,16 +59,30 @@ struct Mode {
     rate: f64,
     middle_angle: f64,
     middle_rate: f64,
+    /// Its size κ in K ô.
     feedback: f64,
-    /// Size along it of a pulse of the rates, until it has been seen.
+    /// Size g along it of a pulse of the rates, until it has been seen.
     first: f64,
+}
+
+/// Transitions of [`Carried`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Transitions {
+    /// Over an optimisation period.
+    stage: Matrix3<f64>,
+    /// Largest entries of those to the ticks of an optimisation period.
+    within: Matrix3<f64>,
+    /// Largest entries of those to any later tick.
+    ever: Matrix3<f64>,
+    /// Limit of what changes of acceleration by 1 rad/s² at each optimisation leave.
+    limit: Carried,
 }
 
 /// Size of a transition that has faded to rounding.
 const FADED: f64 = 1e-14;
 
 /// Number of commands that may have begun to act too late for a measurement to show it, when the
-/// command that follows from the measurement begins to act.
+/// command that follows from the measurement begins to act: ⌈(d + δ)/τ⌉ − 1.
 pub(in crate::crmpc) fn unseen(s: &Settings) -> usize {
     if s.delay_error == 0.0 {
         return 0;
@@ -82,8 +90,58 @@ pub(in crate::crmpc) fn unseen(s: &Settings) -> usize {
     ticks(s.delay + s.delay_error, s.period_feedback).saturating_sub(1)
 }
 
+impl Mode {
+    fn new(s: &Settings, v: &Vector2<f64>, first: f64) -> Self {
+        let tau = s.period_feedback;
+        let half = transition(0.5 * tau) + response(0.5 * tau) * s.feedback.row();
+        let middle = half * v;
+        Self {
+            angle: v.x.abs(),
+            rate: v.y.abs(),
+            middle_angle: middle.x.abs(),
+            middle_rate: middle.y.abs(),
+            feedback: (s.feedback.row() * v).x.abs(),
+            first,
+        }
+    }
+}
+
+impl Transitions {
+    /// Computes the transitions from the one over a `tick`, with `ratio` ticks in an optimisation
+    /// period and a pulse of `by_change` (s) per change of acceleration.
+    fn new(tick: &Matrix3<f64>, ratio: usize, by_change: f64) -> Self {
+        let (mut power, mut within) = (Matrix3::identity(), Matrix3::identity());
+        for _ in 1..ratio {
+            power *= tick;
+            within = within.sup(&power);
+        }
+        let stage: Matrix3<f64> = power * tick;
+        let (mut ever, mut power) = (within, stage);
+        while power.amax() > FADED && power.amax() < 1.0 / FADED {
+            ever = ever.sup(&(power * within));
+            power *= stage;
+        }
+        let inverse = (Matrix3::identity() - stage).try_inverse();
+        let limit = inverse
+            .filter(|_| power.amax() <= FADED)
+            .map_or(Vector3::repeat(f64::INFINITY), |inverse| {
+                within * inverse.column(2) * by_change
+            });
+        Self { stage, within, ever, limit }
+    }
+}
+
 impl Switching {
     /// Returns `None` if the delay is exact.
+    ///
+    /// The deviation s along the eigenvectors of Φ with the eigenvalues λ_i, and the pulse p of the
+    /// tick, satisfy (docs/guarantee.md, step 7)
+    ///
+    /// |s_i⁺| ≤ |λ_i| |s_i| + g_i p,  p⁺ = δ (‖Δa‖ + Σ κ_i (|1 − λ_i| |s_i| + g_i p)).
+    ///
+    /// g_i is the largest component of [u; 1] along the eigenvector for 0 ≤ u ≤ d + δ + τ. A pulse
+    /// may be seen up to ⌈(d + δ)/τ⌉ − 1 ticks later than at the next one, when what it leaves
+    /// should have faded by as many powers of |λ_i|.
     ///
     /// # Errors
     /// Returns an error if the eigenvalues of Φ are not real and distinct.
@@ -96,79 +154,43 @@ impl Switching {
             return Ok(None);
         }
         let complex = DesignError::NotReal { name: "feedback" };
-        let (values, vectors) = error.modes().ok_or(complex)?;
-        let across = Matrix2::from_columns(&vectors).try_inverse();
-        let across = across.ok_or(DesignError::NotReal { name: "feedback" })?;
-        let tau = s.period_feedback;
-        let half = transition(0.5 * tau) + response(0.5 * tau) * s.feedback.row();
-        // A pulse is seen up to this many ticks later than at the next one.
-        let late = unseen(s);
+        let modes = error.modes().and_then(|(values, vectors)| {
+            Some((values, vectors, Matrix2::from_columns(&vectors).try_inverse()?))
+        });
+        let (values, vectors, across) = modes.ok_or(complex)?;
+        let (tau, late) = (s.period_feedback, unseen(s));
         let longest = s.delay + s.delay_error + tau;
         let modes: [Mode; 2] = std::array::from_fn(|i| {
-            let (v, middle) = (vectors[i], half * vectors[i]);
             let along = |time: f64| (across * Vector2::new(time, 1.0))[i].abs();
-            Mode {
-                angle: v.x.abs(),
-                rate: v.y.abs(),
-                middle_angle: middle.x.abs(),
-                middle_rate: middle.y.abs(),
-                feedback: (s.feedback.row() * v).x.abs(),
-                first: along(0.0).max(along(longest)) / powi(values[i].abs(), late),
-            }
+            let first = along(0.0).max(along(longest)) / powi(values[i].abs(), late);
+            Mode::new(s, &vectors[i], first)
         });
         let (size, fast) = (values.map(f64::abs), values[0].abs().min(values[1].abs()));
         // The mismatch that a pulse causes shows later than the pulse itself.
-        let later = parts.pulse.mismatch / powi(fast, late + 1);
-        let revised = (1.0 - parts.pulse.revised) / (1.0 - parts.pulse.revised / fast);
-        let by_change = s.delay_error * parts.pulse.inertia * revised * (1.0 + later);
+        let PulseFactors { inertia, revised, mismatch, turn, .. } = parts.pulse;
+        let later = mismatch / powi(fast, late + 1);
+        let revised = (1.0 - revised) / (1.0 - revised / fast);
+        let by_change = s.delay_error * inertia * revised * (1.0 + later);
         // A change that is seen late changes K ô late.
         let again = by_change / powi(fast, late);
         let [slow_mode, fast_mode] = &modes;
         let change = |mode: &Mode, value: f64| mode.feedback * (1.0 - value).abs();
         let at_once = slow_mode.feedback * slow_mode.first + fast_mode.feedback * fast_mode.first;
+        #[rustfmt::skip]
         let tick = Matrix3::new(
-            size[0],
-            0.0,
-            slow_mode.first,
-            0.0,
-            size[1],
-            fast_mode.first,
-            again * change(slow_mode, values[0]),
-            again * change(fast_mode, values[1]),
-            again * at_once,
+            size[0], 0.0, slow_mode.first,
+            0.0, size[1], fast_mode.first,
+            again * change(slow_mode, values[0]), again * change(fast_mode, values[1]), again * at_once,
         );
         let ratio = (s.period_optimisation / tau).round().max(1.0) as usize;
-        let (mut power, mut within) = (Matrix3::identity(), Matrix3::identity());
-        for _ in 1..ratio {
-            power *= tick;
-            within = within.sup(&power);
-        }
-        let stage: Matrix3<f64> = power * tick;
-        let (mut ever, mut power) = (within, stage);
-        while power.amax() > FADED && power.amax() < 1.0 / FADED {
-            ever = ever.sup(&(power * within));
-            power *= stage;
-        }
-        let unbounded = Vector3::repeat(f64::INFINITY);
-        let limit = if power.amax() <= FADED {
-            let inverse = (Matrix3::identity() - stage).try_inverse();
-            inverse.map_or(unbounded, |inverse| within * inverse.column(2) * by_change)
-        } else {
-            unbounded
-        };
-        let h = s.period_optimisation;
-        let (delay_error, turn) = (s.delay_error, parts.pulse.turn);
         Ok(Some(Self {
             by_change,
             turn,
-            stage,
-            within,
-            ever,
-            limit,
+            transitions: Transitions::new(&tick, ratio, by_change),
             modes,
             period: tau,
-            delay_error,
-            h,
+            delay_error: s.delay_error,
+            h: s.period_optimisation,
         }))
     }
 
@@ -177,11 +199,6 @@ impl Switching {
     pub fn unseen(&self, changes: &[f64]) -> Carried {
         let pulse: f64 = changes.iter().map(|change| self.pulse(change + self.turn)).sum();
         Vector3::new(0.0, 0.0, pulse)
-    }
-
-    /// Returns the change of acceleration at every tick while the vehicle turns, rad/s².
-    pub fn turn(&self) -> f64 {
-        self.turn
     }
 
     /// Returns the jump of the rates by a change of the acceleration (rad/s²), rad/s.
@@ -202,19 +219,20 @@ impl Switching {
 
     /// Returns what is left at the beginning of the next stage.
     pub fn next(&self, carried: &Carried) -> Carried {
-        self.stage * carried
+        self.transitions.stage * carried
     }
 
     /// Returns the deviation at the ticks of the stage that begins with `carried`, and the largest
     /// one of the vehicle between them.
     pub fn deviation(&self, carried: &Carried) -> Deviation {
-        self.of(&(self.within * carried))
+        self.of(&(self.transitions.within * carried))
     }
 
     /// Returns the deviation at any later time, while changes of the plan's acceleration are at
     /// most `change` (rad/s²).
     pub fn forever(&self, carried: &Carried, change: f64) -> Deviation {
-        self.of(&(self.ever * carried + self.limit * change))
+        let Transitions { ever, limit, .. } = &self.transitions;
+        self.of(&(ever * carried + limit * change))
     }
 
     /// Returns the deviation of the angles and rates at the end of the stage before the one that
@@ -225,27 +243,27 @@ impl Switching {
         (pulse * self.delay_error, pulse)
     }
 
+    /// Returns the deviation by what is carried: s as the law sees it, and for the vehicle itself
+    /// the pulse of the tick besides, with what exceeds the straight line between two ticks.
     fn of(&self, carried: &Carried) -> Deviation {
-        let seen = [carried.x, carried.y];
-        let sum = |of: fn(&Mode) -> f64, sizes: &[f64; 2]| {
-            of(&self.modes[0]) * sizes[0] + of(&self.modes[1]) * sizes[1]
+        let [slow, fast] = &self.modes;
+        let (seen, pulse, tau) = ([carried.x, carried.y], carried.z, self.period);
+        let all = [seen[0] + slow.first * pulse, seen[1] + fast.first * pulse];
+        let sum = |of: fn(&Mode) -> f64, [along_slow, along_fast]: [f64; 2]| {
+            of(slow) * along_slow + of(fast) * along_fast
         };
-        let pulse = carried.z;
-        let all = [0, 1].map(|i| seen[i] + self.modes[i].first * pulse);
-        let tau = self.period;
-        let feedback_norm = sum(|mode| mode.feedback, &seen);
+        let feedback_norm = sum(|mode| mode.feedback, seen);
         Deviation {
-            angle: sum(|mode| mode.angle, &all)
+            angle: sum(|mode| mode.angle, all)
                 + 0.25 * tau * pulse
                 + 0.125 * tau * tau * feedback_norm,
-            rate: sum(|mode| mode.rate, &all),
-            seen_angle: sum(|mode| mode.angle, &seen),
-            seen_rate: sum(|mode| mode.rate, &seen),
-            middle_angle: sum(|mode| mode.middle_angle, &seen),
-            middle_rate: sum(|mode| mode.middle_rate, &seen),
-            feedback: 0.0,
+            rate: sum(|mode| mode.rate, all),
+            seen_angle: sum(|mode| mode.angle, seen),
+            seen_rate: sum(|mode| mode.rate, seen),
+            middle_angle: sum(|mode| mode.middle_angle, seen),
+            middle_rate: sum(|mode| mode.middle_rate, seen),
             feedback_norm,
-            feedback_moment: 0.0,
+            ..Deviation::default()
         }
     }
 }

@@ -78,7 +78,7 @@ impl Robust {
         let Settings { delay_error, sideslip_domain, .. } = self.settings;
         let of_angle = tightening.at(self.age).angle + switching.deviation(&carried).angle;
         let Dynamics { geometry, rate, .. } = &self.dynamics;
-        let most = first.pull.max(before.norm()) + tightening.norm + switching.turn();
+        let most = first.pull.max(before.norm()) + tightening.norm + switching.turn;
         size + delay_error * (most + geometry.drift * rate * rate) <= bound
             && first.angles.y.abs() + of_angle + delay_error * rate <= sideslip_domain
     }
