@@ -19,7 +19,7 @@ mod tighten;
 mod tightening;
 
 pub use assessment::Assessment;
-pub(super) use assessment::{braking, terminal_rate};
+pub(super) use assessment::{HorizonEnd, braking, terminal_rate};
 pub use deviation::Deviation;
 pub(super) use dynamics::Dynamics;
 pub use geometry::{BRAKING, CURVATURE, DRIFT_BY_ANGLES_TWICE, DRIFT_MIXED, Domain, FOURTH, TURN};

@@ -55,13 +55,6 @@ impl Paper {
         })
     }
 
-    /// Returns the acceleration under the terminal law (14), rad/s².
-    fn terminal_law(&self, state: &Vector6<f64>, reference: &Reference) -> Vector3<f64> {
-        terminal::acceleration(&self.settings, state, reference)
-    }
-}
-
-impl Paper {
     /// Returns the bounds of every optimisation.
     pub(super) fn bounds(&self) -> Bounds {
         let n = self.settings.horizon;
@@ -97,7 +90,8 @@ impl Paper {
         if first {
             memory.start(n);
         } else {
-            let a = self.terminal_law(&memory.plan.states[n], &self.stages.references[n - 1]);
+            let (last, reference) = (&memory.plan.states[n], &self.stages.references[n - 1]);
+            let a = terminal::acceleration(&self.settings, last, reference);
             memory.plan.shift(&a, h);
         }
         let start = match initial_state {
@@ -107,7 +101,9 @@ impl Paper {
         let mut report = planner.solve(self, &self.stages, memory, &start, first);
         if report.status == SolverStatus::Fallback {
             if first {
-                let law = |state: &_, reference: &_| self.terminal_law(state, reference);
+                let law = |state: &_, reference: &_| {
+                    terminal::acceleration(&self.settings, state, reference)
+                };
                 memory.plan.roll_out(start, &self.stages, law);
             }
             report = planner.keep(self, &self.stages, memory, &start, report);

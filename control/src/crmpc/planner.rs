@@ -48,7 +48,9 @@ pub(super) struct Planner {
     shift: Vector3<f64>,
     /// Distance from the measured angles beyond which a reference is replaced, rad.
     pub reach: f64,
-    /// State from which the last optimisation began.
+    /// Measured state (Θ, x_ω) at the optimisation.
+    pub measured: Vector6<f64>,
+    /// State from which the last optimum was sought.
     pub start: Vector6<f64>,
     /// Beginning of the present optimisation.
     clock: Instant,
@@ -98,6 +100,7 @@ impl Planner {
             affine: vec![[Vector3::zeros(); 2]; n],
             shift: Vector3::zeros(),
             reach: if is_of_paper { f64::INFINITY } else { reach },
+            measured: Vector6::zeros(),
             start: Vector6::zeros(),
             clock: Instant::now(),
         })
@@ -113,7 +116,7 @@ impl Planner {
     pub(super) fn begin(&mut self, stages: &mut Stages, tick: &Tick, shift: Vector3<f64>) {
         self.clock = Instant::now();
         self.optimiser.begin();
-        self.shift = shift;
+        (self.measured, self.shift) = (tick.state, shift);
         for (k, slot) in stages.references.iter_mut().enumerate() {
             *slot = (tick.reference)(tick.time + k as f64 * stages.step);
             slot.angles += shift;

@@ -36,10 +36,15 @@ impl Stages {
 
     /// Returns stage `k` of a trajectory of the errors.
     pub(super) fn point(&self, motion: &ErrorTrajectory<2>, k: usize) -> Point {
-        let Reference { angles, rates, accelerations } = &self.references[k];
-        let acceleration =
-            motion.inputs.get(k).map_or_else(Vector3::zeros, |input| accelerations + input);
-        Point::new(angles + motion.states[k][0], rates + motion.states[k][1], acceleration)
+        let input = motion.inputs.get(k).copied().unwrap_or_default();
+        self.point_at(k, &motion.states[k], &input)
+    }
+
+    /// Returns stage `k` with this error and its input, which the last stage does not have.
+    pub(super) fn point_at(&self, k: usize, state: &State<2>, input: &Vector3<f64>) -> Point {
+        let [angles, rates, a] = self.nominal(k, state, input);
+        let is_last = k + 1 == self.references.len();
+        Point::new(angles, rates, if is_last { Vector3::zeros() } else { a })
     }
 
     /// Returns the range from the first to the last of these intervals that the trajectory

@@ -57,23 +57,55 @@ pub(super) fn left(
     (of_rates - x, of_moment - loss - dynamics.nominal_moment(x, a))
 }
 
-/// Returns the rate κ (1/s) at which the sideslip has to brake beyond a horizon that ends with the
-/// angle `sideslip` and the rates `rates`. While braking, β travels by |β̇|/κ, and all limits must
-/// hold. `carried` is the deviation that the plan's changes of acceleration leave at the end of the
-/// horizon, `last` the size of the acceleration before it, and `turn` (rad/s) what the turn of the
-/// trajectory needs. The result is `None` if that is impossible.
+/// The end of a plan, from which the motion brakes.
+pub(in crate::crmpc) struct HorizonEnd {
+    /// Sideslip β̃, rad.
+    pub sideslip: f64,
+    /// Rates x̃_ω, rad/s.
+    pub rates: Vector3<f64>,
+    /// Norm of the acceleration before it, rad/s².
+    pub pull: f64,
+    /// What the plan's pulses have left.
+    pub carried: Carried,
+    /// Part of the rate limit that the turn of the trajectory needs, rad/s.
+    pub turn: f64,
+}
+
+impl HorizonEnd {
+    /// Returns the acceleration, but for its sign, of a motion that begins to brake.
+    fn braked(&self, braking: f64) -> Vector3<f64> {
+        self.rates.component_mul(&Vector3::new(BRAKING, braking, BRAKING))
+    }
+
+    /// Returns what changes of the acceleration add to the deviation while the motion at first
+    /// brakes by no more than the rate `most` (1/s). The first change is that from the acceleration
+    /// before; from step to step the acceleration then changes by less than κ h of itself.
+    pub(in crate::crmpc) fn while_braking(
+        &self,
+        s: &Settings,
+        switching: &Switching,
+        most: f64,
+    ) -> Deviation {
+        let a = self.braked(most).norm();
+        let first = switching.begin(&self.carried, self.pull + a);
+        switching.forever(&first, most * s.period_optimisation * a)
+    }
+}
+
+/// Returns the braking, the rate κ_β (1/s) at which the sideslip has to brake beyond the horizon:
+/// the least one with which β, which travels by |β̇|/κ_β, keeps its bound. All limits must hold
+/// meanwhile (docs/guarantee.md, step 6). The result is `None` if that is impossible.
 pub(in crate::crmpc) fn braking(
     s: &Settings,
     dynamics: &Dynamics,
     tightening: &Tightening,
-    sideslip: f64,
-    rates: &Vector3<f64>,
-    (carried, last, turn): (&Carried, f64, f64),
+    end: &HorizonEnd,
 ) -> Option<f64> {
+    let rate_of_sideslip = end.rates.y.abs();
     let with = |more: Option<&Deviation>| {
         let angle = tightening.forever().angle + more.map_or(0.0, |more| more.angle);
-        let room = s.sideslip_domain - angle - sideslip.abs();
-        let by_room = if rates.y == 0.0 { 0.0 } else { rates.y.abs() / room };
+        let room = s.sideslip_domain - angle - end.sideslip.abs();
+        let by_room = if rate_of_sideslip == 0.0 { 0.0 } else { rate_of_sideslip / room };
         // A κ beyond 1/h would reverse the motion.
         (room >= 0.0 && by_room * s.period_optimisation <= 1.0).then_some(by_room.max(BRAKING))
     };
@@ -81,60 +113,28 @@ pub(in crate::crmpc) fn braking(
     let mut more = None;
     if let Some(switching) = &tightening.switching {
         let most = 2.0 * braking;
-        let left = while_braking(s, switching, carried, last, (rates, most));
+        let left = end.while_braking(s, switching, most);
         braking = with(Some(&left)).filter(|&braking| braking <= most)?;
         more = Some(left);
     }
-    let sizes = (rates.norm(), braked(rates, braking).norm());
+    let sizes = (end.rates.norm(), end.braked(braking).norm());
     let (rate, moment) = left(s, dynamics, tightening, more.as_ref(), sizes);
-    (rate >= turn && moment >= 0.0).then_some(braking)
-}
-
-/// Returns the acceleration, but for its sign, of a motion that brakes.
-pub(super) fn braked(rates: &Vector3<f64>, braking: f64) -> Vector3<f64> {
-    rates.component_mul(&Vector3::new(BRAKING, braking, BRAKING))
-}
-
-/// Returns what changes of the acceleration add to the deviation while a motion with these `rates`
-/// at first brakes by no more than the rate `most` (1/s). The first change is that from the
-/// acceleration of size `last`. From step to step the acceleration changes by less than κ h of
-/// itself.
-pub(super) fn while_braking(
-    s: &Settings,
-    switching: &Switching,
-    carried: &Carried,
-    last: f64,
-    (rates, most): (&Vector3<f64>, f64),
-) -> Deviation {
-    let a = braked(rates, most).norm();
-    let first = switching.begin(carried, last + a);
-    switching.forever(&first, most * s.period_optimisation * a)
+    (rate >= end.turn && moment >= 0.0).then_some(braking)
 }
 
 /// Returns the largest ‖x̃_ω‖ at the end of the horizon from which the motion can brake while the
-/// trajectory's turn needs `turn` of the rate limit, rad/s. `switching` holds the other arguments
-/// of [`while_braking`] if the delay is not exact.
+/// trajectory's turn needs `turn` of the rate limit, rad/s. `more` is the deviation by changes of
+/// the acceleration meanwhile, if the delay is not exact.
 pub(in crate::crmpc) fn terminal_rate(
     s: &Settings,
     dynamics: &Dynamics,
     tightening: &Tightening,
-    switching: Option<(&Switching, &Carried, f64, &Vector3<f64>)>,
+    more: Option<&Deviation>,
     turn: f64,
 ) -> f64 {
-    let more = switching.map(|(switching, carried, last, rates)| {
-        while_braking(s, switching, carried, last, (rates, 2.0 * BRAKING))
-    });
-    largest_rate(s, |x| {
-        let (rate, moment) = left(s, dynamics, tightening, more.as_ref(), (x, BRAKING * x));
-        (rate - turn, moment)
-    })
-}
-
-/// Returns the largest ‖x̃_ω‖ (rad/s) for which something is `left` of both limits.
-pub(super) fn largest_rate(s: &Settings, left: impl Fn(f64) -> (f64, f64)) -> f64 {
     let is_left = |x: f64| {
-        let (rate, moment) = left(x);
-        rate > 0.0 && moment > 0.0
+        let (rate, moment) = left(s, dynamics, tightening, more, (x, BRAKING * x));
+        rate - turn > 0.0 && moment > 0.0
     };
     let (mut low, mut high) = (0.0, s.limit_rate);
     if is_left(0.0) {
@@ -149,11 +149,10 @@ pub(super) fn largest_rate(s: &Settings, left: impl Fn(f64) -> (f64, f64)) -> f6
 /// Computes what is left of the limits at rest and for the motion beyond the horizon, at any
 /// attitude.
 pub(super) fn assess(s: &Settings, dynamics: &Dynamics, tightening: &Tightening) -> Assessment {
-    let left = |x: f64| left(s, dynamics, tightening, None, (x, BRAKING * x));
-    let (rate, moment) = left(0.0);
+    let (rate, moment) = left(s, dynamics, tightening, None, (0.0, 0.0));
     Assessment {
         rate_left: rate / s.limit_rate,
         moment_left: moment / s.limit_moment,
-        terminal_rate: largest_rate(s, left),
+        terminal_rate: terminal_rate(s, dynamics, tightening, None, 0.0),
     }
 }

@@ -8,11 +8,8 @@ use crate::delay::ticks;
 use nalgebra::Vector3;
 use vehicle::math::{exp, exp_m1};
 
-/// Time constants of the means that are judged besides that of the observer, s. Errors of the
-/// measured rates have the less effect, the longer the time is.
-const LONGER: [f64; 4] = [0.5, 1.0, 3.0, 8.0];
 /// Number of means that are judged.
-pub(in crate::crmpc) const MEANS: usize = 1 + LONGER.len();
+pub(in crate::crmpc) const MEANS: usize = 5;
 
 /// Largest component of a first-order mean of the change of x_ω beyond the commanded acceleration,
 /// as the assumptions explain it.
@@ -31,10 +28,10 @@ pub(in crate::crmpc) struct Observable {
 }
 
 impl Observable {
-    /// Returns what is explained of each mean, the one with the observer's time constant first.
+    /// Returns what is explained of each mean, the one with the observer's time constant first. The
+    /// longer a time constant is (s), the less effect have the errors of the measured rates.
     pub(super) fn all(s: &Settings, dynamics: &Dynamics, parts: &Parts) -> [Self; MEANS] {
-        let [first, second, third, fourth] = LONGER;
-        [s.observer.time_constant, first, second, third, fourth]
+        [s.observer.time_constant, 0.5, 1.0, 3.0, 8.0]
             .map(|time_constant| Self::new(s, dynamics, parts, time_constant))
     }
 

@@ -174,13 +174,14 @@ impl Switching {
         // A change that is seen late changes K ô late.
         let again = by_change / powi(fast, late);
         let [slow_mode, fast_mode] = &modes;
-        let change = |mode: &Mode, value: f64| mode.feedback * (1.0 - value).abs();
+        let change = |mode: &Mode, value: f64| again * (mode.feedback * (1.0 - value).abs());
+        let (by_slow, by_fast) = (change(slow_mode, values[0]), change(fast_mode, values[1]));
         let at_once = slow_mode.feedback * slow_mode.first + fast_mode.feedback * fast_mode.first;
         #[rustfmt::skip]
         let tick = Matrix3::new(
             size[0], 0.0, slow_mode.first,
             0.0, size[1], fast_mode.first,
-            again * change(slow_mode, values[0]), again * change(fast_mode, values[1]), again * at_once,
+            by_slow, by_fast, again * at_once,
         );
         let ratio = (s.period_optimisation / tau).round().max(1.0) as usize;
         Ok(Some(Self {

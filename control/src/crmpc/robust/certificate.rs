@@ -38,26 +38,20 @@ impl Robust {
         let rates = first.motion(&stages.body);
         let bound = self.rate_bound(0, norm_of_columns(&rates.rates_by_angles), &first, &second);
         let sideslip = |k: usize| {
-            let (reference, [angles, rates]) = (&stages.references[k], &motion.states[k]);
-            [reference.angles.y + angles.y, reference.rates.y + rates.y]
+            let input = motion.inputs.get(k).copied().unwrap_or_default();
+            stages.nominal(k, &motion.states[k], &input).map(|vector| vector.y)
         };
         let inside = (0..n).all(|k| {
-            let a = stages.references[k].accelerations.y + motion.inputs[k].y;
-            self.keeps_sideslip(k, sideslip(k), a, sideslip(k + 1)[0])
+            let [beta, rate, a] = sideslip(k);
+            self.keeps_sideslip(k, [beta, rate], a, sideslip(k + 1)[0])
         });
         let (size, bound) = (rates.rates.norm(), bound + self.reserves().0);
         if !inside || size > bound || !self.keeps_before(&first, (size, bound)) {
             return None;
         }
-        let before = stages.references[n - 1].accelerations + motion.inputs[n - 1];
-        let braking = guarantee::braking(
-            &self.settings_of_plan(),
-            dynamics,
-            self.tightening(),
-            last.angles.y,
-            &last.rates,
-            (&self.carried_to_the_end(), before.norm(), self.turn),
-        )?;
+        let end = self.horizon_end(&last, &stages.point(motion, n - 1));
+        let (settings, tightening) = (self.settings_of_plan(), self.tightening());
+        let braking = guarantee::braking(&settings, dynamics, tightening, &end)?;
         Some(Certified { margins: self.margins_of_first(&first, &second), braking })
     }
 

@@ -2,7 +2,6 @@
 //! error dynamics do (docs/guarantee.md).
 
 mod certificate;
-mod few_stages;
 mod judging;
 mod norms;
 mod planning;
@@ -11,7 +10,8 @@ mod tests;
 
 use super::design::Design;
 use super::guarantee::{
-    self, Carried, Dynamics, End, Held, MomentLoss, Onset, Switching, Tightening,
+    self, BRAKING, Carried, Dynamics, End, Held, HorizonEnd, MomentLoss, Onset, Switching,
+    Tightening,
 };
 use super::plan::Terms;
 use super::settings::Settings;
@@ -132,11 +132,6 @@ impl Robust {
         carried_at_stages.push(carried);
     }
 
-    /// Returns what is carried along at the end of the horizon.
-    pub(super) fn carried_to_the_end(&self) -> Carried {
-        self.carried.borrow().last().copied().unwrap_or_default()
-    }
-
     /// Returns the parts of the rate limit and of the moment limit that the bounds leave free.
     pub(super) fn reserves(&self) -> (f64, f64) {
         (RESERVE * self.settings.limit_rate, RESERVE * self.settings.limit_moment)
@@ -203,18 +198,31 @@ impl Robust {
     }
 
     /// Returns the largest ‖x̃_ω‖ at the end of the horizon, rad/s.
-    fn terminal_rate(&self, end: &Point, before: &Point) -> f64 {
+    fn terminal_rate(&self, last: &Point, before: &Point) -> f64 {
         let Self { settings, dynamics, design, terms, .. } = self;
-        let switching = self.switching(settings.horizon);
+        let switching = design.tightening.switching.as_deref();
         let is_scheduled = terms.level > 0 || terms.limit_moment < settings.limit_moment;
         if switching.is_none() && self.turn == 0.0 && !is_scheduled {
             return design.assessment.terminal_rate;
         }
-        let from = switching
-            .as_ref()
-            .map(|(switching, carried)| (*switching, carried, before.pull, &end.rates));
-        let settings = self.settings_of_plan();
-        guarantee::terminal_rate(&settings, dynamics, self.tightening(), from, self.turn)
+        let (settings, tightening) = (self.settings_of_plan(), self.tightening());
+        let braking = switching.map(|switching| {
+            let end = self.horizon_end(last, before);
+            end.while_braking(&settings, switching, 2.0 * BRAKING)
+        });
+        guarantee::terminal_rate(&settings, dynamics, tightening, braking.as_ref(), self.turn)
+    }
+
+    /// Returns the end of a plan with these last two stages.
+    fn horizon_end(&self, last: &Point, before: &Point) -> HorizonEnd {
+        let carried = self.switching(self.settings.horizon).map(|(_, carried)| carried);
+        HorizonEnd {
+            sideslip: last.angles.y,
+            rates: last.rates,
+            pull: before.pull,
+            carried: carried.unwrap_or_default(),
+            turn: self.turn,
+        }
     }
 
     /// Returns what the plan's changes of acceleration add to the deviation of angles and rates

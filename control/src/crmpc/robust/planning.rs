@@ -115,7 +115,7 @@ impl Robust {
         if contradicted {
             memory.guarantee = GuaranteeStatus::Exceeded;
         }
-        let report = self.plan(planner, memory, &tick.state, before);
+        let report = self.plan(planner, memory, before);
         planner.end(memory, &report);
         contradicted.then_some(Contradiction::Deviation)
     }
@@ -210,15 +210,14 @@ impl Robust {
         &mut self,
         planner: &mut Planner,
         memory: &mut Memory,
-        measured: &Vector6<f64>,
         before: Before,
     ) -> OptimiserReport {
         if !self.credible(memory) {
-            return self.violate_least(planner, memory, measured, 0);
+            return self.violate_least(planner, memory, 0);
         }
         let assured = memory.assured();
         let mut iterations = 0;
-        for beginning in self.beginnings(memory, measured).into_iter().flatten() {
+        for beginning in self.beginnings(memory, &planner.measured).into_iter().flatten() {
             self.begin(&beginning, 1.0);
             // If the last optimisation has not begun at the measured state either, this one will
             // hardly find an optimum there.
@@ -232,9 +231,9 @@ impl Robust {
         if assured {
             self.go_towards_the_optimum(planner, memory);
             self.terms = memory.plan.terms;
-            return self.keep(planner, memory, measured, (SolverStatus::Kept, iterations));
+            return self.keep(planner, memory, (SolverStatus::Kept, iterations));
         }
-        self.violate_least(planner, memory, measured, iterations)
+        self.violate_least(planner, memory, iterations)
     }
 
     /// Follows the optimum from this beginning if it is certified, or if no guarantee ends by it.
@@ -310,12 +309,12 @@ impl Robust {
         &mut self,
         planner: &mut Planner,
         memory: &mut Memory,
-        measured: &Vector6<f64>,
         tried: u32,
     ) -> OptimiserReport {
+        let measured = planner.measured;
         memory.guarantee = self.without_guarantee(memory);
         self.terms = self.terms(memory);
-        let beginning = self.anew(memory, measured);
+        let beginning = self.anew(memory, &measured);
         (memory.age, memory.plan.onset, memory.plan.terms) = (0, beginning.onset, self.terms);
         let mut iterations = tried;
         for share in LESS {
@@ -323,10 +322,10 @@ impl Robust {
                 break;
             }
             self.begin(&beginning, share);
-            let report = planner.solve(self, &self.stages, memory, measured, true);
+            let report = planner.solve(self, &self.stages, memory, &measured, true);
             iterations += report.iterations;
             if report.status != SolverStatus::Fallback {
-                planner.follow_optimum(&self.stages, memory, measured);
+                planner.follow_optimum(&self.stages, memory, &measured);
                 memory.margins = self.margins(planner.optimiser.trajectory());
                 return OptimiserReport { iterations, ..report };
             }
@@ -335,8 +334,8 @@ impl Robust {
         let law = |state: &_, reference: &_| {
             terminal::acceleration_within_limits(&settings, state, reference)
         };
-        memory.plan.roll_out(*measured, &self.stages, law);
-        self.keep(planner, memory, measured, (SolverStatus::Fallback, iterations))
+        memory.plan.roll_out(measured, &self.stages, law);
+        self.keep(planner, memory, (SolverStatus::Fallback, iterations))
     }
 
     /// Keeps the present plan, and returns the report on it with this status and these iterations.
@@ -344,11 +343,11 @@ impl Robust {
         &self,
         planner: &mut Planner,
         memory: &mut Memory,
-        measured: &Vector6<f64>,
         (status, iterations): (SolverStatus, u32),
     ) -> OptimiserReport {
-        let ended = OptimiserReport { status, iterations, ..OptimiserReport::default() };
-        let report = planner.keep(self, &self.stages, memory, measured, ended);
+        let (ended, measured) = (OptimiserReport::default(), planner.measured);
+        let ended = OptimiserReport { status, iterations, ..ended };
+        let report = planner.keep(self, &self.stages, memory, &measured, ended);
         memory.margins = self.margins(&planner.previous);
         report
     }

@@ -4,7 +4,7 @@
 //!
 //! The gains in the files' heads are the times of `cargo bench -p reentry-control --bench
 //! optimisation` (250 samples of 50 s) without and with the shortcut, in the same run. The check of
-//! the constraints has a shortcut, too: `few_stages` of CRMPC.
+//! the constraints has a shortcut, too: `Robust::examine` of CRMPC.
 
 mod terminal_constraint;
 mod unconstrained;
