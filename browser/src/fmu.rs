@@ -115,15 +115,6 @@ impl Called {
 impl Instance for Called {
     forward! {
         call:
-        get_real(references: &[u32], values: &mut [f64]);
-        get_integer(references: &[u32], values: &mut [i32]);
-        get_boolean(references: &[u32], values: &mut [i32]);
-        set_real(references: &[u32], values: &[f64]);
-        set_integer(references: &[u32], values: &[i32]);
-        set_boolean(references: &[u32], values: &[i32]);
-        set_string(reference: u32, value: &str);
-        enter_initialization(start: f64, stop: f64);
-        exit_initialization();
-        do_step(time: f64, step: f64);
+        get_real, get_integer, get_boolean, set_real, set_integer, set_boolean, set_string, enter_initialization, exit_initialization, do_step,
     }
 }

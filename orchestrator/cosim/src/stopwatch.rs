@@ -70,29 +70,12 @@ impl Stopwatch {
 impl Instance for Stopwatch {
     forward! {
         time:
-        get_real(references: &[u32], values: &mut [f64]);
-        get_integer(references: &[u32], values: &mut [i32]);
-        get_boolean(references: &[u32], values: &mut [i32]);
-        set_real(references: &[u32], values: &[f64]);
-        set_integer(references: &[u32], values: &[i32]);
-        set_boolean(references: &[u32], values: &[i32]);
-        set_string(reference: u32, value: &str);
+        get_real, get_integer, get_boolean, set_real, set_integer, set_boolean, set_string,
     }
 
     forward! {
         inside:
-        enter_initialization(start: f64, stop: f64);
-        exit_initialization();
-        terminate();
-        reset();
-        save(number: usize);
-        restore(number: usize);
-        directional_derivative(
-            unknown: &[u32],
-            known: &[u32],
-            seed: &[f64],
-            added: &mut [f64]
-        );
+        enter_initialization, exit_initialization, terminate, reset, save, restore, directional_derivative,
     }
 
     fn do_step(&mut self, time: f64, step: f64) -> Outcome {

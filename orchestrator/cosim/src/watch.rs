@@ -140,23 +140,6 @@ impl Instance for Watched {
 
     forward! {
         inside:
-        set_real(references: &[u32], values: &[f64]);
-        set_integer(references: &[u32], values: &[i32]);
-        set_boolean(references: &[u32], values: &[i32]);
-        set_string(reference: u32, value: &str);
-        enter_initialization(start: f64, stop: f64);
-        exit_initialization();
-        begin_step(time: f64, step: f64);
-        do_step(time: f64, step: f64);
-        terminate();
-        reset();
-        save(number: usize);
-        restore(number: usize);
-        directional_derivative(
-            unknown: &[u32],
-            known: &[u32],
-            seed: &[f64],
-            added: &mut [f64]
-        );
+        set_real, set_integer, set_boolean, set_string, enter_initialization, exit_initialization, begin_step, do_step, terminate, reset, save, restore, directional_derivative,
     }
 }

@@ -7,6 +7,7 @@
 //! time in s (f64), the length of what follows (u32), and what follows, all in little-endian order.
 
 use fmi_master::description::{ModelDescription, VariableKind};
+use fmi_master::forward;
 use fmi_master::instance::{CallFailure, Instance, Outcome};
 use parking_lot::Mutex;
 use std::cell::Cell;
@@ -158,6 +159,10 @@ impl LawInstance {
         Self { stand_in, ports, law, now: Memory::default(), kept: BTreeMap::new() }
     }
 
+    fn inside(&mut self, call: impl FnOnce(&mut dyn Instance) -> Outcome) -> Outcome {
+        call(self.stand_in.as_mut())
+    }
+
     /// Notes the reference, which is that of the communication point unless it responds to inputs.
     fn read_reference(&mut self) -> Outcome {
         self.stand_in.get_real(&self.ports.reference, &mut self.now.reference)
@@ -202,12 +207,8 @@ impl Instance for LawInstance {
         Ok(())
     }
 
-    fn get_integer(&mut self, references: &[u32], values: &mut [i32]) -> Outcome {
-        self.stand_in.get_integer(references, values)
-    }
-
-    fn get_boolean(&mut self, references: &[u32], values: &mut [i32]) -> Outcome {
-        self.stand_in.get_boolean(references, values)
+    forward! {
+        inside: get_integer, get_boolean, set_integer, set_boolean, set_string, terminate
     }
 
     fn set_real(&mut self, references: &[u32], values: &[f64]) -> Outcome {
@@ -221,18 +222,6 @@ impl Instance for LawInstance {
             self.now.responds |= self.ports.external.contains(reference);
         }
         self.stand_in.set_real(references, values)
-    }
-
-    fn set_integer(&mut self, references: &[u32], values: &[i32]) -> Outcome {
-        self.stand_in.set_integer(references, values)
-    }
-
-    fn set_boolean(&mut self, references: &[u32], values: &[i32]) -> Outcome {
-        self.stand_in.set_boolean(references, values)
-    }
-
-    fn set_string(&mut self, reference: u32, value: &str) -> Outcome {
-        self.stand_in.set_string(reference, value)
     }
 
     fn enter_initialization(&mut self, start: f64, stop: f64) -> Outcome {
@@ -264,10 +253,6 @@ impl Instance for LawInstance {
         self.stand_in.do_step(time, step)?;
         self.read_reference()?;
         if responds { self.ask(time) } else { Ok(()) }
-    }
-
-    fn terminate(&mut self) -> Outcome {
-        self.stand_in.terminate()
     }
 
     fn reset(&mut self) -> Outcome {

@@ -146,12 +146,58 @@ pub trait Instance {
 }
 
 /// Makes calls of [`Instance`] those of another instance, which the method `through` hands to a
-/// closure.
+/// closure: `forward! { through: set_real, do_step }`.
 #[macro_export]
 macro_rules! forward {
-    ($through:ident: $($call:ident($($argument:ident: $type:ty),*);)*) => {$(
+    ($through:ident: $($call:ident),* $(,)?) => {
+        $($crate::forward!(@signature $through $call);)*
+    };
+    (@signature $through:ident get_real) => {
+        $crate::forward!(@call $through get_real(references: &[u32], values: &mut [f64]));
+    };
+    (@signature $through:ident get_integer) => {
+        $crate::forward!(@call $through get_integer(references: &[u32], values: &mut [i32]));
+    };
+    (@signature $through:ident get_boolean) => {
+        $crate::forward!(@call $through get_boolean(references: &[u32], values: &mut [i32]));
+    };
+    (@signature $through:ident set_real) => {
+        $crate::forward!(@call $through set_real(references: &[u32], values: &[f64]));
+    };
+    (@signature $through:ident set_integer) => {
+        $crate::forward!(@call $through set_integer(references: &[u32], values: &[i32]));
+    };
+    (@signature $through:ident set_boolean) => {
+        $crate::forward!(@call $through set_boolean(references: &[u32], values: &[i32]));
+    };
+    (@signature $through:ident set_string) => {
+        $crate::forward!(@call $through set_string(reference: u32, value: &str));
+    };
+    (@signature $through:ident enter_initialization) => {
+        $crate::forward!(@call $through enter_initialization(start: f64, stop: f64));
+    };
+    (@signature $through:ident begin_step) => {
+        $crate::forward!(@call $through begin_step(time: f64, step: f64));
+    };
+    (@signature $through:ident do_step) => {
+        $crate::forward!(@call $through do_step(time: f64, step: f64));
+    };
+    (@signature $through:ident save) => {
+        $crate::forward!(@call $through save(number: usize));
+    };
+    (@signature $through:ident restore) => {
+        $crate::forward!(@call $through restore(number: usize));
+    };
+    (@signature $through:ident directional_derivative) => {
+        $crate::forward!(@call $through directional_derivative(
+            unknown: &[u32], known: &[u32], seed: &[f64], added: &mut [f64]
+        ));
+    };
+    // All others have no arguments.
+    (@signature $through:ident $call:ident) => { $crate::forward!(@call $through $call()); };
+    (@call $through:ident $call:ident($($argument:ident: $type:ty),*)) => {
         fn $call(&mut self, $($argument: $type),*) -> $crate::instance::Outcome {
             self.$through(|instance| instance.$call($($argument),*))
         }
-    )*};
+    };
 }
