@@ -3,7 +3,8 @@
 
 mod harness;
 
-use control::crmpc::{Constraints, InitialState, Settings, SolverStatus};
+use control::crmpc::{Constraints, InitialState, Lemmas, Settings, SolverStatus};
+use control::error_dynamics::SampledError;
 use control::{Crmpc, crmpc::Memory};
 use harness::{
     Case, adversaries, constant, disturbance, in_parallel, settings, simulate, square, white,
@@ -199,8 +200,11 @@ fn oracle_deviation_from_the_nominal_motion_obeys_the_error_dynamics() {
     // sampled dynamics. A square wave drives its rate to twice the value that (26) permits.
     for constraints in [Constraints::Robust, Constraints::Paper] {
         let design = Crmpc::new(settings(constraints)).unwrap().design().clone();
-        let (reach, paper) = (design.reach, design.paper.unwrap());
-        let Settings { feedback, disturbance_bound: bound, .. } = settings(constraints);
+        let paper = design.paper.unwrap();
+        let chosen = Settings { feedback: design.feedback, ..settings(constraints) };
+        let Settings { feedback, disturbance_bound: bound, period_feedback, delay, .. } = chosen;
+        let error = SampledError::delayed(feedback, period_feedback, delay);
+        let reach = error.reach_forever().unwrap();
         let deviations =
             |disturbance| around_the_nominal_trajectory(constraints, 1.0, disturbance).1;
         let largest = |deviations: &[Vector6<f64>], components: [usize; 3]| {
@@ -213,7 +217,7 @@ fn oracle_deviation_from_the_nominal_motion_obeys_the_error_dynamics() {
 
         // The other part that drives the deviation is the mismatch (docs/guarantee.md); the
         // vehicle's inertia is the one that the controller uses.
-        let bound = bound + design.tightening.mismatch;
+        let bound = bound + Lemmas::new(&chosen).parts.mismatch.mean;
         // Seven seconds between two switches are three time constants of the slow mode of the
         // robust set's K, -0.42 1/s, so that the deviation has all but settled before a switch.
         let square_period = 14.0;

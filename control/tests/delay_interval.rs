@@ -174,7 +174,7 @@ fn oracle_changes_of_the_plan_leave_no_more_than_is_carried_along() {
             for (stage, begun) in (0_i32..).zip(&carried_changes) {
                 let bound = switching.deviation(begun);
                 let next = carried_changes.get(stage as usize + 1).copied().unwrap_or_default();
-                let early = switching.early(&next);
+                let early = switching.begun_early(&next);
                 for tick in stage * ratio..(stage + 1) * ratio {
                     let n = tick as usize;
                     assert!(axis.seen[n].x.abs() <= bound.seen_angle + 1e-12);

@@ -7,7 +7,7 @@ use super::rule::{self, Tightened};
 use super::settings::{Constraints, Guarantee, InitialState, Settings};
 use crate::delay;
 use crate::error::{DesignError, positive};
-use crate::error_dynamics::{Gain, InvariantSet, Reach, SampledError};
+use crate::error_dynamics::{Gain, InvariantSet, SampledError};
 use nalgebra::{Matrix2, Vector2};
 use serde::{Deserialize, Serialize};
 use vehicle::math::{exp, hypot, ln, powi, tan};
@@ -102,8 +102,6 @@ pub struct Design {
     pub g: [Matrix2<f64>; 3],
     /// Constants of the paper; `None` if its assumptions (real distinct eigenvalues) do not hold.
     pub paper: Option<PaperConstants>,
-    /// Exact sampled bounds of the error dynamics for all times, per unit of Δ̄.
-    pub reach: Reach,
     /// Invariant set of the deviation of one axis per unit of its disturbance bound; `None` if the
     /// eigenvalues are complex.
     pub invariant: Option<InvariantSet>,
@@ -150,7 +148,6 @@ impl Design {
         let s = &settings;
         let lower = if accepted_share < 1.0 { Vec::new() } else { lower(s)? };
         let error = SampledError::delayed(s.feedback, s.period_feedback, s.delay);
-        let reach = error.reach_forever().ok_or_else(|| guarantee::unstable(s, &error))?;
 
         let held = SampledError::new(s.terminal, s.period_optimisation);
         let g: [Matrix2<f64>; 3] = std::array::from_fn(|i| {
@@ -161,14 +158,9 @@ impl Design {
             }
         });
         if held.settling().is_none() {
-            let Gain { k1, k2 } = s.terminal;
-            let radius = held.spectral_radius();
-            return Err(DesignError::UnstableTerminal {
-                k1,
-                k2,
-                period: s.period_optimisation,
-                radius,
-            });
+            let (Gain { k1, k2 }, radius) = (s.terminal, held.spectral_radius());
+            let period = s.period_optimisation;
+            return Err(DesignError::UnstableTerminal { k1, k2, period, radius });
         }
         let eigenvalues = s.body.inertia.symmetric_eigenvalues();
         let (smallest_inertia, largest_inertia) = (eigenvalues.min(), eigenvalues.max());
@@ -178,7 +170,6 @@ impl Design {
             feedback: s.feedback,
             paper: paper_constants(s, smallest_inertia, largest_inertia),
             g,
-            reach,
             invariant,
             tightening,
             lower,
@@ -233,20 +224,14 @@ fn ratio(s: &Settings) -> Result<usize, DesignError> {
     if s.delay_error > 0.0 && s.initial_state == InitialState::Tube {
         return Err(DesignError::DelayErrorWithTube);
     }
-    if s.delay_error > s.delay.min(s.period_feedback) {
-        return Err(DesignError::DelayError {
-            value: s.delay_error,
-            largest: s.delay.min(s.period_feedback),
-        });
+    let largest = s.delay.min(s.period_feedback);
+    if s.delay_error > largest {
+        return Err(DesignError::DelayError { value: s.delay_error, largest });
     }
-    let ratio = (s.period_optimisation / s.period_feedback).round();
-    if ratio < 1.0
-        || (ratio * s.period_feedback - s.period_optimisation).abs() > 1e-9 * s.period_optimisation
-    {
-        return Err(DesignError::Periods {
-            optimisation: s.period_optimisation,
-            feedback: s.period_feedback,
-        });
+    let (optimisation, feedback) = (s.period_optimisation, s.period_feedback);
+    let ratio = (optimisation / feedback).round();
+    if ratio < 1.0 || (ratio * feedback - optimisation).abs() > 1e-9 * optimisation {
+        return Err(DesignError::Periods { optimisation, feedback });
     }
     Ok(ratio as usize)
 }

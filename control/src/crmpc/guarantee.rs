@@ -28,5 +28,5 @@ pub(super) use losses::{End, Held, MomentLoss};
 pub(super) use observable::{MEANS, Observable};
 pub(super) use switching::unseen;
 pub use switching::{Carried, Onset, Switching};
-pub(super) use tighten::{lateral, tighten, unstable, with_share};
+pub(super) use tighten::{lateral, tighten, with_share};
 pub use tightening::Tightening;

@@ -13,9 +13,8 @@ use crate::error::DesignError;
 use crate::linearise::{self, InverseKinematics};
 use crate::mpc::{self, Bounded, ErrorTrajectory, NormConstraint, StageConstraints, State};
 use crate::report::SolverStatus;
-use nalgebra::{Matrix3, Vector3, Vector6};
+use nalgebra::{Matrix3, Vector3};
 use std::ops::Range;
-use vehicle::reference::Reference;
 
 /// The paper's sets, whose bounds are constants.
 #[derive(Clone, Debug)]

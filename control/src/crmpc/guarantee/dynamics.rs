@@ -166,7 +166,6 @@ impl Dynamics {
             + angles_twice * rate * rate
             + by_angles * acceleration
             + by_rates * (by_rates * acceleration + by_angles * rate);
-        let slope = by_rates * acceleration + by_angles * rate;
         // I Ẅ a gives ∂²W [x, x] a + ∂W [a] a. The rest is as in `MomentLoss`, with ẋ_ω = a and
         // Θ̈ = a.
         let twisted = largest - smallest;
@@ -197,7 +196,6 @@ impl Dynamics {
                 * (2.0 * largest * DRIFT_BY_ANGLES_TWICE
                     + 2.0 * twisted * (CURVATURE + TURN * TURN)),
         ];
-        let curvature_of_bearing = [root3 * largest * TURN, root3 * largest * CURVATURE];
         Self {
             vehicle: domain,
             domain,
@@ -209,12 +207,12 @@ impl Dynamics {
             acceleration,
             by_rates,
             by_angles,
-            slope,
+            slope: by_rates * acceleration + by_angles * rate,
             jerk,
             curvature,
             curvature_by_angles,
             curvature_by_rates,
-            curvature_of_bearing,
+            curvature_of_bearing: [root3 * largest * TURN, root3 * largest * CURVATURE],
         }
     }
 

@@ -119,14 +119,8 @@ impl MomentLoss {
         bearing: f64,
         h: f64,
     ) -> Self {
-        let Deviation {
-            middle_angle: angle,
-            middle_rate: rate,
-            feedback,
-            feedback_norm,
-            feedback_moment,
-            ..
-        } = *deviation;
+        let Deviation { feedback, feedback_norm, feedback_moment, .. } = *deviation;
+        let (angle, rate) = (deviation.middle_angle, deviation.middle_rate);
         let largest = dynamics.largest;
         let spread = largest - dynamics.smallest;
         // The second derivatives are those of I W a, and of I Ẇ x + ω × I ω by rates, by both, and

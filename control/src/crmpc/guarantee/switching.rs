@@ -239,7 +239,7 @@ impl Switching {
     /// Returns the deviation of the angles and rates at the end of the stage before the one that
     /// begins with `carried`, by a command that begins to act early. In between it lies below the
     /// straight line from zero at the beginning of the stage before.
-    pub fn early(&self, carried: &Carried) -> (f64, f64) {
+    pub fn begun_early(&self, carried: &Carried) -> (f64, f64) {
         let pulse = carried.z / (1.0 - self.delay_error / self.h);
         (pulse * self.delay_error, pulse)
     }

@@ -23,7 +23,12 @@ use vehicle::math::powi;
 /// gain for which no invariant set can be computed.
 pub(in crate::crmpc) fn tighten(s: &Settings) -> Result<(Tightening, Assessment), DesignError> {
     let error = SampledError::delayed(s.feedback, s.period_feedback, s.delay);
-    let steps = error.settling().ok_or_else(|| unstable(s, &error))?;
+    let steps = error.settling().ok_or_else(|| DesignError::Unstable {
+        k1: s.feedback.k1,
+        k2: s.feedback.k2,
+        period: s.period_feedback,
+        radius: error.spectral_radius(),
+    })?;
     let dynamics = Dynamics::new(s);
     let parts = Parts::new(s, &dynamics);
     let switching = Switching::new(s, &error, &parts)?.map(Box::new);
@@ -43,21 +48,10 @@ pub(in crate::crmpc) fn tighten(s: &Settings) -> Result<(Tightening, Assessment)
         explained: explained(s, &dynamics, &parts),
         bearing,
         norm: parts.norm,
-        mismatch: parts.mismatch.mean,
         observable: Observable::all(s, &dynamics, &parts),
     };
     let assessment = assess(s, &dynamics, &tightening);
     Ok((tightening, assessment))
-}
-
-/// Returns the error that says that the gain does not stabilise the error dynamics.
-pub(in crate::crmpc) fn unstable(s: &Settings, error: &SampledError) -> DesignError {
-    DesignError::Unstable {
-        k1: s.feedback.k1,
-        k2: s.feedback.k2,
-        period: s.period_feedback,
-        radius: error.spectral_radius(),
-    }
 }
 
 /// Returns the largest mean acceleration over one period that the assumptions explain, rad/s²: Δ̄,

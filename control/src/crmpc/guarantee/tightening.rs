@@ -16,9 +16,6 @@ pub struct Tightening {
     pub bearing: f64,
     /// Bound on the norm of everything that drives the deviation, rad/s².
     pub norm: f64,
-    /// Part of `norm` by which F differs between two ticks from the acceleration that the law
-    /// intended, rad/s².
-    pub mismatch: f64,
     /// Largest means of an observed disturbance that the assumptions explain.
     pub(in crate::crmpc) observable: [Observable; MEANS],
     /// Largest mean acceleration over a period that the assumptions explain.

@@ -90,7 +90,7 @@ impl Robust {
         let tightening = self.tightening();
         let more = self.switching(k).map_or(0.0, |(switching, carried)| {
             let next = self.carried.borrow().get(k + 1).copied().unwrap_or_default();
-            switching.deviation(&carried).angle + switching.early(&next).0
+            switching.deviation(&carried).angle + switching.begun_early(&next).0
         });
         let [from, to] = [k, k + 1].map(|k| tightening.at(self.tick(k)).angle + more);
         let slope = (to - from) / h;

@@ -239,7 +239,7 @@ impl Robust {
         let Some(before) = k.checked_sub(1).and_then(|k| self.switching(k)) else {
             return Some((after.angle, after.rate));
         };
-        let (in_between, early) = (switching.deviation(&before.1), switching.early(&carried));
+        let (in_between, early) = (switching.deviation(&before.1), switching.begun_early(&carried));
         let largest = |after: f64, before: f64, early: f64| after.max(before + early);
         Some((
             largest(after.angle, in_between.angle, early.0),

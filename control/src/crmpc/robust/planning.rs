@@ -295,11 +295,10 @@ impl Robust {
             }
         }
         // The plan itself may serve for what its inputs have become since it was certified.
-        if memory.plan.terms != self.terms {
-            let certified = self.certify(&planner.previous, false);
-            if certified.is_some() {
-                self.take_over(planner, memory, certified);
-            }
+        let is_outdated = memory.plan.terms != self.terms;
+        let certified = is_outdated.then(|| self.certify(&planner.previous, false)).flatten();
+        if certified.is_some() {
+            self.take_over(planner, memory, certified);
         }
     }
 

@@ -350,7 +350,7 @@ fn oracle_rates_between_two_stages_exceed_their_line_by_no_more_than_is_counted(
         };
         let [(from, x), (to, y)] = [rate(0.0), rate(1.0)];
         let counted =
-            robust.design.tightening.rate_loss(0).within(x.max(y), stage.acceleration.norm());
+            robust.design.tightening.tick(0).rate_loss.within(x.max(y), stage.acceleration.norm());
         for share in [0.25, 0.5, 0.75] {
             let beyond = rate(share).0 - (from + share * (to - from));
             assert!(beyond <= counted, "{beyond} {counted}");
