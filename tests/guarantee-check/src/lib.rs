@@ -13,6 +13,7 @@
 
 pub mod assessment;
 pub mod draws;
+mod driven;
 pub mod dual;
 pub mod dynamics;
 pub mod flights;

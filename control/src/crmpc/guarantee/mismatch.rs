@@ -82,8 +82,8 @@ impl InertiaMoments {
     ///
     /// The inertia is I_v = (1 + c) I^½ (1 + E) I^½. With D = 1 − (1 + E)⁻¹, I_v⁻¹ (m − ω × I_v ω)
     /// differs from I⁻¹ (m − ω × I ω) by −c/(1 + c) I⁻¹ m, by I^−½ D I^−½ (ω × I ω − m/(1 + c)),
-    /// and by I^−½ (1 + E)⁻¹ I^−½ (ω × I^½ E I^½ ω). For the last one, ‖ω × S ω‖ is at most half the
-    /// range of the eigenvalues of S.
+    /// and by I^−½ (1 + E)⁻¹ I^−½ (ω × I^½ E I^½ ω). For the last one, ‖ω × S ω‖ is at most half
+    /// the range of the eigenvalues of S.
     pub(super) fn new(s: &Settings, vehicle: &Domain, (smallest, largest): (f64, f64)) -> Self {
         let gyroscopic = (0.5 * (largest - smallest) + largest) * powi(vehicle.rate, 2);
         let moment = s.limit_total();

@@ -8,8 +8,7 @@
 //! on all of them would take too much of the limits.
 
 use super::deviation::Deviation;
-use super::parts::Parts;
-use super::pulse::PulseFactors;
+use super::parts::{Parts, PulseFactors};
 use crate::crmpc::settings::Settings;
 use crate::delay::ticks;
 use crate::error::DesignError;

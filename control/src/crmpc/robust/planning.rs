@@ -120,8 +120,9 @@ impl Robust {
         contradicted.then_some(Contradiction::Deviation)
     }
 
-    /// Shifts the plan by one step as in (31). Beyond the horizon it brakes, α̈ = −κ α̇, β̈ = −κ_β β̇
-    /// and σ̈ = −κ σ̇ (step 6 of the proof). What it carries is moved on to its new beginning.
+    /// Shifts the plan by one step as in (31). Beyond the horizon it brakes, α̈ = −κ α̇,
+    /// β̈ = −κ_β β̇ and σ̈ = −κ σ̇ (step 6 of the proof). What it carries is moved on to its new
+    /// beginning.
     fn shift(&self, memory: &mut Memory) {
         let Settings { horizon, period_optimisation, .. } = self.settings;
         let plan = &mut memory.plan;
