@@ -18,8 +18,7 @@ use super::settings::Settings;
 use super::stages::{Point, Stages};
 use crate::linearise::Linear;
 use crate::mpc::ErrorTrajectory;
-use nalgebra::{Matrix3, Vector3};
-use planning::Beginning;
+use nalgebra::{Matrix3, Vector3, Vector6};
 use std::cell::RefCell;
 use vehicle::math::cos;
 
@@ -72,6 +71,18 @@ impl Interval {
     pub(super) fn keeps(&self, (of_rate, of_moment): (f64, f64)) -> bool {
         self.rate <= self.rate_bound + of_rate && self.moment <= self.moment_bound + of_moment
     }
+}
+
+/// How a nominal trajectory begins (docs/guarantee.md, "Where the nominal trajectory begins").
+#[derive(Clone, Copy)]
+struct Beginning {
+    /// First state (Θ̃, x̃_ω), rad and rad/s.
+    state: Vector6<f64>,
+    /// Feedback ticks since the nominal motion began at a measured state.
+    age: u32,
+    onset: Onset,
+    /// Level of the bound on the disturbance, see [`crate::crmpc::Terms::level`].
+    level: usize,
 }
 
 impl Robust {

@@ -1,8 +1,8 @@
 //! The law over the robust set: how a plan is found that satisfies the conditions of the theorem
 //! (docs/guarantee.md), and what is commanded from it.
 
-use super::Robust;
 use super::certificate::Certified;
+use super::{Beginning, Robust};
 use crate::crmpc::feedback::{Feedback, Tick};
 use crate::crmpc::guarantee::{BRAKING, Onset};
 use crate::crmpc::memory::Memory;
@@ -32,18 +32,6 @@ enum Before {
     /// The vehicle is further from it than the assumptions explain. The plan is then useless, and
     /// bounds about it would be misleading.
     LeftBehind,
-}
-
-/// How a nominal trajectory begins (docs/guarantee.md, "Where the nominal trajectory begins").
-#[derive(Clone, Copy)]
-pub(super) struct Beginning {
-    /// First state (Θ̃, x̃_ω), rad and rad/s.
-    pub state: Vector6<f64>,
-    /// Feedback ticks since the nominal motion began at a measured state.
-    pub age: u32,
-    pub onset: Onset,
-    /// Level of the bound on the disturbance, see [`crate::crmpc::Terms::level`].
-    pub level: usize,
 }
 
 impl Robust {
