@@ -65,41 +65,6 @@ pub fn r_dot(angles: &Vector3<f64>, angle_rates: &Vector3<f64>) -> Matrix3<f64> 
     r_alpha(angles) * angle_rates.x + r_beta(angles) * angle_rates.y
 }
 
-/// Second partial derivative ∂²R/∂α² of the printed R.
-pub fn r_alpha_alpha(angles: &Vector3<f64>) -> Matrix3<f64> {
-    let (sa, ca) = sin_cos(angles.x);
-    let (sb, cb) = sin_cos(angles.y);
-    let tb = sb / cb;
-    Matrix3::new(ca * tb, 0.0, sa * tb, -sa, 0.0, ca, ca * cb, 0.0, cb * sa)
-}
-
-/// Second partial derivative ∂²R/∂α∂β of the printed R.
-pub fn r_alpha_beta(angles: &Vector3<f64>) -> Matrix3<f64> {
-    let (sa, ca) = sin_cos(angles.x);
-    let (sb, cb) = sin_cos(angles.y);
-    let sec2 = 1.0 / (cb * cb);
-    Matrix3::new(sa * sec2, 0.0, -ca * sec2, 0.0, 0.0, 0.0, -sa * sb, 0.0, sb * ca)
-}
-
-/// Second partial derivative ∂²R/∂β² of the printed R.
-pub fn r_beta_beta(angles: &Vector3<f64>) -> Matrix3<f64> {
-    let (sa, ca) = sin_cos(angles.x);
-    let (sb, cb) = sin_cos(angles.y);
-    let tb = sb / cb;
-    let sec2 = 1.0 / (cb * cb);
-    Matrix3::new(
-        -2.0 * ca * sec2 * tb,
-        0.0,
-        -2.0 * sa * sec2 * tb,
-        0.0,
-        0.0,
-        0.0,
-        ca * cb,
-        sb,
-        cb * sa,
-    )
-}
-
 /// Form of the matrix R in the attitude kinematics.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Choice)]
 #[serde(rename_all = "lowercase")]

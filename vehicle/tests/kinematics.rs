@@ -4,9 +4,7 @@
 use nalgebra::{Matrix3, Rotation3, Vector3};
 use proptest::prelude::*;
 use vehicle::kinematics::Kinematics;
-use vehicle::kinematics::{
-    r, r_alpha, r_alpha_alpha, r_alpha_beta, r_beta, r_beta_beta, r_dot, r_inverse,
-};
+use vehicle::kinematics::{r, r_alpha, r_beta, r_dot, r_inverse};
 use vehicle::trajectory::{TRAJECTORY, Trajectory};
 
 fn attitude() -> impl Strategy<Value = Vector3<f64>> {
@@ -51,14 +49,7 @@ proptest! {
     fn oracle_partial_derivatives_against_differences(angles in attitude()) {
         let h = 1e-5;
         let scale = 1.0 / angles.y.cos().powi(5);
-        let pairs: [(Of, usize, Of); 6] = [
-            (r, 0, r_alpha),
-            (r, 1, r_beta),
-            (r_alpha, 0, r_alpha_alpha),
-            (r_alpha, 1, r_alpha_beta),
-            (r_beta, 0, r_alpha_beta),
-            (r_beta, 1, r_beta_beta),
-        ];
+        let pairs: [(Of, usize, Of); 2] = [(r, 0, r_alpha), (r, 1, r_beta)];
         for (matrix, axis, exact) in pairs {
             let mut shift = Vector3::zeros();
             shift[axis] = h;

@@ -119,14 +119,6 @@ impl System {
         Ok(run.master.initialize()?)
     }
 
-    /// Returns the values that are set in all components with the changes made to them.
-    pub fn set_values(&self, changes: &[(Target, SettingValue)]) -> Parameters {
-        let settings = self.varied(changes).into_iter().map(|settings| {
-            settings.into_iter().map(|setting| (setting.name, setting.value.to_json())).collect()
-        });
-        self.names().into_iter().map(String::from).zip(settings).collect()
-    }
-
     /// Returns the settings of all components with the changes made to them.
     fn varied(&self, changes: &[(Target, SettingValue)]) -> Vec<Vec<Setting>> {
         let mut settings = self.settings();
