@@ -4,7 +4,7 @@
 use crate::error::Error;
 use crate::interrupt::Interrupt;
 use crate::run::Run;
-use crate::system::{Parameters, System};
+use crate::system::System;
 use fmi_master::description::{Carrier, Variable, VariableKind};
 use fmi_master::names;
 use fmi_master::quantity;
