@@ -1,12 +1,13 @@
 """Laws in Python in every loop and by every function that flies one, against LQR.fmu."""
 
 import subprocess
+import warnings
 
 import numpy as np
 import pytest
 from laws import lqr
 from laws import pd as pd_law
-from reentry_fmus import LawError, OrchestratorError, experiment, falsify, linearise, margins, reproduce
+from reentry_fmus import LawError, OrchestratorError, OrchestratorWarning, experiment, falsify, linearise, margins, reproduce
 from reentry_fmus._data import experiment_path, program
 from test_campaign import CAMPAIGN
 
@@ -215,6 +216,14 @@ def test_an_error_of_a_law_is_one_wherever_it_flies(fly, tmp_path):
     with pytest.raises(LawError, match="the law fails failed .*at t = 0.52 s: ZeroDivisionError: so") as caught:
         fly(tmp_path, fails)
     assert caught.value.time == pytest.approx(0.52) and 'raise ZeroDivisionError("so")' in str(caught.value)
+
+
+def test_a_setting_that_does_nothing_to_a_law_says_so():
+    with pytest.warns(OrchestratorWarning, match=r"controller.weight.P\[1\] has no effect on a law"):
+        experiment("lqr", set={"controller.weight.P[1]": 1.0}, stop=1.0, law=pd_law)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        experiment("lqr", set={"controller.limit.rate": 0.1, "plant.disturbance.seed": 2}, stop=1.0, law=pd_law)
 
 
 def test_what_a_law_cannot_fly_is_refused(tmp_path):

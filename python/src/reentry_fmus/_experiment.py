@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import warnings
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -10,11 +11,14 @@ import numpy as np
 
 from ._data import FMUS, experiment_path, fmu_path
 from ._law import Laws, laws_of
-from ._orchestrator import OrchestratorError, orchestrate
+from ._orchestrator import OrchestratorError, OrchestratorWarning, orchestrate
 from ._run import Run, read
 from ._state import Law
 from ._table import Units, check_units
 from ._unpacked import Folder
+
+TOLD = ("controller.reference.", "controller.limit.", "controller.period.feedback")
+"""Beginnings of the parameters that act on a law, or on what it is judged by."""
 
 Value = bool | int | float | str
 """Value of a parameter: a number in the variable's SI unit, a truth value, the name of an
@@ -72,8 +76,13 @@ def changes(
     **numbers: float | None,
 ) -> list[str]:
     """Returns the arguments of the orchestrator for changes of an experiment."""
-    if law is not None and "controller" in (fmu or {}):
-        raise TypeError("the law replaces the controller: leave out its FMU")
+    if law is not None:
+        if "controller" in (fmu or {}):
+            raise TypeError("the law replaces the controller: leave out its FMU")
+        for name in set or {}:
+            if name.startswith("controller.") and not name.startswith(TOLD):
+                text = f"{name} has no effect on a law: it has the reference, limits and period"
+                warnings.warn(text, OrchestratorWarning, stacklevel=3)
     arguments = ["--fmu-dir", str(FMUS)]
     for component, replacement in (fmu or {}).items():
         arguments += ["--fmu", f"{component}={fmu_path(replacement)}"]
