@@ -234,11 +234,11 @@ impl Dynamics {
         }
         let Drive { all, of_two, rate_error, rate_error_of_two, angle_error, .. } = *drive;
         let Self { by_rates, by_angles, .. } = *self;
-        // The drive takes the motion away from its prediction until the next measurement, and from
-        // then on that prediction from the next one. The distances grow with time, so that on
-        // average over time, and over the straight line between two motions, the domain exceeds
-        // that of the vehicle by half as much. The bound on ∂F/∂x_ω is proportional to that on ‖ω‖.
-        // The jumps by commands that begin early or late come at any time.
+        // Until the next measurement the drive separates the vehicle from its prediction, and
+        // afterwards this prediction from the next one. Both distances grow from zero. On average
+        // over time, and over the straight line between two motions, the states therefore exceed
+        // the vehicle's domain by half of the largest excess. The bound on ∂F/∂x_ω is proportional
+        // to that on ‖ω‖. The jumps by commands that begin early or late come at any time.
         let halfway = if s.delay_error > 0.0 {
             1.0
         } else {
@@ -320,7 +320,7 @@ impl Dynamics {
 
     /// Returns the largest amount by which the mismatch moves the rates, between two ticks, beyond
     /// the straight line of its mean, rad/s: τ²/8 ‖dF/dt‖ by the change of first order in time, and
-    /// τ³/(36 √12) ‖d²F/dt²‖ by that of second order.
+    /// τ³/(36 √12) ‖d²F/dt²‖ by that of second order, rounded up to τ³/120.
     pub(super) fn between(&self, s: &Settings) -> f64 {
         let tau = s.period_feedback;
         self.slope * tau * tau / 8.0 + self.jerk * powi(tau, 3) / 120.0

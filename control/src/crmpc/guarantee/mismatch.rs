@@ -53,9 +53,10 @@ pub struct Mismatch {
     pub mean: f64,
     /// Largest difference at any time, rad/s².
     pub peak: f64,
-    /// Change of the rates by it between a measurement and its tick, rad/s.
+    /// Change of the vehicle's rates by it during d, from a measurement until its command acts,
+    /// rad/s.
     pub unseen_rate: f64,
-    /// Change of the predicted rates by it because of errors of the measurement, rad/s.
+    /// Error of the predicted rates because errors of the measurement change F, rad/s.
     pub mispredicted: f64,
 }
 

@@ -77,7 +77,8 @@ impl Parts {
         if !first.mean.is_finite() {
             mismatch = Mismatch::UNBOUNDED;
         }
-        // The inertia error has a larger effect before the motion, too.
+        // The peak and the unseen rate are those from before the beginning, where the inertia error
+        // has a larger effect, too; `early` enlarges the others.
         let more = larger.of_inertia - drive.of_inertia;
         mismatch.peak = first.peak + more;
         mismatch.unseen_rate = first.unseen_rate + more * s.delay;
@@ -151,8 +152,9 @@ impl Parts {
 }
 
 impl InertiaPart {
-    /// A part caused at an attitude turned by o since then is larger as a moment by up to
-    /// ‖I (W − W′) R′ I⁻¹‖ ≤ I_max/I_min √2 ‖o‖ ‖R‖ (docs/guarantee.md, step 4).
+    /// If the vehicle has turned by o since the inertia error caused a part of the deviation, the
+    /// moment that compensates for it is larger by up to the share ‖I (W − W′) R′ I⁻¹‖ ≤
+    /// I_max/I_min √2 ‖o‖ ‖R‖ (docs/guarantee.md, step 4).
     fn new(s: &Settings, dynamics: &Dynamics, before: &Dynamics, drive: &Drive) -> Self {
         let Dynamics { smallest, largest, rate, .. } = dynamics;
         let moments = InertiaMoments::new(s, &dynamics.vehicle, (*smallest, *largest));

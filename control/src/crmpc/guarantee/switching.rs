@@ -80,8 +80,8 @@ struct Transitions {
 /// Size of a transition that has faded to rounding.
 const FADED: f64 = 1e-14;
 
-/// Number of commands that may have begun to act too late for a measurement to show it, when the
-/// command that follows from the measurement begins to act: ⌈(d + δ)/τ⌉ − 1.
+/// Number of earlier commands whose pulses a measurement may not contain, although they act before
+/// the command that is computed from it: ⌈(d + δ)/τ⌉ − 1.
 pub(in crate::crmpc) fn unseen(s: &Settings) -> usize {
     if s.delay_error == 0.0 {
         return 0;
@@ -138,9 +138,10 @@ impl Switching {
     ///
     /// |s_i⁺| ≤ |λ_i| |s_i| + g_i p,  p⁺ = δ (‖Δa‖ + Σ κ_i (|1 − λ_i| |s_i| + g_i p)).
     ///
-    /// g_i is the largest component of [u; 1] along the eigenvector for 0 ≤ u ≤ d + δ + τ. A pulse
-    /// may be seen up to ⌈(d + δ)/τ⌉ − 1 ticks later than at the next one, when what it leaves
-    /// should have faded by as many powers of |λ_i|.
+    /// g_i is the largest component of [u; 1] along the eigenvector for 0 ≤ u ≤ d + δ + τ. A
+    /// measurement may show a pulse up to ⌈(d + δ)/τ⌉ − 1 ticks after the next tick. The recursion
+    /// would let it fade by |λ_i| in each of these, although nothing has reacted yet. Therefore g_i
+    /// is divided by |λ_i| once for each of them.
     ///
     /// # Errors
     /// Returns an error if the eigenvalues of Φ are not real and distinct.
@@ -243,8 +244,8 @@ impl Switching {
         (pulse * self.delay_error, pulse)
     }
 
-    /// Returns the deviation by what is carried: s as the law sees it, and for the vehicle itself
-    /// the pulse of the tick besides, with what exceeds the straight line between two ticks.
+    /// Converts what is carried to a deviation. The law sees s alone. The vehicle also deviates by
+    /// the pulse of this tick and, between two ticks, by the excess over the straight line.
     fn of(&self, carried: &Carried) -> Deviation {
         let [slow, fast] = &self.modes;
         let (seen, pulse, tau) = ([carried.x, carried.y], carried.z, self.period);

@@ -117,8 +117,9 @@ impl Sequence {
             (parts.deviation(s, &reaches).plus(&of_pulses), pulse.norm())
         };
         let mut ticks: Vec<(Deviation, f64)> = (0..=steps).map(at).collect();
-        // Errors of the measurement may drive the vehicle further at first than later on, and the
-        // first ticks of a motion in the tube count at any time.
+        // By errors of the measurement the deviation may be larger at an early tick than at the
+        // last. As the last entry stands for all later ticks, and for every tick with `tube`, it
+        // takes the largest of all.
         ticks[steps].0 = ticks.iter().fold(Deviation::default(), |most, at| most.or(&at.0));
         if is_tube {
             ticks.drain(..steps);
