@@ -639,7 +639,7 @@ def test_a_grid_with_a_mistake_is_refused_before_anything_runs(tmp_path, old, ne
 
 
 def differences(folder) -> list[str]:
-    return pages.problems(pages.read([folder], pages.data()))
+    return pages.problems(pages.read([folder], pages.data(), times=False))
 
 
 def test_pages_agree_with_the_study_of_chai_2022(report):

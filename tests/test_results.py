@@ -91,6 +91,8 @@ def test_with_fewer_members_only_what_must_be_so_is_compared():
 def test_times_must_agree_within_a_factor_of_ten():
     time = hole([1.0], 1, digits=2, time=True)
     assert time.agrees("0.10") and time.agrees("10.00") and not time.agrees("0.09") and not time.agrees("11.00")
+    time.times = False
+    assert time.agrees("11.00") and not time.agrees("none")
 
 
 def test_verdicts_count_the_checks_that_hold():

@@ -171,8 +171,9 @@ def differences_of_table(table: dict, body: list[list], text: str) -> list[str]:
     return problems
 
 
-def read(folders: list[Path], data: dict) -> dict[str, Study]:
-    """The studies of the folders by their names; the title says which study it is."""
+def read(folders: list[Path], data: dict, times: bool = True) -> dict[str, Study]:
+    """The studies of the folders by their names; the title says which study it is. `times` says whether
+    computing times are compared, which other work beside the runs would spoil."""
     titles = {}
     for path in (ROOT / "orchestrator" / "experiments").glob("*/study.toml"):
         titles[tomllib.loads(path.read_text(encoding="utf-8"))["title"]] = path.parent.name
@@ -180,7 +181,7 @@ def read(folders: list[Path], data: dict) -> dict[str, Study]:
     for folder in folders:
         results = json.loads((folder / "results.json").read_text(encoding="utf-8"))
         name = titles[results["title"]]
-        studies[name] = Study(results, data["members"].get(name, {}))
+        studies[name] = Study(results, data["members"].get(name, {}), times)
     return studies
 
 
