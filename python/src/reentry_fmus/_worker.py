@@ -40,9 +40,17 @@ def main() -> None:
 
 
 def serve(
-    tasks: BinaryIO, answers: BinaryIO, law: bytes, key: str, command: list[str], progress: Path
+    tasks: BinaryIO,
+    answers: BinaryIO,
+    law: bytes,
+    key: str,
+    command: list[str],
+    progress: Path,
+    core: int | None,
 ) -> None:
-    """Flies part after part."""
+    """Flies part after part, on one core if it is given."""
+    if core is not None:
+        os.sched_setaffinity(0, {core})
     from ._law import Laws, Progress
     from ._orchestrator import orchestrate
     from ._state import LawError
