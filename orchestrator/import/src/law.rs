@@ -87,6 +87,8 @@ pub(crate) struct Ports {
     external: Vec<u32>,
     moment: Vec<u32>,
     period: u32,
+    /// The parameter that chooses the reference, and its value for a reference from outside.
+    profile: (u32, i32),
     /// Names of what the law is told: inputs, reference, and the moment that it gave last.
     names: Vec<String>,
     starts: Vec<f64>,
@@ -122,6 +124,12 @@ impl Ports {
             reference: found.iter().map(|(_, reference)| *reference).collect(),
             moment: moments.iter().map(|name| Ok(named(name)?.1)).collect::<Result<_, String>>()?,
             period: named("period.feedback")?.1,
+            profile: {
+                let (place, reference) = named("reference.profile")?;
+                let mut items = description.variables[place].kind.items().iter();
+                let external = items.find(|(name, _)| name == "external");
+                (reference, external.map_or(-1, |(_, value)| *value))
+            },
             starts: inputs.iter().map(|input| start(&input.start).unwrap_or(0.0)).collect(),
             names: inputs.iter().map(|i| i.name.clone()).chain(references).chain(moments).collect(),
             inputs: inputs.iter().map(|input| input.reference).collect(),
@@ -137,6 +145,8 @@ struct Memory {
     moment: [f64; 3],
     /// Whether the reference responds to inputs that were set for this step.
     responds: bool,
+    /// Whether the reference comes from outside.
+    is_external: bool,
     start: f64,
     period: f64,
     /// Periods that have begun.
@@ -234,8 +244,11 @@ impl Instance for LawInstance {
         self.stand_in.get_real(&[self.ports.period], &mut period)?;
         let inputs = if self.now.inputs.is_empty() { &self.ports.starts } else { &self.now.inputs };
         let reference = vec![0.0; self.ports.reference.len()];
-        let [period] = period;
-        self.now = Memory { inputs: inputs.clone(), reference, start, period, ..Memory::default() };
+        let ([period], mut profile) = (period, [0]);
+        self.stand_in.get_integer(&[self.ports.profile.0], &mut profile)?;
+        let is_external = profile == [self.ports.profile.1];
+        let inputs = inputs.clone();
+        self.now = Memory { inputs, reference, is_external, start, period, ..Memory::default() };
         Ok(())
     }
 
@@ -246,7 +259,7 @@ impl Instance for LawInstance {
     }
 
     fn do_step(&mut self, time: f64, step: f64) -> Outcome {
-        let responds = std::mem::take(&mut self.now.responds);
+        let responds = std::mem::take(&mut self.now.responds) && self.now.is_external;
         if !responds {
             self.ask(time)?;
         }

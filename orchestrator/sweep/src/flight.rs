@@ -10,6 +10,7 @@ use cosim::system::{Opened, Parameters, System};
 use cosim::variation::{SettingValue, Target};
 use cosim_metrics::metrics::{Meters, Metrics};
 use fmi_master::description::VariableKind as Type;
+use fmu_import::fmu::Fmu;
 use fmu_import::law;
 use linear::linearise::{Linearised, Lineariser};
 use linear::measures::{self, Measured};
@@ -323,7 +324,8 @@ pub fn can_reset(sweep: &Sweep, opened: &mut Opened, interrupt: &Interrupt) -> R
     if sweep.experiment().law.is_some() {
         // A trial would ask the law for flights that nobody wants.
         let components = sweep.system(opened)?.components;
-        return Ok(components.iter().all(|component| component.fmu.is_made_by_fmu_pack()));
+        let resets = |fmu: &Fmu| fmu.is_made_by_fmu_pack() || fmu.is_lookup_table();
+        return Ok(components.iter().all(|component| resets(&component.fmu)));
     }
     let mut flight = Flight::new(sweep, opened, true, interrupt)?;
     let mut result = |case| {

@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING, Any
 import pandas as pd
 
 from ._arrays import dataset
-from ._data import FMUS, need
+from ._data import FMUS, fmu, need
 from ._experiment import recorded
-from ._law import Laws, PickledLaw
+from ._law import STAND_IN, Laws, PickledLaw
 from ._orchestrator import OrchestratorError, missing_parts, orchestrate
 from ._pool import Pool
 from ._run import Figure, Run
@@ -231,6 +231,8 @@ class Campaign:
     def command(self, name: str) -> list[str]:
         """Returns the arguments of a command of the orchestrator for this campaign."""
         command = [name, self.path, "--fmu-dir", str(FMUS), "--quiet"]
+        if self.law is not None:
+            command += ["--fmu", f"controller={fmu(STAND_IN)}"]
         return command
 
     @contextmanager

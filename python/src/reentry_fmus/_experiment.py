@@ -10,15 +10,16 @@ from pathlib import Path
 import numpy as np
 
 from ._data import FMUS, experiment_path, fmu_path
-from ._law import Laws, laws_of
+from ._law import STAND_IN, Laws, laws_of
 from ._orchestrator import OrchestratorError, OrchestratorWarning, orchestrate
 from ._run import Run, read
 from ._state import Law
 from ._table import Units, check_units
 from ._unpacked import Folder
 
-TOLD = ("controller.reference.", "controller.limit.", "controller.period.feedback")
-"""Beginnings of the parameters that act on a law, or on what it is judged by."""
+GROUPS = ("reference", "limit", "knownMoment", "trajectory", "achievedMoment", "scheduled")
+TOLD = (*(f"controller.{group}." for group in GROUPS), "controller.period.feedback")
+"""Beginnings of the names of what acts on a law, or on what it is judged by."""
 
 Value = bool | int | float | str
 """Value of a parameter: a number in the variable's SI unit, a truth value, the name of an
@@ -81,8 +82,10 @@ def changes(
             raise TypeError("the law replaces the controller: leave out its FMU")
         for name in set or {}:
             if name.startswith("controller.") and not name.startswith(TOLD):
-                text = f"{name} has no effect on a law: it has the reference, limits and period"
+                text = f"{name} has no effect on a law: it has reference, limits, inputs and period"
                 warnings.warn(text, OrchestratorWarning, stacklevel=3)
+        # One beside the experiment might be another.
+        fmu = {**(fmu or {}), "controller": STAND_IN}
     arguments = ["--fmu-dir", str(FMUS)]
     for component, replacement in (fmu or {}).items():
         arguments += ["--fmu", f"{component}={fmu_path(replacement)}"]

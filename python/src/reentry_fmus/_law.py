@@ -19,7 +19,11 @@ import numpy as np
 
 from ._data import need
 from ._recording import ATTITUDE, RATE
-from ._state import Inputs, Law, State, Vector, moment_of, name_of
+from ._state import Inputs, Law, LawError, State, Vector, moment_of, name_of
+
+
+STAND_IN = "LQR"
+"""FMU that stands in for everything but the moment of a law."""
 
 
 class Flight:
@@ -77,6 +81,7 @@ class Laws:
         key: str,
         case: int | None = None,
         progress: Progress | None = None,
+        file: str | None = None,
     ) -> None:
         self.key = key
         """Name and hash, under which the orchestrator keeps what the law has flown."""
@@ -85,6 +90,7 @@ class Laws:
         self._make = make
         self._case = case
         self._progress = progress
+        self._file = file
         self._flights: dict[int, Flight] = {}
 
     def answer(self, kind: bytes, number: int, time: float, told: bytes) -> bytes | None:
@@ -108,29 +114,53 @@ class Laws:
             self._flights.pop(number, None)
         elif kind == b"p":
             self.printed += told
+        else:
+            raise RuntimeError(f"the orchestrator sent {kind!r}, which is no message")
         return None
 
     def _ask(self, flight: Flight, time: float, told: bytes) -> bytes:
         state, progress = flight.state(time, told), self._progress
         if progress is not None:
             progress.ask(time)
-        moment = moment_of(flight.law, state, flight.case)
+        try:
+            moment = moment_of(flight.law, state, flight.case)
+        except LawError as error:
+            # A function that was sent or copied has lost its file.
+            raise error.in_file(self._file) from error.__cause__
         if progress is not None:
             progress.answer()
         return moment.tobytes()
 
 
 def copied(law: Law) -> Law:
-    """Returns a law with a memory of its own. A function has none, unless it encloses variables,
-    which cloudpickle can copy."""
-    if not inspect.isfunction(law):
-        return copy.deepcopy(law)
-    try:
-        import cloudpickle
-    except ModuleNotFoundError:
+    """Returns a law with a memory of its own: what an object holds and a function encloses, but not
+    what is global.
+
+    Raises:
+        TypeError: The law cannot be copied.
+        ModuleNotFoundError: cloudpickle, which copies functions, is not installed.
+    """
+    if inspect.isfunction(law) and law.__closure__ is None:
         return law
-    again: Law = pickle.loads(cloudpickle.dumps(law)) if law.__closure__ else law
+    if inspect.isfunction(law):
+        need("cloudpickle", "campaign")
+    try:
+        try:
+            import cloudpickle
+        except ModuleNotFoundError:
+            return copy.deepcopy(law)
+        again: Law = pickle.loads(cloudpickle.dumps(law))
+    except Exception as error:
+        raise TypeError(f"the law {name_of(law)} cannot be copied: {error}") from error
+    if again is law:
+        raise TypeError(f"the law {name_of(law)} cannot be copied: it is known by its name")
     return again
+
+
+def file_of(law: Law) -> str | None:
+    """Returns the file that defines a law."""
+    code = getattr(law, "__code__", None) or getattr(type(law).__call__, "__code__", None)
+    return getattr(code, "co_filename", None)
 
 
 def laws_of(law: Law, is_first: bool = False) -> Laws:
@@ -138,19 +168,20 @@ def laws_of(law: Law, is_first: bool = False) -> Laws:
     itself if `is_first` says so.
 
     Raises:
-        TypeError: The law cannot be called.
+        TypeError: The law cannot be called, or cannot be copied.
     """
     if not callable(law):
         raise TypeError(f"a law is a function from the state to the moment, not {law!r}")
     left = [law] if is_first else []
     try:
         fresh = copied(law)
-    except Exception as error:
+    except (TypeError, ModuleNotFoundError):
         if not is_first:
-            raise TypeError(f"the law {name_of(law)} cannot be copied: {error}") from error
+            raise
         # Most runs need no second one.
         fresh = law
-    return Laws(lambda: left.pop() if left else copied(fresh), name_of(law))
+    make = lambda: left.pop() if left else copied(fresh)  # noqa: E731
+    return Laws(make, name_of(law), file=file_of(law))
 
 
 class Progress:
@@ -200,8 +231,7 @@ class PickledLaw:
         self.name = name_of(law)
         if not callable(law):
             raise TypeError(f"a law is a function from the state to the moment, not {law!r}")
-        code = getattr(law, "__code__", None) or getattr(type(law).__call__, "__code__", None)
-        self.file: str | None = getattr(code, "co_filename", None)
+        self.file = file_of(law)
         """File that defines the law."""
         try:
             self.content: bytes = cloudpickle.dumps(law)
@@ -221,4 +251,4 @@ class PickledLaw:
 
     def laws(self, case: int | None = None) -> Laws:
         """Returns the laws of flights in this process."""
-        return Laws(lambda: pickle.loads(self.content), self.key, case)
+        return Laws(lambda: pickle.loads(self.content), self.key, case, file=self.file)

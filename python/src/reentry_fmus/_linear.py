@@ -98,8 +98,8 @@ def linearise(
         fmu: FMUs that replace those of components.
         step: Length of the communication step, s.
         law: Law in Python that replaces the controller, as in `experiment`. Its memory is copied
-            with the state of the loop (`copy.deepcopy`; a function that encloses variables by
-            cloudpickle, if that is installed).
+            with the state of the loop (by cloudpickle): what an object holds and a function
+            encloses, but not what is global.
 
     Raises:
         OrchestratorError: The experiment was refused, or its run failed.

@@ -83,12 +83,9 @@ def converse(command: list[str], environment: dict[str, str], laws: Laws) -> tup
                     if len(told := process.stdout.read(length)) < length:
                         break
                     answer = laws.answer(kind, number, time, told)
-                    if answer is not None:
-                        process.stdin.write(answer)
-                        process.stdin.flush()
-            except BrokenPipeError:
-                # The orchestrator has ended, and its messages say why.
-                pass
+                    if answer is not None and not sent(process.stdin, answer):
+                        # The orchestrator has ended, and its messages say why.
+                        break
             except BaseException:
                 close(process.stdin)
                 end(process)
@@ -129,6 +126,16 @@ def manner(exit_code: int) -> str:
         return f"was ended by {signal.Signals(-exit_code).name}"
     except ValueError:
         return f"was ended by signal {-exit_code}"
+
+
+def sent(pipe: IO[bytes], answer: bytes) -> bool:
+    """Writes an answer. Returns whether somebody reads it."""
+    try:
+        pipe.write(answer)
+        pipe.flush()
+    except OSError:
+        return False
+    return True
 
 
 def close(pipe: IO[bytes]) -> None:

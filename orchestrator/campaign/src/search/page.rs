@@ -6,7 +6,7 @@ use crate::plan::Plan;
 use crate::report::untitled;
 use crate::track::Track;
 use cosim::error::Error;
-use cosim::experiment::MeasureKind;
+use cosim::experiment::{MeasureKind, name_of};
 use cosim::files;
 use cosim::interrupt::Interrupt;
 use cosim::signal::{Resolved, Signal};
@@ -184,7 +184,7 @@ fn page(
                         h2 { "Answer" }
                         (answer(plan, outcome))
                         p { "Fly it again, with everything recorded and a page of it:" }
-                        p { code { "orchestrator run " (file(&outcome.out, "worst.toml")) " --page" } }
+                        p { code { (again(plan, &file(&outcome.out, "worst.toml"))) } }
                     }
                     @if let Some(svg) = worst_case {
                         figure id="worst" { h3 { "The worst case" } div.plot { (PreEscaped(svg)) } }
@@ -208,6 +208,14 @@ fn page(
         }
     };
     markup.into_string()
+}
+
+/// Returns the command that flies the worst case again.
+fn again(plan: &Plan, worst: &str) -> String {
+    match plan.sweep.experiment().law.as_deref() {
+        Some(law) => format!("experiment(\"{worst}\", law={})", name_of(law)),
+        None => format!("orchestrator run {worst} --page"),
+    }
 }
 
 /// Returns the path of a file in the folder of the results, quoted for a shell if it must be.

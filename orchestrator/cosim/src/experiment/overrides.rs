@@ -114,7 +114,9 @@ impl Experiment {
             // The command line decides for components that decide for themselves, too.
             self.components.values_mut().for_each(|component| component.isolate = None);
         }
-        let stand_in = overrides.law.is_some().then(|| format!("{CONTROLLER}={STAND_IN}"));
+        let is_given = |assignment: &String| assignment.starts_with(&format!("{CONTROLLER}="));
+        let is_needed = overrides.law.is_some() && !overrides.fmu.iter().any(is_given);
+        let stand_in = is_needed.then(|| format!("{CONTROLLER}={STAND_IN}"));
         for assignment in overrides.fmu.iter().chain(&stand_in) {
             let refuse =
                 |message: String| Error::experiment(format!("--fmu {assignment}: {message}"));
