@@ -213,8 +213,10 @@ def fails(state):
 def test_an_error_of_a_law_is_one_wherever_it_flies(fly, tmp_path):
     (tmp_path / "gusts.toml").write_text(CAMPAIGN)
     (tmp_path / "study.toml").write_text(STUDY.format(lqr=experiment_path("lqr")))
-    with pytest.raises(LawError, match="the law fails failed .*at t = 0.52 s: ZeroDivisionError: so") as caught:
+    # Only a study's cases have numbers by which they can be flown again.
+    with pytest.raises(LawError, match="the law fails failed (in case 0 )?at t = 0.52 s: ZeroDivisionError: so") as caught:
         fly(tmp_path, fails)
+    assert (caught.value.case is None) == ("in case" not in str(caught.value))
     assert caught.value.time == pytest.approx(0.52) and 'raise ZeroDivisionError("so")' in str(caught.value)
 
 
@@ -224,6 +226,13 @@ def test_a_setting_that_does_nothing_to_a_law_says_so():
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         experiment("lqr", set={"controller.limit.rate": 0.1, "plant.disturbance.seed": 2}, stop=1.0, law=pd_law)
+
+
+def test_a_case_of_a_search_has_no_number(tmp_path):
+    (tmp_path / "gusts.toml").write_text(CAMPAIGN)
+    with pytest.raises(LawError, match="the law fails failed at t = 0.52 s") as caught:
+        falsify(tmp_path / "gusts.toml", out=tmp_path / "out", law=fails)
+    assert caught.value.case is None
 
 
 def test_what_a_law_cannot_fly_is_refused(tmp_path):

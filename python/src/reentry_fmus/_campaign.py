@@ -248,6 +248,8 @@ class Campaign:
         """Calls the orchestrator with this campaign, and returns what it prints."""
         command_line = [*self.command(command), *arguments]
         with self._laws() as laws:
+            if laws is not None:
+                laws.has_cases = command != "falsify"
             exit_code, error, printed = orchestrate(command_line, stacklevel=4, laws=laws)
         if exit_code != 0:
             raise OrchestratorError(error, exit_code, None)

@@ -85,6 +85,8 @@ class Laws:
     ) -> None:
         self.key = key
         """Name and hash, under which the orchestrator keeps what the law has flown."""
+        self.has_cases = True
+        """Whether the number of a case says which one it is. In a search it does not."""
         self.printed = bytearray()
         """What the orchestrator has printed."""
         self._make = make
@@ -103,7 +105,8 @@ class Laws:
             return self._ask(self._flights[number], time, told)
         if kind == b"b":
             case, *names = told.decode().split("\n")
-            flight = Flight(self._make(), int(case) if case else self._case, names)
+            is_numbered = case and self.has_cases
+            flight = Flight(self._make(), int(case) if is_numbered else self._case, names)
             self._flights[number] = flight
             if self._progress is not None:
                 self._progress.begin(flight.case)
