@@ -3,7 +3,7 @@
 //! else: variables, reference, sampling period, and the limits that the law is judged by.
 //!
 //! This program writes a message for each thing that it wants, the other one answers a question
-//! for a moment only. A message is a [`Kind`] as one byte, the number of a flight's law (u64), a
+//! for a moment only. A message is its kind as one byte, the number of a flight's law (u64), a
 //! time in s (f64), the length of what follows (u32), and what follows, all in little-endian order.
 
 use fmi_master::description::{ModelDescription, VariableKind};

@@ -48,7 +48,7 @@ pub(super) const DOMAINS: usize = 50;
 /// Widest sideslip angle of a domain, rad.
 pub(super) const WIDEST: f64 = 0.95;
 /// Rate at which the nominal motion brakes beyond the horizon, a = −κ x̃_ω, 1/s; for the sideslip
-/// it is the smallest rate, see [`super::braking`].
+/// it is the smallest rate, see the module `braking`.
 pub const BRAKING: f64 = 0.01;
 
 impl Geometry {
