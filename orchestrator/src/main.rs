@@ -31,7 +31,7 @@ use cosim::pacing;
 use cosim::search::named::{Kind, find};
 use failure::Failure;
 use fmu_import::crash;
-use fmu_import::law::Printed;
+use fmu_import::law::{self, Printed};
 use live::log::Messages;
 use plain::{Plain, plain};
 use run::Options;
@@ -64,9 +64,14 @@ fn main() -> ExitCode {
         .with_target(false)
         .init();
 
-    let out: Box<dyn Write> = match arguments.command.law() {
-        Some(_) => Box::new(Printed),
-        None => Box::new(stdout()),
+    let out: Box<dyn Write> = if arguments.command.law().is_some() {
+        if let Err(error) = law::begin() {
+            let _ = writeln!(stderr(), "error: standard output cannot be redirected: {error}");
+            return ExitCode::FAILURE;
+        }
+        Box::new(Printed)
+    } else {
+        Box::new(stdout())
     };
     let mut out = Plain(BufWriter::new(out));
     let interrupt = Interrupt::default();

@@ -1,13 +1,17 @@
 """Laws in Python in every loop and by every function that flies one, against LQR.fmu."""
 
+import shutil
 import subprocess
+import sys
 import warnings
+import zipfile
+from pathlib import Path
 
 import numpy as np
 import pytest
 from laws import lqr
 from laws import pd as pd_law
-from reentry_fmus import LawError, OrchestratorError, OrchestratorWarning, experiment, falsify, linearise, margins, reproduce
+from reentry_fmus import LawError, OrchestratorError, campaign, experiment, falsify, linearise, margins, reproduce
 from reentry_fmus._data import experiment_path, program
 from test_campaign import CAMPAIGN
 
@@ -220,12 +224,66 @@ def test_an_error_of_a_law_is_one_wherever_it_flies(fly, tmp_path):
     assert caught.value.time == pytest.approx(0.52) and 'raise ZeroDivisionError("so")' in str(caught.value)
 
 
-def test_a_setting_that_does_nothing_to_a_law_says_so():
-    with pytest.warns(OrchestratorWarning, match=r"controller.weight.P\[1\] has no effect on a law"):
-        experiment("lqr", set={"controller.weight.P[1]": 1.0}, stop=1.0, law=pd_law)
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        experiment("lqr", set={"controller.limit.rate": 0.1, "plant.disturbance.seed": 2}, stop=1.0, law=pd_law)
+def told(fly):
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        fly()
+    assert all(Path(warning.filename) == Path(__file__) for warning in caught)
+    return {str(warning.message) for warning in caught}
+
+
+def test_a_law_is_warned_of_what_its_fmu_is_warned_of(tmp_path):
+    """Only the parameters of the law that it replaces are none of its."""
+    (tmp_path / "idle.toml").write_text(
+        f"extends = ['{experiment_path('crmpc-robust')}']\n[isolation]\ncall_timeout = 2.0\n"
+    )
+    by_fmu = told(lambda: experiment(tmp_path / "idle.toml", stop=1.0, fmu={"controller": "LQR"}))
+    by_law = told(lambda: experiment(tmp_path / "idle.toml", stop=1.0, law=pd_law))
+    assert any("call_timeout has no effect" in text for text in by_law)
+    assert {text for text in by_fmu if "does not have these parameters" not in text} == by_law
+
+
+IDLE, ACTS = "controller.weight.P[1]", "controller.limit.rate"
+
+
+@pytest.mark.parametrize(
+    "fly",
+    [
+        lambda folder, name: experiment("lqr", set={name: 0.1}, stop=1.0, law=pd_law),
+        lambda folder, name: linearise("lqr", set={name: 0.1}, at=1.0, open="plant.moment.*", law=pd_law),
+        lambda folder, name: margins("lqr", set={name: 0.1}, at=1.0, open="plant.moment.*", law=pd_law),
+        lambda folder, name: campaign(changed(folder, f'[set]\n"{name}" = 0.1\n'), law=pd_law).run(),
+        lambda folder, name: campaign(
+            changed(folder, f'[[vary]]\nparameter = "{name}"\nuniform = [0.1, 0.2]\n'), law=pd_law
+        ).run(),
+    ],
+)
+def test_a_setting_that_does_nothing_to_a_law_says_so(fly, tmp_path):
+    expected = f"{IDLE} has no effect on the law pd: of its controller, a law has reference, limits, inputs and period"
+    assert told(lambda: fly(tmp_path, IDLE)) == {expected}
+    assert told(lambda: fly(tmp_path, ACTS)) == set()
+
+
+def changed(folder, text):
+    file = folder / f"changed-{len(list(folder.iterdir()))}.toml"
+    file.write_text(CAMPAIGN.replace("cases = 600", "cases = 4") + text)
+    return file
+
+
+@pytest.mark.skipif(shutil.which("cc") is None or sys.platform != "linux", reason="needs a C compiler and Linux")
+def test_what_an_fmu_prints_is_no_message_for_a_law(tmp_path):
+    library, model = tmp_path / "model.so", Path(__file__).parents[2] / "orchestrator/tests/model"
+    flags = ["-shared", "-fPIC", "-w", "-DPLACE=STEP", "-DHOW=FLOOD"]
+    subprocess.run(["cc", *flags, "-o", library, model / "model.c"], check=True)
+    with zipfile.ZipFile(tmp_path / "Model.fmu", "w") as archive:
+        archive.write(model / "modelDescription.xml", "modelDescription.xml")
+        archive.write(library, "binaries/linux64/model.so")
+    (tmp_path / "noisy.toml").write_text(
+        f"extends = ['{experiment_path('lqr')}']\n[components.noise]\nfmu = 'Model.fmu'\nunconnected = ['input']\n"
+    )
+    noisy = experiment(tmp_path / "noisy.toml", stop=0.2, law=pd_law)
+    quiet = experiment("lqr", stop=0.2, law=pd_law)
+    assert np.array_equal(noisy["controller.moment.x"], quiet["controller.moment.x"])
 
 
 def test_a_case_of_a_search_has_no_number(tmp_path):

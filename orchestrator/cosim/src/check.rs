@@ -2,7 +2,7 @@
 //! refused. After that only the instances themselves can fail.
 
 use crate::error::Error;
-use crate::experiment::{CONTROLLER, Coupling, Experiment};
+use crate::experiment::{Coupling, Experiment};
 use crate::search;
 use crate::settings;
 use crate::system::{CheckedComponent, Opened, System, parts};
@@ -41,8 +41,7 @@ pub fn check(
             None => Rc::new(open(&path)?),
         };
         opened.insert(path, Rc::clone(&fmu));
-        let is_law = experiment.law.is_some() && name == CONTROLLER;
-        let fmu = if is_law { Rc::new(fmu.flown_by_law()?) } else { fmu };
+        let fmu = if experiment.is_flown_by_law(&name) { Rc::new(fmu.flown_by_law()?) } else { fmu };
         let component = &experiment.components[&name];
         let is_isolated = experiment.isolation.isolates(component, &fmu, fmu_dirs);
         let (every, settings) = (component.every, Vec::new());
@@ -54,6 +53,7 @@ pub fn check(
     }
     experiment.isolation.check().map_err(|problem| experiment.isolation_error(&problem))?;
     warn_of_idle_keys(&experiment, &components);
+    experiment.warn_of_idle(experiment.assigned.iter().map(String::as_str));
     check_single_instances(&experiment, &components)?;
     if let Some(name) = &experiment.simulation.ends_with
         && !experiment.components.contains_key(name)

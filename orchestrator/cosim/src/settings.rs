@@ -38,7 +38,8 @@ pub(crate) fn resolve(
         let setting = Setting::new(name, written.get_ref(), index, part, wires, is_assigned);
         settings.push(setting.map_err(refuse)?);
     }
-    if !left_out.is_empty() {
+    // A law in another program has none of the parameters of its controller.
+    if !left_out.is_empty() && !experiment.is_flown_by_law(part.name) {
         warn_once(format!(
             "{} as \"{}\" does not have these parameters, which are left out: {}",
             part.description.model_name,

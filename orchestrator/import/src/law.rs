@@ -12,7 +12,13 @@ use fmi_master::instance::{CallFailure, Instance, Outcome};
 use parking_lot::Mutex;
 use std::cell::Cell;
 use std::collections::BTreeMap;
+use std::fs::File;
 use std::io::{self, Read, Write, stdin, stdout};
+#[cfg(unix)]
+use std::os::fd::AsFd;
+#[cfg(windows)]
+use std::os::windows::io::AsHandle;
+use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// What a message asks for.
@@ -46,6 +52,28 @@ pub fn in_case(case: Option<u64>) {
     CASE.set(case);
 }
 
+/// Standard output as it was when this program began.
+static MESSAGES: OnceLock<File> = OnceLock::new();
+
+/// Takes standard output for messages. What else prints there, such as an FMU, prints to standard
+/// error from now on.
+///
+/// # Errors
+/// Returns an error if standard output cannot be redirected.
+#[allow(unsafe_code)]
+pub fn begin() -> io::Result<()> {
+    #[cfg(unix)]
+    let messages = stdout().as_fd().try_clone_to_owned()?;
+    #[cfg(windows)]
+    let messages = stdout().as_handle().try_clone_to_owned()?;
+    // SAFETY: The call has no effect on memory.
+    if unsafe { libc::dup2(2, 1) } == -1 {
+        return Err(io::Error::last_os_error());
+    }
+    let _ = MESSAGES.set(messages.into());
+    Ok(())
+}
+
 /// Sends a message, and reads the answer.
 fn exchange(kind: Kind, law: u64, time: f64, told: &[u8], answer: &mut [u8]) -> io::Result<()> {
     let _turn = TURN.lock();
@@ -56,9 +84,8 @@ fn exchange(kind: Kind, law: u64, time: f64, told: &[u8], answer: &mut [u8]) -> 
     message.extend(time.to_le_bytes());
     message.extend(length.to_le_bytes());
     message.extend(told);
-    let mut out = stdout().lock();
+    let mut out = MESSAGES.get().ok_or(io::ErrorKind::NotConnected)?;
     out.write_all(&message)?;
-    out.flush()?;
     stdin().lock().read_exact(answer)
 }
 

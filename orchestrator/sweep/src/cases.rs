@@ -62,6 +62,8 @@ impl Sweep {
             varied.extend(distributions(vary, source, &system, variation.seed)?);
         }
         check_twice(&varied, variation, source, &system)?;
+        let paths = varied.iter().flat_map(|entry| &entry.paths).map(String::as_str);
+        system.experiment.warn_of_idle(paths.chain(variation.set.iter().copied()));
         check_design(&varied, variation, source)?;
         let correlation = correlation(variation.correlations, source, &varied)?;
         let levels = varied.iter().map(|entry| {

@@ -250,7 +250,7 @@ class Campaign:
         with self._laws() as laws:
             if laws is not None:
                 laws.has_cases = command != "falsify"
-            exit_code, error, printed = orchestrate(command_line, stacklevel=4, laws=laws)
+            exit_code, error, printed = orchestrate(command_line, laws=laws)
         if exit_code != 0:
             raise OrchestratorError(error, exit_code, None)
         return printed

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import json
 import os
 import subprocess
@@ -116,3 +117,12 @@ def need(module: str, extra: str) -> None:
             raise
         message = f'{module} is not installed: pip install "reentry-fmus[{extra}]"'
         raise ModuleNotFoundError(message, name=module) from None
+
+
+def caller() -> int:
+    """Returns how many levels of calls further up the line is that called this package."""
+    frame, level = inspect.currentframe(), 0
+    package = __name__.partition(".")[0]
+    while frame is not None and frame.f_globals.get("__name__", "").partition(".")[0] == package:
+        frame, level = frame.f_back, level + 1
+    return level

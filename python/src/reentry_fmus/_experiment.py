@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import warnings
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -11,15 +10,11 @@ import numpy as np
 
 from ._data import FMUS, experiment_path, fmu_path
 from ._law import STAND_IN, Laws, laws_of
-from ._orchestrator import OrchestratorError, OrchestratorWarning, orchestrate
+from ._orchestrator import OrchestratorError, orchestrate
 from ._run import Run, read
 from ._state import Law
 from ._table import Units, check_units
 from ._unpacked import Folder
-
-GROUPS = ("reference", "limit", "knownMoment", "trajectory", "achievedMoment", "scheduled")
-TOLD = (*(f"controller.{group}." for group in GROUPS), "controller.period.feedback")
-"""Beginnings of the names of what acts on a law, or on what it is judged by."""
 
 Value = bool | int | float | str
 """Value of a parameter: a number in the variable's SI unit, a truth value, the name of an
@@ -80,10 +75,6 @@ def changes(
     if law is not None:
         if "controller" in (fmu or {}):
             raise TypeError("the law replaces the controller: leave out its FMU")
-        for name in set or {}:
-            if name.startswith("controller.") and not name.startswith(TOLD):
-                text = f"{name} has no effect on a law: it has reference, limits, inputs and period"
-                warnings.warn(text, OrchestratorWarning, stacklevel=3)
         # One beside the experiment might be another.
         fmu = {**(fmu or {}), "controller": STAND_IN}
     arguments = ["--fmu-dir", str(FMUS)]
@@ -101,7 +92,6 @@ def recorded(
     arguments: Sequence[str],
     out: str | os.PathLike[str] | None,
     units: Units,
-    stacklevel: int = 4,
     laws: Laws | None = None,
 ) -> Run:
     """Calls the orchestrator for one run, and reads what it recorded."""
@@ -111,7 +101,7 @@ def recorded(
         # A folder of earlier results must not pass for those of a run that was refused.
         stale = folder / "results.json"
         before = stale.stat().st_mtime_ns if stale.exists() else None
-        exit_code, error, _ = orchestrate(command, stacklevel, laws=laws)
+        exit_code, error, _ = orchestrate(command, laws=laws)
         is_new = stale.exists() and stale.stat().st_mtime_ns != before
         run = read(folder, units) if is_new else None
     if run is not None and laws is not None:

@@ -13,7 +13,7 @@ import numpy as np
 from fmpy import fmi2
 from fmpy.fmi1 import FMICallException
 
-from ._data import hint
+from ._data import caller, hint
 from ._unpacked import copies
 
 Value = bool | int | float | str
@@ -109,7 +109,7 @@ class Instance:
             raise InstanceError(self.name, error.function, self._errors(str(error))) from None
         for status, message in self._messages:
             if status == fmi2.fmi2Warning:
-                warnings.warn(f"{self.name}: {message}", InstanceWarning, stacklevel=4)
+                warnings.warn(f"{self.name}: {message}", InstanceWarning, stacklevel=caller())
         return result
 
     # Variables

@@ -191,7 +191,7 @@ def answer(
     for signal in [open] if isinstance(open, str) else open:
         arguments += ["--open", signal]
     laws = None if law is None else laws_of(law)
-    exit_code, error, text = orchestrate(arguments, 4, laws=laws)
+    exit_code, error, text = orchestrate(arguments, laws=laws)
     if exit_code != 0:
         raise OrchestratorError(error, exit_code, None)
     found: dict[str, Any] = json.loads(text)

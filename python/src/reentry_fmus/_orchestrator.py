@@ -14,7 +14,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import IO, Any
 
-from ._data import program
+from ._data import caller, program
 from ._law import Laws
 from ._run import Run
 
@@ -36,17 +36,28 @@ class OrchestratorWarning(UserWarning):
 
 
 def orchestrate(
-    arguments: Sequence[str], stacklevel: int, level: str = "warn", laws: Laws | None = None
+    arguments: Sequence[str], level: str = "warn", laws: Laws | None = None
 ) -> tuple[int, str, str]:
     """Runs the orchestrator. Returns its exit code, the text of its error, and what it printed.
-    Its warnings are Python warnings, as many levels of calls further up as `stacklevel` says; with
-    the level "error" there are none. With `laws`, these give the moment in place of the controller;
-    an error of them ends the orchestrator and is raised."""
-    environment = {**os.environ, "RUST_LOG": level if laws is None else "error"}
+    Its warnings are Python warnings of the line that called this package; with the level "error"
+    there are none. With `laws`, these give the moment in place of the controller; an error of them
+    ends the orchestrator and is raised."""
+    command = [str(program()), *arguments]
+    environment = {**os.environ, "RUST_LOG": level}
     if laws is not None:
-        return converse([str(program()), *arguments, "--law", laws.key], environment, laws)
+        exit_code, said, printed = converse([*command, "--law", laws.key], environment, laws)
+    else:
+        exit_code, said, printed = listen(command, environment)
+    messages, _, error = said.partition("error: ")
+    for text in re.findall(r"^ *WARN (.+)$", messages, re.MULTILINE):
+        warnings.warn(text, OrchestratorWarning, stacklevel=caller())
+    return exit_code, reason(exit_code, error, said), printed
+
+
+def listen(command: list[str], environment: dict[str, str]) -> tuple[int, str, str]:
+    """Runs the orchestrator. Returns its exit code, its messages, and what it printed."""
     with subprocess.Popen(
-        [str(program()), *arguments],
+        command,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
@@ -58,14 +69,11 @@ def orchestrate(
         except BaseException:
             end(process)
             raise
-    messages, _, error = said.partition("error: ")
-    for text in re.findall(r"^ *WARN (.+)$", messages, re.MULTILINE):
-        warnings.warn(text, OrchestratorWarning, stacklevel=stacklevel)
-    return process.returncode, reason(process.returncode, error, said), printed
+    return process.returncode, said, printed
 
 
 def converse(command: list[str], environment: dict[str, str], laws: Laws) -> tuple[int, str, str]:
-    """Runs the orchestrator, and lets laws answer its messages."""
+    """Does as `listen`, and lets laws answer the orchestrator's questions."""
     head = laws.HEAD
     with tempfile.TemporaryFile() as messages:
         with subprocess.Popen(
@@ -94,8 +102,7 @@ def converse(command: list[str], environment: dict[str, str], laws: Laws) -> tup
             close(process.stdin)
         messages.seek(0)
         said = messages.read().decode(errors="replace")
-    error = reason(process.returncode, said.partition("error: ")[2], said)
-    return process.returncode, error, laws.printed.decode()
+    return process.returncode, said, laws.printed.decode()
 
 
 PATIENCE = 2.0

@@ -114,13 +114,15 @@ class Pool:
     def _begin(self, count: int) -> None:
         self._folder = self._folder or Folder()
         for number in range(len(self._workers), count):
-            place = (self._folder.path, number, self._core(number))
+            core = self._core(number) if count == cores() else None
+            place = (self._folder.path, number, core)
             self._workers.append(Worker(self._law, self._command, *place))
 
     def _core(self, number: int) -> int | None:
-        """Returns the core of a worker, if there is a worker for each. It and its orchestrator wait
-        for each other in turn, which takes a third of the time on the same core."""
-        if not hasattr(os, "sched_getaffinity") or self._jobs != cores():
+        """Returns the core of a worker, of which there is one for each core. It and its
+        orchestrator wait for each other in turn, which takes a third of the time on the same
+        core."""
+        if not hasattr(os, "sched_getaffinity"):
             return None
         return sorted(os.sched_getaffinity(0))[number]
 

@@ -79,7 +79,7 @@ def reproduce(
         if number is not None:
             command += [option, str(number)]
     # A study may have a thousand runs, and its report counts their warnings.
-    exit_code, error, _ = orchestrate(command, stacklevel=3, level="error", laws=laws)
+    exit_code, error, _ = orchestrate(command, level="error", laws=laws)
     if exit_code != 0:
         raise OrchestratorError(error, exit_code, None)
     results = json.loads((folder / "results.json").read_text("utf-8"))

@@ -63,7 +63,7 @@ def serve(
             break
         answer: Answer
         try:
-            exit_code, error, _ = orchestrate([*command, *arguments], 1, laws=laws)
+            exit_code, error, _ = orchestrate([*command, *arguments], laws=laws)
             answer = ("orchestrator", (error, exit_code)) if exit_code else ("done", None)
         except LawError as failed:
             answer = ("law", failed.args)

@@ -13,7 +13,6 @@ mod vehicle;
 pub use crate::watch::OnInvalid;
 pub use fmi_master::wiring::Coupling;
 pub use measures::{Curve, Guarantee, Loss, Margins, Measure, MeasureKind, Observe, Panel, Scaled};
-pub(crate) use overrides::CONTROLLER;
 pub use overrides::{Given, Overrides, name_of};
 pub use protection::Protection;
 pub use quantity::{Band, Quantity};

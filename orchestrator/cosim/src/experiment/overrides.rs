@@ -4,12 +4,13 @@ use super::{Coupling, Experiment, Protection};
 use crate::error::Error;
 use crate::watch::OnInvalid;
 use fmi_master::names;
+use fmu_import::warnings::warn_once;
 use std::collections::BTreeMap;
 use std::path::Path;
 use toml::{Spanned, Value};
 
 /// Component whose law another program may replace.
-pub(crate) const CONTROLLER: &str = "controller";
+const CONTROLLER: &str = "controller";
 /// FMU that stands in for such a law: it gives reference, sampling period and limits.
 const STAND_IN: &str = "LQR";
 
@@ -17,6 +18,12 @@ const STAND_IN: &str = "LQR";
 pub fn name_of(law: &str) -> &str {
     law.split_whitespace().next().unwrap_or_default()
 }
+
+/// Groups of the parameters that act on a law in another program, or on what it is judged by.
+const GROUPS_OF_LAW: [&str; 6] =
+    ["reference", "limit", "knownMoment", "trajectory", "achievedMoment", "scheduled"];
+/// The other parameter that does.
+const PERIOD_OF_LAW: &str = "period.feedback";
 
 /// Settings of an experiment that the command line may change.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -93,6 +100,28 @@ impl Experiment {
         match self.given.call_timeout {
             Some(time) => Error::experiment(format!("--call-timeout {time}: {problem}")),
             None => self.source.error(&(0..0), format!("[isolation] {problem}")),
+        }
+    }
+
+    /// Returns whether a law in another program gives the moment of a component.
+    pub(crate) fn is_flown_by_law(&self, component: &str) -> bool {
+        self.law.is_some() && component == CONTROLLER
+    }
+
+    /// Warns of parameters that are given for a flight by a law in another program, and do nothing
+    /// to it. `given` holds names such as "controller.weight.alpha".
+    pub fn warn_of_idle<'a>(&self, given: impl IntoIterator<Item = &'a str>) {
+        let Some(law) = self.law.as_deref().map(name_of) else { return };
+        let owned = given.into_iter().filter_map(names::split);
+        let acts = |name: &str| {
+            let group = name.split('.').next().unwrap_or_default();
+            name == PERIOD_OF_LAW || GROUPS_OF_LAW.contains(&group)
+        };
+        for (owner, name) in owned.filter(|(owner, name)| *owner == CONTROLLER && !acts(name)) {
+            warn_once(format!(
+                "{owner}.{name} has no effect on the law {law}: of its controller, a law has \
+                 reference, limits, inputs and period"
+            ));
         }
     }
 
