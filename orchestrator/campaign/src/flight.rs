@@ -93,6 +93,11 @@ impl<'a> Flight<'a> {
         self
     }
 
+    /// Leaves out the margins of cases, which are flown for their curves.
+    pub fn leave_out_margins(&mut self) {
+        self.instances.leave_out_margins();
+    }
+
     /// Returns the system whose cases are flown. Signals that are probed now are seen by observers.
     pub fn system(&mut self) -> &mut System {
         self.instances.system()

@@ -41,7 +41,8 @@ pub fn check(
             None => Rc::new(open(&path)?),
         };
         opened.insert(path, Rc::clone(&fmu));
-        let fmu = if experiment.is_flown_by_law(&name) { Rc::new(fmu.flown_by_law()?) } else { fmu };
+        let fmu =
+            if experiment.is_flown_by_law(&name) { Rc::new(fmu.flown_by_law()?) } else { fmu };
         let component = &experiment.components[&name];
         let is_isolated = experiment.isolation.isolates(component, &fmu, fmu_dirs);
         let (every, settings) = (component.every, Vec::new());

@@ -2,7 +2,7 @@
 
 use crate::Matrix;
 use crate::continuous::Continuous;
-use crate::margins::structured::golden;
+use crate::margins::structured::least;
 use crate::model::Step;
 use crate::realisation::least_squares;
 use crate::responses::{Lags, Scales};
@@ -105,7 +105,7 @@ pub(crate) fn delayed(
         let rest = (responses * &b - &measured).norm();
         (b, rest)
     };
-    let (middle, _) = golden(&mut |x| fit(0.5 + x).1, 0.5);
+    let (middle, _) = least(&mut |x| fit(0.5 + x).1, 0.5);
     let part = 0.5 + middle;
     // A change of the operating point over a step is no delay.
     let counts = (SMALLEST_PART..=1.0 - SMALLEST_PART).contains(&part);

@@ -110,6 +110,11 @@ impl<'a> Flight<'a> {
         self.times = true;
     }
 
+    /// Leaves out the margins of cases.
+    pub fn leave_out_margins(&mut self) {
+        self.lineariser = None;
+    }
+
     /// Replaces the bounds that end a case, and returns those before.
     pub fn replace_bounds(&mut self, bounds: Vec<Bound>) -> Vec<Bound> {
         std::mem::replace(&mut self.bounds, bounds)

@@ -34,6 +34,7 @@ pub(super) fn draw(
         return Ok(None);
     }
     let signals: Vec<_> = curves.iter().map(|(p, c)| (p.factor, c.signal.clone())).collect();
+    flight.leave_out_margins();
     let stride = (flight.system().clock.ticks() / POINTS).max(1);
     let mut track = |case: u64, stride: u64| {
         let mut track = Track::new(signals.clone(), stride);

@@ -10,7 +10,7 @@
 //! frequencies differ by multiples of that of the period. δ acts on each of them by itself, so that
 //! in these coordinates it is still diagonal.
 
-use super::structured::{ComplexMatrix, balanced, golden, largest_singular_value, upper_bound};
+use super::structured::{ComplexMatrix, balanced, largest_singular_value, least, upper_bound};
 use crate::model::{OpenLoop, Step};
 use crate::spectrum::dominant;
 use nalgebra::Complex;
@@ -131,7 +131,7 @@ impl<'a> Responses<'a> {
         let reach = (above / frequency).ln().max((frequency / below).ln());
         let limit = PI / self.open.period;
         let near = |x: f64| (frequency * (x * reach).exp()).min(limit);
-        let (x, negative) = golden(&mut |x| -value(chosen(&sensitivity(self.open, near(x)))), 1.0);
+        let (x, negative) = least(&mut |x| -value(chosen(&sensitivity(self.open, near(x)))), 1.0);
         if -negative > found {
             Peak { value: -negative, frequency: near(x) }
         } else {

@@ -6,7 +6,7 @@
 //! value is exact for up to three numbers. For more of them a balancing D is taken. A margin that
 //! follows from an upper bound is a safe one.
 
-use nalgebra::{Complex, DMatrix, Matrix2, Matrix3};
+use nalgebra::{Complex, ComplexField, DMatrix, Matrix2, Matrix3};
 
 /// A complex matrix.
 pub type ComplexMatrix = DMatrix<Complex<f64>>;
@@ -43,14 +43,14 @@ fn scaled_singular_value(matrix: &ComplexMatrix, d: [f64; 3]) -> f64 {
 
 /// Scales a matrix to D M D⁻¹ in which each row is as large as its column (E. E. Osborne, Journal
 /// of the ACM 7, 1960). Its largest singular value is an upper bound, and often a close one.
-pub fn balanced(mut matrix: ComplexMatrix) -> ComplexMatrix {
+pub fn balanced<T: ComplexField<RealField = f64>>(mut matrix: DMatrix<T>) -> DMatrix<T> {
     let n = matrix.nrows();
     for _ in 0..10 {
         for i in 0..n {
             let others =
                 |of: &dyn Fn(usize) -> f64| -> f64 { (0..n).filter(|j| *j != i).map(of).sum() };
-            let row = others(&|j| matrix[(i, j)].norm_sqr());
-            let column = others(&|j| matrix[(j, i)].norm_sqr());
+            let row = others(&|j| matrix[(i, j)].clone().modulus_squared());
+            let column = others(&|j| matrix[(j, i)].clone().modulus_squared());
             if row > 0.0 && column > 0.0 {
                 scale(&mut matrix, i, (column / row).powf(0.25));
             } else if row > 0.0 || column > 0.0 {
@@ -62,7 +62,7 @@ pub fn balanced(mut matrix: ComplexMatrix) -> ComplexMatrix {
     matrix
 }
 
-fn scale(matrix: &mut ComplexMatrix, i: usize, factor: f64) {
+fn scale<T: ComplexField<RealField = f64>>(matrix: &mut DMatrix<T>, i: usize, factor: f64) {
     matrix.row_mut(i).scale_mut(factor);
     matrix.column_mut(i).scale_mut(1.0 / factor);
 }
@@ -74,34 +74,60 @@ pub fn upper_bound(matrix: &ComplexMatrix) -> f64 {
     // One number of D is free; all others follow one inside the other.
     let with = |x: f64, y: f64| scaled_singular_value(&matrix, [1.0, x.exp(), y.exp()]);
     match matrix.nrows() {
-        2 => golden(&mut |x| with(x, 0.0), RANGE).1,
-        3 => golden(&mut |x| golden(&mut |y| with(x, y), RANGE).1, RANGE).1,
+        2 => least(&mut |x| with(x, 0.0), RANGE).1,
+        3 => least(&mut |x| least(&mut |y| with(x, y), RANGE).1, RANGE).1,
         _ => largest_singular_value(&matrix),
     }
 }
 
-/// Finds the least value of a convex function between −`range` and `range` by golden sections.
-/// Returns its place and the value.
-pub fn golden(function: &mut dyn FnMut(f64) -> f64, range: f64) -> (f64, f64) {
-    let share = 0.5 * (5.0_f64.sqrt() - 1.0);
+/// Finds the least value of a function with one minimum between −`range` and `range`, by parabolas
+/// through the best three points, or golden sections where they do not get nearer: R. Brent,
+/// "Algorithms for minimization without derivatives" (1973), chapter 5. Returns its place and the
+/// value.
+pub fn least(function: &mut dyn FnMut(f64) -> f64, range: f64) -> (f64, f64) {
+    let tolerance = 2.5e-9 * range;
+    let share = 0.5 * (3.0 - 5.0_f64.sqrt());
     let (mut low, mut high) = (-range, range);
-    let mut inner = [high - share * (high - low), low + share * (high - low)];
-    let mut values = inner.map(&mut *function);
-    while high - low > 1e-8 * range {
-        if values[0] < values[1] {
-            high = inner[1];
-            (inner[1], values[1]) = (inner[0], values[0]);
-            inner[0] = high - share * (high - low);
-            values[0] = function(inner[0]);
+    let start = low + share * (high - low);
+    // The best point, the next best, and the one that this was before.
+    let mut best = [(start, function(start)); 3];
+    let (mut step, mut before) = (0.0_f64, 0.0_f64);
+    loop {
+        let [(x, y), (x1, y1), (x2, y2)] = best;
+        let middle = 0.5 * (low + high);
+        if (x - middle).abs() <= 2.0 * tolerance - 0.5 * (high - low) {
+            return best[0];
+        }
+        let (r, q) = ((x - x1) * (y - y2), (x - x2) * (y - y1));
+        let (p, q) = ((x - x2) * q - (x - x1) * r, 2.0 * (q - r));
+        let parabola = -p / q;
+        let is_shrinking = parabola.abs() < 0.5 * before.abs();
+        let is_inside = x + parabola > low && x + parabola < high;
+        before = step;
+        if is_shrinking && is_inside {
+            step = parabola;
+            let ends = (x + step - low).min(high - x - step);
+            if ends < 2.0 * tolerance {
+                step = tolerance.copysign(middle - x);
+            }
         } else {
-            low = inner[0];
-            (inner[0], values[0]) = (inner[1], values[1]);
-            inner[1] = low + share * (high - low);
-            values[1] = function(inner[1]);
+            before = if x >= middle { low - x } else { high - x };
+            step = share * before;
+        }
+        let next = x + step.abs().max(tolerance).copysign(step);
+        let value = function(next);
+        if value <= y {
+            *(if next >= x { &mut low } else { &mut high }) = x;
+            best = [(next, value), best[0], best[1]];
+        } else {
+            *(if next < x { &mut low } else { &mut high }) = next;
+            if value <= y1 || x1 == x {
+                best = [best[0], (next, value), best[1]];
+            } else if value <= y2 || x2 == x || x2 == x1 {
+                best[2] = (next, value);
+            }
         }
     }
-    let best = usize::from(values[1] < values[0]);
-    (inner[best], values[best])
 }
 
 #[cfg(test)]
