@@ -11,7 +11,7 @@ use vehicle::translation::Planet;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Choice)]
 pub(crate) enum Translation {
     /// The flight condition is fixed by flight.altitude and flight.mach; the inputs trajectory.*
-    /// say how the trajectory turns.
+    /// give the turn of the trajectory.
     #[default]
     Given,
     /// An entry flight from the initial motion: the FMU computes the trajectory and the air.

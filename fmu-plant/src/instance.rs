@@ -154,7 +154,7 @@ impl Model for ReentryPlant {
 
     /// Copies the indicators, one for each deflection: the time until it comes to rest, or one
     /// second while it is at rest. They are positive between events and fall through zero with
-    /// slope −1. Two more are how far an entry flight is from its end.
+    /// slope −1. Two more are the distances of an entry flight from its end.
     fn event_indicators(&self, indicators: &mut [f64]) {
         indicators.copy_from_slice(self.output.indicators.as_slice());
     }

@@ -17,13 +17,13 @@ use crate::time::tolerance;
 use nalgebra::{SMatrix, Vector3};
 use serde::{Deserialize, Serialize};
 
-/// Command from which on a jet in on-off mode is switched on.
+/// Command at or above which a jet in on-off mode is switched on.
 pub const THRESHOLD: f64 = 0.5;
 
 /// Meaning of a jet's command at the instant at which it is taken.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum JetMode {
-    /// The jet gives full thrust for commands from [`THRESHOLD`] on and none below.
+    /// The jet gives full thrust for commands at or above [`THRESHOLD`] and none below.
     #[default]
     OnOff,
     /// The command is the mean thrust as a fraction of the full one.

@@ -73,7 +73,7 @@ pub struct Gust {
     #[setting(unit = "s", nominal = 100.0)]
     #[setting(used_with = "(~.north != 0 or ~.east != 0 or ~.down != 0)")]
     pub start: f64,
-    /// Time that the gust takes.
+    /// Duration of the gust.
     #[setting(unit = "s", min = 1e-3, nominal = 10.0)]
     #[setting(used_with = "(~.north != 0 or ~.east != 0 or ~.down != 0)")]
     pub duration: f64,
@@ -106,8 +106,8 @@ impl Undisturbed {
     }
 }
 
-/// The standard atmosphere along a short way: a parabola through three points. Its powers would
-/// otherwise take most of the time of an integration step.
+/// The standard atmosphere along a short path, as a parabola through three points: to evaluate its
+/// powers would take most of the time of an integration step.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct AlongTheWay {
     middle: f64,
@@ -116,7 +116,7 @@ pub(crate) struct AlongTheWay {
 }
 
 impl AlongTheWay {
-    /// Makes the parabola for a way from an altitude that is likely to change by `change` (m).
+    /// Makes the parabola for a path from an altitude that is likely to change by `change` (m).
     pub(crate) fn new(altitude: f64, change: f64) -> Self {
         let half = (0.5 * change.abs()).max(1.0).copysign(change);
         let middle = altitude + half;

@@ -1,9 +1,9 @@
-//! Endings of the names of vectors' entries, each with what the entry is for; and which angles
+//! Endings of the names of vectors' entries, each with the meaning of the entry; and which angles
 //! repeat after a whole turn.
 
 use std::f64::consts::TAU;
 
-/// Ending of a name, and what the entry is for.
+/// Ending of a name, and the meaning of the entry.
 pub type Entry = (&'static str, &'static str);
 
 /// Components of Θ by name.
@@ -35,7 +35,7 @@ pub const NUMBERED_STATE: [Entry; 6] = [
     ("[6]", "derivative of the bank angle"),
 ];
 
-/// Which of α, β and σ are the same attitude after a whole turn.
+/// Which of α, β and σ repeat after a whole turn.
 pub const REPEATS: [bool; 3] = [true, false, true];
 
 /// Returns the number of whole turns that brings `angle` nearest to `to` (rad).

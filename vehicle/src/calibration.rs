@@ -42,7 +42,7 @@ impl Sequence {
         let reach = initial.y.abs() + self.beta_amplitude.abs();
         if reach >= BETA_LIMIT {
             let problem = format!(
-                "= {} deg: with initial.beta beta comes to {} deg, it must stay within 90 deg",
+                "= {} deg: with initial.beta, beta reaches {} deg, but it must stay within 90 deg",
                 self.beta_amplitude.to_degrees(),
                 reach.to_degrees()
             );

@@ -241,7 +241,7 @@ mod tests {
     #[test]
     fn published_thrust_and_moments_in_either_unit() {
         // (64) is printed without a unit; N m is assumed. The thrust is 800 lbf and the moment
-        // limit of Chai 2022 10⁵ ft lbf, which speaks for ft lbf.
+        // limit of Chai 2022 10⁵ ft lbf, which suggests ft lbf.
         let (lbf, ft_lbf) = (4.448_221_615_260_5, 1.355_817_948_331_4);
         let effectors = Effectors::published();
         let limit = crate::Scenario::crmpc2022().limit_moment;

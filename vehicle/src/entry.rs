@@ -1,4 +1,4 @@
-//! Entry flight: the motion of the vehicle's centre of mass, and what the air does to it.
+//! Entry flight: the motion of the vehicle's centre of mass, and the effect of the air on it.
 //!
 //! The attitude angles Θ are counted from the trajectory's axes, that is from the velocity relative
 //! to the rotating planet. The air's forces follow from the flow past the vehicle, which a wind
@@ -218,12 +218,12 @@ impl Config {
         [motion[0] - self.end.altitude, motion[3] - self.end.speed]
     }
 
-    /// Returns what the air does to the vehicle at `time` (s).
+    /// Returns the effect of the air on the vehicle at `time` (s).
     pub fn passage(&self, time: f64, motion: &Motion, angles: &Vector3<f64>) -> Passage {
         self.passage_through(&self.air.at(time, motion[0]), motion, angles)
     }
 
-    /// Returns what the air does to the vehicle under given conditions.
+    /// Returns the effect of the air on the vehicle under given conditions.
     pub(crate) fn passage_through(
         &self,
         conditions: &Conditions,

@@ -10,8 +10,8 @@ pub fn uniform<const N: usize>(seed: u64, tick: i64) -> [f64; N] {
     Stream::new(seed).at(tick)
 }
 
-/// The numbers of [`uniform`] for ticks that follow each other. It stands at a tick, and a jump
-/// takes less time the nearer its end is.
+/// The numbers of [`uniform`] for ticks that follow each other. It has a current tick, and a jump
+/// to a nearby tick takes less time.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Stream<const N: usize> {
     seed: u64,
@@ -20,7 +20,7 @@ pub struct Stream<const N: usize> {
 }
 
 impl<const N: usize> Stream<N> {
-    /// Makes the stream of a seed, which stands at tick 0.
+    /// Makes the stream of a seed, at tick 0.
     pub fn new(seed: u64) -> Self {
         Self { seed, tick: 0, generator: Pcg64::seed_from_u64(seed) }
     }

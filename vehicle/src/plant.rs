@@ -7,8 +7,8 @@
 //! | `config`, `making` | the configuration of a plant, and the plant that is made from it |
 //! | `flight` | an entry flight |
 //! | `loads` | the inputs, and the moments and derivatives that follow from them |
-//! | `holding` | what is held from one event to the next |
-//! | `sensing` | what the sensors measure |
+//! | `holding` | quantities that are held from one event to the next |
+//! | `sensing` | measurements of the sensors |
 
 mod config;
 mod equations;
@@ -178,7 +178,7 @@ impl Plant {
             let end = cut.unwrap_or(to);
             let steps = equal_steps(end - time, self.step);
             let h = (end - time) / steps as f64;
-            // Over a longer way a parabola would not do.
+            // Over a longer path a parabola would be too inaccurate.
             let renewed = ((AIR_WAY / h) as u64).max(1);
             let mut air = None;
             for k in 0..steps {

@@ -54,7 +54,7 @@ impl LookupTable {
         if self.curvatures.len() == self.times.len() && finite {
             return Ok(());
         }
-        Err(Error::parameter("reference table", "has other curvatures than points"))
+        Err(Error::parameter("reference table", "must have one finite curvature for each time"))
     }
 
     /// Reads a CSV file with the headings `time_s` and, in any order, `alpha_deg` or `alpha_rad`,

@@ -107,7 +107,7 @@ impl Trajectory {
 pub struct Quantity {
     /// Name of the variable.
     pub name: &'static str,
-    /// What it is.
+    /// Description of the quantity.
     pub meaning: &'static str,
     /// Its unit.
     pub unit: &'static str,

@@ -41,7 +41,7 @@ struct Standing {
     at: Instant,
     /// Commanded angles Θ_c, rad.
     command: Vector3<f64>,
-    /// How far the angles θ are behind the command, Θ_c − θ, rad.
+    /// Lag of the angles θ behind the command, Θ_c − θ, rad.
     error: Vector3<f64>,
 }
 
@@ -56,7 +56,7 @@ pub struct Turntable {
 }
 
 impl Turntable {
-    /// Makes a turntable that stands at the first attitude that it is given, or `None` without a
+    /// Makes a turntable that starts at the first attitude that it is given, or `None` without a
     /// bandwidth.
     ///
     /// # Errors
@@ -152,7 +152,7 @@ impl Turntable {
             left -= way / drift;
             error += way;
         }
-        // The error of a servo that has followed the slope for long, if its rate allowed it.
+        // The steady error of a servo that follows the slope, if its rate limit allows it.
         let end = slope * tau;
         let limit = end.clamp(-edge, edge);
         let to_limit =

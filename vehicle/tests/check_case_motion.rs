@@ -26,9 +26,9 @@ fn position(planet: &Planet, altitude: f64, latitude: f64) -> [f64; 2] {
 }
 
 /// Cases 4, 5, 9 and 10: a sphere falls from 30,000 ft over a round Earth without and with
-/// rotation, and is shot to the east and to the north from the equator of the ellipsoid, through
-/// the standard atmosphere. The first two begin at 0.1 s, because the angles of the velocity have
-/// no meaning at rest.
+/// rotation, and is launched to the east and to the north from the equator of the ellipsoid,
+/// through the standard atmosphere. The first two begin at 0.1 s, because the angles of the
+/// velocity have no meaning at rest.
 #[test]
 fn published_a_sphere_falls_and_is_shot() {
     struct Case {

@@ -230,8 +230,8 @@ fn oracle_a_steep_ballistic_entry_by_allen_and_eggers() {
     }
 }
 
-/// What docs/entry.md says of the bound on the disturbance: the largest acceleration of an angle by
-/// what may be unknown of the air.
+/// Bound on the disturbance that docs/entry.md states: the largest acceleration of an angle by
+/// uncertainties of the air.
 #[test]
 fn oracle_what_is_unknown_of_the_air_takes_of_the_disturbance_bound() {
     let papers = Aerodynamics::papers();

@@ -1,5 +1,5 @@
-//! Tests of the platform's sensor readings against values by hand and numerically differentiated
-//! rotations.
+//! Tests of the platform's sensor readings against values computed by hand and numerically
+//! differentiated rotations.
 
 use nalgebra::{Matrix3, Vector3};
 use proptest::prelude::*;

@@ -1,5 +1,5 @@
-//! Tests of the sensors and their line, effect by effect, against values by hand and the statistics
-//! of the noise.
+//! Tests of the sensors and their line, effect by effect, against values computed by hand and the
+//! statistics of the noise.
 
 use nalgebra::{Matrix3, Vector3};
 use vehicle::platform::Readings;

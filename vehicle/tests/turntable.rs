@@ -1,5 +1,5 @@
-//! Tests of the turntable against a servo that is integrated in small steps, and against values by
-//! hand.
+//! Tests of the turntable against a servo that is integrated in small steps, and against values
+//! computed by hand.
 
 use nalgebra::Vector3;
 use proptest::prelude::*;

@@ -1,5 +1,5 @@
-//! Entry flights: co-simulation against model exchange, the end, partial derivatives, and what a
-//! fixed flight condition shows.
+//! Entry flights: co-simulation against model exchange, the end, partial derivatives, and the
+//! outputs of a fixed flight condition.
 
 use super::model_exchange::exchange;
 use super::{Constant, STATES, outputs, started, step};
@@ -203,7 +203,8 @@ fn oracle_long_steps_of_an_entry_agree_with_short_ones() {
     }
 }
 
-/// A flight has no course where it is vertical. It is told so, and not that an input is wrong.
+/// A flight has no course where it is vertical. The message says so, and not that an input is
+/// wrong.
 #[test]
 fn a_flight_that_becomes_vertical_is_an_error_that_says_so() {
     let mut instance = started(|instance| {

@@ -16,7 +16,7 @@ pub enum Field<'a> {
     Text(&'a mut String),
 }
 
-/// A value that an integer stands for.
+/// A value that is encoded as an integer.
 pub trait Numbered {
     /// Returns the integer.
     fn number(&self) -> i64;

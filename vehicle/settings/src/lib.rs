@@ -41,7 +41,7 @@
 //! |---|---|
 //! | `name` | name of the setting; by default the name of the field in camel case. Below a structure, names are joined by dots; an empty name adds nothing |
 //! | `unit` | unit of measure, such as `"rad/s2"` |
-//! | `rate` | the unit is that of the rate of what has the unit of the field that holds the structure |
+//! | `rate` | the unit is that of the time derivative of the field that holds the structure |
 //! | `min`, `max`, `above`, `below` | ends of the range; the last two are not allowed themselves |
 //! | `nominal` | typical magnitude |
 //! | `start` | value at the start, where no file has it, for [`start`] |
@@ -51,7 +51,7 @@
 //! | `used_with` | condition on other settings under which the setting has an effect, as `"profile = constant or sine"`; it is added to that of the structure, whose name `~` stands for |
 //! | `skip` | the field is no setting |
 //!
-//! What a field does not declare, it takes from the field that holds its structure.
+//! A field inherits the declarations that it lacks from the field that holds its structure.
 
 mod access;
 mod check;
@@ -84,7 +84,7 @@ pub trait Declared {
     fn field(&mut self, index: usize) -> Result<Field<'_>, usize>;
 }
 
-/// A setting: what its user has to know.
+/// A setting as its user sees it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Setting {
     /// Name, and everything else that is declared.

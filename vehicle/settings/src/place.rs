@@ -11,7 +11,7 @@ pub struct About {
     pub text: &'static str,
     /// Unit of measure: empty for that of the structure's field, `1` for none.
     pub unit: &'static str,
-    /// Whether the unit is that of the rate of what has the unit of the structure's field.
+    /// Whether the unit is that of the time derivative of the structure's field.
     pub is_rate: bool,
     /// Endings of the names of the entries, and what each is for.
     pub each: &'static [(&'static str, &'static str)],
@@ -126,7 +126,7 @@ impl Place {
         if self.text.is_empty() { text } else { format!("{}: {text}", self.text) }
     }
 
-    /// Returns what a value must satisfy, if it does not.
+    /// Returns the requirement that a value violates, if any.
     pub fn problem(&self, value: f64) -> Option<String> {
         let too_low = self.min.filter(|min| value < *min).map(|min| format!("at least {min}"));
         let too_high = self.max.filter(|max| value > *max).map(|max| format!("at most {max}"));

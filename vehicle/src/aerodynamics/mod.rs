@@ -237,7 +237,7 @@ impl Aerodynamics {
         coefficient::polynomial(factors, alpha.to_degrees()) * flux * BTU_PER_SQUARE_FOOT
     }
 
-    /// Returns where the numbers come from: the name of each group, and its source.
+    /// Returns the name and the source of each group of numbers.
     pub fn sources(&self) -> Vec<(&'static str, &str)> {
         let Moments {
             roll_by_sideslip,
@@ -271,7 +271,7 @@ impl Aerodynamics {
         others.into_iter().chain(given).collect()
     }
 
-    /// Returns what the vehicle is and what the data are good for.
+    /// Returns the description of the vehicle and of the validity of the data.
     pub fn title(&self) -> &str {
         &self.title
     }
@@ -281,7 +281,7 @@ impl Aerodynamics {
 mod tests {
     use super::*;
 
-    /// Every number says where it comes from, and every vehicle what it is.
+    /// Every number has a source, and every vehicle a description.
     #[test]
     fn every_number_has_a_source() {
         for vehicle in [Aerodynamics::shuttle(), Aerodynamics::papers()] {

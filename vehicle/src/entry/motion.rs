@@ -1,4 +1,4 @@
-//! The motion of the centre of mass as six numbers, and where it has a meaning.
+//! The motion of the centre of mass as six numbers, and the range in which they are defined.
 
 use crate::error::Error;
 use crate::math::{atan2, hypot, sin_cos};
@@ -18,7 +18,7 @@ pub const STEEPEST: f64 = std::f64::consts::FRAC_PI_2 - 1e-4;
 pub struct Quantity {
     /// Name of the variable.
     pub name: &'static str,
-    /// What it is.
+    /// Description of the component.
     pub meaning: &'static str,
     /// Its unit, and that of its rate.
     pub units: [&'static str; 2],

@@ -47,7 +47,7 @@ pub struct Config {
     /// Configuration of sampled sensors; without it the plant outputs the readings of ideal
     /// sensors.
     pub sensors: Option<sensors::Config>,
-    /// Servo of the turntable on which sampled sensors stand.
+    /// Servo of the turntable on which sampled sensors are mounted.
     pub turntable: turntable::Config,
     /// Longest step of the integration, s.
     pub step: f64,

@@ -140,7 +140,7 @@ impl Plant {
         parts(&rk4(&mut f, begin, &joint(&self.motion, &self.state), h))
     }
 
-    /// Standard atmosphere along the way that an entry flight takes within `length` (s).
+    /// Standard atmosphere along the path of an entry flight over `length` (s).
     pub(super) fn air_ahead(&self, length: f64) -> AlongTheWay {
         AlongTheWay::new(self.motion[0], self.motion[3] * sin(self.motion[4]) * length)
     }
@@ -153,7 +153,7 @@ impl Plant {
         self.entry.as_ref().map_or(Ok(()), |_| entry::check(motion, time))
     }
 
-    /// Whether the entry flight has ended if it came to this motion.
+    /// Whether an entry flight with this motion has ended.
     pub(super) fn has_ended_at(&self, motion: &Motion) -> bool {
         self.entry
             .as_ref()

@@ -1,4 +1,4 @@
-//! Makes a plant from its configuration, and checks that.
+//! Makes a plant from its configuration, which it checks.
 
 use super::Plant;
 use super::config::{Calibration, Config};
@@ -171,7 +171,7 @@ fn check_motion(config: &Config) -> Result<(), Error> {
     if let Some(entry) = &config.entry {
         entry.check(&config.motion)?;
         if config.calibration.is_some() {
-            let problem = "prescribes the attitude, as an entry flight does not allow";
+            let problem = "prescribes the attitude, which an entry flight does not allow";
             return Err(Error::parameter("calibration.active", problem));
         }
     } else if !config.motion.iter().all(|value| value.is_finite()) {

@@ -80,7 +80,7 @@ fn flaps(deflection_deg: f64) -> Command {
     command
 }
 
-/// A plant whose sensors stand on a slow turntable.
+/// A plant whose sensors are mounted on a slow turntable.
 fn on_a_turntable() -> Config {
     let data = SensorData::embedded();
     Config {

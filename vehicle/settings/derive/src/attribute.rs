@@ -12,7 +12,7 @@ pub(crate) struct Keys {
     pub(crate) skip: bool,
     /// The sentence of the field continues that of the field that holds its structure.
     part: bool,
-    /// The unit is that of the rate of what has the unit of the field that holds the structure.
+    /// The unit is that of the time derivative of the field that holds the structure.
     rate: bool,
     pub(crate) name: Option<String>,
     text: Option<String>,
