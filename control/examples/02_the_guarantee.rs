@@ -14,7 +14,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let scenario = Scenario::crmpc2022();
     let settings = Settings::new(Constraints::Robust);
 
-    // Errors of the measured rates have to be made up for by moment that the disturbance needs as
+    // To compensate for errors of the measured rates takes moment that the disturbance needs as
     // well.
     let with_errors = Settings {
         angle_error: 0.25_f64.to_radians(),

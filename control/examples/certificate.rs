@@ -1,4 +1,4 @@
-//! Measures what the certificate of a plan costs, and whether it holds to its edge:
+//! Measures the cost of the certificate of a plan, and whether it holds up to its edge:
 //!
 //! ```text
 //! cargo run --release -p reentry-control --example certificate -- ARGUMENTS
@@ -11,8 +11,8 @@
 //! prints EMS, kept plans and computing times; COMMON and TENSOR are the bounds on the inertia
 //! error as a common factor and of the tensor. `edge` flies COUNT flights, with the seeds from
 //! FIRST on, that begin just inside the set of certified states, optimising every PERIOD seconds.
-//! `late` flies COUNT flights whose commands act up to 0.01 s earlier or later than after the 0.04
-//! s that the controller is told. A line shows each broken promise with its seed.
+//! `late` flies COUNT flights whose commands act up to 0.01 s earlier or later than after the
+//! declared 0.04 s. A line shows each violation of the guarantee with its seed.
 
 #[path = "../tests/harness/mod.rs"]
 mod harness;

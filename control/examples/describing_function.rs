@@ -1,5 +1,5 @@
-//! Describing function of the jets' pulse modulation: gain and phase that a sinusoidal command of a
-//! given amplitude and frequency sees. `cargo run --release -p reentry-control --example
+//! Describing function of the jets' pulse modulation: gain and phase for a sinusoidal command of a
+//! given amplitude and frequency. `cargo run --release -p reentry-control --example
 //! describing_function`
 
 use control::allocation::Settings;

@@ -43,9 +43,9 @@ fn main() {
     }
 }
 
-/// Returns how far a plan at rest is moved at least if a search fails, over attitudes and
-/// directions: the smallest share of the way to the optimum without constraints, and by how much
-/// its end comes nearer at least to a reference that is further away than the horizon reaches, rad.
+/// Returns the least move of a plan at rest if a search fails, over attitudes and directions: the
+/// smallest share of the way to the optimum without constraints, and the least approach of its end
+/// to a reference beyond the reach of the horizon, rad.
 fn kept(settings: &Settings) -> (f64, f64) {
     let mut law = Crmpc::new(*settings).unwrap();
     let (ratio, period) = (law.design().ratio as u64, settings.period_feedback);
@@ -65,7 +65,7 @@ fn kept(settings: &Settings) -> (f64, f64) {
         let plan = &memory.plan;
         let end = plan.states[settings.horizon].fixed_rows::<3>(0);
         let nearer = (to - from).norm() - (to - end).norm();
-        // The way to the optimum without constraints is as many times as long as its acceleration.
+        // The distance to the optimum without constraints scales with its acceleration.
         let mut free = law.memory();
         let near = from + (to - from) * 1e-4;
         let reference = |_| Reference { angles: near, ..Reference::default() };

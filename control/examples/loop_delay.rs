@@ -81,7 +81,7 @@ fn outcome(is_lqr: bool, scenario: &Scenario, (told, truly): (f64, f64)) -> [f64
 fn main() {
     let flights: u64 = std::env::args().nth(1).and_then(|n| n.parse().ok()).unwrap_or(100);
     println!(
-        "law, disturbance, told, truly: share found within 10 s, found ever, 95 % found at; assumptions contradicted within 10 s, ever; estimates"
+        "law, disturbance, declared and true delay: share found within 10 s, found ever, 95 % found at; assumptions contradicted within 10 s, ever; estimates"
     );
     for is_lqr in [false, true] {
         for kind in [DisturbanceKind::White, DisturbanceKind::Constant, DisturbanceKind::Square] {

@@ -131,8 +131,8 @@ fn write_samples(
                 plan.accelerations.iter().map(|a| <[f64; 3]>::from(*a)).collect();
             json!({ "states": states, "accelerations": accelerations })
         });
-        // The problem is that of the second way. The third linearises its norm constraints about a
-        // point, and its bounds are those about it.
+        // The problem is that of the Riccati method. The cone solver linearises its norm
+        // constraints about a point, and its bounds are those about it.
         let sample = json!({
             "set": set,
             "time": time,

@@ -6,8 +6,8 @@
 //! ```
 //!
 //! The search consists of a coarse grid over three seeds, then of steps from its best sets over
-//! SEEDS (10) seeds, halved until none leads further. There are two criteria, both of means over
-//! the seeds and of the largest rate in any of them (‖m‖ keeps its limit by construction):
+//! SEEDS (10) seeds, halved until none is an improvement. There are two criteria, both of means
+//! over the seeds and of the largest rate in any of them (‖m‖ keeps its limit by construction):
 //!
 //! - `tuned`: the least CMS of all gains that are no worse than the published ones in EMS and in
 //!   the largest ‖ω‖;
@@ -117,7 +117,7 @@ impl Criterion {
         allowed
     }
 
-    /// Takes steps from `start` until none leads further, and adds the sets that it tries to
+    /// Takes steps from `start` until none is an improvement, and adds the sets that it tries to
     /// `tried`.
     fn search(&self, start: Score, published: &Score, seeds: u64, tried: &mut Vec<Score>) -> Score {
         let mut chosen = start;

@@ -15,7 +15,8 @@ mod still {
     use std::ops::{Add, Sub};
     use std::time::Duration;
 
-    /// A point in time, counted from the beginning: what is used of [`std::time::Instant`].
+    /// A point in time, counted from the beginning: the part of [`std::time::Instant`] that is
+    /// used.
     #[derive(Clone, Copy, Debug, PartialEq, PartialOrd)]
     pub(crate) struct Instant(Duration);
 

@@ -12,7 +12,7 @@ pub struct Measurement {
     /// Angles of attack, sideslip and bank, Θ = [α, β, σ], rad.
     pub angles: Vector3<f64>,
     /// Body rates, ω = [p, q, r], rad/s; relative to the axes that turn with the trajectory, if
-    /// [`Measurement::relative_to`] has been told of its turn.
+    /// [`Measurement::relative_to`] was given their turn rate.
     pub rates: Vector3<f64>,
     /// Part of `rates` that the turn of these axes adds, w = R⁻¹ Δ_f, rad/s.
     pub turn: Vector3<f64>,
@@ -25,7 +25,7 @@ pub struct Measurement {
     /// Limits that hold at present.
     pub scheduled: Scheduled,
     /// Whether the measurement was made at an earlier instant than the tick, because the
-    /// communication step is longer than the period or no multiple of it.
+    /// communication step is longer than the period or not a multiple of it.
     pub stale: bool,
     /// Fault that the measurements up to this one show without knowledge of the law.
     pub doubt: Option<Doubt>,
@@ -53,7 +53,7 @@ impl Default for Scheduled {
 pub enum Doubt {
     /// Angles and rates have been the same at three ticks, although the vehicle moves.
     Frozen,
-    /// The delay of the loop is another one than the declared one.
+    /// The delay of the loop differs from the declared one.
     OtherDelay,
     /// The acceleration over the last period is larger than [`Controller::explained`].
     Unexplained,
@@ -61,12 +61,12 @@ pub enum Doubt {
 
 impl Measurement {
     /// Returns the measurement with the rates relative to axes that turn with the trajectory, for a
-    /// law that takes Θ̇ = R ω to be true. While the trajectory turns, Θ̇ = R ω + Δ_f by Chai 2022
-    /// (2), with Δ_f by Wu 2015 (1); relative to it, Θ̇ = R (ω + R⁻¹ Δ_f). `turn_rate` (rad/s)
-    /// comes from [`vehicle::trajectory::Trajectory::turn_rate`].
+    /// law that assumes Θ̇ = R ω. While the trajectory turns, Θ̇ = R ω + Δ_f by Chai 2022 (2), with
+    /// Δ_f by Wu 2015 (1); relative to it, Θ̇ = R (ω + R⁻¹ Δ_f). `turn_rate` (rad/s) comes from
+    /// [`vehicle::trajectory::Trajectory::turn_rate`].
     ///
-    /// What this leaves for the law to bear as a disturbance is of second order: the change of
-    /// R⁻¹ Δ_f, and what the gyroscopic moment of the relative rates lacks.
+    /// The remaining disturbance of the law is of second order: the change of R⁻¹ Δ_f, and the part
+    /// that the gyroscopic moment of the relative rates lacks.
     #[must_use]
     pub fn relative_to(self, turn_rate: &Vector3<f64>) -> Self {
         if *turn_rate == Vector3::zeros() {
@@ -131,14 +131,14 @@ pub fn saturated(moment: Vector3<f64>, limit: f64) -> Vector3<f64> {
         let excess = moment.norm() / limit;
         if excess > 1.0 { moment / excess } else { moment }
     };
-    // The second scaling takes away what rounding leaves above the limit.
+    // The second scaling removes the excess that rounding leaves above the limit.
     scaled(scaled(moment))
 }
 
 /// A sampled attitude controller: a law that commands a moment, and that is informed if a limit
-/// reduces it. Of what later calls depend on, `update` changes `memory` alone. A tick can therefore
-/// be evaluated again with other inputs from the same memory, and a saved memory continues bit for
-/// bit.
+/// reduces it. Of the data on which later calls depend, `update` changes `memory` alone. A tick can
+/// therefore be evaluated again with other inputs from the same memory, and a saved memory
+/// continues bit for bit.
 pub trait Controller {
     /// The state of the controller that is carried from tick to tick.
     type Memory: Clone + Default + Serialize + DeserializeOwned + Send;
@@ -170,8 +170,8 @@ pub trait Controller {
         f64::INFINITY
     }
 
-    /// Returns the angular acceleration that the law's assumptions explain, if it has any. Another
-    /// delay than the declared one is then reported only if they do not explain the measurements.
+    /// Returns the angular acceleration that the law's assumptions explain, if it has any. A delay
+    /// other than the declared one is then reported only if they do not explain the measurements.
     fn explained(&self) -> Option<Explained> {
         None
     }
@@ -181,8 +181,8 @@ pub trait Controller {
     fn limited(&mut self, _memory: &mut Self::Memory, _applied: &Vector3<f64>) {}
 
     /// Evaluates a tick, and returns the moment to hold until the next one, N m: the command less
-    /// what is known to act already. It is limited here alone, except that the inner law of
-    /// [`Dlmpc`](crate::Dlmpc) also limits its moment. A limit that is scheduled always holds.
+    /// the moment that is known to act already. It is limited here alone, except that the inner law
+    /// of [`Dlmpc`](crate::Dlmpc) also limits its moment. A limit that is scheduled always holds.
     fn update(
         &mut self,
         memory: &mut Self::Memory,

@@ -137,7 +137,7 @@ pub struct Memory<M> {
     pub loop_delay: LoopDelay,
     /// Turns of the measured angles and of the reference.
     pub turns: Turns,
-    /// Last measurement, and how often it has come.
+    /// Last measurement, and how often it has repeated.
     pub frozen: Frozen,
 }
 

@@ -1,17 +1,17 @@
-//! Detection of measurements that have stopped to change.
+//! Detection of measurements that have stopped changing.
 
 use crate::controller::Measurement;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-/// Number of ticks with the same measurement from which on it counts as frozen.
+/// Number of ticks with the same measurement after which it counts as frozen.
 const TICKS: u32 = 3;
-/// Rates below which the same measurement may come again, because the vehicle is at rest, rad/s.
+/// Rates below which a measurement may repeat, because the vehicle is at rest, rad/s.
 const AT_REST: f64 = 1e-5;
 /// Largest difference between equal rates, which may have passed through other axes, rad/s.
 const ROUNDING: f64 = 1e-14;
 
-/// The last measurement, and how often it has come.
+/// The last measurement, and how often it has repeated.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Frozen {
     last: Option<[Vector3<f64>; 2]>,

@@ -14,9 +14,9 @@
 //! This is a prediction-error method (L. Ljung, System Identification, 1999, section 13.4), which
 //! may be used in a closed loop: at the right delay the residual is not correlated with any earlier
 //! command. That is not so for noise of the measurements, to which the next command responds while
-//! the noise itself looks like an acceleration, nor for a disturbance that repeats itself. Where a
-//! law states the acceleration that its assumptions explain, another delay is therefore reported
-//! only if the measurements show more than that with the declared delay.
+//! the noise itself looks like an acceleration, nor for a periodic disturbance. Where a law states
+//! the acceleration that its assumptions explain, another delay is therefore reported only if the
+//! measurements exceed it with the declared delay.
 
 use crate::controller::{Explained, Measurement};
 use nalgebra::Vector3;
@@ -42,7 +42,7 @@ const PARTS: usize = 4;
 /// Residual of a period with the best delay, relative to the root mean square, above which the
 /// period has a smaller weight.
 const USUAL: f64 = 3.0;
-/// Acceleration below which nothing is evidence, because the model is not exact, rad/s².
+/// Acceleration that is too small to be evidence, because the model is not exact, rad/s².
 const FLOOR: f64 = 1e-3;
 /// Largest factor between the actual and the assumed inertia.
 const GAIN: f64 = 1.25;
@@ -115,8 +115,8 @@ pub struct LoopDelaySettings {
     /// Acceleration that the law's assumptions explain with that delay, if it has any.
     pub explained: Option<Explained>,
     /// Whether measurements are old when they arrive. They come through a filter then, and their
-    /// noise would be taken for a response: no estimate is made. What the law's assumptions explain
-    /// is judged all the same.
+    /// noise would be taken for a response: no estimate is made. The law's assumptions are checked
+    /// nevertheless.
     pub is_filtered: bool,
 }
 
@@ -223,14 +223,14 @@ impl LoopDelaySettings {
         commands[0] = self.body.inverse * command;
     }
 
-    /// Replaces the newest command by the moment that a limit leaves of it, N m.
+    /// Replaces the newest command by the moment to which a limit reduces it, N m.
     pub fn limit(&self, memory: &mut LoopDelay, applied: &Vector3<f64>) {
         if let Some(newest) = memory.commands.first_mut() {
             *newest = self.body.inverse * applied;
         }
     }
 
-    /// Adds the last period to the fits, and makes the estimate anew from time to time.
+    /// Adds the last period to the fits, and updates the estimate from time to time.
     fn weigh(&self, memory: &mut LoopDelay) {
         let retained = exp(-self.period / FORGETTING);
         let commands = &memory.commands[self.first()..];

@@ -1,5 +1,4 @@
-//! What a law sees of angles that repeat after a whole turn, and of a reference that contradicts
-//! itself.
+//! Treatment of angles that repeat after a whole turn, and of a reference that contradicts itself.
 //!
 //! Angle of attack and bank angle are the same attitude after a turn of 360°. A vehicle or an
 //! estimator may count them from −180° to 180°, and a reference may jump from one end to the other.
@@ -13,8 +12,8 @@ use std::f64::consts::PI;
 use vehicle::axes::{REPEATS, nearest, turned, turns};
 use vehicle::reference::Reference;
 
-/// By how much the reference may be further than half a turn before the other way round is taken:
-/// noise does not reverse a turn of 180°, rad.
+/// Excess over half a turn of the reference above which the other direction is taken: noise does
+/// not reverse a turn of 180°, rad.
 const HYSTERESIS: f64 = 2.0 * PI / 180.0;
 /// Time after which a contradiction between angles and rates is reported, and the part of it that a
 /// single change of the reference can take, s.
@@ -33,11 +32,11 @@ pub struct Turns {
     angles: Vector3<f64>,
     /// Whole turns that are added to the reference; `None` before the first tick.
     reference: Option<Vector3<f64>>,
-    /// Reference when it was looked at last, and the time (s).
+    /// Reference at the last check, and the time (s).
     last: Option<(f64, Reference)>,
     /// Time for which the reference's rates have not been the derivatives of its angles, s.
     contradicting: f64,
-    /// Whether they have not been for a second.
+    /// Whether they have not been so for a second.
     pub contradicts: bool,
 }
 

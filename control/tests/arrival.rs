@@ -35,7 +35,7 @@ const HELD_OUT: u64 = 1051;
 const MOST: u32 = 60;
 const MOST_IN_MOTION: u32 = 130;
 
-/// A jump of the reference, with the vehicle's start and what disturbs it.
+/// A jump of the reference, with the vehicle's start and the disturbance.
 #[derive(Clone, Copy, Debug)]
 struct Jump {
     horizon: usize,
@@ -50,7 +50,7 @@ struct Jump {
     delay: f64,
 }
 
-/// What came out: when the vehicle arrived for good, s, and the time of a turn; whether the
+/// Result of a jump: when the vehicle arrived for good, s, and the time of a turn; whether the
 /// guarantee was in force at the jump and at every tick behind it; the most iterations of an
 /// optimisation.
 #[derive(Default)]

@@ -40,7 +40,7 @@ struct Axis {
 
 impl Axis {
     /// Simulates the axis. `plan` is the plan's acceleration from each tick on; the one before the
-    /// first is zero. `jump` is by how much Δ makes the rate jump in a part.
+    /// first is zero. `jump` is the jump of the rate by Δ in a part.
     fn new(
         (settings, delay, late): (&Settings, i32, i32),
         plan: impl Fn(i32) -> f64,
@@ -137,7 +137,7 @@ fn oracle_the_worst_disturbance_reaches_no_further() {
     }
 }
 
-/// Returns what is carried along at each stage.
+/// Returns the propagated deviation at each stage.
 fn carried(switching: &Switching, plan: &impl Fn(i32) -> f64, ratio: i32) -> Vec<Carried> {
     let mut carried = Carried::zeros();
     let stages = 0..TICKS / ratio;
@@ -216,7 +216,7 @@ fn sizes(deviation: &Deviation) -> [f64; 7] {
 fn oracle_changes_at_every_optimisation_leave_as_much_as_is_expected_for_ever() {
     for (delay, error) in CASES {
         let switching = Design::new(&settings(delay, error)).unwrap().tightening.switching.unwrap();
-        // What the motion begins with, and the size of each change later on.
+        // Change at the beginning of the motion, and the size of each later change.
         for (first, each) in [(1.0, 0.0), (0.0, 1.0), (1.0, 0.1)] {
             let mut carried = switching.begin(&Carried::zeros(), first);
             let bounds = sizes(&switching.forever(&carried, each));

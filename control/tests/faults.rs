@@ -1,5 +1,5 @@
-//! What the status of the guarantee says where the assumptions are not true: a limit may only be
-//! exceeded while the guarantee is not in force. And it stays in force while they are true.
+//! The status of the guarantee where the assumptions are violated: a limit may only be exceeded
+//! while the guarantee is not in force. It stays in force while they are true.
 
 mod harness;
 

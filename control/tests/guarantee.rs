@@ -276,8 +276,8 @@ fn second_prediction(settings: &Settings) -> f64 {
 
 #[test]
 fn regress_errors_grow_over_the_delay() {
-    // What F changes along the prediction enlarges the errors of two measurements before the next
-    // one shows it. The bound did not count this, and was exceeded.
+    // The change of F along the prediction enlarges the errors of two measurements before the next
+    // one shows it. The bound once omitted this, and was exceeded.
     let error = 0.2_f64.to_radians();
     let settings = Settings {
         feedback: Gain { k1: -0.5, k2: -1.5 },

@@ -1,4 +1,4 @@
-//! Loops in which the air's static moments act, of which the laws are told or not.
+//! Loops in which the air's static moments act, with and without these as inputs of the laws.
 
 use control::Crmpc;
 use control::controller::{Controller, Measurement};

@@ -1,4 +1,4 @@
-//! Loops while the trajectory turns, of which the laws are told or not.
+//! Loops while the trajectory turns, with and without the turn as an input of the laws.
 
 use control::Crmpc;
 use control::controller::{Controller, Measurement};
@@ -78,7 +78,7 @@ fn oracle_a_turn_that_is_known_leaves_the_guarantee_in_force() {
         for turn in [0.1, 0.35, 0.6] {
             let mut scenario = Scenario::crmpc2022();
             scenario.disturbance.kind = kind;
-            // What is left of the turn is a part of Δ.
+            // The remainder of the turn is a part of Δ.
             scenario.disturbance.bound -= 0.15_f64.to_radians() * turn / 0.6;
             let (share, rate, why) = guaranteed(&scenario, turn, true, 0.1);
             assert!(share == 1.0 && rate <= 1.0, "{kind:?} {turn}: {share} {rate} {why}");
@@ -142,7 +142,7 @@ fn a_turn_that_jumps_at_an_optimisation_ends_the_guarantee() {
         angles: scenario.initial_angles,
         ..Default::default()
     };
-    // The vehicle rests, and is told of turns from tick 20 on, which is an optimisation.
+    // The vehicle rests, and receives turns from tick 20 on, which is an optimisation.
     for (tick, jump) in (0..=20).map(|tick| (tick, if tick < 20 { 0.2 } else { 0.35 })) {
         let turn = Vector3::z() * f64::to_radians(jump);
         let measured =

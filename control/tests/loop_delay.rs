@@ -11,7 +11,7 @@ const PERIOD: f64 = 0.04;
 
 /// Outcome of a flight.
 struct Flight {
-    /// Time at which another delay than the declared one is found, s.
+    /// Time at which a delay other than the declared one is found, s.
     found_at: Option<f64>,
     /// Estimated delay at the end, s.
     estimate: f64,

@@ -108,7 +108,7 @@ fn oracle_no_start_and_no_reference_breaks_a_limit_that_changes() {
     }
 }
 
-/// Flies, and returns what contradicted the assumptions first.
+/// Flies, and returns the first contradiction of the assumptions.
 fn followed(flight: &Flight) -> (Contradiction, Shown) {
     let mut first = Contradiction::None;
     let shown = flight.fly_seen(|memory, _, _, _| {

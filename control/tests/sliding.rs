@@ -184,7 +184,7 @@ fn oracle_cross_product_is_skew() {
     assert!(momentum.dot(&(body.inertia * free - printed)).abs() > 1e-3 * momentum.norm_squared());
 }
 
-// What the paper says of its gains.
+// Statements of the paper about its gains.
 
 #[test]
 fn published_larger_c_and_lambda_converge_faster_and_demand_more() {
@@ -226,8 +226,8 @@ fn published_8_5_3_suit_the_observer() {
 
 #[test]
 fn published_a_thicker_layer_has_less_chatter_and_a_larger_error() {
-    // Section 4.3, on BTVSMC. What the law cannot know makes it chatter: here its moment acts one
-    // tick late. The sum of second differences from 5 s on measures that.
+    // Section 4.3, on BTVSMC. An effect that the law does not know makes it chatter: here its
+    // moment acts one tick late. The sum of second differences from 5 s on measures that.
     let outcome = |h: f64, late: bool| {
         let settings = Settings::btvsmc();
         let reaching = BoundaryLayer { h: [h; 3], ..settings.reaching };
@@ -324,7 +324,7 @@ fn the_moment_of_a_tick_does_not_depend_on_the_moment_achieved_before_it() {
         first
     });
     assert_eq!(one, two);
-    assert_ne!(memory, other, "but what follows does");
+    assert_ne!(memory, other, "but its consequences do");
 }
 
 #[test]

@@ -302,9 +302,9 @@ fn oracle_least_reaching_gain_balances_the_disturbance_at_the_edge_of_the_layer(
 fn the_inner_sliding_variable_stays_in_its_layer_from_the_least_accepted_gain_on() {
     let above = direct(&reaching_at(1.001));
     assert!(above.inner_sliding <= 1.0, "{above:?}");
-    assert!(above.inner_sliding > 0.99, "the gain is the least that does: {above:?}");
+    assert!(above.inner_sliding > 0.99, "the gain is the least that suffices: {above:?}");
     // A gain of 0.25 rad/s² exceeds the acceleration of the disturbance, 0.183 rad/s², but not its
-    // 1.68-fold. It is accepted if the controller is told of 81 % of the disturbance only.
+    // 1.68-fold. It is accepted if only 81 % of the disturbance is declared.
     let mut weak = TwoLoopSettings::ours();
     weak.inner.layer.rho = [0.25; 3];
     assert!(TwoLoopSmc::new(weak).is_err());

@@ -99,7 +99,7 @@ impl Law for CrmpcLaw {
                     "the guarantee is no longer in force: scheduled.limitMoment has fallen, or scheduled.disturbanceBound risen, by more than the plan reserves"
                 }
                 Contradiction::Turn => {
-                    "the guarantee is no longer in force: the turn that trajectory.* tell has changed by more than trajectory.turnChange while a plan was followed"
+                    "the guarantee is no longer in force: the turn given by trajectory.* has changed by more than trajectory.turnChange while a plan was followed"
                 }
                 Contradiction::Limit => {
                     "the guarantee is no longer in force: a guaranteed limit is exceeded, or the law requires a moment beyond limit.moment"

@@ -303,7 +303,7 @@ fn variants_have_an_observer_if_their_published_settings_have_one() {
     );
 }
 
-/// The law sees rates relative to the trajectory that it is told of, Wu 2015 (1).
+/// The law sees rates relative to the trajectory at its inputs, Wu 2015 (1).
 #[test]
 fn oracle_a_known_trajectory_is_taken_out_of_the_rates() {
     let told = |rate: f64, rates: Vector3<f64>| {

@@ -100,7 +100,7 @@ pub struct Allocator {
     without_jets: OptimalAllocation,
 }
 
-/// Part of the moment, as a fraction of it, that counts as rounding when it is left over.
+/// Remainder of the moment, as a fraction of it, that counts as rounding.
 const NEGLIGIBLE: f64 = 1e-7;
 
 impl Allocator {

@@ -95,7 +95,7 @@ impl Pwpf {
         for k in 0..samples as u64 * u64::from(1 + PERIODS) {
             let angle = TAU * (k as f64 / samples).fract();
             let (sine, cosine) = sin_cos(angle);
-            // What is commanded at a sample acts until the next one, as in the allocator.
+            // A command acts from its sample until the next one, as in the allocator.
             let thrust = f64::from(u8::from(jets[0].on)) - f64::from(u8::from(jets[1].on));
             if k >= samples as u64 {
                 in_phase += thrust * sine;

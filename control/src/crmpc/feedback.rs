@@ -8,7 +8,7 @@ use crate::controller::{Measurement, ReferenceAt};
 use nalgebra::{Vector3, Vector6};
 use vehicle::kinematics;
 
-/// What a law is given at a tick.
+/// Inputs of a law at a tick.
 pub(super) struct Tick<'a> {
     /// Feedback ticks since the last optimisation; the next one is due if there are none.
     pub within: u64,

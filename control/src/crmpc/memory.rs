@@ -26,7 +26,7 @@ pub struct Memory {
     pub turn: Vector3<f64>,
     /// Limits that are scheduled at the last tick.
     pub scheduled: Scheduled,
-    /// Largest bound on the disturbance of late, see [`Scheduled::disturbance_bound`], rad/s².
+    /// Largest recent bound on the disturbance, see [`Scheduled::disturbance_bound`], rad/s².
     pub recent_bound: f64,
     /// Terms of an earlier plan whose commands still act.
     pub acting: Acting,

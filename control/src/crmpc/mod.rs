@@ -81,7 +81,7 @@ enum Law {
 }
 
 impl Law {
-    // What the sets need of the stack is not added to what the planner needs.
+    // As a separate function, this does not add its need of stack to that of the planner.
     #[inline(never)]
     fn new(settings: &Settings, design: &Design) -> Result<Self, DesignError> {
         Ok(match settings.constraints {

@@ -1,4 +1,5 @@
-//! Observer that estimates the disturbance from the rates, and what the assumptions explain of it.
+//! Observer that estimates the disturbance from the rates, and the part of it that the assumptions
+//! explain.
 
 use super::guarantee::{MEANS, Observable};
 use super::settings::{InitialState, Settings};
@@ -13,7 +14,7 @@ const BEYOND: f64 = 2.0;
 /// they can be contradicted, and bounded, so that the mean returns soon after a fault.
 const ABOVE: f64 = 1.5;
 
-/// Means of what was observed, by a first-order filter.
+/// Means of the observed quantities, by a first-order filter.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 struct Mean {
     /// Change of x_ω beyond the commanded acceleration, rad/s².

@@ -112,7 +112,7 @@ impl Planner {
     /// A reference that is too far from the measured angles is replaced by one at rest on the way
     /// to it: an artificial reference as in Limon et al., "MPC for tracking piecewise constant
     /// references", Automatica 44 (2008). From the far one the optimum without constraints would
-    /// exceed the bounds by orders of magnitude, and no iteration would come back from there.
+    /// exceed the bounds by orders of magnitude, and no iteration would recover from that.
     pub(super) fn begin(&mut self, stages: &mut Stages, tick: &Tick, shift: Vector3<f64>) {
         self.clock = Instant::now();
         self.optimiser.begin();
@@ -178,7 +178,8 @@ impl Planner {
         memory.plan.multipliers.extend(self.optimiser.multipliers());
     }
 
-    /// Keeps the present plan after an optimisation that `ended` so, and returns the report on it.
+    /// Keeps the present plan after an optimisation with the outcome `ended`, and returns the
+    /// report on it.
     pub(super) fn keep(
         &mut self,
         set: &dyn Bounded<2>,

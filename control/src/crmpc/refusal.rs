@@ -1,4 +1,4 @@
-//! Which values of the settings would be accepted where no guarantee can be given.
+//! Values of the settings that would be accepted where no guarantee can be given.
 
 use super::guarantee;
 use super::rule::{self, Tightened};

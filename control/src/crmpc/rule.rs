@@ -5,7 +5,7 @@ use super::settings::{Settings, rule};
 use crate::error::DesignError;
 use crate::error_dynamics::Gain;
 
-/// Settings whose gain K is set, with the tightening and what it leaves of the limits.
+/// Settings whose gain K is set, with the tightening and the remainder of the limits.
 pub(super) struct Tightened {
     pub settings: Settings,
     pub tightening: Tightening,

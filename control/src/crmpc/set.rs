@@ -1,4 +1,4 @@
-//! An optimisation as data, and what the constraint sets `robust` and `paper` share.
+//! An optimisation as data, and the parts that the constraint sets `robust` and `paper` share.
 
 use crate::linearise::Linear;
 use crate::mpc::{self, NormConstraint};

@@ -175,7 +175,7 @@ pub struct Settings {
     )]
     #[setting(used_with = "constraints = robust")]
     pub rate_error: f64,
-    /// Bound on the change of the trajectory's turn, as the inputs trajectory.* tell it, while a
+    /// Bound on the change of the trajectory's turn, as given by the inputs trajectory.*, while a
     /// plan is followed, which is one period.optimisation or longer. The plan reserves it and the
     /// turn's own rate of limit.rate; without a turn it reserves nothing.
     #[setting(name = "trajectory.turnChange", unit = "rad/s", min = 0.0, nominal = 0.002)]

@@ -1,13 +1,13 @@
-//! Supervision of the guarantee: what a controller says of it, tick by tick.
+//! Supervision of the guarantee: its status, tick by tick.
 //!
 //! The theorem needs a certified plan and true assumptions. The plan is certified where it is made,
-//! and `robust/judging.rs` finds what contradicts the assumptions. Once one has been contradicted,
+//! and `robust/judging.rs` finds contradictions of the assumptions. Once one has been contradicted,
 //! the guarantee is in force again only after nothing has contradicted them for a while.
 
 use serde::{Deserialize, Serialize};
 use settings::Choice;
 
-/// Time without contradiction after which the assumptions are believed again, s.
+/// Time without contradiction after which the assumptions are trusted again, s.
 const PROBATION: f64 = 1.0;
 
 /// Status of the guarantee of the robust set at the last tick.
@@ -60,7 +60,7 @@ pub enum Contradiction {
     /// knownMoment.* is larger than knownMoment.bound, or has changed by more than
     /// knownMoment.change since the plan in force was made.
     KnownMoment,
-    /// The turn that the inputs trajectory.* tell has changed by more than trajectory.turnChange
+    /// The turn that the inputs trajectory.* give has changed by more than trajectory.turnChange
     /// since the plan in force was made.
     Turn,
     /// scheduled.limitMoment has fallen, or scheduled.disturbanceBound risen, by more than the plan
@@ -73,7 +73,7 @@ pub enum Contradiction {
 pub struct Supervision {
     /// Status of the guarantee at the last tick.
     pub status: GuaranteeStatus,
-    /// Last contradiction, until the assumptions are believed again.
+    /// Last contradiction, until the assumptions are trusted again.
     pub contradiction: Contradiction,
     /// Ticks left until they are.
     probation: u32,
@@ -82,8 +82,8 @@ pub struct Supervision {
 }
 
 impl Supervision {
-    /// Takes the status of the plan and what contradicts the assumptions at a tick, one
-    /// `period` (s) after the last.
+    /// Takes the status of the plan and a contradiction of the assumptions at a tick, one `period`
+    /// (s) after the last.
     pub(super) fn judge(
         &mut self,
         plan: GuaranteeStatus,

@@ -200,7 +200,7 @@ fn seen_from(
     for (i, (a, b)) in PRODUCTS.into_iter().enumerate() {
         let (a_row, b_row) = (row(a), row(b));
         for (j, (c, d)) in PRODUCTS.into_iter().enumerate() {
-            // Off the diagonal an entry of d is twice the product and stands for two of them.
+            // Off the diagonal an entry of d is twice the product and represents two of them.
             let both = if c == d {
                 a_row[c] * b_row[c]
             } else {
@@ -298,6 +298,6 @@ mod tests {
         assert!(still.fit().is_err(), "{:?}", still.fit());
         assert!(Scatter::default().fit().is_err());
         let half = scatter(2000, 0.005, |k| direction(k, 0.0)).fit().unwrap();
-        assert!(error(&half) < 0.05, "half a sphere is poor, but does: {half:?}");
+        assert!(error(&half) < 0.05, "half a sphere is poor, but suffices: {half:?}");
     }
 }

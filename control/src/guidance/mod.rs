@@ -1,11 +1,11 @@
 //! Guidance of an entry flight to the terminal area: a predictor–corrector in the bank angle, P.
 //! Lu, "Entry guidance: a unified method", Journal of Guidance, Control, and Dynamics 37(3) (2014).
 //!
-//! Once a second the magnitude of the bank angle is found with which the predicted flight ends at
-//! the wanted distance from the target. The angle of attack follows a schedule over speed. The sign
-//! of the bank angle is reversed when the heading has left a dead band about the direction to the
-//! target. At every tick the reference of the attitude follows these commands within limits on its
-//! rate and acceleration.
+//! Once a second the guidance finds the magnitude of the bank angle with which the predicted flight
+//! ends at the required distance from the target. The angle of attack follows a schedule over
+//! speed. The sign of the bank angle is reversed when the heading has left a dead band about the
+//! direction to the target. At every tick the reference of the attitude follows these commands
+//! within limits on its rate and acceleration.
 
 mod predictor;
 mod settings;
@@ -62,7 +62,7 @@ pub struct Command {
     pub range: f64,
     /// Direction to the target less the heading, positive to the right, rad.
     pub heading_error: f64,
-    /// By how much the predicted flight ends too far from the target, m.
+    /// Excess of the distance to the target at the end of the predicted flight, m.
     pub miss: f64,
     /// Whether a plan reaches the target within the tolerance: the present one, or, as long as the
     /// bank angle is corrected, one between those with the least and the largest bank angle.
@@ -76,8 +76,8 @@ pub struct Memory {
     begun: bool,
     /// Magnitude of the bank angle, rad.
     magnitude: f64,
-    /// Magnitude before the last correction, from which the command moves on in a second: steps of
-    /// the command would cost moments at each.
+    /// Magnitude before the last correction, from which the command moves on in a second: each step
+    /// of the command would cost moment.
     before: f64,
     /// Whether the vehicle turns to the left, which a positive bank angle does.
     to_left: bool,
@@ -229,7 +229,7 @@ impl Guidance {
             near_equator: cos_latitude * cos(settings.target.latitude),
             ratios: memory.ratios,
         };
-        // How much too far from the target the flight ends with this bank angle.
+        // Excess of the distance to the target at the end of a flight with this bank angle.
         let wanted = command.range - settings.target.range;
         let fly = |bank: f64| self.predictor.fly(settings, &begin, bank);
         let miss = |bank: f64| wanted - fly(bank).range;
@@ -255,8 +255,8 @@ impl Guidance {
             command.in_reach = miss(largest) >= -tolerance && miss(0.0) <= tolerance;
         }
         let slope = (miss(memory.magnitude + PROBE) - here) / PROBE;
-        // A larger bank angle makes the flight shorter. Where it does not, the correction only has
-        // the right sign.
+        // A larger bank angle makes the flight shorter. Where it does not, only the sign of the
+        // correction is right.
         let change = if slope > 0.0 { -here / slope } else { -CORRECTION.copysign(here) };
         let change = change.clamp(-CORRECTION, CORRECTION);
         memory.magnitude = (memory.magnitude + change).clamp(0.0, largest);

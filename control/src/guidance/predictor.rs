@@ -25,7 +25,7 @@ pub struct Predictor {
     density: [f64; ALTITUDES],
 }
 
-/// Where a prediction begins.
+/// Beginning of a prediction.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Beginning {
     /// Altitude, m.
@@ -110,7 +110,7 @@ impl Predictor {
             let [lift, drag] = self.accelerations(altitude, speed, settings.alpha.at(speed));
             let (lift, drag) = (lift * lift_ratio, drag * drag_ratio);
             let (sin_path, cos_path) = sin_cos(path);
-            // The planet's rotation makes what flies to the east lighter.
+            // The planet's rotation makes a vehicle that flies to the east lighter.
             let centrifugal = planet.rate * planet.rate * r * begin.near_equator;
             let g = planet.gravitation / (r * r) - centrifugal;
             let eastward = 2.0 * planet.rate * speed * begin.eastward;

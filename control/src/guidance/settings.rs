@@ -87,7 +87,7 @@ pub struct Alpha {
     /// lift differs from the predicted one.
     #[setting(unit = "rad", min = 0.0, max = 0.5, nominal = 0.1)]
     pub adjustment: f64,
-    /// Speed from which on the angle of attack is alpha.high.
+    /// Speed above which the angle of attack is alpha.high.
     #[setting(unit = "m/s", min = 0.0, nominal = 1e3)]
     pub upper_speed: f64,
     /// Speed below which the angle of attack is alpha.low.
@@ -104,7 +104,7 @@ pub struct Reversal {
     /// Heading error at low speed beyond which the bank is reversed.
     #[setting(unit = "rad", above = 0.0, max = 1.5, nominal = 0.1)]
     pub low: f64,
-    /// Speed from which on the heading error may be reversal.high.
+    /// Speed above which the heading error may be reversal.high.
     #[setting(unit = "m/s", min = 0.0, nominal = 1e3)]
     pub upper_speed: f64,
     /// Speed below which the heading error may be reversal.low.

@@ -28,8 +28,8 @@ impl Shaped {
     pub fn follow(&mut self, command: f64, limits: &Limits, period: f64) {
         self.value += (self.rate + self.acceleration * period / 2.0) * period;
         self.rate += self.acceleration * period;
-        // Of the next rate v the distance until standstill is v² / (2 a), plus what half a period
-        // costs because accelerations change at ticks only.
+        // Of the next rate v the distance until standstill is v² / (2 a), plus the loss of half a
+        // period because accelerations change at ticks only.
         let ahead = command - self.value - self.rate * period / 2.0;
         let a = limits.acceleration;
         let fastest = a * ((period * period + 2.0 * ahead.abs() / a).sqrt() - period);

@@ -271,7 +271,7 @@ impl<const O: usize> Optimiser<O> {
     }
 
     /// Returns the report of a plan that is followed instead of an optimum, after an optimisation
-    /// that `ended` so. The bounds are computed about the plan.
+    /// with the outcome `ended`. The bounds are computed about the plan.
     pub fn fall_back(
         &mut self,
         bounded: &dyn Bounded<O>,

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-/// The state of a search: from what the next solver begins.
+/// The state of a search: the point from which the next solver begins.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) enum Guess {
     /// No solver has begun.

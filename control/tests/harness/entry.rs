@@ -8,7 +8,7 @@ use vehicle::entry::{Config, Deviations, End, Following, Motion, Trim};
 use vehicle::integrator::rk4;
 use vehicle::translation::Planet;
 
-/// A flight: its start, and what the guidance does not know.
+/// A flight: its start, and the deviations that the guidance does not know.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Flight {
     pub(crate) start: Motion,

@@ -1,5 +1,5 @@
-//! Recorded runs of a controller that optimises, and what happens if ticks of them are evaluated
-//! again, with a solver that fails, or from a saved memory.
+//! Recorded runs of a controller that optimises, and their behaviour if ticks are evaluated again,
+//! with a solver that fails, or from a saved memory.
 
 use super::{FEEDBACK, disturbance, simulate};
 use control::controller::{Preview, ReferenceAt};

@@ -1,4 +1,4 @@
-//! Every way to the optimum leads there.
+//! Every shortcut leads to the optimum.
 
 use super::{controller, optimisations};
 use crate::harness::recording::reference;

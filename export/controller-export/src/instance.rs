@@ -1,4 +1,4 @@
-//! How the instance of a controller works at its ticks.
+//! Operation of a controller's instance at its ticks.
 
 use crate::law::{ControllerFmu, ControllerInstance, Input, Law, Output, Parameters, Vehicle};
 use crate::reference::{self, Source};

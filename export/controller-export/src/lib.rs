@@ -39,8 +39,8 @@
 //!
 //! | module | contents |
 //! |---|---|
-//! | [`law`] | what a control law adds, and the data that all controllers share |
-//! | `instance` | how an instance of a controller works at its ticks |
+//! | [`law`] | the part that a control law adds, and the data that all controllers share |
+//! | `instance` | operation of a controller's instance at its ticks |
 //! | [`sampled`] | any instance that works at ticks: steps, saved states |
 //! | [`table`] | the variables that all controllers have, and declarations that laws share |
 //! | [`mod@reference`] | the source of the reference |

@@ -95,7 +95,7 @@ pub trait SampledInstance: Serialize + DeserializeOwned + Send + Sized + 'static
         true
     }
 
-    /// Returns what is wrong with a restored instance, apart from its ticks.
+    /// Returns the fault of a restored instance, apart from its ticks.
     fn problem(&self, _before: &Self) -> Option<&'static str> {
         None
     }
@@ -135,8 +135,8 @@ fn designed<I: SampledInstance>(
     present.take_if(same).map_or_else(|| instance.design().map(Box::new), Ok)
 }
 
-/// Returns the state before the first tick. What it needs of the stack is not added to what the
-/// design needs.
+/// Returns the state before the first tick. As a separate function, this does not add its need of
+/// stack to that of the design.
 #[inline(never)]
 #[expect(clippy::unnecessary_box_returns, reason = "a caller would hold it on its stack")]
 fn first<I: SampledInstance>(start: f64, device: &I::Device) -> Box<Ticks<I>> {

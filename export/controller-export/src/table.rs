@@ -116,7 +116,7 @@ fn achieved<L: Law>(axis: &str, meaning: &str) -> Real {
 
 fn known_moment(axis: &str, meaning: &str) -> Real {
     let text = format!(
-        "{meaning} moment that is known to act besides that of the actuators, such as the air's; the command is what it leaves to do"
+        "{meaning} moment that is known to act besides that of the actuators, such as the air's; the command is the remainder"
     );
     input(&format!("knownMoment.{axis}"), &capital(&text)).real().unit("N.m").nominal(1e5)
 }

@@ -34,8 +34,8 @@ impl Assessment {
 /// is no room to move at all.
 pub(super) const SMALLEST_TERMINAL_RATE: f64 = 3.5e-3;
 
-/// Returns what is left of the limits (rad/s, N m) beyond a motion with ‖x̃_ω‖ ≤ `x` and ‖a‖ ≤ `a`,
-/// with the deviation that is never exceeded and `more` of it, at any attitude.
+/// Returns the remainder of the limits (rad/s, N m) beyond a motion with ‖x̃_ω‖ ≤ `x` and ‖a‖ ≤
+/// `a`, with the deviation that is never exceeded and `more` of it, at any attitude.
 pub(super) fn left(
     s: &Settings,
     dynamics: &Dynamics,
@@ -65,7 +65,7 @@ pub(in crate::crmpc) struct HorizonEnd {
     pub rates: Vector3<f64>,
     /// Norm of the acceleration before it, rad/s².
     pub pull: f64,
-    /// What the plan's pulses have left.
+    /// Deviation that the plan's pulses have left.
     pub carried: Carried,
     /// Part of the rate limit that the turn of the trajectory needs, rad/s.
     pub turn: f64,
@@ -77,9 +77,9 @@ impl HorizonEnd {
         self.rates.component_mul(&Vector3::new(BRAKING, braking, BRAKING))
     }
 
-    /// Returns what changes of the acceleration add to the deviation while the motion at first
-    /// brakes by no more than the rate `most` (1/s). The first change is that from the acceleration
-    /// before; from step to step the acceleration then changes by less than κ h of itself.
+    /// Returns the deviation by changes of the acceleration while the motion at first brakes by no
+    /// more than the rate `most` (1/s). The first change is that from the acceleration before; from
+    /// step to step the acceleration then changes by less than κ h of itself.
     pub(in crate::crmpc) fn while_braking(
         &self,
         s: &Settings,
@@ -146,7 +146,7 @@ pub(in crate::crmpc) fn terminal_rate(
     low
 }
 
-/// Computes what is left of the limits at rest and for the motion beyond the horizon, at any
+/// Computes the remainder of the limits at rest and for the motion beyond the horizon, at any
 /// attitude.
 pub(super) fn assess(s: &Settings, dynamics: &Dynamics, tightening: &Tightening) -> Assessment {
     let (rate, moment) = left(s, dynamics, tightening, None, (0.0, 0.0));

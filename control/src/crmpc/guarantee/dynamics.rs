@@ -51,7 +51,7 @@ pub struct Dynamics {
 }
 
 impl Dynamics {
-    /// Returns everything that drives the trajectory off its prediction but for the mismatch.
+    /// Returns all causes that drive the trajectory off its prediction, except the mismatch.
     pub(super) fn drive(&self, s: &Settings) -> Drive {
         Drive::new(s, &self.vehicle, (self.smallest, self.largest))
     }
@@ -90,7 +90,7 @@ impl Dynamics {
             if needed.rate <= domain.rate && needed.sideslip <= domain.sideslip {
                 return dynamics;
             }
-            // A little more than needed is found sooner.
+            // A slightly larger domain is found sooner.
             let more = |value: f64, least: f64| least + (1.0 + 1e-3) * (value - least);
             domain = Domain {
                 rate: more(needed.rate, vehicle.rate),

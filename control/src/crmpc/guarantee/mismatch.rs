@@ -5,7 +5,7 @@ use crate::crmpc::settings::Settings;
 use std::f64::consts::SQRT_2;
 use vehicle::math::{cos, powi};
 
-/// All that pushes the vehicle off its prediction, but for the mismatch.
+/// All causes that drive the vehicle off its prediction, except the mismatch.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Drive {
     /// Bound on the norm of Δ and the effect of the inertia error, rad/s².

@@ -17,8 +17,8 @@ pub(in crate::crmpc) const MEANS: usize = 5;
 pub(in crate::crmpc) struct Observable {
     /// Weight of the newest value in the mean.
     pub(in crate::crmpc) weight: f64,
-    /// Part that may last, Δ̄, the mismatch, and what the inertia error does in any direction, and
-    /// the part by the errors of predicted rates, rad/s².
+    /// Part that may last (Δ̄, the mismatch, and the effect of the inertia error in any direction),
+    /// and the part by the errors of predicted rates, rad/s².
     others: f64,
     /// Share of the mean acceleration by the commanded moments, by the common factor of the
     /// inertia.
@@ -28,8 +28,8 @@ pub(in crate::crmpc) struct Observable {
 }
 
 impl Observable {
-    /// Returns what is explained of each mean, the one with the observer's time constant first. The
-    /// longer a time constant is (s), the less effect have the errors of the measured rates.
+    /// Returns the explained part of each mean, the one with the observer's time constant first.
+    /// The longer a time constant is (s), the less effect the errors of the measured rates have.
     pub(super) fn all(s: &Settings, dynamics: &Dynamics, parts: &Parts) -> [Self; MEANS] {
         [s.observer.time_constant, 0.5, 1.0, 3.0, 8.0]
             .map(|time_constant| Self::new(s, dynamics, parts, time_constant))

@@ -8,10 +8,10 @@ use crate::crmpc::settings::Settings;
 use crate::error_dynamics::{Early, Reach};
 use std::f64::consts::SQRT_2;
 
-/// What drives the deviation, separated by the way in which it adds up.
+/// Causes of the deviation, separated by the way in which they add up.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Parts {
-    /// All that pushes the vehicle off its prediction, but for the mismatch.
+    /// All causes that drive the vehicle off its prediction, except the mismatch.
     pub drive: Drive,
     /// Difference between the acceleration and the one that the law intended.
     pub mismatch: Mismatch,
@@ -26,7 +26,7 @@ pub struct Parts {
     pub norm: f64,
     /// Moment of the inertia error.
     pub inertia: InertiaPart,
-    /// What makes a pulse larger.
+    /// Factors that enlarge a pulse.
     pub pulse: PulseFactors,
 }
 
@@ -53,7 +53,7 @@ pub struct InertiaPart {
 pub(super) struct Reaches {
     /// Of the disturbance and of the inertia error.
     pub(super) disturbance: Reach,
-    /// Part of its feedback by what happened before the nominal motion began.
+    /// Part of its feedback by causes before the nominal motion began.
     pub(super) early_feedback: f64,
     /// Of the errors of measured angles and rates.
     pub(super) errors: [Reach; 2],
@@ -118,10 +118,10 @@ impl Parts {
     ///
     /// With ρ per unit of a bound on each component, and v the norm of the parts with any
     /// direction, two axes deviate by √2 ρ + v and all three by √3 ρ + v. The vehicle itself
-    /// deviates further by what no measurement shows yet (`unseen_rate`), and between two ticks:
-    /// an angle by τ²/8 times the largest acceleration, a rate by `between`. K ô has the part in a
-    /// box ρ_fb Δ̄ and that of the errors, the ball of the mismatch, and the moment of the inertia
-    /// error. Angles in rad, rates in rad/s, K ô in rad/s² or N m.
+    /// deviates further by the part that no measurement shows yet (`unseen_rate`), and between two
+    /// ticks: an angle by τ²/8 times the largest acceleration, a rate by `between`. K ô has the
+    /// part in a box ρ_fb Δ̄ and that of the errors, the ball of the mismatch, and the moment of
+    /// the inertia error. Angles in rad, rates in rad/s, K ô in rad/s² or N m.
     pub(super) fn deviation(&self, s: &Settings, reaches: &Reaches) -> Deviation {
         let root3 = 3.0_f64.sqrt();
         let Drive { all, of_two, .. } = self.drive;
@@ -192,13 +192,13 @@ impl Reaches {
     }
 }
 
-/// What makes a pulse larger than δ times the change of acceleration that the law intends.
+/// Factors that enlarge a pulse beyond δ times the change of acceleration that the law intends.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PulseFactors {
     /// Factor 1/(1 − ι) by the common factor of the inertia.
     pub common: f64,
     /// Factor by the whole inertia error and by the turn of the attitude until the command acts,
-    /// with the jump that `revised` says.
+    /// with the jump `revised`.
     pub inertia: f64,
     /// Jump of the rates at the next command because of a pulse, relative to the pulse.
     pub revised: f64,

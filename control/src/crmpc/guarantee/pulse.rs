@@ -20,8 +20,8 @@ impl Pulse {
     ///
     /// Each pulse changes the later commands too, by a share δ X of itself, X being the reach
     /// `change` of pulses, so that all together are at most 1/(1 − δ X) times the first (small-gain
-    /// theorem). The parts that stay within the axes are a box; what the inertia error and the
-    /// mismatch turn is a ball.
+    /// theorem). The parts that stay within the axes are a box; those that the inertia error and
+    /// the mismatch turn are a ball.
     pub(super) fn new(s: &Settings, parts: &Parts, reaches: &Reaches) -> Self {
         if s.delay_error == 0.0 {
             return Self { of_box: 0.0, of_ball: 0.0 };

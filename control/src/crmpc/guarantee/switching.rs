@@ -4,8 +4,8 @@
 //! from the one assumed only between the assumed and the true beginning of each command. This is a
 //! pulse: it makes the rates jump by at most δ times the change of the commanded acceleration. The
 //! changes of K ô are bounded for all times in [`super::pulse`]. The changes of the plan's own
-//! acceleration are known. What they leave is carried along from stage to stage here, since a bound
-//! on all of them would take too much of the limits.
+//! acceleration are known. The deviation that they leave is propagated from stage to stage here,
+//! since a bound on all of them would take too much of the limits.
 
 use super::deviation::Deviation;
 use super::parts::{Parts, PulseFactors};
@@ -34,7 +34,7 @@ pub struct Onset {
     pub allowed: f64,
 }
 
-/// How what the pulses leave is carried along.
+/// Propagation of the deviation that the pulses leave.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Switching {
     /// Pulse per change of the commanded acceleration, s.
@@ -51,7 +51,7 @@ pub struct Switching {
     h: f64,
 }
 
-/// Size of one eigenvector of Φ in what the deviation is judged by.
+/// Size of one eigenvector of Φ in the quantities that are bounded.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Mode {
     angle: f64,
@@ -73,7 +73,7 @@ struct Transitions {
     within: Matrix3<f64>,
     /// Largest entries of those to any later tick.
     ever: Matrix3<f64>,
-    /// Limit of what changes of acceleration by 1 rad/s² at each optimisation leave.
+    /// Limit of the deviation by changes of acceleration of 1 rad/s² at each optimisation.
     limit: Carried,
 }
 
@@ -195,8 +195,8 @@ impl Switching {
         }))
     }
 
-    /// Returns what commands leave that began to act late for the measurement with which a nominal
-    /// motion begins, from the changes of acceleration at their beginning (rad/s²).
+    /// Returns the deviation by commands that began to act too late for the measurement with which
+    /// a nominal motion begins, from the changes of acceleration at their beginning (rad/s²).
     pub fn unseen(&self, changes: &[f64]) -> Carried {
         let pulse: f64 = changes.iter().map(|change| self.pulse(change + self.turn)).sum();
         Vector3::new(0.0, 0.0, pulse)
@@ -218,7 +218,7 @@ impl Switching {
         carried + Vector3::new(0.0, 0.0, self.pulse(change))
     }
 
-    /// Returns what is left at the beginning of the next stage.
+    /// Returns the deviation that is left at the beginning of the next stage.
     pub fn next(&self, carried: &Carried) -> Carried {
         self.transitions.stage * carried
     }
@@ -244,8 +244,9 @@ impl Switching {
         (pulse * self.delay_error, pulse)
     }
 
-    /// Converts what is carried to a deviation. The law sees s alone. The vehicle also deviates by
-    /// the pulse of this tick and, between two ticks, by the excess over the straight line.
+    /// Converts the propagated quantities to a deviation. The law sees s alone. The vehicle also
+    /// deviates by the pulse of this tick and, between two ticks, by the excess over the straight
+    /// line.
     fn of(&self, carried: &Carried) -> Deviation {
         let [slow, fast] = &self.modes;
         let (seen, pulse, tau) = ([carried.x, carried.y], carried.z, self.period);

@@ -70,7 +70,7 @@ fn explained(s: &Settings, dynamics: &Dynamics, parts: &Parts) -> Explained {
 }
 
 /// The deviation at each feedback tick since the nominal motion began, with the largest pulse
-/// (rad/s) by a change of K ô there. The last tick stands for all later ones.
+/// (rad/s) by a change of K ô there. The last tick represents all later ones.
 struct Sequence {
     ticks: Vec<(Deviation, f64)>,
     /// Feedback ticks per optimisation.
@@ -118,7 +118,7 @@ impl Sequence {
         };
         let mut ticks: Vec<(Deviation, f64)> = (0..=steps).map(at).collect();
         // By errors of the measurement the deviation may be larger at an early tick than at the
-        // last. As the last entry stands for all later ticks, and for every tick with `tube`, it
+        // last. As the last entry represents all later ticks, and for every tick with `tube`, it
         // takes the largest of all.
         ticks[steps].0 = ticks.iter().fold(Deviation::default(), |most, at| most.or(&at.0));
         if is_tube {

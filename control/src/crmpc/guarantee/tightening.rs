@@ -10,7 +10,7 @@ use crate::controller::Explained;
 /// state.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tightening {
-    /// What it takes at each tick; the last one stands for all later ticks.
+    /// Reserves at each tick; the last ones apply to all later ticks.
     pub(super) ticks: Vec<AtTick>,
     /// Largest ‖I W s‖ over the corners s of the unit box at any attitude of the domain, kg m².
     pub bearing: f64,
@@ -24,7 +24,7 @@ pub struct Tightening {
     pub switching: Option<Box<Switching>>,
 }
 
-/// What the deviation takes of the limits at a feedback tick.
+/// Parts of the limits that are reserved for the deviation at a feedback tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(in crate::crmpc) struct AtTick {
     /// Deviation at the tick.
@@ -43,7 +43,7 @@ pub(in crate::crmpc) struct AtTick {
 }
 
 impl Tightening {
-    /// Returns what is taken `tick` feedback ticks after the nominal motion began.
+    /// Returns the reserves `tick` feedback ticks after the nominal motion began.
     pub(in crate::crmpc) fn tick(&self, tick: usize) -> &AtTick {
         &self.ticks[tick.min(self.ticks.len() - 1)]
     }

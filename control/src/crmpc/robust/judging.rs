@@ -17,7 +17,7 @@ fn keeps(value: f64, bound: f64) -> bool {
     value <= bound * (1.0 + ROUNDING) + 1e-12
 }
 
-/// Returns what the measurements contradict, as far as no plan is needed to see it.
+/// Returns the assumption that the measurements contradict, as far as that shows without a plan.
 fn shown(measured: &Measurement) -> Option<Contradiction> {
     match measured.doubt {
         _ if measured.stale => Some(Contradiction::Step),
@@ -28,7 +28,7 @@ fn shown(measured: &Measurement) -> Option<Contradiction> {
     }
 }
 
-/// Returns the first that does not hold.
+/// Returns the first assumption that does not hold.
 fn first(found: &[(bool, Contradiction)]) -> Option<Contradiction> {
     found.iter().find(|(holds, _)| !holds).map(|(_, what)| *what)
 }
@@ -104,7 +104,7 @@ impl Robust {
             && (!memory.assured() || keeps((known - memory.plan.terms.known).norm(), known_change))
     }
 
-    /// Returns whether the scheduled limits are still those that a plan in force takes for granted.
+    /// Returns whether the scheduled limits are still those that a plan in force assumes.
     fn keeps_schedule(&self, memory: &Memory) -> bool {
         let Memory { plan, scheduled: Scheduled { limit_moment, disturbance_bound }, .. } = memory;
         let level = memory.acting.terms().map_or(0, |terms| terms.level).max(plan.terms.level);
@@ -131,7 +131,7 @@ impl Robust {
         disturbance_bound * (parts.saturating_sub(level) as f64 / parts as f64)
     }
 
-    /// Returns the bound on the disturbance that still has an effect after the one told at a tick,
+    /// Returns the bound on the disturbance that still has an effect after the one given at a tick,
     /// rad/s². It falls by no more than one part of the whole bound in each optimisation period.
     pub(super) fn recent_bound(&self, memory: &Memory) -> f64 {
         let Settings { disturbance_bound, disturbance_parts, .. } = self.settings;
@@ -143,7 +143,7 @@ impl Robust {
         told.max(memory.recent_bound - part / self.design.ratio as f64)
     }
 
-    /// Returns what a plan takes for granted that is certified now.
+    /// Returns the assumptions of a plan that is certified now.
     pub(super) fn terms(&self, memory: &Memory) -> Terms {
         let Settings { limit_moment, limit_fall, disturbance_bound, disturbance_parts, .. } =
             self.settings;

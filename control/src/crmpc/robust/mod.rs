@@ -41,7 +41,7 @@ pub(super) struct Robust {
     terms: Terms,
     /// Part of the rate limit that the turn of the trajectory needs, rad/s.
     turn: f64,
-    /// What changes of the acceleration leave at the stages of the motion that was carried along
+    /// Deviation by changes of the acceleration at the stages of the motion that was propagated
     /// last; empty if the delay is exact.
     carried: RefCell<Vec<Carried>>,
 }
@@ -60,8 +60,7 @@ pub(super) struct Interval {
     /// Norm of the body rates at the interval's end, ‖ω̃‖, and its bound, rad/s.
     pub rate: f64,
     pub rate_bound: f64,
-    /// Norm of the moment that is asked of the actuators at the interval's start, and its bound,
-    /// N m.
+    /// Norm of the moment that the actuators must give at the interval's start, and its bound, N m.
     pub moment: f64,
     pub moment_bound: f64,
 }
@@ -103,7 +102,7 @@ impl Robust {
         }
     }
 
-    /// Prepares the bounds for a nominal trajectory that begins so, with this share of the
+    /// Prepares the bounds for a nominal trajectory with this beginning and this share of the
     /// tightening.
     fn begin(&mut self, beginning: &Beginning, share: f64) {
         let Beginning { age, onset, level, .. } = *beginning;
@@ -112,23 +111,23 @@ impl Robust {
         self.another = false;
     }
 
-    /// Returns the tightening for the bound on the disturbance that the plan takes for granted.
+    /// Returns the tightening for the bound on the disturbance that the plan assumes.
     fn tightening(&self) -> &Tightening {
         self.design.at_level(self.terms.level)
     }
 
-    /// Returns the settings with the limit that the plan takes for granted.
+    /// Returns the settings with the limit that the plan assumes.
     fn settings_of_plan(&self) -> Settings {
         Settings { limit_moment: self.terms.limit_moment, ..self.settings }
     }
 
-    /// Returns what an unknown part of the delay adds, with what is carried along at stage `k`.
+    /// Returns the addition for an unknown part of the delay, with the deviation at stage `k`.
     fn switching(&self, k: usize) -> Option<(&Switching, Carried)> {
         let switching = self.design.tightening.switching.as_deref()?;
         Some((switching, self.carried.borrow().get(k).copied().unwrap_or_default()))
     }
 
-    /// Carries along what the changes of acceleration of a trajectory leave.
+    /// Propagates the deviation that the changes of acceleration of a trajectory leave.
     pub(super) fn carry(&self, motion: &ErrorTrajectory<2>) {
         let Some(switching) = &self.design.tightening.switching else { return };
         let mut carried_at_stages = self.carried.borrow_mut();
@@ -170,7 +169,7 @@ impl Robust {
         }
     }
 
-    /// Returns the part of a moment that is asked of the actuators.
+    /// Returns the part of a moment that the actuators must give.
     pub(super) fn asked(&self, moment: Linear) -> Linear {
         Linear { value: moment.value - self.terms.known, ..moment }
     }
@@ -236,9 +235,8 @@ impl Robust {
         }
     }
 
-    /// Returns what the plan's changes of acceleration add to the deviation of angles and rates
-    /// (rad, rad/s) at prediction step k and in the intervals before and after, if the delay is
-    /// not exact.
+    /// Returns the deviation of angles and rates (rad, rad/s) by the plan's changes of acceleration
+    /// at prediction step k and in the intervals before and after, if the delay is not exact.
     fn more_of_the_deviation(&self, k: usize, here: &Point, before: &Point) -> Option<(f64, f64)> {
         let (switching, mut carried) = self.switching(k)?;
         let Settings { horizon, period_optimisation: h, .. } = self.settings;

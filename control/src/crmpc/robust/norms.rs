@@ -15,8 +15,8 @@ use std::ops::Range;
 use vehicle::math::cos;
 
 /// A stage with known kinematics, from which neighbouring stages are estimated. About every tenth
-/// stage of a check is one, and serves its neighbours as long as their sizes alone show that they
-/// keep the bounds that they set.
+/// stage of a check is one, and serves its neighbours as long as their norms alone show that they
+/// keep their bounds.
 ///
 /// Gain: mean time 0.044 → 0.031 ms (robust set), measured as in `mpc::shortcuts`.
 pub(super) struct Anchor {

@@ -1,5 +1,5 @@
-//! The law over the robust set: how a plan is found that satisfies the conditions of the theorem
-//! (docs/guarantee.md), and what is commanded from it.
+//! The law over the robust set: the search for a plan that satisfies the conditions of the theorem
+//! (docs/guarantee.md), and the command that follows from it.
 
 use super::certificate::Certified;
 use super::{Beginning, Robust};
@@ -22,10 +22,10 @@ const LESS: [f64; 2] = [0.5, 0.0];
 /// first covers half of the way, each further one half as much as the one before.
 const HALVINGS: usize = 12;
 
-/// What the plan before is to an optimisation.
+/// Use of the previous plan in an optimisation.
 #[derive(Clone, Copy, PartialEq)]
 enum Before {
-    /// There is none.
+    /// There is no previous plan.
     Nothing,
     /// The vehicle is no further from it than the assumptions explain.
     Followed,
@@ -124,8 +124,8 @@ impl Robust {
         memory.age = memory.age.saturating_add(self.design.ratio as u32);
     }
 
-    /// Returns what the shifted plan is to an optimisation from the measured state. If the design
-    /// does not hold anyway, the plan still serves as a guess.
+    /// Returns the use of the shifted plan in an optimisation from the measured state. If the
+    /// design does not hold anyway, the plan still serves as a guess.
     fn before(&self, memory: &Memory, measured: &Vector6<f64>) -> Before {
         let (angles, rates) = split(&(measured - memory.plan.states[0]));
         let gain = self.settings.feedback;
@@ -167,8 +167,8 @@ impl Robust {
         })
     }
 
-    /// Returns the beginning of the present plan, if it goes on. It takes no less of the
-    /// disturbance for granted than what drives the deviation already.
+    /// Returns the beginning of the present plan, if it goes on. It assumes a disturbance no
+    /// smaller than the one that drives the deviation already.
     fn going_on(&self, memory: &Memory) -> Beginning {
         let plan = &memory.plan;
         let mut onset = plan.onset;
@@ -225,7 +225,7 @@ impl Robust {
         self.violate_least(planner, memory, iterations)
     }
 
-    /// Follows the optimum from this beginning if it is certified, or if no guarantee ends by it.
+    /// Follows the optimum from this beginning if it is certified, or if no guarantee ends with it.
     /// Otherwise the report is that of a fallback.
     fn optimum(
         &self,
@@ -283,7 +283,7 @@ impl Robust {
                 return;
             }
         }
-        // The plan itself may serve for what its inputs have become since it was certified.
+        // The plan itself may be certified anew for inputs that have changed since its certificate.
         let is_outdated = memory.plan.terms != self.terms;
         let certified = is_outdated.then(|| self.certify(&planner.previous, false)).flatten();
         if certified.is_some() {

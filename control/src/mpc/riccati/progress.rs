@@ -18,7 +18,7 @@ const STALLED_STEPS: u32 = 4;
 /// trajectory.
 const PATIENCE: (u32, f64) = (30, 1e3);
 const PATIENCE_FOLLOWING: (u32, f64) = (16, f64::INFINITY);
-/// Patience of a search, cold or warm, behind which another one begins from another start: it ends
+/// Patience of a search, cold or warm, that is followed by another one from another start: it ends
 /// in time for that one, with bounds of any kind.
 const PATIENCE_ANOTHER: (u32, u32) = (10, 8);
 /// A search runs in a cycle when its residual has not been halved in `CIRCLING` iterations; its
@@ -26,9 +26,9 @@ const PATIENCE_ANOTHER: (u32, u32) = (10, 8);
 const CIRCLING: u32 = 8;
 const DAMPING: f64 = 0.5;
 /// Where only the bounds still move, a step that leaves more than this share of the residual
-/// overshoots: the bounds answer the trajectory by almost as much in the other direction. Every
-/// other step is then multiplied by `DAMPING`, which ends that; the whole steps between them end
-/// what does not answer.
+/// overshoots: the bounds respond to the trajectory by almost as much in the other direction. Every
+/// other step is then multiplied by `DAMPING`, which ends that; the whole steps between them reduce
+/// the residuals that do not respond.
 const OVERSHOOTING: f64 = 0.5;
 /// A first guess is misleading when the residual of the norm constraints exceeds the least one so
 /// far by this factor; least values below 1 count as 1.
@@ -113,7 +113,7 @@ impl Progress {
         Ok(if is_damped || since >= CIRCLING { DAMPING * length } else { length })
     }
 
-    /// Returns whether the next step is to be damped because the bounds answer the steps.
+    /// Returns whether the next step is to be damped because the bounds respond to the steps.
     fn overshoots_bounds(&mut self, residual: f64, closed: bool) -> bool {
         let answers = closed && residual > self.overshooting * self.last;
         self.overshoots |= answers;

@@ -1,6 +1,6 @@
 //! Shortcuts: cheaper exact ways to the optimum, cheapest first. Each leaves constraints out,
-//! solves the rest, and checks what it has left out. If the result satisfies that too, it is the
-//! optimum of the whole problem, so that no shortcut loses accuracy.
+//! solves the rest, and checks the omitted ones. If the result satisfies those too, it is the
+//! optimum of the whole problem, so no shortcut loses accuracy.
 //!
 //! The gains in the files' heads are the times of `cargo bench -p reentry-control --bench
 //! optimisation` (250 samples of 50 s) without and with the shortcut, in the same run. The check of
@@ -17,7 +17,7 @@ use crate::report::SolverStatus;
 /// A cheaper exact way to the optimum.
 pub(super) trait Shortcut<const O: usize> {
     /// Leaves the optimum in the optimiser's solution and returns its status, or returns `None` and
-    /// leaves in `search` what the next shortcut must solve for.
+    /// leaves in `search` the problem of the next shortcut.
     fn optimum(
         &self,
         optimiser: &mut Optimiser<O>,

@@ -1,7 +1,7 @@
 //! The optimum with the terminal constraint as the only constraint.
 //!
 //! Gain: none in the mean (0.009 ms, CRMPC paper) or in the longest time. It is kept because
-//! `solver.status` tells it apart, and because a window would change the last digits of the
+//! `solver.status` reports it separately, and because a window would change the last digits of the
 //! results.
 
 use super::{Optimiser, Sample, Search, Shortcut, SolverStatus};

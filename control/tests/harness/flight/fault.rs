@@ -6,7 +6,7 @@ use nalgebra::Vector3;
 /// A fault, which begins at [`BEGIN`].
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Fault {
-    /// There is none.
+    /// No fault.
     #[default]
     None,
     /// The measurement stays as it was.
@@ -40,7 +40,7 @@ impl Faulty {
         Self { fault, held: None, moment: Vector3::zeros() }
     }
 
-    /// Returns what the controller is given instead of this measurement at `time` (s).
+    /// Returns the measurement that the controller is given instead of this one at `time` (s).
     pub(super) fn measured(&mut self, time: f64, measured: Measurement) -> Measurement {
         let into = |cycle: f64| (time - BEGIN).rem_euclid(cycle);
         let wrong = |size: f64| Measurement {

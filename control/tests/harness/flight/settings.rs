@@ -1,4 +1,4 @@
-//! Random settings, and what becomes of them.
+//! Random settings, and the results of trying them.
 
 use super::random::Random;
 use super::{Flight, Shown};
