@@ -11,8 +11,8 @@ use toml::Table;
 
 /// Name of the campaign's file in the folder.
 pub const CAMPAIGN: &str = "campaign.toml";
-/// Folder of the FMUs that share the process of the program here. Where `--fmu-dir` names it, they
-/// do so as well.
+/// Folder of the FMUs that share the process of this program. They also do so on a machine where
+/// `--fmu-dir` names the folder.
 const TRUSTED: &str = "fmu";
 const EXPERIMENT: &str = "experiment.toml";
 

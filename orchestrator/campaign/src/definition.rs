@@ -69,7 +69,7 @@ pub struct Campaign {
     pub keep: Keep,
     /// Search for the worst case, for `orchestrator falsify`.
     pub search: Option<Search>,
-    /// The campaign file, together with the files that it extends. This is no key of the file.
+    /// The campaign file, together with the files that it extends. This is not a key of the file.
     #[serde(skip)]
     pub source: Source,
 }
@@ -189,7 +189,7 @@ impl Campaign {
         self.source.error(&limit.measure.span(), message)
     }
 
-    /// Returns an error that says nothing of a line of the file.
+    /// Returns an error that refers to no line of the file.
     pub(crate) fn fault(&self, message: impl Into<String>) -> Error {
         self.source.error(&(0..0), message)
     }

@@ -49,7 +49,7 @@ pub struct Measured {
     pub summary: Option<Summary>,
     /// Sensitivity of the measure to each parameter that is no seed.
     pub sensitivities: Vec<Sensitivity>,
-    /// Share of the variance that the noise of the seeds makes by itself, if the design tells it.
+    /// Share of the variance due to the noise of the seeds alone, if the design gives it.
     pub noise: Option<Estimate>,
 }
 

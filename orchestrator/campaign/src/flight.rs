@@ -19,7 +19,7 @@ use sweep::table::{CaseTable, Column, Values};
 pub enum CaseStatus {
     /// It reached its stop time.
     Completed,
-    /// It broke a limit that ends cases, or an FMU ended it, which is no fault.
+    /// It broke a limit that ends cases, or an FMU ended it, which is not a fault.
     Ended,
     /// It was lost, as the experiment defines it.
     Lost,

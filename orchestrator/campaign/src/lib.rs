@@ -2,8 +2,8 @@
 //!
 //! A campaign ([`definition`]) is a sweep with limits: it is prepared once ([`plan`]), and a
 //! [`flight`] flies its cases. Their parts are kept until all are merged ([`run`]); other machines
-//! can fly some of them, with the files of a [`bundle`]. [`findings`] and [`sensitivity`] say what
-//! the cases show, and [`report`] draws it. [`search`] looks for the worst case.
+//! can fly some of them, with the files of a [`bundle`]. [`findings`] and [`sensitivity`] evaluate
+//! the cases, and [`report`] shows the results. [`search`] looks for the worst case.
 
 pub mod bundle;
 pub mod changes;

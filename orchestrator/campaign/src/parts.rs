@@ -19,7 +19,7 @@ pub const LENGTH: u64 = 250;
 const FEW: u64 = 2500;
 
 /// Returns the parts of a campaign of `cases` cases. The parts of a smaller one are the first of
-/// them, but for its last.
+/// them, except for its last.
 pub fn parts(cases: u64) -> impl Iterator<Item = Range<u64>> {
     let others = parts::parts(cases, LENGTH).skip_while(|part| part.start < FEW);
     parts::parts(cases.min(FEW), LENGTH / 10).chain(others)
@@ -40,7 +40,7 @@ pub fn broken(plan: &Plan, rows: &CaseTable) -> Vec<u64> {
     broken.collect()
 }
 
-/// Names the case in which a unit could not be flown.
+/// Names the case in which an FMU could not be flown.
 pub fn of_case(case: u64, error: Single) -> Error {
     match error {
         source @ Single::Call { .. } => Error::Case { case, more: 0, source: Box::new(source) },

@@ -20,7 +20,7 @@ pub struct Recorded {
     pub name: String,
     /// Unit of the number, or an empty text.
     pub unit: String,
-    /// Number that a missing value stands for, if it means that something never happened, as with a
+    /// Number that replaces a missing value, if it means that something never happened, as with a
     /// settling time, or that there is no limit, as with a margin.
     pub missing: Option<f64>,
 }
@@ -133,8 +133,8 @@ fn missing(name: &str, observe: &Observe) -> Option<f64> {
 pub(crate) fn keys(campaign: &Campaign, changes: &Changes) -> Result<String, Error> {
     let mut table: toml::Table = toml::from_str(campaign.source.whole())
         .map_err(|error| campaign.source.error(&(0..0), error.to_string()))?;
-    // These change neither the cases nor what is recorded of them. Experiment and FMUs count by
-    // their content, wherever they are.
+    // These change neither the cases nor their recorded values. Experiment and FMUs count by their
+    // content, wherever they are.
     for key in ["title", "description", "extends", "experiment", "fmu", "until", "keep", "search"] {
         table.remove(key);
     }

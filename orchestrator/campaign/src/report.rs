@@ -278,7 +278,7 @@ fn measures(measures: &[Measured]) -> Markup {
                 } @else { td colspan="11" { "no case has a value" } }
             } } }
         }
-        p.note { "Below a quantile stands its 95 % interval, whose ends are values of the sample." }
+        p.note { "The 95 % interval of a quantile is below it; its ends are values of the sample." }
     }
 }
 
@@ -356,15 +356,15 @@ fn sensitivity_note(plan: &Plan) -> Markup {
     html! {
         p.note {
             "Spearman's rank correlation is 1 or −1 if the measure only rises or only falls with the parameter. "
-            "A small p-value says that a correlation this large would hardly arise by chance. Below a number stands its 95 % interval. "
+            "A small p-value says that a correlation this large would hardly arise by chance. The 95 % interval of a number is below it. "
             @if has_indices {
                 "An index is a share of the variance of the measure: the first-order index is that which the parameter explains by itself, "
-                "the total index that in which it takes part. What all first-order indices leave is that of parameters together. "
+                "the total index that in which it takes part. The remainder of the sum of all first-order indices is the share of interactions. "
             }
             @if !seeds.is_empty() {
                 "The seeds (" (seeds.join(", ")) ") have no sensitivity, because their order has no meaning. "
-                @if has_indices { "The share of their noise is what two points with the same seeds and nothing else in common share." }
-                @else { "Their noise is in what no parameter explains." }
+                @if has_indices { "The share of their noise is the correlation of two points that have only the seeds in common." }
+                @else { "Their noise is part of the share that no parameter explains." }
             }
         }
     }

@@ -240,7 +240,7 @@ pub fn fly(plan: &Plan, options: &Options) -> Result<CampaignReport, Error> {
             _ => String::new(),
         };
         return Err(Error::Failed(format!(
-            "all {cases} cases failed, which is no statistic: {first} ({} has every message, and the same command flies all cases again)",
+            "all {cases} cases failed, so there are no statistics: {first} ({} has every message, and the same command flies all cases again)",
             path.display()
         )));
     }
@@ -261,7 +261,7 @@ fn check_values(plan: &Plan, table: &Reader) -> Result<(), Error> {
         let is_seen = values.iter().zip(&completed).any(|(value, is)| *is && !value.is_nan());
         if missing.is_none() && !is_seen && completed.contains(&true) {
             return Err(Error::Failed(format!(
-                "no case has a value of {name}, so that nothing can be said of the limit {}",
+                "no case has a value of {name}, so the limit {} cannot be judged",
                 limit.id
             )));
         }

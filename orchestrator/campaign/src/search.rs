@@ -28,7 +28,7 @@ use sweep::work;
 
 /// Step size of a search at its beginning, as a share of the range of each parameter.
 const STEP: f64 = 0.3;
-/// Number of the case that stands for all cases of a search, so that seeds stay the same.
+/// Number of the case that all cases of a search use, so that seeds stay the same.
 const CASE: u64 = 0;
 
 /// Names of the files of a search's results.
@@ -189,7 +189,7 @@ fn look_in_threads(
             scope.spawn(|| serve(plan, &options.interrupt, &waiting));
         }
         let result = look(&searched, search, &orders, is_late);
-        // The threads end when nobody can order anything any more.
+        // The threads end when no more cases can be ordered.
         drop(orders);
         result
     });
@@ -230,13 +230,13 @@ fn serve(plan: &Plan, interrupt: &Interrupt, waiting: &Mutex<Receiver<Order>>) {
         let mut fly = || {
             let current = match flight.take() {
                 Some(flight) => flight,
-                // A case that ends at its limit would hide how much worse it becomes.
+                // A case that ends at its limit would hide how far it exceeds it.
                 None => Flight::new(plan, false, interrupt)?.without_ends(),
             };
             let values = plan.sweep.values_at(&order.places, CASE);
             flight.insert(current).fly_with(CASE, values, &mut [])
         };
-        // If nobody waits for the result any more, it is of no use.
+        // If the search no longer waits for the result, it is discarded.
         let _ = order.reply.send(fly());
     }
 }

@@ -62,7 +62,7 @@ pub fn rank_correlation(x: &[f64], y: &[f64]) -> Option<(Estimate, f64)> {
     let n = x.len() as f64;
     let nearest = 1.0 - 12.0 / (n * (n * n - 1.0));
     let centre = value.clamp(-nearest, nearest).atanh();
-    // Three pairs say nothing.
+    // Three pairs are too few.
     let end = |sign: f64| if n > 3.0 { (centre + sign * width).tanh() } else { sign };
     let (low, high) = (end(-1.0).min(value), end(1.0).max(value));
     Some((Estimate { value, low, high }, 2.0 * (1.0 - t_distribution.cdf(t.abs()))))
@@ -103,8 +103,8 @@ fn correlation(x: &[f64], y: &[f64]) -> Option<f64> {
 pub struct Indices {
     /// First-order and total index of each parameter.
     pub parameters: Vec<[Estimate; 2]>,
-    /// First-order index of what varies in each sample beside the parameters, which is the noise of
-    /// the seeds.
+    /// First-order index of the noise of the seeds, which varies in each sample besides the
+    /// parameters.
     pub noise: Estimate,
 }
 
@@ -123,7 +123,7 @@ pub fn indices(measure: &[f64], parameters: usize) -> Option<Indices> {
             |sample: &[f64]| f64::midpoint((sample[0] - mean).powi(2), (sample[1] - mean).powi(2));
         ratio(samples.iter().map(|sample| (part(sample), square(sample))))
     };
-    // The mean is taken off, which changes nothing in theory and much of the noise.
+    // The mean is subtracted, which changes nothing in theory but removes much of the noise.
     let noise = share(&|sample| (sample[0] - mean) * (sample[1] - mean))?;
     let index = |parameter: usize| {
         let first = |sample: &[f64]| (sample[1] - mean) * (sample[2 + parameter] - sample[0]);
@@ -154,7 +154,7 @@ fn ratio(pairs: impl Iterator<Item = (f64, f64)> + Clone) -> Option<Estimate> {
 }
 
 /// Computes the sensitivities of a measure to all parameters that are no seeds, and the share of
-/// its variance that the noise of the seeds makes, if the design tells it.
+/// its variance due to the noise of the seeds, if the design gives it.
 pub fn sensitivities(
     design: DesignKind,
     inputs: &[Input],
@@ -203,7 +203,7 @@ mod tests {
         // tanh(atanh(r) -+ 1.959964 sqrt((1 + r^2 / 2) / 2))
         assert!((r.low + 0.416_291).abs() < 1e-5 && (r.high - 0.992_046).abs() < 1e-5, "{r:?}");
         let (r, _) = rank_correlation(&x, &[1.0, 8.0, 27.0, f64::NAN, 125.0]).unwrap();
-        // Four pairs in order say little.
+        // Four pairs in order are weak evidence.
         assert!(r.value == 1.0 && r.low < 0.0 && r.high == 1.0, "{r:?}");
         assert_eq!(rank_correlation(&x, &[2.0; 5]), None);
     }
@@ -264,7 +264,7 @@ mod tests {
         assert!(noise.low <= share && share <= noise.high, "{noise:?} {share}");
         assert!(noise.high - noise.low < 0.1, "{noise:?}");
         assert_eq!(rows.len(), 3);
-        // Places of cases say nothing of the function, and are as many as independent points.
+        // The places of cases do not depend on the function, and are as many as independent points.
         let ranks = rows[0].rank_correlation.unwrap();
         assert!((ranks.high - ranks.low - 2.0 * 1.96 / 8000_f64.sqrt()).abs() < 1e-3, "{ranks:?}");
         for (row, published) in rows.iter().zip(PUBLISHED) {

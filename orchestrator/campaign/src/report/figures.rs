@@ -60,7 +60,7 @@ pub(super) fn distributions(
         bars.extend(marks());
         let mut panels = vec![panel(&label(measure), "number of cases", bars)];
         let n = values.len();
-        // Every value at the upper end, where few are and where one looks; fewer below.
+        // Every value at the upper end, where values are few and matter most; fewer below.
         let tail = n.saturating_sub(POINTS / 3);
         let stride = tail.div_ceil(POINTS).max(1);
         let places = || (0..tail).step_by(stride).chain(tail..n);

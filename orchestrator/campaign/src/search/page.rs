@@ -88,7 +88,7 @@ struct Judged {
     signals: Vec<(String, Resolved)>,
 }
 
-/// Flies the worst case again and draws the signals of the measure that was looked for, and of all
+/// Flies the worst case again and draws the signals of the measure that was searched, and of all
 /// others that have a limit.
 fn worst_case(plan: &Plan, outcome: &SearchOutcome, worst: &Row) -> Result<Figure, Error> {
     // An interrupt of the search must not end this flight.
