@@ -1,5 +1,5 @@
-//! Checks an experiment in one pass: every name in it is looked up, and whatever cannot be run is
-//! refused. After that only the instances themselves can fail.
+//! Checks an experiment in one pass: every name in it is looked up, and an experiment that cannot
+//! be run is refused. After that only the instances themselves can fail.
 
 use crate::error::Error;
 use crate::experiment::{Coupling, Experiment};
@@ -132,7 +132,7 @@ fn open(path: &Path) -> Result<Fmu, Error> {
     Ok(fmu)
 }
 
-/// Explains which component may be meant if a parameter is given without one, or with a wrong one.
+/// Suggests the component if a parameter is given without one, or with a wrong one.
 fn whereabouts(target: &str, parts: &[Part]) -> String {
     let settable = |part: &Part| {
         let names = part.description.names("parameter").chain(part.description.names("input"));

@@ -88,7 +88,7 @@ impl Source {
         iter::once((self.path.as_path(), self.text.as_str())).chain(bases)
     }
 
-    /// Creates an error at a place. The place `0..0` stands for the whole file.
+    /// Creates an error at a place. The place `0..0` denotes the whole file.
     pub fn error(&self, span: &Range<usize>, message: impl Into<String>) -> Error {
         let mut at = format!("{}: ", self.path.display());
         let mut start = 0;

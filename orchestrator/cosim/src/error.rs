@@ -59,7 +59,7 @@ pub enum Error {
     /// missed.
     #[error("{what} at t = {} s: {reason}", rounded(*time))]
     Lost {
-        /// What was lost or missed, such as "attitude lost".
+        /// Loss or missed goal, such as "attitude lost".
         what: String,
         /// Time of the first communication point at which this was so, s.
         time: f64,

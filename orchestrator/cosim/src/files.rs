@@ -18,8 +18,8 @@ pub struct PartialFile {
 }
 
 impl PartialFile {
-    /// Begins a file, whose folder is made if it is missing. What processes that were killed have
-    /// left of this file is removed.
+    /// Begins a file, whose folder is made if it is missing. Parts of this file that killed
+    /// processes have left are removed.
     ///
     /// # Errors
     /// Returns an error if the file cannot be created.

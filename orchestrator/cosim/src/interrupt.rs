@@ -58,7 +58,7 @@ impl std::fmt::Display for Request {
     }
 }
 
-/// Returns whether this process ignores SIGHUP, or whether it cannot be told.
+/// Returns whether this process ignores SIGHUP, or whether this is unknown.
 #[cfg(unix)]
 fn ignores_hangup() -> bool {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();

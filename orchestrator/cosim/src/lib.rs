@@ -1,5 +1,5 @@
-//! Steps FMI 2.0 instances as an experiment file describes. What their variables stand for is known
-//! to the experiment alone.
+//! Steps FMI 2.0 instances as an experiment file describes. Only the experiment knows the meaning
+//! of their variables.
 //!
 //! An [`experiment`] is read ([`document`]) and [checked](mod@check) once, from the top down, into
 //! a [`system::System`] (`wiring`, `settings`). After this no name is looked up. A [`run`] steps

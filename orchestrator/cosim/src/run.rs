@@ -23,7 +23,7 @@ pub trait Observer {
     fn observe(&mut self, sample: &Sample) -> Result<(), Error>;
 }
 
-/// Initialized instances with what accompanies their run.
+/// Initialized instances, with the pacer and the interrupt of their run.
 pub struct Run {
     /// The instances with their connections.
     pub master: Master,
@@ -120,7 +120,7 @@ struct Watch<'a, 'b> {
     pacer: Option<&'a mut Pacer>,
     interrupt: &'a Interrupt,
     /// Whether the next values are those of a tick. The moment at which an instance ended the run
-    /// is none, and has no deadline.
+    /// is not a tick, and has no deadline.
     is_step: bool,
     observers: &'a mut [&'b mut dyn Observer],
 }

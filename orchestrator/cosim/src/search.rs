@@ -64,8 +64,8 @@ pub fn is_installed(archive: &Path, folders: &[PathBuf]) -> bool {
     own.chain(folders.iter().cloned()).any(|other| canonical(&other).as_ref() == Some(&folder))
 }
 
-/// Returns the folders that are searched for what a name stands for: those that hold experiments
-/// and FMUs, and the current one.
+/// Returns the folders in which the file of a name is searched: those that hold experiments and
+/// FMUs, and the current one.
 pub fn folders() -> Vec<PathBuf> {
     let mut folders = experiments();
     folders.extend(fmu_folders());
@@ -94,8 +94,8 @@ fn has_extension(path: &Path, extension: &str) -> bool {
 }
 
 /// Returns whether a folder or file is skipped. Hidden folders and build folders are large and hold
-/// nothing to run, except `target/fmu`, which is searched separately. A folder `fuzz` holds what a
-/// fuzzer feeds to a program, such as faulty experiments.
+/// nothing to run, except `target/fmu`, which is searched separately. A folder `fuzz` holds the
+/// inputs of a fuzzer, such as faulty experiments.
 fn is_passed_over(name: &str) -> bool {
     name.starts_with('.') || name == "target" || name == "fuzz"
 }

@@ -1,5 +1,5 @@
-//! What a system consists of, for those who look into it: variables, and connections with the time
-//! at which their values are read.
+//! Content of a system, for inspection: variables, and connections with the time at which their
+//! values are read.
 
 use crate::system::System;
 use fmi_master::delay::{self, Reading};
@@ -13,8 +13,8 @@ impl System {
         delay::readings_of_wires(&self.parts(), &self.wires, self.experiment.simulation.coupling)
     }
 
-    /// Returns the variables that a name stands for, as `component.variable` or
-    /// `component.prefix.*`, in the order of the description. Texts are left out.
+    /// Returns the variables that a name denotes, as `component.variable` or `component.prefix.*`,
+    /// in the order of the description. Texts are left out.
     pub fn ports(&self, pattern: &str) -> Vec<Port> {
         let Some((name, rest)) = names::split(pattern) else { return Vec::new() };
         let parts = self.parts();

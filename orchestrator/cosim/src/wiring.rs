@@ -132,14 +132,14 @@ fn check_unconnected(experiment: &Experiment, parts: &[Part], wires: &[Wire]) ->
             let text = pattern.get_ref();
             let refuse = |message| Err(experiment.source.error(&pattern.span(), message));
             let mut meant = inputs.iter().filter(|(_, name)| names::matches(text, name)).peekable();
-            // The pattern "*" may stand for no input at all.
+            // The pattern "*" may match no input at all.
             if meant.peek().is_none() && text != "*" && !component.is_exchanged {
                 let hint = names::hint(text, inputs.iter().map(|(_, name)| *name));
                 return refuse(format!("\"{}\" has no input \"{text}\"{hint}", part.name));
             }
             if let Some((_, name)) = meant.find(|(position, _)| connected.contains(position)) {
                 return refuse(format!(
-                    "the input \"{}.{name}\" is said to be unconnected, but is connected",
+                    "the input \"{}.{name}\" is listed as unconnected, but is connected",
                     part.name
                 ));
             }
@@ -180,12 +180,11 @@ fn check_unconnected(experiment: &Experiment, parts: &[Part], wires: &[Wire]) ->
     Ok(())
 }
 
-/// Resolves the recorded variables. A pattern stands for inputs, outputs and local variables; a
+/// Resolves the recorded variables. A pattern matches inputs, outputs and local variables; a
 /// parameter is recorded only if it is named in full, and a text never is.
 ///
 /// # Errors
-/// Returns an error if a name does not exist, a pattern stands for nothing, or a variable is a
-/// text.
+/// Returns an error if a name does not exist, a pattern matches nothing, or a variable is a text.
 pub(crate) fn columns(experiment: &Experiment, parts: &[Part]) -> Result<Vec<Column>, Error> {
     let (mut columns, mut missing) = (Vec::<Column>::new(), Vec::new());
     let mut seen: HashSet<Port> = HashSet::new();

@@ -66,7 +66,7 @@ pub struct Experiment {
     /// Settings of the command line that name no component of the experiment.
     #[serde(skip)]
     pub unplaced: Vec<String>,
-    /// What the command line gives in place of the file.
+    /// Settings of the command line that replace those of the file.
     #[serde(skip)]
     pub given: Given,
     /// The experiment file, together with the files that it extends.

@@ -47,8 +47,8 @@ pub struct Overrides {
     pub isolation: Protection,
 }
 
-/// What the command line gives in place of an experiment's file, so that a fault is blamed on the
-/// option.
+/// Settings of the command line that replace those of an experiment's file. A fault in them is
+/// attributed to the option.
 #[derive(Clone, Debug, Default)]
 pub struct Given {
     stop: Option<f64>,

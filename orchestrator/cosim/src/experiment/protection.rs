@@ -67,15 +67,16 @@ impl Protection {
     }
 
     /// Returns whether a component gets a process of its own. By default FMUs share the process of
-    /// the program if this project's fmu-pack made them, as they say, and if they lie in a folder
-    /// of the program or in one of `fmu_dirs`, which the command line names: what an archive says
-    /// proves nothing, and others do not write there.
+    /// the program if they declare that this project's fmu-pack made them, and if they lie in a
+    /// folder of the program or in one of `fmu_dirs`, which the command line names: the declaration
+    /// alone proves nothing, and others do not write to these folders.
     pub fn isolates(&self, component: &Component, fmu: &Fmu, fmu_dirs: &[PathBuf]) -> bool {
         if fmu.is_lookup_table() {
             return false;
         }
         let asked = component.isolate.or(self.isolate);
-        // A sandbox is a process of its own. Where there can be none, the instance is refused.
+        // A sandbox is a process of its own. Where a sandbox is impossible, the instance is
+        // refused.
         self.sandbox == Some(true)
             || isolation::is_enabled()
                 && asked.unwrap_or_else(|| {

@@ -1,8 +1,8 @@
-//! What a measure computes: its kind, with the keys that this kind needs.
+//! Quantity that a measure computes: its kind, with the keys of this kind.
 
 use super::{Measure, MeasureKind};
 
-/// Quantity that a measure computes, with what its kind needs.
+/// Quantity that a measure computes, with the keys of its kind.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Quantity {
     /// Square root of the mean of the sum of the signals' squares.
@@ -110,7 +110,7 @@ impl Measure {
         }
     }
 
-    /// Reads what the kind needs. Further keys are not looked at.
+    /// Reads the keys of the kind. Further keys are ignored.
     fn quantity_of_kind(&self) -> Result<Quantity, String> {
         Ok(match self.kind {
             MeasureKind::Rms => Quantity::Rms,

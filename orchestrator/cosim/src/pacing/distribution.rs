@@ -4,7 +4,7 @@ use hdrhistogram::Histogram;
 use serde::{Deserialize, Serialize};
 use std::time::Duration;
 
-/// Upper end of the range in which durations are told apart, which is an hour.
+/// Upper end of the range in which durations are distinguished, which is an hour.
 const LONGEST: Duration = Duration::from_secs(3600);
 /// Width of the first column of the written histogram; each further column ends at a constant
 /// multiple of the one before.

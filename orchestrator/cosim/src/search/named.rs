@@ -16,7 +16,7 @@ use std::path::{Path, PathBuf};
 /// File that makes its folder a study.
 const STUDY: &str = "study.toml";
 
-/// What a file describes.
+/// Kind of a file by its content.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Kind {
     /// The file describes an experiment, or it is an SSP archive.
@@ -89,7 +89,7 @@ impl Kind {
         }
         let text = fs::read_to_string(path).ok()?;
         let kind = Self::of_text(&text)?;
-        // What extends a campaign is one, too.
+        // A file that extends a campaign is a campaign, too.
         let whole = (kind == Self::Experiment && sets(text.lines(), "extends"))
             .then(|| Source::new(path, text).ok())
             .flatten();
@@ -179,8 +179,8 @@ fn with_extension(name: &Path, extension: &str) -> PathBuf {
     PathBuf::from(text)
 }
 
-/// Finds what this name stands for: a file, or something of this kind that `list` shows, by its
-/// name or the end of its path.
+/// Finds the file that this name denotes: a path, or an entry of this kind that `list` shows, by
+/// its name or the end of its path.
 ///
 /// # Errors
 /// Returns an error if there is nothing of this kind with this name, if there are several, or if
@@ -189,7 +189,7 @@ pub fn find(name: &Path, kind: Kind) -> Result<PathBuf, Error> {
     find_any(name, &[kind])
 }
 
-/// Finds what this name stands for, of the first of these kinds that has such a name.
+/// Finds the file that this name denotes, of the first of these kinds that has such a name.
 ///
 /// # Errors
 /// Returns an error as [`find`] does.
@@ -217,7 +217,7 @@ pub fn find_any(name: &Path, kinds: &[Kind]) -> Result<PathBuf, Error> {
 /// Looks for a name among the files of one kind.
 fn look(name: &Path, kind: Kind) -> Result<Option<PathBuf>, Error> {
     let file = kind.file(name);
-    // What is of no kind is taken as it was meant, and its reader says what is wrong with it.
+    // A file of no kind is accepted as one of the expected kind, and its reader reports its faults.
     let fits = |path: &Path| path.is_file() && Kind::of(path).is_none_or(|other| other == kind);
     if let Some(path) = [name, &file].into_iter().find(|path| fits(path)) {
         return Ok(Some(path.to_path_buf()));
@@ -261,7 +261,7 @@ fn of_another_kind(name: &Path, others: &[Kind], reads: bool) -> Error {
     let what: Vec<&str> = others.iter().map(|kind| kind.with_article()).collect();
     let mut commands: Vec<&str> = others.iter().map(|kind| kind.command()).collect();
     if reads {
-        // Who asks what an FMU is asks what another file says, too.
+        // A user who inspects an FMU may want to see the content of another file, too.
         commands.push("show");
     }
     let calls: Vec<String> =

@@ -136,7 +136,7 @@ fn identifier(text: &str) -> String {
     name
 }
 
-/// Writes the step in the way of OMSimulator, which other importers read as well.
+/// Writes the step in the form of OMSimulator, which other importers read as well.
 fn open_modelica(xml: &mut Xml, system: &Source) -> io::Result<()> {
     let schema = "https://raw.githubusercontent.com/OpenModelica/OMSimulator/master/schema/oms.xsd";
     element(xml, "oms:Annotations", &[("xmlns:oms", schema.into())], |xml| {
@@ -153,7 +153,7 @@ fn open_modelica(xml: &mut Xml, system: &Source) -> io::Result<()> {
 }
 
 /// Writes the settings that are needed to repeat the same run: step, coupling, order, periods,
-/// recorded variables, and what is measured, watched and drawn.
+/// recorded variables, and the section `[observe]`.
 fn run_settings(xml: &mut Xml, system: &Source) -> io::Result<()> {
     let experiment = &system.experiment;
     let coupling = match experiment.simulation.coupling {
