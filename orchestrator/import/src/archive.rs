@@ -99,7 +99,7 @@ fn names(archive: &mut ZipArchive<File>, limit: usize) -> Result<Vec<String>, St
                 "is {depth} folders deep, at most {DEPTH_LIMIT} are allowed"
             )));
         }
-        // Folders that no entry stands for are made as well.
+        // Folders without an entry of their own are made as well.
         folders.extend(name.match_indices('/').map(|(end, _)| name[..end].to_string()));
         if folders.len() > limit {
             return Err(format!("refused: it has more than {limit} folders"));

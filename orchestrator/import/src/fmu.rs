@@ -78,7 +78,7 @@ impl Fmu {
         Ok(Self { path: path.to_path_buf(), description, content: Content::Archive(archive) })
     }
 
-    /// Puts the law of another program into the place of that of this controller.
+    /// Replaces the law of this controller by that of another program.
     ///
     /// # Errors
     /// Returns an error if the FMU lacks a variable that a law needs.

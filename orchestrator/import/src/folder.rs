@@ -19,7 +19,7 @@ const DEEP: usize = 50;
 /// A temporary folder that is removed when this value is dropped.
 #[derive(Debug)]
 pub struct TemporaryFolder {
-    /// Tells other processes that the folder is in use.
+    /// Lock that shows other processes that the folder is in use.
     hold: Option<File>,
     path: PathBuf,
 }
@@ -116,8 +116,8 @@ fn allow(_folder: &Path) -> io::Result<()> {
     Ok(())
 }
 
-/// Returns whether a folder belongs to the user of this process. In a folder of another one, paths
-/// may change under the feet of whoever removes it.
+/// Returns whether a folder belongs to the user of this process. In a folder of another user, paths
+/// may change while they are removed.
 #[cfg(unix)]
 fn is_own(folder: &Path) -> bool {
     use std::os::unix::fs::MetadataExt;

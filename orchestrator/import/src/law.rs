@@ -2,9 +2,9 @@
 //! in Python. It takes the place of the law of a controller's FMU, which stands in for everything
 //! else: variables, reference, sampling period, and the limits that the law is judged by.
 //!
-//! This program writes a message for each thing that it wants, the other one answers a question
-//! for a moment only. A message is its kind as one byte, the number of a flight's law (u64), a
-//! time in s (f64), the length of what follows (u32), and what follows, all in little-endian order.
+//! This program writes a message for each request; the other one answers only requests for a
+//! moment. A message is its kind as one byte, the number of a flight's law (u64), a time in s
+//! (f64), the length of what follows (u32), and what follows, all in little-endian order.
 
 use fmi_master::description::{ModelDescription, VariableKind};
 use fmi_master::forward;
@@ -21,20 +21,20 @@ use std::os::windows::io::AsHandle;
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// What a message asks for.
+/// Kind of a message.
 #[derive(Clone, Copy)]
 #[repr(u8)]
 enum Kind {
     /// A fresh law is to begin a flight. Lines of text follow: the number of the case, empty if it
-    /// is none of several, and the name of each value that the law will be told.
+    /// is none of several, and the name of each value that the law will receive.
     Begin = b'b',
-    /// The law is asked for its moment (x, y, z in N m, three f64). What it is told follows.
+    /// The law is asked for its moment (x, y, z in N m, three f64). Its inputs follow.
     Ask = b'a',
     /// The law is to be as another one is now, whose number follows.
     Copy = b'c',
     /// The law is no longer needed.
     End = b'e',
-    /// What this program prints follows.
+    /// Output of this program follows.
     Print = b'p',
 }
 
@@ -103,7 +103,7 @@ impl Write for Printed {
     }
 }
 
-/// Variables of a stand-in, by what the law is told and gives.
+/// Variables of a stand-in, by the inputs and the output of the law.
 #[derive(Clone, Debug)]
 pub(crate) struct Ports {
     /// Real inputs.
@@ -116,7 +116,7 @@ pub(crate) struct Ports {
     period: u32,
     /// The parameter that chooses the reference, and its value for a reference from outside.
     profile: (u32, i32),
-    /// Names of what the law is told: inputs, reference, and the moment that it gave last.
+    /// Names of the values that the law receives: inputs, reference, and its last moment.
     names: Vec<String>,
     starts: Vec<f64>,
 }
@@ -164,7 +164,7 @@ impl Ports {
     }
 }
 
-/// What changes from step to step.
+/// State that changes from step to step.
 #[derive(Clone, Default)]
 struct Memory {
     inputs: Vec<f64>,
@@ -226,7 +226,7 @@ impl LawInstance {
     }
 }
 
-/// Makes a failure of a message that of a call.
+/// Converts the failure of a message to that of a call.
 fn sent(call: &'static str, outcome: io::Result<()>) -> Outcome {
     outcome.map_err(|error| {
         CallFailure::new(call, format!("the program with the control law has ended: {error}"))

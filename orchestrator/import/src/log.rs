@@ -131,7 +131,7 @@ impl Log {
         self.last.lock().take()
     }
 
-    /// Takes the last message that tells of no problem, such as why a simulation ends.
+    /// Takes the last message that reports no problem, such as why a simulation ends.
     pub(crate) fn take_event(&self) -> Option<String> {
         self.event.lock().take()
     }
@@ -188,7 +188,8 @@ impl Log {
             return;
         }
         match status {
-            // What the discarded call says tells the reason, which may be the end of a simulation.
+            // The message of the discarded call gives the reason, which may be the end of a
+            // simulation.
             Ok(Status::Ok | Status::Pending | Status::Discard) => {
                 tracing::info!("{component}: [{category}] {message}");
             }

@@ -86,7 +86,7 @@ impl Element {
             Ok(())
         };
         let mut reader = Reader::from_str(text);
-        // Stack of the elements that are open; the first one stands for the document itself.
+        // Stack of the elements that are open; the first one represents the document itself.
         let mut open = vec![Self::default()];
         let (mut line, mut counted) = (1, 0);
         // Number of open elements that are too deep to be kept.

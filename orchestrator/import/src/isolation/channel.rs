@@ -88,7 +88,7 @@ impl Channel {
         message.reserve(length);
         // SAFETY: both places have room for `length` bytes, which are initialised by the copy. A
         // process that breaks the protocol by writing now gives other bytes, which are decoded as
-        // bytes of a stranger are.
+        // untrusted ones.
         unsafe {
             message.as_mut_ptr().copy_from_nonoverlapping(self.content(slot), length);
             message.set_len(length);

@@ -1,4 +1,4 @@
-//! Says how a process has ended.
+//! Description of the end of a process.
 
 use std::process::ExitStatus;
 
@@ -33,7 +33,7 @@ pub(super) fn ended(status: ExitStatus) -> String {
     format!("it ended its process with exit code {code}")
 }
 
-/// Returns what an exception of Windows means.
+/// Returns the meaning of an exception of Windows.
 #[cfg(windows)]
 fn exception(code: i32) -> Option<&'static str> {
     match code.cast_unsigned() {

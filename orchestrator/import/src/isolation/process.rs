@@ -56,7 +56,7 @@ pub(super) struct Process {
     gone: Option<String>,
 }
 
-/// What the process prints.
+/// Output of the process.
 #[derive(Default)]
 struct Printed {
     last: Mutex<String>,
@@ -76,7 +76,8 @@ impl Process {
     /// Starts a process, which then waits for [`Self::set_up`].
     ///
     /// In a sandbox it works in the `folder` of the archive, which is also its home and its place
-    /// for temporary files. Of the environment it has language, time zone and where libraries are.
+    /// for temporary files. Its environment has only language, time zone and the paths of
+    /// libraries.
     pub(super) fn start(
         program: &Path,
         name: &str,
@@ -318,7 +319,7 @@ fn passes(name: &OsStr) -> bool {
 }
 
 impl Printed {
-    /// Passes on what the process prints, until it ends.
+    /// Passes on the output of the process, until it ends.
     fn listen(&self, component: &str, prints: PipeReader) {
         let mut prints = BufReader::new(prints);
         let mut line = Vec::new();
@@ -346,8 +347,8 @@ fn memory(process: u32) -> u64 {
     1024 * status.lines().filter_map(kib).sum::<u64>()
 }
 
-/// Gives the process a session of its own: it has no controlling terminal, so that Ctrl-C does not
-/// reach it, which the master ends in order, and it can write no command into the user's shell.
+/// Gives the process a session of its own: it has no controlling terminal, so Ctrl-C does not reach
+/// it (the master ends it in order), and it can write no command into the user's shell.
 #[cfg(unix)]
 #[allow(unsafe_code)]
 fn apart(command: &mut Command) {

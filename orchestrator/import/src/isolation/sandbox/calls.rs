@@ -1,5 +1,5 @@
-//! The system calls that a sandboxed instance may make: what the C library, memory, threads, timers
-//! and files of its folder need. All others fail with EPERM.
+//! The system calls that a sandboxed instance may make: those for the C library, memory, threads,
+//! timers and files of its folder. All others fail with EPERM.
 
 use libc::{c_int, c_long};
 use seccompiler::{
@@ -93,7 +93,7 @@ const ALLOWED: &[c_long] = &[
     libc::SYS_timerfd_create,
     libc::SYS_timerfd_settime,
     libc::SYS_timerfd_gettime,
-    // What it is and where it runs.
+    // Identity of the process and of the system.
     libc::SYS_getpid,
     libc::SYS_getppid,
     libc::SYS_gettid,
@@ -171,7 +171,7 @@ const NAMESPACES: c_int = libc::CLONE_NEWNS
 /// # Errors
 /// Returns an error if the system has no such filters.
 pub(super) fn close() -> Result<(), Error> {
-    // To a call that does not exist, the C library knows an older one whose arguments can be seen.
+    // If a call does not exist, the C library uses an older one whose arguments can be seen.
     let unknown = BTreeMap::from([(libc::SYS_clone3, Vec::new())]);
     apply(unknown, SeccompAction::Allow, SeccompAction::Errno(libc::ENOSYS as u32))?;
     apply(rules()?, SeccompAction::Errno(libc::EPERM as u32), SeccompAction::Allow)

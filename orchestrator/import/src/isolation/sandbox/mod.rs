@@ -2,7 +2,7 @@
 //! system's libraries and its own folder, write in its own folder, and reach nothing else.
 //!
 //! Landlock guards the paths, a filter of system calls ([`calls`]) everything that has no path.
-//! What each version of the kernel holds is in SECURITY.md.
+//! SECURITY.md lists the restrictions of each version of the kernel.
 
 mod calls;
 
@@ -57,8 +57,8 @@ pub(super) fn close(folder: &Path) -> Result<(), String> {
 
 fn close_files(folder: &Path) -> Result<(), RulesetError> {
     let reads = AccessFs::from_read(NEWEST) & !BitFlags::from(AccessFs::Execute);
-    // Without the first version of Landlock there is no sandbox; what later ones add is used where
-    // the kernel has it.
+    // Without the first version of Landlock there is no sandbox; additions of later ones are used
+    // where the kernel has them.
     let rules = Ruleset::default()
         .set_compatibility(CompatLevel::HardRequirement)
         .handle_access(AccessFs::from_all(ABI::V1))?
@@ -69,7 +69,7 @@ fn close_files(folder: &Path) -> Result<(), RulesetError> {
     let mut rules = rules.create()?;
     let libraries = env::var_os("LD_LIBRARY_PATH").unwrap_or_default();
     let readable = READABLE.iter().map(PathBuf::from).chain(env::split_paths(&libraries));
-    // What is not there cannot be read.
+    // Missing paths cannot be read.
     for path in readable.filter(|path| path.is_absolute()).filter_map(|path| PathFd::new(path).ok())
     {
         rules = rules.add_rule(PathBeneath::new(path, reads))?;
