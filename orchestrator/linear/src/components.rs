@@ -4,7 +4,7 @@ use crate::continuous::Continuous;
 use crate::model::Step;
 use fmi_master::wiring::Port;
 
-/// How a component answers to its inputs.
+/// Response of a component to its inputs.
 #[derive(Clone, Debug)]
 pub enum Dynamics {
     /// By derivatives of its states.
@@ -28,12 +28,12 @@ pub struct Component {
     pub outputs: Vec<Port>,
     /// Names of its continuous states.
     pub states: Vec<String>,
-    /// How it answers.
+    /// Response of the component.
     pub dynamics: Dynamics,
 }
 
 impl Component {
-    /// Returns the number of communication points after which the component repeats itself.
+    /// Returns the period of the component, in communication points.
     pub(crate) fn period(&self) -> u64 {
         let steps = match &self.dynamics {
             Dynamics::Continuous(_) => 1,
@@ -42,8 +42,8 @@ impl Component {
         self.every * steps
     }
 
-    /// Returns the place of the step that begins at a communication point, or that was the last
-    /// one before it.
+    /// Returns the place of the step that begins at a communication point, or of the last one
+    /// before it.
     pub(crate) fn phase(&self, tick: u64) -> usize {
         let Dynamics::Sampled(steps) = &self.dynamics else { return 0 };
         let count = steps.len() as u64;

@@ -25,8 +25,8 @@ pub struct ResponseCurves {
     pub phase: Vec<f64>,
     /// Magnitude of L, dB.
     pub gain: Vec<f64>,
-    /// Largest singular value of the sensitivity of all signals together, at the frequency that is
-    /// put in, dB. A loop with a period of several samples answers at others, too.
+    /// Largest singular value of the sensitivity of all signals together, at the frequency of the
+    /// input, dB. A loop with a period of several samples responds at others, too.
     pub sensitivity: Vec<f64>,
 }
 

@@ -10,8 +10,8 @@ use fmi_master::instance::{CallFailure, Instance};
 use fmi_master::quantity::rounded;
 
 impl Builder<'_> {
-    /// Returns the model by derivatives, if the component gives them and they describe what it
-    /// does.
+    /// Returns the model by derivatives, if the component gives them and they describe its
+    /// responses.
     pub(crate) fn continuous(
         &self,
         instance: &mut dyn Instance,
@@ -41,7 +41,7 @@ impl Builder<'_> {
         };
         instance.restore(0)?;
         let Ok(found) = Continuous::of(instance, &references) else { return Ok(None) };
-        // The states may be read, so that each of their responses can be held against it.
+        // The states may be read, so that each of their responses can be compared.
         let scales = Scales {
             inputs: self.inputs.iter().map(|port| self.scale(port)).collect(),
             outputs: states

@@ -1,4 +1,4 @@
-//! Holding derivatives of a component against its responses, and finding its delay from them.
+//! Comparison of a component's derivatives with its responses, and its delay from them.
 
 use crate::Matrix;
 use crate::continuous::Continuous;
@@ -14,7 +14,8 @@ pub(crate) const DESCRIBED: f64 = 0.02;
 pub(crate) const AT_LENGTH: f64 = 0.2;
 /// Number of responses from which a delay is found.
 const FITTED: usize = 4;
-/// Shortest delay within a step that is told from a change of the operating point, in steps.
+/// Shortest delay within a step that is distinguished from a change of the operating point, in
+/// steps.
 const SMALLEST_PART: f64 = 1e-3;
 
 /// Returns whether derivatives describe the responses of states and outputs to a change that is
@@ -48,8 +49,8 @@ pub(crate) fn describes(
     })
 }
 
-/// Returns the largest difference between the responses of steps that repeat themselves and those
-/// that were measured, relative to the largest response of a variable.
+/// Returns the largest difference between the responses of repeated steps and those that were
+/// measured, relative to the largest response of a variable.
 pub(crate) fn deviation(steps: &[Step], lags: &[Matrix]) -> f64 {
     let mut state = steps[0].b.clone();
     let mut differences = vec![&steps[0].d - &lags[0]];
@@ -67,8 +68,8 @@ pub(crate) fn deviation(steps: &[Step], lags: &[Matrix]) -> f64 {
 
 /// Gives a system the delay and the matrix B of its responses, and no D. While an input has not
 /// acted yet, the component's own derivatives by it are zero. With a trial of the delay, the
-/// responses are linear in B; the delay is the one with the least rest. Returns the whole steps of
-/// it, too.
+/// responses are linear in B; the delay is the one with the least residual. Returns the whole steps
+/// of it, too.
 pub(crate) fn delayed(
     system: Continuous,
     lags: &Lags,

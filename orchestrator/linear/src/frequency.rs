@@ -63,7 +63,7 @@ pub fn measure(
     if system.variable_at(input).causality != "input" {
         let name = &open.signals[channel].name;
         return Err(Error::experiment(format!(
-            "--open {name}: a sine is added to what an input receives, and this is an output"
+            "--open {name}: the sine must be added at an input, but this is an output"
         )));
     }
     let step = system.clock.step();
@@ -84,7 +84,7 @@ pub fn measure(
     let stop = start + (last + 1) as f64 * step;
     system.clock = Clock::new(start, stop, step).map_err(Error::experiment)?;
     let place = system.probe(&system.name(input)).map_err(Error::experiment)?.place;
-    // The model holds what is put in from sample to sample.
+    // The model holds its inputs from sample to sample.
     let held = (open.sampling() / step).round().max(1.0) as u64;
     let sine = |tick: u64| {
         let since = (tick - lineariser.first()) / held * held;

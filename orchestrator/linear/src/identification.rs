@@ -1,4 +1,4 @@
-//! Finding the linear model of a component from what its instance answers.
+//! Identification of the linear model of a component from the responses of its instance.
 
 use crate::Matrix;
 use crate::components::{Component, Dynamics};
@@ -16,7 +16,7 @@ use fmi_master::quantity::rounded;
 use fmi_master::wiring::Port;
 use std::ops::Range;
 
-/// Most steps of the next period whose responses are held against those of the first.
+/// Most steps of the next period whose responses are compared with those of the first.
 const AGAIN: usize = 4;
 /// Difference of two periods up to which they count as equal, relative to the largest response, and
 /// in relation to the least difference that any period leaves.
@@ -135,7 +135,7 @@ impl Builder<'_> {
         components.into_iter().any(|one| one.fmu.description.states().next().is_some())
     }
 
-    /// Returns what counts in its responses, in relation to the largest.
+    /// Returns the smallest size of its responses that counts, in relation to the largest.
     fn smallest(&self) -> f64 {
         if self.components.len() > 1 { SMALLEST_OF_PAIR } else { SMALLEST }
     }
@@ -183,7 +183,7 @@ impl Builder<'_> {
 
     /// Finds the size of the change that fits the component, from `count` lags after each step, and
     /// the period after which its responses repeat, which is at most `longest`. A law that is not
-    /// smooth wants a small change, and one that iterates a larger one.
+    /// smooth needs a small change, and one that iterates a larger one.
     fn trial(
         &self,
         respond: &mut Respond,
@@ -194,7 +194,7 @@ impl Builder<'_> {
         let mut firsts: Vec<Response> = Vec::new();
         for change in CHANGES {
             // A change that leaves next to nothing is as good as any. Of the others one response
-            // tells whether the component is smooth.
+            // shows whether the component is smooth.
             let is_found = best.error <= EQUAL;
             let responses = respond(change, 0..if is_found { 1 } else { 2 * longest }, count)?;
             if !is_found {
@@ -223,7 +223,7 @@ impl Builder<'_> {
         let again = period + period.min(AGAIN);
         let count = compared_steps(self.recorded.length).max(late + COMPARED);
         let long = respond(change, 0..1, count)?;
-        // What a component remembers of its inputs takes as many steps to show as it remembers.
+        // The memory of a component takes as many steps to show as it is long.
         let may_grow = late > 0 || !self.moves();
         let most = ((self.recorded.rows.len() - again) / 2).min(MOST_BLOCKS);
         let mut blocks = BLOCKS.max(2 * period);
@@ -233,7 +233,7 @@ impl Builder<'_> {
             let drift = difference(&phases, period);
             if drift > REPEATS {
                 return Err(without_model(format!(
-                    "responses to a change of its inputs do not repeat within {longest} steps of {} s, but differ by {:.0} %: it has no linear model here, or a longer period than that, which takes fewer of a longer step",
+                    "responses to a change of its inputs do not repeat within {longest} steps of {} s, but differ by {:.0} %: it has no linear model here, or a longer period, which a longer step can cover",
                     self.recorded.length,
                     1e2 * drift
                 )));

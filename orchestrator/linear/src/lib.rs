@@ -3,10 +3,10 @@
 //! An experiment is run to an instant and kept there. A component that declares continuous states
 //! gives its derivatives ([`continuous`]); of every other one the responses to small changes of its
 //! inputs are taken from the kept state ([`responses`]), and realised as a linear model of the
-//! fewest states ([`realisation`]). One that has edges is taken together with the one that it hands
-//! on to. Then the master's calls are repeated on matrices instead of
-//! values ([`propagation`]), so that order, coupling, periods and delays are those of the run. The
-//! loop is opened at named signals. [`margins`] says how far it is from instability there.
+//! fewest states ([`realisation`]). A component with edges is combined with the one that receives
+//! its outputs. Then the master's calls are repeated on matrices instead of values
+//! ([`propagation`]), so that order, coupling, periods and delays are those of the run. The loop is
+//! opened at named signals. [`margins`] gives its distance from instability there.
 
 pub mod components;
 pub mod continuous;

@@ -23,8 +23,8 @@ use fmi_master::wiring::{Port, Wire};
 use fmu_import::warnings;
 use std::ops::Range;
 
-/// Growth of a closed loop with a pair that is not told from none, and growth of the open loop that
-/// a vehicle does not have, 1/s.
+/// Growth of a closed loop with a pair that is not distinguished from none, and growth of the open
+/// loop that a vehicle does not have, 1/s.
 const SLOWEST_GROWTH: f64 = 0.1;
 const OWN_GROWTH: f64 = 1.0;
 
@@ -145,8 +145,8 @@ impl Lineariser {
     /// Linearises a run of the system after its initialisation.
     ///
     /// # Errors
-    /// Returns an error if an instance fails or keeps no states, if the loop does not
-    /// respond to what is put in at the opened signals, or if the run was asked to end.
+    /// Returns an error if an instance fails or keeps no states, if the loop does not respond to
+    /// changes of the opened signals, or if the run was asked to end.
     pub fn linearise(&self, run: &mut Run, interrupt: &Interrupt) -> Result<Linearised, Error> {
         let Self { system, time, ticks, wired, signals, opened } = self;
         let recorded = record(system, wired, ticks.clone(), run).map_err(|error| match error {
@@ -210,7 +210,7 @@ impl Lineariser {
                 failure: CallFailure::answer(
                     "linearise",
                     format!(
-                        "whether the loop is stable cannot be told, as the allocator's noise hides a growth of {growth:.1e}/s"
+                        "the stability of the loop is undecided, because the allocator's noise hides a growth of {growth:.1e}/s"
                     ),
                 ),
             });
@@ -281,8 +281,8 @@ impl Lineariser {
 }
 
 /// Returns the growth, 1/s, of a closed loop with a pair if noise alone may make it unstable: a
-/// model of a pair may have motions that grow by themselves, and does not tell a very slow growth
-/// from none.
+/// model of a pair may have motions that grow by themselves, and cannot distinguish a very slow
+/// growth from none.
 fn noise(open: &OpenLoop) -> Option<f64> {
     let growth = |a: &Matrix| spectral_radius(a).ln() / open.period;
     let closed = open.closed(&vec![1.0; open.channels()]).map(|a| growth(&a))?;

@@ -28,9 +28,9 @@ pub struct Signal {
     pub size: f64,
 }
 
-/// The open loop over one common period of its components: from what is put in at the opened
-/// signals to what arrives there. The loop is closed by putting in what arrives: the feedback is
-/// positive, and the return ratio is the negative of this system.
+/// The open loop over one common period of its components: from the values injected at the opened
+/// signals to those that arrive there. The loop is closed by injecting the arriving values: the
+/// feedback is positive, and the return ratio is the negative of this system.
 #[derive(Clone, Debug, PartialEq)]
 pub struct OpenLoop {
     /// Step of one period. Its inputs and outputs are all signals at the first sample of the

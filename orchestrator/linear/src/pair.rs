@@ -1,7 +1,7 @@
-//! Two components of which one hands on to the other, as one component.
+//! Two components in series, as one component.
 //!
 //! An allocator divides a moment among effectors, none of which has a slope where its limit
-//! changes; what they do together is smooth all the same. So the response of both is taken.
+//! changes; their joint effect is smooth nevertheless. So the response of both is used.
 
 use crate::replay::Recorded;
 use cosim::system::System;
@@ -107,15 +107,15 @@ impl Joined {
 pub(crate) struct Pair<'a, 'b> {
     joined: &'a Joined,
     members: [&'b mut dyn Instance; 2],
-    /// What has been set since the last step: reference, type and value. It reaches the members
-    /// when they step, because nothing may be read after it.
+    /// Values set since the last step: reference, type and value. It reaches the members when they
+    /// step, because nothing may be read after it.
     set: Vec<(u32, Carrier, f64)>,
     /// Member whose call came last.
     pub(crate) last: usize,
 }
 
 impl<'a, 'b> Pair<'a, 'b> {
-    /// Takes two instances as one.
+    /// Combines two instances into one.
     pub(crate) fn new(joined: &'a Joined, members: [&'b mut dyn Instance; 2]) -> Self {
         Self { joined, members, set: Vec::new(), last: 0 }
     }
@@ -129,7 +129,7 @@ impl<'a, 'b> Pair<'a, 'b> {
         (0..2).try_for_each(|member| call(self.member(member)))
     }
 
-    /// Hands on what is read at this time of a round.
+    /// Passes on the values that are read at this time of a round.
     fn hand_on(&mut self, reading: Reading, from: usize) -> Result<Vec<(Port, f64)>, CallFailure> {
         let joined = self.joined;
         let meant = joined.inner.iter().filter(|one| one.reading == reading && one.from == from);

@@ -1,5 +1,5 @@
 //! The master's algorithm on matrices: every value is a row of factors, by which it follows from
-//! the states at the beginning of a period and from what is put in at the opened signals.
+//! the states at the beginning of a period and from the values injected at the opened signals.
 //!
 //! The order of the calls is that of [`fmi_master::master`], so that the delays are those of a run.
 
@@ -77,8 +77,7 @@ struct Rows<'a> {
     before: Vec<Matrix>,
     /// Value that arrives at each opened signal.
     arriving: Matrix,
-    /// Where what is put in at a communication point begins among the columns; `None` if the loop
-    /// is closed.
+    /// First column of the values injected at a communication point; `None` if the loop is closed.
     put_in: Option<usize>,
     /// Delay of each component's inputs.
     delays: Vec<Vec<Steps>>,
@@ -87,7 +86,7 @@ struct Rows<'a> {
     parts: Vec<Vec<(f64, Step)>>,
     /// Inputs of each component at its last steps, the newest first.
     history: Vec<Vec<Matrix>>,
-    /// Number of communication steps for which what arrives at the opened signals is held.
+    /// Number of communication steps for which the values at the opened signals are held.
     held: u64,
 }
 
@@ -325,7 +324,7 @@ impl<'a> Rows<'a> {
             let mut value = source.row(link.from.1) * link.factor;
             if let Some(channel) = link.opened {
                 if !(tick - self.net.first).is_multiple_of(self.held) {
-                    // To the last digit, so that what is remembered of it is found to be equal.
+                    // Exact to the last digit, so that remembered copies are found to be equal.
                     value = self.arriving.row(channel).into_owned();
                 }
                 self.arriving.set_row(channel, &value);

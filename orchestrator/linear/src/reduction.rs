@@ -5,8 +5,8 @@ use crate::model::Step;
 use nalgebra::DVector as Vector;
 use std::f64::consts::PI;
 
-/// Combines communication points between which no opened signal changes, so that what is put in is
-/// held there too. Returns the number of samples that are left.
+/// Combines communication points between which no opened signal changes, so that injected values
+/// are held there too. Returns the number of samples that are left.
 pub(crate) fn held(step: Step, ticks: usize, channels: usize) -> (Step, usize) {
     let Step { a, b, c, d } = step;
     let largest = c.amax().max(d.amax());

@@ -8,7 +8,7 @@ use crate::margins::structured::balanced;
 use nalgebra::{Complex, ComplexField, DMatrix, DVector};
 use std::f64::consts::PI;
 
-/// Logarithm of a norm from which its growth is looked at: transients of quantities in different
+/// Logarithm of a norm from which its growth is evaluated: transients of quantities in different
 /// components are smaller.
 const GROWN: f64 = 60.0;
 /// Number of squarings, and the relative error from which on there are no more.
@@ -20,7 +20,7 @@ pub fn spectral_radius<T: ComplexField<RealField = f64>>(a: &DMatrix<T>) -> f64 
     dominant(a).norm()
 }
 
-/// Returns whether all eigenvalues lie within the unit circle. Far from it, few squarings tell.
+/// Returns whether all eigenvalues lie within the unit circle. Far from it, few squarings decide.
 pub fn is_stable<T: ComplexField<RealField = f64>>(a: &DMatrix<T>) -> bool {
     let (mut power, mut square) = (a.clone(), a.clone());
     // ln ‖Aᴺ‖ for N = 2ᵏ, and before.

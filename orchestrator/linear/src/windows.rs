@@ -1,10 +1,10 @@
-//! Over how many of its steps a component is looked at.
+//! Numbers of steps over which a component is evaluated.
 
 /// Longest period of a component that is looked for: a time in s, but so many of its steps at least
 /// and at most.
 const LONGEST_PERIOD: f64 = 0.25;
 const LONGEST: [usize; 2] = [25, 50];
-/// Time over which responses are looked at, and longest delay of a component, s. It limits the
+/// Time over which responses are evaluated, and longest delay of a component, s. It limits the
 /// longest period, too.
 pub(crate) const LONGEST_TIME: f64 = 1.0;
 /// Number of steps whose responses a model reproduces twice over: the first that is tried, and the
@@ -23,7 +23,7 @@ pub(crate) fn needed_steps(length: f64) -> usize {
     (2 * longest + 2 * blocks).max(longest + window)
 }
 
-/// Returns the number of steps over which a model is held against the motion of a vehicle.
+/// Returns the number of steps over which a model is compared with the motion of a vehicle.
 pub(crate) fn compared_steps(length: f64) -> usize {
     (LONGEST_TIME / length).ceil() as usize
 }

@@ -16,7 +16,7 @@ const TURN: f64 = 6.0;
 /// Most parts of a step between the delays that are tried, and the longest delay in steps.
 const PARTS: f64 = 4.0;
 const LONGEST_DELAY: f64 = 200.0;
-/// Number of delays that are tried up to the one that the phase lets expect.
+/// Number of delays that are tried up to the one that the phase suggests.
 const TRIALS: f64 = 8.0;
 /// Steps that enclose a change of stability, and the relative width at which they end.
 const REFINEMENTS: usize = 60;
@@ -31,8 +31,8 @@ pub struct Crossing {
     pub frequency: f64,
 }
 
-/// Gains, phase and delay at which the loop becomes unstable; `None` if none within the range that
-/// is looked at does.
+/// Gains, phase and delay at which the loop becomes unstable; `None` if none within the searched
+/// range does.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct Classical {
     /// Least factor above 1, up to 1000.
@@ -43,11 +43,11 @@ pub struct Classical {
     pub phase: Option<Crossing>,
     /// Least delay in addition, s.
     pub delay: Option<Crossing>,
-    /// Longest delay that was looked at, s.
+    /// Longest delay that was searched, s.
     pub longest_delay: f64,
 }
 
-/// Looks at one signal, or at all of them changed in the same way.
+/// Searches for one signal, or for all of them changed in the same way.
 pub(super) fn classical(net: &Net, open: &OpenLoop, channel: Option<usize>) -> Classical {
     let count = open.channels();
     let gains = |gain: f64| -> Vec<f64> {
@@ -70,7 +70,8 @@ pub(super) fn classical(net: &Net, open: &OpenLoop, channel: Option<usize>) -> C
         Some(Crossing { value: (direction * crossing.value).exp(), ..crossing })
     };
     let phase = first(&by_phase, TURN, 180.0, [0.0, open.period]);
-    // A delay turns the loop by its product with the frequency, which says where to look for it.
+    // A delay turns the loop by its product with the frequency, which gives the range of the
+    // search.
     let expected = phase
         .filter(|at| at.frequency > 0.0)
         .map_or(0.0, |at| at.value.to_radians() / (at.frequency * step));

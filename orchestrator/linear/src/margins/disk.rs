@@ -6,9 +6,9 @@
 //! introduction to disk margins", IEEE Control Systems Magazine 40 (2020), with skew 0. α is the
 //! inverse of the largest structured singular value of S − I/2 over all frequencies.
 //!
-//! A loop that repeats itself after several samples answers to a sine with several: those whose
-//! frequencies differ by multiples of that of the period. δ acts on each of them by itself, so that
-//! in these coordinates it is still diagonal.
+//! A loop with a period of several samples responds to a sine with several: those whose frequencies
+//! differ by multiples of that of the period. δ acts on each of them by itself, so that in these
+//! coordinates it is still diagonal.
 
 use super::structured::{ComplexMatrix, balanced, largest_singular_value, least, upper_bound};
 use crate::model::{OpenLoop, Step};
@@ -17,7 +17,7 @@ use nalgebra::Complex;
 use serde::Serialize;
 use std::f64::consts::{PI, TAU};
 
-/// Number of frequencies that are looked at, and their range in relation to the largest.
+/// Number of frequencies that are evaluated, and their range in relation to the largest.
 const FREQUENCIES: usize = 450;
 const RANGE: f64 = 1e-6;
 
