@@ -141,7 +141,8 @@ mod tests {
 
     proptest::proptest! {
         /// An instance that adds time and length ends at the stop time, or one place before it
-        /// where no sum of two numbers is the stop time. Whole steps never pass what it is told.
+        /// where no sum of two numbers is the stop time. Whole steps never pass the stop time that
+        /// it is given.
         #[test]
         fn oracle_the_last_step_ends_at_the_stop_time(ticks in 1u64..5000, every in 1u32..6, step in 1e-3f64..2.0, start in -50.0f64..50.0, places in 1i32..5) {
             // Numbers as people write them, and their sum with all its digits.

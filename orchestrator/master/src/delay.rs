@@ -35,8 +35,8 @@ pub struct FeedbackLoop {
     /// Components of the loop that do not declare their outputs' dependencies, so that the worst
     /// case was assumed.
     pub undeclared: Vec<usize>,
-    /// Components of the loop that respond to it through states only, so that what comes round is
-    /// never part of the same instant's output.
+    /// Components of the loop that respond to it through states only, so that the returning value
+    /// is never part of the same instant's output.
     pub stateful: Vec<usize>,
 }
 
@@ -270,8 +270,8 @@ const TRANSPORT: &str = "actuation.delay";
 /// `step` (s), plus the transport delays of the other components on it. If there are several loops,
 /// the one with the longest delay counts; the warning says so if another one has the delay that the
 /// law is designed for. If the component responds to some of its loops at once, those through its
-/// states alone do not count: what they bring, as the moment that actuators achieved, is a record
-/// of earlier ticks and not the measurement that the law acts upon.
+/// states alone do not count: the values that they carry, as the moment that actuators achieved,
+/// are a record of earlier ticks and not the measurement that the law acts upon.
 pub fn warnings(
     parts: &[Part],
     settings: &[Vec<Setting>],

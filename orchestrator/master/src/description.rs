@@ -1,5 +1,5 @@
-//! What a master must know of an FMU, as its `modelDescription.xml` says it: variables, units of
-//! measure, enumerations, and the dependencies of outputs on inputs.
+//! Data of an FMU's `modelDescription.xml` that a master needs: variables, units of measure,
+//! enumerations, and the dependencies of outputs on inputs.
 
 use crate::quantity::{self, Scaling, UnitDefinition};
 use serde::{Deserialize, Serialize};

@@ -4,8 +4,8 @@
 //! Components are known by their [`description`]. Their connections become pairs of value
 //! references ([`wiring`]), parameters become values in the variables' units ([`settings`],
 //! [`quantity`]), and [`delay`] says when each connected output is read. The [`master`] then calls
-//! the [instances](instance) at the ticks of a [`clock`]. What is written for people, such as
-//! [`names`] and their mistakes, ends before that.
+//! the [instances](instance) at the ticks of a [`clock`]. Texts that people write, such as
+//! [`names`] with their mistakes, are resolved before that.
 
 pub mod clock;
 pub mod delay;

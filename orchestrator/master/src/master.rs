@@ -37,7 +37,7 @@ pub struct Sample<'a> {
     pub values: &'a [f64],
 }
 
-/// What accompanies a run: it may hold each tick until it is due, and sees its values.
+/// Watcher of a run: it may hold each tick until it is due, and sees its values.
 pub trait Watcher {
     /// Error by which it ends the run.
     type Error: From<Failed>;

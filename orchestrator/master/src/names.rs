@@ -32,8 +32,8 @@ pub fn hint<'a>(wrong: &str, names: impl IntoIterator<Item = &'a str> + Clone) -
     }
 }
 
-/// Returns whether `pattern` stands for `name`: either they are the same, or the name begins and
-/// ends as the pattern does before and after its `*`.
+/// Returns whether `pattern` matches `name`: either they are the same, or the name begins and ends
+/// as the pattern does before and after its `*`.
 pub fn matches(pattern: &str, name: &str) -> bool {
     match pattern.split_once('*') {
         None => pattern == name,
@@ -47,8 +47,8 @@ pub fn split(path: &str) -> Option<(&str, &str)> {
         .filter(|(component, variable)| !component.is_empty() && !variable.is_empty())
 }
 
-/// Finds patterns that stand for exactly the `open` ones among the `inputs`: a group is named by
-/// its prefix if all of its inputs are open.
+/// Finds patterns that match exactly the `open` ones among the `inputs`: a group is named by its
+/// prefix if all of its inputs are open.
 pub fn patterns<'a>(open: &[&str], inputs: &(impl Iterator<Item = &'a str> + Clone)) -> String {
     let mut patterns: Vec<String> = Vec::new();
     for name in open {

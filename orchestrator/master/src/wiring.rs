@@ -79,7 +79,7 @@ pub struct Written<'a> {
     pub component: usize,
     /// The component.
     pub part: Part<'a>,
-    /// What follows the name of the component.
+    /// Name or pattern of the variable, which follows that of the component.
     pub rest: &'a str,
 }
 
@@ -98,7 +98,7 @@ impl<'a> Written<'a> {
         Ok(Self { text, component, part: parts[component], rest })
     }
 
-    /// Returns what precedes the `*` of several variables.
+    /// Returns the prefix before the `*` of several variables.
     pub fn prefix(&self) -> Option<&'a str> {
         self.rest.strip_suffix('*')
     }
@@ -128,9 +128,9 @@ impl<'a> Written<'a> {
 /// Why two sides cannot be connected, with the side that is at fault.
 #[derive(Debug)]
 pub enum Fault {
-    /// The outputs are.
+    /// The outputs are at fault.
     From(String),
-    /// The inputs are, or the two do not match.
+    /// The inputs are at fault, or the two do not match.
     To(String),
 }
 
@@ -161,8 +161,8 @@ pub fn connect(from: &Written, to: &Written) -> Result<Vec<Wire>, Fault> {
     pairs.into_iter().map(wire).collect()
 }
 
-/// Lists the pairs of names that two patterns stand for: an output behind the first prefix is
-/// paired with the variable of the same name behind the second prefix, if there is one.
+/// Lists the pairs of names that two patterns match: an output behind the first prefix is paired
+/// with the variable of the same name behind the second prefix, if there is one.
 fn expand(
     from: &Written,
     from_prefix: &str,

@@ -133,7 +133,7 @@ impl GuaranteeRecord {
         self.lost.map_or(self.status, |loss| loss.status)
     }
 
-    /// Returns the name of the enumeration item that a status stands for.
+    /// Returns the name of the enumeration item of a status.
     pub fn name_of(&self, status: f64) -> String {
         let mut items = self.signals.status.iter().flat_map(|status| &status.items);
         let item = items.find(|(_, item)| f64::from(*item) == status);

@@ -77,7 +77,7 @@ const ALWAYS: [&str; 6] =
 /// Metrics of every run that depend on the machine.
 const OF_THE_MACHINE: [&str; 2] = ["real_time_factor", "wall_s"];
 
-/// Further names in `metrics.json`, which stand for more than one number.
+/// Further names in `metrics.json`, which hold more than one number.
 const GROUPS: [&str; 2] = ["step_us", "real_time"];
 
 impl Metrics {

@@ -1,5 +1,4 @@
-//! Calls of one instance between two ticks, and values added on the way, for those who look into a
-//! run.
+//! Calls of one instance between two ticks, and values added on the way, for the analysis of a run.
 
 use super::{Failed, Master};
 use crate::instance::{CallFailure, Instance};
@@ -40,7 +39,7 @@ impl Master {
         outcome.map_err(|(place, failure)| self.failed(time, (indices[place], failure)))
     }
 
-    /// Adds a value to what a connected real input receives, from now on.
+    /// Adds a value to those that a connected real input receives, from now on.
     pub fn add(&mut self, input: Port, value: f64) {
         self.inputs[input.component].add(input.reference, value);
     }

@@ -8,8 +8,8 @@ use crate::quantity::Scaling;
 use crate::wiring::{Port, Wire};
 use std::collections::BTreeSet;
 
-/// An instance together with what the master must know to step it. Members are kept in the order in
-/// which they are stepped.
+/// An instance together with the data that the master needs to step it. Members are kept in the
+/// order in which they are stepped.
 pub struct Member {
     /// Name of the component in the experiment.
     pub name: String,
@@ -18,7 +18,7 @@ pub struct Member {
     /// Whether others may work while it steps, because it has a process of its own.
     pub ahead: bool,
     /// Whether its last step is fitted to the stop time. Otherwise all its steps are whole, and it
-    /// is told where the last one ends.
+    /// is given the end of the last one.
     pub varies: bool,
     /// The instance itself, instantiated and with its parameters set.
     pub instance: Box<dyn Instance>,
@@ -172,7 +172,7 @@ struct Bundle<T> {
     references: Vec<u32>,
     places: Vec<(Place, Scaling)>,
     values: Vec<T>,
-    /// What is added to the values on the way; empty for nothing.
+    /// Offsets that are added to the values on the way; empty for none.
     added: Vec<T>,
 }
 
@@ -216,7 +216,7 @@ impl Inputs {
         }
     }
 
-    /// Adds a value to what a real input receives from now on.
+    /// Adds a value to those that a real input receives from now on.
     pub(super) fn add(&mut self, reference: u32, value: f64) {
         let Bundle { references, added, .. } = &mut self.real;
         added.resize(references.len(), 0.0);
