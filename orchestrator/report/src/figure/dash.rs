@@ -1,4 +1,4 @@
-//! Dashes that tell the lines of a figure apart without their colours.
+//! Dashes that distinguish the lines of a figure without their colours.
 
 use super::{Curve, Panel, Shape};
 

@@ -19,7 +19,7 @@ pub struct Color(pub u8, pub u8, pub u8);
 impl Color {
     /// Black, which pages draw in the colour of their text.
     pub const INK: Self = Self(0, 0, 0);
-    /// Colour of what stands behind the rest, a grey.
+    /// Colour of the background, a grey.
     pub const GREY: Self = Self(110, 110, 110);
     /// Colour of limits, a neutral grey.
     pub const LIMIT: Self = Self(91, 104, 117);

@@ -28,7 +28,7 @@ const TITLE_LETTERS: usize = 100;
 const NAME_LETTERS: usize = 36;
 /// Largest number of lines of the title.
 const TITLE_LINES: usize = 4;
-/// Width of a letter in the legend, and of what stands beside the name, px.
+/// Width of a letter in the legend, and of the sample beside the name, px.
 const LETTER: f64 = 7.2;
 const SAMPLE: f64 = 56.0;
 
@@ -103,7 +103,7 @@ fn document(figure: &Figure, begin: &str, titled: bool) -> String {
             width: width - beside,
             height: HEIGHT,
         };
-        // Panels over the same axis say once what it shows.
+        // Panels over the same axis have one label.
         let below = figure.panels.get(place + columns);
         let is_named = below.is_none_or(|below| below.x_label != panel.x_label);
         let own = Dashes::new(std::slice::from_ref(panel));

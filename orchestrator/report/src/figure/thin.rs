@@ -1,4 +1,4 @@
-//! Curves thinned to what a screen shows.
+//! Curves thinned to the points that a screen shows.
 
 /// Height by which a line may miss a point that is left out, px.
 const MISSED: f64 = 0.05;
@@ -61,7 +61,7 @@ fn extremes(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
             kept.push(first);
             kept.extend(Some(second).filter(|second| *second != first));
         } else {
-            // Where in its column a peak lies cannot be seen, and even places are said shorter.
+            // Where in its column a peak lies cannot be seen, and even places are shorter.
             kept.extend([(column + 0.2, first.1), (column + 0.8, second.1)]);
         }
     }

@@ -1,4 +1,4 @@
-//! Where the marks of an axis stand, and what they say.
+//! Positions of the marks of an axis, and their texts.
 
 /// Returns round values within a range, about `count` of them.
 pub(super) fn linear(low: f64, high: f64, count: usize) -> Vec<f64> {
@@ -30,7 +30,7 @@ pub(super) fn logarithmic(low: f64, high: f64) -> Vec<f64> {
 /// Largest number of letters of a mark without an exponent.
 const LETTERS: usize = 7;
 
-/// Writes the marks of an axis with the digits that tell them apart, without trailing zeros; with
+/// Writes the marks of an axis with the digits that distinguish them, without trailing zeros; with
 /// exponents if they need many letters otherwise. Marks of a logarithmic axis, which has no
 /// `range`, have digits of their own.
 pub(super) fn labels(marks: &[f64], range: Option<f64>) -> Vec<String> {

@@ -1,5 +1,5 @@
-//! What is known of a run for its pictures: the recorded variables over time, what its experiment
-//! draws, its parameters and its outcome. It comes from the files of a run, or from the run itself.
+//! Data of a run for its pictures: the recorded variables over time, the panels of its experiment,
+//! its parameters and its outcome. It comes from the files of a run, or from the run itself.
 
 mod cover;
 pub mod panels;
@@ -16,7 +16,7 @@ use std::iter;
 /// A run as its pictures show it.
 #[derive(Clone, Debug, Default)]
 pub struct Recording {
-    /// Short name by which the run is told from others.
+    /// Short name that distinguishes the run from others.
     pub name: String,
     /// Title of the experiment.
     pub title: String,
@@ -41,11 +41,11 @@ pub struct Recording {
 /// A line of a run's summary.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct SummaryLine {
-    /// Heading, which names what was measured.
+    /// Heading, which names the measured quantity.
     pub heading: String,
     /// Values as text.
     pub text: String,
-    /// Whether what was measured is within its limits; `None` if it has none.
+    /// Whether the quantity is within its limits; `None` if it has none.
     pub is_within: Option<bool>,
 }
 

@@ -10,7 +10,7 @@ use std::iter;
 
 /// Largest number of curves in a panel, beside references, norms and limits.
 pub const CURVES: usize = 6;
-/// Largest number of variables that are drawn if nobody says which ones.
+/// Largest number of variables that are drawn if none are chosen.
 pub(super) const UNASKED: usize = 24;
 
 /// A panel with curves of one unit.
@@ -55,10 +55,10 @@ pub struct Curve {
 pub enum Role {
     /// A signal.
     Signal,
-    /// What a signal is to follow: in the first run that has it, and in the others as well unless
-    /// they have their own.
+    /// Reference of a signal: in the first run that has it, and in the others as well unless they
+    /// have their own.
     Reference,
-    /// What a signal of this run is to follow, where that differs from the first run's.
+    /// Reference of a signal of this run, where it differs from the first run's.
     OwnReference,
     /// The norm of all signals of the panel, which its limit is for.
     Norm,
@@ -238,8 +238,8 @@ fn matching(runs: &[Recording], asked: &str) -> Result<Vec<String>, String> {
 }
 
 impl Panel {
-    /// Returns whether all curves of the panel are of one signal, so that colours can tell the runs
-    /// apart.
+    /// Returns whether all curves of the panel are of one signal, so that colours can distinguish
+    /// the runs.
     pub fn has_one_signal(&self) -> bool {
         self.curves.iter().all(|curve| curve.place == self.curves[0].place)
     }
@@ -337,7 +337,7 @@ impl Panel {
         });
     }
 
-    /// Leaves out of the names of the curves what the label already says. The label names the
+    /// Leaves out of the names of the curves the parts that the label has. The label names the
     /// signal if it is the only one.
     fn shorten(&mut self) {
         let first = self.curves.first().map(|curve| curve.name.clone()).unwrap_or_default();
@@ -353,7 +353,7 @@ impl Panel {
     }
 }
 
-/// Returns what the name of a variable has before its last part; nothing for a combination.
+/// Returns the name of a variable before its last part; nothing for a combination.
 fn stem(name: &str) -> &str {
     if name.contains(' ') || name.contains('(') {
         return "";

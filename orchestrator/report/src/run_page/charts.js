@@ -40,7 +40,7 @@ class Chart {
     Object.assign(this, { panel, runs });
     const times = runs.flatMap((run) => [run.time[0], run.time.at(-1)]);
     this.span = [Math.min(...times), Math.max(...times)];
-    // In a panel with one signal, the colour tells the runs apart.
+    // In a panel with one signal, the colour distinguishes the runs.
     this.isAlone = panel.curves.every((curve) => curve.place === panel.curves[0].place);
     this.figure = document.createElement("figure");
     this.figure.className = "panel";

@@ -11,7 +11,7 @@ const DIGITS: usize = 5;
 /// Number of significant digits of a time.
 const TIME_DIGITS: usize = 7;
 
-/// Returns what the scripts of a page draw.
+/// Returns the data that the scripts of a page draw.
 pub fn page(runs: &[Recording], panels: &[Panel], vehicles: &[usize]) -> Value {
     let run = |(place, run): (usize, &Recording)| {
         let is_shown = vehicles.contains(&place);

@@ -56,7 +56,7 @@ fn drawn(runs: &[Recording], names: &[String], panel: &Panel) -> figure::Panel {
 
 fn one(runs: &[Recording], names: &[String], panel: &Panel, curve: &Curve) -> figure::Curve {
     let run = &runs[curve.run];
-    // In a panel with one signal, the colour tells the runs apart.
+    // In a panel with one signal, the colour distinguishes the runs.
     let place = if panel.has_one_signal() { curve.run } else { curve.place };
     let own = Color::CURVES[place % Color::CURVES.len()];
     let (color, shape) = match curve.role {

@@ -82,7 +82,7 @@ fn page(runs: &[Recording], panels: &[Panel]) -> String {
     markup.into_string()
 }
 
-/// Returns the outcome of a run in one line: what was compared with a limit, and how the run ended.
+/// Returns the outcome of a run in one line: the comparisons with limits, and how the run ended.
 fn verdict(run: &Recording, named: bool) -> Markup {
     let of = |verdict| {
         let lines = run.summary.iter().filter(move |line| line.is_within == Some(verdict));
@@ -225,7 +225,7 @@ mod tests {
         );
         // Without a limit there is no verdict.
         assert_eq!(told(&[load], "completed"), (String::new(), vec![]));
-        // A run that was lost is not good, whatever it kept until then.
+        // A run that was lost is not good, even if it kept limits until then.
         assert_eq!(
             told(&[rate], "attitude lost at 3 s"),
             (format!("{within} attitude lost at 3 s."), vec![])

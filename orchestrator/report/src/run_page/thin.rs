@@ -1,4 +1,4 @@
-//! Thins curves to what the pixels of a picture can show.
+//! Thins curves to the points that the pixels of a picture can show.
 
 use std::ops::Range;
 

@@ -88,7 +88,7 @@ fn label(panel: &Panel) -> Vec<String> {
     wrapped(&panel.y_label, LABEL_LETTERS, LABEL_LINES)
 }
 
-/// Returns the marks of a vertical axis of this height, and what they say.
+/// Returns the marks of a vertical axis of this height, with their texts.
 fn marks_y((low, high): (f64, f64), height: f64) -> Vec<(f64, String)> {
     let marks = ticks::linear(low, high, ((height / MARK_HEIGHT) as usize).max(2));
     let texts = ticks::labels(&marks, Some(high - low));
@@ -293,7 +293,7 @@ fn name_lines(out: &mut String, panel: &Panel, axes: &Axes) {
 }
 
 /// Returns a line through points as the data of a path, in fifths of a pixel and relative to the
-/// point before, as short as it can be said.
+/// point before, as short as possible.
 pub(super) fn path(points: &[(f64, f64)]) -> String {
     let fifths = |value: i64| (value as f64 / 5.0).to_string();
     let mut places =

@@ -138,7 +138,7 @@ fn signals_that_are_asked_for_are_grouped_by_unit_and_stem() {
     // The label has room for the name of a signal alone.
     assert_eq!(panels[1].label, "plant.attitude.α");
     assert_eq!(legend(&panels[1], &["a"]), [""]);
-    // Signals that are named one by one are compared, also with what a combination gives.
+    // Signals that are named one by one are compared, also with a combination.
     let panels = asked(&["plant.rate.p", "law.limit", "norm(plant.rate.p, plant.rate.q)"]).unwrap();
     assert_eq!((panels.len(), panels[0].curves.len()), (1, 3));
     let fault = asked(&["plant.rat.p"]).unwrap_err();
