@@ -157,8 +157,9 @@ fn finite(numbers: impl Iterator<Item = f64>) -> Numbers {
     Numbers(numbers.filter(|number| number.is_finite()).collect())
 }
 
-/// Returns whether two numbers stand in a relation, with `by` as the least difference. What never
-/// settles is later than all that does, and neither below nor at most what never settles either.
+/// Returns whether two numbers stand in a relation, with `by` as the least difference. A time that
+/// never settles is later than any that does, and neither below nor at most another one that never
+/// settles.
 fn stand(relation: Relation, left: f64, right: f64, by: Option<f64>) -> bool {
     let margin = if right.is_finite() { by.unwrap_or(0.0) * right.abs() } else { 0.0 };
     match relation {
@@ -169,7 +170,7 @@ fn stand(relation: Relation, left: f64, right: f64, by: Option<f64>) -> bool {
     }
 }
 
-/// Replaces the missing time of what never settles by infinity, so that it can be compared.
+/// Replaces a missing settling time by infinity, so that it can be compared.
 fn never_is_infinite(
     reference: &str,
     results: &Results,

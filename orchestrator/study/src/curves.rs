@@ -7,7 +7,7 @@ use linear::curves::ResponseCurves;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// What a part keeps besides its numbers.
+/// Results of a part besides its numbers.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Curves {
     /// Signals of the run's first case, if it belongs to the part.

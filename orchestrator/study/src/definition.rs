@@ -65,14 +65,14 @@ pub struct Study {
     /// Claims of the paper, with the checks that decide on them.
     #[serde(default, rename = "claim")]
     pub claims: Vec<Claim>,
-    /// Largest number of cases of a run, if it is smaller than the file says. This is no key of a
-    /// study file.
+    /// Largest number of cases of a run, if it is smaller than the file says. This is not a key of
+    /// a study file.
     #[serde(skip)]
     pub(crate) most_cases: Option<u64>,
-    /// Values that were read from the files. This is no key of a study file.
+    /// Values that were read from the files. This is not a key of a study file.
     #[serde(skip)]
     pub values: Values,
-    /// The study file, together with the files that it extends. This is no key of a study file.
+    /// The study file, together with the files that it extends. This is not a key of a study file.
     #[serde(skip)]
     pub source: Source,
 }
@@ -102,7 +102,7 @@ impl Study {
         })
     }
 
-    /// Returns an error that says nothing of a line of the file.
+    /// Returns an error that refers to no line of the file.
     pub(crate) fn fault(&self, message: impl Into<String>) -> Error {
         self.source.error(&(0..0), message)
     }

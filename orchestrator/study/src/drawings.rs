@@ -90,7 +90,7 @@ pub struct Panel {
     pub y_range: Option<[f64; 2]>,
 }
 
-/// What a panel draws beside its points and straight lines.
+/// Content of a panel besides its points and straight lines.
 #[derive(Clone, Copy, Debug)]
 pub enum Drawn<'a> {
     /// Signals over time.
@@ -108,7 +108,7 @@ pub enum Drawn<'a> {
 }
 
 impl Panel {
-    /// Returns what the panel draws.
+    /// Returns the content of the panel.
     ///
     /// # Errors
     /// Returns an error unless the panel has exactly one key that says so, or points alone.

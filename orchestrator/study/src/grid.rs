@@ -14,7 +14,7 @@ use std::path::PathBuf;
 use sweep::vary::DesignKind;
 use toml::{Spanned, Value};
 
-/// A grid of candidates and scenarios, which stands for the runs `SCENARIO-CANDIDATE`.
+/// A grid of candidates and scenarios, which defines the runs `SCENARIO-CANDIDATE`.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Grid {

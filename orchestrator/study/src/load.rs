@@ -11,7 +11,7 @@ use serde::de::DeserializeOwned;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-/// Reads a study in which no table stands for several, and no run extends another one.
+/// Reads a study in which lists are expanded, and no run extends another one.
 fn spelled_out<T: DeserializeOwned>(source: &Source) -> Result<T, Error> {
     source.read_with(|mut table| {
         let study = table.get_mut();

@@ -1,5 +1,5 @@
-//! The report as one self-contained HTML page. What a reader wants first stands on the first
-//! screen: how many claims hold, one picture and one small table. Everything else is folded.
+//! The report as one self-contained HTML page. The first screen has the main results: how many
+//! claims hold, one picture and one small table. Everything else is folded.
 
 mod evidence;
 mod numbers;
@@ -56,7 +56,7 @@ pub(crate) fn page(
                     }
                     }
                     section id="about" {
-                        h2 { "What was compared" }
+                        h2 { "Compared quantities" }
                         @for paragraph in paragraphs(&study.summary) { p { (paragraph) } }
                         @if let Some(most) = study.most_cases {
                             p.note { "A quick look: of each run, at most " (most) " cases were flown. Texts name the full numbers." }
@@ -236,7 +236,7 @@ fn sections(results: &Results) -> impl Iterator<Item = (&'static str, &'static s
     let study = results.study;
     let sections = [
         ("claims", "Claims", study.claims.is_empty()),
-        ("about", "What was compared", study.summary.is_empty()),
+        ("about", "Compared quantities", study.summary.is_empty()),
         ("figures", "Figures", !has_more_figures(results)),
         ("tables", "Numbers", study.tables.is_empty() && study.overviews.is_empty()),
         ("scenario", "Scenario", study.scenario.is_empty()),

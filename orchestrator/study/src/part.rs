@@ -167,8 +167,8 @@ fn measure(study: &Study, run: &Run, experiment: &mut Experiment) -> Result<(), 
     Ok(())
 }
 
-/// Hashes what the study says about the results of a run. Experiment and FMUs have their own
-/// hashes.
+/// Hashes the parts of the study on which the results of a run depend. Experiment and FMUs have
+/// their own hashes.
 fn key(run: &Run, drawn: &DrawnSignals, observe: &Observe) -> String {
     let inputs = json!([
         run.set,
@@ -193,8 +193,8 @@ pub(crate) struct Instances<'a> {
     watch: Watch,
 }
 
-/// What a thread keeps from one part to the next: opened archives, and the instances of the run
-/// that it works on.
+/// State that a thread keeps from one part to the next: opened archives, and the instances of the
+/// run that it works on.
 #[derive(Default)]
 pub(crate) struct Bench<'a> {
     opened: Opened,
@@ -237,7 +237,7 @@ impl Instances<'_> {
             let mut samples = self.flight.samples();
             if self.preparation.is_timed(range) {
                 // Computing times are only meaningful if the run has the machine for itself, and
-                // what interrupts a run can only lengthen them.
+                // interruptions can only lengthen them.
                 for _ in 1..REPETITIONS {
                     let again = self.one(case)?.metrics;
                     keep_least_times(&mut flown.metrics, &again, &sweep.experiment().observe);
@@ -263,7 +263,7 @@ impl Instances<'_> {
         Ok(PartResult { rows: table(sweep, &cases), units: units.unwrap_or_default(), curves })
     }
 
-    /// Flies one case, which the watch sees if something of it is drawn.
+    /// Flies one case, which the watch sees if any of its signals is drawn.
     fn one(&mut self, case: u64) -> Result<Flown, Single> {
         self.watch.clear();
         let is_drawn = case == 0 || !self.preparation.drawn.spread.is_empty();

@@ -56,7 +56,7 @@ impl RunResult {
         self.parts.iter().flat_map(of_part).collect()
     }
 
-    /// Returns the number of each case that a metric stands for, or all parameters that it names.
+    /// Returns the value of a metric for each case, or all parameters that it names.
     pub(crate) fn numbers(&self, metric: &Metric) -> Vec<Option<f64>> {
         match metric {
             Metric::Parameter(component, pattern) => {
@@ -90,7 +90,7 @@ pub(crate) enum Metric {
         is_time: bool,
     },
     /// Parameters of a component, in SI units, written as `parameter.COMPONENT.NAME`; a `*` at the
-    /// end stands for several parameters.
+    /// end matches several parameters.
     Parameter(String, String),
 }
 
@@ -204,7 +204,7 @@ pub(crate) fn is_reference(study: &Study, quantity: &Quantity) -> bool {
 }
 
 impl<'a> Results<'a> {
-    /// Returns results in which no run has been flown, to check what refers to them.
+    /// Returns results in which no run has been flown, to check references to them.
     pub fn empty(study: &'a Study) -> Self {
         Self { study, runs: vec![RunResult::default(); study.runs.len()] }
     }
@@ -250,8 +250,7 @@ impl<'a> Results<'a> {
         }
     }
 
-    /// Returns the number of each case that a reference stands for, or the single number of a
-    /// value.
+    /// Returns the number of each case that a reference denotes, or the single number of a value.
     ///
     /// # Errors
     /// Returns an error if the quantity refers to something that does not exist.

@@ -9,8 +9,8 @@
 //! ```
 //!
 //! A table in a list may have the key `for`: the name of a list of rows, or such a list, or several
-//! names. It then stands for one table for each row, and with several lists for each combination,
-//! in which the last list changes fastest. The names in braces are replaced by the row's values; a
+//! names. It is expanded to one table for each row, and with several lists for each combination, in
+//! which the last list changes fastest. The names in braces are replaced by the row's values; a
 //! text that is only such a name becomes the value itself, be it a number or a list. The values of
 //! a row apply in everything inside the table, and in the rows that are named there.
 
@@ -24,7 +24,7 @@ use toml::de::{DeArray, DeTable, DeValue};
 /// The place of a fault, and a message that describes it.
 pub(crate) type Fault = (Range<usize>, String);
 
-/// Replaces each table that stands for the rows of a list by the tables that it stands for.
+/// Replaces each table with a list of rows by one table for each row.
 ///
 /// # Errors
 /// Returns an error that names the list or the value that does not exist.

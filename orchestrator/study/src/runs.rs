@@ -87,7 +87,7 @@ pub struct Run {
     #[serde(default)]
     #[schemars(with = "Vec<String>")]
     pub measures: Vec<Spanned<String>>,
-    /// Metrics, panels and limits of the run's experiment. This is no key of a study file.
+    /// Metrics, panels and limits of the run's experiment. This is not a key of a study file.
     #[serde(skip)]
     pub observe: Observe,
 }
@@ -102,7 +102,7 @@ impl Run {
         self.cases.unwrap_or(1)
     }
 
-    /// Returns what differs between the cases.
+    /// Returns the differences between the cases.
     pub fn variation(&self) -> Variation<'_> {
         Variation {
             vary: &self.vary,

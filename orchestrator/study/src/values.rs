@@ -97,7 +97,7 @@ impl Values {
         self.0.iter().find(|value| value.id == id)
     }
 
-    /// Returns the number that a quantity stands for.
+    /// Returns the number of a quantity.
     ///
     /// # Errors
     /// Returns an error that names the id if there is no such value.

@@ -31,8 +31,8 @@ pub struct Sweep {
     pub design: Design,
     /// Simulated time at which the cases start and stop, s.
     pub span: [f64; 2],
-    /// Hashes of the program's version, the experiment and the FMUs, by their names. Whoever flies
-    /// the sweep adds what else the results depend on.
+    /// Hashes of the program's version, the experiment and the FMUs, by their names. The caller
+    /// adds everything else on which the results depend.
     pub keys: BTreeMap<String, String>,
     /// Archive of an FMU that can be instantiated only once per process, if there is one.
     pub single: Option<PathBuf>,
@@ -192,8 +192,8 @@ impl Sweep {
         toml::to_string(&table).map_err(fault)
     }
 
-    /// Returns what an experiment in another folder calls the archive of a component: its file name
-    /// if it is found by that from any folder, and else its path.
+    /// Returns the name by which an experiment in another folder refers to the archive of a
+    /// component: its file name if it is found by that from any folder, and else its path.
     fn archive(&self, component: &str) -> String {
         let written = self.experiment.components[component].fmu.get_ref();
         let is_there = |folder: &PathBuf| folder.join(written).is_file();
@@ -248,7 +248,7 @@ fn check_twice(
     Ok(())
 }
 
-/// Refuses what the design of a sweep leaves without effect, or without meaning.
+/// Refuses settings that have no effect, or no meaning, in the design of a sweep.
 fn check_design(varied: &[Varied], variation: &Variation, source: &Source) -> Result<(), Error> {
     let design = json!(variation.design);
     let design = design.as_str().unwrap_or_default();
@@ -284,7 +284,7 @@ fn check_design(varied: &[Varied], variation: &Variation, source: &Source) -> Re
     Ok(())
 }
 
-/// Hashes what all cases depend on, with the files that text parameters name.
+/// Hashes the inputs of all cases, with the files that text parameters name.
 fn keys(system: &System, varied: &[Varied]) -> Result<BTreeMap<String, String>, Error> {
     let mut keys = BTreeMap::from([
         ("experiment".to_string(), files::digest(system.experiment.source.whole())),

@@ -18,7 +18,7 @@ pub enum Error {
         /// The error of that run.
         source: Single,
     },
-    /// Cases could not be flown, for a reason that says nothing about what was to be flown.
+    /// Cases could not be flown, for a reason that is independent of their values.
     #[error(
         "case {case} could not be flown: {source}{}; the same command flies what is missing",
         if *more > 0 { format!(" ({more} more parts have such cases)") } else { String::new() }

@@ -198,8 +198,8 @@ impl<'a> Flight<'a> {
         let Watch { broken, time, .. } = watch;
         let outcome = match outcome {
             Err(error) if !is_of_case(&error) => return Err(error),
-            // What an instance answers before the flight may have a reason beyond its values, such
-            // as a file that is not there: then it answers so without them, too.
+            // An instance may fail before the flight for a reason other than its values, such as a
+            // missing file: then it fails without them, too.
             Err(error @ Error::Call { .. }) if time.is_none() => {
                 self.start_without_numbers(&changes)?;
                 Err(error)
@@ -255,8 +255,7 @@ impl Flight<'_> {
     }
 }
 
-/// Returns whether an error is the result of a case. Everything else says nothing about what was to
-/// be flown.
+/// Returns whether an error is the result of a case. All other errors are independent of the case.
 fn is_of_case(error: &Error) -> bool {
     match error {
         Error::Lost { .. } | Error::EndedByInstance { .. } => true,
@@ -327,7 +326,7 @@ fn typed<'a>(kind: &Type, values: impl Iterator<Item = &'a SettingValue>) -> Val
 /// The errors are those of [`Flight::fly`] for the first case.
 pub fn can_reset(sweep: &Sweep, opened: &mut Opened, interrupt: &Interrupt) -> Result<bool, Error> {
     if sweep.experiment().law.is_some() {
-        // A trial would ask the law for flights that nobody wants.
+        // A trial would ask the law for flights that nobody requested.
         let components = sweep.system(opened)?.components;
         let resets = |fmu: &Fmu| fmu.is_made_by_fmu_pack() || fmu.is_lookup_table();
         return Ok(components.iter().all(|component| resets(&component.fmu)));

@@ -131,7 +131,7 @@ impl PartResult {
     }
 }
 
-/// Sorts what was found of the missing parts into remarks for the user.
+/// Sorts the states of the missing parts into remarks for the user.
 #[derive(Debug, Default)]
 pub struct Remarks {
     damaged: u64,

@@ -22,11 +22,11 @@ pub struct Probability {
 }
 
 impl Probability {
-    /// Estimates a probability from `events` among `cases`. Each end is exceeded with half of what
-    /// is left of the confidence; without an event (or with nothing else) the other end has all of
-    /// it, as the bound that so many cases prove. Over all outcomes the interval holds with at
-    /// least `1 - 1.5 (1 - confidence)`, because such a bound is exceeded twice as often as an end
-    /// of the other intervals.
+    /// Estimates a probability from `events` among `cases`. Each end is exceeded with half of the
+    /// remaining probability; without an event (or with nothing else) the other end has all of it,
+    /// as the bound that so many cases prove. Over all outcomes the interval holds with at least `1
+    /// - 1.5 (1 - confidence)`, because such a bound is exceeded twice as often as an end of the
+    /// other intervals.
     pub fn new(events: u64, cases: u64, confidence: f64) -> Self {
         let (k, n) = (events as f64, cases as f64);
         let rest = 1.0 - confidence;
@@ -82,7 +82,7 @@ pub struct Summary {
 /// A quantile of a measure.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Quantile {
-    /// Probability below the quantile; 0 and 1 stand for the smallest and largest value.
+    /// Probability below the quantile; 0 and 1 denote the smallest and largest value.
     pub probability: f64,
     /// Value in the sample.
     pub value: f64,

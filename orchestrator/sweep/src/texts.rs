@@ -1,4 +1,4 @@
-//! Numbers as a reader wants them.
+//! Numbers formatted for readers.
 
 /// Formats a share as percent.
 pub fn percent(share: f64) -> String {

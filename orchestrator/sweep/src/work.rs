@@ -16,8 +16,8 @@ pub struct Worked<R, E> {
     pub failures: BTreeMap<usize, E>,
 }
 
-/// Returns the number of threads for `jobs`, of which 0 stands for one for each core. It is one if
-/// an FMU can be instantiated only once in a process.
+/// Returns the number of threads for `jobs`, where 0 means one for each core. It is one if an FMU
+/// can be instantiated only once in a process.
 pub fn threads<'a>(jobs: usize, sweeps: impl IntoIterator<Item = &'a Sweep>) -> usize {
     if let Some(path) = sweeps.into_iter().find_map(|sweep| sweep.single.as_ref()) {
         tracing::warn!(

@@ -77,7 +77,7 @@ pub(super) fn overview(overview: &Overview, results: &Results) -> Markup {
     rows(overview, results, &several)
 }
 
-/// Returns what the figures draw in a colour: the names of runs, and of lines through runs.
+/// Returns the names that the figures draw in a colour: those of runs, and of lines through runs.
 fn names(study: &Study, color: Color) -> BTreeSet<&String> {
     let panels =
         study.figures.iter().flat_map(|figure| figure.panels.iter().map(move |p| (figure, p)));
@@ -218,7 +218,7 @@ mod tests {
         };
         assert_eq!(swatches(&figure(r#""a""#)), [true, false]);
         assert_eq!(swatches(&figure(r#""b""#)), [false, true]);
-        // In the colour of both, neither can be told.
+        // In the same colour, the two could not be distinguished.
         assert_eq!(swatches(&figure(r#""a", "b""#)), [false, false]);
         assert_eq!(swatches(""), [false, false]);
     }

@@ -150,7 +150,7 @@ impl Reader<'_> {
         Ok(Shape::Case(Seeds::new(first, [least, most], self.seed)))
     }
 
-    /// Converts a value; text with a percent sign stands for percent of the experiment's value.
+    /// Converts a value; text with a percent sign denotes percent of the experiment's value.
     fn setting(&self, written: &Value) -> Result<SettingValue, String> {
         let value = match self.percent(written, |nominal| nominal)? {
             Some(value) => self.checked(value)?,
@@ -162,7 +162,7 @@ impl Reader<'_> {
         Ok(value)
     }
 
-    /// Computes the percentage that a text stands for, of a function of the experiment's value.
+    /// Computes the percentage in a text, of a function of the experiment's value.
     fn percent(&self, written: &Value, of: fn(f64) -> f64) -> Result<Option<f64>, String> {
         let Some(number) = written.as_str().and_then(|text| text.trim().strip_suffix('%')) else {
             return Ok(None);

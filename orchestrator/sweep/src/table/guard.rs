@@ -9,7 +9,7 @@ thread_local! {
     static IS_GUARDED: Cell<bool> = const { Cell::new(false) };
 }
 
-/// Reads something, and makes an error of a panic, of which nothing is printed.
+/// Reads something, and converts a panic to an error without printing it.
 pub(super) fn guarded<T>(
     read: impl FnOnce() -> Result<T, ParquetError>,
 ) -> Result<T, ParquetError> {
