@@ -1,4 +1,4 @@
-//! Arguments that several commands share, and their conversion to what the libraries take.
+//! Arguments that several commands share, and their conversion for the libraries.
 
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
@@ -92,7 +92,7 @@ where
         .try_map(|name| T::deserialize(IntoDeserializer::<Error>::into_deserializer(name)))
 }
 
-/// Returns what the documentation of `[isolation]` says about a key.
+/// Returns the documentation of a key of `[isolation]`.
 fn key(name: &str) -> String {
     let schema = experiment::Protection::json_schema(&mut SchemaGenerator::default());
     schema.pointer(&format!("/properties/{name}")).map_or(String::new(), text)

@@ -43,7 +43,7 @@ pub(crate) struct Common {
     /// Show neither progress nor summary.
     #[arg(long)]
     quiet: bool,
-    // Its heading holds for all that would follow.
+    // Its heading would apply to all arguments that follow.
     #[command(flatten)]
     pub(crate) overrides: arguments::Overrides,
 }

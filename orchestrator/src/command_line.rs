@@ -210,7 +210,7 @@ pub(crate) enum Command {
     /// Print an experiment, a study or a campaign with all that it extends, and with lists
     /// expanded.
     Show {
-        /// What to print: a file, or the name of an experiment, a study or a campaign.
+        /// File to print, or the name of an experiment, a study or a campaign.
         name: PathBuf,
     },
     /// Print the JSON Schema of a kind of file, by which editors complete and check such files.
@@ -292,8 +292,8 @@ impl Command {
 mod tests {
     use super::*;
 
-    /// Commands that are told where FMUs are load them. A hidden one is for programs that have
-    /// loaded the same FMUs already.
+    /// Commands with an option for folders of FMUs load them. A hidden one is for programs that
+    /// have loaded the same FMUs already.
     #[test]
     fn whatever_loads_fmus_can_do_so_in_a_sandbox() {
         let definition = definition();

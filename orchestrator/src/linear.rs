@@ -26,8 +26,8 @@ use std::path::PathBuf;
 pub(crate) struct Instant {
     /// Experiment: a file, an SSP archive, or the name of an experiment that `list` shows.
     experiment: PathBuf,
-    /// Time of the run at which it is linearised, s [default: what the experiment's
-    /// [observe.margins] says].
+    /// Time of the run at which it is linearised, s [default: that of the experiment's
+    /// [observe.margins]].
     #[arg(long, value_name = "SECONDS", help_heading = "Linearisation")]
     at: Option<f64>,
     /// Signals at which the loop is opened: connected inputs or outputs, as `plant.moment.*`. The
@@ -51,7 +51,7 @@ impl Instant {
         let asked = system.experiment.observe.margins.clone();
         let missing = |option: &str| {
             let problem = format!(
-                "{option} is missing: the experiment has no [observe.margins] that says it"
+                "{option} is missing: the experiment has no [observe.margins] that gives it"
             );
             Error::experiment(problem)
         };

@@ -1,4 +1,4 @@
-//! The orchestrator: runs what the command line asks for, and ends with the exit code of it.
+//! The orchestrator: runs the command of the command line, and ends with its exit code.
 
 mod arguments;
 mod campaign;

@@ -42,7 +42,7 @@ impl Form {
                 forms.iter().map(|form| format!(".{}", form.ending())).collect();
             let (last, others) = endings.split_last().expect("there is a form");
             Error::experiment(format!(
-                "{option} {}: the name must end with {} or {last}, which tells what is written",
+                "{option} {}: the name must end with {} or {last}, which selects the format",
                 path.display(),
                 others.join(", ")
             ))
@@ -53,7 +53,7 @@ impl Form {
 /// Returns the file of a figure and its form, if the option `--plot` names one.
 ///
 /// # Errors
-/// Returns an error if the ending of its name tells no form of a figure.
+/// Returns an error if the ending of its name belongs to no form of a figure.
 pub(crate) fn asked(plot: Option<&Path>) -> Result<Option<(&Path, Form)>, Error> {
     plot.map(|path| Ok((path, Form::of(path, "--plot", &Form::FIGURE)?))).transpose()
 }

@@ -1,5 +1,5 @@
-//! Text of FMUs and files as it may be shown on a terminal: without control characters, by which it
-//! could move the cursor, hide lines, or change the title of the window.
+//! Text of FMUs and files that is safe for a terminal: without control characters, which could move
+//! the cursor, hide lines, or change the title of the window.
 
 use std::fmt::Write as _;
 use std::io::{self, Write};

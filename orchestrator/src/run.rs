@@ -179,7 +179,7 @@ fn ended(reason: Option<Error>, quiet: bool) -> Result<(), Failure> {
 /// results up to then are written as well.
 ///
 /// # Errors
-/// Returns an error if a unit fails, or if a file cannot be written.
+/// Returns an error if an FMU fails, or if a file cannot be written.
 fn record(system: &mut System, options: &Options) -> Result<RunReport, Failure> {
     if options.live {
         live::check_terminal()?;
@@ -285,7 +285,8 @@ fn record(system: &mut System, options: &Options) -> Result<RunReport, Failure> 
         Ok((metrics, files))
     };
     let written = write();
-    // What ended the run is told first: a disk that its results filled has no room for the rest.
+    // The reason why the run ended comes first: a disk that its results filled has no room for the
+    // rest.
     let ended = early(outcome, &out)?;
     let (metrics, files) = written?;
     let end = run.master.end().map(String::from);
@@ -304,8 +305,8 @@ fn warn_of_priority(system: &System, priority: &Priority) {
     }
 }
 
-/// Computes the margins that an experiment asks for. A loop that cannot be linearised has none,
-/// which loses nothing of the run.
+/// Computes the margins that an experiment asks for. A loop that cannot be linearised has none, and
+/// the run is complete without them.
 fn margins(system: &System, interrupt: &Interrupt) -> Result<Measured, Error> {
     match measures::asked(system, interrupt) {
         Err(error @ Error::Call { .. }) => {

@@ -22,7 +22,7 @@ pub(crate) struct Scene {
     pub(crate) panels: Vec<Panel>,
     /// Further lines of variables, each with its heading.
     pub(crate) readings: Vec<(String, Vec<Probed>)>,
-    /// Variables of the guarantee, if a unit gives one.
+    /// Variables of the guarantee, if an FMU gives one.
     pub(crate) guarantee: Option<GuaranteeSignals>,
     /// Recorded variables, which are shown if the experiment names no panels.
     pub(crate) recorded: Vec<Probed>,

@@ -47,7 +47,7 @@ impl Plot {
     fn recordings(&self) -> Result<Vec<Recording>, Error> {
         if self.runs.len() > panels::CURVES {
             return Err(Error::experiment(format!(
-                "{} runs: at most {} can be told apart in a picture",
+                "{} runs: at most {} can be distinguished in a picture",
                 self.runs.len(),
                 panels::CURVES
             )));
@@ -73,7 +73,7 @@ impl Plot {
             }
             runs.push(run);
         }
-        // Runs of the same name are told by their paths.
+        // Runs of the same name are distinguished by their paths.
         let names: Vec<String> = runs.iter().map(|run| run.name.clone()).collect();
         for (place, run) in runs.iter_mut().enumerate() {
             if names.iter().filter(|name| **name == names[place]).count() > 1 {

@@ -66,7 +66,7 @@ pub(super) fn recording(path: &Path) -> Result<Recording, Error> {
     Ok(run)
 }
 
-/// Checks that a name stands for one column only.
+/// Checks that a name belongs to one column only.
 fn check_names(columns: &[(String, Vec<f64>)], file: &Path) -> Result<(), Error> {
     let mut seen = BTreeSet::new();
     match columns.iter().find(|(name, _)| !seen.insert(name)) {
@@ -97,7 +97,7 @@ fn check_time(time: &[f64], file: &Path) -> Result<(), Error> {
     Err(Error::experiment(format!("{}, {problem}", file.display())))
 }
 
-/// Returns the file of recorded variables that a path stands for.
+/// Returns the file of recorded variables at a path.
 fn table_of(path: &Path) -> Result<PathBuf, Error> {
     let below = Path::new("out").join(path);
     let mut tried = [path, &below].into_iter();

@@ -1,4 +1,4 @@
-//! Ends of runs: instances that take the stop time at its word, and disks that take no more.
+//! Ends of runs: instances that enforce the exact stop time, and full disks.
 
 use crate::bench::{Bench, LOOP, Recipe};
 use crate::campaign::CAMPAIGN;

@@ -1,5 +1,5 @@
-//! Third-party FMUs, imitated by an FMU in C. What they do differently must run, and their
-//! faults must be reported.
+//! Third-party FMUs, imitated by an FMU in C. Their deviations must run, and their faults must be
+//! reported.
 
 use crate::bench::{Bench, LOOP, Recipe};
 use std::fs;

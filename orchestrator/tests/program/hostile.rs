@@ -1,4 +1,4 @@
-//! Instances that try to reach what is not their own: tests/model/hostile.h.
+//! Instances that try to reach resources of others: tests/model/hostile.h.
 
 use crate::bench::{Bench, LOOP, Recipe};
 use crate::campaign::CAMPAIGN;
@@ -126,7 +126,7 @@ fn the_attempts_get_through_without_a_sandbox() {
             let text = errors.split("[attempt] ").nth(1)?;
             text.split(' ').next().map(str::to_string)
         };
-        // What an attempt is called is asked in the sandbox.
+        // The name of an attempt is read in the sandbox.
         let (_, errors) = hostile.attempt(number, &["--sandbox"]);
         if errors.contains("there are ") || errors.contains("has no sandbox") {
             break;

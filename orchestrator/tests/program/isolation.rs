@@ -7,7 +7,7 @@ use std::path::Path;
 use std::process::Stdio;
 use std::time::{Duration, Instant};
 
-/// Ways of harm, with what is told of them.
+/// Kinds of harm, with the messages about them.
 const HARM: [(&str, &str); 8] = [
     ("EXIT", "it ended its process with exit code 0"),
     ("QUICK_EXIT", "it ended its process with exit code 0"),
@@ -24,7 +24,7 @@ const LIMITS: [&str; 2] = ["--call-timeout=0.5", "--unit-memory=64"];
 
 fn harmful(place: &str, how: &str) -> Bench {
     let (place, how) = (format!("-DPLACE={place}"), format!("-DHOW={how}"));
-    // What the compiler makes of a write past an array is part of the harm.
+    // The compiled form of a write past an array is part of the harm.
     let flags = [place.as_str(), how.as_str(), "-Wno-error", "-w"];
     Bench::made(LOOP, &Recipe { flags: &flags, ..Recipe::default() })
 }
@@ -261,7 +261,7 @@ fn what_an_archive_says_of_its_origin_is_not_trusted() {
     let bench = Bench::made(LOOP, &recipe);
     let (code, errors) = run(&bench, &[]);
     assert!(code == 1 && errors.contains("its process was killed by signal 6"), "{errors}");
-    // Whoever names the folder trusts what lies in it.
+    // A user who names the folder trusts its content.
     let mut command = bench.command(&["run", "loop.toml", "--force", "--quiet", "--fmu-dir", "."]);
     let output = command.output().unwrap();
     let errors = String::from_utf8(output.stderr).unwrap();
@@ -290,7 +290,7 @@ fn a_sandbox_keeps_an_instance_from_files_and_network() {
     assert!(outside.is_file());
     fs::remove_file(&outside).unwrap();
     let (code, errors) = run(&bench, &["--sandbox"]);
-    // Where the system has no Landlock, it is said.
+    // Where the system has no Landlock, a message says so.
     assert!(
         !outside.exists() || errors.contains("cannot limit these for instances: files"),
         "{errors}"

@@ -1,4 +1,5 @@
-//! Archives that are none, or not what they say: each is refused in one line that names it.
+//! Files that are no archives, and archives with false content: each is refused in one line that
+//! names it.
 
 use crate::bench::Bench;
 use std::fs;

@@ -1,4 +1,4 @@
-//! Tests of names: what the list shows, what each command takes, and what it says of a name of
+//! Tests of names: the list, the names that each command takes, and its message about a name of
 //! another kind.
 
 use crate::bench::{Bench, LOOP};
@@ -53,12 +53,13 @@ fn a_name_of_another_kind_is_told_what_to_call() {
         assert!(code == 2 && errors.contains(says), "{command} {name}: {errors}");
         assert_eq!(errors.lines().count(), 1, "{errors}");
     }
-    // A name of several kinds is told all of them, and each command takes its own.
+    // The message about a name of several kinds lists all of them, and each command takes its own.
     fs::write(bench.path("papers.toml"), CAMPAIGN).unwrap();
     let (_, _, errors) = bench.call(&["run", "papers"]);
     let both = "papers is a study and a campaign: orchestrator reproduce papers, or orchestrator campaign papers";
     assert!(errors.contains(both), "{errors}");
-    // A campaign that extends another one says itself neither what varies nor of what.
+    // A campaign that extends another one names neither the experiment nor the varied parameters
+    // itself.
     fs::write(bench.path("more.toml"), "extends = \"gains.toml\"\ntitle = \"more\"\n").unwrap();
     let (code, _, errors) = bench.call(&["campaign", "more", "--quiet"]);
     assert_eq!(code, 0, "{errors}");

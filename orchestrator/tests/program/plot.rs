@@ -4,7 +4,7 @@ use crate::bench::{Bench, LOOP};
 use serde_json::Value;
 use std::fs;
 
-/// What the loop draws. Its integrator has the values 2^k at tick k.
+/// Panels of the loop. Its integrator has the values 2^k at tick k.
 const PANELS: &str = r#"
 [observe]
 panels = [{ name = "integral", limit = "gain.gain", curves = [
@@ -49,7 +49,7 @@ fn a_run_is_drawn_as_its_experiment_says_or_as_it_is_asked_for() {
     let picture = plotted(&bench, &["a"]);
     assert!(picture.starts_with("<svg") && picture.contains("limit of norm"), "{picture}");
     assert!(picture.contains("α") && picture.contains("gain and integrator"));
-    // The norm that has the limit is bold, and what it is the norm of is thin.
+    // The norm that has the limit is bold, and its components are thin.
     for picture in [picture, fs::read_to_string(bench.path("a/plot.svg")).unwrap()] {
         let width = |name: &str| {
             let path = picture.split(&format!("<path data-name=\"{name}\"")).nth(1).unwrap();
@@ -154,7 +154,7 @@ fn the_page_of_a_run_without_panels_draws_what_is_recorded() {
     assert_eq!(code, 0, "{errors}");
     let page = data(&fs::read_to_string(bench.path("a/page.html")).unwrap());
     assert_eq!(page["panels"].as_array().unwrap().len(), 3);
-    // The same as `plot` draws of the files.
+    // The same as `plot` draws from the files.
     assert_eq!(page["panels"], data(&plotted(&bench, &["a", "--out", "a.html"]))["panels"]);
 }
 
@@ -164,7 +164,7 @@ fn figures_of_margins_and_responses_are_svg_or_png() {
     for command in ["margins", "response"] {
         let (code, _, errors) = bench.call(&[command, "loop.toml", "--plot", "a.pdf"]);
         assert_eq!(code, 2, "{errors}");
-        let said = "--plot a.pdf: the name must end with .svg or .png, which tells what is written";
+        let said = "--plot a.pdf: the name must end with .svg or .png, which selects the format";
         assert!(errors.contains(said), "{errors}");
     }
 }

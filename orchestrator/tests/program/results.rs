@@ -1,4 +1,4 @@
-//! Tests of what a run measures, writes and prints.
+//! Tests of the results of a run: measured, written and printed.
 
 use crate::bench::{Bench, LOOP};
 use std::fs;

@@ -44,7 +44,7 @@ fn the_page_of_a_search_shows_the_worst_case_against_its_limit() {
     assert!(outcome["broken"][0] == "small" && page.contains("verdict not"), "{page}");
     assert!(page.contains("orchestrator run w/worst.toml --page"), "{page}");
     assert!(page.contains("<code>gain.gain</code>") && page.contains("largest so far"));
-    // Curves of the measure that was looked for and of the one with a limit, and the history.
+    // Curves of the searched measure and of the one with a limit, and the history.
     assert_eq!(page.matches("<svg xmlns").count(), 2);
     assert!(page.contains("plant.output.integral"), "{page}");
     // The page has no network and no script.

@@ -1,5 +1,5 @@
-//! Campaigns that make no sense are refused, seeds separate campaigns, and what fails for a reason
-//! outside the unit is no result.
+//! Campaigns that make no sense are refused, seeds separate campaigns, and a failure outside the
+//! FMU is not a result.
 
 use crate::bench::{Bench, LOOP, Recipe};
 use crate::campaign::{CAMPAIGN, RANDOM, bench};
@@ -65,7 +65,7 @@ fn distributions_that_make_no_sense_are_refused_with_the_parameter() {
         assert!(errors.contains(said), "{distribution}: {errors}");
         assert!(errors.contains("gain.gain") || errors.contains("sorted"), "{errors}");
     }
-    // A small part at the lower end can be told apart.
+    // Values of a small part at the lower end can be distinguished.
     let tail = "normal = { mean = 0.0, deviation = 1.0 }\nwithin = [-8.1, -8.0]";
     let (code, _, errors) =
         bench(&RANDOM.replace(UNIFORM, tail)).call(&["campaign", "c.toml", "--work"]);
@@ -251,7 +251,7 @@ fn more_cases_than_seeds_are_refused() {
 fn a_campaign_in_which_all_cases_failed_is_no_statistic() {
     let bench = bench(&CAMPAIGN.replace("[1e9, 2.0]", "[1.0, 2.0]"));
     let (code, out, errors) = bench.call(&["campaign", "c.toml", "--csv"]);
-    assert!(code == 1 && errors.contains("all 6 cases failed, which is no statistic"), "{errors}");
+    assert!(code == 1 && errors.contains("6 cases failed, so there are no statistics"), "{errors}");
     assert!(errors.contains("out of propellant at 1") && out.is_empty(), "{errors}{out}");
     assert!(!bench.path("out/c/summary.json").exists() && !bench.path("out/c/parts").exists());
     let table = fs::read_to_string(bench.path("out/c/cases.csv")).unwrap();
@@ -276,7 +276,7 @@ fn an_instance_that_refuses_values_fails_and_one_that_lacks_a_file_is_an_error()
     assert_eq!(code, 0, "{errors}");
     let table = fs::read_to_string(bench.path("out/c/cases.csv")).unwrap();
     assert_eq!(table.matches("gain too large: 500").count(), 2, "{table}");
-    // It refuses that of the experiment as well: something else is wrong than what was drawn.
+    // It refuses that of the experiment as well: the fault is not in the drawn values.
     let set = "set = { \"plant.gain\" = 500.0 }\n[signals]";
     fs::write(bench.path("c.toml"), CAMPAIGN.replace("[signals]", set)).unwrap();
     let (code, _, errors) = bench.call(&["campaign", "c.toml"]);

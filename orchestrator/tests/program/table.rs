@@ -48,7 +48,7 @@ fn oracle_an_input_follows_the_rows_of_a_table() {
         answers(&bench, &[&set[..], &["drive.input[1]=4"]].concat())[..4],
         [80.0, 80.0, 80.0, 100.0]
     );
-    // Processes of their own are for code of others.
+    // Processes of their own are for third-party code.
     assert_eq!(answers(&bench, &["--isolate"]), [6.0, 6.0, 10.0, 10.0, 10.0]);
     fs::write(bench.path("other.csv"), "time,input\n0,1\n").unwrap();
     assert_eq!(answers(&bench, &["--fmu", "drive=other.csv"]), [2.0; 5]);

@@ -1,4 +1,4 @@
-//! Tests of what the program refuses, in the command line and in files, and of what it finds.
+//! Tests of refusals, in the command line and in files, and of the search for files.
 
 use crate::bench::{Bench, LOOP, Recipe};
 use std::fs;
@@ -320,7 +320,7 @@ fn inputs_without_connection_must_be_meant() {
         &LOOP.replace("[components.plant]\n", "[components.plant]\nunconnected = [\"input\"]\n"),
     )
     .refusal(&[]);
-    assert!(message.contains("is said to be unconnected, but is connected"), "{message}");
+    assert!(message.contains("is listed as unconnected, but is connected"), "{message}");
 }
 
 #[test]

@@ -39,7 +39,7 @@ bound = { label = "bound", kind = "last", signals = "bound" }
         let verdict = page.split_once("<p class=\"verdict\">").unwrap().1;
         (said, verdict.split_once("</p>").unwrap().0.to_string())
     };
-    // The integral comes to 3.375; the gain responds last to 2.25, by half of it.
+    // The integral reaches 3.375; the gain responds last to 2.25, by half of it.
     let (said, verdict) = outcome("4");
     assert_eq!(said.matches("within its limit 4").count(), 2, "{said}");
     assert!(!said.contains("EXCEEDS") && !said.contains("DEFECT"), "{said}");
@@ -128,7 +128,7 @@ fn a_search_says_whether_the_worst_case_breaks_a_limit() {
         let verdicts = |class: &str, word: &str| {
             text.matches(&format!("<span class=\"{class}\">{word}</span>")).count()
         };
-        // Once for the measure that was looked for, once for the limit.
+        // Once for the searched measure, once for the limit.
         let (kept, broken) = if breaks { (0, 2) } else { (2, 0) };
         assert_eq!(verdicts("verdict holds", "kept"), kept, "{text}");
         assert_eq!(verdicts("verdict not", "broken"), broken, "{text}");
