@@ -1,12 +1,11 @@
 //! Condition on the settings of an FMU under which one of its variables has an effect.
 //!
-//! It is a text, such as `reference.profile = constant or sine`, or
-//! `translation = entry and air.rows >= 3`, which descriptions and warnings show as it is. Parts
-//! joined by `and` must all hold, and one of the alternatives joined by `or`, which stand in
-//! brackets beside another part. An alternative without a comparison repeats name and operator of
-//! the one before. A name with `*` at its end stands for all variables that begin so, of which one
-//! must satisfy the comparison. [`CO_SIMULATION`] holds for instances of co-simulation, and
-//! [`NEVER`] for none.
+//! It is a text, such as `reference.profile = constant or sine`, or `translation = entry and
+//! air.rows >= 3`, which descriptions and warnings show as it is. Parts joined by `and` must all
+//! hold, and one of the alternatives joined by `or`, which stand in brackets beside another part.
+//! An alternative without a comparison repeats name and operator of the one before. A name with `*`
+//! at its end denotes all variables that begin with it, of which one must satisfy the comparison.
+//! [`CO_SIMULATION`] holds for instances of co-simulation, and [`NEVER`] for none.
 
 use crate::variable::{Causality, Variable, VariableKind};
 use std::cmp::Ordering;
@@ -93,7 +92,7 @@ pub fn holds(
     })
 }
 
-/// Says what is wrong with a condition, if anything is.
+/// Returns the fault of a condition, if it has one.
 pub(crate) fn problem(condition: &str, variables: &[Variable]) -> Option<String> {
     for part in parts(condition) {
         let alternatives = match part {

@@ -72,7 +72,7 @@ pub enum Error {
     NoDescriptions {
         /// Path of the library file.
         path: PathBuf,
-        /// Description of what the library lacks.
+        /// Description of the part that the library lacks.
         problem: String,
     },
     /// The file is not a library that can be packed.
@@ -80,7 +80,7 @@ pub enum Error {
     Library {
         /// Path of the library file.
         path: PathBuf,
-        /// Description of what is wrong with it.
+        /// Description of its fault.
         problem: String,
     },
     /// Two FMUs of the given libraries have the same name.
@@ -113,7 +113,7 @@ pub struct ModelDescription {
     pub name: String,
     /// Purpose of the FMU, in one line.
     pub description: String,
-    /// HTML fragment for `documentation/index.html` that says what the FMU computes, with
+    /// HTML fragment for `documentation/index.html` that describes the computation of the FMU, with
     /// equations and their sources.
     pub documentation: String,
     /// Version of the crate that made the FMU.

@@ -132,6 +132,6 @@ pub struct Variable {
     pub dependencies: Vec<String>,
     /// [Condition](crate::condition) under which the variable has an effect; empty for always.
     pub used_with: String,
-    /// Whether an input may stay unconnected without a word about it.
+    /// Whether an input may stay unconnected without a warning.
     pub is_optional: bool,
 }

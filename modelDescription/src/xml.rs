@@ -199,7 +199,7 @@ impl ModelDescription {
             if !variable.is_optional {
                 return Ok(());
             }
-            // FMI has no word for it, and importers pass over annotations that they do not know.
+            // FMI has no attribute for it, and importers ignore annotations that they do not know.
             parent(xml, "Annotations", vec![], |xml| {
                 let tool = vec![("name", OPTIONAL.into())];
                 parent(xml, "Tool", tool, |xml| leaf(xml, "Optional", vec![]))

@@ -11,7 +11,7 @@ use std::fs;
 use std::io::Read;
 use std::path::Path;
 
-/// A library for Linux of which nothing but its file matters.
+/// A library for Linux of which only the file matters.
 fn library_file(path: &Path) -> LibraryFile {
     let path = path.to_owned();
     LibraryFile { path, folders: &["linux64"], suffix: "so", exports: [].into(), sources: None }

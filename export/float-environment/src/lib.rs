@@ -1,4 +1,4 @@
-//! The floating-point environment at the border between this code and that of others.
+//! The floating-point environment at the border between this code and third-party code.
 //!
 //! Rust assumes the default environment of IEEE 754: rounding to nearest, no traps, subnormal
 //! numbers kept. Hosts of an FMU may have another one: those in Fortran and Delphi trap invalid
@@ -25,7 +25,7 @@ pub fn in_default<R>(body: impl FnOnce() -> R) -> R {
 }
 
 /// Calls `body`. It is not inlined, so that no arithmetic moves out of the environment, on which
-/// arithmetic does not depend in the eyes of the compiler.
+/// arithmetic does not depend for the compiler.
 #[inline(never)]
 fn apart<R>(body: impl FnOnce() -> R) -> R {
     body()

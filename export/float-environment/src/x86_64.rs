@@ -27,7 +27,7 @@ impl Environment {
         let x87 = (control_word & MASKS != MASKS).then(|| {
             let mut x87 = [0u32; 7];
             // SAFETY: the instruction stores 28 bytes. It does not wait for a pending exception,
-            // which stays in what it stores, and masks all exceptions.
+            // which stays in the stored bytes, and masks all exceptions.
             unsafe { asm!("fnstenv [{}]", in(reg) &raw mut x87, options(nostack)) };
             x87
         });
@@ -41,7 +41,7 @@ impl Drop for Environment {
     fn drop(&mut self) {
         if control_word() & MASKS != MASKS {
             // SAFETY: the instruction clears the exceptions of the x87 unit, without waiting for
-            // one. What traps here is left by a library that was called.
+            // one. Exceptions that trap here are left by a library that was called.
             unsafe { asm!("fnclex", options(nomem, nostack)) };
         }
         match &self.x87 {

@@ -6,7 +6,7 @@ mod sources;
 use std::env;
 use std::path::PathBuf;
 
-/// Tells the compiler and the linker what the library of an FMU needs:
+/// Sets the options of the compiler and the linker for the library of an FMU:
 ///
 /// - On Linux the library is never unloaded, because thread-local destructors of a Rust library
 ///   crash a host that unloads it before the thread ends.

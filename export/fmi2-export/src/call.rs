@@ -85,8 +85,8 @@ const ME: Option<Interface> = Some(Interface::ModelExchange);
 const CS: Option<Interface> = Some(Interface::CoSimulation);
 
 /// The table of calls. Where the standard allows setting some variables only, [`crate::instance`]
-/// looks at the variable. Getting values in initialization mode is not restricted to outputs,
-/// states and derivatives.
+/// checks the variable. Getting values in initialization mode is not restricted to outputs, states
+/// and derivatives.
 #[rustfmt::skip]
 pub(crate) mod table {
     use super::{CS, Call, ME, call};

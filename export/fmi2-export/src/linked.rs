@@ -1,6 +1,6 @@
 //! An instance of an FMU that is linked into the same program: the same calls with the same checks
-//! as through the C interface, but without pointers. It is what a program uses that cannot open
-//! libraries, such as one in a browser.
+//! as through the C interface, but without pointers. It is for programs that cannot open libraries,
+//! such as one in a browser.
 //!
 //! ```ignore
 //! let mut plant = Linked::new(&Export::new::<ReentryPlant>());

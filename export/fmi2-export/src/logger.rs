@@ -79,8 +79,8 @@ impl Logger {
         }
     }
 
-    /// Returns a logger that keeps warnings until they are taken, and reports nothing else: who is
-    /// linked with the FMU gets failures as results.
+    /// Returns a logger that keeps warnings until they are taken, and reports nothing else: a
+    /// program that is linked with the FMU gets failures as results.
     pub(crate) fn of_warnings() -> Self {
         let active = 1 << Category::Warning as u8;
         Self { active, ..Self::new(None, CString::default(), false) }

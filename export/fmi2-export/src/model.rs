@@ -13,9 +13,9 @@ pub enum Failure {
     /// The simulation cannot continue, but the process and other instances can (`fmi2Error`).
     #[error("{0}")]
     Error(String),
-    /// A step came to the end of what the model simulates, before it reached its end. The outputs
-    /// are those at this time. The importer gets `fmi2Discard` and learns the rest from
-    /// `fmi2GetBooleanStatus` and `fmi2GetRealStatus` (2.0.5, section 4.2.3).
+    /// A step came to the end of the simulated range before its own end. The outputs are those at
+    /// this time. The importer gets `fmi2Discard` and learns the rest from `fmi2GetBooleanStatus`
+    /// and `fmi2GetRealStatus` (2.0.5, section 4.2.3).
     #[error("{reason}")]
     Ended {
         /// Time at which the simulation ends, s.
@@ -46,8 +46,8 @@ pub trait Inputs<M> {
     fn are_extrapolated(&self) -> bool;
 }
 
-/// Last event before outputs are read. In co-simulation it decides what the outputs of a sampled
-/// model mean: FMI 2.0 forbids reading them after an input was set, until a step has been made
+/// Last event before outputs are read. In co-simulation it determines the meaning of the outputs of
+/// a sampled model: FMI 2.0 forbids reading them after an input was set, until a step has been made
 /// (2.0.5, section 4.2.1), so that a master which keeps to the standard reads them after a step.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum LastEvent {
@@ -104,8 +104,8 @@ pub trait Model: Serialize + DeserializeOwned + Send + Sized + 'static {
     /// are read from here.
     fn new() -> Self;
 
-    /// Brings the model back to what [`Self::new`] makes. It may keep scratch space that determines
-    /// nothing. After a failure the shell makes a new model instead.
+    /// Brings the model back to the result of [`Self::new`]. It may keep scratch space that
+    /// determines nothing. After a failure the shell makes a new model instead.
     fn reset(&mut self) {
         *self = Self::new();
     }

@@ -6,8 +6,8 @@ use serde::ser::{
 };
 use std::fmt::{self, Display};
 
-/// Whether no Real in `value`, however deep, is NaN. Infinite ones are allowed, as they may stand
-/// for an interval without end.
+/// Whether no Real in `value`, however deep, is NaN. Infinite ones are allowed, as they may denote
+/// an interval without end.
 pub(crate) fn are_numbers<T: Serialize>(value: &T) -> bool {
     value.serialize(&mut Search).is_ok()
 }

@@ -43,8 +43,8 @@ pub(crate) unsafe fn slice<'a, T>(
     Ok(unsafe { std::slice::from_raw_parts(pointer, n) })
 }
 
-/// Room for the results of a call. The importer need not have initialized it, and it keeps what was
-/// there until a result is put.
+/// Room for the results of a call. The importer need not have initialized it, and it keeps its
+/// content until a result is put.
 pub(crate) struct Room<'a, T>(&'a mut [MaybeUninit<T>]);
 
 impl<'a, T: Copy + Default> Room<'a, T> {
@@ -87,12 +87,12 @@ pub(crate) unsafe fn room<'a, T>(
     check(name, pointer, n)?;
     // SAFETY: `check` refused null, wrong alignment and lengths beyond `isize::MAX` bytes; the
     // importer vouches for room for n elements that nobody else uses during the call. MaybeUninit
-    // asks nothing of what is there.
+    // requires nothing of the content.
     Ok(Room(unsafe { std::slice::from_raw_parts_mut(pointer.cast(), n) }))
 }
 
-/// Refuses a room for results that overlaps what the same call reads: two references to it must not
-/// live at the same time.
+/// Refuses room for results that overlaps the data that the same call reads: two references to it
+/// must not live at the same time.
 pub(crate) fn apart<T, U>(
     read: (&str, *const T, usize),
     written: (&str, *mut U, usize),
@@ -108,7 +108,7 @@ pub(crate) fn apart<T, U>(
 }
 
 /// Returns the value references of a call that gets values, with the room for the values. The
-/// caller promises what [`slice`] and [`room`] ask.
+/// caller fulfils the conditions of [`slice`] and [`room`].
 pub(crate) unsafe fn requested<'a, T>(
     vr: *const u32,
     n: usize,

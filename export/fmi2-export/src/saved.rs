@@ -1,4 +1,4 @@
-//! A saved state as bytes: a header that tells whether the state fits, then the postcard encoding
+//! A saved state as bytes: a header that shows whether the state fits, then the postcard encoding
 //! of shell and model.
 //!
 //! | bytes | content |

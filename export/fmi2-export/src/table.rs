@@ -34,7 +34,7 @@ pub(crate) struct Integer<M> {
     pub(crate) set: Setter<M>,
 }
 
-/// Says what cannot happen, as the declaration of a setting and its field have one source.
+/// Message for an impossible case, as the declaration of a setting and its field have one source.
 const NO_FIELD: &str = "a setting has a field of its declared type";
 
 /// Returns access to a setting with numbered values, which FMI numbers from `first` on where the
@@ -106,7 +106,7 @@ pub struct Description<M> {
     pub name: &'static str,
     /// Purpose of the FMU, in one line.
     pub description: &'static str,
-    /// HTML fragment that says what the FMU computes, with equations and sources.
+    /// HTML fragment that describes the computation of the FMU, with equations and sources.
     pub documentation: String,
     /// Version of the FMU's crate.
     pub version: &'static str,
@@ -291,7 +291,7 @@ impl Common {
         })
     }
 
-    /// Declares that an input may stay unconnected without a word about it.
+    /// Declares that an input may stay unconnected without a warning.
     #[must_use]
     pub fn optional(mut self) -> Self {
         self.0.is_optional = true;
@@ -307,7 +307,7 @@ impl Common {
     }
 
     /// Declares the [condition](model_description::condition) under which the variable has an
-    /// effect. The importer is warned if it sets the variable in vain.
+    /// effect. The importer is warned if it sets the variable without effect.
     #[must_use]
     pub fn used_with(mut self, condition: &str) -> Self {
         if !condition.is_empty() {

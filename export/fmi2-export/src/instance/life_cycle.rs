@@ -1,4 +1,4 @@
-//! The way of an instance from its initialization to its end, and its calculated variables.
+//! The life cycle of an instance from its initialization to its end, and its calculated variables.
 
 use super::Instance;
 use crate::call::{Outcome, State, error};

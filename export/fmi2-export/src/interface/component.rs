@@ -92,7 +92,7 @@ pub unsafe fn fmi2Instantiate(
     logging_on: c_int,
 ) -> Component {
     if !callbacks.is_aligned() {
-        // Without a logger there is nobody to tell.
+        // Without a logger no message can be delivered.
         return null_mut();
     }
     // SAFETY: the standard demands null or a pointer to a callback structure that lives and stays

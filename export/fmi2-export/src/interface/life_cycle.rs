@@ -1,4 +1,4 @@
-//! Logging, and the way of an instance from its initialization to its end.
+//! Logging, and the life cycle of an instance from its initialization to its end.
 
 use super::component::{Component, run, run_always};
 use crate::call::table;

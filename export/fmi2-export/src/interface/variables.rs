@@ -24,7 +24,7 @@ unsafe fn get<T: Typed, C: Copy + Default>(
     unsafe { run(component, call, body) }
 }
 
-/// Sets variables of type `T` to what `convert` makes of the values of C, or says why that is
+/// Sets variables of type `T` to the values of C, converted by `convert`, or says why that is
 /// refused. The caller promises what [`run`] and [`slice`] ask.
 unsafe fn set<T: Typed + std::fmt::Debug, C: Copy>(
     component: Component,
