@@ -36,7 +36,7 @@ pub struct ClosedLoop {
     pub warnings: Warnings,
     /// Variables that hold the limits of body rates and moment.
     pub limits: Vec<Port>,
-    /// Items of the variables by which the controller speaks of its guarantee; none if it gives no
+    /// Items of the variables by which the controller reports its guarantee; none if it gives no
     /// guarantee.
     pub guarantee: [Items; 2],
     /// Tracking error beyond which the attitude counts as lost, deg.

@@ -1,4 +1,4 @@
-//! What the page is built from: the controllers, the parameters of all FMUs as their variable
+//! Data from which the page is built: the controllers, the parameters of all FMUs as their variable
 //! tables declare them, and the scenario's values.
 
 use crate::error::Error;

@@ -1,4 +1,4 @@
-//! What can be wrong with a request of the page.
+//! Faults of a request of the page.
 
 use fmi_master::master::Failed;
 
@@ -17,7 +17,7 @@ pub enum Error {
     Wrong {
         /// Name of the parameter with that of its component, or place in the experiment.
         what: String,
-        /// What is wrong with it.
+        /// Description of its fault.
         problem: String,
     },
     /// An FMU refused a call, in its own words.

@@ -8,7 +8,7 @@ use crate::summary::{Limits, Message, Summary};
 use fmi_master::master::{Failed, Sample, Watcher};
 use vehicle::axes::{REPEATS, nearest};
 
-/// What is made of a flight on its way.
+/// Data that are collected during a flight.
 struct Flight<'a> {
     summary: Summary,
     signals: &'a mut Vec<f64>,

@@ -16,7 +16,7 @@ use std::sync::OnceLock;
 pub struct Fmu {
     /// Name of the FMU.
     pub name: &'static str,
-    /// What the module exports of it.
+    /// Export of the FMU by the module.
     pub export: Export,
     description: OnceLock<ModelDescription>,
 }
@@ -32,7 +32,7 @@ impl Fmu {
         Called { linked: Linked::new(&self.export), warnings: Rc::clone(warnings) }
     }
 
-    /// Returns what a master must know of the FMU: what others read in its XML.
+    /// Returns the data of the FMU that a master needs, which others read in its XML.
     pub fn description(&self) -> &ModelDescription {
         self.description.get_or_init(|| description(Linked::new(&self.export).description()))
     }
@@ -95,7 +95,7 @@ fn variable((reference, variable): (u32, &exported::Variable)) -> Variable {
     }
 }
 
-/// Warnings of all instances that were not told yet.
+/// Warnings of all instances that are not delivered yet.
 pub type Warnings = Rc<RefCell<Vec<String>>>;
 
 /// An instance as the master calls it.

@@ -16,7 +16,7 @@
 //! A request is `{"controller": "crmpc", "set": {"plant.disturbance.bound": "2 deg/s2"}}`, with
 //! values as in experiment files. `describe`, `fly` and `experiment` return 1 if they succeeded.
 //! Otherwise they return 0, and the answer says why. Addresses are valid until the next call of a
-//! function that is not named after what it returns.
+//! function other than these getters.
 #![cfg_attr(not(test), deny(clippy::disallowed_methods))]
 
 pub mod closed_loop;

@@ -1,4 +1,4 @@
-//! What the page asks for: a controller and the parameters that differ, as an experiment.
+//! Request of the page: a controller and the parameters that differ, as an experiment.
 
 use crate::closed_loop::ClosedLoop;
 use crate::error::Error;
@@ -72,7 +72,7 @@ fn parameters<'a>(experiment: &'a mut Table, component: &str) -> Result<&'a mut 
     parameters.as_table_mut().ok_or_else(|| scenario::problem(component, "parameters is no table"))
 }
 
-/// Writes the step of the loop, and has what its controller says of a guarantee recorded.
+/// Writes the step of the loop, and records the guarantee that its controller reports.
 fn record(experiment: &mut Table, closed_loop: &ClosedLoop) {
     if let Some(Value::Table(simulation)) = experiment.get_mut("simulation") {
         simulation.insert("step".into(), closed_loop.master.clock().step().into());

@@ -1,5 +1,5 @@
 //! The experiments that the page flies. Controllers, scenario, connections and order come from the
-//! files that the orchestrator runs; nothing of them is said again here.
+//! files that the orchestrator runs; none of them is repeated here.
 
 use crate::error::Error;
 use crate::fmu::Fmu;
@@ -59,7 +59,7 @@ pub fn fmu(name: &str) -> Result<&'static Fmu, Error> {
 pub struct Choice {
     /// Short name for addresses and files.
     pub id: String,
-    /// Name for people.
+    /// Name for readers.
     pub name: String,
     /// Name of the FMU.
     pub fmu: String,
@@ -152,7 +152,7 @@ fn merge(table: &mut Table, over: Table) {
     }
 }
 
-/// Returns the error that something is wrong with a parameter or a place in an experiment.
+/// Returns the error for a fault of a parameter or a place in an experiment.
 pub fn problem(what: &str, problem: &str) -> Error {
     Error::Wrong { what: what.into(), problem: problem.into() }
 }

@@ -1,6 +1,7 @@
 //! The signals that a flight records.
 
-/// Columns of the signals, in this order; in SI units, what the guarantee says as numbers of items.
+/// Columns of the signals, in this order; in SI units, the state of the guarantee as numbers of
+/// items.
 pub const COLUMNS: [&str; 15] = [
     "time",
     "plant.attitude.alpha",
@@ -19,7 +20,7 @@ pub const COLUMNS: [&str; 15] = [
     "controller.guarantee.contradiction",
 ];
 
-/// What the controllers that guarantee limits say of it: the status, and what contradicts an
+/// Outputs of the controllers that guarantee limits: the status, and the contradiction of an
 /// assumption.
 pub const GUARANTEE: [&str; 2] = [COLUMNS[13], COLUMNS[14]];
 

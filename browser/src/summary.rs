@@ -19,7 +19,7 @@ pub struct Limits {
 pub struct Message {
     /// Communication point at which it appeared, s.
     pub time: f64,
-    /// What it says.
+    /// Text of the message.
     pub text: String,
 }
 
@@ -46,7 +46,7 @@ pub struct Summary {
     rate_ratio: f64,
     /// Largest ‖m‖ as a share of its limit.
     moment_ratio: f64,
-    /// Items of the guarantee's status and of what contradicts it; none if the controller gives no
+    /// Items of the guarantee's status and of its contradiction; none if the controller gives no
     /// guarantee.
     guarantee: [Items; 2],
     /// Warnings of the FMUs.

@@ -1,4 +1,4 @@
-//! Requests of the page, and what is refused.
+//! Requests of the page, and refusals.
 
 use crate::description;
 use crate::flight::fly;
