@@ -100,9 +100,8 @@ impl Row {
 /// All functions that answer for an instance. `fmi2FreeInstance` returns nothing and has its own
 /// test, as have the functions that need no instance.
 ///
-/// The variables that may be set are fewer, as [`settable`] tells. The standard allows `fmi2GetXXX`
-/// in initialization mode for outputs, states and derivatives only; the FMUs return every
-/// variable.
+/// The variables that may be set are fewer, see [`settable`]. The standard allows `fmi2GetXXX` in
+/// initialization mode for outputs, states and derivatives only; the FMUs return every variable.
 #[rustfmt::skip]
 pub const TABLE: &[Row] = &[
     Row("fmi2SetDebugLogging",               |i, _| c!(i, fmi2SetDebugLogging(i.component, 1, 0, null())),        "INECTX", "INSTX", OK),

@@ -1,4 +1,4 @@
-//! Calls of the C interface in any order, held against a model of the standard's states.
+//! Calls of the C interface in any order, compared with a model of the standard's states.
 
 #![allow(clippy::borrow_as_ptr, reason = "calls read better as in C")]
 
@@ -68,7 +68,7 @@ impl Model {
             assert_eq!(status, ERROR, "{what}");
         }
         assert!(is_right || status != OK, "{what}: the arguments are wrong");
-        // Nobody may have asked to hear of what was discarded.
+        // Messages about discarded calls may be switched off.
         if status == ERROR {
             assert!(texts.last().is_some_and(|text| text.starts_with(name)), "{what}");
         }
@@ -87,8 +87,8 @@ impl Model {
         }
     }
 
-    /// Looks at all values. Those that cannot be had put the instance into the error state, so it
-    /// is brought back.
+    /// Looks at all values. Those that are not available put the instance into the error state, so
+    /// it is brought back.
     fn look(&mut self, what: &str) {
         let saved_state = self.instance.save();
         let wrong = self.instance.wrong_value();
@@ -333,7 +333,7 @@ impl Model {
         })
     }
 
-    /// A handle of a saved state with the state, or one that is none.
+    /// A handle of a saved state with the state, or an invalid one.
     fn handle(&self, bytes: &mut Bytes) -> (FmuState, Option<State>) {
         match bytes.byte() {
             0..=15 => (null_mut(), None),

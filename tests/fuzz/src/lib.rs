@@ -1,6 +1,6 @@
-//! Targets for fuzzing: everything that reads text or files of others, and the C interface of the
-//! FMUs.
-//! A target returns whatever comes; a panic, a crash, a hang or memory without bound is a fault.
+//! Targets for fuzzing: everything that reads foreign text or files, and the C interface of the
+//! FMUs. A target returns for any input; a panic, a crash, a hang or memory without bound is a
+//! fault.
 #![allow(clippy::missing_panics_doc, reason = "a target fails by panicking")]
 
 mod bytes;

@@ -43,7 +43,7 @@ fn values(deviation: &Deviation) -> [f64; 9] {
 /// Bounds at one tick on the effects of Δ, of the errors of angle and rate, and of the others.
 struct Effects<'a> {
     reach: &'a Bounds,
-    /// Part of the feedback by what happened before the nominal trajectory began.
+    /// Part of the feedback by causes before the nominal trajectory began.
     early_feedback: Interval,
     errors: [&'a Bounds; 2],
     changes: &'a Bounds,

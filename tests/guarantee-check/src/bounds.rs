@@ -89,7 +89,7 @@ impl Bounds {
     }
 }
 
-/// Returns what the checks of all bounds say together.
+/// Returns the verdict of the checks of all bounds.
 fn verdict(holds: bool) -> &'static str {
     if holds { "Every bound holds." } else { "NOT every bound is shown to hold." }
 }

@@ -1,4 +1,4 @@
-//! What drives the deviation from the nominal trajectory, computed anew from the bounds and rounded
+//! Causes of the deviation from the nominal trajectory, computed anew from the bounds and rounded
 //! outwards.
 
 use crate::interval::Interval;

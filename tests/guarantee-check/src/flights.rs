@@ -29,7 +29,7 @@ pub struct Recorded {
     pub deviation: Vector6<f64>,
     /// Whether the previous plan was kept.
     pub is_kept: bool,
-    /// What was commanded before, as far as it may have an effect if the delay is not exact.
+    /// Earlier commands, as far as they may have an effect if the delay is not exact.
     pub past: Past,
     /// Size of R I⁻¹ (m − m′) for the change of the command with which the plan begins, rad/s².
     pub change: f64,

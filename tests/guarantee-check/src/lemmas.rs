@@ -32,7 +32,7 @@ pub struct Finding {
     pub bound: f64,
     /// Enclosure of the smallest bound that would be true. The upper end is rounded outwards. For
     /// the bounds of [`crate::dynamics`] the lower end comes from a search in plain floating-point
-    /// numbers and only tells how tight the bound is.
+    /// numbers and only shows how tight the bound is.
     pub truth: Interval,
 }
 

@@ -109,7 +109,7 @@ mod tests {
         let good = Tally { plans: 3, ..Tally::default() };
         assert!(good.confirmed() && !report("all", &good).contains("NOT"));
         assert!(report("all", &good).starts_with("all: 3 plans (0 kept"));
-        // A plan whose states do not follow from its accelerations is none.
+        // A plan whose states do not follow from its accelerations is invalid.
         let settings = Settings::new(Constraints::Robust);
         let check = PlanCheck::new(&settings).unwrap();
         let mut refuted = Vec::new();

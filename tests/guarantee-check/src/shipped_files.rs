@@ -62,7 +62,7 @@ impl ShippedFiles {
     }
 }
 
-/// Returns what the checks say together.
+/// Returns the verdict of all checks.
 fn verdict(confirmed: bool, is_any: bool) -> &'static str {
     match (is_any, confirmed) {
         (false, _) => "No guarantee is given, so that NO plan was checked.",

@@ -2,8 +2,8 @@
 //! deviation, and the terminal weight.
 //!
 //! Φⁿ is computed as Φʳ (Φᵇ)ᵐ with n = m b + r and ‖Φᵇ‖ ≤ ½ in the norm of the largest row sum. The
-//! width of the intervals therefore fades with the power, and a geometric series bounds what is
-//! left out after n periods.
+//! width of the intervals therefore fades with the power, and a geometric series bounds the
+//! remainder after n periods.
 
 use crate::interval::Interval;
 use control::crmpc::{Settings, held_terminal_weight, terminal_weight};

@@ -80,7 +80,7 @@ const BETWEEN: &[(Call, &str)] = &[
     (|i| c!(i, fmi2GetDirectionalDerivative(i.component, &0, 1, &0, 1, &1.0, between())), "fmi2GetDirectionalDerivative: argument 'dvUnknown' is at 0x"),
 ];
 
-/// Calls whose results would overwrite what they read.
+/// Calls whose results would overwrite their input.
 #[rustfmt::skip]
 const OVERLAPS: &[(Call, &str)] = &[
     (|i| overlapping(|p| c!(i, fmi2GetReal(i.component, p.cast(), 2, p))), "fmi2GetReal: arguments 'vr' and 'value' overlap"),

@@ -131,7 +131,7 @@ fn the_values_of_an_fmu_are_finite_whatever_it_accepted() {
         if let Err(error) = outcome {
             panic!("{}: {error}", fmu.name());
         }
-        // The property says little where most sequences end before the first step.
+        // The property is weak where most sequences end before the first step.
         assert!(count.get() >= sequences_run, "{}: {} steps", fmu.name(), count.get());
     }
 }

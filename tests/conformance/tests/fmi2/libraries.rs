@@ -27,7 +27,7 @@ fn the_guid_selects_the_fmu() {
             "{}",
             fmu.name()
         );
-        // A saved state tells to which FMU it belongs.
+        // A saved state names the FMU to which it belongs.
         let state = fmu.instance(CO_SIMULATION).serialize();
         let guid = fmu.guid().to_bytes();
         assert!(state.windows(guid.len()).any(|part| part == guid), "{}", fmu.name());

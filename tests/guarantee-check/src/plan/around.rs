@@ -1,4 +1,4 @@
-//! The tube around one plan: with what the changes of its acceleration add, if the delay is not
+//! The tube around one plan: with the deviation by changes of its acceleration, if the delay is not
 //! exact.
 
 use super::deviation::Deviation;

@@ -1,4 +1,4 @@
-//! What drives the vehicle off a nominal trajectory: Δ, the inertia error, the errors of
+//! Causes that drive the vehicle off a nominal trajectory: Δ, the inertia error, the errors of
 //! measurement, and the change of F between where the law evaluates it and where the vehicle is.
 
 use super::body::{Body, sin_cos};
@@ -42,7 +42,7 @@ pub(super) struct Switched {
 
 impl Switched {
     /// R I_v⁻¹ I W′ = R (1 + D) W′/(1 + c) with ‖D‖ ≤ √(I_max/I_min) ε/(1 − ε), and ‖R W′ − 1‖ ≤
-    /// ‖R‖ ‖W′ − W‖. From one middle to the next lie a period and what a measurement adds.
+    /// ‖R‖ ‖W′ − W‖. From one middle to the next lie a period and the change by a measurement.
     fn new(s: &Settings, bounds: &Smoothness, inertia: &InertiaError, later: &Mismatch) -> Self {
         let [error, tau] = [s.delay_error, s.period_feedback].map(number);
         let one = Interval::ONE;
@@ -138,8 +138,8 @@ impl InertiaError {
 /// finds an upper bound.
 ///
 /// If commands begin to act early or late, the integral of the moment over any time differs by that
-/// at both ends of this time, so that the rates are displaced by no more than `jump`.
-/// This counts for the distances; what it makes F differ by belongs to each pulse.
+/// at both ends of this time, so that the rates are displaced by no more than `jump`. This counts
+/// for the distances; the difference of F by it belongs to each pulse.
 fn mismatch(s: &Settings, bounds: &Smoothness, inertia: &InertiaError) -> Option<Mismatch> {
     let end = number(s.delay) + number(s.period_feedback);
     let jump = inertia.displaced * (bounds.r[0] + bounds.r[1] * end);
@@ -186,7 +186,7 @@ fn mismatch_with(
         by_rates * rates + by_angles * angles
     };
     let unseen = sum(d);
-    // Two predictions differ by what has happened within a period, and by both errors.
+    // Two predictions differ by the effects within a period, and by both errors.
     let apart = [root3 * e + rates(drive, tau), root2 * eta + angles(drive_of_two, tau)];
     let grown = (by_rates * apart[0] + by_angles * (apart[1] + apart[0] * d)) / slack;
     let rate = apart[0] + grown * d;

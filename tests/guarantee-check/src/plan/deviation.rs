@@ -30,8 +30,8 @@ impl Extent {
     }
 }
 
-/// Deviations at one tick: of the vehicle when the command begins to act, and of what the law
-/// computes from the predicted state.
+/// Deviations at one tick: of the vehicle when the command begins to act, and of the quantities
+/// that the law computes from the predicted state.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Deviation {
     /// Angles (rad) and rates (rad/s) of the vehicle.

@@ -111,7 +111,7 @@ impl Mul for Jet {
 
 impl Div for Jet {
     type Output = Self;
-    // Nothing here divides by what depends on the coordinates; the result is right, if wide.
+    // Nothing here divides by a function of the coordinates; the result is right, if wide.
     fn div(self, other: Self) -> Self {
         let depends = other.slope.iter().chain(&other.bend).any(|&slope| slope != Interval::ZERO);
         let by = if depends { Interval::ALL } else { Interval::ONE / other.value };

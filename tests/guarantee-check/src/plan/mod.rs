@@ -133,9 +133,9 @@ impl PlanCheck {
         self.check_after(&Past::default(), plan, age, 0.0)
     }
 
-    /// Checks a plan with what was commanded before it. The command that ends its first interval
-    /// changes the acceleration by `next` (rad/s²), if that is more than the plan itself does; it
-    /// may begin to act before that end.
+    /// Checks a plan with the commands before it. The command that ends its first interval changes
+    /// the acceleration by `next` (rad/s²), if that is more than the plan itself does; it may begin
+    /// to act before that end.
     pub fn check_after(&self, past: &Past, plan: &Plan, age: usize, next: f64) -> Verdict {
         let mut verdict =
             Verdict { left: Left::ALL, at: [0.0; 3], consistent: self.is_consistent(plan) };
@@ -253,7 +253,7 @@ impl PlanCheck {
 }
 
 /// The set in which `tube` lets the deviation of an axis begin, and its size: this defines the
-/// constraint of the optimisation, and is no bound.
+/// constraint of the optimisation, and is not a bound.
 fn start_set(settings: &Settings) -> Result<(InvariantSet, f64), String> {
     let design = Design::new(settings).map_err(|error| error.to_string())?;
     let set = design.invariant.ok_or("no set exists in which a nominal trajectory may begin")?;

@@ -1,4 +1,4 @@
-//! What commands add to the deviation that begin to act earlier or later than assumed.
+//! Deviation by commands that begin to act earlier or later than assumed.
 //!
 //! If the command of tick k acts from T_k + s on, |s| ≤ δ, then between T_k and T_k + s the moment
 //! differs from the assumed one by the change of the command. That is a pulse of the rates at T_k +
@@ -180,8 +180,8 @@ fn responses(
     unseen.chain(seen).collect()
 }
 
-/// What the changes of the plan's own acceleration, and of the commands before it, add to the
-/// deviation by pulses.
+/// Deviation by the pulses of the changes of the plan's own acceleration, and of the commands
+/// before it.
 pub(super) struct Carried {
     /// Sizes along the five rows at the ticks from the beginning of the plan on, and for ever.
     at: Vec<Sizes>,
@@ -266,7 +266,8 @@ impl Carried {
 }
 
 /// Bounds the effects after the last of the pulses of these `sizes`, when each further one is `own`
-/// and what the ones before cause. The `recent` last pulses count with the largest one of them.
+/// and the part that the ones before cause. The `recent` last pulses count with the largest one of
+/// them.
 fn endless(pulses: &Pulses, sizes: &[f64], own: f64, recent: usize) -> Sizes {
     let (old, young) = sizes.split_at(sizes.len().saturating_sub(recent));
     let mut faded = [0.0; 6];

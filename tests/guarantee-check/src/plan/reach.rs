@@ -156,7 +156,7 @@ impl<'a> Builder<'a> {
         response
     }
 
-    /// Adds what follows when every response has faded, bounded by the sum `tail` of its size.
+    /// Adds the remainder when every response has faded, bounded by the sum `tail` of its size.
     fn end(&self, response: &mut Response, tail: Interval, earlier: Interval) {
         let tau = number(self.s.period_feedback);
         let end = number(self.s.delay) + tau;
@@ -298,7 +298,7 @@ impl<'a> Builder<'a> {
     ) -> Deviation {
         let Causes { disturbance, inertia: InertiaError { acceleration: inertia, .. }, .. } =
             &self.causes;
-        // What pulses change in F is summed along the predictions only.
+        // The change of F by pulses is summed along the predictions only.
         let is_exact = self.s.delay_error == 0.0;
         let half = |i: usize| {
             let Response { seen, erred, .. } = &responses[i];

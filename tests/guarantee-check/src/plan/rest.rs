@@ -24,7 +24,7 @@ fn down_to_zero(value: f64) -> Interval {
 }
 
 impl PlanCheck {
-    /// Bounds what happens after the horizon.
+    /// Bounds the motion after the horizon.
     pub(super) fn rest(&self, plan: &Plan, forever: &Deviation) -> Left {
         let nothing = Left { sideslip: f64::NAN, rate: f64::NAN, moment: f64::NAN };
         let Some(last) = plan.states.last() else { return nothing };
