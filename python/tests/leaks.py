@@ -1,4 +1,4 @@
-"""What loops and campaigns leave behind: memory, mappings, descriptors, child processes and
+"""Remains of loops and campaigns: memory, mappings, descriptors, child processes and
 temporary files of this process, as Linux counts them.
 
 As a program it measures 1,000 loops and 100 campaigns with a law, against those after the tenth:

@@ -123,7 +123,7 @@ def test_workers_give_the_bytes_of_one_machine(file, expected, client, tmp_path)
     run = campaign(file).run(client, out=tmp_path / "out", units="deg")
     assert content(run.folder) == expected
     assert len(run.table) == CASES and run.summary["cases"] == CASES
-    # What was flown is not flown again, and what is missing is.
+    # Flown parts are not flown again, and missing ones are.
     (run.folder / "parts" / "0000000500-0000000525.parquet").unlink()
     before = {path: path.stat().st_mtime_ns for path in (run.folder / "parts").iterdir()}
     assert content(campaign(file).run(client, out=tmp_path / "out").folder) == expected
@@ -170,7 +170,7 @@ def test_parts_are_kept_at_an_address(kind, file, expected, tmp_path, monkeypatc
     monkeypatch.chdir(tmp_path)
     folder = tmp_path / "shared" if kind == "file" else Path(f"/{uuid.uuid4().hex}")
     address = f"{kind}://{folder.as_posix()}"
-    # What is in memory is there for threads of the same process only.
+    # Data in memory are there for threads of the same process only.
     with workers(processes=kind == "file") as client:
         run = campaign(file).run(client, out=address)
         assert run.folder == tmp_path / "out" / "gusts" and content(run.folder) == expected

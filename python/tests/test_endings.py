@@ -1,4 +1,4 @@
-"""However a law, a process or the work ends: the error says so, no result comes of it, and nothing
+"""However a law, a process or the work ends: the error says so, there is no result, and nothing
 is left behind."""
 
 import ctypes
@@ -353,7 +353,7 @@ def test_folders_end_with_their_process(tmp_path):
 
     assert run() == "1\n" and not list(tmp_path.iterdir())
     if sys.platform == "linux":
-        # What a killed process has left is removed by the next one.
+        # The remains of a killed process are removed by the next one.
         run("killed")
         assert len(list(tmp_path.iterdir())) == 1
         assert run() == "1\n" and not list(tmp_path.iterdir())

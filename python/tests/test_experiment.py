@@ -96,7 +96,7 @@ def test_a_law_replaces_the_controller_of_an_experiment():
     assert run.description["law"] == usual.description["law"] == "pd"
     shared = run.table.columns.intersection(usual.table.columns)
     assert len(shared) >= 12
-    # What the plant computes of its attitude is computed by the law from what it knows.
+    # The law computes from its inputs the values that the plant computes of its attitude.
     assert np.allclose(run.table[shared], usual.table[shared], rtol=1e-12, atol=1e-12)
     assert run.metrics["rate_limit_deg_s"] == pytest.approx(np.degrees(0.1))
 
@@ -126,7 +126,7 @@ def test_a_run_becomes_arrays():
     assert status.dtype.kind == "U" and status.values.tolist() == run["controller.solver.status"].tolist()
     assert data["controller.solver.iterations"].dtype == np.int64
     assert data.attrs["title"] == run.title and data.attrs["ems_deg"] == run.metrics["ems_deg"]
-    # What a netCDF file can hold.
+    # Types that a netCDF file can hold.
     assert all(isinstance(value, (int, float, str)) for value in data.attrs.values())
     assert float(data[ALPHA].sel(time=1.0)) == run.table[ALPHA][1.0]
 

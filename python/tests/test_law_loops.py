@@ -33,7 +33,7 @@ cases = 3
 parameter = "plant.disturbance.seed"
 case = 1
 """
-# The law in Python knows no turn of the trajectory, so that the FMU is not told of it either.
+# The law in Python knows no turn of the trajectory, so that the FMU does not receive it either.
 ENTRY = """
 extends = '{base}'
 
@@ -189,7 +189,7 @@ def test_a_study_flies_a_law(tmp_path):
     by_fmu = reproduce(tmp_path / "mine", out=tmp_path / "fmu")
     both = [study.runs["start"]["ems_deg"].to_numpy() for study in (by_law, by_fmu)]
     assert len(both[0]) == 3 and np.allclose(*both, rtol=1e-9)
-    # What one law has flown is not taken for another's.
+    # The flights of one law are not taken for another's.
     other = reproduce(tmp_path / "mine", out=tmp_path / "law", law=pd_law)
     assert not np.allclose(other.runs["start"]["ems_deg"], both[0])
 

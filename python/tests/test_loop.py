@@ -373,7 +373,7 @@ def test_an_fmu_that_fails_says_why_and_can_be_reset():
 
 
 def test_warnings_of_fmus_are_warnings():
-    # The plant is lighter than the controller is told by far, which no guarantee covers.
+    # The plant is much lighter than the controller assumes, which no guarantee covers.
     with ClosedLoop(controller="CRMPC", parameters={"plant.inertia.scale": 0.5}) as loop:
         with pytest.warns(InstanceWarning, match="CRMPC: the guarantee is no longer in force"):
             loop.run(50.0)

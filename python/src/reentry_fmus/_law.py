@@ -27,7 +27,7 @@ STAND_IN = "LQR"
 
 
 class Flight:
-    """A law and what it is told in a flight."""
+    """A law and its inputs in a flight."""
 
     def __init__(self, law: Law, case: int | None, names: list[str]) -> None:
         self.law = law
@@ -38,7 +38,7 @@ class Flight:
         self._rate = [self._places[name] for name in RATE]
 
     def state(self, time: float, told: bytes) -> State:
-        """Reads what the law is told: the inputs, nine numbers of the reference, and the moment."""
+        """Reads the values that the law receives: the inputs, nine numbers of the reference, and the moment."""
         values = np.frombuffer(told).copy()
         attitude, rate = values[self._attitude], values[self._rate]
         return State(
@@ -88,7 +88,7 @@ class Laws:
         self.has_cases = True
         """Whether the number of a case says which one it is. In a search it does not."""
         self.printed = bytearray()
-        """What the orchestrator has printed."""
+        """Output that the orchestrator has printed."""
         self._make = make
         self._case = case
         self._progress = progress
@@ -96,7 +96,7 @@ class Laws:
         self._flights: dict[int, Flight] = {}
 
     def answer(self, kind: bytes, number: int, time: float, told: bytes) -> bytes | None:
-        """Does what a message asks for, and returns the answer if there is one.
+        """Serves the request of a message, and returns the answer if there is one.
 
         Raises:
             LawError: The law ended in another way than by returning a moment.

@@ -85,7 +85,7 @@ def converse(command: list[str], environment: dict[str, str], laws: Laws) -> tup
         ) as process:
             assert process.stdin is not None and process.stdout is not None
             try:
-                # What is shorter was cut off by the end of the orchestrator.
+                # A shorter message was cut off by the end of the orchestrator.
                 while len(message := process.stdout.read(head.size)) == head.size:
                     kind, number, time, length = head.unpack(message)
                     if len(told := process.stdout.read(length)) < length:
@@ -98,7 +98,7 @@ def converse(command: list[str], environment: dict[str, str], laws: Laws) -> tup
                 close(process.stdin)
                 end(process)
                 raise
-            # What an orchestrator that has ended did not read is not written at the end.
+            # Requests that an ended orchestrator did not read are not written at the end.
             close(process.stdin)
         messages.seek(0)
         said = messages.read().decode(errors="replace")

@@ -35,7 +35,7 @@ RECORDED: list[Variable] = [
 
 
 class Probes:
-    """Reads variables into the rows of a run. With a law in Python its moment stands for that of
+    """Reads variables into the rows of a run. With a law in Python its moment replaces that of
     the controller."""
 
     def __init__(

@@ -32,7 +32,7 @@ class Figure(str):
 
 @dataclass(frozen=True)
 class Judgement:
-    """What the orchestrator says of a run."""
+    """Results of the orchestrator about a run."""
 
     metrics: dict[str, Any]
     figure: Figure
