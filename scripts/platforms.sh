@@ -57,7 +57,7 @@ need_macos_sdk() {
     local zig lib="$macos_sdk/usr/lib"
     zig="$("$python" -c 'import os, ziglang; print(os.path.dirname(ziglang.__file__))')"
     mkdir -p "$lib"
-    # What is there for arm64e is there for arm64.
+    # Symbols for arm64e are there for arm64, too.
     sed 's/arm64e\(\.x1\)\?-/arm64-/g' "$zig/lib/libc/darwin/libSystem.tbd" >"$lib/libSystem.tbd"
     cp "$zig/lib/libc/darwin/SDKSettings.json" "$macos_sdk/"
     cp "$lib/libSystem.tbd" "$lib/libc.tbd"
@@ -119,7 +119,7 @@ cross_build() (
     esac
 )
 
-# What browsers run. rustup has the standard library for it; else Debian's Rust builds it from its
+# Target of browsers. rustup has the standard library for it; else Debian's Rust builds it from its
 # sources, for which it takes the place of the Rust that everything else is built with.
 wasm=wasm32-unknown-unknown
 debian=/usr/bin
@@ -149,7 +149,7 @@ browser_build() {
     CARGO_ENCODED_RUSTFLAGS="$flags" "${rust[@]}" "${build[@]}"
 }
 
-# What every build for another platform needs.
+# Needs of every build for another platform.
 need_cross() {
     need_rust
     fetch

@@ -1,4 +1,4 @@
-"""How figures are held against those who see no red or no green: curves of a panel differ by their dashes, or by colours that
+"""Check of figures for people who see no red or no green: curves of a panel differ by their dashes, or by colours that
 differ for them."""
 
 import itertools

@@ -32,7 +32,7 @@ def test_every_fmu_was_packed_and_tested():
 
 @pytest.mark.parametrize("crate", ["reentry-fmu-plant-library", "reentry-fmu-optimising", "reentry-fmu-feedback"])
 def test_a_library_is_built_again_if_a_source_or_a_dependency_has_changed_and_only_then(crate):
-    # What cargo watches. Of a path that does not exist it thinks that it has changed.
+    # Files that cargo watches. It considers a path that does not exist as changed.
     said = newest(*TARGET.glob(f"*/build/{crate}-*/output"), *TARGET.glob(f"*/*/build/{crate}-*/output")).read_text()
     prefix = "cargo::rerun-if-changed="
     watched = {Path(line.removeprefix(prefix)) for line in said.splitlines() if line.startswith(prefix)}

@@ -86,7 +86,7 @@ def saved(page: Page, folder: Path) -> Path:
 
 
 def flown(experiment: Path, folder: Path, code: int = 0) -> tuple[pd.DataFrame, dict]:
-    """What the orchestrator makes of an experiment file."""
+    """Results of the orchestrator for an experiment file."""
     done = subprocess.run([program("orchestrator"), "run", experiment, "--out", folder], capture_output=True, text=True)
     assert done.returncode == code, done.stderr
     table = pd.read_csv(folder / "results.csv", dtype=str).map(float)

@@ -27,7 +27,7 @@ else:
 
 FOLDER = ROOT / "orchestrator" / "experiments"
 STOP = 0.4
-# It flies what it is told by standard input, and writes what the package returns.
+# It flies the tasks of standard input, and writes the results of the package.
 BY_PACKAGE = """
 import json, sys
 import numpy as np
@@ -135,7 +135,7 @@ def test_every_direct_loop_is_stepped_in_python_with_the_same_bits(flown):
         with np.load(path) as kept:
             assert len(kept["names"]) >= 12, path
             assert kept["loop"].tobytes() == kept["run"].tobytes(), path
-        # What the package has read is what the program has written.
+        # The package has read the files that the program has written.
         name = path.parent.relative_to(flown / "package")
         with open(flown / "program" / name / "results.csv", newline="") as file:
             rows = list(csv.DictReader(file))

@@ -1,4 +1,4 @@
-"""Curves of a panel can be told apart without red and green."""
+"""Curves of a panel can be distinguished without red and green."""
 
 import pytest
 

@@ -294,7 +294,7 @@ def test_oracle_fmi_rs_closes_the_loop(loop, agree, tmp_path, name):
 @pytest.mark.importer("FMPy", "closed loop, SSP archive", plant=True, within=0.0, to="stepping its way by hand")
 def test_oracle_fmpy_closes_the_loop_of_an_archive(fmu, agree, packed, name):
     """FMPy sets zeros at the first step, steps all instances, and passes values on afterwards. Each
-    row bears the time at which its step starts. FMPy ignores the archive's values."""
+    row has the time at which its step starts. FMPy ignores the archive's values."""
     found = simulate_ssp(str(packed(name)), stop_time=STOP, step_size=STEP)
     expected = []
     with Instance(fmu(name)).start() as controller, Instance(fmu("ReentryPlant")).start() as plant:

@@ -231,7 +231,7 @@ def test_oracle_margins_do_not_depend_on_the_communication_step(law, step):
     for one, other in zip([*whole["loops"], whole["together"]], [*fine["loops"], fine["together"]]):
         for margin in ("gain_above", "gain_below", "phase", "delay"):
             a, b = (row["classical"][margin] for row in (one, other))
-            # A delay beyond what is looked at is not found.
+            # A delay beyond the searched range is not found.
             if margin == "delay" and b is None:
                 assert a["value"] > other["classical"]["longest_delay"] == 200 * step
             else:

@@ -28,7 +28,7 @@ FOLDERS = {
     "macos-x86_64": {"darwin64": "dylib"},
     "macos-aarch64": {"darwin64": "dylib"},
 }
-# What `scripts/test` builds; the rest needs `scripts/test --all`.
+# Platforms that `scripts/test` builds; the rest needs `scripts/test --all`.
 ALWAYS = ("linux-x86_64", "windows-x86_64")
 
 
@@ -44,7 +44,7 @@ EXPERIMENTS = [
     for path in sorted((ROOT / "orchestrator" / "experiments").glob("*/*.toml"))
     if path.parent.name not in ("base", "campaigns") and path.stem not in PARTS
 ]
-# What Windows 10 and macOS 11 have.
+# Libraries of Windows 10 and macOS 11.
 WINDOWS = ("api-ms-win-core-", "api-ms-win-crt-", "bcryptprimitives.", "kernel32.", "ntdll.", "userenv.", "ws2_32.")
 MACOS = {
     "/usr/lib/libSystem.B.dylib",
@@ -61,7 +61,7 @@ record.variables = ["model.steps"]
 """
 
 pytestmark = pytest.mark.skipif(not DIST.is_dir(), reason="no packages: run scripts/package")
-# What runs under an emulator. scripts/package makes the programs, the tests of a change only FMUs.
+# Programs that run under an emulator. scripts/package makes the programs, the tests of a change only FMUs.
 PROGRAMS = {"windows-x86_64": "orchestrator.exe", "linux-aarch64": "orchestrator"}
 
 
@@ -101,7 +101,7 @@ def functions(names) -> set[str]:
     return {name.removeprefix("_") for name in names if name}
 
 
-# What lief reads is kept in names, as its parts do not keep the whole alive.
+# The objects of lief are kept in names, as their parts do not keep the whole alive.
 @pytest.mark.parametrize("platform", marked(["windows-x86_64", "macos-universal"]))
 def test_every_platform_exports_the_same_functions_and_no_others(library, platform):
     linux = lief.ELF.parse(list(library("linux-x86_64")))
@@ -262,7 +262,7 @@ def orchestrator(platform: str) -> Path:
 
 
 def driven(variable) -> str:
-    """An input as the importer in C is told of it: its reference, and limits to jump between, near
+    """An input as an argument of the importer in C: its reference, and limits to jump between, near
     its start value so that sensors are believed."""
     start = float(variable.start)
     low, high = (start + sign * 0.05 * max(abs(start), 0.2) for sign in (-1.0, 1.0))

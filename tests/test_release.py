@@ -268,7 +268,7 @@ def test_the_bill_of_materials_fits_its_schema_and_the_lock_file(made):
     assert bill["metadata"]["timestamp"].startswith("2023-11-14T22:13:20")
 
 
-# What keeps a release from being made
+# Faults that prevent a release
 
 
 def test_missing_and_foreign_fmus_are_named(dist, tmp_path):
@@ -358,7 +358,7 @@ patched = ["{patched}"]
 
 # An advisory of this test
 
-It stands for a real one.
+It replaces a real one.
 """
 
 

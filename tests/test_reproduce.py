@@ -546,7 +546,7 @@ def test_every_controller_has_its_margins(tmp_path):
     assert len(results["runs"]) == 112
     assert [claim["verdict"] for claim in results["claims"]] == [HOLDS, HOLDS, HOLDS]
     [member] = results["runs"]["late-lqr"]["members"]
-    # What the disk allows is within what gain and phase by themselves allow.
+    # The disk margin is within the margins of gain and phase by themselves.
     without = []
     for name, run in results["runs"].items():
         metrics = run["members"][0]["metrics"]
@@ -562,7 +562,7 @@ def test_every_controller_has_its_margins(tmp_path):
     sloped = [name for name in results["runs"] if not name.endswith(("-dlmpc", "-btvsmc-do", "-sotvsmc-do"))]
     assert [name for name in sloped if name in without] == ["strong-two-loop"]
     assert set(results["runs"]) - set(sloped) <= set(without)
-    # What a delay takes, the delay margin loses.
+    # The delay margin falls by the delay.
     [ideal] = results["runs"]["ideal-lqr"]["members"]
     assert ideal["metrics"]["margin_delay_s"] - member["metrics"]["margin_delay_s"] == pytest.approx(0.04, abs=1e-6)
     assert differences(tmp_path / "out") == []

@@ -110,7 +110,7 @@ def prepared(folder):
     (folder / "target").mkdir()
     (folder / "target" / "fmu").symlink_to(TARGET / "fmu")
     (folder / "target" / "release").symlink_to(program("orchestrator").parent)
-    # What the pages call the reader's own experiment and law.
+    # Names of the reader's own experiment and law in the pages.
     (folder / "my.toml").write_text(merged(ROOT / "orchestrator/experiments/crmpc-2022/crmpc-robust.toml"))
     (folder / "MyLaw.fmu").symlink_to(TARGET / "fmu" / "LQR.fmu")
     return folder
@@ -150,7 +150,7 @@ def schema(kind, complete):
 
 
 def kind_of(table):
-    """What a block is a part of, and whether it is a whole file."""
+    """The file that a block is a part of, and whether it is a whole file."""
     if "experiment" in table or "search" in table:
         return "campaign", "experiment" in table
     if "run" in table or "claim" in table:

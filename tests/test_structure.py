@@ -38,7 +38,7 @@ def code(file: Path) -> str:
 
 
 def leaves(tree: str) -> list[str]:
-    """The paths that a tree of a use declaration stands for."""
+    """The paths in a tree of a use declaration."""
     depth, start, parts = 0, 0, []
     head = re.match(r"([\w:]*?)(?:::)?\{(.*)\}$", tree, re.S)
     if not head:
@@ -107,8 +107,8 @@ def test_the_modules_of_the_python_package_use_each_other_in_one_direction() -> 
 
 
 def test_what_the_orchestrator_knows_of_a_vehicle_is_what_the_architecture_says() -> None:
-    """Its crates name no quantity of a vehicle, but for the roles in the picture of one, and what a
-    law in another program is told and gives."""
+    """Its crates name no quantity of a vehicle, except for the roles in the picture of one, and the
+    inputs and the output of a law in another program."""
     words = re.compile(r"\b(attitude|sideslip|bank|deflections?|moments?|elevons?)\b", re.IGNORECASE)
     crates = [ROOT / "orchestrator" / name / "src" for name in ("master", "import", "cosim", "metrics", "report", "sweep", "study", "campaign", "linear")]
     files = [file for crate in crates for file in crate.rglob("*.rs") if file.stem != "tests"]

@@ -1,4 +1,4 @@
-"""What docs/find-it.md promises, in headless Chromium and on the command line, and the size and shape of pages."""
+"""The tasks of docs/find-it.md, in headless Chromium and on the command line, and the size and shape of pages."""
 
 import re
 import shutil

@@ -1,4 +1,4 @@
-"""What scripts/test says at its end, tried with stand-ins for all that it runs."""
+"""The last words of scripts/test, tried with stand-ins for all that it runs."""
 
 import os
 import shutil
@@ -10,7 +10,7 @@ import pytest
 
 from conftest import ROOT
 
-# What scripts/test takes from the scripts that it reads, doing nothing.
+# Functions that scripts/test takes from the scripts that it reads, doing nothing.
 ENVIRONMENT = """
 set -euo pipefail
 root=. wasm=wasm target=target fmus=target/fmu dist=target/dist python=python-of-tests

@@ -87,7 +87,7 @@ def wheel(tmp_path_factory) -> Path:
     return made(FMUS, tmp_path_factory.mktemp("wheel"))
 
 
-# What is in the wheel
+# Content of the wheel
 
 
 def test_the_wheel_holds_what_it_should(wheel):
@@ -178,7 +178,7 @@ def test_binaries_that_need_a_newer_glibc_than_the_tag_allows_are_refused(tmp_pa
     assert wheel.name.endswith("-py3-none-manylinux2014_x86_64.whl")
 
 
-# What it does where it is installed
+# Use where it is installed
 
 
 class Installed:
@@ -243,7 +243,7 @@ def test_the_package_works_where_it_is_installed(which, wheel, tmp_path):
     assert passed and int(passed[1]) >= 135, said
 
 
-# What it is shown with
+# Examples that show it
 
 
 @pytest.fixture(scope="module")
@@ -252,7 +252,7 @@ def site(wheel, tmp_path_factory) -> Path:
     return notebooks.install(wheel, tmp_path_factory.mktemp("site"))
 
 
-# What each notebook prints, and how many pictures it has.
+# Output of each notebook, and the number of its pictures.
 PRINTED = {
     "campaign": (["broken in ", "deg/s again: True"], {"image/png": 2}),
     "own_controller": (["PD: EMS 2.7", "CRMPC: EMS 2.0", "Run: pd, closed loop", "broken by 2 of 200"], {"image/png": 2}),

@@ -12,7 +12,7 @@ const PANELS = [
   ["rate", { title: "Body rates", unit: "deg/s", norm: "‖ω‖", names: ["p", "q", "r"], digits: 2 }],
   ["moment", { title: "Control moment", unit: "kN m", norm: "‖m‖", names: ["x", "y", "z"], digits: 1, axis: true }],
 ];
-// What contradicts an assumption of the guarantee, by the item of guarantee.contradiction.
+// Contradictions of the guarantee's assumptions, by the item of guarantee.contradiction.
 const VOID = {
   step: "measurements are older than assumed", delay: "the delay is another than assumed",
   disturbance: "the disturbance is larger than assumed", deviation: "the vehicle is further from its plan than assumed",
@@ -61,7 +61,7 @@ function received({ data }) {
   if (data.call === "experiment") return saved(data);
   busy = false;
   clearTimeout(patience);
-  // What is shown is not what is set.
+  // The shown flight is not that of the settings.
   document.body.classList.toggle("refused", Boolean(data.error));
   if (data.error) {
     say(data.error, true);
@@ -341,7 +341,7 @@ function number(input, parameter, { names, low, high, exact }) {
   }
   input.type = "range";
   const step = Chart.step(high - low, 200);
-  // What is no number of the unit is refused, and the slider stands anywhere.
+  // A value that is not a number in the unit is refused, and the slider stays where it is.
   if (Number.isFinite(value)) [low, high] = [Math.min(low, value), Math.max(high, value)];
   input.min = low;
   input.max = high;

@@ -26,7 +26,7 @@ const SHOWN = [
     ["controller.saturation", "scale the moment into its limit"],
   ]],
 ];
-// What is tuned in a law; the rest of its parameters is folded away.
+// Tuned parameters of a law; the rest is folded away.
 const GAINS = /^(weight|feedback|terminal|gain|surface|reaching|boundaryLayer|slidingMode|inner|outer|observer|commandFilter)\.|^disturbance\.bound$/;
 const HIDDEN = /^(period|trajectory|calibration|solver\.timeBudget)|^reference\.file$/;
 // Units that read better: factor and name.

@@ -31,7 +31,7 @@ extensions = [
     "sources",
 ]
 nitpicky = True
-# What Python's documentation describes, and the packages whose types stand in signatures.
+# Names that Python's documentation describes, and the packages whose types are in signatures.
 nitpick_ignore_regex = [("py:.*", ".*")]
 
 # Pages: GitHub's Markdown, with its anchors of headings and its formulas.

@@ -97,7 +97,7 @@ def prose(item):
 
 
 def type_of(key):
-    """What may stand behind a key, in words."""
+    """Returns the values that a key may have, in words."""
     if "$ref" in key:
         name = key["$ref"].rpartition("/")[2]
         return "number, text or truth value" if name == "Scalar" else f"[{name}](#{name.lower()})"

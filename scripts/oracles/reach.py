@@ -20,7 +20,7 @@ except ModuleNotFoundError:  # Python 3.10
 ROOT = Path(__file__).parents[2]
 FILE = ROOT / "orchestrator" / "experiments" / "two-loop-smc" / "computed.toml"
 HEADER = """\
-# What surfaces and jets can do at all. Written by scripts/yardsticks:
+# Moments that surfaces and jets can give. Written by scripts/yardsticks:
 # change scripts/oracles/reach.py, not this file."""
 with (ROOT / "vehicle" / "data" / "effectors.toml").open("rb") as _file:
     _DATA = tomllib.load(_file)

@@ -33,7 +33,7 @@ PLATFORMS = {
 # Platforms whose FMUs and program go into wheels alone.
 IN_WHEELS = ("macos-x86_64", "macos-aarch64")
 LICENCES = ("LICENSE-APACHE", "LICENSE-MIT")
-# What inventory.py and the Rust distribution know of the linked packages.
+# Licences of the linked packages, by inventory.py and the Rust distribution.
 NOTICES = ("LICENSES.txt", "LICENSES-rust-std.html")
 
 FMUS_README = """# Re-entry attitude control: FMUs (FMI 2.0) {version}

@@ -1,4 +1,4 @@
-"""What stands in the cells of docs/results.md and in the gaps of sentences with numbers: its text, and
+"""Content of the cells of docs/results.md and of the gaps of sentences with numbers: its text, and
 whether a page says the same. scripts/pages/results.py explains the keys."""
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ class Study:
 
 
 class Hole:
-    """What stands in a cell, or in a gap of a sentence: its text, and how it is compared."""
+    """Content of a cell, or of a gap of a sentence: its text, and how it is compared."""
 
     def __init__(self, study: Study, spec: dict):
         self.spec = spec

@@ -85,7 +85,7 @@ def items(paper: dict) -> list[dict]:
 
 
 def kind(place: str) -> str:
-    """What an item is by its place: what the paper numbers, or a claim of its text."""
+    """Returns the kind of an item by its place: a number of the paper, or a claim of its text."""
     if re.fullmatch(r"\(\d+[a-z]?\)", place):
         return "equation"
     if re.fullmatch(r"(Assumption|Definition|Lemma|Remark|Theorem) \d+", place):

@@ -13,7 +13,7 @@ from xml.etree import ElementTree
 
 ROOT = Path(__file__).resolve().parents[2]
 HEAD = "| parameter | start | range | meaning |\n|---|---|---|---|"
-# What all controllers have is described once, on the page of CRMPC.
+# Parameters of all controllers are described once, on the page of CRMPC.
 COMMON = re.compile(r"reference\.|inertia\.I|limit\.|saturation$|delay$|measurement\.age$|trajectory\.earthRate$")
 BLOCK = re.compile(r"(<!-- parameters of ([\w ]+?)( without common)? -->\n).*?(<!-- end -->)", re.S)
 AXES = [["alpha", "beta", "sigma"], ["p", "q", "r"], ["x", "y", "z"], ["north", "east", "down"]]

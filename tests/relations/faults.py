@@ -49,7 +49,7 @@ SEEDS = range(1, 9)
 
 
 class Wrong(Exception):
-    """What a campaign did that it must not do."""
+    """Misbehaviour of a campaign."""
 
 
 def library(target: Path, *flags: str) -> Path:

@@ -4,7 +4,7 @@ the shipped experiments, until an output of the FMU differs.
 A place is the settings of a component of an experiment, and the inputs that it had in a run. The FMU is
 driven alone, so what differs at its outputs differs in the experiment's results. A variable that acts
 under some settings only says so: its description ends with "; used with CONDITION", and the FMU warns if
-it is set in vain.
+it is set without effect.
 
     python tests/relations/settable.py      # writes docs/settings.md
 """
@@ -220,7 +220,7 @@ class Driven:
         return name in self.variables and self.variables[name].causality == "input"
 
     def tried(self, place: Place, name: str, value, is_set: bool = True) -> str:
-        """What comes of a value: it `acts`, is `refused`, the FMU has `warned`, or nothing. An input that is not
+        """Returns the effect of a value: it `acts`, is `refused`, the FMU has `warned`, or nothing. An input that is not
         set like a parameter, but connected, has the value added to its signal."""
         key = (place.times[-1], place.name, *sorted(place.settings.items(), key=str))
         if key not in self.bases:
@@ -311,7 +311,7 @@ class Driven:
         return refused
 
     def in_vain(self, variable, places: list[Place]) -> str:
-        """What comes of setting a variable where its condition does not hold."""
+        """Returns the effect of setting a variable where its condition does not hold."""
         text = condition(variable.description)
         elsewhere = [place for place in places if not self.holds(place, text)] or [self.unfulfilled(places[0], text)]
         place = replace(elsewhere[0], times=elsewhere[0].times[:SHORT])

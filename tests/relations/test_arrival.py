@@ -7,7 +7,7 @@ from loops import ATTITUDE, controllers, experiments, fly
 
 AT, STOP = 5.0, 75.0
 RATE, ACCELERATION = 4.29, 2.0
-"""What CRMPC's tube leaves of the rate, deg/s, and what the moment gives at least, deg/s2."""
+"""Rate that CRMPC's tube leaves, deg/s, and least acceleration by the moment, deg/s2."""
 
 
 def steps(seed: int, count: int) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:

@@ -1,4 +1,4 @@
-"""What fails for a reason outside the unit is no result of a campaign: it gives no probability, is kept nowhere, and is told."""
+"""A failure for a reason outside the FMU is not a result of a campaign: it gives no probability, is kept nowhere, and is reported."""
 
 import subprocess
 

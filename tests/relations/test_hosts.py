@@ -66,7 +66,7 @@ def parts(fmu):
 
 @pytest.fixture(scope="module")
 def flown(built, fmu, parts):
-    """What the host prints about an FMU in an environment, and what it says to stderr."""
+    """Output of the host about an FMU in an environment, on stdout and stderr."""
     done = {}
 
     def fly(name: str, environment: str, *around: object, **variables: str) -> tuple[list[str], str]:

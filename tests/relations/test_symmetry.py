@@ -1,4 +1,4 @@
-"""What a flight must not depend on: left and right, the clock, the longitude, the plant's own step."""
+"""Independence of a flight from left and right, the clock, the longitude, the plant's own step."""
 
 import tomllib
 

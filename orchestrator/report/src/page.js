@@ -19,7 +19,7 @@ function marks(low, high, count, logarithmic) {
   return all;
 }
 
-// Texts of marks, each with its range, with the digits that tell them apart; with exponents if they need many letters.
+// Texts of marks, each with its range, with the digits that distinguish them; with exponents if they need many letters.
 function labels(values, range) {
   const power = (value) => Math.floor(Math.log10(Math.abs(value)));
   const rounded = values.map((value) => {
@@ -204,7 +204,7 @@ for (const part of document.querySelectorAll("details.figure"))
     for (const plot of part.querySelectorAll("[data-folded]")) { if (!folded.get(plot)) await read(plot); show(plot); }
   });
 const idle = window.requestIdleCallback ?? setTimeout;
-// What is opened meanwhile is no longer folded when its turn comes.
+// A part that is opened meanwhile is no longer folded when its turn comes.
 idle(async () => { for (const plot of [...folded.keys()]) if (folded.get(plot) === null) await read(plot); });
 // A link into a folded part opens it, and paper shows the figures.
 const open = (id) => { for (let part = id && document.getElementById(id); part; part = part.parentElement) if (part.tagName === "DETAILS") part.open = true; };

@@ -54,7 +54,7 @@
   slider.addEventListener("input", () => seek(start + (span * slider.value) / 1000, true));
   document.addEventListener("keydown", (event) => {
     const { key, target } = event;
-    // What has keys of its own keeps them: the search, the choices, and a view that is turned.
+    // Elements with keys of their own keep them: the search, the choices, and a view that is turned.
     const own = target.closest("input:not(#seek), select, summary, button:not(#play)");
     if (event.defaultPrevented || own || event.ctrlKey || event.altKey || event.metaKey) return;
     const step = (span / 100) * (event.shiftKey ? 10 : 1);
