@@ -15,8 +15,7 @@ mod still {
     use std::ops::{Add, Sub};
     use std::time::Duration;
 
-    /// A point in time, counted from the beginning: the part of [`std::time::Instant`] that is
-    /// used.
+    /// A point in time, counted from the beginning: the used part of [`std::time::Instant`].
     #[derive(Clone, Copy, Debug, PartialEq, PartialOrd)]
     pub(crate) struct Instant(Duration);
 

@@ -47,10 +47,9 @@ fn a_target_out_of_reach_is_reported() {
     assert!(!command.in_reach && command.miss > 1e5, "{command:?}");
 }
 
-/// At the last tick the verdict is the result of the flight. A target that is called in reach at
-/// the first tick is reached, if the vehicle is as the guidance expects. A near target may be
-/// reached although no plan does so at first, because later plans hold the largest bank angle for
-/// longer.
+/// At the last tick the verdict is the result of the flight. A target in reach at the first tick is
+/// reached, if the vehicle is as the guidance expects. A near target may be reached although no
+/// plan does so at first, because later plans hold the largest bank angle for longer.
 #[test]
 fn oracle_the_verdict_on_reach_is_the_end_of_the_flight() {
     let mut ends = [0, 0];

@@ -43,7 +43,7 @@ pub struct Memory {
     pub moment_left: f64,
     /// Gain K of the feedback law.
     pub gain: Gain,
-    /// Feedback ticks from the beginning of the nominal motion to the beginning of the plan in
+    /// Feedback ticks from the beginning of the nominal trajectory to the beginning of the plan in
     /// force.
     pub age: u32,
     /// Feedback ticks until a pending guarantee is in force.

@@ -1,5 +1,4 @@
-//! Observer that estimates the disturbance from the rates, and the part of it that the assumptions
-//! explain.
+//! Observer that estimates the disturbance from the rates, and the part that is explained.
 
 use super::guarantee::{MEANS, Observable};
 use super::settings::{InitialState, Settings};
@@ -105,8 +104,8 @@ impl Observed {
     }
 
     /// Returns the shift of the reference's angles. Under a constant Δ the vehicle comes to rest
-    /// beside the nominal motion, at a distance of Δ over a stiffness; the nominal motion must
-    /// therefore come to rest at the same distance on the other side.
+    /// beside the nominal trajectory, at a distance of Δ over a stiffness; the nominal trajectory
+    /// must therefore come to rest at the same distance on the other side.
     pub(super) fn shift(&self, s: &Settings) -> Vector3<f64> {
         if !s.observer.active || s.initial_state == InitialState::Nominal {
             return Vector3::zeros();

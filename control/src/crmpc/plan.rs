@@ -74,8 +74,7 @@ impl Plan {
         self.multipliers.resize(horizon, [0.0; 2]);
     }
 
-    /// Returns the deviation that changes of the acceleration have left when the plan's first
-    /// command acts.
+    /// Returns the deviation by changes of the acceleration when the plan's first command acts.
     pub(super) fn begins_with(&self, switching: &Switching) -> Carried {
         switching.begin(&self.onset.carried, self.first_change())
     }

@@ -178,8 +178,7 @@ impl Planner {
         memory.plan.multipliers.extend(self.optimiser.multipliers());
     }
 
-    /// Keeps the present plan after an optimisation with the outcome `ended`, and returns the
-    /// report on it.
+    /// Keeps the present plan after an optimisation with the outcome `ended`. Returns the report.
     pub(super) fn keep(
         &mut self,
         set: &dyn Bounded<2>,

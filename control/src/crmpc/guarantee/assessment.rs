@@ -72,7 +72,7 @@ pub(in crate::crmpc) struct HorizonEnd {
 }
 
 impl HorizonEnd {
-    /// Returns the acceleration, but for its sign, of a motion that begins to brake.
+    /// Returns the acceleration, except for its sign, of a motion that begins to brake.
     fn braked(&self, braking: f64) -> Vector3<f64> {
         self.rates.component_mul(&Vector3::new(BRAKING, braking, BRAKING))
     }

@@ -39,7 +39,7 @@ pub struct Dynamics {
     /// Bound on ‖d²F/dt²‖ along the predicted motion with m held, rad/s⁴.
     pub jerk: f64,
     /// Coefficients of ‖a‖², ‖x_ω‖² ‖a‖ and ‖x_ω‖⁴ in the bound on ‖d²m/dt²‖ of a nominal
-    /// motion with a held.
+    /// trajectory with a held.
     pub curvature: [f64; 3],
     /// Coefficients of the same powers in the bound on ‖d²/dt² ∂m/∂(α, β)‖ (Frobenius).
     pub curvature_by_angles: [f64; 3],
@@ -61,8 +61,8 @@ impl Dynamics {
         Self::around(s, Domain { rate: s.limit_rate, sideslip: s.sideslip_domain })
     }
 
-    /// Returns the bounds for the delay before the nominal motion began. From then on the limits
-    /// hold; before, rates and sideslip exceeded them by no more than they change over the delay.
+    /// Returns the bounds for the delay before the nominal trajectory began. From then on the
+    /// limits hold; before, rates and sideslip exceeded them by no more than their change over it.
     pub(super) fn before(&self, s: &Settings) -> Self {
         let Self { smallest, largest, .. } = *self;
         let mut vehicle = Domain { rate: s.limit_rate, sideslip: s.sideslip_domain };

@@ -47,8 +47,8 @@ pub(super) const LARGEST_IN_TURN: f64 = 0.75;
 pub(super) const DOMAINS: usize = 50;
 /// Widest sideslip angle of a domain, rad.
 pub(super) const WIDEST: f64 = 0.95;
-/// Rate at which the nominal motion brakes beyond the horizon, a = −κ x̃_ω, 1/s; for the sideslip
-/// it is the smallest rate, see the module `braking`.
+/// Rate at which the nominal trajectory brakes beyond the horizon, a = −κ x̃_ω, 1/s; for the
+/// sideslip it is the smallest rate, see the module `braking`.
 pub const BRAKING: f64 = 0.01;
 
 impl Geometry {

@@ -28,7 +28,7 @@ impl Lemmas {
         Self::of(s, Dynamics::new(s))
     }
 
-    /// Computes the bounds for the time before the nominal motion began.
+    /// Computes the bounds for the time before the nominal trajectory began.
     pub fn before(s: &Settings) -> Self {
         Self::of(s, Dynamics::new(s).before(s))
     }
@@ -46,7 +46,7 @@ impl Lemmas {
     }
 
     /// Returns bounds on the second time derivatives of m, of ω (2 Ẇ a + ∂²W [x, x] x + ∂W [a] x),
-    /// of ∂m/∂(α, β) and ∂m/∂x_ω (Frobenius) and of the largest ‖I W s‖, along a nominal motion
+    /// of ∂m/∂(α, β) and ∂m/∂x_ω (Frobenius) and of the largest ‖I W s‖, along a nominal trajectory
     /// with a held, for ‖x_ω‖ ≤ x and ‖a‖ ≤ a.
     pub fn curvatures(&self, x: f64, a: f64) -> [f64; 5] {
         let Dynamics {

@@ -15,8 +15,8 @@ pub struct Parts {
     pub drive: Drive,
     /// Difference between the acceleration and the one that the law intended.
     pub mismatch: Mismatch,
-    /// Larger effects of the ticks before the nominal motion began, see [`Early`]: on the mean of
-    /// the mismatch, on the predictions, and on the swing.
+    /// Larger effects of the ticks before the nominal trajectory began, see [`Early`]: on the mean
+    /// of the mismatch, on the predictions, and on the swing.
     pub early: [Early; 3],
     /// Shift of the angle per time, see [`Dynamics::swing`], rad/s.
     pub swing: f64,
@@ -43,9 +43,9 @@ pub struct InertiaPart {
     /// Share by which the moment is larger because the attitude is measured with an error.
     pub turned: f64,
     /// Share by which the moment is larger because the vehicle was faster before the nominal
-    /// motion began.
+    /// trajectory began.
     pub turned_early: f64,
-    /// Moment by which the inertia error amounts to more before the nominal motion began, N m.
+    /// Moment by which the inertia error amounts to more before the nominal trajectory began, N m.
     pub early_moment: f64,
 }
 
@@ -53,7 +53,7 @@ pub struct InertiaPart {
 pub(super) struct Reaches {
     /// Of the disturbance and of the inertia error.
     pub(super) disturbance: Reach,
-    /// Part of its feedback by causes before the nominal motion began.
+    /// Part of its feedback by causes before the nominal trajectory began.
     pub(super) early_feedback: f64,
     /// Of the errors of measured angles and rates.
     pub(super) errors: [Reach; 2],
@@ -82,7 +82,7 @@ impl Parts {
         let more = larger.of_inertia - drive.of_inertia;
         mismatch.peak = first.peak + more;
         mismatch.unseen_rate = first.unseen_rate + more * s.delay;
-        // The first ⌈d/τ⌉ predictions begin before the nominal motion does.
+        // The first ⌈d/τ⌉ predictions begin before the nominal trajectory does.
         let ticks = (s.delay / s.period_feedback).ceil() as usize;
         let early = |first: f64, later: f64| Early {
             ticks,
@@ -210,7 +210,7 @@ pub struct PulseFactors {
 }
 
 impl PulseFactors {
-    /// `before` and `drive` are the bounds before the nominal motion began, the larger ones.
+    /// `before` and `drive` are the bounds before the nominal trajectory began, the larger ones.
     ///
     /// With the growth g over d + τ the pulse's share in the mismatch is (‖∂F/∂x‖ + ½ ‖∂F/∂Θ‖
     /// (d + τ)) (d + τ) g, and a pulse revises the next command by δ (‖∂F/∂x‖ + ‖∂F/∂Θ‖ (d + τ)) g

@@ -196,7 +196,7 @@ impl Switching {
     }
 
     /// Returns the deviation by commands that began to act too late for the measurement with which
-    /// a nominal motion begins, from the changes of acceleration at their beginning (rad/s²).
+    /// a nominal trajectory begins, from the changes of acceleration at their beginning (rad/s²).
     pub fn unseen(&self, changes: &[f64]) -> Carried {
         let pulse: f64 = changes.iter().map(|change| self.pulse(change + self.turn)).sum();
         Vector3::new(0.0, 0.0, pulse)
@@ -244,7 +244,7 @@ impl Switching {
         (pulse * self.delay_error, pulse)
     }
 
-    /// Converts the propagated quantities to a deviation. The law sees s alone. The vehicle also
+    /// Converts the propagated values to a deviation. The law sees s alone. The vehicle also
     /// deviates by the pulse of this tick and, between two ticks, by the excess over the straight
     /// line.
     fn of(&self, carried: &Carried) -> Deviation {

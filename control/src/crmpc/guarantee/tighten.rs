@@ -69,7 +69,7 @@ fn explained(s: &Settings, dynamics: &Dynamics, parts: &Parts) -> Explained {
     }
 }
 
-/// The deviation at each feedback tick since the nominal motion began, with the largest pulse
+/// The deviation at each feedback tick since the nominal trajectory began, with the largest pulse
 /// (rad/s) by a change of K ô there. The last tick represents all later ones.
 struct Sequence {
     ticks: Vec<(Deviation, f64)>,

@@ -6,8 +6,8 @@ use super::observable::{MEANS, Observable};
 use super::switching::Switching;
 use crate::controller::Explained;
 
-/// Tightening of the robust set, by feedback ticks since the nominal motion began at the measured
-/// state.
+/// Tightening of the robust set, by feedback ticks since the nominal trajectory began at the
+/// measured state.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tightening {
     /// Reserves at each tick; the last ones apply to all later ticks.
@@ -43,12 +43,12 @@ pub(in crate::crmpc) struct AtTick {
 }
 
 impl Tightening {
-    /// Returns the reserves `tick` feedback ticks after the nominal motion began.
+    /// Returns the reserves `tick` feedback ticks after the nominal trajectory began.
     pub(in crate::crmpc) fn tick(&self, tick: usize) -> &AtTick {
         &self.ticks[tick.min(self.ticks.len() - 1)]
     }
 
-    /// Returns the deviation `tick` feedback ticks after the nominal motion began.
+    /// Returns the deviation `tick` feedback ticks after the nominal trajectory began.
     pub fn at(&self, tick: usize) -> &Deviation {
         &self.tick(tick).deviation
     }

@@ -12,7 +12,7 @@ use crate::linearise;
 use nalgebra::Vector3;
 use vehicle::math::cos;
 
-/// Returns whether a value keeps its bound, but for rounding.
+/// Returns whether a value keeps its bound, except for rounding.
 fn keeps(value: f64, bound: f64) -> bool {
     value <= bound * (1.0 + ROUNDING) + 1e-12
 }

@@ -29,7 +29,7 @@ pub(super) struct Robust {
     pub design: Design,
     pub dynamics: Dynamics,
     pub stages: Stages,
-    /// Feedback ticks since the nominal motion began at the measured state.
+    /// Feedback ticks since the nominal trajectory began at the measured state.
     pub age: usize,
     /// Applied share of the tightening; below 1 only for best effort.
     pub share: f64,
@@ -77,7 +77,7 @@ impl Interval {
 struct Beginning {
     /// First state (Θ̃, x̃_ω), rad and rad/s.
     state: Vector6<f64>,
-    /// Feedback ticks since the nominal motion began at a measured state.
+    /// Feedback ticks since the nominal trajectory began at a measured state.
     age: u32,
     onset: Onset,
     /// Level of the bound on the disturbance, see [`crate::crmpc::Terms::level`].
@@ -174,7 +174,8 @@ impl Robust {
         Linear { value: moment.value - self.terms.known, ..moment }
     }
 
-    /// Returns the feedback ticks from the beginning of the nominal motion to prediction step `k`.
+    /// Returns the feedback ticks from the beginning of the nominal trajectory to prediction step
+    /// `k`.
     fn tick(&self, k: usize) -> usize {
         self.age + k * self.design.ratio
     }
