@@ -1,7 +1,6 @@
 //! The signals that a flight records.
 
-/// Columns of the signals, in this order; in SI units, the state of the guarantee as numbers of
-/// items.
+/// Columns of the signals, in this order; in SI units, the guarantee as numbers of items.
 pub const COLUMNS: [&str; 15] = [
     "time",
     "plant.attitude.alpha",

@@ -285,8 +285,7 @@ fn record(system: &mut System, options: &Options) -> Result<RunReport, Failure> 
         Ok((metrics, files))
     };
     let written = write();
-    // The reason why the run ended comes first: a disk that its results filled has no room for the
-    // rest.
+    // The reason why the run ended comes first: a disk filled by its results has no room for more.
     let ended = early(outcome, &out)?;
     let (metrics, files) = written?;
     let end = run.master.end().map(String::from);

@@ -179,7 +179,7 @@ def licences(packages: list[dict[str, Any]], others: dict[str, Path]) -> str:
     # Texts that differ in their line breaks alone are one.
     users: dict[str, tuple[str, list[str]]] = {}
     lines = [
-        "What is linked into the FMUs and the orchestrator, and under which licences.",
+        "Packages that are linked into the FMUs and the orchestrator, with their licences.",
         "The texts follow below, each after the names of those that bring it.",
         "",
     ]

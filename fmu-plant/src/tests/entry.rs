@@ -203,8 +203,7 @@ fn oracle_long_steps_of_an_entry_agree_with_short_ones() {
     }
 }
 
-/// A flight has no course where it is vertical. The message says so, and not that an input is
-/// wrong.
+/// A flight has no course where it is vertical. The message says so, and blames no input.
 #[test]
 fn a_flight_that_becomes_vertical_is_an_error_that_says_so() {
     let mut instance = started(|instance| {

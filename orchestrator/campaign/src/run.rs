@@ -135,7 +135,7 @@ impl<'a> State<'a> {
         Ok(resets)
     }
 
-    /// Returns the number of cases that are needed as far as the parts tell, and the answer to the
+    /// Returns the number of cases that are needed as far as the parts show, and the answer to the
     /// campaign's question if it has one and the parts are all there.
     fn needed(&mut self) -> (u64, Vec<Range<u64>>, Option<Answer>) {
         let total = self.plan.sweep.cases();

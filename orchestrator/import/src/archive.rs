@@ -215,7 +215,7 @@ mod tests {
 
     #[test]
     fn nothing_is_written_of_an_archive_that_is_refused_by_a_name() {
-        // The disk of the temporary folder is not even looked at.
+        // The disk of the temporary folder is not even accessed.
         let file = archive(&[("good", b"1"), ("../evil", b"x")]);
         let mut zip = ZipArchive::new(File::open(file.path()).unwrap()).unwrap();
         assert!(names(&mut zip, 10).unwrap_err().contains("leads out"));

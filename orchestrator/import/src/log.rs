@@ -40,7 +40,7 @@ type ReportProblem = Box<dyn Fn(&[u8]) + Send + Sync>;
 enum Sink {
     /// Prints messages as `tracing` does.
     Printed(Mutex<Pace>),
-    /// Holds messages for another process, and hands on the text of problems at once.
+    /// Holds messages for another process, and passes on the text of problems at once.
     Held(Arc<Held>, ReportProblem),
 }
 
@@ -188,8 +188,7 @@ impl Log {
             return;
         }
         match status {
-            // The message of the discarded call gives the reason, which may be the end of a
-            // simulation.
+            // The message of the discarded call gives the reason, such as the end of a run.
             Ok(Status::Ok | Status::Pending | Status::Discard) => {
                 tracing::info!("{component}: [{category}] {message}");
             }

@@ -14,8 +14,7 @@ pub(crate) const DESCRIBED: f64 = 0.02;
 pub(crate) const AT_LENGTH: f64 = 0.2;
 /// Number of responses from which a delay is found.
 const FITTED: usize = 4;
-/// Shortest delay within a step that is distinguished from a change of the operating point, in
-/// steps.
+/// Shortest delay within a step that differs from a change of the operating point, in steps.
 const SMALLEST_PART: f64 = 1e-3;
 
 /// Returns whether derivatives describe the responses of states and outputs to a change that is

@@ -65,7 +65,7 @@ pub(crate) fn reduced(step: Step) -> (Step, Vec<usize>) {
 }
 
 /// Combines states that always change to the same value, such as the remembered values of a signal
-/// that is held. The eigenvalues but for zeros stay: where they are not zero, the components of
+/// that is held. All eigenvalues except zeros stay: where they are not zero, the components of
 /// these states in an eigenvector are equal.
 pub(crate) fn merged(mut a: Matrix) -> Matrix {
     loop {

@@ -32,7 +32,7 @@ impl Clock {
             ));
         }
         if (exact - ticks).abs() > 1e-9 * ticks.max(1.0) {
-            // Ten digits after the point tell the number apart from a whole one, and hide the
+            // Ten digits after the point distinguish the number from a whole one, and hide the
             // rounding.
             let shown = format!("{exact:.10}");
             let shown = shown.trim_end_matches('0');
@@ -141,8 +141,8 @@ mod tests {
 
     proptest::proptest! {
         /// An instance that adds time and length ends at the stop time, or one place before it
-        /// where no sum of two numbers is the stop time. Whole steps never pass the stop time that
-        /// it is given.
+        /// where no sum of two numbers is the stop time. Whole steps never pass the announced stop
+        /// time.
         #[test]
         fn oracle_the_last_step_ends_at_the_stop_time(ticks in 1u64..5000, every in 1u32..6, step in 1e-3f64..2.0, start in -50.0f64..50.0, places in 1i32..5) {
             // Numbers as people write them, and their sum with all its digits.

@@ -4,7 +4,7 @@
 //! Every instance sees the calls set, doStep and get in this order, as FMI 2.0.5, section 4.2.1,
 //! asks: nothing is read between setting and stepping. At tick k, every instance that stands at t_k
 //! is set and stepped. With sequential coupling this is done instance by instance, so that outputs
-//! which respond to inputs, such as the moment of a controller, are handed on at once: they are
+//! which respond to inputs, such as the moment of a controller, are passed on at once: they are
 //! read after the step for which the inputs were set. All other outputs are those that were read
 //! when the instance came to t_k, even if it has been stepped since. So no value shows an
 //! instance's future, and an instance that steps at every n-th tick only is stepped when its

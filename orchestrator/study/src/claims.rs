@@ -157,9 +157,8 @@ fn finite(numbers: impl Iterator<Item = f64>) -> Numbers {
     Numbers(numbers.filter(|number| number.is_finite()).collect())
 }
 
-/// Returns whether two numbers stand in a relation, with `by` as the least difference. A time that
-/// never settles is later than any that does, and neither below nor at most another one that never
-/// settles.
+/// Returns whether two numbers stand in a relation, with `by` as the least difference. A run that
+/// never settles is later than any that does, and neither below nor at most another such run.
 fn stand(relation: Relation, left: f64, right: f64, by: Option<f64>) -> bool {
     let margin = if right.is_finite() { by.unwrap_or(0.0) * right.abs() } else { 0.0 };
     match relation {

@@ -6,7 +6,7 @@ use toml::{Spanned, Value};
 
 /// A parameter that varies from case to case, or several, with the distribution of the values.
 /// Exactly one of the keys from `uniform` to `case` is given. A number may be a text with a unit
-/// (`"5 deg"`), or with a percent sign, which stands for percent of the value in the experiment.
+/// (`"5 deg"`), or with a percent sign, which denotes percent of the value in the experiment.
 #[derive(Clone, Debug, Deserialize, JsonSchema, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Vary {

@@ -1,5 +1,4 @@
-//! Files that are no archives, and archives with false content: each is refused in one line that
-//! names it.
+//! Files that are no archives, and archives with false content: each is refused in one line.
 
 use crate::bench::Bench;
 use std::fs;
@@ -30,7 +29,7 @@ fn half(mut bytes: Vec<u8>) -> Vec<u8> {
 
 type Damage = fn(Vec<u8>) -> Vec<u8>;
 
-/// Files that are no archive, or damaged ones, with a part of what is said of them.
+/// Files that are no archive, or damaged ones, with a part of the message about them.
 const FILES: &[(&str, Damage, &str)] = &[
     ("nothing", |_| vec![], "is not a zip archive"),
     ("one byte", |_| vec![b'P'], "is not a zip archive"),

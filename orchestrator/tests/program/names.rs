@@ -58,8 +58,7 @@ fn a_name_of_another_kind_is_told_what_to_call() {
     let (_, _, errors) = bench.call(&["run", "papers"]);
     let both = "papers is a study and a campaign: orchestrator reproduce papers, or orchestrator campaign papers";
     assert!(errors.contains(both), "{errors}");
-    // A campaign that extends another one names neither the experiment nor the varied parameters
-    // itself.
+    // A campaign that extends another one names no experiment and no varied parameters itself.
     fs::write(bench.path("more.toml"), "extends = \"gains.toml\"\ntitle = \"more\"\n").unwrap();
     let (code, _, errors) = bench.call(&["campaign", "more", "--quiet"]);
     assert_eq!(code, 0, "{errors}");

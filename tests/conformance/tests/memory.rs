@@ -58,8 +58,7 @@ fn three_thousand_instances_and_three_hundred_libraries_leave_nothing_behind() {
     drop(fmus);
     let libraries = growth(60, 300, |i| {
         let name = names[i % names.len()].clone();
-        // The thread ends after the libraries are closed, and releases the memory that it kept for
-        // them.
+        // The thread ends after the libraries are closed, and releases their memory.
         std::thread::spawn(move || live(conformance::fmu(&name).instance(CO_SIMULATION)))
             .join()
             .unwrap();

@@ -336,7 +336,7 @@ fn erroneous(s: &Settings, seed: u64) -> Matrix3<f64> {
     let sizes = random.vector().map(|size| (2.0 * size).clamp(-1.0, 1.0) * s.tensor_error);
     let error = axes * Matrix3::from_diagonal(&sizes) * axes.transpose();
     let inertia = root * (Matrix3::identity() + error) * root;
-    // Products are symmetric only but for rounding.
+    // Products are symmetric except for rounding.
     (inertia + inertia.transpose()) * 0.5
 }
 

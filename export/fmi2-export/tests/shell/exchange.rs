@@ -155,7 +155,7 @@ fn oracle_directional_derivatives_agree_with_differences() {
     let values = || unknown.map(|reference| instance.real(reference));
     let before = values();
     assert_eq!(c!(fmi2EnterContinuousTimeMode(component)), FmiStatus::Ok);
-    // The model is linear, so a difference of any size is exact but for rounding.
+    // The model is linear, so a difference of any size is exact except for rounding.
     let x = state(&instance) + seed[1];
     assert_eq!(instance.set_real(U, seed[0]), FmiStatus::Ok);
     assert_eq!(c!(fmi2SetContinuousStates(component, &x, 1)), FmiStatus::Ok);

@@ -75,8 +75,7 @@ impl Protection {
             return false;
         }
         let asked = component.isolate.or(self.isolate);
-        // A sandbox is a process of its own. Where a sandbox is impossible, the instance is
-        // refused.
+        // A sandbox is a process of its own. Where it is impossible, the instance is refused.
         self.sandbox == Some(true)
             || isolation::is_enabled()
                 && asked.unwrap_or_else(|| {

@@ -76,8 +76,7 @@ impl Process {
     /// Starts a process, which then waits for [`Self::set_up`].
     ///
     /// In a sandbox it works in the `folder` of the archive, which is also its home and its place
-    /// for temporary files. Its environment has only language, time zone and the paths of
-    /// libraries.
+    /// for temporary files. Its environment has only language, time zone and library paths.
     pub(super) fn start(
         program: &Path,
         name: &str,

@@ -70,8 +70,7 @@ pub(super) fn classical(net: &Net, open: &OpenLoop, channel: Option<usize>) -> C
         Some(Crossing { value: (direction * crossing.value).exp(), ..crossing })
     };
     let phase = first(&by_phase, TURN, 180.0, [0.0, open.period]);
-    // A delay turns the loop by its product with the frequency, which gives the range of the
-    // search.
+    // A delay turns the loop by its product with the frequency, which guides the search.
     let expected = phase
         .filter(|at| at.frequency > 0.0)
         .map_or(0.0, |at| at.value.to_radians() / (at.frequency * step));

@@ -226,7 +226,7 @@ impl Panel {
 }
 
 /// Returns the size to which an axis from `low` to `high` is drawn. A value that does not change,
-/// but for rounding, is drawn to its own magnitude, as the page of a run does.
+/// except for rounding, is drawn to its own magnitude, as the page of a run does.
 fn size(low: f64, high: f64) -> f64 {
     let magnitude = low.abs().max(high.abs());
     if high - low > 1e-9 * magnitude {

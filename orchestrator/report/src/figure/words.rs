@@ -19,7 +19,7 @@ pub(super) fn wrapped(text: &str, room: usize, lines: usize) -> Vec<String> {
         .unwrap_or_default()
 }
 
-/// Returns a text of at most `room` letters, in which dots stand for a part that is left out.
+/// Returns a text of at most `room` letters, in which dots replace a part that is left out.
 pub(super) fn shortened(text: &str, room: usize) -> String {
     let length = letters(text);
     if length <= room {

@@ -217,7 +217,7 @@ fn add(
     }
 }
 
-/// Returns the signals that a name or pattern stands for.
+/// Returns the signals of a name or pattern.
 fn matching(runs: &[Recording], asked: &str) -> Result<Vec<String>, String> {
     if !asked.contains('*') {
         return Ok(vec![asked.to_string()]);

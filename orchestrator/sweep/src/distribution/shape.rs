@@ -119,7 +119,7 @@ impl Continuous {
             ));
         }
         let [from, to] = [low, high].map(|value| self.whole.function().cdf(value));
-        // Of a smaller part of the upper tail, few values could be told apart.
+        // In a smaller part of the upper tail, few values could be distinguished.
         if to - from <= SMALLEST * to {
             return Err(format!(
                 "within = [{low}, {high}]: the distribution has next to no values between them"

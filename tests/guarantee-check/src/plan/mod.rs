@@ -194,7 +194,7 @@ impl PlanCheck {
         let angles = ends.map(|(_, deviation)| deviation.angle.component());
         let off = angles[0].max(angles[1]) + ends[0].1.bulge + more[0];
         let swept = stage.sideslip(j).abs();
-        // The plan's rates are straight lines, and the deviation is convex but for the swing, so
+        // The plan's rates are straight lines, and the deviation is convex except for the swing, so
         // that ‖ω‖ is largest at an end.
         let near = (swept - off).low.max(0.0);
         let cosine = body::sin_cos(Interval::from(near)).1;

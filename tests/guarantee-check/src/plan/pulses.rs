@@ -266,8 +266,7 @@ impl Carried {
 }
 
 /// Bounds the effects after the last of the pulses of these `sizes`, when each further one is `own`
-/// and the part that the ones before cause. The `recent` last pulses count with the largest one of
-/// them.
+/// and the part that the ones before cause. The `recent` last pulses count with their largest one.
 fn endless(pulses: &Pulses, sizes: &[f64], own: f64, recent: usize) -> Sizes {
     let (old, young) = sizes.split_at(sizes.len().saturating_sub(recent));
     let mut faded = [0.0; 6];
