@@ -99,9 +99,42 @@ pub type ReferenceAt<'a> = &'a dyn Fn(f64) -> Reference;
 pub enum Preview<'a> {
     /// The whole reference is known in advance and does not change during an experiment.
     Profile(&'a Profile),
-    /// The reference is given from outside and valid until a time (s). What follows is unknown; the
-    /// angles are assumed to stay constant.
-    External(Reference, f64),
+    /// The reference is given from outside, and its future is unknown.
+    External(Forecast),
+}
+
+/// Forecast of a reference that is given from outside: up to an instant it is the given one, then
+/// each angle goes on at its rate and brakes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Forecast {
+    /// The given reference.
+    pub given: Reference,
+    /// Instant from which on the angles brake, s.
+    pub from: f64,
+    /// Deceleration of each angle, rad/s²; infinite if they stay constant.
+    pub braking: Vector3<f64>,
+}
+
+impl Forecast {
+    /// Returns the reference at `time` (s).
+    fn at(&self, time: f64) -> Reference {
+        let since = time - self.from;
+        if since <= 0.0 {
+            return self.given;
+        }
+        let mut reference = Reference::default();
+        for i in 0..3 {
+            let (rate, braking) = (self.given.rates[i], self.braking[i]);
+            let stops = rate.abs() / braking;
+            let left = if since < stops { rate - (braking * since).copysign(rate) } else { 0.0 };
+            reference.angles[i] = self.given.angles[i] + 0.5 * (rate + left) * since.min(stops);
+            reference.rates[i] = left;
+            if since < stops {
+                reference.accelerations[i] = -braking.copysign(rate);
+            }
+        }
+        reference
+    }
 }
 
 impl Preview<'_> {
@@ -109,10 +142,7 @@ impl Preview<'_> {
     pub fn at(&self, time: f64) -> Reference {
         match self {
             Self::Profile(profile) => profile.at(time),
-            Self::External(reference, until) if time <= *until => *reference,
-            Self::External(reference, _) => {
-                Reference { angles: reference.angles, ..Reference::default() }
-            }
+            Self::External(forecast) => forecast.at(time),
         }
     }
 
@@ -120,7 +150,7 @@ impl Preview<'_> {
     pub(crate) fn external(&self) -> Option<Reference> {
         match self {
             Self::Profile(_) => None,
-            Self::External(reference, _) => Some(*reference),
+            Self::External(forecast) => Some(forecast.given),
         }
     }
 }

@@ -147,7 +147,7 @@ impl<Memory: Clone + Default> Sampled<Memory> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::controller::ReferenceAt;
+    use crate::controller::{Forecast, ReferenceAt};
 
     /// Sums its measurements, so that any evaluation that is lost or counted twice shows in the
     /// sum.
@@ -173,7 +173,9 @@ mod tests {
     }
 
     fn evaluate(sampled: &mut Sampled<f64>, x: f64) {
-        sampled.evaluate(&mut Sum, &measured(x), &Preview::External(Reference::default(), 0.0));
+        let braking = Vector3::repeat(f64::INFINITY);
+        let forecast = Forecast { given: Reference::default(), from: 0.0, braking };
+        sampled.evaluate(&mut Sum, &measured(x), &Preview::External(forecast));
     }
 
     #[test]

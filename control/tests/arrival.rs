@@ -3,7 +3,7 @@
 
 mod harness;
 
-use control::controller::{Controller, Measurement, Preview};
+use control::controller::{Controller, Forecast, Measurement, Preview};
 use control::crmpc::{Constraints, Crmpc, GuaranteeStatus, Memory, Settings};
 use control::delay::{Delayed, Latency};
 use harness::flight::Random;
@@ -146,8 +146,10 @@ impl Jump {
             let (angles, rates) = (plant.angles(), plant.rates());
             let measured = Measurement { angles, rates, ..Measurement::default() };
             // The reference is known from the time on at which it has jumped.
-            let shown = Reference { angles: self.angles(time), ..Reference::default() };
-            let reference = |ahead| Preview::External(shown, time).at(ahead);
+            let given = Reference { angles: self.angles(time), ..Reference::default() };
+            let braking = Vector3::repeat(f64::INFINITY);
+            let forecast = Forecast { given, from: time, braking };
+            let reference = |ahead| Preview::External(forecast).at(ahead);
             let moment = law.update(&mut memory, tick, time, &measured, &reference);
             let in_force = inner(&memory).supervision.status == GuaranteeStatus::InForce;
             if time < JUMP {

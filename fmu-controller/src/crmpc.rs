@@ -40,6 +40,7 @@ impl Law for CrmpcLaw {
     const DESCRIPTION: &'static str =
         "Centralised robust model predictive attitude controller of Chai et al. (2022)";
     const DOCUMENTATION: &'static str = include_str!("crmpc.html");
+    const PLANS: bool = true;
 
     fn settings() -> Settings {
         Settings::new(Constraints::Robust)

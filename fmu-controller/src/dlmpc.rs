@@ -26,6 +26,7 @@ impl Law for DlmpcLaw {
     const NAME: &'static str = "DLMPC";
     const DESCRIPTION: &'static str = "Double-layered model predictive and sliding-mode attitude controller, a comparison law of Chai et al. (2022)";
     const DOCUMENTATION: &'static str = include_str!("dlmpc.html");
+    const PLANS: bool = true;
 
     fn settings() -> Settings {
         Settings::published()

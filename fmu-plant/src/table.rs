@@ -87,7 +87,9 @@ fn outputs(variables: PlantVariables) -> PlantVariables {
     let deflections: Vec<String> = (1..=SURFACES).map(|i| format!("deflection[{i}]")).collect();
     let actuators: Vec<&str> = jets.iter().chain(&deflections).map(String::as_str).collect();
     let angle = |axis: &str, meaning: &str| {
-        output(&format!("attitude.{axis}"), &sentence(meaning)).real().unit("rad").nominal(0.1)
+        // In a wind the angles relative to the air are others: flow.alpha and flow.beta.
+        let text = format!("{} relative to the ground velocity", sentence(meaning));
+        output(&format!("attitude.{axis}"), &text).real().unit("rad").nominal(0.1)
     };
     let rate = |axis: &str, meaning: &str| {
         let text = format!("Body {meaning} rate");

@@ -64,7 +64,7 @@ def test_a_run_is_a_table_with_figures_of_merit():
     assert run.description["seeds"]["plant.disturbance.seed"] == 1
     assert set(run.table.attrs["units"]) == set(run.table.columns)
     assert run.table.attrs["units"][ALPHA] == "rad"
-    assert run.table.attrs["descriptions"][ALPHA] == "Angle of attack"
+    assert run.table.attrs["descriptions"][ALPHA] == "Angle of attack relative to the ground velocity"
 
 
 def test_a_run_is_shown_in_a_few_lines():
@@ -119,7 +119,7 @@ def test_a_run_becomes_arrays():
     data = run.to_xarray()
     assert isinstance(data, xarray.Dataset) and dict(data.sizes) == {"time": 51}
     assert data["time"].attrs == {"units": "s"}
-    assert data[ALPHA].attrs == {"units": "deg", "long_name": "Angle of attack"}
+    assert data[ALPHA].attrs == {"units": "deg", "long_name": "Angle of attack relative to the ground velocity"}
     assert np.array_equal(data[ALPHA], run.table[ALPHA])
     assert set(data.data_vars) == set(run.table.columns)
     status = data["controller.solver.status"]

@@ -204,7 +204,7 @@ def test_degrees_are_for_reading():
     expected = {ATTITUDE[0]: "deg", RATE[0]: "deg/s", MOMENT[0]: "N.m"}
     assert {name: deg.attrs["units"][name] for name in expected} == expected
     assert deg.attrs["units"]["controller.referenceAcceleration.alpha"] == "deg/s2"
-    assert deg.attrs["descriptions"][ATTITUDE[0]] == "Angle of attack"
+    assert deg.attrs["descriptions"][ATTITUDE[0]] == "Angle of attack relative to the ground velocity"
 
 
 def test_the_reference_is_chosen():

@@ -50,8 +50,13 @@ FILE = "time_s,alpha_rad,beta_rad,sigma_rad\n0,0.1,0.0,-0.3\n100,0.2,0.1,-0.4\n"
 
 # Settings in which some variables act and no experiment has them, with an experiment's inputs.
 ROWS = range(1, 9)
+TURNING = ("entry/from-120km", {"reference.externalRate.beta": 0.01})
+DELAYED = (TURNING[0], {"delay": 0.08, **TURNING[1]})
 SCENES = {
+    **{law: {"a moment that acts later": DELAYED} for law in ("LQR", "FBL", "BTVSMC", "BTVSMC_DO", "SOTVSMC_DO", "TwoLoopSMC")},
+    "DLMPC": {"a sideslip angle that is to turn": TURNING},
     "CRMPC": {
+        "a sideslip angle that is to turn": TURNING,
         "settings without guarantee": ("crmpc-2022/crmpc-robust", {"disturbance.bound": 0.2}),
         "limits that are scheduled": ("crmpc-2022/crmpc-robust", {"scheduled.limitMoment": 1.3e5, "scheduled.disturbanceBound": 0.01, "scheduled.disturbanceParts": 2}),
     },

@@ -51,10 +51,9 @@ impl<L: Law> ControllerInstance<L> {
         let measured = Measurement { achieved_moment, known_moment, stale, ..input.measured };
         let measured = measured.relative_to(&turn_rate);
         let now = ticks.next_time();
-        // The future of an external reference is unknown; the law uses its present value for the
-        // time at which its moment acts.
-        let acts_at = now + controller.acts_after();
-        ticks.evaluate(controller, &measured, &source.preview(acts_at, &input.reference));
+        let times = [now, now + controller.acts_after()];
+        let preview = source.preview(&self.parameters.reference, times, &input.reference);
+        ticks.evaluate(controller, &measured, &preview);
         if ticks.in_force().0.iter().all(|value| value.is_finite()) {
             return Ok(());
         }
@@ -177,7 +176,10 @@ impl<L: Law> SampledInstance for ControllerInstance<L> {
         self.law.show(&self.settings, &memory.inner);
         self.output = Output {
             moment,
-            reference: self.source.preview(time, &self.input.reference).at(time),
+            reference: self
+                .source
+                .preview(&self.parameters.reference, [time; 2], &self.input.reference)
+                .at(time),
             loop_delay: device.controller.estimated_delay(memory),
             has_other_delay: memory.loop_delay.is_other,
         };

@@ -125,6 +125,9 @@ pub trait Law: Default + Serialize + DeserializeOwned + Send + 'static {
     /// Version of the FMU.
     const VERSION: &'static str = env!("CARGO_PKG_VERSION");
 
+    /// Whether the law plans over the future of its reference.
+    const PLANS: bool = false;
+
     /// Returns the start values of the settings, by default those that are declared.
     fn settings() -> Self::Settings {
         settings::start()

@@ -1,7 +1,7 @@
 //! The reference that a controller follows: a paper's profile, a constant, a sine, a lookup table,
 //! or the external inputs.
 
-use control::controller::Preview;
+use control::controller::{Forecast, Preview};
 use fmi2_export::{Context, Failure};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
@@ -31,8 +31,19 @@ pub enum Choice {
     Sine,
     /// Values interpolated from the file reference.file.
     Table,
-    /// Inputs reference.external; predictions hold their angles constant.
+    /// Inputs reference.external; reference.preview says what predictions assume of their future.
     External,
+}
+
+/// Future of an external reference in predictions.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, settings::Choice)]
+#[setting(name = "ReferencePreview")]
+pub enum Ahead {
+    /// Angles stay constant.
+    Hold,
+    /// Angles go on at their rates and brake with reference.previewAcceleration.
+    #[default]
+    Brake,
 }
 
 /// Parameters of the reference.
@@ -59,6 +70,13 @@ pub struct Parameters {
     #[setting(unit = "rad")]
     #[setting(used_with = "reference.profile = sine and reference.amplitude.* != 0")]
     pub phase: f64,
+    #[allow(missing_docs)] // Its type says what it is.
+    #[setting(used_with = "reference.profile = external")]
+    pub preview: Ahead,
+    /// Deceleration of the external reference in predictions.
+    #[setting(each = axes::ANGLES, unit = "rad/s2", above = 0.0, nominal = 0.01)]
+    #[setting(used_with = "reference.profile = external and reference.preview = brake")]
+    pub preview_acceleration: Vector3<f64>,
 }
 
 impl Default for Parameters {
@@ -71,6 +89,8 @@ impl Default for Parameters {
             amplitude: Vector3::zeros(),
             frequency: 1.0,
             phase: 0.0,
+            preview: Ahead::default(),
+            preview_acceleration: Vector3::new(0.1, 0.1, 0.8).map(f64::to_radians),
         }
     }
 }
@@ -109,12 +129,22 @@ impl Source {
         }
     }
 
-    /// Returns the preview of the reference. An external reference is valid until `valid_until`
+    /// Returns the preview of the reference at a tick at `now` (s), whose moment acts at `acts_at`
     /// (s).
-    pub(crate) fn preview(&self, valid_until: f64, external: &Reference) -> Preview<'_> {
+    pub(crate) fn preview(
+        &self,
+        parameters: &Parameters,
+        [now, acts_at]: [f64; 2],
+        external: &Reference,
+    ) -> Preview<'_> {
+        let (from, braking) = match parameters.preview {
+            // The law uses the present value for the time at which its moment acts.
+            Ahead::Hold => (acts_at, Vector3::repeat(f64::INFINITY)),
+            Ahead::Brake => (now, parameters.preview_acceleration),
+        };
         match self {
             Self::Profile(profile) => Preview::Profile(profile),
-            Self::External => Preview::External(*external, valid_until),
+            Self::External => Preview::External(Forecast { given: *external, from, braking }),
         }
     }
 }

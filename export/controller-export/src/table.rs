@@ -58,6 +58,9 @@ pub fn description<L: Law>() -> Description<ControllerFmu<L>> {
     let table = outputs(inputs(VariableTable::new()))
         .settings(|model: &mut ControllerFmu<L>| &mut model.parameters)
         .settings(|model: &mut ControllerFmu<L>| &mut model.settings);
+    // Other laws ask for the reference at the instant at which their moment acts.
+    let table =
+        if L::PLANS { table } else { table.also_used_with("reference.preview", "delay > 0") };
     Description {
         name: L::NAME,
         description: L::DESCRIPTION,
@@ -95,7 +98,8 @@ fn declared(axes: [(&str, &str); 3], declare: &dyn Fn(&str, &str) -> Real) -> Ve
 }
 
 fn measured_angle(axis: &str, meaning: &str) -> Real {
-    let text = format!("Measured {meaning}");
+    let relative = if axis == "sigma" { "ground velocity" } else { "air" };
+    let text = format!("Measured {meaning} relative to the {relative}");
     input(&format!("attitude.{axis}"), &text).real().unit("rad").nominal(0.1)
 }
 

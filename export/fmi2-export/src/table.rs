@@ -199,6 +199,20 @@ impl<M: 'static> VariableTable<M> {
         self
     }
 
+    /// Adds a condition to those of the variables whose names begin so.
+    #[must_use]
+    pub fn also_used_with(mut self, beginning: &str, condition: &str) -> Self {
+        let variables = self.entries.iter_mut().map(|entry| &mut entry.variable);
+        for variable in variables.filter(|variable| variable.name.starts_with(beginning)) {
+            // The description ends with the condition.
+            for text in [&mut variable.description, &mut variable.used_with] {
+                text.push_str(" and ");
+                text.push_str(condition);
+            }
+        }
+        self
+    }
+
     #[inline(never)]
     fn push_setting(&mut self, Setting { place, kind }: Setting, index: usize, part: Part<M>) {
         let common = parameter(&place.name, &place.text).used_with(&place.used_with);
