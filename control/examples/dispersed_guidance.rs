@@ -12,14 +12,14 @@ use vehicle::noise::uniform;
 fn main() {
     let count: u32 = std::env::args().nth(1).and_then(|text| text.parse().ok()).unwrap_or(1000);
     for (name, flight) in [("120 km", Flight::nominal()), ("80 km", Flight::lower())] {
-        println!("from {name}: {}", told(&fly(Settings::default(), &flight, |_, _, _| {})));
+        println!("from {name}: {}", told(&fly(&Settings::default(), &flight, |_, _, _| {})));
     }
     for share in [0.1, 0.2] {
         let begin = Instant::now();
         let outcomes: Vec<Outcome> = (0..count)
             .map(|number| {
                 let flight = Flight::dispersed(share, uniform(1, i64::from(number)));
-                fly(Settings::default(), &flight, |_, _, _| {})
+                fly(&Settings::default(), &flight, |_, _, _| {})
             })
             .collect();
         let arrived = outcomes.iter().filter(|outcome| outcome.arrived()).count();

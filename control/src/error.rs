@@ -112,6 +112,18 @@ pub enum DesignError {
         /// Period of the modulator, s.
         pwpf: f64,
     },
+    /// The end of an entry flight exceeds a limit.
+    #[error(
+        "{name} = {limit} is less than what altitude and speed of the target need with the standard atmosphere, {floor:.4}"
+    )]
+    LimitBelowTarget {
+        /// Name of the limit.
+        name: &'static str,
+        /// Value of the limit.
+        limit: f64,
+        /// Value at the target.
+        floor: f64,
+    },
     /// One of the paper's sets is empty after tightening.
     #[error(
         "the paper's set is empty after tightening: {name} = {value:.4}; lower disturbance.bound or the reference bounds, or raise the limits"

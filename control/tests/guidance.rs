@@ -12,7 +12,7 @@ use vehicle::noise::uniform;
 fn regress_the_nominal_flights_end_in_the_terminal_area() {
     for flight in [Flight::nominal(), Flight::lower()] {
         let settings = Settings::default();
-        let outcome = fly(settings, &flight, |_, _, memory| {
+        let outcome = fly(&settings, &flight, |_, _, memory| {
             assert!(memory.command.in_reach);
         });
         assert!(outcome.arrived(), "{} m to go", outcome.range);
@@ -30,7 +30,7 @@ fn regress_the_nominal_flights_end_in_the_terminal_area() {
 fn regress_dispersed_flights_end_in_the_terminal_area() {
     for number in 2000..2010 {
         let flight = Flight::dispersed(0.1, uniform(2, number));
-        let outcome = fly(Settings::default(), &flight, |_, _, _| {});
+        let outcome = fly(&Settings::default(), &flight, |_, _, _| {});
         assert!(outcome.arrived(), "{flight:?}: {} m to go", outcome.range);
     }
 }
@@ -57,7 +57,7 @@ fn oracle_the_verdict_on_reach_is_the_end_of_the_flight() {
         let mut settings = Settings::default();
         settings.target.longitude += shift;
         let mut first = None;
-        let outcome = fly(settings, &Flight::nominal(), |_, _, memory| {
+        let outcome = fly(&settings, &Flight::nominal(), |_, _, memory| {
             first.get_or_insert(memory.command.in_reach);
         });
         let miss = (outcome.range - settings.target.range).abs();
@@ -101,6 +101,81 @@ fn oracle_the_first_bank_turns_towards_the_target() {
         let command = guidance.update(&mut memory, 0, &navigation);
         assert_eq!(command.bank > 0.0, is_positive, "{}", command.bank);
     }
+}
+
+/// Without damping the flight skips several times.
+#[test]
+fn the_damped_flight_descends_without_a_skip() {
+    let climbs = |gain: f64| {
+        let mut settings = Settings::default();
+        settings.damping.gain = gain;
+        let (mut climbs, mut before) = (0.0, f64::INFINITY);
+        let outcome = fly(&settings, &Flight::nominal(), |_, motion, _| {
+            climbs += (motion[0] - before).max(0.0);
+            before = motion[0];
+        });
+        (climbs, outcome.greatest_heat_flux)
+    };
+    let ([damped, free], [flux, largest]) = {
+        let (damped, flux) = climbs(Settings::default().damping.gain);
+        let (free, largest) = climbs(0.0);
+        ([damped, free], [flux, largest])
+    };
+    assert!(damped < 500.0 && free > 5e3, "{damped} m, {free} m");
+    assert!(flux < 0.87 * largest, "{flux} W/m², {largest} W/m²");
+}
+
+/// The verdict at the first tick is what the flight shows, and a limit that is called feasible is
+/// kept also by dispersed flights within 2 %.
+#[test]
+fn oracle_a_limit_is_kept_or_called_infeasible() {
+    let mut verdicts = [0, 0];
+    for limit in [400e3, 425e3, 470e3, 500e3] {
+        let mut settings = Settings::default();
+        settings.limit.heat_flux = limit;
+        let mut first = None;
+        let outcome = fly(&settings, &Flight::nominal(), |_, _, memory| {
+            first.get_or_insert(memory.command.keeps_limits);
+        });
+        let ratio = outcome.greatest_heat_flux / limit;
+        assert!(if first == Some(true) { ratio < 1.01 } else { ratio > 0.99 }, "{limit}: {ratio}");
+        verdicts[usize::from(first == Some(true))] += 1;
+    }
+    assert!(verdicts[0] > 0 && verdicts[1] > 0, "{verdicts:?}");
+    let mut settings = Settings::default();
+    settings.limit.heat_flux = 470e3;
+    for number in 3000..3006 {
+        let outcome = fly(&settings, &Flight::dispersed(0.1, uniform(2, number)), |_, _, _| {});
+        assert!(outcome.greatest_heat_flux < 480e3, "{number}: {}", outcome.greatest_heat_flux);
+        assert!(outcome.arrived(), "{number}: {} m to go", outcome.range);
+    }
+}
+
+/// From too steep a start no bank angle keeps the limits, and from too flat a start none reaches the
+/// target.
+#[test]
+fn a_start_that_exceeds_a_limit_is_reported() {
+    for path in [-4.0, -0.5] {
+        let guidance = Guidance::new(Settings::default()).unwrap();
+        let motion = start([120e3, 0.0, -10.0, 7450.0, path, 60.0]);
+        let mut memory = Memory::default();
+        let navigation = Navigation { motion, ..Navigation::default() };
+        let command = guidance.update(&mut memory, 0, &navigation);
+        assert!(!command.keeps_limits || !command.in_reach, "{path}: {command:?}");
+    }
+}
+
+#[test]
+fn a_limit_below_what_the_target_needs_is_refused() {
+    let refusal = |change: fn(&mut Settings)| {
+        let mut settings = Settings::default();
+        change(&mut settings);
+        Guidance::new(settings).unwrap_err().to_string()
+    };
+    let text = refusal(|settings| settings.limit.pressure = 12e3);
+    assert!(text.starts_with("limit.pressure = 12000 is less than"), "{text}");
+    let text = refusal(|settings| settings.limit.load = 1.1);
+    assert!(text.starts_with("limit.load = 1.1 is less than"), "{text}");
 }
 
 proptest! {

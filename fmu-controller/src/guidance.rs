@@ -1,6 +1,6 @@
 //! `EntryGuidance`: the reference of the attitude along an entry flight.
 
-use control::guidance::{Command, Guidance, Memory, Navigation, PERIOD, Settings};
+use control::guidance::{Command, Guidance, Loads, Memory, Navigation, PERIOD, Settings};
 use controller_export::sampled::{SampledFmu, SampledInstance, Ticks};
 use controller_export::table::{ANGLES, vector};
 use fmi2_export::table::{Common, Real, discrete_output, input};
@@ -25,6 +25,8 @@ pub struct GuidanceInstance {
 pub(crate) struct Output {
     pub(crate) command: Command,
     reversals: u64,
+    /// Shares of the limits that are left.
+    margins: Loads,
 }
 
 /// Longest flight that is expected, s.
@@ -104,13 +106,20 @@ impl SampledInstance for GuidanceInstance {
     }
 
     fn show(&mut self, _time: f64, _guidance: &Guidance, ((), memory): ((), &Memory)) {
-        self.output = Output { command: memory.command, reversals: memory.reversals };
+        let (command, reversals) = (memory.command, memory.reversals);
+        let margins = self.settings.limit.margins(&command.loads);
+        self.output = Output { command, reversals, margins };
     }
 
     fn warning(before: &Memory, after: &Memory) -> Option<&'static str> {
-        let was_in_reach = before.command.in_reach || !before.has_begun();
-        (was_in_reach && !after.command.in_reach).then_some(
-            "the target is out of reach: the predicted flight ends farther from it than target.tolerance, and no bank angle changes that (see miss)",
+        let (first, now) = (!before.has_begun(), &after.command);
+        if (before.command.in_reach || first) && !now.in_reach {
+            return Some(
+                "the target is out of reach: the predicted flight ends farther from it than target.tolerance, and no bank angle changes that (see miss)",
+            );
+        }
+        ((before.command.keeps_limits || first) && !now.keeps_limits).then_some(
+            "the predicted flight exceeds a limit: heat flux, load or dynamic pressure becomes larger than limit.heatFlux, limit.load or limit.pressure (see limits.feasible)",
         )
     }
 
@@ -167,6 +176,10 @@ fn outputs(table: Variables) -> Variables {
     let real = |name: &str, text: &str, unit: &str, nominal: f64| {
         sampled(name, text).real().unit(unit).nominal(nominal)
     };
+    let margin = |name: &str| {
+        let text = format!("Share of limit.{name} that is left");
+        sampled(&format!("margins.{name}"), &text).real()
+    };
     table
         .real(real("command.alpha", "Angle of attack of the schedule", "rad", 0.1), |m| {
             &mut m.output.command.alpha
@@ -197,6 +210,24 @@ fn outputs(table: Variables) -> Variables {
             ),
             |m| &mut m.output.command.in_reach,
         )
+        .real(real("loads.heatFlux", "Heat flux into the leading edge", "W/m2", 1e5), |m| {
+            &mut m.output.command.loads.heat_flux
+        })
+        .real(sampled("loads.load", "Load, in 9.80665 m/s2").real(), |m| {
+            &mut m.output.command.loads.load
+        })
+        .real(real("loads.pressure", "Dynamic pressure", "Pa", 1e4), |m| {
+            &mut m.output.command.loads.pressure
+        })
+        .real(margin("heatFlux"), |m| &mut m.output.margins.heat_flux)
+        .real(margin("load"), |m| &mut m.output.margins.load)
+        .real(margin("pressure"), |m| &mut m.output.margins.pressure)
+        .boolean(sampled("limits.active", "Whether a limit makes the bank angle smaller"), |m| {
+            &mut m.output.command.is_limited
+        })
+        .boolean(sampled("limits.feasible", "Whether the predicted flight keeps all limits"), |m| {
+            &mut m.output.command.keeps_limits
+        })
         .integer(sampled("reversals", "Number of bank reversals so far"), (Some(0), None), |m| {
             &mut m.output.reversals
         })

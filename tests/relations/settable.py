@@ -60,6 +60,7 @@ SCENES = {
         "settings without guarantee": ("crmpc-2022/crmpc-robust", {"disturbance.bound": 0.2}),
         "limits that are scheduled": ("crmpc-2022/crmpc-robust", {"scheduled.limitMoment": 1.3e5, "scheduled.disturbanceBound": 0.01, "scheduled.disturbanceParts": 2}),
     },
+    "EntryGuidance": {"limits that are reached": (TURNING[0], {"limit.heatFlux": 3e5, "limit.load": 1.15, "limit.pressure": 1.29e4})},
     "AttitudeEstimator": {"a gyroscope that is stuck": ("crmpc-2022/estimator", {f"measured.gyroscope.{axis}": 0.01 for axis in "xyz"})},
     "ReentryPlant": {
         "rotating Earth": ("crmpc-2022/lqr", {"trajectory.earthRate": 7.292115e-5}),

@@ -7,12 +7,16 @@
 //! direction to the target. At every tick the reference of the attitude follows these commands
 //! within limits on its rate and acceleration.
 
+mod glide;
 mod predictor;
 mod settings;
 mod shaping;
 
+pub use glide::{Glide, Guided, Loads};
 pub use predictor::{Beginning, End, Predictor};
-pub use settings::{Alpha, Bank, Filter, Initial, Reversal, Settings, Shaping, Sphere, Target};
+pub use settings::{
+    Alpha, Bank, Damping, Filter, Initial, Limit, Reversal, Settings, Shaping, Sphere, Target,
+};
 pub use shaping::{Limits, Shaped};
 
 use crate::error::DesignError;
@@ -20,7 +24,7 @@ use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 use vehicle::axes::nearest;
 use vehicle::entry::{Motion, great_circle};
-use vehicle::math::{cos, exp, sin_cos};
+use vehicle::math::{atan2, cos, exp, sin_cos};
 use vehicle::reference::Reference;
 use vehicle::translation::Planet;
 
@@ -67,6 +71,12 @@ pub struct Command {
     /// Whether a plan reaches the target within the tolerance: the present one, or, as long as the
     /// bank angle is corrected, one between those with the least and the largest bank angle.
     pub in_reach: bool,
+    /// Present heat flux, load and dynamic pressure.
+    pub loads: Loads,
+    /// Whether a limit has made the present command.
+    pub is_limited: bool,
+    /// Whether the predicted flight keeps all limits.
+    pub keeps_limits: bool,
 }
 
 /// State that is carried from tick to tick.
@@ -74,10 +84,11 @@ pub struct Command {
 pub struct Memory {
     /// Whether a first bank angle was found.
     begun: bool,
-    /// Magnitude of the bank angle, rad.
+    /// Magnitude of the bank angle that reaches the target, rad.
     magnitude: f64,
-    /// Magnitude before the last correction, from which the command moves on in a second: each step
-    /// of the command would cost moment.
+    /// Commanded magnitude, and the one before the last correction, from which the command moves on
+    /// in a second: each step of the command would cost moment.
+    commanded: f64,
     before: f64,
     /// Whether the vehicle turns to the left, which a positive bank angle does.
     to_left: bool,
@@ -124,10 +135,20 @@ impl Guidance {
 
     /// Returns whether a restored memory can be used.
     pub fn fits(&self, memory: &Memory) -> bool {
-        let Memory { magnitude, before, ratios, alpha, bank, .. } = memory;
-        [*magnitude, *before, alpha.value, alpha.rate, bank.value, bank.rate, ratios[0], ratios[1]]
-            .iter()
-            .all(|value| value.is_finite())
+        let Memory { magnitude, commanded, before, ratios, alpha, bank, .. } = memory;
+        [
+            *magnitude,
+            *commanded,
+            *before,
+            alpha.value,
+            alpha.rate,
+            bank.value,
+            bank.rate,
+            ratios[0],
+            ratios[1],
+        ]
+        .iter()
+        .all(|value| value.is_finite())
     }
 
     /// Evaluates the guidance at the tick with this number.
@@ -147,15 +168,15 @@ impl Guidance {
         let mut command = Command { range, heading_error, ..memory.command };
         if first || tick.is_multiple_of(TICKS) {
             self.filter(memory, measured);
-            memory.before = memory.magnitude;
+            memory.before = memory.commanded;
             self.correct(memory, measured, &mut command);
             self.reverse(memory, tick, speed, heading_error);
         }
         if first {
-            memory.before = memory.magnitude;
+            memory.before = memory.commanded;
         }
         let share = (tick % TICKS + 1) as f64 / TICKS as f64;
-        let magnitude = memory.before + share * (memory.magnitude - memory.before);
+        let magnitude = memory.before + share * (memory.commanded - memory.before);
         let bank = if memory.to_left { magnitude } else { -magnitude };
         let alpha = self.schedule(memory).at(speed);
         let Shaping { bank_rate, bank_acceleration, alpha_rate, alpha_acceleration } =
@@ -211,7 +232,8 @@ impl Guidance {
     }
 
     /// Corrects the magnitude of the bank angle by the predicted miss: Lu 2014, section III, with
-    /// a Newton step whose slope is a difference.
+    /// a Newton step whose slope is a difference. The command follows from it by the feedback of
+    /// the altitude rate.
     fn correct(&self, memory: &mut Memory, measured: &Navigation, command: &mut Command) {
         let settings = &Settings { alpha: self.schedule(memory), ..self.settings };
         let [altitude, _, latitude, speed, path, heading] = measured.motion.into();
@@ -242,24 +264,36 @@ impl Guidance {
             }
             memory.magnitude = f64::midpoint(low, high);
         }
-        let End { range, arrives } = fly(memory.magnitude);
+        let End { range, arrives, loads } = fly(memory.magnitude);
         let here = wanted - range;
         let tolerance = settings.target.tolerance;
         command.miss = here;
         command.in_reach = arrives && here.abs() <= tolerance;
-        if left.abs() < FROZEN {
-            return;
+        if left.abs() >= FROZEN {
+            if !command.in_reach {
+                // The plan with the largest bank angle is the shortest one, that with none the
+                // longest.
+                command.in_reach = miss(largest) >= -tolerance && miss(0.0) <= tolerance;
+            }
+            let slope = (miss(memory.magnitude + PROBE) - here) / PROBE;
+            // A larger bank angle makes the flight shorter. Where it does not, only the sign of the
+            // correction is right.
+            let change = if slope > 0.0 { -here / slope } else { -CORRECTION.copysign(here) };
+            let change = change.clamp(-CORRECTION, CORRECTION);
+            memory.magnitude = (memory.magnitude + change).clamp(0.0, largest);
         }
-        if !command.in_reach {
-            // The plan with the largest bank angle is the shortest one, that with none the longest.
-            command.in_reach = miss(largest) >= -tolerance && miss(0.0) <= tolerance;
-        }
-        let slope = (miss(memory.magnitude + PROBE) - here) / PROBE;
-        // A larger bank angle makes the flight shorter. Where it does not, only the sign of the
-        // correction is right.
-        let change = if slope > 0.0 { -here / slope } else { -CORRECTION.copysign(here) };
-        let change = change.clamp(-CORRECTION, CORRECTION);
-        memory.magnitude = (memory.magnitude + change).clamp(0.0, largest);
+        let present = Glide {
+            alpha: memory.alpha.value,
+            accelerations: [measured.lift, measured.drag],
+            ..self.predictor.glide(settings, &begin, memory.magnitude)
+        };
+        let Guided { cosine, is_limited, loads: now } = self.predictor.guided(settings, &present);
+        let cosine = cosine.clamp(cos(largest), 1.0);
+        memory.commanded = atan2((1.0 - cosine * cosine).sqrt(), cosine);
+        (command.loads, command.is_limited) = (now, is_limited);
+        let limits = settings.limit.all();
+        let kept = loads.all().into_iter().zip(limits).all(|(load, limit)| load <= limit);
+        command.keeps_limits = kept;
     }
 
     /// Reverses the bank angle when the heading has left its dead band and still moves away.

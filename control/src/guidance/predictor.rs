@@ -1,11 +1,12 @@
 //! Predicts the range of a flight whose bank angle is linear in energy.
 
+use super::glide::{Glide, Loads};
 use super::settings::Settings;
 use nalgebra::Vector4;
 use vehicle::aerodynamics::Aerodynamics;
 use vehicle::atmosphere::air_anywhere;
 use vehicle::integrator::rk4;
-use vehicle::math::{cos, exp, ln, sin_cos};
+use vehicle::math::{cos, exp, ln, sin, sin_cos};
 
 /// Distance between the altitudes at which the density is known, m.
 const SPACING: f64 = 500.0;
@@ -13,6 +14,8 @@ const SPACING: f64 = 500.0;
 const ALTITUDES: usize = 281;
 /// Step of the prediction, s.
 const STEP: f64 = 4.0;
+/// Difference of the angle of attack from which a slope follows, rad.
+const PROBE: f64 = 0.01;
 /// Steps after which a prediction is given up: the flight does not come down.
 const MOST_STEPS: usize = 1500;
 
@@ -50,6 +53,8 @@ pub struct End {
     pub range: f64,
     /// Whether the flight comes to the energy of the target.
     pub arrives: bool,
+    /// Largest loads on the way.
+    pub loads: Loads,
 }
 
 impl Predictor {
@@ -63,12 +68,29 @@ impl Predictor {
         }
     }
 
-    /// Returns the density of the standard atmosphere (kg/m³) at an altitude (m), within 0.12 %.
-    fn density(&self, altitude: f64) -> f64 {
+    /// Returns the density of the standard atmosphere (kg/m³) at an altitude (m), within 0.12 %, and
+    /// the height over which it falls to 1/e there, m.
+    pub(super) fn air(&self, altitude: f64) -> [f64; 2] {
         let place = (altitude / SPACING).max(0.0);
         let below = (place as usize).min(ALTITUDES - 2);
         let (low, high) = (self.density[below], self.density[below + 1]);
-        exp(low + (place - below as f64) * (high - low))
+        [exp(low + (place - below as f64) * (high - low)), SPACING / (low - high)]
+    }
+
+    /// Returns the heat flux into the leading edge, W/m².
+    pub(super) fn heat_flux(&self, density: f64, speed: f64, alpha: f64) -> f64 {
+        self.aerodynamics.heat_flux(density, speed, alpha)
+    }
+
+    /// Returns the power of the speed with which the heat flux grows.
+    pub(super) fn heating_exponent(&self) -> f64 {
+        self.aerodynamics.heating_exponent()
+    }
+
+    /// Returns the relative change of the lift with the angle of attack, 1/rad.
+    pub(super) fn lift_slope(&self, alpha: f64) -> f64 {
+        let lift = |angle: f64| self.coefficients(angle)[0];
+        (lift(alpha + PROBE) / lift(alpha) - 1.0) / PROBE
     }
 
     /// Returns the coefficients of lift and drag at an angle of attack (rad).
@@ -79,7 +101,7 @@ impl Predictor {
     /// Returns lift and drag per mass (m/s²) of the model at an altitude (m), a speed (m/s) and an
     /// angle of attack (rad).
     pub fn accelerations(&self, altitude: f64, speed: f64, alpha: f64) -> [f64; 2] {
-        let pressure = 0.5 * self.density(altitude) * speed * speed * self.area_per_mass;
+        let pressure = 0.5 * self.air(altitude)[0] * speed * speed * self.area_per_mass;
         self.coefficients(alpha).map(|coefficient| pressure * coefficient)
     }
 
@@ -87,6 +109,46 @@ impl Predictor {
     /// m²/s².
     pub fn energy(settings: &Settings, altitude: f64, speed: f64) -> f64 {
         settings.planet.gravitation / (settings.planet.radius + altitude) - speed * speed / 2.0
+    }
+
+    /// Returns the beginning of a flight with this bank angle (rad).
+    pub fn glide(&self, settings: &Settings, begin: &Beginning, bank: f64) -> Glide {
+        let from = Self::energy(settings, begin.altitude, begin.speed);
+        let to = Self::energy(settings, settings.target.altitude, settings.target.speed);
+        let slope = if to > from { (settings.bank.last - bank) / (to - from) } else { 0.0 };
+        let state = Vector4::new(begin.altitude, begin.speed, begin.path, 0.0);
+        self.glide_at(settings, begin, &state, [bank, slope])
+    }
+
+    /// Returns the state of a flight with altitude, speed and flight path angle, and with a bank
+    /// angle (rad) and its derivative over energy.
+    fn glide_at(
+        &self,
+        settings: &Settings,
+        begin: &Beginning,
+        state: &Vector4<f64>,
+        bank: [f64; 2],
+    ) -> Glide {
+        let planet = &settings.planet;
+        let [altitude, speed, path, _]: [f64; 4] = (*state).into();
+        let radius = planet.radius + altitude;
+        let alpha = settings.alpha.at(speed);
+        let [lift, drag] = self.accelerations(altitude, speed, alpha);
+        let [lift_ratio, drag_ratio] = begin.ratios;
+        // The planet's rotation makes a vehicle that flies to the east lighter.
+        let centrifugal = planet.rate * planet.rate * radius * begin.near_equator;
+        Glide {
+            altitude,
+            speed,
+            rate: speed * sin(path),
+            alpha,
+            accelerations: [lift * lift_ratio, drag * drag_ratio],
+            drag_ratio,
+            gravity: planet.gravitation / (radius * radius) - centrifugal,
+            radius,
+            coriolis: 2.0 * planet.rate * speed * begin.eastward,
+            bank,
+        }
     }
 
     /// Flies from `begin` with a bank angle that is linear in energy, from `bank` (rad) to that of
@@ -97,42 +159,43 @@ impl Predictor {
         let from = Self::energy(settings, begin.altitude, begin.speed);
         let to = Self::energy(settings, target.altitude, target.speed);
         if to <= from {
-            return End { range: 0.0, arrives: true };
+            return End { range: 0.0, arrives: true, loads: Loads::default() };
         }
-        let [lift_ratio, drag_ratio] = begin.ratios;
         let energy = |state: &Vector4<f64>| Self::energy(settings, state[0], state[1]);
+        let slope = (settings.bank.last - bank) / (to - from);
+        let glide = |state: &Vector4<f64>| {
+            let passed = (energy(state) - from).clamp(0.0, to - from);
+            self.glide_at(settings, begin, state, [bank + slope * passed, slope])
+        };
+        let cosine = |cosine: f64| cosine.clamp(cos(settings.bank.largest), 1.0);
         // Altitude, speed, flight path angle, and the angle travelled over ground.
         let mut f = |_: f64, state: &Vector4<f64>| {
-            let [altitude, speed, path, _]: [f64; 4] = (*state).into();
-            let r = planet.radius + altitude;
-            let share = ((energy(state) - from) / (to - from)).clamp(0.0, 1.0);
-            let sigma = bank + share * (settings.bank.last - bank);
-            let [lift, drag] = self.accelerations(altitude, speed, settings.alpha.at(speed));
-            let (lift, drag) = (lift * lift_ratio, drag * drag_ratio);
-            let (sin_path, cos_path) = sin_cos(path);
-            // The planet's rotation makes a vehicle that flies to the east lighter.
-            let centrifugal = planet.rate * planet.rate * r * begin.near_equator;
-            let g = planet.gravitation / (r * r) - centrifugal;
-            let eastward = 2.0 * planet.rate * speed * begin.eastward;
+            let glide = glide(state);
+            let Glide { speed, gravity: g, radius, coriolis, .. } = glide;
+            let [lift, drag] = glide.accelerations;
+            let cosine = cosine(self.guided(settings, &glide).cosine);
+            let (sin_path, cos_path) = sin_cos(state[2]);
             Vector4::new(
                 speed * sin_path,
                 -drag - g * sin_path,
-                (lift * cos(sigma) + (speed * speed / r - g) * cos_path + eastward) / speed,
-                speed * cos_path / r,
+                (lift * cosine + (speed * speed / radius - g) * cos_path + coriolis) / speed,
+                speed * cos_path / radius,
             )
         };
         let mut state = Vector4::new(begin.altitude, begin.speed, begin.path, 0.0);
+        let mut loads = Loads::default();
         for _ in 0..MOST_STEPS {
             let next = rk4(&mut f, 0.0, &state, STEP);
+            loads = loads.max(&self.loads(&glide(&next)));
             if energy(&next) >= to || next[0] <= 0.0 {
                 let (before, after) = (energy(&state), energy(&next));
                 let share = ((to - before) / (after - before)).clamp(0.0, 1.0);
                 let angle = state[3] + share * (next[3] - state[3]);
-                return End { range: angle * planet.radius, arrives: after >= to };
+                return End { range: angle * planet.radius, arrives: after >= to, loads };
             }
             state = next;
         }
-        End { range: state[3] * planet.radius, arrives: false }
+        End { range: state[3] * planet.radius, arrives: false, loads }
     }
 }
 
@@ -151,7 +214,7 @@ mod tests {
         let predictor = Predictor::new();
         for metres in (0..140_000).step_by(70) {
             let altitude = f64::from(metres);
-            let ratio = predictor.density(altitude) / air_anywhere(altitude).density;
+            let ratio = predictor.air(altitude)[0] / air_anywhere(altitude).density;
             assert!((ratio - 1.0).abs() < 1.2e-3, "{altitude} m: {ratio}");
         }
     }

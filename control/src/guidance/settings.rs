@@ -1,5 +1,7 @@
 //! Settings of the guidance, with ours from `data/guidance.toml`.
 
+use super::glide::Loads;
+use super::predictor::Predictor;
 use crate::error::DesignError;
 use ::settings::{Declared, check};
 use serde::{Deserialize, Serialize};
@@ -23,6 +25,10 @@ pub struct Settings {
     pub reversal: Reversal,
     #[allow(missing_docs)]
     pub shaping: Shaping,
+    #[allow(missing_docs)]
+    pub damping: Damping,
+    #[allow(missing_docs)]
+    pub limit: Limit,
     #[allow(missing_docs)]
     pub filter: Filter,
     #[allow(missing_docs)]
@@ -132,6 +138,56 @@ pub struct Shaping {
     pub alpha_acceleration: f64,
 }
 
+/// Damping of the oscillation about the equilibrium glide.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Declared)]
+pub struct Damping {
+    /// Change of the cosine of the bank angle with the altitude rate; 0 leaves it out.
+    #[setting(unit = "s/m", min = 0.0, nominal = 1e-3)]
+    pub gain: f64,
+    /// Drag per mass below which the bank angle is changed neither for damping nor for a limit.
+    #[setting(unit = "m/s2", min = 0.0, nominal = 1.0)]
+    pub drag: f64,
+}
+
+/// Limits that the bank angle keeps.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Declared)]
+pub struct Limit {
+    /// Largest heat flux into the leading edge.
+    #[setting(unit = "W/m2", above = 0.0, nominal = 1e5)]
+    pub heat_flux: f64,
+    /// Largest load, in 9.80665 m/s2.
+    #[setting(above = 0.0, nominal = 1.0)]
+    pub load: f64,
+    /// Largest dynamic pressure.
+    #[setting(unit = "Pa", above = 0.0, nominal = 1e4)]
+    pub pressure: f64,
+    /// Share of each limit that is kept in reserve.
+    #[setting(min = 0.0, max = 0.5, nominal = 0.1)]
+    pub margin: f64,
+    /// Time constant with which a limit is approached.
+    #[setting(unit = "s", above = 0.0, nominal = 10.0)]
+    pub time: f64,
+    /// Change of the cosine of the bank angle with the altitude rate at a limit.
+    #[setting(unit = "s/m", min = 0.0, nominal = 1e-2)]
+    pub gain: f64,
+}
+
+impl Limit {
+    /// Returns the share of each limit that these loads leave.
+    pub fn margins(&self, loads: &Loads) -> Loads {
+        Loads {
+            heat_flux: 1.0 - loads.heat_flux / self.heat_flux,
+            load: 1.0 - loads.load / self.load,
+            pressure: 1.0 - loads.pressure / self.pressure,
+        }
+    }
+
+    /// Returns the limits of heat flux, load and dynamic pressure.
+    pub(super) fn all(&self) -> [f64; 3] {
+        [self.heat_flux, self.load, self.pressure]
+    }
+}
+
 /// Filters of the measured lift and drag.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Declared)]
 pub struct Filter {
@@ -183,6 +239,8 @@ impl Default for Settings {
                 alpha: Alpha::default(),
                 reversal: Reversal::default(),
                 shaping: Shaping::default(),
+                damping: Damping::default(),
+                limit: Limit::default(),
                 filter: Filter::default(),
                 planet: Sphere::EARTH,
             };
@@ -197,9 +255,22 @@ impl Settings {
     /// Checks the settings.
     ///
     /// # Errors
-    /// Names the setting that is out of range.
+    /// Names the setting that is out of range, or the limit that the end of the flight exceeds.
     pub fn check(&self) -> Result<(), DesignError> {
-        Ok(check(self)?)
+        check(self)?;
+        let Target { altitude, speed, .. } = self.target;
+        let predictor = Predictor::new();
+        let floor = predictor.loads_at(altitude, speed, self.alpha.at(speed));
+        // The heat flux is the largest long before.
+        for (name, limit, floor) in [
+            ("limit.load", self.limit.load, floor.load),
+            ("limit.pressure", self.limit.pressure, floor.pressure),
+        ] {
+            if limit < floor {
+                return Err(DesignError::LimitBelowTarget { name, limit, floor });
+            }
+        }
+        Ok(())
     }
 }
 
@@ -214,6 +285,15 @@ impl Alpha {
     /// Returns the angle of attack of the schedule (rad) at a speed (m/s).
     pub fn at(&self, speed: f64) -> f64 {
         over_speed(speed, [self.lower_speed, self.upper_speed], [self.low, self.high])
+    }
+}
+
+impl Alpha {
+    /// Returns the derivative of the schedule over speed, rad per m/s.
+    pub(super) fn slope(&self, speed: f64) -> f64 {
+        let is_between = speed > self.lower_speed && speed < self.upper_speed;
+        let slope = (self.high - self.low) / (self.upper_speed - self.lower_speed);
+        if is_between { slope } else { 0.0 }
     }
 }
 

@@ -68,17 +68,19 @@ pub(crate) struct Outcome {
     pub(crate) range: f64,
     pub(crate) greatest_load: f64,
     pub(crate) greatest_pressure: f64,
+    /// W/m².
+    pub(crate) greatest_heat_flux: f64,
     /// Greatest turn rate of the trajectory's axes relative to inertial space, rad/s.
     pub(crate) greatest_turn: f64,
 }
 
 /// Flies until the altitude or the speed of the terminal area. Calls `observe` once a second.
 pub(crate) fn fly(
-    settings: Settings,
+    settings: &Settings,
     flight: &Flight,
     mut observe: impl FnMut(f64, &Motion, &Memory),
 ) -> Outcome {
-    let guidance = Guidance::new(settings).unwrap();
+    let guidance = Guidance::new(*settings).unwrap();
     let mut air = Air { rows: 1, ..Air::default() };
     air.profile[0] = Row { altitude: 0.0, density: flight.density, wind: flight.wind };
     let config = Config {
@@ -111,6 +113,7 @@ pub(crate) fn fly(
         let turn = config.derivative(&motion, &passage).2.norm();
         outcome.greatest_load = outcome.greatest_load.max(passage.specific_force.norm() / 9.80665);
         outcome.greatest_pressure = outcome.greatest_pressure.max(passage.dynamic_pressure);
+        outcome.greatest_heat_flux = outcome.greatest_heat_flux.max(config.heat_flux(&passage));
         outcome.greatest_turn = outcome.greatest_turn.max(turn);
         if config.margins(&motion).iter().any(|margin| *margin <= 0.0) {
             return Outcome {

@@ -237,6 +237,11 @@ impl Aerodynamics {
         coefficient::polynomial(factors, alpha.to_degrees()) * flux * BTU_PER_SQUARE_FOOT
     }
 
+    /// Returns the power of the speed with which the heat flux grows.
+    pub fn heating_exponent(&self) -> f64 {
+        self.heating.exponent
+    }
+
     /// Returns the name and the source of each group of numbers.
     pub fn sources(&self) -> Vec<(&'static str, &str)> {
         let Moments {

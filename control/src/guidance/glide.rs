@@ -1,0 +1,146 @@
+//! Feedback of the altitude rate: it damps the oscillation about the equilibrium glide, and keeps
+//! heat flux, load and dynamic pressure below their limits. P. Lu, "Entry guidance: a unified
+//! method" (2014), on altitude-rate compensation and on path constraints.
+
+use super::predictor::Predictor;
+use super::settings::{Settings, over_speed};
+use vehicle::math::{cos, hypot, ln, tan};
+
+/// Least share of gravity that is taken to be left to the lift, where the speed is almost that of
+/// an orbit.
+const LEAST_WEIGHT: f64 = 0.1;
+/// Speeds between which the damping fades away, m/s. At the end the base may be so large that there
+/// is no glide with it, and the range decides.
+const FADING: [f64; 2] = [1000.0, 2000.0];
+/// Distance of the base from bank.largest below which the damping fades away, too, rad: a near
+/// target needs the steepest flight.
+const ROOM: f64 = 0.2;
+/// Standard gravity, in which loads count, m/s².
+const GRAVITY: f64 = 9.80665;
+
+/// Quantities that have limits: heat flux, load and dynamic pressure.
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct Loads {
+    /// Heat flux into the leading edge, W/m².
+    pub heat_flux: f64,
+    /// Load, in 9.80665 m/s².
+    pub load: f64,
+    /// Dynamic pressure, Pa.
+    pub pressure: f64,
+}
+
+impl Loads {
+    /// Returns the three numbers.
+    pub fn all(&self) -> [f64; 3] {
+        [self.heat_flux, self.load, self.pressure]
+    }
+
+    /// Returns the larger one of each.
+    #[must_use]
+    pub fn max(&self, other: &Self) -> Self {
+        Self {
+            heat_flux: self.heat_flux.max(other.heat_flux),
+            load: self.load.max(other.load),
+            pressure: self.pressure.max(other.pressure),
+        }
+    }
+}
+
+/// State of the flight in the vertical plane, as far as the feedback depends on it.
+#[derive(Clone, Copy, Debug)]
+pub struct Glide {
+    /// Altitude, m.
+    pub altitude: f64,
+    /// Speed, m/s.
+    pub speed: f64,
+    /// Altitude rate, m/s.
+    pub rate: f64,
+    /// Angle of attack, rad.
+    pub alpha: f64,
+    /// Lift and drag per mass, m/s².
+    pub accelerations: [f64; 2],
+    /// Ratio of the drag to that of the model.
+    pub drag_ratio: f64,
+    /// Gravity less the centrifugal acceleration of the planet's rotation, m/s².
+    pub gravity: f64,
+    /// Distance from the planet's centre, m.
+    pub radius: f64,
+    /// Upward Coriolis acceleration, m/s².
+    pub coriolis: f64,
+    /// Base of the bank angle, rad, and its derivative over energy, rad per m²/s².
+    pub bank: [f64; 2],
+}
+
+/// Bank angle and loads at a state.
+#[derive(Clone, Copy, Debug)]
+pub struct Guided {
+    /// Cosine of the commanded bank angle.
+    pub cosine: f64,
+    /// Whether a limit has made the command.
+    pub is_limited: bool,
+    /// Loads at this state.
+    pub loads: Loads,
+}
+
+impl Predictor {
+    /// Returns heat flux, load and dynamic pressure at a state. The ratio of the drag to that of
+    /// the model is taken for that of the density.
+    pub fn loads(&self, glide: &Glide) -> Loads {
+        let Glide { altitude, speed, alpha, drag_ratio, .. } = *glide;
+        let [lift, drag] = glide.accelerations;
+        let density = self.air(altitude)[0] * drag_ratio;
+        Loads {
+            heat_flux: self.heat_flux(density, speed, alpha),
+            load: hypot(lift, drag) / GRAVITY,
+            pressure: 0.5 * density * speed * speed,
+        }
+    }
+
+    /// Returns the same of the model at an altitude (m), a speed (m/s) and an angle of attack
+    /// (rad).
+    pub(super) fn loads_at(&self, altitude: f64, speed: f64, alpha: f64) -> Loads {
+        let density = self.air(altitude)[0];
+        let [lift, drag] = self.accelerations(altitude, speed, alpha);
+        Loads {
+            heat_flux: self.heat_flux(density, speed, alpha),
+            load: hypot(lift, drag) / GRAVITY,
+            pressure: 0.5 * density * speed * speed,
+        }
+    }
+
+    /// Returns the commanded bank angle: cos σ = cos σ₀ − k (ḣ − ḣ₀), with ḣ₀ of the equilibrium
+    /// glide, and with at least the altitude rate at which no load rises beyond its limit.
+    pub fn guided(&self, settings: &Settings, glide: &Glide) -> Guided {
+        let Glide { speed, rate, gravity, radius, coriolis, bank: [bank, slope], .. } = *glide;
+        let loads = self.loads(glide);
+        let base = cos(bank);
+        let [_, drag] = glide.accelerations;
+        if drag < settings.damping.drag {
+            return Guided { cosine: base, is_limited: false, loads };
+        }
+        let [_, scale] = self.air(glide.altitude);
+        // −V̇/V.
+        let braking = (drag + gravity * rate / speed) / speed;
+        // Lift carries the weight, L cos σ = g − V²/r − (Coriolis), while V, the angle of attack
+        // and σ change: ρ̇/ρ + 2 V̇/V + Ċ_L/C_L − σ̇ tan σ is the relative change of the weight.
+        let weight = (gravity - speed * speed / radius - coriolis).max(LEAST_WEIGHT * gravity);
+        let by_weight = (2.0 * speed * speed / radius + coriolis) / weight;
+        let by_alpha = speed * settings.alpha.slope(speed) * self.lift_slope(glide.alpha);
+        let by_bank = slope * tan(bank) * speed * speed;
+        let equilibrium = -scale * braking * (2.0 + by_weight + by_alpha + by_bank);
+        let room = ((settings.bank.largest - bank) / ROOM).clamp(0.0, 1.0);
+        let gain = room * over_speed(speed, FADING, [0.0, settings.damping.gain]);
+        let damped = base - gain * (rate - equilibrium);
+        // ẏ/y = −a ḣ/H + b V̇/V for each load y is at most ln(limit/y)/τ.
+        let limits = &settings.limit;
+        let exponents = [[0.5, self.heating_exponent()], [1.0, 2.0], [1.0, 2.0]];
+        let mut least = f64::NEG_INFINITY;
+        for ((value, limit), [a, b]) in loads.all().iter().zip(limits.all()).zip(exponents) {
+            let room = ln((1.0 - limits.margin) * limit / value) / limits.time;
+            least = least.max(-scale / a * (room + b * braking));
+        }
+        let limited = base - limits.gain * (rate - least);
+        let is_limited = rate < least && limited > damped;
+        Guided { cosine: if is_limited { limited } else { damped }, is_limited, loads }
+    }
+}
