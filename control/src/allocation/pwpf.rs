@@ -4,12 +4,7 @@
 use crate::error::{DesignError, invalid};
 use serde::{Deserialize, Serialize};
 use settings::Declared;
-use std::f64::consts::TAU;
-use vehicle::math::{atan2, exp, hypot, sin_cos};
-
-/// Number of periods of a sine over which a describing function is taken, after one that is left
-/// out.
-const PERIODS: u32 = 8;
+use vehicle::math::exp;
 
 /// Constants of the modulator.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Declared)]
@@ -80,32 +75,5 @@ impl Pwpf {
         let filtered = end + (state.filtered - end) * exp(-self.period / self.time_constant);
         let on = if state.on { filtered > self.off } else { filtered >= self.on };
         Modulator { filtered, on }
-    }
-
-    /// Returns the describing function of two opposed jets: the first harmonic of their thrust
-    /// (from −1 to 1) over a sine that is commanded, as magnitude and phase (rad). The amplitude
-    /// of the sine is a duty cycle, its frequency in rad/s; each jet gets one half-wave.
-    ///
-    /// A. Gelb and W. E. Vander Velde, "Multiple-input describing functions and nonlinear system
-    /// design", 1968.
-    pub fn describing_function(&self, amplitude: f64, frequency: f64) -> (f64, f64) {
-        let samples = (TAU / (frequency * self.period)).round().max(1.0);
-        let mut jets = [Modulator::default(); 2];
-        let (mut in_phase, mut ahead) = (0.0, 0.0);
-        for k in 0..samples as u64 * u64::from(1 + PERIODS) {
-            let angle = TAU * (k as f64 / samples).fract();
-            let (sine, cosine) = sin_cos(angle);
-            // A command acts from its sample until the next one, as in the allocator.
-            let thrust = f64::from(u8::from(jets[0].on)) - f64::from(u8::from(jets[1].on));
-            if k >= samples as u64 {
-                in_phase += thrust * sine;
-                ahead += thrust * cosine;
-            }
-            for (jet, sign) in jets.iter_mut().zip([1.0, -1.0]) {
-                *jet = self.advance(*jet, (sign * amplitude * sine).clamp(0.0, 1.0));
-            }
-        }
-        let share = 2.0 / (amplitude * samples * f64::from(PERIODS));
-        (share * hypot(in_phase, ahead), atan2(ahead, in_phase))
     }
 }
