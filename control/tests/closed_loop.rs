@@ -1,5 +1,5 @@
 //! The closed loop of Chai 2022, section 5: 50 s, both inertia errors, with the rates checked
-//! between samples too. The example `campaign` runs the same with 200 seeds.
+//! between samples too. `orchestrator campaign white` flies a thousand seeds.
 
 mod harness;
 

@@ -1,5 +1,5 @@
-//! The guarantee of the robust set in closed loops: it is in force throughout, and it holds. The
-//! examples `worst_case` and `random_settings` search for its limits with many more flights.
+//! The guarantee of the robust set in closed loops: it is in force throughout, and it holds.
+//! `orchestrator campaign` and `orchestrator falsify` fly many more cases.
 
 mod harness;
 
@@ -171,8 +171,8 @@ fn guarantee_is_kept_from_random_starts_along_random_references() {
 
 #[test]
 fn guarantee_is_kept_from_the_edge_of_the_certified_states() {
-    // The example `certificate` flies many more. Without the check of beta between two stages, 2 %
-    // of the flights with a period of 1 s leave the bound on the sideslip.
+    // Without the check of beta between two stages, 2 % of the flights with a period of 1 s leave
+    // the bound on the sideslip.
     for period in [0.08, 0.2, 0.4, 1.0] {
         let settings = optimised_every(period);
         let seeds: Vec<u64> = (1..=150).collect();
@@ -294,8 +294,8 @@ fn regress_errors_grow_over_the_delay() {
 
 #[test]
 fn regress_a_disturbance_of_1_4_times_the_bound_does_not_cost_the_attitude() {
-    // The EMS of an LQR with limited moment is 4.15° on average and 16.3° at most (example
-    // `beyond_the_bound`).
+    // The EMS of an LQR with limited moment is 4.15° on average and 16.3° at most: docs/guarantee.md
+    // names the campaign.
     let published = settings(Constraints::Robust);
     let disturbance_bound = 1.4 * published.disturbance_bound;
     let told = Settings { disturbance_bound, guarantee: Guarantee::BestEffort, ..published };

@@ -15,7 +15,7 @@ use serde::{Deserialize, Serialize};
 use settings::Choice;
 
 /// Share of the moment limit for the plan below which optimisations take several times as long
-/// (example `loop_times` of `control` with other disturbance bounds).
+/// (docs/guarantee.md has iterations for other disturbance bounds).
 const LITTLE_MOMENT: f64 = 0.1;
 
 /// Outputs of CRMPC.

@@ -1,5 +1,4 @@
-//! Random optimisations, for the search for the slowest one and for the tests of those that were
-//! found.
+//! Random optimisations, for the example `worst_time` and for the tests of the longest ones.
 #![allow(dead_code, unreachable_pub)] // Each user needs a part of it.
 
 use super::flight::Random;
@@ -14,7 +13,7 @@ use vehicle::scenario::Scenario;
 /// Largest errors of the angles and rates, deg and deg/s.
 const ERRORS: (f64, f64) = (15.0, 4.5);
 /// Count of the numbers of size 1 that define a case.
-pub const UNKNOWNS: usize = 22;
+const UNKNOWNS: usize = 22;
 
 /// A case to optimise: a reference, a start, and a second state to which the vehicle is kicked one
 /// optimisation later.
@@ -32,7 +31,7 @@ fn degrees(values: [f64; 3]) -> Vector3<f64> {
 
 impl Case {
     /// Returns the case that these numbers define, with errors scaled by `size`.
-    pub fn from_numbers(x: &[f64], size: f64) -> Self {
+    fn from_numbers(x: &[f64], size: f64) -> Self {
         let at = |i: usize| x[i].clamp(-1.0, 1.0);
         let three = |i: usize| Vector3::new(at(i), at(i + 1), at(i + 2));
         let mean = degrees([10.0, 0.0, -30.0]) + three(2).component_mul(&degrees([5.0, 3.0, 20.0]));

@@ -1,5 +1,4 @@
-//! A closed loop of the scenario of Chai 2022 in one process, for tests, the campaign example and
-//! the benchmark.
+//! A closed loop of the scenario of Chai 2022 in one process, for tests, examples and benchmarks.
 #![allow(dead_code, unreachable_pub, unused_imports)] // Each user needs a part of it.
 
 pub mod draws;

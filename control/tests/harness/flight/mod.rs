@@ -101,8 +101,6 @@ pub struct Shown {
     pub sideslip: f64,
     /// Largest ‖m‖ relative to its limit that was commanded under guarantee.
     pub moment: f64,
-    /// Largest ‖ω‖ relative to its limit over the whole flight.
-    pub rate_at_all: f64,
     /// Whether ‖ω‖, |β| or ‖m‖ exceeded its limit under guarantee.
     pub broken: bool,
     /// Time at which the guarantee ended, s.
@@ -230,7 +228,6 @@ impl Flight {
                 for j in 0..FINE {
                     vehicle.advance(fine(j), fine(j + 1), &delta);
                     let rate = vehicle.rates().norm() / s.limit_rate;
-                    shown.rate_at_all = shown.rate_at_all.max(rate);
                     if now && rate > shown.rate && !faulty.is_unseen(time, self.age) {
                         (shown.rate, shown.rate_time) = (rate, fine(j + 1));
                     }

@@ -21,9 +21,6 @@ pub enum Waveform {
     AlongRate(f64),
     /// The vector is the corner along the acceleration by the acting moment, times this sign.
     AlongMoment(f64),
-    /// The vector takes these values one after the other, each until its time (s); the last one
-    /// stays.
-    Segments(Vec<(f64, Vector3<f64>)>),
 }
 
 impl Waveform {
@@ -96,10 +93,6 @@ impl Progress {
             Waveform::AlongRate(sign) => signs(&(r * vehicle.rates())) * *sign,
             Waveform::AlongMoment(sign) => {
                 signs(&(r * vehicle.body.inverse * vehicle.moment(time))) * *sign
-            }
-            Waveform::Segments(segments) => {
-                let current = segments.iter().find(|(until, _)| time < *until).or(segments.last());
-                current.map_or_else(Vector3::zeros, |(_, value)| *value)
             }
         }
     }
