@@ -13,6 +13,7 @@
 //! Artstein, "Linear systems with delayed controls: a reduction", IEEE Transactions on Automatic
 //! Control 27 (1982), with the nonlinear equations of motion in place of the linear ones.
 
+use crate::clone_in_place::clone_in_place;
 use crate::controller::{Controller, Doubt, Measurement, ReferenceAt};
 use crate::error::{DesignError, invalid};
 use crate::frozen::Frozen;
@@ -141,26 +142,7 @@ pub struct Memory<M> {
     pub frozen: Frozen,
 }
 
-impl<M: Clone> Clone for Memory<M> {
-    fn clone(&self) -> Self {
-        Self {
-            inner: self.inner.clone(),
-            under_way: self.under_way.clone(),
-            loop_delay: self.loop_delay.clone(),
-            turns: self.turns,
-            frozen: self.frozen,
-        }
-    }
-
-    // The derived version would allocate at every tick.
-    fn clone_from(&mut self, source: &Self) {
-        self.inner.clone_from(&source.inner);
-        self.under_way.clone_from(&source.under_way);
-        self.loop_delay.clone_from(&source.loop_delay);
-        self.turns = source.turns;
-        self.frozen = source.frozen;
-    }
-}
+clone_in_place!([M: Clone + Default] Memory<M> { inner, under_way, loop_delay });
 
 /// A controller whose moments act later than its measurements by a known delay. It evaluates the
 /// law behind it for the predicted state and for the time at which the moment acts. Without delay

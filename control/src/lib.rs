@@ -4,6 +4,7 @@
 
 pub mod allocation;
 mod clock;
+mod clone_in_place;
 pub mod closed_loop;
 mod conic_program;
 pub mod controller;

@@ -18,6 +18,7 @@
 //! the acceleration that its assumptions explain, another delay is therefore reported only if the
 //! measurements exceed it with the declared delay.
 
+use crate::clone_in_place::clone_in_place;
 use crate::controller::{Explained, Measurement};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
@@ -74,6 +75,8 @@ pub struct LoopDelay {
     pub is_other: bool,
 }
 
+clone_in_place!([] LoopDelay { commands, fits });
+
 /// Number of fits: of differences of order 0, 1 and 2.
 const ORDERS: usize = 3;
 
@@ -90,6 +93,8 @@ struct Fit {
     /// Least mean square of a component, (rad/s²)²; zero before the first estimate.
     scale: f64,
 }
+
+clone_in_place!([] Fit { sums });
 
 /// Sums of products of y, of the same u of the command after a whole number of periods of delay,
 /// and of u⁺ after one period more, (rad/s²)².
@@ -349,48 +354,5 @@ impl Fit {
         let gain = if square > 0.0 { explained / square } else { 1.0 };
         let gain = gain.clamp(1.0 / GAIN, GAIN);
         self.square - gain * (2.0 * explained - gain * square)
-    }
-}
-
-impl Clone for Fit {
-    fn clone(&self) -> Self {
-        Self { sums: self.sums.clone(), ..*self }
-    }
-
-    fn clone_from(&mut self, source: &Self) {
-        self.sums.clone_from(&source.sums);
-        (self.square, self.count, self.scale) = (source.square, source.count, source.scale);
-    }
-}
-
-impl Clone for LoopDelay {
-    fn clone(&self) -> Self {
-        let mut clone = Self::default();
-        clone.clone_from(self);
-        clone
-    }
-
-    // The derived version would allocate at every tick.
-    fn clone_from(&mut self, source: &Self) {
-        let Self {
-            commands,
-            rates,
-            accelerations,
-            available,
-            fits,
-            periods,
-            unexplained,
-            is_unexplained,
-            estimate,
-            is_other,
-        } = source;
-        self.commands.clone_from(commands);
-        for (fit, source) in self.fits.iter_mut().zip(fits) {
-            fit.clone_from(source);
-        }
-        (self.rates, self.accelerations, self.available) = (*rates, *accelerations, *available);
-        (self.periods, self.unexplained) = (*periods, *unexplained);
-        self.is_unexplained = *is_unexplained;
-        (self.estimate, self.is_other) = (*estimate, *is_other);
     }
 }

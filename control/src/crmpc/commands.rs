@@ -3,6 +3,7 @@
 use super::guarantee::{Switching, unseen};
 use super::observer::Observed;
 use super::settings::Settings;
+use crate::clone_in_place::clone_in_place;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
@@ -14,6 +15,8 @@ pub struct Commands {
     /// Acceleration commanded before the last tick, rad/s²; `None` before the second tick.
     before: Option<Vector3<f64>>,
 }
+
+clone_in_place!([] Commands { changes });
 
 impl Commands {
     pub(super) fn new(s: &Settings) -> Self {
@@ -46,17 +49,5 @@ impl Commands {
             self.changes.rotate_left(1);
         }
         switching.pulse_of_command(change) / s.period_feedback
-    }
-}
-
-impl Clone for Commands {
-    fn clone(&self) -> Self {
-        Self { changes: self.changes.clone(), before: self.before }
-    }
-
-    // The derived version would allocate at every tick.
-    fn clone_from(&mut self, source: &Self) {
-        self.changes.clone_from(&source.changes);
-        self.before = source.before;
     }
 }

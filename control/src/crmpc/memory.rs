@@ -4,12 +4,12 @@ use super::commands::Commands;
 use super::observer::Observed;
 use super::plan::{Plan, Terms};
 use super::supervision::{GuaranteeStatus, Supervision};
+use crate::clone_in_place::clone_in_place;
 use crate::controller::Scheduled;
 use crate::error_dynamics::Gain;
 use crate::report::SolverReport;
 use nalgebra::{Vector3, Vector6};
 use serde::{Deserialize, Serialize};
-use std::mem::take;
 
 /// The state that CRMPC carries from tick to tick.
 #[derive(Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -68,21 +68,7 @@ impl Memory {
     }
 }
 
-impl Clone for Memory {
-    fn clone(&self) -> Self {
-        let mut clone = Self::default();
-        clone.clone_from(self);
-        clone
-    }
-
-    // The derived version would allocate memory for a plan at every tick.
-    fn clone_from(&mut self, source: &Self) {
-        let (mut plan, mut commands) = (take(&mut self.plan), take(&mut self.commands));
-        plan.clone_from(&source.plan);
-        commands.clone_from(&source.commands);
-        *self = Self { plan, commands, ..*source };
-    }
-}
+clone_in_place!([] Memory { plan, commands });
 
 /// Terms of a plan that hold until the commands of the next one act.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]

@@ -3,10 +3,10 @@
 use super::guarantee::{Carried, Onset, Switching};
 use super::stages::Stages;
 use super::state::{self, join};
+use crate::clone_in_place::clone_in_place;
 use crate::mpc::ErrorTrajectory;
 use nalgebra::{Vector3, Vector6};
 use serde::{Deserialize, Serialize};
-use std::mem::take;
 use vehicle::reference::Reference;
 
 /// Terms under which a plan was certified; they bound its inputs while it is followed.
@@ -43,22 +43,7 @@ pub struct Plan {
     pub onset: Onset,
 }
 
-impl Clone for Plan {
-    fn clone(&self) -> Self {
-        let mut clone = Self::default();
-        clone.clone_from(self);
-        clone
-    }
-
-    // This keeps the allocated memory.
-    fn clone_from(&mut self, source: &Self) {
-        let Self { mut states, mut accelerations, mut multipliers, .. } = take(self);
-        states.clone_from(&source.states);
-        accelerations.clone_from(&source.accelerations);
-        multipliers.clone_from(&source.multipliers);
-        *self = Self { states, accelerations, multipliers, ..*source };
-    }
-}
+clone_in_place!([] Plan { states, accelerations, multipliers });
 
 impl Plan {
     /// Returns a plan of `horizon` intervals at rest at the origin.

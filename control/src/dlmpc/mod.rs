@@ -15,6 +15,7 @@ pub use crate::report::{SolverReport, SolverStatus};
 pub use plan::Plan;
 pub use settings::{Settings, SlidingMode};
 
+use crate::clone_in_place::clone_in_place;
 use crate::controller::{Controller, Measurement, ReferenceAt};
 use crate::error::DesignError;
 use crate::mpc::{Chain, Cost, ErrorTrajectory, Layout, Optimiser, State};
@@ -44,23 +45,7 @@ pub struct Memory {
     pub inner_time: f64,
 }
 
-impl Clone for Memory {
-    fn clone(&self) -> Self {
-        Self { plan: self.plan.clone(), ..*self }
-    }
-
-    // The derived version would allocate memory for a plan at every tick.
-    fn clone_from(&mut self, source: &Self) {
-        let Self { plan, started, report, rate_command, integral, sliding, inner_time } = self;
-        plan.clone_from(&source.plan);
-        *started = source.started;
-        *report = source.report;
-        *rate_command = source.rate_command;
-        *integral = source.integral;
-        *sliding = source.sliding;
-        *inner_time = source.inner_time;
-    }
-}
+clone_in_place!([] Memory { plan });
 
 /// The controller: settings, solvers and scratch memory. All state that later ticks depend on is in
 /// [`Memory`].

@@ -1,5 +1,6 @@
 //! A trajectory of the angles over the horizon.
 
+use crate::clone_in_place::clone_in_place;
 use crate::mpc::ErrorTrajectory;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
@@ -17,22 +18,7 @@ pub struct Plan {
     pub multipliers: Vec<[f64; 2]>,
 }
 
-impl Clone for Plan {
-    fn clone(&self) -> Self {
-        Self {
-            angles: self.angles.clone(),
-            commands: self.commands.clone(),
-            multipliers: self.multipliers.clone(),
-        }
-    }
-
-    // This keeps the allocated memory.
-    fn clone_from(&mut self, source: &Self) {
-        self.angles.clone_from(&source.angles);
-        self.commands.clone_from(&source.commands);
-        self.multipliers.clone_from(&source.multipliers);
-    }
-}
+clone_in_place!([] Plan { angles, commands, multipliers });
 
 impl Plan {
     /// Returns a plan of `horizon` intervals at rest at the origin.

@@ -1,6 +1,7 @@
 //! The structured problem: chains of integrators, quadratic cost, and the conditions on both ends.
 //! Its norm constraints are in [`super::constraints`].
 
+use crate::clone_in_place::clone_in_place;
 use nalgebra::{SMatrix, SVector, Vector3};
 
 /// The tracking error of one stage: the errors of the three axes, then those of their derivatives
@@ -176,7 +177,7 @@ impl<'a, const O: usize, C> Problem<'a, O, C> {
 }
 
 /// A trajectory of the tracking error over the horizon.
-#[derive(Debug, PartialEq)]
+#[derive(Debug, Default, PartialEq)]
 pub struct ErrorTrajectory<const O: usize> {
     /// States E_0 … E_N at the stages.
     pub states: Vec<State<O>>,
@@ -184,17 +185,7 @@ pub struct ErrorTrajectory<const O: usize> {
     pub inputs: Vec<Vector3<f64>>,
 }
 
-impl<const O: usize> Clone for ErrorTrajectory<O> {
-    fn clone(&self) -> Self {
-        Self { states: self.states.clone(), inputs: self.inputs.clone() }
-    }
-
-    // This keeps the allocated memory.
-    fn clone_from(&mut self, source: &Self) {
-        self.states.clone_from(&source.states);
-        self.inputs.clone_from(&source.inputs);
-    }
-}
+clone_in_place!([const O: usize] ErrorTrajectory<O> { states, inputs });
 
 impl<const O: usize> ErrorTrajectory<O> {
     /// Returns a trajectory without error over `horizon` intervals.
