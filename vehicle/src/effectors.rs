@@ -20,7 +20,7 @@ const EFFECTORS: (&str, &str) = ("effectors.toml", include_str!("../data/effecto
 
 /// Moments and limits of the surfaces and jets. Moments act about the body axes x forward, y right,
 /// z down; a deflection with the trailing edge down is positive.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Effectors {
     /// Surface effectiveness D_A of Wu 2015 (58) at the reference dynamic pressure, N m/rad. The
     /// values are representative, as the paper prints none.

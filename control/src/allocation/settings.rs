@@ -6,9 +6,8 @@ use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 use settings::{Choice, Declared};
 use std::sync::LazyLock;
-use toml::Table;
 use vehicle::axes::NUMBERED_AXES;
-use vehicle::data;
+use vehicle::data::Tables;
 use vehicle::effectors::{Effectors, SURFACES, Surfaces};
 
 /// Method that divides the moment among the effectors.
@@ -34,7 +33,7 @@ pub enum JetCommand {
 }
 
 /// Settings of the allocator. Units SI, angles rad.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Declared)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, Declared)]
 pub struct Settings {
     #[allow(missing_docs)] // Its type says what it is.
     pub method: Method,
@@ -68,35 +67,16 @@ pub struct Settings {
     pub pwpf: Pwpf,
 }
 
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct File {
-    settings: Table,
-    modulator: Table,
-}
-
-const FILE: &str = "allocation.toml";
+static FILE: LazyLock<Tables> =
+    LazyLock::new(|| Tables::new("allocation.toml", include_str!("../../data/allocation.toml")));
 
 impl Settings {
     /// Returns the settings of Wu 2015, sections 5 and 6. Blending and all other values of ours are
     /// as in `data/allocation.toml`.
     pub fn published() -> Self {
-        static READ: LazyLock<File> =
-            LazyLock::new(|| data::embedded(FILE, include_str!("../../data/allocation.toml")));
-        let mut settings = Self {
-            method: Method::default(),
-            jets: JetCommand::default(),
-            period: 0.0,
-            threshold: 0.0,
-            max_iterations: 0,
-            weight_moment: Vector3::zeros(),
-            weight_jet: 0.0,
-            weight_surface: 0.0,
-            effectors: Effectors::published(),
-            pwpf: Pwpf::default(),
-        };
-        data::set(&mut settings, FILE, &READ.settings);
-        data::set(&mut settings.pwpf, FILE, &READ.modulator);
+        let mut settings = Self { effectors: Effectors::published(), ..Self::default() };
+        FILE.set("settings", &mut settings);
+        FILE.set("modulator", &mut settings.pwpf);
         settings
     }
 

@@ -5,9 +5,8 @@ use crate::mpc::SolverSettings;
 use serde::{Deserialize, Serialize};
 use settings::Declared;
 use std::sync::LazyLock;
-use toml::Table;
 use vehicle::axes::NUMBERED_ANGLES;
-use vehicle::data;
+use vehicle::data::Tables;
 use vehicle::dynamics::RigidBody;
 use vehicle::scenario::Scenario;
 
@@ -62,20 +61,8 @@ pub struct Settings {
     pub sliding_mode: SlidingMode,
 }
 
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct File {
-    settings: Table,
-    tuned: Table,
-}
-
-const FILE: &str = "dlmpc-2022.toml";
-
-fn embedded() -> &'static File {
-    static READ: LazyLock<File> =
-        LazyLock::new(|| data::embedded(FILE, include_str!("../../data/dlmpc-2022.toml")));
-    &READ
-}
+static FILE: LazyLock<Tables> =
+    LazyLock::new(|| Tables::new("dlmpc-2022.toml", include_str!("../../data/dlmpc-2022.toml")));
 
 impl Settings {
     /// Returns the settings of Chai 2022, section 5.1, with its vehicle at the nominal inertia.
@@ -89,14 +76,14 @@ impl Settings {
             limit_moment: scenario.limit_moment,
             ..Self::default()
         };
-        data::set(&mut settings, FILE, &embedded().settings);
+        FILE.set("settings", &mut settings);
         settings
     }
 
     /// Returns the published settings with the gains that `examples/tune_dlmpc.rs` found.
     pub fn tuned() -> Self {
         let mut settings = Self::published();
-        data::set(&mut settings, FILE, &embedded().tuned);
+        FILE.set("tuned", &mut settings);
         settings
     }
 

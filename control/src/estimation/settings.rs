@@ -6,9 +6,8 @@ use ::settings::{Choice, Declared};
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 use std::sync::LazyLock;
-use toml::Table;
 use vehicle::axes::ANGLES;
-use vehicle::data;
+use vehicle::data::{self, Tables};
 use vehicle::kinematics::Kinematics;
 use vehicle::math::atan2;
 use vehicle::scenario::Scenario;
@@ -129,20 +128,13 @@ impl Gate {
     }
 }
 
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct File {
-    settings: Table,
-}
-
-const FILE: &str = "estimator.toml";
+static FILE: LazyLock<Tables> =
+    LazyLock::new(|| Tables::new("estimator.toml", include_str!("../../data/estimator.toml")));
 
 impl Settings {
     /// Returns the settings of `data/estimator.toml`, for the start of Chai 2022 and sensors
     /// without errors in the field of the vehicle's data.
     pub fn ours() -> Self {
-        static READ: LazyLock<File> =
-            LazyLock::new(|| data::embedded(FILE, include_str!("../../data/estimator.toml")));
         let SensorData { surroundings, mems, .. } = SensorData::embedded();
         let field = surroundings.field;
         let mut settings = Self {
@@ -151,7 +143,7 @@ impl Settings {
             gates: PerSensor(mems.map(|triad| Gate { range: triad.range, jump: 0.0 })),
             ..Self::default()
         };
-        data::set(&mut settings, FILE, &READ.settings);
+        FILE.set("settings", &mut settings);
         settings
     }
 }

@@ -124,8 +124,8 @@ impl Guidance {
     /// # Errors
     /// Names the setting that is out of range.
     pub fn new(settings: Settings) -> Result<Self, DesignError> {
-        settings.check()?;
-        Ok(Self { settings, predictor: Predictor::new() })
+        ::settings::check(&settings)?;
+        Ok(Self { settings, predictor: Predictor::default() })
     }
 
     /// Returns the settings.

@@ -57,9 +57,9 @@ pub struct End {
     pub loads: Loads,
 }
 
-impl Predictor {
-    /// Makes a predictor for the vehicle of the papers in the standard atmosphere.
-    pub fn new() -> Self {
+impl Default for Predictor {
+    /// Returns the predictor for the vehicle of the papers in the standard atmosphere.
+    fn default() -> Self {
         let aerodynamics = Aerodynamics::papers();
         Self {
             area_per_mass: aerodynamics.area() / aerodynamics.mass(),
@@ -67,7 +67,9 @@ impl Predictor {
             density: std::array::from_fn(|i| ln(air_anywhere(i as f64 * SPACING).density)),
         }
     }
+}
 
+impl Predictor {
     /// Returns the density of the standard atmosphere (kg/m³) at an altitude (m), within 0.12 %, and
     /// the height over which it falls to 1/e there, m.
     pub(super) fn air(&self, altitude: f64) -> [f64; 2] {
@@ -199,19 +201,13 @@ impl Predictor {
     }
 }
 
-impl Default for Predictor {
-    fn default() -> Self {
-        Self::new()
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
     fn oracle_the_density_is_that_of_the_standard_atmosphere() {
-        let predictor = Predictor::new();
+        let predictor = Predictor::default();
         for metres in (0..140_000).step_by(70) {
             let altitude = f64::from(metres);
             let ratio = predictor.air(altitude)[0] / air_anywhere(altitude).density;

@@ -6,8 +6,7 @@ use crate::error::DesignError;
 use ::settings::{Declared, check};
 use serde::{Deserialize, Serialize};
 use std::sync::LazyLock;
-use toml::Table;
-use vehicle::data;
+use vehicle::data::Tables;
 use vehicle::translation::Planet;
 
 /// All settings of the guidance.
@@ -213,25 +212,14 @@ pub struct Sphere {
     pub rate: f64,
 }
 
-impl Sphere {
-    const EARTH: Self = {
-        let Planet { radius, gravitation, rate, .. } = Planet::EARTH;
-        Self { radius, gravitation, rate }
-    };
-}
-
-const FILE: &str = "guidance.toml";
-
-#[derive(Deserialize)]
-struct File {
-    settings: Table,
-}
+static FILE: LazyLock<Tables> =
+    LazyLock::new(|| Tables::new("guidance.toml", include_str!("../../data/guidance.toml")));
 
 impl Default for Settings {
     /// Returns the settings of `data/guidance.toml`.
     fn default() -> Self {
         static READ: LazyLock<Settings> = LazyLock::new(|| {
-            let file: File = data::embedded(FILE, include_str!("../../data/guidance.toml"));
+            let Planet { radius, gravitation, rate, .. } = Planet::EARTH;
             let mut settings = Settings {
                 target: Target::default(),
                 initial: Initial::default(),
@@ -242,9 +230,9 @@ impl Default for Settings {
                 damping: Damping::default(),
                 limit: Limit::default(),
                 filter: Filter::default(),
-                planet: Sphere::EARTH,
+                planet: Sphere { radius, gravitation, rate },
             };
-            data::set(&mut settings, FILE, &file.settings);
+            FILE.set("settings", &mut settings);
             settings
         });
         *READ
@@ -259,7 +247,7 @@ impl Settings {
     pub fn check(&self) -> Result<(), DesignError> {
         check(self)?;
         let Target { altitude, speed, .. } = self.target;
-        let predictor = Predictor::new();
+        let predictor = Predictor::default();
         let floor = predictor.loads_at(altitude, speed, self.alpha.at(speed));
         // The heat flux is the largest long before.
         for (name, limit, floor) in [

@@ -4,8 +4,7 @@ use crate::sliding::{BoundaryLayer, FblSettings, Observer, SecondOrder, Surface}
 use serde::{Deserialize, Serialize};
 use settings::Declared;
 use std::sync::LazyLock;
-use toml::Table;
-use vehicle::data;
+use vehicle::data::Tables;
 use vehicle::dynamics::RigidBody;
 use vehicle::scenario::Scenario;
 
@@ -42,23 +41,8 @@ pub struct Settings<R> {
     pub observer: Option<Observer>,
 }
 
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct File {
-    feedback_linearisation: Table,
-    sliding_modes: Table,
-    boundary_layer: Table,
-    second_order: Table,
-    observer: Table,
-}
-
-const FILE: &str = "tvsmc-2015.toml";
-
-fn embedded() -> &'static File {
-    static READ: LazyLock<File> =
-        LazyLock::new(|| data::embedded(FILE, include_str!("../../data/tvsmc-2015.toml")));
-    &READ
-}
+static FILE: LazyLock<Tables> =
+    LazyLock::new(|| Tables::new("tvsmc-2015.toml", include_str!("../../data/tvsmc-2015.toml")));
 
 fn body() -> RigidBody {
     // This cannot fail, as the tests that use it show: the scenario is embedded.
@@ -69,40 +53,43 @@ impl FblSettings {
     /// Returns the settings of Wu 2015, section 6, with its vehicle at the nominal inertia.
     pub fn published() -> Self {
         let mut settings = Self { body: body(), ..Self::default() };
-        data::set(&mut settings, FILE, &embedded().feedback_linearisation);
+        FILE.set("feedback_linearisation", &mut settings);
         settings
     }
 }
 
 impl<R: Declared + Default> Settings<R> {
-    fn published(reaching: &Table, observer: Option<&Table>) -> Self {
-        let read = |table| {
-            let mut observer = Observer::default();
-            data::set(&mut observer, FILE, table);
-            observer
-        };
-        let mut settings = Self { body: body(), observer: observer.map(read), ..Self::default() };
-        data::set(&mut settings, FILE, &embedded().sliding_modes);
-        data::set(&mut settings, FILE, reaching);
+    /// Returns the published settings of the law with this table of its reaching law.
+    fn published(reaching: &str) -> Self {
+        let mut settings = Self { body: body(), ..Self::default() };
+        FILE.set("sliding_modes", &mut settings);
+        FILE.set(reaching, &mut settings);
         settings
+    }
+
+    /// Returns the settings with the published observer.
+    fn with_observer(self) -> Self {
+        let mut observer = Observer::default();
+        FILE.set("observer", &mut observer);
+        Self { observer: Some(observer), ..self }
     }
 }
 
 impl Settings<BoundaryLayer> {
     /// Returns the settings of BTVSMC in Wu 2015, Table 1.
     pub fn btvsmc() -> Self {
-        Self::published(&embedded().boundary_layer, None)
+        Self::published("boundary_layer")
     }
 
     /// Returns the settings of BTVSMC/DO in Wu 2015, Table 1.
     pub fn btvsmc_do() -> Self {
-        Self::published(&embedded().boundary_layer, Some(&embedded().observer))
+        Self::btvsmc().with_observer()
     }
 }
 
 impl Settings<SecondOrder> {
     /// Returns the settings of SOTVSMC/DO in Wu 2015, Table 1.
     pub fn sotvsmc_do() -> Self {
-        Self::published(&embedded().second_order, Some(&embedded().observer))
+        Self::published("second_order").with_observer()
     }
 }

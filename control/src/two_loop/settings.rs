@@ -6,9 +6,8 @@ use ::settings::{Choice, Declared};
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 use std::sync::LazyLock;
-use toml::Table;
 use vehicle::axes::{NUMBERED_ANGLES, NUMBERED_AXES, NUMBERED_RATES};
-use vehicle::data;
+use vehicle::data::Tables;
 use vehicle::dynamics::RigidBody;
 use vehicle::kinematics;
 use vehicle::math::sin_cos;
@@ -104,24 +103,18 @@ pub struct TwoLoopSettings {
     pub kinematics: OuterKinematics,
 }
 
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct File {
-    settings: Table,
-}
-
-const FILE: &str = "two-loop-smc.toml";
+static FILE: LazyLock<Tables> = LazyLock::new(|| {
+    Tables::new("two-loop-smc.toml", include_str!("../../data/two-loop-smc.toml"))
+});
 
 impl TwoLoopSettings {
     /// Returns our gains for the scenario of section V; the paper prints none.
     #[allow(clippy::missing_panics_doc)]
     pub fn ours() -> Self {
-        static READ: LazyLock<File> =
-            LazyLock::new(|| data::embedded(FILE, include_str!("../../data/two-loop-smc.toml")));
         // This cannot fail, as the tests that use it show: the scenario is embedded.
         let body = Scenario::two_loop().inertia.body(1.0).unwrap_or_else(|error| panic!("{error}"));
         let mut settings = Self { body, ..Self::default() };
-        data::set(&mut settings, FILE, &READ.settings);
+        FILE.set("settings", &mut settings);
         settings
     }
 
