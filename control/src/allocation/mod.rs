@@ -187,9 +187,7 @@ impl Allocator {
             // they return to zero.
             let mut target = Surfaces::zeros();
             if dynamic_pressure >= self.settings.threshold {
-                let (middle, half) = middle_and_half(&low, &high);
-                let (optimum, iterations) =
-                    self.without_jets.solve(&moment, &matrix, &middle, &half);
+                let (optimum, iterations) = self.without_jets.solve(&moment, &matrix, &low, &high);
                 (target, first) = (optimum.map_or(before, |(surfaces, _)| surfaces), iterations);
             }
             low = clamp(&target, &low, &high);
@@ -203,8 +201,7 @@ impl Allocator {
             // No moment is left for the jets.
             (Some((low, Jets::zeros())), 0)
         } else {
-            let (middle, half) = middle_and_half(&low, &high);
-            self.problem.solve(&moment, &matrix, &middle, &half)
+            self.problem.solve(&moment, &matrix, &low, &high)
         };
         let (surfaces, duty) = optimum.unwrap_or((before, memory.duty));
         memory.surfaces = clamp(&surfaces, &low, &high);
@@ -237,11 +234,6 @@ fn scarcity(jets: &JetMatrix) -> Vector3<f64> {
         f64::min(up, down)
     });
     authority.map(|moment| if moment > 0.0 { authority.max() / moment } else { 1.0 })
-}
-
-/// Returns the middle of an interval and half its width.
-fn middle_and_half(low: &Surfaces, high: &Surfaces) -> (Surfaces, Surfaces) {
-    ((low + high) / 2.0, (high - low) / 2.0)
 }
 
 fn clamp(values: &Surfaces, low: &Surfaces, high: &Surfaces) -> Surfaces {

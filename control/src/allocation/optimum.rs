@@ -4,7 +4,7 @@
 //! δ_RCS = u. The range of a surface within its limits of position and rate is middle ± half. A
 //! surface that may not move has half = 0, so that the program always has an interior.
 
-use crate::conic_program::{ConicProgram, Triplets};
+use crate::conic_program::{ConicProgram, Optimum, Triplets};
 use clarabel::solver::SupportedConeT::{NonnegativeConeT, SecondOrderConeT};
 use nalgebra::{SMatrix, Vector3};
 use vehicle::effectors::{JETS, Jets, SURFACES, Surfaces};
@@ -86,14 +86,15 @@ impl OptimalAllocation {
     }
 
     /// Returns the optimum for `moment` (N m), if it is found, and the number of iterations.
-    /// `matrix` is D_A in N m/rad.
+    /// `matrix` is D_A in N m/rad; the deflections are within `low` and `high`, rad.
     pub(super) fn solve(
         &mut self,
         moment: &Vector3<f64>,
         matrix: &SurfaceMatrix,
-        middle: &Surfaces,
-        half: &Surfaces,
+        low: &Surfaces,
+        high: &Surfaces,
     ) -> (Option<(Surfaces, Jets)>, u32) {
+        let (middle, half) = ((low + high) / 2.0, (high - low) / 2.0);
         let rest = moment - matrix * middle;
         let weight = self.weights.moment / MOMENT_SCALE;
         for (j, slots) in self.surface_slots.iter().enumerate() {
@@ -108,10 +109,9 @@ impl OptimalAllocation {
             self.program.right_side[BOX_ROWS + 1 + i] = weight[i] * rest[i];
         }
         let (solution, iterations) = self.program.solve();
-        let solution = solution.map(|optimum| optimum.x);
-        let optimum = solution.map(|solution| {
-            let x = Surfaces::from_column_slice(&solution[1..=SURFACES]);
-            let u = Jets::from_column_slice(&solution[1 + SURFACES..]);
+        let optimum = solution.map(|Optimum { x, .. }| {
+            let (x, u) = x[1..].split_at(SURFACES);
+            let (x, u) = (Surfaces::from_column_slice(x), Jets::from_column_slice(u));
             (middle + half.component_mul(&x), u)
         });
         (optimum, iterations)
