@@ -91,19 +91,9 @@ impl Predictor {
         Ok(Self { body, delay, period, count: ticks(delay, period) })
     }
 
-    /// Returns the time from a measurement to the resulting moment, s.
-    pub fn delay(&self) -> f64 {
-        self.delay
-    }
-
-    /// Returns the number of commands that determine the motion over the delay.
-    pub fn count(&self) -> usize {
-        self.count
-    }
-
-    /// Returns the state after the delay. `under_way` ends with the last [`Predictor::count`]
-    /// moments that were commanded before this tick, oldest first, N m. Before the first of them
-    /// only the known moment acts. The achieved moment is passed on unchanged.
+    /// Returns the state after the delay. `under_way` ends with the moments that were commanded
+    /// before this tick and act within the delay, oldest first, N m. Before the first of them only
+    /// the known moment acts. The achieved moment is passed on unchanged.
     pub fn predict(&self, under_way: &[Vector3<f64>], measured: &Measurement) -> Measurement {
         let mut state = plant::state(&measured.angles, &measured.rates);
         for age in (1..=self.count).rev() {

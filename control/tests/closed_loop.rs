@@ -204,7 +204,7 @@ fn oracle_deviation_from_the_nominal_motion_obeys_the_error_dynamics() {
         let chosen = Settings { feedback: design.feedback, ..settings(constraints) };
         let Settings { feedback, disturbance_bound: bound, period_feedback, delay, .. } = chosen;
         let error = SampledError::delayed(feedback, period_feedback, delay);
-        let reach = error.reach_forever().unwrap();
+        let reach = error.reach(error.settling().unwrap()).pop().unwrap();
         let deviations =
             |disturbance| around_the_nominal_trajectory(constraints, 1.0, disturbance).1;
         let largest = |deviations: &[Vector6<f64>], components: [usize; 3]| {

@@ -1,6 +1,6 @@
 //! A set of deviations that the error dynamics never leave.
 
-use super::{Gain, Reach, SampledError, transition};
+use super::{Reach, SampledError, transition};
 use nalgebra::{Matrix2, Vector2};
 
 /// Number of impulse responses that an invariant set holds one by one; the remaining ones are
@@ -14,9 +14,7 @@ pub(super) const EXPLICIT: usize = 30;
 #[derive(Clone, Debug, PartialEq)]
 pub struct InvariantSet {
     generators: Vec<Vector2<f64>>,
-    gain: Gain,
-    latency: f64,
-    to_middle: Matrix2<f64>,
+    dynamics: SampledError,
 }
 
 impl InvariantSet {
@@ -35,15 +33,16 @@ impl InvariantSet {
     /// command is under way.
     pub fn reach(&self) -> Reach {
         let (angle, rate) = (self.support(&Vector2::x()), self.support(&Vector2::y()));
-        let middle = |i: usize| self.support(&self.to_middle.row(i).transpose());
+        let SampledError { gain, latency, to_middle, .. } = &self.dynamics;
+        let middle = |i: usize| self.support(&to_middle.row(i).transpose());
         Reach {
-            angle: angle + 0.5 * self.latency * self.latency,
-            rate: rate + self.latency,
+            angle: angle + 0.5 * latency * latency,
+            rate: rate + latency,
             seen_angle: angle,
             seen_rate: rate,
             middle_angle: middle(0),
             middle_rate: middle(1),
-            feedback: self.support(&self.gain.row().transpose()),
+            feedback: self.support(&gain.row().transpose()),
             // These fields are not used.
             feedback_age: 0.0,
             change: 0.0,
@@ -75,7 +74,6 @@ impl SampledError {
                 vectors[i] * ((rest[i].abs() + shift[i].abs()) / (1.0 - eigenvalues[i].abs())),
             );
         }
-        let Self { gain, latency, to_middle, .. } = *self;
-        Some(InvariantSet { generators, gain, latency, to_middle })
+        Some(InvariantSet { generators, dynamics: *self })
     }
 }

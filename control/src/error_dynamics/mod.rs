@@ -130,11 +130,6 @@ impl SampledError {
     pub fn transition(&self) -> &Matrix2<f64> {
         &self.phi
     }
-
-    /// Returns the deviation after one period: o⁺ = Φ o + Γ Δ.
-    pub fn advance(&self, deviation: &Vector2<f64>, disturbance: f64) -> Vector2<f64> {
-        self.phi * deviation + self.gamma * disturbance
-    }
 }
 
 #[cfg(test)]

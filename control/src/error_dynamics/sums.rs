@@ -93,12 +93,6 @@ impl SampledError {
         reaches
     }
 
-    /// Returns the limit of [`Self::reach`] for infinitely many periods; `None` if the dynamics are
-    /// not stable.
-    pub fn reach_forever(&self) -> Option<Reach> {
-        self.reach(self.settling()?).pop()
-    }
-
     /// Returns the largest effect of errors of the measured angle and of the measured rate within
     /// 0, 1, …, `steps` periods, per unit of their bound. The errors may take any value within the
     /// bound at every tick. The nominal trajectory begins at the measured state.

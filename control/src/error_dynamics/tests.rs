@@ -3,6 +3,11 @@
 use super::invariant_set::EXPLICIT;
 use super::*;
 
+/// Returns the limit of [`SampledError::reach`] for infinitely many periods.
+fn forever(error: &SampledError) -> Reach {
+    error.reach(error.settling().unwrap()).pop().unwrap()
+}
+
 #[test]
 fn oracle_no_step_leads_out_of_the_invariant_set() {
     // Condition on the support function h: h(Φᵀn) + |nᵀΓ| ≤ h(n) for every facet of the set.
@@ -21,7 +26,7 @@ fn oracle_no_step_leads_out_of_the_invariant_set() {
         // Without shifts the set is that of held disturbances, which reach no further than
         // disturbances that change at any time.
         let (set, held) = (set.reach(), error.invariant_set(0.0).unwrap().reach());
-        let reach = error.reach_forever().unwrap();
+        let reach = forever(&error);
         for (outer, held, exact) in [
             (set.angle, held.angle, reach.angle),
             (set.rate, held.rate, reach.rate),
@@ -203,7 +208,7 @@ fn oracle_changes_and_mispredictions_add_up_as_in_a_simulation() {
 fn oracle_a_held_disturbance_reaches_as_far_as_one_that_changes_within_the_period() {
     // Here the response does not change its sign within a period. (26) is for constant
     // disturbances.
-    let reach = SampledError::new(Gain { k1: -5.0, k2: -5.0 }, 0.04).reach_forever().unwrap();
+    let reach = forever(&SampledError::new(Gain { k1: -5.0, k2: -5.0 }, 0.04));
     assert!(
         (reach.angle - 0.2).abs() < 1e-4 && (reach.feedback - 1.2473).abs() < 1e-4,
         "{reach:?}"
@@ -216,6 +221,6 @@ fn the_papers_box_is_not_invariant() {
     // leaves the box within one tick.
     let error = SampledError::new(Gain { k1: -5.0, k2: -5.0 }, 0.04);
     let (angle, rate) = (0.2, 0.1525);
-    let next = error.advance(&Vector2::new(angle, rate), 1.0);
+    let next = error.phi * Vector2::new(angle, rate) + error.gamma;
     assert!(next.x > angle);
 }

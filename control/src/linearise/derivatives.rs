@@ -27,18 +27,8 @@ pub struct Linearisation {
     pub moment: Linear,
 }
 
-/// Returns ω and m with their derivatives at (Θ, x_ω, a).
-pub fn linearise(
-    body: &RigidBody,
-    angles: &Vector3<f64>,
-    angle_rates: &Vector3<f64>,
-    acceleration: &Vector3<f64>,
-) -> Linearisation {
-    InverseKinematics::at(angles).linearise(body, angle_rates, acceleration)
-}
-
 impl InverseKinematics {
-    /// Returns ω and m with their derivatives, as [`linearise`] does.
+    /// Returns ω and m with their derivatives at (Θ, x_ω, a).
     pub fn linearise(&self, body: &RigidBody, x: &Vector3<f64>, a: &Vector3<f64>) -> Linearisation {
         let (rates, rates_by_angles) = self.body_rates(x);
         let omega_dot = self.acceleration(x, a, &rates_by_angles);

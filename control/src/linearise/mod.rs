@@ -13,7 +13,7 @@ mod bounds;
 mod derivatives;
 
 pub use bounds::{MomentSlopeBounds, TURN_BY_ANGLES, input_bound};
-pub use derivatives::{Linear, Linearisation, linearise};
+pub use derivatives::{Linear, Linearisation};
 
 use nalgebra::{Matrix3, Vector3};
 use vehicle::dynamics::RigidBody;
@@ -114,7 +114,7 @@ impl InverseKinematics {
         }
     }
 
-    /// Returns the input u = R I⁻¹ m, as [`input`] does.
+    /// Returns the input u = R I⁻¹ m = a − f of Chai 2022 (4), rad/s².
     pub fn input(
         &self,
         body: &RigidBody,
@@ -182,16 +182,6 @@ pub fn moment(
     acceleration: &Vector3<f64>,
 ) -> Vector3<f64> {
     InverseKinematics::at(angles).moment(body, angle_rates, acceleration)
-}
-
-/// Returns the input u = R I⁻¹ m = a − f of Chai 2022 (4), rad/s².
-pub fn input(
-    body: &RigidBody,
-    angles: &Vector3<f64>,
-    angle_rates: &Vector3<f64>,
-    acceleration: &Vector3<f64>,
-) -> Vector3<f64> {
-    InverseKinematics::at(angles).input(body, angle_rates, acceleration)
 }
 
 #[cfg(test)]

@@ -16,7 +16,7 @@ fn oracle_moment_is_that_of_the_printed_equations() {
     let angles = Vector3::new(0.17, 0.12, -0.5);
     let (x, a) = (Vector3::new(0.05, -0.06, 0.04), Vector3::new(0.1, -0.08, 0.05));
     let u = a - body.drift(&angles, &x);
-    assert!((input(&body, &angles, &x, &a) - u).norm() < 1e-13 * u.norm());
+    assert!((InverseKinematics::at(&angles).input(&body, &x, &a) - u).norm() < 1e-13 * u.norm());
     let printed = body.inertia * kin::r_inverse(&angles) * (a - body.drift(&angles, &x));
     let ours = moment(&body, &angles, &x, &a);
     assert!((ours - printed).norm() < 1e-13 * printed.norm(), "{ours} {printed}");
@@ -44,10 +44,10 @@ fn oracle_slopes_of_the_moment_and_the_input_stay_within_their_bounds() {
         let angles = Vector3::new(3.1 * at(i, 0), 1.5 * at(i, 1), 0.0);
         let x = Vector3::new(at(i, 2), at(i, 3), at(i, 4)) * 10.0_f64.powf(2.0 * at(i, 5) - 1.0);
         let a = Vector3::new(at(i, 4), at(i, 2), at(i, 6)) * 10.0_f64.powf(2.0 * at(i, 6) - 1.0);
-        let exact = linearise(&body, &angles, &x, &a);
+        let exact = InverseKinematics::at(&angles).linearise(&body, &x, &a);
         let ratio = inertia.max() / inertia.min();
         let bounds = MomentSlopeBounds::new(x.norm(), a.norm(), ratio);
-        let u = input(&body, &angles, &x, &a).norm();
+        let u = InverseKinematics::at(&angles).input(&body, &x, &a).norm();
         let input_bound = input_bound(angles.y, x.norm(), a.norm(), ratio);
         let shares = [
             exact.moment.by_angles.norm() / (inertia.max() * bounds.by_angles),
@@ -78,11 +78,11 @@ fn oracle_derivatives_agree_with_central_differences() {
         [
             body_rates(&angles, &rates),
             moment(&body, &angles, &rates, &a),
-            input(&body, &angles, &rates, &a),
+            InverseKinematics::at(&angles).input(&body, &rates, &a),
         ]
     };
     let (angles, rates, a) = split(&point);
-    let exact = linearise(&body, &angles, &rates, &a);
+    let exact = InverseKinematics::at(&angles).linearise(&body, &rates, &a);
     let exact_input = InverseKinematics::at(&angles).input_of_moment(&body, &exact.moment);
     for (y, linear) in [exact.rates, exact.moment, exact_input].iter().enumerate() {
         assert!((linear.value - quantities(&point)[y]).norm() <= 1e-12 * linear.value.norm());

@@ -3,8 +3,13 @@
 use super::{assert_digits, gain, settings};
 use control::DesignError;
 use control::crmpc::{Design, Published, Settings, step_response_peak};
-use control::error_dynamics::{Gain, SampledError};
+use control::error_dynamics::{Gain, Reach, SampledError};
 use nalgebra::Vector2;
+
+/// Returns the limit of [`SampledError::reach`] for infinitely many periods.
+fn forever(error: &SampledError) -> Reach {
+    error.reach(error.settling().unwrap()).pop().unwrap()
+}
 
 /// Deviation of one axis simulated without the code under test: ö = K o + Δ with K o held over each
 /// period of `parts.len()` equal parts, and Δ given for each part.
@@ -59,7 +64,7 @@ fn oracle_sampled_bounds() {
             }
             impulse.advance(&[0.0]);
         }
-        let reach = SampledError::new(gain(k), period).reach_forever().unwrap();
+        let reach = forever(&SampledError::new(gain(k), period));
         for (i, value) in [reach.angle, reach.rate, reach.feedback].into_iter().enumerate() {
             assert_digits(held[i], expected[i], 4);
             assert!(
@@ -145,13 +150,13 @@ fn oracle_constant_disturbance_reaches_the_peak_of_the_step_response_only() {
     assert_digits(peak(-1.0), c, 4);
     assert_digits(peak(1.0) / 2.0, c, 4);
     // It cannot exceed that, as the exact bound tends to 2 c̄ with the period.
-    let reach = SampledError::new(gain(-10.0), 1e-4).reach_forever().unwrap();
+    let reach = forever(&SampledError::new(gain(-10.0), 1e-4));
     assert!((reach.rate / (2.0 * step_response_peak(gain(-10.0)).unwrap()) - 1.0).abs() < 1e-3);
 }
 
 mod properties {
     use super::{PUBLISHED_CASES, Simulation, gain};
-    use control::error_dynamics::SampledError;
+    use control::error_dynamics::{SampledError, response};
     use nalgebra::Vector2;
     use proptest::prelude::*;
 
@@ -182,7 +187,8 @@ mod properties {
         ) {
             let gain = control::error_dynamics::Gain { k1, k2 };
             let mut simulation = Simulation { gain, period, deviation: Vector2::new(angle, rate) };
-            let ours = SampledError::new(gain, period).advance(&simulation.deviation, disturbance);
+            let transition = *SampledError::new(gain, period).transition();
+            let ours = transition * simulation.deviation + response(period) * disturbance;
             simulation.advance(&[disturbance; 7]);
             prop_assert!((ours - simulation.deviation).norm() < 1e-12);
         }
@@ -219,7 +225,7 @@ fn oracle_invariant_set_holds_what_can_be_reached_and_is_less_than_half_larger()
     for ((k, period, _), delay) in cases {
         let error = SampledError::delayed(gain(k), period, delay);
         let set = error.invariant_set(0.25 * period * period).unwrap().reach();
-        let least = error.reach_forever().unwrap();
+        let least = forever(&error);
         let pairs =
             [(set.angle, least.angle), (set.rate, least.rate), (set.feedback, least.feedback)];
         for (of_set, least) in pairs {

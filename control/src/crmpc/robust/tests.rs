@@ -193,7 +193,7 @@ fn needs(robust: &Robust, stage: &Stage, samples: usize, random: &mut Random) ->
         let (now, then) = (tightening.at(robust.age + tick), tightening.at(robust.age + tick + 1));
         let begin = tick as f64 * tau;
         let (angles, rates) = stage.at(begin + 0.5 * tau);
-        let at = linearise::linearise(&body, &angles, &rates, &a).moment;
+        let at = InverseKinematics::at(&angles).linearise(&body, &rates, &a).moment;
         let (angle, rate, x) = (now.middle_angle, now.middle_rate, rates.norm());
         let turned = now.feedback * largest_inertia * (2.0_f64 * 3.0).sqrt() * angle;
         let bearing = now.feedback * super::super::robust::largest_over_box(&at.by_acceleration);
