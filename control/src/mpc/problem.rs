@@ -114,6 +114,11 @@ impl<const O: usize> Cost<O> {
     }
 }
 
+/// Returns the sum of two states.
+pub(super) fn add<const O: usize>(a: &State<O>, b: &State<O>) -> State<O> {
+    std::array::from_fn(|i| a[i] + b[i])
+}
+
 /// Returns the scalar product of two states over all components.
 pub(super) fn dot<const O: usize>(a: &State<O>, b: &State<O>) -> f64 {
     a.iter().zip(b).map(|(a, b)| a.dot(b)).sum()
@@ -208,11 +213,18 @@ impl<const O: usize> ErrorTrajectory<O> {
         states.map(|(a, b)| (a - b).amax()).fold(0.0, f64::max)
     }
 
+    /// Replaces the first `count` inputs by those that lead the last derivative through the states.
+    pub(super) fn set_inputs(&mut self, count: usize, chain: &Chain<O>, affine: &[State<O>]) {
+        for k in 0..count {
+            let moved = self.states[k + 1][O - 1] - self.states[k][O - 1] - affine[k][O - 1];
+            self.inputs[k] = moved / chain.step;
+        }
+    }
+
     /// Replaces the states by those that the inputs produce from the first state.
     pub fn roll_out(&mut self, chain: &Chain<O>, affine: &[State<O>]) {
         for (k, (v, d)) in self.inputs.iter().zip(affine).enumerate() {
-            let next = chain.advance(&self.states[k], v);
-            self.states[k + 1] = std::array::from_fn(|i| next[i] + d[i]);
+            self.states[k + 1] = add(&chain.advance(&self.states[k], v), d);
         }
     }
 }

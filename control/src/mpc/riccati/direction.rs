@@ -3,10 +3,9 @@
 use super::iterate::Riccati;
 use super::pair::Pair;
 use super::residuals::{GAP, Residuals};
-use super::stage::add;
 use super::sweep::minimiser;
 use crate::mpc::constraints::Constraints;
-use crate::mpc::problem::{Problem, Start, dot, zero_state};
+use crate::mpc::problem::{Problem, Start, add, dot, zero_state};
 use nalgebra::Vector3;
 use vehicle::math::powi;
 
@@ -103,21 +102,15 @@ impl<const O: usize> Riccati<O> {
             stage.d_state = change;
             if stage.state_pair.watched {
                 let constraint = &stage.constraints.state;
-                let y = constraint
-                    .by_state
-                    .iter()
-                    .zip(&change)
-                    .fold(Vector3::zeros(), |sum, (by, e)| sum + by * e);
-                stage.state_pair.set_direction(constraint.value.dot(&y), 0.5 * y.norm_squared());
+                let y = constraint.change(&change, &Vector3::zeros());
+                stage.state_pair.follow(&constraint.value, &y);
             }
             if k < last {
                 stage.d_input = stage.gain.input(&change, &stage.feedforward);
                 if stage.input_pair.watched {
                     let constraint = &stage.constraints.input;
                     let y = constraint.change(&change, &stage.d_input);
-                    stage
-                        .input_pair
-                        .set_direction(constraint.value.dot(&y), 0.5 * y.norm_squared());
+                    stage.input_pair.follow(&constraint.value, &y);
                 }
                 change = problem.chain.advance(&change, &stage.d_input);
             }

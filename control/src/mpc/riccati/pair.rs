@@ -70,6 +70,11 @@ impl Pair {
             (self.target - self.multiplier * self.d_slack) / self.slack - self.multiplier;
     }
 
+    /// Computes the direction of a norm constraint, along which y changes by `change`.
+    pub(super) fn follow(&mut self, y: &Vector3<f64>, change: &Vector3<f64>) {
+        self.set_direction(y.dot(change), 0.5 * change.norm_squared());
+    }
+
     /// Returns the longest step that keeps s and λ positive.
     pub(super) fn longest(&self) -> f64 {
         let until =

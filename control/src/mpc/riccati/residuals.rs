@@ -2,9 +2,8 @@
 
 use super::iterate::Riccati;
 use super::pair::Pair;
-use super::stage::add;
 use crate::mpc::constraints::Constraints;
-use crate::mpc::problem::{Chain, Problem, Start, State, apply, dot, zero_state};
+use crate::mpc::problem::{Chain, Problem, Start, State, add, apply, dot, zero_state};
 use nalgebra::Vector3;
 
 /// Relative residuals below which a trajectory counts as the optimum.

@@ -95,8 +95,3 @@ impl<const O: usize> Stage<O> {
         (by_state, by_input)
     }
 }
-
-/// Returns the sum of two states.
-pub(super) fn add<const O: usize>(a: &State<O>, b: &State<O>) -> State<O> {
-    std::array::from_fn(|i| a[i] + b[i])
-}
