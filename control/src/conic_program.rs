@@ -17,6 +17,18 @@ impl Triplets {
         self.entries.len() - 1
     }
 
+    /// Removes all entries, and keeps their memory.
+    pub(crate) fn clear(&mut self) {
+        self.entries.clear();
+    }
+
+    /// Writes the values of the entries to their `position` among `values`.
+    pub(crate) fn write(&self, position: &[usize], values: &mut [f64]) {
+        for (&(.., value), &place) in self.entries.iter().zip(position) {
+            values[place] = value;
+        }
+    }
+
     /// Returns the matrix, and for each pushed entry its position among the values.
     pub(crate) fn compress(&self, rows: usize, columns: usize) -> (CscMatrix<f64>, Vec<usize>) {
         let mut order: Vec<usize> = (0..self.entries.len()).collect();

@@ -38,8 +38,7 @@ impl Budget {
 
     /// Returns a budget without limits.
     pub fn unlimited() -> Self {
-        let begin = Instant::now();
-        Self { begin, deadline: None, last: begin, iterations: u32::MAX, exhausted: false }
+        Self::begin(&SolverSettings::default())
     }
 
     /// Takes one iteration. Returns `false` if none is left, or if the time is too short for
@@ -78,15 +77,12 @@ impl Budget {
     /// solver ended.
     pub fn spend(&mut self, iterations: u32) {
         self.iterations = self.iterations.saturating_sub(iterations);
-        self.exhausted |= self.iterations == 0 || self.is_late();
+        let is_late = self.deadline.is_some_and(|deadline| Instant::now() >= deadline);
+        self.exhausted |= self.iterations == 0 || is_late;
     }
 
     /// Returns whether the optimisation needed more than the budget allowed.
     pub fn is_exhausted(&self) -> bool {
         self.exhausted
-    }
-
-    fn is_late(&self) -> bool {
-        self.deadline.is_some_and(|deadline| Instant::now() >= deadline)
     }
 }

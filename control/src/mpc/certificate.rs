@@ -60,8 +60,9 @@ impl Certificate {
             let state = &trajectory.states[k];
             let input = trajectory.inputs.get(k).copied().unwrap_or_default();
             // A stage without multipliers contributes only its norms.
-            let by_input = multipliers.input.get(k).copied().unwrap_or_default();
-            let by_state = if k > 0 && constrains_states { multipliers.state[k - 1] } else { 0.0 };
+            let by_input = multipliers.intervals.get(k).map_or(0.0, |[_, input]| *input);
+            let by_state =
+                if k > 0 && constrains_states { multipliers.intervals[k - 1][0] } else { 0.0 };
             let idle = by_input == 0.0 && by_state == 0.0;
             let (stage, squares) = if idle && checked {
                 (StageConstraints::default(), (0.0, 0.0))

@@ -6,7 +6,7 @@
 
 use super::constraints::{LinearisedConstraints, StageConstraints};
 use super::layout::Layout;
-use super::problem::{Outcome, Problem, Solution, Start, of_axis};
+use super::problem::{Outcome, Problem, Solution, Start, State, of_axis, zero_state};
 use crate::conic_program::{ConicProgram, Optimum, Triplets};
 use clarabel::algebra::CscMatrix;
 use clarabel::solver::SupportedConeT::{self, NonnegativeConeT, SecondOrderConeT, ZeroConeT};
@@ -17,20 +17,20 @@ pub struct ConicSolver<const O: usize> {
     layout: Layout<O>,
     max_iterations: u32,
     program: ConicProgram,
-    /// Positions of the coefficients of each stage's norm constraint in the matrix, and of its rows
-    /// in the right side.
-    state_slots: Vec<Slots<O>>,
-    input_slots: Vec<Slots<O>>,
-    start_row: usize,
-    terminal_row: Option<usize>,
+    rows: Rows,
+    /// Position of each entry of the rows among the values of the program's matrix.
+    position: Vec<usize>,
+    /// First row of the norm constraints, four for each: those on states, then those on inputs.
+    first_norm: usize,
 }
 
-struct Slots<const O: usize> {
-    row: usize,
-    /// Positions of the block on E_k of the stage to which the norm constraint belongs.
-    state: [[[usize; 3]; O]; 3],
-    /// Positions of the block on the last derivative of E_{k+1} (input constraints).
-    next: Option<[[usize; 3]; 3]>,
+/// The rows A x + s = b of a problem with their cones. Problems of one layout have the same entries
+/// with other values.
+#[derive(Default)]
+struct Rows {
+    a: Triplets,
+    b: Vec<f64>,
+    cones: Vec<SupportedConeT<f64>>,
 }
 
 impl<const O: usize> ConicSolver<O> {
@@ -40,100 +40,16 @@ impl<const O: usize> ConicSolver<O> {
     /// Returns the solver's message if it refuses the data, for example weights that are not
     /// positive semidefinite.
     pub fn new(layout: Layout<O>, max_iterations: u32) -> Result<Self, String> {
-        let Layout { horizon: n, scale, .. } = &layout;
-        let n = *n;
-        let top = O - 1;
-
-        let mut a = Triplets::default();
-        let mut cones: Vec<SupportedConeT<f64>> = Vec::new();
-        let mut row = add_chain(&layout, &mut a);
-        if row > 0 {
-            cones.push(ZeroConeT(row));
-        }
-        let start_row = row;
-        match &layout.start {
-            None => {
-                for i in 0..3 * O {
-                    a.push(row, i, 1.0);
-                    row += 1;
-                }
-                cones.push(ZeroConeT(3 * O));
-            }
-            Some(normals) => {
-                // Faces of the initial set: ±nᵀ(E_given − E_0) ≤ 1.
-                for (axis, normals) in normals.iter().enumerate() {
-                    for (normal, sign) in
-                        normals.iter().flat_map(|normal| [(normal, 1.0), (normal, -1.0)])
-                    {
-                        for i in 0..O {
-                            a.push(row, column::<O>(0, i, axis), -sign * normal[i] * scale[i]);
-                        }
-                        row += 1;
-                    }
-                }
-                cones.push(NonnegativeConeT(row - start_row));
-            }
-        }
-        let mut add_cone = |a: &mut Triplets, k: usize, next: bool| {
-            let mut block = |k: usize, i: usize, component: usize| {
-                std::array::from_fn(|axis| {
-                    a.push(row + 1 + component, column::<O>(k, i, axis), 0.0)
-                })
-            };
-            let state =
-                std::array::from_fn(|component| std::array::from_fn(|i| block(k, i, component)));
-            let next = next.then(|| std::array::from_fn(|component| block(k + 1, top, component)));
-            let slots = Slots { row, state, next };
-            row += 4;
-            cones.push(SecondOrderConeT(4));
-            slots
-        };
-        let stages = if layout.constrains_states { n } else { 0 };
-        let mut state_slots: Vec<Slots<O>> =
-            (1..=stages).map(|k| add_cone(&mut a, k, false)).collect();
-        let mut input_slots: Vec<Slots<O>> = (0..n).map(|k| add_cone(&mut a, k, true)).collect();
-        let terminal_row = layout.terminal.then(|| {
-            // Terminal constraint ‖Lᵀ E_N‖ ≤ ε with G = L Lᵀ, divided by the scale.
-            for axis in 0..3 {
-                let root = square_root(&of_axis(&layout.cost.end, axis));
-                for i in 0..O {
-                    for j in 0..O {
-                        a.push(
-                            row + 1 + O * axis + i,
-                            column::<O>(n, j, axis),
-                            -root[(i, j)] * scale[j] / scale[0],
-                        );
-                    }
-                }
-            }
-            cones.push(SecondOrderConeT(1 + 3 * O));
-            row += 1 + 3 * O;
-            row - 1 - 3 * O
-        });
-
-        let (matrix, position) = a.compress(row, 3 * O * (n + 1));
-        for slots in state_slots.iter_mut().chain(&mut input_slots) {
-            let next = slots.next.iter_mut().flatten().flatten();
-            for i in slots.state.iter_mut().flatten().flatten().chain(next) {
-                *i = position[*i];
-            }
-        }
-        let mut right_side = vec![0.0; row];
-        // Strictly feasible placeholders give the solver finite data for its setup.
-        for slots in state_slots.iter().chain(&input_slots) {
-            right_side[slots.row] = 1.0;
-        }
-        let cost = cost_matrix(&layout);
-        let program = ConicProgram::new(cost, matrix, right_side, &cones, max_iterations)?;
-        Ok(Self {
-            layout,
-            max_iterations,
-            program,
-            state_slots,
-            input_slots,
-            start_row,
-            terminal_row,
-        })
+        let n = layout.horizon;
+        // A problem at rest gives the solver finite data for its setup.
+        let (affine, constraints) = (vec![zero_state(); n], LinearisedConstraints::new(n));
+        let at_rest = layout.problem(&zero_state(), &affine, &constraints, None);
+        let mut rows = Rows::default();
+        let first_norm = rows.set(&layout, &at_rest);
+        let (matrix, position) = rows.a.compress(rows.b.len(), 3 * O * (n + 1));
+        let (cost, right_side) = (cost_matrix(&layout), rows.b.clone());
+        let program = ConicProgram::new(cost, matrix, right_side, &rows.cones, max_iterations)?;
+        Ok(Self { layout, max_iterations, program, rows, position, first_norm })
     }
 
     /// Solves `problem` within the given number of iterations and time (s). The trajectory in
@@ -146,7 +62,7 @@ impl<const O: usize> ConicSolver<O> {
     ) -> Outcome {
         self.update(problem);
         self.program.limit(iterations.min(self.max_iterations), seconds);
-        let Layout { chain, scale, horizon: n, .. } = &self.layout;
+        let Layout { chain, scale, horizon: n, constrains_states, terminal, .. } = &self.layout;
         let (optimum, iterations) = self.program.solve();
         let Some(Optimum { x, duals }) = optimum else { return Outcome::Failed(iterations) };
         let Solution { trajectory, multipliers } = solution;
@@ -158,30 +74,28 @@ impl<const O: usize> ConicSolver<O> {
         if let Start::Fixed(given) = problem.start {
             trajectory.states[0] = given;
         }
-        for k in 0..*n {
-            let moved = trajectory.states[k + 1][O - 1]
-                - trajectory.states[k][O - 1]
-                - problem.affine[k][O - 1];
-            trajectory.inputs[k] = moved / chain.step;
-        }
+        trajectory.set_inputs(*n, chain, problem.affine);
         trajectory.roll_out(chain, problem.affine);
         // The dual of ‖y‖ ≤ 1 is the multiplier of ½(‖y‖² − 1) for the whole cost; the factor ½
         // converts it to half the cost.
         multipliers.clear();
-        for (multiplier, slots) in multipliers.state.iter_mut().zip(&self.state_slots) {
-            *multiplier = 0.5 * duals[slots.row];
+        let (start_duals, norm_duals) = duals.split_at(self.first_norm);
+        let stages = if *constrains_states { *n } else { 0 };
+        let mut norms = norm_duals.iter().step_by(4).map(|dual| 0.5 * dual);
+        for (interval, dual) in multipliers.intervals[..stages].iter_mut().zip(&mut norms) {
+            interval[0] = dual;
         }
-        for (multiplier, slots) in multipliers.input.iter_mut().zip(&self.input_slots) {
-            *multiplier = 0.5 * duals[slots.row];
+        for (interval, dual) in multipliers.intervals.iter_mut().zip(norms) {
+            interval[1] = dual;
         }
-        if let (Some(row), Some(radius)) = (self.terminal_row, problem.end.radius) {
-            multipliers.terminal = 0.5 * duals[row] * radius / scale[0];
+        if let (true, Some(radius)) = (*terminal, problem.end.radius) {
+            multipliers.terminal = 0.5 * norm_duals[4 * (stages + n)] * radius / scale[0];
         }
         if let Start::Within(given, normals) = &problem.start {
-            let mut row = self.start_row;
+            let mut pairs = start_duals[3 * (O - 1) * n..].chunks_exact(2);
             for (axis, normals) in normals.iter().enumerate() {
-                for normal in normals {
-                    let force = 0.5 * (duals[row] - duals[row + 1]);
+                for (normal, pair) in normals.iter().zip(&mut pairs) {
+                    let force = 0.5 * (pair[0] - pair[1]);
                     let deviation: f64 = (0..O)
                         .map(|i| normal[i] * (given[i][axis] - trajectory.states[0][i][axis]))
                         .sum();
@@ -189,92 +103,170 @@ impl<const O: usize> ConicSolver<O> {
                         multipliers.start[i][axis] -= normal[i] * force;
                     }
                     multipliers.start_gap += 0.5
-                        * (duals[row] * (deviation - 1.0).abs()
-                            + duals[row + 1] * (deviation + 1.0).abs());
-                    row += 2;
+                        * (pair[0] * (deviation - 1.0).abs() + pair[1] * (deviation + 1.0).abs());
                 }
             }
         }
         Outcome::Solved(iterations)
     }
 
+    /// Writes the problem into the program.
     fn update(&mut self, problem: &Problem<O, LinearisedConstraints<O>>) {
-        let Layout { chain, cost, scale, .. } = &self.layout;
-        let top = O - 1;
-        let h = chain.step;
-        self.program.linear_cost.fill(0.0);
+        let Self { layout, program, rows, position, .. } = self;
+        rows.set(layout, problem);
+        rows.a.write(position, &mut program.matrix);
+        program.right_side.copy_from_slice(&rows.b);
+        let Layout { chain, cost, scale, .. } = layout;
+        let (top, h) = (O - 1, chain.step);
+        program.linear_cost.fill(0.0);
         for (k, d) in problem.affine.iter().enumerate() {
             for axis in 0..3 {
                 // Part V/h² (E_{k+1} − E_k − d)² of the last derivative.
                 let slope = 2.0 * cost.input[axis] / (h * h) * d[top][axis] * scale[top];
-                self.program.linear_cost[3 * (O * k + top) + axis] += slope;
-                self.program.linear_cost[3 * (O * (k + 1) + top) + axis] -= slope;
-                for i in 0..top {
-                    self.program.right_side[3 * (top * k + i) + axis] =
-                        (d[i][axis] - chain.b[i] / h * d[top][axis]) / scale[i];
-                }
+                program.linear_cost[column::<O>(k, top, axis)] += slope;
+                program.linear_cost[column::<O>(k + 1, top, axis)] -= slope;
             }
-        }
-        match &problem.start {
-            Start::Fixed(given) => {
-                for i in 0..3 * O {
-                    self.program.right_side[self.start_row + i] =
-                        given[i / 3][i % 3] / scale[i / 3];
-                }
-            }
-            Start::Arrival(..) => {}
-            Start::Within(given, normals) => {
-                let mut row = self.start_row;
-                for (axis, normals) in normals.iter().enumerate() {
-                    for normal in normals {
-                        let at: f64 = (0..O).map(|i| normal[i] * given[i][axis]).sum();
-                        self.program.right_side[row] = 1.0 - at;
-                        self.program.right_side[row + 1] = 1.0 + at;
-                        row += 2;
-                    }
-                }
-            }
-        }
-        let stages = problem.constraints.stages();
-        for (slots, StageConstraints { state, .. }) in self.state_slots.iter().zip(&stages[1..]) {
-            write_constraint(&mut self.program, slots, &state.by_state, &state.value, scale);
-        }
-        for (k, (slots, StageConstraints { input, .. })) in
-            self.input_slots.iter().zip(stages).enumerate()
-        {
-            let by_difference = input.by_input / h;
-            let mut by_state = input.by_state;
-            by_state[top] -= by_difference;
-            let value = input.value - by_difference * problem.affine[k][top];
-            write_constraint(&mut self.program, slots, &by_state, &value, scale);
-            for (i, places) in slots.next.iter().flatten().enumerate() {
-                for (j, &place) in places.iter().enumerate() {
-                    self.program.matrix[place] = -by_difference[(i, j)] * scale[top];
-                }
-            }
-        }
-        if let (Some(row), Some(radius)) = (self.terminal_row, problem.end.radius) {
-            self.program.right_side[row] = radius / scale[0];
         }
     }
 }
 
-fn write_constraint<const O: usize>(
-    program: &mut ConicProgram,
-    slots: &Slots<O>,
-    by_state: &[Matrix3<f64>; O],
-    value: &Vector3<f64>,
-    scale: &[f64; O],
-) {
-    for (component, places) in slots.state.iter().enumerate() {
-        for (i, places) in places.iter().enumerate() {
-            for (axis, &place) in places.iter().enumerate() {
-                program.matrix[place] = -by_state[i][(component, axis)] * scale[i];
+impl Rows {
+    /// Sets all rows, and returns the first row of the norm constraints.
+    fn set<const O: usize>(
+        &mut self,
+        layout: &Layout<O>,
+        problem: &Problem<O, LinearisedConstraints<O>>,
+    ) -> usize {
+        self.a.clear();
+        self.b.clear();
+        self.cones.clear();
+        self.add_chain(layout, problem.affine);
+        self.add_start(layout, &problem.start);
+        let first_norm = self.b.len();
+        let Layout { chain, scale, horizon: n, .. } = layout;
+        let (top, stages) = (O - 1, problem.constraints.stages());
+        if layout.constrains_states {
+            for (k, StageConstraints { state, .. }) in stages.iter().enumerate().skip(1) {
+                self.add_norm(k, &state.by_state, None, &state.value, scale);
             }
         }
-        program.right_side[slots.row + 1 + component] = value[component];
+        for (k, StageConstraints { input, .. }) in stages[..*n].iter().enumerate() {
+            let by_difference = input.by_input / chain.step;
+            let mut by_state = input.by_state;
+            by_state[top] -= by_difference;
+            let value = input.value - by_difference * problem.affine[k][top];
+            self.add_norm(k, &by_state, Some(&by_difference), &value, scale);
+        }
+        if layout.terminal {
+            self.add_terminal(layout, problem.end.radius.unwrap_or_default());
+        }
+        first_norm
     }
-    program.right_side[slots.row] = 1.0;
+
+    /// Adds the chain below its last derivative with v eliminated, divided by the scale.
+    fn add_chain<const O: usize>(&mut self, layout: &Layout<O>, affine: &[State<O>]) {
+        let Layout { chain, scale, .. } = layout;
+        let top = O - 1;
+        for (k, d) in affine.iter().enumerate() {
+            for i in 0..top {
+                let by_input = chain.b[i] / chain.step;
+                for axis in 0..3 {
+                    let row = self.b.len();
+                    self.a.push(row, column::<O>(k + 1, i, axis), 1.0);
+                    let by_end = -by_input * scale[top] / scale[i];
+                    self.a.push(row, column::<O>(k + 1, top, axis), by_end);
+                    for j in i..O {
+                        let by_state =
+                            if j == top { chain.a[(i, j)] - by_input } else { chain.a[(i, j)] };
+                        let by_state = -by_state * scale[j] / scale[i];
+                        self.a.push(row, column::<O>(k, j, axis), by_state);
+                    }
+                    self.b.push((d[i][axis] - by_input * d[top][axis]) / scale[i]);
+                }
+            }
+        }
+        if !self.b.is_empty() {
+            self.cones.push(ZeroConeT(self.b.len()));
+        }
+    }
+
+    /// Adds the condition on the first state: its value, or the faces ±nᵀ(E_given − E_0) ≤ 1 of the
+    /// initial set.
+    fn add_start<const O: usize>(&mut self, layout: &Layout<O>, start: &Start<O>) {
+        let (scale, first) = (&layout.scale, self.b.len());
+        match start {
+            Start::Fixed(given) => {
+                for i in 0..3 * O {
+                    self.a.push(self.b.len(), i, 1.0);
+                    self.b.push(given[i / 3][i % 3] / scale[i / 3]);
+                }
+                self.cones.push(ZeroConeT(3 * O));
+            }
+            Start::Within(given, normals) => {
+                for (axis, normals) in normals.iter().enumerate() {
+                    for normal in normals {
+                        let at: f64 = (0..O).map(|i| normal[i] * given[i][axis]).sum();
+                        for (sign, b) in [(1.0, 1.0 - at), (-1.0, 1.0 + at)] {
+                            for i in 0..O {
+                                let by_state = -sign * normal[i] * scale[i];
+                                self.a.push(self.b.len(), column::<O>(0, i, axis), by_state);
+                            }
+                            self.b.push(b);
+                        }
+                    }
+                }
+                self.cones.push(NonnegativeConeT(self.b.len() - first));
+            }
+            // Only windows have an arrival cost, and they are not solved here.
+            Start::Arrival(..) => {}
+        }
+    }
+
+    /// Adds a norm constraint at stage `k`, with the derivatives of its vector by the state and by
+    /// the last derivative of the next state.
+    fn add_norm<const O: usize>(
+        &mut self,
+        k: usize,
+        by_state: &[Matrix3<f64>; O],
+        by_next: Option<&Matrix3<f64>>,
+        value: &Vector3<f64>,
+        scale: &[f64; O],
+    ) {
+        let top = O - 1;
+        self.b.push(1.0);
+        for component in 0..3 {
+            let row = self.b.len();
+            for axis in 0..3 {
+                for i in 0..O {
+                    let by_state = -by_state[i][(component, axis)] * scale[i];
+                    self.a.push(row, column::<O>(k, i, axis), by_state);
+                }
+                if let Some(by_next) = by_next {
+                    let by_next = -by_next[(component, axis)] * scale[top];
+                    self.a.push(row, column::<O>(k + 1, top, axis), by_next);
+                }
+            }
+            self.b.push(value[component]);
+        }
+        self.cones.push(SecondOrderConeT(4));
+    }
+
+    /// Adds the terminal constraint ‖Lᵀ E_N‖ ≤ ε with G = L Lᵀ, divided by the scale.
+    fn add_terminal<const O: usize>(&mut self, layout: &Layout<O>, radius: f64) {
+        let Layout { cost, scale, horizon: n, .. } = layout;
+        self.b.push(radius / scale[0]);
+        for axis in 0..3 {
+            let root = square_root(&of_axis(&cost.end, axis));
+            for i in 0..O {
+                for j in 0..O {
+                    let by_state = -root[(i, j)] * scale[j] / scale[0];
+                    self.a.push(self.b.len(), column::<O>(*n, j, axis), by_state);
+                }
+                self.b.push(0.0);
+            }
+        }
+        self.cones.push(SecondOrderConeT(1 + 3 * O));
+    }
 }
 
 /// Returns Lᵀ with G = L Lᵀ; it is zero where G is zero.
@@ -301,37 +293,13 @@ fn column<const O: usize>(k: usize, i: usize, axis: usize) -> usize {
     3 * (O * k + i) + axis
 }
 
-/// Adds the chain below its last derivative with v eliminated, divided by the scale. Returns the
-/// number of its rows.
-fn add_chain<const O: usize>(layout: &Layout<O>, a: &mut Triplets) -> usize {
-    let Layout { chain, horizon, scale, .. } = layout;
-    let (top, mut row) = (O - 1, 0);
-    for k in 0..*horizon {
-        for i in 0..top {
-            let by_input = chain.b[i] / chain.step;
-            for axis in 0..3 {
-                a.push(row, column::<O>(k + 1, i, axis), 1.0);
-                let by_end = -by_input * scale[top] / scale[i];
-                a.push(row, column::<O>(k + 1, top, axis), by_end);
-                for j in i..O {
-                    let by_state =
-                        if j == top { chain.a[(i, j)] - by_input } else { chain.a[(i, j)] };
-                    a.push(row, column::<O>(k, j, axis), -by_state * scale[j] / scale[i]);
-                }
-                row += 1;
-            }
-        }
-    }
-    row
-}
-
 /// Returns P of ½ xᵀP x for the cost Σ EᵀW E + V/h² (ΔE)² + E_NᵀG E_N: upper triangle, scaled.
 fn cost_matrix<const O: usize>(layout: &Layout<O>) -> CscMatrix<f64> {
     let Layout { chain, cost, horizon: n, scale, .. } = layout;
     let (top, h2) = (O - 1, chain.step * chain.step);
     let mut triplets = Triplets::default();
     for k in 0..=*n {
-        let column = |i: usize, axis: usize| 3 * (O * k + i) + axis;
+        let column = |i: usize, axis: usize| column::<O>(k, i, axis);
         let intervals = if k == 0 || k == *n { 1.0 } else { 2.0 };
         let weight = |i: usize, j: usize| match (k == *n, i == j) {
             (true, _) => cost.end[i][j],

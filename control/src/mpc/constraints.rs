@@ -140,12 +140,4 @@ impl<const O: usize> Constraints<O> for LinearisedConstraints<O> {
         stage.input.value = stage.input.at(state, input);
         stage
     }
-
-    fn squares(&self, k: usize, state: &State<O>, input: &Vector3<f64>) -> (f64, f64) {
-        let StageConstraints { state: of_state, input: of_input } = &self.stages[k];
-        (
-            of_state.at(state, &Vector3::zeros()).norm_squared(),
-            of_input.at(state, input).norm_squared(),
-        )
-    }
 }

@@ -1,6 +1,6 @@
 //! Structure of an optimisation problem, which does not change between samples.
 
-use super::problem::{Chain, Cost, ErrorTrajectory};
+use super::problem::{Chain, Cost, End, ErrorTrajectory, Problem, Start, State, zero_state};
 use nalgebra::SVector;
 use std::ops::Range;
 
@@ -34,6 +34,24 @@ pub(super) const MARGIN: usize = 3;
 const CHECK_SLACK: f64 = 1e-9;
 
 impl<const O: usize> Layout<O> {
+    /// Returns the problem of the whole horizon from a measured start, with this radius of the
+    /// terminal constraint.
+    pub(super) fn problem<'a, C>(
+        &'a self,
+        measured: &State<O>,
+        affine: &'a [State<O>],
+        constraints: &'a C,
+        radius: Option<f64>,
+    ) -> Problem<'a, O, C> {
+        let Self { chain, cost, start, .. } = self;
+        let start = match start {
+            None => Start::Fixed(*measured),
+            Some(normals) => Start::Within(*measured, normals),
+        };
+        let end = End { weight: &cost.end, slope: zero_state(), radius };
+        Problem { chain, cost, start, affine, constraints, end }
+    }
+
     /// Returns `radius` if the trajectory violates the terminal constraint.
     pub(super) fn ends_outside(
         &self,
@@ -57,20 +75,16 @@ impl<const O: usize> Layout<O> {
             (None, true) => n..n,
             (violated, false) => violated?,
         };
-        let share = (violated.len() as f64 * self.margin) as usize;
-        Some(self.widen(&violated, MARGIN + share))
+        let margin = MARGIN + (violated.len() as f64 * self.margin) as usize;
+        let start = violated.start.saturating_sub(margin);
+        // Fewer steps than the order cannot reach every state.
+        let start = if start < O { 0 } else { start };
+        Some(start..(violated.end + margin).min(n))
     }
 
     /// Returns whether it pays to solve for these intervals alone, which may be at most three
     /// quarters of the horizon.
     pub(super) fn is_worth_a_window(&self, range: &Range<usize>) -> bool {
         4 * range.len() <= 3 * self.horizon
-    }
-
-    /// Extends the range by `margin` intervals before and after.
-    fn widen(&self, range: &Range<usize>, margin: usize) -> Range<usize> {
-        let start = range.start.saturating_sub(margin);
-        // Fewer steps than the order cannot reach every state.
-        (if start < O { 0 } else { start })..(range.end + margin).min(self.horizon)
     }
 }

@@ -6,7 +6,6 @@ use super::certificate::Certificate;
 use super::optimiser::{Optimiser, OptimiserReport, Sample};
 use super::problem::{ErrorTrajectory, State};
 use super::search::Search;
-use super::shortcuts;
 use crate::report::SolverStatus;
 
 impl<const O: usize> Optimiser<O> {
@@ -24,39 +23,36 @@ impl<const O: usize> Optimiser<O> {
         self.without_constraints(start, affine);
         let outside =
             self.layout.ends_outside(&self.solution.trajectory, bounded.terminal_radius());
-        let mut search = Search::new(outside);
-        let shortcuts = self.settings.shortcuts && self.layout.start.is_none();
-        let status = shortcuts::in_order()
-            .into_iter()
-            .filter(|_| shortcuts)
-            .find_map(|shortcut| shortcut.optimum(self, &sample, &mut search))
-            .unwrap_or_else(|| self.over_whole_horizon(&sample, &mut search));
+        self.search = Search::new(outside);
+        let mut found = None;
+        if self.settings.shortcuts && self.layout.start.is_none() {
+            found = self.by_shortcut(&sample);
+        }
+        let status = found.unwrap_or_else(|| self.over_whole_horizon(&sample));
         // In a fallback the laws follow another plan.
         let is_optimum = status != SolverStatus::Fallback;
         let certificate =
             if is_optimum { self.certificate(&sample, true) } else { Certificate::default() };
         OptimiserReport {
             status,
-            iterations: search.iterations,
+            iterations: self.search.iterations,
             certificate,
-            settled: search.settled,
+            settled: self.search.settled,
         }
     }
 
     /// Finds the optimum by the solvers for the whole horizon.
-    fn over_whole_horizon(&mut self, sample: &Sample<O>, search: &mut Search) -> SolverStatus {
-        self.prepare(sample, search);
+    fn over_whole_horizon(&mut self, sample: &Sample<O>) -> SolverStatus {
+        self.prepare(sample);
         if sample.previous.is_none() && self.settings.is_exact_riccati() {
-            if let Some(status) = self.settle(sample, search, Self::by_riccati) {
+            if let Some(status) = self.settle(sample, Self::by_riccati) {
                 return status;
             }
             // From here on the bounds are those about the trajectory that the search has left.
             self.linearisation_point.clone_from(&self.solution.trajectory);
-            search.restart_passes();
+            self.search.restart_passes();
         }
-        let by_any = |this: &mut Self, sample: &Sample<O>, search: &mut Search| {
-            this.by_riccati(sample, search).or_else(|| this.by_cone(sample, search))
-        };
-        self.settle(sample, search, by_any).unwrap_or(SolverStatus::Fallback)
+        self.settle(sample, |this, sample| this.by_riccati(sample).or_else(|| this.by_cone(sample)))
+            .unwrap_or(SolverStatus::Fallback)
     }
 }

@@ -9,9 +9,7 @@ use super::conic::ConicSolver;
 use super::constraints::LinearisedConstraints;
 use super::layout::Layout;
 use super::lq::Unconstrained;
-use super::problem::{
-    Cost, End, ErrorTrajectory, Multipliers, Outcome, Problem, Solution, Start, State, zero_state,
-};
+use super::problem::{Cost, End, ErrorTrajectory, Outcome, Problem, Solution, Start, State};
 use super::riccati::{Rest, Riccati};
 use super::search::Search;
 use super::settings::{Method, Nonlinearity, SolverSettings};
@@ -41,11 +39,21 @@ pub(super) struct Sample<'a, const O: usize> {
     pub previous: Option<(&'a ErrorTrajectory<O>, &'a [[f64; 2]])>,
 }
 
+impl<'a, const O: usize> Sample<'a, O> {
+    /// Returns the problem of the whole horizon.
+    fn problem<C>(&self, layout: &'a Layout<O>, constraints: &'a C) -> Problem<'a, O, C> {
+        let radius = self.bounded.terminal_radius();
+        layout.problem(self.start, self.affine, constraints, radius)
+    }
+}
+
 /// All solvers of one controller with their scratch memory.
 pub struct Optimiser<const O: usize> {
     pub(super) layout: Layout<O>,
     pub(super) settings: SolverSettings,
     budget: Budget,
+    /// Progress of the present optimisation.
+    pub(super) search: Search,
     pub(super) unconstrained: Unconstrained<O>,
     pub(super) riccati: Riccati<O>,
     cone: ConicSolver<O>,
@@ -77,6 +85,7 @@ impl<const O: usize> Optimiser<O> {
             checked_bounds: Bounds::unlimited(n),
             solution: Solution::new(n),
             budget: Budget::unlimited(),
+            search: Search::default(),
             layout,
             settings,
         })
@@ -103,11 +112,9 @@ impl<const O: usize> Optimiser<O> {
         self.unconstrained.feedback()
     }
 
-    /// Returns for each interval the multipliers of the state constraint at its end and of the norm
-    /// constraint on its input.
-    pub fn multipliers(&self) -> impl Iterator<Item = [f64; 2]> {
-        let Multipliers { state, input, .. } = &self.solution.multipliers;
-        state.iter().zip(input).map(|(&state, &input)| [state, input])
+    /// Returns the multipliers of the norm constraints of each interval.
+    pub fn multipliers(&self) -> &[[f64; 2]] {
+        &self.solution.multipliers.intervals
     }
 
     /// Starts the budget of an optimisation of the controller. It covers all calls of
@@ -122,73 +129,63 @@ impl<const O: usize> Optimiser<O> {
     }
 
     /// Finds the optimum with the present bounds by the Riccati method.
-    pub(super) fn by_riccati(
-        &mut self,
-        sample: &Sample<O>,
-        search: &mut Search,
-    ) -> Option<SolverStatus> {
-        if !self.may_iterate(search) {
+    pub(super) fn by_riccati(&mut self, sample: &Sample<O>) -> Option<SolverStatus> {
+        if !self.may_iterate() {
             return None;
         }
-        search.window = None;
-        if !search.is_warm() {
+        self.search.window = None;
+        if !self.search.is_warm() {
             self.without_constraints(sample.start, sample.affine);
         }
-        let outcome = self.interior_point(sample, search, 0..self.layout.horizon);
+        let outcome = self.interior_point(sample, 0..self.layout.horizon);
         if outcome.solved() {
             return Some(SolverStatus::Constrained);
         }
         let is_hopeless =
-            outcome.hopeless() && (!search.is_warm() || sample.bounded.has_another_start());
-        if search.is_warm() && !is_hopeless && !self.is_exhausted() {
+            outcome.hopeless() && (!self.search.is_warm() || sample.bounded.has_another_start());
+        if self.search.is_warm() && !is_hopeless && !self.is_exhausted() {
             // The first guess was misleading.
-            self.begin_cold(sample, search);
-            return self.by_riccati(sample, search);
+            self.begin_cold(sample);
+            return self.by_riccati(sample);
         }
         if is_hopeless {
-            search.give_up();
+            self.search.give_up();
         }
         None
     }
 
     /// Finds the optimum with the present bounds and linearised constraints by the cone solver. In
     /// a hopeless search it would find none either.
-    pub(super) fn by_cone(
-        &mut self,
-        sample: &Sample<O>,
-        search: &mut Search,
-    ) -> Option<SolverStatus> {
-        if search.is_hopeless() {
+    pub(super) fn by_cone(&mut self, sample: &Sample<O>) -> Option<SolverStatus> {
+        if self.search.is_hopeless() {
             return None;
         }
         let limits = self.budget.of_the_cone()?;
-        search.window = None;
+        self.search.window = None;
         sample.bounded.bounds_about(
             &self.linearisation_point,
             0..self.layout.horizon,
             &mut self.bounds,
         );
         self.linearised.set(&within(sample, &mut self.bounds), &self.linearisation_point, 0);
-        let problem = problem(&self.layout, sample, &self.linearised);
+        let problem = sample.problem(&self.layout, &self.linearised);
         let outcome = self.cone.solve(&problem, &mut self.solution, limits);
-        search.iterations += outcome.iterations();
+        self.search.iterations += outcome.iterations();
         self.budget.spend(outcome.iterations());
         outcome.solved().then_some(SolverStatus::Cone)
     }
 
     /// Returns whether the Riccati method may begin.
-    pub(super) fn may_iterate(&self, search: &Search) -> bool {
-        self.settings.method == Method::Riccati && !search.is_hopeless() && !self.is_exhausted()
+    pub(super) fn may_iterate(&self) -> bool {
+        self.settings.method == Method::Riccati
+            && !self.search.is_hopeless()
+            && !self.is_exhausted()
     }
 
     /// Runs the Riccati method on the intervals `range`, with the present bounds. The rest of the
     /// horizon is replaced by its arrival cost and its unconstrained cost-to-go.
-    pub(super) fn interior_point(
-        &mut self,
-        sample: &Sample<O>,
-        search: &mut Search,
-        range: Range<usize>,
-    ) -> Outcome {
+    pub(super) fn interior_point(&mut self, sample: &Sample<O>, range: Range<usize>) -> Outcome {
+        let (warm, follows) = (self.search.is_warm(), self.search.follows);
         let Self {
             layout,
             budget,
@@ -202,10 +199,10 @@ impl<const O: usize> Optimiser<O> {
         } = self;
         let (bounded, first) = (sample.bounded, range.start);
         bounded.bounds_about(linearisation_point, range.clone(), bounds);
-        let within = Within { bounded, bounds: bounds.cells(), follows: search.follows, first };
+        let within = Within { bounded, bounds: bounds.cells(), follows, first };
         let (weight, slope) = unconstrained.to_go(range.end);
         let radius = bounded.terminal_radius().filter(|_| range.end == layout.horizon);
-        let mut problem = problem(layout, sample, &within);
+        let mut problem = sample.problem(layout, &within);
         if first > 0 {
             let (weight, mean) = unconstrained.arrival(first);
             problem.start = Start::Arrival(weight, mean);
@@ -215,22 +212,15 @@ impl<const O: usize> Optimiser<O> {
         let outcome = if self.settings.nonlinearity == Nonlinearity::Exact {
             // A warm search knows its window; bounds that depend on the trajectory rarely hold
             // beyond it.
-            let extends = !search.is_warm() || !bounded.depends_on_trajectory();
+            let extends = !warm || !bounded.depends_on_trajectory();
             let rest = Rest { unconstrained: &*unconstrained, affine: sample.affine };
             let rest = Some(&rest).filter(|_| extends && radius.is_none());
-            riccati.solve(&problem, solution, first, search.is_warm(), budget, rest)
+            riccati.solve(&problem, solution, first, warm, budget, rest)
         } else {
             linearised.set(&within, linearisation_point, first);
-            riccati.solve(
-                &problem.with(&*linearised),
-                solution,
-                first,
-                search.is_warm(),
-                budget,
-                None,
-            )
+            riccati.solve(&problem.with(&*linearised), solution, first, warm, budget, None)
         };
-        search.iterations += outcome.iterations();
+        self.search.iterations += outcome.iterations();
         outcome
     }
 
@@ -252,8 +242,8 @@ impl<const O: usize> Optimiser<O> {
     }
 
     /// Computes the arrival costs of the sample, once.
-    pub(super) fn arrive(&mut self, sample: &Sample<O>, search: &mut Search) {
-        if !replace(&mut search.arrived, true) {
+    pub(super) fn arrive(&mut self, sample: &Sample<O>) {
+        if !replace(&mut self.search.arrived, true) {
             self.unconstrained.arrive(sample.start, sample.affine);
         }
     }
@@ -293,27 +283,11 @@ impl<const O: usize> Optimiser<O> {
     pub(super) fn certificate(&mut self, sample: &Sample<O>, is_checked: bool) -> Certificate {
         let Self { layout, bounds, solution, .. } = self;
         let within = within(sample, bounds);
-        Certificate::new(&problem(layout, sample, &within), solution, is_checked)
+        Certificate::new(&sample.problem(layout, &within), solution, is_checked)
     }
 }
 
 /// Returns the constraints of all stages with fixed bounds.
 fn within<'a, const O: usize>(sample: &Sample<'a, O>, bounds: &'a mut Bounds) -> Within<'a, O> {
     Within { bounded: sample.bounded, bounds: bounds.cells(), follows: false, first: 0 }
-}
-
-/// Returns the problem of the whole horizon.
-fn problem<'a, const O: usize, C>(
-    layout: &'a Layout<O>,
-    sample: &Sample<'a, O>,
-    constraints: &'a C,
-) -> Problem<'a, O, C> {
-    let Layout { chain, cost, start, .. } = layout;
-    let start = match start {
-        None => Start::Fixed(*sample.start),
-        Some(normals) => Start::Within(*sample.start, normals),
-    };
-    let radius = sample.bounded.terminal_radius();
-    let end = End { weight: &cost.end, slope: zero_state(), radius };
-    Problem { chain, cost, start, affine: sample.affine, constraints, end }
 }

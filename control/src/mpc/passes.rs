@@ -5,7 +5,6 @@
 use super::layout::MARGIN;
 use super::optimiser::{Optimiser, Sample};
 use super::problem::Solution;
-use super::search::Search;
 use super::settings::{Method, Nonlinearity};
 use crate::report::SolverStatus;
 use std::mem::replace;
@@ -24,16 +23,16 @@ const FIRST_PASSES: usize = 20;
 impl<const O: usize> Optimiser<O> {
     /// Chooses the first guess and the trajectory about which the first bounds are computed. This
     /// is done once, by the first solver that iterates.
-    pub(super) fn prepare(&mut self, sample: &Sample<O>, search: &mut Search) {
-        if search.has_begun() {
+    pub(super) fn prepare(&mut self, sample: &Sample<O>) {
+        if self.search.has_begun() {
             return;
         }
         let is_given = self.layout.start.is_none();
         if is_given && sample.bounded.out_of_reach(sample.start) {
-            search.give_up();
+            self.search.give_up();
             return;
         }
-        self.begin_cold(sample, search);
+        self.begin_cold(sample);
         let Some((previous, active)) = sample.previous else {
             self.linearisation_point.clone_from(&self.solution.trajectory);
             return;
@@ -47,17 +46,17 @@ impl<const O: usize> Optimiser<O> {
         }
         // Where the terminal constraint is active, each sample has one more stage to reach it, and
         // successive plans differ too much for a warm start.
-        if self.settings.method == Method::Riccati && is_given && search.outside.is_none() {
-            self.start_warm(sample, active, search);
+        if self.settings.method == Method::Riccati && is_given && self.search.outside.is_none() {
+            self.start_warm(sample, active);
         }
     }
 
     /// Takes the previous plan, tracked from the new start, and its multipliers as first guess if
     /// some of them are active in the range to be solved. A window is extended by the active stages
     /// just beyond its end, as it would otherwise have to grow.
-    fn start_warm(&mut self, sample: &Sample<O>, active: &[[f64; 2]], search: &mut Search) {
+    fn start_warm(&mut self, sample: &Sample<O>, active: &[[f64; 2]]) {
         let n = self.layout.horizon;
-        let mut range = search.window.clone().unwrap_or(0..n);
+        let mut range = self.search.window.clone().unwrap_or(0..n);
         let more_than = |least: f64| move |&[state, input]: &[f64; 2]| state.max(input) > least;
         if !active[range.clone()].iter().any(more_than(0.0)) {
             return;
@@ -65,7 +64,7 @@ impl<const O: usize> Optimiser<O> {
         let largest = active.iter().flatten().copied().fold(0.0, f64::max);
         let is_active = more_than(ACTIVE * largest);
         let last = active.iter().rposition(&is_active).unwrap_or(0);
-        let is_news = search.violated.as_ref().is_some_and(|range| range.end > last + NEWS);
+        let is_news = self.search.violated.as_ref().is_some_and(|range| range.end > last + NEWS);
         if is_news && sample.bounded.depends_on_trajectory() {
             return;
         }
@@ -74,29 +73,27 @@ impl<const O: usize> Optimiser<O> {
         {
             range.end += last + 1;
         }
-        if let Some(window) = &mut search.window {
+        if let Some(window) = &mut self.search.window {
             window.end = range.end;
         }
         if !self.layout.is_worth_a_window(&range) {
-            search.window = None;
+            self.search.window = None;
             range = 0..n;
         }
         let Solution { trajectory, multipliers } = &mut self.solution;
         trajectory.clone_from(&self.linearisation_point);
-        for k in range {
-            [multipliers.state[k], multipliers.input[k]] = active[k];
-        }
-        search.begin_warm();
+        multipliers.intervals[range.clone()].copy_from_slice(&active[range]);
+        self.search.begin_warm();
     }
 
     /// Lets the next search begin without the multipliers of a similar problem. Its guess may be
     /// far away, so that bounds that depend on the trajectory follow the iterates.
-    pub(super) fn begin_cold(&self, sample: &Sample<O>, search: &mut Search) {
+    pub(super) fn begin_cold(&mut self, sample: &Sample<O>) {
         let follows = match sample.previous {
             None => sample.bounded.follows_at_first(),
             Some(_) => sample.bounded.depends_on_trajectory(),
         };
-        search.begin_cold(follows && self.settings.is_exact_riccati());
+        self.search.begin_cold(follows && self.settings.is_exact_riccati());
     }
 
     /// Repeats `solve_pass` with the bounds (and linearised constraints) computed about its last
@@ -104,22 +101,21 @@ impl<const O: usize> Optimiser<O> {
     pub(super) fn settle(
         &mut self,
         sample: &Sample<O>,
-        search: &mut Search,
-        solve_pass: impl Fn(&mut Self, &Sample<O>, &mut Search) -> Option<SolverStatus>,
+        solve_pass: impl Fn(&mut Self, &Sample<O>) -> Option<SolverStatus>,
     ) -> Option<SolverStatus> {
         loop {
-            let status = solve_pass(self, sample, search)?;
-            search.pass += 1;
-            if self.is_final(sample, search) {
+            let status = solve_pass(self, sample)?;
+            self.search.pass += 1;
+            if self.is_final(sample) {
                 return Some(status);
             }
-            search.go_on();
+            self.search.go_on();
         }
     }
 
     /// Returns whether the optimum of a pass is final; otherwise the linearisation point is set for
     /// the next pass.
-    fn is_final(&mut self, sample: &Sample<O>, search: &mut Search) -> bool {
+    fn is_final(&mut self, sample: &Sample<O>) -> bool {
         let Self {
             layout, settings, linearisation_point, bounds, checked_bounds, solution, ..
         } = self;
@@ -130,19 +126,19 @@ impl<const O: usize> Optimiser<O> {
         if sample.previous.is_none() && !settings.is_exact_riccati() {
             let moved = linearisation_point.distance(trajectory);
             linearisation_point.clone_from(trajectory);
-            return moved < layout.standstill || search.pass == FIRST_PASSES;
+            return moved < layout.standstill || self.search.pass == FIRST_PASSES;
         }
-        if replace(&mut search.follows, false) {
+        if replace(&mut self.search.follows, false) {
             sample.bounded.bounds_about(trajectory, 0..layout.horizon, bounds);
         }
         // The intervals outside a window have already been checked.
-        let solved = search.window.clone().unwrap_or(0..layout.horizon);
-        search.settled = !sample.bounded.depends_on_trajectory()
+        let solved = self.search.window.clone().unwrap_or(0..layout.horizon);
+        self.search.settled = !sample.bounded.depends_on_trajectory()
             || sample.bounded.violated(trajectory, solved, checked_bounds).is_none();
-        if search.settled || search.pass == SETTLING_PASSES {
+        if self.search.settled || self.search.pass == SETTLING_PASSES {
             return true;
         }
-        if search.pass == 1 {
+        if self.search.pass == 1 {
             linearisation_point.clone_from(trajectory);
         } else {
             // Where the bounds change more than the trajectory, whole steps would alternate between

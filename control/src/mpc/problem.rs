@@ -233,10 +233,9 @@ impl<const O: usize> ErrorTrajectory<O> {
 /// faces of the initial set.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Multipliers<const O: usize> {
-    /// Multipliers of the state constraints of stages 1..=N, at position k − 1.
-    pub state: Vec<f64>,
-    /// Multipliers of the input constraints.
-    pub input: Vec<f64>,
+    /// Multipliers of each interval: of the state constraint at its end, and of the norm constraint
+    /// on its input.
+    pub intervals: Vec<[f64; 2]>,
     /// Multiplier of the terminal constraint.
     pub terminal: f64,
     /// Signed sum Σ λ n over the faces of the initial set: their slope in E_0.
@@ -249,8 +248,7 @@ impl<const O: usize> Multipliers<O> {
     /// Returns multipliers that are all zero.
     pub fn new(horizon: usize) -> Self {
         Self {
-            state: vec![0.0; horizon],
-            input: vec![0.0; horizon],
+            intervals: vec![[0.0; 2]; horizon],
             terminal: 0.0,
             start: zero_state(),
             start_gap: 0.0,
@@ -259,8 +257,7 @@ impl<const O: usize> Multipliers<O> {
 
     /// Sets all multipliers to zero.
     pub fn clear(&mut self) {
-        self.state.fill(0.0);
-        self.input.fill(0.0);
+        self.intervals.fill([0.0; 2]);
         self.terminal = 0.0;
         self.start = zero_state();
         self.start_gap = 0.0;

@@ -364,7 +364,7 @@ fn oracle_constraints_that_only_the_iterates_come_near_are_found() {
         assert!(outcome.solved(), "{outcome:?}");
         let residual = Certificate::new(&problem, &solution, false).residual();
         assert!(residual <= 1e-6, "{residual}");
-        assert!(solution.multipliers.state.iter().any(|multiplier| *multiplier > 1e-3));
+        assert!(solution.multipliers.intervals.iter().any(|[state, _]| *state > 1e-3));
         cost.total(&solution.trajectory)
     });
     assert!((optima[0] - optima[1]).abs() <= 1e-8 * optima[0], "{optima:?}");

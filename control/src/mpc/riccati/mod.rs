@@ -85,11 +85,11 @@ impl<const O: usize> Riccati<O> {
             let multiplier = |pair: &Pair| if pair.watched { pair.multiplier } else { 0.0 };
             trajectory.states[first + k] = stage.state;
             if k > 0 && constrains_states {
-                multipliers.state[first + k - 1] = multiplier(&stage.state_pair);
+                multipliers.intervals[first + k - 1][0] = multiplier(&stage.state_pair);
             }
             if k < self.horizon {
                 trajectory.inputs[first + k] = stage.input;
-                multipliers.input[first + k] = multiplier(&stage.input_pair);
+                multipliers.intervals[first + k][1] = multiplier(&stage.input_pair);
             }
         }
         if problem.end.radius.is_some() {

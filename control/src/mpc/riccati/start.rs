@@ -64,15 +64,15 @@ impl<const O: usize> Riccati<O> {
         let per_stage = if problem.constraints.constrains_states() { 2 } else { 1 };
         let share = cost / (per_stage * self.horizon + self.faces.len() + 1) as f64;
         let mean = gap * share;
-        let Multipliers { state, input, terminal, .. } = multipliers;
+        let Multipliers { intervals, terminal, .. } = multipliers;
         self.terminal.begin(smallest, mean, if warm { *terminal } else { 0.0 });
         for face in &mut self.faces {
             face.pair.begin(smallest, mean, 0.0);
         }
         self.watch(problem, smallest, mean, |k| {
-            let before = (first + k).checked_sub(1);
-            let given = [before.and_then(|k| state.get(k)), input.get(first + k)];
-            given.map(|multiplier| multiplier.copied().filter(|_| warm).unwrap_or_default())
+            let given = |k: usize| intervals.get(k).copied().filter(|_| warm).unwrap_or_default();
+            let [state, _] = (first + k).checked_sub(1).map_or([0.0; 2], given);
+            [state, given(first + k)[1]]
         });
         let pairs = self.stages[..=self.horizon]
             .iter()

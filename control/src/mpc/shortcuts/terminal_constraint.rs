@@ -4,42 +4,30 @@
 //! `solver.status` reports it separately, and because a window would change the last digits of the
 //! results.
 
-use super::{Optimiser, Sample, Search, Shortcut, SolverStatus};
+use super::{Optimiser, Sample, SolverStatus};
 use crate::mpc::lq::Unconstrained;
-use crate::mpc::problem::{Chain, Cost, ErrorTrajectory, State, apply, of_axis, zero_state};
+use crate::mpc::problem::{ErrorTrajectory, State, apply, dot, of_axis, zero_state};
 use nalgebra::{SMatrix, SVector};
-
-pub(super) struct TerminalConstraintAlone;
 
 /// Limits of the secant search for λ.
 const SECANT_STEPS: usize = 30;
 const SECANT_TOLERANCE: f64 = 1e-12;
 
-impl<const O: usize> Shortcut<O> for TerminalConstraintAlone {
-    fn optimum(
-        &self,
-        optimiser: &mut Optimiser<O>,
-        sample: &Sample<O>,
-        search: &mut Search,
-    ) -> Option<SolverStatus> {
-        let radius = search.outside?;
-        optimiser.arrive(sample, search);
-        let Optimiser { layout, unconstrained, solution, .. } = optimiser;
-        let multiplier = solve(
-            unconstrained,
-            &layout.chain,
-            &layout.cost,
-            sample.affine,
-            radius,
-            &mut solution.trajectory,
-        );
-        let violated = optimiser.violated(sample, &(0..0));
-        search.settled = multiplier.is_some() && violated.is_none();
-        if search.settled {
-            optimiser.solution.multipliers.terminal = multiplier?;
+impl<const O: usize> Optimiser<O> {
+    /// Finds the optimum with the terminal constraint alone, and checks the norm constraints.
+    pub(super) fn by_terminal_constraint(&mut self, sample: &Sample<O>) -> Option<SolverStatus> {
+        let radius = self.search.outside?;
+        self.arrive(sample);
+        let Self { unconstrained, solution, .. } = self;
+        let trajectory = &mut solution.trajectory;
+        let multiplier = solve(unconstrained, sample.affine, radius, trajectory);
+        let violated = self.violated(sample, &(0..0));
+        self.search.settled = multiplier.is_some() && violated.is_none();
+        if self.search.settled {
+            self.solution.multipliers.terminal = multiplier?;
             return Some(SolverStatus::TerminalConstraint);
         }
-        search.window = optimiser.layout.window(violated, true);
+        self.search.window = self.layout.window(violated, true);
         None
     }
 }
@@ -52,8 +40,6 @@ impl<const O: usize> Shortcut<O> for TerminalConstraintAlone {
 /// nearly linear in λ, a secant method finds λ in a few steps.
 fn solve<const O: usize>(
     unconstrained: &Unconstrained<O>,
-    chain: &Chain<O>,
-    cost: &Cost<O>,
     affine: &[State<O>],
     radius: f64,
     trajectory: &mut ErrorTrajectory<O>,
@@ -68,13 +54,13 @@ fn solve<const O: usize>(
         let mut end = zero_state();
         for axis in 0..3 {
             let sum: SMatrix<f64, O, O> =
-                of_axis(weight, axis) + of_axis(&cost.end, axis) * (1.0 + lambda);
+                of_axis(weight, axis) + of_axis(&unconstrained.end, axis) * (1.0 + lambda);
             let solution = sum.try_inverse()? * SVector::<f64, O>::from_fn(|i, _| pull[i][axis]);
             for (i, slot) in end.iter_mut().enumerate() {
                 slot[axis] = solution[i];
             }
         }
-        let norm = cost.end_square(&end).sqrt();
+        let norm = dot(&end, &apply(&unconstrained.end, &end)).sqrt();
         Some((end, radius / norm - 1.0))
     };
 
@@ -85,7 +71,7 @@ fn solve<const O: usize>(
         if left.abs() <= SECANT_TOLERANCE {
             trajectory.states[n] = end;
             unconstrained.trace_back(n, affine, trajectory);
-            trajectory.roll_out(chain, affine);
+            trajectory.roll_out(&unconstrained.chain, affine);
             return Some(next * radius * radius);
         }
         let slope = (left - excess) / (next - lambda);
@@ -98,7 +84,7 @@ fn solve<const O: usize>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mpc::lq::tests::{N, affine, chain, cost, optimum, slopes, start};
+    use crate::mpc::lq::tests::{N, affine, cost, optimum, slopes, start};
 
     #[test]
     fn oracle_the_terminal_constraint_adds_its_multiplier_to_the_end() {
@@ -108,7 +94,7 @@ mod tests {
         for share in [0.99, 0.5, 0.01] {
             let radius = share * norm;
             let mut onto = ErrorTrajectory::new(N);
-            let multiplier = solve(&lq, &chain(), &cost(), &affine(), radius, &mut onto).unwrap();
+            let multiplier = solve(&lq, &affine(), radius, &mut onto).unwrap();
             assert!(multiplier > 0.0);
             assert!((cost().end_square(&onto.states[N]).sqrt() - radius).abs() < 1e-9 * radius);
             let slope = slopes(&onto, multiplier / (radius * radius)).amax();
