@@ -124,7 +124,7 @@ impl Guidance {
     /// # Errors
     /// Names the setting that is out of range.
     pub fn new(settings: Settings) -> Result<Self, DesignError> {
-        ::settings::check(&settings)?;
+        settings.check()?;
         Ok(Self { settings, predictor: Predictor::default() })
     }
 

@@ -24,8 +24,8 @@ pub struct Probability {
 impl Probability {
     /// Estimates a probability from `events` among `cases`. Each end is exceeded with half of the
     /// remaining probability; without an event (or with nothing else) the other end has all of it,
-    /// as the bound that so many cases prove. Over all outcomes the interval holds with at least `1
-    /// - 1.5 (1 - confidence)`, because such a bound is exceeded twice as often as an end of the
+    /// as the bound that so many cases prove. Over all outcomes the interval holds with at least
+    /// `1 - 1.5 (1 - confidence)`, because such a bound is exceeded twice as often as an end of the
     /// other intervals.
     pub fn new(events: u64, cases: u64, confidence: f64) -> Self {
         let (k, n) = (events as f64, cases as f64);
