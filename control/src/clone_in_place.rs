@@ -1,7 +1,7 @@
 //! Copies of memories without allocation.
 
-/// Implements `Clone` for a type of which only the given fields own memory. `clone_from`, by which a
-/// memory is copied at every tick, keeps what these fields have allocated; the derived one would
+/// Implements `Clone` for a type of which only the given fields own memory. `clone_from`, by which
+/// a memory is copied at every tick, keeps what these fields have allocated; the derived one would
 /// allocate anew. The brackets hold the parameters of the type.
 macro_rules! clone_in_place {
     ([$($parameters:tt)*] $type:ty { $($field:ident),+ }) => {

@@ -132,8 +132,8 @@ fn oracle_duty_cycles_of_the_modulator() {
 }
 
 /// Returns the describing function of two opposed jets: the first harmonic of their thrust (from −1
-/// to 1) over a sine that is commanded, as magnitude and phase (rad). The amplitude of the sine is a
-/// duty cycle, its frequency in rad/s; each jet gets one half-wave.
+/// to 1) over a sine that is commanded, as magnitude and phase (rad). The amplitude of the sine is
+/// a duty cycle, its frequency in rad/s; each jet gets one half-wave.
 ///
 /// A. Gelb and W. E. Vander Velde, "Multiple-input describing functions and nonlinear system
 /// design", 1968.

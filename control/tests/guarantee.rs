@@ -294,8 +294,8 @@ fn regress_errors_grow_over_the_delay() {
 
 #[test]
 fn regress_a_disturbance_of_1_4_times_the_bound_does_not_cost_the_attitude() {
-    // The EMS of an LQR with limited moment is 4.15° on average and 16.3° at most: docs/guarantee.md
-    // names the campaign.
+    // The EMS of an LQR with limited moment is 4.15° on average and 16.3° at most, by a campaign
+    // that docs/guarantee.md names.
     let published = settings(Constraints::Robust);
     let disturbance_bound = 1.4 * published.disturbance_bound;
     let told = Settings { disturbance_bound, guarantee: Guarantee::BestEffort, ..published };

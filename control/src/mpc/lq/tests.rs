@@ -1,4 +1,4 @@
-//! Tests of the unconstrained optimum against the normal equations, and data for tests beside them.
+//! Tests of the unconstrained optimum against the normal equations, and data that other tests use.
 
 use super::*;
 use nalgebra::SVector;
