@@ -3,7 +3,7 @@
 //! method" (2014), on altitude-rate compensation and on path constraints.
 
 use super::predictor::Predictor;
-use super::settings::{Settings, over_speed};
+use super::settings::{Limit, Settings, over_speed};
 use vehicle::math::{cos, hypot, ln, tan};
 
 /// Least share of gravity that is taken to be left to the lift, where the speed is almost that of
@@ -48,7 +48,7 @@ impl Loads {
 
 /// State of the flight in the vertical plane, as far as the feedback depends on it.
 #[derive(Clone, Copy, Debug)]
-pub struct Glide {
+pub(super) struct Glide {
     /// Altitude, m.
     pub altitude: f64,
     /// Speed, m/s.
@@ -71,24 +71,20 @@ pub struct Glide {
     pub bank: [f64; 2],
 }
 
-/// Bank angle and loads at a state.
-#[derive(Clone, Copy, Debug)]
-pub struct Guided {
-    /// Cosine of the commanded bank angle.
-    pub cosine: f64,
-    /// Whether a limit has made the command.
-    pub is_limited: bool,
-    /// Loads at this state.
-    pub loads: Loads,
+impl Glide {
+    /// Returns −V̇/V, 1/s.
+    fn braking(&self) -> f64 {
+        (self.accelerations[1] + self.gravity * self.rate / self.speed) / self.speed
+    }
 }
 
 impl Predictor {
     /// Returns heat flux, load and dynamic pressure at a state. The ratio of the drag to that of
     /// the model is taken for that of the density.
-    pub fn loads(&self, glide: &Glide) -> Loads {
+    pub(super) fn loads(&self, glide: &Glide) -> Loads {
         let Glide { altitude, speed, alpha, drag_ratio, .. } = *glide;
         let [lift, drag] = glide.accelerations;
-        let density = self.air(altitude)[0] * drag_ratio;
+        let density = self.density(altitude) * drag_ratio;
         Loads {
             heat_flux: self.heat_flux(density, speed, alpha),
             load: hypot(lift, drag) / GRAVITY,
@@ -99,7 +95,7 @@ impl Predictor {
     /// Returns the same of the model at an altitude (m), a speed (m/s) and an angle of attack
     /// (rad).
     pub(super) fn loads_at(&self, altitude: f64, speed: f64, alpha: f64) -> Loads {
-        let density = self.air(altitude)[0];
+        let density = self.density(altitude);
         let [lift, drag] = self.accelerations(altitude, speed, alpha);
         Loads {
             heat_flux: self.heat_flux(density, speed, alpha),
@@ -108,39 +104,41 @@ impl Predictor {
         }
     }
 
-    /// Returns the commanded bank angle: cos σ = cos σ₀ − k (ḣ − ḣ₀), with ḣ₀ of the equilibrium
-    /// glide, and with at least the altitude rate at which no load rises beyond its limit.
-    pub fn guided(&self, settings: &Settings, glide: &Glide) -> Guided {
+    /// Returns the least altitude rate at which no load rises beyond its limit, m/s: for each load y
+    /// ∼ ρᵃ Vᵇ, ẏ/y = −a ḣ/H + b V̇/V must be at most ln(limit/y)/τ.
+    pub(super) fn least_rate(&self, limit: &Limit, glide: &Glide, loads: &Loads) -> f64 {
+        let exponents = [[0.5, self.heating_exponent()], [1.0, 2.0], [1.0, 2.0]];
+        let scale = self.scale(glide.altitude);
+        let each = loads.all().into_iter().zip(limit.all()).zip(exponents);
+        each.fold(f64::NEG_INFINITY, |least, ((load, largest), [a, b])| {
+            let room = ln((1.0 - limit.margin) * largest / load) / limit.time;
+            least.max(-scale / a * (room + b * glide.braking()))
+        })
+    }
+
+    /// Returns the cosine of the commanded bank angle, and whether a limit has made it: cos σ =
+    /// cos σ₀ − k (ḣ − ḣ₀), with ḣ₀ of the equilibrium glide, and with at least the altitude rate
+    /// `least` (m/s).
+    pub(super) fn cosine(&self, settings: &Settings, glide: &Glide, least: f64) -> (f64, bool) {
         let Glide { speed, rate, gravity, radius, coriolis, bank: [bank, slope], .. } = *glide;
-        let loads = self.loads(glide);
         let base = cos(bank);
-        let [_, drag] = glide.accelerations;
-        if drag < settings.damping.drag {
-            return Guided { cosine: base, is_limited: false, loads };
+        if glide.accelerations[1] < settings.damping.drag {
+            return (base, false);
         }
-        let [_, scale] = self.air(glide.altitude);
-        // −V̇/V.
-        let braking = (drag + gravity * rate / speed) / speed;
         // Lift carries the weight, L cos σ = g − V²/r − (Coriolis), while V, the angle of attack
         // and σ change: ρ̇/ρ + 2 V̇/V + Ċ_L/C_L − σ̇ tan σ is the relative change of the weight.
         let weight = (gravity - speed * speed / radius - coriolis).max(LEAST_WEIGHT * gravity);
         let by_weight = (2.0 * speed * speed / radius + coriolis) / weight;
         let by_alpha = speed * settings.alpha.slope(speed) * self.lift_slope(glide.alpha);
         let by_bank = slope * tan(bank) * speed * speed;
-        let equilibrium = -scale * braking * (2.0 + by_weight + by_alpha + by_bank);
+        let shares = 2.0 + by_weight + by_alpha + by_bank;
+        let equilibrium = -self.scale(glide.altitude) * glide.braking() * shares;
         let room = ((settings.bank.largest - bank) / ROOM).clamp(0.0, 1.0);
         let gain = room * over_speed(speed, FADING, [0.0, settings.damping.gain]);
         let damped = base - gain * (rate - equilibrium);
-        // ẏ/y = −a ḣ/H + b V̇/V for each load y is at most ln(limit/y)/τ.
-        let limits = &settings.limit;
-        let exponents = [[0.5, self.heating_exponent()], [1.0, 2.0], [1.0, 2.0]];
-        let mut least = f64::NEG_INFINITY;
-        for ((value, limit), [a, b]) in loads.all().iter().zip(limits.all()).zip(exponents) {
-            let room = ln((1.0 - limits.margin) * limit / value) / limits.time;
-            least = least.max(-scale / a * (room + b * braking));
-        }
-        let limited = base - limits.gain * (rate - least);
+        let limited = base - settings.limit.gain * (rate - least);
         let is_limited = rate < least && limited > damped;
-        Guided { cosine: if is_limited { limited } else { damped }, is_limited, loads }
+        let cosine = if is_limited { limited } else { damped };
+        (cosine.clamp(cos(settings.bank.largest), 1.0), is_limited)
     }
 }

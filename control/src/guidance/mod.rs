@@ -12,7 +12,8 @@ mod predictor;
 mod settings;
 mod shaping;
 
-pub use glide::{Glide, Guided, Loads};
+use glide::Glide;
+pub use glide::Loads;
 pub use predictor::{Beginning, End, Predictor};
 pub use settings::{
     Alpha, Bank, Damping, Filter, Initial, Limit, Reversal, Settings, Shaping, Sphere, Target,
@@ -287,8 +288,9 @@ impl Guidance {
             accelerations: [measured.lift, measured.drag],
             ..self.predictor.glide(settings, &begin, memory.magnitude)
         };
-        let Guided { cosine, is_limited, loads: now } = self.predictor.guided(settings, &present);
-        let cosine = cosine.clamp(cos(largest), 1.0);
+        let now = self.predictor.loads(&present);
+        let least = self.predictor.least_rate(&settings.limit, &present, &now);
+        let (cosine, is_limited) = self.predictor.cosine(settings, &present, least);
         memory.commanded = atan2((1.0 - cosine * cosine).sqrt(), cosine);
         (command.loads, command.is_limited) = (now, is_limited);
         let limits = settings.limit.all();

@@ -6,7 +6,7 @@ use nalgebra::Vector4;
 use vehicle::aerodynamics::Aerodynamics;
 use vehicle::atmosphere::air_anywhere;
 use vehicle::integrator::rk4;
-use vehicle::math::{cos, exp, ln, sin, sin_cos};
+use vehicle::math::{exp, ln, sin, sin_cos};
 
 /// Distance between the altitudes at which the density is known, m.
 const SPACING: f64 = 500.0;
@@ -70,13 +70,17 @@ impl Default for Predictor {
 }
 
 impl Predictor {
-    /// Returns the density of the standard atmosphere (kg/m³) at an altitude (m), within 0.12 %, and
-    /// the height over which it falls to 1/e there, m.
-    pub(super) fn air(&self, altitude: f64) -> [f64; 2] {
-        let place = (altitude / SPACING).max(0.0);
-        let below = (place as usize).min(ALTITUDES - 2);
+    /// Returns the density of the standard atmosphere (kg/m³) at an altitude (m), within 0.12 %.
+    pub(super) fn density(&self, altitude: f64) -> f64 {
+        let (place, below) = place(altitude);
         let (low, high) = (self.density[below], self.density[below + 1]);
-        [exp(low + (place - below as f64) * (high - low)), SPACING / (low - high)]
+        exp(low + (place - below as f64) * (high - low))
+    }
+
+    /// Returns the height over which the density falls to 1/e at an altitude (m), m.
+    pub(super) fn scale(&self, altitude: f64) -> f64 {
+        let (_, below) = place(altitude);
+        SPACING / (self.density[below] - self.density[below + 1])
     }
 
     /// Returns the heat flux into the leading edge, W/m².
@@ -103,7 +107,7 @@ impl Predictor {
     /// Returns lift and drag per mass (m/s²) of the model at an altitude (m), a speed (m/s) and an
     /// angle of attack (rad).
     pub fn accelerations(&self, altitude: f64, speed: f64, alpha: f64) -> [f64; 2] {
-        let pressure = 0.5 * self.air(altitude)[0] * speed * speed * self.area_per_mass;
+        let pressure = 0.5 * self.density(altitude) * speed * speed * self.area_per_mass;
         self.coefficients(alpha).map(|coefficient| pressure * coefficient)
     }
 
@@ -114,7 +118,7 @@ impl Predictor {
     }
 
     /// Returns the beginning of a flight with this bank angle (rad).
-    pub fn glide(&self, settings: &Settings, begin: &Beginning, bank: f64) -> Glide {
+    pub(super) fn glide(&self, settings: &Settings, begin: &Beginning, bank: f64) -> Glide {
         let from = Self::energy(settings, begin.altitude, begin.speed);
         let to = Self::energy(settings, settings.target.altitude, settings.target.speed);
         let slope = if to > from { (settings.bank.last - bank) / (to - from) } else { 0.0 };
@@ -169,13 +173,12 @@ impl Predictor {
             let passed = (energy(state) - from).clamp(0.0, to - from);
             self.glide_at(settings, begin, state, [bank + slope * passed, slope])
         };
-        let cosine = |cosine: f64| cosine.clamp(cos(settings.bank.largest), 1.0);
         // Altitude, speed, flight path angle, and the angle travelled over ground.
-        let mut f = |_: f64, state: &Vector4<f64>| {
+        let derivative = |state: &Vector4<f64>, least: f64| {
             let glide = glide(state);
             let Glide { speed, gravity: g, radius, coriolis, .. } = glide;
             let [lift, drag] = glide.accelerations;
-            let cosine = cosine(self.guided(settings, &glide).cosine);
+            let (cosine, _) = self.cosine(settings, &glide, least);
             let (sin_path, cos_path) = sin_cos(state[2]);
             Vector4::new(
                 speed * sin_path,
@@ -187,8 +190,12 @@ impl Predictor {
         let mut state = Vector4::new(begin.altitude, begin.speed, begin.path, 0.0);
         let mut loads = Loads::default();
         for _ in 0..MOST_STEPS {
-            let next = rk4(&mut f, 0.0, &state, STEP);
-            loads = loads.max(&self.loads(&glide(&next)));
+            let here = glide(&state);
+            let now = self.loads(&here);
+            loads = loads.max(&now);
+            // What a limit asks for is held over a step, as its powers take long.
+            let least = self.least_rate(&settings.limit, &here, &now);
+            let next = rk4(&mut |_, state: &_| derivative(state, least), 0.0, &state, STEP);
             if energy(&next) >= to || next[0] <= 0.0 {
                 let (before, after) = (energy(&state), energy(&next));
                 let share = ((to - before) / (after - before)).clamp(0.0, 1.0);
@@ -201,6 +208,12 @@ impl Predictor {
     }
 }
 
+/// Returns an altitude (m) in units of the table, and the place of the table below it.
+fn place(altitude: f64) -> (f64, usize) {
+    let place = (altitude / SPACING).max(0.0);
+    (place, (place as usize).min(ALTITUDES - 2))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -210,7 +223,7 @@ mod tests {
         let predictor = Predictor::default();
         for metres in (0..140_000).step_by(70) {
             let altitude = f64::from(metres);
-            let ratio = predictor.air(altitude)[0] / air_anywhere(altitude).density;
+            let ratio = predictor.density(altitude) / air_anywhere(altitude).density;
             assert!((ratio - 1.0).abs() < 1.2e-3, "{altitude} m: {ratio}");
         }
     }
