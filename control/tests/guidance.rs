@@ -151,8 +151,8 @@ fn oracle_a_limit_is_kept_or_called_infeasible() {
     }
 }
 
-/// From too steep a start no bank angle keeps the limits, and from too flat a start none reaches the
-/// target.
+/// From too steep a start no bank angle keeps the limits, and from too flat a start none reaches
+/// the target.
 #[test]
 fn a_start_that_exceeds_a_limit_is_reported() {
     for path in [-4.0, -0.5] {

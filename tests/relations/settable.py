@@ -51,10 +51,8 @@ FILE = "time_s,alpha_rad,beta_rad,sigma_rad\n0,0.1,0.0,-0.3\n100,0.2,0.1,-0.4\n"
 # Settings in which some variables act and no experiment has them, with an experiment's inputs.
 ROWS = range(1, 9)
 TURNING = ("entry/from-120km", {"reference.externalRate.beta": 0.01})
-DELAYED = (TURNING[0], {"delay": 0.08, **TURNING[1]})
-SCENES = {
-    **{law: {"a moment that acts later": DELAYED} for law in ("LQR", "FBL", "BTVSMC", "BTVSMC_DO", "SOTVSMC_DO", "TwoLoopSMC")},
-    "DLMPC": {"a sideslip angle that is to turn": TURNING},
+LATE = {"a moment that acts later": (TURNING[0], {"delay": 0.08} | TURNING[1])}
+SCENES = dict.fromkeys(("DLMPC", "LQR", "FBL", "BTVSMC", "BTVSMC_DO", "SOTVSMC_DO", "TwoLoopSMC"), LATE) | {
     "CRMPC": {
         "a sideslip angle that is to turn": TURNING,
         "settings without guarantee": ("crmpc-2022/crmpc-robust", {"disturbance.bound": 0.2}),
@@ -327,14 +325,12 @@ class Driven:
 
 def places_of(fmu: Fmu, fmus: list[Fmu], found: dict[str, list[Place]]) -> list[Place]:
     """The places of an FMU: its own, those of FMUs with the same inputs, for which it can be exchanged, and scenes."""
-    own = found[fmu.name]
-    known = {place.name for place in own}
+    known = {place.name for place in (own := found[fmu.name])}
     others = [place for other in fmus if other.names("input") == fmu.names("input") for place in found[other.name]]
     exchanged = [place for place in others if place.name not in known]
-    made = []
-    for title, (experiment, settings) in SCENES.get(fmu.name, {}).items():
-        place = next(place for place in own if place.name == experiment)
-        made.append(replace(place, name=title, settings=place.settings | settings))
+    scenes = SCENES.get(fmu.name, {}).items()
+    base = {place.name: place for place in own + exchanged}
+    made = [replace(base[experiment], name=title, settings=base[experiment].settings | settings) for title, (experiment, settings) in scenes]
     return own + exchanged + made
 
 

@@ -104,8 +104,8 @@ impl Predictor {
         }
     }
 
-    /// Returns the least altitude rate at which no load rises beyond its limit, m/s: for each load y
-    /// ∼ ρᵃ Vᵇ, ẏ/y = −a ḣ/H + b V̇/V must be at most ln(limit/y)/τ.
+    /// Returns the least altitude rate at which no load rises beyond its limit, m/s: for each load
+    /// y ∼ ρᵃ Vᵇ, ẏ/y = −a ḣ/H + b V̇/V must be at most ln(limit/y)/τ.
     pub(super) fn least_rate(&self, limit: &Limit, glide: &Glide, loads: &Loads) -> f64 {
         let exponents = [[0.5, self.heating_exponent()], [1.0, 2.0], [1.0, 2.0]];
         let scale = self.scale(glide.altitude);

@@ -123,10 +123,22 @@ impl Guidance {
     /// Makes a guidance.
     ///
     /// # Errors
-    /// Names the setting that is out of range.
+    /// Names the setting that is out of range, or the limit that the end of the flight exceeds.
     pub fn new(settings: Settings) -> Result<Self, DesignError> {
-        settings.check()?;
-        Ok(Self { settings, predictor: Predictor::default() })
+        ::settings::check(&settings)?;
+        let predictor = Predictor::default();
+        let Target { altitude, speed, .. } = settings.target;
+        let floor = predictor.loads_at(altitude, speed, settings.alpha.at(speed));
+        // The heat flux is the largest long before.
+        for (name, limit, floor) in [
+            ("limit.load", settings.limit.load, floor.load),
+            ("limit.pressure", settings.limit.pressure, floor.pressure),
+        ] {
+            if limit < floor {
+                return Err(DesignError::LimitBelowTarget { name, limit, floor });
+            }
+        }
+        Ok(Self { settings, predictor })
     }
 
     /// Returns the settings.

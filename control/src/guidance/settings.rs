@@ -1,9 +1,7 @@
 //! Settings of the guidance, with ours from `data/guidance.toml`.
 
 use super::glide::Loads;
-use super::predictor::Predictor;
-use crate::error::DesignError;
-use ::settings::{Declared, check};
+use ::settings::Declared;
 use serde::{Deserialize, Serialize};
 use std::sync::LazyLock;
 use vehicle::data::Tables;
@@ -236,29 +234,6 @@ impl Default for Settings {
             settings
         });
         *READ
-    }
-}
-
-impl Settings {
-    /// Checks the settings.
-    ///
-    /// # Errors
-    /// Names the setting that is out of range, or the limit that the end of the flight exceeds.
-    pub fn check(&self) -> Result<(), DesignError> {
-        check(self)?;
-        let Target { altitude, speed, .. } = self.target;
-        let predictor = Predictor::default();
-        let floor = predictor.loads_at(altitude, speed, self.alpha.at(speed));
-        // The heat flux is the largest long before.
-        for (name, limit, floor) in [
-            ("limit.load", self.limit.load, floor.load),
-            ("limit.pressure", self.limit.pressure, floor.pressure),
-        ] {
-            if limit < floor {
-                return Err(DesignError::LimitBelowTarget { name, limit, floor });
-            }
-        }
-        Ok(())
     }
 }
 
