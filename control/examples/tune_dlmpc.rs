@@ -8,8 +8,8 @@
 //! The search consists of a coarse grid over three seeds, then of steps from its best sets over
 //! SEEDS (10) seeds, halved until none is an improvement. The criterion is the least CMS of all
 //! gains that are no worse than the published ones in EMS and in the largest ‖ω‖: means over the
-//! seeds, and the largest rate in any of them (‖m‖ keeps its limit by construction). The gains found are
-//! also printed with seeds that the search has not seen.
+//! seeds, and the largest rate in any of them (‖m‖ keeps its limit by construction). The gains
+//! found are also printed with seeds that the search has not seen.
 
 #[path = "../tests/harness/mod.rs"]
 mod harness;

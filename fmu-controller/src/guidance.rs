@@ -107,7 +107,7 @@ impl SampledInstance for GuidanceInstance {
 
     fn show(&mut self, _time: f64, _guidance: &Guidance, ((), memory): ((), &Memory)) {
         let (command, reversals) = (memory.command, memory.reversals);
-        let margins = self.settings.limit.margins(&command.loads);
+        let margins = command.loads.margins(&self.settings.limit);
         self.output = Output { command, reversals, margins };
     }
 

@@ -325,9 +325,9 @@ class Driven:
 
 def places_of(fmu: Fmu, fmus: list[Fmu], found: dict[str, list[Place]]) -> list[Place]:
     """The places of an FMU: its own, those of FMUs with the same inputs, for which it can be exchanged, and scenes."""
-    known = {place.name for place in (own := found[fmu.name])}
+    own = found[fmu.name]
     others = [place for other in fmus if other.names("input") == fmu.names("input") for place in found[other.name]]
-    exchanged = [place for place in others if place.name not in known]
+    exchanged = [place for place in others if place.name not in {place.name for place in own}]
     scenes = SCENES.get(fmu.name, {}).items()
     base = {place.name: place for place in own + exchanged}
     made = [replace(base[experiment], name=title, settings=base[experiment].settings | settings) for title, (experiment, settings) in scenes]

@@ -2,7 +2,7 @@
 //! heat flux, load and dynamic pressure below their limits. P. Lu, "Entry guidance: a unified
 //! method" (2014), on altitude-rate compensation and on path constraints.
 
-use super::predictor::Predictor;
+use super::model::Model;
 use super::settings::{Limit, Settings, over_speed};
 use vehicle::math::{cos, hypot, ln, tan};
 
@@ -33,6 +33,16 @@ impl Loads {
     /// Returns the three numbers.
     pub fn all(&self) -> [f64; 3] {
         [self.heat_flux, self.load, self.pressure]
+    }
+
+    /// Returns the share of each limit that they leave.
+    #[must_use]
+    pub fn margins(&self, limit: &Limit) -> Self {
+        Self {
+            heat_flux: 1.0 - self.heat_flux / limit.heat_flux,
+            load: 1.0 - self.load / limit.load,
+            pressure: 1.0 - self.pressure / limit.pressure,
+        }
     }
 
     /// Returns the larger one of each.
@@ -71,68 +81,66 @@ pub(super) struct Glide {
     pub bank: [f64; 2],
 }
 
+impl Loads {
+    /// Returns heat flux, load and dynamic pressure in air of a density (kg/m³), at a speed (m/s)
+    /// and an angle of attack (rad), with lift and drag per mass (m/s²).
+    fn of(model: &Model, density: f64, [speed, alpha]: [f64; 2], [lift, drag]: [f64; 2]) -> Self {
+        Self {
+            heat_flux: model.heat_flux(density, speed, alpha),
+            load: hypot(lift, drag) / GRAVITY,
+            pressure: 0.5 * density * speed * speed,
+        }
+    }
+
+    /// Returns those of the model at an altitude (m), a speed (m/s) and an angle of attack (rad).
+    pub(super) fn at(model: &Model, altitude: f64, speed: f64, alpha: f64) -> Self {
+        let accelerations = model.accelerations(altitude, speed, alpha);
+        Self::of(model, model.density(altitude), [speed, alpha], accelerations)
+    }
+}
+
 impl Glide {
     /// Returns −V̇/V, 1/s.
     fn braking(&self) -> f64 {
         (self.accelerations[1] + self.gravity * self.rate / self.speed) / self.speed
     }
-}
 
-impl Predictor {
-    /// Returns heat flux, load and dynamic pressure at a state. The ratio of the drag to that of
-    /// the model is taken for that of the density.
-    pub(super) fn loads(&self, glide: &Glide) -> Loads {
-        let Glide { altitude, speed, alpha, drag_ratio, .. } = *glide;
-        let [lift, drag] = glide.accelerations;
-        let density = self.density(altitude) * drag_ratio;
-        Loads {
-            heat_flux: self.heat_flux(density, speed, alpha),
-            load: hypot(lift, drag) / GRAVITY,
-            pressure: 0.5 * density * speed * speed,
-        }
-    }
-
-    /// Returns the same of the model at an altitude (m), a speed (m/s) and an angle of attack
-    /// (rad).
-    pub(super) fn loads_at(&self, altitude: f64, speed: f64, alpha: f64) -> Loads {
-        let density = self.density(altitude);
-        let [lift, drag] = self.accelerations(altitude, speed, alpha);
-        Loads {
-            heat_flux: self.heat_flux(density, speed, alpha),
-            load: hypot(lift, drag) / GRAVITY,
-            pressure: 0.5 * density * speed * speed,
-        }
+    /// Returns heat flux, load and dynamic pressure. The ratio of the drag to that of the model is
+    /// taken for that of the density.
+    pub(super) fn loads(&self, model: &Model) -> Loads {
+        let density = model.density(self.altitude) * self.drag_ratio;
+        Loads::of(model, density, [self.speed, self.alpha], self.accelerations)
     }
 
     /// Returns the least altitude rate at which no load rises beyond its limit, m/s: for each load
     /// y ∼ ρᵃ Vᵇ, ẏ/y = −a ḣ/H + b V̇/V must be at most ln(limit/y)/τ.
-    pub(super) fn least_rate(&self, limit: &Limit, glide: &Glide, loads: &Loads) -> f64 {
-        let exponents = [[0.5, self.heating_exponent()], [1.0, 2.0], [1.0, 2.0]];
-        let scale = self.scale(glide.altitude);
+    pub(super) fn least_rate(&self, model: &Model, limit: &Limit, loads: &Loads) -> f64 {
+        let exponents = [[0.5, model.heating_exponent()], [1.0, 2.0], [1.0, 2.0]];
+        let scale = model.scale(self.altitude);
         let each = loads.all().into_iter().zip(limit.all()).zip(exponents);
         each.fold(f64::NEG_INFINITY, |least, ((load, largest), [a, b])| {
             let room = ln((1.0 - limit.margin) * largest / load) / limit.time;
-            least.max(-scale / a * (room + b * glide.braking()))
+            least.max(-scale / a * (room + b * self.braking()))
         })
     }
 
     /// Returns the cosine of the commanded bank angle, and whether a limit has made it: cos σ =
     /// cos σ₀ − k (ḣ − ḣ₀), with ḣ₀ of the equilibrium glide, and with at least the altitude rate
     /// `least` (m/s).
-    pub(super) fn cosine(&self, settings: &Settings, glide: &Glide, least: f64) -> (f64, bool) {
-        let Glide { speed, rate, gravity, radius, coriolis, bank: [bank, slope], .. } = *glide;
+    pub(super) fn cosine(&self, model: &Model, settings: &Settings, least: f64) -> (f64, bool) {
+        let Glide { speed, rate, gravity, radius, coriolis, bank: [bank, slope], .. } = *self;
         let base = cos(bank);
-        if glide.accelerations[1] < settings.damping.drag {
+        if self.accelerations[1] < settings.damping.drag {
             return (base, false);
         }
         // Lift carries the weight, L cos σ = g − V²/r − (Coriolis), while V, the angle of attack
         // and σ change: ρ̇/ρ + 2 V̇/V + Ċ_L/C_L − σ̇ tan σ is the relative change of the weight.
         let weight = (gravity - speed * speed / radius - coriolis).max(LEAST_WEIGHT * gravity);
         let by_weight = (2.0 * speed * speed / radius + coriolis) / weight;
-        let by_alpha = speed * settings.alpha.slope(speed) * self.lift_slope(glide.alpha);
+        let by_alpha = speed * settings.alpha.slope(speed) * model.lift_slope(self.alpha);
         let by_bank = slope * tan(bank) * speed * speed;
         let shares = 2.0 + by_weight + by_alpha + by_bank;
-        let equilibrium = -self.scale(glide.altitude) * glide.braking() * shares;
+        let equilibrium = -model.scale(self.altitude) * self.braking() * shares;
         let room = ((settings.bank.largest - bank) / ROOM).clamp(0.0, 1.0);
         let gain = room * over_speed(speed, FADING, [0.0, settings.damping.gain]);
         let damped = base - gain * (rate - equilibrium);

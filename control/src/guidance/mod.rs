@@ -8,6 +8,7 @@
 //! within limits on its rate and acceleration.
 
 mod glide;
+mod model;
 mod predictor;
 mod settings;
 mod shaping;
@@ -128,7 +129,7 @@ impl Guidance {
         ::settings::check(&settings)?;
         let predictor = Predictor::default();
         let Target { altitude, speed, .. } = settings.target;
-        let floor = predictor.loads_at(altitude, speed, settings.alpha.at(speed));
+        let floor = Loads::at(&predictor.model, altitude, speed, settings.alpha.at(speed));
         // The heat flux is the largest long before.
         for (name, limit, floor) in [
             ("limit.load", settings.limit.load, floor.load),
@@ -223,7 +224,7 @@ impl Guidance {
         }
         let [altitude, _, _, speed, ..]: [f64; 6] = measured.motion.into();
         let alpha = memory.alpha.value;
-        let predicted = self.predictor.accelerations(altitude, speed, alpha);
+        let predicted = self.predictor.model.accelerations(altitude, speed, alpha);
         let share = 1.0 - exp(-(TICKS as f64) * PERIOD / time);
         let actual = [measured.lift, measured.drag];
         for ((ratio, actual), predicted) in memory.ratios.iter_mut().zip(actual).zip(predicted) {
@@ -237,7 +238,7 @@ impl Guidance {
     fn schedule(&self, memory: &Memory) -> Alpha {
         let alpha = self.settings.alpha;
         let [lift_ratio, _] = memory.ratios;
-        let lift = |angle: f64| self.predictor.coefficients(angle)[0];
+        let lift = |angle: f64| self.predictor.model.coefficients(angle)[0];
         let slope = (lift(alpha.low + PROBE) - lift(alpha.low)) / PROBE;
         let change = lift(alpha.low) * (1.0 / lift_ratio - 1.0) / slope;
         let largest = self.settings.alpha.adjustment;
@@ -300,9 +301,10 @@ impl Guidance {
             accelerations: [measured.lift, measured.drag],
             ..self.predictor.glide(settings, &begin, memory.magnitude)
         };
-        let now = self.predictor.loads(&present);
-        let least = self.predictor.least_rate(&settings.limit, &present, &now);
-        let (cosine, is_limited) = self.predictor.cosine(settings, &present, least);
+        let model = &self.predictor.model;
+        let now = present.loads(model);
+        let least = present.least_rate(model, &settings.limit, &now);
+        let (cosine, is_limited) = present.cosine(model, settings, least);
         memory.commanded = atan2((1.0 - cosine * cosine).sqrt(), cosine);
         (command.loads, command.is_limited) = (now, is_limited);
         let limits = settings.limit.all();

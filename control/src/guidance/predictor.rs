@@ -1,31 +1,22 @@
 //! Predicts the range of a flight whose bank angle is linear in energy.
 
 use super::glide::{Glide, Loads};
+use super::model::Model;
 use super::settings::Settings;
 use nalgebra::Vector4;
-use vehicle::aerodynamics::Aerodynamics;
-use vehicle::atmosphere::air_anywhere;
 use vehicle::integrator::rk4;
-use vehicle::math::{exp, ln, sin, sin_cos};
+use vehicle::math::{sin, sin_cos};
 
-/// Distance between the altitudes at which the density is known, m.
-const SPACING: f64 = 500.0;
-/// Number of these altitudes, up to 140 km.
-const ALTITUDES: usize = 281;
 /// Step of the prediction, s.
 const STEP: f64 = 4.0;
-/// Difference of the angle of attack from which a slope follows, rad.
-const PROBE: f64 = 0.01;
 /// Steps after which a prediction is given up: the flight does not come down.
 const MOST_STEPS: usize = 1500;
 
-/// Model of vehicle, air and planet in the guidance.
-#[derive(Clone, Debug)]
+/// Predictor of the range of flights.
+#[derive(Clone, Debug, Default)]
 pub struct Predictor {
-    aerodynamics: Aerodynamics,
-    area_per_mass: f64,
-    /// Logarithms of the density of the standard atmosphere.
-    density: [f64; ALTITUDES],
+    /// Vehicle and air as the guidance knows them.
+    pub(super) model: Model,
 }
 
 /// Beginning of a prediction.
@@ -57,60 +48,7 @@ pub struct End {
     pub loads: Loads,
 }
 
-impl Default for Predictor {
-    /// Returns the predictor for the vehicle of the papers in the standard atmosphere.
-    fn default() -> Self {
-        let aerodynamics = Aerodynamics::papers();
-        Self {
-            area_per_mass: aerodynamics.area() / aerodynamics.mass(),
-            aerodynamics,
-            density: std::array::from_fn(|i| ln(air_anywhere(i as f64 * SPACING).density)),
-        }
-    }
-}
-
 impl Predictor {
-    /// Returns the density of the standard atmosphere (kg/m³) at an altitude (m), within 0.12 %.
-    pub(super) fn density(&self, altitude: f64) -> f64 {
-        let (place, below) = place(altitude);
-        let (low, high) = (self.density[below], self.density[below + 1]);
-        exp(low + (place - below as f64) * (high - low))
-    }
-
-    /// Returns the height over which the density falls to 1/e at an altitude (m), m.
-    pub(super) fn scale(&self, altitude: f64) -> f64 {
-        let (_, below) = place(altitude);
-        SPACING / (self.density[below] - self.density[below + 1])
-    }
-
-    /// Returns the heat flux into the leading edge, W/m².
-    pub(super) fn heat_flux(&self, density: f64, speed: f64, alpha: f64) -> f64 {
-        self.aerodynamics.heat_flux(density, speed, alpha)
-    }
-
-    /// Returns the power of the speed with which the heat flux grows.
-    pub(super) fn heating_exponent(&self) -> f64 {
-        self.aerodynamics.heating_exponent()
-    }
-
-    /// Returns the relative change of the lift with the angle of attack, 1/rad.
-    pub(super) fn lift_slope(&self, alpha: f64) -> f64 {
-        let lift = |angle: f64| self.coefficients(angle)[0];
-        (lift(alpha + PROBE) / lift(alpha) - 1.0) / PROBE
-    }
-
-    /// Returns the coefficients of lift and drag at an angle of attack (rad).
-    pub fn coefficients(&self, alpha: f64) -> [f64; 2] {
-        self.aerodynamics.lift_and_drag(alpha)
-    }
-
-    /// Returns lift and drag per mass (m/s²) of the model at an altitude (m), a speed (m/s) and an
-    /// angle of attack (rad).
-    pub fn accelerations(&self, altitude: f64, speed: f64, alpha: f64) -> [f64; 2] {
-        let pressure = 0.5 * self.density(altitude) * speed * speed * self.area_per_mass;
-        self.coefficients(alpha).map(|coefficient| pressure * coefficient)
-    }
-
     /// Returns the energy-like variable e = μ/r − V²/2 of Lu 2014, which grows during the entry,
     /// m²/s².
     pub fn energy(settings: &Settings, altitude: f64, speed: f64) -> f64 {
@@ -139,7 +77,7 @@ impl Predictor {
         let [altitude, speed, path, _]: [f64; 4] = (*state).into();
         let radius = planet.radius + altitude;
         let alpha = settings.alpha.at(speed);
-        let [lift, drag] = self.accelerations(altitude, speed, alpha);
+        let [lift, drag] = self.model.accelerations(altitude, speed, alpha);
         let [lift_ratio, drag_ratio] = begin.ratios;
         // The planet's rotation makes a vehicle that flies to the east lighter.
         let centrifugal = planet.rate * planet.rate * radius * begin.near_equator;
@@ -178,7 +116,7 @@ impl Predictor {
             let glide = glide(state);
             let Glide { speed, gravity: g, radius, coriolis, .. } = glide;
             let [lift, drag] = glide.accelerations;
-            let (cosine, _) = self.cosine(settings, &glide, least);
+            let (cosine, _) = glide.cosine(&self.model, settings, least);
             let (sin_path, cos_path) = sin_cos(state[2]);
             Vector4::new(
                 speed * sin_path,
@@ -191,10 +129,10 @@ impl Predictor {
         let mut loads = Loads::default();
         for _ in 0..MOST_STEPS {
             let here = glide(&state);
-            let now = self.loads(&here);
+            let now = here.loads(&self.model);
             loads = loads.max(&now);
             // What a limit asks for is held over a step, as its powers take long.
-            let least = self.least_rate(&settings.limit, &here, &now);
+            let least = here.least_rate(&self.model, &settings.limit, &now);
             let next = rk4(&mut |_, state: &_| derivative(state, least), 0.0, &state, STEP);
             if energy(&next) >= to || next[0] <= 0.0 {
                 let (before, after) = (energy(&state), energy(&next));
@@ -205,26 +143,5 @@ impl Predictor {
             state = next;
         }
         End { range: state[3] * planet.radius, arrives: false, loads }
-    }
-}
-
-/// Returns an altitude (m) in units of the table, and the place of the table below it.
-fn place(altitude: f64) -> (f64, usize) {
-    let place = (altitude / SPACING).max(0.0);
-    (place, (place as usize).min(ALTITUDES - 2))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn oracle_the_density_is_that_of_the_standard_atmosphere() {
-        let predictor = Predictor::default();
-        for metres in (0..140_000).step_by(70) {
-            let altitude = f64::from(metres);
-            let ratio = predictor.density(altitude) / air_anywhere(altitude).density;
-            assert!((ratio - 1.0).abs() < 1.2e-3, "{altitude} m: {ratio}");
-        }
     }
 }

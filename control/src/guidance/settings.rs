@@ -1,6 +1,5 @@
 //! Settings of the guidance, with ours from `data/guidance.toml`.
 
-use super::glide::Loads;
 use ::settings::Declared;
 use serde::{Deserialize, Serialize};
 use std::sync::LazyLock;
@@ -170,15 +169,6 @@ pub struct Limit {
 }
 
 impl Limit {
-    /// Returns the share of each limit that these loads leave.
-    pub fn margins(&self, loads: &Loads) -> Loads {
-        Loads {
-            heat_flux: 1.0 - loads.heat_flux / self.heat_flux,
-            load: 1.0 - loads.load / self.load,
-            pressure: 1.0 - loads.pressure / self.pressure,
-        }
-    }
-
     /// Returns the limits of heat flux, load and dynamic pressure.
     pub(super) fn all(&self) -> [f64; 3] {
         [self.heat_flux, self.load, self.pressure]
