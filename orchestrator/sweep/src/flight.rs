@@ -16,6 +16,9 @@ use linear::linearise::{Linearised, Lineariser};
 use linear::measures::{self, Measured};
 use std::collections::BTreeMap;
 
+/// Number of other cases that are tried before an FMU that fails is not put down to a case's values.
+const OTHERS: u64 = 8;
+
 /// Result of a case.
 #[derive(Debug)]
 pub struct Flown {
@@ -217,11 +220,22 @@ impl<'a> Flight<'a> {
         Ok(Flown { case, values, metrics, outcome, without_margins, broken, time })
     }
 
-    /// Starts new instances with the texts among these changes alone.
+    /// Starts new instances with the texts among these changes, and without their numbers. What the
+    /// file sets may need numbers that vary, so that those of other cases are tried as well.
     fn start_without_numbers(&self, changes: &[(Target, SettingValue)]) -> Result<(), Error> {
         let is_text = |change: &&(Target, SettingValue)| matches!(change.1, SettingValue::Text(_));
-        let texts: Vec<_> = changes.iter().filter(is_text).cloned().collect();
-        self.system.start_varied(&texts, self.interrupt).map(drop)
+        let texts = || changes.iter().filter(is_text).cloned();
+        let start = |changes: &[_]| self.system.start_varied(changes, self.interrupt).map(drop);
+        let alone = start(&texts().collect::<Vec<_>>());
+        if alone.is_ok() {
+            return alone;
+        }
+        let mut others = (0..OTHERS).map(|case| {
+            let numbers = self.sweep.changes(&self.sweep.values(case)).into_iter();
+            let numbers = numbers.filter(|change| !is_text(&change));
+            start(&numbers.chain(texts()).collect::<Vec<_>>())
+        });
+        if others.any(|outcome| outcome.is_ok()) { Ok(()) } else { alone }
     }
 }
 
