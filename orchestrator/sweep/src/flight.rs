@@ -16,7 +16,7 @@ use linear::linearise::{Linearised, Lineariser};
 use linear::measures::{self, Measured};
 use std::collections::BTreeMap;
 
-/// Number of other cases that are tried before an FMU that fails is not put down to a case's values.
+/// Number of other cases that are tried before an FMU's failure counts as that of its installation.
 const OTHERS: u64 = 8;
 
 /// Result of a case.
