@@ -103,31 +103,46 @@ pub enum Preview<'a> {
     External(Forecast),
 }
 
-/// Forecast of a reference that is given from outside: up to an instant it is the given one, then
-/// each angle goes on at its rate and brakes.
+/// Forecast of a reference that is given from outside.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Forecast {
     /// The given reference.
     pub given: Reference,
-    /// Instant from which on the angles brake, s.
+    /// Instant for which it is given, s.
     pub from: f64,
-    /// Deceleration of each angle, rad/s²; infinite if they stay constant.
-    pub braking: Vector3<f64>,
+    /// Instant at which the moment of this tick acts, s. Until then the reference moves on as its
+    /// derivatives say.
+    pub until: f64,
+    /// Deceleration with which each angle brakes afterwards, rad/s². Without it the given reference
+    /// counts until then, and the angles stay constant afterwards.
+    pub braking: Option<Vector3<f64>>,
 }
 
 impl Forecast {
     /// Returns the reference at `time` (s).
     fn at(&self, time: f64) -> Reference {
-        let since = time - self.from;
+        let Self { given, from, until, braking } = *self;
+        let Some(braking) = braking else {
+            let held = Reference { angles: given.angles, ..Reference::default() };
+            return if time <= until { given } else { held };
+        };
+        let moving = (time.min(until) - from).max(0.0);
+        let Reference { angles, rates, accelerations } = given;
+        let moved = Reference {
+            angles: angles + (rates + accelerations * (0.5 * moving)) * moving,
+            rates: rates + accelerations * moving,
+            accelerations,
+        };
+        let since = time - until;
         if since <= 0.0 {
-            return self.given;
+            return moved;
         }
         let mut reference = Reference::default();
         for i in 0..3 {
-            let (rate, braking) = (self.given.rates[i], self.braking[i]);
+            let (rate, braking) = (moved.rates[i], braking[i]);
             let stops = rate.abs() / braking;
             let left = if since < stops { rate - (braking * since).copysign(rate) } else { 0.0 };
-            reference.angles[i] = self.given.angles[i] + 0.5 * (rate + left) * since.min(stops);
+            reference.angles[i] = moved.angles[i] + 0.5 * (rate + left) * since.min(stops);
             reference.rates[i] = left;
             if since < stops {
                 reference.accelerations[i] = -braking.copysign(rate);

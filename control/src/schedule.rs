@@ -173,8 +173,8 @@ mod tests {
     }
 
     fn evaluate(sampled: &mut Sampled<f64>, x: f64) {
-        let braking = Vector3::repeat(f64::INFINITY);
-        let forecast = Forecast { given: Reference::default(), from: 0.0, braking };
+        let given = Reference::default();
+        let forecast = Forecast { given, from: 0.0, until: 0.0, braking: None };
         sampled.evaluate(&mut Sum, &measured(x), &Preview::External(forecast));
     }
 

@@ -147,8 +147,7 @@ impl Jump {
             let measured = Measurement { angles, rates, ..Measurement::default() };
             // The reference is known from the time on at which it has jumped.
             let given = Reference { angles: self.angles(time), ..Reference::default() };
-            let braking = Vector3::repeat(f64::INFINITY);
-            let forecast = Forecast { given, from: time, braking };
+            let forecast = Forecast { given, from: time, until: time, braking: None };
             let reference = |ahead| Preview::External(forecast).at(ahead);
             let moment = law.update(&mut memory, tick, time, &measured, &reference);
             let in_force = inner(&memory).supervision.status == GuaranteeStatus::InForce;

@@ -51,8 +51,8 @@ FILE = "time_s,alpha_rad,beta_rad,sigma_rad\n0,0.1,0.0,-0.3\n100,0.2,0.1,-0.4\n"
 # Settings in which some variables act and no experiment has them, with an experiment's inputs.
 ROWS = range(1, 9)
 TURNING = ("entry/from-120km", {"reference.externalRate.beta": 0.01})
-LATE = {"a moment that acts later": (TURNING[0], {"delay": 0.08} | TURNING[1])}
-SCENES = dict.fromkeys(("DLMPC", "LQR", "FBL", "BTVSMC", "BTVSMC_DO", "SOTVSMC_DO", "TwoLoopSMC"), LATE) | {
+SCENES = {
+    "DLMPC": {"a sideslip angle that is to turn": TURNING},
     "CRMPC": {
         "a sideslip angle that is to turn": TURNING,
         "settings without guarantee": ("crmpc-2022/crmpc-robust", {"disturbance.bound": 0.2}),

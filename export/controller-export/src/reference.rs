@@ -139,14 +139,15 @@ impl Source {
         [now, acts_at]: [f64; 2],
         external: &Reference,
     ) -> Preview<'_> {
-        let (from, braking) = match parameters.preview {
-            // The law uses the present value for the time at which its moment acts.
-            Ahead::Hold => (acts_at, Vector3::repeat(f64::INFINITY)),
-            Ahead::Brake => (now, parameters.preview_acceleration),
+        let braking = match parameters.preview {
+            Ahead::Hold => None,
+            Ahead::Brake => Some(parameters.preview_acceleration),
         };
         match self {
             Self::Profile(profile) => Preview::Profile(profile),
-            Self::External => Preview::External(Forecast { given: *external, from, braking }),
+            Self::External => {
+                Preview::External(Forecast { given: *external, from: now, until: acts_at, braking })
+            }
         }
     }
 }

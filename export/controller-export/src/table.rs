@@ -58,9 +58,8 @@ pub fn description<L: Law>() -> Description<ControllerFmu<L>> {
     let table = outputs(inputs(VariableTable::new()))
         .settings(|model: &mut ControllerFmu<L>| &mut model.parameters)
         .settings(|model: &mut ControllerFmu<L>| &mut model.settings);
-    // Other laws ask for the reference at the instant at which their moment acts.
-    let table =
-        if L::PLANS { table } else { table.also_used_with("reference.preview", "delay > 0") };
+    // Other laws ask for no later reference than that of the instant at which their moment acts.
+    let table = if L::PLANS { table } else { table.without("reference.preview") };
     Description {
         name: L::NAME,
         description: L::DESCRIPTION,

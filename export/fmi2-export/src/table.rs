@@ -4,8 +4,6 @@
 //! FMUs declare hundreds of variables, so the functions that a declaration calls are not inlined:
 //! libraries are smaller that way.
 
-mod condition;
-
 use crate::scalar::Scalar;
 use model_description::DefaultExperiment;
 use model_description::unit::Unit;
@@ -201,6 +199,13 @@ impl<M: 'static> VariableTable<M> {
         self
     }
 
+    /// Leaves out the variables whose names begin so.
+    #[must_use]
+    pub fn without(mut self, beginning: &str) -> Self {
+        self.entries.retain(|entry| !entry.variable.name.starts_with(beginning));
+        self
+    }
+
     #[inline(never)]
     fn push_setting(&mut self, Setting { place, kind }: Setting, index: usize, part: Part<M>) {
         let common = parameter(&place.name, &place.text).used_with(&place.used_with);
@@ -305,6 +310,17 @@ impl Common {
     #[must_use]
     pub fn depends_on<'a>(mut self, names: impl IntoIterator<Item = &'a str>) -> Self {
         self.0.dependencies.extend(names.into_iter().map(String::from));
+        self
+    }
+
+    /// Declares the [condition](model_description::condition) under which the variable has an
+    /// effect. The importer is warned if it sets the variable without effect.
+    #[must_use]
+    pub fn used_with(mut self, condition: &str) -> Self {
+        if !condition.is_empty() {
+            self.0.description = format!("{}; used with {condition}", self.0.description);
+            self.0.used_with = condition.into();
+        }
         self
     }
 
