@@ -13,7 +13,6 @@ use model_description::variable::{
 use settings::{Choice, Declared, Field, Numbered, Setting};
 use std::sync::Arc;
 
-type Setter<M> = Box<dyn Fn(&mut M, i32) + Send + Sync>;
 type Lens<M, T> = Box<dyn Fn(&mut M) -> &mut T + Send + Sync>;
 /// A part of the model with declared settings.
 type Part<M> = Arc<dyn Fn(&mut M) -> &mut (dyn Declared + 'static) + Send + Sync>;
@@ -31,11 +30,8 @@ pub(crate) enum Access<M> {
 pub(crate) struct Integer<M> {
     pub(crate) get: Box<dyn Fn(&mut M) -> i32 + Send + Sync>,
     /// Setter that is called only with values that the declaration allows.
-    pub(crate) set: Setter<M>,
+    pub(crate) set: Box<dyn Fn(&mut M, i32) + Send + Sync>,
 }
-
-/// Message for an impossible case, as the declaration of a setting and its field have one source.
-const NO_FIELD: &str = "a setting has a field of its declared type";
 
 /// Returns access to a setting with numbered values, which FMI numbers from `first` on where the
 /// setting numbers them from 0. A value without a number is 0 or less.
@@ -43,13 +39,13 @@ fn numbered<M: 'static>(part: Part<M>, index: usize, first: i32) -> Access<M> {
     let other = Arc::clone(&part);
     let get = move |model: &mut M| match part(model).field(index) {
         Ok(Field::Integer(field) | Field::Choice(field)) => fmi_number(field, first),
-        _ => unreachable!("{NO_FIELD}"),
+        _ => unreachable!("a setting has a field of its declared type"),
     };
     let set = move |model: &mut M, value: i32| match other(model).field(index) {
         Ok(Field::Integer(field) | Field::Choice(field)) => {
-            field.set_number(i64::from(value) - i64::from(first));
+            field.set_number(i64::from(value) - i64::from(first))
         }
-        _ => unreachable!("{NO_FIELD}"),
+        _ => unreachable!("a setting has a field of its declared type"),
     };
     Access::Integer(Integer { get: Box::new(get), set: Box::new(set) })
 }
@@ -63,7 +59,7 @@ macro_rules! access {
     ($variant:ident, $part:ident, $index:ident) => {
         Box::new(move |model| match $part(model).field($index) {
             Ok(Field::$variant(field)) => field,
-            _ => unreachable!("{NO_FIELD}"),
+            _ => unreachable!("a setting has a field of its declared type"),
         })
     };
 }
@@ -244,12 +240,9 @@ impl<M: 'static> VariableTable<M> {
     ) -> Self {
         let field = Arc::new(field);
         let other = Arc::clone(&field);
-        let access = Integer {
-            get: Box::new(move |model| fmi_number(field(model), 1)),
-            set: Box::new(move |model, value| {
-                other(model).set_number(i64::from(value) - 1);
-            }),
-        };
+        let get = Box::new(move |model: &mut M| fmi_number(field(model), 1));
+        let set = move |model: &mut M, value| other(model).set_number(i64::from(value) - 1);
+        let access = Integer { get, set: Box::new(set) };
         self.push(common, described(&T::items()), Access::Integer(access));
         self
     }
@@ -266,8 +259,8 @@ impl<M: 'static> VariableTable<M> {
     }
 
     #[inline(never)]
-    fn push_real(&mut self, declaration: Real, field: Lens<M, f64>) {
-        let Real { common, unit, min, max, nominal, derivative_of } = declaration;
+    fn push_real(&mut self, real: Real, field: Lens<M, f64>) {
+        let Real { common, unit, min, max, nominal, derivative_of } = real;
         let kind = VariableKind::Real { unit, min, max, nominal, start: None, derivative_of };
         self.push(common, kind, Access::Real(field));
     }
