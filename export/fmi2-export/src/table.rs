@@ -43,7 +43,7 @@ fn numbered<M: 'static>(part: Part<M>, index: usize, first: i32) -> Access<M> {
     };
     let set = move |model: &mut M, value: i32| match other(model).field(index) {
         Ok(Field::Integer(field) | Field::Choice(field)) => {
-            field.set_number(i64::from(value) - i64::from(first))
+            field.set_number(i64::from(value) - i64::from(first));
         }
         _ => unreachable!("a setting has a field of its declared type"),
     };
@@ -144,9 +144,8 @@ impl<M: 'static> VariableTable<M> {
         self
     }
 
-    /// Adds an integer variable, whose field may have any integer type. Values set from outside are
-    /// checked against the limits, and a type without negative numbers raises the lower limit to
-    /// zero.
+    /// Adds an integer variable, whose field may have any integer type: one without negative numbers
+    /// raises the lower limit to zero.
     #[must_use]
     pub fn integer<I>(
         mut self,
@@ -241,8 +240,10 @@ impl<M: 'static> VariableTable<M> {
         let field = Arc::new(field);
         let other = Arc::clone(&field);
         let get = Box::new(move |model: &mut M| fmi_number(field(model), 1));
-        let set = move |model: &mut M, value| other(model).set_number(i64::from(value) - 1);
-        let access = Integer { get, set: Box::new(set) };
+        let set = Box::new(move |model: &mut M, value| {
+            other(model).set_number(i64::from(value) - 1);
+        });
+        let access = Integer { get, set };
         self.push(common, described(&T::items()), Access::Integer(access));
         self
     }
@@ -306,8 +307,7 @@ impl Common {
         self
     }
 
-    /// Declares the [condition](model_description::condition) under which the variable has an
-    /// effect. The importer is warned if it sets the variable without effect.
+    /// Declares the [condition](model_description::condition) without which setting it is warned of.
     #[must_use]
     pub fn used_with(mut self, condition: &str) -> Self {
         if !condition.is_empty() {
