@@ -4,15 +4,19 @@
 //! FMUs declare hundreds of variables, so the functions that a declaration calls are not inlined:
 //! libraries are smaller that way.
 
+mod real;
+
+pub use real::Real;
+
 use crate::scalar::Scalar;
 use model_description::DefaultExperiment;
-use model_description::unit::Unit;
 use model_description::variable::{
     Causality, EnumerationType, Variability, Variable, VariableKind,
 };
 use settings::{Choice, Declared, Field, Numbered, Setting};
 use std::sync::Arc;
 
+type Setter<M> = Box<dyn Fn(&mut M, i32) + Send + Sync>;
 type Lens<M, T> = Box<dyn Fn(&mut M) -> &mut T + Send + Sync>;
 /// A part of the model with declared settings.
 type Part<M> = Arc<dyn Fn(&mut M) -> &mut (dyn Declared + 'static) + Send + Sync>;
@@ -30,8 +34,11 @@ pub(crate) enum Access<M> {
 pub(crate) struct Integer<M> {
     pub(crate) get: Box<dyn Fn(&mut M) -> i32 + Send + Sync>,
     /// Setter that is called only with values that the declaration allows.
-    pub(crate) set: Box<dyn Fn(&mut M, i32) + Send + Sync>,
+    pub(crate) set: Setter<M>,
 }
+
+/// Message for an impossible case, as the declaration of a setting and its field have one source.
+const NO_FIELD: &str = "a setting has a field of its declared type";
 
 /// Returns access to a setting with numbered values, which FMI numbers from `first` on where the
 /// setting numbers them from 0. A value without a number is 0 or less.
@@ -39,13 +46,13 @@ fn numbered<M: 'static>(part: Part<M>, index: usize, first: i32) -> Access<M> {
     let other = Arc::clone(&part);
     let get = move |model: &mut M| match part(model).field(index) {
         Ok(Field::Integer(field) | Field::Choice(field)) => fmi_number(field, first),
-        _ => unreachable!("a setting has a field of its declared type"),
+        _ => unreachable!("{NO_FIELD}"),
     };
     let set = move |model: &mut M, value: i32| match other(model).field(index) {
         Ok(Field::Integer(field) | Field::Choice(field)) => {
             field.set_number(i64::from(value) - i64::from(first));
         }
-        _ => unreachable!("a setting has a field of its declared type"),
+        _ => unreachable!("{NO_FIELD}"),
     };
     Access::Integer(Integer { get: Box::new(get), set: Box::new(set) })
 }
@@ -59,7 +66,7 @@ macro_rules! access {
     ($variant:ident, $part:ident, $index:ident) => {
         Box::new(move |model| match $part(model).field($index) {
             Ok(Field::$variant(field)) => field,
-            _ => unreachable!("a setting has a field of its declared type"),
+            _ => unreachable!("{NO_FIELD}"),
         })
     };
 }
@@ -144,8 +151,9 @@ impl<M: 'static> VariableTable<M> {
         self
     }
 
-    /// Adds an integer variable, whose field may have any integer type: one without negative numbers
-    /// raises the lower limit to zero.
+    /// Adds an integer variable, whose field may have any integer type. Values set from outside are
+    /// checked against the limits, and a type without negative numbers raises the lower limit to
+    /// zero.
     #[must_use]
     pub fn integer<I>(
         mut self,
@@ -239,11 +247,12 @@ impl<M: 'static> VariableTable<M> {
     ) -> Self {
         let field = Arc::new(field);
         let other = Arc::clone(&field);
-        let get = Box::new(move |model: &mut M| fmi_number(field(model), 1));
-        let set = Box::new(move |model: &mut M, value| {
-            other(model).set_number(i64::from(value) - 1);
-        });
-        let access = Integer { get, set };
+        let access = Integer {
+            get: Box::new(move |model| fmi_number(field(model), 1)),
+            set: Box::new(move |model, value| {
+                other(model).set_number(i64::from(value) - 1);
+            }),
+        };
         self.push(common, described(&T::items()), Access::Integer(access));
         self
     }
@@ -260,8 +269,8 @@ impl<M: 'static> VariableTable<M> {
     }
 
     #[inline(never)]
-    fn push_real(&mut self, real: Real, field: Lens<M, f64>) {
-        let Real { common, unit, min, max, nominal, derivative_of } = real;
+    fn push_real(&mut self, declaration: Real, field: Lens<M, f64>) {
+        let Real { common, unit, min, max, nominal, derivative_of } = declaration;
         let kind = VariableKind::Real { unit, min, max, nominal, start: None, derivative_of };
         self.push(common, kind, Access::Real(field));
     }
@@ -307,7 +316,8 @@ impl Common {
         self
     }
 
-    /// Declares the [condition](model_description::condition) without which setting it is warned of.
+    /// Declares the [condition](model_description::condition) under which the variable has an
+    /// effect. The importer is warned if it sets the variable without effect.
     #[must_use]
     pub fn used_with(mut self, condition: &str) -> Self {
         if !condition.is_empty() {
@@ -349,52 +359,4 @@ pub fn discrete_output(name: &str, description: &str) -> Common {
 /// Declares a continuous local variable, which can be observed.
 pub fn local(name: &str, description: &str) -> Common {
     Common::new(name, description, Causality::Local, Variability::Continuous)
-}
-
-/// Declaration of a real variable.
-#[derive(Clone, Debug)]
-pub struct Real {
-    common: Common,
-    unit: Option<Unit>,
-    min: Option<f64>,
-    max: Option<f64>,
-    nominal: Option<f64>,
-    derivative_of: Option<String>,
-}
-
-impl Real {
-    /// Declares the unit of measure of the variable by its name, as [`Unit::new`] has it.
-    #[must_use]
-    #[inline(never)]
-    pub fn unit(mut self, name: &str) -> Self {
-        self.unit = (!name.is_empty()).then(|| Unit::new(name));
-        self
-    }
-    /// Declares the smallest allowed value.
-    #[must_use]
-    #[inline(never)]
-    pub fn min(mut self, min: f64) -> Self {
-        self.min = Some(min);
-        self
-    }
-    /// Declares the largest allowed value.
-    #[must_use]
-    #[inline(never)]
-    pub fn max(mut self, max: f64) -> Self {
-        self.max = Some(max);
-        self
-    }
-    /// Declares the typical magnitude of the variable.
-    #[must_use]
-    #[inline(never)]
-    pub fn nominal(mut self, nominal: f64) -> Self {
-        self.nominal = Some(nominal);
-        self
-    }
-    /// Declares the variable as the time derivative of the (state) variable `name`.
-    #[must_use]
-    pub fn derivative_of(mut self, name: &str) -> Self {
-        self.derivative_of = Some(name.into());
-        self
-    }
 }
