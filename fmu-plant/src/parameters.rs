@@ -16,10 +16,11 @@ use vehicle::dynamics::Inertia;
 use vehicle::effectors::Effectors;
 use vehicle::entry::{Motion, Passage};
 use vehicle::error::Error;
+use vehicle::fixes::Devices;
 use vehicle::kinematics::Kinematics;
 use vehicle::plant::{BETA_LIMIT, Config, state};
 use vehicle::platform::Surroundings;
-use vehicle::sensor_data::SensorData;
+use vehicle::sensor_data::{LAST_SENSORS, SensorData};
 use vehicle::sensors::{self, Line, PerSensor};
 use vehicle::transport;
 use vehicle::triad::Triad;
@@ -49,7 +50,7 @@ pub(crate) const NO_SENSORS: i32 = 0;
 /// Value of `sensor.set` for sampled sensors without errors.
 const IDEAL_SENSORS: i32 = 1;
 /// Value of `sensor.set` for sampled sensors with the errors given by the parameters.
-pub(crate) const MEMS_SENSORS: i32 = 2;
+const GIVEN_SENSORS: i32 = 2;
 
 /// Parameters that a user sets before the simulation, in the order of the variable table.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Declared)]
@@ -177,15 +178,19 @@ impl Initial {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Declared)]
 pub(crate) struct Sensing {
     /// Sensor set: 0 for ideal continuous readings, 1 for samples without errors, 2 for samples
-    /// with errors, which are those of a typical MEMS set by default.
-    #[setting(name = "sensor.set", min = NO_SENSORS, max = MEMS_SENSORS)]
+    /// with errors, which are those of a typical MEMS set by default; 3, 4, 5 for inertial sensors
+    /// of navigation and tactical grade and calibrated MEMS sensors.
+    #[setting(name = "sensor.set", min = NO_SENSORS, max = LAST_SENSORS)]
     pub(crate) sensor_set: i32,
     #[setting(name = "sensor")]
     pub(crate) line: Line,
     /// Seed of sensor noise and dropped samples; the same seed gives the same samples.
     #[setting(name = "sensor.seed", min = 0)]
-    #[setting(used_with = "sensor.set >= 1 and (sensor.set = 2 or sensor.drop.probability > 0)")]
+    #[setting(used_with = "sensor.set >= 1")]
     pub(crate) sensor_seed: u64,
+    #[setting(name = "sensor")]
+    #[setting(used_with = "sensor.set >= 1 and translation = entry")]
+    pub(crate) devices: Devices,
     #[setting(name = "sensor")]
     pub(crate) triads: PerSensor<Triad>,
     #[setting(name = "sensor")]
@@ -268,6 +273,7 @@ impl Default for Parameters {
                 sensor_set: NO_SENSORS,
                 line,
                 sensor_seed: 1,
+                devices: Devices::default(),
                 triads: sensors.mems,
                 surroundings: sensors.surroundings,
                 calibrates: false,
@@ -337,18 +343,19 @@ impl Parameters {
     /// Configuration of the sampled sensors, or `None` if the FMU outputs the readings of ideal
     /// sensors.
     fn sensors(&self) -> Option<sensors::Config> {
-        let Sensing { sensor_set, line, sensor_seed: seed, .. } = self.sensing;
-        let errors = self.sensing.triads;
-        let triads = match sensor_set {
+        let Sensing { sensor_set, line, sensor_seed: seed, devices, triads: given, .. } =
+            self.sensing;
+        let data = SensorData::embedded();
+        let errors = match sensor_set {
             NO_SENSORS => return None,
-            IDEAL_SENSORS => {
-                let ideal = SensorData::embedded().ideal;
-                // Freezing is not an error of the sensor set, so the ideal set keeps it.
-                PerSensor(std::array::from_fn(|i| Triad { freeze: errors[i].freeze, ..ideal[i] }))
-            }
-            _ => errors,
+            IDEAL_SENSORS => data.ideal,
+            GIVEN_SENSORS => given,
+            _ => data.inertial(sensor_set, line.period),
         };
-        Some(sensors::Config { triads, line, seed })
+        // Freezing is not an error of the sensor set, so every set keeps it.
+        let triads =
+            PerSensor(std::array::from_fn(|i| Triad { freeze: given[i].freeze, ..errors[i] }));
+        Some(sensors::Config { triads, line, devices, seed })
     }
 
     /// Configuration of the plant that these parameters describe.

@@ -35,7 +35,7 @@ pub(crate) enum Unknown {
     DisturbanceMoment(usize),
     Flight(Quantity),
     Measured(usize),
-    /// Time of the sample, which depends on nothing.
+    /// Time of a sample, or a part of a fix, which depend on nothing.
     MeasuredTime,
 }
 

@@ -15,6 +15,8 @@ pub mod dynamics;
 pub mod effectors;
 pub mod entry;
 pub mod error;
+pub mod fixes;
+pub mod frames;
 pub mod integrator;
 pub mod kinematics;
 pub mod math;

@@ -1,6 +1,7 @@
 //! Data of the embedded file of sensors: sensor sets, the surrounding fields and the calibration
 //! sequence.
 
+use crate::aerodynamics::FOOT;
 use crate::calibration::Sequence;
 use crate::data;
 use crate::platform::Surroundings;
@@ -25,7 +26,70 @@ pub struct SensorData {
     pub ideal: PerSensor<Triad>,
     /// Rotation sequence for calibrating the sensors.
     pub calibration: Sequence,
+    /// Grades of inertial sensors.
+    grades: [Grade; 3],
 }
+
+/// Grade of inertial sensors, whose known errors are corrected.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Grade {
+    gyroscope: Inertial,
+    accelerometer: Inertial,
+}
+
+/// Errors of an inertial sensor, in SI units after its unit.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Inertial {
+    unit: Unit,
+    instability: f64,
+    correlation: f64,
+    /// Noise density: random walk of angle or velocity over the square root of time.
+    random_walk: RandomWalk,
+}
+
+/// Random walk as data sheets give it.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+enum RandomWalk {
+    #[serde(rename = "deg_sqrt_h")]
+    Angle(f64),
+    #[serde(rename = "ft_s_sqrt_h")]
+    Velocity(f64),
+}
+
+impl Inertial {
+    /// Returns the sensor's errors when it is sampled with a period (s).
+    fn triad(&self, period: f64) -> Triad {
+        let per_root_second = match self.random_walk {
+            RandomWalk::Angle(degrees) => degrees.to_radians(),
+            RandomWalk::Velocity(feet) => feet * FOOT,
+        } / 60.0;
+        Triad {
+            instability: self.instability * self.unit.factor(),
+            correlation: self.correlation,
+            noise: per_root_second / period.sqrt(),
+            ..Triad::default()
+        }
+    }
+}
+
+impl SensorData {
+    /// Returns the errors of gyroscope and accelerometer of a sensor set from
+    /// [`NAVIGATION_SENSORS`] on, sampled with a period (s); its magnetometer is without errors.
+    pub fn inertial(&self, set: i32, period: f64) -> PerSensor<Triad> {
+        let last = self.grades.len() - 1;
+        let index = usize::try_from(set - NAVIGATION_SENSORS).unwrap_or(0).min(last);
+        let Grade { gyroscope, accelerometer } = &self.grades[index];
+        PerSensor([gyroscope.triad(period), accelerometer.triad(period), Triad::default()])
+    }
+}
+
+/// Number of the first set of inertial sensors: navigation grade. Tactical grade and calibrated
+/// MEMS sensors follow.
+pub const NAVIGATION_SENSORS: i32 = 3;
+/// Number of the last set.
+pub const LAST_SENSORS: i32 = 5;
 
 impl SensorData {
     /// Returns the data of the embedded file.
@@ -50,6 +114,7 @@ impl SensorData {
             },
             mems: file.mems.triads(),
             ideal: file.ideal.triads(),
+            grades: [file.navigation, file.tactical, file.calibrated],
             calibration: Sequence {
                 alpha_rate: alpha_rate_deg_s.to_radians(),
                 sigma_rate: sigma_rate_deg_s.to_radians(),
@@ -72,6 +137,9 @@ struct File {
     line: Times,
     mems: Set,
     ideal: Set,
+    navigation: Grade,
+    tactical: Grade,
+    calibrated: Grade,
     calibration: Calibration,
 }
 
@@ -113,10 +181,12 @@ impl Set {
     }
 }
 
-#[derive(Clone, Copy, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
 enum Unit {
     #[serde(rename = "deg/s")]
     DegreePerSecond,
+    #[serde(rename = "deg/h")]
+    DegreePerHour,
     #[serde(rename = "g")]
     StandardGravity,
     #[serde(rename = "uT")]
@@ -128,6 +198,7 @@ impl Unit {
     fn factor(self) -> f64 {
         match self {
             Self::DegreePerSecond => 1f64.to_radians(),
+            Self::DegreePerHour => 1f64.to_radians() / 3600.0,
             Self::StandardGravity => 9.80665,
             Self::Microtesla => 1e-6,
         }
@@ -162,6 +233,8 @@ impl Sensor {
             bias: self.bias * unit,
             // Data sheets give none over the length of a flight.
             drift: Vector3::zeros(),
+            instability: 0.0,
+            correlation: 0.0,
             noise: self.noise * unit,
             bandwidth: self.bandwidth,
             range: self.range * unit,

@@ -6,10 +6,12 @@
 //! tick. It is committed when time moves on.
 
 use crate::error::Error;
+use crate::fixes::{Devices, Fixes};
+use crate::frames;
 use crate::noise::{normal_pair, uniform};
 use crate::platform::Readings;
 use crate::time::{check_resolution, tick, tick_time, tick_tolerance};
-use crate::triad::{Memory, Triad, Window};
+use crate::triad::{Draws, Memory, Triad, Window};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 use settings::{About, Declared, Field, Place, Setting};
@@ -69,6 +71,8 @@ pub struct Config {
     pub triads: PerSensor<Triad>,
     /// Timing and drops of the serial line.
     pub line: Line,
+    /// Satellite navigation and star tracker of an entry flight.
+    pub devices: Devices,
     /// Seed of the random noise and drops.
     pub seed: u64,
 }
@@ -114,6 +118,23 @@ pub struct Sample {
     pub time: f64,
     /// Readings of the three sensors, with their errors.
     pub readings: Readings,
+    /// Latest fixes, if there is an entry flight.
+    pub fixes: Fixes,
+}
+
+/// What the sensors would measure without errors.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Felt {
+    /// Readings of the three sensors.
+    pub readings: Readings,
+    /// Position, velocity and attitude, and the altitude (m), of an entry flight.
+    pub place: Option<(frames::Place, f64)>,
+}
+
+impl From<&Readings> for Felt {
+    fn from(readings: &Readings) -> Self {
+        Self { readings: *readings, place: None }
+    }
 }
 
 /// Sample that was taken, whether or not it has arrived.
@@ -121,13 +142,15 @@ pub struct Sample {
 struct Taken {
     at: Instant,
     memories: [Memory; 3],
+    fixes: Fixes,
     dropped: bool,
 }
 
 impl Taken {
     fn sample(&self) -> Sample {
         let number = i32::try_from(self.at.tick + 1).unwrap_or(i32::MAX);
-        Sample { number, time: self.at.time, readings: self.memories.map(|memory| memory.value) }
+        let readings = self.memories.map(|memory| memory.value);
+        Sample { number, time: self.at.time, readings, fixes: self.fixes }
     }
 }
 
@@ -163,12 +186,13 @@ impl Config {
             return refuse("sensor.drop.probability", problem);
         }
         let check = |(name, triad): (&str, &Triad)| triad.check(&format!("sensor.{name}"));
-        self.triads.named().try_for_each(check)
+        self.triads.named().try_for_each(check)?;
+        self.devices.check()
     }
 
-    /// Draws the normal noise of the three sensors at a tick, and a random number in [0, 1) that
+    /// Draws the normal numbers of the three sensors at a tick, and a random number in [0, 1) that
     /// decides whether its sample is dropped.
-    fn draw(&self, tick: i64) -> ([Vector3<f64>; 3], f64) {
+    fn draw(&self, tick: i64) -> ([Draws; 3], f64) {
         // The inverted seed gives another sequence than that of a disturbance with the same seed.
         let [a, b, c, d, e, f, g, h, i, j, chance] = uniform(!self.seed, tick);
         let [first, second, third, fourth, fifth] =
@@ -178,7 +202,20 @@ impl Config {
             Vector3::new(second[1], third[0], third[1]),
             Vector3::new(fourth[0], fourth[1], fifth[0]),
         ];
-        (noise, f64::midpoint(chance, 1.0))
+        let wander = self.wander(tick);
+        let draws = std::array::from_fn(|i| Draws { noise: noise[i], wander: wander[i] });
+        (draws, f64::midpoint(chance, 1.0))
+    }
+
+    /// Draws the normal numbers of the wandering biases at a tick, if there are any.
+    fn wander(&self, tick: i64) -> [Vector3<f64>; 3] {
+        if self.triads.iter().all(|triad| triad.instability == 0.0) {
+            return [Vector3::zeros(); 3];
+        }
+        let [a, b, c, d, e, f, g, h, i, j] = uniform(self.seed.rotate_left(16) ^ 0x7761_6e64, tick);
+        let pairs = [[a, b], [c, d], [e, f], [g, h], [i, j]].map(normal_pair);
+        let each = |k: usize| pairs[k / 2][k % 2];
+        std::array::from_fn(|i| Vector3::from_fn(|axis, _| each(3 * i + axis)))
     }
 }
 
@@ -256,21 +293,31 @@ impl Sensors {
     }
 
     /// Sample that is taken at an instant.
-    fn sampled(&self, at: Instant, felt: &Readings) -> Taken {
+    fn sampled(&self, at: Instant, felt: &Felt) -> Taken {
         let before = if self.last.is_some_and(|last| last.at.tick == at.tick) {
             self.before
         } else {
             self.last
         };
-        let Config { triads, line, .. } = &self.config;
-        let (noise, chance) = self.config.draw(at.tick);
+        let Config { triads, line, devices, seed } = &self.config;
+        let (draws, chance) = self.config.draw(at.tick);
         let memories = std::array::from_fn(|i| {
             let before =
                 before.as_ref().map(|before| (&before.memories[i], at.time - before.at.time));
-            triads[i].drifted(at.time - self.start).sample(at.time, &felt[i], &noise[i], before)
+            triads[i].drifted(at.time - self.start).sample(
+                at.time,
+                &felt.readings[i],
+                &draws[i],
+                before,
+            )
         });
+        let mut fixes = before.map_or_else(Fixes::default, |before| before.fixes);
+        if let Some((place, altitude)) = &felt.place {
+            let times = (at.time, at.time - self.start, line.period);
+            fixes = devices.taken((*seed, at.tick), times, (place, *altitude), &fixes);
+        }
         let dropped = line.drop_window.holds(at.time) && chance < line.drop_probability;
-        Taken { at, memories, dropped }
+        Taken { at, memories, fixes, dropped }
     }
 
     fn slot(&self, tick: i64) -> usize {
@@ -289,10 +336,10 @@ impl Sensors {
 
     /// Takes the sample that is due at `time` (s), if there is one, and receives what has arrived.
     /// A call repeated at the same tick replaces the sample.
-    pub fn take(&mut self, time: f64, felt: &Readings) {
+    pub fn take(&mut self, time: f64, felt: impl Into<Felt>) {
         self.arrived = self.newest(time);
         if let Some(at) = self.due(time) {
-            let taken = self.sampled(at, felt);
+            let taken = self.sampled(at, &felt.into());
             if self.last.is_none_or(|last| last.at.tick != at.tick) {
                 self.before = self.last;
             }
@@ -309,11 +356,11 @@ impl Sensors {
     }
 
     /// Newest sample that would have arrived after a call of [`Sensors::take`] at `time` (s).
-    pub fn shown(&self, time: f64, felt: &Readings) -> Sample {
+    pub fn shown(&self, time: f64, felt: impl Into<Felt>) -> Sample {
         let due = self
             .due(time)
             .filter(|at| at.tick <= self.tick_arrived(time))
-            .map(|at| self.sampled(at, felt));
+            .map(|at| self.sampled(at, &felt.into()));
         due.filter(|taken| !taken.dropped).map_or_else(|| self.newest(time), |taken| taken.sample())
     }
 }

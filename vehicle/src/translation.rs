@@ -51,6 +51,17 @@ impl Planet {
         self.gravity_at(radius, sin_cos(latitude))
     }
 
+    /// Returns the acceleration of gravity at a position along the planet-fixed axes (m), m/s².
+    pub fn gravity_vector(&self, position: &Vector3<f64>) -> Vector3<f64> {
+        let radius = position.norm();
+        let sphere = self.gravitation / (radius * radius * radius);
+        let bulge = 1.5 * self.oblateness * (self.radius / radius) * (self.radius / radius);
+        let sine = position.z / radius;
+        let across = 1.0 + bulge * (1.0 - 5.0 * sine * sine);
+        let along = across + 2.0 * bulge;
+        position.component_mul(&Vector3::new(across, across, along)) * -sphere
+    }
+
     fn gravity_at(&self, radius: f64, (sine, cosine): (f64, f64)) -> [f64; 2] {
         let sphere = self.gravitation / (radius * radius);
         let bulge = 1.5 * self.oblateness * (self.radius / radius) * (self.radius / radius);

@@ -25,6 +25,15 @@ pub struct Triad {
     #[setting(part, rate, each = AXES)]
     #[setting(used_with = "sensor.set = 2")]
     pub drift: Vector3<f64>,
+    /// Standard deviation of a random part of the bias, which wanders: a Gauss-Markov process that
+    /// is stationary from the start.
+    #[setting(part, min = 0.0)]
+    #[setting(used_with = "sensor.set = 2")]
+    pub instability: f64,
+    /// Correlation time of the wandering bias; 0 for one that stays.
+    #[setting(part, unit = "s", min = 0.0, nominal = 1e3)]
+    #[setting(used_with = "sensor.set = 2 and ~.instability > 0")]
+    pub correlation: f64,
     /// Standard deviation of the white noise on the samples.
     #[setting(part, min = 0.0)]
     #[setting(used_with = "sensor.set = 2")]
@@ -73,6 +82,8 @@ impl Default for Triad {
             matrix: Matrix3::identity(),
             bias: Vector3::zeros(),
             drift: Vector3::zeros(),
+            instability: 0.0,
+            correlation: 0.0,
             noise: 0.0,
             bandwidth: 0.0,
             range: 0.0,
@@ -91,12 +102,25 @@ pub struct Memory {
     filtered: Vector3<f64>,
     /// Value that the sensor output.
     pub value: Vector3<f64>,
+    /// Part of the bias that wanders.
+    wander: Vector3<f64>,
+}
+
+/// Normal numbers of variance 1 for a sample.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Draws {
+    /// For the white noise.
+    pub noise: Vector3<f64>,
+    /// For the wandering bias.
+    pub wander: Vector3<f64>,
 }
 
 impl Triad {
     /// Refuses negative values and values that are not finite; `path` leads to this sensor.
     pub(crate) fn check(&self, path: &str) -> Result<(), Error> {
         for (name, value) in [
+            ("instability", self.instability),
+            ("correlation", self.correlation),
             ("noise", self.noise),
             ("bandwidth", self.bandwidth),
             ("range", self.range),
@@ -130,22 +154,32 @@ impl Triad {
 
     /// Takes the sample at `time` (s), which is the given time (s) after the one in `before`, if
     /// there was one. The filter is exact for a signal that is linear in time between samples.
-    /// `noise` is normal with variance 1.
     pub fn sample(
         &self,
         time: f64,
         felt: &Vector3<f64>,
-        noise: &Vector3<f64>,
+        draws: &Draws,
         before: Option<(&Memory, f64)>,
     ) -> Memory {
-        let input = self.matrix * felt + self.bias;
+        let wander = self.wandered(&draws.wander, before);
+        let input = self.matrix * felt + self.bias + wander;
         let filtered =
             before.map_or(input, |(before, elapsed)| self.filtered(&input, before, elapsed));
         let value = match before {
             Some((before, _)) if self.freeze.holds(time) => before.value,
-            _ => (filtered + noise * self.noise).map(|value| self.convert(value)),
+            _ => (filtered + draws.noise * self.noise).map(|value| self.convert(value)),
         };
-        Memory { input, filtered, value }
+        Memory { input, filtered, value, wander }
+    }
+
+    /// Returns the wandering part of the bias.
+    fn wandered(&self, draw: &Vector3<f64>, before: Option<(&Memory, f64)>) -> Vector3<f64> {
+        let Some((before, elapsed)) = before else { return draw * self.instability };
+        if self.correlation == 0.0 {
+            return before.wander;
+        }
+        let kept = exp(-elapsed / self.correlation);
+        before.wander * kept + draw * (self.instability * (1.0 - kept * kept).sqrt())
     }
 
     /// Solves τ ẏ = u − y over `elapsed` (s), with u on a straight line from `before.input` to

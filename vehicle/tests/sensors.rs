@@ -2,6 +2,7 @@
 //! statistics of the noise.
 
 use nalgebra::{Matrix3, Vector3};
+use vehicle::fixes::Devices;
 use vehicle::platform::Readings;
 use vehicle::sensor_data::SensorData;
 use vehicle::sensors::{Config, IN_FLIGHT, Line, PerSensor, Sample, Sensors};
@@ -19,6 +20,7 @@ fn ideal() -> Config {
             drop_probability: 0.0,
             drop_window: Window { start: 0.0, end: 1e9 },
         },
+        devices: Devices::default(),
         seed: 1,
     }
 }
@@ -50,7 +52,8 @@ fn the_embedded_data_can_be_used_and_ideal_sensors_have_no_errors() {
     let data = SensorData::embedded();
     assert_eq!(data.ideal, PerSensor::default());
     data.surroundings.check().unwrap();
-    let config = Config { triads: data.mems, line: data.line, seed: 1 };
+    let config =
+        Config { triads: data.mems, line: data.line, devices: Devices::default(), seed: 1 };
     Sensors::new(&config, 0.0).unwrap();
 }
 

@@ -70,10 +70,56 @@ pub(super) fn measured(mut variables: PlantVariables) -> PlantVariables {
         "measured.sample",
         "Number of the latest received sample, counted from 1; 0 before the first",
     );
-    variables
+    let variables = variables
         .real(seconds(time), |m| &mut m.output.measured.time)
         .role(Unknown::MeasuredTime)
-        .integer(number, (Some(0), None), |m| &mut m.output.measured.number)
+        .integer(number, (Some(0), None), |m| &mut m.output.measured.number);
+    fixes(variables)
+}
+
+/// Planet-fixed axes.
+const FIXED: [(&str, &str); 3] =
+    [("x", "axis through longitude 0"), ("y", "axis through 90 deg east"), ("z", "polar axis")];
+
+/// Adds the fixes of satellite navigation and star tracker.
+fn fixes(variables: PlantVariables) -> PlantVariables {
+    let component = |name: &'static str, quantity: &'static str, unit: &'static str, nominal| {
+        move |axis: &str, meaning: &str| {
+            let text = format!("{quantity} along the {meaning}, of the latest fix");
+            discrete_output(&format!("{name}.{axis}"), &text).real().unit(unit).nominal(nominal)
+        }
+    };
+    let position = component("gnss.position", "Position", "m", 1e6);
+    let velocity = component("gnss.velocity", "Velocity relative to the planet", "m/s", 1e3);
+    let role = |_| Unknown::MeasuredTime.into();
+    let variables =
+        vector(variables, FIXED, position, role, |m| &mut m.output.measured.fixes.gnss.position);
+    let variables =
+        vector(variables, FIXED, velocity, role, |m| &mut m.output.measured.fixes.gnss.velocity);
+    let taken = |name: &str| {
+        seconds(discrete_output(&format!("{name}.time"), "Time at which the latest fix was taken"))
+    };
+    let number = |name: &str| {
+        let text = "Number of the latest fix, counted from 1; 0 before the first";
+        discrete_output(&format!("{name}.fix"), text)
+    };
+    let mut variables = variables
+        .real(taken("gnss"), |m| &mut m.output.measured.fixes.gnss.time)
+        .role(Unknown::MeasuredTime)
+        .integer(number("gnss"), (Some(0), None), |m| &mut m.output.measured.fixes.gnss.number);
+    for (i, part) in ["w", "x", "y", "z"].into_iter().enumerate() {
+        let text = format!(
+            "Part {part} of the quaternion from inertial to body axes, of the latest fix; the inertial axes are the planet's at time 0"
+        );
+        let real = discrete_output(&format!("star.attitude.{part}"), &text).real().nominal(1.0);
+        variables = variables
+            .real(real, move |m| &mut m.output.measured.fixes.star.attitude[i])
+            .role(Unknown::MeasuredTime);
+    }
+    variables
+        .real(taken("star"), |m| &mut m.output.measured.fixes.star.time)
+        .role(Unknown::MeasuredTime)
+        .integer(number("star"), (Some(0), None), |m| &mut m.output.measured.fixes.star.number)
 }
 
 fn seconds(common: Common) -> Real {

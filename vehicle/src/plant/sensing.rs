@@ -3,8 +3,10 @@
 
 use super::equations::angle_rates;
 use super::{Entering, Held, Input, Load, Plant, angles};
+use crate::fixes::Fixes;
+use crate::frames::Place;
 use crate::platform::{Pose, Readings};
-use crate::sensors::{Sample, Sensors};
+use crate::sensors::{Felt, Sample, Sensors};
 use crate::trajectory::TRAJECTORY;
 use nalgebra::SMatrix;
 
@@ -14,7 +16,7 @@ impl Plant {
         let Some(mut sensors) = self.sensors.take() else { return };
         let entering = self.entering(time);
         let vehicle = self.pose(entering.as_ref(), time, input);
-        sensors.take(time, &self.felt_by(&sensors, entering.as_ref(), (time, input), &vehicle));
+        sensors.take(time, self.felt_by(&sensors, entering.as_ref(), (time, input), &vehicle));
         if let (Some(turntable), Some(at)) = (&mut self.turntable, sensors.due(time)) {
             turntable.follow(at, &vehicle);
         }
@@ -52,27 +54,29 @@ impl Plant {
         entering: Option<&Entering>,
         (time, input): (f64, &Input),
         vehicle: &Pose,
-    ) -> Readings {
+    ) -> Felt {
         let pose = match (&self.turntable, sensors.due(time)) {
             (Some(turntable), Some(at)) => {
                 turntable.pose(at, vehicle, &self.trajectory(entering, input).1)
             }
             _ => *vehicle,
         };
-        pose.felt(&self.surroundings)
+        let place = self.entry.as_ref().filter(|_| sensors.due(time).is_some()).map(|entry| {
+            let place = Place::of(&entry.planet, &self.motion, &vehicle.angles, time);
+            (place, self.motion[0])
+        });
+        Felt { readings: pose.felt(&self.surroundings), place }
     }
 
     /// Newest sample that the sensors output at `time` (s), including one that is due then but not
     /// yet taken. Without sampled sensors it holds the readings of ideal ones and the number 0.
     pub fn measured(&self, entering: Option<&Entering>, time: f64, input: &Input) -> Sample {
         let vehicle = self.pose(entering, time, input);
-        match &self.sensors {
-            Some(sensors) => {
-                let felt = self.felt_by(sensors, entering, (time, input), &vehicle);
-                sensors.shown(time, &felt)
-            }
-            None => Sample { number: 0, time, readings: vehicle.felt(&self.surroundings) },
-        }
+        let Some(sensors) = &self.sensors else {
+            let readings = vehicle.felt(&self.surroundings);
+            return Sample { number: 0, time, readings, fixes: Fixes::default() };
+        };
+        sensors.shown(time, self.felt_by(sensors, entering, (time, input), &vehicle))
     }
 
     /// Sample that the sensors output at `time` (s) after the last call of [`Plant::hold`].

@@ -12,6 +12,7 @@ use vehicle::disturbance::{
     Disturbance, DisturbanceKind, DisturbanceTable, MomentWave, Row, SineMoment,
 };
 use vehicle::effectors::Effectors;
+use vehicle::fixes::Devices;
 use vehicle::plant::{Config, State};
 use vehicle::sensor_data::SensorData;
 use vehicle::{Scenario, sensors, turntable};
@@ -84,7 +85,12 @@ fn flaps(deflection_deg: f64) -> Command {
 fn on_a_turntable() -> Config {
     let data = SensorData::embedded();
     Config {
-        sensors: Some(sensors::Config { triads: data.ideal, line: data.line, seed: 1 }),
+        sensors: Some(sensors::Config {
+            triads: data.ideal,
+            line: data.line,
+            devices: Devices::default(),
+            seed: 1,
+        }),
         surroundings: data.surroundings,
         turntable: turntable::Config { bandwidth: 2.0, rate: 0.05, resolution: 1e-3 },
         ..config()

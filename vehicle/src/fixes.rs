@@ -1,0 +1,189 @@
+//! Satellite navigation and star tracker, which give fixes of position, velocity and attitude.
+//!
+//! A fix is taken with the first sample of the other sensors at or after each multiple of its
+//! period, and it travels with this sample on the line.
+
+use crate::error::Error;
+use crate::frames::Place;
+use crate::noise::{normal_pair, uniform};
+use crate::time::tick_tolerance;
+use nalgebra::{Quaternion, UnitQuaternion, Vector3};
+use serde::{Deserialize, Serialize};
+use settings::Declared;
+
+/// Receiver of satellite navigation.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Declared)]
+pub struct Gnss {
+    /// Time between two fixes of the satellite navigation; 0 for none.
+    #[setting(unit = "s", min = 0.0, nominal = 1.0)]
+    pub period: f64,
+    /// Standard deviation of the position of a fix, along each axis.
+    #[setting(name = "noise.position", unit = "m", min = 0.0, nominal = 5.0)]
+    #[setting(used_with = "~.period > 0")]
+    pub position_noise: f64,
+    /// Standard deviation of the velocity of a fix, along each axis.
+    #[setting(name = "noise.velocity", unit = "m/s", min = 0.0, nominal = 0.1)]
+    #[setting(used_with = "~.period > 0")]
+    pub velocity_noise: f64,
+    /// Altitude at which the plasma begins to hold back the signals; it ends at blackout.bottom.
+    #[setting(name = "blackout.top", unit = "m", nominal = 1e5)]
+    #[setting(used_with = "~.period > 0")]
+    pub blackout_top: f64,
+    /// Altitude below which the signals are received again.
+    #[setting(name = "blackout.bottom", unit = "m", nominal = 1e5)]
+    #[setting(used_with = "~.period > 0")]
+    pub blackout_bottom: f64,
+}
+
+/// Star tracker.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Declared)]
+pub struct StarTracker {
+    /// Time between two fixes of the star tracker; 0 for none.
+    #[setting(unit = "s", min = 0.0, nominal = 1.0)]
+    pub period: f64,
+    /// Standard deviation of the attitude of a fix, about each axis.
+    #[setting(unit = "rad", min = 0.0, nominal = 1e-4)]
+    #[setting(used_with = "~.period > 0")]
+    pub noise: f64,
+    /// Altitude above which the star tracker sees stars.
+    #[setting(name = "altitude", unit = "m", nominal = 1e5)]
+    #[setting(used_with = "~.period > 0")]
+    pub least_altitude: f64,
+}
+
+/// Both devices.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Declared)]
+pub struct Devices {
+    /// Satellite navigation.
+    pub gnss: Gnss,
+    /// Star tracker.
+    pub star: StarTracker,
+}
+
+impl Default for Devices {
+    /// Returns a receiver with the blackout of an entry, and no star tracker.
+    fn default() -> Self {
+        Self {
+            gnss: Gnss {
+                period: 1.0,
+                position_noise: 5.0,
+                velocity_noise: 0.1,
+                blackout_top: 85e3,
+                blackout_bottom: 45e3,
+            },
+            // Some ten seconds of arc.
+            star: StarTracker { period: 0.0, noise: 5e-5, least_altitude: 90e3 },
+        }
+    }
+}
+
+/// Latest fix of the satellite navigation.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct GnssFix {
+    /// Number of the fix, counted from 1; 0 before the first.
+    pub number: i32,
+    /// Time at which it was taken, s.
+    pub time: f64,
+    /// Position along the planet-fixed axes, m.
+    pub position: Vector3<f64>,
+    /// Velocity relative to the planet, along these axes, m/s.
+    pub velocity: Vector3<f64>,
+}
+
+/// Latest fix of the star tracker.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct StarFix {
+    /// Number of the fix, counted from 1; 0 before the first.
+    pub number: i32,
+    /// Time at which it was taken, s.
+    pub time: f64,
+    /// Quaternion (w, x, y, z) of the rotation from the inertial axes to those of the body.
+    pub attitude: [f64; 4],
+}
+
+/// Latest fixes of both devices.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Fixes {
+    /// Of the satellite navigation.
+    pub gnss: GnssFix,
+    /// Of the star tracker.
+    pub star: StarFix,
+}
+
+impl StarFix {
+    /// Returns the rotation, unless the quaternion is zero or not finite.
+    pub fn rotation(&self) -> Option<UnitQuaternion<f64>> {
+        let [w, x, y, z] = self.attitude;
+        UnitQuaternion::try_new(Quaternion::new(w, x, y, z), 0.1)
+    }
+}
+
+impl Devices {
+    /// Refuses values that are negative or not finite.
+    pub(crate) fn check(&self) -> Result<(), Error> {
+        let Self { gnss, star } = self;
+        for (name, value) in [
+            ("gnss.period", gnss.period),
+            ("gnss.noise.position", gnss.position_noise),
+            ("gnss.noise.velocity", gnss.velocity_noise),
+            ("star.period", star.period),
+            ("star.noise", star.noise),
+        ] {
+            if !(value >= 0.0 && value.is_finite()) {
+                let problem = format!("= {value} must not be negative");
+                return Err(Error::parameter(format!("sensor.{name}"), problem));
+            }
+        }
+        let (top, bottom) = (gnss.blackout_top, gnss.blackout_bottom);
+        if !(top.is_finite() && bottom <= top && star.least_altitude.is_finite()) {
+            let problem = format!("= {bottom} m must not lie above blackout.top = {top} m");
+            return Err(Error::parameter("sensor.gnss.blackout.bottom", problem));
+        }
+        Ok(())
+    }
+
+    /// Returns the latest fixes after the sample at `time` (s), a time `elapsed` (s) after the
+    /// start and one `period` (s) after the sample before.
+    pub(crate) fn taken(
+        &self,
+        (seed, tick): (u64, i64),
+        (time, elapsed, period): (f64, f64, f64),
+        (place, altitude): (&Place, f64),
+        before: &Fixes,
+    ) -> Fixes {
+        let mut fixes = *before;
+        let is_due = |every: f64| {
+            let multiples = |at: f64| ((at + tick_tolerance(time, period)) / every).floor();
+            every > 0.0 && (tick == 0 || multiples(elapsed) > multiples(elapsed - period))
+        };
+        let hears = altitude >= self.gnss.blackout_top || altitude <= self.gnss.blackout_bottom;
+        let by_gnss = is_due(self.gnss.period) && hears;
+        let by_star = is_due(self.star.period) && altitude >= self.star.least_altitude;
+        if !(by_gnss || by_star) {
+            return fixes;
+        }
+        // Another sequence than those of the sensors and of a disturbance with the same seed.
+        let draws: [f64; 10] = uniform(seed.rotate_left(32) ^ 0x6e61_7669, tick);
+        let [a, b, c, d, e] = [0, 2, 4, 6, 8].map(|i| normal_pair([draws[i], draws[i + 1]]));
+        if by_gnss {
+            fixes.gnss = GnssFix {
+                number: before.gnss.number.saturating_add(1),
+                time,
+                position: place.position
+                    + Vector3::new(a[0], a[1], b[0]) * self.gnss.position_noise,
+                velocity: place.velocity
+                    + Vector3::new(b[1], c[0], c[1]) * self.gnss.velocity_noise,
+            };
+        }
+        if by_star {
+            let error = Vector3::new(d[0], d[1], e[0]) * self.star.noise;
+            let seen = UnitQuaternion::from_scaled_axis(error) * place.attitude;
+            fixes.star = StarFix {
+                number: before.star.number.saturating_add(1),
+                time,
+                attitude: [seen.w, seen.i, seen.j, seen.k],
+            };
+        }
+        fixes
+    }
+}
