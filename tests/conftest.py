@@ -34,6 +34,7 @@ NAMES = [
     "ControlAllocator",
     "AttitudeEstimator",
     "EntryGuidance",
+    "EntryNavigation",
 ]
 
 # The files that take longest. Begun first, none of them runs alone at the end while the other

@@ -50,7 +50,7 @@ def test_description_says_what_tools_rely_on(fmu, name):
     assert description.coSimulation.canGetAndSetFMUstate and description.coSimulation.canSerializeFMUstate
     assert (description.modelExchange is not None) == (name == "ReentryPlant")
     # The duration of the paper's scenario, or of an entry flight.
-    assert float(description.defaultExperiment.stopTime) == (3000.0 if name == "EntryGuidance" else 50.0)
+    assert float(description.defaultExperiment.stopTime) == (3000.0 if name in ("EntryGuidance", "EntryNavigation") else 50.0)
     for variable in description.modelVariables:
         assert variable.description, f"{variable.name} has no description"
     with zipfile.ZipFile(archive(name)) as packed:

@@ -24,7 +24,7 @@ from fmi import ANGLES, MOMENT, NOT_REPRODUCIBLE, RATES, Fmu, Instance, Loop, of
 STEP = 0.04
 STEPS = 250
 STOP = STEPS * STEP
-CONTROLLERS = [name for name in NAMES if name not in ("ReentryPlant", "ControlAllocator", "AttitudeEstimator", "EntryGuidance")]
+CONTROLLERS = [name for name in NAMES if name not in ("ReentryPlant", "ControlAllocator", "AttitudeEstimator", "EntryGuidance", "EntryNavigation")]
 LINUX = sys.platform == "linux" and os.uname().machine == "x86_64"
 only_linux = pytest.mark.skipif(not LINUX, reason="what this needs has no binaries for every platform: tried on Linux on x86-64")
 

@@ -25,7 +25,7 @@ else:
 SITE = TARGET / "manual"
 CHAPTERS = tomllib.loads((ROOT / "docs" / "site" / "chapters.toml").read_text())["part"]
 # FMUs that command no moment. The gallery has them in experiments.
-NO_CONTROLLERS = {"ReentryPlant", "ControlAllocator", "AttitudeEstimator", "EntryGuidance"}
+NO_CONTROLLERS = {"ReentryPlant", "ControlAllocator", "AttitudeEstimator", "EntryGuidance", "EntryNavigation"}
 # Files beside experiments: studies, their values, and what other experiments extend.
 NO_EXPERIMENTS = {"study", "published", "computed", "any", "any-allocated"}
 can_build = pytest.mark.skipif(

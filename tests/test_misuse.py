@@ -11,7 +11,7 @@ from conftest import NAMES
 from fmi import ANGLES, RATES, Instance
 
 STEP = 0.04
-INPUT = {"ReentryPlant": "moment.x", "CRMPC": "rate.p", "DLMPC": "rate.q", "LQR": "attitude.beta", "ControlAllocator": "moment.y", "AttitudeEstimator": "measured.gyroscope.y", "EntryGuidance": "motion.heading"}
+INPUT = {"ReentryPlant": "moment.x", "CRMPC": "rate.p", "DLMPC": "rate.q", "LQR": "attitude.beta", "ControlAllocator": "moment.y", "AttitudeEstimator": "measured.gyroscope.y", "EntryGuidance": "motion.heading", "EntryNavigation": "measured.gyroscope.y"}
 INPUT |= {name: "rate.p" for name in NAMES if name not in INPUT}
 
 
@@ -90,6 +90,7 @@ def test_value_references_that_do_not_exist(instance):
         ("ControlAllocator", "dynamicPressure", -1.0),
         ("AttitudeEstimator", "filter.cutoff", -1.0),
         ("EntryGuidance", "shaping.bankRate", -1.0),
+        ("EntryNavigation", "alignment.attitude", -1.0),
         ("LQR", "reference.profile", 77),
     ],
 )
@@ -121,6 +122,7 @@ def test_parameters_out_of_range_are_refused_when_set(fmu, name, variable, value
         ("AttitudeEstimator", {"filter.cutoff": 50.0}, ["filter.cutoff"]),
         ("AttitudeEstimator", {"lost.after": 0.0}, ["lost.after"]),
         ("EntryGuidance", {"shaping.bankRate": 0.0}, ["shaping.bankRate"]),
+        ("EntryNavigation", {"fix.gate": 1.0}, ["fix.gate"]),
         ("ReentryPlant", {"translation": "entry", "initial.altitude": 10e3}, ["initial.altitude", "end.altitude"]),
         ("ReentryPlant", {"translation": "entry", "air.rows": 2}, ["air.altitude[2]"]),
     ],
@@ -179,7 +181,7 @@ def test_calls_in_the_wrong_state(instance):
 
 
 def test_parameters_are_fixed_once_the_simulation_runs(instance):
-    name = {"ControlAllocator": "weight.jet", "AttitudeEstimator": "field.declination", "EntryGuidance": "planet.radius"}.get(instance.fmu.name, "inertia.Ixx")
+    name = {"ControlAllocator": "weight.jet", "AttitudeEstimator": "field.declination", "EntryGuidance": "planet.radius", "EntryNavigation": "planet.radius"}.get(instance.fmu.name, "inertia.Ixx")
     instance.start()
     with refuses(instance, name):
         instance.set({name: 6e5})

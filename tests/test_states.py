@@ -27,6 +27,9 @@ def inputs(name: str, tick: int) -> dict:
         return {"measured.gyroscope.x": 1e-3 * tick, "measured.gyroscope.y": -0.02, "measured.time": STEP * tick, "measured.sample": tick + 1}
     if name == "EntryGuidance":
         return {"motion.altitude": 60e3 - 10.0 * tick, "motion.speed": 5000.0 - 30.0 * tick, "motion.heading": 1.2 + 0.01 * tick, "load.drag": 3.0}
+    if name == "EntryNavigation":
+        sample = {"measured.time": STEP * tick, "measured.sample": tick + 1}
+        return sample | {"measured.gyroscope.x": 1e-3 * tick, "measured.accelerometer.z": -9.0}
     if name not in ("ReentryPlant", "ControlAllocator"):
         return course(tick)
     return dict(zip(MOMENT, [1e4 * (-1) ** (tick // 10), 2e3 * tick, -3e4 + 1e3 * tick]))
@@ -100,6 +103,7 @@ def test_interleaved_instances_do_not_disturb_each_other(fmu, name):
         "ControlAllocator": {"method": "blending"},
         "AttitudeEstimator": {"filter.cutoff": 3.0},
         "EntryGuidance": {"bank.final": 0.3},
+        "EntryNavigation": {"alignment.seed": 2},
         "FBL": {"gain.p": 4.0},
     }.get(name, {"surface.lambda": 1.5})
     alone = []

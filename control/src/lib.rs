@@ -20,6 +20,7 @@ pub mod linearise;
 pub mod loop_delay;
 pub mod lqr;
 pub mod mpc;
+pub mod navigation;
 pub mod report;
 pub mod schedule;
 pub mod sliding;

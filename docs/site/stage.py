@@ -157,7 +157,7 @@ def gallery_page(folder, pictures):
         "The command above it repeats the run.\n",
         "## Every controller\n\nAll of them on the scenario of Chai 2022, with the moment acting as "
         "commanded. The vehicle is in every picture; ControlAllocator is in the experiments with control "
-        "allocation, AttitudeEstimator in those with sensors, and EntryGuidance in the entry flights.\n",
+        "allocation, AttitudeEstimator in those with sensors, and EntryGuidance and EntryNavigation in the entry flights.\n",
     ]
     groups = {None: gallery.controllers(), **gallery.experiments()}
     for group, members in groups.items():

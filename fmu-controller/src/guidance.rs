@@ -219,6 +219,9 @@ fn outputs(table: Variables) -> Variables {
         .real(real("loads.pressure", "Dynamic pressure", "Pa", 1e4), |m| {
             &mut m.output.command.loads.pressure
         })
+        .real(real("loads.heatLoad", "Heat load of the leading edge so far", "J/m2", 1e8), |m| {
+            &mut m.output.command.heat_load
+        })
         .real(margin("heatFlux"), |m| &mut m.output.margins.heat_flux)
         .real(margin("load"), |m| &mut m.output.margins.load)
         .real(margin("pressure"), |m| &mut m.output.margins.pressure)

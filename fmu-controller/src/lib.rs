@@ -10,6 +10,7 @@ mod estimator;
 mod fbl;
 mod guidance;
 mod lqr;
+mod navigation;
 mod solver;
 #[cfg(test)]
 mod tests;
@@ -20,6 +21,7 @@ pub use allocator::ControlAllocator;
 use controller_export::ControllerFmu;
 pub use estimator::AttitudeEstimator;
 pub use guidance::EntryGuidance;
+pub use navigation::EntryNavigation;
 
 /// `CRMPC`: centralised robust model predictive control.
 pub type Crmpc = ControllerFmu<crmpc::CrmpcLaw>;

@@ -34,7 +34,7 @@ pub struct Unit {
 }
 
 /// Dimension of a named unit: its symbol, and the exponents of kg, m, s, A, K and rad.
-const SYMBOLS: [(&str, [i32; 6]); 12] = [
+const SYMBOLS: [(&str, [i32; 6]); 13] = [
     ("kg", [1, 0, 0, 0, 0, 0]),
     ("m", [0, 1, 0, 0, 0, 0]),
     ("s", [0, 0, 1, 0, 0, 0]),
@@ -45,6 +45,7 @@ const SYMBOLS: [(&str, [i32; 6]); 12] = [
     ("N", [1, 1, -2, 0, 0, 0]),
     ("Pa", [1, -1, -2, 0, 0, 0]),
     ("W", [1, 2, -3, 0, 0, 0]),
+    ("J", [1, 2, -2, 0, 0, 0]),
     ("T", [1, 0, -2, -1, 0, 0]),
     ("1", [0; 6]),
 ];

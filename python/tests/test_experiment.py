@@ -30,7 +30,7 @@ ALPHA = "plant.attitude.alpha"
 
 
 def test_every_fmu_is_there_and_simulates():
-    names = "AttitudeEstimator BTVSMC BTVSMC_DO ControlAllocator CRMPC DLMPC EntryGuidance FBL LQR ReentryPlant"
+    names = "AttitudeEstimator BTVSMC BTVSMC_DO ControlAllocator CRMPC DLMPC EntryGuidance EntryNavigation FBL LQR ReentryPlant"
     assert fmus() == [*names.split(), "SOTVSMC_DO", "TwoLoopSMC"]
     for name in fmus():
         assert fmpy.read_model_description(str(fmu(name))).modelName == name

@@ -75,6 +75,8 @@ pub struct Command {
     pub in_reach: bool,
     /// Present heat flux, load and dynamic pressure.
     pub loads: Loads,
+    /// Heat load of the leading edge so far, J/m².
+    pub heat_load: f64,
     /// Whether a limit has made the present command.
     pub is_limited: bool,
     /// Whether the predicted flight keeps all limits.
@@ -306,6 +308,10 @@ impl Guidance {
         let least = present.least_rate(model, &settings.limit, &now);
         let (cosine, is_limited) = present.cosine(model, settings, least);
         memory.commanded = atan2((1.0 - cosine * cosine).sqrt(), cosine);
+        if memory.begun {
+            let mean = f64::midpoint(command.loads.heat_flux, now.heat_flux);
+            command.heat_load += mean * TICKS as f64 * PERIOD;
+        }
         (command.loads, command.is_limited) = (now, is_limited);
         let limits = settings.limit.all();
         let kept = loads.all().into_iter().zip(limits).all(|(load, limit)| load <= limit);

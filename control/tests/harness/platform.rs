@@ -10,6 +10,7 @@ use control::estimation::{
     self, CalibrationMode, CalibrationStatus, Estimate, Estimator, Settings,
 };
 use nalgebra::{Matrix3, Matrix4, SMatrix, Vector3};
+use vehicle::fixes::Devices;
 use vehicle::kinematics::{self, Kinematics};
 use vehicle::plant::{Plant, angles, rates};
 use vehicle::platform::{Pose, Readings};
@@ -111,7 +112,7 @@ pub fn lines(trajectory: &[Truth], config: &Config) -> Vec<estimation::Line> {
 
 /// Returns sensors on the line of the data file.
 pub fn config(triads: &PerSensor<Triad>, seed: u64) -> Config {
-    Config { triads: *triads, line: SensorData::embedded().line, seed }
+    Config { triads: *triads, line: SensorData::embedded().line, devices: Devices::default(), seed }
 }
 
 /// Returns the typical MEMS set.

@@ -2,7 +2,8 @@
 #![deny(clippy::disallowed_methods)]
 
 use fmu_controller::{
-    AttitudeEstimator, Btvsmc, BtvsmcDo, EntryGuidance, Fbl, Lqr, SotvsmcDo, TwoLoopSmc,
+    AttitudeEstimator, Btvsmc, BtvsmcDo, EntryGuidance, EntryNavigation, Fbl, Lqr, SotvsmcDo,
+    TwoLoopSmc,
 };
 
 fmi2_export::export_fmus!(
@@ -13,5 +14,6 @@ fmi2_export::export_fmus!(
     SotvsmcDo,
     TwoLoopSmc,
     AttitudeEstimator,
-    EntryGuidance
+    EntryGuidance,
+    EntryNavigation
 );

@@ -1,0 +1,159 @@
+//! Error-state Kalman filter: P. D. Groves, "Principles of GNSS, Inertial, and Multisensor
+//! Integrated Navigation Systems" (2013), chapters 3 and 14, in inertial axes.
+//!
+//! The error x is true less estimated: position, velocity, attitude as a rotation vector φ in
+//! inertial axes (R = exp(φ) R̂), biases of gyroscope and accelerometer, wind to the north and east, and
+//! the relative error of the model of the side force.
+
+use super::settings::{Errors, Wind};
+use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
+use vehicle::math::exp;
+
+/// Number of states of the error.
+pub const STATES: usize = 18;
+/// First state of the error of the position, velocity, attitude, both biases, the wind, and the
+/// model of the side force.
+pub(super) const POSITION: usize = 0;
+pub(super) const VELOCITY: usize = 3;
+pub(super) const ATTITUDE: usize = 6;
+pub(super) const GYROSCOPE: usize = 9;
+pub(super) const ACCELEROMETER: usize = 12;
+pub(super) const WIND: usize = 15;
+pub(super) const SIDE: usize = 17;
+
+/// Error of the state.
+pub type Error = SVector<f64, STATES>;
+/// Covariance of the error.
+pub type Covariance = SMatrix<f64, STATES, STATES>;
+
+/// Least standard deviations, so that a perfect sensor leaves the covariance regular: noise of a
+/// rate (rad/s/√Hz) and of a specific force (m/s²/√Hz).
+const LEAST_NOISE: [f64; 2] = [1e-7, 1e-5];
+
+/// A way of the vehicle over which the covariance is propagated at once.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Way {
+    /// Its duration, s.
+    pub(super) time: f64,
+    /// Change of the velocity by the specific force on it, inertial axes, m/s.
+    pub(super) pushed: Vector3<f64>,
+    /// Rotation from the body axes to the inertial ones.
+    pub(super) attitude: Matrix3<f64>,
+    /// Gradient of gravity, 1/s².
+    pub(super) gradient: Matrix3<f64>,
+    /// Change of the altitude, m.
+    pub(super) climbed: f64,
+}
+
+/// Returns the gradient of gravity at a position (m), 1/s²: that of a sphere.
+pub(super) fn gravity_gradient(gravitation: f64, position: &Vector3<f64>) -> Matrix3<f64> {
+    let radius = position.norm();
+    let up = position / radius;
+    (up * up.transpose() * 3.0 - Matrix3::identity()) * (gravitation / (radius * radius * radius))
+}
+
+/// Returns how much of a wandering bias is left after `elapsed` (s).
+pub(super) fn kept(errors: &Errors, elapsed: f64) -> f64 {
+    if errors.correlation > 0.0 { exp(-elapsed / errors.correlation) } else { 1.0 }
+}
+
+/// Returns the covariance after a way, P ← Φ P Φᵀ + Q, with samples of a `period` (s).
+pub(super) fn propagated(
+    covariance: &Covariance,
+    way: &Way,
+    (errors, period, wind): (&[Errors; 2], f64, &Wind),
+) -> Covariance {
+    let Way { time, pushed, attitude, gradient, climbed } = way;
+    let cross = pushed.cross_matrix();
+    let kept_biases = errors.map(|errors| kept(&errors, *time));
+    let kept_wind = exp(-climbed.abs() / wind.correlation);
+    let mut transition = Covariance::identity();
+    let mut set = |row: usize, column: usize, block: Matrix3<f64>| {
+        transition.fixed_view_mut::<3, 3>(row, column).copy_from(&block);
+    };
+    let identity = Matrix3::identity();
+    set(POSITION, VELOCITY, identity * *time);
+    set(POSITION, ATTITUDE, cross * (-time / 2.0));
+    set(POSITION, ACCELEROMETER, attitude * (-time * time / 2.0));
+    set(VELOCITY, POSITION, gradient * *time);
+    set(VELOCITY, ATTITUDE, -cross);
+    set(VELOCITY, GYROSCOPE, cross * attitude * (time / 2.0));
+    set(VELOCITY, ACCELEROMETER, attitude * -*time);
+    set(ATTITUDE, GYROSCOPE, attitude * -*time);
+    set(GYROSCOPE, GYROSCOPE, identity * kept_biases[0]);
+    set(ACCELEROMETER, ACCELEROMETER, identity * kept_biases[1]);
+    for i in WIND..STATES {
+        transition[(i, i)] = kept_wind;
+    }
+    let mut next = transition * covariance * transition.transpose();
+    // The spectral density of the noise follows from its deviation at the samples.
+    let density = |i: usize| {
+        let noise = errors[i].noise * period.sqrt();
+        noise * noise + LEAST_NOISE[i] * LEAST_NOISE[i]
+    };
+    let (by_rate, by_force) = (density(0) * time, density(1) * time);
+    let wandered = |i: usize| {
+        let deviation = errors[i].instability;
+        deviation * deviation * (1.0 - kept_biases[i] * kept_biases[i])
+    };
+    let blown = 1.0 - kept_wind * kept_wind;
+    let added = [
+        (POSITION..VELOCITY, by_force * time * time / 3.0),
+        (VELOCITY..ATTITUDE, by_force),
+        (ATTITUDE..GYROSCOPE, by_rate),
+        (GYROSCOPE..ACCELEROMETER, wandered(0)),
+        (ACCELEROMETER..WIND, wandered(1)),
+        (WIND..SIDE, wind.deviation * wind.deviation * blown),
+        (SIDE..STATES, wind.model * wind.model * blown),
+    ];
+    for (states, variance) in added {
+        for i in states {
+            next[(i, i)] += variance;
+        }
+    }
+    symmetric(&next)
+}
+
+fn symmetric(covariance: &Covariance) -> Covariance {
+    (covariance + covariance.transpose()) * 0.5
+}
+
+/// Measurement of a linear form of the error, with independent noise.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Measured {
+    /// The form.
+    pub(super) row: Error,
+    /// Measured less predicted value.
+    pub(super) residual: f64,
+    /// Variance of the noise.
+    pub(super) variance: f64,
+}
+
+impl Measured {
+    /// Returns the measurement of one state.
+    pub(super) fn state(state: usize, residual: f64, deviation: f64) -> Self {
+        let mut row = Error::zeros();
+        row[state] = 1.0;
+        Self { row, residual, variance: deviation * deviation }
+    }
+}
+
+/// Returns the error that follows from measurements, its covariance, and the square of the
+/// normalised innovations per measurement, which is 1 on average.
+pub(super) fn updated(covariance: &Covariance, all: &[Measured]) -> (Error, Covariance, f64) {
+    let (mut error, mut after, mut squares) = (Error::zeros(), *covariance, 0.0);
+    for Measured { row, residual, variance } in all {
+        let column = after * row;
+        let total = row.dot(&column) + variance;
+        let innovation = residual - row.dot(&error);
+        squares += innovation * innovation / total;
+        error += column * (innovation / total);
+        after -= column * column.transpose() / total;
+    }
+    (error, symmetric(&after), squares / all.len() as f64)
+}
+
+/// Returns the standard deviation of a linear form of the error.
+pub(super) fn deviation(covariance: &Covariance, row: &Error) -> f64 {
+    row.dot(&(covariance * row)).max(0.0).sqrt()
+}

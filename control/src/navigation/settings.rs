@@ -1,0 +1,205 @@
+//! Settings of the navigation.
+
+use ::settings::Declared;
+use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
+use vehicle::axes::ANGLES;
+use vehicle::entry::{Motion, STEEPEST};
+use vehicle::sensor_data::{LAST_SENSORS, SensorData};
+use vehicle::translation::Planet;
+
+/// All settings of the navigation. Units are SI, angles in rad.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Declared)]
+pub struct Settings {
+    /// The planet, as in the plant.
+    pub planet: Planet,
+    /// Sensor set, the same as in the plant: 1 without errors; 2 with the errors of the parameters
+    /// gyroscope and accelerometer; 3, 4, 5 of navigation and tactical grade and calibrated MEMS.
+    #[setting(name = "sensor.set", min = 1, max = LAST_SENSORS)]
+    pub sensor_set: i32,
+    /// Period of the navigation and of the samples of the inertial sensors.
+    #[setting(unit = "s", min = 1e-3, max = 1.0, nominal = 0.01)]
+    pub period: f64,
+    /// Errors of the gyroscope, in rad/s.
+    #[setting(unit = "rad/s", nominal = 1e-5)]
+    #[setting(used_with = "sensor.set = 2")]
+    pub gyroscope: Errors,
+    /// Errors of the accelerometer, in m/s².
+    #[setting(unit = "m/s2", nominal = 1e-2)]
+    #[setting(used_with = "sensor.set = 2")]
+    pub accelerometer: Errors,
+    /// Initial state.
+    pub initial: Initial,
+    /// Alignment before the entry.
+    pub alignment: Alignment,
+    /// Fixes of satellite navigation and star tracker.
+    pub fix: Fix,
+    /// Wind by the side force.
+    pub wind: Wind,
+    /// Time in which the shown state follows a correction; 0 for at once.
+    #[setting(name = "blend.time", unit = "s", min = 0.0, max = 1e3, nominal = 3.0)]
+    pub blend: f64,
+    /// When the navigation counts as healthy.
+    pub health: Trust,
+}
+
+/// Errors of an inertial sensor that the filter expects.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Declared)]
+pub struct Errors {
+    /// Standard deviation of the wandering bias.
+    #[setting(part, min = 0.0)]
+    pub instability: f64,
+    /// Correlation time of the wandering bias; 0 for one that stays.
+    #[setting(part, unit = "s", min = 0.0, nominal = 1e3)]
+    pub correlation: f64,
+    /// Standard deviation of the white noise on the samples.
+    #[setting(part, min = 0.0)]
+    pub noise: f64,
+}
+
+/// State at the first sample. Position and velocity are those of the first fix of satellite
+/// navigation, if it comes with that sample.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Declared)]
+pub struct Initial {
+    /// Initial altitude.
+    #[setting(unit = "m", min = 0.0, max = 1e6, nominal = 1e5)]
+    pub altitude: f64,
+    /// Initial longitude.
+    #[setting(unit = "rad", nominal = 1.0)]
+    pub longitude: f64,
+    /// Initial latitude.
+    #[setting(unit = "rad", min = -STEEPEST, max = STEEPEST, nominal = 1.0)]
+    pub latitude: f64,
+    /// Initial speed relative to the planet.
+    #[setting(unit = "m/s", above = 0.0, max = 2e4, nominal = 1e3)]
+    pub speed: f64,
+    /// Initial flight path angle.
+    #[setting(unit = "rad", min = -STEEPEST, max = STEEPEST, nominal = 0.1)]
+    pub flight_path_angle: f64,
+    /// Initial heading, from north towards east.
+    #[setting(unit = "rad", nominal = 1.0)]
+    pub heading: f64,
+    /// Initial angle.
+    #[setting(name = "", each = ANGLES, unit = "rad", nominal = 0.1)]
+    pub angles: Vector3<f64>,
+}
+
+impl Initial {
+    /// Returns the motion.
+    pub fn motion(&self) -> Motion {
+        let Self { altitude, longitude, latitude, speed, flight_path_angle, heading, .. } = *self;
+        Motion::new(altitude, longitude, latitude, speed, flight_path_angle, heading)
+    }
+}
+
+/// How well the initial state is known.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Declared)]
+pub struct Alignment {
+    /// Standard deviation of the initial attitude, about each axis.
+    #[setting(unit = "rad", above = 0.0, max = 1.0, nominal = 1e-3)]
+    pub attitude: f64,
+    /// Standard deviation of the initial position along each axis, if no fix gives it.
+    #[setting(unit = "m", above = 0.0, nominal = 100.0)]
+    pub position: f64,
+    /// Standard deviation of the initial velocity along each axis, if no fix gives it.
+    #[setting(unit = "m/s", above = 0.0, nominal = 1.0)]
+    pub velocity: f64,
+    /// Seed of the errors of the initial state, which have these deviations; 0 for none.
+    #[setting(min = 0)]
+    pub seed: u64,
+}
+
+/// Fixes of satellite navigation and star tracker.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Declared)]
+pub struct Fix {
+    /// Standard deviation of the position of satellite navigation, along each axis.
+    #[setting(unit = "m", above = 0.0, nominal = 5.0)]
+    pub position: f64,
+    /// Standard deviation of the velocity of satellite navigation, along each axis.
+    #[setting(unit = "m/s", above = 0.0, nominal = 0.1)]
+    pub velocity: f64,
+    /// Standard deviation of the attitude of the star tracker, about each axis.
+    #[setting(unit = "rad", above = 0.0, nominal = 1e-4)]
+    pub attitude: f64,
+    /// Square of the standard deviations per component from which a fix is rejected; after five
+    /// rejections in a row one is taken.
+    #[setting(above = 1.0, nominal = 25.0)]
+    pub gate: f64,
+}
+
+/// Wind, which is seen by the side force: the vehicle flies sideways through it.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Declared)]
+pub struct Wind {
+    /// Standard deviation of the wind to the north and to the east; 0 if there is none.
+    #[setting(unit = "m/s", min = 0.0, max = 300.0, nominal = 30.0)]
+    pub deviation: f64,
+    /// Change of the altitude over which the wind becomes another one.
+    #[setting(unit = "m", above = 0.0, nominal = 1e4)]
+    #[setting(used_with = "wind.deviation > 0")]
+    pub correlation: f64,
+    /// Relative standard deviation of the ratio of side force to lift and drag.
+    #[setting(name = "model", min = 0.0, max = 1.0, nominal = 0.1)]
+    #[setting(used_with = "wind.deviation > 0")]
+    pub model: f64,
+}
+
+/// When the navigation counts as healthy.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Declared)]
+pub struct Trust {
+    /// Standard deviation of an attitude angle from which the navigation counts as degraded.
+    #[setting(unit = "rad", above = 0.0, nominal = 0.01)]
+    pub deviation: f64,
+    /// Time without a fix from which the navigation counts as bridging.
+    #[setting(unit = "s", above = 0.0, nominal = 5.0)]
+    pub after: f64,
+}
+
+impl Default for Settings {
+    /// Returns the settings for tactical sensors, from the start of the plant's entry flight.
+    fn default() -> Self {
+        Self {
+            planet: Planet::EARTH,
+            sensor_set: 4,
+            period: 0.04,
+            gyroscope: Errors::default(),
+            accelerometer: Errors::default(),
+            initial: Initial {
+                altitude: 120e3,
+                longitude: 0.0,
+                latitude: -10_f64.to_radians(),
+                speed: 7450.0,
+                flight_path_angle: -1.2_f64.to_radians(),
+                heading: 60_f64.to_radians(),
+                angles: Vector3::new(40_f64.to_radians(), 0.0, 64_f64.to_radians()),
+            },
+            alignment: Alignment {
+                attitude: 0.1_f64.to_radians(),
+                position: 50.0,
+                velocity: 0.5,
+                seed: 1,
+            },
+            fix: Fix { position: 5.0, velocity: 0.1, attitude: 5e-5, gate: 25.0 },
+            wind: Wind { deviation: 40.0, correlation: 1e4, model: 0.1 },
+            blend: 3.0,
+            health: Trust { deviation: 1_f64.to_radians(), after: 5.0 },
+        }
+    }
+}
+
+impl Settings {
+    /// Returns the errors of gyroscope and accelerometer that the filter expects.
+    pub(super) fn errors(&self) -> [Errors; 2] {
+        match self.sensor_set {
+            1 => [Errors::default(); 2],
+            2 => [self.gyroscope, self.accelerometer],
+            set => {
+                let triads = SensorData::embedded().inertial(set, self.period);
+                [triads[0], triads[1]].map(|triad| Errors {
+                    instability: triad.instability,
+                    correlation: triad.correlation,
+                    noise: triad.noise,
+                })
+            }
+        }
+    }
+}

@@ -1,0 +1,154 @@
+//! What the navigation shows: the motion, the attitude and the flow as controllers and guidance
+//! take them.
+
+use super::air::Relative;
+use super::filter::{self, Covariance, Error};
+use super::strapdown::{Felt, State};
+use super::{Navigation, Settings};
+use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
+use vehicle::axes::nearest;
+use vehicle::entry::Motion;
+use vehicle::frames::{attitude_angles, fixed_from_inertial, level_from_fixed};
+use vehicle::platform::{body_from_velocity, velocity_from_level};
+use vehicle::trajectory::Trajectory;
+use vehicle::translation;
+
+/// Standard deviations that the filter predicts.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Deviations {
+    /// Of the attitude angles relative to the ground velocity, rad.
+    pub angles: Vector3<f64>,
+    /// Of angle of attack and sideslip relative to the air, rad.
+    pub flow: [f64; 2],
+    /// Of the position along the worst of the inertial axes, m.
+    pub position: f64,
+    /// Of the velocity along the worst of the inertial axes, m/s.
+    pub velocity: f64,
+    /// Of the wind to the north and to the east, m/s.
+    pub wind: [f64; 2],
+}
+
+/// The navigated state.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Shown {
+    /// Motion relative to the rotating planet.
+    pub motion: Motion,
+    /// Its time derivative.
+    pub motion_rate: Motion,
+    /// Attitude angles Θ relative to the ground velocity, rad.
+    pub angles: Vector3<f64>,
+    /// Angle of attack and sideslip relative to the air, rad.
+    pub flow: [f64; 2],
+    /// Body rates ω, rad/s.
+    pub rates: Vector3<f64>,
+    /// Lift per mass, m/s².
+    pub lift: f64,
+    /// Drag per mass, m/s².
+    pub drag: f64,
+    /// Wind to the north and to the east, m/s.
+    pub wind: [f64; 2],
+    /// Standard deviations that the filter predicts.
+    pub deviations: Deviations,
+    /// Squares of the normalised innovations per component, of the latest fix of satellite
+    /// navigation and star tracker and of the latest side force; they are 1 on average.
+    pub innovations: [f64; 3],
+    /// Estimated biases of gyroscope (rad/s) and accelerometer (m/s²).
+    pub biases: [Vector3<f64>; 2],
+    /// Number of fixes that were rejected.
+    pub rejected: u32,
+}
+
+/// Returns the wind (m/s) as a vector, and the directions to the north and the east, all along the
+/// inertial axes.
+fn level(settings: &Settings, (time, state): (f64, &State)) -> [Vector3<f64>; 2] {
+    let to_fixed = fixed_from_inertial(&settings.planet, time);
+    let motion = state.place(&settings.planet, time).motion(&settings.planet);
+    let to_level = level_from_fixed(motion[1], motion[2]) * to_fixed;
+    [to_level.row(0).transpose(), to_level.row(1).transpose()]
+}
+
+impl Navigation {
+    /// Returns the velocities relative to the ground and to the air.
+    pub(super) fn relative(&self, at: (f64, &State), wind: [f64; 2]) -> [Relative; 2] {
+        let state = at.1;
+        let to_body = state.attitude.inverse().to_rotation_matrix().into_inner();
+        let velocity = state.over_ground(&self.settings.planet);
+        let [north, east] = level(&self.settings, at);
+        let through_air = velocity - north * wind[0] - east * wind[1];
+        [
+            Relative { velocity, to_body, level: None },
+            Relative { velocity: through_air, to_body, level: Some([north, east]) },
+        ]
+    }
+
+    /// Returns the standard deviations that follow from a covariance.
+    pub(super) fn deviations(
+        &self,
+        at: (f64, &State),
+        wind: [f64; 2],
+        covariance: &Covariance,
+    ) -> Deviations {
+        let of = |row: &Error| filter::deviation(covariance, row);
+        let worst = |from: usize| {
+            (from..from + 3).map(|i| covariance[(i, i)]).fold(0.0, f64::max).max(0.0).sqrt()
+        };
+        let [ground, air] = self.relative(at, wind);
+        let [alpha, beta] = ground.rows();
+        Deviations {
+            angles: Vector3::new(of(&alpha), of(&beta), of(&ground.bank_row())),
+            flow: air.rows().map(|row| of(&row)),
+            position: worst(filter::POSITION),
+            velocity: worst(filter::VELOCITY),
+            wind: [0, 1].map(|i| covariance[(filter::WIND + i, filter::WIND + i)].max(0.0).sqrt()),
+        }
+    }
+
+    /// Shows a state at a time (s). Angles are shown as the turns nearest to those before.
+    pub(super) fn show(
+        &self,
+        shown: &mut Shown,
+        (time, state): (f64, &State),
+        felt: &Felt,
+        wind: [f64; 2],
+    ) {
+        let planet = &self.settings.planet;
+        let motion = state.place(planet, time).motion(planet);
+        let [_, longitude, latitude, _, path, heading] = motion.into();
+        let course = Trajectory { flight_path_angle: path, heading, ..Trajectory::default() };
+        let velocity_from_inertial = velocity_from_level(&course)
+            * level_from_fixed(longitude, latitude)
+            * fixed_from_inertial(planet, time);
+        let to_inertial = state.attitude.to_rotation_matrix().into_inner();
+        let to_velocity = velocity_from_inertial * to_inertial;
+        let mut angles = attitude_angles(&to_velocity.transpose());
+        for (angle, before) in angles.iter_mut().zip(&shown.angles) {
+            *angle = nearest(*angle, *before);
+        }
+        let [_, air] = self.relative((time, state), wind);
+        let [alpha, beta] = air.angles();
+        let flow = [nearest(alpha, shown.flow[0]), beta];
+        let from_flow = body_from_velocity(&Vector3::new(alpha, beta, 0.0));
+        let along_flow = from_flow.transpose() * felt.force;
+        let mut from_centre: translation::State = motion;
+        from_centre[0] += planet.radius;
+        let motion_rate =
+            translation::derivative_under(planet, &from_centre, &(to_velocity * felt.force));
+        let mut continued = motion;
+        // Longitude and heading count on beyond a whole turn.
+        for i in [1, 5] {
+            continued[i] = nearest(motion[i], shown.motion[i]);
+        }
+        *shown = Shown {
+            motion: continued,
+            motion_rate,
+            angles,
+            flow,
+            rates: felt.rate,
+            lift: -along_flow.z,
+            drag: -along_flow.x,
+            wind,
+            ..*shown
+        };
+    }
+}

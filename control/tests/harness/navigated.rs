@@ -1,0 +1,280 @@
+//! Entry flights whose attitude follows the guidance in an ideal loop, watched by a navigation.
+#![allow(dead_code)] // Each user needs a part of it.
+
+use control::guidance::{self, Guidance};
+use control::navigation::{self, Line, Memory, Navigation};
+use nalgebra::{SMatrix, SVector, Vector3};
+use vehicle::actuators::Command;
+use vehicle::aerodynamics::Aerodynamics;
+use vehicle::air::{Air, ROWS, Row};
+use vehicle::disturbance::{Disturbance, DisturbanceKind};
+use vehicle::entry::{Config, Deviations, End, Following, Prescribed, Trim};
+use vehicle::fixes::Devices;
+use vehicle::frames::Place;
+use vehicle::kinematics::Kinematics;
+use vehicle::noise::uniform;
+use vehicle::plant::{Input, Plant, state};
+use vehicle::scenario::Scenario;
+use vehicle::sensor_data::SensorData;
+use vehicle::sensors::{self, Line as Timing, PerSensor};
+use vehicle::translation::Planet;
+use vehicle::triad::Window;
+
+const PERIOD: f64 = guidance::PERIOD;
+
+/// An entry flight with its sensors.
+#[derive(Clone, Debug)]
+pub(crate) struct Case {
+    /// Sensor set, see [`SensorData::inertial`].
+    pub(crate) set: i32,
+    pub(crate) stars: bool,
+    pub(crate) seed: u64,
+    /// Wind to the north and to the east at 20, 60 and 100 km, m/s.
+    pub(crate) wind: [[f64; 2]; 3],
+    pub(crate) deviations: Deviations,
+    pub(crate) settings: navigation::Settings,
+}
+
+impl Case {
+    pub(crate) fn new(set: i32, stars: bool, seed: u64) -> Self {
+        let mut settings =
+            navigation::Settings { sensor_set: set, ..navigation::Settings::default() };
+        settings.alignment.seed = seed + 1000;
+        settings.wind.deviation = 0.0;
+        Self { set, stars, seed, wind: [[0.0; 2]; 3], deviations: Deviations::default(), settings }
+    }
+
+    /// Tactical sensors in winds up to some 60 m/s, with lift and drag wrong by up to 10 %.
+    pub(crate) fn windy(seed: u64) -> Self {
+        let draws: [f64; 8] = uniform(seed, 99);
+        let mut case = Self::new(4, false, seed);
+        let low = [60.0 * draws[0], 60.0 * draws[1]];
+        let middle = [0.7 * low[0] + 20.0 * draws[2], 0.7 * low[1] + 20.0 * draws[3]];
+        case.wind = [low, middle, [20.0 * draws[4], 20.0 * draws[5]]];
+        case.deviations.lift = 1.0 + 0.1 * draws[6];
+        case.deviations.drag = 1.0 + 0.1 * draws[7];
+        case.settings.wind.deviation = 40.0;
+        case
+    }
+}
+
+/// Sums over flights.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Figures {
+    count: f64,
+    squares: [f64; 5],
+    variances: [f64; 5],
+    /// Square of the normalised error of position, velocity and attitude, per component.
+    normalised: f64,
+    /// Squares of the innovations of satellite navigation while there are fixes, and their number.
+    innovations: [f64; 2],
+    /// Square of the error of the sideslip relative to the air below Mach 5, its predicted variance,
+    /// and their number.
+    slow: [f64; 3],
+}
+
+impl Figures {
+    pub(crate) fn of(case: &Case) -> Self {
+        let mut sum = Self::default();
+        fly(case, |seen| {
+            sum.count += 1.0;
+            for i in 0..5 {
+                sum.squares[i] += seen.errors[i] * seen.errors[i];
+                sum.variances[i] += seen.predicted[i] * seen.predicted[i];
+            }
+            let covariance = seen.covariance;
+            let scale = SMatrix::<f64, 9, 9>::from_diagonal(
+                &covariance.diagonal().map(|variance| 1.0 / variance.sqrt()),
+            );
+            let error = scale * seen.error;
+            let inverse = (scale * covariance * scale).try_inverse().unwrap();
+            sum.normalised += (error.transpose() * inverse * error)[0] / 9.0;
+            let blackout = 44e3..86e3;
+            if seen.time > 1.0 && !blackout.contains(&seen.altitude) {
+                sum.innovations[0] += seen.innovations[0];
+                sum.innovations[1] += 1.0;
+            }
+            if seen.mach < 5.0 {
+                sum.slow[0] += seen.errors[4] * seen.errors[4];
+                sum.slow[1] += seen.predicted[4] * seen.predicted[4];
+                sum.slow[2] += 1.0;
+            }
+        });
+        sum
+    }
+
+    pub(crate) fn with(mut self, other: &Self) -> Self {
+        self.count += other.count;
+        for i in 0..5 {
+            self.squares[i] += other.squares[i];
+            self.variances[i] += other.variances[i];
+        }
+        self.normalised += other.normalised;
+        for i in 0..2 {
+            self.innovations[i] += other.innovations[i];
+        }
+        for i in 0..3 {
+            self.slow[i] += other.slow[i];
+        }
+        self
+    }
+
+    /// Root mean squares of the errors of α, β, σ, and of α, β relative to the air, rad.
+    pub(crate) fn angles(&self) -> [f64; 5] {
+        self.squares.map(|sum| (sum / self.count).sqrt())
+    }
+
+    /// What the filter predicts of these, rad.
+    pub(crate) fn predicted(&self) -> [f64; 5] {
+        self.variances.map(|sum| (sum / self.count).sqrt())
+    }
+
+    pub(crate) fn normalised_error(&self) -> f64 {
+        self.normalised / self.count
+    }
+
+    pub(crate) fn innovation(&self) -> f64 {
+        self.innovations[0] / self.innovations[1]
+    }
+
+    /// Error of the sideslip relative to the air below Mach 5, rad.
+    pub(crate) fn slow_sideslip(&self) -> f64 {
+        (self.slow[0] / self.slow[2]).sqrt()
+    }
+
+    /// What the filter predicts of it, rad.
+    pub(crate) fn slow_prediction(&self) -> f64 {
+        (self.slow[1] / self.slow[2]).sqrt()
+    }
+}
+
+/// What is seen once a second.
+#[derive(Clone, Debug)]
+pub(crate) struct Seen {
+    pub(crate) time: f64,
+    pub(crate) altitude: f64,
+    pub(crate) mach: f64,
+    /// Shown less true α, β, σ relative to the ground, and α, β relative to the air, rad.
+    pub(crate) errors: [f64; 5],
+    /// Predicted standard deviations of these, rad.
+    pub(crate) predicted: [f64; 5],
+    /// Error of the filter in position, velocity and attitude, and its covariance.
+    pub(crate) error: SVector<f64, 9>,
+    pub(crate) covariance: SMatrix<f64, 9, 9>,
+    pub(crate) innovations: [f64; 3],
+    pub(crate) health: navigation::Health,
+}
+
+/// Flies to the terminal area, and calls `see` at every tick of a whole second.
+pub(crate) fn fly(case: &Case, mut see: impl FnMut(&Seen)) {
+    let guidance = Guidance::new(guidance::Settings::default()).unwrap();
+    let initial = case.settings.initial;
+    let mut air = Air { rows: 3, ..Air::default() };
+    for (row, (altitude, wind)) in
+        air.profile.iter_mut().zip([20e3, 60e3, 100e3].into_iter().zip(case.wind))
+    {
+        *row = Row { altitude, density: 1.0, wind };
+    }
+    assert!(air.rows <= ROWS);
+    let entry = Config {
+        planet: Planet::EARTH,
+        aerodynamics: Aerodynamics::papers(),
+        deviations: case.deviations,
+        air,
+        trim: Trim::Anywhere,
+        following: Following { active: true, frequency: 1.0 },
+        end: End { altitude: 20e3, speed: 762.0 },
+    };
+    let mut devices = Devices::default();
+    devices.star.period = if case.stars { 1.0 } else { 0.0 };
+    let data = SensorData::embedded();
+    let triads = if case.set == 1 { PerSensor::default() } else { data.inertial(case.set, PERIOD) };
+    let scenario = Scenario {
+        disturbance: Disturbance {
+            kind: DisturbanceKind::None,
+            ..Scenario::crmpc2022().disturbance
+        },
+        ..Scenario::crmpc2022()
+    };
+    let config = vehicle::plant::Config {
+        kinematics: Kinematics::Exact,
+        entry: Some(entry.clone()),
+        motion: initial.motion(),
+        initial: state(&initial.angles, &Vector3::zeros()),
+        surroundings: data.surroundings,
+        sensors: Some(sensors::Config {
+            triads,
+            line: Timing {
+                period: PERIOD,
+                delay: 0.0,
+                drop_probability: 0.0,
+                drop_window: Window::default(),
+            },
+            devices,
+            seed: case.seed,
+        }),
+        ..scenario.config(PERIOD)
+    };
+    let mut plant = Plant::new(&config, 0.0).unwrap();
+    let navigation = Navigation::new(case.settings).unwrap();
+    let mut memory: Memory = navigation.memory();
+    let mut guided = guidance::Memory::default();
+    let mut input = Input::default();
+    for tick in 0..100_000_u64 {
+        let time = tick as f64 * PERIOD;
+        let entering = plant.entering(time).unwrap();
+        let passage = entering.passage;
+        let known =
+            guidance::Navigation { motion: plant.motion, lift: passage.lift, drag: passage.drag };
+        let reference = guidance.update(&mut guided, tick, &known).reference;
+        input.prescribed = Prescribed { angles: reference.angles, rates: reference.rates };
+        let sample = plant.measured(Some(&entering), time, &input);
+        let [rate, force, _] = sample.readings;
+        let line =
+            Line { sample: sample.number, time: sample.time, rate, force, fixes: sample.fixes };
+        navigation.update(&mut memory, time, &line);
+        if tick.is_multiple_of(25) {
+            let altitude = plant.motion[0];
+            let wind = entry.air.at(time, altitude).wind;
+            let truth = Place::of(&entry.planet, &plant.motion, &plant.angles(), time);
+            let (error, covariance) = navigation.error(&memory, &truth, [wind.x, wind.y]).unwrap();
+            let shown = &memory.shown;
+            let off = shown.angles - plant.angles();
+            let turn = |angle: f64| vehicle::axes::nearest(angle, 0.0);
+            see(&Seen {
+                time,
+                altitude,
+                mach: passage.mach,
+                errors: [
+                    turn(off.x),
+                    off.y,
+                    turn(off.z),
+                    shown.flow[0] - passage.air_angles[0],
+                    shown.flow[1] - passage.air_angles[1],
+                ],
+                predicted: [
+                    shown.deviations.angles.x,
+                    shown.deviations.angles.y,
+                    shown.deviations.angles.z,
+                    shown.deviations.flow[0],
+                    shown.deviations.flow[1],
+                ],
+                error: error.fixed_rows::<9>(0).into(),
+                covariance: covariance.fixed_view::<9, 9>(0, 0).into(),
+                innovations: shown.innovations,
+                health: memory.health,
+            });
+        }
+        if plant.ended().is_some() {
+            return;
+        }
+        // A reference that is held would shake the vehicle between the samples.
+        let moving = |at: f64| {
+            let mut input = input;
+            input.prescribed.angles += input.prescribed.rates * (at - time);
+            input
+        };
+        plant.advance_with(time, time + PERIOD, &Command::default(), moving).unwrap();
+    }
+    panic!("it does not come down");
+}

@@ -1,0 +1,103 @@
+//! Navigation of entry flights: the error against what the filter predicts, in flights whose sensors
+//! and winds are drawn.
+
+#[path = "harness/mod.rs"]
+mod harness;
+#[path = "harness/navigated.rs"]
+mod navigated;
+
+use control::navigation::{Health, Line, Navigation, Settings};
+use nalgebra::Vector3;
+use navigated::{Case, Figures, fly};
+use vehicle::fixes::Fixes;
+
+fn figures(case: impl Fn(u64) -> Case + Sync, seeds: std::ops::Range<u64>) -> Figures {
+    let seeds: Vec<u64> = seeds.collect();
+    let flown = harness::in_parallel(&seeds, |&seed| Figures::of(&case(seed)));
+    flown.into_iter().fold(Figures::default(), |sum, one| sum.with(&one))
+}
+
+/// The errors of all angles are as large as the filter says, for every grade, and the innovations
+/// have the size that it expects.
+#[test]
+fn oracle_errors_are_as_large_as_predicted() {
+    for (set, stars) in [(3, false), (4, false), (4, true), (5, true)] {
+        let all = figures(|seed| Case::new(set, stars, seed), 300..310);
+        let name = format!("set {set}, stars {stars}: {all:?}");
+        assert!((0.7..1.3).contains(&all.normalised_error()), "{name}");
+        assert!((0.9..1.1).contains(&all.innovation()), "{name}");
+        for (error, predicted) in all.angles().into_iter().zip(all.predicted()) {
+            assert!((0.5..1.6).contains(&(error / predicted)), "{name}");
+        }
+    }
+}
+
+/// With tactical sensors, wind of 60 m/s and lift and drag wrong by 10 %, the bank angle is known
+/// within 0.2°, angle of attack and sideslip within 0.3°, and the sideslip relative to the air within
+/// 0.25° below Mach 5.
+#[test]
+fn regress_wind_is_found_by_the_side_force() {
+    let all = figures(Case::windy, 400..410);
+    let [alpha, beta, sigma, _, _] = all.angles().map(f64::to_degrees);
+    assert!(alpha < 0.3 && beta < 0.3 && sigma < 0.2, "{all:?}");
+    assert!(all.slow_sideslip().to_degrees() < 0.25, "{all:?}");
+    assert!((0.7..1.3).contains(&all.normalised_error()), "{all:?}");
+}
+
+/// A correction does not move what is shown in one tick.
+#[test]
+fn corrections_are_blended_in() {
+    let mut case = Case::new(5, true, 7);
+    case.settings.alignment.attitude = 1_f64.to_radians();
+    let mut before: Option<[f64; 5]> = None;
+    let mut largest = 0.0_f64;
+    fly(&case, |seen| {
+        if let Some(before) = before {
+            for (now, then) in seen.errors.iter().zip(before) {
+                largest = largest.max((now - then).abs());
+            }
+        }
+        before = Some(seen.errors);
+    });
+    // Within a second the first fix of the star tracker removes a degree.
+    assert!(largest.to_degrees() < 0.4, "{}", largest.to_degrees());
+}
+
+/// Sensors that cannot bridge the time without fixes are named, and better ones are not.
+#[test]
+fn health_says_which_sensors_bridge_the_blackout() {
+    for (set, bridges) in [(3, true), (4, true), (5, false)] {
+        let mut worst = false;
+        fly(&Case::new(set, false, 3), |seen| worst |= seen.health == Health::Degraded);
+        assert_eq!(worst, !bridges, "set {set}");
+    }
+}
+
+/// A filter that expects better sensors than there are says so once fixes come back.
+#[test]
+fn health_names_a_filter_that_expects_too_much() {
+    let mut case = Case::new(5, false, 3);
+    case.settings.sensor_set = 3;
+    let mut healths = Vec::new();
+    fly(&case, |seen| healths.push(seen.health));
+    assert!(healths.contains(&Health::Inconsistent));
+    assert!(!healths[..60].contains(&Health::Inconsistent));
+}
+
+/// The sample of a tick, or none, repeated or late, leaves a finite state.
+#[test]
+fn samples_may_be_lost_or_repeated() {
+    let navigation = Navigation::new(Settings::default()).unwrap();
+    let mut memory = navigation.memory();
+    let mut line = Line { force: Vector3::new(-3.0, 0.0, -9.0), ..Line::default() };
+    for (tick, sample) in [(0, 1), (1, 2), (2, 2), (3, 2), (4, 5), (5, 6), (300, 301), (301, 302)] {
+        let time = f64::from(tick) * 0.04;
+        (line.sample, line.time, line.fixes) = (sample, f64::from(sample - 1) * 0.04, Fixes::default());
+        navigation.update(&mut memory, time, &line);
+        let shown = &memory.shown;
+        assert!(shown.motion.iter().chain(&shown.angles).all(|value| value.is_finite()));
+        assert!(shown.deviations.angles.iter().all(|value| *value > 0.0));
+    }
+    navigation.update(&mut memory, 20.0, &line);
+    assert_eq!(memory.health, Health::Lost);
+}

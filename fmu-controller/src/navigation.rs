@@ -1,0 +1,307 @@
+//! `EntryNavigation`: motion, attitude and wind along an entry flight, from inertial sensors,
+//! satellite navigation and star tracker.
+
+use control::navigation::{Health, Line, Memory, Navigation, Settings, Shown};
+use controller_export::sampled::{SampledFmu, SampledInstance, Ticks};
+use controller_export::table::{ANGLES, AXES, RATES, vector};
+use fmi2_export::table::{Common, Real, discrete_input, discrete_output, input};
+use fmi2_export::{Description, Failure, VariableTable};
+use model_description::DefaultExperiment;
+use serde::{Deserialize, Serialize};
+use settings::Choice;
+use vehicle::entry::QUANTITIES;
+use vehicle::error::rounded_time;
+
+/// The navigation as an FMU.
+pub type EntryNavigation = SampledFmu<NavigationInstance>;
+
+/// An instance of the navigation: its parameters, inputs and outputs.
+#[derive(Serialize, Deserialize)]
+pub struct NavigationInstance {
+    pub(crate) settings: Settings,
+    pub(crate) line: Line,
+    pub(crate) shown: Shown,
+    health: Health,
+}
+
+/// Longest flight that is expected, s.
+const LONGEST: f64 = 3000.0;
+
+impl SampledInstance for NavigationInstance {
+    type Device = Navigation;
+    type Memory = Memory;
+    type Input = Line;
+    type Output = ();
+
+    fn description() -> Description<EntryNavigation> {
+        Description {
+            name: "EntryNavigation",
+            description: "Navigation of an entry flight by strapdown and Kalman filter, with the wind by the side force",
+            documentation: include_str!("navigation.html").into(),
+            version: env!("CARGO_PKG_VERSION"),
+            model_exchange: false,
+            event_indicators: 0,
+            default_experiment: DefaultExperiment {
+                start: 0.0,
+                stop: LONGEST,
+                tolerance: 1e-6,
+                step: Settings::default().period,
+            },
+            table: outputs(inputs(VariableTable::new()))
+                .settings(|m: &mut EntryNavigation| &mut m.settings),
+        }
+    }
+
+    fn new() -> Self {
+        Self {
+            settings: Settings::default(),
+            line: Line::default(),
+            shown: Shown::default(),
+            health: Health::default(),
+        }
+    }
+
+    fn design(&self) -> Result<Navigation, Failure> {
+        Navigation::new(self.settings).map_err(|error| Failure::Error(error.to_string()))
+    }
+
+    fn is_designed(&self, navigation: &Navigation) -> bool {
+        *navigation.settings() == self.settings
+    }
+
+    fn period(navigation: &Navigation) -> f64 {
+        navigation.settings().period
+    }
+
+    fn memory(navigation: &Navigation) -> Memory {
+        navigation.memory()
+    }
+
+    fn evaluate(
+        &self,
+        navigation: &mut Navigation,
+        ticks: &mut Ticks<Self>,
+    ) -> Result<(), Failure> {
+        let line = self.line;
+        if let Some(name) = line.fault() {
+            return Err(Failure::Error(format!("an input {name} is not a finite number")));
+        }
+        let time = ticks.next_time();
+        ticks.evaluate_with(line, |memory, _| navigation.update(memory, time, &line));
+        let Shown { motion, motion_rate, angles, .. } = &ticks.in_force().1.shown;
+        if motion.iter().chain(motion_rate).chain(angles).all(|value| value.is_finite()) {
+            return Ok(());
+        }
+        Err(Failure::Error(format!(
+            "the navigated motion at t = {} s is not finite; check the inputs measured.*, gnss.* and star.*",
+            rounded_time(time)
+        )))
+    }
+
+    fn show(&mut self, _time: f64, _navigation: &Navigation, ((), memory): ((), &Memory)) {
+        (self.shown, self.health) = (memory.shown, memory.health);
+    }
+
+    fn warning(before: &Memory, after: &Memory) -> Option<&'static str> {
+        let becomes = |health: Health| after.health == health && before.health != health;
+        if becomes(Health::Lost) {
+            Some("no sample has arrived for half a second: the navigation is lost (see health)")
+        } else if becomes(Health::Degraded) {
+            Some(
+                "the attitude is known worse than health.deviation asks for: the inertial sensors cannot bridge the time without fixes (see health and deviation.*)",
+            )
+        } else if becomes(Health::Inconsistent) {
+            Some(
+                "the fixes contradict what the filter expects: sensor.set, the noise of fixes or the initial state is not that of the plant (see health and innovation.*)",
+            )
+        } else {
+            None
+        }
+    }
+}
+
+type Variables = VariableTable<EntryNavigation>;
+
+/// Names of the inputs, which are those of outputs of the plant.
+const INPUTS: [&str; 22] = [
+    "measured.gyroscope.x",
+    "measured.gyroscope.y",
+    "measured.gyroscope.z",
+    "measured.accelerometer.x",
+    "measured.accelerometer.y",
+    "measured.accelerometer.z",
+    "measured.time",
+    "measured.sample",
+    "gnss.position.x",
+    "gnss.position.y",
+    "gnss.position.z",
+    "gnss.velocity.x",
+    "gnss.velocity.y",
+    "gnss.velocity.z",
+    "gnss.time",
+    "gnss.fix",
+    "star.attitude.w",
+    "star.attitude.x",
+    "star.attitude.y",
+    "star.attitude.z",
+    "star.time",
+    "star.fix",
+];
+
+fn inputs(table: Variables) -> Variables {
+    let part = |name: &'static str, text: &'static str, unit: &'static str, nominal: f64| {
+        move |axis: &str, _: &str| -> Real {
+            let common = input(&format!("{name}.{axis}"), &format!("{text} {axis}"));
+            common.real().unit(unit).nominal(nominal)
+        }
+    };
+    let seconds = |name: &str| {
+        let text = "Time at which the latest sample or fix was taken";
+        input(name, text).real().unit("s").nominal(1.0)
+    };
+    let number = |name: &str| {
+        discrete_input(
+            name,
+            "Number of the latest sample or fix, counted from 1; 0 before the first",
+        )
+    };
+    let rate = part("measured.gyroscope", "Angular rate measured about", "rad/s", 0.05);
+    let force = part("measured.accelerometer", "Specific force measured along", "m/s2", 10.0);
+    let position =
+        part("gnss.position", "Position by satellite navigation along planet-fixed", "m", 1e6);
+    let velocity =
+        part("gnss.velocity", "Velocity by satellite navigation along planet-fixed", "m/s", 1e3);
+    let table = vector(table, AXES, rate, |m| &mut m.line.rate);
+    let table = vector(table, AXES, force, |m| &mut m.line.force)
+        .real(seconds("measured.time"), |m| &mut m.line.time)
+        .integer(number("measured.sample"), (Some(0), None), |m| &mut m.line.sample);
+    let table = vector(table, AXES, position, |m| &mut m.line.fixes.gnss.position);
+    let mut table = vector(table, AXES, velocity, |m| &mut m.line.fixes.gnss.velocity)
+        .real(seconds("gnss.time"), |m| &mut m.line.fixes.gnss.time)
+        .integer(number("gnss.fix"), (Some(0), None), |m| &mut m.line.fixes.gnss.number);
+    for (i, name) in ["w", "x", "y", "z"].into_iter().enumerate() {
+        let text =
+            format!("Part {name} of the star tracker's quaternion from inertial to body axes");
+        let real = input(&format!("star.attitude.{name}"), &text).real().nominal(1.0);
+        table = table.real(real, move |m| &mut m.line.fixes.star.attitude[i]);
+    }
+    table.real(seconds("star.time"), |m| &mut m.line.fixes.star.time).integer(
+        number("star.fix"),
+        (Some(0), None),
+        |m| &mut m.line.fixes.star.number,
+    )
+}
+
+fn sampled(name: &str, text: &str) -> Common {
+    discrete_output(name, text).depends_on(INPUTS)
+}
+
+fn outputs(table: Variables) -> Variables {
+    let real = |name: &str, text: &str, unit: &str, nominal: f64| -> Real {
+        sampled(name, text).real().unit(unit).nominal(nominal)
+    };
+    let mut table = table;
+    for (prefix, kind) in [("motion", 0), ("motionRate", 1)] {
+        for (i, quantity) in QUANTITIES.into_iter().enumerate() {
+            let (name, nominal) = (format!("{prefix}.{}", quantity.name), quantity.nominal);
+            let text = if kind == 0 {
+                format!("{}, navigated", quantity.meaning)
+            } else {
+                format!("Rate of motion.{}, navigated", quantity.name)
+            };
+            let unit = quantity.units[kind];
+            table = table.real(real(&name, &text, unit, nominal), move |m| {
+                let shown = &mut m.shown;
+                if kind == 0 { &mut shown.motion[i] } else { &mut shown.motion_rate[i] }
+            });
+        }
+    }
+    let angle = |axis: &str, meaning: &str| {
+        let text = format!("Navigated {meaning} relative to the ground velocity");
+        real(&format!("attitude.{axis}"), &text, "rad", 0.1)
+    };
+    let rate = |axis: &str, meaning: &str| {
+        let text = format!("Navigated body {meaning} rate");
+        real(&format!("rate.{axis}"), &text, "rad/s", 0.05)
+    };
+    let bias = |name: &'static str, unit: &'static str, nominal: f64| {
+        move |axis: &str, _: &str| {
+            let text = format!("Estimated bias of the {name} about or along {axis}");
+            sampled(&format!("bias.{name}.{axis}"), &text).real().unit(unit).nominal(nominal)
+        }
+    };
+    let deviation = |axis: &str, meaning: &str| {
+        let text = format!(
+            "Predicted standard deviation of the {meaning} relative to the ground velocity"
+        );
+        real(&format!("deviation.attitude.{axis}"), &text, "rad", 0.01)
+    };
+    let table = vector(table, ANGLES, angle, |m| &mut m.shown.angles);
+    let table = vector(table, RATES, rate, |m| &mut m.shown.rates);
+    let mut table = vector(table, ANGLES, deviation, |m| &mut m.shown.deviations.angles);
+    for (i, (axis, meaning)) in ANGLES.into_iter().take(2).enumerate() {
+        let text = format!("Navigated {meaning} relative to the air");
+        let spread = format!("Predicted standard deviation of the {meaning} relative to the air");
+        table = table
+            .real(real(&format!("flow.{axis}"), &text, "rad", 0.1), move |m| &mut m.shown.flow[i])
+            .real(real(&format!("deviation.flow.{axis}"), &spread, "rad", 0.01), move |m| {
+                &mut m.shown.deviations.flow[i]
+            });
+    }
+    for (i, direction) in ["north", "east"].into_iter().enumerate() {
+        let text = format!("Estimated wind to the {direction}");
+        let spread = format!("Predicted standard deviation of the wind to the {direction}");
+        table = table
+            .real(real(&format!("wind.{direction}"), &text, "m/s", 10.0), move |m| {
+                &mut m.shown.wind[i]
+            })
+            .real(real(&format!("deviation.wind.{direction}"), &spread, "m/s", 10.0), move |m| {
+                &mut m.shown.deviations.wind[i]
+            });
+    }
+    for (i, (name, text)) in [
+        ("gnss", "fix of satellite navigation"),
+        ("star", "fix of the star tracker"),
+        ("side", "side force"),
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        let text = format!(
+            "Square of the normalised innovation per component of the latest {text}, 1 on average"
+        );
+        table = table.real(sampled(&format!("innovation.{name}"), &text).real(), move |m| {
+            &mut m.shown.innovations[i]
+        });
+    }
+    let table = vector(table, AXES, bias("gyroscope", "rad/s", 1e-5), |m| &mut m.shown.biases[0]);
+    let table =
+        vector(table, AXES, bias("accelerometer", "m/s2", 1e-2), |m| &mut m.shown.biases[1]);
+    table
+        .real(real("load.lift", "Measured lift per mass", "m/s2", 10.0), |m| &mut m.shown.lift)
+        .real(real("load.drag", "Measured drag per mass", "m/s2", 10.0), |m| &mut m.shown.drag)
+        .real(
+            real(
+                "deviation.position",
+                "Predicted standard deviation of the position along the worst axis",
+                "m",
+                10.0,
+            ),
+            |m| &mut m.shown.deviations.position,
+        )
+        .real(
+            real(
+                "deviation.velocity",
+                "Predicted standard deviation of the velocity along the worst axis",
+                "m/s",
+                0.1,
+            ),
+            |m| &mut m.shown.deviations.velocity,
+        )
+        .integer(
+            sampled("rejectedFixes", "Number of fixes so far that were rejected"),
+            (Some(0), None),
+            |m| &mut m.shown.rejected,
+        )
+        .choice(sampled("health", Health::TEXT), |m| &mut m.health)
+}
