@@ -34,6 +34,14 @@ fn main() {
         let tensor = Settings { inertia_error: 0.0, tensor_error, ..with(0.0, 0.0) };
         row(&format!("tensor error {tensor_error}"), by_delay(tensor));
     }
+    for slow_deg in [0.3, 0.6] {
+        let slow = Settings {
+            slow_angle_error: f64::to_radians(slow_deg),
+            slow_angle_rate: f64::to_radians(0.046),
+            ..with(0.0, 0.005)
+        };
+        row(&format!("slow errors of {slow_deg}°"), by_delay(slow));
+    }
     for (k1, k2) in [(-5.0, -5.0), (-1.5, -4.0)] {
         row(
             &format!("K = [{k1}, {k2}]").replace('-', "−"),

@@ -191,6 +191,9 @@ pub struct Refusal {
     pub known_bound: Option<f64>,
     /// Largest accepted errors of angles (rad) and rates (rad/s) in the given proportion.
     pub errors: Option<(f64, f64)>,
+    /// Largest accepted slow errors of the angles (rad) and their rates of change (rad/s) in the
+    /// given proportion.
+    pub slow_errors: Option<(f64, f64)>,
     /// Largest accepted delay, s.
     pub delay: Option<f64>,
     /// Largest accepted error of the delay, s.
@@ -214,6 +217,7 @@ fn no_guarantee(refusal: &Refusal) -> String {
         disturbance,
         known_bound,
         errors,
+        slow_errors,
         delay,
         delay_error,
     } = refusal;
@@ -252,6 +256,13 @@ fn no_guarantee(refusal: &Refusal) -> String {
     if let Some((angle, rate)) = errors {
         accepted.push(format!(
             "at most estimation.angleError = {:.4} deg with estimation.rateError = {:.4} deg/s",
+            down(angle.to_degrees()),
+            down(rate.to_degrees())
+        ));
+    }
+    if let Some((angle, rate)) = slow_errors {
+        accepted.push(format!(
+            "at most estimation.slowAngleError = {:.4} deg with estimation.slowAngleRate = {:.4} deg/s",
             down(angle.to_degrees()),
             down(rate.to_degrees())
         ));

@@ -47,6 +47,12 @@ pub(super) fn refusal(s: &Settings, closest: &Tightened) -> DesignError {
         ..*s
     });
     let errors = (s.rate_error > 0.0 || s.angle_error > 0.0).then_some(error_share).flatten();
+    let with_slow = |share: f64| Settings {
+        slow_angle_error: share * s.slow_angle_error,
+        slow_angle_rate: share * s.slow_angle_rate,
+        ..*s
+    };
+    let are_slow = s.slow_angle_error > 0.0 || s.slow_angle_rate > 0.0;
     DesignError::NoGuarantee(Box::new(Refusal {
         feedback: *feedback,
         moment_left: assessment.moment_left,
@@ -68,5 +74,9 @@ pub(super) fn refusal(s: &Settings, closest: &Tightened) -> DesignError {
             .then(|| largest(s.delay_error, &|delay_error| Settings { delay_error, ..*s }))
             .flatten(),
         errors: errors.map(|share| (share * s.angle_error, share * s.rate_error)),
+        slow_errors: are_slow
+            .then(|| largest(1.0, &with_slow))
+            .flatten()
+            .map(|share| (share * s.slow_angle_error, share * s.slow_angle_rate)),
     }))
 }

@@ -153,8 +153,8 @@ pub struct Settings {
     #[setting(name = "bound.referenceAcceleration", unit = "rad/s2", min = 0.0, nominal = 0.02)]
     #[setting(used_with = "constraints = paper")]
     pub reference_acceleration: f64,
-    /// Bound on the measurement error of each angle, which may change arbitrarily from tick to
-    /// tick; the robust set is tightened for it.
+    /// Bound on the measurement error of each angle beside its slow part, which may change
+    /// arbitrarily from tick to tick; the robust set is tightened for it.
     #[setting(
         name = "estimation.angleError",
         unit = "rad",
@@ -175,6 +175,28 @@ pub struct Settings {
     )]
     #[setting(used_with = "constraints = robust")]
     pub rate_error: f64,
+    /// Bound on the slow part of the measurement error of angle of attack and of sideslip; the
+    /// robust set is tightened for it. That of the bank angle may have any size.
+    #[setting(
+        name = "estimation.slowAngleError",
+        unit = "rad",
+        min = 0.0,
+        max = 0.1,
+        nominal = 0.005
+    )]
+    #[setting(used_with = "constraints = robust")]
+    pub slow_angle_error: f64,
+    /// Bound on the rate at which the slow part of each angle's measurement error changes; the
+    /// robust set is tightened for it.
+    #[setting(
+        name = "estimation.slowAngleRate",
+        unit = "rad/s",
+        min = 0.0,
+        below = 1.0,
+        nominal = 0.001
+    )]
+    #[setting(used_with = "constraints = robust")]
+    pub slow_angle_rate: f64,
     /// Bound on the change of the trajectory's turn, as given by the inputs trajectory.*, while a
     /// plan is followed, which is one period.optimisation or longer. The plan reserves it and the
     /// turn's own rate of limit.rate; without a turn it reserves nothing.

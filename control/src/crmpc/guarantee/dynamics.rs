@@ -56,6 +56,11 @@ impl Dynamics {
         Drive::new(s, &self.vehicle, (self.smallest, self.largest))
     }
 
+    /// Returns a bound on the speed of the angles (α, β) of the vehicle, with the creep, rad/s.
+    pub(in crate::crmpc) fn travel(&self, s: &Settings) -> f64 {
+        self.rate + self.drive(s).creep
+    }
+
     /// Computes the bounds for all states within the limits.
     pub(in crate::crmpc) fn new(s: &Settings) -> Self {
         Self::around(s, Domain { rate: s.limit_rate, sideslip: s.sideslip_domain })
@@ -71,7 +76,7 @@ impl Dynamics {
             let spin = s.limit_total() / smallest
                 + 0.5 * (largest - smallest) / smallest * powi(vehicle.rate, 2);
             let rate = s.limit_rate + (spin + dynamics.drive(s).all) * s.delay;
-            let sideslip = s.sideslip_domain + vehicle.rate * s.delay;
+            let sideslip = s.sideslip_domain + (vehicle.rate + dynamics.drive(s).creep) * s.delay;
             if rate <= vehicle.rate && sideslip <= vehicle.sideslip || !dynamics.is_bounded() {
                 return dynamics;
             }
@@ -120,7 +125,7 @@ impl Dynamics {
         // The moment that acts is the assumed one, shifted by up to the error of the delay. The
         // integrals of both over any time therefore differ by no more than this much at both ends,
         // and R changes little in the meantime.
-        let turned = 1.0 + TURN * self.geometry.r * self.rate * end;
+        let turned = 1.0 + TURN * self.geometry.r * self.travel(s) * end;
         let jumps = 2.0 * s.delay_error * s.limit_moment * self.geometry.r * turned
             / ((1.0 - s.inertia_error) * (1.0 - s.tensor_error) * self.smallest);
         let by_jumps = (self.by_rates + self.by_angles * end) * jumps;
@@ -128,7 +133,7 @@ impl Dynamics {
         let beside = 0.25 * self.slope * powi(s.period_feedback, 2);
         let rates = drive.rate_error + (drive.all + f) * end + beside + jumps;
         let angles = drive.angle_error
-            + (drive.rate_error_of_two + (0.5 * drive.of_two + 0.5 * f) * end) * end
+            + (drive.rate_error_of_two + drive.creep + (0.5 * drive.of_two + 0.5 * f) * end) * end
             + beside * s.period_feedback
             + jumps * end;
         Domain {
@@ -221,7 +226,9 @@ impl Dynamics {
     pub(super) fn apart(&self, drive: &Drive, t: f64) -> f64 {
         self.by_rates * (drive.all * t + drive.rate_error)
             + self.by_angles
-                * (0.5 * drive.of_two * t * t + drive.angle_error + drive.rate_error_of_two * t)
+                * (0.5 * drive.of_two * t * t
+                    + drive.angle_error
+                    + (drive.rate_error_of_two + drive.creep) * t)
     }
 
     /// Returns how F differs from the acceleration that the law intended, see [`Mismatch`].
@@ -232,7 +239,7 @@ impl Dynamics {
         if !self.is_bounded() {
             return Mismatch::UNBOUNDED;
         }
-        let Drive { all, of_two, rate_error, rate_error_of_two, angle_error, .. } = *drive;
+        let Drive { all, of_two, creep, rate_error, rate_error_of_two, angle_error, .. } = *drive;
         let Self { by_rates, by_angles, .. } = *self;
         // Until the next measurement the drive separates the vehicle from its prediction, and
         // afterwards this prediction from the next one. Both distances grow from zero. On average
@@ -245,7 +252,8 @@ impl Dynamics {
             0.5 + 0.5 * self.vehicle.rate / self.domain.rate
         };
         let revised = halfway * by_rates * all * (d + 0.5 * tau)
-            + by_angles * of_two * (tau * tau / 6.0 + 0.5 * d * end);
+            + by_angles * of_two * (tau * tau / 6.0 + 0.5 * d * end)
+            + by_angles * creep * (d + 0.5 * tau);
         let erred =
             by_rates * rate_error + by_angles * (angle_error + rate_error_of_two * (d + 0.5 * tau));
         let itself = self.jerk * tau * tau / 24.0 + self.middle(tau) * growth;
@@ -256,7 +264,9 @@ impl Dynamics {
         Mismatch {
             mean: (revised + erred) * growth + itself,
             peak,
-            unseen_rate: (0.5 * by_rates * all * d * d + by_angles * of_two * d * d * d / 6.0)
+            unseen_rate: (0.5 * by_rates * all * d * d
+                + by_angles * of_two * d * d * d / 6.0
+                + 0.5 * by_angles * creep * d * d)
                 * growth,
             mispredicted: (by_rates * rate_error
                 + by_angles * (angle_error + 0.5 * rate_error_of_two * d))
@@ -290,15 +300,19 @@ impl Dynamics {
         let (tau, error) = (s.period_feedback, s.delay_error);
         let end = s.delay + tau + error;
         let growth = self.growth(end);
-        let Drive { all, of_two, rate_error, rate_error_of_two, angle_error, .. } = *drive;
+        let Drive { all, of_two, creep, rate_error, rate_error_of_two, angle_error, .. } = *drive;
         let rates = self.acceleration * tau
             + 0.25 * self.slope * tau * tau
             + (all * tau + 2.0 * rate_error) * growth;
         let angles = self.rate * tau
             + 0.25 * self.acceleration * tau * tau
-            + (of_two * tau * end + 2.0 * angle_error + 2.0 * rate_error_of_two * end) * growth;
+            + (of_two * tau * end
+                + creep * tau
+                + 2.0 * angle_error
+                + 2.0 * rate_error_of_two * end)
+                * growth;
         let apart = self.rate * (0.5 * tau + error)
-            + (angle_error + (rate_error_of_two + 0.5 * of_two * end) * end) * growth;
+            + (angle_error + (rate_error_of_two + creep + 0.5 * of_two * end) * end) * growth;
         (
             self.by_rates * rates + self.by_angles * angles,
             TURN * self.geometry.r * self.geometry.r * apart,

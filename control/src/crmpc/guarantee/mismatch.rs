@@ -1,19 +1,24 @@
 //! Causes that drive the trajectory off its prediction.
 
-use super::geometry::Domain;
+use super::geometry::{Domain, TURN};
 use crate::crmpc::settings::Settings;
-use std::f64::consts::SQRT_2;
+use std::f64::consts::{FRAC_PI_2, SQRT_2};
 use vehicle::math::{cos, powi};
 
 /// All causes that drive the vehicle off its prediction, except the mismatch.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Drive {
-    /// Bound on the norm of Δ and the effect of the inertia error, rad/s².
+    /// Bound on the norm of Δ and the effects of the inertia error and the creep, rad/s².
     pub all: f64,
     /// The same bound for two axes, rad/s².
     pub of_two: f64,
     /// Bound on the norm of the effect of the inertia error, rad/s².
     pub of_inertia: f64,
+    /// Bound on the creep: the norm of the difference between the derivative of the navigated
+    /// angles and the navigated rates, rad/s.
+    pub creep: f64,
+    /// Bound on the norm of the acceleration that the slow errors amount to, rad/s².
+    pub of_creep: f64,
     /// Bound on the norm of the error of the measured rates, rad/s.
     pub rate_error: f64,
     /// The same bound for two rates, rad/s.
@@ -28,10 +33,19 @@ impl Drive {
         let root3 = 3.0_f64.sqrt();
         let InertiaMoments { along, any } = InertiaMoments::new(s, vehicle, principal);
         let of_inertia = (along + any) / smallest_in_rates(vehicle, principal.0);
+        // The angles are navigated ones, from which the true ones differ by the slow errors. With
+        // ‖W(Θ) − W(Θ′)‖ ≤ `turned` and ‖R‖ = sec β, the rates R ω differ by ‖R′‖ `turned` ‖R‖ ‖ω‖.
+        let turned = TURN * SQRT_2 * s.slow_angle_error;
+        let secant = |more: f64| 1.0 / cos((vehicle.sideslip + more).min(FRAC_PI_2));
+        let (r, x) = (secant(0.0), secant(0.0) * vehicle.rate);
+        let creep = root3 * s.slow_angle_rate + secant(s.slow_angle_error) * turned * x;
+        let of_creep = r * (TURN * creep * x + turned * root3 * s.disturbance_bound);
         Self {
             of_inertia,
-            all: root3 * s.disturbance_bound + of_inertia,
-            of_two: SQRT_2 * s.disturbance_bound + of_inertia,
+            all: root3 * s.disturbance_bound + of_inertia + of_creep,
+            of_two: SQRT_2 * s.disturbance_bound + of_inertia + of_creep,
+            creep,
+            of_creep,
             rate_error: root3 * s.rate_error,
             rate_error_of_two: SQRT_2 * s.rate_error,
             angle_error: SQRT_2 * s.angle_error,

@@ -20,6 +20,8 @@ pub struct Parts {
     pub early: [Early; 3],
     /// Shift of the angle per time, see [`Dynamics::swing`], rad/s.
     pub swing: f64,
+    /// Largest creep, before the nominal trajectory began or later, see [`Drive`], rad/s.
+    pub creep: f64,
     /// Deviation of the rates between two ticks, see [`Dynamics::between`], rad/s.
     pub between: f64,
     /// Bound on the norm of all parts together, rad/s².
@@ -78,8 +80,8 @@ impl Parts {
             mismatch = Mismatch::UNBOUNDED;
         }
         // The peak and the unseen rate are those from before the beginning, where the inertia error
-        // has a larger effect, too; `early` enlarges the others.
-        let more = larger.of_inertia - drive.of_inertia;
+        // and the creep have a larger effect, too; `early` enlarges the others.
+        let more = (larger.of_inertia + larger.of_creep) - (drive.of_inertia + drive.of_creep);
         mismatch.peak = first.peak + more;
         mismatch.unseen_rate = first.unseen_rate + more * s.delay;
         // The first ⌈d/τ⌉ predictions begin before the nominal trajectory does.
@@ -96,9 +98,10 @@ impl Parts {
                 early(before.swing(s), swing),
             ],
             swing,
+            creep: larger.creep,
             between: before.between(s),
             norm: drive.all + mismatch.mean,
-            inertia: InertiaPart::new(s, dynamics, &before, &drive),
+            inertia: InertiaPart::new(s, dynamics, &before, [&drive, &larger]),
             pulse: PulseFactors::new(s, &before, &larger),
             drive,
             mismatch,
@@ -106,12 +109,12 @@ impl Parts {
     }
 
     /// Returns the effect of the mismatch, which may have any direction: `mean` by the changes,
-    /// `mispredicted` by the mispredictions, and the swing by the shifts.
+    /// `mispredicted` by the mispredictions, and the swing and the creep by the shifts.
     pub(super) fn mismatched(&self, reaches: &Reaches) -> Reach {
         let Mismatch { mean, mispredicted, .. } = self.mismatch;
         let Reaches { changes, mispredictions, shifts, .. } = reaches;
         let of_errors = mispredictions.times(mispredicted);
-        changes.times(mean).plus(&of_errors).plus(&shifts.times(self.swing))
+        changes.times(mean).plus(&of_errors).plus(&shifts.times(self.swing + self.creep))
     }
 
     /// Returns the deviation at a tick (docs/guarantee.md, steps 2 and 3).
@@ -124,7 +127,7 @@ impl Parts {
     /// the inertia error. Angles in rad, rates in rad/s, K ô in rad/s² or N m.
     pub(super) fn deviation(&self, s: &Settings, reaches: &Reaches) -> Deviation {
         let root3 = 3.0_f64.sqrt();
-        let Drive { all, of_two, .. } = self.drive;
+        let Drive { all, of_two, of_creep, .. } = self.drive;
         let Mismatch { peak, unseen_rate, .. } = self.mismatch;
         let (errors, of_mismatch) = (reaches.of_errors(s), self.mismatched(reaches));
         let reach = &reaches.disturbance;
@@ -137,7 +140,7 @@ impl Parts {
             all * (1.0 + reach.feedback) + root3 * errors.feedback + of_mismatch.feedback + peak;
         Deviation {
             angle: on_two(|reach| reach.angle)
-                + unseen_rate * s.delay
+                + (unseen_rate + self.creep) * s.delay
                 + tau * tau / 8.0 * accelerated,
             rate: on_all(|reach| reach.rate) + unseen_rate + self.between,
             seen_angle: on_two(|reach| reach.seen_angle),
@@ -145,7 +148,7 @@ impl Parts {
             middle_angle: on_two(|reach| reach.middle_angle),
             middle_rate: on_all(|reach| reach.middle_rate),
             feedback: reach.feedback * s.disturbance_bound + errors.feedback,
-            feedback_norm: of_mismatch.feedback,
+            feedback_norm: of_mismatch.feedback + reach.feedback * of_creep,
             feedback_moment: self.inertia.feedback_moment(reach, reaches.early_feedback, tau),
         }
     }
@@ -155,7 +158,12 @@ impl InertiaPart {
     /// If the vehicle has turned by o since the inertia error caused a part of the deviation, the
     /// moment that compensates for it is larger by up to the share ‖I (W − W′) R′ I⁻¹‖ ≤
     /// I_max/I_min √2 ‖o‖ ‖R‖ (docs/guarantee.md, step 4).
-    fn new(s: &Settings, dynamics: &Dynamics, before: &Dynamics, drive: &Drive) -> Self {
+    fn new(
+        s: &Settings,
+        dynamics: &Dynamics,
+        before: &Dynamics,
+        [drive, larger]: [&Drive; 2],
+    ) -> Self {
         let Dynamics { smallest, largest, rate, .. } = dynamics;
         let moments = InertiaMoments::new(s, &dynamics.vehicle, (*smallest, *largest));
         let any_before =
@@ -164,7 +172,7 @@ impl InertiaPart {
         Self {
             moments,
             root_condition: (largest / smallest).sqrt(),
-            turning: by_turn * rate,
+            turning: by_turn * (rate + larger.creep),
             turned: by_turn * drive.angle_error,
             turned_early: by_turn * (before.rate - rate) * s.delay,
             // No turn makes a moment larger than ‖I‖ ‖R‖ ‖I⁻¹‖ does.

@@ -35,7 +35,7 @@ impl Pulse {
         let (errors, reach) = (reaches.of_errors(s), &reaches.disturbance);
         let of_box = (reach.change * s.disturbance_bound + errors.change) / (1.0 - again * common);
         let besides = (all - common) * 3.0_f64.sqrt() * of_box + all * turn;
-        let by_inertia = reach.change * parts.drive.of_inertia
+        let by_inertia = reach.change * (parts.drive.of_inertia + parts.drive.of_creep)
             + parts.mismatched(reaches).change
             + again * besides;
         let of_ball = by_inertia / (1.0 - again * all);

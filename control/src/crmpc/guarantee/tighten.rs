@@ -55,15 +55,17 @@ pub(in crate::crmpc) fn tighten(s: &Settings) -> Result<(Tightening, Assessment)
 }
 
 /// Returns the largest mean acceleration over one period that the assumptions explain, rad/s²: Δ̄,
-/// the tensor's error in any direction, and both errors of the rates at the period's ends. The
-/// measured rates become x_ω at an attitude that is wrong, with ‖∂R[o]‖ ≤ √2 sec²β ‖o‖.
+/// the tensor's error in any direction, the effect of the creep, and both errors of the rates at the
+/// period's ends. The measured rates become x_ω at an attitude that is wrong, with ‖∂R[o]‖ ≤
+/// √2 sec²β ‖o‖.
 fn explained(s: &Settings, dynamics: &Dynamics, parts: &Parts) -> Explained {
     let Dynamics { domain, geometry, smallest, .. } = dynamics;
     let of_angles = 2.0 * powi(geometry.r, 2) * domain.rate * s.angle_error;
     Explained {
         disturbance: s.disturbance_bound
             + parts.inertia.moments.any * geometry.r / smallest
-            + 2.0 * (s.rate_error + of_angles) / s.period_feedback,
+            + 2.0 * (s.rate_error + of_angles) / s.period_feedback
+            + parts.drive.of_creep,
         share: relative(s.inertia_error),
         delay_error: s.delay_error,
     }
@@ -174,6 +176,8 @@ pub(in crate::crmpc) fn with_share(s: &Settings, share: f64) -> Settings {
         disturbance_bound: share * s.disturbance_bound,
         angle_error: share * s.angle_error,
         rate_error: share * s.rate_error,
+        slow_angle_error: share * s.slow_angle_error,
+        slow_angle_rate: share * s.slow_angle_rate,
         delay_error: share * s.delay_error,
         known_bound: share * s.known_bound,
         known_change: share * s.known_change,

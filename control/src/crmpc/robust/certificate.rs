@@ -72,9 +72,10 @@ impl Robust {
         let Settings { delay_error, sideslip_domain, .. } = self.settings;
         let of_angle = tightening.at(self.age).angle + switching.deviation(&carried).angle;
         let Dynamics { geometry, rate, .. } = &self.dynamics;
+        let travel = self.dynamics.travel(&self.settings);
         let most = first.pull.max(before.norm()) + tightening.norm + switching.turn;
         size + delay_error * (most + geometry.drift * rate * rate) <= bound
-            && first.angles.y.abs() + of_angle + delay_error * rate <= sideslip_domain
+            && first.angles.y.abs() + of_angle + delay_error * travel <= sideslip_domain
     }
 
     /// Returns whether |β| stays within its bound throughout interval `k`, whatever the error
