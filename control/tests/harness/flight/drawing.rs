@@ -2,7 +2,7 @@
 
 use super::random::Random;
 use super::waveform::Waveform;
-use super::{Flight, Sight};
+use super::{Flight, Sight, Slow};
 use control::crmpc::{Crmpc, Settings};
 use control::{Controller, Measurement};
 use nalgebra::{Matrix3, Rotation3, Vector3};
@@ -50,6 +50,9 @@ impl Flight {
         }
         if settings.rate_error > 0.0 || settings.angle_error > 0.0 {
             flight.sight = Sight::Errors(Waveform::random(random));
+        }
+        if settings.slow_angle_error > 0.0 || settings.slow_angle_rate > 0.0 {
+            flight.slow = Some(Slow::new(settings, Waveform::random(random), random.vector()));
         }
         flight
     }

@@ -2,6 +2,7 @@
 
 use super::super::{CHECK, platform};
 use super::moving::Vehicle;
+use super::slow::SlowErrors;
 use super::waveform::Progress;
 use super::{Flight, SLACK, Sight};
 use control::Measurement;
@@ -14,6 +15,7 @@ use vehicle::sensors::Sensors;
 /// The source of the measurements.
 pub(super) struct Eyes {
     errors: Option<Progress>,
+    slow: Option<SlowErrors>,
     /// Bounds on the errors of angles (rad) and rates (rad/s).
     bounds: (f64, f64),
     estimation: Option<(Sensors, Estimator, estimation::Memory)>,
@@ -49,6 +51,7 @@ impl Eyes {
         };
         let mut eyes = Self {
             errors,
+            slow: flight.slow.as_ref().map(|slow| SlowErrors::new(slow, flight.seed)),
             bounds: (angle_error, rate_error),
             estimation,
             largest: (0.0, 0.0),
@@ -88,7 +91,10 @@ impl Eyes {
 
     /// Returns the controller's measurement at a tick.
     pub(super) fn look(&mut self, time: f64, vehicle: &Vehicle) -> Measurement {
-        let (angles, rates) = self.past(vehicle);
+        let (mut angles, rates) = self.past(vehicle);
+        if let Some(slow) = &mut self.slow {
+            angles += slow.at(time, vehicle);
+        }
         let angle_rates = kinematics::r(&angles) * rates;
         let (angle_bound, rate_bound) = self.bounds;
         let mut measured = Measurement { angles, rates, ..Measurement::default() };

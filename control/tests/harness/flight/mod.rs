@@ -8,6 +8,7 @@ mod fault;
 mod moving;
 mod random;
 mod settings;
+mod slow;
 mod waveform;
 
 use super::CHECK;
@@ -27,6 +28,7 @@ use waveform::Progress;
 pub use fault::{BEGIN, Fault};
 pub use random::Random;
 pub use settings::{Tried, optimised_every, random_settings, tried};
+pub use slow::Slow;
 pub use waveform::Waveform;
 
 /// Attitude errors above this value count as a lost attitude, rad.
@@ -74,6 +76,8 @@ pub struct Flight {
     pub hold: f64,
     /// Source of the controller's measurements.
     pub sight: Sight,
+    /// Slow part of the errors of the angles.
+    pub slow: Option<Slow>,
     /// Age of the measurements, s, which is a part of the delay of the settings.
     pub age: f64,
     /// Amount by which commands act later than the settings say, s.
@@ -96,8 +100,8 @@ pub struct Shown {
     pub rate: f64,
     /// Time of this largest ‖ω‖, s.
     pub rate_time: f64,
-    /// Largest |β| relative to the bound up to which the guarantee is given, in the same periods
-    /// and as often.
+    /// Largest |β| relative to the bound up to which the guarantee is given, and to which the slow
+    /// errors add, in the same periods and as often.
     pub sideslip: f64,
     /// Largest ‖m‖ relative to its limit that was commanded under guarantee.
     pub moment: f64,
@@ -116,7 +120,7 @@ pub struct Shown {
     /// Root mean square over the ticks of ‖Θ − Θ_r‖, deg.
     pub ems_deg: f64,
     /// Largest error of an angle (rad) and of a component of x_ω (rad/s) in the controller's
-    /// measurements.
+    /// measurements, besides the slow part.
     pub errors: (f64, f64),
 }
 
@@ -145,6 +149,7 @@ impl Flight {
             disturbance: Waveform::Constant(Vector3::zeros()),
             hold: 0.04,
             sight: Sight::Exact,
+            slow: None,
             age: 0.0,
             late: 0.0,
             scheduled: |_, _| Scheduled::default(),
@@ -232,7 +237,8 @@ impl Flight {
                         (shown.rate, shown.rate_time) = (rate, fine(j + 1));
                     }
                     if now {
-                        let sideslip = vehicle.angles().y.abs() / s.sideslip_domain;
+                        let sideslip =
+                            vehicle.angles().y.abs() / (s.sideslip_domain + s.slow_angle_error);
                         shown.sideslip = shown.sideslip.max(sideslip);
                     }
                 }
@@ -246,7 +252,8 @@ impl Flight {
             in_force: in_force as f64 / ticks as f64,
             ems_deg: (error / ticks as f64).sqrt().to_degrees(),
             errors: eyes.largest,
-            assumed: eyes.within_bounds(),
+            assumed: eyes.within_bounds()
+                && self.slow.as_ref().is_none_or(|slow| slow.is_assumed(s)),
             ..shown
         }
     }

@@ -62,6 +62,8 @@ pub fn random_settings(seed: u64) -> Settings {
     if settings.initial_state != InitialState::Tube && settings.feedback.eigenvalues().is_some() {
         settings.delay_error = half(random, 0.5) * settings.delay.min(period_feedback);
     }
+    settings.slow_angle_error = half(random, 1.0).to_radians();
+    settings.slow_angle_rate = half(random, 0.1).to_radians();
     settings
 }
 
@@ -74,7 +76,7 @@ pub fn tried(settings: &Settings, seed: u64) -> Tried {
     let DesignError::NoGuarantee(bounds) = &error else {
         return Tried::Invalid(error.to_string());
     };
-    let Refusal { disturbance, errors, delay, delay_error, .. } = **bounds;
+    let Refusal { disturbance, errors, slow_errors, delay, delay_error, .. } = **bounds;
     // The bounds are rounded as the message prints them.
     let down = |value: f64| (value * 1e4).floor() / 1e4;
     let down_angle = |value: f64| down(value.to_degrees()).to_radians();
@@ -83,6 +85,11 @@ pub fn tried(settings: &Settings, seed: u64) -> Tried {
         errors.map(|(angle, rate)| Settings {
             angle_error: down_angle(angle),
             rate_error: down_angle(rate),
+            ..*settings
+        }),
+        slow_errors.map(|(angle, rate)| Settings {
+            slow_angle_error: down_angle(angle),
+            slow_angle_rate: down_angle(rate),
             ..*settings
         }),
         delay.map(|delay| Settings { delay: down(delay), ..*settings }),

@@ -1,0 +1,258 @@
+//! The guarantee of the robust set while the errors of the measured angles change slowly.
+
+mod harness;
+
+use control::crmpc::{Constraints, Crmpc, Design, GuaranteeStatus, InitialState, Memory, Settings};
+use control::{Controller, Measurement};
+use harness::flight::{Flight, Random, Shown, Sight, Slow, Waveform};
+use harness::{in_parallel, settings};
+use nalgebra::Vector3;
+use vehicle::actuators::Command;
+use vehicle::kinematics;
+use vehicle::plant::{Input, Plant};
+use vehicle::profile::Profile;
+use vehicle::reference::Reference;
+use vehicle::scenario::Scenario;
+use vehicle::trajectory::Trajectory;
+
+/// Returns the settings for errors of an inertial navigation: of the angles up to 0.3°, which change
+/// by up to 0.046°/s, and small ones from tick to tick.
+fn navigated(delay: f64) -> Settings {
+    let error = f64::to_radians(0.005);
+    Settings {
+        delay,
+        angle_error: error,
+        rate_error: error,
+        slow_angle_error: f64::to_radians(0.3),
+        slow_angle_rate: f64::to_radians(0.046),
+        ..settings(Constraints::Robust)
+    }
+}
+
+/// Returns derivatives of the slow error: ramps up to the bound, reversals in resonance with the
+/// loop and slower ones, and those that follow the motion or the moment.
+fn derivatives() -> [Waveform; 8] {
+    let corner = Vector3::new(-1.0, 1.0, 1.0);
+    [
+        Waveform::Constant(corner),
+        Waveform::Square(0.4, corner),
+        Waveform::Square(2.0, corner),
+        Waveform::Square(20.0, corner),
+        Waveform::Switching(5.0),
+        Waveform::AlongRate(1.0),
+        Waveform::AlongRate(-1.0),
+        Waveform::AlongMoment(1.0),
+    ]
+}
+
+/// Returns flights under disturbances of every kind with slow errors of every kind at the bounds of
+/// `declared`, and fast errors.
+fn flights(settings: &Settings, declared: &Settings) -> Vec<Flight> {
+    let begin = Vector3::new(1.0, -1.0, 2.0);
+    let mut flights = Vec::new();
+    for (i, derivative) in derivatives().into_iter().enumerate() {
+        for (j, disturbance) in Waveform::all().into_iter().enumerate() {
+            flights.push(Flight {
+                disturbance,
+                slow: Some(Slow::new(declared, derivative.clone(), begin)),
+                sight: Sight::Errors([Waveform::White, Waveform::AlongMoment(1.0)][i % 2].clone()),
+                inertia_scale: harness::INERTIA_SCALES[j % 2],
+                seed: (10 * i + j) as u64,
+                duration: 30.0,
+                ..Flight::new(settings)
+            });
+        }
+    }
+    flights
+}
+
+fn assert_kept(flights: &[Flight]) {
+    for (flight, shown) in flights.iter().zip(in_parallel(flights, Flight::fly)) {
+        let Flight { disturbance, slow, settings, duration, .. } = flight;
+        assert!(shown.assumed && !shown.defective(), "{disturbance:?}, {slow:?}: {shown:?}");
+        let before = (settings.delay / settings.period_feedback).ceil() * settings.period_feedback;
+        assert!(
+            (shown.in_force - (1.0 - before / duration)).abs() < 1e-12,
+            "{disturbance:?}, {slow:?}: {shown:?}"
+        );
+    }
+}
+
+#[test]
+fn guarantee_is_kept_with_slow_errors() {
+    assert_kept(&flights(&navigated(0.0), &navigated(0.0)));
+}
+
+#[test]
+fn guarantee_is_kept_with_slow_errors_and_a_delay() {
+    assert_kept(&flights(&navigated(0.04), &navigated(0.04)));
+}
+
+#[test]
+fn guarantee_is_kept_with_slow_errors_and_a_delay_that_is_known_within_an_interval() {
+    let settings =
+        Settings { delay_error: 0.01, disturbance_bound: f64::to_radians(1.5), ..navigated(0.04) };
+    let late = [-0.01, 0.01].map(|late| {
+        let flights = flights(&settings, &settings);
+        flights.into_iter().map(move |flight| Flight { late, ..flight }).collect::<Vec<_>>()
+    });
+    assert_kept(&late.concat());
+}
+
+/// Returns settings in which the slow errors, large and quick ones, count for more than Δ.
+fn creeping() -> Settings {
+    Settings {
+        slow_angle_error: f64::to_radians(1.0),
+        slow_angle_rate: f64::to_radians(0.3),
+        disturbance_bound: f64::to_radians(0.5),
+        ..settings(Constraints::Robust)
+    }
+}
+
+#[test]
+fn guarantee_is_kept_with_slow_errors_from_the_edge_of_the_certified_states() {
+    let settings = creeping();
+    let seeds: Vec<u64> = (1..=150).collect();
+    let shown = in_parallel(&seeds, |&seed| {
+        let flight = Flight::at_the_edge(&settings, seed)?;
+        // At first the navigated angles are those for which a plan was just certified, and the
+        // sideslip is larger.
+        let begin = Vector3::new(0.0, -flight.angles.y.signum(), 0.0);
+        let slow = flight.slow.clone().map(|slow| Slow { begin, ..slow });
+        let angles = flight.angles - begin * settings.slow_angle_error;
+        Some(Flight { angles, slow, ..flight }.fly())
+    });
+    let flown: Vec<Shown> = shown.into_iter().flatten().collect();
+    let largest = |of: fn(&Shown) -> f64| flown.iter().map(of).fold(0.0, f64::max);
+    assert!(flown.iter().all(|shown| !shown.defective()));
+    let in_force: f64 = flown.iter().map(|shown| shown.in_force).sum();
+    assert!(flown.len() > 100 && in_force > 0.98 * flown.len() as f64, "{in_force}");
+    let (sideslip, rate) = (largest(|shown| shown.sideslip), largest(|shown| shown.rate));
+    assert!(sideslip > 0.99 && rate > 0.9, "{sideslip} {rate}");
+}
+
+/// Returns the largest deviations of the state that the law sees, relative to their bounds: of the
+/// angles, of the rates, and K ô.
+fn shares(flight: &Flight) -> [f64; 3] {
+    let Settings { feedback, .. } = flight.settings;
+    let design = Design::new(&flight.settings).unwrap();
+    let mut shares = [0.0_f64; 3];
+    let observe = |memory: &Memory, tick: u64, measured: &Measurement, _: &Reference| {
+        let rates = kinematics::r(&measured.angles) * measured.rates;
+        let angles: Vector3<f64> = measured.angles - memory.nominal.fixed_rows::<3>(0);
+        let rates: Vector3<f64> = rates - memory.nominal.fixed_rows::<3>(3);
+        let n = memory.age as usize + (tick as usize) % design.ratio;
+        let bounds = design.tightening.at(n);
+        let sizes = [
+            (angles.xy().norm(), bounds.seen_angle),
+            (rates.norm(), bounds.seen_rate),
+            ((angles * feedback.k1 + rates * feedback.k2).norm(), bounds.feedback_norm),
+        ];
+        if n > 0 {
+            shares = std::array::from_fn(|i| shares[i].max(sizes[i].0 / sizes[i].1));
+        }
+    };
+    let shown = flight.fly_seen(observe);
+    assert!(!shown.defective() && shown.in_force == 1.0, "{shown:?}");
+    shares
+}
+
+#[test]
+fn no_slow_error_drives_the_vehicle_beyond_the_bound_and_the_worst_comes_half_way() {
+    // Nothing else drives it, and the nominal trajectory never begins anew.
+    let settings = Settings {
+        disturbance_bound: 0.0,
+        inertia_error: 0.0,
+        initial_state: InitialState::Nominal,
+        ..creeping()
+    };
+    let mut flights = Vec::new();
+    for period in [0.16, 0.4, 0.8, 1.4, 2.0, 2.8, 4.0, 8.0, 60.0] {
+        for corner in [[1.0, 1.0, 1.0], [-1.0, 1.0, 1.0], [1.0, -1.0, 1.0], [1.0, 1.0, -1.0]] {
+            let corner = Vector3::from(corner);
+            let slow = Slow::new(&settings, Waveform::Square(period, corner), -corner);
+            flights.push(Flight { slow: Some(slow), duration: 30.0, ..Flight::new(&settings) });
+        }
+    }
+    let found = in_parallel(&flights, shares);
+    let largest = |i: usize| found.iter().map(|shares| shares[i]).fold(0.0, f64::max);
+    for i in 0..3 {
+        assert!(largest(i) < 1.0, "{i}: {}", largest(i));
+    }
+    assert!(largest(1) > 0.5, "{}", largest(1));
+}
+
+#[test]
+fn slow_errors_that_are_not_declared_can_end_the_guarantee() {
+    let exact = Settings { angle_error: 0.0, rate_error: 0.0, ..navigated(0.0) };
+    let undeclared = |s: Settings| Settings { slow_angle_error: 0.0, slow_angle_rate: 0.0, ..s };
+    for (settings, least) in [(navigated(0.0), 5), (exact, 40)] {
+        let flights = flights(&undeclared(settings), &navigated(0.0));
+        let shown = in_parallel(&flights, Flight::fly);
+        let ended = shown.iter().filter(|shown| shown.withdrawn.is_some()).count();
+        assert!(shown.iter().all(|shown| !shown.broken && !shown.assumed));
+        assert!(ended >= least, "{ended} of {}", shown.len());
+    }
+}
+
+/// Flies bank reversals while the trajectory turns as in a guided entry, with slow errors that are
+/// sines of up to 0.3° in angle of attack and sideslip and 0.6° in the bank angle. Returns the share
+/// of the ticks in force.
+fn entry(settings: &Settings, phase: f64) -> f64 {
+    let period = settings.period_feedback;
+    let mut law = Crmpc::new(*settings).unwrap();
+    let mut memory = law.memory();
+    let mut scenario = Scenario::crmpc2022();
+    scenario.disturbance.bound = settings.disturbance_bound - f64::to_radians(0.15);
+    scenario.duration = 100.0;
+    let attitude = |alpha: f64, sigma: f64| Vector3::new(alpha, 0.0, sigma).map(f64::to_radians);
+    let reference = Profile::step(attitude(38.0, 60.0), attitude(32.0, -55.0), 30.0);
+    scenario.initial_angles = attitude(38.0, 60.0);
+    let mut config = scenario.config(0.01);
+    config.earth_rate = 0.0;
+    let mut plant = Plant::new(&config, 0.0).unwrap();
+    let trajectory = |time: f64| Trajectory {
+        heading_rate: f64::to_radians(0.35) * (0.1 * time).cos(),
+        flight_path_angle_rate: f64::to_radians(-0.046),
+        ..Trajectory::default()
+    };
+    let sizes = Vector3::new(0.3, 0.3, 0.6).map(f64::to_radians);
+    let mut random = Random::new(phase.to_bits());
+    let (ticks, mut in_force) = ((scenario.duration / period).round() as u64, 0);
+    for tick in 0..ticks {
+        let time = tick as f64 * period;
+        // The rate of change of each error is at most 0.046°/s.
+        let slow = sizes.map(|size| {
+            let turn = time * f64::to_radians(0.046) / size + phase;
+            size * turn.sin()
+        });
+        let fast = random.vector() * settings.angle_error;
+        let rates = plant.rates() + random.vector() * (0.5 * settings.rate_error);
+        let angles = plant.angles() + slow + fast;
+        let measured = Measurement { angles, rates, ..Measurement::default() };
+        let measured = measured.relative_to(&trajectory(time).turn_rate(0.0));
+        let moment = law.update(&mut memory, tick, time, &measured, &|time| reference.at(time));
+        let input = |time| Input { moment, trajectory: trajectory(time), ..Input::default() };
+        plant.advance_with(time, time + period, &Command::default(), input).unwrap();
+        if memory.supervision.status == GuaranteeStatus::InForce {
+            in_force += 1;
+            assert!(
+                plant.rates().norm() <= settings.limit_rate
+                    && moment.norm() <= settings.limit_moment
+            );
+        }
+    }
+    f64::from(in_force) / ticks as f64
+}
+
+#[test]
+fn guarantee_is_kept_with_slow_errors_along_an_entry() {
+    let turn_change = f64::to_radians(0.1);
+    // The errors of the attitude change the turn that the law computes.
+    let slow_angle_rate = f64::to_radians(0.05);
+    let settings = Settings { turn_change, slow_angle_rate, ..navigated(0.0) };
+    for phase in [0.0, 1.0, 2.0, 3.0, 4.0, 5.0] {
+        let in_force = entry(&settings, phase);
+        assert!(in_force == 1.0, "{phase}: {in_force}");
+    }
+}
