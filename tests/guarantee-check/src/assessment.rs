@@ -63,7 +63,7 @@ fn deviation(s: &Settings, driven: &Driven, effects: &Effects) -> Deviations {
     let in_norm: Bounds = std::array::from_fn(|i| {
         changes[i] * mismatch.mean
             + mispredictions[i] * mismatch.mispredicted
-            + shifts[i] * mismatch.swing
+            + shifts[i] * (mismatch.swing + driven.creep)
     });
     let accelerated = drive.of_three * (Interval::ONE + reach[6])
         + root3 * errors[6]
@@ -73,14 +73,16 @@ fn deviation(s: &Settings, driven: &Driven, effects: &Effects) -> Deviations {
     let of_rates = |i: usize| reach[i] * drive.of_three + root3 * errors[i] + in_norm[i];
     let any_and_along = drive.inertia[0] + drive.inertia[1];
     [
-        of_angles(0) + mismatch.unseen_rate * delay + tau.square() / number(8.0) * accelerated,
+        of_angles(0)
+            + (mismatch.unseen_rate + driven.creep) * delay
+            + tau.square() / number(8.0) * accelerated,
         of_rates(1) + mismatch.unseen_rate + driven.between,
         of_angles(2),
         of_rates(3),
         of_angles(4),
         of_rates(5),
         reach[6] * number(s.disturbance_bound) + errors[6],
-        in_norm[6],
+        in_norm[6] + reach[6] * drive.of_creep,
         (drive.inertia[0] + driven.root_condition * drive.inertia[1]) * reach[6]
             + any_and_along
                 * (driven.turning * (reach[7] + number(0.5) * tau * reach[6])
@@ -183,6 +185,7 @@ pub fn check(
         mismatch.mispredicted,
     );
     note("swing of the cancelled drift", lemmas.parts.swing, mismatch.swing);
+    note("creep", lemmas.parts.creep, driven.creep);
     note("‖drive‖", lemmas.parts.norm, driven.drive.of_three + mismatch.mean);
     let (Domain { rate, sideslip }, [of_rate, of_sideslip]) =
         (lemmas.dynamics.domain, mismatch.domain);

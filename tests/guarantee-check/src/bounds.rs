@@ -34,6 +34,12 @@ pub(crate) struct Bounds {
     /// Bound on the error of each measured rate, deg/s.
     #[arg(long)]
     rate_error_deg: Option<f64>,
+    /// Bound on the slow part of the errors of angle of attack and sideslip, deg.
+    #[arg(long)]
+    slow_angle_error_deg: Option<f64>,
+    /// Bound on the rate of change of the slow part of each angle's error, deg/s.
+    #[arg(long)]
+    slow_angle_rate_deg: Option<f64>,
     /// Largest sideslip angle of the domain, deg.
     #[arg(long)]
     sideslip_deg: Option<f64>,
@@ -80,6 +86,8 @@ impl Bounds {
         s.tensor_error = self.tensor_error.unwrap_or(s.tensor_error);
         s.angle_error = degrees(self.angle_error_deg, s.angle_error);
         s.rate_error = degrees(self.rate_error_deg, s.rate_error);
+        s.slow_angle_error = degrees(self.slow_angle_error_deg, s.slow_angle_error);
+        s.slow_angle_rate = degrees(self.slow_angle_rate_deg, s.slow_angle_rate);
         s.sideslip_domain = degrees(self.sideslip_deg, s.sideslip_domain);
         if let Some(&[ixx, iyy, izz, ixz]) = self.inertia.as_deref() {
             let inertia = Inertia { Ixx: ixx, Iyy: iyy, Izz: izz, Ixz: ixz };

@@ -11,7 +11,23 @@ const KINDS: u64 = 10;
 /// Returns the settings of draw `seed`, or `None` if the design accepts nothing near them.
 pub fn accepted(seed: u64) -> Option<Settings> {
     let random = &mut Random::new(seed);
-    let mut settings = drawn(seed % KINDS, random);
+    let settings = drawn(seed % KINDS, random);
+    near(settings, random)
+}
+
+/// Returns the settings of the same draw with slow errors of the angles as well.
+pub fn with_slow_errors(seed: u64) -> Option<Settings> {
+    let random = &mut Random::new(seed);
+    let settings = Settings {
+        slow_angle_error: random.between(0.0, 1.0).to_radians(),
+        slow_angle_rate: random.between(0.0, 0.15).to_radians(),
+        ..drawn(seed % KINDS, random)
+    };
+    near(settings, random)
+}
+
+/// Returns the settings with the disturbance that they permit, or with less.
+fn near(mut settings: Settings, random: &mut Random) -> Option<Settings> {
     for _ in 0..3 {
         match Design::new(&settings) {
             Ok(design) if design.accepted_share >= 1.0 => return Some(settings),

@@ -10,6 +10,10 @@ pub(crate) struct Drive {
     pub of_three: Interval,
     pub of_two: Interval,
     pub of_inertia: Interval,
+    /// Difference of the derivative of the navigated angles from the navigated rates, and the
+    /// acceleration that it amounts to.
+    pub creep: Interval,
+    pub of_creep: Interval,
     /// Errors of all rates, of two of them, and of two angles.
     pub errors: [Interval; 3],
     /// Moments that the inertia error amounts to: along the acting one, and in any direction.
@@ -34,6 +38,8 @@ pub(crate) struct Driven {
     pub drive: Drive,
     pub mismatch: Mismatch,
     pub early: [Early; 3],
+    /// Largest creep at any time.
+    pub creep: Interval,
     /// Deviation of the rates between two ticks.
     pub between: Interval,
     pub turning: Interval,
@@ -63,10 +69,20 @@ fn drive(s: &Settings, lemmas: &Lemmas) -> Drive {
     ];
     let cosine = number(sideslip).sin_cos().1;
     let of_inertia = (inertia[0] + inertia[1]) / (cosine * smallest);
+    // By the slow errors W differs by this from W at the navigated angles.
+    let slow = number(s.slow_angle_error);
+    let turned = number(TURN) * root2 * slow;
+    let r = Interval::ONE / cosine;
+    let navigated_rate = r * number(rate);
+    let at_true_angles = Interval::ONE / (number(sideslip) + slow).sin_cos().1;
+    let creep = root3 * number(s.slow_angle_rate) + at_true_angles * turned * navigated_rate;
+    let of_creep = r * number(TURN) * creep * navigated_rate + r * turned * root3 * disturbance;
     Drive {
-        of_three: root3 * disturbance + of_inertia,
-        of_two: root2 * disturbance + of_inertia,
+        of_three: root3 * disturbance + of_inertia + of_creep,
+        of_two: root2 * disturbance + of_inertia + of_creep,
         of_inertia,
+        creep,
+        of_creep,
         errors: [
             root3 * number(s.rate_error),
             root2 * number(s.rate_error),
@@ -82,7 +98,7 @@ fn mismatch(s: &Settings, lemmas: &Lemmas, drive: &Drive) -> Mismatch {
     let [tau, d] = [s.period_feedback, s.delay].map(number);
     let [by_rates, by_angles, jerk] =
         [lemmas.dynamics.by_rates, lemmas.dynamics.by_angles, lemmas.dynamics.jerk].map(number);
-    let Drive { of_three, of_two, errors: [rates, rates_of_two, angles], .. } = *drive;
+    let Drive { of_three, of_two, creep, errors: [rates, rates_of_two, angles], .. } = *drive;
     let end = d + tau;
     let growth = ((by_rates + by_angles * end) * end).exp();
     let square = tau.square();
@@ -97,19 +113,20 @@ fn mismatch(s: &Settings, lemmas: &Lemmas, drive: &Drive) -> Mismatch {
     // Integrals over [0, τ], and over [τ, d + τ], of the distances of rates and angles that the
     // drive causes. Up to τ it acts, and from then on both are predictions.
     let of_rates = half * of_three * square + of_three * tau * d;
-    let of_angles = of_two * (sixth * square * tau + half * square * d + half * tau * d.square());
+    let of_angles = of_two * (sixth * square * tau + half * square * d + half * tau * d.square())
+        + creep * (half * square + tau * d);
     let [inner, outer] = [lemmas.dynamics.vehicle.rate, lemmas.dynamics.domain.rate];
     let halfway = half * (number(inner) + number(outer)) / number(outer);
     let revised = halfway * by_rates * of_rates + by_angles * of_angles;
     let erred =
         by_rates * rates * tau + by_angles * (angles * tau + rates_of_two * tau * (d + half * tau));
     let apart = by_rates * (of_three * end + rates)
-        + by_angles * (half * of_two * end.square() + angles + rates_of_two * end);
+        + by_angles * (half * of_two * end.square() + angles + (rates_of_two + creep) * end);
     let f = apart * growth;
     let off = number(0.25) * slope * square;
     let far = [
         rates + (of_three + f) * end + off,
-        angles + rates_of_two * end + half * (of_two + f) * end.square() + off * tau,
+        angles + (rates_of_two + creep) * end + half * (of_two + f) * end.square() + off * tau,
     ];
     let Domain { rate: vehicle_rate, sideslip: vehicle_sideslip } = lemmas.dynamics.vehicle;
     let turned = number(TURN) * far[1] * number(lemmas.dynamics.geometry.r) * number(vehicle_rate);
@@ -117,7 +134,8 @@ fn mismatch(s: &Settings, lemmas: &Lemmas, drive: &Drive) -> Mismatch {
         mean: (revised + erred) * growth / tau + jerk * square / number(24.0) + beside,
         peak: f + beside + jerk * square / number(8.0) + half * slope * tau,
         unseen_rate: (half * by_rates * of_three * d.square()
-            + sixth * by_angles * of_two * d.square() * d)
+            + sixth * by_angles * of_two * d.square() * d
+            + half * by_angles * creep * d.square())
             * growth,
         mispredicted: (by_rates * rates * d
             + by_angles * (angles * d + half * rates_of_two * d.square()))
@@ -135,7 +153,8 @@ pub(crate) fn driven(s: &Settings, lemmas: &Lemmas, before: &Lemmas) -> Driven {
     let (drive, larger) = (self::drive(s, lemmas), self::drive(s, before));
     let mut mismatch = self::mismatch(s, lemmas, &drive);
     let first = self::mismatch(s, before, &larger);
-    let more = (larger.of_inertia - drive.of_inertia).max(Interval::ZERO);
+    let lasting = |drive: &Drive| drive.of_inertia + drive.of_creep;
+    let more = (lasting(&larger) - lasting(&drive)).max(Interval::ZERO);
     let ticks = (s.delay / s.period_feedback).ceil() as usize;
     let early = |first: Interval, later: Interval| Early {
         ticks,
@@ -153,10 +172,11 @@ pub(crate) fn driven(s: &Settings, lemmas: &Lemmas, before: &Lemmas) -> Driven {
         (number(s.limit_total()) + half * (largest - smallest) * number(rate).square()) / smallest;
     Driven {
         early,
+        creep: larger.creep,
         between: first.slope * tau.square() / number(8.0)
             + number(before.dynamics.jerk) * tau.square() * tau
                 / (number(36.0) * number(12.0).sqrt()),
-        turning: by_turn * number(lemmas.dynamics.rate),
+        turning: by_turn * (number(lemmas.dynamics.rate) + larger.creep),
         turned: [
             by_turn * drive.errors[2],
             by_turn * (number(before.dynamics.rate) - number(lemmas.dynamics.rate)) * d,
@@ -166,7 +186,7 @@ pub(crate) fn driven(s: &Settings, lemmas: &Lemmas, before: &Lemmas) -> Driven {
         root_condition: (largest / smallest).sqrt(),
         vehicle_before: [
             number(s.limit_rate) + (spin + larger.of_three) * d,
-            number(s.sideslip_domain) + number(rate) * d,
+            number(s.sideslip_domain) + (number(rate) + larger.creep) * d,
         ],
         domain_before: first.domain,
         drive,

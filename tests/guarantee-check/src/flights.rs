@@ -2,6 +2,8 @@
 //! inertia and measurement error within the assumptions of the guarantee.
 
 use crate::plan::Past;
+pub use crate::random::Random;
+use crate::random::sign;
 use control::crmpc::{Crmpc, Plan, Settings};
 use control::delay::{Delayed, Latency};
 use control::error::DesignError;
@@ -33,47 +35,6 @@ pub struct Recorded {
     pub past: Past,
     /// Size of R I⁻¹ (m − m′) for the change of the command with which the plan begins, rad/s².
     pub change: f64,
-}
-
-/// Pseudo-random numbers (SplitMix64), the same on every platform.
-#[derive(Clone, Debug)]
-pub struct Random(u64);
-
-impl Random {
-    /// Starts the sequence of a seed.
-    pub fn new(seed: u64) -> Self {
-        Self(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15))
-    }
-
-    fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        z ^ (z >> 31)
-    }
-
-    /// Returns a number between `low` and `high`.
-    pub fn between(&mut self, low: f64, high: f64) -> f64 {
-        low + (high - low) * (self.next() >> 11) as f64 / (1_u64 << 53) as f64
-    }
-
-    /// Returns one of the numbers below `count`.
-    pub fn below(&mut self, count: u64) -> u64 {
-        self.next() % count
-    }
-
-    fn vector(&mut self) -> Vector3<f64> {
-        Vector3::from_fn(|_, _| self.between(-1.0, 1.0))
-    }
-
-    fn corner(&mut self) -> Vector3<f64> {
-        self.vector().map(sign)
-    }
-}
-
-fn sign(value: f64) -> f64 {
-    if value < 0.0 { -1.0 } else { 1.0 }
 }
 
 /// How a bounded vector changes over time, relative to its bound.
@@ -108,6 +69,8 @@ pub struct Flight {
     begin: f64,
     disturbance: Waveform,
     errors: Waveform,
+    /// Derivative of the slow errors of the angles, and their present values, rad.
+    slow: (Waveform, Vector3<f64>),
     /// Difference of the delay from the assumed one, s.
     late: f64,
     random: Random,
@@ -148,6 +111,8 @@ impl Flight {
             let edge = settings.sideslip_domain * random.between(0.9, 1.0);
             angles.y = sign(random.between(-1.0, 1.0)) * edge;
         }
+        let more = &mut Random::new(seed ^ 1 << 41);
+        let slow = (Waveform::random(more), more.corner() * settings.slow_angle_error);
         let direction = random.vector().normalize();
         let rates = direction * settings.limit_rate * random.between(0.0, 0.95);
         Ok(Self {
@@ -158,6 +123,7 @@ impl Flight {
             begin,
             disturbance: Waveform::random(&mut random),
             errors: Waveform::random(&mut random),
+            slow,
             late: settings.delay_error * Random::new(!seed).between(-2.0, 2.0).clamp(-1.0, 1.0),
             random,
             duration,
@@ -220,7 +186,8 @@ impl Flight {
 
     /// Measures the state with errors of angles and x_ω within their bounds.
     fn measure(&mut self, state: &State, moment: &Vector3<f64>, time: f64) -> Measurement {
-        let (angles, rates) = (plant::angles(state), plant::rates(state));
+        let angles = plant::angles(state) + self.slow_error(state, moment, time);
+        let rates = plant::rates(state);
         let Settings { angle_error, rate_error, .. } = self.settings;
         let waveform = self.errors;
         let error = self.value(waveform, state, moment, time);
@@ -228,6 +195,20 @@ impl Flight {
         let angle_rates = kinematics::r(&angles) * rates + error * rate_error;
         let rates = kinematics::r_inverse(&seen) * angle_rates;
         Measurement { angles: seen, rates, ..Measurement::default() }
+    }
+
+    /// Changes the slow errors of the angles by as much as they may in a feedback period.
+    fn slow_error(&mut self, state: &State, moment: &Vector3<f64>, time: f64) -> Vector3<f64> {
+        let Settings { slow_angle_error: most, slow_angle_rate, period_feedback, .. } =
+            self.settings;
+        if slow_angle_rate > 0.0 {
+            let derivative = self.value(self.slow.0, state, moment, time) * slow_angle_rate;
+            self.slow.1 += derivative * period_feedback;
+            for i in 0..2 {
+                self.slow.1[i] = self.slow.1[i].clamp(-most, most);
+            }
+        }
+        self.slow.1
     }
 
     fn value(

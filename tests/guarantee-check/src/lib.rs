@@ -22,6 +22,7 @@ pub mod interval;
 pub mod kinematics;
 pub mod lemmas;
 pub mod plan;
+mod random;
 pub mod search;
 #[cfg(feature = "shipped")]
 pub mod shipped;

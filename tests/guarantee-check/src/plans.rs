@@ -22,6 +22,9 @@ pub(crate) struct Plans {
     /// Seed of the first draw.
     #[arg(long, default_value_t = 0)]
     seed: u64,
+    /// Draw slow errors of the angles as well.
+    #[arg(long)]
+    slow_errors: bool,
     /// Number of threads.
     #[arg(long, default_value_t = 1)]
     threads: u64,
@@ -37,7 +40,8 @@ impl Plans {
                 if seed >= self.seed + self.draws {
                     return Ok(());
                 }
-                let Some(settings) = draws::accepted(seed) else { continue };
+                let draw = if self.slow_errors { draws::with_slow_errors } else { draws::accepted };
+                let Some(settings) = draw(seed) else { continue };
                 let tally = self.fly(&settings, seed)?;
                 if !tally.confirmed() {
                     print!("draw {seed}: {settings:?}\n{}", report("", &tally));

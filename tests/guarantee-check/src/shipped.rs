@@ -195,6 +195,8 @@ fn set(s: &mut Settings, inertia: &mut Inertia, name: &str, value: &Value) -> Re
         "disturbance.bound" => &mut s.disturbance_bound,
         "estimation.angleError" => &mut s.angle_error,
         "estimation.rateError" => &mut s.rate_error,
+        "estimation.slowAngleError" => &mut s.slow_angle_error,
+        "estimation.slowAngleRate" => &mut s.slow_angle_rate,
         "inertia.error" => &mut s.inertia_error,
         "inertia.tensorError" => &mut s.tensor_error,
         "delayError" => &mut s.delay_error,

@@ -52,6 +52,8 @@ fn settings(experiment: &str) -> Settings {
             "disturbance.bound" => s.disturbance_bound = quantity(value),
             "estimation.angleError" => s.angle_error = quantity(value),
             "estimation.rateError" => s.rate_error = quantity(value),
+            "estimation.slowAngleError" => s.slow_angle_error = quantity(value),
+            "estimation.slowAngleRate" => s.slow_angle_rate = quantity(value),
             "inertia.error" => s.inertia_error = quantity(value),
             "inertia.tensorError" => s.tensor_error = quantity(value),
             "delayError" => s.delay_error = quantity(value),

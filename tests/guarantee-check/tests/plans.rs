@@ -7,9 +7,18 @@ use guarantee_check::tally::{Tally, check_flights};
 
 #[test]
 fn recorded_plans_of_every_kind_of_settings_are_confirmed() {
+    confirm(draws::accepted);
+}
+
+#[test]
+fn recorded_plans_with_slow_errors_are_confirmed() {
+    confirm(draws::with_slow_errors);
+}
+
+fn confirm(draw: fn(u64) -> Option<Settings>) {
     let mut total = Tally::default();
     for seed in 0..10 {
-        let Some(settings) = draws::accepted(seed) else { continue };
+        let Some(settings) = draw(seed) else { continue };
         let tally = check_flights(&settings, seed..=seed, 1.0).unwrap();
         assert_eq!(tally.outside, 0, "draw {seed}");
         assert_eq!(tally.not_confirmed, 0, "draw {seed}: {:?}", tally.refuted);

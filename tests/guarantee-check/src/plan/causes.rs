@@ -2,7 +2,7 @@
 //! measurement, and the change of F between where the law evaluates it and where the vehicle is.
 
 use super::body::{Body, sin_cos};
-use super::smoothness::Smoothness;
+use super::smoothness::{Smoothness, turns};
 use crate::interval::Interval;
 use crate::sums::Pair;
 use control::crmpc::Settings;
@@ -66,6 +66,7 @@ pub(super) struct Causes {
     /// Bounds on the error of each measured angle and rate.
     pub(super) errors: Pair,
     pub(super) inertia: InertiaError,
+    pub(super) slow: SlowErrors,
     pub(super) later: Mismatch,
     /// Mismatch while a part of the prediction lies before the nominal trajectory, where the rates
     /// may exceed their limit, and the number of such ticks.
@@ -133,6 +134,30 @@ impl InertiaError {
     }
 }
 
+/// Effect of the slow errors e. The navigated angles Θ′ = Θ + e and rates x′ = R(Θ′) ω obey Θ̇′ = x′
+/// + d and ẋ′ = F(Θ′, x′, m) + R(Θ′) R(Θ)⁻¹ (Δ + …) + (∂R[d]) ω, with d = ė + (R(Θ) − R(Θ′)) ω.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct SlowErrors {
+    /// Bound on ‖d‖, rad/s.
+    pub(super) creep: Interval,
+    /// Bound on the norm of the acceleration besides F and Δ, rad/s².
+    pub(super) acceleration: Interval,
+}
+
+impl SlowErrors {
+    /// Bounds the effect for ‖ω‖ ≤ `rate` and |β′| ≤ `sideslip`.
+    fn new(s: &Settings, rate: f64, sideslip: f64) -> Self {
+        let (root2, root3) = (number(2.0).sqrt(), number(3.0).sqrt());
+        let [_, first, ..] = turns(sideslip + s.slow_angle_error);
+        // The difference of R at both attitudes, as R⁻¹ has the norm 1.
+        let turned = first * root2 * number(s.slow_angle_error);
+        let creep = root3 * number(s.slow_angle_rate) + turned * number(rate);
+        let disturbance = root3 * number(s.disturbance_bound);
+        let acceleration = first * creep * number(rate) + turned * disturbance;
+        Self { creep, acceleration }
+    }
+}
+
 /// Bounds how F differs along the true and the predicted trajectory. The distance z of the rates
 /// grows by what drives them apart and by the difference f of F itself, for which the function
 /// finds an upper bound.
@@ -140,11 +165,16 @@ impl InertiaError {
 /// If commands begin to act early or late, the integral of the moment over any time differs by that
 /// at both ends of this time, so that the rates are displaced by no more than `jump`. This counts
 /// for the distances; the difference of F by it belongs to each pulse.
-fn mismatch(s: &Settings, bounds: &Smoothness, inertia: &InertiaError) -> Option<Mismatch> {
+fn mismatch(
+    s: &Settings,
+    bounds: &Smoothness,
+    inertia: &InertiaError,
+    slow: SlowErrors,
+) -> Option<Mismatch> {
     let end = number(s.delay) + number(s.period_feedback);
     let jump = inertia.displaced * (bounds.r[0] + bounds.r[1] * end);
-    let Mismatch { apart, updated, .. } = mismatch_with(s, bounds, inertia, jump)?;
-    let without = mismatch_with(s, bounds, inertia, Interval::ZERO)?;
+    let Mismatch { apart, updated, .. } = mismatch_with(s, bounds, (inertia, slow), jump)?;
+    let without = mismatch_with(s, bounds, (inertia, slow), Interval::ZERO)?;
     Some(Mismatch { apart, updated, ..without })
 }
 
@@ -156,7 +186,7 @@ fn slack(bounds: &Smoothness, end: Interval) -> Interval {
 fn mismatch_with(
     s: &Settings,
     bounds: &Smoothness,
-    inertia: &InertiaError,
+    (inertia, slow): (&InertiaError, SlowErrors),
     jump: Interval,
 ) -> Option<Mismatch> {
     let (d, tau, half) = (number(s.delay), number(s.period_feedback), number(0.5));
@@ -165,11 +195,12 @@ fn mismatch_with(
         (number(s.disturbance_bound), number(s.angle_error), number(s.rate_error));
     let Smoothness { by_rates, by_angles, .. } = *bounds;
     let end = d + tau;
-    let InertiaError { acceleration: inertia, .. } = *inertia;
-    let (drive, drive_of_two) = (root3 * delta + inertia, root2 * delta + inertia);
+    let lasting = inertia.acceleration + slow.acceleration;
+    let (drive, drive_of_two) = (root3 * delta + lasting, root2 * delta + lasting);
     let rates = |drive: Interval, t: Interval| root3 * e + jump + drive * t;
-    let angles =
-        |drive: Interval, t: Interval| root2 * (eta + e * t) + jump * t + half * drive * t.square();
+    let angles = |drive: Interval, t: Interval| {
+        root2 * (eta + e * t) + (jump + slow.creep) * t + half * drive * t.square()
+    };
     let slack = slack(bounds, end);
     if slack.low <= 0.1 {
         return None;
@@ -181,7 +212,7 @@ fn mismatch_with(
     let sum = |t: Interval| {
         let rates = (root3 * e + jump) * t + half * drive * t.square();
         let angles = root2 * (eta * t + half * e * t.square())
-            + half * jump * t.square()
+            + half * (jump + slow.creep) * t.square()
             + sixth * drive_of_two * t.square() * t;
         by_rates * rates + by_angles * angles
     };
@@ -208,20 +239,27 @@ impl Causes {
         let mut margin = [0.01 * s.limit_rate + 1.5 * s.rate_error, 1e-3 + 1.5 * s.angle_error];
         for _ in 0..12 {
             let sideslip = s.sideslip_domain + margin[1];
-            let early = sideslip + (d * number(2.0 * s.limit_rate)).high;
+            let most = 2.0 * s.limit_rate;
+            let early = sideslip + (d * number(most)).high;
+            let creep = SlowErrors::new(s, most, early).creep.high;
+            let early = early + (d * number(creep)).high;
             if early > 0.95 {
                 return None;
             }
             let bounds = Smoothness::new(s, s.limit_rate + margin[0], sideslip)?;
             let before = margin[0] + (bounds.turning * d).high;
             let inertia = InertiaError::new(s, &body, s.limit_rate + before, early);
-            let later = mismatch(s, &bounds, &inertia)?;
+            let slow = SlowErrors::new(s, s.limit_rate + before, early);
+            if slow.creep.high > creep {
+                return None;
+            }
+            let later = mismatch(s, &bounds, &inertia, slow)?;
             let [rate, angle] = later.apart;
             let swing = bounds.slope * tau.square();
             let outside = [rate + angle * bounds.angle_rate + swing, angle + swing * tau];
             if outside[0].high <= margin[0] && outside[1].high <= margin[1] {
                 let wider = Smoothness::new(s, s.limit_rate + before, early)?;
-                let first = mismatch(s, &wider, &inertia)?;
+                let first = mismatch(s, &wider, &inertia, slow)?;
                 let ticks = (s.delay / s.period_feedback).ceil() as usize;
                 let middle = middle(&bounds, tau);
                 return Some(Self {
@@ -229,6 +267,7 @@ impl Causes {
                     errors: [number(s.angle_error), number(s.rate_error)],
                     switched: Switched::new(s, &wider, &inertia, &first),
                     inertia,
+                    slow,
                     later,
                     first: (first, ticks),
                     smoothness: bounds,

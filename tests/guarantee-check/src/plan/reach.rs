@@ -7,7 +7,8 @@
 //! o(T_k+1) = Φ o(T_k) − Γ K q_k + ∫ [T_k+1 − v; 1] w(v) dv,
 //!
 //! w = Δ + ν + F(x, m) − F(mid-period, m): disturbance, the effect ν of the inertia error, and the
-//! mismatch. q_k holds what Δ and ν did since t_k, −A_d e_k for the measurement's error e_k, and a
+//! mismatch. With slow errors all of them are those of the navigated state, and the creep d adds
+//! ∫ [d(v); 0] dv. q_k holds what Δ and ν did since t_k, −A_d e_k for the measurement's error e_k, and a
 //! part φ_k because F differs along the two trajectories. The linear parts are summed exactly;
 //! mismatch and φ are bounded as vectors.
 
@@ -34,6 +35,8 @@ struct Response {
     seen: Vec<Interval>,
     /// Parts by measurement errors: of earlier ticks, and of the first.
     erred: Vec<Interval>,
+    /// Sums of |r Φⁱ [1; 0]| over all unit shifts of the angle per time that have been seen, s.
+    crept: Vec<Interval>,
     /// Part by mismatch and φ.
     mismatched: Vec<Interval>,
     /// Part by the mismatch, if it is summed along the predictions.
@@ -104,7 +107,7 @@ impl<'a> Builder<'a> {
         let early = self.causes.smoothness.turning * number(self.s.delay).square();
         let jump = number(2.0).sqrt() * self.causes.errors[0] + early;
         let (one, rate) = (Interval::ONE, number(self.s.limit_rate) + self.causes.later.apart[0]);
-        let angle = rate * age + jump;
+        let angle = (rate + self.causes.slow.creep) * age + jump;
         let InertiaError { direct, turned, root_condition, .. } = self.causes.inertia;
         direct * self.growth.after(one, angle) + turned * self.growth.after(root_condition, angle)
     }
@@ -112,10 +115,11 @@ impl<'a> Builder<'a> {
     /// Sums the responses of a row, or the changes of its responses from tick to tick.
     fn respond(&self, row: Pair, changes: bool) -> Response {
         let (zero, tau, d) = (Interval::ZERO, number(self.s.period_feedback), number(self.s.delay));
-        let mut sums = [zero; 4];
+        let mut sums = [zero; 5];
         let mut response = Response {
             seen: vec![zero],
             erred: vec![zero],
+            crept: vec![zero],
             mismatched: vec![zero],
             revised: vec![zero],
             begun: vec![],
@@ -141,8 +145,10 @@ impl<'a> Builder<'a> {
             let age = number(i as f64) * tau + d + tau + number(0.5) * tau;
             response.begun.push(self.unseen(&reached));
             let inertia = wave * self.compensating(age);
-            sums = [sums[0] + wave, sums[1] + small[0], sums[2] + inertia, sums[3] + small[1]];
+            let parts = [wave, small[0], inertia, small[1], reached[0].abs() * tau];
+            sums = std::array::from_fn(|j| sums[j] + parts[j]);
             response.seen.push(sums[0]);
+            response.crept.push(sums[4]);
             let more = |j: usize| excess.iter().fold(zero, |sum, part| sum + part[j]);
             response.mismatched.push(sums[1] + more(0));
             response.revised.push(sums[3] + more(1));
@@ -164,12 +170,14 @@ impl<'a> Builder<'a> {
         let one = [Interval::ONE, Interval::ONE];
         let more = tail * end.max(Interval::ONE);
         let seen = last(&response.seen) + more * tau;
+        let crept = last(&response.crept) + tail * tau;
         let small = self.mismatched(&one, &self.causes.first.0);
         let revised = last(&response.revised) + more * small[1];
         let small = last(&response.mismatched) + more * small[0];
         let inertia = last(&response.inertia) + more * tau * self.compensating(number(1e9));
         let erred = earlier + more * (self.erred(&one, 0) + self.erred(&one, 1));
         response.seen.push(seen);
+        response.crept.push(crept);
         response.mismatched.push(small);
         response.revised.push(revised);
         response.inertia.push(inertia);
@@ -264,7 +272,10 @@ impl<'a> Builder<'a> {
                 erred = erred.max(feedback.erred[n] + self.erred(&rows[4], 2));
             }
             let half = causes.disturbance * changes.seen[n] + number(2.0) * erred;
-            let norm = causes.inertia.acceleration * changes.seen[n] + changes.revised[n];
+            let lasting = causes.inertia.acceleration + causes.slow.acceleration;
+            let norm = lasting * changes.seen[n]
+                + causes.slow.creep * changes.crept[n]
+                + changes.revised[n];
             pulses.sizes(half, norm).map(upper)
         };
         let sizes = (0..=self.steps + 1).map(size).collect();
@@ -296,8 +307,8 @@ impl<'a> Builder<'a> {
         starts: &[Vec<Interval>; 5],
         unseen: &Pair,
     ) -> Deviation {
-        let Causes { disturbance, inertia: InertiaError { acceleration: inertia, .. }, .. } =
-            &self.causes;
+        let Causes { disturbance, inertia, slow, .. } = &self.causes;
+        let (inertia, delay) = (inertia.acceleration, number(self.s.delay));
         // The change of F by pulses is summed along the predictions only.
         let is_exact = self.s.delay_error == 0.0;
         let half = |i: usize| {
@@ -305,16 +316,18 @@ impl<'a> Builder<'a> {
             *disturbance * seen[n] + erred[n] + starts[i][n]
         };
         let vehicle = |i: usize| {
-            let Response { seen, mismatched, revised, begun, .. } = &responses[i];
+            let Response { seen, crept, mismatched, revised, begun, .. } = &responses[i];
             let erred = if n == 0 { self.erred(&rows[i], 2) } else { Interval::ZERO };
             let (along, revised) = (mismatched[n] + begun[n], revised[n] + self.unseen(&rows[i]));
             let small = if is_exact { along.min(revised) } else { revised };
             let pulses = seen[n] + unseen[i];
             let half = half(i) + *disturbance * unseen[i] + erred;
-            Extent { half: upper(half), norm: upper(*inertia * pulses + small) }
+            let crept = slow.creep * (crept[n] + rows[i][0].abs() * delay);
+            let lasting = (inertia + slow.acceleration) * pulses;
+            Extent { half: upper(half), norm: upper(lasting + crept + small) }
         };
         let law = |i: usize, compensated: bool| {
-            let Response { seen, mismatched, revised, begun, .. } = &responses[i];
+            let Response { seen, crept, mismatched, revised, begun, .. } = &responses[i];
             // The first predicted state is known exactly.
             let (mut half, mut small) = (half(i), Interval::ZERO);
             if n > 0 {
@@ -322,8 +335,9 @@ impl<'a> Builder<'a> {
                 let along = mismatched[n] + begun[n] + self.unseen(&rows[i]);
                 small = if is_exact { along.min(revised[n]) } else { revised[n] };
             }
-            let inertia = if compensated { *inertia * seen[n] } else { Interval::ZERO };
-            Extent { half: upper(half), norm: upper(inertia + small) }
+            let inertia = if compensated { inertia * seen[n] } else { Interval::ZERO };
+            let slow = slow.acceleration * seen[n] + slow.creep * crept[n];
+            Extent { half: upper(half), norm: upper(inertia + slow + small) }
         };
         Deviation {
             angle: vehicle(0),

@@ -88,6 +88,12 @@ impl Kinematics {
     }
 }
 
+/// Returns bounds on ‖R‖ and on its first, second and third derivative along a unit vector, for |β|
+/// ≤ `sideslip`.
+pub(super) fn turns(sideslip: f64) -> [Interval; 4] {
+    Kinematics::new(sideslip).turns
+}
+
 impl Smoothness {
     /// Computes the bounds; `None` if the body is not symmetric about its x–z plane.
     pub(super) fn new(s: &Settings, rate: f64, sideslip: f64) -> Option<Self> {
