@@ -160,6 +160,68 @@ fn oracle_no_adversary_exceeds_the_deviation_and_the_worst_one_comes_near() {
     }
 }
 
+/// Largest deviations of the bank angle from a plan at rest, as the law sees them, under the slow
+/// error that is worst for one of them. Nothing else drives it.
+fn crept(s: &Settings, row: [f64; 2], ticks: usize) -> [f64; 3] {
+    let rest = Vector3::new(10.0, 2.0, -30.0).map(f64::to_radians);
+    let (tau, k) = (s.period_feedback, s.feedback);
+    let mut response = [tau, 0.0];
+    let mut signs = vec![0.0; ticks];
+    for sign in signs.iter_mut().rev() {
+        *sign = (row[0] * response[0] + row[1] * response[1]).signum();
+        let fed = k.k1 * response[0] + k.k2 * response[1];
+        response[0] += tau * response[1] + 0.5 * tau * tau * fed;
+        response[1] += tau * fed;
+    }
+    let (mut state, mut error) = (plant::state(&rest, &Vector3::zeros()), Vector3::zeros());
+    let seen = |state: &plant::State, error: &Vector3<f64>| {
+        let angles = plant::angles(state) + error;
+        let rates = kinematics::r(&angles) * plant::rates(state);
+        let fed = (angles - rest) * k.k1 + rates * k.k2;
+        (angles, rates, fed)
+    };
+    for sign in signs {
+        let (angles, rates, a) = seen(&state, &error);
+        let half = 0.5 * tau;
+        let middle = angles + (rates + a * (0.5 * half)) * half;
+        let moment = linearise::moment(&s.body, &middle, &(rates + a * half), &a);
+        let load = Load { moment, ..Load::default() };
+        let mut f =
+            |_: f64, x: &plant::State| plant::derivative(&s.body, Kinematics::Printed, x, &load);
+        for _ in 0..4 {
+            state = rk4(&mut f, 0.0, &state, 0.25 * tau);
+        }
+        error.z += sign * s.slow_angle_rate * tau;
+    }
+    let (angles, rates, fed) = seen(&state, &error);
+    [(angles - rest).amax(), rates.amax(), fed.amax()]
+}
+
+#[test]
+fn oracle_no_slow_error_exceeds_the_deviation_and_the_worst_one_comes_near() {
+    let s = Settings {
+        disturbance_bound: 0.0,
+        inertia_error: 0.0,
+        slow_angle_rate: 0.3_f64.to_radians(),
+        ..published()
+    };
+    let check = PlanCheck::new(&s).unwrap();
+    let rows = [[1.0, 0.0], [0.0, 1.0], [s.feedback.k1, s.feedback.k2]];
+    for ticks in [1, 5, 25, 200] {
+        let deviation = check.reach.around(&s, &Plan::new(0), ticks, &Past::default()).at(0);
+        let bounds = [deviation.angle, deviation.rate, deviation.feedback];
+        let bounds = bounds.map(|bound| bound.component().high);
+        for (i, row) in rows.into_iter().enumerate() {
+            let deviations = crept(&s, row, ticks);
+            assert!((0..3).all(|j| deviations[j] <= bounds[j]), "{ticks} {i}: {deviations:?}");
+            // The bound is that of a norm with three components.
+            let share = 3.0_f64.sqrt() * deviations[i] / bounds[i];
+            let least = if i == 0 { 0.95 } else { 0.75 };
+            assert!(share > least || i > 0 && ticks < 200, "{ticks} {i}: {share}");
+        }
+    }
+}
+
 /// Parts of a feedback period in which an axis with another delay is simulated.
 const PARTS: i32 = 8;
 
