@@ -34,13 +34,13 @@ fn main() {
         let tensor = Settings { inertia_error: 0.0, tensor_error, ..with(0.0, 0.0) };
         row(&format!("tensor error {tensor_error}"), by_delay(tensor));
     }
-    for slow_deg in [0.3, 0.6] {
+    for (angle, rate) in [(0.3, 0.046), (0.6, 0.046), (0.3, 0.35)] {
         let slow = Settings {
-            slow_angle_error: f64::to_radians(slow_deg),
-            slow_angle_rate: f64::to_radians(0.046),
+            slow_angle_error: f64::to_radians(angle),
+            slow_angle_rate: f64::to_radians(rate),
             ..with(0.0, 0.005)
         };
-        row(&format!("slow errors of {slow_deg}°"), by_delay(slow));
+        row(&format!("slow errors {angle}°, {rate}°/s"), by_delay(slow));
     }
     for (k1, k2) in [(-5.0, -5.0), (-1.5, -4.0)] {
         row(

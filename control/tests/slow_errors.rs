@@ -2,21 +2,24 @@
 
 mod harness;
 
-use control::crmpc::{Constraints, Crmpc, Design, GuaranteeStatus, InitialState, Memory, Settings};
+use control::crmpc::{
+    Constraints, Crmpc, Design, GuaranteeStatus, InitialState, Lemmas, Memory, Settings,
+};
 use control::{Controller, Measurement};
 use harness::flight::{Flight, Random, Shown, Sight, Slow, Waveform};
 use harness::{in_parallel, settings};
 use nalgebra::Vector3;
 use vehicle::actuators::Command;
-use vehicle::kinematics;
-use vehicle::plant::{Input, Plant};
+use vehicle::integrator::rk4;
+use vehicle::kinematics::{self, Kinematics};
+use vehicle::plant::{self, Input, Load, Plant};
 use vehicle::profile::Profile;
 use vehicle::reference::Reference;
 use vehicle::scenario::Scenario;
 use vehicle::trajectory::Trajectory;
 
-/// Returns the settings for errors of an inertial navigation: of the angles up to 0.3°, which change
-/// by up to 0.046°/s, and small ones from tick to tick.
+/// Returns the settings for errors of an inertial navigation: of the angles up to 0.3°, which
+/// change by up to 0.046°/s, and small ones from tick to tick.
 fn navigated(delay: f64) -> Settings {
     let error = f64::to_radians(0.005);
     Settings {
@@ -131,6 +134,52 @@ fn guarantee_is_kept_with_slow_errors_from_the_edge_of_the_certified_states() {
     assert!(sideslip > 0.99 && rate > 0.9, "{sideslip} {rate}");
 }
 
+/// Returns the largest creep of random states, and the largest acceleration of the navigated rates
+/// besides F and Δ, relative to their bounds.
+fn creep_found(s: &Settings) -> [f64; 2] {
+    let Settings { body, sideslip_domain, slow_angle_error, slow_angle_rate, .. } = *s;
+    let bounds = Lemmas::new(s).parts.drive;
+    let random = &mut Random::new(3);
+    let mut largest = [0.0_f64; 2];
+    for _ in 0..20_000 {
+        let side = random.corner().y;
+        let alpha = random.between(-3.1, 3.1);
+        let navigated = Vector3::new(alpha, side * sideslip_domain, random.between(-3.0, 3.0));
+        let (error, derivative) = (random.corner(), random.corner() * slow_angle_rate);
+        let error = error * slow_angle_error;
+        let (rates, moment) = (random.direction(s.limit_rate), random.direction(s.limit_moment));
+        let delta = random.corner() * s.disturbance_bound;
+        let load = Load { moment, delta, ..Load::default() };
+        let mut f = |_: f64, state: &plant::State| {
+            plant::derivative(&body, Kinematics::Printed, state, &load)
+        };
+        // The navigated angles and rates after a time (s).
+        let mut after = |time: f64| {
+            let state = rk4(&mut f, 0.0, &plant::state(&(navigated - error), &rates), time);
+            let angles = plant::angles(&state) + error + derivative * time;
+            (angles, kinematics::r(&angles) * plant::rates(&state))
+        };
+        let h = 1e-4;
+        let [(angles, x), (before, x_before)] = [h, -h].map(&mut after);
+        let [angle_rates, accelerations] = [angles - before, x - x_before].map(|d| d / (2.0 * h));
+        let r = kinematics::r(&navigated);
+        let intended = body.drift(&navigated, &(r * rates)) + r * body.inverse * moment;
+        let creep = (angle_rates - r * rates).norm() / bounds.creep;
+        let further = (accelerations - intended - delta).norm() / bounds.of_creep;
+        largest = [largest[0].max(creep), largest[1].max(further)];
+    }
+    largest
+}
+
+#[test]
+fn oracle_navigated_angles_and_rates_move_as_the_true_ones_but_for_the_creep() {
+    for settings in [navigated(0.0), creeping()] {
+        let [creep, further] = creep_found(&settings);
+        assert!(creep < 1.0 && creep > 0.7, "{creep}");
+        assert!(further < 1.0 && further > 0.4, "{further}");
+    }
+}
+
 /// Returns the largest deviations of the state that the law sees, relative to their bounds: of the
 /// angles, of the rates, and K ô.
 fn shares(flight: &Flight) -> [f64; 3] {
@@ -196,8 +245,8 @@ fn slow_errors_that_are_not_declared_can_end_the_guarantee() {
 }
 
 /// Flies bank reversals while the trajectory turns as in a guided entry, with slow errors that are
-/// sines of up to 0.3° in angle of attack and sideslip and 0.6° in the bank angle. Returns the share
-/// of the ticks in force.
+/// sines of up to 0.3° in angle of attack and sideslip and 0.6° in the bank angle. Returns the
+/// share of the ticks in force.
 fn entry(settings: &Settings, phase: f64) -> f64 {
     let period = settings.period_feedback;
     let mut law = Crmpc::new(*settings).unwrap();

@@ -55,8 +55,8 @@ pub(in crate::crmpc) fn tighten(s: &Settings) -> Result<(Tightening, Assessment)
 }
 
 /// Returns the largest mean acceleration over one period that the assumptions explain, rad/s²: Δ̄,
-/// the tensor's error in any direction, the effect of the creep, and both errors of the rates at the
-/// period's ends. The measured rates become x_ω at an attitude that is wrong, with ‖∂R[o]‖ ≤
+/// the tensor's error in any direction, the effect of the creep, and both errors of the rates at
+/// the period's ends. The measured rates become x_ω at an attitude that is wrong, with ‖∂R[o]‖ ≤
 /// √2 sec²β ‖o‖.
 fn explained(s: &Settings, dynamics: &Dynamics, parts: &Parts) -> Explained {
     let Dynamics { domain, geometry, smallest, .. } = dynamics;

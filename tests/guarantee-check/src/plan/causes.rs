@@ -134,11 +134,11 @@ impl InertiaError {
     }
 }
 
-/// Effect of the slow errors e. The navigated angles Θ′ = Θ + e and rates x′ = R(Θ′) ω obey Θ̇′ = x′
-/// + d and ẋ′ = F(Θ′, x′, m) + R(Θ′) R(Θ)⁻¹ (Δ + …) + (∂R[d]) ω, with d = ė + (R(Θ) − R(Θ′)) ω.
+/// Effect of the slow errors e. The navigated angles Θ′ = Θ + e and rates x′ = R(Θ′) ω obey Θ̇′ =
+/// x′ + ζ and ẋ′ = F(Θ′, x′, m) + ν + R(Θ′) R(Θ)⁻¹ Δ + ∂R[ζ] ω, with ζ = ė + (R(Θ) − R(Θ′)) ω.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct SlowErrors {
-    /// Bound on ‖d‖, rad/s.
+    /// Bound on ‖ζ‖, rad/s.
     pub(super) creep: Interval,
     /// Bound on the norm of the acceleration besides F and Δ, rad/s².
     pub(super) acceleration: Interval,

@@ -7,10 +7,10 @@
 //! o(T_k+1) = Φ o(T_k) − Γ K q_k + ∫ [T_k+1 − v; 1] w(v) dv,
 //!
 //! w = Δ + ν + F(x, m) − F(mid-period, m): disturbance, the effect ν of the inertia error, and the
-//! mismatch. With slow errors all of them are those of the navigated state, and the creep d adds
-//! ∫ [d(v); 0] dv. q_k holds what Δ and ν did since t_k, −A_d e_k for the measurement's error e_k, and a
-//! part φ_k because F differs along the two trajectories. The linear parts are summed exactly;
-//! mismatch and φ are bounded as vectors.
+//! mismatch. With slow errors all of them are those of the navigated state, and the creep ζ adds
+//! ∫ [ζ(v); 0] dv. q_k holds what Δ, ν and ζ did since t_k, −A_d e_k for the measurement's error
+//! e_k, and a part φ_k because F differs along the two trajectories. The linear parts are summed
+//! exactly; mismatch and φ are bounded as vectors.
 
 use super::body::Body;
 use super::causes::{Causes, InertiaError, Mismatch};
