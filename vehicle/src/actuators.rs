@@ -11,7 +11,8 @@
 //! the deflection comes to rest, so the right side of its differential equation and its exact
 //! solution are both available.
 
-use crate::effectors::{Effectors, JETS, Jets, SURFACES, Surfaces};
+use crate::aerodynamics::{Flow, SurfaceTable};
+use crate::effectors::{Effectors, JETS, Jets, SURFACES, Surfaces, moment_of_tables};
 use crate::error::Error;
 use crate::time::tolerance;
 use nalgebra::{SMatrix, Vector3};
@@ -39,6 +40,8 @@ pub struct Config {
     pub jet_mode: JetMode,
     /// Dynamic pressure of the flight condition, Pa.
     pub dynamic_pressure: f64,
+    /// Mach number of the flight condition.
+    pub mach: f64,
     /// Factor from the nominal surface effectiveness to that of the vehicle.
     pub aerodynamics_scale: f64,
 }
@@ -71,9 +74,23 @@ pub struct Drive {
     thrust: Jets,
 }
 
+/// Flow past the surfaces.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Conditions {
+    /// The flight condition for which the actuators were made, at an angle of attack (rad).
+    Fixed(f64),
+    /// Another flow, in which the effectiveness of the surfaces has a ratio to that for which the
+    /// actuators were made.
+    Entry(f64, Flow),
+}
+
 /// Surfaces and jets at one flight condition.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Actuators {
+    /// Dynamic pressure (Pa) and Mach number of the flight condition.
+    condition: [f64; 2],
+    scale: f64,
+    tables: Vec<SurfaceTable>,
     /// Surface effectiveness D_A at the dynamic pressure of the flight, N m/rad.
     surface_moments: SMatrix<f64, 3, SURFACES>,
     jet_moments: SMatrix<f64, 3, JETS>,
@@ -96,6 +113,9 @@ impl Actuators {
         }
         let Effectors { min, max, rate, jet_moments, .. } = config.effectors;
         Ok(Self {
+            condition: [config.dynamic_pressure, config.mach],
+            scale,
+            tables: config.effectors.tables.clone(),
             surface_moments: config.effectors.effectiveness_at(config.dynamic_pressure) * scale,
             jet_moments,
             min,
@@ -163,18 +183,34 @@ impl Actuators {
         }
     }
 
-    /// Control moment (N m) of the surfaces and jets, with the effectiveness of the surfaces times
-    /// `pressure_ratio`.
+    /// Whether some surfaces have tables, so that their moments are not linear in the deflections.
+    pub fn has_tables(&self) -> bool {
+        !self.tables.is_empty()
+    }
+
+    /// Control moment (N m) of the surfaces and jets.
     pub fn moment(
         &self,
         drive: &Drive,
         deflections: &Surfaces,
-        pressure_ratio: f64,
+        conditions: &Conditions,
     ) -> Vector3<f64> {
-        self.surface_moments * deflections * pressure_ratio + self.jet_moments * drive.thrust
+        let [dynamic_pressure, mach] = self.condition;
+        let (ratio, flow) = match *conditions {
+            Conditions::Fixed(alpha) => {
+                (1.0, Flow { dynamic_pressure, mach, alpha, ..Flow::default() })
+            }
+            Conditions::Entry(ratio, flow) => (ratio, flow),
+        };
+        let moment = self.surface_moments * deflections * ratio + self.jet_moments * drive.thrust;
+        if self.tables.is_empty() {
+            return moment;
+        }
+        moment + moment_of_tables(&self.tables, &flow, deflections) * self.scale
     }
 
-    /// Partial derivative of [`Actuators::moment`] with respect to the deflections, N m/rad.
+    /// Partial derivative of [`Actuators::moment`] with respect to the deflections, N m/rad, without
+    /// tables.
     pub fn moment_by_deflections(&self) -> &SMatrix<f64, 3, SURFACES> {
         &self.surface_moments
     }

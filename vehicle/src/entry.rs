@@ -8,6 +8,7 @@ mod motion;
 
 pub use motion::{Motion, QUANTITIES, Quantity, STEEPEST, check, great_circle};
 
+use crate::actuators;
 use crate::aerodynamics::{Aerodynamics, Flow};
 use crate::air::{Air, Conditions};
 use crate::error::Error;
@@ -145,6 +146,11 @@ impl Passage {
             beta,
         }
     }
+
+    /// Returns the flow past the surfaces.
+    pub(crate) fn conditions(&self) -> actuators::Conditions {
+        actuators::Conditions::Entry(self.surface_pressure, self.flow())
+    }
 }
 
 impl Config {
@@ -277,7 +283,7 @@ impl Config {
         }
     }
 
-    /// Returns the moment of the air (N m) without that of the surfaces, at body `rates` (rad/s);
+    /// Returns the moment of the air about the centre of mass (N m) without that of the surfaces, at body `rates` (rad/s);
     /// `trim` is the input for the angle of attack at which the vehicle is trimmed, rad.
     pub fn moment(&self, passage: &Passage, rates: &Vector3<f64>, trim: f64) -> Vector3<f64> {
         let flow = passage.flow();
@@ -287,6 +293,14 @@ impl Config {
         };
         let mut moment = self.aerodynamics.moment(&flow, rates, trim) * self.deviations.moment;
         moment.y += self.aerodynamics.pitch_moment(&flow, self.deviations.pitch);
+        if let Some(point) = self.aerodynamics.moment_point() {
+            // The forces act at the point of the moments, which leaves a lever arm.
+            let [_, side, _] = self.aerodynamics.forces(&flow);
+            let mass = self.aerodynamics.mass();
+            let force = Vector3::new(-passage.drag * mass, side, -passage.lift * mass);
+            let along_flow = Vector3::new(flow.alpha, flow.beta, 0.0);
+            moment += point.cross(&(body_from_velocity(&along_flow) * force));
+        }
         moment
     }
 

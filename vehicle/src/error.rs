@@ -13,11 +13,13 @@ pub enum Error {
         /// Description of the fault in the file.
         problem: String,
     },
-    /// The file of surfaces and jets cannot be read or understood.
-    #[error("effectors {file}: {problem}")]
-    Effectors {
+    /// The file of a vehicle cannot be read or understood.
+    #[error("{file}{}: {problem}", place(line.map(|line| line as u64), None))]
+    Vehicle {
         /// Path of the file, or the name of an embedded one.
         file: String,
+        /// Number of the line, counted from 1, if the problem belongs to one.
+        line: Option<usize>,
         /// Description of the fault in the file.
         problem: String,
     },

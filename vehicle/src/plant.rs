@@ -190,7 +190,7 @@ impl Plant {
                     self.moved(entry, (time, begin, h), air, &held, &mut input)
                 } else {
                     let mut f = |t: f64, state: &State| {
-                        let load = self.load(t, &input(t), &held, t - time);
+                        let load = self.load((t, t - time), state[0], &input(t), &held);
                         self.derivative_at(t, state, &load)
                     };
                     (self.motion, rk4(&mut f, begin, &self.state, h))

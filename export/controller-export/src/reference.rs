@@ -6,7 +6,6 @@ use fmi2_export::{Context, Failure};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 use settings::Declared;
-use std::path::Path;
 use vehicle::Scenario;
 use vehicle::axes;
 use vehicle::profile::Profile;
@@ -158,10 +157,6 @@ fn table(file: &str, context: &Context) -> Result<LookupTable, Failure> {
         let text = "reference.profile = table, but reference.file is empty; set it to the path of a CSV file";
         return Err(Failure::Error(text.into()));
     }
-    let path = Path::new(file);
-    let inside =
-        context.resources.map(|folder| folder.join(path)).filter(|inside| inside.is_file());
-    let path = if path.is_file() { path.into() } else { inside.unwrap_or_else(|| path.into()) };
-    LookupTable::from_csv_file(&path)
+    LookupTable::from_csv_file(&context.file(file))
         .map_err(|error| Failure::Error(format!("reference.file: {error}")))
 }

@@ -2,7 +2,7 @@
 
 use crate::table::Description;
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Reason why a call failed. Its text reaches the user through the FMI logger.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -34,6 +34,15 @@ pub struct Context<'a> {
     pub stop_time: Option<f64>,
     /// Path of the unpacked `resources` folder, if the importer gave one.
     pub resources: Option<&'a Path>,
+}
+
+impl Context<'_> {
+    /// Returns the path of a file that a parameter names: as given, or in the FMU's resources.
+    pub fn file(&self, name: &str) -> PathBuf {
+        let path = PathBuf::from(name);
+        let inside = self.resources.map(|folder| folder.join(name));
+        if path.is_file() { path } else { inside.filter(|file| file.is_file()).unwrap_or(path) }
+    }
 }
 
 /// Inputs during a step: constant, or extrapolated with the derivatives that the importer gave.

@@ -2,11 +2,20 @@
 
 use super::*;
 
+/// The flight condition of the actuators.
+const FIXED: Conditions = Conditions::Fixed(0.0);
+
 fn actuators(jet_mode: JetMode) -> Actuators {
     let effectors = Effectors::published();
     let dynamic_pressure = effectors.reference_pressure;
-    Actuators::new(&Config { effectors, jet_mode, dynamic_pressure, aerodynamics_scale: 1.0 })
-        .unwrap()
+    Actuators::new(&Config {
+        effectors,
+        jet_mode,
+        dynamic_pressure,
+        mach: 9.8,
+        aerodynamics_scale: 1.0,
+    })
+    .unwrap()
 }
 
 fn surfaces(deflections_deg: [f64; SURFACES]) -> Command {
@@ -129,9 +138,9 @@ fn published_moments_at_rest() {
     let actuators = actuators(JetMode::OnOff);
     let drive = actuators.commanded(0.0, &command, &Surfaces::zeros());
     let jets = Vector3::new(11625.0 - 11623.0, -9466.0 - 9465.0, 0.0);
-    assert!((actuators.moment(&drive, &Surfaces::zeros(), 1.0) - jets).amax() < 1e-9);
+    assert!((actuators.moment(&drive, &Surfaces::zeros(), &FIXED) - jets).amax() < 1e-9);
     let flaps = Vector3::new(3.0 * 1375.0, -5100.0, -3000.0);
-    assert!((actuators.moment(&drive, &command.surfaces, 1.0) - jets - flaps).amax() < 1e-9);
+    assert!((actuators.moment(&drive, &command.surfaces, &FIXED) - jets - flaps).amax() < 1e-9);
 }
 
 #[test]
@@ -143,7 +152,7 @@ fn jets_switch_at_one_half_when_commands_are_taken() {
     {
         command.jets[0] = value;
         let drive = actuators.commanded(0.0, &command, &Surfaces::zeros());
-        assert_eq!(actuators.moment(&drive, &Surfaces::zeros(), 1.0), full * on, "{value}");
+        assert_eq!(actuators.moment(&drive, &Surfaces::zeros(), &FIXED), full * on, "{value}");
     }
     assert!(actuators.moment_by_jets(&command).iter().all(|derivative| *derivative == 0.0));
 }
@@ -156,7 +165,7 @@ fn duty_cycles_scale_the_thrust_and_are_cut_off() {
     for (value, duty) in [(0.0, 0.0), (0.25, 0.25), (1.0, 1.0), (1.5, 1.0), (-0.5, 0.0)] {
         command.jets[0] = value;
         let drive = actuators.commanded(0.0, &command, &Surfaces::zeros());
-        let moment = actuators.moment(&drive, &Surfaces::zeros(), 1.0);
+        let moment = actuators.moment(&drive, &Surfaces::zeros(), &FIXED);
         assert!((moment - full * duty).amax() < 1e-9, "{value}");
         let slope = if value == duty { full } else { Vector3::zeros() };
         assert!((actuators.moment_by_jets(&command).column(0) - slope).amax() < 1e-9);
@@ -173,11 +182,12 @@ fn aerodynamics_and_density_biases_multiply() {
             effectors: effectors.clone(),
             jet_mode: JetMode::OnOff,
             dynamic_pressure,
+            mach: 9.8,
             aerodynamics_scale: scale,
         };
         let actuators = Actuators::new(&config).unwrap();
         let drive = actuators.commanded(0.0, &command, &Surfaces::zeros());
-        actuators.moment(&drive, &command.surfaces, 1.0)
+        actuators.moment(&drive, &command.surfaces, &FIXED)
     };
     let (nominal, biased) = (moment(1.0, 1.0), moment(0.9, 0.9));
     assert!(nominal.amin() > 500.0);
@@ -191,6 +201,7 @@ fn a_negative_scale_is_refused_by_name() {
         effectors,
         jet_mode: JetMode::OnOff,
         dynamic_pressure: 1e3,
+        mach: 9.8,
         aerodynamics_scale: -1.0,
     };
     let text = Actuators::new(&config).unwrap_err().to_string();

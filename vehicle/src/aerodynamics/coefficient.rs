@@ -1,10 +1,12 @@
 //! A coefficient over the angle of attack and the Mach number.
 
-use serde::{Deserialize, Serialize};
+use serde::de::Error;
+use serde::{Deserialize, Deserializer, Serialize};
 
 /// A coefficient: a polynomial of the angle of attack in degrees, or a table over the angle of
 /// attack and the Mach number, linear between its points and constant beyond them.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(try_from = "Given", into = "Given")]
 pub struct Coefficient {
     source: String,
@@ -27,24 +29,41 @@ impl Default for Curve {
 
 /// A table: one row of values per Mach number, one value per angle of attack.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
-struct Table {
-    alpha_deg: Vec<f64>,
-    mach: Vec<f64>,
-    values: Vec<Vec<f64>>,
+pub(super) struct Table {
+    /// Angles of attack in degrees, increasing.
+    pub alpha_deg: Vec<f64>,
+    /// Mach numbers, increasing.
+    pub mach: Vec<f64>,
+    /// One row for each Mach number, with one value for each angle of attack.
+    pub values: Vec<Vec<f64>>,
 }
 
-/// A coefficient as a file gives it.
+/// A coefficient as a file gives it: either a polynomial or a table.
 #[derive(Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
+#[cfg_attr(test, schemars(rename = "Coefficient"))]
 #[serde(deny_unknown_fields)]
-struct Given {
+pub(super) struct Given {
+    /// Publication or derivation from which the numbers come.
     source: String,
+    /// Factors of 1, α, α², … with the angle of attack α in degrees.
     #[serde(default)]
     polynomial: Option<Vec<f64>>,
-    #[serde(default)]
+    /// Table over angle of attack and Mach number.
+    #[serde(default, deserialize_with = "checked")]
     table: Option<Table>,
+    /// Whether the numbers are per degree. Those of derivatives are otherwise per radian.
     #[serde(default)]
     per_degree: bool,
+}
+
+/// Reads a table and checks it, so that the error points at the table.
+fn checked<'de, D: Deserializer<'de>>(file: D) -> Result<Option<Table>, D::Error> {
+    let table = Option::<Table>::deserialize(file)?;
+    let fault = table.as_ref().and_then(|table| table.check().err());
+    fault.map_or(Ok(table), |fault| Err(D::Error::custom(fault)))
 }
 
 impl TryFrom<Given> for Coefficient {
@@ -52,10 +71,18 @@ impl TryFrom<Given> for Coefficient {
 
     fn try_from(given: Given) -> Result<Self, String> {
         let Given { source, polynomial, table, per_degree } = given;
+        // A coefficient that is left out has no source.
+        if source.trim().is_empty() && polynomial.as_ref().is_none_or(|factors| !factors.is_empty())
+        {
+            return Err("source is empty; say where the numbers come from".into());
+        }
         let curve = match (polynomial, table) {
-            (Some(polynomial), None) => Curve::Polynomial(polynomial),
-            (None, Some(table)) => Curve::Table(table.checked()?),
-            _ => return Err(format!("{source}: give either 'polynomial' or 'table'")),
+            (Some(polynomial), None) if polynomial.iter().all(|factor| factor.is_finite()) => {
+                Curve::Polynomial(polynomial)
+            }
+            (Some(_), None) => return Err("polynomial holds a value that is not finite".into()),
+            (None, Some(table)) => Curve::Table(table),
+            _ => return Err("a coefficient has either polynomial or table".into()),
         };
         Ok(Self { source, curve, per_degree })
     }
@@ -72,20 +99,34 @@ impl From<Coefficient> for Given {
 }
 
 impl Table {
-    fn checked(self) -> Result<Self, String> {
-        let increases = |axis: &[f64]| axis.windows(2).all(|pair| pair[0] < pair[1]);
-        let is_full = self.values.len() == self.mach.len()
-            && self.values.iter().all(|row| row.len() == self.alpha_deg.len());
-        if self.alpha_deg.is_empty() || !is_full {
-            return Err("a table needs one row per Mach number, one value per angle".into());
+    /// Refuses a table that is not full, that holds a value which is not finite, or whose axes do
+    /// not increase. The message begins with the key at fault.
+    pub(super) fn check(&self) -> Result<(), String> {
+        increasing("alpha_deg", &self.alpha_deg)?;
+        increasing("mach", &self.mach)?;
+        let (rows, columns) = (self.mach.len(), self.alpha_deg.len());
+        if self.values.len() != rows {
+            let found = self.values.len();
+            return Err(format!(
+                "values has {found} rows; it needs one for each of the {rows} Mach numbers"
+            ));
         }
-        if !(increases(&self.alpha_deg) && increases(&self.mach)) {
-            return Err("the angles and Mach numbers of a table must increase".into());
+        for (number, row) in self.values.iter().enumerate() {
+            let (number, found) = (number + 1, row.len());
+            if found != columns {
+                return Err(format!(
+                    "values: row {number} has {found} values; it needs one for each of the {columns} angles of attack"
+                ));
+            }
+            if !row.iter().all(|value| value.is_finite()) {
+                return Err(format!("values: row {number} holds a value that is not finite"));
+            }
         }
-        Ok(self)
+        Ok(())
     }
 
-    fn at(&self, alpha: f64, mach: f64) -> f64 {
+    /// Returns the value at an angle of attack (deg) and a Mach number.
+    pub(super) fn at(&self, alpha: f64, mach: f64) -> f64 {
         let (column, right) = place(&self.alpha_deg, alpha);
         let (row, above) = place(&self.mach, mach);
         let along = |row: &[f64]| {
@@ -98,9 +139,22 @@ impl Table {
     }
 }
 
+/// Refuses an axis of a table whose values are not finite, or do not increase.
+pub(super) fn increasing(name: &str, axis: &[f64]) -> Result<(), String> {
+    if axis.is_empty() || !axis.iter().all(|value| value.is_finite()) {
+        return Err(format!("{name} must hold finite values, one at least"));
+    }
+    match axis.windows(2).find(|pair| pair[0] >= pair[1]) {
+        Some([before, after, ..]) => {
+            Err(format!("{name} must increase, but {after} follows {before}"))
+        }
+        _ => Ok(()),
+    }
+}
+
 /// Position of a value between the points of an axis: the point before it, and the share of the way
 /// to the next.
-fn place(axis: &[f64], value: f64) -> (usize, f64) {
+pub(super) fn place(axis: &[f64], value: f64) -> (usize, f64) {
     let last = axis.len() - 1;
     let before = axis.partition_point(|point| *point <= value).saturating_sub(1).min(last);
     let next = (before + 1).min(last);
@@ -147,7 +201,7 @@ mod tests {
 
     #[test]
     fn oracle_tables_are_linear_between_their_points_and_constant_beyond() {
-        let text = "source = 'a test'\n[table]\nalpha_deg = [0, 10]\nmach = [2, 4]\nvalues = [[1, 3], [5, 11]]";
+        let text = "source = 'a test of tables'\n[table]\nalpha_deg = [0, 10]\nmach = [2, 4]\nvalues = [[1, 3], [5, 11]]";
         let table = read(text).unwrap();
         for (alpha, mach, value) in [
             (0.0, 2.0, 1.0),
@@ -163,10 +217,14 @@ mod tests {
 
     #[test]
     fn a_table_that_is_not_full_is_refused() {
-        let rows = "source = 'a test'\n[table]\nalpha_deg = [0, 10]\nmach = [2]\nvalues = [[1]]";
-        assert!(read(rows).unwrap_err().to_string().contains("one value per angle"));
-        let order = "source = 'a test'\n[table]\nalpha_deg = [0, 0]\nmach = [2]\nvalues = [[1, 2]]";
-        assert!(read(order).unwrap_err().to_string().contains("must increase"));
-        assert!(read("source = 'a test'").unwrap_err().to_string().contains("either"));
+        let rows =
+            "source = 'a test of tables'\n[table]\nalpha_deg = [0, 10]\nmach = [2]\nvalues = [[1]]";
+        assert!(read(rows).unwrap_err().to_string().contains("values: row 1 has 1 values"));
+        let order = "source = 'a test of tables'\n[table]\nalpha_deg = [0, 0]\nmach = [2]\nvalues = [[1, 2]]";
+        assert!(read(order).unwrap_err().to_string().contains("alpha_deg must increase"));
+        let rows =
+            "source = 'a test of tables'\n[table]\nalpha_deg = [0]\nmach = [2, 3]\nvalues = [[1]]";
+        assert!(read(rows).unwrap_err().to_string().contains("2 Mach numbers"));
+        assert!(read("source = 'a test of tables'").unwrap_err().to_string().contains("either"));
     }
 }

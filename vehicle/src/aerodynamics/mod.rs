@@ -6,90 +6,32 @@
 //! about the body axes.
 
 mod coefficient;
+mod groups;
+mod surfaces;
 mod units;
 
 pub use coefficient::Coefficient;
+pub use surfaces::SurfaceTable;
 pub use units::FOOT;
 
-use crate::data;
+pub(crate) use groups::{ExponentialAir, Forces, Heating, Moments, Reference};
+pub(crate) use surfaces::GivenTable;
+
 use crate::math::{exp, powf};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
-use units::{Area, BTU_PER_SQUARE_FOOT, Length, Mass, SLUG};
+use units::{BTU_PER_SQUARE_FOOT, SLUG};
 
 /// Air forces and moments of a vehicle.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
 pub struct Aerodynamics {
     /// Description of the vehicle and of the validity of the data.
-    title: String,
-    reference: Reference,
-    forces: Forces,
-    #[serde(default)]
-    moments: Moments,
-    heating: Heating,
-    air: ExponentialAir,
-}
-
-/// Reference quantities of the coefficients.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Reference {
-    source: String,
-    mass: Mass,
-    area: Area,
-    /// Span b of roll and yaw moments, and chord c of pitch moments; none without moments.
-    span: Option<Length>,
-    chord: Option<Length>,
-    /// Point about which the moments are given.
-    #[serde(default)]
-    moment_point: String,
-}
-
-/// Coefficients of the forces.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Forces {
-    lift: Coefficient,
-    drag: Coefficient,
-    /// Side force per radian of sideslip.
-    #[serde(default)]
-    side: Coefficient,
-}
-
-/// Coefficients of the moments: static ones per radian, damping ones per rad of p b/(2 V) and so
-/// on.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-struct Moments {
-    roll_by_sideslip: Coefficient,
-    yaw_by_sideslip: Coefficient,
-    /// Pitch per radian of α beyond the angle at which the vehicle is trimmed.
-    pitch_by_alpha: Coefficient,
-    roll_damping: Coefficient,
-    pitch_damping: Coefficient,
-    yaw_damping: Coefficient,
-    /// Effectiveness of the surfaces relative to the one of the effectors' data.
-    surfaces: Option<Coefficient>,
-}
-
-/// Heating of the leading edge: a polynomial of α times `factor` √ρ (V/10⁴ ft/s)^`exponent`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Heating {
-    source: String,
-    polynomial: Vec<f64>,
-    factor: f64,
-    exponent: f64,
-}
-
-/// Air whose density falls exponentially with altitude.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct ExponentialAir {
-    source: String,
-    density_slug_ft3: f64,
-    scale_height_ft: f64,
+    pub(crate) title: String,
+    pub(crate) reference: Reference,
+    pub(crate) forces: Forces,
+    pub(crate) moments: Moments,
+    pub(crate) heating: Option<Heating>,
+    pub(crate) air: Option<ExponentialAir>,
 }
 
 /// Accelerations by the air, m/s².
@@ -117,18 +59,6 @@ pub struct Flow {
 }
 
 impl Aerodynamics {
-    /// The Space Shuttle of J. T. Betts, "Practical Methods for Optimal Control and Estimation
-    /// Using Nonlinear Programming", chapter 6: forces and heating, no moments.
-    pub fn shuttle() -> Self {
-        data::embedded("shuttle.toml", include_str!("../../data/shuttle.toml"))
-    }
-
-    /// The vehicle of the papers: the Shuttle's forces at the same wing loading, and representative
-    /// moments.
-    pub fn papers() -> Self {
-        data::embedded("papers.toml", include_str!("../../data/papers.toml"))
-    }
-
     /// Returns the mass of the vehicle, kg.
     pub fn mass(&self) -> f64 {
         self.reference.mass.kilograms()
@@ -141,15 +71,15 @@ impl Aerodynamics {
 
     /// Returns the exponential air that belongs to the data: density at zero altitude (kg/m³) and
     /// scale height (m).
-    pub fn exponential_air(&self) -> [f64; 2] {
-        let ExponentialAir { density_slug_ft3, scale_height_ft, .. } = self.air;
-        [density_slug_ft3 * SLUG / (FOOT * FOOT * FOOT), scale_height_ft * FOOT]
+    pub fn exponential_air(&self) -> Option<[f64; 2]> {
+        let ExponentialAir { density_slug_ft3, scale_height_ft, .. } = self.air.as_ref()?;
+        Some([density_slug_ft3 * SLUG / (FOOT * FOOT * FOOT), scale_height_ft * FOOT])
     }
 
-    /// Returns the density of the exponential air at an altitude (m), kg/m³.
+    /// Returns the density of the exponential air at an altitude (m), kg/m³; 0 without one.
     pub fn density(&self, altitude: f64) -> f64 {
-        let [at_zero, scale_height] = self.exponential_air();
-        at_zero * exp(-altitude / scale_height)
+        self.exponential_air()
+            .map_or(0.0, |[at_zero, scale_height]| at_zero * exp(-altitude / scale_height))
     }
 
     /// Returns lift and drag per mass in exponential air at an altitude (m), a speed (m/s) and an
@@ -161,10 +91,9 @@ impl Aerodynamics {
         LiftAndDrag { lift, drag }
     }
 
-    /// Returns the coefficients of lift and drag at an angle of attack (rad), at a Mach number
-    /// above that of all tables.
-    pub fn lift_and_drag(&self, alpha: f64) -> [f64; 2] {
-        [&self.forces.lift, &self.forces.drag].map(|coefficient| coefficient.at(alpha, f64::MAX))
+    /// Returns the coefficients of lift and drag at an angle of attack (rad) and a Mach number.
+    pub fn lift_and_drag(&self, alpha: f64, mach: f64) -> [f64; 2] {
+        [&self.forces.lift, &self.forces.drag].map(|coefficient| coefficient.at(alpha, mach))
     }
 
     /// Returns drag, side force (to the right) and lift, N.
@@ -179,38 +108,47 @@ impl Aerodynamics {
         ]
     }
 
-    /// Returns the moment about the body axes (N m) without that of the surfaces, at body `rates`
-    /// (rad/s) and trimmed at the angle of attack `trim` (rad).
+    /// Returns span, chord and span, to which roll, pitch and yaw moments refer, m; none without
+    /// moments.
+    pub(crate) fn lengths(&self) -> Option<Vector3<f64>> {
+        let (span, chord) = (self.reference.span?.metres(), self.reference.chord?.metres());
+        Some(Vector3::new(span, chord, span))
+    }
+
+    /// Returns the point about which the moments are given, from the centre of mass along the body
+    /// axes, m.
+    pub fn moment_point(&self) -> Option<Vector3<f64>> {
+        self.reference.moment_point_metres.map(Vector3::from)
+    }
+
+    /// Returns the moment about the body axes and the point of the moments (N m) without that of
+    /// the surfaces, at body `rates` (rad/s) and trimmed at the angle of attack `trim` (rad).
     pub fn moment(&self, flow: &Flow, rates: &Vector3<f64>, trim: f64) -> Vector3<f64> {
-        let (Some(span), Some(chord)) = (&self.reference.span, &self.reference.chord) else {
-            return Vector3::zeros();
-        };
+        let Some(lengths) = self.lengths() else { return Vector3::zeros() };
         let Flow { dynamic_pressure, mach, speed, alpha, beta } = *flow;
         let of = |coefficient: &Coefficient| coefficient.at(alpha, mach);
-        let lengths = Vector3::new(span.metres(), chord.metres(), span.metres());
+        let moments = &self.moments;
         let damping = if speed > 0.0 {
             let turned = rates.component_mul(&lengths) / (2.0 * speed);
-            let Moments { roll_damping, pitch_damping, yaw_damping, .. } = &self.moments;
             turned.component_mul(&Vector3::new(
-                of(roll_damping),
-                of(pitch_damping),
-                of(yaw_damping),
+                of(&moments.roll_damping),
+                of(&moments.pitch_damping),
+                of(&moments.yaw_damping),
             ))
         } else {
             Vector3::zeros()
         };
-        let Moments { roll_by_sideslip, yaw_by_sideslip, pitch_by_alpha, .. } = &self.moments;
         let fixed = Vector3::new(
-            of(roll_by_sideslip) * beta,
-            of(pitch_by_alpha) * (alpha - trim),
-            of(yaw_by_sideslip) * beta,
+            of(&moments.roll_by_sideslip) * beta + of(&moments.roll),
+            of(&moments.pitch_by_alpha) * (alpha - trim) + of(&moments.pitch),
+            of(&moments.yaw_by_sideslip) * beta + of(&moments.yaw),
         );
         (fixed + damping).component_mul(&lengths) * (dynamic_pressure * self.area())
     }
 
     /// Returns the pitch moment (N m) that belongs to a coefficient.
     pub fn pitch_moment(&self, flow: &Flow, coefficient: f64) -> f64 {
-        let chord = self.reference.chord.as_ref().map_or(0.0, Length::metres);
+        let chord = self.lengths().map_or(0.0, |lengths| lengths.y);
         flow.dynamic_pressure * self.area() * chord * coefficient
     }
 
@@ -229,9 +167,10 @@ impl Aerodynamics {
     }
 
     /// Returns the heat flux into the leading edge (W/m²) in air of a density (kg/m³), at a speed
-    /// (m/s) and an angle of attack (rad).
+    /// (m/s) and an angle of attack (rad); 0 without data of the heating.
     pub fn heat_flux(&self, density: f64, speed: f64, alpha: f64) -> f64 {
-        let Heating { polynomial: factors, factor, exponent, .. } = &self.heating;
+        let Some(heating) = &self.heating else { return 0.0 };
+        let Heating { polynomial: factors, factor, exponent, .. } = heating;
         let density = density * FOOT * FOOT * FOOT / SLUG;
         let flux = factor * density.sqrt() * powf(speed / FOOT / 1e4, *exponent);
         coefficient::polynomial(factors, alpha.to_degrees()) * flux * BTU_PER_SQUARE_FOOT
@@ -239,41 +178,22 @@ impl Aerodynamics {
 
     /// Returns the power of the speed with which the heat flux grows.
     pub fn heating_exponent(&self) -> f64 {
-        self.heating.exponent
+        self.heating.as_ref().map_or(0.0, |heating| heating.exponent)
     }
 
     /// Returns the name and the source of each group of numbers.
     pub fn sources(&self) -> Vec<(&'static str, &str)> {
-        let Moments {
-            roll_by_sideslip,
-            yaw_by_sideslip,
-            pitch_by_alpha,
-            roll_damping,
-            pitch_damping,
-            yaw_damping,
-            surfaces,
-        } = &self.moments;
-        let coefficients = [
-            ("lift", Some(&self.forces.lift)),
-            ("drag", Some(&self.forces.drag)),
-            ("side force", Some(&self.forces.side)),
-            ("roll by sideslip", Some(roll_by_sideslip)),
-            ("yaw by sideslip", Some(yaw_by_sideslip)),
-            ("pitch by angle of attack", Some(pitch_by_alpha)),
-            ("roll damping", Some(roll_damping)),
-            ("pitch damping", Some(pitch_damping)),
-            ("yaw damping", Some(yaw_damping)),
-            ("surfaces", surfaces.as_ref()),
-        ];
-        let given = coefficients.into_iter().filter_map(|(name, coefficient)| {
-            Some((name, coefficient.filter(|coefficient| !coefficient.is_zero())?.source()))
-        });
+        let moments = self.moments.all();
+        let coefficients = [("lift", &self.forces.lift), ("drag", &self.forces.drag)];
+        let given = coefficients.into_iter().chain([("side force", &self.forces.side)]);
+        let given = given.chain(moments).filter(|(_, coefficient)| !coefficient.is_zero());
         let others = [
-            ("reference quantities", self.reference.source.as_str()),
-            ("heating", self.heating.source.as_str()),
-            ("exponential air", self.air.source.as_str()),
+            Some(("reference quantities", self.reference.source.as_str())),
+            self.heating.as_ref().map(|heating| ("heating", heating.source.as_str())),
+            self.air.as_ref().map(|air| ("exponential air", air.source.as_str())),
         ];
-        others.into_iter().chain(given).collect()
+        let given = given.map(|(name, coefficient)| (name, coefficient.source()));
+        others.into_iter().flatten().chain(given).collect()
     }
 
     /// Returns the description of the vehicle and of the validity of the data.

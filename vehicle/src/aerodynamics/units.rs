@@ -1,5 +1,6 @@
 //! Units in which the sources of the data print their numbers.
 
+use crate::given;
 use serde::{Deserialize, Serialize};
 
 /// Foot, m.
@@ -11,12 +12,18 @@ pub(super) const BTU_PER_SQUARE_FOOT: f64 = 1_055.055_852_62 / (FOOT * FOOT);
 
 /// Mass of a vehicle as its source gives it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]
-pub(super) enum Mass {
-    Kilograms(f64),
+pub(crate) enum Mass {
+    /// Mass in kg.
+    Kilograms(#[serde(deserialize_with = "given::positive")] f64),
     /// Weight, and the acceleration of gravity by which the mass follows from it.
     Weight {
+        /// Weight in lbf.
+        #[serde(deserialize_with = "given::positive")]
         pounds: f64,
+        /// Acceleration of gravity in ft/s².
+        #[serde(deserialize_with = "given::positive")]
         gravity_ft_s2: f64,
     },
 }
@@ -32,10 +39,13 @@ impl Mass {
 
 /// Area as its source gives it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]
-pub(super) enum Area {
-    SquareMetres(f64),
-    SquareFeet(f64),
+pub(crate) enum Area {
+    /// Area in m².
+    SquareMetres(#[serde(deserialize_with = "given::positive")] f64),
+    /// Area in ft².
+    SquareFeet(#[serde(deserialize_with = "given::positive")] f64),
 }
 
 impl Area {
@@ -49,15 +59,18 @@ impl Area {
 
 /// Length as its source gives it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]
-pub(super) enum Length {
-    Metres(f64),
-    Feet(f64),
+pub(crate) enum Length {
+    /// Length in m.
+    Metres(#[serde(deserialize_with = "given::positive")] f64),
+    /// Length in ft.
+    Feet(#[serde(deserialize_with = "given::positive")] f64),
 }
 
 impl Length {
-    pub(super) fn metres(&self) -> f64 {
-        match *self {
+    pub(super) fn metres(self) -> f64 {
+        match self {
             Self::Metres(length) => length,
             Self::Feet(length) => length * FOOT,
         }

@@ -2,6 +2,7 @@
 
 use super::equations::{self, Load};
 use super::{Held, Input, Plant};
+use crate::actuators::Conditions;
 use crate::air::AlongTheWay;
 use crate::entry::{self, Motion, Passage, great_circle};
 use crate::error::Error;
@@ -75,13 +76,13 @@ impl Plant {
         self.entry.as_ref().map_or(0.0, |entry| great_circle(&entry.planet, self.origin, here).0)
     }
 
-    /// Effectiveness of the surfaces relative to that for which the actuators were made.
-    pub(super) fn pressure_ratio(&self, time: f64) -> f64 {
+    /// Flow past the surfaces, if there are any.
+    pub(super) fn conditions(&self, time: f64) -> Conditions {
         match (&self.entry, &self.actuators) {
             (Some(entry), Some(_)) => {
-                entry.passage(time, &self.motion, &self.angles()).surface_pressure
+                entry.passage(time, &self.motion, &self.angles()).conditions()
             }
-            _ => 1.0,
+            _ => Conditions::Fixed(self.state[0]),
         }
     }
 
@@ -108,9 +109,9 @@ impl Plant {
             let angle_rates = equations::angle_rates(self.kinematics, &matrix, attitude, turn_rate);
             return state(&angle_rates, &acceleration);
         }
-        let ratio = (elapsed, passage.surface_pressure);
+        let conditions = (elapsed, passage.conditions());
         let load = Load {
-            moment: self.control_moment(input, held.delayed, &held.drive, ratio)
+            moment: self.control_moment(input, held.delayed, &held.drive, conditions)
                 + self.disturbance_moment(time, input, held)
                 + entry.moment(passage, &rates, input.trim),
             delta: held.delta(),

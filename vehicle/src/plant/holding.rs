@@ -79,8 +79,8 @@ impl Plant {
             }
             _ => {
                 let (angles, rates) = (self.angles(), self.rates());
-                let ratio = self.pressure_ratio(time);
-                let moment = self.control_moment(input, delayed, &drive, (0.0, ratio));
+                let conditions = self.conditions(time);
+                let moment = self.control_moment(input, delayed, &drive, (0.0, conditions));
                 let view = View {
                     body: &self.body,
                     kinematics: self.kinematics,

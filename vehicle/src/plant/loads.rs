@@ -3,7 +3,7 @@
 use super::config::Calibration;
 use super::equations::{self, Load, Partials};
 use super::{Entering, Held, Plant};
-use crate::actuators::{Command, Drive};
+use crate::actuators::{Actuators, Command, Conditions, Drive};
 use crate::effectors::{JETS, SURFACES, Surfaces};
 use crate::entry::Prescribed;
 use crate::state::State;
@@ -60,21 +60,25 @@ impl Plant {
         input.disturbance_moment + disturbance_moment
     }
 
+    /// Whether the moment of some surfaces is not linear in the deflections.
+    pub fn has_surface_tables(&self) -> bool {
+        self.actuators.as_ref().is_some_and(Actuators::has_tables)
+    }
+
     /// Control moment (N m) at the time `elapsed` (s) after the present one, provided that the
-    /// drive does not change until then, and with the effectiveness of the surfaces times
-    /// `pressure_ratio`.
+    /// drive does not change until then.
     pub(super) fn control_moment(
         &self,
         input: &Input,
         delayed: Option<Vector3<f64>>,
         drive: &Drive,
-        (elapsed, pressure_ratio): (f64, f64),
+        (elapsed, conditions): (f64, Conditions),
     ) -> Vector3<f64> {
         self.actuators.as_ref().map_or_else(
             || self.converted(&delayed.unwrap_or(input.moment)),
             |actuators| {
                 let deflections = self.deflections + actuators.rates(drive) * elapsed;
-                actuators.moment(drive, &deflections, pressure_ratio)
+                actuators.moment(drive, &deflections, &conditions)
             },
         )
     }
@@ -94,8 +98,9 @@ impl Plant {
         input: &Input,
         held: &Held,
     ) -> Vector3<f64> {
-        let ratio = entering.map_or(1.0, |entering| entering.passage.surface_pressure);
-        self.control_moment(input, held.delayed, &held.drive, (0.0, ratio))
+        let fixed = Conditions::Fixed(self.state[0]);
+        let conditions = entering.map_or(fixed, |entering| entering.passage.conditions());
+        self.control_moment(input, held.delayed, &held.drive, (0.0, conditions))
     }
 
     /// Rate of each deflection, rad/s: plus or minus the rate limit, or zero.
@@ -142,11 +147,21 @@ impl Plant {
     }
 
     /// Returns the loads without an entry flight at `time` (s), which is `elapsed` (s) after the
-    /// time of the deflections.
-    pub(super) fn load(&self, time: f64, input: &Input, held: &Held, elapsed: f64) -> Load {
+    /// time of the deflections, at an angle of attack (rad).
+    pub(super) fn load(
+        &self,
+        (time, elapsed): (f64, f64),
+        alpha: f64,
+        input: &Input,
+        held: &Held,
+    ) -> Load {
         Load {
-            moment: self.control_moment(input, held.delayed, &held.drive, (elapsed, 1.0))
-                + self.disturbance_moment(time, input, held),
+            moment: self.control_moment(
+                input,
+                held.delayed,
+                &held.drive,
+                (elapsed, Conditions::Fixed(alpha)),
+            ) + self.disturbance_moment(time, input, held),
             delta: held.delta(),
             turn_rate: self.trajectory(None, input).1,
         }
@@ -171,12 +186,11 @@ impl Plant {
         input: &Input,
         held: &Held,
     ) -> State {
-        match (&self.entry, entering) {
-            (Some(entry), Some(entering)) => {
-                self.turned(entry, entering, (time, 0.0), &self.state, (input, held))
-            }
-            _ => self.derivative_at(time, &self.state, &self.load(time, input, held, 0.0)),
+        if let (Some(entry), Some(entering)) = (&self.entry, entering) {
+            return self.turned(entry, entering, (time, 0.0), &self.state, (input, held));
         }
+        let load = self.load((time, 0.0), self.state[0], input, held);
+        self.derivative_at(time, &self.state, &load)
     }
 
     /// Partial derivatives of [`Plant::derivative`] without an entry flight, and those of the turn
@@ -187,7 +201,7 @@ impl Plant {
         input: &Input,
         held: &Held,
     ) -> (Partials, SMatrix<f64, 3, TRAJECTORY>) {
-        let load = self.load(time, input, held, 0.0);
+        let load = self.load((time, 0.0), self.state[0], input, held);
         let mut partials =
             equations::partial_derivatives(&self.body, self.kinematics, &self.state, &load);
         if self.calibration.is_some() {

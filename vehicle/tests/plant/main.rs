@@ -69,6 +69,7 @@ fn actuated(initial: State, jet_mode: JetMode) -> Config {
         effectors: Effectors::published(),
         jet_mode,
         dynamic_pressure,
+        mach: 9.8,
         aerodynamics_scale: 1.0,
     };
     Config { actuators: Some(actuators), ..undisturbed(initial, 0.05) }
