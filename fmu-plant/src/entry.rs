@@ -21,11 +21,20 @@ pub(crate) enum Translation {
 /// Data of the air's forces and moments.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Choice)]
 pub(crate) enum Vehicle {
-    /// The vehicle of the papers: representative forces and moments.
+    /// The vehicle of the papers: representative forces and moments; or that of vehicle.file.
     #[default]
     Papers,
     /// The Space Shuttle of Betts: forces and heating, no moments.
     Shuttle,
+}
+
+/// File of the vehicle.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, Declared)]
+pub(crate) struct VehicleFile {
+    /// Path of a TOML file with the vehicle, or name of a file in the resources of the FMU; empty
+    /// for a built-in vehicle.
+    #[setting(name = "vehicle.file")]
+    pub(crate) file: String,
 }
 
 /// Parameters of an entry flight.
@@ -120,12 +129,12 @@ impl EntryParameters {
         self.translation == Translation::Entry
     }
 
-    /// Returns the configuration of the entry flight, with a factor on the density of the air, or
-    /// `None` without one.
-    pub(crate) fn config(&self, density_scale: f64) -> Option<Config> {
+    /// Returns the configuration of the entry flight of a vehicle, with a factor on the density of
+    /// the air, or `None` without one.
+    pub(crate) fn config(&self, density_scale: f64, vehicle: &vehicle::Vehicle) -> Option<Config> {
         let aerodynamics = match (self.translation, self.vehicle) {
             (Translation::Given, _) => return None,
-            (Translation::Entry, Vehicle::Papers) => Aerodynamics::papers(),
+            (Translation::Entry, Vehicle::Papers) => vehicle.aerodynamics.clone(),
             (Translation::Entry, Vehicle::Shuttle) => Aerodynamics::shuttle(),
         };
         Some(Config {

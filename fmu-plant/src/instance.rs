@@ -47,6 +47,7 @@ impl Model for ReentryPlant {
             input: Input::default(),
             command: Command::default(),
             output: Output::default(),
+            vehicle: None,
             plant: None,
             fixed: Passage::default(),
             event_driven: false,
@@ -56,7 +57,8 @@ impl Model for ReentryPlant {
     fn initialize(&mut self, context: &Context) -> Result<(), Failure> {
         let failed = |error: vehicle::Error| Failure::Error(error.to_string());
         self.fixed = self.parameters.fixed().map_err(failed)?.0;
-        let config = self.parameters.config().map_err(failed)?;
+        self.vehicle = self.parameters.load_vehicle(context)?;
+        let config = self.parameters.config(self.vehicle.as_deref()).map_err(failed)?;
         self.plant = Some(Box::new(Plant::new(&config, context.start_time).map_err(failed)?));
         self.event_driven = false;
         Ok(())
@@ -110,14 +112,17 @@ impl Model for ReentryPlant {
     /// parameters, and otherwise with a new one.
     fn restored(&mut self, from: Restoration<'_, Self>) -> Result<(), Failure> {
         let Some(plant) = self.plant.as_ref().filter(|_| from.initialized) else { return Ok(()) };
+        self.check_vehicle(from.before)?;
         let failed = |error: vehicle::Error| Failure::Error(error.to_string());
         let before = from.before.plant.as_ref().filter(|before| {
-            before.start_time() == from.start_time && from.before.parameters == self.parameters
+            before.start_time() == from.start_time
+                && from.before.parameters == self.parameters
+                && from.before.vehicle == self.vehicle
         });
         let fits = if let Some(before) = before {
             plant.fits(before, from.time, from.failed)
         } else {
-            let config = self.parameters.config().map_err(failed)?;
+            let config = self.parameters.config(self.vehicle.as_deref()).map_err(failed)?;
             plant.fits(
                 &Plant::new(&config, from.start_time).map_err(failed)?,
                 from.time,
@@ -198,7 +203,8 @@ impl Model for ReentryPlant {
                 "variable {unknown_variable} by variable {known_variable}: {text}"
             )));
         };
-        if self.parameters.entry.is_entry() || matches!(unknown, Unknown::Flight(_)) {
+        let is_curved = self.ready()?.has_surface_tables();
+        if is_curved || self.parameters.entry.is_entry() || matches!(unknown, Unknown::Flight(_)) {
             return self.difference(time, unknown, known);
         }
         self.given_derivative(time, unknown, known)

@@ -5,6 +5,7 @@
 mod derivatives;
 mod entry;
 mod instance;
+mod own_vehicle;
 mod parameters;
 mod plant;
 mod roles;

@@ -1,10 +1,9 @@
 //! Parameters of the FMU. Their defaults are the scenario of Chai 2022.
 
-use crate::entry::EntryParameters;
+use crate::entry::{EntryParameters, VehicleFile};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 use settings::{Choice, Declared};
-use vehicle::Scenario;
 use vehicle::actuators::{self, JetMode};
 use vehicle::atmosphere::{Air, Flight, air};
 use vehicle::axes::{ANGLES, AXES, Entry, RATES};
@@ -13,7 +12,6 @@ use vehicle::disturbance::{
     Disturbance, DisturbanceKind, DisturbanceTable, MomentWave, Row, SineMoment,
 };
 use vehicle::dynamics::Inertia;
-use vehicle::effectors::Effectors;
 use vehicle::entry::{Motion, Passage};
 use vehicle::error::Error;
 use vehicle::fixes::Devices;
@@ -25,6 +23,7 @@ use vehicle::sensors::{self, Line, PerSensor};
 use vehicle::transport;
 use vehicle::triad::Triad;
 use vehicle::turntable;
+use vehicle::{Scenario, Vehicle};
 
 /// Default of the longest integration step, s.
 const STEP: f64 = 0.01;
@@ -138,6 +137,8 @@ pub(crate) struct Parameters {
     pub(crate) table: Table,
     #[setting(skip)]
     pub(crate) entry: EntryParameters,
+    #[setting(skip)]
+    pub(crate) vehicle: VehicleFile,
 }
 
 /// Names of the two sinusoids of the disturbance moment.
@@ -283,6 +284,7 @@ impl Default for Parameters {
             converter: Converter::default(),
             table: Table::default(),
             entry: EntryParameters::default(),
+            vehicle: VehicleFile::default(),
         }
     }
 }
@@ -327,15 +329,16 @@ impl Parameters {
     }
 
     /// Configuration of the actuators, or `None` if the control moment is an input.
-    fn actuators(&self) -> Result<Option<actuators::Config>, Error> {
+    fn actuators(&self, vehicle: &Vehicle) -> Result<Option<actuators::Config>, Error> {
         if self.actuation == Actuation::Moment {
             return Ok(None);
         }
-        let effectors = Effectors::published();
+        let effectors = vehicle.effectors.clone().unwrap_or_default();
         Ok(Some(actuators::Config {
             effectors: if self.jet_symmetric { effectors.symmetric() } else { effectors },
             jet_mode: if self.jet_duty { JetMode::Duty } else { JetMode::OnOff },
             dynamic_pressure: self.dynamic_pressure()?,
+            mach: self.flight.mach,
             aerodynamics_scale: self.aerodynamics_scale,
         }))
     }
@@ -358,13 +361,15 @@ impl Parameters {
         Some(sensors::Config { triads, line, devices, seed })
     }
 
-    /// Configuration of the plant that these parameters describe.
+    /// Configuration of the plant that these parameters describe, with the vehicle of a file if
+    /// there is one.
     ///
     /// # Errors
     /// Names the parameter that is out of range.
-    pub(crate) fn config(&self) -> Result<Config, Error> {
+    pub(crate) fn config(&self, file: Option<&Vehicle>) -> Result<Config, Error> {
+        let vehicle = file.unwrap_or_else(|| Vehicle::papers());
         Ok(Config {
-            inertia: self.inertia,
+            inertia: vehicle.inertia.unwrap_or(self.inertia),
             inertia_scale: self.inertia_scale,
             initial: state(&self.initial.angles(), &self.initial.rates),
             disturbance: Disturbance {
@@ -380,10 +385,10 @@ impl Parameters {
                 end: self.end,
             },
             motion: if self.entry.is_entry() { self.entry.start.motion() } else { self.fixed()?.1 },
-            entry: self.entry.config(self.density_scale),
+            entry: self.entry.config(self.density_scale, vehicle),
             kinematics: self.kinematics,
             earth_rate: self.earth_rate,
-            actuators: self.actuators()?,
+            actuators: self.actuators(vehicle)?,
             moment_delay: self.converter.delay,
             moment_resolution: self.converter.resolution,
             calibration: self.sensing.calibrates.then_some(self.sensing.sequence),

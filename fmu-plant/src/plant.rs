@@ -4,6 +4,7 @@ use crate::parameters::Parameters;
 use fmi2_export::Failure;
 use nalgebra::{SVector, Vector3};
 use serde::{Deserialize, Serialize};
+use vehicle::Vehicle;
 use vehicle::actuators::Command;
 use vehicle::effectors::{SURFACES, Surfaces};
 use vehicle::entry::{Motion, Passage};
@@ -30,6 +31,8 @@ pub struct ReentryPlant {
     pub(crate) input: Input,
     pub(crate) command: Command,
     pub(crate) output: Output,
+    /// Vehicle that was read from vehicle.file at initialization.
+    pub(crate) vehicle: Option<Box<Vehicle>>,
     /// Simulated plant, which exists from initialization on. Every step takes it out and puts it
     /// back: the box spares moving all of it.
     pub(crate) plant: Option<Box<Plant>>,

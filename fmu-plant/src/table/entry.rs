@@ -33,6 +33,7 @@ const ATTITUDE: [&str; 3] = ["attitude.alpha", "attitude.beta", "attitude.sigma"
 pub(super) fn entry(variables: PlantVariables) -> PlantVariables {
     let variables = quantities(rates(states(variables)));
     profile(inputs(variables).settings(|m| &mut m.parameters.entry))
+        .settings(|m| &mut m.parameters.vehicle)
 }
 
 fn states(mut variables: PlantVariables) -> PlantVariables {

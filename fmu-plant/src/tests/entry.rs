@@ -14,7 +14,7 @@ use vehicle::effectors::Surfaces;
 use vehicle::entry::Trim;
 
 /// An entry flight without disturbance at 45 km, through wind, with surfaces and jets.
-fn entering(instance: &mut ReentryPlant) {
+pub(super) fn entering(instance: &mut ReentryPlant) {
     super::actuate(instance);
     instance.parameters.kind = DisturbanceKind::None;
     instance.parameters.jet_duty = true;

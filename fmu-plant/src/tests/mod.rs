@@ -6,6 +6,7 @@ mod description;
 mod entry;
 mod model_exchange;
 mod outputs;
+mod own_vehicle;
 mod refusals;
 mod sensors;
 
