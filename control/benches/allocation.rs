@@ -18,7 +18,11 @@ fn command(sample: u32) -> Command {
     let t = f64::from(sample) * 0.01;
     let disturbance = 1e4 * (0.5 + (0.1 * t).sin() + t.sin());
     let manoeuvre = Vector3::new(-1.5e5, 2.5e5, 1e5) * (1.0 - t) * (-t).exp();
-    Command { moment: manoeuvre - Vector3::repeat(disturbance), dynamic_pressure: 2859.0 }
+    Command {
+        moment: manoeuvre - Vector3::repeat(disturbance),
+        dynamic_pressure: 2859.0,
+        ..Command::default()
+    }
 }
 
 fn allocations(criterion: &mut Criterion) {

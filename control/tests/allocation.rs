@@ -23,7 +23,7 @@ fn allocator(method: Method) -> Allocator {
 }
 
 fn command(moment: [f64; 3], dynamic_pressure: f64) -> Command {
-    Command { moment: Vector3::from(moment), dynamic_pressure }
+    Command { moment: Vector3::from(moment), dynamic_pressure, ..Command::default() }
 }
 
 /// Returns the memory after `samples` samples of a constant command.

@@ -3,10 +3,11 @@
 use control::allocation::{
     AllocationReport, AllocationStatus, Allocator, Command, Memory, Settings,
 };
+use controller_export::own_vehicle::OwnVehicle;
 use controller_export::sampled::{SampledFmu, SampledInstance, Ticks};
 use controller_export::table::{AXES, capital};
 use fmi2_export::table::{Common, discrete_output, input, parameter};
-use fmi2_export::{Description, Failure, VariableTable};
+use fmi2_export::{Context, Description, Failure, VariableTable};
 use model_description::DefaultExperiment;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
@@ -21,6 +22,7 @@ pub type ControlAllocator = SampledFmu<AllocatorInstance>;
 #[derive(Serialize, Deserialize)]
 pub struct AllocatorInstance {
     pub(crate) settings: Settings,
+    pub(crate) own: OwnVehicle,
     command: Command,
     output: Output,
 }
@@ -53,6 +55,15 @@ impl From<&Memory> for Output {
     }
 }
 
+impl AllocatorInstance {
+    /// Returns the settings with the surfaces and jets that are in force.
+    fn in_force(&self) -> Settings {
+        let effectors = self.own.read().and_then(|vehicle| vehicle.effectors.clone());
+        let effectors = effectors.unwrap_or_else(|| self.settings.effectors.clone());
+        Settings { effectors, ..self.settings.clone() }
+    }
+}
+
 impl SampledInstance for AllocatorInstance {
     type Device = Allocator;
     type Memory = Memory;
@@ -77,7 +88,8 @@ impl SampledInstance for AllocatorInstance {
                 outputs(inputs(VariableTable::new()))
                     .settings(|m: &mut ControlAllocator| &mut m.settings),
             )
-            .settings(|m| &mut m.settings.pwpf),
+            .settings(|m| &mut m.settings.pwpf)
+            .settings(|m| &mut m.own),
         }
     }
 
@@ -86,18 +98,46 @@ impl SampledInstance for AllocatorInstance {
         let dynamic_pressure = settings.effectors.reference_pressure;
         Self {
             settings,
-            command: Command { moment: Vector3::zeros(), dynamic_pressure },
+            own: OwnVehicle::default(),
+            command: Command { dynamic_pressure, ..Command::default() },
             output: Output::from(&Memory::default()),
         }
     }
 
+    /// Reads the vehicle, whose surfaces and jets take the place of the parameters. A parameter
+    /// that is set as well would be in vain.
+    fn load(&mut self, context: &Context) -> Result<(), Failure> {
+        self.own.load(context)?;
+        let Some(vehicle) = self.own.read() else { return Ok(()) };
+        if vehicle.effectors.is_none() {
+            let text = "vehicle.file gives neither surfaces nor jets, which the allocator needs";
+            return Err(Failure::Error(text.into()));
+        }
+        let (start, set) = (Settings::published().effectors, &self.settings.effectors);
+        let given = [
+            ("limit.surfaceMin", start.min != set.min),
+            ("limit.surfaceMax", start.max != set.max),
+            ("limit.surfaceRate", start.rate != set.rate),
+            ("surfaceAllowed", start.allowed != set.allowed),
+            ("dynamicPressure.reference", start.reference_pressure != set.reference_pressure),
+            ("surfaceMoment", start.effectiveness != set.effectiveness),
+            ("jetMoment", start.jet_moments != set.jet_moments),
+        ];
+        let given = given.into_iter().find_map(|(name, is_set)| is_set.then_some(name));
+        given.map_or(Ok(()), |name| {
+            Err(Failure::Error(format!(
+                "{name} is set, but vehicle.file gives surfaces and jets: leave {name} at its start value"
+            )))
+        })
+    }
+
     fn design(&self) -> Result<Allocator, Failure> {
-        let allocator = Allocator::new(self.settings.clone());
+        let allocator = Allocator::new(self.in_force());
         allocator.map_err(|error| Failure::Error(error.to_string()))
     }
 
     fn is_designed(&self, allocator: &Allocator) -> bool {
-        *allocator.settings() == self.settings
+        *allocator.settings() == self.in_force()
     }
 
     fn period(allocator: &Allocator) -> f64 {
@@ -111,8 +151,20 @@ impl SampledInstance for AllocatorInstance {
         {
             return Err(Failure::Error("moment or dynamicPressure is not a finite number".into()));
         }
+        if !(command.alpha.is_finite() && command.mach.is_finite()) {
+            return Err(Failure::Error("flow.alpha or flow.mach is not a finite number".into()));
+        }
+        let has_tables = !allocator.settings().effectors.tables.is_empty();
+        if has_tables && command.mach <= 0.0 {
+            let text = "flow.mach is 0, but surfaces of vehicle.file have tables over the Mach number: connect flow.mach and flow.alpha";
+            return Err(Failure::Error(text.into()));
+        }
         ticks.evaluate_with(command, |memory, tick| allocator.update(memory, tick, &command));
         Ok(())
+    }
+
+    fn problem(&self, before: &Self) -> Option<&'static str> {
+        self.own.problem(&before.own)
     }
 
     fn warning(before: &Memory, after: &Memory) -> Option<&'static str> {
@@ -128,7 +180,8 @@ impl SampledInstance for AllocatorInstance {
 
 type Variables = VariableTable<ControlAllocator>;
 
-const INPUTS: [&str; 4] = ["moment.x", "moment.y", "moment.z", "dynamicPressure"];
+const INPUTS: [&str; 6] =
+    ["moment.x", "moment.y", "moment.z", "dynamicPressure", "flow.alpha", "flow.mach"];
 
 fn inputs(mut table: Variables) -> Variables {
     for (i, (axis, meaning)) in AXES.into_iter().enumerate() {
@@ -140,8 +193,17 @@ fn inputs(mut table: Variables) -> Variables {
         "dynamicPressure",
         "Dynamic pressure, to which the moments of the surfaces are proportional",
     );
+    let flow = |name: &str, text: &str| {
+        let text =
+            format!("{text}, on which the moments of surfaces with tables in vehicle.file depend");
+        input(name, &text).optional().real()
+    };
     table
         .real(pressure.real().unit("Pa").min(0.0).nominal(1e3), |m| &mut m.command.dynamic_pressure)
+        .real(flow("flow.alpha", "Angle of attack").unit("rad").nominal(0.1), |m| {
+            &mut m.command.alpha
+        })
+        .real(flow("flow.mach", "Mach number").min(0.0).nominal(10.0), |m| &mut m.command.mach)
 }
 
 fn sampled(name: &str, text: &str) -> Common {

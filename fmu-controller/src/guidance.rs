@@ -1,10 +1,11 @@
 //! `EntryGuidance`: the reference of the attitude along an entry flight.
 
 use control::guidance::{Command, Guidance, Loads, Memory, Navigation, PERIOD, Settings};
+use controller_export::own_vehicle::OwnVehicle;
 use controller_export::sampled::{SampledFmu, SampledInstance, Ticks};
 use controller_export::table::{ANGLES, vector};
 use fmi2_export::table::{Common, Real, discrete_output, input};
-use fmi2_export::{Description, Failure, VariableTable};
+use fmi2_export::{Context, Description, Failure, VariableTable};
 use model_description::DefaultExperiment;
 use serde::{Deserialize, Serialize};
 use vehicle::entry::{Motion, QUANTITIES, Quantity};
@@ -16,6 +17,7 @@ pub type EntryGuidance = SampledFmu<GuidanceInstance>;
 #[derive(Serialize, Deserialize)]
 pub struct GuidanceInstance {
     pub(crate) settings: Settings,
+    pub(crate) own: OwnVehicle,
     pub(crate) navigation: Navigation,
     pub(crate) output: Output,
 }
@@ -53,7 +55,8 @@ impl SampledInstance for GuidanceInstance {
                 step: PERIOD,
             },
             table: outputs(inputs(VariableTable::new()))
-                .settings(|m: &mut EntryGuidance| &mut m.settings),
+                .settings(|m: &mut EntryGuidance| &mut m.settings)
+                .settings(|m| &mut m.own),
         }
     }
 
@@ -61,6 +64,7 @@ impl SampledInstance for GuidanceInstance {
         let degrees = f64::to_radians;
         Self {
             settings: Settings::default(),
+            own: OwnVehicle::default(),
             navigation: Navigation {
                 // The start of the plant's entry flight.
                 motion: Motion::new(
@@ -77,12 +81,18 @@ impl SampledInstance for GuidanceInstance {
         }
     }
 
+    fn load(&mut self, context: &Context) -> Result<(), Failure> {
+        self.own.load(context)
+    }
+
     fn design(&self) -> Result<Guidance, Failure> {
-        Guidance::new(self.settings).map_err(|error| Failure::Error(error.to_string()))
+        let aerodynamics = self.own.vehicle().aerodynamics.clone();
+        Guidance::of(self.settings, aerodynamics).map_err(|error| Failure::Error(error.to_string()))
     }
 
     fn is_designed(&self, guidance: &Guidance) -> bool {
         *guidance.settings() == self.settings
+            && *guidance.aerodynamics() == self.own.vehicle().aerodynamics
     }
 
     fn period(_guidance: &Guidance) -> f64 {
@@ -125,6 +135,10 @@ impl SampledInstance for GuidanceInstance {
 
     fn fits(guidance: &Guidance, memory: &Memory) -> bool {
         guidance.fits(memory)
+    }
+
+    fn problem(&self, before: &Self) -> Option<&'static str> {
+        self.own.problem(&before.own)
     }
 }
 

@@ -14,7 +14,8 @@ use nalgebra::{SMatrix, Vector3};
 use optimum::{OptimalAllocation, Weights};
 use pwpf::Modulator;
 use serde::{Deserialize, Serialize};
-use vehicle::effectors::{JETS, Jets, Surfaces};
+use vehicle::aerodynamics::Flow;
+use vehicle::effectors::{Effectors, JETS, Jets, SURFACES, Surfaces};
 
 /// Effectiveness D_RCS of the jets, N m at full thrust.
 type JetMatrix = SMatrix<f64, 3, JETS>;
@@ -26,6 +27,17 @@ pub struct Command {
     pub moment: Vector3<f64>,
     /// Dynamic pressure of the flow, Pa.
     pub dynamic_pressure: f64,
+    /// Angle of attack, on which surfaces with tables depend, rad.
+    pub alpha: f64,
+    /// Mach number, on which surfaces with tables depend.
+    pub mach: f64,
+}
+
+impl Command {
+    fn flow(&self) -> Flow {
+        let Self { dynamic_pressure, alpha, mach, .. } = *self;
+        Flow { dynamic_pressure, alpha, mach, ..Flow::default() }
+    }
 }
 
 /// Origin of the allocation in force.
@@ -84,7 +96,8 @@ pub struct Memory {
 ///
 /// let mut allocator = Allocator::new(Settings::published())?;
 /// let mut memory = Memory::default();
-/// let command = Command { moment: Vector3::new(1e3, -2e3, 5e2), dynamic_pressure: 7e3 };
+/// let moment = Vector3::new(1e3, -2e3, 5e2);
+/// let command = Command { moment, dynamic_pressure: 7e3, ..Command::default() };
 /// allocator.update(&mut memory, 0, &command);
 /// assert!(memory.residual.norm() < 1.0, "surfaces and jets give the moment: {}", memory.residual);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
@@ -172,15 +185,25 @@ impl Allocator {
 
     fn allocate(&mut self, memory: &mut Memory, command: &Command) {
         let begin = Instant::now();
-        let Command { moment, dynamic_pressure } = *command;
-        let matrix = self.settings.effectors.effectiveness_at(dynamic_pressure);
+        let Command { moment: commanded, dynamic_pressure, .. } = *command;
+        let effectors = &self.settings.effectors;
+        let mut matrix = effectors.effectiveness_at(dynamic_pressure);
         // Wu 2015, (59) for one period: the range, and the part of it that the rate permits.
         let (min, max) = &self.limits;
         let change = self.settings.effectors.rate * self.settings.period;
         let before = clamp(&memory.surfaces, min, max);
         let mut low = (before - change).sup(min);
         let mut high = (before + change).inf(max);
-        let finite = moment.iter().all(|value| value.is_finite()) && dynamic_pressure.is_finite();
+        let finite = commanded.iter().all(|value| value.is_finite())
+            && dynamic_pressure.is_finite()
+            && (command.alpha * command.mach).is_finite();
+        // Tables of surfaces are linearised over the deflections in reach: exact at their ends.
+        let mut moment = commanded;
+        if !effectors.tables.is_empty() {
+            let (slopes, offset) = secant(effectors, &command.flow(), &low, &high);
+            matrix += slopes;
+            moment -= offset;
+        }
         let mut first = 0;
         if finite && self.settings.method == Method::Blending {
             // Jia et al., section IV: the surfaces give as much as they can; below the threshold
@@ -206,9 +229,10 @@ impl Allocator {
         let (surfaces, duty) = optimum.unwrap_or((before, memory.duty));
         memory.surfaces = clamp(&surfaces, &low, &high);
         memory.duty = duty.map(|duty| duty.clamp(0.0, 1.0));
-        memory.by_surfaces = matrix * memory.surfaces;
-        memory.achieved = memory.by_surfaces + self.settings.effectors.moment_of_jets(&memory.duty);
-        memory.residual = moment - memory.achieved;
+        memory.by_surfaces = effectors.effectiveness_at(dynamic_pressure) * memory.surfaces
+            + effectors.moment_of_tables(&command.flow(), &memory.surfaces);
+        memory.achieved = memory.by_surfaces + effectors.moment_of_jets(&memory.duty);
+        memory.residual = commanded - memory.achieved;
         memory.report = AllocationReport {
             status: if optimum.is_some() {
                 AllocationStatus::Optimal
@@ -220,6 +244,26 @@ impl Allocator {
             fallbacks: memory.report.fallbacks.saturating_add(u32::from(optimum.is_none())),
         };
     }
+}
+
+/// Returns a linear model of the surfaces with tables between the lowest and the highest deflections
+/// in reach (rad): slopes, N m/rad, and the moment at zero deflection, N m.
+fn secant(
+    effectors: &Effectors,
+    flow: &Flow,
+    low: &Surfaces,
+    high: &Surfaces,
+) -> (SMatrix<f64, 3, SURFACES>, Vector3<f64>) {
+    let (mut slopes, mut offset) = (SMatrix::zeros(), Vector3::zeros());
+    for table in &effectors.tables {
+        let (i, j) = (table.axis, table.surface);
+        let (from, to) = (low[j], high[j]);
+        let at_low = table.moment(flow, from);
+        let slope = if to > from { (table.moment(flow, to) - at_low) / (to - from) } else { 0.0 };
+        slopes[(i, j)] += slope;
+        offset[i] += at_low - slope * from;
+    }
+    (slopes, offset)
 }
 
 /// Returns the scarcity of the jets' moment about each axis, relative to the axis where they give

@@ -137,7 +137,9 @@ impl Glide {
         // and σ change: ρ̇/ρ + 2 V̇/V + Ċ_L/C_L − σ̇ tan σ is the relative change of the weight.
         let weight = (gravity - speed * speed / radius - coriolis).max(LEAST_WEIGHT * gravity);
         let by_weight = (2.0 * speed * speed / radius + coriolis) / weight;
-        let by_alpha = speed * settings.alpha.slope(speed) * model.lift_slope(self.alpha);
+        let by_alpha = speed
+            * settings.alpha.slope(speed)
+            * model.lift_slope(self.alpha, model.mach(self.altitude, speed));
         let by_bank = slope * tan(bank) * speed * speed;
         let shares = 2.0 + by_weight + by_alpha + by_bank;
         let equilibrium = -model.scale(self.altitude) * self.braking() * shares;

@@ -24,6 +24,7 @@ pub use shaping::{Limits, Shaped};
 use crate::error::DesignError;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
+use vehicle::aerodynamics::Aerodynamics;
 use vehicle::axes::nearest;
 use vehicle::entry::{Motion, great_circle};
 use vehicle::math::{atan2, cos, exp, sin_cos};
@@ -123,13 +124,21 @@ impl Memory {
 }
 
 impl Guidance {
-    /// Makes a guidance.
+    /// Makes a guidance of the papers' vehicle.
+    ///
+    /// # Errors
+    /// As [`Self::of`].
+    pub fn new(settings: Settings) -> Result<Self, DesignError> {
+        Self::of(settings, Aerodynamics::papers())
+    }
+
+    /// Makes a guidance of a vehicle.
     ///
     /// # Errors
     /// Names the setting that is out of range, or the limit that the end of the flight exceeds.
-    pub fn new(settings: Settings) -> Result<Self, DesignError> {
+    pub fn of(settings: Settings, aerodynamics: Aerodynamics) -> Result<Self, DesignError> {
         ::settings::check(&settings)?;
-        let predictor = Predictor::default();
+        let predictor = Predictor::new(aerodynamics);
         let Target { altitude, speed, .. } = settings.target;
         let floor = Loads::at(&predictor.model, altitude, speed, settings.alpha.at(speed));
         // The heat flux is the largest long before.
@@ -147,6 +156,11 @@ impl Guidance {
     /// Returns the settings.
     pub fn settings(&self) -> &Settings {
         &self.settings
+    }
+
+    /// Returns the air forces and moments of the vehicle.
+    pub fn aerodynamics(&self) -> &Aerodynamics {
+        self.predictor.model.aerodynamics()
     }
 
     /// Returns whether a restored memory can be used.
@@ -240,7 +254,9 @@ impl Guidance {
     fn schedule(&self, memory: &Memory) -> Alpha {
         let alpha = self.settings.alpha;
         let [lift_ratio, _] = memory.ratios;
-        let lift = |angle: f64| self.predictor.model.coefficients(angle)[0];
+        let model = &self.predictor.model;
+        let mach = model.mach(self.settings.target.altitude, self.settings.target.speed);
+        let lift = |angle: f64| model.coefficients(angle, mach)[0];
         let slope = (lift(alpha.low + PROBE) - lift(alpha.low)) / PROBE;
         let change = lift(alpha.low) * (1.0 / lift_ratio - 1.0) / slope;
         let largest = self.settings.alpha.adjustment;

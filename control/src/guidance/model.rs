@@ -16,23 +16,42 @@ const PROBE: f64 = 0.01;
 pub(super) struct Model {
     aerodynamics: Aerodynamics,
     area_per_mass: f64,
-    /// Logarithms of the density of the standard atmosphere.
+    /// Logarithms of the density of the standard atmosphere, and the speed of sound in it, m/s.
     density: [f64; ALTITUDES],
+    sound_speed: [f64; ALTITUDES],
 }
 
 impl Default for Model {
     /// Returns the vehicle of the papers in the standard atmosphere.
     fn default() -> Self {
-        let aerodynamics = Aerodynamics::papers();
-        Self {
-            area_per_mass: aerodynamics.area() / aerodynamics.mass(),
-            aerodynamics,
-            density: std::array::from_fn(|i| ln(air_anywhere(i as f64 * SPACING).density)),
-        }
+        Self::new(Aerodynamics::papers())
     }
 }
 
 impl Model {
+    /// Returns a vehicle in the standard atmosphere.
+    pub(super) fn new(aerodynamics: Aerodynamics) -> Self {
+        let air = |i: usize| air_anywhere(i as f64 * SPACING);
+        Self {
+            area_per_mass: aerodynamics.area() / aerodynamics.mass(),
+            aerodynamics,
+            density: std::array::from_fn(|i| ln(air(i).density)),
+            sound_speed: std::array::from_fn(|i| air(i).sound_speed),
+        }
+    }
+
+    /// Returns the air forces and moments of the vehicle.
+    pub(super) fn aerodynamics(&self) -> &Aerodynamics {
+        &self.aerodynamics
+    }
+
+    /// Returns the Mach number at an altitude (m) and a speed (m/s).
+    pub(super) fn mach(&self, altitude: f64, speed: f64) -> f64 {
+        let (place, below) = place(altitude);
+        let (low, high) = (self.sound_speed[below], self.sound_speed[below + 1]);
+        speed / (low + (place - below as f64).min(1.0) * (high - low))
+    }
+
     /// Returns the density of the standard atmosphere (kg/m³) at an altitude (m), within 0.12 %.
     pub(super) fn density(&self, altitude: f64) -> f64 {
         let (place, below) = place(altitude);
@@ -56,22 +75,24 @@ impl Model {
         self.aerodynamics.heating_exponent()
     }
 
-    /// Returns the relative change of the lift with the angle of attack, 1/rad.
-    pub(super) fn lift_slope(&self, alpha: f64) -> f64 {
-        let lift = |angle: f64| self.coefficients(angle)[0];
+    /// Returns the relative change of the lift with the angle of attack at an angle of attack (rad)
+    /// and a Mach number, 1/rad.
+    pub(super) fn lift_slope(&self, alpha: f64, mach: f64) -> f64 {
+        let lift = |angle: f64| self.coefficients(angle, mach)[0];
         (lift(alpha + PROBE) / lift(alpha) - 1.0) / PROBE
     }
 
-    /// Returns the coefficients of lift and drag at an angle of attack (rad).
-    pub(super) fn coefficients(&self, alpha: f64) -> [f64; 2] {
-        self.aerodynamics.lift_and_drag(alpha)
+    /// Returns the coefficients of lift and drag at an angle of attack (rad) and a Mach number.
+    pub(super) fn coefficients(&self, alpha: f64, mach: f64) -> [f64; 2] {
+        self.aerodynamics.lift_and_drag(alpha, mach)
     }
 
     /// Returns lift and drag per mass (m/s²) of the model at an altitude (m), a speed (m/s) and an
     /// angle of attack (rad).
     pub(super) fn accelerations(&self, altitude: f64, speed: f64, alpha: f64) -> [f64; 2] {
         let pressure = 0.5 * self.density(altitude) * speed * speed * self.area_per_mass;
-        self.coefficients(alpha).map(|coefficient| pressure * coefficient)
+        self.coefficients(alpha, self.mach(altitude, speed))
+            .map(|coefficient| pressure * coefficient)
     }
 }
 

@@ -4,6 +4,7 @@ use super::glide::{Glide, Loads};
 use super::model::Model;
 use super::settings::Settings;
 use nalgebra::Vector4;
+use vehicle::aerodynamics::Aerodynamics;
 use vehicle::integrator::rk4;
 use vehicle::math::{sin, sin_cos};
 
@@ -49,6 +50,11 @@ pub struct End {
 }
 
 impl Predictor {
+    /// Makes the predictor of a vehicle's flights.
+    pub fn new(aerodynamics: Aerodynamics) -> Self {
+        Self { model: Model::new(aerodynamics) }
+    }
+
     /// Returns the energy-like variable e = μ/r − V²/2 of Lu 2014, which grows during the entry,
     /// m²/s².
     pub fn energy(settings: &Settings, altitude: f64, speed: f64) -> f64 {

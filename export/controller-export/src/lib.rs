@@ -43,11 +43,13 @@
 //! | `instance` | operation of a controller's instance at its ticks |
 //! | [`sampled`] | any instance that works at ticks: steps, saved states |
 //! | [`table`] | the variables that all controllers have, and declarations that laws share |
+//! | [`own_vehicle`] | the vehicle that a file gives |
 //! | [`mod@reference`] | the source of the reference |
 #![cfg_attr(not(test), deny(clippy::disallowed_methods))]
 
 mod instance;
 pub mod law;
+pub mod own_vehicle;
 pub mod reference;
 pub mod sampled;
 pub mod table;
