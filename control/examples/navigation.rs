@@ -24,7 +24,9 @@ fn main() {
             all.slow_prediction().to_degrees(),
         );
     };
-    println!("| sensors | rms of α, β, σ, air α, β, deg | predicted | NEES/9 | NIS | air β < Mach 5 | predicted |");
+    println!(
+        "| sensors | rms of α, β, σ, air α, β, deg | predicted | NEES/9 | NIS | air β < Mach 5 | predicted |"
+    );
     println!("|---|---|---|---|---|---|---|");
     let grades = ["without errors", "", "navigation", "tactical", "calibrated MEMS"];
     for (set, stars) in [(3, false), (4, false), (4, true), (5, false), (5, true)] {

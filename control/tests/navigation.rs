@@ -92,7 +92,8 @@ fn samples_may_be_lost_or_repeated() {
     let mut line = Line { force: Vector3::new(-3.0, 0.0, -9.0), ..Line::default() };
     for (tick, sample) in [(0, 1), (1, 2), (2, 2), (3, 2), (4, 5), (5, 6), (300, 301), (301, 302)] {
         let time = f64::from(tick) * 0.04;
-        (line.sample, line.time, line.fixes) = (sample, f64::from(sample - 1) * 0.04, Fixes::default());
+        (line.sample, line.time, line.fixes) =
+            (sample, f64::from(sample - 1) * 0.04, Fixes::default());
         navigation.update(&mut memory, time, &line);
         let shown = &memory.shown;
         assert!(shown.motion.iter().chain(&shown.angles).all(|value| value.is_finite()));

@@ -6,7 +6,7 @@
 
 mod motion;
 
-pub use motion::{Motion, QUANTITIES, Quantity, STEEPEST, check, great_circle};
+pub use motion::{Motion, QUANTITIES, Quantity, STEEPEST, check, great_circle, motion_rate};
 
 use crate::actuators;
 use crate::aerodynamics::{Aerodynamics, Flow};
@@ -16,7 +16,7 @@ use crate::kinematics::Kinematics;
 use crate::math::{asin, atan2, sin_cos};
 use crate::platform::{body_from_velocity, velocity_from_level};
 use crate::trajectory::Trajectory;
-use crate::translation::{self, Planet, derivative_at};
+use crate::translation::Planet;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 use settings::{Choice, Declared};
@@ -160,9 +160,10 @@ impl Config {
     /// Names the value at fault.
     pub fn check(&self, motion: &Motion) -> Result<(), Error> {
         let refuse = |name: &'static str, problem: String| Err(Error::parameter(name, problem));
-        let Planet { radius, gravitation, oblateness, rate } = self.planet;
+        let Planet { radius, flattening, gravitation, oblateness, rate } = self.planet;
         let planet = [
             ("planet.radius", radius),
+            ("planet.flattening", flattening),
             ("planet.gravitation", gravitation),
             ("planet.oblateness", oblateness),
             ("planet.rate", rate),
@@ -317,8 +318,6 @@ impl Config {
         motion: &Motion,
         passage: &Passage,
     ) -> (Motion, Trajectory, Vector3<f64>) {
-        let mut state: translation::State = *motion;
-        state[0] += self.planet.radius;
         let mut trajectory = Trajectory {
             flight_path_angle: motion[4],
             heading: motion[5],
@@ -326,7 +325,7 @@ impl Config {
             ..Trajectory::default()
         };
         let sines = trajectory.sines();
-        let derivative = derivative_at(&self.planet, &state, &sines, &passage.specific_force);
+        let derivative = motion_rate(&self.planet, motion, &sines, &passage.specific_force);
         trajectory = Trajectory {
             flight_path_angle_rate: derivative[4],
             heading_rate: derivative[5],

@@ -4,7 +4,7 @@
 //! The inertial axes are those of the planet at time 0. The level axes are north, east and down.
 
 use crate::entry::Motion;
-use crate::math::{asin, atan2, hypot, sin_cos};
+use crate::math::{asin, atan2, hypot, sin, sin_cos};
 use crate::platform::{body_from_velocity, velocity_from_level};
 use crate::trajectory::Trajectory;
 use crate::translation::Planet;
@@ -44,7 +44,7 @@ impl Place {
         let velocity_axes = velocity_from_level(&course) * level;
         let body = body_from_velocity(angles) * velocity_axes * fixed_from_inertial(planet, time);
         Self {
-            position: level.row(2).transpose() * -(planet.radius + altitude),
+            position: level.row(2).transpose() * -(planet.surface(sin(latitude))[0] + altitude),
             velocity: velocity_axes.row(0).transpose() * speed,
             attitude: UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(body)),
         }
@@ -53,10 +53,11 @@ impl Place {
     /// Returns the motion.
     pub fn motion(&self, planet: &Planet) -> Motion {
         let [x, y, z] = self.position.into();
+        let distance = self.position.norm();
         let [longitude, latitude] = [atan2(y, x), atan2(z, hypot(x, y))];
         let [north, east, down] = (level_from_fixed(longitude, latitude) * self.velocity).into();
         Motion::new(
-            self.position.norm() - planet.radius,
+            distance - planet.surface(z / distance)[0],
             longitude,
             latitude,
             self.velocity.norm(),
@@ -84,6 +85,7 @@ pub fn attitude_angles(body_from_velocity: &Matrix3<f64>) -> Vector3<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::entry::motion_rate;
 
     #[test]
     fn oracle_a_motion_comes_back_from_its_vectors() {
@@ -105,6 +107,28 @@ mod tests {
         }
     }
 
+    /// The radius at the poles is that of WGS 84, and the altitude changes as it does along the
+    /// velocity in planet-fixed axes.
+    #[test]
+    fn oracle_altitudes_are_counted_from_the_ellipsoid() {
+        let planet = Planet::EARTH;
+        assert!((planet.surface(1.0)[0] - 6_356_752.314_2).abs() < 1e-3);
+        assert!((planet.surface(0.0)[0] - 6_378_137.0).abs() < 1e-6);
+        for (latitude, heading) in [(0.1, 0.3), (0.8, -0.4), (-1.2, 2.8)] {
+            let motion = Motion::new(6e4, 0.5, latitude, 6e3, -0.03, heading);
+            let place = Place::of(&planet, &motion, &Vector3::zeros(), 0.0);
+            let sines = [-0.03, heading, latitude].map(sin_cos);
+            let rate = motion_rate(&planet, &motion, &sines, &Vector3::zeros());
+            let step = 1e-3;
+            let altitude = |time: f64| {
+                let position = place.position + place.velocity * time;
+                Place { position, ..place }.motion(&planet)[0]
+            };
+            let difference = (altitude(step) - altitude(-step)) / (2.0 * step);
+            assert!((rate[0] - difference).abs() < 1e-4, "{} {difference}", rate[0]);
+        }
+    }
+
     #[test]
     fn oracle_gravity_as_a_vector_is_that_of_the_equations_of_motion() {
         let planet = Planet::EARTH;
@@ -113,7 +137,7 @@ mod tests {
             let place = Place::of(&planet, &motion, &Vector3::zeros(), 0.0);
             let level =
                 level_from_fixed(longitude, latitude) * planet.gravity_vector(&place.position);
-            let [down, north] = planet.gravity(planet.radius + 5e4, latitude);
+            let [down, north] = planet.gravity(place.position.norm(), latitude);
             assert!((level - Vector3::new(north, 0.0, down)).amax() < 1e-14 * down * 100.0);
         }
     }

@@ -22,9 +22,12 @@ use settings::Declared;
 /// A planet that rotates about its axis.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Declared)]
 pub struct Planet {
-    /// Radius of the planet, from which altitudes are counted.
+    /// Radius of the planet at its equator.
     #[setting(unit = "m", min = 1e3, nominal = 1e6)]
     pub radius: f64,
+    /// Flattening of the ellipsoid from which altitudes are counted; 0 for a sphere.
+    #[setting(min = 0.0, max = 0.1, nominal = 1e-3)]
+    pub flattening: f64,
     /// Gravitational parameter of the planet.
     #[setting(unit = "m3/s2", min = 0.0, nominal = 1e14)]
     pub gravitation: f64,
@@ -40,10 +43,21 @@ impl Planet {
     /// The Earth by WGS 84.
     pub const EARTH: Self = Self {
         radius: 6_378_137.0,
+        flattening: 1.0 / 298.257_223_563,
         gravitation: 3.986_004_418e14,
         oblateness: 1.082_629_82e-3,
         rate: 7.292_115e-5,
     };
+
+    /// Returns the distance of the ellipsoid's surface from the centre (m) where the geocentric
+    /// latitude has this sine, and its derivative with respect to the sine, m.
+    pub fn surface(&self, sine: f64) -> [f64; 2] {
+        let polar = 1.0 - self.flattening;
+        let bulge = 1.0 - polar * polar;
+        let square = polar * polar + bulge * sine * sine;
+        let distance = self.radius * (polar / square.sqrt());
+        [distance, -distance * bulge * sine / square]
+    }
 
     /// Returns the acceleration of gravity at a distance from the centre (m) and a latitude (rad):
     /// downward and to the north, m/s².

@@ -120,6 +120,7 @@ fn fly(rows: &[[f64; 3]]) -> (Motion, f64) {
     let shuttle = Aerodynamics::shuttle();
     let planet = Planet {
         radius: 20_902_900.0 * FOOT,
+        flattening: 0.0,
         gravitation: 1.407_653_9e16 * FOOT.powi(3),
         oblateness: 0.0,
         rate: 0.0,
@@ -194,7 +195,8 @@ fn published_the_shuttle_reaches_its_greatest_cross_range() {
 #[test]
 fn oracle_a_steep_ballistic_entry_by_allen_and_eggers() {
     // A flat planet without gravity, as in the closed form.
-    let planet = Planet { radius: 1e12, gravitation: 0.0, oblateness: 0.0, rate: 0.0 };
+    let planet =
+        Planet { radius: 1e12, flattening: 0.0, gravitation: 0.0, oblateness: 0.0, rate: 0.0 };
     let (height, speed, path) = (7254.24, 7000.0, -40_f64.to_radians());
     for ballistic in [1000.0, 5000.0] {
         // Air of 1.225 kg/m³ at the ground; mass over drag area in kg/m².

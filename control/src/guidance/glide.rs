@@ -63,8 +63,9 @@ pub(super) struct Glide {
     pub altitude: f64,
     /// Speed, m/s.
     pub speed: f64,
-    /// Altitude rate, m/s.
+    /// Altitude rate, m/s, and the sine of the flight path angle.
     pub rate: f64,
+    pub sin_path: f64,
     /// Angle of attack, rad.
     pub alpha: f64,
     /// Lift and drag per mass, m/s².
@@ -102,7 +103,7 @@ impl Loads {
 impl Glide {
     /// Returns −V̇/V, 1/s.
     fn braking(&self) -> f64 {
-        (self.accelerations[1] + self.gravity * self.rate / self.speed) / self.speed
+        (self.accelerations[1] + self.gravity * self.sin_path) / self.speed
     }
 
     /// Returns heat flux, load and dynamic pressure. The ratio of the drag to that of the model is

@@ -17,7 +17,7 @@ use glide::Glide;
 pub use glide::Loads;
 pub use predictor::{Beginning, End, Predictor};
 pub use settings::{
-    Alpha, Bank, Damping, Filter, Initial, Limit, Reversal, Settings, Shaping, Sphere, Target,
+    Alpha, Bank, Damping, Ellipsoid, Filter, Initial, Limit, Reversal, Settings, Shaping, Target,
 };
 pub use shaping::{Limits, Shaped};
 
@@ -29,7 +29,6 @@ use vehicle::axes::nearest;
 use vehicle::entry::{Motion, great_circle};
 use vehicle::math::{atan2, cos, exp, sin_cos};
 use vehicle::reference::Reference;
-use vehicle::translation::Planet;
 
 /// Time between two ticks, s.
 pub const PERIOD: f64 = 0.04;
@@ -186,8 +185,7 @@ impl Guidance {
         let [_, _, _, speed, _, heading] = measured.motion.into();
         let target = [self.settings.target.longitude, self.settings.target.latitude];
         let here = [measured.motion[1], measured.motion[2]];
-        let planet = Planet { radius: self.settings.planet.radius, ..Planet::EARTH };
-        let (range, direction) = great_circle(&planet, here, target);
+        let (range, direction) = great_circle(&self.settings.planet.planet(), here, target);
         let heading_error = nearest(direction - heading, 0.0);
         let first = !memory.begun;
         if first {
@@ -269,16 +267,17 @@ impl Guidance {
     fn correct(&self, memory: &mut Memory, measured: &Navigation, command: &mut Command) {
         let settings = &Settings { alpha: self.schedule(memory), ..self.settings };
         let [altitude, _, latitude, speed, path, heading] = measured.motion.into();
-        let energy = |altitude: f64, speed: f64| Predictor::energy(settings, altitude, speed);
-        let last = energy(settings.target.altitude, settings.target.speed);
+        let last = Predictor::last_energy(settings);
         let circular = settings.planet.gravitation / (2.0 * settings.planet.radius);
-        let left = (last - energy(altitude, speed)) / circular;
-        let (_, cos_latitude) = sin_cos(latitude);
+        let (sin_latitude, cos_latitude) = sin_cos(latitude);
+        let radius = settings.planet.planet().surface(sin_latitude)[0] + altitude;
+        let left = (last - Predictor::energy(settings, radius, speed)) / circular;
         let direction = heading + command.heading_error;
         let begin = Beginning {
-            altitude,
+            radius,
             speed,
             path,
+            latitude: [sin_latitude, cos_latitude * cos(direction)],
             eastward: cos_latitude * sin_cos(direction).0,
             near_equator: cos_latitude * cos(settings.target.latitude),
             ratios: memory.ratios,

@@ -2,7 +2,7 @@
 
 use super::glide::{Glide, Loads};
 use super::model::Model;
-use super::settings::Settings;
+use super::settings::{Settings, Target};
 use nalgebra::Vector4;
 use vehicle::aerodynamics::Aerodynamics;
 use vehicle::integrator::rk4;
@@ -23,12 +23,15 @@ pub struct Predictor {
 /// Beginning of a prediction.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Beginning {
-    /// Altitude, m.
-    pub altitude: f64,
+    /// Distance from the planet's centre, m.
+    pub radius: f64,
     /// Speed, m/s.
     pub speed: f64,
     /// Flight path angle, rad.
     pub path: f64,
+    /// sin φ, and cos φ cos ψ of the great circle to the target: on it sin φ is the first times the
+    /// cosine of the angle travelled, plus the second times its sine.
+    pub latitude: [f64; 2],
     /// cos φ sin ψ of the great circle to the target, which is constant along it.
     pub eastward: f64,
     /// About cos² φ on the way, for the centrifugal acceleration: the product of cos φ at both
@@ -57,21 +60,28 @@ impl Predictor {
 
     /// Returns the energy-like variable e = μ/r − V²/2 of Lu 2014, which grows during the entry,
     /// m²/s².
-    pub fn energy(settings: &Settings, altitude: f64, speed: f64) -> f64 {
-        settings.planet.gravitation / (settings.planet.radius + altitude) - speed * speed / 2.0
+    pub fn energy(settings: &Settings, radius: f64, speed: f64) -> f64 {
+        settings.planet.gravitation / radius - speed * speed / 2.0
+    }
+
+    /// Returns that of the target, m²/s².
+    pub fn last_energy(settings: &Settings) -> f64 {
+        let Target { altitude, latitude, speed, .. } = settings.target;
+        let [surface, _] = settings.planet.planet().surface(sin(latitude));
+        Self::energy(settings, surface + altitude, speed)
     }
 
     /// Returns the beginning of a flight with this bank angle (rad).
     pub(super) fn glide(&self, settings: &Settings, begin: &Beginning, bank: f64) -> Glide {
-        let from = Self::energy(settings, begin.altitude, begin.speed);
-        let to = Self::energy(settings, settings.target.altitude, settings.target.speed);
+        let from = Self::energy(settings, begin.radius, begin.speed);
+        let to = Self::last_energy(settings);
         let slope = if to > from { (settings.bank.last - bank) / (to - from) } else { 0.0 };
-        let state = Vector4::new(begin.altitude, begin.speed, begin.path, 0.0);
+        let state = Vector4::new(begin.radius, begin.speed, begin.path, 0.0);
         self.glide_at(settings, begin, &state, [bank, slope])
     }
 
-    /// Returns the state of a flight with altitude, speed and flight path angle, and with a bank
-    /// angle (rad) and its derivative over energy.
+    /// Returns the state of a flight with distance from the centre, speed, flight path angle and
+    /// angle travelled, and with a bank angle (rad) and its derivative over energy.
     fn glide_at(
         &self,
         settings: &Settings,
@@ -80,8 +90,14 @@ impl Predictor {
         bank: [f64; 2],
     ) -> Glide {
         let planet = &settings.planet;
-        let [altitude, speed, path, _]: [f64; 4] = (*state).into();
-        let radius = planet.radius + altitude;
+        let [radius, speed, path, angle]: [f64; 4] = (*state).into();
+        let (sine, cosine) = sin_cos(angle);
+        let [here, ahead] = begin.latitude;
+        let [surface, slope] = planet.planet().surface(here * cosine + ahead * sine);
+        let altitude = radius - surface;
+        let (sin_path, cos_path) = sin_cos(path);
+        // The surface rises or falls on the way.
+        let rising = slope * (ahead * cosine - here * sine) * speed * cos_path / radius;
         let alpha = settings.alpha.at(speed);
         let [lift, drag] = self.model.accelerations(altitude, speed, alpha);
         let [lift_ratio, drag_ratio] = begin.ratios;
@@ -90,7 +106,8 @@ impl Predictor {
         Glide {
             altitude,
             speed,
-            rate: speed * sin(path),
+            rate: speed * sin_path - rising,
+            sin_path,
             alpha,
             accelerations: [lift * lift_ratio, drag * drag_ratio],
             drag_ratio,
@@ -105,9 +122,8 @@ impl Predictor {
     /// the settings, until the energy of the target.
     pub fn fly(&self, settings: &Settings, begin: &Beginning, bank: f64) -> End {
         let planet = &settings.planet;
-        let target = &settings.target;
-        let from = Self::energy(settings, begin.altitude, begin.speed);
-        let to = Self::energy(settings, target.altitude, target.speed);
+        let from = Self::energy(settings, begin.radius, begin.speed);
+        let to = Self::last_energy(settings);
         if to <= from {
             return End { range: 0.0, arrives: true, loads: Loads::default() };
         }
@@ -117,7 +133,7 @@ impl Predictor {
             let passed = (energy(state) - from).clamp(0.0, to - from);
             self.glide_at(settings, begin, state, [bank + slope * passed, slope])
         };
-        // Altitude, speed, flight path angle, and the angle travelled over ground.
+        // Distance from the centre, speed, flight path angle, and the angle travelled over ground.
         let derivative = |state: &Vector4<f64>, least: f64| {
             let glide = glide(state);
             let Glide { speed, gravity: g, radius, coriolis, .. } = glide;
@@ -131,7 +147,7 @@ impl Predictor {
                 speed * cos_path / radius,
             )
         };
-        let mut state = Vector4::new(begin.altitude, begin.speed, begin.path, 0.0);
+        let mut state = Vector4::new(begin.radius, begin.speed, begin.path, 0.0);
         let mut loads = Loads::default();
         for _ in 0..MOST_STEPS {
             let here = glide(&state);
@@ -140,7 +156,7 @@ impl Predictor {
             // What a limit asks for is held over a step, as its powers take long.
             let least = here.least_rate(&self.model, &settings.limit, &now);
             let next = rk4(&mut |_, state: &_| derivative(state, least), 0.0, &state, STEP);
-            if energy(&next) >= to || next[0] <= 0.0 {
+            if energy(&next) >= to || next[0] <= planet.radius * (1.0 - planet.flattening) {
                 let (before, after) = (energy(&state), energy(&next));
                 let share = ((to - before) / (after - before)).clamp(0.0, 1.0);
                 let angle = state[3] + share * (next[3] - state[3]);

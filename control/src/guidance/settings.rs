@@ -28,7 +28,7 @@ pub struct Settings {
     #[allow(missing_docs)]
     pub filter: Filter,
     #[allow(missing_docs)]
-    pub planet: Sphere,
+    pub planet: Ellipsoid,
 }
 
 /// Where the flight is to end.
@@ -186,18 +186,29 @@ pub struct Filter {
     pub drag: f64,
 }
 
-/// The planet as the guidance knows it: a sphere that rotates.
+/// The planet as the guidance knows it: an ellipsoid that rotates, with the gravity of a sphere.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Declared)]
-pub struct Sphere {
-    /// Radius of the planet, from which altitudes are counted.
+pub struct Ellipsoid {
+    /// Radius of the planet at its equator.
     #[setting(unit = "m", min = 1e3, nominal = 1e6)]
     pub radius: f64,
+    /// Flattening of the ellipsoid from which altitudes are counted; 0 for a sphere.
+    #[setting(min = 0.0, max = 0.1, nominal = 1e-3)]
+    pub flattening: f64,
     /// Gravitational parameter of the planet.
     #[setting(unit = "m3/s2", min = 0.0, nominal = 1e14)]
     pub gravitation: f64,
     /// Angular rate of the planet's rotation.
     #[setting(unit = "rad/s", min = 0.0, max = 1.0, nominal = 1e-4)]
     pub rate: f64,
+}
+
+impl Ellipsoid {
+    /// Returns the planet.
+    pub(super) fn planet(&self) -> Planet {
+        let Self { radius, flattening, gravitation, rate } = *self;
+        Planet { radius, flattening, gravitation, oblateness: 0.0, rate }
+    }
 }
 
 static FILE: LazyLock<Tables> =
@@ -207,7 +218,7 @@ impl Default for Settings {
     /// Returns the settings of `data/guidance.toml`.
     fn default() -> Self {
         static READ: LazyLock<Settings> = LazyLock::new(|| {
-            let Planet { radius, gravitation, rate, .. } = Planet::EARTH;
+            let Planet { radius, flattening, gravitation, rate, .. } = Planet::EARTH;
             let mut settings = Settings {
                 target: Target::default(),
                 initial: Initial::default(),
@@ -218,7 +229,7 @@ impl Default for Settings {
                 damping: Damping::default(),
                 limit: Limit::default(),
                 filter: Filter::default(),
-                planet: Sphere { radius, gravitation, rate },
+                planet: Ellipsoid { radius, flattening, gravitation, rate },
             };
             FILE.set("settings", &mut settings);
             settings

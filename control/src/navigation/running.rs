@@ -237,7 +237,9 @@ impl Navigation {
     fn by_side(&self, running: &Running) -> Option<Measured> {
         let at = (running.last.time, &running.state);
         let [_, air] = self.relative(at, running.wind);
-        let altitude = running.state.position.norm() - self.settings.planet.radius;
+        let distance = running.state.position.norm();
+        let sine = running.state.position.z / distance;
+        let altitude = distance - self.settings.planet.surface(sine)[0];
         let mach = air.velocity.norm() / air_anywhere(altitude).sound_speed;
         let felt = running.felt(&running.last);
         let force = (&felt.force, self.errors[1].noise);

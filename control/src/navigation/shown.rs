@@ -8,11 +8,11 @@ use super::{Navigation, Settings};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 use vehicle::axes::nearest;
-use vehicle::entry::Motion;
+use vehicle::entry::{Motion, motion_rate};
 use vehicle::frames::{attitude_angles, fixed_from_inertial, level_from_fixed};
+use vehicle::math::sin_cos;
 use vehicle::platform::{body_from_velocity, velocity_from_level};
 use vehicle::trajectory::Trajectory;
-use vehicle::translation;
 
 /// Standard deviations that the filter predicts.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -130,10 +130,8 @@ impl Navigation {
         let flow = [nearest(alpha, shown.flow[0]), beta];
         let from_flow = body_from_velocity(&Vector3::new(alpha, beta, 0.0));
         let along_flow = from_flow.transpose() * felt.force;
-        let mut from_centre: translation::State = motion;
-        from_centre[0] += planet.radius;
-        let motion_rate =
-            translation::derivative_under(planet, &from_centre, &(to_velocity * felt.force));
+        let sines = [path, heading, latitude].map(sin_cos);
+        let motion_rate = motion_rate(planet, &motion, &sines, &(to_velocity * felt.force));
         let mut continued = motion;
         // Longitude and heading count on beyond a whole turn.
         for i in [1, 5] {

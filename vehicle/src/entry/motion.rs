@@ -2,8 +2,8 @@
 
 use crate::error::Error;
 use crate::math::{atan2, hypot, sin_cos};
-use crate::translation::Planet;
-use nalgebra::SVector;
+use crate::translation::{self, Planet, derivative_at};
+use nalgebra::{SVector, Vector3};
 
 /// Motion of the centre of mass `[altitude, longitude, latitude, speed, flight path angle,
 /// heading]`, relative to the rotating planet, in m, rad and m/s.
@@ -41,7 +41,7 @@ const ANGLE: [&str; 2] = ["rad", "rad/s"];
 
 /// The components of [`Motion`], in their order.
 pub const QUANTITIES: [Quantity; 6] = [
-    quantity("altitude", "Altitude above the planet's radius", LENGTH, 1e5),
+    quantity("altitude", "Altitude above the planet's ellipsoid", LENGTH, 1e5),
     quantity("longitude", "Longitude, positive to the east", ANGLE, 1.0),
     quantity("latitude", "Latitude, positive to the north", ANGLE, 1.0),
     quantity("speed", "Speed relative to the rotating planet", SPEED, 1e3),
@@ -70,8 +70,26 @@ pub fn check(motion: &Motion, time: f64) -> Result<(), Error> {
     Err(Error::NoCourse { time, problem })
 }
 
+/// Returns the time derivative of a motion under a specific force (m/s²) along the trajectory's
+/// axes, given the sines and cosines of flight path angle, heading and latitude.
+pub fn motion_rate(
+    planet: &Planet,
+    motion: &Motion,
+    sines: &[(f64, f64); 3],
+    force: &Vector3<f64>,
+) -> Motion {
+    let (sine, cosine) = sines[2];
+    let [surface, slope] = planet.surface(sine);
+    let mut from_centre: translation::State = *motion;
+    from_centre[0] += surface;
+    let mut derivative = derivative_at(planet, &from_centre, sines, force);
+    // The surface rises or falls below the vehicle.
+    derivative[0] -= slope * cosine * derivative[2];
+    derivative
+}
+
 /// Returns the great circle from one position to another, given as longitude and latitude (rad):
-/// its length over ground (m, at zero altitude), and its direction at the first position from north
+/// its length over ground (m, at the planet's radius), and its direction at the first position from north
 /// to east, rad.
 pub fn great_circle(planet: &Planet, from: [f64; 2], to: [f64; 2]) -> (f64, f64) {
     let (sin_from, cos_from) = sin_cos(from[1]);
