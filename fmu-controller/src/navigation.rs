@@ -2,10 +2,11 @@
 //! satellite navigation and star tracker.
 
 use control::navigation::{Health, Line, Memory, Navigation, Settings, Shown};
+use controller_export::own_vehicle::OwnVehicle;
 use controller_export::sampled::{SampledFmu, SampledInstance, Ticks};
 use controller_export::table::{ANGLES, AXES, RATES, vector};
 use fmi2_export::table::{Common, Real, discrete_input, discrete_output, input};
-use fmi2_export::{Description, Failure, VariableTable};
+use fmi2_export::{Context, Description, Failure, VariableTable};
 use model_description::DefaultExperiment;
 use serde::{Deserialize, Serialize};
 use settings::Choice;
@@ -19,6 +20,7 @@ pub type EntryNavigation = SampledFmu<NavigationInstance>;
 #[derive(Serialize, Deserialize)]
 pub struct NavigationInstance {
     pub(crate) settings: Settings,
+    own: OwnVehicle,
     pub(crate) line: Line,
     pub(crate) shown: Shown,
     health: Health,
@@ -48,25 +50,38 @@ impl SampledInstance for NavigationInstance {
                 step: Settings::default().period,
             },
             table: outputs(inputs(VariableTable::new()))
-                .settings(|m: &mut EntryNavigation| &mut m.settings),
+                .settings(|m: &mut EntryNavigation| &mut m.settings)
+                .settings(|m| &mut m.own),
         }
     }
 
     fn new() -> Self {
         Self {
             settings: Settings::default(),
+            own: OwnVehicle::default(),
             line: Line::default(),
             shown: Shown::default(),
             health: Health::default(),
         }
     }
 
+    fn load(&mut self, context: &Context) -> Result<(), Failure> {
+        self.own.load(context)
+    }
+
     fn design(&self) -> Result<Navigation, Failure> {
-        Navigation::new(self.settings).map_err(|error| Failure::Error(error.to_string()))
+        let aerodynamics = self.own.vehicle().aerodynamics.clone();
+        Navigation::of(self.settings, aerodynamics)
+            .map_err(|error| Failure::Error(error.to_string()))
+    }
+
+    fn problem(&self, before: &Self) -> Option<&'static str> {
+        self.own.problem(&before.own)
     }
 
     fn is_designed(&self, navigation: &Navigation) -> bool {
         *navigation.settings() == self.settings
+            && *navigation.aerodynamics() == self.own.vehicle().aerodynamics
     }
 
     fn period(navigation: &Navigation) -> f64 {

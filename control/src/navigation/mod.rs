@@ -108,8 +108,21 @@ impl Navigation {
     /// # Errors
     /// Names the setting that is out of range.
     pub fn new(settings: Settings) -> Result<Self, DesignError> {
+        Self::of(settings, Aerodynamics::papers())
+    }
+
+    /// Makes the navigation of a vehicle.
+    ///
+    /// # Errors
+    /// Names the setting that is out of range.
+    pub fn of(settings: Settings, aerodynamics: Aerodynamics) -> Result<Self, DesignError> {
         ::settings::check(&settings)?;
-        Ok(Self { errors: settings.errors(), aerodynamics: Aerodynamics::papers(), settings })
+        Ok(Self { errors: settings.errors(), aerodynamics, settings })
+    }
+
+    /// Returns the air forces of the vehicle.
+    pub fn aerodynamics(&self) -> &Aerodynamics {
+        &self.aerodynamics
     }
 
     /// Returns the settings.
