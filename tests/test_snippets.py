@@ -155,6 +155,8 @@ def kind_of(table):
         return "campaign", "experiment" in table
     if "run" in table or "claim" in table:
         return "study", True
+    if table.keys() & {"reference", "forces", "moments", "surfaces", "jets"}:
+        return "vehicle", {"title", "reference", "forces"} <= set(table)
     return "experiment", {"simulation", "record"} <= set(table)
 
 

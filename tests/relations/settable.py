@@ -38,14 +38,12 @@ else:
 
 PAGE = ROOT / "docs" / "settings.md"
 TIMED = {"solver.timeBudget"}
-# Communication points of a run, unless its FMUs end it, and those at which an FMU is driven.
-FLOWN, DRIVEN = 3000, 60
-# Communication points of a flight that is flown to its end as well.
-LONGEST = 100_000
-# Those at which it is driven first, before it is driven at all of them.
-SHORT = 8
+# Communication points of a run, unless its FMUs end it, and those at which an FMU is driven: first at
+# a few of them. A flight that has not more than the last number is flown to its end as well.
+FLOWN, DRIVEN, SHORT, LONGEST = 3000, 60, 8, 100_000
 NEVER, STEPPED = "no setting of this FMU", "co-simulation"
-# A file for parameters that are texts, all of which name files.
+# Files for parameters that are texts, all of which name files.
+VEHICLE = ROOT / "orchestrator" / "experiments" / "entry" / "vehicles" / "lifting-body.toml"
 FILE = "time_s,alpha_rad,beta_rad,sigma_rad\n0,0.1,0.0,-0.3\n100,0.2,0.1,-0.4\n"
 
 # Settings in which some variables act and no experiment has them, with an experiment's inputs.
@@ -96,6 +94,8 @@ def experiments() -> list[Path]:
 def flown(experiment: Path, folder: Path, to_the_end: bool) -> list[tuple[str, Place]]:
     """Flies an experiment. Returns the names of the FMUs of its components, and the place of each."""
     text = subprocess.run([program("orchestrator"), "show", experiment], capture_output=True, text=True, check=True).stdout
+    # The text is written to another folder, and its files stay where they are.
+    text = re.sub(r'(\.file" = ")([^"/])', rf"\1{experiment.parent}/\2", text)
     merged = tomllib.loads(text)
     time, components = merged["simulation"], merged["components"]
     start, step = time.get("start", 0.0), time["step"]
@@ -242,7 +242,7 @@ class Driven:
         if variable.type == "Boolean":
             return [not now]
         if variable.type == "String":
-            return [str(self.file)]
+            return [str(VEHICLE if name == "vehicle.file" else self.file)]
         if variable.type == "Enumeration":
             return [int(item.value) for item in variable.declaredType.items if int(item.value) != now]
         ends = [None if end is None else float(end) for end in (variable.min, variable.max)]

@@ -209,8 +209,8 @@ impl Actuators {
         moment + moment_of_tables(&self.tables, &flow, deflections) * self.scale
     }
 
-    /// Partial derivative of [`Actuators::moment`] with respect to the deflections, N m/rad, without
-    /// tables.
+    /// Partial derivative of [`Actuators::moment`] with respect to the deflections, N m/rad,
+    /// without tables.
     pub fn moment_by_deflections(&self) -> &SMatrix<f64, 3, SURFACES> {
         &self.surface_moments
     }

@@ -246,8 +246,8 @@ impl Allocator {
     }
 }
 
-/// Returns a linear model of the surfaces with tables between the lowest and the highest deflections
-/// in reach (rad): slopes, N m/rad, and the moment at zero deflection, N m.
+/// Returns a linear model of the surfaces with tables between the lowest and the highest
+/// deflections in reach (rad): slopes, N m/rad, and the moment at zero deflection, N m.
 fn secant(
     effectors: &Effectors,
     flow: &Flow,
