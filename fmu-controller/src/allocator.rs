@@ -23,20 +23,20 @@ pub type ControlAllocator = SampledFmu<AllocatorInstance>;
 pub struct AllocatorInstance {
     pub(crate) settings: Settings,
     pub(crate) own: OwnVehicle,
-    command: Command,
-    output: Output,
+    pub(crate) command: Command,
+    pub(crate) output: Output,
 }
 
 /// Outputs of the allocator.
 #[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
-struct Output {
-    surfaces: Surfaces,
+pub(crate) struct Output {
+    pub(crate) surfaces: Surfaces,
     jets: Jets,
-    duty: Jets,
+    pub(crate) duty: Jets,
     achieved: Vector3<f64>,
-    residual: Vector3<f64>,
+    pub(crate) residual: Vector3<f64>,
     modulated: Vector3<f64>,
-    by_surfaces: Vector3<f64>,
+    pub(crate) by_surfaces: Vector3<f64>,
     report: AllocationReport,
 }
 

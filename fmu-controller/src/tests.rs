@@ -1,6 +1,7 @@
 //! Tests of the FMUs through the trait that the FMI shell uses.
 
 mod messages;
+mod own_vehicle;
 
 use crate::crmpc::CrmpcLaw;
 use crate::dlmpc::DlmpcLaw;

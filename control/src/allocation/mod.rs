@@ -34,7 +34,8 @@ pub struct Command {
 }
 
 impl Command {
-    fn flow(&self) -> Flow {
+    /// Returns the flow past the surfaces.
+    pub fn flow(&self) -> Flow {
         let Self { dynamic_pressure, alpha, mach, .. } = *self;
         Flow { dynamic_pressure, alpha, mach, ..Flow::default() }
     }

@@ -24,8 +24,8 @@ UNITS = {
     **dict.fromkeys(("m_s", "m/s", "m_s-1"), ("speed", 1.0)),
     **dict.fromkeys(("ft_s", "f_s", "ft/s", "f_s-1", "fps"), ("speed", 0.3048)),
     **dict.fromkeys(("kn", "kt", "knots"), ("speed", 1852.0 / 3600.0)),
-    **dict.fromkeys(("rad_s", "r_s", "rad/s", "r_s-1"), ("rate", 1.0)),
-    **dict.fromkeys(("deg_s", "d_s", "deg/s", "d_s-1"), ("rate", math.pi / 180.0)),
+    **dict.fromkeys(("rad_s", "r_s", "rad/s", "r_s-1", "rad_s-1", "rad/sec"), ("rate", 1.0)),
+    **dict.fromkeys(("deg_s", "d_s", "deg/s", "d_s-1", "deg_s-1", "deg/sec"), ("rate", math.pi / 180.0)),
     **dict.fromkeys(("kg",), ("mass", 1.0)),
     **dict.fromkeys(("slug", "slugs", "sl"), ("mass", 0.45359237 * 9.80665 / 0.3048)),
     **dict.fromkeys(("lbm",), ("mass", 0.45359237)),
@@ -177,9 +177,10 @@ class Model:
         self.limited: dict[str, tuple[float, float]] = {}
         header = root.one("fileHeader")
         self.title = header.attributes.get("name", path.stem) if header else path.stem
-        known = ("variableDef", "breakpointDef", "griddedTableDef", "function", "checkData", "fileHeader")
+        used = ("variableDef", "breakpointDef", "griddedTableDef", "function", "checkData")
+        told = ("fileHeader", "description", "documentation", "provenance", "reference", "modificationRecord")
         for node in root.children:
-            if node.tag not in known:
+            if node.tag not in used + told:
                 raise refuse(node, "it is not supported")
         for node in root.all("variableDef"):
             self._variable(node)
@@ -294,7 +295,10 @@ class Model:
         """The variable with an identifier or a name."""
         if name in self.variables:
             return self.variables[name]
-        return next((v for v in self.variables.values() if name in (v.name, v.node.attributes.get("symbol"))), None)
+        for variable in self.variables.values():
+            if name in (variable.name, f"{variable.name}_{variable.units}", variable.node.attributes.get("symbol")):
+                return variable
+        return None
 
     def evaluate(self, inputs: Mapping[str, float]) -> Callable[[str], float]:
         """Returns the function that gives the value of every variable for some inputs, by their

@@ -144,6 +144,8 @@ def _applied(node: Node) -> Formula:
     if not node.children:
         raise refuse(node, "it lacks an operator")
     head, *rest = node.children
+    if head.tag in ("apply", "piecewise", "ci", "cn") and not rest:
+        return formula(head)
     name = head.text.strip() if head.tag == "csymbol" else head.tag
     given = {child.tag: formula(child.children[0]) for child in rest if child.tag in ("degree", "logbase") and child.children}
     inside = [formula(child) for child in rest if child.tag not in ("degree", "logbase")]

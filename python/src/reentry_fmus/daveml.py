@@ -260,7 +260,7 @@ def _surfaces(
         if not low <= 0.0 <= high:
             raise DaveError(f'line {variable.node.line}: the limits of "{name}" must hold 0')
         limits.append((low, high))
-        points = sorted({low + (high - low) * i / (STEPS - 1) for i in range(STEPS)} | {0.0})
+        points = sorted({round(low + (high - low) * i / (STEPS - 1), 9) for i in range(STEPS)} | {0.0})
         parts = [sampled(list(static), {variable.identifier: sampler.angle(variable, point)}) for point in points]
         for i, axis in enumerate(static):
             changes = [_difference(static[axis], part[i], 1.0) for part in parts]
@@ -307,6 +307,14 @@ def pairs(written_pairs: list[str]) -> dict[str, str]:
     return {name.strip(): value.strip() for name, _, value in (pair.rpartition("=") for pair in written_pairs)}
 
 
+def controls(model: Model) -> dict[str, str]:
+    """The inputs that deflect surfaces, as far as the model says so."""
+    inputs = [variable for variable in model.variables.values() if variable.is_input]
+    found = [v for v in inputs if v.node.one("isControl") or "deflection" in v.name.lower()]
+    angles = [variable for variable in found if factor(variable.units, "deg") is not None]
+    return {variable.name: variable.identifier for variable in angles}
+
+
 def arguments() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser("python -m reentry_fmus.daveml", description=(__doc__ or "").partition("\n\n")[0])
     three = {"nargs": 3, "type": float}
@@ -317,7 +325,7 @@ def arguments() -> argparse.ArgumentParser:
     parser.add_argument("--alpha", type=grid_of, default=grid_of("0:40:4"), help="angles of attack in deg, as 0:40:4 or 0,10,30")
     parser.add_argument("--mach", type=grid_of, default=[2.0, 4.0], help="Mach numbers, as --alpha")
     parser.add_argument("--map", action="append", default=[], metavar="ROLE=VARID", help="variable of a role, as lift=CL")
-    parser.add_argument("--surface", action="append", default=[], metavar="NAME=VARID", help="input that deflects a surface; once for each")
+    parser.add_argument("--surface", action="append", default=[], metavar="NAME=VARID", help="input that deflects a surface, once for each; by default all inputs that are controls or deflections")
     parser.add_argument("--deflection", nargs=2, type=float, default=[-30.0, 30.0], help="widest limits of the deflections, deg")
     parser.add_argument("--rate", type=float, default=20.0, help="largest deflection rate, deg/s")
     parser.add_argument("--mass", type=float, help="mass, kg")
@@ -338,7 +346,11 @@ def main(words: list[str] | None = None) -> int:
             return 1
         if options.output and not options.check:
             roles = Roles(model, pairs(options.map))
-            text = convert(model, roles, (options.alpha, options.mach), pairs(options.surface), options)
+            surfaces = pairs(options.surface) or controls(model)
+            for role, variable in [(role, roles.find(role)) for role in ROLES]:
+                print(f"{role}: {variable.identifier if variable else 'none'}")
+            print("surfaces: " + (", ".join(f"{name} = {identifier}" for name, identifier in surfaces.items()) or "none"))
+            text = convert(model, roles, (options.alpha, options.mach), surfaces, options)
             options.output.write_text(text, encoding="utf-8")
             print(f"{options.output}: written")
     except (DaveError, ValueError, OSError) as error:

@@ -1,0 +1,88 @@
+"""A vehicle from a file, as docs/own-vehicle.md explains it: the example's flight, faults, and states of
+another file."""
+
+import json
+import shutil
+import subprocess
+
+import jsonschema
+import pytest
+from fmpy.fmi1 import FMICallException
+
+from conftest import ROOT, program
+from fmi import Instance
+from test_schema import tomllib
+
+ENTRY = ROOT / "orchestrator" / "experiments" / "entry"
+EXAMPLE = ENTRY / "vehicles" / "lifting-body.toml"
+DATA = ROOT / "vehicle" / "data"
+PAPERS = "\n".join((DATA / name).read_text(encoding="utf-8") for name in ("papers.toml", "effectors.toml"))
+
+
+def schema() -> dict:
+    printed = subprocess.run([program("orchestrator"), "schema", "vehicle"], capture_output=True, text=True, check=True).stdout
+    return json.loads(printed)
+
+
+@pytest.mark.parametrize("text", [PAPERS, (DATA / "shuttle.toml").read_text(encoding="utf-8"), EXAMPLE.read_text(encoding="utf-8")])
+def test_vehicles_keep_to_their_schema(text):
+    jsonschema.validate(tomllib.loads(text), schema(), cls=jsonschema.Draft7Validator)
+    with pytest.raises(jsonschema.ValidationError):
+        jsonschema.validate(tomllib.loads(text.replace("[forces.lift]", "[forces.left]")), schema())
+
+
+def test_the_example_flies_to_the_terminal_area(orchestrate):
+    finished, out = orchestrate(ENTRY / "own-vehicle.toml")
+    assert finished.returncode == 0, finished.stderr
+    metrics = json.loads((out / "metrics.json").read_text())
+    assert metrics["completed"] and metrics["range_off_km"] < 5
+
+
+def test_the_papers_vehicle_from_a_file_flies_with_the_same_bits(orchestrate, tmp_path):
+    (tmp_path / "papers.toml").write_text(PAPERS, encoding="utf-8")
+    parts = [f'[components.{name}.parameters]\n"vehicle.file" = "papers.toml"\n' for name in ("plant", "guidance", "allocator")]
+    again = tmp_path / "again.toml"
+    again.write_text(f'extends = "{ENTRY / "surfaces-and-jets.toml"}"\n' + "".join(parts), encoding="utf-8")
+    flights = [orchestrate(path, "--stop", "900") for path in (ENTRY / "surfaces-and-jets.toml", again)]
+    assert [finished.returncode for finished, _ in flights] == [0, 0], flights
+    one, other = ((out / "results.csv").read_bytes() for _, out in flights)
+    assert one == other
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "named"),
+    [
+        ("mach = [2.0, 5.0]", "mach = [5.0, 2.0]", "forces.lift.table.mach must increase, but 2 follows 5"),
+        ("kilograms = 36000.0", "kilograms = 0.0", "reference.mass: must be positive"),
+        ("[forces.lift]", "[forces.left]", "unknown field `left`"),
+        ('surface = "body flap"', 'surface = "body flop"', "there is no 'body flop'"),
+    ],
+)
+def test_a_fault_is_refused_with_file_line_and_key(orchestrate, tmp_path, old, new, named):
+    for folder in ("entry", "base"):
+        shutil.copytree(ENTRY.parent / folder, tmp_path / folder)
+    file = tmp_path / "entry" / "vehicles" / "lifting-body.toml"
+    lines = file.read_text(encoding="utf-8").splitlines()
+    line = lines.index(old) if old in lines else next(i for i, text in enumerate(lines) if old in text)
+    file.write_text("\n".join([*lines[:line], lines[line].replace(old, new), *lines[line + 1 :]]), encoding="utf-8")
+    finished, _ = orchestrate(tmp_path / "entry" / "own-vehicle.toml")
+    assert finished.returncode != 0
+    said = " ".join(finished.stderr.split())
+    assert f"lifting-body.toml, line {line + 1}: " in said and named in said and "vehicle.file" in said, finished.stderr
+
+
+@pytest.mark.parametrize("name", ["ReentryPlant", "EntryGuidance", "ControlAllocator"])
+def test_a_saved_state_does_not_fit_another_content_of_the_file(fmu, tmp_path, name):
+    file = tmp_path / "vehicle.toml"
+    shutil.copy(EXAMPLE, file)
+    inputs = {"flow.mach": 5.0} if name == "ControlAllocator" else {}
+    settings = {"vehicle.file": str(file)}
+    with Instance(fmu(name), settings).start(inputs=inputs) as instance:
+        saved = instance.save()
+    with Instance(fmu(name), settings).start(inputs=inputs) as instance:
+        instance.restore(saved)
+    file.write_text(EXAMPLE.read_text(encoding="utf-8").replace("36000.0", "36001.0"), encoding="utf-8")
+    with Instance(fmu(name), settings).start(inputs=inputs) as instance:
+        with pytest.raises(FMICallException):
+            instance.restore(saved)
+        assert "vehicle.file" in instance.messages()
