@@ -83,7 +83,7 @@ fn table(heading: &str) -> Vec<Vec<&'static str>> {
 
 /// Returns the numbers of a cell such as `2.079°/s² [−1.5, −4]`.
 fn numbers(cell: &str) -> Vec<f64> {
-    let cell = cell.replace('−', "-").replace("°/s²", "");
+    let cell = cell.replace('−', "-").replace("°/s²", "").replace("°/s", "").replace('°', "");
     cell.split(['[', ']', ',', ' ']).filter_map(|word| word.parse().ok()).collect()
 }
 
@@ -119,12 +119,19 @@ fn regress_the_printed_bounds_by_delay_and_errors_are_those_of_the_design() {
 #[test]
 fn regress_the_printed_bounds_with_other_errors_and_gains_are_those_of_the_design() {
     let rows = table("| delay | 0 s | 0.04 s | 0.08 s | 0.117 s | 0.2 s |\n");
-    assert_eq!(rows.len(), 7);
+    assert_eq!(rows.len(), 10);
     for row in rows {
         let value = numbers(row[0]);
         let settings = match row[0].chars().next() {
             Some('±') => Settings { delay_error: value[0], ..robust() },
             Some('K') => Settings { feedback: Gain { k1: value[0], k2: value[1] }, ..robust() },
+            Some('s') => Settings {
+                angle_error: f64::to_radians(0.005),
+                rate_error: f64::to_radians(0.005),
+                slow_angle_error: value[0].to_radians(),
+                slow_angle_rate: value[1].to_radians(),
+                ..robust()
+            },
             _ => Settings { inertia_error: 0.0, tensor_error: value[0], ..robust() },
         };
         for (cell, delay) in row[1..].iter().zip([0.0, 0.04, 0.08, 0.117, 0.2]) {
