@@ -28,7 +28,7 @@ pub type Covariance = SMatrix<f64, STATES, STATES>;
 
 /// Least standard deviations, so that a perfect sensor leaves the covariance regular: noise of a
 /// rate (rad/s/√Hz) and of a specific force (m/s²/√Hz).
-const LEAST_NOISE: [f64; 2] = [1e-7, 1e-5];
+const LEAST_NOISE: [f64; 2] = [3e-8, 3e-6];
 
 /// A way of the vehicle over which the covariance is propagated at once.
 #[derive(Clone, Copy, Debug)]

@@ -271,6 +271,8 @@ impl Navigation {
         running.biases[1] += part(ACCELEROMETER);
         running.wind = [running.wind[0] + error[WIND], running.wind[1] + error[WIND + 1]];
         running.side += error[SIDE];
+        // A corrected altitude is no climb through another wind.
+        running.way.2 = running.state.position.norm();
         running.offset[0] += error;
     }
 

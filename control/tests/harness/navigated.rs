@@ -222,6 +222,9 @@ pub(crate) fn fly(case: &Case, mut see: impl FnMut(&Seen)) {
     let mut input = Input::default();
     for tick in 0..100_000_u64 {
         let time = tick as f64 * PERIOD;
+        if plant.ended().is_some() {
+            return;
+        }
         let entering = plant.entering(time).unwrap();
         let passage = entering.passage;
         let known =
@@ -264,9 +267,6 @@ pub(crate) fn fly(case: &Case, mut see: impl FnMut(&Seen)) {
                 innovations: shown.innovations,
                 health: memory.health,
             });
-        }
-        if plant.ended().is_some() {
-            return;
         }
         // A reference that is held would shake the vehicle between the samples.
         let moving = |at: f64| {
