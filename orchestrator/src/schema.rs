@@ -1,5 +1,5 @@
-//! JSON Schemas of experiment and study files, made from the types that read them, so that editors
-//! can complete and check these files.
+//! JSON Schemas of experiment, study and campaign files, made from the types that read them, so
+//! that editors can complete and check these files.
 //!
 //! Keys that a file leaves out may come from one that it extends. A schema therefore knows
 //! every key and its type but requires none; missing keys are reported when the file is read.
@@ -21,11 +21,15 @@ pub(crate) enum FileKind {
     Study,
     /// The file describes a campaign.
     Campaign,
+    /// The file describes a vehicle, which parameters vehicle.file name.
+    Vehicle,
 }
 
 /// Returns the schema of a kind of file as text.
 pub(crate) fn text(kind: FileKind) -> String {
     let mut schema = match kind {
+        // The types that read this file are in the FMUs, and their test makes the schema.
+        FileKind::Vehicle => return include_str!("../schema/vehicle.json").into(),
         FileKind::Campaign => schema_of::<Campaign>(&[]),
         FileKind::Experiment => schema_of::<Experiment>(&[(
             "unset",

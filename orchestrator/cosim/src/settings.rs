@@ -5,6 +5,7 @@ use crate::experiment::Experiment;
 use fmi_master::settings::Setting;
 use fmi_master::wiring::{Part, Wire};
 use fmu_import::warnings::warn_once;
+use toml::Value;
 
 /// Resolves the settings of a component.
 ///
@@ -35,7 +36,9 @@ pub(crate) fn resolve(
             left_out.push(name.as_str());
             continue;
         }
-        let setting = Setting::new(name, written.get_ref(), index, part, wires, is_assigned);
+        let beside = (!is_assigned).then(|| file_beside(experiment, name, written.get_ref()));
+        let value = beside.flatten().unwrap_or_else(|| written.get_ref().clone());
+        let setting = Setting::new(name, &value, index, part, wires, is_assigned);
         settings.push(setting.map_err(refuse)?);
     }
     // A law in another program has none of the parameters of its controller.
@@ -48,4 +51,12 @@ pub(crate) fn resolve(
         ));
     }
     Ok(settings)
+}
+
+/// Returns the path of a file beside the experiment, or beside one that it extends, if a parameter
+/// such as `vehicle.file` names it. FMUs themselves look for files in the working directory.
+fn file_beside(experiment: &Experiment, name: &str, written: &Value) -> Option<Value> {
+    let file = written.as_str().filter(|_| name.ends_with(".file"))?;
+    let path = experiment.source.folders().map(|folder| folder.join(file)).find(|p| p.is_file())?;
+    Some(Value::from(std::path::absolute(path).ok()?.to_str()?))
 }
