@@ -69,6 +69,7 @@ fn what_a_file_leaves_without_effect_is_refused() {
     let text = set(|allocator| allocator.own.file = "no-such.toml".into());
     assert!(text.starts_with("vehicle.file: no-such.toml: "), "{text}");
     let mut blind = allocator(|allocator| allocator.command.mach = 0.0);
-    let text = blind.calculate(0.0, LastEvent::InputSet).unwrap_err().to_string();
+    blind.calculate(0.0, LastEvent::Initialization).unwrap();
+    let text = blind.step(0.0, 0.1, &Held, &mut |_| {}).unwrap_err().to_string();
     assert!(text.contains("connect flow.mach"), "{text}");
 }

@@ -23,6 +23,9 @@ use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 use study::definition::Study;
 use tempfile::TempDir;
+use vehicle::Vehicle;
+use vehicle::aerodynamics::Flow;
+use vehicle::effectors::Surfaces;
 use vehicle::table::LookupTable;
 use zip::ZipWriter;
 use zip::write::SimpleFileOptions;
@@ -104,7 +107,7 @@ pub fn ssp(data: &[u8]) {
 pub type Target = fn(&[u8]);
 
 /// All targets with their names, which are those of the folders of `corpus/`.
-pub const TARGETS: [(&str, Target); 10] = [
+pub const TARGETS: [(&str, Target); 11] = [
     ("archive", archive),
     ("calls", calls),
     ("campaign", campaign),
@@ -115,7 +118,24 @@ pub const TARGETS: [(&str, Target); 10] = [
     ("state", state),
     ("study", study),
     ("table", table),
+    ("vehicle", vehicle),
 ];
+
+/// Reads the file of a vehicle, whose forces and moments are then computed.
+pub fn vehicle(data: &[u8]) {
+    let Ok(text) = std::str::from_utf8(data) else { return };
+    let Ok(vehicle) = Vehicle::from_toml("v.toml", text) else { return };
+    assert!(vehicle.fits());
+    for (alpha, mach) in [(-1.0, 0.0), (0.0, 1.0), (0.5, 6.0), (3.0, 1e9)] {
+        let flow = Flow { dynamic_pressure: 1e3, mach, speed: 1e3, alpha, beta: 0.1 };
+        vehicle.aerodynamics.forces(&flow);
+        let rates = Surfaces::repeat(0.1).fixed_rows::<3>(0).into_owned();
+        vehicle.aerodynamics.moment(&flow, &rates, 0.1);
+        if let Some(effectors) = &vehicle.effectors {
+            effectors.moment_of_tables(&flow, &Surfaces::repeat(alpha));
+        }
+    }
+}
 
 /// Reads a lookup table of reference values, and one that is a component, whose outputs are finite
 /// at any time.
