@@ -3,7 +3,8 @@
 //! of the centre of mass. The numbers are those of tool SIM 4 (`Atmos_03_sim_04.csv` and so on).
 
 use nalgebra::{SVector, Vector3};
-use vehicle::aerodynamics::{Aerodynamics, FOOT, Flow};
+use vehicle::Vehicle;
+use vehicle::aerodynamics::{FOOT, Flow};
 use vehicle::atmosphere::air;
 use vehicle::dynamics::Inertia;
 use vehicle::integrator::rk4;
@@ -144,23 +145,12 @@ drag = { source = "none, as in the case", polynomial = [0.0] }
 roll_damping = { source = "NASA/TM-2015-218675, volume II, B.3", polynomial = [-1.0] }
 pitch_damping = { source = "NASA/TM-2015-218675, volume II, B.3", polynomial = [-1.0] }
 yaw_damping = { source = "NASA/TM-2015-218675, volume II, B.3", polynomial = [-1.0] }
-
-[heating]
-source = "none, as in the case"
-polynomial = [0.0]
-factor = 0.0
-exponent = 1.0
-
-[air]
-source = "none, the case has the standard atmosphere"
-density_slug_ft3 = 0.0
-scale_height_ft = 1.0
 "#;
 
 /// Case 3: a brick tumbles while it falls from 30,000 ft, and the air damps its rates.
 #[test]
 fn published_a_brick_tumbles_and_is_damped() {
-    let brick: Aerodynamics = toml::from_str(BRICK).unwrap();
+    let brick = Vehicle::from_toml("brick.toml", BRICK).unwrap().aerodynamics;
     let slug_ft2 = SLUG * FOOT * FOOT;
     let inertia = Inertia {
         Ixx: 0.001_894_220 * slug_ft2,
