@@ -9,6 +9,7 @@ mod own_vehicle;
 mod parameters;
 mod plant;
 mod roles;
+mod sensing;
 mod table;
 #[cfg(test)]
 mod tests;

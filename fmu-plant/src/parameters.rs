@@ -1,35 +1,26 @@
 //! Parameters of the FMU. Their defaults are the scenario of Chai 2022.
 
 use crate::entry::{EntryParameters, VehicleFile};
+use crate::sensing::{NEVER, Sensing};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 use settings::{Choice, Declared};
 use vehicle::actuators::{self, JetMode};
 use vehicle::atmosphere::{Air, Flight, air};
 use vehicle::axes::{ANGLES, AXES, Entry, RATES};
-use vehicle::calibration::Sequence;
 use vehicle::disturbance::{
     Disturbance, DisturbanceKind, DisturbanceTable, MomentWave, Row, SineMoment,
 };
 use vehicle::dynamics::Inertia;
 use vehicle::entry::{Motion, Passage};
 use vehicle::error::Error;
-use vehicle::fixes::Devices;
 use vehicle::kinematics::Kinematics;
 use vehicle::plant::{BETA_LIMIT, Config, state};
-use vehicle::platform::Surroundings;
-use vehicle::sensor_data::{LAST_SENSORS, SensorData};
-use vehicle::sensors::{self, Line, PerSensor};
 use vehicle::transport;
-use vehicle::triad::Triad;
-use vehicle::turntable;
 use vehicle::{Scenario, Vehicle};
 
 /// Default of the longest integration step, s.
 const STEP: f64 = 0.01;
-/// Time (s) that no simulation reaches. It replaces an infinite number, which not all FMI importers
-/// can read.
-const NEVER: f64 = 1e15;
 
 /// Number of rows of the disturbance's lookup table for which there are variables.
 pub(crate) const TABLE_ROWS: usize = 8;
@@ -43,13 +34,6 @@ pub(crate) enum Actuation {
     /// The inputs surface and jet command eight aerodynamic surfaces and ten jets.
     SurfacesAndJets,
 }
-
-/// Value of `sensor.set` without sampling: the FMU outputs the readings of ideal sensors.
-pub(crate) const NO_SENSORS: i32 = 0;
-/// Value of `sensor.set` for sampled sensors without errors.
-const IDEAL_SENSORS: i32 = 1;
-/// Value of `sensor.set` for sampled sensors with the errors given by the parameters.
-const GIVEN_SENSORS: i32 = 2;
 
 /// Parameters that a user sets before the simulation, in the order of the variable table.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, Declared)]
@@ -175,36 +159,6 @@ impl Initial {
     }
 }
 
-/// Parameters of the sensors and of their surroundings.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Declared)]
-pub(crate) struct Sensing {
-    /// Sensor set: 0 for ideal continuous readings, 1 for samples without errors, 2 for samples
-    /// with errors, which are those of a typical MEMS set by default; 3, 4, 5 for inertial sensors
-    /// of navigation and tactical grade and calibrated MEMS sensors.
-    #[setting(name = "sensor.set", min = NO_SENSORS, max = LAST_SENSORS)]
-    pub(crate) sensor_set: i32,
-    #[setting(name = "sensor")]
-    pub(crate) line: Line,
-    /// Seed of sensor noise and dropped samples; the same seed gives the same samples.
-    #[setting(name = "sensor.seed", min = 0)]
-    #[setting(used_with = "sensor.set >= 1")]
-    pub(crate) sensor_seed: u64,
-    #[setting(name = "sensor")]
-    #[setting(used_with = "sensor.set >= 1 and translation = entry")]
-    pub(crate) devices: Devices,
-    #[setting(name = "sensor")]
-    pub(crate) triads: PerSensor<Triad>,
-    #[setting(name = "sensor")]
-    pub(crate) surroundings: Surroundings,
-    /// If true, the attitude follows a prescribed calibration sequence instead of the dynamics.
-    #[setting(name = "calibration.active")]
-    pub(crate) calibrates: bool,
-    #[setting(name = "calibration")]
-    #[setting(used_with = "calibration.active = true")]
-    pub(crate) sequence: Sequence,
-    pub(crate) turntable: turntable::Config,
-}
-
 /// Parameters of the converter of the input moment.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Declared)]
 pub(crate) struct Converter {
@@ -243,9 +197,6 @@ impl Default for Parameters {
         let sine = tvsmc.disturbance.sine;
         let Disturbance { kind, bound, period, seed, direction, square_period, start, end, .. } =
             scenario.disturbance;
-        let sensors = SensorData::embedded();
-        let mut line = sensors.line;
-        line.drop_window.end = line.drop_window.end.min(NEVER);
         let wave = |i: usize| sine.waves.get(i).copied().unwrap_or_default();
         Self {
             inertia: scenario.inertia,
@@ -270,17 +221,7 @@ impl Default for Parameters {
             aerodynamics_scale: 1.0,
             jet_duty: false,
             jet_symmetric: false,
-            sensing: Sensing {
-                sensor_set: NO_SENSORS,
-                line,
-                sensor_seed: 1,
-                devices: Devices::default(),
-                triads: sensors.mems,
-                surroundings: sensors.surroundings,
-                calibrates: false,
-                sequence: sensors.calibration,
-                turntable: turntable::Config::default(),
-            },
+            sensing: Sensing::default(),
             converter: Converter::default(),
             table: Table::default(),
             entry: EntryParameters::default(),
@@ -343,24 +284,6 @@ impl Parameters {
         }))
     }
 
-    /// Configuration of the sampled sensors, or `None` if the FMU outputs the readings of ideal
-    /// sensors.
-    fn sensors(&self) -> Option<sensors::Config> {
-        let Sensing { sensor_set, line, sensor_seed: seed, devices, triads: given, .. } =
-            self.sensing;
-        let data = SensorData::embedded();
-        let errors = match sensor_set {
-            NO_SENSORS => return None,
-            IDEAL_SENSORS => data.ideal,
-            GIVEN_SENSORS => given,
-            _ => data.inertial(sensor_set, line.period),
-        };
-        // Freezing is not an error of the sensor set, so every set keeps it.
-        let triads =
-            PerSensor(std::array::from_fn(|i| Triad { freeze: given[i].freeze, ..errors[i] }));
-        Some(sensors::Config { triads, line, devices, seed })
-    }
-
     /// Configuration of the plant that these parameters describe, with the vehicle of a file if
     /// there is one.
     ///
@@ -393,7 +316,7 @@ impl Parameters {
             moment_resolution: self.converter.resolution,
             calibration: self.sensing.calibrates.then_some(self.sensing.sequence),
             surroundings: self.sensing.surroundings,
-            sensors: self.sensors(),
+            sensors: self.sensing.sensors(),
             turntable: self.sensing.turntable,
             step: self.step,
         })

@@ -30,6 +30,7 @@ if __name__ == "__main__":
 from conftest import NAMES, ROOT, TARGET, archive, program
 from fmi import NOT_REPRODUCIBLE, Fmu, Instance, number
 from parameters import joined, pattern, without_index
+from scenes import SCENES
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -45,25 +46,6 @@ NEVER, STEPPED = "no setting of this FMU", "co-simulation"
 # Files for parameters that are texts, all of which name files.
 VEHICLE = ROOT / "orchestrator" / "experiments" / "entry" / "vehicles" / "lifting-body.toml"
 FILE = "time_s,alpha_rad,beta_rad,sigma_rad\n0,0.1,0.0,-0.3\n100,0.2,0.1,-0.4\n"
-
-# Settings in which some variables act and no experiment has them, with an experiment's inputs.
-ROWS = range(1, 9)
-TURNING = ("entry/from-120km", {"reference.externalRate.beta": 0.01})
-SCENES = {
-    "DLMPC": {"a sideslip angle that is to turn": TURNING},
-    "CRMPC": {
-        "a sideslip angle that is to turn": TURNING,
-        "settings without guarantee": ("crmpc-2022/crmpc-robust", {"disturbance.bound": 0.2}),
-        "limits that are scheduled": ("crmpc-2022/crmpc-robust", {"scheduled.limitMoment": 1.3e5, "scheduled.disturbanceBound": 0.01, "scheduled.disturbanceParts": 2}),
-    },
-    "EntryGuidance": {"limits that are reached": (TURNING[0], {"limit.heatFlux": 3e5, "limit.load": 1.15, "limit.pressure": 1.29e4})},
-    "AttitudeEstimator": {"a gyroscope that is stuck": ("crmpc-2022/estimator", {f"measured.gyroscope.{axis}": 0.01 for axis in "xyz"})},
-    "ReentryPlant": {
-        "rotating Earth": ("crmpc-2022/lqr", {"trajectory.earthRate": 7.292115e-5}),
-        "air of six rows": ("entry/from-120km", {"air.rows": 6} | {f"air.altitude[{k}]": 117e3 + 500 * k for k in ROWS[:6]} | {f"air.wind.{axis}[{k}]": 9.0 * k for k in ROWS[:6] for axis in ("north", "east")}),
-        "disturbance of eight rows": ("crmpc-2022/lqr", {"disturbance.kind": "table", "disturbance.table.rows": 8} | {f"disturbance.table.time[{k}]": 4.0 * k for k in ROWS} | {f"disturbance.table.{axis}[{k}]": (-0.1) ** k for k in ROWS for axis in ("alpha", "beta", "sigma")}),
-    },
-}
 
 
 @dataclass(frozen=True)

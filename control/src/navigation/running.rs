@@ -107,12 +107,16 @@ impl Navigation {
         }
         let mut state = State::at(&settings.planet, &place, line.time);
         state.attitude = UnitQuaternion::from_scaled_axis(normal(6) * attitude) * state.attitude;
+        let mut tilt = attitude;
+        if let Some(seen) = seen(line, &line.rate).filter(|_| line.fixes.star.number > 0) {
+            (state.attitude, tilt) = (seen, settings.fix.attitude);
+        }
         let mut covariance = Covariance::zeros();
         let [gyroscope, accelerometer] = self.errors.map(|errors| errors.instability);
         for (from, deviation) in [
             (POSITION, off),
             (VELOCITY, fast),
-            (ATTITUDE, attitude),
+            (ATTITUDE, tilt),
             (GYROSCOPE, gyroscope.max(1e-12)),
             (ACCELEROMETER, accelerometer.max(1e-9)),
         ] {
@@ -169,7 +173,7 @@ impl Navigation {
             let measured = self.by_gnss(running, &line.fixes.gnss);
             self.correct(running, &measured, Some(0));
         }
-        if by_star && let Some(measured) = self.by_star(running, &line.fixes.star) {
+        if by_star && let Some(measured) = self.by_star(running) {
             self.correct(running, &measured, Some(1));
         }
         if by_side {
@@ -226,8 +230,8 @@ impl Navigation {
     }
 
     /// Returns what a fix of the star tracker shows.
-    fn by_star(&self, running: &Running, fix: &StarFix) -> Option<[Measured; 3]> {
-        let seen = fix.rotation()?.inverse();
+    fn by_star(&self, running: &Running) -> Option<[Measured; 3]> {
+        let seen = seen(&running.last, &running.felt(&running.last).rate)?;
         let error = (seen * running.state.attitude.inverse()).scaled_axis();
         let noise = self.settings.fix.attitude;
         Some(std::array::from_fn(|i| Measured::state(ATTITUDE + i, error[i], noise)))
@@ -307,6 +311,14 @@ impl Navigation {
         }
         error
     }
+}
+
+/// Returns the rotation from the body axes to the inertial ones that the star tracker has seen,
+/// turned on at a rate (rad/s) to the time of the sample.
+fn seen(line: &Line, rate: &Vector3<f64>) -> Option<UnitQuaternion<f64>> {
+    let StarFix { time, .. } = line.fixes.star;
+    let turned = UnitQuaternion::from_scaled_axis(rate * (line.time - time));
+    Some(line.fixes.star.rotation()?.inverse() * turned)
 }
 
 /// Moves a state by a multiple of an error.
