@@ -10,7 +10,7 @@ use fmi2_export::{Context, Description, Failure, VariableTable};
 use model_description::DefaultExperiment;
 use serde::{Deserialize, Serialize};
 use settings::Choice;
-use vehicle::entry::QUANTITIES;
+use vehicle::entry::{QUANTITIES, Quantity};
 use vehicle::error::rounded_time;
 
 /// The navigation as an FMU.
@@ -211,25 +211,31 @@ fn sampled(name: &str, text: &str) -> Common {
     discrete_output(name, text).depends_on(INPUTS)
 }
 
+fn real(name: &str, text: &str, unit: &str, nominal: f64) -> Real {
+    sampled(name, text).real().unit(unit).nominal(nominal)
+}
+
+/// Names and meanings of the angles relative to the air, and of the directions of the wind.
+const FLOW: [(&str, &str); 2] = [
+    ("alpha", "angle of attack relative to the air"),
+    ("beta", "sideslip angle relative to the air"),
+];
+const WIND: [(&str, &str); 2] = [("north", "wind to the north"), ("east", "wind to the east")];
+
 fn outputs(table: Variables) -> Variables {
-    let real = |name: &str, text: &str, unit: &str, nominal: f64| -> Real {
-        sampled(name, text).real().unit(unit).nominal(nominal)
-    };
-    let mut table = table;
-    for (prefix, kind) in [("motion", 0), ("motionRate", 1)] {
-        for (i, quantity) in QUANTITIES.into_iter().enumerate() {
-            let (name, nominal) = (format!("{prefix}.{}", quantity.name), quantity.nominal);
-            let text = if kind == 0 {
-                format!("{}, navigated", quantity.meaning)
-            } else {
-                format!("Rate of motion.{}, navigated", quantity.name)
-            };
-            let unit = quantity.units[kind];
-            table = table.real(real(&name, &text, unit, nominal), move |m| {
-                let shown = &mut m.shown;
-                if kind == 0 { &mut shown.motion[i] } else { &mut shown.motion_rate[i] }
-            });
-        }
+    quality(state(table))
+}
+
+/// Adds the navigated state.
+fn state(mut table: Variables) -> Variables {
+    for (i, Quantity { name, meaning, units, nominal }) in QUANTITIES.into_iter().enumerate() {
+        let motion = real(&format!("motion.{name}"), meaning, units[0], nominal);
+        table = table.real(motion, move |m| &mut m.shown.motion[i]);
+    }
+    for (i, Quantity { name, units, nominal, .. }) in QUANTITIES.into_iter().enumerate() {
+        let text = format!("Rate of motion.{name}");
+        let rate = real(&format!("motionRate.{name}"), &text, units[1], nominal);
+        table = table.real(rate, move |m| &mut m.shown.motion_rate[i]);
     }
     let angle = |axis: &str, meaning: &str| {
         let text = format!("Navigated {meaning} relative to the ground velocity");
@@ -239,84 +245,71 @@ fn outputs(table: Variables) -> Variables {
         let text = format!("Navigated body {meaning} rate");
         real(&format!("rate.{axis}"), &text, "rad/s", 0.05)
     };
-    let bias = |name: &'static str, unit: &'static str, nominal: f64| {
-        move |axis: &str, _: &str| {
-            let text = format!("Estimated bias of the {name} about or along {axis}");
-            sampled(&format!("bias.{name}.{axis}"), &text).real().unit(unit).nominal(nominal)
-        }
-    };
-    let deviation = |axis: &str, meaning: &str| {
-        let text = format!(
-            "Predicted standard deviation of the {meaning} relative to the ground velocity"
-        );
-        real(&format!("deviation.attitude.{axis}"), &text, "rad", 0.01)
-    };
     let table = vector(table, ANGLES, angle, |m| &mut m.shown.angles);
-    let table = vector(table, RATES, rate, |m| &mut m.shown.rates);
-    let mut table = vector(table, ANGLES, deviation, |m| &mut m.shown.deviations.angles);
-    for (i, (axis, meaning)) in ANGLES.into_iter().take(2).enumerate() {
-        let text = format!("Navigated {meaning} relative to the air");
-        let spread = format!("Predicted standard deviation of the {meaning} relative to the air");
-        table = table
-            .real(real(&format!("flow.{axis}"), &text, "rad", 0.1), move |m| &mut m.shown.flow[i])
-            .real(real(&format!("deviation.flow.{axis}"), &spread, "rad", 0.01), move |m| {
-                &mut m.shown.deviations.flow[i]
-            });
+    let mut table = vector(table, RATES, rate, |m| &mut m.shown.rates)
+        .real(real("load.lift", "Measured lift per mass", "m/s2", 10.0), |m| &mut m.shown.lift)
+        .real(real("load.drag", "Measured drag per mass", "m/s2", 10.0), |m| &mut m.shown.drag);
+    for (i, (axis, meaning)) in FLOW.into_iter().enumerate() {
+        let angle = real(&format!("flow.{axis}"), &format!("Navigated {meaning}"), "rad", 0.1);
+        table = table.real(angle, move |m| &mut m.shown.flow[i]);
     }
-    for (i, direction) in ["north", "east"].into_iter().enumerate() {
-        let text = format!("Estimated wind to the {direction}");
-        let spread = format!("Predicted standard deviation of the wind to the {direction}");
+    for (i, (direction, meaning)) in WIND.into_iter().enumerate() {
+        let wind = real(&format!("wind.{direction}"), &format!("Estimated {meaning}"), "m/s", 10.0);
+        table = table.real(wind, move |m| &mut m.shown.wind[i]);
+    }
+    table
+}
+
+/// Adds what says how good the navigated state is.
+fn quality(table: Variables) -> Variables {
+    let deviation = |name: &str, meaning: &str, unit: &str, nominal: f64| {
+        let text = format!("Predicted standard deviation of the {meaning}");
+        real(&format!("deviation.{name}"), &text, unit, nominal)
+    };
+    let angle = |axis: &str, meaning: &str| {
+        let meaning = format!("{meaning} relative to the ground velocity");
+        deviation(&format!("attitude.{axis}"), &meaning, "rad", 0.01)
+    };
+    let mut table = vector(table, ANGLES, angle, |m| &mut m.shown.deviations.angles);
+    for (i, (axis, meaning)) in FLOW.into_iter().enumerate() {
+        table = table.real(deviation(&format!("flow.{axis}"), meaning, "rad", 0.01), move |m| {
+            &mut m.shown.deviations.flow[i]
+        });
+    }
+    for (i, (direction, meaning)) in WIND.into_iter().enumerate() {
         table = table
-            .real(real(&format!("wind.{direction}"), &text, "m/s", 10.0), move |m| {
-                &mut m.shown.wind[i]
-            })
-            .real(real(&format!("deviation.wind.{direction}"), &spread, "m/s", 10.0), move |m| {
+            .real(deviation(&format!("wind.{direction}"), meaning, "m/s", 10.0), move |m| {
                 &mut m.shown.deviations.wind[i]
             });
     }
-    for (i, (name, text)) in [
+    table = table
+        .real(deviation("position", "position along the worst axis", "m", 10.0), |m| {
+            &mut m.shown.deviations.position
+        })
+        .real(deviation("velocity", "velocity along the worst axis", "m/s", 0.1), |m| {
+            &mut m.shown.deviations.velocity
+        });
+    let sources = [
         ("gnss", "fix of satellite navigation"),
         ("star", "fix of the star tracker"),
         ("side", "side force"),
-    ]
-    .into_iter()
-    .enumerate()
-    {
+    ];
+    for (i, (name, text)) in sources.into_iter().enumerate() {
         let text = format!(
             "Square of the normalised innovation per component of the latest {text}, 1 on average"
         );
-        table = table.real(sampled(&format!("innovation.{name}"), &text).real(), move |m| {
-            &mut m.shown.innovations[i]
-        });
+        let square = sampled(&format!("innovation.{name}"), &text).real();
+        table = table.real(square, move |m| &mut m.shown.innovations[i]);
     }
+    let bias = |name: &'static str, unit: &'static str, nominal: f64| {
+        move |axis: &str, _: &str| {
+            let text = format!("Estimated bias of the {name} about or along {axis}");
+            real(&format!("bias.{name}.{axis}"), &text, unit, nominal)
+        }
+    };
     let table = vector(table, AXES, bias("gyroscope", "rad/s", 1e-5), |m| &mut m.shown.biases[0]);
-    let table =
-        vector(table, AXES, bias("accelerometer", "m/s2", 1e-2), |m| &mut m.shown.biases[1]);
-    table
-        .real(real("load.lift", "Measured lift per mass", "m/s2", 10.0), |m| &mut m.shown.lift)
-        .real(real("load.drag", "Measured drag per mass", "m/s2", 10.0), |m| &mut m.shown.drag)
-        .real(
-            real(
-                "deviation.position",
-                "Predicted standard deviation of the position along the worst axis",
-                "m",
-                10.0,
-            ),
-            |m| &mut m.shown.deviations.position,
-        )
-        .real(
-            real(
-                "deviation.velocity",
-                "Predicted standard deviation of the velocity along the worst axis",
-                "m/s",
-                0.1,
-            ),
-            |m| &mut m.shown.deviations.velocity,
-        )
-        .integer(
-            sampled("rejectedFixes", "Number of fixes so far that were rejected"),
-            (Some(0), None),
-            |m| &mut m.shown.rejected,
-        )
+    let rejected = sampled("rejectedFixes", "Number of fixes so far that were rejected");
+    vector(table, AXES, bias("accelerometer", "m/s2", 1e-2), |m| &mut m.shown.biases[1])
+        .integer(rejected, (Some(0), None), |m| &mut m.shown.rejected)
         .choice(sampled("health", Health::TEXT), |m| &mut m.health)
 }

@@ -165,9 +165,8 @@ pub(crate) struct Seen {
     pub(crate) health: navigation::Health,
 }
 
-/// Flies to the terminal area, and calls `see` at every tick of a whole second.
-pub(crate) fn fly(case: &Case, mut see: impl FnMut(&Seen)) {
-    let guidance = Guidance::new(guidance::Settings::default()).unwrap();
+/// Returns the entry flight of a case, and the plant with its sensors.
+fn vehicle(case: &Case) -> (Config, vehicle::plant::Config) {
     let initial = case.settings.initial;
     let mut air = Air { rows: 3, ..Air::default() };
     for (row, (altitude, wind)) in
@@ -215,6 +214,13 @@ pub(crate) fn fly(case: &Case, mut see: impl FnMut(&Seen)) {
         }),
         ..scenario.config(PERIOD)
     };
+    (entry, config)
+}
+
+/// Flies to the terminal area, and calls `see` at every tick of a whole second.
+pub(crate) fn fly(case: &Case, mut see: impl FnMut(&Seen)) {
+    let guidance = Guidance::new(guidance::Settings::default()).unwrap();
+    let (entry, config) = vehicle(case);
     let mut plant = Plant::new(&config, 0.0).unwrap();
     let navigation = Navigation::new(case.settings).unwrap();
     let mut memory: Memory = navigation.memory();
