@@ -1,5 +1,5 @@
-//! Navigation of entry flights: the error against what the filter predicts, in flights whose sensors
-//! and winds are drawn.
+//! Navigation of entry flights: the error against what the filter predicts, in flights whose
+//! sensors and winds are drawn.
 
 #[path = "harness/mod.rs"]
 mod harness;
@@ -33,8 +33,8 @@ fn oracle_errors_are_as_large_as_predicted() {
 }
 
 /// With tactical sensors, wind of 60 m/s and lift and drag wrong by 10 %, the bank angle is known
-/// within 0.2°, angle of attack and sideslip within 0.3°, and the sideslip relative to the air within
-/// 0.25° below Mach 5.
+/// within 0.2°, angle of attack and sideslip within 0.3°, and the sideslip relative to the air
+/// within 0.25° below Mach 5.
 #[test]
 fn regress_wind_is_found_by_the_side_force() {
     let all = figures(Case::windy, 400..410);

@@ -74,8 +74,8 @@ fn side_ratio(aerodynamics: &Aerodynamics, [alpha, beta]: [f64; 2], mach: f64) -
 }
 
 /// Returns what a specific force (m/s², body axes) with a noise (m/s²) shows of the sideslip, and
-/// with it of the wind. The angle of attack cannot be had in this way: the ratio of lift to drag has
-/// a maximum over it. The model times `scale` predicts the side force.
+/// with it of the wind. The angle of attack cannot be had in this way: the ratio of lift to drag
+/// has a maximum over it. The model times `scale` predicts the side force.
 pub(super) fn side_force(
     aerodynamics: &Aerodynamics,
     relative: &Relative,

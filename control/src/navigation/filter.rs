@@ -2,8 +2,8 @@
 //! Integrated Navigation Systems" (2013), chapters 3 and 14, in inertial axes.
 //!
 //! The error x is true less estimated: position, velocity, attitude as a rotation vector φ in
-//! inertial axes (R = exp(φ) R̂), biases of gyroscope and accelerometer, wind to the north and east, and
-//! the relative error of the model of the side force.
+//! inertial axes (R = exp(φ) R̂), biases of gyroscope and accelerometer, wind to the north and
+//! east, and the relative error of the model of the side force.
 
 use super::settings::{Errors, Wind};
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};

@@ -2,87 +2,34 @@
 //! corrects it by fixes of satellite navigation and star tracker and finds the wind by the side
 //! force.
 //!
-//! The shown state follows the filter's in a smooth way: a correction is blended in over seconds, so
-//! that controllers see an error that drifts instead of one that jumps.
+//! The shown state follows the filter's in a smooth way: a correction is blended in over seconds,
+//! so that controllers see an error that drifts instead of one that jumps.
 
 mod air;
+mod device;
 mod filter;
+mod line;
 mod running;
 mod settings;
 mod shown;
 mod strapdown;
 
+pub use device::Navigation;
 pub use filter::{Covariance, Error, STATES};
+pub use line::{Health, Line};
 pub use settings::{Alignment, Errors, Fix, Initial, Settings, Trust, Wind};
 pub use shown::{Deviations, Shown};
 pub use strapdown::State;
 
-use crate::error::DesignError;
-use ::settings::Choice;
-use nalgebra::Vector3;
 use running::Running;
 use serde::{Deserialize, Serialize};
 use strapdown::Felt;
-use vehicle::aerodynamics::Aerodynamics;
-use vehicle::fixes::Fixes;
 use vehicle::frames::Place;
 
 /// Time without a sample from which the navigation is lost, s.
 const LOST_AFTER: f64 = 0.5;
 /// Average of the squares of the normalised innovations from which the filter is inconsistent.
 const INCONSISTENT: f64 = 3.0;
-
-/// What the navigation receives.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Line {
-    /// Number of the newest sample, counted from 1; 0 before the first.
-    pub sample: i32,
-    /// Time at which it was taken, s.
-    pub time: f64,
-    /// Reading of the gyroscope, rad/s.
-    pub rate: Vector3<f64>,
-    /// Reading of the accelerometer, m/s².
-    pub force: Vector3<f64>,
-    /// Latest fixes.
-    pub fixes: Fixes,
-}
-
-impl Line {
-    /// Returns the name of the inputs that hold a value that is not finite.
-    pub fn fault(&self) -> Option<&'static str> {
-        let Fixes { gnss, star } = &self.fixes;
-        let broken = |values: &[f64]| values.iter().any(|value| !value.is_finite());
-        let vectors = |vectors: [&Vector3<f64>; 2], time: f64| {
-            vectors.iter().any(|vector| broken(vector.as_slice())) || broken(&[time])
-        };
-        if vectors([&self.rate, &self.force], self.time) {
-            Some("measured.*")
-        } else if vectors([&gnss.position, &gnss.velocity], gnss.time) {
-            Some("gnss.*")
-        } else {
-            (broken(&star.attitude) || broken(&[star.time])).then_some("star.*")
-        }
-    }
-}
-
-/// Health of the navigation: how far it can be trusted.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Choice)]
-#[setting(name = "NavigationHealth")]
-pub enum Health {
-    /// No sample has arrived yet.
-    #[default]
-    Waiting,
-    /// Fixes arrive, and the attitude is known as well as health.deviation asks for.
-    Aided,
-    /// No fix has arrived for health.after, and the inertial sensors bridge the gap.
-    Bridging,
-    /// The predicted standard deviation of an attitude angle exceeds health.deviation.
-    Degraded,
-    /// The fixes contradict the filter's own standard deviations.
-    Inconsistent,
-    /// No sample has arrived for half a second.
-    Lost,
-}
 
 /// State that is carried from tick to tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -94,42 +41,7 @@ pub struct Memory {
     pub health: Health,
 }
 
-/// Navigation.
-#[derive(Clone, Debug)]
-pub struct Navigation {
-    settings: Settings,
-    errors: [Errors; 2],
-    aerodynamics: Aerodynamics,
-}
-
 impl Navigation {
-    /// Makes a navigation.
-    ///
-    /// # Errors
-    /// Names the setting that is out of range.
-    pub fn new(settings: Settings) -> Result<Self, DesignError> {
-        Self::of(settings, Aerodynamics::papers())
-    }
-
-    /// Makes the navigation of a vehicle.
-    ///
-    /// # Errors
-    /// Names the setting that is out of range.
-    pub fn of(settings: Settings, aerodynamics: Aerodynamics) -> Result<Self, DesignError> {
-        ::settings::check(&settings)?;
-        Ok(Self { errors: settings.errors(), aerodynamics, settings })
-    }
-
-    /// Returns the air forces of the vehicle.
-    pub fn aerodynamics(&self) -> &Aerodynamics {
-        &self.aerodynamics
-    }
-
-    /// Returns the settings.
-    pub fn settings(&self) -> &Settings {
-        &self.settings
-    }
-
     /// Returns the memory before the first sample, which shows the initial state.
     pub fn memory(&self) -> Memory {
         let Settings { planet, initial, .. } = &self.settings;

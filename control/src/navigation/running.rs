@@ -1,13 +1,15 @@
 //! The navigation from sample to sample.
 
 use super::air::side_force;
+use super::device::Navigation;
 use super::filter::{
     ACCELEROMETER, ATTITUDE, Covariance, Error, GYROSCOPE, Measured, POSITION, SIDE, VELOCITY,
     WIND, Way, gravity_gradient, kept, propagated, updated,
 };
+use super::line::Line;
+use super::settings::{Alignment, Wind};
 use super::shown::Deviations;
 use super::strapdown::{Felt, State, rotation};
-use super::{Alignment, Line, Navigation, Wind};
 use nalgebra::{UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 use vehicle::atmosphere::air_anywhere;

@@ -2,9 +2,10 @@
 //! take them.
 
 use super::air::Relative;
+use super::device::Navigation;
 use super::filter::{self, Covariance, Error};
+use super::settings::Settings;
 use super::strapdown::{Felt, State};
-use super::{Navigation, Settings};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 use vehicle::axes::nearest;

@@ -68,8 +68,8 @@ pub(crate) struct Figures {
     normalised: f64,
     /// Squares of the innovations of satellite navigation while there are fixes, and their number.
     innovations: [f64; 2],
-    /// Square of the error of the sideslip relative to the air below Mach 5, its predicted variance,
-    /// and their number.
+    /// Square of the error of the sideslip relative to the air below Mach 5, its predicted
+    /// variance, and their number.
     slow: [f64; 3],
 }
 
