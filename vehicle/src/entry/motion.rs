@@ -89,8 +89,8 @@ pub fn motion_rate(
 }
 
 /// Returns the great circle from one position to another, given as longitude and latitude (rad):
-/// its length over ground (m, at the planet's radius), and its direction at the first position from north
-/// to east, rad.
+/// its length over ground (m, at the planet's radius), and its direction at the first position from
+/// north to east, rad.
 pub fn great_circle(planet: &Planet, from: [f64; 2], to: [f64; 2]) -> (f64, f64) {
     let (sin_from, cos_from) = sin_cos(from[1]);
     let (sin_to, cos_to) = sin_cos(to[1]);
