@@ -1,7 +1,9 @@
-"""Draws the pictures of docs/entry.md from finished runs of entry flights: entry.py DIRECT_DIR ACTUATED_DIR.
+"""Draws the pictures of docs/entry.md and docs/EntryNavigation.md from finished runs of entry flights:
+entry.py DIRECT_DIR ACTUATED_DIR NAVIGATED_DIR.
 
-The folders are what `orchestrator run from-120km` and `orchestrator run surfaces-and-jets` wrote, the latter with
-`--fmu controller=CRMPC.fmu`; each holds its results.csv.
+The folders are what `orchestrator run from-120km`, `orchestrator run surfaces-and-jets` with
+`--fmu controller=CRMPC.fmu`, and `orchestrator run navigated` wrote, the latter with wind (docs/EntryNavigation.md);
+each holds its results.csv.
 The corridor of the first picture has the altitudes at which the vehicle of vehicle/data/papers.toml, at the
 flight's angle of attack, would meet a load of 2.5, a heat flux of 700 kW/m2, or a lift that holds it in
 equilibrium without bank.
@@ -125,7 +127,35 @@ def actuated(run: dict[str, np.ndarray]) -> None:
     figure.savefig(f"{IMAGES}/entry-actuators.png", dpi=90)
 
 
+def navigated(run: dict[str, np.ndarray]) -> None:
+    """Errors of the navigation with what it predicts of them."""
+    time = run["time"]
+    names = {"attitude.sigma": "bank angle", "flow.alpha": "angle of attack, air", "flow.beta": "sideslip, air"}
+    figure, axes = plt.subplots(4, 1, figsize=(9, 9), sharex=True, layout="constrained")
+    height = run["plant.motion.altitude"] / 1e3
+    for one in axes:
+        one.axvspan(time[height < 85][0], time[height < 45][0], color="0.93", lw=0)
+        one.grid(alpha=0.3)
+    for one, (name, title) in zip(axes, names.items()):
+        error = run[f"navigation.{name}"] - run[f"plant.{name}"]
+        deviation = np.degrees(run[f"navigation.deviation.{name}"])
+        one.fill_between(time, -2 * deviation, 2 * deviation, color="#56b4e9", alpha=0.4, lw=0, label="twice the predicted deviation")
+        one.plot(time, np.degrees(np.angle(np.exp(1j * error))), label="error")
+        one.set(ylabel="deg", title=title)
+    axes[0].legend(loc="upper left", ncols=2)
+    wind = axes[-1]
+    for part in ("north", "east"):
+        wind.plot(time, run[f"navigation.wind.{part}"], label=f"to the {part}")
+    low, high = np.interp(height, [20, 60, 100], [40, 20, 0]), np.interp(height, [20, 60, 100], [-30, 10, 0])
+    wind.plot(time, low, **LIMIT, label="true")
+    wind.plot(time, high, **LIMIT)
+    wind.set(xlabel="time, s", ylabel="m/s", title="wind; without satellite navigation where it is grey")
+    wind.legend(loc="lower left", ncols=3)
+    figure.savefig(f"{IMAGES}/entry-navigation.png", dpi=90)
+
+
 if __name__ == "__main__":
-    direct, by_actuators = sys.argv[1:]
+    direct, by_actuators, by_navigation = sys.argv[1:]
     whole(read(f"{direct}/results.csv"))
     actuated(read(f"{by_actuators}/results.csv"))
+    navigated(read(f"{by_navigation}/results.csv"))

@@ -189,7 +189,8 @@ impl Navigation {
     }
 
     /// Propagates the covariance over the way since the last time, and lets the estimated biases
-    /// and the wind fade as the filter expects of the true ones.
+    /// fade as the filter expects of the true ones. The wind stays: each correction of one that
+    /// fades would be shown late.
     fn propagate(&self, running: &mut Running) {
         let (time, pushed, from) = running.way;
         let radius = running.state.position.norm();
@@ -206,9 +207,6 @@ impl Navigation {
         for (bias, errors) in running.biases.iter_mut().zip(&self.errors) {
             *bias *= kept(errors, time);
         }
-        let kept = exp(-way.climbed.abs() / wind.correlation);
-        running.wind = running.wind.map(|part| part * kept);
-        running.side = 1.0 + (running.side - 1.0) * kept;
         running.way = (0.0, Vector3::zeros(), radius);
     }
 
