@@ -8,7 +8,8 @@ use vehicle::fixes::Fixes;
 /// What the navigation receives.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Line {
-    /// Number of the newest sample, counted from 1; 0 before the first.
+    /// Number of the newest sample, counted from 1; 0 before the first, or always if samples are
+    /// not counted.
     pub sample: i32,
     /// Time at which it was taken, s.
     pub time: f64,

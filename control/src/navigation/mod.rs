@@ -21,6 +21,7 @@ pub use settings::{Alignment, Errors, Fix, Initial, Settings, Trust, Wind};
 pub use shown::{Deviations, Shown};
 pub use strapdown::State;
 
+use nalgebra::Vector3;
 use running::Running;
 use serde::{Deserialize, Serialize};
 use strapdown::Felt;
@@ -53,16 +54,22 @@ impl Navigation {
         memory
     }
 
-    /// Takes what has arrived at `time` (s), and shows the state then.
+    /// Takes what has arrived at `time` (s), and shows the state then. Samples without numbers are
+    /// taken as those of the instant.
     pub fn update(&self, memory: &mut Memory, time: f64, line: &Line) {
-        if line.sample == 0 {
-            return;
+        let mut line = *line;
+        let is_counted = line.sample > 0;
+        if !is_counted {
+            if line.rate == Vector3::zeros() && line.force == Vector3::zeros() {
+                return;
+            }
+            line.time = time;
         }
         let running = match &mut memory.running {
-            None => memory.running.insert(self.begin(line)),
+            None => memory.running.insert(self.begin(&line)),
             Some(running) => {
-                if line.sample > running.last.sample {
-                    self.take(running, line);
+                if !is_counted || line.sample > running.last.sample {
+                    self.take(running, &line);
                 }
                 running
             }

@@ -19,7 +19,7 @@ fn both_libraries_have_every_function_and_say_what_they_are() {
 #[test]
 fn the_guid_selects_the_fmu() {
     let fmus = fmus();
-    assert_eq!(fmus.len(), 12);
+    assert_eq!(fmus.len(), 13);
     for fmu in &fmus {
         assert_eq!(
             fmus.iter().filter(|other| other.guid() == fmu.guid()).count(),
