@@ -80,3 +80,29 @@ def test_a_fault_is_refused_with_its_line(tmp_path, capsys, old, new, named):
 
 def test_units_of_signals_are_converted():
     assert Model(GLIDER).check()[4].value == pytest.approx(math.atan2(math.radians(2), 2))
+
+
+def changed(tmp_path, old, new):
+    """The glider with another text."""
+    text, file = GLIDER.read_text(encoding="utf-8"), tmp_path / "changed.dml"
+    assert old in text
+    file.write_text(text.replace(old, new), encoding="utf-8")
+    return file
+
+
+def test_tolerances_have_the_unit_of_their_signal(tmp_path, capsys):
+    signal = "<signal><varID>bet</varID><signalUnits>deg</signalUnits><signalValue>2.5</signalValue><tol>0.1</tol></signal>"
+    file = changed(tmp_path, "<checkOutputs>", f"<checkOutputs>{signal}")
+    assert main([str(file), "--check"]) == 1
+    assert "WRONG   supersonic: bet" in capsys.readouterr().out
+
+
+def test_a_unit_of_a_signal_that_cannot_be_converted_is_refused(tmp_path, capsys):
+    file = changed(tmp_path, "<signalUnits>f_s</signalUnits>", "<signalUnits>mrad</signalUnits>")
+    assert main([str(file), "--check"]) == 2
+    assert '"trueAirspeed" has the unit "mrad", which cannot be converted to "f_s"' in capsys.readouterr().err
+
+
+def test_a_quotient_is_a_real_division(tmp_path):
+    file = changed(tmp_path, "<m:cn>0.05</m:cn>", "<m:apply><m:quotient/><m:cn>6</m:cn><m:cn>5</m:cn></m:apply>")
+    assert Model(file).evaluate({"cl0": 0.0})("CD") == pytest.approx(1.2)

@@ -4,40 +4,15 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_right
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from ._mathml import DaveError, Formula, formula, refuse
+from ._units import factor
 from ._xml import Node, parse
 
 INTERPOLATIONS = ("linear", "discrete", "floor", "ceiling")
-# Factors to one unit of each kind, by the names that models use.
-UNITS = {
-    **dict.fromkeys(("rad", "r", "radian", "radians"), ("angle", 1.0)),
-    **dict.fromkeys(("deg", "d", "degree", "degrees"), ("angle", math.pi / 180.0)),
-    **dict.fromkeys(("m",), ("length", 1.0)),
-    **dict.fromkeys(("ft", "f"), ("length", 0.3048)),
-    **dict.fromkeys(("in",), ("length", 0.0254)),
-    **dict.fromkeys(("m2", "m^2"), ("area", 1.0)),
-    **dict.fromkeys(("ft2", "f2", "ft^2", "sqft"), ("area", 0.3048**2)),
-    **dict.fromkeys(("m_s", "m/s", "m_s-1"), ("speed", 1.0)),
-    **dict.fromkeys(("ft_s", "f_s", "ft/s", "f_s-1", "fps"), ("speed", 0.3048)),
-    **dict.fromkeys(("kn", "kt", "knots"), ("speed", 1852.0 / 3600.0)),
-    **dict.fromkeys(("rad_s", "r_s", "rad/s", "r_s-1", "rad_s-1", "rad/sec"), ("rate", 1.0)),
-    **dict.fromkeys(("deg_s", "d_s", "deg/s", "d_s-1", "deg_s-1", "deg/sec"), ("rate", math.pi / 180.0)),
-    **dict.fromkeys(("kg",), ("mass", 1.0)),
-    **dict.fromkeys(("slug", "slugs", "sl"), ("mass", 0.45359237 * 9.80665 / 0.3048)),
-    **dict.fromkeys(("lbm",), ("mass", 0.45359237)),
-    **dict.fromkeys(("kgm2", "kg_m2", "kg-m2"), ("inertia", 1.0)),
-    **dict.fromkeys(("slugft2", "slug_ft2", "slug-ft2"), ("inertia", 0.45359237 * 9.80665 * 0.3048)),
-}
-
-
-def factor(given: str, wanted: str) -> float | None:
-    """Factor from one unit to another; none if they are not known, or of different kinds."""
-    one, other = UNITS.get(given.strip().lower()), UNITS.get(wanted.strip().lower())
-    return one[1] / other[1] if one and other and one[0] == other[0] else None
 
 
 def numbers(node: Node) -> list[float]:
@@ -74,6 +49,8 @@ class Variable:
     limits: tuple[float, float]
     is_output: bool
     formula: Formula | None = None
+    needs: set[str] = field(default_factory=set)
+    """Variables of which it is calculated."""
 
     @property
     def is_input(self) -> bool:
@@ -173,8 +150,8 @@ class Model:
         self.variables: dict[str, Variable] = {}
         self.breakpoints: dict[str, list[float]] = {}
         self.tables: dict[str, Node] = {}
+        self.axes: list[Axis] = []
         self.shots: list[Shot] = []
-        self.limited: dict[str, tuple[float, float]] = {}
         header = root.one("fileHeader")
         self.title = header.attributes.get("name", path.stem) if header else path.stem
         used = ("variableDef", "breakpointDef", "griddedTableDef", "function", "checkData")
@@ -190,7 +167,7 @@ class Model:
         for node in root.all("griddedTableDef"):
             self.tables[required(node, "gtID")] = node
         for variable in self.variables.values():
-            self._check_names(variable.node)
+            self._collect_names(variable, variable.node)
         for node in root.all("function"):
             self._function(node)
         for checks in root.all("checkData"):
@@ -221,12 +198,12 @@ class Model:
             raise refuse(node, f'there is no variable "{name}"')
         return name
 
-    def _check_names(self, node: Node) -> None:
-        """Refuses a calculation with a variable that does not exist."""
+    def _collect_names(self, variable: Variable, node: Node) -> None:
+        """Notes the variables of a calculation, and refuses one that does not exist."""
         for child in node.children:
             if child.tag == "ci":
-                self._known(child, child.text.strip())
-            self._check_names(child)
+                variable.needs.add(self._known(child, child.text.strip()))
+            self._collect_names(variable, child)
 
     def _function(self, node: Node) -> None:
         axes = [self._axis(child) for child in node.all("independentVarRef", "independentVarPts")]
@@ -253,6 +230,8 @@ class Model:
         if self.variables[target].formula is not None:
             raise refuse(node, f'the variable "{target}" is calculated twice')
         self.variables[target].formula = interpolated(axes, values)
+        self.variables[target].needs |= {axis.variable for axis in axes}
+        self.axes += axes
 
     def _axis(self, node: Node) -> Axis:
         interpolate = node.attributes.get("interpolate", "linear")
@@ -300,6 +279,16 @@ class Model:
                 return variable
         return None
 
+    def behind(self, identifiers: Iterable[str]) -> set[str]:
+        """These variables, and all of which they are calculated."""
+        found: set[str] = set()
+        waiting = list(identifiers)
+        while waiting:
+            if (name := waiting.pop()) not in found:
+                found.add(name)
+                waiting += self.variables[name].needs
+        return found
+
     def evaluate(self, inputs: Mapping[str, float]) -> Callable[[str], float]:
         """Returns the function that gives the value of every variable for some inputs, by their
         identifiers. Inputs that are left out have their initial values."""
@@ -336,13 +325,17 @@ class Model:
         """Evaluates all static check cases, and returns every value that they state."""
         found = []
         for shot in self.shots:
-            inputs = {(variable := self._named(signal)).identifier: self._converted(signal, variable) for signal in shot.inputs}
+            inputs = {}
+            for signal in shot.inputs:
+                variable = self._named(signal)
+                inputs[variable.identifier] = signal.value * self._scale(signal, variable)
             value = self.evaluate(inputs)
             for signal in shot.internal + shot.outputs:
                 variable = self._named(signal)
-                expected = self._converted(signal, variable)
+                scale = self._scale(signal, variable)
+                expected = signal.value * scale
                 # Without a tolerance, printed digits are compared.
-                tolerance = signal.tolerance if signal.tolerance is not None else 1e-4 * max(1.0, abs(expected))
+                tolerance = signal.tolerance * scale if signal.tolerance is not None else 1e-4 * max(1.0, abs(expected))
                 is_required = signal.tolerance is not None or signal in shot.outputs
                 found.append(Difference(shot.name, signal.name, expected, value(variable.identifier), tolerance, is_required))
         return found
@@ -353,6 +346,11 @@ class Model:
             raise refuse(signal.node, f'there is no variable "{signal.name}"')
         return variable
 
-    def _converted(self, signal: Signal, variable: Variable) -> float:
-        scale = factor(signal.units, variable.units) if signal.units and variable.units != signal.units else 1.0
-        return signal.value * (1.0 if scale is None else scale)
+    def _scale(self, signal: Signal, variable: Variable) -> float:
+        """Factor from the unit of a signal to that of its variable. Without a unit it has that of the variable."""
+        scale = factor(signal.units, variable.units) if signal.units else 1.0
+        if scale is None:
+            raise refuse(
+                signal.node, f'"{signal.name}" has the unit "{signal.units}", which cannot be converted to "{variable.units}"'
+            )
+        return scale

@@ -51,7 +51,8 @@ BINARY: dict[str, Callable[[float, float], float]] = {
     "divide": operator.truediv,
     "power": math.pow,
     "rem": math.fmod,
-    "quotient": lambda value, by: math.trunc(value / by),
+    # A real division, as in the reference files of the schema: 6/5 is 1.2.
+    "quotient": operator.truediv,
     "atan2": math.atan2,
 }
 SEVERAL: dict[str, Callable[..., float]] = {

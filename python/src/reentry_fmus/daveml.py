@@ -15,8 +15,9 @@ from collections.abc import Callable, Iterable
 from math import cos, pi, radians, sin
 from pathlib import Path
 
-from ._dave import Difference, Model, Variable, factor
+from ._dave import Difference, Model, Variable
 from ._mathml import DaveError
+from ._units import factor
 
 __all__ = ["DaveError", "Model", "convert", "main"]
 
