@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from reentry_fmus.daveml import Model, main
+from reentry_fmus.daveml import Model, grid_of, main
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -106,3 +106,110 @@ def test_a_unit_of_a_signal_that_cannot_be_converted_is_refused(tmp_path, capsys
 def test_a_quotient_is_a_real_division(tmp_path):
     file = changed(tmp_path, "<m:cn>0.05</m:cn>", "<m:apply><m:quotient/><m:cn>6</m:cn><m:cn>5</m:cn></m:apply>")
     assert Model(file).evaluate({"cl0": 0.0})("CD") == pytest.approx(1.2)
+
+
+HEIGHT = ('<variableDef name="clean lift"', '<variableDef name="height" varID="H_rwy" units="f"/><variableDef name="clean lift"')
+
+
+def higher(tmp_path, value=""):
+    """The glider with a drag that depends on a height."""
+    file = changed(tmp_path, HEIGHT[0], HEIGHT[1].replace("/>", f" {value}/>", 1))
+    text = file.read_text(encoding="utf-8").partition("<checkData>")[0] + "</DAVEfunc>"
+    file.write_text(text.replace("<m:cn>0.05</m:cn>", "<m:ci>H_rwy</m:ci>"), encoding="utf-8")
+    return file
+
+
+def drag(made):
+    return tomllib.loads(made.read_text(encoding="utf-8"))["forces"]["drag"]["table"]["values"][0][0]
+
+
+def test_an_input_without_a_value_is_refused_and_can_be_set(tmp_path, capsys):
+    file, made = higher(tmp_path), tmp_path / "vehicle.toml"
+    assert main([str(file), "-o", str(made), *CHOICES]) == 2
+    assert "H_rwy (height) in f; give --set H_rwy=…" in capsys.readouterr().err
+    assert main([str(file), "-o", str(made), *CHOICES, "--set", "H_rwy=0.25"]) == 0
+    assert drag(made) == 0.25
+
+
+@pytest.mark.parametrize(
+    ("pair", "named"),
+    [("nothing=1", 'no input "nothing"'), ("cl0=1", 'no input "cl0"'), ("alp=1", "is sampled"), ("sref=nan", "no finite number")],
+)
+def test_a_wrong_setting_is_refused(tmp_path, capsys, pair, named):
+    assert main([str(GLIDER), "-o", str(tmp_path / "vehicle.toml"), *CHOICES, "--set", pair]) == 2
+    assert named in capsys.readouterr().err
+
+
+def test_inputs_with_initial_values_are_told(tmp_path, capsys):
+    file, made = higher(tmp_path, 'initialValue="0.125"'), tmp_path / "vehicle.toml"
+    assert main([str(file), "-o", str(made), *CHOICES]) == 0
+    assert "initial value: H_rwy (height) = 0.125 f" in capsys.readouterr().out and drag(made) == 0.125
+
+
+def test_without_a_moment_point_what_the_model_says_of_it_is_told(tmp_path, capsys):
+    place = '<variableDef name="vrsPositionOfMrc_X" varID="XRP" units="fracMAC" initialValue="0.54"/><variableDef name="clean lift"'
+    file, made = changed(tmp_path, HEIGHT[0], place), tmp_path / "vehicle.toml"
+    assert main([str(file), "-o", str(made), *CHOICES]) == 0
+    assert "vrsPositionOfMrc_X = 0.54 fracMAC" in capsys.readouterr().err
+    assert main([str(file), "-o", str(made), *CHOICES, "--moment-point", "1", "0", "0"]) == 0
+    assert capsys.readouterr().err == ""
+
+
+def test_names_with_quotes_are_written_as_toml(tmp_path):
+    file = changed(tmp_path, "A glider, invented for tests", "models\\new &quot;K&quot;&#10;second line \x7f")
+    made = tmp_path / "vehicle.toml"
+    assert main([str(file), "-o", str(made), *CHOICES[:4], "--mass", "9000", "--surface", 'a "flap"=dflap']) == 0
+    vehicle = tomllib.loads(made.read_text(encoding="utf-8"))
+    assert vehicle["title"].startswith('models\\new "K"\nsecond line \x7f, from ')
+    assert vehicle["surfaces"]["names"] == ['a "flap"'] and vehicle["surfaces"]["table"][0]["surface"] == 'a "flap"'
+
+
+def test_the_model_is_not_overwritten(tmp_path, capsys):
+    file = changed(tmp_path, "<m:cn>0.05</m:cn>", "<m:cn>0.06</m:cn>")
+    before = file.read_bytes()
+    assert main([str(file), "-o", str(file), *CHOICES, "--force"]) == 2
+    assert "-o names the model itself" in capsys.readouterr().err and file.read_bytes() == before
+
+
+def test_the_grid_is_by_default_that_of_the_breakpoints(tmp_path, capsys):
+    made = tmp_path / "vehicle.toml"
+    assert main([str(GLIDER), "-o", str(made), "--mass", "9000"]) == 0
+    lift = tomllib.loads(made.read_text(encoding="utf-8"))["forces"]["lift"]["table"]
+    assert lift["alpha_deg"] == [0, 10, 20] and lift["mach"] == [0.5, 2]
+    # Half-way, the square of the lift is less than the mean by a quarter of the square of its step.
+    assert "half-way between grid points drag differs by 0.05 at most, at 5 deg and Mach 0.5" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("old", "named"),
+    [
+        ('varID="alp" units="deg"', '"alp" (alpha) has the unit "mrad", which cannot be converted to deg'),
+        ('varID="qb" units="r_s"', '"qb" (q) has the unit "mrad", which cannot be converted to rad/s'),
+        ('varID="dflap" units="deg"', '"dflap" (surface "flap") has the unit "mrad", which cannot be converted to deg'),
+    ],
+)
+def test_a_role_with_an_unknown_unit_is_refused(tmp_path, capsys, old, named):
+    file = changed(tmp_path, old, old.rpartition("units")[0] + 'units="mrad"')
+    file.write_text(file.read_text(encoding="utf-8").partition("<checkData>")[0] + "</DAVEfunc>", encoding="utf-8")
+    assert main([str(file), "-o", str(tmp_path / "vehicle.toml"), *CHOICES]) == 2
+    assert named in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("option", "named"),
+    [
+        ("--alpha=0:40:3", "steps of 3 from 0 do not reach 40"),
+        ("--alpha=0,nan", "is not of the form"),
+        ("--mach=2,1", "does not increase"),
+        ("--mass=nan", "no positive number"),
+        ("--mass=-9", "no positive number"),
+    ],
+)
+def test_a_wrong_number_is_refused(capsys, option, named):
+    with pytest.raises(SystemExit):
+        main([str(GLIDER), option])
+    assert named in capsys.readouterr().err
+
+
+def test_a_range_has_both_ends():
+    assert grid_of("-20:20:10") == [-20, -10, 0, 10, 20]
