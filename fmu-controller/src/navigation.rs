@@ -8,6 +8,7 @@ use controller_export::table::{ANGLES, AXES, RATES, vector};
 use fmi2_export::table::{Common, Real, discrete_input, discrete_output, input};
 use fmi2_export::{Context, Description, Failure, VariableTable};
 use model_description::DefaultExperiment;
+use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 use settings::Choice;
 use vehicle::entry::{QUANTITIES, Quantity};
@@ -59,7 +60,8 @@ impl SampledInstance for NavigationInstance {
         Self {
             settings: Settings::default(),
             own: OwnVehicle::default(),
-            line: Line::default(),
+            // The air at the start of the flight, so that the navigation moves without a plant.
+            line: Line { force: Vector3::new(0.0, 0.0, -1e-3), ..Line::default() },
             shown: Shown::default(),
             health: Health::default(),
         }

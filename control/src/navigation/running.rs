@@ -21,7 +21,9 @@ use vehicle::noise::{normal_pair, uniform};
 /// Time over which the covariance is propagated at once, s.
 const LONGEST_WAY: f64 = 0.2;
 /// Time between two measurements of the side force, s.
-const SIDE_PERIOD: f64 = 1.0;
+const SIDE_PERIOD: f64 = 0.2;
+/// Standard deviation of the sideslip below which its corrections are too small to be blended, rad.
+const WELL_KNOWN: f64 = 1e-3;
 /// Rejections in a row after which a fix is taken.
 const REJECTIONS: u32 = 5;
 /// Number of fixes over which the innovations are averaged.
@@ -165,7 +167,7 @@ impl Navigation {
         self.decay(running, elapsed);
         let by_gnss = line.fixes.gnss.number > before.gnss.number;
         let by_star = line.fixes.star.number > before.star.number;
-        let by_side = line.time - running.sideways >= SIDE_PERIOD;
+        let by_side = line.time - running.sideways >= SIDE_PERIOD - 1e-9;
         let is_due = running.way.0 >= LONGEST_WAY - 1e-9;
         if !(is_due || by_gnss || by_star || by_side) {
             return;
@@ -189,8 +191,7 @@ impl Navigation {
     }
 
     /// Propagates the covariance over the way since the last time, and lets the estimated biases
-    /// fade as the filter expects of the true ones. The wind stays: each correction of one that
-    /// fades would be shown late.
+    /// and the wind fade as the filter expects of the true ones.
     fn propagate(&self, running: &mut Running) {
         let (time, pushed, from) = running.way;
         let radius = running.state.position.norm();
@@ -207,6 +208,9 @@ impl Navigation {
         for (bias, errors) in running.biases.iter_mut().zip(&self.errors) {
             *bias *= kept(errors, time);
         }
+        let kept = exp(-way.climbed.abs() / wind.correlation);
+        running.wind = running.wind.map(|part| part * kept);
+        running.side = 1.0 + (running.side - 1.0) * kept;
         running.way = (0.0, Vector3::zeros(), radius);
     }
 
@@ -277,7 +281,10 @@ impl Navigation {
         running.side += error[SIDE];
         // A corrected altitude is no climb through another wind.
         running.way.2 = running.state.position.norm();
-        running.offset[0] += error;
+        // Small corrections by the side force come often, and would be late if they were blended.
+        if fix.is_some() || running.deviations.flow[1] > WELL_KNOWN {
+            running.offset[0] += error;
+        }
     }
 
     /// Lets the offset of the shown state fade as a critically damped oscillator at rest does.
