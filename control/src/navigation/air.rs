@@ -13,7 +13,7 @@ const LEAST_FORCE: f64 = 0.5;
 const PROBE: f64 = 0.01;
 /// Standard deviation of what the model of the side force does not explain, relative to the force
 /// in the plane of symmetry.
-const UNEXPLAINED: f64 = 1.1e-3;
+const UNEXPLAINED: f64 = 3e-4;
 
 /// A velocity of the vehicle, relative to the ground or to the air.
 #[derive(Clone, Copy, Debug)]

@@ -15,15 +15,16 @@ use serde::{Deserialize, Serialize};
 use vehicle::atmosphere::air_anywhere;
 use vehicle::fixes::{GnssFix, StarFix};
 use vehicle::frames::{Place, fixed_from_inertial};
-use vehicle::math::exp;
+use vehicle::math::{exp, hypot};
 use vehicle::noise::{normal_pair, uniform};
 
 /// Time over which the covariance is propagated at once, s.
 const LONGEST_WAY: f64 = 0.2;
 /// Time between two measurements of the side force, s.
-const SIDE_PERIOD: f64 = 0.2;
-/// Standard deviation of the sideslip below which its corrections are too small to be blended, rad.
-const WELL_KNOWN: f64 = 1e-3;
+const SIDE_PERIOD: f64 = 1.0;
+/// Corrections of attitude (rad) and wind (m/s) that are too small to be blended.
+const SMALL_TILT: f64 = 2e-4;
+const SMALL_WIND: f64 = 0.5;
 /// Rejections in a row after which a fix is taken.
 const REJECTIONS: u32 = 5;
 /// Number of fixes over which the innovations are averaged.
@@ -281,8 +282,9 @@ impl Navigation {
         running.side += error[SIDE];
         // A corrected altitude is no climb through another wind.
         running.way.2 = running.state.position.norm();
-        // Small corrections by the side force come often, and would be late if they were blended.
-        if fix.is_some() || running.deviations.flow[1] > WELL_KNOWN {
+        // Small corrections by the side force always come, and would be late if they were blended.
+        let [tilt, wind] = [part(ATTITUDE).norm(), hypot(error[WIND], error[WIND + 1])];
+        if fix.is_some() || tilt > SMALL_TILT || wind > SMALL_WIND {
             running.offset[0] += error;
         }
     }
