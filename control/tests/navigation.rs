@@ -99,6 +99,40 @@ fn samples_may_be_lost_or_repeated() {
         assert!(shown.motion.iter().chain(&shown.angles).all(|value| value.is_finite()));
         assert!(shown.deviations.angles.iter().all(|value| *value > 0.0));
     }
+    // Two of these are between samples 2 and 5, and most of the others before sample 301.
+    assert_eq!(memory.missed, 2 + 294);
     navigation.update(&mut memory, 20.0, &line);
     assert_eq!(memory.health, Health::Lost);
+}
+
+/// The errors split as orchestrator/experiments/entry/navigated-told.toml tells CRMPC: in a part
+/// that changes at most at a rate, and one that may change at every tick. Such a split exists if
+/// no two errors differ by more than the rate allows plus twice the bound of the fast part.
+#[test]
+fn oracle_errors_split_in_a_slow_and_a_fast_part() {
+    let (rate, fast) = (0.046_f64.to_radians(), 0.02_f64.to_radians());
+    let flown = harness::in_parallel(&[1, 2, 3, 4, 5, 6, 7, 8], |&seed| {
+        let mut worst = [0.0_f64; 4];
+        for windy in [false, true] {
+            let mut case = if windy { Case::windy(seed) } else { Case::new(4, false, seed) };
+            case.every = 1;
+            // Least of e − ρ t and largest of e + ρ t so far.
+            let mut bounds = [[f64::INFINITY, f64::NEG_INFINITY]; 3];
+            fly(&case, |seen| {
+                let [_, _, sigma, alpha, beta] = seen.errors;
+                for (i, error) in [alpha, beta, sigma].into_iter().enumerate() {
+                    let way = rate * seen.time;
+                    bounds[i] = [bounds[i][0].min(error - way), bounds[i][1].max(error + way)];
+                    let apart = (error - way - bounds[i][0]).max(bounds[i][1] - error - way);
+                    worst[i] = worst[i].max(apart / 2.0);
+                }
+                worst[3] = worst[3].max(alpha.abs()).max(beta.abs());
+            });
+        }
+        worst
+    });
+    for worst in flown {
+        assert!(worst[..3].iter().all(|part| *part < fast), "{worst:?}");
+        assert!(worst[3].to_degrees() < 0.6, "{worst:?}");
+    }
 }

@@ -8,7 +8,7 @@ use fmi2_export::table::{Common, Real, discrete_output, input};
 use fmi2_export::{Context, Description, Failure, VariableTable};
 use model_description::DefaultExperiment;
 use serde::{Deserialize, Serialize};
-use vehicle::entry::{Motion, QUANTITIES, Quantity};
+use vehicle::entry::{QUANTITIES, Quantity, Start};
 
 /// The guidance as an FMU.
 pub type EntryGuidance = SampledFmu<GuidanceInstance>;
@@ -61,22 +61,10 @@ impl SampledInstance for GuidanceInstance {
     }
 
     fn new() -> Self {
-        let degrees = f64::to_radians;
         Self {
             settings: Settings::default(),
             own: OwnVehicle::default(),
-            navigation: Navigation {
-                // The start of the plant's entry flight.
-                motion: Motion::new(
-                    120e3,
-                    0.0,
-                    degrees(-10.0),
-                    7450.0,
-                    degrees(-1.2),
-                    degrees(60.0),
-                ),
-                ..Navigation::default()
-            },
+            navigation: Navigation { motion: Start::default().motion(), ..Navigation::default() },
             output: Output::default(),
         }
     }

@@ -123,6 +123,10 @@ impl SampledInstance for NavigationInstance {
         let becomes = |health: Health| after.health == health && before.health != health;
         if becomes(Health::Lost) {
             Some("no sample has arrived for half a second: the navigation is lost (see health)")
+        } else if before.missed == 0 && after.missed > 0 {
+            Some(
+                "a sample never arrived: it was lost, or the plant's sensor.period is shorter than period, so that the noise of the samples is another one than the filter expects",
+            )
         } else if becomes(Health::Degraded) {
             Some(
                 "the attitude is known worse than health.deviation asks for: the inertial sensors cannot bridge the time without fixes (see health and deviation.*)",

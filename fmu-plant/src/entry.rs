@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 use settings::{Choice, Declared};
 use vehicle::aerodynamics::Aerodynamics;
 use vehicle::air::Air;
-use vehicle::entry::{Config, Deviations, End, Following, Motion, STEEPEST, Trim};
+use vehicle::entry::{Config, Deviations, End, Following, Start, Trim};
 use vehicle::translation::Planet;
 
 /// Motion of the centre of mass.
@@ -64,53 +64,12 @@ pub(crate) struct EntryParameters {
     pub(crate) end: End,
 }
 
-/// Largest initial longitude and heading, rad.
-const TURN: f64 = 2.0 * std::f64::consts::PI;
-
-/// Motion of the centre of mass at the start of an entry flight.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Declared)]
-pub(crate) struct Start {
-    /// Initial altitude of an entry flight.
-    #[setting(unit = "m", min = 0.0, max = 1e6, nominal = 1e5)]
-    pub(crate) altitude: f64,
-    /// Initial longitude of an entry flight.
-    #[setting(unit = "rad", min = -TURN, max = TURN, nominal = 1.0)]
-    pub(crate) longitude: f64,
-    /// Initial latitude of an entry flight.
-    #[setting(unit = "rad", min = -STEEPEST, max = STEEPEST, nominal = 1.0)]
-    pub(crate) latitude: f64,
-    /// Initial speed of an entry flight, relative to the rotating planet.
-    #[setting(unit = "m/s", above = 0.0, max = 2e4, nominal = 1e3)]
-    pub(crate) speed: f64,
-    /// Initial flight path angle of an entry flight, positive above the horizon.
-    #[setting(unit = "rad", min = -STEEPEST, max = STEEPEST, nominal = 0.1)]
-    pub(crate) flight_path_angle: f64,
-    /// Initial heading of an entry flight, measured from north towards east.
-    #[setting(unit = "rad", min = -TURN, max = TURN, nominal = 1.0)]
-    pub(crate) heading: f64,
-}
-
-impl Start {
-    /// Returns the initial motion.
-    pub(crate) fn motion(&self) -> Motion {
-        let Self { altitude, longitude, latitude, speed, flight_path_angle, heading } = *self;
-        Motion::new(altitude, longitude, latitude, speed, flight_path_angle, heading)
-    }
-}
-
 impl Default for EntryParameters {
     /// Returns the start of the guided flight from 120 km in docs/entry.md.
     fn default() -> Self {
         Self {
             translation: Translation::default(),
-            start: Start {
-                altitude: 120e3,
-                longitude: 0.0,
-                latitude: -10_f64.to_radians(),
-                speed: 7450.0,
-                flight_path_angle: -1.2_f64.to_radians(),
-                heading: 60_f64.to_radians(),
-            },
+            start: Start::default(),
             planet: Planet::EARTH,
             vehicle: Vehicle::default(),
             trim: Trim::default(),

@@ -5,8 +5,10 @@
 //! turns away from that velocity.
 
 mod motion;
+mod start;
 
 pub use motion::{Motion, QUANTITIES, Quantity, STEEPEST, check, great_circle, motion_rate};
+pub use start::Start;
 
 use crate::actuators;
 use crate::aerodynamics::{Aerodynamics, Flow};

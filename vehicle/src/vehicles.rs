@@ -96,11 +96,12 @@ impl Vehicle {
     pub fn read(path: &Path) -> Result<Self, Error> {
         let file = path.display().to_string();
         let refuse = |problem: String| Error::Vehicle { file: file.clone(), line: None, problem };
-        let opened = File::open(path).map_err(|error| refuse(error.to_string()))?;
-        // A device or a pipe may have no end.
-        if !opened.metadata().is_ok_and(|about| about.is_file()) {
+        // A device or a pipe may have no end, or not even open.
+        let about = std::fs::metadata(path).map_err(|error| refuse(error.to_string()))?;
+        if !about.is_file() {
             return Err(refuse("is not a file".into()));
         }
+        let opened = File::open(path).map_err(|error| refuse(error.to_string()))?;
         let mut text = String::new();
         let mut limited = opened.take(LARGEST + 1);
         limited.read_to_string(&mut text).map_err(|error| refuse(error.to_string()))?;
@@ -123,6 +124,18 @@ impl Vehicle {
             .map_err(|error| refuse(error.span().map(|span| span.start), error.message()))?;
         let Given { title, reference, inertia, forces, moments, heating, air, surfaces, jets } =
             given;
+        for (name, coefficient) in [
+            ("forces.lift", &forces.lift),
+            ("forces.drag", &forces.drag),
+            ("moments.roll", &moments.roll),
+            ("moments.pitch", &moments.pitch),
+            ("moments.yaw", &moments.yaw),
+        ] {
+            if coefficient.is_per_degree() {
+                let text = format!("{name}.per_degree is for derivatives, and this is none");
+                return Err(refuse(None, &text));
+            }
+        }
         let has_moments = moments != Moments::default();
         let aerodynamics = Aerodynamics { title, reference, forces, moments, heating, air };
         let lengths = aerodynamics.lengths();

@@ -40,13 +40,15 @@ pub struct Memory {
     pub shown: Shown,
     /// Health of the navigation.
     pub health: Health,
+    /// Number of samples that never arrived.
+    pub missed: u32,
 }
 
 impl Navigation {
     /// Returns the memory before the first sample, which shows the initial state.
     pub fn memory(&self) -> Memory {
         let Settings { planet, initial, .. } = &self.settings;
-        let place = Place::of(planet, &initial.motion(), &initial.angles, 0.0);
+        let place = Place::of(planet, &initial.start.motion(), &initial.angles, 0.0);
         let state = State::at(planet, &place, 0.0);
         let mut memory = Memory::default();
         memory.shown.angles = initial.angles;
@@ -69,6 +71,8 @@ impl Navigation {
             None => memory.running.insert(self.begin(&line)),
             Some(running) => {
                 if !is_counted || line.sample > running.last.sample {
+                    let passed = line.sample.saturating_sub(running.last.sample);
+                    memory.missed += u32::try_from(passed - 1).unwrap_or(0);
                     self.take(running, &line);
                 }
                 running

@@ -85,7 +85,7 @@ impl Navigation {
         let Alignment { attitude, position, velocity, seed } = settings.alignment;
         let mut place = Place::of(
             &settings.planet,
-            &settings.initial.motion(),
+            &settings.initial.start.motion(),
             &settings.initial.angles,
             line.time,
         );
@@ -244,12 +244,9 @@ impl Navigation {
 
     /// Returns what the side force shows.
     fn by_side(&self, running: &Running) -> Option<Measured> {
-        let at = (running.last.time, &running.state);
-        let [_, air] = self.relative(at, running.wind);
-        let distance = running.state.position.norm();
-        let sine = running.state.position.z / distance;
-        let altitude = distance - self.settings.planet.surface(sine)[0];
-        let mach = air.velocity.norm() / air_anywhere(altitude).sound_speed;
+        let (motion, to_level) = self.level((running.last.time, &running.state));
+        let [_, air] = self.relative(&running.state, &to_level, running.wind);
+        let mach = air.velocity.norm() / air_anywhere(motion[0]).sound_speed;
         let felt = running.felt(&running.last);
         let force = (&felt.force, self.errors[1].noise);
         side_force(&self.aerodynamics, &air, mach, force, running.side)

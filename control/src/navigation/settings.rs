@@ -4,7 +4,7 @@ use ::settings::Declared;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 use vehicle::axes::ANGLES;
-use vehicle::entry::{Motion, STEEPEST};
+use vehicle::entry::Start;
 use vehicle::sensor_data::{LAST_SENSORS, SensorData};
 use vehicle::translation::Planet;
 
@@ -61,35 +61,12 @@ pub struct Errors {
 /// navigation, if it comes with that sample.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Declared)]
 pub struct Initial {
-    /// Initial altitude.
-    #[setting(unit = "m", min = 0.0, max = 1e6, nominal = 1e5)]
-    pub altitude: f64,
-    /// Initial longitude.
-    #[setting(unit = "rad", nominal = 1.0)]
-    pub longitude: f64,
-    /// Initial latitude.
-    #[setting(unit = "rad", min = -STEEPEST, max = STEEPEST, nominal = 1.0)]
-    pub latitude: f64,
-    /// Initial speed relative to the planet.
-    #[setting(unit = "m/s", above = 0.0, max = 2e4, nominal = 1e3)]
-    pub speed: f64,
-    /// Initial flight path angle.
-    #[setting(unit = "rad", min = -STEEPEST, max = STEEPEST, nominal = 0.1)]
-    pub flight_path_angle: f64,
-    /// Initial heading, from north towards east.
-    #[setting(unit = "rad", nominal = 1.0)]
-    pub heading: f64,
+    /// Motion at the first sample.
+    #[setting(name = "")]
+    pub start: Start,
     /// Initial angle.
     #[setting(name = "", each = ANGLES, unit = "rad", nominal = 0.1)]
     pub angles: Vector3<f64>,
-}
-
-impl Initial {
-    /// Returns the motion.
-    pub fn motion(&self) -> Motion {
-        let Self { altitude, longitude, latitude, speed, flight_path_angle, heading, .. } = *self;
-        Motion::new(altitude, longitude, latitude, speed, flight_path_angle, heading)
-    }
 }
 
 /// How well the initial state is known.
@@ -164,12 +141,7 @@ impl Default for Settings {
             gyroscope: Errors::default(),
             accelerometer: Errors::default(),
             initial: Initial {
-                altitude: 120e3,
-                longitude: 0.0,
-                latitude: -10_f64.to_radians(),
-                speed: 7450.0,
-                flight_path_angle: -1.2_f64.to_radians(),
-                heading: 60_f64.to_radians(),
+                start: Start::default(),
                 angles: Vector3::new(40_f64.to_radians(), 0.0, 64_f64.to_radians()),
             },
             alignment: Alignment {

@@ -4,9 +4,8 @@
 use super::air::Relative;
 use super::device::Navigation;
 use super::filter::{self, Covariance, Error};
-use super::settings::Settings;
 use super::strapdown::{Felt, State};
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 use vehicle::axes::nearest;
 use vehicle::entry::{Motion, motion_rate};
@@ -60,22 +59,25 @@ pub struct Shown {
     pub rejected: u32,
 }
 
-/// Returns the wind (m/s) as a vector, and the directions to the north and the east, all along the
-/// inertial axes.
-fn level(settings: &Settings, (time, state): (f64, &State)) -> [Vector3<f64>; 2] {
-    let to_fixed = fixed_from_inertial(&settings.planet, time);
-    let motion = state.place(&settings.planet, time).motion(&settings.planet);
-    let to_level = level_from_fixed(motion[1], motion[2]) * to_fixed;
-    [to_level.row(0).transpose(), to_level.row(1).transpose()]
-}
-
 impl Navigation {
+    /// Returns the motion of a state at a time (s), and the rotation from inertial to level axes.
+    pub(super) fn level(&self, (time, state): (f64, &State)) -> (Motion, Matrix3<f64>) {
+        let planet = &self.settings.planet;
+        let motion = state.place(planet, time).motion(planet);
+        let to_level = level_from_fixed(motion[1], motion[2]) * fixed_from_inertial(planet, time);
+        (motion, to_level)
+    }
+
     /// Returns the velocities relative to the ground and to the air.
-    pub(super) fn relative(&self, at: (f64, &State), wind: [f64; 2]) -> [Relative; 2] {
-        let state = at.1;
+    pub(super) fn relative(
+        &self,
+        state: &State,
+        to_level: &Matrix3<f64>,
+        wind: [f64; 2],
+    ) -> [Relative; 2] {
         let to_body = state.attitude.inverse().to_rotation_matrix().into_inner();
         let velocity = state.over_ground(&self.settings.planet);
-        let [north, east] = level(&self.settings, at);
+        let [north, east] = [0, 1].map(|i| to_level.row(i).transpose());
         let through_air = velocity - north * wind[0] - east * wind[1];
         [
             Relative { velocity, to_body, level: None },
@@ -94,7 +96,7 @@ impl Navigation {
         let worst = |from: usize| {
             (from..from + 3).map(|i| covariance[(i, i)]).fold(0.0, f64::max).max(0.0).sqrt()
         };
-        let [ground, air] = self.relative(at, wind);
+        let [ground, air] = self.relative(at.1, &self.level(at).1, wind);
         let [alpha, beta] = ground.rows();
         Deviations {
             angles: Vector3::new(of(&alpha), of(&beta), of(&ground.bank_row())),
@@ -114,19 +116,16 @@ impl Navigation {
         wind: [f64; 2],
     ) {
         let planet = &self.settings.planet;
-        let motion = state.place(planet, time).motion(planet);
-        let [_, longitude, latitude, _, path, heading] = motion.into();
+        let (motion, to_level) = self.level((time, state));
+        let [_, _, latitude, _, path, heading] = motion.into();
         let course = Trajectory { flight_path_angle: path, heading, ..Trajectory::default() };
-        let velocity_from_inertial = velocity_from_level(&course)
-            * level_from_fixed(longitude, latitude)
-            * fixed_from_inertial(planet, time);
         let to_inertial = state.attitude.to_rotation_matrix().into_inner();
-        let to_velocity = velocity_from_inertial * to_inertial;
+        let to_velocity = velocity_from_level(&course) * to_level * to_inertial;
         let mut angles = attitude_angles(&to_velocity.transpose());
         for (angle, before) in angles.iter_mut().zip(&shown.angles) {
             *angle = nearest(*angle, *before);
         }
-        let [_, air] = self.relative((time, state), wind);
+        let [_, air] = self.relative(state, &to_level, wind);
         let [alpha, beta] = air.angles();
         let flow = [nearest(alpha, shown.flow[0]), beta];
         let from_flow = body_from_velocity(&Vector3::new(alpha, beta, 0.0));

@@ -32,6 +32,8 @@ pub(crate) struct Case {
     /// Wind to the north and to the east at 20, 60 and 100 km, m/s.
     pub(crate) wind: [[f64; 2]; 3],
     pub(crate) deviations: Deviations,
+    /// Ticks from one time at which it is seen to the next.
+    pub(crate) every: u64,
     pub(crate) settings: navigation::Settings,
 }
 
@@ -41,7 +43,15 @@ impl Case {
             navigation::Settings { sensor_set: set, ..navigation::Settings::default() };
         settings.alignment.seed = seed + 1000;
         settings.wind.deviation = 0.0;
-        Self { set, stars, seed, wind: [[0.0; 2]; 3], deviations: Deviations::default(), settings }
+        Self {
+            set,
+            stars,
+            seed,
+            wind: [[0.0; 2]; 3],
+            deviations: Deviations::default(),
+            every: 25,
+            settings,
+        }
     }
 
     /// Tactical sensors in winds up to some 60 m/s, with lift and drag wrong by up to 10 %.
@@ -148,7 +158,7 @@ impl Figures {
     }
 }
 
-/// What is seen once a second.
+/// What is seen at a tick.
 #[derive(Clone, Debug)]
 pub(crate) struct Seen {
     pub(crate) time: f64,
@@ -198,7 +208,7 @@ fn vehicle(case: &Case) -> (Config, vehicle::plant::Config) {
     let config = vehicle::plant::Config {
         kinematics: Kinematics::Exact,
         entry: Some(entry.clone()),
-        motion: initial.motion(),
+        motion: initial.start.motion(),
         initial: state(&initial.angles, &Vector3::zeros()),
         surroundings: data.surroundings,
         sensors: Some(sensors::Config {
@@ -217,7 +227,7 @@ fn vehicle(case: &Case) -> (Config, vehicle::plant::Config) {
     (entry, config)
 }
 
-/// Flies to the terminal area, and calls `see` at every tick of a whole second.
+/// Flies to the terminal area, and calls `see` as often as the case says.
 pub(crate) fn fly(case: &Case, mut see: impl FnMut(&Seen)) {
     let guidance = Guidance::new(guidance::Settings::default()).unwrap();
     let (entry, config) = vehicle(case);
@@ -242,7 +252,7 @@ pub(crate) fn fly(case: &Case, mut see: impl FnMut(&Seen)) {
         let line =
             Line { sample: sample.number, time: sample.time, rate, force, fixes: sample.fixes };
         navigation.update(&mut memory, time, &line);
-        if tick.is_multiple_of(25) {
+        if tick.is_multiple_of(case.every) {
             let altitude = plant.motion[0];
             let wind = entry.air.at(time, altitude).wind;
             let truth = Place::of(&entry.planet, &plant.motion, &plant.angles(), time);

@@ -180,6 +180,11 @@ impl Coefficient {
         &self.source
     }
 
+    /// Returns whether the numbers are those of a derivative per degree.
+    pub(crate) fn is_per_degree(&self) -> bool {
+        self.per_degree
+    }
+
     /// Returns whether the coefficient was left out.
     pub(super) fn is_zero(&self) -> bool {
         self.curve == Curve::default()

@@ -48,6 +48,12 @@ fn every_fault_has_its_file_line_and_key() {
         ("[0.0, 0.5],", "[0.0],", "values = [[0.0]", "values: row 1 has 1 values"),
         ("[0.0, 0.5],", "[0.0, inf],", "values = [[0.0, inf]", "row 1 holds a value"),
         ("polynomial = [0.1]", "polynomial = [nan]", "polynomial", "forces.drag.polynomial holds"),
+        (
+            "polynomial = [0.1]",
+            "polynomial = [0.1]\nper_degree = true",
+            "per_degree",
+            "forces.drag.per_degree is for derivatives",
+        ),
         ("polynomial = [0.1]", "", "[forces.drag]", "either polynomial or table"),
         ("[10.0, 20.0], mach", "[20.0], mach", "table =", "moments.pitch.table: values: row 1"),
         ("min_deg = [-20.0, -30.0]", "min_deg = [-20.0]", "min_deg", "surfaces.min_deg has 1"),
