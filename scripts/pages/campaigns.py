@@ -71,6 +71,7 @@ CAMPAIGNS = {
     "everything-jia": Campaign(ANY),
     "entry": Campaign(ANY),
     "entry-told": Campaign({"CRMPC": ANY["CRMPC"]}),
+    "entry-navigated": Campaign({"CRMPC, told": ["--experiment", "navigated-told"], "LQR": ANY["LQR"]}),
 }
 # Name of a limit, its measure, and what the largest value is called, by the limit's id.
 LIMITS = {
