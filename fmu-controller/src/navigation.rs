@@ -289,10 +289,10 @@ fn quality(table: Variables) -> Variables {
             });
     }
     table = table
-        .real(deviation("position", "position along the worst axis", "m", 10.0), |m| {
+        .real(deviation("position", "position, root mean square over the axes", "m", 10.0), |m| {
             &mut m.shown.deviations.position
         })
-        .real(deviation("velocity", "velocity along the worst axis", "m/s", 0.1), |m| {
+        .real(deviation("velocity", "velocity, root mean square over the axes", "m/s", 0.1), |m| {
             &mut m.shown.deviations.velocity
         });
     let sources = [

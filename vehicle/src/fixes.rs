@@ -166,13 +166,15 @@ impl Devices {
         let draws: [f64; 10] = uniform(seed.rotate_left(32) ^ 0x6e61_7669, tick);
         let [a, b, c, d, e] = [0, 2, 4, 6, 8].map(|i| normal_pair([draws[i], draws[i + 1]]));
         if by_gnss {
+            // Along the level axes, so that no longitude is special.
+            let turned = place.level().transpose();
             fixes.gnss = GnssFix {
                 number: before.gnss.number.saturating_add(1),
                 time,
                 position: place.position
-                    + Vector3::new(a[0], a[1], b[0]) * self.gnss.position_noise,
+                    + turned * Vector3::new(a[0], a[1], b[0]) * self.gnss.position_noise,
                 velocity: place.velocity
-                    + Vector3::new(b[1], c[0], c[1]) * self.gnss.velocity_noise,
+                    + turned * Vector3::new(b[1], c[0], c[1]) * self.gnss.velocity_noise,
             };
         }
         if by_star {

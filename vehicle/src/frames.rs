@@ -50,14 +50,25 @@ impl Place {
         }
     }
 
+    /// Returns longitude and latitude, rad.
+    fn coordinates(&self) -> [f64; 2] {
+        let [x, y, z] = self.position.into();
+        [atan2(y, x), atan2(z, hypot(x, y))]
+    }
+
+    /// Returns the rotation from planet-fixed to level axes.
+    pub fn level(&self) -> Matrix3<f64> {
+        let [longitude, latitude] = self.coordinates();
+        level_from_fixed(longitude, latitude)
+    }
+
     /// Returns the motion.
     pub fn motion(&self, planet: &Planet) -> Motion {
-        let [x, y, z] = self.position.into();
         let distance = self.position.norm();
-        let [longitude, latitude] = [atan2(y, x), atan2(z, hypot(x, y))];
+        let [longitude, latitude] = self.coordinates();
         let [north, east, down] = (level_from_fixed(longitude, latitude) * self.velocity).into();
         Motion::new(
-            distance - planet.surface(z / distance)[0],
+            distance - planet.surface(self.position.z / distance)[0],
             longitude,
             latitude,
             self.velocity.norm(),

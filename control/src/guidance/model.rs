@@ -16,9 +16,10 @@ const PROBE: f64 = 0.01;
 pub(super) struct Model {
     aerodynamics: Aerodynamics,
     area_per_mass: f64,
-    /// Logarithms of the density of the standard atmosphere, and the speed of sound in it, m/s.
-    density: [f64; ALTITUDES],
-    sound_speed: [f64; ALTITUDES],
+    /// Logarithms of the density of the standard atmosphere, and the speed of sound in it, m/s. They
+    /// are not part of the structure itself, because a host may have little stack.
+    density: Vec<f64>,
+    sound_speed: Vec<f64>,
 }
 
 impl Default for Model {
@@ -35,8 +36,8 @@ impl Model {
         Self {
             area_per_mass: aerodynamics.area() / aerodynamics.mass(),
             aerodynamics,
-            density: std::array::from_fn(|i| ln(air(i).density)),
-            sound_speed: std::array::from_fn(|i| air(i).sound_speed),
+            density: (0..ALTITUDES).map(|i| ln(air(i).density)).collect(),
+            sound_speed: (0..ALTITUDES).map(|i| air(i).sound_speed).collect(),
         }
     }
 

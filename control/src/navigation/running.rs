@@ -107,11 +107,13 @@ impl Navigation {
             };
             [off, fast] = [settings.fix.position, settings.fix.velocity];
         } else {
-            place.position += normal(0) * position;
-            place.velocity += normal(3) * velocity;
+            // Along the level axes, so that no longitude is special.
+            let turned = place.level().transpose();
+            place.position += turned * normal(0) * position;
+            place.velocity += turned * normal(3) * velocity;
         }
         let mut state = State::at(&settings.planet, &place, line.time);
-        state.attitude = UnitQuaternion::from_scaled_axis(normal(6) * attitude) * state.attitude;
+        state.attitude *= UnitQuaternion::from_scaled_axis(normal(6) * attitude);
         let mut tilt = attitude;
         if let Some(seen) = seen(line, &line.rate).filter(|_| line.fixes.star.number > 0) {
             (state.attitude, tilt) = (seen, settings.fix.attitude);

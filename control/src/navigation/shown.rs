@@ -21,9 +21,9 @@ pub struct Deviations {
     pub angles: Vector3<f64>,
     /// Of angle of attack and sideslip relative to the air, rad.
     pub flow: [f64; 2],
-    /// Of the position along the worst of the inertial axes, m.
+    /// Of the position, root mean square over the axes, m.
     pub position: f64,
-    /// Of the velocity along the worst of the inertial axes, m/s.
+    /// Of the velocity, root mean square over the axes, m/s.
     pub velocity: f64,
     /// Of the wind to the north and to the east, m/s.
     pub wind: [f64; 2],
@@ -93,16 +93,18 @@ impl Navigation {
         covariance: &Covariance,
     ) -> Deviations {
         let of = |row: &Error| filter::deviation(covariance, row);
-        let worst = |from: usize| {
-            (from..from + 3).map(|i| covariance[(i, i)]).fold(0.0, f64::max).max(0.0).sqrt()
+        // Independent of the directions of the axes.
+        let per_axis = |from: usize| {
+            let sum: f64 = (from..from + 3).map(|i| covariance[(i, i)]).sum();
+            (sum / 3.0).max(0.0).sqrt()
         };
         let [ground, air] = self.relative(at.1, &self.level(at).1, wind);
         let [alpha, beta] = ground.rows();
         Deviations {
             angles: Vector3::new(of(&alpha), of(&beta), of(&ground.bank_row())),
             flow: air.rows().map(|row| of(&row)),
-            position: worst(filter::POSITION),
-            velocity: worst(filter::VELOCITY),
+            position: per_axis(filter::POSITION),
+            velocity: per_axis(filter::VELOCITY),
             wind: [0, 1].map(|i| covariance[(filter::WIND + i, filter::WIND + i)].max(0.0).sqrt()),
         }
     }

@@ -26,8 +26,8 @@ def refuse(node: Node, problem: str) -> DaveError:
 def _root(value: float, degree: float = 2.0) -> float:
     is_odd = degree == round(degree) and round(degree) % 2
     if value < 0.0 and is_odd:
-        return -((-value) ** (1.0 / degree))
-    return math.sqrt(value) if degree == 2.0 else value ** (1.0 / degree)
+        return -math.pow(-value, 1.0 / degree)
+    return math.sqrt(value) if degree == 2.0 else math.pow(value, 1.0 / degree)
 
 
 def _minus(value: float, *other: float) -> float:
@@ -174,8 +174,8 @@ def _applied(node: Node) -> Formula:
         return lambda values: float(all(relation(a, b) for a, b in pairwise([part(values) for part in inside])))
     if name == "root":
         needs(1)
-        degree = given.get("degree", lambda _: 2.0)
-        return lambda values: _root(inside[0](values), degree(values))
+        degree = given.get("degree")
+        return lambda values: _root(inside[0](values), degree(values) if degree else 2.0)
     if name == "log":
         needs(1)
         base = given.get("logbase")

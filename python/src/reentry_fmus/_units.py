@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 
-# Non-dimensional, written apart: the spelling check takes it for a mistake.
-NONE = "n" + "d"
+NONE = "nd"
 # Factors to one unit of each kind, by the names that models use.
 UNITS = {
     **dict.fromkeys(("rad", "r", "radian", "radians"), ("angle", 1.0)),
