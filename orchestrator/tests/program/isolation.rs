@@ -14,13 +14,13 @@ const HARM: [(&str, &str); 8] = [
     ("ABORT", "killed by signal 6 (SIGABRT, an abort); its last output: a bolt is loose"),
     ("SEGFAULT", "killed by signal 11 (SIGSEGV"),
     ("DIVISION", "killed by signal 8 (SIGFPE"),
-    ("ENDLESS", "no answer within 0.5 s (call_timeout)"),
+    ("ENDLESS", "no answer within 3 s (call_timeout)"),
     ("OVERWRITE", "killed by signal 11 (SIGSEGV"),
     ("MEMORY", "killed by signal 6 (SIGABRT, an abort); its last output: no memory is left"),
 ];
 
 /// Limits with which an instance that never answers, or takes all memory, does so soon.
-const LIMITS: [&str; 2] = ["--call-timeout=0.5", "--unit-memory=64"];
+const LIMITS: [&str; 2] = ["--call-timeout=3", "--unit-memory=64"];
 
 fn harmful(place: &str, how: &str) -> Bench {
     let (place, how) = (format!("-DPLACE={place}"), format!("-DHOW={how}"));
