@@ -16,8 +16,8 @@ const PROBE: f64 = 0.01;
 pub(super) struct Model {
     aerodynamics: Aerodynamics,
     area_per_mass: f64,
-    /// Logarithms of the density of the standard atmosphere, and the speed of sound in it, m/s. They
-    /// are not part of the structure itself, because a host may have little stack.
+    /// Logarithms of the density of the standard atmosphere, and the speed of sound in it, m/s.
+    /// They are not part of the structure itself, because a host may have little stack.
     density: Vec<f64>,
     sound_speed: Vec<f64>,
 }
