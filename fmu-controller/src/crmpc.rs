@@ -2,7 +2,8 @@
 
 use crate::solver;
 use control::crmpc::{
-    Constraints, Contradiction, Crmpc, GuaranteeStatus, Margins, Memory, Settings, Supervision,
+    Constraints, Contradiction, Crmpc, GuaranteeStatus, Margins, Memory, POINTS, PlanPoint,
+    Settings, Supervision, points,
 };
 use control::error::DesignError;
 use control::error_dynamics::Gain;
@@ -30,6 +31,15 @@ pub struct CrmpcLaw {
     gain: Gain,
     disturbance: Vector3<f64>,
     report: SolverReport,
+    plan: ShownPlan,
+}
+
+/// The plan in force, if the settings ask for it.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+struct ShownPlan {
+    began: f64,
+    times: [f64; POINTS],
+    points: [PlanPoint; POINTS],
 }
 
 impl Law for CrmpcLaw {
@@ -59,8 +69,13 @@ impl Law for CrmpcLaw {
         outputs(table)
     }
 
-    fn show(&mut self, _settings: &Settings, memory: &Memory) {
+    fn show(&mut self, settings: &Settings, memory: &Memory) {
+        if settings.shows_plan && memory.shown.len() == POINTS {
+            self.plan.show(settings, memory);
+        }
+        let plan = std::mem::take(&mut self.plan);
         *self = Self {
+            plan,
             angles: shown_vector(&memory.nominal.fixed_rows::<3>(0).into()),
             rates: shown_vector(&memory.nominal.fixed_rows::<3>(3).into()),
             in_force: memory.supervision.status == GuaranteeStatus::InForce,
@@ -129,6 +144,23 @@ impl Law for CrmpcLaw {
     }
 }
 
+impl ShownPlan {
+    fn show(&mut self, settings: &Settings, memory: &Memory) {
+        self.began = memory.planned;
+        for (time, step) in self.times.iter_mut().zip(points(settings.horizon)) {
+            *time = step as f64 * settings.period_optimisation;
+        }
+        for (to, from) in self.points.iter_mut().zip(&memory.shown) {
+            *to = PlanPoint {
+                rate: shown(from.rate),
+                rate_bound: shown(from.rate_bound),
+                moment: shown(from.moment),
+                moment_bound: shown(from.moment_bound),
+            };
+        }
+    }
+}
+
 type Controller = VariableTable<ControllerFmu<CrmpcLaw>>;
 fn outputs(table: Controller) -> Controller {
     let sampled = sampled_output;
@@ -178,5 +210,44 @@ fn outputs(table: Controller) -> Controller {
         .real(gain("k1", "angle").unit("1/s2"), |m| &mut m.law.gain.k1)
         .real(gain("k2", "rate").unit("1/s"), |m| &mut m.law.gain.k2);
     let table = vector(table, ANGLES, disturbance, |m| &mut m.law.disturbance);
-    solver::outputs(table, |law| &mut law.report)
+    plan_outputs(solver::outputs(table, |law| &mut law.report))
+}
+
+/// Adds the outputs that show the plan.
+fn plan_outputs(table: Controller) -> Controller {
+    let began = "Time of the optimisation whose plan the outputs plan.* show; 0 unless plan.shown";
+    let began = sampled_output("plan.began", began).real().unit("s").nominal(10.0);
+    let table = table.real(began, |m| &mut m.law.plan.began);
+    let declare = |i: usize, name: &str, text: &str| {
+        sampled_output(&format!("plan.{name}[{}]", i + 1), text).real()
+    };
+    (0..POINTS).fold(table, |table, i| {
+        let time = declare(i, "time", "Time from plan.began to this point of the plan");
+        let rate = declare(i, "rate", "Norm of the planned body rates at this point");
+        let rate_bound = declare(
+            i,
+            "rateBound",
+            "Bound on plan.rate here; what is missing to limit.rate is the tube, the largest difference to the flown norm",
+        );
+        let moment = declare(
+            i,
+            "moment",
+            "Norm of the moment planned from this point on, less the known moment",
+        );
+        let moment_bound = declare(
+            i,
+            "momentBound",
+            "Bound on plan.moment here; what is missing to limit.moment is the tube, the largest difference to the flown norm",
+        );
+        table
+            .real(time.unit("s"), move |m| &mut m.law.plan.times[i])
+            .real(rate.unit("rad/s").nominal(0.1), move |m| &mut m.law.plan.points[i].rate)
+            .real(rate_bound.unit("rad/s").nominal(0.1), move |m| {
+                &mut m.law.plan.points[i].rate_bound
+            })
+            .real(moment.unit("N.m").nominal(1e5), move |m| &mut m.law.plan.points[i].moment)
+            .real(moment_bound.unit("N.m").nominal(1e5), move |m| {
+                &mut m.law.plan.points[i].moment_bound
+            })
+    })
 }

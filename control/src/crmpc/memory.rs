@@ -1,6 +1,7 @@
 //! The state that CRMPC carries from tick to tick.
 
 use super::commands::Commands;
+use super::horizon::PlanPoint;
 use super::observer::Observed;
 use super::plan::{Plan, Terms};
 use super::supervision::{GuaranteeStatus, Supervision};
@@ -52,6 +53,10 @@ pub struct Memory {
     pub observed: Observed,
     /// Recent changes of the command, if the delay is not exact.
     pub commands: Commands,
+    /// Time of the last optimisation, s.
+    pub planned: f64,
+    /// The plan in force at [`super::points`] of its horizon; empty unless the settings ask for it.
+    pub shown: Vec<PlanPoint>,
 }
 
 impl Memory {
@@ -68,7 +73,7 @@ impl Memory {
     }
 }
 
-clone_in_place!([] Memory { plan, commands });
+clone_in_place!([] Memory { plan, commands, shown });
 
 /// Terms of a plan that hold until the commands of the next one act.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]

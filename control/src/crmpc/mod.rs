@@ -5,6 +5,7 @@ mod commands;
 mod design;
 mod feedback;
 mod guarantee;
+mod horizon;
 mod memory;
 mod observer;
 mod paper;
@@ -30,6 +31,7 @@ pub use guarantee::{Assessment, Carried, Deviation, Onset, Switching, Tightening
 pub use guarantee::{
     BRAKING, CURVATURE, DRIFT_BY_ANGLES_TWICE, DRIFT_MIXED, Domain, FOURTH, Lemmas, TURN,
 };
+pub use horizon::{POINTS, PlanPoint, points};
 pub use memory::{Acting, Margins, Memory};
 pub use observer::Observed;
 pub use plan::{Plan, Terms};
@@ -153,6 +155,7 @@ impl Controller for Crmpc {
             },
             gain: self.settings.feedback,
             commands: Commands::new(&self.settings),
+            shown: vec![PlanPoint::default(); self.settings.points_shown()],
             ..Memory::default()
         }
     }
@@ -163,6 +166,7 @@ impl Controller for Crmpc {
         states.len() == n + 1
             && accelerations.len() == n
             && multipliers.len() == n
+            && memory.shown.len() == self.settings.points_shown()
             && memory.commands.fits(&self.settings)
     }
 

@@ -2,6 +2,7 @@
 
 use super::design::Design;
 use super::feedback::{Feedback, Tick};
+use super::horizon::{PlanPoint, points};
 use super::memory::Memory;
 use super::planner::Planner;
 use super::set::{Bounds, ROUNDING, norm_constraint};
@@ -110,6 +111,29 @@ impl Paper {
             planner.follow_optimum(&self.stages, memory, &start);
         }
         planner.end(memory, &report);
+        memory.planned = tick.time;
+        if self.settings.shows_plan {
+            self.show(memory);
+        }
+    }
+}
+
+impl Paper {
+    /// Shows the plan in force. As the paper's sets bound other norms, the whole limits are left to
+    /// it.
+    fn show(&self, memory: &mut Memory) {
+        let Memory { plan, shown, .. } = memory;
+        let Settings { limit_rate, limit_moment, horizon, body, .. } = &self.settings;
+        for (slot, k) in shown.iter_mut().zip(points(*horizon)) {
+            let (here, begins) = (plan.point(k), plan.point(k.min(horizon - 1)));
+            let moment = begins.motion(body).moment(&begins.acceleration);
+            *slot = PlanPoint {
+                rate: here.motion(body).rates.norm(),
+                rate_bound: *limit_rate,
+                moment: moment.norm(),
+                moment_bound: *limit_moment,
+            };
+        }
     }
 }
 

@@ -3,7 +3,8 @@
 
 use super::{Interval, RESERVE, Robust, norm_of_columns};
 use crate::crmpc::guarantee::{self, Dynamics, Onset};
-use crate::crmpc::memory::Margins;
+use crate::crmpc::horizon::{PlanPoint, points};
+use crate::crmpc::memory::{Margins, Memory};
 use crate::crmpc::set::ROUNDING;
 use crate::crmpc::settings::Settings;
 use crate::crmpc::stages::Point;
@@ -106,6 +107,26 @@ impl Robust {
             at_top.max(after)
         };
         largest(1.0).max(largest(-1.0)) + tightening.tick(self.tick(k)).bulge <= sideslip_domain
+    }
+
+    /// Shows the plan in force, with the bounds that its certificate has checked.
+    pub(super) fn show(&self, memory: &mut Memory) {
+        let Memory { plan, shown, .. } = memory;
+        let n = self.settings.horizon;
+        let reserves = self.reserves();
+        for (slot, k) in shown.iter_mut().zip(points(n)) {
+            let begins = k.min(n - 1);
+            let interval = self.interval(begins, &plan.point(begins), &plan.point(begins + 1));
+            let (here, beside) = (plan.point(k), plan.point(if k == 0 { 1 } else { k - 1 }));
+            let rates = here.motion(&self.stages.body);
+            let by_angles = norm_of_columns(&rates.rates_by_angles);
+            *slot = PlanPoint {
+                rate: rates.rates.norm(),
+                rate_bound: self.rate_bound(k, by_angles, &here, &beside) + reserves.0,
+                moment: interval.moment,
+                moment_bound: interval.moment_bound + reserves.1,
+            };
+        }
     }
 
     /// Returns the margins of a trajectory.

@@ -105,6 +105,10 @@ impl Robust {
         }
         let report = self.plan(planner, memory, before);
         planner.end(memory, &report);
+        memory.planned = tick.time;
+        if self.settings.shows_plan {
+            self.show(memory);
+        }
         contradicted.then_some(Contradiction::Deviation)
     }
 
