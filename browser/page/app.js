@@ -39,6 +39,9 @@ let first = null;
 let time = 26;
 const view = new Vehicle3D($("view"));
 const charts = Object.fromEntries(PANELS.map(([id, panel]) => [id, new Chart($(id), panel, point)]));
+let proof = null;
+// The flight of another law under the same disturbance, and the request that it answers.
+let ghost = null, ghostRequest = null;
 
 // --- The flight -----------------------------------------------------------------------------------------------------
 
@@ -59,6 +62,7 @@ function send() {
 function received({ data }) {
   if (data.call === "describe") return begin(data);
   if (data.call === "experiment") return saved(data);
+  if (data.call === "ghost") return compared(data);
   busy = false;
   clearTimeout(patience);
   // The shown flight is not that of the settings.
@@ -67,15 +71,18 @@ function received({ data }) {
     say(data.error, true);
     $("verdict").textContent = `Refused: ${data.error}`;
   } else {
-    flight = read(data);
+    flight = { ...read(data), ghost: null };
+    compare();
     say(remark?.text ?? "", remark?.wrong);
     show();
+    first ??= performance.now();
+    document.documentElement.dataset.flights = 1 + Number(document.documentElement.dataset.flights ?? 0);
   }
   if (!wanted) remark = null;
   send();
 }
 
-function read({ text, signals, ms }) {
+function read({ text, signals, plans, ms }, name = sent.name) {
   const summary = JSON.parse(text);
   const columns = settings.description.columns;
   const width = columns.length;
@@ -85,9 +92,29 @@ function read({ text, signals, ms }) {
   const angles = three(1, DEG), reference = three(7, DEG);
   const errors = angles.map((angle, i) => angle.map((value, row) => value - reference[i][row]));
   return {
-    summary, signals, columns, ms, rows, width, name: sent.name, time: column(0, 1), angles, reference, errors,
+    summary, signals, columns, ms, rows, width, name, time: column(0, 1), angles, reference, errors, plans: readPlans(plans),
     rates: three(4, DEG), moment: three(10, 1e-3), status: column(13, 1), contradiction: column(14, 1),
   };
+}
+
+// Asks for the flight to compare with: that of another law with the settings that all laws share.
+function compare() {
+  const id = $("ghost").value;
+  const shared = Object.entries(settings.set).filter(([name]) => name.startsWith("plant.") || settings.common.has(name.replace("controller.", "")));
+  const request = JSON.stringify({ controller: id, set: Object.fromEntries(shared) });
+  if (!id || id === settings.choice.id) ghost = ghostRequest = null;
+  // A flight of another disturbance is not shown beside this one.
+  else if (request !== ghostRequest) worker.postMessage({ call: "ghost", request: JSON.parse(ghostRequest = request) });
+  if (!ghostRequest || ghost?.request === ghostRequest) flight.ghost = ghost;
+}
+
+function compared({ error, ...data }) {
+  const { controller } = JSON.parse(ghostRequest ?? "{}");
+  if (error || !controller) return;
+  const { name, time: at, rates, moment } = read(data, settings.controllers.get(controller).name.split(",")[0]);
+  ghost = { name, time: at, norms: [norm(rates), norm(moment)], request: ghostRequest };
+  flight.ghost = ghost;
+  show();
 }
 
 function norm([x, y, z]) {
@@ -118,12 +145,12 @@ function show() {
     const [size, limit] = [norm(curves), limits[id]];
     charts[id].show({ stop, time: at, curves, norm: size, limit, exceeded: exceeded(size, limit) }, time);
   }
+  $("ghost-says").textContent = flight.ghost ? ` Dashed: ${flight.ghost.name} under the same disturbance.` : "";
+  proof.show();
   judge(limits);
   clock();
   pose(time);
   $("cost").textContent = `Computed in ${flight.ms.toFixed(0)} ms.`;
-  first ??= performance.now();
-  document.documentElement.dataset.flights = 1 + Number(document.documentElement.dataset.flights ?? 0);
 }
 
 // --- The verdict ----------------------------------------------------------------------------------------------------
@@ -197,6 +224,7 @@ function point(at) {
   clock();
   if (!flight) return;
   for (const chart of Object.values(charts)) chart.point(at);
+  proof.point(at);
   pose(at);
 }
 
@@ -240,9 +268,14 @@ function say(text, wrong = false) {
   $("said").classList.toggle("wrong", wrong);
 }
 
+let latest = 0;
+
 function changed(names, value) {
   for (const name of names) settings.change(name, value);
-  history.replaceState(null, "", `#${settings.address()}`);
+  // A change that does not go on with the one before can be undone by going back.
+  const now = performance.now();
+  history[now - latest > 1000 ? "pushState" : "replaceState"](null, "", `#${settings.address()}`);
+  latest = now;
   mark();
   fly();
 }
@@ -380,12 +413,18 @@ function begin({ text, error }) {
     const option = new Option(name, id);
     option.title = settings.description.fmus[fmu].description;
     $("controller").add(option);
+    $("ghost").add(new Option(name, id));
   }
+  $("ghost").add(new Option("nothing", ""));
+  $("ghost").value = "lqr";
+  proof = new Proof();
   $("length").textContent = stop;
   $("time").max = stop;
   $("version").textContent = version;
   point(time);
+  const isNew = location.hash.length < 2 && !matchMedia("(prefers-reduced-motion: reduce)").matches;
   load(location.hash.slice(1));
+  if (isNew) proof.begin();
 }
 
 function saved({ text, error }) {
@@ -403,6 +442,7 @@ $("controller").onchange = () => {
   build();
   changed([], null);
 };
+$("ghost").onchange = () => { compare(); show(); };
 $("reset").onclick = () => {
   settings.set = {};
   settings.choose(settings.choice.id);
@@ -420,6 +460,17 @@ $("copy").onclick = async () => {
 $("save").onclick = () => worker.postMessage({ call: "experiment", request: settings.request() });
 $("time").oninput = () => point($("time").valueAsNumber);
 $("play").onclick = play;
+// The space bar plays wherever it does nothing else, and arrows move the time where the plan has the focus.
+window.addEventListener("keydown", (event) => {
+  const { target, key } = event;
+  if (key === " " && !target.closest("button, input, select, summary")) {
+    event.preventDefault();
+    play();
+  } else if (target.id === "plan" && /^Arrow(Left|Right)$/.test(key)) {
+    event.preventDefault();
+    point(Math.max(0, Math.min(settings.description.stop, time + (key === "ArrowLeft" ? -0.2 : 0.2))));
+  }
+});
 window.addEventListener("hashchange", () => load(location.hash.slice(1)));
 for (const what of ["(prefers-color-scheme: dark)", "print"]) matchMedia(what).addEventListener("change", () => flight && show());
 

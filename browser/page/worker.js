@@ -1,4 +1,5 @@
-// The flights, computed beside the page. A message is { call, request } or, first, { module }.
+// The flights, computed beside the page. A message is { call, request } or, first, { module }. `ghost` is a flight to
+// compare with.
 "use strict";
 
 let exports = null;
@@ -20,12 +21,13 @@ function call(name, request) {
   const address = exports.reserve(bytes.length);
   // A call that needs more memory replaces the buffer, so it is asked for after the call.
   new Uint8Array(exports.memory.buffer, address, bytes.length).set(bytes);
-  const right = exports[name]() === 1;
+  const right = exports[name === "ghost" ? "fly" : name]() === 1;
   const memory = exports.memory.buffer;
   const text = new TextDecoder().decode(new Uint8Array(memory, exports.answer(), exports.answer_length()));
   if (!right) throw new Error(text);
   const signals = new Float64Array(memory, exports.signals(), exports.signals_length()).slice();
-  return { text, signals };
+  const plans = new Float64Array(memory, exports.plans(), exports.plans_length()).slice();
+  return { text, signals, plans };
 }
 
 onmessage = async ({ data }) => {
@@ -35,8 +37,8 @@ onmessage = async ({ data }) => {
       start = await load(data.module);
       start();
     }
-    const { text, signals } = call(data.call, data.request);
-    postMessage({ call: data.call, text, signals, ms: performance.now() - begun }, [signals.buffer]);
+    const { text, signals, plans } = call(data.call, data.request);
+    postMessage({ call: data.call, text, signals, plans, ms: performance.now() - begun }, [signals.buffer, plans.buffer]);
   } catch (error) {
     // After a trap the memory may be in any state.
     if (error instanceof WebAssembly.RuntimeError) start();

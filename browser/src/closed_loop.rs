@@ -3,7 +3,7 @@
 use crate::error::Error;
 use crate::fmu::Warnings;
 use crate::scenario::{self, problem, read};
-use crate::signals::{COLUMNS, GUARANTEE};
+use crate::signals::{COLUMNS, GUARANTEE, PLAN_SHOWN, plan};
 use fmi_master::clock::Clock;
 use fmi_master::delay;
 use fmi_master::master::{Master, Member};
@@ -75,7 +75,11 @@ impl ClosedLoop {
                 let setting = Setting::new(name, written, index, *part, &wires, false);
                 setting.map_err(|text| problem(&format!("{}.{name}", part.name), &text))
             };
-            let own = parameters.iter().map(setting).collect::<Result<Vec<_>, _>>()?;
+            let mut own = parameters.iter().map(setting).collect::<Result<Vec<_>, _>>()?;
+            // It changes nothing but the outputs that show the plan.
+            if part.description.variables.iter().any(|variable| variable.name == PLAN_SHOWN) {
+                own.push(setting((&PLAN_SHOWN.into(), &Value::Boolean(true)))?);
+            }
             if part.name == CONTROLLER {
                 step = delay::duration(PERIOD, *part, &own);
             }
@@ -96,6 +100,7 @@ impl ClosedLoop {
         let mut probes = always.iter().map(find).collect::<Result<Vec<_>, _>>()?;
         let guarantee = GUARANTEE.map(|path| wiring::find(path, &parts));
         probes.extend(guarantee.iter().flatten());
+        probes.extend(plan().iter().filter_map(|path| wiring::find(path, &parts)));
         let items = |port: Port| {
             parts[port.component].description.variables[port.variable].kind.items().to_vec()
         };

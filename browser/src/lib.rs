@@ -12,6 +12,7 @@
 //! | `experiment()` | answers with the request as an experiment file (TOML) |
 //! | `answer()`, `answer_length()` | address and length of the last answer, UTF-8 |
 //! | `signals()`, `signals_length()` | address and number of the signals, as f64 |
+//! | `plans()`, `plans_length()` | address and number of the plans' values ([`signals::plan`]), as f64 |
 //!
 //! A request is `{"controller": "crmpc", "set": {"plant.disturbance.bound": "2 deg/s2"}}`, with
 //! values as in experiment files. `describe`, `fly` and `experiment` return 1 if they succeeded.
@@ -41,6 +42,7 @@ struct Shared {
     request: Vec<u8>,
     answer: String,
     signals: Vec<f64>,
+    plans: Vec<f64>,
 }
 
 thread_local! {
@@ -63,8 +65,9 @@ fn described(_: &mut Shared) -> Result<String, Error> {
 
 fn flown(shared: &mut Shared) -> Result<String, Error> {
     shared.signals.clear();
+    shared.plans.clear();
     let (_, closed_loop) = Request::read(&shared.request)?.prepare()?;
-    Ok(serde_json::to_string(&flight::fly(closed_loop, &mut shared.signals)?)?)
+    Ok(serde_json::to_string(&flight::fly(closed_loop, &mut shared.signals, &mut shared.plans)?)?)
 }
 
 fn written(shared: &mut Shared) -> Result<String, Error> {
@@ -125,5 +128,15 @@ mod exported {
     #[unsafe(no_mangle)]
     extern "C" fn signals_length() -> usize {
         look(|shared| shared.signals.len())
+    }
+
+    #[unsafe(no_mangle)]
+    extern "C" fn plans() -> *const f64 {
+        look(|shared| shared.plans.as_ptr())
+    }
+
+    #[unsafe(no_mangle)]
+    extern "C" fn plans_length() -> usize {
+        look(|shared| shared.plans.len())
     }
 }

@@ -4,17 +4,22 @@ use crate::description;
 use crate::flight::fly;
 use crate::request::Request;
 use crate::scenario;
-use crate::signals::COLUMNS;
+use crate::signals::{COLUMNS, plan};
 use serde_json::{Value, json};
 
 /// Flies a request. Returns the summary and the signals.
 fn flown(request: &Value) -> Result<(Value, Vec<f64>), String> {
-    let mut signals = vec![];
+    let (summary, signals, _) = flown_with_plans(request)?;
+    Ok((summary, signals))
+}
+
+fn flown_with_plans(request: &Value) -> Result<(Value, Vec<f64>, Vec<f64>), String> {
+    let (mut signals, mut plans) = (vec![], vec![]);
     let request = Request::read(request.to_string().as_bytes());
     let prepared = request.and_then(Request::prepare);
-    let summary = prepared.and_then(|(_, closed_loop)| fly(closed_loop, &mut signals));
+    let summary = prepared.and_then(|(_, closed_loop)| fly(closed_loop, &mut signals, &mut plans));
     let summary = summary.map_err(|error| error.to_string())?;
-    Ok((serde_json::to_value(summary).unwrap(), signals))
+    Ok((serde_json::to_value(summary).unwrap(), signals, plans))
 }
 
 fn refused(set: &Value) -> String {
@@ -55,6 +60,24 @@ fn the_guarantee_of_crmpc_is_shown_and_only_that() {
     };
     assert!(status("crmpc").iter().all(|(items, item)| (1..=*items).contains(item)));
     assert_eq!(status("lqr"), [(0, 0); 2]);
+}
+
+#[test]
+fn crmpc_shows_each_plan_once_and_others_none() {
+    let (_, _, plans) = flown_with_plans(&json!({"controller": "crmpc"})).unwrap();
+    let width = plan().len();
+    assert_eq!(plans.len(), 250 * width);
+    for (index, plan) in plans.chunks(width).enumerate() {
+        assert!((plan[0] - 0.2 * index as f64).abs() < 1e-9 && plan[25] == 20.0);
+        // Norms and bounds of the rates, then of the moment.
+        let limits = [5f64.to_radians(), 135_600.0];
+        for (first, limit) in [26, 76].into_iter().zip(limits) {
+            let (norms, bounds) = (&plan[first..first + 25], &plan[first + 25..first + 50]);
+            let kept = |(norm, bound): (&f64, &f64)| norm <= bound && *bound < limit;
+            assert!(norms.iter().zip(bounds).all(kept), "{index}");
+        }
+    }
+    assert!(flown_with_plans(&json!({"controller": "lqr"})).unwrap().2.is_empty());
 }
 
 #[test]
