@@ -127,7 +127,7 @@ class GuaranteePicture {
 
   axis(top, box) {
     const { context } = this;
-    const step = Chart.step(top, Math.max(3, (box.bottom - box.top) / 34));
+    const step = Chart.step(top, Math.max(4, (box.bottom - box.top) / 34));
     context.textAlign = "right";
     context.textBaseline = "middle";
     for (let value = 0; value <= top * 1.001; value += step) {

@@ -80,6 +80,10 @@ pygments_dark_style = "a11y-high-contrast-dark"
 def add_chapters(app, docname, source):
     """Puts the chapters below the front page, which is plain Markdown."""
     if docname == root_doc:
+        if "MANUAL_TRY" in os.environ:
+            first, rest = source[0].split("\n\n", 1)
+            link = '<p><a href="../try.html"><strong>Drag a setting and see the flight and its guarantee</strong></a></p>'
+            source[0] = f"{first}\n\n{link}\n\n{rest}"
         for part in tomllib.loads((SITE / "chapters.toml").read_text(encoding="utf-8"))["part"]:
             # Paths begin at the root of the pages, also in brackets behind a title.
             pages = "\n".join(re.sub(r"^([^<]*<)?(?=[^<]*$)", r"\g<0>/", page) for page in part["pages"])

@@ -186,6 +186,9 @@ def pages(stage):
         for file in tracked(pattern):
             (stage / file).parent.mkdir(parents=True, exist_ok=True)
             shutil.copy2(ROOT / file, stage / file)
+    # Only a picture in Markdown is copied to the site.
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    write(stage / "README.md", re.sub(r"<picture>.*?src=\"(.*?)\" alt=\"(.*?)\".*?</picture>", r"![\2](\1)", readme, flags=re.S))
 
 
 def main(stage, pictures, rust):

@@ -131,6 +131,23 @@ def test_a_run_becomes_arrays():
     assert float(data[ALPHA].sel(time=1.0)) == run.table[ALPHA][1.0]
 
 
+def test_a_run_becomes_a_file_of_matlab(tmp_path):
+    io = pytest.importorskip("scipy.io")
+    run = experiment("crmpc-robust", stop=2.0, units="deg")
+    run.to_mat(tmp_path / "run.mat")
+    read = io.loadmat(tmp_path / "run.mat", simplify_cells=True)
+    assert np.array_equal(read["time"], run.table.index)
+    assert np.array_equal(read["plant_attitude_alpha"], run.table[ALPHA])
+    assert list(read["controller_solver_status"]) == run["controller.solver.status"].tolist()
+    assert read["units"]["plant_attitude_alpha"] == "deg" and read["names"]["plant_attitude_alpha"] == ALPHA
+    assert read["metrics"]["ems_deg"] == run.metrics["ems_deg"]
+    assert {name for name in read if not name.startswith("__")} == {*read["names"], "units", "names", "metrics"}
+    table = run.table.rename(columns={ALPHA: "x" * 64})
+    run.table = table
+    with pytest.raises(ValueError, match="is no name for MATLAB"):
+        run.to_mat(tmp_path / "other.mat")
+
+
 def test_oracle_metrics_follow_from_the_table():
     run = experiment("lqr")
     axes = ("alpha", "beta", "sigma")

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 
-from ._arrays import dataset
+from ._arrays import dataset, write_mat
 from ._table import Units, convert
 
 if TYPE_CHECKING:
@@ -96,6 +96,18 @@ class Run:
             ModuleNotFoundError: xarray is not installed.
         """
         return dataset(self.table, self.title, self._numbers(), index_unit="s")
+
+    def to_mat(self, path: str | Path) -> None:
+        """Writes the table as a file of MATLAB: a column vector for the time (s) and one for each
+        variable, such as plant_attitude_alpha, with "_" in place of "." and brackets. The structs
+        units, names and metrics have the unit and the own name of each, and the metrics that are
+        numbers.
+
+        Raises:
+            ModuleNotFoundError: scipy is not installed.
+            ValueError: a name is too long for MATLAB, or occurs twice.
+        """
+        write_mat(Path(path), self.table, self._numbers())
 
     def _numbers(self) -> dict[str, float]:
         """Returns the metrics that are numbers, without the number of rows and computing times,
