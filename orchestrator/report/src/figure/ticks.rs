@@ -1,7 +1,17 @@
 //! Positions of the marks of an axis, and their texts.
 
-/// Returns round values within a range, about `count` of them.
+/// Number of marks without which nobody can read an axis.
+const FEWEST: usize = 3;
+
+/// Returns round values within a range, about `count` of them and at least three.
 pub(super) fn linear(low: f64, high: f64, count: usize) -> Vec<f64> {
+    // How many there are depends on where the range lies.
+    let first = round_values(low, high, count);
+    let finer = || [2, 4, 8].into_iter().map(|times| round_values(low, high, times * count.max(1)));
+    if first.len() >= FEWEST { first } else { finer().find(|m| m.len() >= FEWEST).unwrap_or(first) }
+}
+
+fn round_values(low: f64, high: f64, count: usize) -> Vec<f64> {
     let rough = (high - low) / count.max(1) as f64;
     let decade = 10_f64.powf(rough.log10().floor());
     let step = [1.0, 2.0, 5.0, 10.0].into_iter().find(|one| one * decade >= rough * 0.999);
@@ -15,7 +25,8 @@ pub(super) fn linear(low: f64, high: f64, count: usize) -> Vec<f64> {
     (0..=count).map(|k| (first + k as f64) * step).collect()
 }
 
-/// Returns the powers of ten within a range, and 2 and 5 times them if there are few.
+/// Returns the powers of ten within a range, with 2 and 5 times them if there are few, or else
+/// round values.
 pub(super) fn logarithmic(low: f64, high: f64) -> Vec<f64> {
     if !(low > 0.0 && high.is_finite()) {
         return Vec::new();
@@ -24,7 +35,8 @@ pub(super) fn logarithmic(low: f64, high: f64) -> Vec<f64> {
     let multiples: &[f64] = if last - first > 3 { &[1.0] } else { &[1.0, 2.0, 5.0] };
     let all =
         (first..=last).flat_map(|power| multiples.iter().map(move |m| m * 10_f64.powi(power)));
-    all.filter(|value| (low..=high).contains(value)).collect()
+    let marks: Vec<f64> = all.filter(|value| (low..=high).contains(value)).collect();
+    if marks.len() >= FEWEST { marks } else { linear(low, high, FEWEST) }
 }
 
 /// Largest number of letters of a mark without an exponent.
@@ -69,6 +81,24 @@ mod tests {
         assert_eq!((logarithmic(0.0, 1.0), linear(0.0, f64::INFINITY, 5)), (vec![], vec![]));
         assert_eq!(logarithmic(0.3, 30.0), [0.5, 1.0, 2.0, 5.0, 10.0, 20.0]);
         assert_eq!(logarithmic(1e-3, 1e2), [1e-3, 1e-2, 1e-1, 1.0, 10.0, 100.0]);
+    }
+
+    #[test]
+    fn every_axis_has_three_marks() {
+        let mut low = -7.3;
+        while low < 7.3 {
+            for power in -3..4 {
+                for count in [2, 3, 5, 8] {
+                    let span = 1.37 * 10_f64.powi(power);
+                    let marks = linear(low, low + span, count);
+                    assert!((3..=4 * count).contains(&marks.len()), "{low} {span}: {marks:?}");
+                    let from = low.exp();
+                    let marks = logarithmic(from, from * (1.0 + span));
+                    assert!((3..=20).contains(&marks.len()), "{from} {span}: {marks:?}");
+                }
+            }
+            low += 0.0917;
+        }
     }
 
     /// Labels of marks on a linear axis.
