@@ -76,7 +76,7 @@ impl ClosedLoop {
                 setting.map_err(|text| problem(&format!("{}.{name}", part.name), &text))
             };
             let mut own = parameters.iter().map(setting).collect::<Result<Vec<_>, _>>()?;
-            // It changes nothing but the outputs that show the plan.
+            // It changes nothing but the variables that show the plan.
             if part.description.variables.iter().any(|variable| variable.name == PLAN_SHOWN) {
                 own.push(setting((&PLAN_SHOWN.into(), &Value::Boolean(true)))?);
             }

@@ -18,7 +18,7 @@ struct Flight<'a> {
 }
 
 /// Flies the loop. `signals` gets a row of [`COLUMNS`] for each communication point, in SI units;
-/// the last one repeats the responses of the step before. `plans` gets the outputs that show a plan
+/// the last one repeats the responses of the step before. `plans` gets the variables that show a plan
 /// ([`crate::signals::plan`]) whenever there is a new one.
 ///
 /// # Errors
@@ -43,7 +43,7 @@ pub fn fly(
 }
 
 impl Flight<'_> {
-    /// Takes the outputs that show the plan, of which the first says when it began.
+    /// Takes the variables that show the plan, of which the first says when it began.
     fn take_plan(&mut self, plan: &[f64]) {
         let last = self.plans.len().checked_sub(plan.len()).and_then(|at| self.plans.get(at));
         if last != plan.first() {

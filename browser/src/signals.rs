@@ -25,13 +25,13 @@ pub const GUARANTEE: [&str; 2] = [COLUMNS[13], COLUMNS[14]];
 
 /// Parameter that asks a controller for its plan.
 pub const PLAN_SHOWN: &str = "plan.shown";
-/// Output that changes with each plan.
+/// Variable that changes with each plan.
 const PLAN_BEGAN: &str = "controller.plan.began";
 /// Number of points at which a plan is shown, and what is shown of each.
 const PLAN_POINTS: usize = 25;
 const PLAN_QUANTITIES: [&str; 5] = ["time", "rate", "rateBound", "moment", "momentBound"];
 
-/// Returns the outputs that show a plan, quantity by quantity.
+/// Returns the variables that show a plan, quantity by quantity.
 pub fn plan() -> Vec<String> {
     let points = |quantity| {
         (1..=PLAN_POINTS).map(move |point| format!("controller.plan.{quantity}[{point}]"))

@@ -11,6 +11,7 @@ use control::report::SolverReport;
 use controller_export::table::{self, ANGLES, sampled_output, shown, shown_vector, vector};
 use controller_export::{ControllerFmu, Law, Vehicle};
 use fmi2_export::VariableTable;
+use fmi2_export::table::discrete_local;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 use settings::Choice;
@@ -210,16 +211,16 @@ fn outputs(table: Controller) -> Controller {
         .real(gain("k1", "angle").unit("1/s2"), |m| &mut m.law.gain.k1)
         .real(gain("k2", "rate").unit("1/s"), |m| &mut m.law.gain.k2);
     let table = vector(table, ANGLES, disturbance, |m| &mut m.law.disturbance);
-    plan_outputs(solver::outputs(table, |law| &mut law.report))
+    plan_shown(solver::outputs(table, |law| &mut law.report))
 }
 
-/// Adds the outputs that show the plan.
-fn plan_outputs(table: Controller) -> Controller {
-    let began = "Time of the optimisation whose plan the outputs plan.* show; 0 unless plan.shown";
-    let began = sampled_output("plan.began", began).real().unit("s").nominal(10.0);
+/// Adds the variables that show the plan. As locals they need no ports in block diagrams.
+fn plan_shown(table: Controller) -> Controller {
+    let began = "Time of the optimisation whose plan plan.* shows; 0 unless plan.shown";
+    let began = discrete_local("plan.began", began).real().unit("s").nominal(10.0);
     let table = table.real(began, |m| &mut m.law.plan.began);
     let declare = |i: usize, name: &str, text: &str| {
-        sampled_output(&format!("plan.{name}[{}]", i + 1), text).real()
+        discrete_local(&format!("plan.{name}[{}]", i + 1), text).real()
     };
     (0..POINTS).fold(table, |table, i| {
         let time = declare(i, "time", "Time from plan.began to this point of the plan");

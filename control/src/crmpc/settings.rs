@@ -234,7 +234,7 @@ pub struct Settings {
     pub sideslip_domain: f64,
     #[allow(missing_docs)]
     pub observer: ObserverSettings,
-    /// Whether the outputs plan.* are computed at each optimisation.
+    /// Whether the variables plan.* are computed at each optimisation.
     #[setting(name = "plan.shown")]
     pub shows_plan: bool,
 }

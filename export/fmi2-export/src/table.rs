@@ -356,6 +356,10 @@ pub fn output(name: &str, description: &str) -> Common {
 pub fn discrete_output(name: &str, description: &str) -> Common {
     Common::new(name, description, Causality::Output, Variability::Discrete)
 }
+/// Declares a local variable that changes at ticks only. Importers show it, but give it no port.
+pub fn discrete_local(name: &str, description: &str) -> Common {
+    Common::new(name, description, Causality::Local, Variability::Discrete)
+}
 /// Declares a continuous local variable, which can be observed.
 pub fn local(name: &str, description: &str) -> Common {
     Common::new(name, description, Causality::Local, Variability::Continuous)
