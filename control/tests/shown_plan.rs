@@ -34,7 +34,7 @@ fn scenario(seed: u64) -> Scenario {
         DisturbanceKind::AgainstMoment,
         DisturbanceKind::Constant,
     ][seed as usize % 4];
-    if seed % 3 == 0 {
+    if seed.is_multiple_of(3) {
         disturbance.bound *= random.between(0.0, 1.0);
     }
     scenario
