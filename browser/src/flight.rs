@@ -18,8 +18,8 @@ struct Flight<'a> {
 }
 
 /// Flies the loop. `signals` gets a row of [`COLUMNS`] for each communication point, in SI units;
-/// the last one repeats the responses of the step before. `plans` gets the variables that show a plan
-/// ([`crate::signals::plan`]) whenever there is a new one.
+/// the last one repeats the responses of the step before. `plans` gets the variables that show a
+/// plan ([`crate::signals::plan`]) whenever there is a new one.
 ///
 /// # Errors
 /// Says which parameter the FMUs refuse. If a step fails or the attitude is lost, the flight ends

@@ -188,7 +188,7 @@ def pages(stage):
             shutil.copy2(ROOT / file, stage / file)
     # Only a picture in Markdown is copied to the site.
     readme = (ROOT / "README.md").read_text(encoding="utf-8")
-    write(stage / "README.md", re.sub(r"<picture>.*?src=\"(.*?)\" alt=\"(.*?)\".*?</picture>", r"![\2](\1)", readme, flags=re.S))
+    write(stage / "README.md", re.sub(r"<picture>.*?src=\"(.*?)\"\s+alt=\"(.*?)\".*?</picture>", r"![\2](\1)", readme, flags=re.S))
 
 
 def main(stage, pictures, rust):

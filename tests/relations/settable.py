@@ -150,7 +150,9 @@ class Driven:
         self.instance = Instance(fmu)
         self.references = [[], [], []]
         for variable in fmu.description.modelVariables:
-            if variable.causality == "output" and variable.name not in NOT_REPRODUCIBLE:
+            # What a law shows of itself for recording only, such as its plan, is local.
+            is_shown = variable.causality == "output" or (variable.causality, variable.variability) == ("local", "discrete")
+            if is_shown and variable.name not in NOT_REPRODUCIBLE:
                 kind = {"Real": 0, "Boolean": 2}.get(variable.type, 1)
                 self.references[kind].append(variable.valueReference)
         self.bases: dict[tuple, list] = {}
