@@ -74,22 +74,17 @@ impl Law for CrmpcLaw {
         if settings.shows_plan && memory.shown.len() == POINTS {
             self.plan.show(settings, memory);
         }
-        let plan = std::mem::take(&mut self.plan);
-        *self = Self {
-            plan,
-            angles: shown_vector(&memory.nominal.fixed_rows::<3>(0).into()),
-            rates: shown_vector(&memory.nominal.fixed_rows::<3>(3).into()),
-            in_force: memory.supervision.status == GuaranteeStatus::InForce,
-            supervision: memory.supervision,
-            margins: Margins {
-                rate: shown(memory.margins.rate),
-                moment: shown(memory.margins.moment),
-            },
-            moment_left: shown(memory.moment_left),
-            gain: memory.gain,
-            disturbance: shown_vector(&memory.observed.disturbance),
-            report: solver::shown_report(&memory.report),
-        };
+        // The plan is not moved at every tick, as it is large and seldom asked for.
+        self.angles = shown_vector(&memory.nominal.fixed_rows::<3>(0).into());
+        self.rates = shown_vector(&memory.nominal.fixed_rows::<3>(3).into());
+        self.in_force = memory.supervision.status == GuaranteeStatus::InForce;
+        self.supervision = memory.supervision;
+        self.margins =
+            Margins { rate: shown(memory.margins.rate), moment: shown(memory.margins.moment) };
+        self.moment_left = shown(memory.moment_left);
+        self.gain = memory.gain;
+        self.disturbance = shown_vector(&memory.observed.disturbance);
+        self.report = solver::shown_report(&memory.report);
     }
 
     fn warning(before: &Memory, after: &Memory) -> Option<&'static str> {

@@ -116,9 +116,7 @@ impl Paper {
             self.show(memory);
         }
     }
-}
 
-impl Paper {
     /// Shows the plan in force. As the paper's sets bound other norms, the whole limits are left to
     /// it.
     fn show(&self, memory: &mut Memory) {
