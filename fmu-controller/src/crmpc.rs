@@ -211,7 +211,7 @@ fn outputs(table: Controller) -> Controller {
 
 /// Adds the variables that show the plan. As locals they need no ports in block diagrams.
 fn plan_shown(table: Controller) -> Controller {
-    let began = "Time of the optimisation whose plan plan.* shows; 0 unless plan.shown";
+    let began = "Time at which the plan begins, later than its optimisation by the delay; 0 unless plan.shown";
     let began = discrete_local("plan.began", began).real().unit("s").nominal(10.0);
     let table = table.real(began, |m| &mut m.law.plan.began);
     let declare = |i: usize, name: &str, text: &str| {

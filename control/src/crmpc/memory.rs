@@ -53,7 +53,7 @@ pub struct Memory {
     pub observed: Observed,
     /// Recent changes of the command, if the delay is not exact.
     pub commands: Commands,
-    /// Time of the last optimisation, s.
+    /// Time at which the plan begins: that of its optimisation, later by the delay, s.
     pub planned: f64,
     /// The plan in force at [`super::points`] of its horizon; empty unless the settings ask for it.
     pub shown: Vec<PlanPoint>,
