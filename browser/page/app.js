@@ -6,12 +6,13 @@
 
 const $ = (id) => document.getElementById(id);
 const DEG = 180 / Math.PI;
-const PANELS = [
-  ["attitude", { title: "Attitude", unit: "deg", names: ["α", "β", "σ"], digits: 2 }],
-  ["error", { title: "Tracking error", unit: "deg", names: ["α", "β", "σ"], digits: 2 }],
-  ["rate", { title: "Body rates", unit: "deg/s", norm: "‖ω‖", names: ["p", "q", "r"], digits: 2 }],
-  ["moment", { title: "Control moment", unit: "kN m", norm: "‖m‖", names: ["x", "y", "z"], digits: 1, axis: true }],
-];
+// Panels: heading, unit, name of the norm that has a limit, and names of the curves.
+const PANELS = {
+  attitude: ["Attitude", "deg", null, ["α", "β", "σ"]],
+  error: ["Tracking error", "deg", null, ["α", "β", "σ"]],
+  rate: ["Body rates", "deg/s", "‖ω‖", ["p", "q", "r"]],
+  moment: ["Control moment", "kN m", "‖m‖", ["x", "y", "z"]],
+};
 // Contradictions of the guarantee's assumptions, by the item of guarantee.contradiction.
 const VOID = {
   step: "measurements are older than assumed", delay: "the delay is another than assumed",
@@ -30,7 +31,10 @@ const SPEED = 5;
 // Ratio up to which a limit counts as met: 1 up to rounding.
 const MET = 1 + 1e-9;
 
-let settings, worker, busy = false, wanted = null, patience = null;
+// Longest time that a flight of a law of the page may take, ms.
+const LONGEST = 1e4;
+
+let settings, worker, busy = false, wanted = null, patience = null, overdue = null;
 let flight = null;
 // The request that is being flown, and what is to be said of an address once it is.
 let sent = null, remark = null;
@@ -38,7 +42,8 @@ let sent = null, remark = null;
 let first = null;
 let time = 26;
 const view = new Vehicle3D($("view"));
-const charts = Object.fromEntries(PANELS.map(([id, panel]) => [id, new Chart($(id), panel, point)]));
+const zoom = (window) => { for (const chart of Object.values(charts)) chart.zoom(window); };
+const charts = Object.fromEntries(Object.keys(PANELS).map((id) => [id, new Chart($("charts"), { onPoint: point, onZoom: zoom })]));
 let proof = null;
 // The flight of another law under the same disturbance, and the request that it answers.
 let ghost = null, ghostRequest = null;
@@ -46,6 +51,11 @@ let ghost = null, ghostRequest = null;
 // --- The flight -----------------------------------------------------------------------------------------------------
 
 function fly() {
+  if (settings.choice.id === OWN && !settings.own.isAgreed) {
+    say("This address brings a law, which is a program. Read it before you fly it.");
+    $("verdict").textContent = "Not flown yet: the law came with the address";
+    return;
+  }
   wanted = settings.request();
   if (!busy) send();
 }
@@ -55,8 +65,17 @@ function send() {
   busy = true;
   patience = setTimeout(() => { $("cost").textContent = "Computing …"; }, 400);
   sent = { name: settings.choice.name.replace(", ", " with ") };
-  worker.postMessage({ call: "fly", request: wanted });
+  worker.postMessage({ call: "fly", request: wanted, code: settings.own.code });
+  overdue = setTimeout(stuck, LONGEST);
   wanted = null;
+}
+
+// A law that does not return keeps its worker busy: another one takes its place.
+function stuck() {
+  if (settings.choice.id !== OWN) return;
+  worker.terminate();
+  employ();
+  received({ data: { call: "fly", error: "your law: a flight takes more than ten seconds" } });
 }
 
 function received({ data }) {
@@ -65,12 +84,13 @@ function received({ data }) {
   if (data.call === "ghost") return compared(data);
   busy = false;
   clearTimeout(patience);
+  clearTimeout(overdue);
   // The shown flight is not that of the settings.
   document.body.classList.toggle("refused", Boolean(data.error));
   if (data.error) {
-    say(data.error, true);
-    $("verdict").textContent = `Refused: ${data.error}`;
+    refused(data);
   } else {
+    if (settings.choice.id === OWN) settings.own.say("");
     flight = { ...read(data), ghost: null };
     compare();
     say(remark?.text ?? "", remark?.wrong);
@@ -80,6 +100,17 @@ function received({ data }) {
   }
   if (!wanted) remark = null;
   send();
+}
+
+async function refused({ error, line, isSyntax }) {
+  const own = settings.choice.id === OWN && error.startsWith("your law");
+  if (own && isSyntax) {
+    line = await OwnLaw.line(settings.own.code);
+    if (line) error = error.replace("your law", `your law, line ${line}`);
+  }
+  if (own) settings.own.say(error, line);
+  say(own ? "" : error, true);
+  $("verdict").textContent = `Refused: ${error}`;
 }
 
 function read({ text, signals, plans, ms }, name = sent.name) {
@@ -102,17 +133,19 @@ function compare() {
   const id = $("ghost").value;
   const shared = Object.entries(settings.set).filter(([name]) => name.startsWith("plant.") || settings.common.has(name.replace("controller.", "")));
   const request = JSON.stringify({ controller: id, set: Object.fromEntries(shared) });
-  if (!id || id === settings.choice.id) ghost = ghostRequest = null;
+  if (!id || id === settings.choice.id || (id === OWN && !settings.own.isAgreed)) ghost = ghostRequest = null;
   // A flight of another disturbance is not shown beside this one.
-  else if (request !== ghostRequest) worker.postMessage({ call: "ghost", request: JSON.parse(ghostRequest = request) });
+  else if (request !== ghostRequest) {
+    worker.postMessage({ call: "ghost", request: JSON.parse(ghostRequest = request), code: settings.own.code });
+  }
   if (!ghostRequest || ghost?.request === ghostRequest) flight.ghost = ghost;
 }
 
 function compared({ error, ...data }) {
   const { controller } = JSON.parse(ghostRequest ?? "{}");
   if (error || !controller) return;
-  const { name, time: at, rates, moment } = read(data, settings.controllers.get(controller).name.split(",")[0]);
-  ghost = { name, time: at, norms: [norm(rates), norm(moment)], request: ghostRequest };
+  const other = read(data, settings.controllers.get(controller).name.split(",")[0]);
+  ghost = { ...other, norms: [norm(other.rates), norm(other.moment)], request: ghostRequest };
   flight.ghost = ghost;
   show();
 }
@@ -121,31 +154,28 @@ function norm([x, y, z]) {
   return x.map((_, row) => Math.hypot(x[row], y[row], z[row]));
 }
 
-// Times between which a norm exceeds its limit.
-function exceeded(values, limit) {
-  const spans = [];
-  let from = null;
-  for (let row = 0; row < flight.rows; row++) {
-    const over = values[row] > limit * MET;
-    if (over && from === null) from = flight.time[row];
-    if (!over && from !== null) spans.push([from, flight.time[row]]);
-    if (!over) from = null;
-  }
-  if (from !== null) spans.push([from, flight.time.at(-1)]);
-  return spans;
+// The curves of a panel, of the flight and of the one that it is compared with, which lies below.
+function panel(id, limits) {
+  const [label, unit, bold, names] = PANELS[id];
+  const of = (each, run) => {
+    const values = { attitude: each.angles, error: each.errors, rate: each.rates, moment: each.moment }[id];
+    const all = values.map((curve, place) => ({ name: names[place], role: "signal", run, place, values: curve }));
+    if (bold) all.unshift({ name: bold, role: "norm", run, place: 0, values: norm(values) });
+    return all;
+  };
+  const { reference, ghost: other } = flight;
+  const curves = [...of(flight, 0), ...(other ? of(other, 1) : [])];
+  if (id === "attitude") curves.push(...reference.map((values, place) => ({ name: "reference", role: "reference", run: 0, place, values })));
+  return { label, unit, curves, limits: bold ? [{ name: `limit of ${bold}`, value: limits[id] }] : [] };
 }
 
 function show() {
-  const { summary, time: at, angles, reference, errors, rates, moment } = flight;
-  const { stop } = settings.description;
+  const { summary, ghost: other } = flight;
   const limits = { rate: summary.limits.rate * DEG, moment: summary.limits.moment * 1e-3 };
-  charts.attitude.show({ stop, time: at, curves: angles, references: reference }, time);
-  charts.error.show({ stop, time: at, curves: errors }, time);
-  for (const [id, curves] of [["rate", rates], ["moment", moment]]) {
-    const [size, limit] = [norm(curves), limits[id]];
-    charts[id].show({ stop, time: at, curves, norm: size, limit, exceeded: exceeded(size, limit) }, time);
-  }
-  $("ghost-says").textContent = flight.ghost ? ` Dashed: ${flight.ghost.name} under the same disturbance.` : "";
+  const runs = [{ time: flight.time }, ...(other ? [{ time: other.time, faint: true }] : [])];
+  for (const id of Object.keys(PANELS)) charts[id].show(panel(id, limits), runs, [0, settings.description.stop]);
+  $("ghost-says").textContent = other ? ` Dashed: ${other.name} under the same disturbance.` : "";
+  $("faint-says").textContent = other ? ` Pale: ${other.name} under the same disturbance.` : "";
   proof.show();
   judge(limits);
   clock();
@@ -188,17 +218,21 @@ function judge(limits) {
   if (over.length) verdict = `${name} exceeds the ${over.map(([limit, ratio]) => `${limit} limit (${percent(ratio)})`).join(" and the ")}`;
   if (summary.end) verdict = `${summary.lost ? `${name} loses the attitude` : "The flight ends"} at ${summary.end.time.toFixed(1)} s`;
   $("verdict").textContent = verdict[0].toUpperCase() + verdict.slice(1);
-  const meter = (label, ratio, limit, unit, digits) => `
-    <div class="${ratio > MET ? "over" : ""}"><dt>${label}</dt>
-    <dd class="meter"><i style="width:${Math.min(100, (ratio * 200) / 3)}%"></i></dd>
-    <dd>${(ratio * limit).toFixed(digits)} of ${limit.toFixed(digits)} ${unit}</dd></div>`;
+  const other = flight.ghost?.summary;
+  const row = (label, middle, value, of) => `<dt>${label}</dt>${middle}<dd${middle ? "" : ' class="wide"'}>${value(summary)}</dd>
+    ${other ? `<dd class="other">${of ? percent(other[of]) : value(other)}</dd>` : ""}`;
+  const meter = (label, of, limit, unit, digits) => `<div class="${summary[of] > MET ? "over" : ""}">${row(label,
+    `<dd class="meter"><i style="width:${Math.min(100, (summary[of] * 200) / 3)}%"></i></dd>`,
+    (each) => `${(each[of] * limit).toFixed(digits)} of ${limit.toFixed(digits)} ${unit}`, of)}</div>`;
   const [light, text] = guarantee();
+  $("figures").classList.toggle("compared", Boolean(other));
   $("figures").innerHTML = `
-    ${meter("Largest rate", summary.rate_ratio, limits.rate, "deg/s", 2)}
-    ${meter("Largest moment", summary.moment_ratio, limits.moment, "kN m", 1)}
-    <div><dt>EMS</dt><dd class="wide">${(summary.ems * DEG).toFixed(3)} deg</dd></div>
-    <div><dt>CMS</dt><dd class="wide">${summary.cms.toFixed(4)}</dd></div>
-    <div><dt>Guarantee</dt><dd class="wide ${light}"><i class="light"></i>${text}</dd></div>`;
+    ${other ? `<div><dt></dt><dd class="wide">${name.split(" with ")[0]}</dd><dd class="other">${flight.ghost.name}</dd></div>` : ""}
+    ${meter("Largest rate", "rate_ratio", limits.rate, "deg/s", 2)}
+    ${meter("Largest moment", "moment_ratio", limits.moment, "kN m", 1)}
+    <div>${row("EMS", "", (each) => `${(each.ems * DEG).toFixed(3)} deg`)}</div>
+    <div>${row("CMS", "", (each) => each.cms.toFixed(4))}</div>
+    <div><dt>Guarantee</dt><dd class="wide ${light}"><i class="light"></i>${text}</dd>${other ? "<dd></dd>" : ""}</div>`;
   const said = [...summary.warnings, ...(summary.end ? [summary.end] : [])];
   $("messages").hidden = said.length === 0;
   $("messages").open ||= summary.end !== null;
@@ -299,6 +333,7 @@ function build() {
     group.append(head, ...rows.map(control));
     return group;
   }));
+  settings.own.show(settings.choice.id === OWN);
   mark();
 }
 
@@ -418,6 +453,7 @@ function begin({ text, error }) {
   $("ghost").add(new Option("nothing", ""));
   $("ghost").value = "lqr";
   proof = new Proof();
+  settings.own.listen();
   $("length").textContent = stop;
   $("time").max = stop;
   $("version").textContent = version;
@@ -474,8 +510,13 @@ window.addEventListener("keydown", (event) => {
 window.addEventListener("hashchange", () => load(location.hash.slice(1)));
 for (const what of ["(prefers-color-scheme: dark)", "print"]) matchMedia(what).addEventListener("change", () => flight && show());
 
-worker = new Worker(URL.createObjectURL(new Blob([$("worker").textContent], { type: "text/javascript" })));
-worker.onmessage = received;
-worker.onerror = (event) => say(`The flights cannot be computed: ${event.message}`, true);
 const packed = Uint8Array.from(atob($("module").textContent.trim()), (letter) => letter.charCodeAt(0));
-worker.postMessage({ module: packed, call: "describe" }, [packed.buffer]);
+
+function employ() {
+  worker = new Worker(URL.createObjectURL(new Blob([$("worker").textContent], { type: "text/javascript" })));
+  worker.onmessage = received;
+  worker.onerror = (event) => say(`The flights cannot be computed: ${event.message}`, true);
+  worker.postMessage({ module: packed, call: settings ? "ready" : "describe" });
+}
+
+employ();

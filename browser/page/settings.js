@@ -98,6 +98,7 @@ class Settings {
     this.description = description;
     this.controllers = new Map(description.controllers.map((choice) => [choice.id, choice]));
     this.set = {};
+    this.own = new OwnLaw();
     this.choose(description.controllers[0].id);
     const names = (choice) => new Set(this.table(choice.fmu).map(({ name }) => name));
     const all = description.controllers.map(names);
@@ -142,7 +143,8 @@ class Settings {
   }
 
   address() {
-    return new URLSearchParams({ controller: this.choice.id, ...this.set }).toString();
+    const law = this.choice.id === OWN && this.own.code !== EXAMPLE ? { law: this.own.code } : {};
+    return new URLSearchParams({ controller: this.choice.id, ...this.set, ...law }).toString();
   }
 
   // Takes the settings of an address. Returns the names that it does not know.
@@ -150,10 +152,11 @@ class Settings {
     const given = new URLSearchParams(address);
     this.set = {};
     this.choose(given.get("controller") ?? this.description.controllers[0].id);
+    this.own.code = given.get("law") ?? (this.choice.id === OWN ? EXAMPLE : this.own.code);
     const unknown = [];
     for (const [name, text] of given) {
       const parameter = this.parameters.get(name);
-      if (name === "controller") continue;
+      if (name === "controller" || name === "law") continue;
       if (!parameter) unknown.push(name);
       else if (/^(true|false)$/.test(text)) this.change(name, text === "true");
       else this.change(name, text.trim() !== "" && !Number.isNaN(Number(text)) ? Number(text) : text);

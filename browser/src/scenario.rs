@@ -3,6 +3,8 @@
 
 use crate::error::Error;
 use crate::fmu::Fmu;
+use crate::own_law::OwnLaw;
+use controller_export::{ControllerFmu, Law};
 use fmi2_export::Export;
 use fmu_controller::{Btvsmc, BtvsmcDo, Crmpc, Dlmpc, Fbl, Lqr, SotvsmcDo, TwoLoopSmc};
 use fmu_plant::ReentryPlant;
@@ -33,7 +35,7 @@ const FILES: &[(&str, &str)] = embedded!(
 /// Name of the vehicle's FMU.
 pub const PLANT: &str = "ReentryPlant";
 
-static FMUS: [Fmu; 9] = [
+static FMUS: [Fmu; 10] = [
     Fmu::new(PLANT, Export::new::<ReentryPlant>()),
     Fmu::new("CRMPC", Export::new::<Crmpc>()),
     Fmu::new("DLMPC", Export::new::<Dlmpc>()),
@@ -43,6 +45,7 @@ static FMUS: [Fmu; 9] = [
     Fmu::new("BTVSMC_DO", Export::new::<BtvsmcDo>()),
     Fmu::new("SOTVSMC_DO", Export::new::<SotvsmcDo>()),
     Fmu::new("TwoLoopSMC", Export::new::<TwoLoopSmc>()),
+    Fmu::new(OwnLaw::NAME, Export::new::<ControllerFmu<OwnLaw>>()),
 ];
 
 /// Finds an FMU by its name.
@@ -86,7 +89,7 @@ struct Entry {
     set: Table,
 }
 
-/// Returns the controllers, in the order of the studies.
+/// Returns the controllers, in the order of the studies, and last the law of the page.
 ///
 /// # Errors
 /// Says what is wrong with the list.
@@ -103,7 +106,13 @@ pub fn choices() -> Result<Vec<Choice>, Error> {
         let fmu = entry.fmu.trim_end_matches(".fmu").to_string();
         Ok(Choice { id: entry.id, name: entry.name, fmu, set: set.collect::<Result<_, Error>>()? })
     };
-    lists.controllers.into_iter().map(choice).collect()
+    let own = Choice {
+        id: "own".into(),
+        name: "Your own law".into(),
+        fmu: OwnLaw::NAME.into(),
+        set: Table::new(),
+    };
+    lists.controllers.into_iter().map(choice).chain([Ok(own)]).collect()
 }
 
 /// Returns the experiment with all that it extends.

@@ -13,9 +13,9 @@ use maud::{DOCTYPE, Markup, PreEscaped, html};
 use std::collections::BTreeMap;
 use std::path::Path;
 
-const STYLE: &str = include_str!("page.css");
+const STYLES: [&str; 2] = [include_str!("../shared.css"), include_str!("page.css")];
 const VEHICLE: &str = include_str!("../vehicle3d.js");
-const CHARTS: &str = include_str!("charts.js");
+const CHARTS: &str = include_str!("../chart.js");
 const INSTRUMENTS: &str = include_str!("instruments.js");
 const PLAYER: &str = include_str!("player.js");
 
@@ -53,7 +53,7 @@ fn page(runs: &[Recording], panels: &[Panel]) -> String {
                 meta charset="utf-8";
                 meta name="viewport" content="width=device-width, initial-scale=1";
                 title { (heading) }
-                style { (PreEscaped(STYLE)) }
+                @for style in STYLES { style { (PreEscaped(style)) } }
             }
             body {
                 header {
@@ -69,7 +69,9 @@ fn page(runs: &[Recording], panels: &[Panel]) -> String {
                             p.note { "Drag to turn the view, double click to turn it back." }
                         }
                     }
-                    section id="curves" aria-label="Curves" {}
+                    section id="curves" aria-label="Curves" {
+                        p.note { "Drag over curves to look closer, and click twice to see all." }
+                    }
                     section id="summary" { h2 { "Summary" } (summary(runs)) }
                     section id="parameters" { h2 { "Parameters" } (parameters(runs)) }
                     section id="origin" { h2 { "Origin" } (origin(runs)) }

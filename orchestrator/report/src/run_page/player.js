@@ -45,7 +45,10 @@
   };
 
   const pointed = (asked) => { if (!isPlaying) seek(asked); };
-  const parts = data.panels.map((panel) => new Chart(find("curves"), panel, data.runs, pointed));
+  const zoomed = (window) => { for (const chart of charts) chart.zoom(window); };
+  const charts = data.panels.map(() => new Chart(find("curves"), { onPoint: pointed, onZoom: zoomed }));
+  charts.forEach((chart, place) => chart.show(data.panels[place], data.runs, [start, stop]));
+  const parts = [...charts];
   for (const element of document.querySelectorAll(".vehicle")) {
     parts.push(new Instruments(element, data.runs[element.dataset.run].vehicle));
   }
