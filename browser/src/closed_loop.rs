@@ -2,8 +2,8 @@
 
 use crate::error::Error;
 use crate::fmu::Warnings;
-use crate::scenario::{self, problem, read};
-use crate::signals::{COLUMNS, GUARANTEE, PLAN_SHOWN, plan};
+use crate::scenario::{self, Scenario, problem, read};
+use crate::signals::{GUARANTEE, PLAN_SHOWN, plan};
 use fmi_master::clock::Clock;
 use fmi_master::delay;
 use fmi_master::master::{Master, Member};
@@ -41,6 +41,8 @@ pub struct ClosedLoop {
     pub guarantee: [Items; 2],
     /// Tracking error beyond which the attitude counts as lost, deg.
     pub lost_beyond: f64,
+    /// The flight.
+    pub scenario: &'static Scenario,
 }
 
 impl ClosedLoop {
@@ -48,7 +50,7 @@ impl ClosedLoop {
     ///
     /// # Errors
     /// Names the parameter at fault.
-    pub fn new(experiment: &Table) -> Result<Self, Error> {
+    pub fn new(experiment: &Table, scenario: &'static Scenario) -> Result<Self, Error> {
         let order: Vec<String> = read(experiment, "simulation.order")?;
         let (mut parts, mut fmus) = (vec![], vec![]);
         for name in &order {
@@ -77,7 +79,8 @@ impl ClosedLoop {
             };
             let mut own = parameters.iter().map(setting).collect::<Result<Vec<_>, _>>()?;
             // It changes nothing but the variables that show the plan.
-            if part.description.variables.iter().any(|variable| variable.name == PLAN_SHOWN) {
+            let plans = part.description.variables.iter().any(|one| one.name == PLAN_SHOWN);
+            if plans && scenario.shows_plans {
                 own.push(setting((&PLAN_SHOWN.into(), &Value::Boolean(true)))?);
             }
             if part.name == CONTROLLER {
@@ -96,21 +99,26 @@ impl ClosedLoop {
             found.ok_or_else(|| problem(path, "there is no such variable"))
         };
         let limits = LIMITS.iter().map(find).collect::<Result<_, _>>()?;
-        let always = &COLUMNS[1..COLUMNS.len() - GUARANTEE.len()];
+        let columns = scenario.columns;
+        let always = &columns[1..columns.len() - GUARANTEE.len()];
         let mut probes = always.iter().map(find).collect::<Result<Vec<_>, _>>()?;
         let guarantee = GUARANTEE.map(|path| wiring::find(path, &parts));
         probes.extend(guarantee.iter().flatten());
-        probes.extend(plan().iter().filter_map(|path| wiring::find(path, &parts)));
+        if scenario.shows_plans {
+            probes.extend(plan().iter().filter_map(|path| wiring::find(path, &parts)));
+        }
         let items = |port: Port| {
             parts[port.component].description.variables[port.variable].kind.items().to_vec()
         };
         let guarantee = guarantee.map(|port| port.map(items).unwrap_or_default());
-        let coupling = read(experiment, "simulation.coupling")?;
+        let coupling = read(experiment, "simulation.coupling").unwrap_or_default();
         let readings = delay::readings_of_wires(&parts, &wires, coupling);
         let probes = delay::readings_of_probes(&parts, &wires, &probes);
         let mut master = Master::new(clock, coupling, members, &readings, &probes);
+        let ender: Option<String> = read(experiment, "simulation.ends_with").ok();
+        master.set_ender(ender.and_then(|ender| order.iter().position(|name| *name == ender)));
         master.set_parameters(&settings)?;
         let lost_beyond = read(experiment, "observe.loss.beyond")?;
-        Ok(Self { master, warnings, limits, guarantee, lost_beyond })
+        Ok(Self { master, warnings, limits, guarantee, lost_beyond, scenario })
     }
 }

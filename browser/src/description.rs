@@ -2,29 +2,39 @@
 //! tables declare them, and the scenario's values.
 
 use crate::error::Error;
-use crate::scenario::{self, Choice};
-use crate::signals::COLUMNS;
+use crate::scenario::{self, Choice, SCENARIOS, Scenario};
 use fmi2_export::linked::Linked;
 use model_description::variable::{Causality, Variable};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
-use toml::{Table, Value};
+use toml::Table;
 
 /// Description of everything that can be chosen.
 #[derive(Debug, Serialize)]
 pub struct Description {
-    columns: [&'static str; COLUMNS.len()],
     controllers: Vec<Choice>,
     /// FMUs by their names.
     fmus: BTreeMap<String, Fmu>,
-    /// Name of the vehicle's FMU.
-    plant: &'static str,
-    /// Values of the scenario by component and parameter.
-    scenario: BTreeMap<String, Table>,
-    /// Length of a flight, s.
-    stop: f64,
+    /// Flights by their short names.
+    scenarios: BTreeMap<&'static str, Flight>,
     /// Version of the FMUs.
     version: &'static str,
+}
+
+#[derive(Debug, Serialize)]
+struct Flight {
+    columns: &'static [&'static str],
+    /// FMU and parameters of each component; those of the controller go for any.
+    components: BTreeMap<String, Component>,
+    /// Length of the flight, s; an entry ends before.
+    stop: f64,
+}
+
+#[derive(Debug, Serialize, Deserialize)]
+struct Component {
+    fmu: String,
+    #[serde(default)]
+    parameters: Table,
 }
 
 #[derive(Debug, Serialize)]
@@ -43,23 +53,34 @@ impl Fmu {
     }
 }
 
+impl Flight {
+    fn new(scenario: &Scenario) -> Result<Self, Error> {
+        let experiment = scenario.experiment()?;
+        let mut components: BTreeMap<String, Component> =
+            scenario::read(&experiment, "components")?;
+        for component in components.values_mut() {
+            component.fmu = component.fmu.trim_end_matches(".fmu").into();
+        }
+        let stop = scenario::read(&experiment, "simulation.stop")?;
+        Ok(Self { columns: scenario.columns, components, stop })
+    }
+}
+
 /// Describes what can be chosen.
 ///
 /// # Errors
 /// Says which of the experiments that are built in contradicts itself.
 pub fn describe() -> Result<Description, Error> {
-    let mut fmus = BTreeMap::from([(scenario::PLANT.into(), Fmu::new(scenario::PLANT)?)]);
+    let flights = SCENARIOS.iter().map(|scenario| Ok((scenario.id, Flight::new(scenario)?)));
+    let scenarios: BTreeMap<_, _> = flights.collect::<Result<_, Error>>()?;
     let controllers = scenario::choices()?;
-    for Choice { fmu, .. } in &controllers {
-        fmus.insert(fmu.clone(), Fmu::new(fmu)?);
+    let components = scenarios.values().flat_map(|flight: &Flight| flight.components.values());
+    let names = components.map(|component| &component.fmu);
+    let mut fmus = BTreeMap::new();
+    for name in names.chain(controllers.iter().map(|Choice { fmu, .. }| fmu)) {
+        if !fmus.contains_key(name) {
+            fmus.insert(name.clone(), Fmu::new(name)?);
+        }
     }
-    let experiment = scenario::experiment()?;
-    let parts: BTreeMap<String, Table> = scenario::read(&experiment, "components")?;
-    let parameters = |part: &Table| part.get("parameters").and_then(Value::as_table).cloned();
-    let scenario = parts.iter().filter_map(|(name, part)| Some((name.clone(), parameters(part)?)));
-    let scenario = scenario.collect();
-    let stop = scenario::read(&experiment, "simulation.stop")?;
-    let version = env!("CARGO_PKG_VERSION");
-    let (columns, plant) = (COLUMNS, scenario::PLANT);
-    Ok(Description { columns, controllers, fmus, plant, scenario, stop, version })
+    Ok(Description { controllers, fmus, scenarios, version: env!("CARGO_PKG_VERSION") })
 }

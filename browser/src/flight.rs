@@ -3,7 +3,7 @@
 use crate::closed_loop::ClosedLoop;
 use crate::error::Error;
 use crate::fmu::Warnings;
-use crate::signals::{COLUMNS, Row};
+use crate::scenario::Scenario;
 use crate::summary::{Limits, Message, Summary};
 use fmi_master::master::{Failed, Sample, Watcher};
 use vehicle::axes::{REPEATS, nearest};
@@ -15,10 +15,15 @@ struct Flight<'a> {
     plans: &'a mut Vec<f64>,
     warnings: Warnings,
     lost_beyond: f64,
+    scenario: &'static Scenario,
+    /// Values of all columns at a communication point.
+    row: Vec<f64>,
+    /// Time of the last recorded row, s.
+    recorded: Option<f64>,
 }
 
-/// Flies the loop. `signals` gets a row of [`COLUMNS`] for each communication point, in SI units;
-/// the last one repeats the responses of the step before. `plans` gets the variables that show a
+/// Flies the loop. `signals` gets a row of the scenario's columns for each communication point, or
+/// for every so many, in SI units; the last one repeats the responses of the step before. `plans` gets the variables that show a
 /// plan ([`crate::signals::plan`]) whenever there is a new one.
 ///
 /// # Errors
@@ -29,16 +34,21 @@ pub fn fly(
     signals: &mut Vec<f64>,
     plans: &mut Vec<f64>,
 ) -> Result<Summary, Error> {
-    let ClosedLoop { mut master, warnings, limits, guarantee, lost_beyond } = closed_loop;
+    let ClosedLoop { mut master, warnings, limits, guarantee, lost_beyond, scenario } = closed_loop;
     master.initialize()?;
     let limits = master.read(&limits)?;
     let limits = Limits { rate: limits[0], moment: limits[1] };
     let summary = Summary::new(limits, master.clock().step(), guarantee);
     signals.clear();
     plans.clear();
-    signals.reserve((master.clock().ticks() as usize + 1) * COLUMNS.len());
-    let mut flight = Flight { summary, signals, plans, warnings, lost_beyond };
+    let row = vec![0.0; scenario.columns.len()];
+    let mut flight =
+        Flight { summary, signals, plans, warnings, lost_beyond, scenario, row, recorded: None };
     flight.summary.end = master.run(&mut flight).err();
+    // The last communication point is recorded, too.
+    if flight.summary.rows > 0 && flight.recorded != Some(flight.row[0]) {
+        flight.signals.extend_from_slice(&flight.row);
+    }
     Ok(flight.summary)
 }
 
@@ -57,7 +67,7 @@ impl Watcher for Flight<'_> {
 
     fn after(&mut self, sample: &Sample, outcome: Result<(), Failed>) -> Result<(), Message> {
         outcome?;
-        let mut row: Row = [0.0; COLUMNS.len()];
+        let Self { row, .. } = self;
         row[0] = sample.time;
         row[1..].iter_mut().zip(sample.values).for_each(|(place, value)| *place = *value);
         for i in (0..3).filter(|i| REPEATS[*i]) {
@@ -66,9 +76,12 @@ impl Watcher for Flight<'_> {
         let time = sample.time;
         let told = self.warnings.take().into_iter().map(|text| Message { time, text });
         self.summary.warnings.extend(told);
-        let error = self.summary.take(&row, sample.last).to_degrees();
-        self.signals.extend_from_slice(&row);
-        self.take_plan(sample.values.get(COLUMNS.len() - 1..).unwrap_or_default());
+        let error = self.summary.take(&self.row, sample.last).to_degrees();
+        if (sample.tick as usize).is_multiple_of(self.scenario.every) {
+            self.signals.extend_from_slice(&self.row);
+            self.recorded = Some(sample.time);
+        }
+        self.take_plan(sample.values.get(self.row.len() - 1..).unwrap_or_default());
         // An error that is not a number counts as lost, too.
         if error.is_nan() || error > self.lost_beyond {
             let text = format!("attitude lost: its error exceeds {} deg", self.lost_beyond);

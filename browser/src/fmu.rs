@@ -108,7 +108,11 @@ impl Called {
     fn call(&mut self, call: impl FnOnce(&mut Linked) -> Result<(), Failure>) -> Outcome {
         let outcome = call(&mut self.linked);
         self.warnings.borrow_mut().append(&mut self.linked.take_warnings());
-        outcome.map_err(|failure| CallFailure::answer("a call", failure.to_string()))
+        outcome.map_err(|failure| {
+            let answer = CallFailure::answer("a call", failure.to_string());
+            let Failure::Ended { time, .. } = failure else { return answer };
+            CallFailure { ends: Some(time), ..answer }
+        })
     }
 }
 

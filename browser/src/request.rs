@@ -2,7 +2,7 @@
 
 use crate::closed_loop::ClosedLoop;
 use crate::error::Error;
-use crate::scenario::{self, Choice};
+use crate::scenario::{self, Choice, SCENARIOS, Scenario};
 use crate::signals::GUARANTEE;
 use serde::Deserialize;
 use std::collections::BTreeMap;
@@ -12,6 +12,9 @@ use toml::{Table, Value};
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Request {
+    /// Short name of the flight; the first one unless given.
+    #[serde(default)]
+    scenario: Option<String>,
     /// Short name of the controller.
     controller: String,
     /// Parameters that differ, by `component.name`.
@@ -35,7 +38,8 @@ impl Request {
     pub fn prepare(self) -> Result<(Table, ClosedLoop), Error> {
         let choice = scenario::choices()?.into_iter().find(|choice| choice.id == self.controller);
         let choice = choice.ok_or(Error::Controller(self.controller))?;
-        let mut experiment = scenario::experiment()?;
+        let scenario = self.scenario.map_or(Ok(&SCENARIOS[0]), |id| Scenario::find(&id))?;
+        let mut experiment = scenario.experiment()?;
         describe(&mut experiment, &choice);
         part(&mut experiment, "controller")?.insert("fmu".into(), (choice.fmu + ".fmu").into());
         let own = choice.set.into_iter().map(|(name, value)| (format!("controller.{name}"), value));
@@ -43,7 +47,7 @@ impl Request {
             let (component, parameter) = name.split_once('.').unwrap_or_default();
             parameters(&mut experiment, component)?.insert(parameter.into(), value);
         }
-        let closed_loop = ClosedLoop::new(&experiment)?;
+        let closed_loop = ClosedLoop::new(&experiment, scenario)?;
         record(&mut experiment, &closed_loop);
         Ok((experiment, closed_loop))
     }
@@ -51,7 +55,8 @@ impl Request {
 
 /// Writes title and description of the experiment.
 fn describe(experiment: &mut Table, choice: &Choice) {
-    let title = format!("{} in the scenario of Chai 2022, as set in the browser", choice.name);
+    let title = experiment.get("title").and_then(Value::as_str).unwrap_or_default();
+    let title = format!("{title}: {}, as set in the browser", choice.name);
     experiment.insert("title".into(), title.into());
     let text = "Settings of the page \"Try it in the browser\". `orchestrator run FILE` gives the same bits.";
     experiment.insert("description".into(), text.into());

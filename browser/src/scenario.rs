@@ -4,16 +4,50 @@
 use crate::error::Error;
 use crate::fmu::Fmu;
 use crate::own_law::OwnLaw;
+use crate::signals;
 use controller_export::{ControllerFmu, Law};
 use fmi2_export::Export;
-use fmu_controller::{Btvsmc, BtvsmcDo, Crmpc, Dlmpc, Fbl, Lqr, SotvsmcDo, TwoLoopSmc};
+use fmu_controller::{
+    Btvsmc, BtvsmcDo, Crmpc, Dlmpc, EntryGuidance, Fbl, Lqr, SotvsmcDo, TwoLoopSmc,
+};
 use fmu_plant::ReentryPlant;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use toml::{Table, Value};
 
-/// Experiment that all flights extend: any controller in the scenario of Chai 2022.
-const EXPERIMENT: &str = "exchange/crmpc-2022.toml";
+/// A flight for any controller.
+#[derive(Debug)]
+pub struct Scenario {
+    /// Short name for addresses.
+    pub id: &'static str,
+    /// Experiment that its flights extend.
+    file: &'static str,
+    /// Recorded columns; the guarantee comes last.
+    pub columns: &'static [&'static str],
+    /// Number of communication steps from one recorded row to the next.
+    pub every: usize,
+    /// Whether the plans of the controller are shown.
+    pub shows_plans: bool,
+}
+
+/// The flights. The first one is flown unless a request says otherwise.
+pub static SCENARIOS: [Scenario; 2] = [
+    Scenario {
+        id: "attitude",
+        file: "exchange/crmpc-2022.toml",
+        columns: signals::ATTITUDE,
+        every: 1,
+        shows_plans: true,
+    },
+    Scenario {
+        id: "entry",
+        file: "entry/from-120km.toml",
+        columns: signals::ENTRY,
+        every: 10,
+        shows_plans: false,
+    },
+];
+
 /// File with the list of all controllers.
 const CONTROLLERS: &str = include_str!("../../orchestrator/experiments/base/studies.toml");
 
@@ -29,14 +63,14 @@ const FILES: &[(&str, &str)] = embedded!(
     "exchange/any.toml",
     "base/direct.toml",
     "base/attitude.toml",
-    "base/crmpc-2022.toml"
+    "base/crmpc-2022.toml",
+    "base/entry.toml",
+    "entry/from-120km.toml"
 );
 
-/// Name of the vehicle's FMU.
-pub const PLANT: &str = "ReentryPlant";
-
-static FMUS: [Fmu; 10] = [
-    Fmu::new(PLANT, Export::new::<ReentryPlant>()),
+static FMUS: [Fmu; 11] = [
+    Fmu::new("ReentryPlant", Export::new::<ReentryPlant>()),
+    Fmu::new("EntryGuidance", Export::new::<EntryGuidance>()),
     Fmu::new("CRMPC", Export::new::<Crmpc>()),
     Fmu::new("DLMPC", Export::new::<Dlmpc>()),
     Fmu::new("LQR", Export::new::<Lqr>()),
@@ -115,12 +149,23 @@ pub fn choices() -> Result<Vec<Choice>, Error> {
     lists.controllers.into_iter().map(choice).chain([Ok(own)]).collect()
 }
 
-/// Returns the experiment with all that it extends.
-///
-/// # Errors
-/// Names a file that is not built in, or is not TOML.
-pub fn experiment() -> Result<Table, Error> {
-    merged(EXPERIMENT)
+impl Scenario {
+    /// Finds a flight by its short name.
+    ///
+    /// # Errors
+    /// Says that there is none of this name.
+    pub fn find(id: &str) -> Result<&'static Self, Error> {
+        let found = SCENARIOS.iter().find(|scenario| scenario.id == id);
+        found.ok_or_else(|| problem(id, "there is no such flight"))
+    }
+
+    /// Returns the experiment with all that it extends.
+    ///
+    /// # Errors
+    /// Names a file that is not built in, or is not TOML.
+    pub fn experiment(&self) -> Result<Table, Error> {
+        merged(self.file)
+    }
 }
 
 fn merged(file: &str) -> Result<Table, Error> {

@@ -1,7 +1,14 @@
 //! The signals that a flight records.
 
-/// Columns of the signals, in this order; in SI units, the guarantee as numbers of items.
-pub const COLUMNS: [&str; 15] = [
+/// Outputs of the controllers that guarantee limits: the status, and the contradiction of an
+/// assumption.
+pub const GUARANTEE: [&str; 2] =
+    ["controller.guarantee.status", "controller.guarantee.contradiction"];
+
+/// Columns of a flight in which the attitude follows a given reference, in this order; in SI units,
+/// the guarantee as numbers of items. Every flight begins with time, the angles that the law
+/// receives, body rates, reference and moment.
+pub const ATTITUDE: &[&str] = &[
     "time",
     "plant.attitude.alpha",
     "plant.attitude.beta",
@@ -15,13 +22,40 @@ pub const COLUMNS: [&str; 15] = [
     "controller.moment.x",
     "controller.moment.y",
     "controller.moment.z",
-    "controller.guarantee.status",
-    "controller.guarantee.contradiction",
+    GUARANTEE[0],
+    GUARANTEE[1],
 ];
 
-/// Outputs of the controllers that guarantee limits: the status, and the contradiction of an
-/// assumption.
-pub const GUARANTEE: [&str; 2] = [COLUMNS[13], COLUMNS[14]];
+/// Columns of an entry flight, whose law receives the angles relative to the air.
+pub const ENTRY: &[&str] = &[
+    "time",
+    "plant.flow.alpha",
+    "plant.flow.beta",
+    "plant.attitude.sigma",
+    "plant.rate.p",
+    "plant.rate.q",
+    "plant.rate.r",
+    "controller.reference.alpha",
+    "controller.reference.beta",
+    "controller.reference.sigma",
+    "controller.moment.x",
+    "controller.moment.y",
+    "controller.moment.z",
+    "plant.motion.altitude",
+    "plant.motion.longitude",
+    "plant.motion.latitude",
+    "plant.motion.speed",
+    "plant.load.lift",
+    "plant.flow.density",
+    "plant.loadFactor",
+    "plant.heating.flux",
+    "plant.flight.dynamicPressure",
+    "guidance.range",
+    "guidance.reversals",
+    "guidance.limits.active",
+    GUARANTEE[0],
+    GUARANTEE[1],
+];
 
 /// Parameter that asks a controller for its plan.
 pub const PLAN_SHOWN: &str = "plan.shown";
@@ -41,6 +75,3 @@ pub fn plan() -> Vec<String> {
         .chain(PLAN_QUANTITIES.into_iter().flat_map(points))
         .collect()
 }
-
-/// Values of all columns at one communication point.
-pub type Row = [f64; COLUMNS.len()];

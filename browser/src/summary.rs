@@ -1,7 +1,6 @@
 //! Figures of merit of a flight, as docs/symbols.md defines them.
 
 use crate::closed_loop::Items;
-use crate::signals::Row;
 use fmi_master::master::Failed;
 use serde::Serialize;
 
@@ -32,8 +31,8 @@ impl From<Failed> for Message {
 /// Result of a flight, apart from its signals.
 #[derive(Clone, Debug, Serialize)]
 pub struct Summary {
-    /// Number of rows of the signals.
-    rows: usize,
+    /// Number of communication points.
+    pub rows: usize,
     /// Communication step, s.
     step: f64,
     /// Limits that the controller knows.
@@ -81,7 +80,7 @@ impl Summary {
 
     /// Takes a row into account. At the end of the flight no step begins, so that it has no command
     /// of its own. Returns the norm of the tracking error, rad.
-    pub fn take(&mut self, row: &Row, end: bool) -> f64 {
+    pub fn take(&mut self, row: &[f64], end: bool) -> f64 {
         let before = self.rows as f64;
         self.rows += 1;
         let rate = squared(row[4..7].iter().copied()).sqrt() / self.limits.rate;

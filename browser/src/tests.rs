@@ -4,7 +4,7 @@ use crate::description;
 use crate::flight::fly;
 use crate::request::Request;
 use crate::scenario;
-use crate::signals::{COLUMNS, plan};
+use crate::signals::{ATTITUDE as COLUMNS, ENTRY, plan};
 use serde_json::{Value, json};
 
 /// Flies a request. Returns the summary and the signals.
@@ -90,11 +90,23 @@ fn a_flight_that_cannot_go_on_ends_with_a_reason() {
     assert!(rows < 1251 && summary["end"]["text"].as_str().unwrap().len() > 20, "{summary}");
 }
 
+#[test]
+fn an_entry_reaches_its_target_and_ends_there() {
+    let request = json!({"scenario": "entry", "controller": "lqr"});
+    let (summary, signals, plans) = flown_with_plans(&request).unwrap();
+    assert_eq!((&summary["end"], plans.len()), (&Value::Null, 0), "{summary}");
+    let last = &signals[signals.len() - ENTRY.len()..];
+    let at = |name: &str| last[ENTRY.iter().position(|column| *column == name).unwrap()];
+    assert!((1700.0..2000.0).contains(&at("time")), "{last:?}");
+    assert!((at("guidance.range") - 60e3).abs() < 5e3 && at("plant.motion.speed") < 763.0);
+    assert!(summary["moment_ratio"].as_f64().unwrap() < 1.0, "{summary}");
+}
+
 /// Outside of a page nothing computes its law, and no moment is invented.
 #[test]
 fn a_law_without_a_page_ends_the_flight() {
-    let (summary, _) = flown(&json!({"controller": "own"})).unwrap();
-    assert_eq!((&summary["rows"], &summary["end"]["time"]), (&json!(1), &json!(0.0)), "{summary}");
+    let refusal = flown(&json!({"controller": "own"})).unwrap_err();
+    assert!(refusal.contains("finite"), "{refusal}");
 }
 
 #[test]
@@ -133,5 +145,8 @@ fn the_page_knows_all_controllers_and_their_parameters() {
         let fmu = &described["fmus"][controller["fmu"].as_str().unwrap()];
         assert!(fmu["parameters"].as_array().unwrap().len() > 20);
     }
-    assert_eq!(described["scenario"]["plant"]["disturbance.bound"], "2 deg/s2");
+    let plant = &described["scenarios"]["attitude"]["components"]["plant"];
+    assert_eq!(plant["parameters"]["disturbance.bound"], "2 deg/s2");
+    let guidance = &described["scenarios"]["entry"]["components"]["guidance"];
+    assert_eq!(guidance["fmu"], "EntryGuidance");
 }
