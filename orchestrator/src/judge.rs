@@ -15,8 +15,7 @@ use cosim::run::{Observer, Sample};
 use cosim::system::{Opened, System};
 use cosim_metrics::folder::Folder;
 use cosim_metrics::metrics::{Meters, Metrics};
-use cosim_report::panels::Panel;
-use cosim_report::plot::Curves;
+use cosim_report::recording::watch::Watch;
 use std::io::{Read, Write, stdin, stdout};
 use std::path::{Path, PathBuf};
 
@@ -28,9 +27,8 @@ use std::path::{Path, PathBuf};
 pub(crate) fn judge(experiment: &Path, fmu_dirs: &[PathBuf], out: &Path) -> Result<(), Failure> {
     let mut system = check(Experiment::load(experiment)?, fmu_dirs, &mut Opened::default())?;
     let mut meters = Meters::new(&mut system)?.ending_when_lost();
-    let panels = Panel::resolve_all(&mut system)?;
-    let mut curves = Curves::new(panels, system.clock.ticks());
-    let outcome = show(&system, &mut [&mut curves, &mut meters]);
+    let mut watch = Watch::new(&mut system)?;
+    let outcome = show(&system, &mut [&mut watch, &mut meters]);
     if let Err(error @ Error::Experiment { .. }) = outcome {
         return Err(error.into());
     }
@@ -43,7 +41,7 @@ pub(crate) fn judge(experiment: &Path, fmu_dirs: &[PathBuf], out: &Path) -> Resu
     let wall_s = f64::NAN;
     let metrics = Metrics { wall_s, loop_delay_s: system.loop_delay(), ..meters.metrics() };
     files::write_json(&out.join("metrics.json"), &metrics)?;
-    curves.draw(&out.join("plot.svg"), &system.experiment.title)?;
+    watch.draw(&out.join("plot.svg"), &system.experiment.title)?;
     // The reason why the run ended comes last, as in `run`.
     Ok(outcome?)
 }

@@ -23,8 +23,7 @@ use cosim_metrics::folder::Folder;
 use cosim_metrics::metrics::{Meters, Metrics};
 use cosim_metrics::progress::Progress;
 use cosim_report::panels::Panel;
-use cosim_report::plot::Curves;
-use cosim_report::recording::panels;
+use cosim_report::recording::asked;
 use cosim_report::recording::watch::Watch;
 use cosim_report::run_page;
 use fmu_import::warnings;
@@ -187,7 +186,8 @@ fn record(system: &mut System, options: &Options) -> Result<RunReport, Failure> 
     options.files.check()?;
     let mut meters = Meters::new(system)?.ending_when_lost();
     let panels = Panel::resolve_all(system)?;
-    let mut watch = options.files.pictures.page.then(|| Watch::new(system)).transpose()?;
+    let Pictures { no_plot, page } = options.files.pictures;
+    let mut watch = (page || !no_plot).then(|| Watch::new(system)).transpose()?;
     for doubt in system.doubts() {
         tracing::warn!("{doubt}");
     }
@@ -201,7 +201,7 @@ fn record(system: &mut System, options: &Options) -> Result<RunReport, Failure> 
     let warnings = warnings::collect();
     warnings::at(clock.start());
     let factor = options.real_time.map(|settings| settings.factor.get());
-    let scene = options.live.then(|| Scene::new(system, panels.clone(), factor)).transpose()?;
+    let scene = options.live.then(|| Scene::new(system, panels, factor)).transpose()?;
     let mut run = system.start(&options.interrupt)?;
     let parameters = system.parameters(&mut run)?;
 
@@ -215,7 +215,6 @@ fn record(system: &mut System, options: &Options) -> Result<RunReport, Failure> 
     let Files { no_csv, format, labels, .. } = options.files;
     let recorder = (!no_csv).then(|| system.recorder(&out, format, labels));
     let mut recorder = recorder.transpose()?;
-    let mut curves = Curves::new(panels, clock.ticks());
     let silent = options.quiet || options.live;
     let mut progress = Progress::new(&title, clock.ticks(), silent, options.real_time.is_some());
 
@@ -231,7 +230,7 @@ fn record(system: &mut System, options: &Options) -> Result<RunReport, Failure> 
     warn_of_priority(system, &scheduling.priority);
 
     let begin = Instant::now();
-    let mut observers: Vec<&mut dyn Observer> = vec![&mut curves, &mut progress];
+    let mut observers: Vec<&mut dyn Observer> = vec![&mut progress];
     observers.extend(watch.as_mut().map(|watch| watch as &mut dyn Observer));
     observers.extend(recorder.as_mut().map(|recorder| recorder as &mut dyn Observer));
     observers.extend(live.as_mut().map(|live| live as &mut dyn Observer));
@@ -271,14 +270,16 @@ fn record(system: &mut System, options: &Options) -> Result<RunReport, Failure> 
             metrics.real_time = Some(real_time);
         }
         files::write_json(&out.join("metrics.json"), &metrics)?;
-        if !options.files.pictures.no_plot && curves.draw(&out.join("plot.svg"), &title)? {
+        if let Some(watch) = watch.as_ref().filter(|_| !no_plot)
+            && watch.draw(&out.join("plot.svg"), &title)?
+        {
             files.push("plot.svg");
         }
-        if let Some(watch) = watch {
+        if let Some(watch) = watch.filter(|_| page) {
             let mut run = watch.recording(&stem, &metadata);
             run.summary = summary::lines(&system.experiment.observe, &metrics);
             let runs = [run];
-            let drawn = panels::of_experiments(&runs).map_err(Error::experiment)?;
+            let drawn = asked::of_experiments(&runs).map_err(Error::experiment)?;
             run_page::write(&runs, &drawn, &out.join("page.html"))?;
             files.push("page.html");
         }

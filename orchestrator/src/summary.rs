@@ -166,7 +166,12 @@ fn guarantee(metrics: &Metrics) -> Option<SummaryLine> {
     let broken = number("broken") == Some(1.0);
     let defect = if broken { "; DEFECT: a limit was EXCEEDED while it was in force" } else { "" };
     let is_within = broken.then_some(false);
-    Some(SummaryLine { heading: "guarantee".into(), text: text + defect, is_within })
+    Some(SummaryLine {
+        heading: "guarantee".into(),
+        text: text + defect,
+        is_within,
+        ..SummaryLine::default()
+    })
 }
 
 /// Returns the lines for the metrics that the experiment lists in `summary`.
@@ -206,7 +211,12 @@ fn metric_lines(observe: &Observe, metrics: &Metrics) -> Vec<SummaryLine> {
                 // One limit that is exceeded decides.
                 line.is_within = [line.is_within, is_within].into_iter().flatten().min();
             }
-            None => lines.push(SummaryLine { heading: measure.label.clone(), text, is_within }),
+            None => lines.push(SummaryLine {
+                heading: measure.label.clone(),
+                meaning: measure.meaning.clone(),
+                text,
+                is_within,
+            }),
         }
     }
     lines
@@ -304,6 +314,7 @@ mod tests {
             heading: heading.into(),
             text: text.into(),
             is_within,
+            ..SummaryLine::default()
         };
         assert_eq!(
             metric_lines(&observe, &metrics),

@@ -8,8 +8,7 @@ use cosim::recorder::Format;
 use cosim::run::Observer;
 use cosim::system::{Opened, System};
 use cosim::variation::SettingValue;
-use cosim_report::panels::Panel;
-use cosim_report::plot::Curves;
+use cosim_report::recording::watch::Watch;
 use std::path::Path;
 use sweep::flight::{Bound, Flown, columns};
 use sweep::table::{CaseTable, Column, Values};
@@ -116,14 +115,13 @@ impl<'a> Flight<'a> {
         title: &str,
     ) -> Result<Row, Error> {
         let system = self.instances.system();
-        let panels = Panel::resolve_all(system)?;
+        let mut watch = Watch::new(system)?;
         let mut recorder = system.recorder(folder, Format::Csv, false)?;
-        let mut curves = Curves::new(panels, system.clock.ticks());
         let bounds = self.instances.replace_bounds(Vec::new());
-        let row = self.fly_with(case, values, &mut [&mut recorder, &mut curves]);
+        let row = self.fly_with(case, values, &mut [&mut recorder, &mut watch]);
         self.instances.replace_bounds(bounds);
         recorder.finish()?;
-        curves.draw(&folder.join("plot.svg"), title)?;
+        watch.draw(&folder.join("plot.svg"), title)?;
         row
     }
 

@@ -4,14 +4,14 @@
 //     onPoint: (time) => …,      // a pointer asks for a time
 //     onZoom: (window) => …,     // a pointer has been dragged over [from, to]; null after a double click
 //   });
-//   chart.show({ label, unit, limits: [{ name, value }], curves: [{ name, role, run, place, values }] }, runs, span);
+//   chart.show({ label, unit, limits: [{ name, value }], curves: [{ name, role, run, place, values }], magnitudes }, runs, span);
 //   chart.zoom(window);
 //   chart.point(time);
 //
-// A run is { time, faint }. The role of a curve is "signal", "norm", "reference" or "own reference". Curves differ by
-// colour and by dashes, and those of a faint run are pale. References are drawn in ink, limits in grey. A norm that has a
-// limit is bold, the components that it is of are thin, and where it exceeds the limit, the panel is shaded. Beyond a
-// limit that is exceeded more than five times, the axis is logarithmic.
+// A run is { time, faint }. The role of a curve is "signal", "norm", "reference" or "own reference". Colours distinguish
+// the signals of a run, or several runs, whose signals then have dashes; curves of a faint run are pale. References are
+// drawn in ink, limits in grey. A norm that has a limit is bold, the components that it is of are thin, and where it
+// exceeds the limit, the panel is shaded. `magnitudes` is the range of a logarithmic axis of magnitudes, or null.
 "use strict";
 
 const svgElement = (name, attributes = {}, text) => {
@@ -42,6 +42,7 @@ class Chart {
   static TOP = 8;
   static BOTTOM = 22;
   static DASHES = ["", "8 3", "2.5 2.5", "10 3 2 3", "5 2", "12 4"];
+  static LIMIT = { stroke: "var(--limit)", "stroke-width": 1.4, "stroke-dasharray": "6 4" };
   // Share of a limit by which values exceed it that are rounded.
   static ROUNDING = 5e-5;
 
@@ -103,8 +104,6 @@ class Chart {
   show(panel, runs, span) {
     Object.assign(this, { panel, runs, span });
     this.window = this.zoomed ?? span;
-    // In a panel with one signal, the colour distinguishes the runs.
-    this.isAlone = panel.curves.every((curve) => curve.place === panel.curves[0].place);
     this.isSingle = runs.filter((run) => !run.faint).length === 1;
     this.list();
     this.draw();
@@ -121,17 +120,16 @@ class Chart {
     const pale = isFaint ? { opacity: 0.42 } : {};
     if (curve.role === "reference") return { stroke: "var(--ink)", "stroke-width": 1, "stroke-dasharray": "1.5 2.5", ...pale };
     if (curve.role === "norm" && this.isSingle) return { stroke: "var(--ink)", "stroke-width": isFaint ? 2 : 3, "stroke-dasharray": "", ...pale };
-    const colour = this.isAlone ? curve.run : curve.place;
+    const colour = this.isSingle ? curve.place : curve.run;
     if (curve.role === "own reference") return { stroke: `var(--c${colour % 6})`, "stroke-width": 1, "stroke-dasharray": "1.5 2.5" };
-    const dash = this.isSingle ? curve.place : curve.run;
-    const width = this.isSingle && (this.panel.limits.length || isFaint) ? 1 : 1.8;
-    return { stroke: `var(--c${colour % 6})`, "stroke-width": width, "stroke-dasharray": Chart.DASHES[dash % 6], ...pale };
+    const width = isFaint || (this.isSingle && this.panel.curves.some(({ role }) => role === "norm")) ? 1 : 1.8;
+    return { stroke: `var(--c${colour % 6})`, "stroke-width": width, "stroke-dasharray": Chart.DASHES[curve.place % 6], ...pale };
   }
 
   // The legend, unless it is there already.
   list() {
-    const { label, unit, curves } = this.panel;
-    const told = JSON.stringify([label, unit, curves.map((curve) => [curve.name, this.style(curve)])]);
+    const { label, unit, limits, curves } = this.panel;
+    const told = JSON.stringify([label, unit, limits, curves.map((curve) => [curve.name, this.style(curve)])]);
     const isReference = (curve) => curve.role.endsWith("reference");
     const valued = curves.filter((curve) => !isReference(curve) && !this.runs[curve.run].faint);
     if (told !== this.told) {
@@ -143,6 +141,7 @@ class Chart {
       this.legend.replaceChildren(
         ...valued.map((curve, i) => this.entry(this.style(curve), curve.name, this.written[i])),
         ...[...references].map(([name, curve]) => this.entry(this.style(curve), name)),
+        ...limits.map(({ name, value }) => this.entry(Chart.LIMIT, `${name} ${minus(String(Number(value.toPrecision(4))))}`)),
       );
     }
     this.outputs = valued.map((curve, i) => [curve, this.written[i]]);
@@ -166,8 +165,9 @@ class Chart {
   }
 
   static ticks(low, high, count) {
-    // At least three marks, so that the scale can be read.
-    const step = [1, 2, 4].map((finer) => Chart.step(high - low, finer * count)).find((one) => Math.floor(high / one) - Math.ceil(low / one) >= 2);
+    // An axis has three marks at least.
+    const finer = [1, 2, 4, 8].map((times) => Chart.step(high - low, times * count));
+    const step = finer.find((step) => Math.floor(high / step + 1e-9) - Math.ceil(low / step - 1e-9) >= 2) ?? finer[0];
     const digits = Math.max(0, Math.min(100, -Math.floor(Math.log10(step))));
     const [first, last] = [Math.ceil(low / step - 1e-9), Math.floor(high / step + 1e-9)];
     const values = Array.from({ length: last - first + 1 }, (_, i) => (first + i) * step);
@@ -178,15 +178,24 @@ class Chart {
     return values.map((value, i) => [value, minus(isLong ? short(value) : texts[i])]);
   }
 
-  // Least and largest value in the window. Sets digits and scale of the axis: linear, or logarithmic beyond a limit.
+  // Powers of ten within a range, with 2 and 5 times them if there are few.
+  static powers(low, high) {
+    const multiples = high / low > 1e3 ? [1] : [1, 2, 5];
+    const values = [];
+    for (let power = Math.floor(Math.log10(low)); power <= Math.log10(high); power++) values.push(...multiples.map((m) => m * 10 ** power));
+    return values.filter((value) => value >= low && value <= high).map((value) => [value, String(Number(value.toPrecision(3)))]);
+  }
+
+  // Least and largest value in the window, with room around them.
   range() {
-    const { limits, curves } = this.panel;
+    const { limits, curves, magnitudes } = this.panel;
     const values = limits.map(({ value }) => value);
     let [low, high] = values.length ? [Math.min(...values), Math.max(...values)] : [Infinity, -Infinity];
     // What a limit is drawn for, is not made small by what it is compared with.
-    if (limits.length && this.runs.some((run) => run.faint)) high *= 1.3;
+    const isCompared = limits.length > 0 && this.runs.some((run) => run.faint);
+    if (isCompared) high *= 1.3;
     for (const curve of curves) {
-      if (limits.length && this.runs[curve.run].faint) continue;
+      if (isCompared && this.runs[curve.run].faint) continue;
       const [from, to] = this.rows(curve);
       for (let row = from; row <= to; row++) {
         const value = curve.values[row];
@@ -195,26 +204,12 @@ class Chart {
         if (value > high) high = value;
       }
     }
-    const largest = Math.max(Math.abs(low), Math.abs(high));
     // Values at the cursor have the digits of the largest one.
-    this.digits = low > high ? 0 : Math.max(0, Math.min(9, 3 - Math.floor(Math.log10(largest || 1))));
-    this.scale = (value) => value;
-    const limit = Math.max(...values.map(Math.abs));
-    this.bend = limit > 0 && largest > 5 * limit ? limit : null;
-    if (this.bend) this.scale = (value) => Math.asinh((value / limit) * 3);
+    this.digits = low > high ? 0 : Math.max(0, Math.min(9, 3 - Math.floor(Math.log10(Math.max(Math.abs(low), Math.abs(high)) || 1))));
+    if (magnitudes) return magnitudes;
     if (low > high) return [0, 1];
-    const [from, to] = [low, high].map(this.scale);
-    const margin = 0.06 * (to - from) || 0.06 * Math.abs(to) || 1;
-    return [from - margin, to + margin];
-  }
-
-  // Marks of the axis of values; where it is logarithmic, the limit and its powers of ten.
-  marks(low, high) {
-    if (!this.bend) return Chart.ticks(low, high, 5);
-    const powers = [0, 1, 10, 100, 1000, 1e4, 1e5, 1e6].map((factor) => factor * this.bend);
-    return [...powers.slice(1).map((value) => -value), ...powers]
-      .filter((value) => this.scale(value) >= low && this.scale(value) <= high)
-      .map((value) => [value, minus(Math.abs(value) >= 1e5 ? value.toExponential(1).replace("e+", "e") : String(Number(value.toPrecision(3))))]);
+    const margin = 0.06 * (high - low) || 0.06 * Math.abs(high) || 1;
+    return [low - margin, high + margin];
   }
 
   // First and last row of a curve that the window needs.
@@ -234,15 +229,18 @@ class Chart {
     const [low, high] = this.range();
     const [from, to] = this.window;
     this.x = (time) => LEFT + ((width - LEFT - RIGHT) * (time - from)) / (to - from || 1);
-    const y = (value) => HEIGHT - BOTTOM - ((HEIGHT - TOP - BOTTOM) * (this.scale(value) - low)) / (high - low);
     const { svg, panel } = this;
+    const share = panel.magnitudes
+      ? (value) => Math.log(Math.max(Math.abs(value), low) / low) / Math.log(high / low)
+      : (value) => (value - low) / (high - low);
+    const y = (value) => HEIGHT - BOTTOM - (HEIGHT - TOP - BOTTOM) * share(value);
     svg.replaceChildren();
     svg.setAttribute("viewBox", `0 0 ${width} ${HEIGHT}`);
     for (const [start, end] of this.exceeded()) {
       const wide = Math.max(1.5, this.x(end) - this.x(start));
       svg.append(svgElement("rect", { class: "beyond", x: this.x(start), y: TOP, width: wide, height: HEIGHT - TOP - BOTTOM }));
     }
-    for (const [value, text] of this.marks(low, high)) {
+    for (const [value, text] of panel.magnitudes ? Chart.powers(low, high) : Chart.ticks(low, high, 5)) {
       svg.append(svgElement("line", { class: "grid", x1: LEFT, x2: width - RIGHT, y1: y(value), y2: y(value) }));
       svg.append(svgElement("text", { x: LEFT - 7, y: y(value) + 4, "text-anchor": "end" }, text));
     }
@@ -261,25 +259,12 @@ class Chart {
       inside.append(svgElement("path", { class: "curve", d: this.path(curve, y), ...this.style(curve) }));
     }
     svg.append(inside);
-    this.limits(y, width);
+    for (const { value } of panel.limits) {
+      svg.append(svgElement("line", { x1: LEFT, x2: width - RIGHT, y1: y(value), y2: y(value), ...Chart.LIMIT }));
+    }
     this.line = svgElement("line", { class: "cursor", x1: LEFT, x2: LEFT, y1: TOP, y2: HEIGHT - BOTTOM });
     svg.append(this.line);
     if (this.time !== undefined) this.point(this.time);
-  }
-
-  limits(y, width) {
-    const { LEFT, RIGHT, TOP, BOTTOM, HEIGHT } = Chart;
-    const heights = [];
-    for (const { name, value } of this.panel.limits) {
-      this.svg.append(svgElement("line", { x1: LEFT, x2: width - RIGHT, y1: y(value), y2: y(value), stroke: "var(--limit)", "stroke-width": 1.4, "stroke-dasharray": "6 4" }));
-      // Above the line if there is no room below it.
-      const isFree = (at) => at > TOP + 10 && at < HEIGHT - BOTTOM && heights.every((other) => Math.abs(other - at) >= 13);
-      const at = [y(value) + 14, y(value) - 5].find(isFree) ?? y(value) + 14;
-      heights.push(at);
-      const bent = this.bend ? ", logarithmic beyond" : "";
-      const text = `${name}: ${minus(String(Number(value.toPrecision(4))))} ${this.panel.unit}${bent}`;
-      this.svg.append(svgElement("text", { class: "limit", x: width - RIGHT - 4, y: at, "text-anchor": "end" }, text));
-    }
   }
 
   // Times between which the norm exceeds its limit.

@@ -6,7 +6,7 @@ use crate::failure::Failure;
 use crate::picture::{self, Form};
 use clap::Args;
 use cosim::error::Error;
-use cosim_report::recording::{Recording, panels};
+use cosim_report::recording::{Recording, asked as drawn, panels};
 use cosim_report::run_page;
 use std::io::Write;
 use std::path::PathBuf;
@@ -93,9 +93,9 @@ pub(crate) fn plot(asked: &Plot, out: &mut impl Write) -> Result<(), Failure> {
     let form = Form::of(&asked.out, "--out", &Form::RUNS)?;
     let runs = asked.recordings()?;
     let panels = if asked.signals.is_empty() {
-        panels::of_experiments(&runs)
+        drawn::of_experiments(&runs)
     } else {
-        panels::of_signals(&runs, &asked.signals).map_err(|problem| format!("--signals: {problem}"))
+        drawn::of_signals(&runs, &asked.signals).map_err(|problem| format!("--signals: {problem}"))
     };
     let panels = panels.map_err(Error::experiment)?;
     if panels.is_empty() {
@@ -103,7 +103,10 @@ pub(crate) fn plot(asked: &Plot, out: &mut impl Write) -> Result<(), Failure> {
     }
     match form {
         Form::Page => run_page::write(&runs, &panels, &asked.out)?,
-        _ => picture::write(&run_page::figure::figure(&runs, &panels), form, &asked.out)?,
+        _ if asked.signals.is_empty() => {
+            picture::write(&run_page::figure::figure(&runs, &panels), form, &asked.out)?;
+        }
+        _ => picture::write(&run_page::figure::of_panels(&runs, &panels), form, &asked.out)?,
     }
     writeln!(out, "{}", asked.out.display())?;
     Ok(())

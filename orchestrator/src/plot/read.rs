@@ -270,7 +270,7 @@ mod tests {
     fn a_column_may_be_called_as_another_program_likes() {
         let run = read("mine.csv", "time,b\n0,1\n1,3\n1,4\n", None).unwrap();
         assert_eq!(run.track("b").unwrap().values, [1.0, 3.0, 4.0]);
-        let panels = cosim_report::recording::panels::of_experiments(&[run]).unwrap();
+        let panels = cosim_report::recording::asked::of_experiments(&[run]).unwrap();
         assert_eq!((panels.len(), panels[0].label.as_str()), (1, "b"));
     }
 

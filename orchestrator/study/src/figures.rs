@@ -55,6 +55,7 @@ fn panel(figure: &Figure, panel: &Panel, results: &Results) -> Result<figure::Pa
         x_range: panel.x_range,
         y_range: panel.y_range,
         curves,
+        ..figure::Panel::default()
     })
 }
 

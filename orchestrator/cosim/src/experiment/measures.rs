@@ -1,6 +1,6 @@
 //! The signals of a run that an experiment measures, watches and draws.
 
-use super::Vehicle;
+use super::{Trajectory, Vehicle};
 use crate::signal::Signal;
 use fmi_master::names;
 use schemars::JsonSchema;
@@ -33,6 +33,8 @@ pub struct Observe {
     pub panels: Vec<Panel>,
     /// Variables by which the page of a run shows the vehicle.
     pub vehicle: Option<Vehicle>,
+    /// Variables by which the pictures of a run show a flight over a planet.
+    pub trajectory: Option<Trajectory>,
     /// Further lines of the live view: lists of variables, by the heading of the line.
     pub readings: BTreeMap<String, Vec<String>>,
 }
@@ -101,6 +103,9 @@ pub struct Measure {
     /// Heading of the number's line in the summary. Metrics with the same heading share a line.
     #[serde(default)]
     pub label: String,
+    /// What the heading means, for readers of the page of a run.
+    #[serde(default)]
+    pub meaning: String,
     /// Label that distinguishes the number from others in the same line of the summary.
     #[serde(default)]
     pub part: String,
@@ -294,6 +299,7 @@ impl Measure {
             steps: false,
             unit: None,
             label: String::new(),
+            meaning: String::new(),
             part: String::new(),
             limit: None,
             optional: false,

@@ -8,6 +8,7 @@ mod measures;
 mod overrides;
 mod protection;
 mod quantity;
+mod trajectory;
 mod vehicle;
 
 pub use crate::watch::OnInvalid;
@@ -16,6 +17,7 @@ pub use measures::{Curve, Guarantee, Loss, Margins, Measure, MeasureKind, Observ
 pub use overrides::{Given, Overrides, name_of};
 pub use protection::Protection;
 pub use quantity::{Band, Quantity};
+pub use trajectory::{Bound, Equilibrium, Trajectory};
 pub use vehicle::Vehicle;
 
 use crate::document::Source;

@@ -23,6 +23,9 @@ pub struct Vehicle {
     /// Deflections of all surfaces.
     #[serde(default)]
     pub deflections: Vec<String>,
+    /// Names of the surfaces in this order, in place of those of the variables.
+    #[serde(default)]
+    pub surfaces: Vec<String>,
     /// Deflections that the flaps of the picture show, left and right, positive downwards.
     pub flaps: Option<[String; 2]>,
     /// Commands of all jets, from 0 (off) to 1 (on).
@@ -31,6 +34,12 @@ pub struct Vehicle {
 }
 
 impl Vehicle {
+    /// Returns the name of the surface at a place among the deflections.
+    pub fn surface(&self, place: usize) -> &str {
+        let variable = || self.deflections.get(place)?.rsplit('.').next();
+        self.surfaces.get(place).map(String::as_str).or_else(variable).unwrap_or_default()
+    }
+
     /// Returns the names of all variables, each with the key that names it.
     pub fn paths(&self) -> impl Iterator<Item = (&'static str, &str)> {
         let lists: [(&'static str, &[String]); 9] = [

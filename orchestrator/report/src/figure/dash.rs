@@ -36,6 +36,7 @@ impl<'a> Dashes<'a> {
                 let place = self.0.iter().position(|name| *name == curve.name).unwrap_or(0);
                 PATTERNS[place % PATTERNS.len()]
             }
+            Shape::Patterned(place) => PATTERNS[place % PATTERNS.len()],
             _ => &[],
         }
     }

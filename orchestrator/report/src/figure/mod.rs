@@ -1,6 +1,7 @@
 //! A figure of panels with curves. It is drawn as SVG ([`svg`]) for papers and pages, and as PNG
 //! ([`png`]).
 
+pub(crate) mod clip;
 pub mod dash;
 pub mod png;
 pub mod svg;
@@ -62,6 +63,8 @@ pub enum Legend {
     Above,
     /// One legend for each panel, to its right.
     Beside,
+    /// One legend for each panel, between its title and its axes.
+    Each,
 }
 
 /// A figure, whose panels are arranged in rows.
@@ -88,10 +91,14 @@ pub struct Panel {
     pub y_label: String,
     /// Whether the horizontal axis is logarithmic.
     pub log_x: bool,
+    /// Whether the vertical axis is logarithmic.
+    pub log_y: bool,
     /// Range of the horizontal axis that is shown at first.
     pub x_range: Option<[f64; 2]>,
     /// Range of the vertical axis that is shown at first.
     pub y_range: Option<[f64; 2]>,
+    /// Height with the labels, px, in place of that of all panels.
+    pub height: Option<f64>,
     /// Curves of the panel; the first one is drawn lowest.
     pub curves: Vec<Curve>,
 }
@@ -127,8 +134,10 @@ pub fn with_unit(name: &str, unit: &str) -> String {
 /// Shape in which the points of a curve are drawn.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Shape {
-    /// A solid line through the points.
+    /// A line through the points, whose dashes distinguish it from others.
     Line,
+    /// A line through the points with the dashes of this number; that of 0 is solid.
+    Patterned(usize),
     /// A thin line through the points.
     Thin,
     /// A thick, solid line through the points, for the norm that a limit is for.
@@ -162,6 +171,7 @@ impl Shape {
         match self {
             Self::Thin | Self::Pale => 1.0,
             Self::Bold => 3.0,
+            Self::Crosses => 2.4,
             _ => 1.8,
         }
     }
@@ -204,10 +214,11 @@ impl Panel {
         if let Some([low, high]) = if along_x { self.x_range } else { self.y_range } {
             return (low, high);
         }
+        let is_logarithmic = if along_x { self.log_x } else { self.log_y };
         let Some((low, high)) = self.extent(along_x) else {
-            return if along_x && self.log_x { (1.0, 10.0) } else { (0.0, 1.0) };
+            return if is_logarithmic { (1.0, 10.0) } else { (0.0, 1.0) };
         };
-        if along_x && self.log_x {
+        if is_logarithmic {
             // A logarithmic axis shows no zero.
             let high = if high > 0.0 { high } else { 10.0 };
             let low = if low > 0.0 { low } else { 1e-3 * high };

@@ -1,16 +1,19 @@
 //! Draws a figure as SVG, for files and for pages. In a page, classes let its style sheet choose
 //! the colours of paper and ink, and its script finds curves and axes.
 
+mod axes;
+mod names;
 mod paint;
 mod panel;
 
 use super::dash::Dashes;
 use super::words::{letters, shortened, wrapped};
 use super::{Curve, Figure, Legend, Panel, Shape};
+use axes::Area;
 use cosim::error::Error;
 use cosim::files;
 use paint::{escaped, stroke};
-use panel::{Area, draw_panel, left_of};
+use panel::{draw_panel, left_of};
 use std::fmt::Write as _;
 use std::path::Path;
 
@@ -48,76 +51,105 @@ pub fn write(figure: &Figure, path: &Path) -> Result<(), Error> {
 pub fn text(figure: &Figure) -> String {
     let style =
         format!("<style>{STYLE}</style><rect class=\"paper\" width=\"100%\" height=\"100%\"/>");
-    document(figure, &style, true)
+    document(figure, &style, true, WIDTH)
 }
 
 /// Returns a figure as an element of a page, whose style sheet has the colours, and whose heading
 /// is elsewhere.
 pub fn element(figure: &Figure) -> String {
-    document(figure, "", false)
+    document(figure, "", false, WIDTH)
 }
 
-fn document(figure: &Figure, begin: &str, titled: bool) -> String {
+/// Returns a figure of half the width of others as an element of a page, like [`element`].
+pub fn half(figure: &Figure) -> String {
+    document(figure, "", false, WIDTH / 2.0)
+}
+
+fn document(figure: &Figure, begin: &str, titled: bool, whole: f64) -> String {
     let columns = figure.columns.max(1);
-    let rows = figure.panels.len().div_ceil(columns).max(1);
     let shared = Dashes::new(&figure.panels);
     let lines = match figure.legend {
-        Legend::Above => arrange(legend(figure.panels.iter().flat_map(|panel| &panel.curves))),
-        Legend::Beside => Vec::new(),
+        Legend::Above => {
+            arrange(legend(figure.panels.iter().flat_map(|panel| &panel.curves)), whole)
+        }
+        Legend::Beside | Legend::Each => Vec::new(),
     };
     let title =
         if titled { wrapped(&figure.title, TITLE_LETTERS, TITLE_LINES) } else { Vec::new() };
     let further = TITLE_LINE * title.len().saturating_sub(1) as f64;
     let title_height = if title.is_empty() { 4.0 } else { TITLE_HEIGHT + further };
     let above = title_height + LEGEND_HEIGHT * lines.len() as f64;
-    let height = above + HEIGHT * rows as f64;
+    let width = whole / columns as f64;
+    let rows = rows_of(figure, columns, width);
+    let height = above + rows.iter().map(|row| row.height).sum::<f64>();
     let mut out = format!(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{WIDTH}\" height=\"{height}\" viewBox=\"0 0 {WIDTH} {height}\" role=\"img\" aria-label=\"{}\">{begin}",
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{whole}\" height=\"{height}\" viewBox=\"0 0 {whole} {height}\" role=\"img\" aria-label=\"{}\">{begin}",
         escaped(&figure.title)
     );
     for (place, line) in title.iter().enumerate() {
-        let (middle, y) = (WIDTH / 2.0, 24.0 + TITLE_LINE * place as f64);
+        let (middle, y) = (whole / 2.0, 24.0 + TITLE_LINE * place as f64);
         let _ = write!(
             out,
             "<text class=\"title\" x=\"{middle}\" y=\"{y}\" text-anchor=\"middle\">{}</text>",
             escaped(line)
         );
     }
-    for (row, line) in lines.iter().enumerate() {
-        let mut x = 64.0;
-        for curve in line {
-            let y = title_height + LEGEND_HEIGHT * row as f64 + 12.0;
-            entry(&mut out, curve, &shared, (x, y), TITLE_LETTERS);
-            x += entry_width(curve);
-        }
-    }
+    draw_legend(&mut out, &lines, &shared, (64.0, title_height + 12.0));
     let beside = if figure.legend == Legend::Beside { beside(&figure.panels) } else { 0.0 };
-    let width = WIDTH / columns as f64;
     // Axes over one another begin at the same place.
     let left = figure.panels.iter().map(|panel| left_of(panel, HEIGHT)).fold(0.0, f64::max);
+    let mut top = above;
     for (place, panel) in figure.panels.iter().enumerate() {
-        let (row, column) = (place / columns, place % columns);
-        let area = Area {
-            x: width * column as f64,
-            y: above + HEIGHT * row as f64,
-            width: width - beside,
-            height: HEIGHT,
-        };
+        let (row, x) = (&rows[place / columns], width * (place % columns) as f64);
         // Panels over the same axis have one label.
         let below = figure.panels.get(place + columns);
         let is_named = below.is_none_or(|below| below.x_label != panel.x_label);
         let own = Dashes::new(std::slice::from_ref(panel));
-        let dashes = if figure.legend == Legend::Beside { &own } else { &shared };
+        let dashes = if figure.legend == Legend::Above { &shared } else { &own };
+        let area =
+            Area { x, y: top, width: width - beside, height: row.height, legend: row.legend };
         draw_panel(&mut out, panel, dashes, area, left, is_named);
-        if figure.legend == Legend::Beside {
-            for (line, curve) in legend(panel.curves.iter()).into_iter().enumerate() {
-                let (x, y) = (area.x + area.width + 4.0, area.y + 18.0 + 19.0 * line as f64);
-                entry(&mut out, curve, dashes, (x, y), NAME_LETTERS);
+        match figure.legend {
+            Legend::Above => {}
+            Legend::Beside => {
+                for (line, curve) in legend(panel.curves.iter()).into_iter().enumerate() {
+                    let at = (x + area.width + 4.0, top + 18.0 + 19.0 * line as f64);
+                    entry(&mut out, curve, dashes, at, NAME_LETTERS);
+                }
             }
+            Legend::Each => {
+                let begin = top + panel::above(panel) + 11.0;
+                let lines = arrange(legend(panel.curves.iter()), width);
+                draw_legend(&mut out, &lines, dashes, (x + left, begin));
+            }
+        }
+        if (place + 1) % columns == 0 {
+            top += row.height;
         }
     }
     out.push_str("</svg>\n");
     out
+}
+
+/// A row of panels.
+struct Row {
+    /// Height with the labels, px.
+    height: f64,
+    /// Height of the legends above the axes, px.
+    legend: f64,
+}
+
+/// Returns the rows of a figure, of which there is at least one.
+fn rows_of(figure: &Figure, columns: usize, width: f64) -> Vec<Row> {
+    let row = |panels: &[Panel]| {
+        let lines = panels.iter().map(|panel| arrange(legend(panel.curves.iter()), width).len());
+        let lines = lines.max().filter(|_| figure.legend == Legend::Each).unwrap_or(0);
+        let legend = LEGEND_HEIGHT * lines as f64;
+        let height = panels.iter().map(|panel| panel.height.unwrap_or(HEIGHT)).fold(0.0, f64::max);
+        Row { height: height + legend, legend }
+    };
+    let rows: Vec<Row> = figure.panels.chunks(columns).map(row).collect();
+    if rows.is_empty() { vec![Row { height: HEIGHT, legend: 0.0 }] } else { rows }
 }
 
 /// Returns the width of the legends beside panels, which follows their longest name, px.
@@ -139,22 +171,33 @@ fn legend<'a>(curves: impl Iterator<Item = &'a Curve>) -> Vec<&'a Curve> {
     entries
 }
 
-/// Arranges the entries of a legend in lines that fit the width of the figure.
-fn arrange(entries: Vec<&Curve>) -> Vec<Vec<&Curve>> {
+/// Arranges the entries of a legend in lines that fit this width, px.
+fn arrange(entries: Vec<&Curve>, width: f64) -> Vec<Vec<&Curve>> {
     let mut lines: Vec<Vec<&Curve>> = Vec::new();
     let mut used = 0.0;
     for entry in entries {
-        let width = entry_width(entry);
-        if lines.is_empty() || used + width > WIDTH - 70.0 {
+        let needed = entry_width(entry);
+        if lines.is_empty() || used + needed > width - 70.0 {
             lines.push(Vec::new());
             used = 0.0;
         }
-        used += width;
+        used += needed;
         if let Some(line) = lines.last_mut() {
             line.push(entry);
         }
     }
     lines
+}
+
+/// Draws a legend in lines, the first of which begins at this place.
+fn draw_legend(out: &mut String, lines: &[Vec<&Curve>], dashes: &Dashes, (x, y): (f64, f64)) {
+    for (row, line) in lines.iter().enumerate() {
+        let mut at = (x, y + LEGEND_HEIGHT * row as f64);
+        for curve in line {
+            entry(out, curve, dashes, at, TITLE_LETTERS);
+            at.0 += entry_width(curve);
+        }
+    }
 }
 
 /// Draws an entry of a legend whose sample begins at this place, and whose name has room for this
@@ -173,13 +216,9 @@ fn entry(out: &mut String, curve: &Curve, dashes: &Dashes, (x, y): (f64, f64), r
         Shape::Dots => {
             write!(out, "<circle cx=\"{}\" cy=\"{y}\" r=\"3\" fill=\"{}\"/>", x + 13.0, curve.color)
         }
-        Shape::Crosses => write!(
-            out,
-            "<path d=\"M{} {}l10 10m0 -10l-10 10\" stroke=\"{}\" stroke-width=\"2\"/>",
-            x + 8.0,
-            y - 5.0,
-            curve.color
-        ),
+        Shape::Crosses => {
+            write!(out, "<path d=\"M{} {}l10 10m0 -10l-10 10\" {paint}/>", x + 8.0, y - 5.0)
+        }
         _ => write!(out, "<path d=\"M{x} {y}h28\" fill=\"none\" {paint}/>"),
     };
     let text = escaped(&shortened(&curve.name, room));

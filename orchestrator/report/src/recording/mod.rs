@@ -1,8 +1,11 @@
 //! Data of a run for its pictures: the recorded variables over time, the panels of its experiment,
 //! its parameters and its outcome. It comes from the files of a run, or from the run itself.
 
+pub mod asked;
 mod cover;
+mod effectors;
 pub mod panels;
+pub mod trajectory;
 pub mod watch;
 
 use cosim::experiment::Observe;
@@ -43,6 +46,8 @@ pub struct Recording {
 pub struct SummaryLine {
     /// Heading, which names the measured quantity.
     pub heading: String,
+    /// What the heading means, or an empty text.
+    pub meaning: String,
     /// Values as text.
     pub text: String,
     /// Whether the quantity is within its limits; `None` if it has none.

@@ -1,15 +1,18 @@
 //! Collects a recording while the run goes on, of variables that may not be written to its files.
 
-use super::panels::UNASKED;
+use super::asked::{self, UNASKED};
 use super::{Recording, Track};
+use crate::figure::svg;
+use crate::run_page::figure::figure;
 use cosim::error::Error;
-use cosim::experiment::{Observe, Vehicle};
+use cosim::experiment::{Observe, Trajectory, Vehicle};
 use cosim::run::{Observer, Sample};
 use cosim::signal::Signal;
 use cosim::system::System;
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::iter;
+use std::path::Path;
 
 /// Largest number of rows that are kept.
 const ROWS: u64 = 100_000;
@@ -25,6 +28,7 @@ pub struct Watch {
     unasked: usize,
     time: Vec<f64>,
     stride: u64,
+    observe: Observe,
 }
 
 impl Watch {
@@ -59,7 +63,37 @@ impl Watch {
             columns.push((name, probed.place, track));
         }
         let stride = system.clock.ticks().div_ceil(ROWS).max(1);
-        Ok(Self { columns, unasked: count, time: Vec::new(), stride })
+        let rows = (system.clock.ticks() / stride + 2) as usize;
+        for (_, _, track) in &mut columns {
+            track.values.reserve_exact(rows);
+        }
+        let (time, observe) = (Vec::with_capacity(rows), system.experiment.observe.clone());
+        Ok(Self { columns, unasked: count, time, stride, observe })
+    }
+
+    /// Draws the figure that the experiment asks for, if it does, and returns whether it does.
+    ///
+    /// # Errors
+    /// Returns an error if the file cannot be written.
+    pub fn draw(&self, path: &Path, title: &str) -> Result<bool, Error> {
+        if self.unasked > 0 || self.time.len() < 2 {
+            return Ok(false);
+        }
+        let tracks = self.columns.iter().map(|(name, _, track)| (name.clone(), track.clone()));
+        let run = Recording {
+            title: title.into(),
+            time: self.time.clone(),
+            tracks: tracks.collect(),
+            observe: self.observe.clone(),
+            ..Recording::default()
+        };
+        let runs = [run];
+        let panels = asked::of_experiments(&runs).map_err(Error::experiment)?;
+        let drawn = figure(&runs, &panels);
+        if !drawn.panels.is_empty() {
+            svg::write(&drawn, path)?;
+        }
+        Ok(!drawn.panels.is_empty())
     }
 
     /// Returns the recording of the run whose `results.json` has this content.
@@ -91,6 +125,9 @@ fn names(observe: &Observe) -> BTreeMap<String, &'static str> {
     }
     for (_, path) in observe.vehicle.iter().flat_map(Vehicle::paths) {
         names.insert(path.to_string(), "[observe.vehicle]");
+    }
+    for path in observe.trajectory.iter().flat_map(Trajectory::paths) {
+        names.insert(path.to_string(), "[observe.trajectory]");
     }
     if let Some(guarantee) = &observe.guarantee {
         for path in iter::once(&guarantee.in_force).chain(&guarantee.status) {

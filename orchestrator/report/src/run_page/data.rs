@@ -2,6 +2,7 @@
 
 use super::thin;
 use crate::recording::panels::{Panel, Role, symbols};
+use crate::recording::trajectory;
 use crate::recording::{Recording, Track};
 use cosim::experiment::Vehicle;
 use serde_json::{Map, Value, json};
@@ -19,6 +20,8 @@ pub fn page(runs: &[Recording], panels: &[Panel], vehicles: &[usize]) -> Value {
             "name": run.name,
             "time": numbers(thin::times(&run.time), TIME_DIGITS),
             "vehicle": is_shown.then(|| vehicle(run)).flatten(),
+            "guarantee": guarantee(run, &thin::frames(run.time.len())),
+            "flight": flight(run),
         })
     };
     let names: Vec<String> = runs.iter().map(|run| run.name.clone()).collect();
@@ -42,6 +45,7 @@ pub fn page(runs: &[Recording], panels: &[Panel], vehicles: &[usize]) -> Value {
         json!({
             "label": symbols(&panel.label), "unit": panel.unit,
             "limits": limits.collect::<Vec<_>>(),
+            "magnitudes": panel.magnitudes,
             "curves": curves.collect::<Vec<_>>(),
         })
     };
@@ -49,6 +53,16 @@ pub fn page(runs: &[Recording], panels: &[Panel], vehicles: &[usize]) -> Value {
         "runs": runs.iter().enumerate().map(run).collect::<Vec<_>>(),
         "panels": panels.iter().map(panel).collect::<Vec<_>>(),
     })
+}
+
+/// Returns the places of a run on the panels of its flight.
+fn flight(run: &Recording) -> Option<Value> {
+    let flight = trajectory::flight(run)?;
+    let places = |line: &[Vec<f64>; 2]| {
+        line.iter().map(|values| numbers(values.iter().copied(), DIGITS)).collect::<Vec<_>>()
+    };
+    let time = numbers(flight.rows.iter().map(|row| run.time[*row]), TIME_DIGITS);
+    Some(json!({ "time": time, "places": [places(&flight.energy), places(&flight.position)] }))
 }
 
 /// Returns whether the attitude of a vehicle is recorded.
@@ -76,9 +90,9 @@ fn vehicle(run: &Recording) -> Option<Value> {
         let track = run.tracks.get(path.as_ref()?)?;
         track.values.last().copied().filter(|limit| limit.is_finite() && *limit > 0.0)
     };
-    let deflection = |path: &String| {
+    let deflection = |(place, path): (usize, &String)| {
         let track = run.tracks.get(path)?;
-        let name = names_last(path);
+        let name = named.surface(place);
         Some(json!({ "name": name, "unit": track.unit, "values": at_frames(track, track.factor) }))
     };
     let mut value = Map::new();
@@ -96,8 +110,10 @@ fn vehicle(run: &Recording) -> Option<Value> {
     put("momentLimit", json!(limit(&named.moment_limit)));
     put("flaps", json!(named.flaps.as_ref().and_then(|flaps| list(flaps))));
     put("jets", json!(list(&named.jets)));
-    put("surfaces", json!(named.deflections.iter().filter_map(deflection).collect::<Vec<_>>()));
-    put("guarantee", guarantee(run, &frames));
+    put(
+        "surfaces",
+        json!(named.deflections.iter().enumerate().filter_map(deflection).collect::<Vec<_>>()),
+    );
     Some(Value::Object(value))
 }
 
@@ -114,7 +130,8 @@ fn guarantee(run: &Recording, frames: &[usize]) -> Value {
         .flat_map(|track| &track.items)
         .map(|(name, value)| (value.to_string(), json!(words(name))))
         .collect();
-    json!({ "inForce": values(in_force), "status": status.map(values), "items": items })
+    let time = numbers(frames.iter().map(|row| run.time[*row]), TIME_DIGITS);
+    json!({ "time": time, "inForce": values(in_force), "status": status.map(values), "items": items })
 }
 
 /// Writes the name of an item as words: "inForce" as "in force".
@@ -127,11 +144,6 @@ fn words(item: &str) -> String {
         text.extend(letter.to_lowercase());
     }
     text
-}
-
-/// Returns the last part of a variable's name.
-fn names_last(path: &str) -> &str {
-    path.rsplit('.').next().unwrap_or(path)
 }
 
 /// Rounds numbers; those that are not finite become null.

@@ -1,12 +1,12 @@
 // The vehicle of a run in motion, with its surfaces and jets where there are any.
 //
-//   const instruments = new Instruments(element, run.vehicle);
+//   const instruments = new Instruments(element, run.vehicle, run.guarantee);
 //   instruments.point(time);
 "use strict";
 
 class Instruments {
-  constructor(element, vehicle) {
-    this.vehicle = vehicle;
+  constructor(element, vehicle, guarantee) {
+    Object.assign(this, { vehicle, guarantee });
     this.view = new Vehicle3D(element.querySelector("canvas"));
     this.canvas = element.querySelector("canvas");
     this.surfaces = this.bars(element.querySelector(".surfaces"), vehicle.surfaces || []);
@@ -24,18 +24,17 @@ class Instruments {
     if (!surfaces.length) return [];
     const reach = Math.max(1e-9, ...surfaces.map(({ values }) => values.reduce((most, value) => Math.max(most, Math.abs(value)), 0)));
     parent.append(Instruments.heading(`surfaces, ${surfaces[0].unit}`));
-    return surfaces.map(({ name, values }, place) => {
+    return surfaces.map(({ name, values }) => {
       const item = document.createElement("span");
       item.className = "surface";
-      item.title = name;
-      const number = document.createElement("span");
-      number.textContent = (name.match(/\[(\d+)\]/) || [0, place + 1])[1];
+      const text = document.createElement("span");
+      text.textContent = name;
       const svg = svgElement("svg", { viewBox: "-17 0 34 10", "aria-hidden": "true" });
       const bar = svgElement("rect", { y: 2, height: 6, fill: "var(--c0)" });
       svg.append(svgElement("rect", { x: -17, y: 2, width: 34, height: 6, fill: "var(--line)" }), bar);
       svg.append(svgElement("line", { x1: 0, x2: 0, y1: 0, y2: 10, stroke: "var(--muted)", "stroke-width": 1 }));
       const output = document.createElement("output");
-      item.append(number, svg, output);
+      item.append(text, svg, output);
       parent.append(item);
       return (frame) => {
         const value = values[frame] ?? 0;
@@ -54,6 +53,7 @@ class Instruments {
     return jets.map((values, place) => {
       const lamp = document.createElement("i");
       lamp.textContent = place + 1;
+      lamp.title = `jet ${place + 1}`;
       parent.append(lamp);
       return (frame) => {
         const share = Math.max(0, Math.min(1, values[frame] ?? 0));
@@ -64,7 +64,7 @@ class Instruments {
   }
 
   light(frame) {
-    const { guarantee } = this.vehicle;
+    const { guarantee } = this;
     if (!guarantee) return { state: "none", text: "no guarantee recorded" };
     const isInForce = guarantee.inForce[frame] !== 0;
     const status = guarantee.status && guarantee.items[guarantee.status[frame]];
@@ -90,3 +90,47 @@ class Instruments {
     for (const show of [...this.surfaces, ...this.jets]) show(frame);
   }
 }
+
+// The place of a run on the drawn panels of its flight.
+class Places {
+  constructor(panels, flight, colour) {
+    this.time = flight.time;
+    this.marks = [...panels].map((panel, number) => {
+      const numbers = (key) => panel.dataset[key].split(" ").map(Number);
+      const [[left, top, width, height], x, y] = ["frame", "x", "y"].map(numbers);
+      const mark = svgElement("circle", { class: "place", r: 5.5, fill: colour });
+      panel.append(mark);
+      const share = (value, [low, high]) => (value - low) / (high - low);
+      return (row) => {
+        const [across, up] = flight.places[number].map((values) => values[row]);
+        mark.setAttribute("cx", (left + width * share(across, x)).toFixed(1));
+        mark.setAttribute("cy", (top + height * (1 - share(up, y))).toFixed(1));
+      };
+    });
+  }
+
+  point(time) {
+    for (const show of this.marks) show(rowAt(this.time, time));
+  }
+}
+
+// A strip that shows when the guarantee of a run is in force.
+const guaranteeStrip = ({ name, guarantee }, isNamed) => {
+  const { time, inForce } = guarantee;
+  const [start, span] = [time[0], time.at(-1) - time[0] || 1];
+  const parts = [];
+  inForce.forEach((is, row) => {
+    if (row === 0 || is !== inForce[row - 1]) parts.push({ is, from: time[row], to: time.at(-1) });
+    if (row > 0 && is !== inForce[row - 1]) parts.at(-2).to = time[row];
+  });
+  const stops = parts.map(({ is, from, to }) => {
+    const [begin, end] = [from, to].map((at) => `${((100 * (at - start)) / span).toFixed(2)}%`);
+    return `var(--${is ? "good" : "warn"}) ${begin} ${end}`;
+  });
+  const strip = document.createElement("div");
+  strip.style.background = `linear-gradient(to right, ${stops.join(", ")})`;
+  const share = parts.reduce((sum, { is, from, to }) => sum + (is ? to - from : 0), 0) / span;
+  const note = document.createElement("small");
+  note.textContent = `${isNamed ? `${name}: ` : ""}guarantee in force for ${(100 * share).toFixed(1).replace(".0", "")} % of the time`;
+  return [strip, note];
+};

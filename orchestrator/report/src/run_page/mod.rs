@@ -5,8 +5,9 @@ pub mod data;
 pub mod figure;
 pub mod thin;
 
+use crate::figure::{Figure, Legend, svg};
 use crate::recording::panels::Panel;
-use crate::recording::{Parameter, Recording, SummaryLine};
+use crate::recording::{Parameter, Recording, SummaryLine, trajectory};
 use cosim::error::Error;
 use cosim::files;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
@@ -69,6 +70,7 @@ fn page(runs: &[Recording], panels: &[Panel]) -> String {
                             p.note { "Drag to turn the view, double click to turn it back." }
                         }
                     }
+                    (flight(runs))
                     section id="curves" aria-label="Curves" {
                         p.note { "Drag over curves to look closer, and click twice to see all." }
                     }
@@ -113,6 +115,7 @@ fn player() -> Markup {
             input id="seek" type="range" min="0" max="1000" step="1" value="0" aria-label="Time";
             output id="time" for="seek" {}
             label { span { "speed " } select id="speed" aria-label="Speed" {} }
+            div id="guarantees" {}
         }
     }
 }
@@ -124,6 +127,23 @@ fn vehicle(place: usize, run: &Recording, named: bool) -> Markup {
             canvas.view aria-label=(format!("Attitude of the vehicle, {}", run.name)) role="img" {}
             div.surfaces {}
             div.jets {}
+        }
+    }
+}
+
+/// Returns altitude over speed and the ground track, if they are recorded.
+fn flight(runs: &[Recording]) -> Markup {
+    let panels = trajectory::panels(runs, &figure::names(runs));
+    let drawn = |panel: crate::figure::Panel| {
+        let title = panel.title.clone();
+        let (panels, legend) = (vec![panel], Legend::Each);
+        svg::half(&Figure { title, columns: 1, legend, panels })
+    };
+    html! {
+        @if !panels.is_empty() {
+            section id="flight" aria-label="Flight" {
+                @for panel in panels { figure.plot { (PreEscaped(drawn(panel))) } }
+            }
         }
     }
 }
@@ -143,10 +163,15 @@ fn summary(runs: &[Recording]) -> Markup {
     }
     html! {
         @if lines.is_empty() { p.note { "The experiment defines no metrics." } }
-        div.scroll { table {
+        div.scroll tabindex="0" role="region" aria-label="Summary" { table {
             @if runs.len() > 1 { thead { tr { th {} @for run in runs { th { (run.name) } } } } }
             tbody { @for (heading, told) in &lines { tr {
-                th scope="row" { (heading) }
+                th scope="row" {
+                    (heading)
+                    @if let Some(meaning) = told.iter().flatten().map(|line| &line.meaning).find(|m| !m.is_empty()) {
+                        small { (meaning) }
+                    }
+                }
                 @for line in told { td class=[line.filter(|line| line.is_within == Some(false)).map(|_| "bad")] {
                     (line.map_or(String::new(), |line| line.text.replace(" %", "\u{a0}%")))
                 } }
@@ -174,7 +199,7 @@ fn parameters(runs: &[Recording]) -> Markup {
             @if runs.len() > 1 { label { input id="different-only" type="checkbox"; " that differ" } }
             output id="found" for="search" {}
         }
-        div.scroll { table id="parameter-table" {
+        div.scroll tabindex="0" role="region" aria-label="Parameters" { table id="parameter-table" {
             @if runs.len() > 1 { thead { tr { th {} @for run in runs { th { (run.name) } } } } }
             tbody { @for (name, values) in &rows {
                 tr data-set[is_set(values)] data-differs[differs(values)] {
@@ -201,7 +226,8 @@ mod tests {
     use super::*;
 
     fn line(heading: &str, is_within: Option<bool>) -> SummaryLine {
-        SummaryLine { heading: heading.into(), text: "1.0".into(), is_within }
+        let (heading, text) = (heading.into(), "1.0".into());
+        SummaryLine { heading, text, is_within, ..SummaryLine::default() }
     }
 
     /// Returns the text of a verdict, and the lights in it.

@@ -50,8 +50,14 @@
   charts.forEach((chart, place) => chart.show(data.panels[place], data.runs, [start, stop]));
   const parts = [...charts];
   for (const element of document.querySelectorAll(".vehicle")) {
-    parts.push(new Instruments(element, data.runs[element.dataset.run].vehicle));
+    const { vehicle, guarantee } = data.runs[element.dataset.run];
+    parts.push(new Instruments(element, vehicle, guarantee));
   }
+  data.runs.forEach((run, place) => {
+    const isNamed = data.runs.length > 1;
+    if (run.flight) parts.push(new Places(document.querySelectorAll("#flight .panel"), run.flight, `var(--c${place % 6})`));
+    if (run.guarantee) find("guarantees").append(...guaranteeStrip(run, isNamed));
+  });
 
   play.addEventListener("click", toggle);
   slider.addEventListener("input", () => seek(start + (span * slider.value) / 1000, true));

@@ -1,5 +1,7 @@
 //! One panel of a figure: axes, grid and curves.
 
+use super::axes::{Area, Axes};
+use super::names;
 use super::paint::{escaped, stroke};
 use crate::figure::dash::Dashes;
 use crate::figure::thin::thinned;
@@ -25,61 +27,16 @@ const LINE: f64 = 15.0;
 const LABEL_LETTERS: usize = 30;
 const LABEL_LINES: usize = 2;
 
-/// Place of a panel with its labels, px.
-#[derive(Clone, Copy)]
-pub(super) struct Area {
-    pub x: f64,
-    pub y: f64,
-    pub width: f64,
-    pub height: f64,
-}
-
-/// A panel's axes: ranges of the values, and where they are drawn.
-struct Axes {
-    x: (f64, f64),
-    y: (f64, f64),
-    log_x: bool,
-    frame: Area,
-}
-
-impl Axes {
-    fn x_at(&self, value: f64) -> f64 {
-        let place = |x: f64| if self.log_x { x.log10() } else { x };
-        let (low, high) = (place(self.x.0), place(self.x.1));
-        self.frame.x + (place(value) - low) / (high - low) * self.frame.width
-    }
-
-    fn y_at(&self, value: f64) -> f64 {
-        let (low, high) = self.y;
-        self.frame.y + (high - value) / (high - low) * self.frame.height
-    }
-
-    /// Returns the runs of points of a curve that can be drawn, px.
-    fn runs(&self, xs: &[f64], ys: &[f64]) -> Vec<Vec<(f64, f64)>> {
-        let mut runs = vec![Vec::new()];
-        for (x, y) in xs.iter().zip(ys) {
-            if (self.x.0..=self.x.1).contains(x) && y.is_finite() {
-                let point = (self.x_at(*x), self.y_at(*y));
-                runs.last_mut().expect("there is a run").push(point);
-            } else if !runs.last().is_some_and(Vec::is_empty) {
-                runs.push(Vec::new());
-            }
-        }
-        runs.retain(|run| !run.is_empty());
-        runs
-    }
-}
-
 /// Returns the space that a panel of this height needs to the left of its axes, px.
 pub(super) fn left_of(panel: &Panel, height: f64) -> f64 {
     let height = height - above(panel) - BELOW;
-    let longest = marks_y(panel.range(false), height).iter().map(|(_, text)| letters(text)).max();
+    let longest = marks_y(panel, height).iter().map(|(_, text)| letters(text)).max();
     let lines = label(panel).len().max(1) as f64;
     LEFT.max(LINE * lines + BESIDE + LETTER * longest.unwrap_or(0) as f64)
 }
 
-/// Returns the space above a panel's axes, px.
-fn above(panel: &Panel) -> f64 {
+/// Returns the space above a panel's axes without a legend, px.
+pub(super) fn above(panel: &Panel) -> f64 {
     ABOVE + if panel.title.is_empty() { 0.0 } else { TITLE }
 }
 
@@ -89,9 +46,18 @@ fn label(panel: &Panel) -> Vec<String> {
 }
 
 /// Returns the marks of a vertical axis of this height, with their texts.
-fn marks_y((low, high): (f64, f64), height: f64) -> Vec<(f64, String)> {
-    let marks = ticks::linear(low, high, ((height / MARK_HEIGHT) as usize).max(2));
-    let texts = ticks::labels(&marks, Some(high - low));
+fn marks_y(panel: &Panel, height: f64) -> Vec<(f64, String)> {
+    marks(panel.range(false), panel.log_y, ((height / MARK_HEIGHT) as usize).max(2))
+}
+
+/// Returns about `count` marks of an axis, with their texts.
+fn marks((low, high): (f64, f64), is_logarithmic: bool, count: usize) -> Vec<(f64, String)> {
+    let marks = if is_logarithmic {
+        ticks::logarithmic(low, high)
+    } else {
+        ticks::linear(low, high, count)
+    };
+    let texts = ticks::labels(&marks, (!is_logarithmic).then_some(high - low));
     marks.into_iter().zip(texts).collect()
 }
 
@@ -104,15 +70,17 @@ pub(super) fn draw_panel(
     left_space: f64,
     names_x: bool,
 ) {
-    let above = above(panel);
+    let above = above(panel) + area.legend;
     let frame = Area {
         x: area.x + left_space,
         y: area.y + above,
         width: area.width - left_space - RIGHT,
         height: area.height - above - BELOW,
+        ..area
     };
-    let axes = Axes { x: panel.range(true), y: panel.range(false), log_x: panel.log_x, frame };
-    let Area { x, y, width, height } = frame;
+    let log = [panel.log_x, panel.log_y];
+    let axes = Axes { x: panel.range(true), y: panel.range(false), log, frame };
+    let Area { x, y, width, height, .. } = frame;
     let ((left, right), (bottom, top)) = (axes.x, axes.y);
     let _ = write!(
         out,
@@ -129,30 +97,23 @@ pub(super) fn draw_panel(
         draw_curve(out, curve, dashes, &axes);
     }
     out.push_str("</svg>");
-    name_lines(out, panel, &axes);
+    names::write(out, panel, &axes);
     out.push_str("</g>");
 }
 
 fn draw_axes(out: &mut String, panel: &Panel, axes: &Axes, area: Area, names_x: bool) {
-    let Area { x, y, width, height } = axes.frame;
+    let Area { x, y, width, height, .. } = axes.frame;
     let (bottom, middle) = (y + height, x + width / 2.0);
     if !panel.title.is_empty() {
-        let above = y - 7.0;
+        let above = y - area.legend - 7.0;
         let title = escaped(&panel.title);
         let _ = write!(
             out,
             "<text x=\"{middle:.1}\" y=\"{above:.1}\" text-anchor=\"middle\">{title}</text>"
         );
     }
-    let (left, right) = axes.x;
-    let marks = if panel.log_x {
-        ticks::logarithmic(left, right)
-    } else {
-        ticks::linear(left, right, ((width / MARK_WIDTH) as usize).max(2))
-    };
     out.push_str("<g class=\"marks-x small\" text-anchor=\"middle\">");
-    let texts = ticks::labels(&marks, (!panel.log_x).then_some(right - left));
-    for (mark, text) in marks.into_iter().zip(texts) {
+    for (mark, text) in marks(axes.x, panel.log_x, ((width / MARK_WIDTH) as usize).max(2)) {
         let at = axes.x_at(mark);
         let _ = write!(
             out,
@@ -161,7 +122,7 @@ fn draw_axes(out: &mut String, panel: &Panel, axes: &Axes, area: Area, names_x: 
         );
     }
     out.push_str("</g><g class=\"marks-y small\" text-anchor=\"end\">");
-    for (mark, text) in marks_y(axes.y, height) {
+    for (mark, text) in marks_y(panel, height) {
         let at = axes.y_at(mark);
         let _ = write!(
             out,
@@ -191,11 +152,16 @@ fn draw_axes(out: &mut String, panel: &Panel, axes: &Axes, area: Area, names_x: 
 fn draw_curve(out: &mut String, curve: &Curve, dashes: &Dashes, axes: &Axes) {
     let (name, paint) = (escaped(&curve.name), stroke(curve, dashes));
     let begin = format!("data-name=\"{name}\" vector-effect=\"non-scaling-stroke\"");
-    let Area { x, y, width, height } = axes.frame;
+    let Area { x, y, width, height, .. } = axes.frame;
     let first = |values: &[f64]| values.first().copied().unwrap_or(f64::NAN);
     let area = format!("fill=\"{}\" fill-opacity=\"{}\"", curve.color, curve.shape.opacity());
     match &curve.shape {
-        Shape::Line | Shape::Thin | Shape::Bold | Shape::Pale | Shape::Dashed => {
+        Shape::Line
+        | Shape::Patterned(_)
+        | Shape::Thin
+        | Shape::Bold
+        | Shape::Pale
+        | Shape::Dashed => {
             for run in axes.runs(&curve.x, &curve.y) {
                 let data = path(&thinned(&run));
                 let _ = write!(
@@ -247,48 +213,10 @@ fn draw_curve(out: &mut String, curve: &Curve, dashes: &Dashes, axes: &Axes) {
                 let (left, top) = (at - 6.0, height - 6.0);
                 let _ = write!(
                     out,
-                    "<path {begin} d=\"M{left:.1} {top:.1}l12 12m0 -12l-12 12\" stroke=\"{}\" stroke-width=\"2.4\"/>",
-                    curve.color
+                    "<path {begin} d=\"M{left:.1} {top:.1}l12 12m0 -12l-12 12\" {paint}/>"
                 );
             }
         }
-    }
-}
-
-/// Writes the names of straight lines beside them, each once.
-fn name_lines(out: &mut String, panel: &Panel, axes: &Axes) {
-    let Area { x, y, width, height } = axes.frame;
-    let mut named: Vec<&str> = Vec::new();
-    // Heights at which names of horizontal lines stand.
-    let mut heights: Vec<f64> = Vec::new();
-    for curve in panel.curves.iter().filter(|curve| curve.shape.is_straight()) {
-        if named.contains(&curve.name.as_str()) {
-            continue;
-        }
-        named.push(&curve.name);
-        let first = |values: &[f64]| values.first().copied().unwrap_or(f64::NAN);
-        let (at_x, at_y, anchor) = if curve.shape == Shape::Horizontal {
-            let line = axes.y_at(first(&curve.y));
-            // Below the line if there is no room above it.
-            let is_free = |at: &f64| {
-                (y + 11.0..y + height).contains(at)
-                    && heights.iter().all(|other| (other - at).abs() >= 13.0)
-            };
-            let at = [line - 5.0, line + 14.0].into_iter().find(is_free).unwrap_or(line - 5.0);
-            heights.push(at);
-            (x + width - 4.0, at, "end")
-        } else {
-            let line = axes.x_at(first(&curve.x));
-            // Names of vertical lines stand over one another at the bottom.
-            let above = named.len() - 1 - heights.len();
-            let at = y + height - 6.0 - 14.0 * above as f64;
-            if line - x < 0.8 * width { (line + 5.0, at, "start") } else { (line - 5.0, at, "end") }
-        };
-        let _ = write!(
-            out,
-            "<text class=\"small limit-name\" x=\"{at_x:.1}\" y=\"{at_y:.1}\" text-anchor=\"{anchor}\">{}</text>",
-            escaped(&curve.name)
-        );
     }
 }
 

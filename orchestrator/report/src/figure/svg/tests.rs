@@ -147,9 +147,59 @@ fn names_of_limits_close_to_one_another_do_not_overlap() {
     let limit = |name: &str, y: f64| Curve { y: vec![y], ..curve(name, Shape::Horizontal) };
     let curves = vec![curve("c", Shape::Line), limit("first", 0.5), limit("second", 0.49)];
     let svg = text(&figure(curves, None));
-    let height = |name: &str| -> f64 {
-        let (_, rest) = text_with(&svg, &format!(">{name}</text>")).split_once(" y=\"").unwrap();
-        rest.split('"').next().unwrap().parse().unwrap()
+    let place = |name: &str| -> (f64, f64) {
+        let attributes = text_with(&svg, &format!(">{name}</text>"));
+        let number = |key: &str| {
+            let (_, rest) = attributes.split_once(&format!(" {key}=\"")).unwrap();
+            rest.split('"').next().unwrap().parse::<f64>().unwrap()
+        };
+        (number("x"), number("y"))
     };
-    assert!(height("second") - height("first") > 13.0, "{svg}");
+    let (first, second) = (place("first"), place("second"));
+    let beside = first.0 - second.0 > 5.0 * 6.0;
+    assert!(beside || (second.1 - first.1).abs() > 13.0, "{svg}");
+    // The curve ends at the limits, so that no name stands there.
+    assert!(first.0 < 986.0 - 4.0 || (first.1 - 175.0) > 13.0, "{svg}");
+}
+
+#[test]
+fn a_name_stands_where_no_curve_crosses_it() {
+    let mut wave = curve("c", Shape::Line);
+    wave.x = (0..400).map(|k| f64::from(k) * 0.01).collect();
+    // Close to the limit in the right half only.
+    wave.y = wave
+        .x
+        .iter()
+        .map(|x| if *x > 2.0 { 0.95 + 0.06 * (40.0 * x).sin() } else { 0.0 })
+        .collect();
+    let limit = Curve { y: vec![1.0], ..curve("limit of all", Shape::Horizontal) };
+    let svg = text(&figure(vec![wave, limit], None));
+    let (_, rest) = text_with(&svg, ">limit of all</text>").split_once(" x=\"").unwrap();
+    let right: f64 = rest.split('"').next().unwrap().parse().unwrap();
+    assert!((64.0..64.0 + 461.0).contains(&right), "{right}");
+}
+
+#[test]
+fn a_legend_of_each_panel_stands_between_its_title_and_its_axes() {
+    let mut figure = figure(vec![curve("first", Shape::Line)], None);
+    figure.legend = Legend::Each;
+    figure.columns = 2;
+    figure.panels.push(Panel { height: Some(330.0), ..figure.panels[0].clone() });
+    figure.panels.push(figure.panels[0].clone());
+    let svg = text(&figure);
+    assert_eq!(svg.matches("class=\"entry\"").count(), 3);
+    // The row is as high as its highest panel, and has a line for the legend.
+    assert!(svg.contains(&format!("height=\"{}\"", 34.0 + 330.0 + 22.0 + 250.0 + 22.0)), "{svg}");
+    assert_eq!(frame(&svg)[1], 34.0 + 10.0 + 18.0 + 22.0);
+}
+
+#[test]
+fn magnitudes_have_a_logarithmic_axis() {
+    let mut figure = figure(vec![curve("c", Shape::Line)], None);
+    figure.panels[0].curves[0].y = vec![0.1, 10.0, 100.0];
+    figure.panels[0].log_y = true;
+    figure.panels[0].y_range = Some([0.1, 100.0]);
+    let svg = text(&figure);
+    assert_eq!(paths(&svg, "c"), ["M64 266l461-121.4 461-60.6"]);
+    assert!(svg.contains(">0.1<") && svg.contains(">100<"));
 }

@@ -1,5 +1,6 @@
 use super::*;
 use crate::recording::Track;
+use crate::recording::panels::Limit;
 
 fn run(name: &str, signals: &[(&str, &str, [f64; 2])], observe: &str) -> Recording {
     let track = |unit: &str, values: [f64; 2]| Track {
@@ -162,4 +163,49 @@ fn angles_are_written_by_their_symbols() {
     assert_eq!(symbols("plant.attitude.alpha"), "plant.attitude.α");
     assert_eq!(symbols("beta - sigma"), "β - σ");
     assert_eq!(symbols("alphabet"), "alphabet");
+}
+
+#[test]
+fn a_limit_that_is_exceeded_many_times_is_seen_on_an_axis_of_magnitudes() {
+    let panel = |most: f64| {
+        let mut signals = SIGNALS;
+        signals[0].2 = [-most, 0.0];
+        of_experiments(&[run("a", &signals, PANELS)]).unwrap().remove(0)
+    };
+    assert_eq!((panel(20.0).magnitudes, panel(20.0).label.as_str()), (None, "rate"));
+    let exceeded = panel(300.0);
+    let [low, high] = exceeded.magnitudes.unwrap();
+    assert!(low == 0.05 && high > 300.0 && exceeded.label == "rate, magnitude");
+}
+
+#[test]
+fn a_limit_of_one_signal_needs_no_norm() {
+    let one = r#"panels = [{ name = "rate", limit = "law.limit", curves = [{ name = "p", of = "plant.rate.p" }] }]"#;
+    let panels = of_experiments(&[run("a", &SIGNALS, one), run("b", &SIGNALS, one)]).unwrap();
+    assert_eq!(names(&panels[0]), [("p", 0), ("p", 1)]);
+    assert_eq!(panels[0].limit_name(&panels[0].limits[0], &[]), "limit");
+    assert_eq!((panels.len(), panels[0].limits[0].value), (1, 5.0));
+}
+
+#[test]
+fn surfaces_have_their_names_and_the_commands_of_jets_are_added() {
+    let signals = [
+        ("plant.rate.p", "deg/s", [3.0, 0.0]),
+        ("plant.deflection[1]", "deg", [-3.0, 2.0]),
+        ("plant.jet[1]", "", [0.5, 0.0]),
+        ("plant.jet[2]", "", [0.25, 1.0]),
+    ];
+    let observe = r#"
+        panels = [{ name = "rate", curves = [{ name = "p", of = "plant.rate.p" }] }]
+        [vehicle]
+        attitude = ["a.a", "a.b", "a.c"]
+        deflections = ["plant.deflection[1]", "plant.deflection[2]"]
+        surfaces = ["left flap", "right flap"]
+        jets = ["plant.jet[1]", "plant.jet[2]"]
+    "#;
+    let panels = of_experiments(&[run("a", &signals, observe)]).unwrap();
+    let labels: Vec<&str> = panels.iter().map(|panel| panel.label.as_str()).collect();
+    assert_eq!(labels, ["rate", "surfaces", "jets, sum of commands"]);
+    assert_eq!((names(&panels[1]), panels[1].unit.as_str()), (vec![("left flap", 0)], "deg"));
+    assert_eq!(panels[2].curves[0].values, [0.75, 1.0]);
 }
