@@ -106,6 +106,42 @@ def test_a_flight_has_the_bits_of_the_orchestrator(chromium, tmp_path, controlle
     assert_same_figures(page, metrics)
 
 
+@pytest.mark.parametrize("address", ["controller=crmpc&plant.initial.flightPathAngle=-1.25+deg", "controller=lqr&plant.air.rows=1&plant.air.wind.east[1]=30"])
+def test_an_entry_has_the_bits_of_the_orchestrator(chromium, tmp_path, address):
+    page = opened(chromium, f"flight=entry&{address}", accept_downloads=True)
+    shown = signals(page)
+    table, metrics = flown(saved(page, tmp_path), tmp_path / "out")
+    assert shown["time"].iloc[-1] == table["time"].iloc[-1] > 1700.0
+    assert_same_bits(shown, table, missing=0 if "crmpc" in address else 2)
+    assert page.evaluate("flight.summary.rate_ratio") * 5.0 == pytest.approx(metrics["max_rate_deg_s"], rel=1e-12)
+    arrival = page.inner_text("#arrival")
+    assert "reaches the terminal area" in arrival and f"{metrics['range_off_km']:.1f} km off" in arrival
+    assert "within its loads" in arrival and page.evaluate("stop") == shown["time"].iloc[-1]
+
+
+def test_an_entry_is_shown_and_answers_to_its_pictures(chromium):
+    page = opened(chromium)
+    assert not page.is_visible("#entry")
+    count = flights(page)
+    page.click("#fly-entry")
+    after(page, count)
+    assert page.is_visible("#entry") and not page.is_visible("#proof") and "flight=entry" in page.evaluate("location.hash")
+    track = page.locator("#entry svg[role=img]").nth(1)
+    box = track.bounding_box()
+    page.mouse.move(box["x"] + 0.5 * box["width"], box["y"] + 0.5 * box["height"])
+    chosen = page.evaluate("time")
+    assert 100 < chosen < 1800 and page.inner_text("#clock") == f"{chosen:.1f} s"
+    # A limit that is exceeded is said.
+    count = flights(page)
+    page.get_by_label("path angle").fill("-2.5")
+    after(page, count)
+    assert "exceeds the limit of heat flux" in page.inner_text("#arrival")
+    page.go_back()
+    page.go_back()
+    page.wait_for_function("!busy && !wanted && settings.flight === 'attitude'")
+    assert page.is_visible("#proof")
+
+
 def assert_same_figures(page: Page, metrics: dict) -> None:
     # The figures of merit are sums, which may be taken in another order.
     summary = page.evaluate("flight.summary")

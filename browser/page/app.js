@@ -8,6 +8,7 @@ const $ = (id) => document.getElementById(id);
 const DEG = 180 / Math.PI;
 // Panels: heading, unit, name of the norm that has a limit, and names of the curves.
 const PANELS = {
+  loads: ["Loads", "share of the limit", null, ["heat flux", "load", "dynamic pressure"]],
   attitude: ["Attitude", "deg", null, ["α", "β", "σ"]],
   error: ["Tracking error", "deg", null, ["α", "β", "σ"]],
   rate: ["Body rates", "deg/s", "‖ω‖", ["p", "q", "r"]],
@@ -26,8 +27,12 @@ const MEANING = {
 };
 // Items of the guarantee's status by what they mean for whoever looks.
 const LIGHTS = { inForce: "good", pending: "good", exceeded: "bad", uncertified: "warn", stale: "warn", refused: "warn" };
-// Playback is five times as fast as the flight.
-const SPEED = 5;
+// Playback is five times as fast as the flight, and an entry takes half a minute.
+const SPEED = { attitude: 5, entry: 60 };
+// Columns of the loads, and the parameters with their limits.
+const LOADS = [
+  ["plant.heating.flux", "heatFlux"], ["plant.loadFactor", "load"], ["plant.flight.dynamicPressure", "pressure"],
+];
 // Ratio up to which a limit counts as met: 1 up to rounding.
 const MET = 1 + 1e-9;
 
@@ -41,10 +46,13 @@ let sent = null, remark = null;
 // When the first flight was drawn, ms after the page was opened.
 let first = null;
 let time = 26;
+// End of the shown flight, s.
+let stop = 50;
 const view = new Vehicle3D($("view"));
 const zoom = (window) => { for (const chart of Object.values(charts)) chart.zoom(window); };
 const charts = Object.fromEntries(Object.keys(PANELS).map((id) => [id, new Chart($("charts"), { onPoint: point, onZoom: zoom })]));
 let proof = null;
+const entry = new EntryPictures($("entry"), (at) => point(at));
 // The flight of another law under the same disturbance, and the request that it answers.
 let ghost = null, ghostRequest = null;
 
@@ -115,7 +123,7 @@ async function refused({ error, line, isSyntax }) {
 
 function read({ text, signals, plans, ms }, name = sent.name) {
   const summary = JSON.parse(text);
-  const columns = settings.description.columns;
+  const { columns } = settings.scenario;
   const width = columns.length;
   const rows = signals.length / width;
   const column = (index, factor) => Float64Array.from({ length: rows }, (_, row) => signals[row * width + index] * factor);
@@ -124,15 +132,16 @@ function read({ text, signals, plans, ms }, name = sent.name) {
   const errors = angles.map((angle, i) => angle.map((value, row) => value - reference[i][row]));
   return {
     summary, signals, columns, ms, rows, width, name, time: column(0, 1), angles, reference, errors, plans: readPlans(plans),
-    rates: three(4, DEG), moment: three(10, 1e-3), status: column(13, 1), contradiction: column(14, 1),
+    rates: three(4, DEG), moment: three(10, 1e-3), status: column(width - 2, 1), contradiction: column(width - 1, 1),
+    of: (name) => column(columns.indexOf(name), 1),
   };
 }
 
 // Asks for the flight to compare with: that of another law with the settings that all laws share.
 function compare() {
   const id = $("ghost").value;
-  const shared = Object.entries(settings.set).filter(([name]) => name.startsWith("plant.") || settings.common.has(name.replace("controller.", "")));
-  const request = JSON.stringify({ controller: id, set: Object.fromEntries(shared) });
+  const shared = Object.entries(settings.set).filter(([name]) => !name.startsWith("controller.") || settings.common.has(name.replace("controller.", "")));
+  const request = JSON.stringify({ scenario: settings.flight, controller: id, set: Object.fromEntries(shared) });
   if (!id || id === settings.choice.id || (id === OWN && !settings.own.isAgreed)) ghost = ghostRequest = null;
   // A flight of another disturbance is not shown beside this one.
   else if (request !== ghostRequest) {
@@ -157,6 +166,13 @@ function norm([x, y, z]) {
 // The curves of a panel, of the flight and of the one that it is compared with, which lies below.
 function panel(id, limits) {
   const [label, unit, bold, names] = PANELS[id];
+  if (id === "loads") {
+    const curves = LOADS.map(([column, limit], place) => {
+      const most = settings.number(`guidance.limit.${limit}`);
+      return { name: names[place], role: "signal", run: 0, place, values: flight.of(column).map((value) => value / most) };
+    });
+    return { label, unit, curves, limits: [{ name: "limit", value: 1 }] };
+  }
   const of = (each, run) => {
     const values = { attitude: each.angles, error: each.errors, rate: each.rates, moment: each.moment }[id];
     const all = values.map((curve, place) => ({ name: names[place], role: "signal", run, place, values: curve }));
@@ -166,14 +182,25 @@ function panel(id, limits) {
   const { reference, ghost: other } = flight;
   const curves = [...of(flight, 0), ...(other ? of(other, 1) : [])];
   if (id === "attitude") curves.push(...reference.map((values, place) => ({ name: "reference", role: "reference", run: 0, place, values })));
-  return { label, unit, curves, limits: bold ? [{ name: `limit of ${bold}`, value: limits[id] }] : [] };
+  const shown = { label, unit, curves, limits: bold ? [{ name: `limit of ${bold}`, value: limits[id] }] : [] };
+  const most = bold && curves[0].values.reduce((a, b) => Math.max(a, b), 0);
+  // A limit that is exceeded five times could not be told from zero.
+  return most > 5 * limits[id] ? { ...shown, label: `${label}, magnitude`, magnitudes: [limits[id] / 20, 1.3 * most] } : shown;
 }
 
 function show() {
   const { summary, ghost: other } = flight;
   const limits = { rate: summary.limits.rate * DEG, moment: summary.limits.moment * 1e-3 };
   const runs = [{ time: flight.time }, ...(other ? [{ time: other.time, faint: true }] : [])];
-  for (const id of Object.keys(PANELS)) charts[id].show(panel(id, limits), runs, [0, settings.description.stop]);
+  stop = settings.isEntry ? flight.time.at(-1) : settings.scenario.stop;
+  $("time").max = stop;
+  charts.loads.figure.hidden = $("entry").hidden = !settings.isEntry;
+  for (const id of Object.keys(PANELS)) if (!charts[id].figure.hidden) charts[id].show(panel(id, limits), runs, [0, stop]);
+  if (settings.isEntry) {
+    const of = (name) => settings.number(`guidance.${name}`);
+    const allowed = Object.fromEntries(LOADS.map(([, name]) => [name, of(`limit.${name}`)]));
+    entry.show({ time: flight.time, of: flight.of, limits: allowed, target: [of("target.longitude") * DEG, of("target.latitude") * DEG] });
+  }
   $("ghost-says").textContent = other ? ` Dashed: ${other.name} under the same disturbance.` : "";
   $("faint-says").textContent = other ? ` Pale: ${other.name} under the same disturbance.` : "";
   proof.show();
@@ -210,14 +237,26 @@ function guarantee() {
   return [light, good ? `in force ${((100 * good) / rows).toFixed(0)} % of the time; ${why}` : why];
 }
 
+// How an entry ends, and what of its loads is above a limit.
+function arrival(verdict) {
+  const last = (column) => flight.of(column).at(-1);
+  const off = (last("guidance.range") - settings.number("guidance.target.range")) / 1e3;
+  const reaches = Math.abs(off) * 1e3 <= settings.number("guidance.target.tolerance");
+  const place = reaches ? `reaches the terminal area after ${(stop / 60).toFixed(0)} minutes, ${Math.abs(off).toFixed(1)} km off` : `ends ${Math.abs(off).toFixed(0)} km ${off > 0 ? "short" : "long"}`;
+  const over = LOADS.filter(([column, name]) => Math.max(...flight.of(column)) > settings.number(`guidance.limit.${name}`) * MET);
+  const loads = over.length ? `exceeds the limit of ${over.map(([, name]) => ({ heatFlux: "heat flux", load: "load", pressure: "dynamic pressure" })[name]).join(" and ")}` : "within its loads";
+  return `${verdict}. The vehicle ${place}, ${loads}`;
+}
+
 function judge(limits) {
   const { summary, name } = flight;
   const over = [["rate", summary.rate_ratio], ["moment", summary.moment_ratio]].filter(([, ratio]) => ratio > MET);
   const percent = (ratio) => `${(100 * ratio).toFixed(0)} %`;
   let verdict = `${name} keeps both limits, of rate and moment`;
   if (over.length) verdict = `${name} exceeds the ${over.map(([limit, ratio]) => `${limit} limit (${percent(ratio)})`).join(" and the ")}`;
+  if (settings.isEntry && !summary.end) verdict = arrival(verdict);
   if (summary.end) verdict = `${summary.lost ? `${name} loses the attitude` : "The flight ends"} at ${summary.end.time.toFixed(1)} s`;
-  $("verdict").textContent = verdict[0].toUpperCase() + verdict.slice(1);
+  $("verdict").textContent = $("arrival").textContent = verdict[0].toUpperCase() + verdict.slice(1);
   const other = flight.ghost?.summary;
   const row = (label, middle, value, of) => `<dt>${label}</dt>${middle}<dd${middle ? "" : ' class="wide"'}>${value(summary)}</dd>
     ${other ? `<dd class="other">${of ? percent(other[of]) : value(other)}</dd>` : ""}`;
@@ -257,7 +296,8 @@ function point(at) {
   time = at;
   clock();
   if (!flight) return;
-  for (const chart of Object.values(charts)) chart.point(at);
+  for (const chart of Object.values(charts)) if (!chart.figure.hidden) chart.point(at);
+  if (settings.isEntry) entry.point(at);
   proof.point(at);
   pose(at);
 }
@@ -265,7 +305,7 @@ function point(at) {
 // Shows the vehicle as it flies at a time.
 function pose(at) {
   if (!flight.rows) return;
-  const row = Math.min(flight.rows - 1, Math.round(at / flight.summary.step));
+  const row = rowAt(flight.time, at);
   const from = row * flight.width;
   const part = (first) => Array.from(flight.signals.subarray(from + first, from + first + 3));
   const [now, why] = standing(row);
@@ -283,11 +323,10 @@ function play() {
   $("play").setAttribute("aria-pressed", playing);
   $("play").textContent = playing ? "Pause" : "Play";
   if (!playing) return;
-  const { stop } = settings.description;
   if (time >= stop) point(0);
   const frame = (now) => {
     if ($("play").getAttribute("aria-pressed") !== "true") return;
-    if (last !== null) point(Math.min(stop, time + ((now - last) / 1000) * SPEED));
+    if (last !== null) point(Math.min(stop, time + ((now - last) / 1000) * SPEED[settings.flight]));
     last = now;
     if (time < stop) requestAnimationFrame(frame);
     else play();
@@ -304,8 +343,9 @@ function say(text, wrong = false) {
 
 let latest = 0;
 
-function changed(names, value) {
+function changed(names, value, needs = {}) {
   for (const name of names) settings.change(name, value);
+  for (const [name, needed] of Object.entries(needs)) settings.change(name, needed);
   // A change that does not go on with the one before can be undone by going back.
   const now = performance.now();
   history[now - latest > 1000 ? "pushState" : "replaceState"](null, "", `#${settings.address()}`);
@@ -323,6 +363,8 @@ function mark() {
 
 function build() {
   $("controller").value = settings.choice.id;
+  for (const [id, button] of [["attitude", $("fly-attitude")], ["entry", $("fly-entry")]]) button.setAttribute("aria-pressed", id === settings.flight);
+  document.body.classList.toggle("entry", settings.isEntry);
   const open = new Set([...$("groups").querySelectorAll("details[open]")].map((group) => group.dataset.title.split(" of ")[1]));
   $("groups").replaceChildren(...settings.groups().map(([title, rows, folded]) => {
     const group = document.createElement(folded ? "details" : "fieldset");
@@ -337,7 +379,7 @@ function build() {
   mark();
 }
 
-function control({ names, label, low, high, exact }) {
+function control({ names, label, low, high, exact, needs }) {
   const parameter = settings.parameters.get(names[0]);
   const row = document.createElement("div");
   row.className = "row";
@@ -369,7 +411,7 @@ function control({ names, label, low, high, exact }) {
       input.checked = settings.value(names[0]) === true;
       input.onchange = () => changed(names, input.checked);
     } else {
-      number(input, parameter, { names, low, high, exact: exact || type === "Integer" });
+      number(input, parameter, { names, low, high, exact: exact || type === "Integer", needs });
     }
   }
   input.id = id;
@@ -392,7 +434,7 @@ function control({ names, label, low, high, exact }) {
   return row;
 }
 
-function number(input, parameter, { names, low, high, exact }) {
+function number(input, parameter, { names, low, high, exact, needs }) {
   const { kind, type } = parameter;
   const value = parameter.shown(settings.value(names[0]));
   if (exact) {
@@ -422,10 +464,18 @@ function number(input, parameter, { names, low, high, exact }) {
     if (input.step !== "any" || at === value) return at;
     return Math.min(high, Math.max(low, Number((Math.round(at / step) * step).toPrecision(10))));
   };
-  input.oninput = () => changed(names, parameter.written(input.chosen()));
+  input.oninput = () => changed(names, parameter.written(input.chosen()), needs);
+}
+
+// Another flight begins: its own time, and nothing beside an entry, which would take twice as long.
+function begun() {
+  $("ghost").value = settings.isEntry ? "" : "lqr";
+  time = settings.isEntry ? 900 : 26;
+  for (const chart of Object.values(charts)) chart.zoomed = null;
 }
 
 function load(address) {
+  const before = settings.flight;
   try {
     const unknown = settings.read(address);
     remark = unknown.length ? { text: `Unknown here: ${unknown.join(", ")}` } : null;
@@ -434,6 +484,7 @@ function load(address) {
     settings.read("");
     history.replaceState(null, "", `#${settings.address()}`);
   }
+  if (settings.flight !== before) begun();
   build();
   fly();
 }
@@ -443,7 +494,7 @@ function load(address) {
 function begin({ text, error }) {
   if (error) return say(error, true);
   settings = new Settings(JSON.parse(text));
-  const { controllers, stop, version } = settings.description;
+  const { controllers, version } = settings.description;
   for (const { id, name, fmu } of controllers) {
     const option = new Option(name, id);
     option.title = settings.description.fmus[fmu].description;
@@ -454,8 +505,6 @@ function begin({ text, error }) {
   $("ghost").value = "lqr";
   proof = new Proof();
   settings.own.listen();
-  $("length").textContent = stop;
-  $("time").max = stop;
   $("version").textContent = version;
   point(time);
   const isNew = location.hash.length < 2 && !matchMedia("(prefers-reduced-motion: reduce)").matches;
@@ -478,6 +527,14 @@ $("controller").onchange = () => {
   build();
   changed([], null);
 };
+for (const id of ["attitude", "entry"]) {
+  $(`fly-${id}`).onclick = () => {
+    settings.fly(id);
+    begun();
+    build();
+    changed([], null);
+  };
+}
 $("ghost").onchange = () => { compare(); show(); };
 $("reset").onclick = () => {
   settings.set = {};
@@ -504,7 +561,7 @@ window.addEventListener("keydown", (event) => {
     play();
   } else if (target.id === "plan" && /^Arrow(Left|Right)$/.test(key)) {
     event.preventDefault();
-    point(Math.max(0, Math.min(settings.description.stop, time + (key === "ArrowLeft" ? -0.2 : 0.2))));
+    point(Math.max(0, Math.min(stop, time + (key === "ArrowLeft" ? -0.2 : 0.2))));
   }
 });
 window.addEventListener("hashchange", () => load(location.hash.slice(1)));

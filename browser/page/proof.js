@@ -68,7 +68,6 @@ class Proof {
     const norms = [norm(rates), norm(moment)];
     const limits = [summary.limits.rate * DEG, summary.limits.moment * 1e-3];
     const holds = (row) => LIGHTS[standing(row)[0]] === "good";
-    const { stop } = settings.description;
     this.picture.show({ stop, time: at, norms, limits, plans, holds, ghost }, Math.min(time, at.at(-1)));
     const chosen = this.chosen();
     this.buttons.forEach((button, index) => button.setAttribute("aria-pressed", index === chosen));

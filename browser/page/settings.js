@@ -4,7 +4,11 @@
 // out. Here stands only what a slider needs besides: its label and its range.
 "use strict";
 
-const SHOWN = [
+const DELAY = ["Delay", [
+  ["plant.actuation.delay", "actual", 0, 0.2],
+  ["controller.delay", "known to the law", 0, 0.2],
+]];
+const ATTITUDE = [
   ["Disturbance", [
     ["plant.disturbance.kind", "kind"],
     ["plant.disturbance.bound", "bound", 0, 6],
@@ -15,12 +19,42 @@ const SHOWN = [
     ["plant.initial.beta", "sideslip β", -15, 15],
     ["plant.initial.sigma", "bank σ", -60, 20],
   ]],
-  ["Delay", [
-    ["plant.actuation.delay", "actual", 0, 0.2],
-    ["controller.delay", "known to the law", 0, 0.2],
-  ]],
+  DELAY,
   ["Vehicle and limits", [
     ["plant.inertia.scale", "inertia", 0.8, 1.2],
+    ["controller.limit.rate", "rate limit", 1, 10],
+    ["controller.limit.moment", "moment limit", 40, 300],
+    ["controller.saturation", "scale the moment into its limit"],
+  ]],
+];
+// A table of the air of one row: the same at all altitudes.
+const AIR = { "plant.air.rows": 1 };
+const ENTRY = [
+  ["Entry interface, at 120 km", [
+    ["plant.initial.speed", "speed", 7200, 7800],
+    ["plant.initial.flightPathAngle", "path angle", -2.5, -0.5],
+    ["plant.initial.heading", "heading", 40, 80],
+  ]],
+  ["What guidance and law do not know", [
+    ["plant.air.densityRatio[1]", "density", 0.7, 1.3, AIR],
+    ["plant.air.wind.north[1]", "wind to the north", -100, 100, AIR],
+    ["plant.air.wind.east[1]", "wind to the east", -100, 100, AIR],
+    ["plant.aerodynamics.lift.scale", "lift", 0.8, 1.2],
+    ["plant.aerodynamics.drag.scale", "drag", 0.8, 1.2],
+    ["plant.aerodynamics.moment.scale", "moments of the air", 0.5, 1.5],
+    ["plant.inertia.scale", "inertia", 0.8, 1.2],
+  ]],
+  ["Target", [
+    ["guidance.target.longitude", "longitude", 60, 95],
+    ["guidance.target.latitude", "latitude", 15, 40],
+  ]],
+  ["Limits of the guidance", [
+    ["guidance.limit.heatFlux", "heat flux", 440, 900],
+    ["guidance.limit.load", "load", 1.2, 4],
+    ["guidance.limit.pressure", "dynamic pressure", 13, 30],
+  ]],
+  DELAY,
+  ["Limits of the law", [
     ["controller.limit.rate", "rate limit", 1, 10],
     ["controller.limit.moment", "moment limit", 40, 300],
     ["controller.saturation", "scale the moment into its limit"],
@@ -30,7 +64,7 @@ const SHOWN = [
 const GAINS = /^(weight|feedback|terminal|gain|surface|reaching|boundaryLayer|slidingMode|inner|outer|observer|commandFilter)\.|^disturbance\.bound$/;
 const HIDDEN = /^(period|trajectory|calibration|solver\.timeBudget)|^reference\.file$/;
 // Units that read better: factor and name.
-const READABLE = { "N.m": [1e-3, "kN m"] };
+const READABLE = { "N.m": [1e-3, "kN m"], "W/m2": [1e-3, "kW/m²"], Pa: [1e-3, "kPa"] };
 
 const rounded = (value) => Number(value.toPrecision(12));
 
@@ -99,6 +133,7 @@ class Settings {
     this.controllers = new Map(description.controllers.map((choice) => [choice.id, choice]));
     this.set = {};
     this.own = new OwnLaw();
+    this.flight = "attitude";
     this.choose(description.controllers[0].id);
     const names = (choice) => new Set(this.table(choice.fmu).map(({ name }) => name));
     const all = description.controllers.map(names);
@@ -109,11 +144,28 @@ class Settings {
     return this.description.fmus[fmu].parameters.filter(({ kind }) => !kind.String);
   }
 
+  // The flight as it is described: columns, components, and its length.
+  get scenario() {
+    return this.description.scenarios[this.flight];
+  }
+
+  get isEntry() {
+    return this.flight === "entry";
+  }
+
+  // Chooses a flight, with all settings as they are in it.
+  fly(id) {
+    if (!(id in this.description.scenarios)) throw new Error(`there is no flight "${id}"`);
+    this.flight = id;
+    this.set = {};
+    this.choose(this.choice.id);
+  }
+
   // Chooses a controller. Settings stay if it has such parameters and they mean the same.
   choose(id) {
     if (!this.controllers.has(id)) throw new Error(`there is no controller "${id}"`);
     this.choice = this.controllers.get(id);
-    const { scenario, plant } = this.description;
+    const { components } = this.scenario;
     this.parameters = new Map();
     const add = (component, fmu, given) => {
       for (const variable of this.table(fmu)) {
@@ -121,8 +173,10 @@ class Settings {
         this.parameters.set(parameter.name, parameter);
       }
     };
-    add("plant", plant, scenario.plant);
-    add("controller", this.choice.fmu, { ...scenario.controller, ...this.choice.set });
+    for (const [name, { fmu, parameters }] of Object.entries(components)) {
+      if (name !== "controller") add(name, fmu, parameters);
+    }
+    add("controller", this.choice.fmu, { ...components.controller.parameters, ...this.choice.set });
     for (const name of Object.keys(this.set)) {
       const [component, ...rest] = name.split(".");
       if (component === "controller" && !this.common.has(rest.join("."))) delete this.set[name];
@@ -133,30 +187,37 @@ class Settings {
     return this.set[name] ?? this.parameters.get(name).initial;
   }
 
+  // Value of a number in SI units.
+  number(name) {
+    const parameter = this.parameters.get(name);
+    return parameter.shown(this.value(name)) / parameter.shown(1);
+  }
+
   change(name, value) {
     if (this.parameters.get(name).isInitial(value)) delete this.set[name];
     else this.set[name] = value;
   }
 
   request() {
-    return { controller: this.choice.id, set: { ...this.set } };
+    return { scenario: this.flight, controller: this.choice.id, set: { ...this.set } };
   }
 
   address() {
     const law = this.choice.id === OWN && this.own.code !== EXAMPLE ? { law: this.own.code } : {};
-    return new URLSearchParams({ controller: this.choice.id, ...this.set, ...law }).toString();
+    const flight = this.isEntry ? { flight: this.flight } : {};
+    return new URLSearchParams({ ...flight, controller: this.choice.id, ...this.set, ...law }).toString();
   }
 
   // Takes the settings of an address. Returns the names that it does not know.
   read(address) {
     const given = new URLSearchParams(address);
-    this.set = {};
+    this.fly(given.get("flight") ?? "attitude");
     this.choose(given.get("controller") ?? this.description.controllers[0].id);
     this.own.code = given.get("law") ?? (this.choice.id === OWN ? EXAMPLE : this.own.code);
     const unknown = [];
     for (const [name, text] of given) {
       const parameter = this.parameters.get(name);
-      if (name === "controller" || name === "law") continue;
+      if (["flight", "controller", "law"].includes(name)) continue;
       if (!parameter) unknown.push(name);
       else if (/^(true|false)$/.test(text)) this.change(name, text === "true");
       else this.change(name, text.trim() !== "" && !Number.isNaN(Number(text)) ? Number(text) : text);
@@ -167,9 +228,10 @@ class Settings {
   // The groups of rows: [title, rows, folded], a row being { names, label, low, high }.
   groups() {
     const taken = new Set();
-    const groups = SHOWN.map(([title, rows]) => [title, rows.map(([name, label, low, high]) => {
+    const shown = (this.isEntry ? ENTRY : ATTITUDE).map(([title, rows]) => [title, rows.filter(([name]) => this.parameters.has(name))]);
+    const groups = shown.map(([title, rows]) => [title, rows.map(([name, label, low, high, needs]) => {
       taken.add(name);
-      return { names: [name], label, low, high };
+      return { names: [name], label, low, high, needs };
     })]);
     const own = [...this.parameters.values()].filter(({ name }) => name.startsWith("controller."));
     const open = own.filter(({ name, variable }) => !taken.has(name) && !HIDDEN.test(variable.name));
@@ -177,11 +239,14 @@ class Settings {
       type === "Real" && !this.common.has(variable.name) && GAINS.test(variable.name));
     groups.push([`Gains of ${this.choice.name}`, Settings.joined(gains)]);
     const further = open.filter((parameter) => !gains.includes(parameter));
-    const vehicle = [...this.parameters.values()].filter(({ name }) =>
-      /^plant\.(inertia|initial\.[pqr]$|disturbance\.(?!table)|kinematics|integrator)/.test(name) && !taken.has(name));
+    const more = this.isEntry
+      ? /^plant\.(inertia|initial|disturbance\.(?!table)|aerodynamics|end)/
+      : /^plant\.(inertia|initial\.[pqr]$|disturbance\.(?!table)|kinematics|integrator)/;
+    const rest = (which) => [...this.parameters.values()].filter(({ name }) => which.test(name) && !taken.has(name));
     const alone = ({ name, variable }) => ({ names: [name], label: variable.name, exact: true });
     groups.push([`Further parameters of ${this.choice.name}`, further.map(alone), true]);
-    groups.push(["Further parameters of the vehicle", vehicle.map(alone), true]);
+    groups.push(["Further parameters of the vehicle", rest(more).map(alone), true]);
+    groups.push(["Further parameters of the guidance", rest(/^guidance\.(?!planet)/).map(alone), true]);
     return groups.filter(([, rows]) => rows.length);
   }
 

@@ -77,10 +77,14 @@ fn parameters<'a>(experiment: &'a mut Table, component: &str) -> Result<&'a mut 
     parameters.as_table_mut().ok_or_else(|| scenario::problem(component, "parameters is no table"))
 }
 
-/// Writes the step of the loop, and records the guarantee that its controller reports.
+/// Writes the step of the loop and which rows are recorded, and records the guarantee that its
+/// controller reports.
 fn record(experiment: &mut Table, closed_loop: &ClosedLoop) {
     if let Some(Value::Table(simulation)) = experiment.get_mut("simulation") {
         simulation.insert("step".into(), closed_loop.master.clock().step().into());
+    }
+    if let Some(Value::Table(record)) = experiment.get_mut("record") {
+        record.insert("every".into(), (closed_loop.scenario.every as i64).into());
     }
     let variables = experiment.get_mut("record").and_then(|record| record.get_mut("variables"));
     if let Some(Value::Array(variables)) = variables {

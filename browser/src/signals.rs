@@ -52,7 +52,6 @@ pub const ENTRY: &[&str] = &[
     "plant.flight.dynamicPressure",
     "guidance.range",
     "guidance.reversals",
-    "guidance.limits.active",
     GUARANTEE[0],
     GUARANTEE[1],
 ];
