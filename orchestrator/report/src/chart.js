@@ -112,7 +112,7 @@ class Chart {
   zoom(window) {
     this.zoomed = window;
     this.window = window ?? this.span;
-    this.draw();
+    if (this.panel) this.draw();
   }
 
   style(curve) {
