@@ -99,6 +99,10 @@ class PlatformHook(BuildHookInterface):  # type: ignore[type-arg]
         # A release adds the licences of what is linked in.
         for notice in filter(None, os.environ.get("WHEEL_NOTICES", "").split(os.pathsep)):
             files[Path(notice)] = Path(notice).name
+        # The page for browsers, which is the same on every platform, may not have been built.
+        page = Path(os.environ.get("WHEEL_PAGE") or root.parent / "out" / "browser" / "index.html")
+        if page.is_file():
+            files[page] = "try.html"
         build_data["force_include"].update(
             {str(path): f"{DATA}/{place}" for path, place in files.items()}
         )

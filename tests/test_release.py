@@ -75,6 +75,8 @@ def packages(folder: Path, names: list[str]) -> Path:
     for each, (content, _) in LIBRARIES.items():
         name = "orchestrator.exe" if each.startswith("windows") else "orchestrator"
         (folder / each / name).write_bytes(content + b"program")
+    (folder / "browser").mkdir()
+    (folder / "browser" / "index.html").write_text("<!doctype html>the page")
     (folder / "man").mkdir()
     for name in ("orchestrator", "orchestrator-run"):
         (folder / "man" / f"{name}.1").write_text(f".TH {name} 1\n")
@@ -136,8 +138,12 @@ def content(request, made) -> dict[str, tuple[bytes, int, float]]:
 def test_a_release_has_these_files(made):
     files = {path.name for path in made.iterdir()}
     wheels = {f"reentry_fmus-{VERSION}-py3-none-{tag}.whl" for tag in WHEELS}
-    others = {"LICENSES.txt", "LICENSES-rust-std.html", "README.md", "SHA256SUMS", "sbom.cdx.json"}
+    others = {"LICENSES.txt", "LICENSES-rust-std.html", "README.md", "SHA256SUMS", "sbom.cdx.json", "try-in-browser.html"}
     assert files == ARCHIVES | wheels | others
+    # Every wheel carries the page.
+    for wheel in wheels:
+        with zipfile.ZipFile(made / wheel) as archive:
+            assert archive.read("reentry_fmus/data/try.html") == (made / "try-in-browser.html").read_bytes()
 
 
 def test_archives_hold_fmus_licences_and_experiments(content, dist):

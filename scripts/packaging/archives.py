@@ -64,7 +64,7 @@ RELEASE_README = """# Re-entry attitude control {version}
 | reentry-fmus-{version}.zip | every FMU, for Linux and Windows on x86-64 and for macOS |
 | reentry-fmus-{version}-linux-aarch64.zip | every FMU, for Linux on aarch64 |
 | orchestrator-{version}-PLATFORM | the program with experiments and the platform's FMUs |
-| *.whl | the Python package, with program, experiments and FMUs |
+| *.whl | the Python package, with program, experiments and FMUs |{page}
 | LICENSES.txt, LICENSES-rust-std.html | the licences of what is linked in |
 | sbom.cdx.json | what is linked in, as a bill of materials (CycloneDX) |
 | SHA256SUMS | checksums: `sha256sum --check SHA256SUMS` |
@@ -204,7 +204,10 @@ def main(dist: str, output: str, version: str, note: str) -> None:
     folder, epoch = Path(output), int(os.environ["SOURCE_DATE_EPOCH"])
     write_fmus(Path(dist), folder, version, epoch)
     write_programs(Path(dist), folder, version, epoch)
-    text = RELEASE_README.format(version=version, note=note)
+    page = ""
+    if (folder / "try-in-browser.html").is_file():
+        page = "\n| try-in-browser.html | one page that flies the controllers; open it in a browser |"
+    text = RELEASE_README.format(version=version, note=note, page=page)
     (folder / "README.md").write_text(text, newline="\n")
     write_checksums(folder)
 

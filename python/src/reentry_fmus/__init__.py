@@ -9,7 +9,7 @@ Quantities are in SI units and radians unless `units="deg"` selects degrees.
 """
 
 from ._campaign import Campaign, Flown, Search, campaign, falsify
-from ._data import experiments, fmu, fmus
+from ._data import browse, experiments, fmu, fmus
 from ._experiment import experiment
 from ._instance import InstanceError, InstanceWarning
 from ._linear import OpenLoop, linearise, margins
@@ -34,6 +34,7 @@ __all__ = [
     "Search",
     "State",
     "Study",
+    "browse",
     "campaign",
     "experiment",
     "experiments",

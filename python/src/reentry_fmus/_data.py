@@ -6,6 +6,7 @@ import inspect
 import json
 import os
 import subprocess
+import webbrowser
 from collections.abc import Iterable
 from difflib import get_close_matches
 from pathlib import Path
@@ -70,6 +71,20 @@ def fmu_path(name_or_file: str | os.PathLike[str]) -> Path:
 def program() -> Path:
     """Returns the path of the orchestrator, an executable file."""
     return DATA / ("orchestrator.exe" if os.name == "nt" else "orchestrator")
+
+
+def browse() -> Path:
+    """Opens the page "Try it in the browser", which flies the controllers while their settings are
+    dragged, and returns its path. It needs no network.
+
+    Raises:
+        FileNotFoundError: the package was built without the page.
+    """
+    page = DATA / "try.html"
+    if not page.is_file():
+        raise FileNotFoundError(f"{page}: this package was built without the page for browsers")
+    webbrowser.open(page.as_uri())
+    return page
 
 
 def experiments() -> dict[str, str]:
