@@ -36,7 +36,7 @@ MEANT_TO_WARN = {"entry/told": ["less than a tenth of limit.moment"]}
 
 def test_no_experiment_warns_about_itself(tmp_path):
     experiments = {row["name"]: row["path"] for row in listed() if row["kind"] == "experiment"}
-    assert len(experiments) == 37
+    assert len(experiments) == 38
     for index, (name, path) in enumerate(experiments.items()):
         # A study may have the same name, which `show` prefers.
         step = tomllib.loads(call("show", path).stdout)["simulation"]["step"]

@@ -24,7 +24,7 @@ def runs(tmp_path_factory):
     """Two runs with their pages, one with surfaces and jets, and a page of two side by side."""
     folder = tmp_path_factory.mktemp("runs")
     root = os.getcwd()
-    for experiment in ("crmpc-robust", "lqr", "crmpc-2022-allocated"):
+    for experiment in ("crmpc-robust", "crmpc-plan", "lqr", "crmpc-2022-allocated"):
         call("run", experiment, "--page", "--quiet", "--out", folder / experiment, cwd=root)
     call("plot", folder / "crmpc-robust", folder / "lqr", "--out", folder / "both.html", cwd=root)
     return folder
@@ -89,6 +89,45 @@ def test_a_norm_that_has_a_limit_is_bold_and_the_verdict_names_what_it_looked_at
     assert drawn[2] == drawn[3] == [3, 1, 1, 1] and drawn[1] == [1.8, 1.8, 1.8]
     assert page.inner_text(".verdict") == "Within the limit: largest rate, largest moment."
     assert page.locator(".verdict .good").count() == 1
+
+
+def test_a_recorded_plan_is_drawn_with_its_tube(runs, opened):
+    path = runs / "crmpc-plan" / "page.html"
+    assert path.stat().st_size < 1e6
+    page = opened(path)
+    table = pd.read_csv(runs / "crmpc-plan" / "results.csv")
+    plans = page.evaluate("JSON.parse(document.getElementById('run-data').textContent).runs[0].plans")
+    began = table["controller.plan.began"].drop_duplicates()
+    assert [plan["began"] for plan in plans] == pytest.approx(began.tolist(), abs=1e-6) and len(plans) == 250
+    row = table.loc[began.index[25]]
+    bounds = [row[f"controller.plan.momentBound[{point}]"] / 1e3 for point in range(1, 26)]
+    assert plans[25]["bounds"][1] == pytest.approx(bounds, rel=1e-4)
+    # The picture moves with the time, and answers to the pointer.
+    picture = "document.getElementById('plan').toDataURL()"
+    first = page.evaluate(picture)
+    page.fill("#seek", "100")
+    assert page.evaluate(picture) != first
+    box = page.locator("#plan").bounding_box()
+    page.mouse.click(box["x"] + 0.5 * box["width"], box["y"] + 60)
+    assert 5 < shown_time(page) < 12
+    # A run without plans has no such picture.
+    assert opened(runs / "lqr" / "page.html").locator("#plan").count() == 0
+
+
+def test_panels_are_looked_at_closely_together(runs, opened):
+    page = opened(runs / "crmpc-robust" / "page.html")
+    panel = page.locator(".panel svg[role=img]").nth(1)
+    panel.scroll_into_view_if_needed()
+    box = panel.bounding_box()
+    page.mouse.move(box["x"] + 0.3 * box["width"], box["y"] + 60)
+    page.mouse.down()
+    page.mouse.move(box["x"] + 0.6 * box["width"], box["y"] + 60, steps=5)
+    page.mouse.up()
+    shown = page.locator(".panel svg[role=img] text").all_inner_texts()
+    ends = [text for text in shown if text.endswith(" s")]
+    assert len(set(ends)) == 1 and ends[0] != "50 s"
+    panel.dblclick()
+    assert page.locator(".panel svg[role=img] text").all_inner_texts().count("50 s") == 4
 
 
 def test_keys_play_and_seek(runs, opened):
@@ -164,7 +203,7 @@ def test_two_runs_side_by_side(runs, opened):
     assert page.locator("#parameter-table tbody tr:visible").count() > 3
 
 
-@pytest.mark.parametrize("name", ["crmpc-robust/page.html", "crmpc-2022-allocated/page.html", "both.html"])
+@pytest.mark.parametrize("name", ["crmpc-robust/page.html", "crmpc-plan/page.html", "crmpc-2022-allocated/page.html", "both.html"])
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_a_page_fits_a_telephone_in_both_themes(runs, opened, name, scheme):
     page = opened(runs / name, viewport={"width": 390, "height": 800}, color_scheme=scheme)

@@ -214,7 +214,7 @@ def test_step_and_units_are_chosen(tmp_path):
 
 @pytest.mark.filterwarnings("ignore::reentry_fmus.OrchestratorWarning")
 def test_every_experiment_runs():
-    assert len(experiments()) == 37
+    assert len(experiments()) == 38
     assert experiments()["crmpc-robust"].startswith("CRMPC, robust constraint sets")
     for name in experiments():
         assert experiment(name, stop=1.0).metrics["completed"], name
@@ -328,7 +328,7 @@ def test_the_command_runs_an_experiment_from_any_folder(tmp_path):
 def test_the_command_lists_what_the_package_has(tmp_path):
     done = orchestrator(tmp_path, "list")
     assert done.returncode == 0, done.stderr
-    for line in ("experiments (37)", "studies (8)", "FMUs (13)"):
+    for line in ("experiments (38)", "studies (8)", "FMUs (13)"):
         assert line in done.stdout
     assert "FAULT" not in done.stdout
 

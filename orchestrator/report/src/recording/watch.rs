@@ -43,6 +43,7 @@ impl Watch {
         let unasked = unasked(system);
         let count = unasked.len();
         let mut named = names(&system.experiment.observe);
+        named.extend(plan(system).map(|name| (name, GUARANTEE)));
         named.retain(|name, _| !unasked.contains(name));
         let named = unasked.into_iter().map(|name| (name, RECORD)).chain(named);
         for (name, place) in named {
@@ -111,6 +112,15 @@ impl Watch {
 fn unasked(system: &System) -> Vec<String> {
     let count = if system.experiment.observe.panels.is_empty() { UNASKED } else { 0 };
     system.recorded().into_iter().take(count).collect()
+}
+
+/// Returns the recorded variables that show plans under guarantee.
+fn plan(system: &System) -> impl Iterator<Item = String> {
+    let guarantee = system.experiment.observe.guarantee.as_ref();
+    let group =
+        guarantee.and_then(|guarantee| guarantee.plan.as_ref()).map(|plan| format!("{plan}."));
+    let recorded = system.recorded().into_iter();
+    recorded.filter(move |name| group.as_ref().is_some_and(|group| name.starts_with(group)))
 }
 
 /// Returns the names of the variables that an experiment draws, each with the place that names it.

@@ -1,6 +1,6 @@
 //! The numbers of a page as JSON: curves, and the vehicle over time.
 
-use super::thin;
+use super::{plans, thin};
 use crate::recording::panels::{Panel, Role, symbols};
 use crate::recording::trajectory;
 use crate::recording::{Recording, Track};
@@ -8,9 +8,9 @@ use cosim::experiment::Vehicle;
 use serde_json::{Map, Value, json};
 
 /// Number of significant digits of a value, which is more than a screen can resolve.
-const DIGITS: usize = 5;
+pub(super) const DIGITS: usize = 5;
 /// Number of significant digits of a time.
-const TIME_DIGITS: usize = 7;
+pub(super) const TIME_DIGITS: usize = 7;
 
 /// Returns the data that the scripts of a page draw.
 pub fn page(runs: &[Recording], panels: &[Panel], vehicles: &[usize]) -> Value {
@@ -22,6 +22,7 @@ pub fn page(runs: &[Recording], panels: &[Panel], vehicles: &[usize]) -> Value {
             "vehicle": is_shown.then(|| vehicle(run)).flatten(),
             "guarantee": guarantee(run, &thin::frames(run.time.len())),
             "flight": flight(run),
+            "plans": is_shown.then(|| plans::of(run)).flatten(),
         })
     };
     let names: Vec<String> = runs.iter().map(|run| run.name.clone()).collect();
@@ -147,7 +148,7 @@ fn words(item: &str) -> String {
 }
 
 /// Rounds numbers; those that are not finite become null.
-fn numbers(values: impl IntoIterator<Item = f64>, digits: usize) -> Vec<Value> {
+pub(super) fn numbers(values: impl IntoIterator<Item = f64>, digits: usize) -> Vec<Value> {
     values.into_iter().map(|value| rounded(value, digits)).collect()
 }
 

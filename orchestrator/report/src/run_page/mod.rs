@@ -3,6 +3,7 @@
 
 pub mod data;
 pub mod figure;
+pub mod plans;
 pub mod thin;
 
 use crate::figure::{Figure, Legend, svg};
@@ -15,6 +16,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 const STYLES: [&str; 2] = [include_str!("../shared.css"), include_str!("page.css")];
+const GUARANTEE: &str = include_str!("../guarantee.js");
 const VEHICLE: &str = include_str!("../vehicle3d.js");
 const CHARTS: &str = include_str!("../chart.js");
 const INSTRUMENTS: &str = include_str!("instruments.js");
@@ -70,16 +72,19 @@ fn page(runs: &[Recording], panels: &[Panel]) -> String {
                             p.note { "Drag to turn the view, double click to turn it back." }
                         }
                     }
-                    (flight(runs))
-                    section id="curves" aria-label="Curves" {
-                        p.note { "Drag over curves to look closer, and click twice to see all." }
+                    div id="pictures" {
+                        (flight(runs))
+                        @if vehicles.iter().any(|run| plans::of(&runs[*run]).is_some()) { (guarantee()) }
+                        section id="curves" aria-label="Curves" {
+                            p.note { "Drag over curves to look closer, and click twice to see all." }
+                        }
                     }
                     section id="summary" { h2 { "Summary" } (summary(runs)) }
                     section id="parameters" { h2 { "Parameters" } (parameters(runs)) }
                     section id="origin" { h2 { "Origin" } (origin(runs)) }
                 }
                 script type="application/json" id="run-data" { (PreEscaped(json)) }
-                @for script in [VEHICLE, CHARTS, INSTRUMENTS, PLAYER] { script { (PreEscaped(script)) } }
+                @for script in [VEHICLE, CHARTS, GUARANTEE, INSTRUMENTS, PLAYER] { script { (PreEscaped(script)) } }
             }
         }
     };
@@ -127,6 +132,20 @@ fn vehicle(place: usize, run: &Recording, named: bool) -> Markup {
             canvas.view aria-label=(format!("Attitude of the vehicle, {}", run.name)) role="img" {}
             div.surfaces {}
             div.jets {}
+        }
+    }
+}
+
+/// Returns the place of the picture of plan, tube and bound.
+fn guarantee() -> Markup {
+    html! {
+        section id="guarantee" aria-label="Guarantee" {
+            p.note {
+                "At each optimisation the law plans (thin line) and knows how far it can be pushed off \
+                 its plan (blue tube). It accepts a plan only if the whole tube stays under the limit, \
+                 that is, if the plan stays under its bound (black line). Flown: thick." span id="ghost" {}
+            }
+            canvas id="plan" role="img" aria-label="Norms of body rates and moment as they were flown and planned at the chosen time, with tube, bound and limit" {}
         }
     }
 }

@@ -59,6 +59,9 @@
     if (run.guarantee) find("guarantees").append(...guaranteeStrip(run, isNamed));
   });
 
+  const planned = data.runs.find((run) => run.plans);
+  if (planned) parts.push(guaranteePicture(planned, data.runs.find((run) => run !== planned && run.vehicle?.rates), [stop, pointed]));
+
   play.addEventListener("click", toggle);
   slider.addEventListener("input", () => seek(start + (span * slider.value) / 1000, true));
   document.addEventListener("keydown", (event) => {
