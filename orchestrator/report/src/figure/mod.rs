@@ -232,7 +232,11 @@ impl Panel {
                 .any(|c| matches!(c.shape, Shape::Line | Shape::Thin | Shape::Band(_)));
         let margin = if is_time { 0.0 } else { 0.06 * size(low, high) };
         let is_count = !along_x && self.curves.iter().any(|curve| curve.shape == Shape::Steps);
-        (if is_count { 0.0 } else { low - margin }, high + margin)
+        // The name of a limit above everything else has room above its line.
+        let highest = |curve: &Curve| curve.shape == Shape::Horizontal && curve.y.contains(&high);
+        let is_limited = !along_x && self.curves.iter().any(highest);
+        let above = if is_limited { 0.11 * size(low, high) } else { margin };
+        (if is_count { 0.0 } else { low - margin }, high + above)
     }
 }
 

@@ -20,7 +20,7 @@ const MARK_HEIGHT: f64 = 38.0;
 const MARK_WIDTH: f64 = 80.0;
 /// Width of a letter of a mark, space of a mark beside its letters, and height of a line of the
 /// label, px.
-const LETTER: f64 = 6.6;
+const LETTER: f64 = 7.5;
 const BESIDE: f64 = 10.0;
 const LINE: f64 = 15.0;
 /// Largest number of letters of a line of the vertical axis's label, and of its lines.

@@ -63,8 +63,8 @@ fn oracle_the_corridor_lies_where_exponential_air_has_the_density_of_each_limit(
         let bound = curve(&panels[0], name);
         assert!(bound.y.iter().all(|y| (y - altitude).abs() < 1e-6), "{name}: {:?}", bound.y);
     }
-    // V² = μ / (2 (R + h)) where half of the weight is held by the speed: there the needed lift is a
-    // quarter of the flight's, and the air lies ln 4 scale heights above the flight's.
+    // Where the speed holds half of the weight, the needed lift is a quarter of the flight's: the
+    // air there is that of ln 4 scale heights above the flight.
     let glide = curve(&panels[0], "equilibrium glide");
     let half = |row: &usize| (1e3 * glide.x[*row]).powi(2) < 3.986e14 / (6.378e6 + 50e3) / 2.0;
     let row = (0..101).find(half).unwrap();

@@ -1,0 +1,45 @@
+"""Redraws the pictures of docs/images that are the program's own: images.py STUDIES
+
+STUDIES holds a folder for each study, as `orchestrator reproduce STUDY --out STUDIES/STUDY` writes it. The flights are
+flown here, with the program and the FMUs in target. docs/images/real-time-20.svg shows what was measured on a quiet
+machine, and stays.
+"""
+
+import shutil
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+from gallery import ROOT, TARGET, program
+
+IMAGES = ROOT / "docs" / "images"
+STUDIES = {
+    "crmpc-2022-delays": "crmpc-2022/figures/delays",
+    "crmpc-2022-guarantee-map": "crmpc-2022/figures/guarantee-map",
+    "crmpc-2022-trade": "crmpc-2022/figures/trade",
+    "crmpc-2022-tube": "crmpc-2022/figures/fig-6-worst",
+    "reversal": "reversal/figures/step",
+    "tvsmc-2015-angles": "tvsmc-2015/figures/fig-3",
+    "tvsmc-2015-biases": "tvsmc-2015-biases/figures/errors",
+    "two-loop-moments": "two-loop-smc/figures/moments",
+}
+FLIGHTS = {"crmpc-robust": "crmpc-robust", "entry": "from-120km"}
+
+
+def call(*arguments):
+    subprocess.run([program(), *arguments, "--fmu-dir", TARGET / "fmu"], cwd=ROOT, check=True, stdout=subprocess.DEVNULL)
+
+
+def main(studies: Path) -> None:
+    for name, figure in STUDIES.items():
+        shutil.copyfile(studies / f"{figure}.svg", IMAGES / f"{name}.svg")
+    with tempfile.TemporaryDirectory() as folder:
+        for name, experiment in FLIGHTS.items():
+            call("run", experiment, "--no-csv", "--quiet", "--out", f"{folder}/{name}")
+            shutil.copyfile(f"{folder}/{name}/plot.svg", IMAGES / f"{name}.svg")
+    call("response", "rest", "--fmu", "controller=CRMPC.fmu", "--plot", IMAGES / "response-crmpc.svg")
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))
