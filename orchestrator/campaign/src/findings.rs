@@ -43,6 +43,8 @@ pub struct LimitFinding {
 pub struct Measured {
     /// Name of the measure.
     pub name: String,
+    /// The quantity in words.
+    pub words: String,
     /// Unit of the measure, or an empty text.
     pub unit: String,
     /// Its distribution; none if no case has a value.
@@ -102,6 +104,7 @@ pub(crate) fn findings(
         let (sensitivities, noise) = sensitivities(plan.campaign.design, &inputs, &values);
         measures.push(Measured {
             name: recorded.name.clone(),
+            words: recorded.words.clone(),
             unit: recorded.unit.clone(),
             summary: summary(&values),
             sensitivities,
@@ -130,7 +133,7 @@ fn says(plan: &Plan, limit: &Limit) -> String {
         (Some(most), _) => ("≤", most),
         (None, least) => ("≥", least.unwrap_or(f64::NAN)),
     };
-    format!("{name} {sign} {bound} {unit}").trim_end().to_string()
+    format!("{} {sign} {bound} {unit}", plan.words(name)).trim_end().to_string()
 }
 
 /// Returns the numbers of the cases whose results are to be kept in full.

@@ -27,6 +27,12 @@ pub struct Plan {
 }
 
 impl Plan {
+    /// Returns a metric or measure in words.
+    pub fn words<'a>(&'a self, name: &'a str) -> &'a str {
+        let recorded = self.recorded.iter().find(|recorded| recorded.name == name);
+        recorded.map_or(name, |recorded| &recorded.words)
+    }
+
     /// Prepares a campaign, with the changes of the command line.
     ///
     /// # Errors

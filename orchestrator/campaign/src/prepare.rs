@@ -18,6 +18,8 @@ use toml::Spanned;
 pub struct Recorded {
     /// Name of the metric or measure.
     pub name: String,
+    /// The quantity in words.
+    pub words: String,
     /// Unit of the number, or an empty text.
     pub unit: String,
     /// Number that replaces a missing value, if it means that something never happened, as with a
@@ -115,9 +117,19 @@ pub(crate) fn recorded(campaign: &Campaign, observe: &Observe, meters: &Meters) 
         .map(|name| Recorded {
             unit: units.get(&name).cloned().or_else(|| Margins::unit(&name)).unwrap_or_default(),
             missing: missing(&name, observe),
+            words: words(&name, observe),
             name,
         })
         .collect()
+}
+
+/// Returns the heading of a metric, or the words of its name.
+fn words(name: &str, observe: &Observe) -> String {
+    let headed = observe.metrics.get(name).filter(|measure| !measure.label.is_empty());
+    headed.map_or_else(
+        || name.replace(['_', '-'], " "),
+        |measure| format!("{} {}", measure.label, measure.part).trim_end().to_string(),
+    )
 }
 
 fn missing(name: &str, observe: &Observe) -> Option<f64> {

@@ -11,7 +11,7 @@ use crate::sensitivity::{Estimate, Sensitivity};
 use cosim::error::Error;
 use cosim::files;
 use cosim::interrupt::Interrupt;
-use cosim_report::figure::{Figure, svg};
+use cosim_report::figure::{Figure, svg, with_unit};
 use cosim_report::page::{head, script};
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 use std::collections::BTreeSet;
@@ -50,11 +50,6 @@ pub fn write(
     }
     let page = page(plan, findings, &pictures, &kept_cases, ranking.zip(Some(ranked)).as_ref());
     files::write(&out.join("report.html"), page)
-}
-
-/// Returns a figure as an element of a page that writes the heading.
-pub(crate) fn untitled(figure: &Figure) -> String {
-    svg::element(&Figure { title: String::new(), ..figure.clone() })
 }
 
 /// Returns the measure that orders the cases: the one that is asked for, or that of the first
@@ -114,7 +109,7 @@ fn page(
                     }
                     div id="figures" {
                         @for figure in figures {
-                            figure { h3 { (figure.title) } div.plot { (PreEscaped(untitled(figure))) } }
+                            figure { h3 { (figure.title) } div.plot { (PreEscaped(svg::element(figure))) } }
                         }
                     }
                     section id="sensitivity" {
@@ -216,7 +211,7 @@ fn limit_table(limits: &[LimitFinding], design: DesignKind) -> Markup {
     html! {
         table.numbers {
             thead { tr {
-                th { "Limit" } th { "Broken by" } th { "Share" } th { "Probability, 95 % interval" } th { "" }
+                th { "Limit" } th { "Broken by" } th { "Share" } th { "Probability, 95 % interval" } td {}
             } }
             tbody { @for limit in limits { tr {
                 td { (limit.says) }
@@ -263,7 +258,7 @@ fn measures(measures: &[Measured]) -> Markup {
                 th { "99 %" } th { "99.9 %" } th { "Largest" } th { "Case of the largest" }
             } }
             tbody { @for measure in measures { tr {
-                td { (measure.name) @if !measure.unit.is_empty() { ", " (measure.unit) } }
+                td { (with_unit(&measure.words, &measure.unit)) br; code { (measure.name) } }
                 @if let Some(summary) = &measure.summary {
                     td { (summary.cases) } td { (short(summary.mean)) } td { (deviation(summary)) }
                     @for quantile in &summary.quantiles {
@@ -324,10 +319,10 @@ fn tornado(measure: &Measured) -> Markup {
     let has_indices = measure.noise.is_some() || rows.iter().any(|row| row.total.is_some());
     html! {
         @if !rows.is_empty() || measure.noise.is_some() {
-            h3 { (measure.name) }
+            h3 { (measure.words) }
             table.numbers {
                 thead { tr {
-                    th { "Parameter" } th { "Rank correlation" } th { "" } th { "p-value" }
+                    th { "Parameter" } th { "Rank correlation" } td {} th { "p-value" }
                     @if has_indices { th { "First-order index" } th { "Total index" } }
                 } }
                 tbody {

@@ -17,12 +17,14 @@ const BINS: usize = 60;
 const POINTS: usize = 600;
 /// Largest number of cases that are marked in a panel.
 const MARKED: usize = 300;
+/// Largest number of values of a parameter whose cases are spread to strips.
+const STRIPS: usize = 5;
 /// Largest number of parameters and of measures whose scatter plots are drawn.
 const PARAMETERS: usize = 12;
 const MEASURES: usize = 3;
 
 fn label(measure: &Recorded) -> String {
-    with_unit(&measure.name, &measure.unit)
+    with_unit(&measure.words, &measure.unit)
 }
 
 fn panel(x_label: &str, y_label: &str, curves: Vec<Curve>) -> Panel {
@@ -71,7 +73,7 @@ pub(super) fn distributions(
         steps.extend(marks());
         panels.push(panel(&label(measure), "share of cases", steps));
         let title =
-            format!("Distribution of {} over {}", measure.name, super::cases(findings.cases));
+            format!("Distribution of {} over {}", measure.words, super::cases(findings.cases));
         figures.push(Figure { title, columns: 2, legend: Legend::Above, panels });
     }
     Ok(figures)
@@ -118,6 +120,7 @@ pub(super) fn scatters(plan: &Plan, table: &Reader) -> Result<Vec<Figure>, Error
             continue;
         }
         let panels = shown.iter().map(|(varied, x)| {
+            let x = strips(x);
             let pick = |cases: &mut dyn Iterator<Item = usize>| -> (Vec<f64>, Vec<f64>) {
                 cases.filter(|i| y[*i].is_finite()).map(|i| (x[i], y[i])).unzip()
             };
@@ -132,7 +135,7 @@ pub(super) fn scatters(plan: &Plan, table: &Reader) -> Result<Vec<Figure>, Error
         });
         let panels: Vec<Panel> = panels.collect();
         if !panels.is_empty() {
-            let title = format!("{} against the varied parameters", measure.name);
+            let title = format!("{} against the varied parameters", measure.words);
             let columns = 3.min(panels.len());
             figures.push(Figure { title, columns, legend: Legend::Above, panels });
         }
@@ -140,9 +143,40 @@ pub(super) fn scatters(plan: &Plan, table: &Reader) -> Result<Vec<Figure>, Error
     Ok(figures)
 }
 
+/// Returns the values of a parameter as places in a scatter plot. Few values are spread to strips,
+/// in which the cases can be told apart.
+fn strips(values: &[f64]) -> Vec<f64> {
+    let mut distinct: Vec<f64> = Vec::new();
+    for value in values.iter().filter(|value| value.is_finite()) {
+        if !distinct.contains(value) {
+            distinct.push(*value);
+        }
+        if distinct.len() > STRIPS {
+            return values.to_vec();
+        }
+    }
+    distinct.sort_by(f64::total_cmp);
+    let gaps = distinct.windows(2).map(|pair| pair[1] - pair[0]);
+    let gap = gaps.reduce(f64::min).unwrap_or(0.0);
+    // Fractions of multiples of the golden ratio are evenly spread.
+    let shift = |place: usize| (place as f64 * 0.618_034).fract() - 0.5;
+    values.iter().enumerate().map(|(place, value)| value + 0.4 * gap * shift(place)).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn few_values_of_a_parameter_become_strips_that_do_not_meet() {
+        let two: Vec<f64> = (0..100).map(|i| if i % 2 == 0 { 0.0 } else { 3.0 }).collect();
+        let spread = strips(&two);
+        assert!(two.iter().zip(&spread).all(|(value, place)| (place - value).abs() <= 0.6));
+        assert!(spread[0] != spread[2] && spread[1] != spread[3]);
+        let many: Vec<f64> = (0..100).map(f64::from).collect();
+        assert_eq!(strips(&many), many);
+        assert_eq!(strips(&[1.0, 1.0]), [1.0, 1.0]);
+    }
 
     #[test]
     fn oracle_a_histogram_by_hand() {

@@ -3,7 +3,6 @@
 use super::{CASE, SearchOutcome, Tried};
 use crate::flight::{Flight, Row};
 use crate::plan::Plan;
-use crate::report::untitled;
 use crate::track::Track;
 use cosim::error::Error;
 use cosim::experiment::{MeasureKind, name_of};
@@ -36,8 +35,8 @@ pub(super) fn write(
     let history = history(plan, outcome, tried);
     svg::write(&history, &out.join("history.svg"))?;
     let worst_case = worst_case(plan, outcome, worst)?;
-    let drawn = (!worst_case.panels.is_empty()).then(|| untitled(&worst_case));
-    let page = page(plan, outcome, worst, drawn.as_deref(), &untitled(&history));
+    let drawn = (!worst_case.panels.is_empty()).then(|| svg::element(&worst_case));
+    let page = page(plan, outcome, worst, drawn.as_deref(), &svg::element(&history));
     files::write(&out.join("report.html"), page)
 }
 
@@ -70,7 +69,7 @@ fn history(plan: &Plan, outcome: &SearchOutcome, tried: &[Tried]) -> Figure {
         Curve::new("largest so far", Color::CURVES[1], Shape::Line, number, so_far),
     ];
     curves.extend(bound(plan, &outcome.measure).map(|(limit, _)| limit_line(limit)));
-    let label = with_unit(&outcome.measure, &outcome.unit);
+    let label = with_unit(plan.words(&outcome.measure), &outcome.unit);
     Figure {
         title: format!("{}: search for the worst case", outcome.title),
         columns: 1,
@@ -148,7 +147,7 @@ fn judged(plan: &Plan, flight: &mut Flight, name: &str) -> Result<Option<Judged>
     let own = signals.first().map(|(_, signal)| signal.unit.clone()).unwrap_or_default();
     let shown = measure.unit.as_ref().filter(|_| is_largest);
     Ok(Some(Judged {
-        measure: name.into(),
+        measure: plan.words(name).into(),
         unit: shown.map_or(own, |shown| shown.name.clone()),
         factor: shown.map_or(1.0, |shown| shown.factor),
         limit: bound(plan, name).map(|(limit, _)| limit).filter(|_| is_largest),
@@ -229,7 +228,7 @@ fn answer(plan: &Plan, outcome: &SearchOutcome) -> Markup {
     let largest = outcome.largest;
     html! {
         p {
-            "The largest " code { (outcome.measure) } " is " b { (short(largest)) (unit) }
+            "The largest value of " b { (plan.words(&outcome.measure)) } " is " b { (short(largest)) (unit) }
             @if let Some((limit, is_upper)) = bound(plan, &outcome.measure) {
                 @let kept = if is_upper { largest <= limit } else { largest >= limit };
                 ", its limit " (short(limit)) (unit) " "
