@@ -82,6 +82,8 @@ pub struct OverviewColumn {
     /// the units of the FMU's variables.
     #[serde(default = "crate::values::unscaled")]
     pub factor: f64,
+    /// Limit in the unit of the heading; larger values are marked.
+    pub limit: Option<f64>,
 }
 
 /// A claim of the paper with the checks that decide on it.

@@ -122,13 +122,22 @@ fn rows(overview: &Overview, results: &Results, cell: &dyn Fn(&Numbers) -> Strin
                             }
                             (run.label)
                         }
-                        @for numbers in numbers { td { (cell(numbers)) } }
+                        @for (column, numbers) in overview.metrics.iter().zip(numbers) {
+                            @if is_beyond(numbers, column.limit) {
+                                td.beyond title="beyond the limit" { (cell(numbers)) }
+                            } @else { td { (cell(numbers)) } }
+                        }
                     }
                 }
             }
         }
         @if !overview.note.is_empty() { p.note { (overview.note) } }
     }
+}
+
+/// Returns whether one of these numbers is beyond a limit, which is met up to rounding.
+fn is_beyond(numbers: &Numbers, limit: Option<f64>) -> bool {
+    limit.is_some_and(|limit| numbers.0.iter().any(|number| *number > limit * (1.0 + 1e-9)))
 }
 
 pub(super) fn all_values(results: &Results) -> Markup {
@@ -185,6 +194,13 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn a_value_beyond_a_limit_is_marked() {
+        let beyond = |values: &[f64]| is_beyond(&Numbers(values.to_vec()), Some(5.0));
+        assert!(beyond(&[4.0, 5.1]) && !beyond(&[4.0, 5.0 + 1e-12]) && !beyond(&[]));
+        assert!(!is_beyond(&Numbers(vec![9.0]), None));
     }
 
     #[test]
