@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import os
 import subprocess
 
 import pandas as pd
 import pytest
+from axe_playwright_python.sync_playwright import Axe
 
 from browsing import in_chromium
 from conftest import program
@@ -213,6 +215,34 @@ def test_a_page_fits_a_telephone_in_both_themes(runs, opened, name, scheme):
     assert (runs / name).stat().st_size < 1e6
 
 
+def test_a_limit_that_is_exceeded_many_times_is_seen(tmp_path, opened):
+    call("run", "lqr", "--set", "controller.limit.moment=10000", "--page", "--quiet", "--out", tmp_path / "run", cwd=os.getcwd())
+    page = opened(tmp_path / "run" / "page.html")
+    panel = page.locator("figure.panel").nth(3)
+    assert panel.locator("h2").inner_text() == "control moment, magnitude, kN m"
+    assert "limit of norm: 10 kN m" in panel.locator(".legend").inner_text()
+    ends = panel.locator("svg[role=img] line[stroke-dasharray='6 4']").evaluate("line => [line.y1.baseVal.value, line.y2.baseVal.value]")
+    assert ends[0] == ends[1] and 20 < ends[0] < 150
+
+
+def test_axe_finds_no_fault(runs, opened):
+    axe = Axe()
+    pages = [runs / "crmpc-2022-allocated" / "page.html", runs / "both.html"]
+    for path, scheme, width in itertools.product(pages, ["light", "dark"], [1400, 390]):
+        page = opened(path, viewport={"width": width, "height": 800}, color_scheme=scheme)
+        found = axe.run(page)
+        assert found.violations_count == 0, found.generate_report()
+
+
+def test_a_printed_page_keeps_its_colours_and_its_width(runs, opened):
+    page = opened(runs / "both.html", color_scheme="dark")
+    page.emulate_media(media="print", color_scheme="dark")
+    assert page.evaluate("getComputedStyle(document.querySelector('.light')).printColorAdjust") == "exact"
+    assert page.evaluate("getComputedStyle(document.body).color") == "rgb(27, 29, 32)"
+    width = "element => element.getBoundingClientRect().width"
+    assert page.locator("figure.panel").first.evaluate(width) > 0.95 * page.locator("main").evaluate(width)
+
+
 def test_the_page_of_an_entry_flight(tmp_path, opened):
     call("run", "from-120km", "--page", "--quiet", "--out", tmp_path / "run", cwd=os.getcwd())
     path = tmp_path / "run" / "page.html"
@@ -224,3 +254,16 @@ def test_the_page_of_an_entry_flight(tmp_path, opened):
     largest = json.loads((tmp_path / "run" / "metrics.json").read_text())["max_rate_deg_s"]
     values = page.evaluate("JSON.parse(document.getElementById('run-data').textContent).panels[2].curves.at(-1).values")
     assert max(values) == pytest.approx(largest, rel=1e-4)
+    # Altitude over speed with its corridor, and the ground track, with the place of the vehicle at the end.
+    flight = page.locator("#flight svg[role=img]")
+    assert [part.get_attribute("aria-label") for part in flight.all()] == ["Altitude over speed", "Ground track"]
+    names = flight.nth(0).locator(".entry").evaluate_all("entries => entries.map(entry => entry.dataset.name)")
+    assert names == ["heat flux limit", "load limit", "pressure limit", "equilibrium glide", "flight"]
+    place = "mark => [mark.cx.baseVal.value, mark.cy.baseVal.value]"
+    end = "path => { const {x, y} = path.getPointAtLength(path.getTotalLength()); return [x, y]; }"
+    for part in flight.all():
+        drawn = part.locator("path[data-name=flight]").evaluate(end)
+        assert part.locator(".place").evaluate(place) == pytest.approx(drawn, abs=0.5)
+    verdict = "largest rate, largest moment, largest load, largest heat flux, largest pressure"
+    assert page.inner_text(".verdict") == f"Within the limit: {verdict}."
+    assert page.inner_text("#guarantees") == "guarantee in force for 100 % of the time"

@@ -16,7 +16,7 @@ class Plane {
   constructor(parent, heading, onPoint) {
     this.figure = document.createElement("figure");
     this.figure.className = "panel";
-    const title = document.createElement("h3");
+    const title = document.createElement("h2");
     title.textContent = heading;
     this.legend = document.createElement("ul");
     this.legend.className = "legend";

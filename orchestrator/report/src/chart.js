@@ -49,7 +49,7 @@ class Chart {
   constructor(parent, { onPoint, onZoom }) {
     this.figure = document.createElement("figure");
     this.figure.className = "panel";
-    this.heading = document.createElement("h3");
+    this.heading = document.createElement("h2");
     this.legend = document.createElement("ul");
     this.legend.className = "legend";
     this.svg = svgElement("svg", { role: "img" });

@@ -163,6 +163,8 @@ function wire(figure) {
     panel.show([along(0, from.x, to.x), along(1, from.y, to.y)]);
   });
   figure.addEventListener("dblclick", () => panels.forEach((panel) => panel.show(panel.whole)));
+  // A picture has no parts that can be pressed, but a group has.
+  if (figure.querySelector(".entry")) figure.setAttribute("role", "group");
   for (const entry of figure.querySelectorAll(".entry")) {
     entry.setAttribute("tabindex", 0);
     entry.setAttribute("role", "switch");
@@ -203,6 +205,13 @@ for (const part of document.querySelectorAll("details.figure"))
   part.addEventListener("toggle", async () => {
     for (const plot of part.querySelectorAll("[data-folded]")) { if (!folded.get(plot)) await read(plot); show(plot); }
   });
+// What is scrolled can be scrolled by keys.
+const scrollable = () => {
+  for (const part of document.querySelectorAll("section, section details, .plot, .scroll, .lead > *"))
+    if (part.scrollWidth > part.clientWidth) part.tabIndex = 0; else part.removeAttribute("tabindex");
+};
+window.addEventListener("resize", scrollable);
+scrollable();
 const idle = window.requestIdleCallback ?? setTimeout;
 // A part that is opened meanwhile is no longer folded when its turn comes.
 idle(async () => { for (const plot of [...folded.keys()]) if (folded.get(plot) === null) await read(plot); });

@@ -21,6 +21,7 @@ pub fn page(runs: &[Recording], panels: &[Panel], vehicles: &[usize]) -> Value {
             "time": numbers(thin::times(&run.time), TIME_DIGITS),
             "vehicle": is_shown.then(|| vehicle(run)).flatten(),
             "guarantee": guarantee(run, &thin::frames(run.time.len())),
+            "guaranteed": guaranteed(run),
             "flight": flight(run),
             "plans": is_shown.then(|| plans::of(run)).flatten(),
         })
@@ -133,6 +134,12 @@ fn guarantee(run: &Recording, frames: &[usize]) -> Value {
         .collect();
     let time = numbers(frames.iter().map(|row| run.time[*row]), TIME_DIGITS);
     json!({ "time": time, "inForce": values(in_force), "status": status.map(values), "items": items })
+}
+
+/// Returns what the summary says of the guarantee, without its margins.
+fn guaranteed(run: &Recording) -> Option<&str> {
+    let line = run.summary.iter().find(|line| line.heading == "guarantee")?;
+    line.text.split(',').next()
 }
 
 /// Writes the name of an item as words: "inForce" as "in force".

@@ -1,12 +1,12 @@
 // The vehicle of a run in motion, with its surfaces and jets where there are any.
 //
-//   const instruments = new Instruments(element, run.vehicle, run.guarantee);
+//   const instruments = new Instruments(element, run);
 //   instruments.point(time);
 "use strict";
 
 class Instruments {
-  constructor(element, vehicle, guarantee) {
-    Object.assign(this, { vehicle, guarantee });
+  constructor(element, { vehicle, guarantee, guaranteed }) {
+    Object.assign(this, { vehicle, guarantee, guaranteed });
     this.view = new Vehicle3D(element.querySelector("canvas"));
     this.canvas = element.querySelector("canvas");
     this.surfaces = this.bars(element.querySelector(".surfaces"), vehicle.surfaces || []);
@@ -64,8 +64,8 @@ class Instruments {
   }
 
   light(frame) {
-    const { guarantee } = this;
-    if (!guarantee) return { state: "none", text: "no guarantee recorded" };
+    const { guarantee, guaranteed } = this;
+    if (!guarantee) return { state: "none", text: guaranteed ? `guarantee over the run: ${guaranteed}` : "no guarantee recorded" };
     const isInForce = guarantee.inForce[frame] !== 0;
     const status = guarantee.status && guarantee.items[guarantee.status[frame]];
     return { state: isInForce ? "good" : "warn", text: `guarantee: ${status || (isInForce ? "in force" : "not in force")}` };

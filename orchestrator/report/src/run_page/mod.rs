@@ -115,7 +115,7 @@ fn verdict(run: &Recording, named: bool) -> Markup {
 
 fn player() -> Markup {
     html! {
-        div id="player" {
+        section id="player" aria-label="Playback" {
             button id="play" type="button" aria-label="Play" title="Space" { "▶" }
             input id="seek" type="range" min="0" max="1000" step="1" value="0" aria-label="Time";
             output id="time" for="seek" {}
@@ -183,7 +183,7 @@ fn summary(runs: &[Recording]) -> Markup {
     html! {
         @if lines.is_empty() { p.note { "The experiment defines no metrics." } }
         div.scroll tabindex="0" role="region" aria-label="Summary" { table {
-            @if runs.len() > 1 { thead { tr { th {} @for run in runs { th { (run.name) } } } } }
+            @if runs.len() > 1 { thead { tr { td {} @for run in runs { th { (run.name) } } } } }
             tbody { @for (heading, told) in &lines { tr {
                 th scope="row" {
                     (heading)
@@ -219,7 +219,7 @@ fn parameters(runs: &[Recording]) -> Markup {
             output id="found" for="search" {}
         }
         div.scroll tabindex="0" role="region" aria-label="Parameters" { table id="parameter-table" {
-            @if runs.len() > 1 { thead { tr { th {} @for run in runs { th { (run.name) } } } } }
+            @if runs.len() > 1 { thead { tr { td {} @for run in runs { th { (run.name) } } } } }
             tbody { @for (name, values) in &rows {
                 tr data-set[is_set(values)] data-differs[differs(values)] {
                     th scope="row" { code { (name) } }

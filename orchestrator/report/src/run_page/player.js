@@ -50,8 +50,7 @@
   charts.forEach((chart, place) => chart.show(data.panels[place], data.runs, [start, stop]));
   const parts = [...charts];
   for (const element of document.querySelectorAll(".vehicle")) {
-    const { vehicle, guarantee } = data.runs[element.dataset.run];
-    parts.push(new Instruments(element, vehicle, guarantee));
+    parts.push(new Instruments(element, data.runs[element.dataset.run]));
   }
   data.runs.forEach((run, place) => {
     const isNamed = data.runs.length > 1;
