@@ -67,7 +67,7 @@ pub(crate) struct Fly {
     #[arg(long, value_name = "DIR", help_heading = "Part of the campaign", conflicts_with_all = ["case", "cases", "work", "fresh", "csv"])]
     bundle: Option<PathBuf>,
     /// Fly all cases again, including those that are finished.
-    #[arg(long, help_heading = "Results")]
+    #[arg(long, visible_alias = "force", help_heading = "Results")]
     fresh: bool,
     /// Also write the results table as cases.csv.
     #[arg(long, help_heading = "Results")]

@@ -124,7 +124,7 @@ pub(crate) enum Command {
         #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
         members: Option<u64>,
         /// Run everything again, including what is finished.
-        #[arg(long, help_heading = "Results")]
+        #[arg(long, visible_alias = "force", help_heading = "Results")]
         fresh: bool,
         /// Show neither progress nor summary.
         #[arg(long)]

@@ -2,6 +2,7 @@
 
 use crate::catalogue::{self, Filter};
 use crate::failure::Failure;
+use crate::list;
 use cosim::error::Error;
 use cosim::experiment::Protection;
 use fmi_master::description::{Interface, ModelDescription, Variable, VariableKind};
@@ -10,6 +11,7 @@ use fmu_import::fmu::Fmu;
 use fmu_import::isolation;
 use std::io::{self, Write};
 use std::path::Path;
+use textwrap::Options;
 
 /// Prints the interfaces and platforms of an archive, and those of its variables that fit the
 /// filter.
@@ -73,8 +75,13 @@ fn print(fmu: &Fmu, out: &mut impl Write) -> io::Result<()> {
     } else {
         writeln!(out, "{} (FMI {})", d.model_name, d.fmi_version)?;
     }
+    let width = list::width();
     let mut line = |label: &str, text: &str| {
-        if text.is_empty() { Ok(()) } else { writeln!(out, "  {label:<16} {text}") }
+        if text.is_empty() {
+            return Ok(());
+        }
+        let label = format!("  {label:<16} ");
+        wrapped(text, [&label, &" ".repeat(label.len())], width, out)
     };
     line("description", &d.description)?;
     line("version", &d.version)?;
@@ -106,50 +113,54 @@ fn print(fmu: &Fmu, out: &mut impl Write) -> io::Result<()> {
     unknown.sort_unstable();
     unknown.dedup();
     for causality in CAUSALITIES.into_iter().chain(unknown) {
-        let rows: Vec<[String; 6]> =
-            d.variables.iter().filter(|v| v.causality == causality).map(|v| row(d, v)).collect();
-        if rows.is_empty() {
+        let variables: Vec<&Variable> =
+            d.variables.iter().filter(|variable| variable.causality == causality).collect();
+        if variables.is_empty() {
             continue;
         }
-        writeln!(out, "\n{} ({})", causality.escape_default(), rows.len())?;
-        let header =
-            ["name", "type", "variability", "unit", "start", "description"].map(String::from);
-        let mut widths = [0; 6];
-        for row in rows.iter().chain([&header]) {
-            for (width, cell) in widths.iter_mut().zip(row) {
-                *width = cell.chars().count().min(WIDEST).max(*width);
-            }
-        }
-        for row in [&header].into_iter().chain(&rows) {
-            // The cells are padded by hand, because the formatter refuses widths beyond 16 bits.
-            let pad = |(cell, width): (&String, usize)| {
-                format!("{cell}{}", " ".repeat(width.saturating_sub(cell.chars().count())))
-            };
-            let cells: Vec<String> = row.iter().zip(widths).map(pad).collect();
-            writeln!(out, "  {}", cells.join("  ").trim_end())?;
+        writeln!(out, "\n{} ({})", causality.escape_default(), variables.len())?;
+        for variable in variables {
+            let first = format!("{}  {}", variable.name, facts(d, variable));
+            wrapped(first.trim_end(), ["  ", MARGIN], width, out)?;
+            wrapped(&variable.description, [MARGIN; 2], width, out)?;
         }
     }
     Ok(())
 }
 
-/// Largest width to which a column is padded. A longer cell shifts only the rest of its own row.
-const WIDEST: usize = 80;
+/// Margin of what is said of a variable below its name.
+const MARGIN: &str = "      ";
 
-fn row(description: &ModelDescription, variable: &Variable) -> [String; 6] {
+/// Writes a text in lines of this width, with these margins of the first line and of the others.
+fn wrapped(
+    text: &str,
+    [first, others]: [&str; 2],
+    width: usize,
+    out: &mut impl Write,
+) -> io::Result<()> {
+    let options = Options::new(width).initial_indent(first).subsequent_indent(others);
+    let lines = if text.is_empty() { Vec::new() } else { textwrap::wrap(text, options) };
+    lines.iter().try_for_each(|line| writeln!(out, "{line}"))
+}
+
+/// Returns type, start value, unit and variability of a variable, as far as they say something.
+fn facts(description: &ModelDescription, variable: &Variable) -> String {
     let mut start = variable.start.clone().unwrap_or_default();
     let mut kind = variable.kind.name().to_string();
-    let mut unit = String::new();
     match &variable.kind {
-        VariableKind::Real { unit: base, display_unit, .. } => {
-            unit = base.clone().unwrap_or_default();
-            if let Some(display) =
-                display_unit.as_ref().filter(|display| Some(*display) != base.as_ref())
-            {
-                if let Some(shown) = shown(description, base.as_deref(), display, &start) {
-                    start = format!("{start} ({shown} {display})");
-                }
-                unit = format!("{unit} ({display})");
-            }
+        VariableKind::Real { unit, display_unit, .. } => {
+            kind.clear();
+            let unit = unit.as_deref().unwrap_or_default();
+            let display = display_unit.as_deref().filter(|display| *display != unit);
+            let converted = display.and_then(|display| {
+                Some(format!("{} {display}", shown(description, Some(unit), display, &start)?))
+            });
+            let own = format!("{start} {unit}").trim().to_string();
+            start = match (converted, display) {
+                (Some(converted), _) => format!("{converted} ({own})"),
+                (None, Some(display)) => format!("{own} ({display})"),
+                (None, None) => own,
+            };
         }
         VariableKind::Enumeration { items } => {
             let names: Vec<&str> = items.iter().map(|(name, _)| name.as_str()).collect();
@@ -160,8 +171,8 @@ fn row(description: &ModelDescription, variable: &Variable) -> [String; 6] {
         }
         VariableKind::Integer { .. } | VariableKind::Boolean | VariableKind::String => {}
     }
-    let name = variable.name.clone();
-    [name, kind, variable.variability.to_string(), unit, start, variable.description.clone()]
+    let facts = [start, variable.variability.to_string(), kind];
+    facts.into_iter().filter(|fact| !fact.is_empty()).collect::<Vec<_>>().join(", ")
 }
 
 /// Converts a start value to its display unit, rounded to the digits that people read.

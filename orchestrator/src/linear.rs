@@ -19,7 +19,7 @@ use linear::{Matrix, margins as analysis};
 use serde_json::{Value, json};
 use std::fs;
 use std::io::Write;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// The loop to linearise, the instant, and where the loop is opened.
 #[derive(Args)]
@@ -86,6 +86,9 @@ pub(crate) struct PrintMargins {
     /// Print JSON, for other programs.
     #[arg(long)]
     pub(crate) json: bool,
+    /// Also write the margins to this file, as JSON.
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
     /// File for a Nichols plot of the return ratio and a plot of the sensitivity (.svg, .png).
     #[arg(long, value_name = "FILE")]
     plot: Option<PathBuf>,
@@ -129,6 +132,11 @@ fn model(open: &OpenLoop) -> Value {
     })
 }
 
+/// Writes JSON to the file that is asked for, if there is one.
+pub(crate) fn keep(path: Option<&Path>, value: &Value) -> Result<(), Error> {
+    path.map_or(Ok(()), |path| fs::write(path, format!("{value:#}\n")).map_err(Error::file(path)))
+}
+
 /// Prints the margins of an experiment.
 pub(crate) fn margins(
     asked: &PrintMargins,
@@ -145,16 +153,16 @@ pub(crate) fn margins(
         .sides
         .as_ref()
         .map(|sides| sides.each_ref().map(|net| analysis::margins(net, &net.open())));
+    let mut value = serde_json::to_value(&margins).unwrap_or_default();
+    value["time"] = json!(found.time);
+    value["period"] = json!(found.open.period);
+    value["notes"] = json!(found.notes);
+    if let Some([increases, decreases]) = &sides {
+        value["sides"] = json!({ "increases": increases, "decreases": decreases });
+    }
+    keep(asked.out.as_deref(), &value)?;
     if asked.json {
-        let mut value = serde_json::to_value(&margins).unwrap_or_default();
-        value["time"] = json!(found.time);
-        value["period"] = json!(found.open.period);
-        value["notes"] = json!(found.notes);
-        if let Some([increases, decreases]) = &sides {
-            value["sides"] = json!({ "increases": increases, "decreases": decreases });
-        }
-        writeln!(out, "{value:#}")?;
-        return Ok(());
+        return Ok(writeln!(out, "{value:#}")?);
     }
     writeln!(
         out,

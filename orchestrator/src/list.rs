@@ -54,11 +54,7 @@ pub(crate) fn list(folder: Option<&Path>, form: Form, out: &mut impl Write) -> R
         serde_json::to_writer_pretty(&mut *out, &rows).map_err(std::io::Error::from)?;
         return Ok(writeln!(out)?);
     }
-    let width = if stdout().is_terminal() {
-        terminal::size().map_or(WIDTH, |(columns, _)| usize::from(columns).clamp(40, 120))
-    } else {
-        WIDTH
-    };
+    let width = width();
     for (index, (kind, rows)) in Kind::ALL.iter().zip(&sections).enumerate() {
         if index > 0 {
             writeln!(out)?;
@@ -70,8 +66,18 @@ pub(crate) fn list(folder: Option<&Path>, form: Form, out: &mut impl Write) -> R
     Ok(())
 }
 
-/// Width of the list where there is no terminal.
+/// Width of printed texts where there is no terminal.
 const WIDTH: usize = 80;
+
+/// Returns the width to which texts are wrapped.
+pub(crate) fn width() -> usize {
+    if stdout().is_terminal() {
+        terminal::size().map_or(WIDTH, |(columns, _)| usize::from(columns).clamp(40, 120))
+    } else {
+        WIDTH
+    }
+}
+
 /// Largest width of the column of names. A longer name gets a line of its own.
 const NAMES: usize = 32;
 /// Number of lines to which a title is shortened.

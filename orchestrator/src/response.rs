@@ -2,7 +2,7 @@
 //! model.
 
 use crate::failure::Failure;
-use crate::linear::Instant;
+use crate::linear::{Instant, keep};
 use crate::picture;
 use clap::Args;
 use cosim::error::Error;
@@ -39,6 +39,9 @@ pub(crate) struct Response {
     /// Print JSON, for other programs.
     #[arg(long)]
     pub(crate) json: bool,
+    /// Also write both responses to this file, as JSON.
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
     /// File for a plot of both responses (.svg, .png).
     #[arg(long, value_name = "FILE")]
     plot: Option<PathBuf>,
@@ -104,14 +107,18 @@ pub(crate) fn respond(
         }
         all.push(points);
     }
-    if asked.json {
+    if asked.json || asked.out.is_some() {
         let rows = std::iter::zip(&found.open.signals, &all).flat_map(|(signal, points)| {
             points.iter().map(|point| {
                 let [in_flight, predicted] = shown(point).map(|[db, deg]| json!({ "db": db, "deg": deg }));
                 json!({ "signal": signal.name, "frequency": point.frequency, "in_flight": in_flight, "predicted": predicted })
             })
         });
-        writeln!(out, "{:#}", rows.collect::<Value>())?;
+        let rows: Value = rows.collect();
+        keep(asked.out.as_deref(), &rows)?;
+        if asked.json {
+            writeln!(out, "{rows:#}")?;
+        }
     }
     if let Some((path, form)) = plot {
         picture::write(&figure(&title, &found.open, &all, [asked.from, to]), form, path)?;

@@ -337,6 +337,7 @@ fn inspect_and_list_show_what_there_is() {
     ] {
         assert!(text.contains(part), "{part}: {text}");
     }
+    assert!(text.lines().all(|line| line.chars().count() <= 80), "{text}");
     let (code, text, _) = bench.call(&["list"]);
     assert_eq!(code, 0);
     assert!(
