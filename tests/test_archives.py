@@ -9,6 +9,7 @@ import pytest
 from fmpy import simulate_fmu
 from fmpy.validation import validate_fmu
 
+from browsing import in_chromium
 from conftest import NAMES, ROOT, TARGET, archive, library, newest, program
 
 # The libraries by the folder with their FMUs' descriptions.
@@ -101,3 +102,11 @@ def test_committed_snapshots_are_what_the_libraries_say(folder, tmp_path):
         name for name in generated.keys() | committed.keys() if generated.get(name) != committed.get(name)
     )
     assert not differing, f"{differing} in {folder}/generated are out of date: run scripts/update-generated"
+
+
+@in_chromium
+@pytest.mark.parametrize("name", NAMES)
+def test_the_documentation_fits_a_telephone(name, chromium):
+    with zipfile.ZipFile(archive(name)) as file, chromium.new_page(viewport={"width": 390, "height": 800}) as page:
+        page.set_content(file.read("documentation/index.html").decode())
+        assert page.evaluate("document.documentElement.scrollWidth") <= 390

@@ -10,13 +10,13 @@ const STYLE: &str = "\
 body{font:16px/1.55 system-ui,sans-serif;max-width:62rem;margin:2.5rem auto;padding:0 1.25rem}
 h1{font-size:1.9rem;margin-bottom:.2rem}h2{margin-top:2.2rem}
 .lead{font-size:1.1rem;margin-top:0}.quiet{opacity:.7;font-size:.9rem}
-.wide{overflow-x:auto}
+.wide,pre{overflow-x:auto}
 table{border-collapse:collapse;width:100%;font-size:.9rem}
 th,td{text-align:left;vertical-align:top;padding:.35rem .7rem .35rem 0;border-bottom:1px solid #8884}
 th{font-weight:600;border-bottom-width:2px}
 td:nth-child(n+2):nth-child(-n+4){font-variant-numeric:tabular-nums}
 code{font:.92em ui-monospace,monospace}
-dl{display:grid;grid-template-columns:max-content 1fr;gap:.2rem 1.2rem}dd{margin:0}
+dl{display:grid;grid-template-columns:max-content 1fr;gap:.2rem 1.2rem}dd{margin:0;overflow-wrap:anywhere}
 ";
 
 impl ModelDescription {
@@ -81,7 +81,7 @@ impl ModelDescription {
         let start = if started { "<th>Start</th>" } else { "" };
         write!(
             page,
-            "<h2>{title}</h2>\n<div class=\"wide\"><table>\n\
+            "<h2>{title}</h2>\n<div class=\"wide\" tabindex=\"0\" role=\"region\" aria-label=\"{title}\"><table>\n\
              <tr><th>Name</th><th>Unit</th>{start}<th>Limits</th><th>Description</th></tr>\n"
         )?;
         for variable in rows {
