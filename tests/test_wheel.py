@@ -25,7 +25,7 @@ from conftest import NAMES, ROOT, TARGET, program
 
 SUPPORTED = [(3, minor) for minor in (10, 11, 12, 13)]
 PACKAGE = "reentry_fmus"
-EXTRAS = ["campaign", "cluster", "control", "gymnasium", "matlab", "xarray"]
+EXTRAS = ["campaign", "cluster", "control", "czml", "gymnasium", "matlab", "xarray"]
 TESTS = ROOT / "python" / "tests"
 
 
