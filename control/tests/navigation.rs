@@ -44,6 +44,44 @@ fn regress_wind_is_found_by_the_side_force() {
     assert!((0.7..1.3).contains(&all.normalised_error()), "{all:?}");
 }
 
+/// The altitude at the end of the blackout is known by the drag as well as the filter says, in air
+/// that departs from the standard atmosphere as it expects: a third of the 3 km without the drag.
+#[test]
+fn oracle_the_drag_shows_the_altitude_in_other_air() {
+    for (windy, seeds) in [(false, 500..530), (true, 540..560)] {
+        let case = |seed| if windy { Case::windy(seed) } else { Case::new(4, false, seed) };
+        let all = figures(|seed| case(seed).in_other_air(), seeds.clone());
+        let [error, predicted] = all.altitude();
+        assert!((0.7..1.3).contains(&(error / predicted)) && predicted < 1e3, "{all:?}");
+        assert!((0.7..1.3).contains(&all.normalised_altitude()), "{all:?}");
+        assert!((0.9..1.1).contains(&all.normalised_error()), "{all:?}");
+        let without = figures(
+            |seed| {
+                let mut case = case(seed).in_other_air();
+                case.settings.drag.model = 0.0;
+                case
+            },
+            seeds.start..seeds.start + 10,
+        );
+        assert!(without.altitude().iter().all(|altitude| *altitude > 2e3), "{without:?}");
+    }
+}
+
+/// A density that is wrong by the same factor all the way costs the altitude over which the air
+/// thins by it, 1.1 km, and no more than that.
+#[test]
+fn oracle_a_wrong_density_costs_the_altitude_over_which_the_air_thins_by_it() {
+    for factor in [0.85, 1.15] {
+        let case = |seed| {
+            let mut case = Case::new(4, false, seed);
+            case.density = [factor; 6];
+            case
+        };
+        let [error, predicted] = figures(case, 570..576).altitude();
+        assert!(error < 1.1e3 && error < 1.6 * predicted, "{factor}: {error} m, {predicted} m");
+    }
+}
+
 /// A correction does not move what is shown in one tick.
 #[test]
 fn corrections_are_blended_in() {

@@ -1,5 +1,5 @@
 //! `EntryNavigation`: motion, attitude and wind along an entry flight, from inertial sensors,
-//! satellite navigation and star tracker.
+//! satellite navigation and star tracker, and from the forces of the air.
 
 use control::navigation::{Health, Line, Memory, Navigation, Settings, Shown};
 use controller_export::own_vehicle::OwnVehicle;
@@ -39,7 +39,7 @@ impl SampledInstance for NavigationInstance {
     fn description() -> Description<EntryNavigation> {
         Description {
             name: "EntryNavigation",
-            description: "Navigation of an entry flight by strapdown and Kalman filter, with the wind by the side force",
+            description: "Navigation of an entry flight by strapdown and Kalman filter, with the wind by the side force and the altitude by the drag",
             documentation: include_str!("navigation.html").into(),
             version: env!("CARGO_PKG_VERSION"),
             model_exchange: false,
@@ -263,7 +263,8 @@ fn state(mut table: Variables) -> Variables {
         let wind = real(&format!("wind.{direction}"), &format!("Estimated {meaning}"), "m/s", 10.0);
         table = table.real(wind, move |m| &mut m.shown.wind[i]);
     }
-    table
+    let ratio = "Estimated ratio of lift and drag to those of the model in the standard atmosphere";
+    table.real(sampled("drag.ratio", ratio).real().nominal(1.0), |m| &mut m.shown.drag_ratio)
 }
 
 /// Adds what says how good the navigated state is.
@@ -294,11 +295,19 @@ fn quality(table: Variables) -> Variables {
         })
         .real(deviation("velocity", "velocity, root mean square over the axes", "m/s", 0.1), |m| {
             &mut m.shown.deviations.velocity
-        });
+        })
+        .real(deviation("altitude", "altitude", "m", 10.0), |m| &mut m.shown.deviations.altitude)
+        .real(
+            sampled("deviation.drag", "Predicted standard deviation of drag.ratio, relative to it")
+                .real()
+                .nominal(0.1),
+            |m| &mut m.shown.deviations.drag,
+        );
     let sources = [
         ("gnss", "fix of satellite navigation"),
         ("star", "fix of the star tracker"),
         ("side", "side force"),
+        ("drag", "drag"),
     ];
     for (i, (name, text)) in sources.into_iter().enumerate() {
         let text = format!(

@@ -3,16 +3,16 @@
 //!
 //! The error x is true less estimated: position, velocity, attitude as a rotation vector φ in
 //! inertial axes (R = exp(φ) R̂), biases of gyroscope and accelerometer, wind to the north and
-//! east, and the relative error of the model of the side force.
+//! east, and the relative errors of the models of the side force and of the drag.
 
-use super::settings::{Errors, Wind};
+use super::settings::{Drag, Errors, Wind};
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 use vehicle::math::exp;
 
 /// Number of states of the error.
-pub const STATES: usize = 18;
+pub const STATES: usize = 19;
 /// First state of the error of the position, velocity, attitude, both biases, the wind, and the
-/// model of the side force.
+/// models of the side force and of the drag.
 pub(super) const POSITION: usize = 0;
 pub(super) const VELOCITY: usize = 3;
 pub(super) const ATTITUDE: usize = 6;
@@ -20,6 +20,7 @@ pub(super) const GYROSCOPE: usize = 9;
 pub(super) const ACCELEROMETER: usize = 12;
 pub(super) const WIND: usize = 15;
 pub(super) const SIDE: usize = 17;
+pub(super) const DRAG: usize = 18;
 
 /// Error of the state.
 pub type Error = SVector<f64, STATES>;
@@ -45,6 +46,25 @@ pub(super) struct Way {
     pub(super) climbed: f64,
 }
 
+/// What the filter expects of the sensors and of the air.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Expected<'a> {
+    /// Errors of gyroscope and accelerometer.
+    pub(super) errors: &'a [Errors; 2],
+    /// Period of the samples, s.
+    pub(super) period: f64,
+    pub(super) wind: &'a Wind,
+    pub(super) drag: &'a Drag,
+}
+
+impl Expected<'_> {
+    /// Returns how much is left of the wind with the error of the side force, and of the error of
+    /// the drag, after a climb (m).
+    pub(super) fn kept_in_climb(&self, climbed: f64) -> [f64; 2] {
+        [self.wind.correlation, self.drag.correlation].map(|length| exp(-climbed.abs() / length))
+    }
+}
+
 /// Returns the gradient of gravity at a position (m), 1/s²: that of a sphere.
 pub(super) fn gravity_gradient(gravitation: f64, position: &Vector3<f64>) -> Matrix3<f64> {
     let radius = position.norm();
@@ -57,16 +77,17 @@ pub(super) fn kept(errors: &Errors, elapsed: f64) -> f64 {
     if errors.correlation > 0.0 { exp(-elapsed / errors.correlation) } else { 1.0 }
 }
 
-/// Returns the covariance after a way, P ← Φ P Φᵀ + Q, with samples of a `period` (s).
+/// Returns the covariance after a way, P ← Φ P Φᵀ + Q.
 pub(super) fn propagated(
     covariance: &Covariance,
     way: &Way,
-    (errors, period, wind): (&[Errors; 2], f64, &Wind),
+    expected: &Expected<'_>,
 ) -> Covariance {
     let Way { time, pushed, attitude, gradient, climbed } = way;
+    let Expected { errors, period, wind, drag } = expected;
     let cross = pushed.cross_matrix();
     let kept_biases = errors.map(|errors| kept(&errors, *time));
-    let kept_wind = exp(-climbed.abs() / wind.correlation);
+    let [kept_wind, kept_drag] = expected.kept_in_climb(*climbed);
     let mut transition = Covariance::identity();
     let mut set = |row: usize, column: usize, block: Matrix3<f64>| {
         transition.fixed_view_mut::<3, 3>(row, column).copy_from(&block);
@@ -82,9 +103,10 @@ pub(super) fn propagated(
     set(ATTITUDE, GYROSCOPE, attitude * -*time);
     set(GYROSCOPE, GYROSCOPE, identity * kept_biases[0]);
     set(ACCELEROMETER, ACCELEROMETER, identity * kept_biases[1]);
-    for i in WIND..STATES {
+    for i in WIND..DRAG {
         transition[(i, i)] = kept_wind;
     }
+    transition[(DRAG, DRAG)] = kept_drag;
     let mut next = transition * covariance * transition.transpose();
     // The spectral density of the noise follows from its deviation at the samples.
     let density = |i: usize| {
@@ -96,7 +118,7 @@ pub(super) fn propagated(
         let deviation = errors[i].instability;
         deviation * deviation * (1.0 - kept_biases[i] * kept_biases[i])
     };
-    let blown = 1.0 - kept_wind * kept_wind;
+    let [blown, renewed] = [kept_wind, kept_drag].map(|kept| 1.0 - kept * kept);
     let added = [
         (POSITION..VELOCITY, by_force * time * time / 3.0),
         (VELOCITY..ATTITUDE, by_force),
@@ -104,7 +126,8 @@ pub(super) fn propagated(
         (GYROSCOPE..ACCELEROMETER, wandered(0)),
         (ACCELEROMETER..WIND, wandered(1)),
         (WIND..SIDE, wind.deviation * wind.deviation * blown),
-        (SIDE..STATES, wind.model * wind.model * blown),
+        (SIDE..DRAG, wind.model * wind.model * blown),
+        (DRAG..STATES, drag.model * drag.model * renewed),
     ];
     for (states, variance) in added {
         for i in states {
@@ -151,6 +174,13 @@ pub(super) fn updated(covariance: &Covariance, all: &[Measured]) -> (Error, Cova
         after -= column * column.transpose() / total;
     }
     (error, symmetric(&after), squares / all.len() as f64)
+}
+
+/// Returns the form of the error that is its part along a direction, from a state on.
+pub(super) fn along(from: usize, direction: &Vector3<f64>) -> Error {
+    let mut row = Error::zeros();
+    row.fixed_rows_mut::<3>(from).copy_from(direction);
+    row
 }
 
 /// Returns the standard deviation of a linear form of the error.

@@ -1,6 +1,6 @@
 //! Navigation of an entry flight: strapdown of the inertial sensors, and a Kalman filter that
-//! corrects it by fixes of satellite navigation and star tracker and finds the wind by the side
-//! force.
+//! corrects it by fixes of satellite navigation and star tracker, finds the wind by the side force,
+//! and keeps the altitude by the drag while there are no fixes.
 //!
 //! The shown state follows the filter's in a smooth way: a correction is blended in over seconds,
 //! so that controllers see an error that drifts instead of one that jumps.
@@ -17,7 +17,7 @@ mod strapdown;
 pub use device::Navigation;
 pub use filter::{Covariance, Error, STATES};
 pub use line::{Health, Line};
-pub use settings::{Alignment, Errors, Fix, Initial, Settings, Trust, Wind};
+pub use settings::{Alignment, Drag, Errors, Fix, Initial, Settings, Trust, Wind};
 pub use shown::{Deviations, Shown};
 pub use strapdown::State;
 
@@ -26,6 +26,7 @@ use running::Running;
 use serde::{Deserialize, Serialize};
 use strapdown::Felt;
 use vehicle::frames::Place;
+use vehicle::math::exp;
 
 /// Time without a sample from which the navigation is lost, s.
 const LOST_AFTER: f64 = 0.5;
@@ -85,6 +86,7 @@ impl Navigation {
         memory.shown.deviations = running.deviations;
         memory.shown.innovations = running.innovations;
         memory.shown.biases = running.biases;
+        memory.shown.drag_ratio = exp(running.drag);
         memory.shown.rejected = running.rejected;
         let felt = Felt { rate: felt.rate + unbiased[0], force: felt.force + unbiased[1] };
         self.show(&mut memory.shown, (time, &state), &felt, wind);

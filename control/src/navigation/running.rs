@@ -1,13 +1,13 @@
 //! The navigation from sample to sample.
 
-use super::air::side_force;
+use super::air::{drag, side_force};
 use super::device::Navigation;
 use super::filter::{
-    ACCELEROMETER, ATTITUDE, Covariance, Error, GYROSCOPE, Measured, POSITION, SIDE, VELOCITY,
-    WIND, Way, gravity_gradient, kept, propagated, updated,
+    ACCELEROMETER, ATTITUDE, Covariance, DRAG, Error, Expected, GYROSCOPE, Measured, POSITION,
+    SIDE, VELOCITY, WIND, Way, gravity_gradient, kept, propagated, updated,
 };
 use super::line::Line;
-use super::settings::{Alignment, Wind};
+use super::settings::{Alignment, Settings};
 use super::shown::Deviations;
 use super::strapdown::{Felt, State, rotation};
 use nalgebra::{UnitQuaternion, Vector3};
@@ -20,8 +20,8 @@ use vehicle::noise::{normal_pair, uniform};
 
 /// Time over which the covariance is propagated at once, s.
 const LONGEST_WAY: f64 = 0.2;
-/// Time between two measurements of the side force, s.
-const SIDE_PERIOD: f64 = 1.0;
+/// Time between two measurements of the air's forces, s.
+const AIR_PERIOD: f64 = 1.0;
 /// Corrections of attitude (rad) and wind (m/s) that are too small to be blended.
 const SMALL_TILT: f64 = 2e-4;
 const SMALL_WIND: f64 = 0.5;
@@ -42,22 +42,33 @@ pub(super) struct Running {
     wind: [f64; 2],
     /// Ratio of the side force to that of the model.
     side: f64,
+    /// Logarithm of the ratio of the drag to that of the model.
+    pub(super) drag: f64,
     pub(super) covariance: Covariance,
     /// Way since the last propagation of the covariance: its duration (s), the change of the
     /// velocity on it (m/s), and the distance from the centre at its beginning (m).
     way: (f64, Vector3<f64>, f64),
     /// What the shown state lacks of the filter's, and its rate.
     offset: [Error; 2],
-    /// Time of the last fix, and of the last measurement of the side force, s.
+    /// Time of the last fix, and of the last measurement of the air's forces, s.
     pub(super) fixed: f64,
-    sideways: f64,
+    felt_air: f64,
     /// Rejections in a row, of satellite navigation and star tracker.
     refused: [u32; 2],
     pub(super) rejected: u32,
     /// Average of the squares of the innovations.
     pub(super) average: f64,
-    pub(super) innovations: [f64; 3],
+    pub(super) innovations: [f64; 4],
     pub(super) deviations: Deviations,
+}
+
+/// Where measurements come from, in the order of the innovations.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Source {
+    Gnss,
+    Star,
+    Side,
+    Drag,
 }
 
 impl Running {
@@ -131,8 +142,13 @@ impl Navigation {
                 covariance[(i, i)] = deviation * deviation;
             }
         }
-        let Wind { deviation, model, .. } = settings.wind;
-        for (i, deviation) in [(WIND, deviation), (WIND + 1, deviation), (SIDE, model)] {
+        let (wind, drag) = (&settings.wind, &settings.drag);
+        for (i, deviation) in [
+            (WIND, wind.deviation),
+            (WIND + 1, wind.deviation),
+            (SIDE, wind.model),
+            (DRAG, drag.model),
+        ] {
             covariance[(i, i)] = deviation * deviation;
         }
         let deviations = self.deviations((line.time, &state), [0.0; 2], &covariance);
@@ -142,15 +158,16 @@ impl Navigation {
             biases: [Vector3::zeros(); 2],
             wind: [0.0; 2],
             side: 1.0,
+            drag: 0.0,
             covariance,
             way: (0.0, Vector3::zeros(), state.position.norm()),
             offset: [Error::zeros(); 2],
             fixed: line.time,
-            sideways: line.time,
+            felt_air: line.time,
             refused: [0; 2],
             rejected: 0,
             average: 1.0,
-            innovations: [0.0; 3],
+            innovations: [0.0; 4],
             deviations,
         }
     }
@@ -170,23 +187,25 @@ impl Navigation {
         self.decay(running, elapsed);
         let by_gnss = line.fixes.gnss.number > before.gnss.number;
         let by_star = line.fixes.star.number > before.star.number;
-        let by_side = line.time - running.sideways >= SIDE_PERIOD - 1e-9;
+        let by_air = line.time - running.felt_air >= AIR_PERIOD - 1e-9;
         let is_due = running.way.0 >= LONGEST_WAY - 1e-9;
-        if !(is_due || by_gnss || by_star || by_side) {
+        if !(is_due || by_gnss || by_star || by_air) {
             return;
         }
         self.propagate(running);
         if by_gnss {
             let measured = self.by_gnss(running, &line.fixes.gnss);
-            self.correct(running, &measured, Some(0));
+            self.correct(running, &measured, Source::Gnss);
         }
         if by_star && let Some(measured) = self.by_star(running) {
-            self.correct(running, &measured, Some(1));
+            self.correct(running, &measured, Source::Star);
         }
-        if by_side {
-            running.sideways = line.time;
-            if let Some(measured) = self.by_side(running) {
-                self.correct(running, &[measured], None);
+        if by_air {
+            running.felt_air = line.time;
+            for source in [Source::Side, Source::Drag] {
+                if let Some(measured) = self.by_air(running, source) {
+                    self.correct(running, &[measured], source);
+                }
             }
         }
         running.deviations =
@@ -205,15 +224,16 @@ impl Navigation {
             gradient: gravity_gradient(self.settings.planet.gravitation, &running.state.position),
             climbed: radius - from,
         };
-        let wind = &self.settings.wind;
-        let expected = (&self.errors, self.settings.period, wind);
-        running.covariance = propagated(&running.covariance, &way, expected);
+        let Settings { period, wind, drag, .. } = &self.settings;
+        let expected = Expected { errors: &self.errors, period: *period, wind, drag };
+        running.covariance = propagated(&running.covariance, &way, &expected);
         for (bias, errors) in running.biases.iter_mut().zip(&self.errors) {
             *bias *= kept(errors, time);
         }
-        let kept = exp(-way.climbed.abs() / wind.correlation);
+        let [kept, kept_drag] = expected.kept_in_climb(way.climbed);
         running.wind = running.wind.map(|part| part * kept);
         running.side = 1.0 + (running.side - 1.0) * kept;
+        running.drag *= kept_drag;
         running.way = (0.0, Vector3::zeros(), radius);
     }
 
@@ -244,30 +264,38 @@ impl Navigation {
         Some(std::array::from_fn(|i| Measured::state(ATTITUDE + i, error[i], noise)))
     }
 
-    /// Returns what the side force shows.
-    fn by_side(&self, running: &Running) -> Option<Measured> {
+    /// Returns what the side force or the drag shows.
+    fn by_air(&self, running: &Running, source: Source) -> Option<Measured> {
+        if source == Source::Drag && self.settings.drag.model == 0.0 {
+            return None;
+        }
         let (motion, to_level) = self.level((running.last.time, &running.state));
+        let altitude = motion[0];
         let [_, air] = self.relative(&running.state, &to_level, running.wind);
-        let mach = air.velocity.norm() / air_anywhere(motion[0]).sound_speed;
         let felt = running.felt(&running.last);
         let force = (&felt.force, self.errors[1].noise);
+        if source == Source::Drag {
+            let up = running.state.position.normalize();
+            return drag(&self.aerodynamics, &air, (altitude, &up), force, running.drag);
+        }
+        let mach = air.velocity.norm() / air_anywhere(altitude).sound_speed;
         side_force(&self.aerodynamics, &air, mach, force, running.side)
     }
 
-    /// Corrects the filter by measurements, those of fixes with their number. The shown state stays
-    /// where it is.
-    fn correct(&self, running: &mut Running, measured: &[Measured], fix: Option<usize>) {
+    /// Corrects the filter by measurements. The shown state stays where it is.
+    fn correct(&self, running: &mut Running, measured: &[Measured], source: Source) {
         let (error, covariance, squares) = updated(&running.covariance, measured);
-        running.innovations[fix.unwrap_or(2)] = squares;
-        if let Some(fix) = fix {
+        let i = source as usize;
+        running.innovations[i] = squares;
+        if matches!(source, Source::Gnss | Source::Star) {
             running.average += (squares.min(self.settings.fix.gate) - running.average) / AVERAGED;
             let is_far = squares > self.settings.fix.gate;
-            if is_far && running.refused[fix] < REJECTIONS {
-                running.refused[fix] += 1;
+            if is_far && running.refused[i] < REJECTIONS {
+                running.refused[i] += 1;
                 running.rejected += 1;
                 return;
             }
-            running.refused[fix] = 0;
+            running.refused[i] = 0;
             running.fixed = running.last.time;
         } else if squares > self.settings.fix.gate {
             return;
@@ -279,11 +307,12 @@ impl Navigation {
         running.biases[1] += part(ACCELEROMETER);
         running.wind = [running.wind[0] + error[WIND], running.wind[1] + error[WIND + 1]];
         running.side += error[SIDE];
+        running.drag += error[DRAG];
         // A corrected altitude is no climb through another wind.
         running.way.2 = running.state.position.norm();
         // Small corrections by the side force always come, and would be late if they were blended.
         let [tilt, wind] = [part(ATTITUDE).norm(), hypot(error[WIND], error[WIND + 1])];
-        if fix.is_some() || tilt > SMALL_TILT || wind > SMALL_WIND {
+        if source != Source::Side || tilt > SMALL_TILT || wind > SMALL_WIND {
             running.offset[0] += error;
         }
     }

@@ -36,6 +36,8 @@ pub struct Settings {
     pub fix: Fix,
     /// Wind by the side force.
     pub wind: Wind,
+    /// Altitude by the drag.
+    pub drag: Drag,
     /// Time in which the shown state follows a correction; 0 for at once.
     #[setting(name = "blend.time", unit = "s", min = 0.0, max = 1e3, nominal = 3.0)]
     pub blend: f64,
@@ -120,6 +122,19 @@ pub struct Wind {
     pub model: f64,
 }
 
+/// Altitude, which is seen by lift and drag: the air thins with it.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Declared)]
+pub struct Drag {
+    /// Relative standard deviation of the product of the air's density and the coefficients of lift
+    /// and drag; 0 leaves the altitude to the other sensors.
+    #[setting(name = "model", min = 0.0, max = 1.0, nominal = 0.1)]
+    pub model: f64,
+    /// Change of the altitude over which the error of this product becomes another one.
+    #[setting(unit = "m", above = 0.0, nominal = 1e4)]
+    #[setting(used_with = "drag.model > 0")]
+    pub correlation: f64,
+}
+
 /// When the navigation counts as healthy.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Declared)]
 pub struct Trust {
@@ -152,6 +167,7 @@ impl Default for Settings {
             },
             fix: Fix { position: 5.0, velocity: 0.1, attitude: 5e-5, gate: 25.0 },
             wind: Wind { deviation: 40.0, correlation: 1e4, model: 0.1 },
+            drag: Drag { model: 0.15, correlation: 2e4 },
             blend: 3.0,
             health: Trust { deviation: 1_f64.to_radians(), after: 5.0 },
         }

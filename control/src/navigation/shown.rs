@@ -3,7 +3,7 @@
 
 use super::air::Relative;
 use super::device::Navigation;
-use super::filter::{self, Covariance, Error};
+use super::filter::{self, Covariance, Error, along};
 use super::strapdown::{Felt, State};
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
@@ -27,6 +27,10 @@ pub struct Deviations {
     pub velocity: f64,
     /// Of the wind to the north and to the east, m/s.
     pub wind: [f64; 2],
+    /// Of the altitude, m.
+    pub altitude: f64,
+    /// Of the ratio of the drag to that of the model, relative to it.
+    pub drag: f64,
 }
 
 /// The navigated state.
@@ -51,10 +55,12 @@ pub struct Shown {
     /// Standard deviations that the filter predicts.
     pub deviations: Deviations,
     /// Squares of the normalised innovations per component, of the latest fix of satellite
-    /// navigation and star tracker and of the latest side force; they are 1 on average.
-    pub innovations: [f64; 3],
+    /// navigation and star tracker and of the latest side force and drag; they are 1 on average.
+    pub innovations: [f64; 4],
     /// Estimated biases of gyroscope (rad/s) and accelerometer (m/s²).
     pub biases: [Vector3<f64>; 2],
+    /// Estimated ratio of lift and drag to those of the model in the standard atmosphere.
+    pub drag_ratio: f64,
     /// Number of fixes that were rejected.
     pub rejected: u32,
 }
@@ -100,12 +106,15 @@ impl Navigation {
         };
         let [ground, air] = self.relative(at.1, &self.level(at).1, wind);
         let [alpha, beta] = ground.rows();
+        let altitude = along(filter::POSITION, &at.1.position.normalize());
         Deviations {
             angles: Vector3::new(of(&alpha), of(&beta), of(&ground.bank_row())),
             flow: air.rows().map(|row| of(&row)),
             position: per_axis(filter::POSITION),
             velocity: per_axis(filter::VELOCITY),
             wind: [0, 1].map(|i| covariance[(filter::WIND + i, filter::WIND + i)].max(0.0).sqrt()),
+            altitude: of(&altitude),
+            drag: covariance[(filter::DRAG, filter::DRAG)].max(0.0).sqrt(),
         }
     }
 

@@ -12,7 +12,8 @@ use vehicle::entry::{Config, Deviations, End, Following, Prescribed, Trim};
 use vehicle::fixes::Devices;
 use vehicle::frames::Place;
 use vehicle::kinematics::Kinematics;
-use vehicle::noise::uniform;
+use vehicle::math::exp;
+use vehicle::noise::{normal_pair, uniform};
 use vehicle::plant::{Input, Plant, state};
 use vehicle::scenario::Scenario;
 use vehicle::sensor_data::SensorData;
@@ -21,6 +22,8 @@ use vehicle::translation::Planet;
 use vehicle::triad::Window;
 
 const PERIOD: f64 = guidance::PERIOD;
+/// Altitudes at which the air is known, m: most of them are in the blackout.
+const ALTITUDES: [f64; ROWS] = [20e3, 45e3, 55e3, 65e3, 75e3, 85e3];
 
 /// An entry flight with its sensors.
 #[derive(Clone, Debug)]
@@ -31,6 +34,8 @@ pub(crate) struct Case {
     pub(crate) seed: u64,
     /// Wind to the north and to the east at 20, 60 and 100 km, m/s.
     pub(crate) wind: [[f64; 2]; 3],
+    /// Ratio of the density to that of the standard atmosphere at [`ALTITUDES`].
+    pub(crate) density: [f64; ROWS],
     pub(crate) deviations: Deviations,
     /// Ticks from one time at which it is seen to the next.
     pub(crate) every: u64,
@@ -48,10 +53,27 @@ impl Case {
             stars,
             seed,
             wind: [[0.0; 2]; 3],
+            density: [1.0; ROWS],
             deviations: Deviations::default(),
             every: 25,
             settings,
         }
+    }
+
+    /// Density that departs from the standard atmosphere as the filter expects, by a factor that
+    /// becomes another one over the altitude.
+    pub(crate) fn in_other_air(mut self) -> Self {
+        let draws: [f64; ROWS] = uniform(self.seed, 98);
+        let normal = [0, 2, 4].map(|i| normal_pair([draws[i], draws[i + 1]]));
+        let expected = self.settings.drag;
+        let mut error = 0.0;
+        for (i, draw) in normal.as_flattened().iter().enumerate() {
+            let climb = if i == 0 { f64::INFINITY } else { ALTITUDES[i] - ALTITUDES[i - 1] };
+            let kept = exp(-climb / expected.correlation);
+            error = kept * error + (1.0 - kept * kept).sqrt() * expected.model * draw;
+            self.density[i] = exp(error);
+        }
+        self
     }
 
     /// Tactical sensors in winds up to some 60 m/s, with lift and drag wrong by up to 10 %.
@@ -81,11 +103,16 @@ pub(crate) struct Figures {
     /// Square of the error of the sideslip relative to the air below Mach 5, its predicted
     /// variance, and their number.
     slow: [f64; 3],
+    /// The same of the altitude at the end of the blackout, m².
+    altitude: [f64; 3],
+    /// Square of the normalised error of the altitude in the blackout, and the number.
+    high: [f64; 2],
 }
 
 impl Figures {
     pub(crate) fn of(case: &Case) -> Self {
         let mut sum = Self::default();
+        let mut last = [0.0; 3];
         fly(case, |seen| {
             sum.count += 1.0;
             for i in 0..5 {
@@ -104,12 +131,19 @@ impl Figures {
                 sum.innovations[0] += seen.innovations[0];
                 sum.innovations[1] += 1.0;
             }
+            let [error, predicted] = seen.altitude_error;
+            if (45.1e3..85e3).contains(&seen.altitude) {
+                last = [error * error, predicted * predicted, 1.0];
+                sum.high[0] += error * error / (predicted * predicted);
+                sum.high[1] += 1.0;
+            }
             if seen.mach < 5.0 {
                 sum.slow[0] += seen.errors[4] * seen.errors[4];
                 sum.slow[1] += seen.predicted[4] * seen.predicted[4];
                 sum.slow[2] += 1.0;
             }
         });
+        sum.altitude = last;
         sum
     }
 
@@ -122,9 +156,11 @@ impl Figures {
         self.normalised += other.normalised;
         for i in 0..2 {
             self.innovations[i] += other.innovations[i];
+            self.high[i] += other.high[i];
         }
         for i in 0..3 {
             self.slow[i] += other.slow[i];
+            self.altitude[i] += other.altitude[i];
         }
         self
     }
@@ -145,6 +181,17 @@ impl Figures {
 
     pub(crate) fn innovation(&self) -> f64 {
         self.innovations[0] / self.innovations[1]
+    }
+
+    /// Root mean squares of the error of the altitude at the end of the blackout and of what the
+    /// filter predicts of it, m.
+    pub(crate) fn altitude(&self) -> [f64; 2] {
+        [0, 1].map(|i| (self.altitude[i] / self.altitude[2]).sqrt())
+    }
+
+    /// Mean square of the normalised error of the altitude in the blackout.
+    pub(crate) fn normalised_altitude(&self) -> f64 {
+        self.high[0] / self.high[1]
     }
 
     /// Error of the sideslip relative to the air below Mach 5, rad.
@@ -171,20 +218,23 @@ pub(crate) struct Seen {
     /// Error of the filter in position, velocity and attitude, and its covariance.
     pub(crate) error: SVector<f64, 9>,
     pub(crate) covariance: SMatrix<f64, 9, 9>,
-    pub(crate) innovations: [f64; 3],
+    /// Shown less true altitude, and its predicted standard deviation, m.
+    pub(crate) altitude_error: [f64; 2],
+    pub(crate) innovations: [f64; 4],
     pub(crate) health: navigation::Health,
 }
 
 /// Returns the entry flight of a case, and the plant with its sensors.
 fn vehicle(case: &Case) -> (Config, vehicle::plant::Config) {
     let initial = case.settings.initial;
-    let mut air = Air { rows: 3, ..Air::default() };
-    for (row, (altitude, wind)) in
-        air.profile.iter_mut().zip([20e3, 60e3, 100e3].into_iter().zip(case.wind))
-    {
-        *row = Row { altitude, density: 1.0, wind };
+    let mut air = Air { rows: ROWS, ..Air::default() };
+    for (i, row) in air.profile.iter_mut().enumerate() {
+        let altitude = ALTITUDES[i];
+        let share = (altitude - 20e3) / 40e3;
+        let [below, above] = if share < 1.0 { [0, 1] } else { [1, 2] }.map(|at| case.wind[at]);
+        let wind = [0, 1].map(|part| below[part] + share.fract() * (above[part] - below[part]));
+        *row = Row { altitude, density: case.density[i], wind };
     }
-    assert!(air.rows <= ROWS);
     let entry = Config {
         planet: Planet::EARTH,
         aerodynamics: Aerodynamics::papers(),
@@ -280,6 +330,7 @@ pub(crate) fn fly(case: &Case, mut see: impl FnMut(&Seen)) {
                 ],
                 error: error.fixed_rows::<9>(0).into(),
                 covariance: covariance.fixed_view::<9, 9>(0, 0).into(),
+                altitude_error: [shown.motion[0] - altitude, shown.deviations.altitude],
                 innovations: shown.innovations,
                 health: memory.health,
             });
