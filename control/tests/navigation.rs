@@ -45,7 +45,8 @@ fn regress_wind_is_found_by_the_side_force() {
 }
 
 /// The altitude at the end of the blackout is known by the drag as well as the filter says, in air
-/// that departs from the standard atmosphere as it expects: a third of the 3 km without the drag.
+/// that departs from the standard atmosphere as it expects, and better than without the drag: 0.6
+/// km instead of 0.9 km in calm air, and 0.8 km instead of 1.8 km in wind.
 #[test]
 fn oracle_the_drag_shows_the_altitude_in_other_air() {
     for (windy, seeds) in [(false, 500..530), (true, 540..560)] {
@@ -63,7 +64,8 @@ fn oracle_the_drag_shows_the_altitude_in_other_air() {
             },
             seeds.start..seeds.start + 10,
         );
-        assert!(without.altitude().iter().all(|altitude| *altitude > 2e3), "{without:?}");
+        let gain = if windy { 2.0 } else { 1.3 };
+        assert!(without.altitude()[1] > gain * predicted, "{without:?}");
     }
 }
 
