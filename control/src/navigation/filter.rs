@@ -159,6 +159,11 @@ impl Measured {
         row[state] = 1.0;
         Self { row, residual, variance: deviation * deviation }
     }
+
+    /// Returns whether all of it are numbers: at rest, or without air, a force shows nothing.
+    pub(super) fn is_finite(&self) -> bool {
+        self.row.iter().chain([&self.residual, &self.variance]).all(|value| value.is_finite())
+    }
 }
 
 /// Returns the error that follows from measurements, its covariance, and the square of the

@@ -203,7 +203,8 @@ impl Navigation {
         if by_air {
             running.felt_air = line.time;
             for source in [Source::Side, Source::Drag] {
-                if let Some(measured) = self.by_air(running, source) {
+                let measured = self.by_air(running, source).filter(Measured::is_finite);
+                if let Some(measured) = measured {
                     self.correct(running, &[measured], source);
                 }
             }
