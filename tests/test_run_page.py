@@ -125,11 +125,11 @@ def test_panels_are_looked_at_closely_together(runs, opened):
     page.mouse.down()
     page.mouse.move(box["x"] + 0.6 * box["width"], box["y"] + 60, steps=5)
     page.mouse.up()
-    shown = page.locator(".panel svg[role=img] text").all_inner_texts()
+    shown = page.locator(".panel svg[role=img] text").all_text_contents()
     ends = [text for text in shown if text.endswith(" s")]
     assert len(set(ends)) == 1 and ends[0] != "50 s"
     panel.dblclick()
-    assert page.locator(".panel svg[role=img] text").all_inner_texts().count("50 s") == 4
+    assert page.locator(".panel svg[role=img] text").all_text_contents().count("50 s") == 4
 
 
 def test_keys_play_and_seek(runs, opened):

@@ -75,6 +75,9 @@ class Proof {
     $("assumed").value = chosen === 2 ? acting : assumed;
     $("bound-of").textContent = chosen === 2 ? "Disturbance that acts" : "Disturbance, acting and assumed";
     $("bound-value").textContent = `${(chosen === 2 ? acting : assumed).toFixed(2)} deg/s²`;
+    const percent = (ratio) => `${(100 * ratio).toFixed(0)} %`;
+    const used = ({ rate_ratio, moment_ratio }) => `${percent(rate_ratio)} of the rate limit and ${percent(moment_ratio)} of the moment limit`;
+    $("versus").textContent = `${flight.name.split(" with ")[0]} takes ${used(summary)}${ghost ? `; ${ghost.name}, under the same disturbance, ${used(ghost.summary)}` : ""}.`;
     this.assumed = assumed;
     this.limits = limits;
     this.point(time);
