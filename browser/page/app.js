@@ -8,7 +8,7 @@ const $ = (id) => document.getElementById(id);
 const DEG = 180 / Math.PI;
 // Panels: heading, unit, name of the norm that has a limit, and names of the curves.
 const PANELS = {
-  loads: ["Loads", "share of the limit", null, ["heat flux", "load", "dynamic pressure"]],
+  loads: ["Loads over their limits", "", null, ["heat flux", "load", "dynamic pressure"]],
   attitude: ["Attitude", "deg", null, ["α", "β", "σ"]],
   error: ["Tracking error", "deg", null, ["α", "β", "σ"]],
   rate: ["Body rates", "deg/s", "‖ω‖", ["p", "q", "r"]],

@@ -45,7 +45,7 @@ function ask(given, moment) {
 
 // What the page says of a fault of its law, with the line if the browser tells it.
 function told(error) {
-  const line = /own-law\.js:(\d+)/.exec(error?.stack ?? "")?.[1];
+  const line = /own-law\.js:(\d+)/.exec(error?.stack ?? "")?.[1] ?? (error?.fileName?.includes("own-law.js") ? error.lineNumber : null);
   return { error: `your law${line ? `, line ${line}` : ""}: ${error?.message ?? error}`, line: Number(line) || null, isSyntax: error instanceof SyntaxError };
 }
 

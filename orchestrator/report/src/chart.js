@@ -141,7 +141,7 @@ class Chart {
       this.legend.replaceChildren(
         ...valued.map((curve, i) => this.entry(this.style(curve), curve.name, this.written[i])),
         ...[...references].map(([name, curve]) => this.entry(this.style(curve), name)),
-        ...limits.map(({ name, value }) => this.entry(Chart.LIMIT, `${name} ${minus(String(Number(value.toPrecision(4))))}`)),
+        ...limits.map(({ name, value }) => this.entry(Chart.LIMIT, `${name}: ${minus(String(Number(value.toPrecision(4))))} ${unit}`)),
       );
     }
     this.outputs = valued.map((curve, i) => [curve, this.written[i]]);
