@@ -59,7 +59,7 @@ def navigated(run: dict[str, np.ndarray]) -> None:
     """Errors of the navigation with what it predicts of them."""
     time = run["time"]
     names = {"attitude.sigma": "bank angle", "flow.alpha": "angle of attack, air", "flow.beta": "sideslip, air"}
-    figure, axes = plt.subplots(4, 1, figsize=(9, 9), sharex=True, layout="constrained")
+    figure, axes = plt.subplots(5, 1, figsize=(9, 11), sharex=True, layout="constrained")
     height = run["plant.motion.altitude"] / 1e3
     for one in axes:
         one.axvspan(time[height < 85][0], time[height < 45][0], color="0.93", lw=0)
@@ -71,6 +71,10 @@ def navigated(run: dict[str, np.ndarray]) -> None:
         one.plot(time, np.degrees(np.angle(np.exp(1j * error))), label="error")
         one.set(ylabel="deg", title=title)
     axes[0].legend(loc="upper left", ncols=2)
+    altitude, deviation = axes[3], run["navigation.deviation.altitude"] / 1e3
+    altitude.fill_between(time, -2 * deviation, 2 * deviation, color="#56b4e9", alpha=0.4, lw=0)
+    altitude.plot(time, run["navigation.motion.altitude"] / 1e3 - height)
+    altitude.set(ylabel="km", title="altitude")
     wind = axes[-1]
     for part in ("north", "east"):
         wind.plot(time, run[f"navigation.wind.{part}"], label=f"to the {part}")
