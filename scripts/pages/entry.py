@@ -24,6 +24,10 @@ plt.rcParams["axes.prop_cycle"] = plt.cycler(
 LIMIT = {"color": "#5b6875", "ls": "--"}
 
 
+# Above the axes, where no curve is.
+LEGEND = {"loc": "lower right", "bbox_to_anchor": (1.0, 1.0), "borderaxespad": 0.2, "frameon": False, "fontsize": "small"}
+
+
 def read(path: str) -> dict[str, np.ndarray]:
     with open(path, newline="") as file:
         rows = list(csv.DictReader(file))
@@ -37,7 +41,7 @@ def actuated(run: dict[str, np.ndarray]) -> None:
     pressure.semilogy(time, run["plant.flight.standardDynamicPressure"])
     pressure.axhline(500.0, **LIMIT, label="selector")
     pressure.set(ylabel="dynamic pressure, Pa")
-    pressure.legend()
+    pressure.legend(**LEGEND)
     duties = [run[f"allocator.jet[{j}]"] for j in range(1, 11)]
     jets.plot(time, np.sum(duties, axis=0))
     jets.set(ylabel="jets, sum of duties")
@@ -45,11 +49,11 @@ def actuated(run: dict[str, np.ndarray]) -> None:
     for i, name in enumerate(names, start=1):
         surfaces.plot(time, np.degrees(run[f"plant.deflection[{i}]"]), label=name)
     surfaces.set(ylabel="deflection, deg")
-    surfaces.legend(ncols=3, fontsize="small")
+    surfaces.legend(ncols=6, **LEGEND)
     for axis, name in zip("xyz", ("roll", "pitch", "yaw")):
         moment.plot(time, run[f"plant.appliedMoment.{axis}"] / 1e3, label=name)
     moment.set(xlabel="time, s", ylabel="moment, kN m")
-    moment.legend(ncols=3)
+    moment.legend(ncols=3, **LEGEND)
     for one in (pressure, jets, surfaces, moment):
         one.grid(alpha=0.3)
     figure.savefig(f"{IMAGES}/entry-actuators.png", dpi=90)
@@ -69,20 +73,23 @@ def navigated(run: dict[str, np.ndarray]) -> None:
         deviation = np.degrees(run[f"navigation.deviation.{name}"])
         one.fill_between(time, -2 * deviation, 2 * deviation, color="#56b4e9", alpha=0.4, lw=0, label="twice the predicted deviation")
         one.plot(time, np.degrees(np.angle(np.exp(1j * error))), label="error")
-        one.set(ylabel="deg", title=title)
-    axes[0].legend(loc="upper left", ncols=2)
+        one.set(ylabel="deg")
+        one.set_title(title, loc="left")
+    axes[0].legend(ncols=2, **LEGEND)
     altitude, deviation = axes[3], run["navigation.deviation.altitude"] / 1e3
     altitude.fill_between(time, -2 * deviation, 2 * deviation, color="#56b4e9", alpha=0.4, lw=0)
     altitude.plot(time, run["navigation.motion.altitude"] / 1e3 - height)
-    altitude.set(ylabel="km", title="altitude")
+    altitude.set(ylabel="km")
+    altitude.set_title("altitude", loc="left")
     wind = axes[-1]
     for part in ("north", "east"):
         wind.plot(time, run[f"navigation.wind.{part}"], label=f"to the {part}")
     low, high = np.interp(height, [20, 60, 100], [40, 20, 0]), np.interp(height, [20, 60, 100], [-30, 10, 0])
     wind.plot(time, low, **LIMIT, label="true")
     wind.plot(time, high, **LIMIT)
-    wind.set(xlabel="time, s", ylabel="m/s", title="wind; without satellite navigation where it is grey")
-    wind.legend(loc="lower left", ncols=3)
+    wind.set(xlabel="time, s", ylabel="m/s")
+    wind.set_title("wind; without satellite navigation where it is grey", loc="left")
+    wind.legend(ncols=3, **LEGEND)
     figure.savefig(f"{IMAGES}/entry-navigation.png", dpi=90)
 
 
