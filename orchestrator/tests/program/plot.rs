@@ -9,6 +9,7 @@ const PANELS: &str = r#"
 [observe]
 panels = [{ name = "integral", limit = "gain.gain", curves = [
     { name = "alpha", of = "plant.output.integral", reference = "gain.output.direct" },
+    { name = "again", of = "plant.output.integral" },
 ] }]
 [observe.vehicle]
 attitude = ["plant.output.integral", "gain.output.direct", "plant.output.integral"]
@@ -66,7 +67,7 @@ fn a_run_is_drawn_as_its_experiment_says_or_as_it_is_asked_for() {
         assert_eq!(picture.matches(&format!(">{text}</text>")).count(), count, "{text}: {picture}");
     }
     let picture = plotted(&bench, &["a", "b", "--out", "both.svg"]);
-    for name in ["limit of norm, a", "limit of norm, b", "reference", "reference, b"] {
+    for name in ["limit of norm, a", "limit of norm, b", "reference", "reference of α, b"] {
         assert_eq!(picture.matches(&format!(">{name}</text>")).count(), 1, "{name}: {picture}");
     }
     let (code, said, errors) = bench.call(&["plot", "a", "b", "--out", "both.png"]);
@@ -91,15 +92,15 @@ fn oracle_the_numbers_of_a_page_are_those_of_the_runs() {
     assert_eq!(data["runs"][0]["time"], serde_json::json!([0, 1, 2, 3]));
     // Doubled at each tick, and half as much again; the norms have a panel of their own.
     assert_eq!(values(0, 0), [1.0, 2.0, 4.0, 8.0]);
-    assert_eq!(values(0, 2), [1.0, 1.5, 2.25, 3.375]);
-    assert_eq!(values(1, 1), values(0, 2));
+    assert_eq!(values(0, 3), [1.0, 1.5, 2.25, 3.375]);
+    assert_eq!(values(1, 1), [1.4142, 2.1213, 3.182, 4.773]);
     // Limits and references differ between the runs.
     let limits = serde_json::json!([
         { "name": "limit of norm, a", "value": 1 }, { "name": "limit of norm, b", "value": 0.5 },
     ]);
     assert_eq!(data["panels"][1]["limits"], limits);
-    assert_eq!(data["panels"][0]["curves"][3]["name"], "reference, b");
-    assert_eq!(values(0, 3), [0.5, 0.75, 1.125, 1.125]);
+    assert_eq!(data["panels"][0]["curves"][4]["name"], "reference of α, b");
+    assert_eq!(values(0, 4), [0.5, 0.75, 1.125, 1.125]);
     assert_eq!(data["runs"][1]["vehicle"]["angles"][0][2], 2.25);
     // At the stop time, a response is that of the step before.
     assert_eq!(

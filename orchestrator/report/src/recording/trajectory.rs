@@ -52,7 +52,7 @@ pub fn panels(runs: &[Recording], names: &[String]) -> Vec<Panel> {
     });
     let flights: Vec<_> = flights.collect();
     let Some((run, first, ..)) = flights.first() else { return Vec::new() };
-    let (mut energy, mut track) = (corridor(run, first), Vec::new());
+    let (mut energy, mut track) = (corridor(run, first, runs.len() == 1), Vec::new());
     for (run, flight, name, color) in &flights {
         let line = |[x, y]: &[Vec<f64>; 2]| {
             Curve::new(name, *color, Shape::Patterned(0), x.clone(), y.clone())
@@ -93,14 +93,16 @@ fn values(run: &Recording, path: &str, rows: &[usize], factor: f64) -> Option<Ve
 /// Returns the curves that bound the corridor of a flight, as far as their variables are recorded.
 /// The density at which a quantity has its limit follows from the flight's own values, and the
 /// altitude of this density from the air through which it flew.
-fn corridor(run: &Recording, flight: &Flight) -> Vec<Curve> {
+fn corridor(run: &Recording, flight: &Flight, is_alone: bool) -> Vec<Curve> {
     let Some(named) = &run.observe.trajectory else { return Vec::new() };
     let at = |path: &str| values(run, path, &flight.rows, 1.0);
     let Some(density) = named.density.as_deref().and_then(at) else { return Vec::new() };
     let air = Air::new(&density, &flight.energy[1]);
     let mut curves = Vec::new();
     let mut add = |name: &str, densities: Vec<f64>, shape| {
-        let color = Color::CURVES[curves.len() % Color::CURVES.len()];
+        let own = Color::CURVES[curves.len() % Color::CURVES.len()];
+        // The colours of several runs distinguish these.
+        let color = if is_alone { own } else { Color::LIMIT };
         let altitude = densities.into_iter().map(|density| air.altitude(density)).collect();
         curves.push(Curve::new(name, color, shape, flight.energy[0].clone(), altitude));
     };

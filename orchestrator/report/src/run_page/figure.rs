@@ -36,7 +36,7 @@ fn arranged(runs: &[Recording], panels: &[Panel], flights: Vec<figure::Panel>) -
 }
 
 /// Returns the names of the runs in legends: numbers if the names are too long for them.
-pub(super) fn names(runs: &[Recording]) -> Vec<String> {
+fn names(runs: &[Recording]) -> Vec<String> {
     let fits = runs.iter().all(|run| run.name.chars().count() <= NAME);
     let name = |(place, run): (usize, &Recording)| {
         if fits { run.name.clone() } else { format!("({})", place + 1) }

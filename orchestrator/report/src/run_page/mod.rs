@@ -152,7 +152,8 @@ fn guarantee() -> Markup {
 
 /// Returns altitude over speed and the ground track, if they are recorded.
 fn flight(runs: &[Recording]) -> Markup {
-    let panels = trajectory::panels(runs, &figure::names(runs));
+    let names: Vec<String> = runs.iter().map(|run| run.name.clone()).collect();
+    let panels = trajectory::panels(runs, &names);
     let drawn = |panel: crate::figure::Panel| {
         let title = panel.title.clone();
         let (panels, legend) = (vec![panel], Legend::Each);
