@@ -94,9 +94,10 @@ fmu_folder() {
     if [[ $1 == fmu_plant_library ]]; then echo fmu-plant; else echo fmu-controller; fi
 }
 
-# Packs every FMU of the libraries in the folder $1 into the folder $2, together with their builds for
-# other platforms in the folders $also, if that is set. Further arguments go to fmu-pack, which runs in
-# the folder with the icons: paths among them are relative to that folder.
+# Packs every FMU of the libraries in the folder $1 into the folder $2, and for FMI 3.0 into fmi3
+# below it, together with their builds for other platforms in the folders $also, if that is set.
+# Further arguments go to fmu-pack, which runs in the folder with the icons: paths among them are
+# relative to that folder.
 pack_fmus() {
     say "Packing the FMUs"
     local name library licence folder others licences=()

@@ -37,7 +37,9 @@ impl ModelDescription {
         {
             return Some("the default experiment holds a number that is not finite".into());
         }
-        let mut names = HashSet::new();
+        // FMI 3.0 has the time as a variable.
+        let time = String::from("time");
+        let mut names = HashSet::from([&time]);
         let mut derived = HashSet::new();
         let mut units: HashMap<&str, &Unit> = HashMap::new();
         let mut enumerations: HashMap<&str, &EnumerationType> = HashMap::new();

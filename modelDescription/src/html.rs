@@ -1,7 +1,7 @@
 //! The page `documentation/index.html` of an FMU, made from its description.
 
 use crate::variable::{Causality, Variable, VariableKind};
-use crate::{AUTHOR, LICENSE, ModelDescription};
+use crate::{AUTHOR, LICENSE, ModelDescription, Version};
 use quick_xml::escape::escape;
 use std::fmt::Write;
 
@@ -25,18 +25,22 @@ impl ModelDescription {
     ///
     /// # Panics
     /// This never panics, because writing to a string does not fail.
-    pub fn to_html(&self) -> String {
+    pub fn to_html(&self, version: Version) -> String {
         let mut page = String::new();
-        self.write_html(&mut page).expect("writing to a string");
+        self.write_html(&mut page, version).expect("writing to a string");
         page
     }
 
-    fn write_html(&self, page: &mut String) -> std::fmt::Result {
+    fn write_html(&self, page: &mut String, version: Version) -> std::fmt::Result {
         let name = escape(&self.name);
         let interface = match (self.co_simulation, self.model_exchange) {
             (true, true) => "co-simulation and model exchange",
             (true, false) => "co-simulation",
             (false, _) => "model exchange",
+        };
+        let (standard, identity) = match version {
+            Version::Fmi2 => ("FMI 2.0", "GUID"),
+            Version::Fmi3 => ("FMI 3.0", "Instantiation token"),
         };
         let experiment = self.default_experiment;
         write!(
@@ -45,8 +49,8 @@ impl ModelDescription {
              <meta name=\"viewport\" content=\"width=device-width,initial-scale=1\">\n\
              <title>{name}</title>\n<style>\n{STYLE}</style>\n</head>\n<body>\n\
              <h1>{name}</h1>\n<p class=\"lead\">{}</p>\n\
-             <dl>\n<dt>Interface</dt><dd>FMI 2.0, {interface}</dd>\n<dt>Version</dt><dd>{}</dd>\n\
-             <dt>GUID</dt><dd><code>{}</code></dd>\n\
+             <dl>\n<dt>Interface</dt><dd>{standard}, {interface}</dd>\n<dt>Version</dt><dd>{}</dd>\n\
+             <dt>{identity}</dt><dd><code>{}</code></dd>\n\
              <dt>Default experiment</dt><dd>{} s to {} s, communication step {} s</dd>\n</dl>\n\
              {}\n",
             escape(&self.description),

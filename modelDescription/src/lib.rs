@@ -1,5 +1,5 @@
-//! Description of an FMI 2.0 FMU as data, the XML made from it, and the packing of the archives
-//! (feature `pack`). The crate knows no physics.
+//! Description of an FMU as data, the XML of FMI 2.0 and 3.0 made from it, and the packing of the
+//! archives (feature `pack`). The crate knows no physics.
 
 pub mod check;
 pub mod condition;
@@ -22,6 +22,26 @@ use sha2::{Digest, Sha256};
 use std::fmt::Write;
 use std::path::PathBuf;
 use variable::Variable;
+
+/// Version of FMI of an archive, or for which an instance was made.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Version {
+    /// FMI 2.0.
+    Fmi2,
+    /// FMI 3.0. The time is its variable 0, then come those of the variable table, then the event
+    /// indicators.
+    Fmi3,
+}
+
+impl Version {
+    /// Returns the value reference of the first variable of the variable table.
+    pub fn first_reference(self) -> usize {
+        match self {
+            Self::Fmi2 => 0,
+            Self::Fmi3 => 1,
+        }
+    }
+}
 
 /// Author of the FMUs, as `modelDescription.xml` names them.
 pub const AUTHOR: &str = "Re-entry Attitude Control contributors";

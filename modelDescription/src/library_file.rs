@@ -15,8 +15,10 @@ use std::str;
 pub struct LibraryFile {
     /// Path of the file.
     pub path: PathBuf,
-    /// Names of its folders below `binaries/` in an archive.
+    /// Names of its folders below `binaries/` in an archive of FMI 2.0.
     pub folders: &'static [&'static str],
+    /// Platform tuples of FMI 3.0, one for each architecture, which are its folders there.
+    pub tuples: Vec<&'static str>,
     /// Suffix of its file name in an archive.
     pub suffix: &'static str,
     /// Names of the exported functions.
@@ -48,18 +50,19 @@ impl LibraryFile {
     /// Reads the library at `path`. A library for macOS may hold several architectures.
     ///
     /// # Errors
-    /// Reports a file that cannot be read, is not a library for a platform that FMI 2.0 defines,
-    /// or needs libraries that a bare system lacks.
+    /// Reports a file that cannot be read, is not a library for a platform that FMI defines, or needs libraries that a bare system lacks.
     pub fn read(path: &Path) -> Result<Self, Error> {
         let bytes =
             std::fs::read(path).map_err(|source| Error::File { path: path.to_owned(), source })?;
         let fault = |problem| Error::Library { path: path.to_owned(), problem };
         let slices = slices(&bytes).map_err(|error| fault(error.to_string()))?;
         let mut parts = slices.iter().map(|slice| Self::from_slice(path, slice).map_err(fault));
-        let first =
+        let mut first =
             parts.next().unwrap_or_else(|| Err(fault("the file holds no library".into())))?;
         for part in parts {
-            if part? != first {
+            let part = part?;
+            first.tuples.extend(&part.tuples);
+            if (Self { tuples: first.tuples.clone(), ..part }) != first {
                 return Err(fault("its architectures differ in sources or exports".into()));
             }
         }
@@ -68,7 +71,7 @@ impl LibraryFile {
 
     fn from_slice(path: &Path, bytes: &[u8]) -> Result<Self, String> {
         let file = File::parse(bytes).map_err(|error| error.to_string())?;
-        let (folders, suffix, bare) = platform(&file)?;
+        let (folders, tuple, suffix, bare) = platform(&file)?;
         let needed = needed(&file, bytes).map_err(|error| error.to_string())?;
         let foreign = |name: &&String| !bare.iter().any(|prefix| name.starts_with(prefix));
         if let Some(name) = needed.iter().find(foreign) {
@@ -77,6 +80,7 @@ impl LibraryFile {
         Ok(Self {
             path: path.to_owned(),
             folders,
+            tuples: vec![tuple],
             suffix,
             exports: exports(&file).map_err(|error| error.to_string())?,
             sources: sources(&file).map_err(|error| error.to_string())?,
@@ -85,7 +89,7 @@ impl LibraryFile {
 }
 
 /// Returns the libraries of each architecture in a file.
-fn slices(bytes: &[u8]) -> object::Result<Vec<&[u8]>> {
+pub(crate) fn slices(bytes: &[u8]) -> object::Result<Vec<&[u8]>> {
     if FileKind::parse(bytes)? == FileKind::MachOFat32 {
         let fat = MachOFatFile32::parse(bytes)?;
         return fat.arches().iter().map(|slice| slice.data(bytes)).collect();
@@ -93,19 +97,22 @@ fn slices(bytes: &[u8]) -> object::Result<Vec<&[u8]>> {
     Ok(vec![bytes])
 }
 
-type Platform = (&'static [&'static str], &'static str, &'static [&'static str]);
+type Platform = (&'static [&'static str], &'static str, &'static str, &'static [&'static str]);
 
-/// Returns the platform's folders and file suffix, and the libraries that its systems have.
+/// Returns the platform's folders, tuple and file suffix, and the libraries that its systems have.
 fn platform(file: &File) -> Result<Platform, String> {
     use Architecture::{Aarch64, I386, X86_64};
     Ok(match (file.format(), file.architecture()) {
-        (BinaryFormat::Elf, X86_64) => (&["linux64"], "so", LINUX),
-        (BinaryFormat::Elf, I386) => (&["linux32"], "so", LINUX),
+        (BinaryFormat::Elf, X86_64) => (&["linux64"], "x86_64-linux", "so", LINUX),
+        (BinaryFormat::Elf, I386) => (&["linux32"], "x86-linux", "so", LINUX),
         // FMI 2.0 has no name for this platform: some importers use one, some the other.
-        (BinaryFormat::Elf, Aarch64) => (&["aarch64-linux", "linux64"], "so", LINUX),
-        (BinaryFormat::Pe, X86_64) => (&["win64"], "dll", WINDOWS),
-        (BinaryFormat::Pe, I386) => (&["win32"], "dll", WINDOWS),
-        (BinaryFormat::MachO, X86_64 | Aarch64) => (&["darwin64"], "dylib", MACOS),
+        (BinaryFormat::Elf, Aarch64) => {
+            (&["aarch64-linux", "linux64"], "aarch64-linux", "so", LINUX)
+        }
+        (BinaryFormat::Pe, X86_64) => (&["win64"], "x86_64-windows", "dll", WINDOWS),
+        (BinaryFormat::Pe, I386) => (&["win32"], "x86-windows", "dll", WINDOWS),
+        (BinaryFormat::MachO, X86_64) => (&["darwin64"], "x86_64-darwin", "dylib", MACOS),
+        (BinaryFormat::MachO, Aarch64) => (&["darwin64"], "aarch64-darwin", "dylib", MACOS),
         (format, architecture) => {
             return Err(format!("FMI 2.0 has no folder for {architecture:?} ({format:?})"));
         }

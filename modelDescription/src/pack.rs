@@ -1,8 +1,8 @@
 //! Packing of an FMU's archive. The same input gives the same bytes, because entries are
 //! sorted and times and permissions are fixed.
 
-use crate::library_file::LibraryFile;
-use crate::{Error, LICENSE, ModelDescription};
+use crate::library_file::{LibraryFile, slices};
+use crate::{Error, LICENSE, ModelDescription, Version};
 use std::fs::{self, File};
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
@@ -16,7 +16,7 @@ pub struct Extras {
     pub resources: Option<PathBuf>,
     /// Paths of licence texts for `documentation/licenses/`.
     pub licenses: Vec<PathBuf>,
-    /// Folder of icons, with `NAME.png` for the FMU of that name.
+    /// Folder of icons, with `NAME.png` for the FMU of that name, and maybe `NAME.svg`.
     pub icons: Option<PathBuf>,
     /// Only folder below `binaries/` that receives libraries; all folders of a platform if it is
     /// `None`.
@@ -28,8 +28,8 @@ pub struct Extras {
 const RESOURCES_README: &str =
     "This folder holds files that an FMU reads during initialization. This FMU needs none.\n";
 
-/// Writes the archive `NAME.fmu` of one FMU into the folder `output` and returns its path.
-/// `libraries` are the builds of the FMU's library, one for each platform.
+/// Writes the archive `NAME.fmu` of one FMU for a version of FMI into the folder `output` and
+/// returns its path. `libraries` are the builds of the FMU's library, one for each platform.
 ///
 /// # Errors
 /// Reports a description that contradicts itself, or a file that cannot be read or written.
@@ -38,21 +38,29 @@ pub fn pack(
     libraries: &[LibraryFile],
     output: &Path,
     extras: &Extras,
+    version: Version,
 ) -> Result<PathBuf, Error> {
     let name = &description.name;
     let mut entries = vec![
-        ("modelDescription.xml".to_string(), description.to_xml()?.into_bytes()),
-        ("documentation/index.html".to_string(), description.to_html().into_bytes()),
+        ("modelDescription.xml".to_string(), description.to_xml(version)?.into_bytes()),
+        ("documentation/index.html".to_string(), description.to_html(version).into_bytes()),
     ];
-    for LibraryFile { path, folders, suffix, .. } in libraries {
+    for LibraryFile { path, folders, tuples, suffix, .. } in libraries {
         let content = read(path)?;
         let entry = |folder| (format!("binaries/{folder}/{name}.{suffix}"), content.clone());
         let chosen = |folder: &&&str| extras.folder.as_ref().is_none_or(|only| only == **folder);
-        entries.extend(folders.iter().filter(chosen).map(entry));
+        if version == Version::Fmi2 {
+            entries.extend(folders.iter().filter(chosen).map(entry));
+            continue;
+        }
+        let parts = slices(&content)
+            .map_err(|error| Error::Library { path: path.clone(), problem: error.to_string() })?;
+        let entry = |(tuple, part): (&&str, &[u8])| {
+            (format!("binaries/{tuple}/{name}.{suffix}"), part.to_vec())
+        };
+        entries.extend(tuples.iter().zip(parts).map(entry));
     }
-    if let Some(icons) = &extras.icons {
-        entries.push(("model.png".into(), read(&icons.join(format!("{name}.png")))?));
-    }
+    add_icons(&mut entries, description, extras, version)?;
     add_licenses(&mut entries, &extras.licenses)?;
     let before = entries.len();
     if let Some(resources) = &extras.resources {
@@ -90,6 +98,33 @@ fn write_archive(
         archive.write_all(content)?;
     }
     archive.finish()?.flush()?;
+    Ok(())
+}
+
+/// Adds the icon where this version of FMI has it, and the terminals of FMI 3.0.
+fn add_icons(
+    entries: &mut Vec<(String, Vec<u8>)>,
+    description: &ModelDescription,
+    extras: &Extras,
+    version: Version,
+) -> Result<(), Error> {
+    let icon = |icons: &PathBuf, suffix| icons.join(format!("{}.{suffix}", description.name));
+    if version == Version::Fmi2 {
+        if let Some(icons) = &extras.icons {
+            entries.push(("model.png".into(), read(&icon(icons, "png"))?));
+        }
+        return Ok(());
+    }
+    let folder = "terminalsAndIcons";
+    let terminals = description.terminals_to_xml().into_bytes();
+    entries.push((format!("{folder}/terminalsAndIcons.xml"), terminals));
+    if let Some(icons) = &extras.icons {
+        entries.push((format!("{folder}/icon.png"), read(&icon(icons, "png"))?));
+        let drawing = icon(icons, "svg");
+        if drawing.is_file() {
+            entries.push((format!("{folder}/icon.svg"), read(&drawing)?));
+        }
+    }
     Ok(())
 }
 

@@ -1,8 +1,11 @@
-//! Text of an FMU's `modelDescription.xml`, FMI 2.0 section 2.2.
+//! Text of an FMU's `modelDescription.xml`: FMI 2.0, section 2.2, and what FMI 3.0 has in common.
+
+mod fmi3;
+mod terminals;
 
 use crate::unit::Unit;
 use crate::variable::{Causality, EnumerationType, VariableKind};
-use crate::{AUTHOR, Error, LICENSE, LOG_CATEGORIES, ModelDescription};
+use crate::{AUTHOR, Error, LICENSE, LOG_CATEGORIES, ModelDescription, Version};
 use quick_xml::Writer;
 use quick_xml::events::{BytesDecl, Event};
 use std::borrow::Cow;
@@ -23,56 +26,64 @@ impl ModelDescription {
     ///
     /// # Panics
     /// This never panics, because writing to memory does not fail and everything written is text.
-    pub fn to_xml(&self) -> Result<String, Error> {
+    pub fn to_xml(&self, version: Version) -> Result<String, Error> {
         self.check()?;
-        let mut xml = Writer::new_with_indent(Vec::new(), b' ', 2);
-        self.write(&mut xml).expect("writing to memory");
-        let mut text = String::from_utf8(xml.into_inner()).expect("only text was written");
-        text.push('\n');
-        Ok(text)
+        Ok(document(|xml| match version {
+            Version::Fmi2 => self.write(xml),
+            Version::Fmi3 => self.write_fmi3(xml),
+        }))
     }
 
     fn write(&self, xml: &mut Xml) -> io::Result<()> {
-        xml.write_event(Event::Decl(BytesDecl::new("1.0", Some("UTF-8"), None)))?;
-        let mut attributes: Attributes = vec![
-            // Several importers compare this text; they would refuse "2.0.4".
-            ("fmiVersion", "2.0".into()),
+        // Several importers compare this text; they would refuse "2.0.4".
+        let mut attributes = self.head("2.0", "guid");
+        if self.model_exchange {
+            attributes.push(("numberOfEventIndicators", self.event_indicators.to_string()));
+        }
+        parent(xml, "fmiModelDescription", attributes, |xml| {
+            self.write_interfaces(xml)?;
+            self.write_units(xml, vec![])?;
+            self.write_enumerations(xml)?;
+            self.write_categories_and_experiment(xml)?;
+            parent(xml, "ModelVariables", vec![], |xml| {
+                (0..self.variables.len()).try_for_each(|i| self.write_variable(xml, i))
+            })?;
+            self.write_structure(xml)
+        })
+    }
+
+    /// Returns the attributes that all versions of FMI have. `identity` is the name of the one that
+    /// identifies the FMU.
+    fn head(&self, version: &str, identity: &'static str) -> Attributes {
+        vec![
+            ("fmiVersion", version.into()),
             ("modelName", self.name.clone()),
-            ("guid", self.guid()),
+            (identity, self.guid()),
             ("description", self.description.clone()),
             ("author", AUTHOR.into()),
             ("version", self.version.clone()),
             ("license", LICENSE.into()),
             ("generationTool", concat!("fmu-pack ", env!("CARGO_PKG_VERSION")).into()),
             ("variableNamingConvention", "structured".into()),
+        ]
+    }
+
+    fn write_categories_and_experiment(&self, xml: &mut Xml) -> io::Result<()> {
+        parent(xml, "LogCategories", vec![], |xml| {
+            LOG_CATEGORIES.iter().try_for_each(|(name, description)| {
+                let attributes =
+                    vec![("name", (*name).into()), ("description", (*description).into())];
+                leaf(xml, "Category", attributes)
+            })
+        })?;
+        let experiment = self.default_experiment;
+        let attributes = vec![
+            ("startTime", real(experiment.start)),
+            ("stopTime", real(experiment.stop)),
+            ("tolerance", real(experiment.tolerance)),
+            ("stepSize", real(experiment.step)),
         ];
-        if self.model_exchange {
-            attributes.push(("numberOfEventIndicators", self.event_indicators.to_string()));
-        }
-        parent(xml, "fmiModelDescription", attributes, |xml| {
-            self.write_interfaces(xml)?;
-            self.write_units(xml)?;
-            self.write_enumerations(xml)?;
-            parent(xml, "LogCategories", vec![], |xml| {
-                LOG_CATEGORIES.iter().try_for_each(|(name, description)| {
-                    let attributes =
-                        vec![("name", (*name).into()), ("description", (*description).into())];
-                    leaf(xml, "Category", attributes)
-                })
-            })?;
-            let experiment = self.default_experiment;
-            let attributes = vec![
-                ("startTime", real(experiment.start)),
-                ("stopTime", real(experiment.stop)),
-                ("tolerance", real(experiment.tolerance)),
-                ("stepSize", real(experiment.step)),
-            ];
-            leaf(xml, "DefaultExperiment", attributes)?;
-            parent(xml, "ModelVariables", vec![], |xml| {
-                (0..self.variables.len()).try_for_each(|i| self.write_variable(xml, i))
-            })?;
-            self.write_structure(xml)
-        })
+        leaf(xml, "DefaultExperiment", attributes)
     }
 
     fn write_interfaces(&self, xml: &mut Xml) -> io::Result<()> {
@@ -106,8 +117,8 @@ impl ModelDescription {
         Ok(())
     }
 
-    fn write_units(&self, xml: &mut Xml) -> io::Result<()> {
-        let mut units: Vec<&Unit> = vec![];
+    /// Writes the units of the variables, and `units` besides.
+    fn write_units<'a>(&'a self, xml: &mut Xml, mut units: Vec<&'a Unit>) -> io::Result<()> {
         for variable in &self.variables {
             if let VariableKind::Real { unit: Some(unit), .. } = &variable.kind
                 && !units.contains(&unit)
@@ -146,7 +157,8 @@ impl ModelDescription {
         })
     }
 
-    fn write_enumerations(&self, xml: &mut Xml) -> io::Result<()> {
+    /// Returns the enumeration types of the variables, sorted by name.
+    fn enumerations(&self) -> Vec<&EnumerationType> {
         let mut enumerations: Vec<&EnumerationType> = vec![];
         for variable in &self.variables {
             if let VariableKind::Enumeration { enumeration_type, .. } = &variable.kind
@@ -155,29 +167,19 @@ impl ModelDescription {
                 enumerations.push(enumeration_type);
             }
         }
+        enumerations.sort_by(|a, b| a.name.cmp(&b.name));
+        enumerations
+    }
+
+    fn write_enumerations(&self, xml: &mut Xml) -> io::Result<()> {
+        let enumerations = self.enumerations();
         if enumerations.is_empty() {
             return Ok(());
         }
-        enumerations.sort_by(|a, b| a.name.cmp(&b.name));
         parent(xml, "TypeDefinitions", vec![], |xml| {
             enumerations.iter().try_for_each(|enumeration| {
-                let attributes = vec![
-                    ("name", enumeration.name.clone()),
-                    ("description", enumeration.description.clone()),
-                ];
-                parent(xml, "SimpleType", attributes, |xml| {
-                    parent(xml, "Enumeration", vec![], |xml| {
-                        enumeration.items.iter().zip(1..).try_for_each(
-                            |((name, description), value)| {
-                                let attributes = vec![
-                                    ("name", name.clone()),
-                                    ("value", value.to_string()),
-                                    ("description", description.clone()),
-                                ];
-                                leaf(xml, "Item", attributes)
-                            },
-                        )
-                    })
+                parent(xml, "SimpleType", named(enumeration), |xml| {
+                    parent(xml, "Enumeration", vec![], |xml| write_items(xml, enumeration))
                 })
             })
         })
@@ -199,11 +201,7 @@ impl ModelDescription {
             if !variable.is_optional {
                 return Ok(());
             }
-            // FMI has no attribute for it, and importers ignore annotations that they do not know.
-            parent(xml, "Annotations", vec![], |xml| {
-                let tool = vec![("name", OPTIONAL.into())];
-                parent(xml, "Tool", tool, |xml| leaf(xml, "Optional", vec![]))
-            })
+            write_optional(xml, "Tool", "name")
         })
     }
 
@@ -263,7 +261,43 @@ impl ModelDescription {
     }
 }
 
-/// Writes one list of ModelStructure. FMI counts variables from 1 here; an empty `dependencies`
+/// Returns the text of a document that `write` fills. Writing to memory does not fail.
+fn document(write: impl FnOnce(&mut Xml) -> io::Result<()>) -> String {
+    let mut xml = Writer::new_with_indent(Vec::new(), b' ', 2);
+    xml.write_event(Event::Decl(BytesDecl::new("1.0", Some("UTF-8"), None)))
+        .and_then(|()| write(&mut xml))
+        .expect("writing to memory");
+    let mut text = String::from_utf8(xml.into_inner()).expect("only text was written");
+    text.push('\n');
+    text
+}
+
+/// Returns name and description of an enumeration type.
+fn named(enumeration: &EnumerationType) -> Attributes {
+    vec![("name", enumeration.name.clone()), ("description", enumeration.description.clone())]
+}
+
+fn write_items(xml: &mut Xml, enumeration: &EnumerationType) -> io::Result<()> {
+    enumeration.items.iter().zip(1..).try_for_each(|((name, description), value)| {
+        let attributes = vec![
+            ("name", name.clone()),
+            ("value", value.to_string()),
+            ("description", description.clone()),
+        ];
+        leaf(xml, "Item", attributes)
+    })
+}
+
+/// Writes the annotation of an input that may stay unconnected. FMI has no attribute for it, and
+/// importers ignore annotations that they do not know.
+fn write_optional(xml: &mut Xml, element: &str, attribute: &'static str) -> io::Result<()> {
+    parent(xml, "Annotations", vec![], |xml| {
+        let tool = vec![(attribute, OPTIONAL.into())];
+        parent(xml, element, tool, |xml| leaf(xml, "Optional", vec![]))
+    })
+}
+
+/// Writes one list of ModelStructure. FMI 2.0 counts variables from 1 here; an empty `dependencies`
 /// means that there are none.
 fn unknowns(
     xml: &mut Xml,

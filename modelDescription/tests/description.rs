@@ -6,7 +6,7 @@ use model_description::unit::Unit;
 use model_description::variable::{
     Causality, EnumerationType, Variability, Variable, VariableKind,
 };
-use model_description::{DefaultExperiment, Error, ModelDescription, library};
+use model_description::{DefaultExperiment, Error, ModelDescription, Version, library};
 use std::fs;
 use std::io::Read;
 use std::path::Path;
@@ -187,14 +187,14 @@ fn contradictions_are_found_and_name_the_variable() {
     for (change, part) in cases {
         let mut changed = fmu();
         change(&mut changed);
-        let text = changed.to_xml().expect_err(part).to_string();
+        let text = changed.to_xml(Version::Fmi2).expect_err(part).to_string();
         assert!(text.contains(part), "no '{part}' in '{text}'");
     }
 }
 
 #[test]
 fn the_xml_says_what_the_variable_table_says() {
-    let xml = fmu().to_xml().unwrap();
+    let xml = fmu().to_xml(Version::Fmi2).unwrap();
     for part in [
         "fmiVersion=\"2.0\"",
         &format!("guid=\"{}\"", fmu().guid()),
@@ -218,7 +218,7 @@ fn the_xml_says_what_the_variable_table_says() {
 
 #[test]
 fn the_model_structure_has_true_dependencies() {
-    let xml = fmu().to_xml().unwrap();
+    let xml = fmu().to_xml(Version::Fmi2).unwrap();
     let structure: Vec<_> =
         xml.lines().map(str::trim).skip_while(|line| *line != "<ModelStructure>").collect();
     assert_eq!(
@@ -246,7 +246,7 @@ fn the_model_structure_has_true_dependencies() {
 
 #[test]
 fn the_page_shows_start_values_in_display_units_and_enumerations_by_name() {
-    let page = fmu().to_html();
+    let page = fmu().to_html(Version::Fmi2);
     for part in [
         "<p>Not much.</p>",
         "<code>gain</code></td><td>–</td><td>2.5</td><td>0 to 10</td>",
@@ -288,7 +288,8 @@ fn the_archive_is_complete_and_the_same_every_time() {
         icons: None,
         folder: None,
     };
-    let path = pack(&fmu(), &[library_file(&at("library"))], folder.path(), &extras).unwrap();
+    let path = pack(&fmu(), &[library_file(&at("library"))], folder.path(), &extras, Version::Fmi2)
+        .unwrap();
     assert_eq!(path, at("Small.fmu"));
     let first = fs::read(&path).unwrap();
     let content = entries(&path);
@@ -307,12 +308,12 @@ fn the_archive_is_complete_and_the_same_every_time() {
         ]
     );
     assert_eq!(content[1].1, "machine code");
-    assert_eq!(content[0].1, fmu().to_xml().unwrap());
+    assert_eq!(content[0].1, fmu().to_xml(Version::Fmi2).unwrap());
 
     // Another time and another order of the folder still give the same bytes.
     std::thread::sleep(std::time::Duration::from_millis(20));
     fs::write(at("data/z.csv"), "1").unwrap();
-    pack(&fmu(), &[library_file(&at("library"))], folder.path(), &extras).unwrap();
+    pack(&fmu(), &[library_file(&at("library"))], folder.path(), &extras, Version::Fmi2).unwrap();
     assert_eq!(fs::read(&path).unwrap(), first);
     assert!(!at("Small.fmu.part").exists());
 }
@@ -323,14 +324,14 @@ fn a_library_goes_into_every_folder_of_its_platform() {
     let library = folder.path().join("library");
     fs::write(&library, "machine code").unwrap();
     let aarch64 = LibraryFile { folders: &["aarch64-linux", "linux64"], ..library_file(&library) };
-    let path = pack(&fmu(), &[aarch64], folder.path(), &Extras::default()).unwrap();
+    let path = pack(&fmu(), &[aarch64], folder.path(), &Extras::default(), Version::Fmi2).unwrap();
     let names: Vec<_> = entries(&path).into_iter().map(|(name, _)| name).collect();
     for folder in ["aarch64-linux", "linux64"] {
         assert!(names.contains(&format!("binaries/{folder}/Small.so")), "{names:?}");
     }
     let aarch64 = LibraryFile { folders: &["aarch64-linux", "linux64"], ..library_file(&library) };
     let extras = Extras { folder: Some("linux64".into()), ..Extras::default() };
-    let path = pack(&fmu(), &[aarch64], folder.path(), &extras).unwrap();
+    let path = pack(&fmu(), &[aarch64], folder.path(), &extras, Version::Fmi2).unwrap();
     let binaries = entries(&path).into_iter().filter(|(name, _)| name.starts_with("binaries/"));
     assert_eq!(binaries.map(|(name, _)| name).collect::<Vec<_>>(), ["binaries/linux64/Small.so"]);
 }
@@ -340,7 +341,9 @@ fn an_archive_without_resources_has_the_folder_all_the_same() {
     let folder = tempfile::tempdir().unwrap();
     let library = folder.path().join("library");
     fs::write(&library, "machine code").unwrap();
-    let path = pack(&fmu(), &[library_file(&library)], folder.path(), &Extras::default()).unwrap();
+    let path =
+        pack(&fmu(), &[library_file(&library)], folder.path(), &Extras::default(), Version::Fmi2)
+            .unwrap();
     assert!(entries(&path).iter().any(|(name, _)| name == "resources/README.txt"));
 }
 
@@ -354,7 +357,8 @@ fn files_that_are_no_library_of_fmus_are_refused() {
     let error = library::descriptions(&text).unwrap_err();
     assert!(matches!(error, Error::Open { .. }), "{error}");
     let nothing = library_file(&folder.path().join("nothing"));
-    let missing = pack(&fmu(), &[nothing], folder.path(), &Extras::default()).unwrap_err();
+    let missing =
+        pack(&fmu(), &[nothing], folder.path(), &Extras::default(), Version::Fmi2).unwrap_err();
     assert!(missing.to_string().contains("nothing"));
 }
 

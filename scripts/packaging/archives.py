@@ -15,6 +15,7 @@ import gzip
 import hashlib
 import io
 import os
+import re
 import sys
 import tarfile
 import time
@@ -36,10 +37,11 @@ LICENCES = ("LICENSE-APACHE", "LICENSE-MIT")
 # Licences of the linked packages, by inventory.py and the Rust distribution.
 NOTICES = ("LICENSES.txt", "LICENSES-rust-std.html")
 
-FMUS_README = """# Re-entry attitude control: FMUs (FMI 2.0) {version}
+FMUS_README = """# Re-entry attitude control: FMUs {version}
 
 The archives (*.fmu) hold the FMUs for {systems}. Any importer for FMI 2.0
-co-simulation opens them; each has its documentation in documentation/index.html.
+co-simulation opens them; those for FMI 3.0 are in fmi3. Each has its documentation in
+documentation/index.html.
 
 LICENSE-MIT and LICENSE-APACHE are the licences of the FMUs, either of which may be chosen.
 LICENSES.txt and LICENSES-rust-std.html are those of what is linked in.
@@ -80,9 +82,10 @@ class Fault(Exception):
     """A fault of the files that a release needs."""
 
 
-def packed_fmus(dist: Path, platform: str) -> Iterator[Entry]:
-    for path in (dist / platform / "fmu").glob("*.fmu"):
-        yield path.name, path.read_bytes(), 0o644
+def packed_fmus(dist: Path, platform: str, pattern: str) -> Iterator[Entry]:
+    folder = dist / platform / "fmu"
+    for path in folder.glob(pattern):
+        yield path.relative_to(folder).as_posix(), path.read_bytes(), 0o644
 
 
 def check(dist: Path) -> None:
@@ -99,6 +102,7 @@ def check(dist: Path) -> None:
             with zipfile.ZipFile(path) as archive:
                 if archive.read("modelDescription.xml") != description:
                     raise Fault(f"{path} is another version of the FMU: run scripts/package")
+            check_fmi3(folder / "fmi3" / f"{name}.fmu", description)
         for path in sorted(folder.glob("*.fmu")):
             if path.stem not in described:
                 raise Fault(f"{path} is no FMU of this version: remove it")
@@ -106,6 +110,17 @@ def check(dist: Path) -> None:
     for path in (*programs, dist / "man" / "orchestrator.1"):
         if not path.is_file():
             raise Fault(f"{path} does not exist: run scripts/package")
+
+
+def check_fmi3(path: Path, description: bytes) -> None:
+    """Raises a fault unless the archive for FMI 3.0 is of the same FMU as the description of FMI 2.0."""
+    if not path.is_file():
+        raise Fault(f"{path} does not exist: run scripts/package")
+    with zipfile.ZipFile(path) as archive:
+        found = archive.read("modelDescription.xml")
+    guid = re.search(rb'guid="([^"]+)"', description)[1]
+    if b'instantiationToken="%b"' % guid not in found:
+        raise Fault(f"{path} is another version of the FMU: run scripts/package")
 
 
 def program(dist: Path, platform: str) -> Path:
@@ -158,7 +173,7 @@ def write_fmus(dist: Path, output: Path, version: str, epoch: int) -> None:
         ("linux-aarch64", "-linux-aarch64", PLATFORMS["linux-aarch64"]),
     ):
         page = readme(FMUS_README, version=version, systems=systems)
-        entries = [*packed_fmus(dist, platform), *licence_files(output), page]
+        entries = [*packed_fmus(dist, platform, "**/*.fmu"), *licence_files(output), page]
         write(output / f"reentry-fmus-{version}{suffix}.zip", entries, epoch)
 
 
@@ -176,7 +191,7 @@ def write_programs(dist: Path, output: Path, version: str, epoch: int) -> None:
         name = binary.stem if binary.suffix else f"./{binary.name}"
         manual = "" if binary.suffix else " `man -M man orchestrator` explains it, too."
         page = readme(PROGRAM_README, version=version, systems=systems, program=name, manual=manual)
-        fmus = [(f"fmu/{name}", content, mode) for name, content, mode in packed_fmus(dist, platform)]
+        fmus = [(f"fmu/{name}", content, mode) for name, content, mode in packed_fmus(dist, platform, "*.fmu")]
         # Windows has no man.
         pages = [] if binary.suffix else sorted((dist / "man").glob("*.1"))
         entries = [

@@ -3,13 +3,14 @@
 use clap::Parser;
 use model_description::library_file::LibraryFile;
 use model_description::pack::{Extras, pack};
-use model_description::{Error, ModelDescription, library};
+use model_description::{Error, ModelDescription, Version, library};
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::{fs, io};
 
-/// Packs every FMI 2.0 FMU in the given libraries into an archive NAME.fmu.
+/// Packs every FMU in the given libraries into an archive NAME.fmu for FMI 2.0, and into another
+/// one for FMI 3.0 in the folder fmi3 beside it.
 ///
 /// Each library must be built with fmi2-export. The program loads it and asks it for the
 /// descriptions of its FMUs. Builds of the libraries for other platforms, given by --also, are only
@@ -28,7 +29,7 @@ struct Arguments {
     /// Packs only the libraries given by --also
     #[arg(long, requires = "also")]
     only_also: bool,
-    /// Folder below binaries/ to use for a platform that has several
+    /// Folder below binaries/ to use for a platform that has several in FMI 2.0
     #[arg(long, value_name = "NAME")]
     folder: Option<String>,
     /// Folder for the archives; it is created if it does not exist
@@ -80,16 +81,19 @@ fn run(arguments: &Arguments) -> Result<(), Error> {
         icons: icons.clone(),
         folder: folder.clone(),
     };
-    make_folder(&arguments.output)?;
+    let beside = arguments.output.join("fmi3");
+    make_folder(&beside)?;
     for (fmu, files) in fmus() {
-        let archive = pack(fmu, files, &arguments.output, &extras)?;
-        println!("{}", archive.display());
+        for (version, folder) in [(Version::Fmi2, &arguments.output), (Version::Fmi3, &beside)] {
+            let archive = pack(fmu, files, folder, &extras, version)?;
+            println!("{}", archive.display());
+        }
     }
     if let Some(folder) = &arguments.xml_snapshot {
         make_folder(folder)?;
         for (fmu, _) in fmus() {
             let path = folder.join(format!("{}.xml", fmu.name));
-            fs::write(&path, fmu.to_xml()?).map_err(at(&path))?;
+            fs::write(&path, fmu.to_xml(Version::Fmi2)?).map_err(at(&path))?;
         }
     }
     Ok(())
