@@ -63,6 +63,12 @@ where
         Some(self.next_time()).filter(|tick| *tick < time - tick_tolerance(time, self.period))
     }
 
+    /// Returns the time of the first uncommitted tick that comes after `time` (s).
+    pub fn next_after(&self, time: f64) -> f64 {
+        let after = self.next + u64::from(self.is_due(time));
+        tick_time(after.cast_signed(), self.start, self.period)
+    }
+
     /// Returns whether a tick has been committed.
     pub fn has_committed(&self) -> bool {
         self.next > 0

@@ -1,7 +1,9 @@
 //! An instance that works at ticks: its steps from tick to tick, and its restoration.
 
 use control::schedule::Sampled;
-use fmi2_export::{Context, Description, Failure, Inputs, LastEvent, Model, Restoration};
+use fmi2_export::{
+    Context, Description, EventInfo, Failure, Inputs, LastEvent, Model, Restoration,
+};
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use std::ops::{Deref, DerefMut};
 
@@ -222,6 +224,14 @@ impl<I: SampledInstance> Model for SampledFmu<I> {
                 log(text);
             }
         }
+    }
+
+    /// Returns the time of the next tick. Ticks are evaluated when an output is read, and committed
+    /// by steps.
+    fn new_discrete_states(&mut self, time: f64) -> Result<EventInfo, Failure> {
+        let (_, _, ticks) = self.parts()?;
+        let next_event_time = Some(ticks.next_after(time));
+        Ok(EventInfo { next_event_time, ..EventInfo::default() })
     }
 
     fn restored(&mut self, from: Restoration<'_, Self>) -> Result<(), Failure> {

@@ -11,12 +11,12 @@
 //! ```
 
 use crate::call::{Call, Outcome, table};
-use crate::instance::{Instance, Setting};
+use crate::instance::{Instance, Setting, Stops};
 use crate::logger::Logger;
 use crate::model::Failure;
 use crate::model_instance::{Described, Export};
 use crate::types::Interface;
-use model_description::ModelDescription;
+use model_description::{ModelDescription, Version};
 use std::sync::Arc;
 
 /// Defines how variables of a type are read and set: type of the values in a call, and of those in
@@ -58,7 +58,9 @@ impl Linked {
         let Described { guid, description } = export.described();
         let setting = Setting {
             guid: guid.clone(),
+            version: Version::Fmi2,
             interface: Interface::CoSimulation,
+            stops: Stops::default(),
             logger: Logger::of_warnings(),
             resources: None,
         };

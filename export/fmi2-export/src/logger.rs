@@ -3,15 +3,16 @@
 //! The reason of every failure is always reported, so that nobody has to repeat a run with logging
 //! on to find it: errors, discarded calls and the end of a simulation. FMI 2.0.4, section 2.1.3,
 //! has the logger called for these statuses whatever `loggingOn` is; for fmi2Discard the importer's
-//! logger decides whether to show the message. Everything else is reported only while logging is on
-//! (`loggingOn` of fmi2Instantiate, fmi2SetDebugLogging), and then only in the chosen categories.
+//! logger decides whether to show the message. FMI 3.0 allows that for errors only. Everything else
+//! is reported only while logging is on (`loggingOn` of fmi2Instantiate, fmi2SetDebugLogging), and
+//! then only in the chosen categories.
 //!
 //! Messages are delivered at the end of a call, when the instance has done its work: an importer in
 //! C++ may throw an exception in its logger, which then passes through the call to the importer.
 //! Rust could not let it pass in the midst of the work, where panics are caught.
 #![allow(unsafe_code)]
 
-use crate::types::{Callbacks, FmiStatus, LogCallback};
+use crate::types::{Callbacks, FmiStatus, LogCallback, LogMessageCallback};
 use model_description::LOG_CATEGORIES;
 use std::ffi::{CString, c_void};
 use std::mem;
@@ -50,11 +51,20 @@ impl Category {
     }
 }
 
+/// Function of the importer that receives messages.
+#[derive(Clone, Copy)]
+pub(crate) enum Receiver {
+    Fmi2(LogCallback),
+    Fmi3(LogMessageCallback),
+}
+
 /// Logger of the importer, with the categories that it is to receive.
 pub(crate) struct Logger {
-    callback: Option<LogCallback>,
+    receiver: Option<Receiver>,
     environment: *mut c_void,
     instance: CString,
+    /// Bit set of the categories that are reported even if logging is off.
+    always: u8,
     /// Bit set of the categories that are reported.
     active: u8,
     /// Messages that are not delivered yet.
@@ -62,21 +72,29 @@ pub(crate) struct Logger {
 }
 
 const EVERYTHING: u8 = u8::MAX;
-const ALWAYS: u8 =
-    1 << Category::Discard as u8 | 1 << Category::Error as u8 | 1 << Category::Fatal as u8;
+const ERRORS: u8 = 1 << Category::Error as u8 | 1 << Category::Fatal as u8;
+const REFUSALS: u8 = ERRORS | 1 << Category::Discard as u8;
 
 impl Logger {
     /// Copies the parts of `callbacks` that are needed, because the importer may free them
     /// afterwards.
     pub(crate) fn new(callbacks: Option<&Callbacks>, instance: CString, on: bool) -> Self {
-        Self {
-            callback: callbacks.and_then(|callbacks| callbacks.logger),
-            environment: callbacks
-                .map_or(std::ptr::null_mut(), |callbacks| callbacks.component_environment),
-            instance,
-            active: if on { EVERYTHING } else { ALWAYS },
-            messages: Vec::new(),
-        }
+        let receiver = callbacks.and_then(|callbacks| callbacks.logger).map(Receiver::Fmi2);
+        let environment =
+            callbacks.map_or(std::ptr::null_mut(), |callbacks| callbacks.component_environment);
+        Self::to(receiver, environment, instance, on)
+    }
+
+    /// Makes a logger that delivers to `receiver`.
+    pub(crate) fn to(
+        receiver: Option<Receiver>,
+        environment: *mut c_void,
+        instance: CString,
+        on: bool,
+    ) -> Self {
+        let always = if matches!(receiver, Some(Receiver::Fmi3(_))) { ERRORS } else { REFUSALS };
+        let active = if on { EVERYTHING } else { always };
+        Self { receiver, environment, instance, always, active, messages: Vec::new() }
     }
 
     /// Returns a logger that keeps warnings until they are taken, and reports nothing else: a
@@ -105,7 +123,7 @@ impl Logger {
         }
         // Switching categories on selects these and no others; switching off leaves the others as
         // they were.
-        self.active = ALWAYS | if on { chosen } else { self.active & !chosen };
+        self.active = self.always | if on { chosen } else { self.active & !chosen };
         unknown
     }
 
@@ -123,30 +141,48 @@ impl Logger {
             return;
         }
         let messages = mem::take(&mut self.messages);
-        let Some(callback) = self.callback else { return };
+        let Some(receiver) = self.receiver else { return };
         for (category, text) in messages {
-            let message = to_c(&text);
-            let category_name = to_c(category.name());
-            // SAFETY: the callback is the importer's function and gets its own environment. All
-            // strings live until it returns. The message holds no `%`, so the variadic function
-            // reads no further argument.
-            unsafe {
-                callback(
-                    self.environment,
-                    self.instance.as_ptr(),
-                    category.status(),
-                    category_name.as_ptr(),
-                    message.as_ptr(),
-                );
+            let status = category.status();
+            let name = to_c(category.name());
+            match receiver {
+                Receiver::Fmi2(callback) => {
+                    let message = to_format(&text);
+                    // SAFETY: the callback is the importer's function and gets its own environment.
+                    // All strings live until it returns. The message holds no `%`, so the variadic
+                    // function reads no further argument.
+                    unsafe {
+                        callback(
+                            self.environment,
+                            self.instance.as_ptr(),
+                            status,
+                            name.as_ptr(),
+                            message.as_ptr(),
+                        );
+                    }
+                }
+                Receiver::Fmi3(callback) => {
+                    // FMI 3.0 reads `#` as the beginning of a value reference.
+                    let message = to_c(&text.replace('#', "##"));
+                    // SAFETY: the callback is the importer's function and gets its own environment.
+                    // Both strings live until it returns.
+                    unsafe {
+                        callback(self.environment, status, name.as_ptr(), message.as_ptr());
+                    }
+                }
             }
         }
     }
 }
 
-/// Converts a text for the importer. The importer reads it as a printf format, so it must not hold
+/// Converts a text for FMI 2.0, whose importers read it as a printf format, so that it must not hold
 /// a `%`.
+fn to_format(text: &str) -> CString {
+    to_c(&text.replace('%', "percent"))
+}
+
 fn to_c(text: &str) -> CString {
-    CString::new(text.replace('%', "percent").replace('\0', " ")).unwrap_or_default()
+    CString::new(text.replace('\0', " ")).unwrap_or_default()
 }
 
 #[cfg(test)]
@@ -199,6 +235,6 @@ mod tests {
 
     #[test]
     fn messages_hold_no_format() {
-        assert_eq!(to_c("at 5 %\0s").to_str(), Ok("at 5 percent s"));
+        assert_eq!(to_format("at 5 %\0s").to_str(), Ok("at 5 percent s"));
     }
 }

@@ -67,8 +67,8 @@ pub enum LastEvent {
     /// A step has been made, and no input was set since. The outputs are those that held over this
     /// step.
     Step,
-    /// An input was set by a call, whatever its value, or the instance runs in model exchange. The
-    /// outputs respond to the inputs.
+    /// An input was set by a call, whatever its value, an event of FMI 3.0 was handled, or the
+    /// instance runs in model exchange. The outputs respond to the inputs.
     InputSet,
 }
 
@@ -166,9 +166,10 @@ pub trait Model: Serialize + DeserializeOwned + Send + Sized + 'static {
     /// Sets the continuous states in model exchange.
     fn set_continuous_states(&mut self, _states: &[f64]) {}
 
-    /// Handles the event at `time` in model exchange: it takes discrete inputs, makes the changes
-    /// that are due, and returns the time of the next event. Importers may call it where no event
-    /// is, and more than once.
+    /// Handles the event at `time`: it takes discrete inputs, makes the changes that are due, and
+    /// returns the time of the next event. Importers may call it where no event is, and more than
+    /// once. A model with model exchange gets this call there only; another one gets it in the event
+    /// mode of FMI 3.0, where it only needs to return the time of its next tick after `time`.
     ///
     /// # Errors
     /// Says why the event could not be handled.

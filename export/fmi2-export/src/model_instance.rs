@@ -64,16 +64,21 @@ impl Default for Progress {
 
 impl Progress {
     /// Says why no instance can have this progress, or `None` if one can.
-    fn problem<M>(&self, table: &VariableTable<M>, interface: Interface) -> Option<String> {
+    fn problem<M>(
+        &self,
+        table: &VariableTable<M>,
+        (interface, event_mode): (Interface, bool),
+    ) -> Option<String> {
         let Self { state, time, start_time, stop_time, initialized, extrapolations, .. } = self;
         if !(time.is_finite() && start_time.is_finite() && !stop_time.is_some_and(f64::is_nan)) {
             return Some("it holds a time that is not a finite number".into());
         }
         let possible = match interface {
             Interface::ModelExchange => !matches!(state, State::StepComplete | State::StepFailed),
-            Interface::CoSimulation => {
-                !matches!(state, State::EventMode | State::ContinuousTimeMode)
-            }
+            Interface::CoSimulation => match state {
+                State::EventMode => event_mode,
+                _ => *state != State::ContinuousTimeMode,
+            },
         };
         if *state == State::Fatal || !possible {
             return Some(format!("an instance cannot go on in state {}", state.name()));
@@ -128,8 +133,9 @@ pub(crate) trait ModelInstance: Send {
     ) -> Result<(), Failure>;
 
     fn save(&self, progress: &Progress) -> Result<Vec<u8>, Failure>;
-    /// Restores a saved state. On an error the model is unchanged.
-    fn restore(&mut self, payload: &[u8], interface: Interface) -> Result<Progress, Failure>;
+    /// Restores a saved state for an instance of this interface, with or without event mode. On an
+    /// error the model is unchanged.
+    fn restore(&mut self, payload: &[u8], usage: (Interface, bool)) -> Result<Progress, Failure>;
 
     fn continuous_states(&self, states: &mut [f64]);
     fn set_continuous_states(&mut self, states: &[f64]);
@@ -240,12 +246,12 @@ impl<M: Model> ModelInstance for Bound<M> {
             .map_err(|error| Failure::Error(format!("the state cannot be saved: {error}")))
     }
 
-    fn restore(&mut self, payload: &[u8], interface: Interface) -> Result<Progress, Failure> {
+    fn restore(&mut self, payload: &[u8], usage: (Interface, bool)) -> Result<Progress, Failure> {
         let unfit =
             |problem: String| Failure::Error(format!("the saved state does not fit: {problem}"));
         let ((progress, mut model), rest): ((Progress, M), _) =
             postcard::take_from_bytes(payload).map_err(|error| unfit(error.to_string()))?;
-        if let Some(problem) = progress.problem(&self.table, interface) {
+        if let Some(problem) = progress.problem(&self.table, usage) {
             return Err(unfit(problem));
         }
         if !rest.is_empty() {

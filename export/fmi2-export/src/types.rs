@@ -1,9 +1,10 @@
-//! C types of FMI 2.0, from fmi2TypesPlatform.h and fmi2FunctionTypes.h.
+//! C types of FMI 2.0, from fmi2TypesPlatform.h and fmi2FunctionTypes.h, and of FMI 3.0, from
+//! fmi3FunctionTypes.h.
 
 use serde::{Deserialize, Serialize};
 use std::ffi::{c_char, c_int, c_void};
 
-/// C type `fmi2Status`, the result of a call.
+/// C types `fmi2Status` and `fmi3Status`, the result of a call.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[repr(C)]
 pub enum FmiStatus {
@@ -17,7 +18,7 @@ pub enum FmiStatus {
     Error,
     /// Status `fmi2Fatal`: the instance can only be freed.
     Fatal,
-    /// Status `fmi2Pending`, which is never returned, because a step is finished when `fmi2DoStep`
+    /// Status `fmi2Pending`, which FMI 3.0 does not have. It is never returned, because a step is finished when `fmi2DoStep`
     /// returns.
     Pending,
 }
@@ -51,6 +52,10 @@ pub type LogCallback = unsafe extern "C-unwind" fn(
     *const c_char,
     ...
 );
+
+/// C type `fmi3LogMessageCallback`. Its message is no format.
+pub type LogMessageCallback =
+    unsafe extern "C-unwind" fn(*mut c_void, FmiStatus, *const c_char, *const c_char);
 
 /// C type `fmi2CallbackFunctions`. The memory and step callbacks are not used and may be null.
 #[derive(Clone, Copy, Debug)]

@@ -43,8 +43,8 @@ impl Instance {
         self.initialize()?;
         self.warn_of_unused();
         self.progress.state = match self.interface {
-            Interface::ModelExchange => State::EventMode,
-            Interface::CoSimulation => State::StepComplete,
+            Interface::CoSimulation if !self.stops.event_mode => State::StepComplete,
+            _ => State::EventMode,
         };
         self.logger.log(Category::Events, "initialized");
         Ok(())
@@ -84,10 +84,10 @@ impl Instance {
         Ok(())
     }
 
-    /// Updates the calculated variables. After an error they keep their values, so that they can
-    /// still be read.
+    /// Updates the calculated variables. Before initialization and after an error they keep their
+    /// values, so that they can be read all the same.
     pub(super) fn refresh(&mut self) -> Outcome {
-        if self.progress.state == State::Error {
+        if matches!(self.progress.state, State::Instantiated | State::Error) {
             return Ok(());
         }
         if self.progress.state == State::InitializationMode {

@@ -15,7 +15,7 @@ use crate::logger::{Category, Logger};
 use crate::model::Failure;
 use crate::model_instance::{Export, ModelInstance, Progress};
 use crate::types::{FmiStatus, Interface};
-use model_description::ModelDescription;
+use model_description::{ModelDescription, Version};
 use std::any::Any;
 use std::ffi::CString;
 use std::mem;
@@ -33,7 +33,9 @@ pub(crate) struct Instance {
     /// Value references of each state and its derivative.
     states: Vec<(usize, usize)>,
     guid: String,
+    version: Version,
     interface: Interface,
+    stops: Stops,
     logger: Logger,
     resources: Option<PathBuf>,
     /// Progress of the simulation. Its list of extrapolations has room for every variable, so
@@ -49,14 +51,27 @@ pub(crate) struct Instance {
     saved: Vec<Box<Saved>>,
     /// Inputs that were set before initialization mode.
     set_inputs: Vec<usize>,
-    /// Texts handed out by the last fmi2GetString.
+    /// Texts handed out by the last call for texts.
     strings: Vec<CString>,
+    /// Room for the event indicators, so that nothing is allocated when one is read.
+    indicators: Vec<f64>,
 }
 
-/// Arguments of fmi2Instantiate, apart from the choice of the FMU.
+/// What the importer of a co-simulation instance of FMI 3.0 can do at events.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Stops {
+    /// Whether the importer uses event mode.
+    pub(crate) event_mode: bool,
+    /// Whether a step may end before its end.
+    pub(crate) early_return: bool,
+}
+
+/// Arguments of the instantiation, apart from the choice of the FMU.
 pub(crate) struct Setting {
     pub(crate) guid: String,
+    pub(crate) version: Version,
     pub(crate) interface: Interface,
+    pub(crate) stops: Stops,
     pub(crate) logger: Logger,
     pub(crate) resources: Option<PathBuf>,
 }
@@ -67,16 +82,19 @@ impl Instance {
         description: Arc<ModelDescription>,
         setting: Setting,
     ) -> Self {
-        let Setting { guid, interface, logger, resources } = setting;
+        let Setting { guid, version, interface, stops, logger, resources } = setting;
         let states = description.states();
         let mut progress = Progress::default();
         progress.extrapolations.reserve(description.variables.len());
         Self {
             model: (export.create)(),
+            indicators: vec![0.0; description.event_indicators],
             states,
             description,
             guid,
+            version,
             interface,
+            stops,
             logger,
             resources,
             progress,
@@ -99,6 +117,7 @@ impl Instance {
         if self.progress.state == State::Fatal {
             return FmiStatus::Fatal;
         }
+        let name = call.row(self.version).name;
         let outcome = catch_unwind(AssertUnwindSafe(|| {
             self.permit(call)?;
             body(self)
@@ -106,7 +125,7 @@ impl Instance {
         match outcome {
             Ok(Ok(())) => FmiStatus::Ok,
             Ok(Err(Failure::Discard(problem))) => {
-                self.logger.log(Category::Discard, &format!("{}: {problem}", call.name));
+                self.logger.log(Category::Discard, &format!("{}: {problem}", name));
                 FmiStatus::Discard
             }
             Ok(Err(Failure::Ended { reason, .. })) => {
@@ -117,13 +136,12 @@ impl Instance {
                 if !call.leaves_state {
                     self.progress.state = State::Error;
                 }
-                self.logger.log(Category::Error, &format!("{}: {problem}", call.name));
+                self.logger.log(Category::Error, &format!("{}: {problem}", name));
                 FmiStatus::Error
             }
             Err(panic) => {
                 self.progress.state = State::Fatal;
-                let text =
-                    format!("{}: defect in the FMU: {}", call.name, panic_text(panic.as_ref()));
+                let text = format!("{}: defect in the FMU: {}", name, panic_text(panic.as_ref()));
                 self.logger.log(Category::Fatal, &text);
                 // Dropping the panic's payload could run code of the model again.
                 mem::forget(panic);
@@ -133,14 +151,15 @@ impl Instance {
     }
 
     pub(crate) fn permit(&self, call: &Call) -> Outcome {
-        if call.interface.is_some_and(|interface| interface != self.interface) {
+        let row = call.row(self.version);
+        if row.interface.is_some_and(|interface| interface != self.interface) {
             let interface = match self.interface {
                 Interface::ModelExchange => "model exchange",
                 Interface::CoSimulation => "co-simulation",
             };
             return error(format!("not available, because this instance was made for {interface}"));
         }
-        if call.allowed_in(self.progress.state) {
+        if row.allowed_in(self.progress.state) {
             return Ok(());
         }
         error(format!("not allowed in state {}", self.progress.state.name()))

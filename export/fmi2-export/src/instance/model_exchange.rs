@@ -1,9 +1,10 @@
-//! Model exchange: events, time, and the continuous states that the importer integrates.
+//! Events, and model exchange: time and the continuous states that the importer integrates.
 
 use super::Instance;
 use crate::call::{Outcome, State, error};
-use crate::model::{EventInfo, Failure};
+use crate::model::{EventInfo, Failure, LastEvent};
 use crate::pointer::Room;
+use crate::types::Interface;
 use model_description::variable::VariableKind;
 
 impl Instance {
@@ -16,18 +17,40 @@ impl Instance {
         Ok(())
     }
 
-    pub(crate) fn enter_event_mode(&mut self) {
+    pub(crate) fn enter_event_mode(&mut self) -> Outcome {
+        if self.interface == Interface::CoSimulation && !self.stops.event_mode {
+            return error("not available, because this instance was made without event mode");
+        }
         self.progress.state = State::EventMode;
+        Ok(())
+    }
+
+    pub(crate) fn enter_step_mode(&mut self) {
+        self.progress.state = State::StepComplete;
     }
 
     pub(crate) fn enter_continuous_time_mode(&mut self) {
         self.progress.state = State::ContinuousTimeMode;
     }
 
+    /// Handles the event. In co-simulation, a due tick is evaluated with the present inputs.
     pub(crate) fn new_discrete_states(&mut self) -> Result<EventInfo, Failure> {
+        if self.interface == Interface::CoSimulation {
+            if self.progress.last_event == LastEvent::Step {
+                self.note_input();
+            }
+            self.refresh()?;
+            let next_event_time = self.next_event()?;
+            return Ok(EventInfo { next_event_time, ..EventInfo::default() });
+        }
         let info = self.model.new_discrete_states(self.progress.time)?;
         self.stale = true;
         Ok(info)
+    }
+
+    /// Returns the numbers of continuous states and event indicators.
+    pub(crate) fn sizes(&self) -> (usize, usize) {
+        (self.states.len(), self.description.event_indicators)
     }
 
     fn expect_length(what: &str, given: usize, expected: usize) -> Outcome {

@@ -38,7 +38,7 @@ impl Instance {
         position.ok_or_else(|| {
             Failure::Error(
                 "this FMUstate was not made by this instance, or was freed; \
-                 carry states between instances with fmi2SerializeFMUstate"
+                 carry states between instances in serialized form"
                     .into(),
             )
         })
@@ -48,7 +48,7 @@ impl Instance {
         let position = self.find(handle)?;
         let payload = saved::unwrap(&self.guid, self.interface, &self.saved[position].0)
             .map_err(Failure::Error)?;
-        self.progress = self.model.restore(payload, self.interface)?;
+        self.progress = self.model.restore(payload, (self.interface, self.stops.event_mode))?;
         self.progress.extrapolations.reserve(self.description.variables.len());
         self.stale = true;
         self.last_step = FmiStatus::Ok;

@@ -7,6 +7,7 @@ use crate::model_instance::ModelInstance;
 use crate::pointer::Room;
 use crate::scalar::Scalar;
 use crate::types::Interface;
+use model_description::Version;
 use model_description::variable::{Causality, Variable};
 use std::ffi::CString;
 use std::mem;
@@ -58,15 +59,80 @@ impl Typed for i32 {
     }
 }
 
+/// An enumeration, which FMI 3.0 transfers with 64 bits.
+impl Typed for i64 {
+    fn look<R>(
+        model: &mut dyn ModelInstance,
+        reference: usize,
+        look: impl FnOnce(&Self) -> R,
+    ) -> Option<R> {
+        model.integer(reference).map(|value| look(&value.into()))
+    }
+    fn put(self, model: &mut dyn ModelInstance, reference: usize) {
+        if let Ok(value) = i32::try_from(self) {
+            model.set_integer(reference, value);
+        }
+    }
+}
+
 impl Instance {
+    /// Returns the position in the variable table. That of a variable beyond the table is not in
+    /// it.
+    fn position(&self, reference: u32) -> usize {
+        (reference as usize).wrapping_sub(self.version.first_reference())
+    }
+
     pub(super) fn variable(&self, reference: u32) -> Result<&Variable, Failure> {
         let variables = &self.description.variables;
-        variables.get(reference as usize).ok_or_else(|| {
-            let last = variables.len() - 1;
+        variables.get(self.position(reference)).ok_or_else(|| {
+            if self.is_beyond(reference) {
+                let text = "is the time or an event indicator: it can be read as Float64 only";
+                return Failure::Error(format!("value reference {reference} {text}"));
+            }
+            let mut last = self.version.first_reference() + variables.len() - 1;
+            if self.version == Version::Fmi3 {
+                last += self.indicators.len();
+            }
             Failure::Error(format!(
                 "value reference {reference} does not exist: {last} is the last"
             ))
         })
+    }
+
+    /// Whether the reference is that of a variable which FMI 3.0 has beyond the variable table.
+    fn is_beyond(&self, reference: u32) -> bool {
+        let position = self.position(reference);
+        let end = self.description.variables.len();
+        self.version == Version::Fmi3
+            && (reference == 0 || (end..end + self.indicators.len()).contains(&position))
+    }
+
+    /// Returns the time or an event indicator, or `None` if the reference is another variable's.
+    pub(crate) fn beyond_table(&mut self, reference: u32) -> Result<Option<f64>, Failure> {
+        if !self.is_beyond(reference) {
+            return Ok(None);
+        }
+        if reference == 0 {
+            return Ok(Some(self.progress.time));
+        }
+        self.refresh()?;
+        self.model.event_indicators(&mut self.indicators);
+        let index = self.position(reference) - self.description.variables.len();
+        Ok(Some(self.indicators[index]))
+    }
+
+    /// Returns the failure of a call for variables of a type that no FMU has.
+    pub(crate) fn no_variable(&self, reference: u32, kind: &str) -> Failure {
+        match self.variable(reference) {
+            Ok(Variable { name, .. }) => Failure::Error(format!("'{name}' is not of type {kind}")),
+            Err(failure) => failure,
+        }
+    }
+
+    /// Notes that an input was set, so that the outputs respond to the inputs.
+    pub(super) fn note_input(&mut self) {
+        self.stale |= self.progress.last_event != LastEvent::InputSet;
+        self.progress.last_event = LastEvent::InputSet;
     }
 
     /// Says why there is no field of type `T` for the value reference.
@@ -81,8 +147,8 @@ impl Instance {
     }
 
     pub(super) fn expect_type<T: Typed>(&mut self, reference: u32) -> Outcome {
-        T::look(self.model.as_mut(), reference as usize, |_| ())
-            .ok_or_else(|| self.misfit::<T>(reference))
+        let position = self.position(reference);
+        T::look(self.model.as_mut(), position, |_| ()).ok_or_else(|| self.misfit::<T>(reference))
     }
 
     /// Gives the values of the variables to `sink`, each with its position in `references`.
@@ -92,14 +158,16 @@ impl Instance {
         mut sink: impl FnMut(usize, &T),
     ) -> Outcome {
         let calculated = |&reference: &u32| {
-            self.description.variables.get(reference as usize).is_some_and(Variable::is_calculated)
+            let variable = self.description.variables.get(self.position(reference));
+            variable.is_some_and(Variable::is_calculated)
         };
         if references.iter().any(calculated) {
             self.refresh()?;
         }
         for (i, &reference) in references.iter().enumerate() {
-            let variable = self.description.variables.get(reference as usize);
-            let shown = T::look(self.model.as_mut(), reference as usize, |value| {
+            let position = self.position(reference);
+            let variable = self.description.variables.get(position);
+            let shown = T::look(self.model.as_mut(), position, |value| {
                 let problem = variable.and_then(|variable| value.unpresentable(&variable.kind));
                 if problem.is_none() {
                     sink(i, value);
@@ -143,20 +211,20 @@ impl Instance {
                 return error(format!("'{name}' = {value:?} {problem}; it keeps its value"));
             }
         }
-        if self.progress.state == State::StepComplete && !references.is_empty() {
-            // Parameters cannot be set in this state, so these are inputs.
-            self.stale |= self.progress.last_event != LastEvent::InputSet;
-            self.progress.last_event = LastEvent::InputSet;
+        let at_rest = self.interface == Interface::CoSimulation
+            && matches!(self.progress.state, State::StepComplete | State::EventMode);
+        if at_rest && !references.is_empty() {
+            // Parameters cannot be set in these states, so these are inputs.
+            self.note_input();
         }
         for (i, &reference) in references.iter().enumerate() {
             let value = value(i).map_err(Failure::Error)?;
-            let same =
-                T::look(self.model.as_mut(), reference as usize, |before| before.same(&value));
+            let position = self.position(reference);
+            let same = T::look(self.model.as_mut(), position, |before| before.same(&value));
             if same != Some(true) {
-                value.put(self.model.as_mut(), reference as usize);
+                value.put(self.model.as_mut(), position);
                 self.stale = true;
-                if self.description.variables[reference as usize].causality == Causality::Parameter
-                {
+                if self.description.variables[position].causality == Causality::Parameter {
                     self.progress.initialized = false;
                 }
             }
@@ -194,12 +262,14 @@ impl Instance {
         Ok(&self.strings)
     }
 
-    pub(crate) fn directional_derivative(
+    /// Gives the derivatives of the unknowns in the direction `seed`, or, if `adjoint`, those of the
+    /// knowns for the weights `seed` of the unknowns.
+    pub(crate) fn derivatives_along(
         &mut self,
-        unknowns: &[u32],
-        knowns: &[u32],
+        (unknowns, knowns): (&[u32], &[u32]),
         seed: &[f64],
         mut derivative: Room<f64>,
+        adjoint: bool,
     ) -> Outcome {
         if self.states.is_empty() {
             return error("this FMU provides no directional derivatives");
@@ -217,18 +287,21 @@ impl Instance {
         for &reference in knowns {
             self.expect_type::<f64>(reference)?;
             let variable = self.variable(reference)?;
-            let is_state = self.states.iter().any(|&(state, _)| state == reference as usize);
+            let position = self.position(reference);
+            let is_state = self.states.iter().any(|&(state, _)| state == position);
             if variable.causality != Causality::Input && !is_state {
                 return error(format!("'{}' is neither an input nor a state", variable.name));
             }
         }
         self.refresh()?;
         let time = self.progress.time;
-        for (i, &unknown) in unknowns.iter().enumerate() {
+        let (rows, columns) = if adjoint { (knowns, unknowns) } else { (unknowns, knowns) };
+        for (i, &row) in rows.iter().enumerate() {
             let mut sum = 0.0;
-            for (&known_variable, seed) in knowns.iter().zip(seed) {
-                let (unknown, known_variable) = (unknown as usize, known_variable as usize);
-                sum += self.model.partial_derivative(time, unknown, known_variable)? * seed;
+            for (&column, seed) in columns.iter().zip(seed) {
+                let (unknown, known) = if adjoint { (column, row) } else { (row, column) };
+                let (unknown, known) = (self.position(unknown), self.position(known));
+                sum += self.model.partial_derivative(time, unknown, known)? * seed;
             }
             derivative.put(i, sum);
         }

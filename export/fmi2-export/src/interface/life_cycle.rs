@@ -24,7 +24,7 @@ pub unsafe fn fmi2SetDebugLogging(
             .collect::<Result<Vec<_>, _>>();
         let names = names.map_err(Failure::Error)?;
         if let Some(unknown) = instance.logger().choose(logging_on != 0, &names) {
-            instance.warn(&format!("fmi2SetDebugLogging: there is no log category '{unknown}'"));
+            instance.warn(&format!("there is no log category '{unknown}'"));
         }
         Ok(())
     };

@@ -1,4 +1,4 @@
-//! Functions of FMI 2.0 with their C signatures.
+//! Functions of FMI 2.0 and 3.0 with their C signatures.
 //!
 //! [`export_fmus!`](crate::export_fmus) makes an exported function of the same name from each of
 //! them. They are `unsafe` like any C function, because a pointer that is neither null nor as the
@@ -14,6 +14,7 @@
 
 mod co_simulation;
 mod component;
+mod fmi3;
 mod library;
 mod life_cycle;
 mod model_exchange;
@@ -22,6 +23,7 @@ mod variables;
 
 pub use co_simulation::*;
 pub use component::{fmi2FreeInstance, fmi2Instantiate};
+pub use fmi3::*;
 pub use library::*;
 pub use life_cycle::*;
 pub use model_exchange::*;

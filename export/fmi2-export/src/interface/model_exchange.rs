@@ -9,7 +9,7 @@ use std::ffi::c_int;
 
 pub unsafe fn fmi2EnterEventMode(component: Component) -> FmiStatus {
     // SAFETY: the importer vouches for `component`, as `run` requires.
-    unsafe { run_always(component, &table::ENTER_EVENT_MODE, Instance::enter_event_mode) }
+    unsafe { run(component, &table::ENTER_EVENT_MODE, Instance::enter_event_mode) }
 }
 
 pub unsafe fn fmi2NewDiscreteStates(

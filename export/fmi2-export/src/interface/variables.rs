@@ -9,7 +9,7 @@ use std::ffi::{c_char, c_int};
 
 /// Gets variables of type `T`, whose values `convert` turns into those of C. The caller promises
 /// what [`run`] and [`requested`] ask.
-unsafe fn get<T: Typed, C: Copy + Default>(
+pub(super) unsafe fn get<T: Typed, C: Copy + Default>(
     component: Component,
     call: &Call,
     (vr, n, value): (*const u32, usize, *mut C),
@@ -26,7 +26,7 @@ unsafe fn get<T: Typed, C: Copy + Default>(
 
 /// Sets variables of type `T` to the values of C, converted by `convert`, or says why that is
 /// refused. The caller promises what [`run`] and [`slice`] ask.
-unsafe fn set<T: Typed + std::fmt::Debug, C: Copy>(
+pub(super) unsafe fn set<T: Typed + std::fmt::Debug, C: Copy>(
     component: Component,
     call: &Call,
     (vr, n, value): (*const u32, usize, *const C),
@@ -148,24 +148,48 @@ pub unsafe fn fmi2GetDirectionalDerivative(
     dv_known: *const f64,
     dv_unknown: *mut f64,
 ) -> FmiStatus {
-    let body = |instance: &mut Instance| {
-        // SAFETY: the importer vouches for the array, as `slice` requires.
-        let (unknown_references, known_references, seed) = unsafe {
-            (
-                slice("vUnknown_ref", unknowns, n_unknown)?,
-                slice("vKnown_ref", knowns, n_known)?,
-                slice("dvKnown", dv_known, n_known)?,
-            )
-        };
-        let written = ("dvUnknown", dv_unknown, n_unknown);
-        apart(("dvKnown", dv_known, n_known), written)?;
-        apart(("vUnknown_ref", unknowns, n_unknown), written)?;
-        apart(("vKnown_ref", knowns, n_known), written)?;
-        // SAFETY: the importer vouches for the array, as `room` requires. It overlaps none of the
-        // others.
-        let derivative = unsafe { room("dvUnknown", dv_unknown, n_unknown) }?;
-        instance.directional_derivative(unknown_references, known_references, seed, derivative)
+    let arguments = Derivatives {
+        unknowns: ("vUnknown_ref", unknowns, n_unknown),
+        knowns: ("vKnown_ref", knowns, n_known),
+        seed: ("dvKnown", dv_known, n_known),
+        result: ("dvUnknown", dv_unknown, n_unknown),
+        adjoint: false,
     };
-    // SAFETY: the importer vouches for `component`, as `run` requires.
-    unsafe { run(component, &table::DIRECTIONAL_DERIVATIVE, body) }
+    // SAFETY: the importer vouches for `component` and the arrays, as `derivatives` requires.
+    unsafe { derivatives(component, &table::DIRECTIONAL_DERIVATIVE, &arguments) }
+}
+
+/// Arguments of a call for derivatives: each array with its name and length.
+pub(super) struct Derivatives {
+    pub(super) unknowns: (&'static str, *const u32, usize),
+    pub(super) knowns: (&'static str, *const u32, usize),
+    pub(super) seed: (&'static str, *const f64, usize),
+    pub(super) result: (&'static str, *mut f64, usize),
+    pub(super) adjoint: bool,
+}
+
+/// Gives directional or adjoint derivatives. The caller promises what [`run`], [`slice`] and
+/// [`room`] ask.
+pub(super) unsafe fn derivatives(
+    component: Component,
+    call: &Call,
+    arguments: &Derivatives,
+) -> FmiStatus {
+    let Derivatives { unknowns, knowns, seed, result, adjoint } = *arguments;
+    let body = |instance: &mut Instance| {
+        // SAFETY: the caller promises what `slice` asks.
+        let (references, values) = unsafe {
+            let unknowns = slice(unknowns.0, unknowns.1, unknowns.2)?;
+            let knowns = slice(knowns.0, knowns.1, knowns.2)?;
+            ((unknowns, knowns), slice(seed.0, seed.1, seed.2)?)
+        };
+        apart(seed, result)?;
+        apart(unknowns, result)?;
+        apart(knowns, result)?;
+        // SAFETY: the caller promises what `room` asks. The room overlaps none of the others.
+        let derivative = unsafe { room(result.0, result.1, result.2) }?;
+        instance.derivatives_along(references, values, derivative, adjoint)
+    };
+    // SAFETY: the caller promises what `run` asks.
+    unsafe { run(component, call, body) }
 }
