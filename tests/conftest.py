@@ -7,6 +7,7 @@ import os
 import subprocess
 import sys
 import sysconfig
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -58,6 +59,13 @@ def program(name: str) -> Path:
 def archive(name: str) -> Path:
     """Path of a packed FMU."""
     path = TARGET / "fmu" / f"{name}.fmu"
+    assert path.is_file(), f"{path} does not exist: run scripts/build-fmus"
+    return path
+
+
+def archive3(name: str) -> Path:
+    """Path of a packed FMU for FMI 3.0."""
+    path = TARGET / "fmu" / "fmi3" / f"{name}.fmu"
     assert path.is_file(), f"{path} does not exist: run scripts/build-fmus"
     return path
 
@@ -126,14 +134,13 @@ def agree(request):
 @pytest.fixture(scope="session")
 def fmu(tmp_path_factory):
     """Opens an FMU by its name, once per session."""
-    opened: dict[str, Fmu] = {}
+    return cache(lambda name: Fmu.open(archive(name), tmp_path_factory.mktemp(name)))
 
-    def open_once(name: str) -> Fmu:
-        if name not in opened:
-            opened[name] = Fmu.open(archive(name), tmp_path_factory.mktemp(name))
-        return opened[name]
 
-    return open_once
+@pytest.fixture(scope="session")
+def fmu3(tmp_path_factory):
+    """Opens an FMU of FMI 3.0 by its name, once per session."""
+    return cache(lambda name: Fmu.open(archive3(name), tmp_path_factory.mktemp(name)))
 
 
 def merged(experiment: Path) -> str:

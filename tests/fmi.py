@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import fmpy
-from fmpy import fmi2
+from fmpy import fmi2, fmi3
 
 ANGLES = [f"attitude.{axis}" for axis in ("alpha", "beta", "sigma")]
 RATES = [f"rate.{axis}" for axis in ("p", "q", "r")]
@@ -56,6 +56,9 @@ class Instance:
     """A co-simulation instance. Parameters are set by name, and enumerations by their item's
     name."""
 
+    # The name of a type in the functions that transfer its values.
+    TYPES = {"Real": "Real", "Integer": "Integer", "Enumeration": "Integer", "Boolean": "Boolean", "String": "String"}
+
     def __init__(self, fmu: Fmu, parameters: dict | None = None, name: str = "instance", guid: str | None = None):
         self.fmu = fmu
         # Each call of the logger adds status, category and message.
@@ -63,18 +66,22 @@ class Instance:
         arguments = fmu.arguments()
         if guid is not None:
             arguments["guid"] = guid
-        self.slave = fmi2.FMU2Slave(instanceName=name, **arguments)
-        callbacks = fmi2.fmi2CallbackFunctions()
-        callbacks.logger = fmi2.fmi2CallbackLoggerTYPE(self._logged)
-        callbacks.allocateMemory = fmi2.defaultCallbacks.allocateMemory
-        callbacks.freeMemory = fmi2.defaultCallbacks.freeMemory
         try:
-            self.slave.instantiate(callbacks=callbacks, loggingOn=True)
+            self._instantiate(instanceName=name, **arguments)
         except Exception as error:
             raise RuntimeError(self.messages()) from error
         self.set(parameters or {})
 
-    def _logged(self, _environment, _instance, status, category, message):
+    def _instantiate(self, **arguments) -> None:
+        self.slave = fmi2.FMU2Slave(**arguments)
+        callbacks = fmi2.fmi2CallbackFunctions()
+        callbacks.logger = fmi2.fmi2CallbackLoggerTYPE(self._logged)
+        callbacks.allocateMemory = fmi2.defaultCallbacks.allocateMemory
+        callbacks.freeMemory = fmi2.defaultCallbacks.freeMemory
+        self.slave.instantiate(callbacks=callbacks, loggingOn=True)
+
+    def _logged(self, *arguments):
+        status, category, message = arguments[-3:]
         self.log.append((status, category.decode(), message.decode()))
 
     def messages(self) -> str:
@@ -92,30 +99,17 @@ class Instance:
             references, group = groups.setdefault(variable.type, ([], []))
             references.append(variable.valueReference)
             group.append(value)
-        setters = {
-            "Real": self.slave.setReal,
-            "Integer": self.slave.setInteger,
-            "Enumeration": self.slave.setInteger,
-            "Boolean": self.slave.setBoolean,
-            "String": self.slave.setString,
-        }
         for kind, (references, group) in groups.items():
-            setters[kind](references, group)
+            getattr(self.slave, f"set{self.TYPES[kind]}")(references, group)
 
     def get(self, names: list[str]) -> list:
         """Returns values in the order of the names. All Reals are read in one call, and so are all
         integers."""
         values = {}
-        getters = {
-            "Real": self.slave.getReal,
-            "Integer": self.slave.getInteger,
-            "Enumeration": self.slave.getInteger,
-            "Boolean": self.slave.getBoolean,
-            "String": self.slave.getString,
-        }
-        for kind, getter in getters.items():
+        for kind, name_in_functions in self.TYPES.items():
             own = [name for name in names if self.fmu.variables[name].type == kind]
             if own:
+                getter = getattr(self.slave, f"get{name_in_functions}")
                 values.update(zip(own, getter([self.fmu.variables[name].valueReference for name in own])))
         return [values[name] for name in names]
 
@@ -166,6 +160,76 @@ class Instance:
 
     def __exit__(self, *_) -> None:
         self.close()
+
+
+class Instance3(Instance):
+    """A co-simulation instance of FMI 3.0. With `events`, the importer uses event mode and allows
+    early return. A step returns whether an event is to be handled, whether the simulation ends,
+    whether the step ended early, and the time reached."""
+
+    TYPES = {"Float64": "Float64", "Int32": "Int32", "Enumeration": "Int64", "Boolean": "Boolean", "String": "String"}
+
+    def __init__(self, *arguments, events: bool = False, **named):
+        self.events = events
+        super().__init__(*arguments, **named)
+
+    def _instantiate(self, **arguments) -> None:
+        self.slave = fmi3.FMU3Slave(**arguments)
+        self.slave.instantiate(loggingOn=True, eventModeUsed=self.events, earlyReturnAllowed=self.events, logMessage=self._logged)
+
+    def enter(self, start: float = 0.0, stop: float | None = None) -> None:
+        self.slave.enterInitializationMode(startTime=start, stopTime=stop)
+
+    def handle(self) -> float | None:
+        """Handles an event, and returns the time of the next one."""
+        *_, is_defined, time = self.slave.updateDiscreteStates()
+        return time if is_defined else None
+
+    def step(self, time: float, step: float) -> tuple[bool, bool, bool, float]:
+        return self.slave.doStep(currentCommunicationPoint=time, communicationStepSize=step)
+
+    def save(self) -> bytes:
+        state = self.slave.getFMUState()
+        saved = self.slave.serializeFMUState(state)
+        self.slave.freeFMUState(state)
+        return saved
+
+    def restore(self, saved: bytes) -> None:
+        state = self.slave.deserializeFMUState(saved)
+        self.slave.setFMUState(state)
+        self.slave.freeFMUState(state)
+
+
+class EventLoop:
+    """Controller and plant of FMI 3.0 in event mode: both make the step at the same time, then each
+    gets the inputs of the instant, so that the loop has no delay."""
+
+    def __init__(self, controller: Instance3, plant: Instance3, step: float):
+        self.controller, self.plant, self.period = controller, plant, step
+
+    def exchange(self) -> list[float]:
+        """Handles the event at the present instant. Returns state and moment."""
+        state = self.plant.get(ANGLES + RATES)
+        self.controller.set(dict(zip(ANGLES + RATES, state)))
+        self.controller.handle()
+        moment = self.controller.get(MOMENT)
+        self.plant.set(dict(zip(MOMENT, moment)))
+        self.plant.handle()
+        for instance in (self.controller, self.plant):
+            instance.slave.enterStepMode()
+        return state + moment
+
+    def fly(self, steps: int) -> list[list[float]]:
+        for instance in (self.plant, self.controller):
+            instance.enter()
+            instance.exit()
+        rows = [self.exchange()]
+        for tick in range(steps):
+            for instance in (self.controller, self.plant):
+                instance.step(tick * self.period, self.period)
+                instance.slave.enterEventMode()
+            rows.append(self.exchange())
+        return rows
 
 
 def number(written):

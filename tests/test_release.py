@@ -55,7 +55,11 @@ ARCHIVES = {
 
 def write_fmu(path: Path, platforms: tuple[str, ...]) -> None:
     [description] = ROOT.glob(f"fmu-*/generated/{path.stem}.xml")
-    path.parent.mkdir(parents=True, exist_ok=True)
+    guid = re.search(r'guid="([^"]+)"', description.read_text())[1]
+    beside = path.parent / "fmi3" / path.name
+    beside.parent.mkdir(parents=True, exist_ok=True)
+    with zipfile.ZipFile(beside, "w") as archive:
+        archive.writestr(zipfile.ZipInfo("modelDescription.xml"), f'<fmi3 instantiationToken="{guid}"/>')
     with zipfile.ZipFile(path, "w") as archive:
         archive.writestr(zipfile.ZipInfo("modelDescription.xml"), description.read_bytes())
         for each in platforms:
@@ -155,7 +159,8 @@ def test_archives_hold_fmus_licences_and_experiments(content, dist):
     assert {mode for _, mode, _ in content.values()} <= {0o644, 0o755}
     if name.startswith("reentry-fmus"):
         system = "linux-aarch64" if "aarch64" in name else "all"
-        places = {f"{each}.fmu": dist / system / "fmu" / f"{each}.fmu" for each in NAMES}
+        folder = dist / system / "fmu"
+        places = {f"{below}{each}.fmu": folder / f"{below}{each}.fmu" for each in NAMES for below in ("", "fmi3/")}
         assert set(content) == {*places, *licences, "README.md"} and not executable
     else:
         system = re.match(rf"orchestrator-{VERSION}-(.+?)\.(zip|tar)", name)[1]
@@ -302,6 +307,10 @@ def test_missing_and_foreign_fmus_are_named(dist, tmp_path):
     one.unlink()
     assert f"{one} does not exist: run scripts/package" in said()
     shutil.copy(dist / "windows-x86_64" / "fmu" / "LQR.fmu", one)
+    beside = folder / "windows-x86_64" / "fmu" / "fmi3" / "LQR.fmu"
+    shutil.copy(beside.with_name("FBL.fmu"), beside)
+    assert f"{beside} is another version of the FMU" in said()
+    shutil.copy(dist / "windows-x86_64" / "fmu" / "fmi3" / "LQR.fmu", beside)
     of_wheel = folder / "linux-aarch64" / "fmu-wheel" / "LQR.fmu"
     of_wheel.unlink()
     assert f"{of_wheel} does not exist: run scripts/package" in said()
