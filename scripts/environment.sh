@@ -95,7 +95,7 @@ fmu_folder() {
 }
 
 # Packs every FMU of the libraries in the folder $1 into the folder $2, and for FMI 3.0 into fmi3
-# below it, together with their builds for other platforms in the folders $also, if that is set.
+# beside it, together with their builds for other platforms in the folders $also, if that is set.
 # Further arguments go to fmu-pack, which runs in the folder with the icons: paths among them are
 # relative to that folder.
 pack_fmus() {
@@ -111,7 +111,7 @@ pack_fmus() {
             others+=(--also "$(library "$name" "$folder")")
         done
         (cd "$(fmu_folder "$name")" && "$programs/fmu-pack" "$library" "${others[@]+"${others[@]}"}" \
-            --output "$2" --icons icons "${licences[@]+"${licences[@]}"}" "${@:3}")
+            --output "$2" --fmi3 "$(dirname "$2")/fmi3" --icons icons "${licences[@]+"${licences[@]}"}" "${@:3}")
     done
 }
 

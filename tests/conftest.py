@@ -65,7 +65,7 @@ def archive(name: str) -> Path:
 
 def archive3(name: str) -> Path:
     """Path of a packed FMU for FMI 3.0."""
-    path = TARGET / "fmu" / "fmi3" / f"{name}.fmu"
+    path = TARGET / "fmi3" / f"{name}.fmu"
     assert path.is_file(), f"{path} does not exist: run scripts/build-fmus"
     return path
 

@@ -46,6 +46,8 @@ WHEELS = {
 ARCHIVES = {
     f"reentry-fmus-{VERSION}.zip",
     f"reentry-fmus-{VERSION}-linux-aarch64.zip",
+    f"reentry-fmus-fmi3-{VERSION}.zip",
+    f"reentry-fmus-fmi3-{VERSION}-linux-aarch64.zip",
     f"orchestrator-{VERSION}-linux-x86_64.tar.gz",
     f"orchestrator-{VERSION}-linux-aarch64.tar.gz",
     f"orchestrator-{VERSION}-windows-x86_64.zip",
@@ -55,11 +57,12 @@ ARCHIVES = {
 
 def write_fmu(path: Path, platforms: tuple[str, ...]) -> None:
     [description] = ROOT.glob(f"fmu-*/generated/{path.stem}.xml")
-    guid = re.search(r'guid="([^"]+)"', description.read_text())[1]
-    beside = path.parent / "fmi3" / path.name
-    beside.parent.mkdir(parents=True, exist_ok=True)
+    beside = path.parents[1] / "fmi3" / path.name
+    for folder in (path.parent, beside.parent):
+        folder.mkdir(parents=True, exist_ok=True)
     with zipfile.ZipFile(beside, "w") as archive:
-        archive.writestr(zipfile.ZipInfo("modelDescription.xml"), f'<fmi3 instantiationToken="{guid}"/>')
+        token = re.search(r'guid=("[^"]+")', description.read_text())[1]
+        archive.writestr(zipfile.ZipInfo("modelDescription.xml"), f"<fmi3 instantiationToken={token}/>")
     with zipfile.ZipFile(path, "w") as archive:
         archive.writestr(zipfile.ZipInfo("modelDescription.xml"), description.read_bytes())
         for each in platforms:
@@ -159,8 +162,8 @@ def test_archives_hold_fmus_licences_and_experiments(content, dist):
     assert {mode for _, mode, _ in content.values()} <= {0o644, 0o755}
     if name.startswith("reentry-fmus"):
         system = "linux-aarch64" if "aarch64" in name else "all"
-        folder = dist / system / "fmu"
-        places = {f"{below}{each}.fmu": folder / f"{below}{each}.fmu" for each in NAMES for below in ("", "fmi3/")}
+        folder = dist / system / ("fmi3" if "fmi3" in name else "fmu")
+        places = {f"{each}.fmu": folder / f"{each}.fmu" for each in NAMES}
         assert set(content) == {*places, *licences, "README.md"} and not executable
     else:
         system = re.match(rf"orchestrator-{VERSION}-(.+?)\.(zip|tar)", name)[1]
@@ -207,11 +210,8 @@ def test_the_same_packages_give_the_same_bytes(made, tmp_path):
 
 def test_the_checksums_are_those_of_the_files(made):
     lines = (made / "SHA256SUMS").read_text().splitlines()
-    sums = {
-        path.name: hashlib.sha256(path.read_bytes()).hexdigest()
-        for path in made.iterdir()
-        if path.name != "SHA256SUMS"
-    }
+    files = [path for path in made.iterdir() if path.name != "SHA256SUMS"]
+    sums = {path.name: hashlib.sha256(path.read_bytes()).hexdigest() for path in files}
     assert lines == [f"{sums[name]}  {name}" for name in sorted(sums)]
 
 
@@ -261,9 +261,7 @@ def test_the_bill_of_materials_fits_its_schema_and_the_lock_file(made):
     )
     python = TARGET / "release-tools" / "bin" / "python"
     for given, code in ((text, 0), (text.replace('"bomFormat"', '"form"'), 1)):
-        done = subprocess.run(
-            [python, "-c", validator], input=given, capture_output=True, text=True
-        )
+        done = subprocess.run([python, "-c", validator], input=given, capture_output=True, text=True)
         assert done.returncode == code, done.stderr
     components = {(each["name"], each["version"]): each for each in bill["components"]}
     assert compiled_in() <= {"-".join(key) for key in components}
@@ -307,10 +305,10 @@ def test_missing_and_foreign_fmus_are_named(dist, tmp_path):
     one.unlink()
     assert f"{one} does not exist: run scripts/package" in said()
     shutil.copy(dist / "windows-x86_64" / "fmu" / "LQR.fmu", one)
-    beside = folder / "windows-x86_64" / "fmu" / "fmi3" / "LQR.fmu"
+    beside = folder / "windows-x86_64" / "fmi3" / "LQR.fmu"
     shutil.copy(beside.with_name("FBL.fmu"), beside)
     assert f"{beside} is another version of the FMU" in said()
-    shutil.copy(dist / "windows-x86_64" / "fmu" / "fmi3" / "LQR.fmu", beside)
+    shutil.copy(dist / "windows-x86_64" / "fmi3" / "LQR.fmu", beside)
     of_wheel = folder / "linux-aarch64" / "fmu-wheel" / "LQR.fmu"
     of_wheel.unlink()
     assert f"{of_wheel} does not exist: run scripts/package" in said()
@@ -343,9 +341,7 @@ for licence in bad:
 
 def test_licences_that_are_not_allowed_are_named(made):
     python = TARGET / "release-tools" / "bin" / "python"
-    done = subprocess.run(
-        [python, "-c", JUDGE], cwd=ROOT / "scripts" / "packaging", capture_output=True, text=True
-    )
+    done = subprocess.run([python, "-c", JUDGE], cwd=ROOT / "scripts" / "packaging", capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     said = [line.split(":")[0] for line in done.stdout.splitlines()]
     assert said == [
@@ -385,9 +381,7 @@ def database(folder: Path, package: str, patched: str) -> Path:
 
 
 def test_a_release_says_that_advisories_were_not_checked(made, dist, tmp_path):
-    assert (
-        "Advisories: not checked, no database could be fetched." in (made / "README.md").read_text()
-    )
+    assert "Advisories: not checked, no database could be fetched." in (made / "README.md").read_text()
     done = release(dist, tmp_path / "dist", "--require-advisories")
     assert done.returncode == 1 and not (tmp_path / "dist").exists()
     assert "error: advisories: not checked, no database could be fetched" in done.stderr
@@ -400,12 +394,8 @@ def test_a_folder_without_advisories_is_no_database(dist, tmp_path):
 
 
 def test_an_advisory_against_a_crate_of_the_lock_file_fails_the_release(dist, tmp_path):
-    done = release(
-        dist,
-        tmp_path / "dist",
-        "--advisory-db",
-        database(tmp_path / "hit", "clarabel", ">= 99.0.0"),
-    )
+    hit = database(tmp_path / "hit", "clarabel", ">= 99.0.0")
+    done = release(dist, tmp_path / "dist", "--advisory-db", hit)
     assert done.returncode == 1 and not (tmp_path / "dist").exists()
     assert "RUSTSEC-2026-9999" in done.stdout and "an advisory concerns a crate" in done.stderr
     mended = database(tmp_path / "mended", "clarabel", ">= 0.0.1")

@@ -108,7 +108,8 @@ def prepared(folder):
     for name in ("orchestrator", "docs"):
         (folder / name).symlink_to(ROOT / name)
     (folder / "target").mkdir()
-    (folder / "target" / "fmu").symlink_to(TARGET / "fmu")
+    for name in ("fmu", "fmi3"):
+        (folder / "target" / name).symlink_to(TARGET / name)
     (folder / "target" / "release").symlink_to(program("orchestrator").parent)
     # Names of the reader's own experiment and law in the pages.
     (folder / "my.toml").write_text(merged(ROOT / "orchestrator/experiments/crmpc-2022/crmpc-robust.toml"))

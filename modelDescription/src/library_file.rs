@@ -50,7 +50,8 @@ impl LibraryFile {
     /// Reads the library at `path`. A library for macOS may hold several architectures.
     ///
     /// # Errors
-    /// Reports a file that cannot be read, is not a library for a platform that FMI defines, or needs libraries that a bare system lacks.
+    /// Reports a file that cannot be read, is not a library for a platform that FMI defines, or
+    /// needs libraries that a bare system lacks.
     pub fn read(path: &Path) -> Result<Self, Error> {
         let bytes =
             std::fs::read(path).map_err(|source| Error::File { path: path.to_owned(), source })?;

@@ -14,7 +14,8 @@ use std::path::Path;
 /// A library for Linux of which only the file matters.
 fn library_file(path: &Path) -> LibraryFile {
     let path = path.to_owned();
-    LibraryFile { path, folders: &["linux64"], suffix: "so", exports: [].into(), sources: None }
+    let (exports, tuples) = ([].into(), vec!["x86_64-linux"]);
+    LibraryFile { path, folders: &["linux64"], tuples, suffix: "so", exports, sources: None }
 }
 
 fn variable(

@@ -1,14 +1,19 @@
 //! Runs FMUs with fmi-rs alone: its importer, its simulation of one FMU, and two instances that are
 //! connected by hand. The results are written as CSV.
 //!
-//! The usage is `fmi_rs cs|me FMU STEP STOP OUT` or `fmi_rs loop CONTROLLER PLANT STEP STOP OUT`.
+//! The usage is `fmi_rs KIND FMU STEP STOP OUT` or `fmi_rs loop CONTROLLER PLANT STEP STOP OUT`.
+//! KIND is `cs` or `me` for FMI 2.0, and for FMI 3.0 `cs3`, `me3` or `events3`, which is
+//! co-simulation with event mode.
 
 use fmi_rs::fmi2::builder::FMU2Builder;
 use fmi_rs::fmi2::types::fmi2Status;
 use fmi_rs::fmi2::{CS, FMU2};
-use fmi_rs::model_description::fmi2::Causality;
+use fmi_rs::fmi3::LibraryKind;
+use fmi_rs::fmi3::builder::FMU3Builder;
+use fmi_rs::model_description::{fmi2::Causality, fmi3};
 use fmi_rs::sim::fmi2::recorder::Recorder;
 use fmi_rs::sim::fmi2::{SimulationSettings, Trajectories, cs, csv, me};
+use fmi_rs::sim::fmi3 as sim3;
 use fmi_rs::sim::solver::ForwardEulerFactory;
 use std::error::Error;
 use std::fs::File;
@@ -29,11 +34,14 @@ fn main() -> Result<(), Box<dyn Error>> {
         [kind @ ("cs" | "me"), fmu, step, stop, out] => {
             alone(kind, fmu, step.parse()?, stop.parse()?, out)
         }
+        [kind @ ("cs3" | "me3" | "events3"), fmu, step, stop, out] => {
+            alone_in_fmi3(kind, fmu, step.parse()?, stop.parse()?, out)
+        }
         ["loop", controller, plant, step, stop, out] => {
             closed_loop(controller, plant, step.parse()?, stop.parse()?, out)
         }
         _ => Err(
-            "usage: fmi_rs cs|me FMU STEP STOP OUT, or fmi_rs loop CONTROLLER PLANT STEP STOP OUT"
+            "usage: fmi_rs cs|me|cs3|me3|events3 FMU STEP STOP OUT, or fmi_rs loop CONTROLLER PLANT STEP STOP OUT"
                 .into(),
         ),
     }
@@ -81,6 +89,56 @@ fn alone(kind: &str, path: &str, step: f64, stop: f64, out: &str) -> Result<(), 
         )?;
     }
     csv::write_csv(&recorder.trajectories.borrow(), out)?;
+    Ok(())
+}
+
+/// Simulates one FMU of FMI 3.0 in the same way.
+#[expect(clippy::arc_with_non_send_sync, reason = "what the library wants")]
+fn alone_in_fmi3(
+    kind: &str,
+    path: &str,
+    step: f64,
+    stop: f64,
+    out: &str,
+) -> Result<(), Box<dyn Error>> {
+    let opened = FMU3Builder::new(&path)?;
+    let description = Arc::new(opened.model_description);
+    let outputs = description.modelVariables.iter().enumerate();
+    let outputs = outputs.filter(|(_, variable)| variable.causality == fmi3::Causality::Output);
+    let trajectories =
+        sim3::Trajectories::new(description.clone(), outputs.map(|(index, _)| index).collect());
+    let recorder = Arc::new(sim3::recorder::Recorder::new(trajectories));
+    let settings = sim3::SimulationSettings {
+        unzipdir: opened.unzipdir.path().to_path_buf(),
+        model_description: description,
+        library_kind: LibraryKind::Native,
+        enable_dae: false,
+        start_time: 0.0,
+        stop_time: stop,
+        visible: false,
+        logging_on: true,
+        set_stop_time: true,
+        output_interval: step,
+        log_time_scale: false,
+        tolerance: 1e-6,
+        set_tolerance: false,
+        start_values: Vec::new(),
+        log_fmi_calls: false,
+        intermediate_update: false,
+        input_file: None,
+        early_return_allowed: kind == "events3",
+        event_mode_used: kind == "events3",
+        log_file: None,
+        initial_fmu_state_file: None,
+        final_fmu_state_file: None,
+    };
+    if kind == "me3" {
+        let euler = ForwardEulerFactory { fixed_step_size: step };
+        sim3::me::simulate(&settings, &euler, None, recorder.clone())?;
+    } else {
+        sim3::cs::simulate(&settings, None, recorder.clone())?;
+    }
+    sim3::csv::write_csv(&recorder.trajectories.borrow(), out)?;
     Ok(())
 }
 

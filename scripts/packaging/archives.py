@@ -37,11 +37,10 @@ LICENCES = ("LICENSE-APACHE", "LICENSE-MIT")
 # Licences of the linked packages, by inventory.py and the Rust distribution.
 NOTICES = ("LICENSES.txt", "LICENSES-rust-std.html")
 
-FMUS_README = """# Re-entry attitude control: FMUs {version}
+FMUS_README = """# Re-entry attitude control: FMUs ({standard}) {version}
 
-The archives (*.fmu) hold the FMUs for {systems}. Any importer for FMI 2.0
-co-simulation opens them; those for FMI 3.0 are in fmi3. Each has its documentation in
-documentation/index.html.
+The archives (*.fmu) hold the FMUs for {systems}. Any importer for {standard}
+co-simulation opens them; each has its documentation in documentation/index.html.
 
 LICENSE-MIT and LICENSE-APACHE are the licences of the FMUs, either of which may be chosen.
 LICENSES.txt and LICENSES-rust-std.html are those of what is linked in.
@@ -65,6 +64,7 @@ RELEASE_README = """# Re-entry attitude control {version}
 |---|---|
 | reentry-fmus-{version}.zip | every FMU, for Linux and Windows on x86-64 and for macOS |
 | reentry-fmus-{version}-linux-aarch64.zip | every FMU, for Linux on aarch64 |
+| reentry-fmus-fmi3-{version}…zip | the same for FMI 3.0 |
 | orchestrator-{version}-PLATFORM | the program with experiments and the platform's FMUs |
 | *.whl | the Python package, with program, experiments and FMUs |{page}
 | LICENSES.txt, LICENSES-rust-std.html | the licences of what is linked in |
@@ -82,10 +82,9 @@ class Fault(Exception):
     """A fault of the files that a release needs."""
 
 
-def packed_fmus(dist: Path, platform: str, pattern: str) -> Iterator[Entry]:
-    folder = dist / platform / "fmu"
-    for path in folder.glob(pattern):
-        yield path.relative_to(folder).as_posix(), path.read_bytes(), 0o644
+def packed_fmus(folder: Path) -> Iterator[Entry]:
+    for path in folder.glob("*.fmu"):
+        yield path.name, path.read_bytes(), 0o644
 
 
 def check(dist: Path) -> None:
@@ -102,7 +101,7 @@ def check(dist: Path) -> None:
             with zipfile.ZipFile(path) as archive:
                 if archive.read("modelDescription.xml") != description:
                     raise Fault(f"{path} is another version of the FMU: run scripts/package")
-            check_fmi3(folder / "fmi3" / f"{name}.fmu", description)
+            check_fmi3(folder.parent / "fmi3" / f"{name}.fmu", description)
         for path in sorted(folder.glob("*.fmu")):
             if path.stem not in described:
                 raise Fault(f"{path} is no FMU of this version: remove it")
@@ -172,9 +171,11 @@ def write_fmus(dist: Path, output: Path, version: str, epoch: int) -> None:
         ("all", "", "Linux and Windows on x86-64 and for macOS"),
         ("linux-aarch64", "-linux-aarch64", PLATFORMS["linux-aarch64"]),
     ):
-        page = readme(FMUS_README, version=version, systems=systems)
-        entries = [*packed_fmus(dist, platform, "**/*.fmu"), *licence_files(output), page]
-        write(output / f"reentry-fmus-{version}{suffix}.zip", entries, epoch)
+        for folder, standard, mark in (("fmu", "FMI 2.0", ""), ("fmi3", "FMI 3.0", "-fmi3")):
+            page = readme(FMUS_README, version=version, standard=standard, systems=systems)
+            fmus = packed_fmus(dist / platform / folder)
+            entries = [*fmus, *licence_files(output), page]
+            write(output / f"reentry-fmus{mark}-{version}{suffix}.zip", entries, epoch)
 
 
 def write_programs(dist: Path, output: Path, version: str, epoch: int) -> None:
@@ -191,7 +192,7 @@ def write_programs(dist: Path, output: Path, version: str, epoch: int) -> None:
         name = binary.stem if binary.suffix else f"./{binary.name}"
         manual = "" if binary.suffix else " `man -M man orchestrator` explains it, too."
         page = readme(PROGRAM_README, version=version, systems=systems, program=name, manual=manual)
-        fmus = [(f"fmu/{name}", content, mode) for name, content, mode in packed_fmus(dist, platform, "*.fmu")]
+        fmus = [(f"fmu/{name}", content, mode) for name, content, mode in packed_fmus(dist / platform / "fmu")]
         # Windows has no man.
         pages = [] if binary.suffix else sorted((dist / "man").glob("*.1"))
         entries = [

@@ -175,8 +175,8 @@ pub(crate) mod table {
     pub(crate) const ENTER_STEP_MODE:           Call = call("fmi3EnterStepMode",                  CS,   "--E-----");
 }
 
-/// Makes the call of a function of FMI 3.0 that needs what no FMU has, such as clocks. It is refused
-/// wherever it is called, and leaves the state as it was.
+/// Makes the call of a function of FMI 3.0 that needs what no FMU has, such as clocks. It is
+/// refused wherever it is called, and leaves the state as it was.
 pub(crate) const fn without_use(name: &'static str) -> Call {
     call(name, None, "INECSFTX").keeping_state()
 }

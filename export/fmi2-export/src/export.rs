@@ -1,17 +1,18 @@
 //! Macro that turns models into the exported functions of a library.
 
-/// Exports the models as FMUs of FMI 2.0 and 3.0 in the calling library. Call it once per library.
+/// Exports the models as FMUs of FMI 2.0 and 3.0 in the calling library. Call it once per
+/// library.
 ///
 /// The macro defines modules `fmi2` and `fmi3` with all functions of these versions under their C
-/// names, and in the former
+/// names. The former also has
 /// - `fmu_model_descriptions() -> char*`: returns a NUL-terminated JSON list of the FMUs'
 ///   descriptions, or null on failure. The memory belongs to the library and is given back by
 /// - `fmu_free_model_descriptions(char*)`: frees that list; it accepts null.
 ///
-/// The GUID given to `fmi2Instantiate`, which is the instantiation token of FMI 3.0, selects the FMU.
-/// The crate needs
-/// `crate-type = ["cdylib", …]` and a build script that calls `fmi2_build::link`. The digest of the
-/// library's sources, which that build script makes, is put into a section of its own.
+/// The GUID given to `fmi2Instantiate`, or the equal instantiation token of FMI 3.0, selects the
+/// FMU. The crate needs `crate-type = ["cdylib", …]` and a build script that calls
+/// `fmi2_build::link`. The digest of the library's sources, which that build script makes, is put
+/// into a section of its own.
 ///
 /// ```ignore
 /// fmi2_export::export_fmus!(Plant);

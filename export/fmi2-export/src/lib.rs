@@ -1,10 +1,11 @@
-//! The FMI 2.0 C interface, written once: the model of an FMU implements [`Model`], and
+//! The C interfaces of FMI 2.0 and 3.0, written once: the model of an FMU implements [`Model`], and
 //! [`export_fmus!`] makes a library of it.
 //!
 //! | module | content |
 //! |---|---|
 //! | [`model`], [`table`] | the interface that a model must implement, and its variable table |
 //! | `model_instance` | a model bound to its variable table, without its type |
+//! | `progress` | the part of an instance's state that the shell keeps |
 //! | [`linked`] | an instance in the same program, without the C interface |
 //! | `instance` | one instance: checks, laziness, saved states; no pointers |
 //! | `call` | the table of calls allowed in each state |
@@ -30,6 +31,7 @@ pub mod model;
 mod model_instance;
 mod numbers;
 mod pointer;
+mod progress;
 mod resource;
 mod saved;
 mod scalar;
@@ -40,5 +42,6 @@ pub mod types;
 #[doc(hidden)]
 pub use export::sources;
 pub use model::{Context, EventInfo, Failure, Inputs, LastEvent, Model, Restoration};
-pub use model_instance::{Export, MAX_INPUT_DERIVATIVE_ORDER, describe};
+pub use model_instance::{Export, describe};
+pub use progress::MAX_INPUT_DERIVATIVE_ORDER;
 pub use table::{Description, VariableTable};

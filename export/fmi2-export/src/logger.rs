@@ -175,8 +175,8 @@ impl Logger {
     }
 }
 
-/// Converts a text for FMI 2.0, whose importers read it as a printf format, so that it must not hold
-/// a `%`.
+/// Converts a text for FMI 2.0, whose importers read it as a printf format, so that it must not
+/// hold a `%`.
 fn to_format(text: &str) -> CString {
     to_c(&text.replace('%', "percent"))
 }

@@ -168,8 +168,8 @@ pub trait Model: Serialize + DeserializeOwned + Send + Sized + 'static {
 
     /// Handles the event at `time`: it takes discrete inputs, makes the changes that are due, and
     /// returns the time of the next event. Importers may call it where no event is, and more than
-    /// once. A model with model exchange gets this call there only; another one gets it in the event
-    /// mode of FMI 3.0, where it only needs to return the time of its next tick after `time`.
+    /// once. A model with model exchange gets this call there only; another one gets it in the
+    /// event mode of FMI 3.0, where it only needs to return the time of its next tick after `time`.
     ///
     /// # Errors
     /// Says why the event could not be handled.

@@ -18,8 +18,8 @@ pub enum FmiStatus {
     Error,
     /// Status `fmi2Fatal`: the instance can only be freed.
     Fatal,
-    /// Status `fmi2Pending`, which FMI 3.0 does not have. It is never returned, because a step is finished when `fmi2DoStep`
-    /// returns.
+    /// Status `fmi2Pending`, which is never returned, because a step is finished when `fmi2DoStep`
+    /// returns. FMI 3.0 does not have it.
     Pending,
 }
 

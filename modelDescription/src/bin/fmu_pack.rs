@@ -9,8 +9,8 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::{fs, io};
 
-/// Packs every FMU in the given libraries into an archive NAME.fmu for FMI 2.0, and into another
-/// one for FMI 3.0 in the folder fmi3 beside it.
+/// Packs every FMU in the given libraries into an archive NAME.fmu for FMI 2.0, and with --fmi3
+/// into another one for FMI 3.0.
 ///
 /// Each library must be built with fmi2-export. The program loads it and asks it for the
 /// descriptions of its FMUs. Builds of the libraries for other platforms, given by --also, are only
@@ -35,6 +35,9 @@ struct Arguments {
     /// Folder for the archives; it is created if it does not exist
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
+    /// Folder for archives for FMI 3.0, which have the same names; none are packed without it
+    #[arg(long, value_name = "DIR")]
+    fmi3: Option<PathBuf>,
     /// Folder into which each modelDescription.xml is also written, as NAME.xml
     #[arg(long, value_name = "DIR")]
     xml_snapshot: Option<PathBuf>,
@@ -81,10 +84,12 @@ fn run(arguments: &Arguments) -> Result<(), Error> {
         icons: icons.clone(),
         folder: folder.clone(),
     };
-    let beside = arguments.output.join("fmi3");
-    make_folder(&beside)?;
-    for (fmu, files) in fmus() {
-        for (version, folder) in [(Version::Fmi2, &arguments.output), (Version::Fmi3, &beside)] {
+    let output =
+        [(Version::Fmi2, Some(&arguments.output)), (Version::Fmi3, arguments.fmi3.as_ref())];
+    for (version, folder) in output {
+        let Some(folder) = folder else { continue };
+        make_folder(folder)?;
+        for (fmu, files) in fmus() {
             let archive = pack(fmu, files, folder, &extras, version)?;
             println!("{}", archive.display());
         }

@@ -15,7 +15,7 @@ impl ModelDescription {
             self.write_fmi3_enumerations(xml)?;
             self.write_categories_and_experiment(xml)?;
             parent(xml, "ModelVariables", vec![], |xml| {
-                self.write_time(xml)?;
+                write_time(xml)?;
                 (0..self.variables.len()).try_for_each(|i| self.write_fmi3_variable(xml, i))?;
                 (0..self.event_indicators).try_for_each(|i| self.write_indicator(xml, i))
             })?;
@@ -59,18 +59,6 @@ impl ModelDescription {
                 })
             })
         })
-    }
-
-    fn write_time(&self, xml: &mut Xml) -> io::Result<()> {
-        let attributes = vec![
-            ("name", "time".into()),
-            ("valueReference", "0".into()),
-            ("description", "Simulation time".into()),
-            ("causality", Causality::Independent.name().into()),
-            ("variability", Variability::Continuous.name().into()),
-            ("unit", "s".into()),
-        ];
-        leaf(xml, "Float64", attributes)
     }
 
     fn write_indicator(&self, xml: &mut Xml, index: usize) -> io::Result<()> {
@@ -177,6 +165,18 @@ impl ModelDescription {
             })
         })
     }
+}
+
+fn write_time(xml: &mut Xml) -> io::Result<()> {
+    let attributes = vec![
+        ("name", "time".into()),
+        ("valueReference", "0".into()),
+        ("description", "Simulation time".into()),
+        ("causality", Causality::Independent.name().into()),
+        ("variability", Variability::Continuous.name().into()),
+        ("unit", "s".into()),
+    ];
+    leaf(xml, "Float64", attributes)
 }
 
 /// Returns the value reference of the variable at a position in the table.

@@ -11,8 +11,8 @@ const MILLIMETRES: (&str, &str) = ("suggestedScalingFactorTo_mm", "0.1");
 
 impl ModelDescription {
     /// Returns the names of the terminals, each with the names of its members: Real inputs, or Real
-    /// outputs, whose names differ behind the last dot only. Terminals of two FMUs match if they have
-    /// the same name.
+    /// outputs, whose names differ behind the last dot only. Terminals of two FMUs match if they
+    /// have the same name.
     fn terminals(&self) -> Vec<(&str, Vec<&str>)> {
         let mut terminals: Vec<(&str, Causality, Vec<&str>)> = vec![];
         for variable in &self.variables {

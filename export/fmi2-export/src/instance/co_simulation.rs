@@ -4,7 +4,7 @@ use super::{Instance, Stops};
 use crate::call::{Outcome, State, error};
 use crate::logger::Category;
 use crate::model::{Failure, LastEvent};
-use crate::model_instance::{Extrapolation, MAX_INPUT_DERIVATIVE_ORDER};
+use crate::progress::{Extrapolation, MAX_INPUT_DERIVATIVE_ORDER};
 use crate::types::FmiStatus;
 use model_description::variable::{Causality, Variability};
 

@@ -4,7 +4,7 @@ use super::Instance;
 use crate::call::{Outcome, State, error};
 use crate::logger::Category;
 use crate::model::{Context, LastEvent};
-use crate::model_instance::Progress;
+use crate::progress::Progress;
 use crate::types::{FmiStatus, Interface};
 use std::mem;
 

@@ -262,8 +262,8 @@ impl Instance {
         Ok(&self.strings)
     }
 
-    /// Gives the derivatives of the unknowns in the direction `seed`, or, if `adjoint`, those of the
-    /// knowns for the weights `seed` of the unknowns.
+    /// Gives the derivatives of the unknowns in the direction `seed`, or, if `adjoint`, those with
+    /// respect to the knowns of the unknowns' sum with the weights `seed`.
     pub(crate) fn derivatives_along(
         &mut self,
         (unknowns, knowns): (&[u32], &[u32]),

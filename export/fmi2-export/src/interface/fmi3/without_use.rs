@@ -1,5 +1,5 @@
-//! Functions for what no FMU has: variables of other types, clocks, structural parameters, partitions
-//! of the model. Without variables the former do nothing; all others are refused.
+//! Functions for what no FMU has: variables of other types, clocks, structural parameters,
+//! partitions of the model. The former do nothing without variables; all others are refused.
 
 use super::super::component::{Component, run};
 use crate::call::{error, without_use};
