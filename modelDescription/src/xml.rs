@@ -1,15 +1,16 @@
-//! Text of an FMU's `modelDescription.xml`: FMI 2.0, section 2.2, and what FMI 3.0 has in common.
+//! Text of an FMU's `modelDescription.xml`, FMI 2.0, section 2.2, and FMI 3.0, section 2.4.
 
-mod fmi3;
+mod interfaces;
 mod terminals;
 
 use crate::unit::Unit;
-use crate::variable::{Causality, EnumerationType, VariableKind};
+use crate::variable::{Causality, EnumerationType, Variability, VariableKind};
 use crate::{AUTHOR, Error, LICENSE, LOG_CATEGORIES, ModelDescription, Version};
 use quick_xml::Writer;
 use quick_xml::events::{BytesDecl, Event};
 use std::borrow::Cow;
 use std::io;
+use std::ops::Range;
 
 /// Name of the tool whose annotation marks the inputs that may stay unconnected.
 pub const OPTIONAL: &str = "re-entry-fmus";
@@ -28,35 +29,49 @@ impl ModelDescription {
     /// This never panics, because writing to memory does not fail and everything written is text.
     pub fn to_xml(&self, version: Version) -> Result<String, Error> {
         self.check()?;
-        Ok(document(|xml| match version {
-            Version::Fmi2 => self.write(xml),
-            Version::Fmi3 => self.write_fmi3(xml),
-        }))
+        Ok(document(|xml| self.write(xml, version)))
     }
 
-    fn write(&self, xml: &mut Xml) -> io::Result<()> {
-        // Several importers compare this text; they would refuse "2.0.4".
-        let mut attributes = self.head("2.0", "guid");
-        if self.model_exchange {
-            attributes.push(("numberOfEventIndicators", self.event_indicators.to_string()));
-        }
-        parent(xml, "fmiModelDescription", attributes, |xml| {
-            self.write_interfaces(xml)?;
-            self.write_units(xml, vec![])?;
-            self.write_enumerations(xml)?;
+    fn write(&self, xml: &mut Xml, version: Version) -> io::Result<()> {
+        parent(xml, "fmiModelDescription", self.head(version), |xml| {
+            self.write_interfaces(xml, version)?;
+            self.write_units(xml, version)?;
+            self.write_enumerations(xml, version)?;
             self.write_categories_and_experiment(xml)?;
             parent(xml, "ModelVariables", vec![], |xml| {
-                (0..self.variables.len()).try_for_each(|i| self.write_variable(xml, i))
+                if version == Version::Fmi3 {
+                    beyond_table(xml, "time", 0, "Simulation time", Causality::Independent)?;
+                }
+                (0..self.variables.len()).try_for_each(|i| self.write_variable(xml, i, version))?;
+                let indicators = self.indicators(version);
+                indicators.zip(1..).try_for_each(|(reference, number)| {
+                    let name = format!("eventIndicator[{number}]");
+                    let text = "Event indicator: an event occurs where its sign changes";
+                    beyond_table(xml, &name, reference, text, Causality::Local)
+                })
             })?;
-            self.write_structure(xml)
+            self.write_structure(xml, version)
         })
     }
 
-    /// Returns the attributes that all versions of FMI have. `identity` is the name of the one that
-    /// identifies the FMU.
-    fn head(&self, version: &str, identity: &'static str) -> Attributes {
-        vec![
-            ("fmiVersion", version.into()),
+    /// Returns the value references of the event indicators, which are variables in FMI 3.0 and
+    /// follow those of the table.
+    fn indicators(&self, version: Version) -> Range<usize> {
+        let first = version.first_reference() + self.variables.len();
+        match version {
+            Version::Fmi2 => first..first,
+            Version::Fmi3 => first..first + self.event_indicators,
+        }
+    }
+
+    fn head(&self, version: Version) -> Attributes {
+        // Several importers compare the version; they would refuse "2.0.4".
+        let (standard, identity) = match version {
+            Version::Fmi2 => ("2.0", "guid"),
+            Version::Fmi3 => ("3.0", "instantiationToken"),
+        };
+        let mut attributes: Attributes = vec![
+            ("fmiVersion", standard.into()),
             ("modelName", self.name.clone()),
             (identity, self.guid()),
             ("description", self.description.clone()),
@@ -65,7 +80,11 @@ impl ModelDescription {
             ("license", LICENSE.into()),
             ("generationTool", concat!("fmu-pack ", env!("CARGO_PKG_VERSION")).into()),
             ("variableNamingConvention", "structured".into()),
-        ]
+        ];
+        if self.model_exchange && version == Version::Fmi2 {
+            attributes.push(("numberOfEventIndicators", self.event_indicators.to_string()));
+        }
+        attributes
     }
 
     fn write_categories_and_experiment(&self, xml: &mut Xml) -> io::Result<()> {
@@ -86,39 +105,10 @@ impl ModelDescription {
         leaf(xml, "DefaultExperiment", attributes)
     }
 
-    fn write_interfaces(&self, xml: &mut Xml) -> io::Result<()> {
-        let mut derivatives = vec![];
-        if self.directional_derivatives() {
-            derivatives.push(("providesDirectionalDerivative", "true".to_string()));
-        }
-        let state: Attributes = vec![
-            ("canNotUseMemoryManagementFunctions", "true".into()),
-            ("canGetAndSetFMUstate", "true".into()),
-            ("canSerializeFMUstate", "true".into()),
-        ];
-        let identifier = vec![("modelIdentifier", self.name.clone())];
-        if self.model_exchange {
-            let flags = vec![("completedIntegratorStepNotNeeded", "true".into())];
-            leaf(
-                xml,
-                "ModelExchange",
-                [identifier.clone(), flags, state.clone(), derivatives.clone()].concat(),
-            )?;
-        }
-        if self.co_simulation {
-            let flags = vec![
-                ("canHandleVariableCommunicationStepSize", "true".into()),
-                ("canInterpolateInputs", "true".into()),
-                ("maxOutputDerivativeOrder", "0".into()),
-                ("canBeInstantiatedOnlyOncePerProcess", "false".into()),
-            ];
-            leaf(xml, "CoSimulation", [identifier, flags, state, derivatives].concat())?;
-        }
-        Ok(())
-    }
-
-    /// Writes the units of the variables, and `units` besides.
-    fn write_units<'a>(&'a self, xml: &mut Xml, mut units: Vec<&'a Unit>) -> io::Result<()> {
+    fn write_units(&self, xml: &mut Xml, version: Version) -> io::Result<()> {
+        let second = Unit::new("s");
+        // FMI 3.0 has the time as a variable.
+        let mut units = if version == Version::Fmi3 { vec![&second] } else { vec![] };
         for variable in &self.variables {
             if let VariableKind::Real { unit: Some(unit), .. } = &variable.kind
                 && !units.contains(&unit)
@@ -157,8 +147,7 @@ impl ModelDescription {
         })
     }
 
-    /// Returns the enumeration types of the variables, sorted by name.
-    fn enumerations(&self) -> Vec<&EnumerationType> {
+    fn write_enumerations(&self, xml: &mut Xml, version: Version) -> io::Result<()> {
         let mut enumerations: Vec<&EnumerationType> = vec![];
         for variable in &self.variables {
             if let VariableKind::Enumeration { enumeration_type, .. } = &variable.kind
@@ -167,49 +156,74 @@ impl ModelDescription {
                 enumerations.push(enumeration_type);
             }
         }
-        enumerations.sort_by(|a, b| a.name.cmp(&b.name));
-        enumerations
-    }
-
-    fn write_enumerations(&self, xml: &mut Xml) -> io::Result<()> {
-        let enumerations = self.enumerations();
         if enumerations.is_empty() {
             return Ok(());
         }
+        enumerations.sort_by(|a, b| a.name.cmp(&b.name));
         parent(xml, "TypeDefinitions", vec![], |xml| {
             enumerations.iter().try_for_each(|enumeration| {
-                parent(xml, "SimpleType", named(enumeration), |xml| {
-                    parent(xml, "Enumeration", vec![], |xml| write_items(xml, enumeration))
-                })
+                let attributes = vec![
+                    ("name", enumeration.name.clone()),
+                    ("description", enumeration.description.clone()),
+                ];
+                let items = |xml: &mut Xml| write_items(xml, enumeration);
+                match version {
+                    Version::Fmi2 => parent(xml, "SimpleType", attributes, |xml| {
+                        parent(xml, "Enumeration", vec![], items)
+                    }),
+                    Version::Fmi3 => parent(xml, "EnumerationType", attributes, items),
+                }
             })
         })
     }
 
-    fn write_variable(&self, xml: &mut Xml, reference: usize) -> io::Result<()> {
-        let variable = &self.variables[reference];
+    fn write_variable(&self, xml: &mut Xml, position: usize, version: Version) -> io::Result<()> {
+        let variable = &self.variables[position];
         // The attribute `initial` is left out, because the standard's defaults fit: parameters are
         // exact, and outputs and locals are calculated.
-        let attributes = vec![
+        let mut attributes = vec![
             ("name", variable.name.clone()),
-            ("valueReference", reference.to_string()),
+            ("valueReference", (position + version.first_reference()).to_string()),
             ("description", variable.description.clone()),
             ("causality", variable.causality.name().into()),
             ("variability", variable.variability.name().into()),
         ];
-        parent(xml, "ScalarVariable", attributes, |xml| {
-            self.write_kind(xml, &variable.kind)?;
-            if !variable.is_optional {
-                return Ok(());
-            }
-            write_optional(xml, "Tool", "name")
+        let (element, mut further) = self.element_of(&variable.kind);
+        let optional = |xml: &mut Xml| match version {
+            _ if !variable.is_optional => Ok(()),
+            Version::Fmi2 => write_optional(xml, "Tool", "name"),
+            Version::Fmi3 => write_optional(xml, "Annotation", "type"),
+        };
+        if version == Version::Fmi2 {
+            return parent(xml, "ScalarVariable", attributes, |xml| {
+                leaf(xml, element, further)?;
+                optional(xml)
+            });
+        }
+        let texts = if element == "String" { std::mem::take(&mut further) } else { vec![] };
+        attributes.extend(further);
+        let element = match element {
+            "Real" => "Float64",
+            "Integer" => "Int32",
+            same => same,
+        };
+        if texts.is_empty() && !variable.is_optional {
+            return leaf(xml, element, attributes);
+        }
+        parent(xml, element, attributes, |xml| {
+            optional(xml)?;
+            texts.into_iter().try_for_each(|(_, text)| leaf(xml, "Start", vec![("value", text)]))
         })
     }
 
-    fn write_kind(&self, xml: &mut Xml, kind: &VariableKind) -> io::Result<()> {
+    /// Returns the element of FMI 2.0 for a type, with the attributes that only this type has.
+    fn element_of(&self, kind: &VariableKind) -> (&'static str, Attributes) {
+        let number = |number: Option<i32>| number.map(|number| number.to_string());
         match kind {
             VariableKind::Real { unit, min, max, nominal, start, derivative_of } => {
-                let index =
-                    derivative_of.as_deref().and_then(|name| self.position(name)).map(|i| i + 1);
+                // In FMI 2.0 this is the number of the state, counted from 1; in FMI 3.0 it is its
+                // value reference, which is the same.
+                let state = derivative_of.as_deref().and_then(|name| self.position(name));
                 let display = unit.as_ref().and_then(|unit| unit.display.as_ref());
                 let attributes = [
                     ("unit", unit.as_ref().map(|unit| unit.name.clone())),
@@ -218,47 +232,67 @@ impl ModelDescription {
                     ("max", max.map(real)),
                     ("nominal", nominal.map(real)),
                     ("start", start.map(real)),
-                    ("derivative", index.map(|i| i.to_string())),
+                    ("derivative", state.map(|position| (position + 1).to_string())),
                 ];
-                leaf(xml, "Real", given(attributes))
+                ("Real", given(attributes))
             }
             VariableKind::Integer { min, max, start } => {
                 let attributes = [("min", *min), ("max", *max), ("start", *start)];
-                leaf(
-                    xml,
-                    "Integer",
-                    given(attributes.map(|(name, x)| (name, x.map(|x| x.to_string())))),
-                )
+                ("Integer", given(attributes.map(|(name, value)| (name, number(value)))))
             }
             VariableKind::Boolean { start } => {
-                leaf(xml, "Boolean", given([("start", start.map(|x| x.to_string()))]))
+                ("Boolean", given([("start", start.map(|x| x.to_string()))]))
             }
             VariableKind::Enumeration { enumeration_type, start } => {
-                let attributes = [
-                    ("declaredType", Some(enumeration_type.name.clone())),
-                    ("start", start.map(|x| x.to_string())),
-                ];
-                leaf(xml, "Enumeration", given(attributes))
+                let name = Some(enumeration_type.name.clone());
+                ("Enumeration", given([("declaredType", name), ("start", number(*start))]))
             }
-            VariableKind::String { start } => {
-                leaf(xml, "String", given([("start", start.clone())]))
-            }
+            VariableKind::String { start } => ("String", given([("start", start.clone())])),
         }
     }
 
-    fn write_structure(&self, xml: &mut Xml) -> io::Result<()> {
+    fn write_structure(&self, xml: &mut Xml, version: Version) -> io::Result<()> {
         let states = self.states();
         let is_output = |i: &usize| self.variables[*i].causality == Causality::Output;
         let outputs: Vec<_> = (0..self.variables.len()).filter(is_output).collect();
         let derivatives: Vec<_> = states.iter().map(|&(_, derivative)| derivative).collect();
         let at_runtime = |i| self.dependencies(i, &states);
         let initially = |i| self.initial_dependencies(i, &states);
+        let names = match version {
+            Version::Fmi2 => ["Outputs", "Derivatives", "InitialUnknowns"],
+            Version::Fmi3 => ["Output", "ContinuousStateDerivative", "InitialUnknown"],
+        };
         parent(xml, "ModelStructure", vec![], |xml| {
-            unknowns(xml, "Outputs", &outputs, at_runtime)?;
-            unknowns(xml, "Derivatives", &derivatives, at_runtime)?;
-            unknowns(xml, "InitialUnknowns", &self.initial_unknowns(&states), initially)
+            unknowns(xml, (version, names[0]), &outputs, at_runtime)?;
+            unknowns(xml, (version, names[1]), &derivatives, at_runtime)?;
+            unknowns(xml, (version, names[2]), &self.initial_unknowns(&states), initially)?;
+            // Without a list of dependencies they depend on everything.
+            self.indicators(version).try_for_each(|reference| {
+                leaf(xml, "EventIndicator", vec![("valueReference", reference.to_string())])
+            })
         })
     }
+}
+
+/// Writes a variable that FMI 3.0 has beyond the variable table.
+fn beyond_table(
+    xml: &mut Xml,
+    name: &str,
+    reference: usize,
+    description: &str,
+    causality: Causality,
+) -> io::Result<()> {
+    let mut attributes: Attributes = vec![
+        ("name", name.into()),
+        ("valueReference", reference.to_string()),
+        ("description", description.into()),
+        ("causality", causality.name().into()),
+        ("variability", Variability::Continuous.name().into()),
+    ];
+    if causality == Causality::Independent {
+        attributes.push(("unit", "s".into()));
+    }
+    leaf(xml, "Float64", attributes)
 }
 
 /// Returns the text of a document that `write` fills. Writing to memory does not fail.
@@ -270,11 +304,6 @@ fn document(write: impl FnOnce(&mut Xml) -> io::Result<()>) -> String {
     let mut text = String::from_utf8(xml.into_inner()).expect("only text was written");
     text.push('\n');
     text
-}
-
-/// Returns name and description of an enumeration type.
-fn named(enumeration: &EnumerationType) -> Attributes {
-    vec![("name", enumeration.name.clone()), ("description", enumeration.description.clone())]
 }
 
 fn write_items(xml: &mut Xml, enumeration: &EnumerationType) -> io::Result<()> {
@@ -297,28 +326,28 @@ fn write_optional(xml: &mut Xml, element: &str, attribute: &'static str) -> io::
     })
 }
 
-/// Writes one list of ModelStructure. FMI 2.0 counts variables from 1 here; an empty `dependencies`
-/// means that there are none.
+/// Writes one list of ModelStructure. FMI 2.0 counts variables from 1 here, which are the value
+/// references of FMI 3.0; an empty `dependencies` means that there are none.
 fn unknowns(
     xml: &mut Xml,
-    name: &str,
+    (version, name): (Version, &str),
     list: &[usize],
     dependencies: impl Fn(usize) -> Vec<usize>,
 ) -> io::Result<()> {
-    if list.is_empty() {
-        return Ok(());
-    }
-    parent(xml, name, vec![], |xml| {
+    let write = |xml: &mut Xml, element: &str, attribute| {
         list.iter().try_for_each(|&i| {
-            let indices: Vec<_> =
-                dependencies(i).iter().map(|reference| (reference + 1).to_string()).collect();
-            leaf(
-                xml,
-                "Unknown",
-                vec![("index", (i + 1).to_string()), ("dependencies", indices.join(" "))],
-            )
+            let others: Vec<_> =
+                dependencies(i).iter().map(|other| (other + 1).to_string()).collect();
+            let attributes =
+                vec![(attribute, (i + 1).to_string()), ("dependencies", others.join(" "))];
+            leaf(xml, element, attributes)
         })
-    })
+    };
+    match version {
+        Version::Fmi3 => write(xml, name, "valueReference"),
+        Version::Fmi2 if list.is_empty() => Ok(()),
+        Version::Fmi2 => parent(xml, name, vec![], |xml| write(xml, "Unknown", "index")),
+    }
 }
 
 /// Returns the shortest text that reads back as the same number.

@@ -48,21 +48,8 @@ macro_rules! export_fmus {
                 ::std::hint::black_box(&SOURCES);
                 shell::fmu_model_descriptions(&EXPORTS)
             }
-            #[unsafe(no_mangle)]
-            pub unsafe extern "C-unwind" fn fmi2Instantiate(
-                name: *const c_char,
-                fmu_type: c_int,
-                guid: *const c_char,
-                resources: *const c_char,
-                callbacks: *const Callbacks,
-                visible: c_int,
-                logging_on: c_int,
-            ) -> *mut c_void {
-                unsafe {
-                    shell::fmi2Instantiate(
-                        &EXPORTS, name, fmu_type, guid, resources, callbacks, visible, logging_on,
-                    )
-                }
+            $crate::forward! { EXPORTS;
+                fmi2Instantiate(name: *const c_char, fmu_type: c_int, guid: *const c_char, resources: *const c_char, callbacks: *const Callbacks, visible: c_int, logging_on: c_int) -> *mut c_void;
             }
             #[unsafe(no_mangle)]
             pub extern "C" fn fmi2GetTypesPlatform() -> *const c_char {
@@ -127,66 +114,10 @@ macro_rules! export_fmus {
             use $crate::types::{FmiStatus, LogMessageCallback};
             use ::std::ffi::{c_char, c_int, c_void};
 
-            #[unsafe(no_mangle)]
-            pub unsafe extern "C-unwind" fn fmi3InstantiateModelExchange(
-                name: *const c_char,
-                token: *const c_char,
-                resources: *const c_char,
-                _visible: bool,
-                logging_on: bool,
-                environment: *mut c_void,
-                log: Option<LogMessageCallback>,
-            ) -> *mut c_void {
-                unsafe {
-                    shell::fmi3InstantiateModelExchange(
-                        &EXPORTS, name, token, resources, logging_on, environment, log,
-                    )
-                }
-            }
-            #[unsafe(no_mangle)]
-            pub unsafe extern "C-unwind" fn fmi3InstantiateCoSimulation(
-                name: *const c_char,
-                token: *const c_char,
-                resources: *const c_char,
-                _visible: bool,
-                logging_on: bool,
-                event_mode: bool,
-                early_return: bool,
-                _intermediate_variables: *const u32,
-                _n_intermediate_variables: usize,
-                environment: *mut c_void,
-                log: Option<LogMessageCallback>,
-                _intermediate_update: *const c_void,
-            ) -> *mut c_void {
-                unsafe {
-                    shell::fmi3InstantiateCoSimulation(
-                        &EXPORTS, name, token, resources, logging_on, event_mode, early_return,
-                        environment, log,
-                    )
-                }
-            }
-            #[unsafe(no_mangle)]
-            pub unsafe extern "C-unwind" fn fmi3InstantiateScheduledExecution(
-                name: *const c_char,
-                token: *const c_char,
-                resources: *const c_char,
-                _visible: bool,
-                logging_on: bool,
-                environment: *mut c_void,
-                log: Option<LogMessageCallback>,
-                _clock_update: *const c_void,
-                _lock_preemption: *const c_void,
-                _unlock_preemption: *const c_void,
-            ) -> *mut c_void {
-                unsafe {
-                    shell::fmi3InstantiateScheduledExecution(
-                        &EXPORTS, name, token, resources, logging_on, environment, log,
-                    )
-                }
-            }
-            #[unsafe(no_mangle)]
-            pub extern "C" fn fmi3GetVersion() -> *const c_char {
-                shell::fmi3GetVersion()
+            $crate::forward! { EXPORTS;
+                fmi3InstantiateModelExchange(name: *const c_char, token: *const c_char, resources: *const c_char, visible: bool, logging_on: bool, environment: *mut c_void, log: Option<LogMessageCallback>) -> *mut c_void;
+                fmi3InstantiateCoSimulation(name: *const c_char, token: *const c_char, resources: *const c_char, visible: bool, logging_on: bool, event_mode: bool, early_return: bool, vr: *const u32, n: usize, environment: *mut c_void, log: Option<LogMessageCallback>, update: *const c_void) -> *mut c_void;
+                fmi3InstantiateScheduledExecution(name: *const c_char, token: *const c_char, resources: *const c_char, visible: bool, logging_on: bool, environment: *mut c_void, log: Option<LogMessageCallback>, update: *const c_void, lock: *const c_void, unlock: *const c_void) -> *mut c_void;
             }
             // These are the functions of FMI 2.0 with another name.
             $crate::forward! {
@@ -209,7 +140,9 @@ macro_rules! export_fmus {
                 fmi3GetContinuousStates = fmi2GetContinuousStates(c: *mut c_void, x: *mut f64, n: usize) -> FmiStatus;
                 fmi3GetNominalsOfContinuousStates = fmi2GetNominalsOfContinuousStates(c: *mut c_void, nominals: *mut f64, n: usize) -> FmiStatus;
             }
+            $crate::without_use! { ($crate::forward) ($crate::forward) }
             $crate::forward! {
+                fmi3GetVersion() -> *const c_char;
                 fmi3SetDebugLogging(c: *mut c_void, on: bool, n: usize, names: *const *const c_char) -> FmiStatus;
                 fmi3EnterInitializationMode(c: *mut c_void, td: bool, t: f64, start: f64, sd: bool, stop: f64) -> FmiStatus;
                 fmi3UpdateDiscreteStates(c: *mut c_void, needed: *mut bool, end: *mut bool, nominals: *mut bool, states: *mut bool, defined: *mut bool, next: *mut f64) -> FmiStatus;
@@ -218,61 +151,35 @@ macro_rules! export_fmus {
                 fmi3GetNumberOfContinuousStates(c: *mut c_void, n: *mut usize) -> FmiStatus;
                 fmi3EnterStepMode(c: *mut c_void) -> FmiStatus;
                 fmi3DoStep(c: *mut c_void, point: f64, size: f64, no_set_prior: bool, event: *mut bool, end: *mut bool, early: *mut bool, time: *mut f64) -> FmiStatus;
-                fmi3GetFloat32(c: *mut c_void, vr: *const u32, n: usize, value: *mut f32, m: usize) -> FmiStatus;
-                fmi3SetFloat32(c: *mut c_void, vr: *const u32, n: usize, value: *const f32, m: usize) -> FmiStatus;
                 fmi3GetFloat64(c: *mut c_void, vr: *const u32, n: usize, value: *mut f64, m: usize) -> FmiStatus;
                 fmi3SetFloat64(c: *mut c_void, vr: *const u32, n: usize, value: *const f64, m: usize) -> FmiStatus;
-                fmi3GetInt8(c: *mut c_void, vr: *const u32, n: usize, value: *mut i8, m: usize) -> FmiStatus;
-                fmi3SetInt8(c: *mut c_void, vr: *const u32, n: usize, value: *const i8, m: usize) -> FmiStatus;
-                fmi3GetUInt8(c: *mut c_void, vr: *const u32, n: usize, value: *mut u8, m: usize) -> FmiStatus;
-                fmi3SetUInt8(c: *mut c_void, vr: *const u32, n: usize, value: *const u8, m: usize) -> FmiStatus;
-                fmi3GetInt16(c: *mut c_void, vr: *const u32, n: usize, value: *mut i16, m: usize) -> FmiStatus;
-                fmi3SetInt16(c: *mut c_void, vr: *const u32, n: usize, value: *const i16, m: usize) -> FmiStatus;
-                fmi3GetUInt16(c: *mut c_void, vr: *const u32, n: usize, value: *mut u16, m: usize) -> FmiStatus;
-                fmi3SetUInt16(c: *mut c_void, vr: *const u32, n: usize, value: *const u16, m: usize) -> FmiStatus;
                 fmi3GetInt32(c: *mut c_void, vr: *const u32, n: usize, value: *mut i32, m: usize) -> FmiStatus;
                 fmi3SetInt32(c: *mut c_void, vr: *const u32, n: usize, value: *const i32, m: usize) -> FmiStatus;
-                fmi3GetUInt32(c: *mut c_void, vr: *const u32, n: usize, value: *mut u32, m: usize) -> FmiStatus;
-                fmi3SetUInt32(c: *mut c_void, vr: *const u32, n: usize, value: *const u32, m: usize) -> FmiStatus;
                 fmi3GetInt64(c: *mut c_void, vr: *const u32, n: usize, value: *mut i64, m: usize) -> FmiStatus;
                 fmi3SetInt64(c: *mut c_void, vr: *const u32, n: usize, value: *const i64, m: usize) -> FmiStatus;
-                fmi3GetUInt64(c: *mut c_void, vr: *const u32, n: usize, value: *mut u64, m: usize) -> FmiStatus;
-                fmi3SetUInt64(c: *mut c_void, vr: *const u32, n: usize, value: *const u64, m: usize) -> FmiStatus;
                 fmi3GetBoolean(c: *mut c_void, vr: *const u32, n: usize, value: *mut u8, m: usize) -> FmiStatus;
                 fmi3SetBoolean(c: *mut c_void, vr: *const u32, n: usize, value: *const u8, m: usize) -> FmiStatus;
                 fmi3GetString(c: *mut c_void, vr: *const u32, n: usize, value: *mut *const c_char, m: usize) -> FmiStatus;
                 fmi3SetString(c: *mut c_void, vr: *const u32, n: usize, value: *const *const c_char, m: usize) -> FmiStatus;
-                fmi3GetBinary(c: *mut c_void, vr: *const u32, n: usize, size: *mut usize, value: *mut *const u8, m: usize) -> FmiStatus;
-                fmi3SetBinary(c: *mut c_void, vr: *const u32, n: usize, size: *const usize, value: *const *const u8, m: usize) -> FmiStatus;
-                fmi3GetClock(c: *mut c_void, vr: *const u32, n: usize, value: *mut bool) -> FmiStatus;
-                fmi3SetClock(c: *mut c_void, vr: *const u32, n: usize, value: *const bool) -> FmiStatus;
                 fmi3GetDirectionalDerivative(c: *mut c_void, unknowns: *const u32, nu: usize, knowns: *const u32, nk: usize, seed: *const f64, ns: usize, value: *mut f64, m: usize) -> FmiStatus;
                 fmi3GetAdjointDerivative(c: *mut c_void, unknowns: *const u32, nu: usize, knowns: *const u32, nk: usize, seed: *const f64, ns: usize, value: *mut f64, m: usize) -> FmiStatus;
-                fmi3GetOutputDerivatives(c: *mut c_void, vr: *const u32, n: usize, order: *const i32, value: *mut f64, m: usize) -> FmiStatus;
-                fmi3GetNumberOfVariableDependencies(c: *mut c_void, vr: u32, n: *mut usize) -> FmiStatus;
-                fmi3GetVariableDependencies(c: *mut c_void, vr: u32, dependent: *mut usize, independents: *mut u32, elements: *mut usize, kinds: *mut c_int, n: usize) -> FmiStatus;
-                fmi3EnterConfigurationMode(c: *mut c_void) -> FmiStatus;
-                fmi3ExitConfigurationMode(c: *mut c_void) -> FmiStatus;
-                fmi3EvaluateDiscreteStates(c: *mut c_void) -> FmiStatus;
-                fmi3GetIntervalDecimal(c: *mut c_void, vr: *const u32, n: usize, interval: *mut f64, qualifier: *mut c_int) -> FmiStatus;
-                fmi3GetIntervalFraction(c: *mut c_void, vr: *const u32, n: usize, counter: *mut u64, resolution: *mut u64, qualifier: *mut c_int) -> FmiStatus;
-                fmi3GetShiftDecimal(c: *mut c_void, vr: *const u32, n: usize, shift: *mut f64) -> FmiStatus;
-                fmi3GetShiftFraction(c: *mut c_void, vr: *const u32, n: usize, counter: *mut u64, resolution: *mut u64) -> FmiStatus;
-                fmi3SetIntervalDecimal(c: *mut c_void, vr: *const u32, n: usize, interval: *const f64) -> FmiStatus;
-                fmi3SetIntervalFraction(c: *mut c_void, vr: *const u32, n: usize, counter: *const u64, resolution: *const u64) -> FmiStatus;
-                fmi3SetShiftDecimal(c: *mut c_void, vr: *const u32, n: usize, shift: *const f64) -> FmiStatus;
-                fmi3SetShiftFraction(c: *mut c_void, vr: *const u32, n: usize, counter: *const u64, resolution: *const u64) -> FmiStatus;
-                fmi3ActivateModelPartition(c: *mut c_void, clock: u32, time: f64) -> FmiStatus;
             }
         }
     };
 }
 
 /// Defines exported functions that call the shell's functions of the same name, or of another one
-/// after `=`. An exception that the importer's logger throws may pass through them.
+/// after `=`. Those after `EXPORTS;` get the FMUs of the library as well. An exception that the
+/// importer's logger throws may pass through them.
 #[doc(hidden)]
 #[macro_export]
 macro_rules! forward {
+    ($exports:ident; $($name:ident($($argument:ident: $type:ty),*) -> $result:ty;)*) => {$(
+        #[unsafe(no_mangle)]
+        pub unsafe extern "C-unwind" fn $name($($argument: $type),*) -> $result {
+            unsafe { shell::$name(&$exports, $($argument),*) }
+        }
+    )*};
     ($($name:ident($($argument:ident: $type:ty),*) -> $result:ty;)*) => {
         $crate::forward! { $($name = $name($($argument: $type),*) -> $result;)* }
     };

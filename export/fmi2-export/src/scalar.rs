@@ -72,23 +72,6 @@ impl Scalar for i32 {
     }
 }
 
-impl Scalar for i64 {
-    const TYPE: &'static str = "Enumeration";
-    fn unpresentable(&self, kind: &VariableKind) -> Option<&'static str> {
-        match kind {
-            VariableKind::Enumeration { .. } => i32::try_from(*self).ok()?.unpresentable(kind),
-            _ => Some("is of type Int32, not an enumeration"),
-        }
-    }
-    fn problem(&self, kind: &VariableKind) -> Option<String> {
-        match kind {
-            // No enumeration has the item 0.
-            VariableKind::Enumeration { .. } => i32::try_from(*self).unwrap_or(0).problem(kind),
-            _ => Some("is of type Int32, not an enumeration".into()),
-        }
-    }
-}
-
 impl Scalar for bool {
     const TYPE: &'static str = "Boolean";
 }

@@ -5,9 +5,8 @@ use super::{Attributes, document, leaf, parent};
 use crate::ModelDescription;
 use crate::variable::{Causality, VariableKind};
 
-/// Position of the icon in the default coordinate system, and the size of a unit in millimetres.
+/// Position of the icon, which fills the default coordinate system.
 const EXTENT: [(&str, &str); 4] = [("x1", "-100"), ("y1", "-100"), ("x2", "100"), ("y2", "100")];
-const MILLIMETRES: (&str, &str) = ("suggestedScalingFactorTo_mm", "0.1");
 
 impl ModelDescription {
     /// Returns the names of the terminals, each with the names of its members: Real inputs, or Real
@@ -46,7 +45,6 @@ impl ModelDescription {
         document(|xml| {
             parent(xml, "fmiTerminalsAndIcons", owned(&[("fmiVersion", "3.0")]), |xml| {
                 parent(xml, "GraphicalRepresentation", vec![], |xml| {
-                    leaf(xml, "CoordinateSystem", owned(&[&EXTENT[..], &[MILLIMETRES]].concat()))?;
                     leaf(xml, "Icon", owned(&EXTENT))
                 })?;
                 if terminals.is_empty() {

@@ -54,7 +54,7 @@ pub(crate) struct Instance {
     set_inputs: Vec<usize>,
     /// Texts handed out by the last call for texts.
     strings: Vec<CString>,
-    /// Room for the event indicators, so that nothing is allocated when one is read.
+    /// Room for the event indicators, which are variables in FMI 3.0 alone.
     indicators: Vec<f64>,
 }
 
@@ -85,11 +85,12 @@ impl Instance {
     ) -> Self {
         let Setting { guid, version, interface, stops, logger, resources } = setting;
         let states = description.states();
+        let indicators = if version == Version::Fmi3 { description.event_indicators } else { 0 };
         let mut progress = Progress::default();
         progress.extrapolations.reserve(description.variables.len());
         Self {
             model: (export.create)(),
-            indicators: vec![0.0; description.event_indicators],
+            indicators: vec![0.0; indicators],
             states,
             description,
             guid,
@@ -126,7 +127,7 @@ impl Instance {
         match outcome {
             Ok(Ok(())) => FmiStatus::Ok,
             Ok(Err(Failure::Discard(problem))) => {
-                self.logger.log(Category::Discard, &format!("{}: {problem}", name));
+                self.logger.log(Category::Discard, &format!("{name}: {problem}"));
                 FmiStatus::Discard
             }
             Ok(Err(Failure::Ended { reason, .. })) => {
@@ -137,7 +138,7 @@ impl Instance {
                 if !call.leaves_state {
                     self.progress.state = State::Error;
                 }
-                self.logger.log(Category::Error, &format!("{}: {problem}", name));
+                self.logger.log(Category::Error, &format!("{name}: {problem}"));
                 FmiStatus::Error
             }
             Err(panic) => {

@@ -7,7 +7,6 @@ use crate::model_instance::ModelInstance;
 use crate::pointer::Room;
 use crate::scalar::Scalar;
 use crate::types::Interface;
-use model_description::Version;
 use model_description::variable::{Causality, Variable};
 use std::ffi::CString;
 use std::mem;
@@ -59,22 +58,6 @@ impl Typed for i32 {
     }
 }
 
-/// An enumeration, which FMI 3.0 transfers with 64 bits.
-impl Typed for i64 {
-    fn look<R>(
-        model: &mut dyn ModelInstance,
-        reference: usize,
-        look: impl FnOnce(&Self) -> R,
-    ) -> Option<R> {
-        model.integer(reference).map(|value| look(&value.into()))
-    }
-    fn put(self, model: &mut dyn ModelInstance, reference: usize) {
-        if let Ok(value) = i32::try_from(self) {
-            model.set_integer(reference, value);
-        }
-    }
-}
-
 impl Instance {
     /// Returns the position in the variable table. That of a variable beyond the table is not in
     /// it.
@@ -85,26 +68,21 @@ impl Instance {
     pub(super) fn variable(&self, reference: u32) -> Result<&Variable, Failure> {
         let variables = &self.description.variables;
         variables.get(self.position(reference)).ok_or_else(|| {
-            if self.is_beyond(reference) {
-                let text = "is the time or an event indicator: it can be read as Float64 only";
-                return Failure::Error(format!("value reference {reference} {text}"));
-            }
-            let mut last = self.version.first_reference() + variables.len() - 1;
-            if self.version == Version::Fmi3 {
-                last += self.indicators.len();
-            }
-            Failure::Error(format!(
-                "value reference {reference} does not exist: {last} is the last"
-            ))
+            let count = variables.len() + self.indicators.len();
+            let last = self.version.first_reference() + count - 1;
+            let fault = if self.is_beyond(reference) {
+                "is the time or an event indicator: it can only be read, as Float64".into()
+            } else {
+                format!("does not exist: {last} is the last")
+            };
+            Failure::Error(format!("value reference {reference} {fault}"))
         })
     }
 
     /// Whether the reference is that of a variable which FMI 3.0 has beyond the variable table.
     fn is_beyond(&self, reference: u32) -> bool {
-        let position = self.position(reference);
-        let end = self.description.variables.len();
-        self.version == Version::Fmi3
-            && (reference == 0 || (end..end + self.indicators.len()).contains(&position))
+        let (position, end) = (self.position(reference), self.description.variables.len());
+        position == usize::MAX || (end..end + self.indicators.len()).contains(&position)
     }
 
     /// Returns the time or an event indicator, or `None` if the reference is another variable's.
@@ -119,14 +97,6 @@ impl Instance {
         self.model.event_indicators(&mut self.indicators);
         let index = self.position(reference) - self.description.variables.len();
         Ok(Some(self.indicators[index]))
-    }
-
-    /// Returns the failure of a call for variables of a type that no FMU has.
-    pub(crate) fn no_variable(&self, reference: u32, kind: &str) -> Failure {
-        match self.variable(reference) {
-            Ok(Variable { name, .. }) => Failure::Error(format!("'{name}' is not of type {kind}")),
-            Err(failure) => failure,
-        }
     }
 
     /// Notes that an input was set, so that the outputs respond to the inputs.

@@ -28,36 +28,9 @@ unsafe fn counted(
     unsafe { run(component, call, body) }
 }
 
-/// Gets Reals, among which may be the time and event indicators.
-pub unsafe fn fmi3GetFloat64(
-    component: Component,
-    vr: *const u32,
-    n: usize,
-    value: *mut f64,
-    m: usize,
-) -> FmiStatus {
-    let body = |instance: &mut Instance| {
-        // SAFETY: the importer vouches for the arrays, as `requested` requires.
-        let (references, mut values) = unsafe { requested(vr, n, value) }?;
-        for (i, reference) in references.iter().enumerate() {
-            match instance.beyond_table(*reference)? {
-                Some(number) => values.put(i, number),
-                None => instance.get::<f64>(std::slice::from_ref(reference), |_, value| {
-                    values.put(i, *value)
-                })?,
-            }
-        }
-        Ok(())
-    };
-    // SAFETY: the importer vouches for `component`, as `run` requires.
-    unsafe {
-        counted(component, &table::GET_REAL, (n, m), || run(component, &table::GET_REAL, body))
-    }
-}
-
-/// Defines functions that do as those of FMI 2.0, once the number of values is checked.
-macro_rules! as_in_fmi2 {
-    ($($name:ident = $call:ident $other:ident(*$access:tt $type:ty);)*) => {$(
+/// Defines functions that access variables, once the number of values is checked.
+macro_rules! values {
+    ($($name:ident = $call:ident(*$access:tt $type:ty) $then:expr;)*) => {$(
         pub unsafe fn $name(
             component: Component,
             vr: *const u32,
@@ -65,55 +38,64 @@ macro_rules! as_in_fmi2 {
             value: *$access $type,
             m: usize,
         ) -> FmiStatus {
+            let call = &table::$call;
             // SAFETY: the importer vouches for `component` and the arrays.
-            unsafe {
-                counted(component, &table::$call, (n, m), || $other(component, vr, n, value))
-            }
+            unsafe { counted(component, call, (n, m), || $then(component, call, (vr, n, value))) }
         }
     )*};
 }
 
-as_in_fmi2! {
-    fmi3GetInt32 = GET_INTEGER fmi2GetInteger(*mut c_int);
-    fmi3GetInt64 = GET_INT64 get_item(*mut i64);
-    fmi3GetBoolean = GET_BOOLEAN get_boolean(*mut u8);
-    fmi3GetString = GET_STRING fmi2GetString(*mut *const c_char);
-    fmi3SetFloat64 = SET_REAL fmi2SetReal(*const f64);
-    fmi3SetInt32 = SET_INTEGER fmi2SetInteger(*const c_int);
-    fmi3SetInt64 = SET_INT64 set_item(*const i64);
-    fmi3SetBoolean = SET_BOOLEAN set_boolean(*const u8);
-    fmi3SetString = SET_STRING fmi2SetString(*const *const c_char);
+values! {
+    fmi3GetFloat64 = GET_REAL(*mut f64) get_reals;
+    fmi3GetInt32 = GET_INTEGER(*mut c_int) |c, _, (vr, n, value)| fmi2GetInteger(c, vr, n, value);
+    fmi3GetInt64 = GET_INT64(*mut i64)
+        |c, call, array| get(c, call, array, |value: &i32| i64::from(*value));
+    fmi3GetBoolean = GET_BOOLEAN(*mut u8)
+        |c, call, array| get(c, call, array, |value: &bool| u8::from(*value));
+    fmi3GetString = GET_STRING(*mut *const c_char)
+        |c, _, (vr, n, value)| fmi2GetString(c, vr, n, value);
+    fmi3SetFloat64 = SET_REAL(*const f64) |c, _, (vr, n, value)| fmi2SetReal(c, vr, n, value);
+    fmi3SetInt32 = SET_INTEGER(*const c_int) |c, _, (vr, n, value)| fmi2SetInteger(c, vr, n, value);
+    fmi3SetInt64 = SET_INT64(*const i64) |c, call, array| set(c, call, array, item);
+    fmi3SetBoolean = SET_BOOLEAN(*const u8) |c, call, array| set(c, call, array, truth);
+    fmi3SetString = SET_STRING(*const *const c_char)
+        |c, _, (vr, n, value)| fmi2SetString(c, vr, n, value);
 }
 
-unsafe fn get_item(component: Component, vr: *const u32, n: usize, value: *mut i64) -> FmiStatus {
-    // SAFETY: the importer vouches for `component` and the arrays, as `get` requires.
-    unsafe { get(component, &table::GET_INT64, (vr, n, value), |value: &i64| *value) }
-}
-
-unsafe fn set_item(component: Component, vr: *const u32, n: usize, value: *const i64) -> FmiStatus {
-    // SAFETY: the importer vouches for `component` and the arrays, as `set` requires.
-    unsafe { set(component, &table::SET_INT64, (vr, n, value), Ok) }
-}
-
-unsafe fn get_boolean(component: Component, vr: *const u32, n: usize, value: *mut u8) -> FmiStatus {
-    // SAFETY: the importer vouches for `component` and the arrays, as `get` requires.
-    unsafe { get(component, &table::GET_BOOLEAN, (vr, n, value), |value: &bool| u8::from(*value)) }
-}
-
-/// Sets truth values. They are read as bytes, as those of an importer may be other than 0 and 1.
-unsafe fn set_boolean(
+/// Gets Reals, among which may be the time and event indicators. The caller promises what [`run`]
+/// and [`requested`] ask.
+unsafe fn get_reals(
     component: Component,
-    vr: *const u32,
-    n: usize,
-    value: *const u8,
+    call: &Call,
+    (vr, n, value): (*const u32, usize, *mut f64),
 ) -> FmiStatus {
-    let convert = |value| match value {
+    let body = |instance: &mut Instance| {
+        // SAFETY: the caller promises what `requested` asks.
+        let (references, mut values) = unsafe { requested(vr, n, value) }?;
+        for (i, reference) in references.iter().enumerate() {
+            match instance.beyond_table(*reference)? {
+                Some(number) => values.put(i, number),
+                None => instance.get(&[*reference], |_, value| values.put(i, *value))?,
+            }
+        }
+        Ok(())
+    };
+    // SAFETY: the caller promises what `run` asks.
+    unsafe { run(component, call, body) }
+}
+
+/// Reads an item of an enumeration.
+fn item(value: i64) -> Result<i32, String> {
+    i32::try_from(value).map_err(|_| format!("{value} is not an item of the enumeration"))
+}
+
+/// Reads a truth value, which is a byte, as importers may pass others than 0 and 1.
+fn truth(value: u8) -> Result<bool, String> {
+    match value {
         0 => Ok(false),
         1 => Ok(true),
         other => Err(format!("{other} is neither fmi3False (0) nor fmi3True (1)")),
-    };
-    // SAFETY: the importer vouches for `component` and the arrays, as `set` requires.
-    unsafe { set(component, &table::SET_BOOLEAN, (vr, n, value), convert) }
+    }
 }
 
 /// Defines functions for derivatives, whose seeds and results belong to these variables.
@@ -139,11 +121,12 @@ macro_rules! derivatives {
             };
             let (seeds, results) =
                 if $adjoint { (n_unknowns, n_knowns) } else { (n_knowns, n_unknowns) };
+            let call = &table::$call;
             // SAFETY: the importer vouches for `component` and the arrays.
             unsafe {
-                counted(component, &table::$call, (seeds, n_seed), || {
-                    counted(component, &table::$call, (results, n_sensitivity), || {
-                        derivatives(component, &table::$call, &arguments)
+                counted(component, call, (seeds, n_seed), || {
+                    counted(component, call, (results, n_sensitivity), || {
+                        derivatives(component, call, &arguments)
                     })
                 })
             }

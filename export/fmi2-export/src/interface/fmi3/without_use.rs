@@ -1,96 +1,89 @@
 //! Functions for what no FMU has: variables of other types, clocks, structural parameters,
-//! partitions of the model. The former do nothing without variables; all others are refused.
+//! partitions of the model. They are refused, unless they are called for no variables at all.
 
 use super::super::component::{Component, run};
-use crate::call::{error, without_use};
+use crate::call::{Outcome, error, without_use};
 use crate::instance::Instance;
-use crate::pointer::slice;
 use crate::types::FmiStatus;
-use std::ffi::c_int;
+use std::ffi::{c_int, c_void};
 
-/// Refuses a call for variables of a type that none has. The caller promises what [`run`] and
-/// [`slice`] ask.
-unsafe fn without(
-    component: Component,
-    name: &'static str,
-    kind: &str,
-    (vr, n): (*const u32, usize),
-) -> FmiStatus {
-    let body = |instance: &mut Instance| {
-        // SAFETY: the caller promises what `slice` asks.
-        let references = unsafe { slice("valueReferences", vr, n) }?;
-        references.first().map_or(Ok(()), |first| Err(instance.no_variable(*first, kind)))
+/// Gives lists of these functions to two macros: those for variables, whose third argument is the
+/// number of variables, and the others.
+#[doc(hidden)]
+#[macro_export]
+macro_rules! without_use {
+    (($($variables:tt)*) ($($others:tt)*)) => {
+        $($variables)*! {
+            fmi3GetFloat32(c: *mut c_void, vr: *const u32, n: usize, value: *mut f32, m: usize) -> FmiStatus;
+            fmi3SetFloat32(c: *mut c_void, vr: *const u32, n: usize, value: *const f32, m: usize) -> FmiStatus;
+            fmi3GetInt8(c: *mut c_void, vr: *const u32, n: usize, value: *mut i8, m: usize) -> FmiStatus;
+            fmi3SetInt8(c: *mut c_void, vr: *const u32, n: usize, value: *const i8, m: usize) -> FmiStatus;
+            fmi3GetUInt8(c: *mut c_void, vr: *const u32, n: usize, value: *mut u8, m: usize) -> FmiStatus;
+            fmi3SetUInt8(c: *mut c_void, vr: *const u32, n: usize, value: *const u8, m: usize) -> FmiStatus;
+            fmi3GetInt16(c: *mut c_void, vr: *const u32, n: usize, value: *mut i16, m: usize) -> FmiStatus;
+            fmi3SetInt16(c: *mut c_void, vr: *const u32, n: usize, value: *const i16, m: usize) -> FmiStatus;
+            fmi3GetUInt16(c: *mut c_void, vr: *const u32, n: usize, value: *mut u16, m: usize) -> FmiStatus;
+            fmi3SetUInt16(c: *mut c_void, vr: *const u32, n: usize, value: *const u16, m: usize) -> FmiStatus;
+            fmi3GetUInt32(c: *mut c_void, vr: *const u32, n: usize, value: *mut u32, m: usize) -> FmiStatus;
+            fmi3SetUInt32(c: *mut c_void, vr: *const u32, n: usize, value: *const u32, m: usize) -> FmiStatus;
+            fmi3GetUInt64(c: *mut c_void, vr: *const u32, n: usize, value: *mut u64, m: usize) -> FmiStatus;
+            fmi3SetUInt64(c: *mut c_void, vr: *const u32, n: usize, value: *const u64, m: usize) -> FmiStatus;
+            fmi3GetBinary(c: *mut c_void, vr: *const u32, n: usize, size: *mut usize, value: *mut *const u8, m: usize) -> FmiStatus;
+            fmi3SetBinary(c: *mut c_void, vr: *const u32, n: usize, size: *const usize, value: *const *const u8, m: usize) -> FmiStatus;
+            fmi3GetClock(c: *mut c_void, vr: *const u32, n: usize, value: *mut bool) -> FmiStatus;
+            fmi3SetClock(c: *mut c_void, vr: *const u32, n: usize, value: *const bool) -> FmiStatus;
+            fmi3GetOutputDerivatives(c: *mut c_void, vr: *const u32, n: usize, order: *const i32, value: *mut f64, m: usize) -> FmiStatus;
+            fmi3GetIntervalDecimal(c: *mut c_void, vr: *const u32, n: usize, interval: *mut f64, qualifier: *mut c_int) -> FmiStatus;
+            fmi3GetIntervalFraction(c: *mut c_void, vr: *const u32, n: usize, counter: *mut u64, resolution: *mut u64, qualifier: *mut c_int) -> FmiStatus;
+            fmi3GetShiftDecimal(c: *mut c_void, vr: *const u32, n: usize, shift: *mut f64) -> FmiStatus;
+            fmi3GetShiftFraction(c: *mut c_void, vr: *const u32, n: usize, counter: *mut u64, resolution: *mut u64) -> FmiStatus;
+            fmi3SetIntervalDecimal(c: *mut c_void, vr: *const u32, n: usize, interval: *const f64) -> FmiStatus;
+            fmi3SetIntervalFraction(c: *mut c_void, vr: *const u32, n: usize, counter: *const u64, resolution: *const u64) -> FmiStatus;
+            fmi3SetShiftDecimal(c: *mut c_void, vr: *const u32, n: usize, shift: *const f64) -> FmiStatus;
+            fmi3SetShiftFraction(c: *mut c_void, vr: *const u32, n: usize, counter: *const u64, resolution: *const u64) -> FmiStatus;
+        }
+        $($others)*! {
+            fmi3GetNumberOfVariableDependencies(c: *mut c_void, vr: u32, n: *mut usize) -> FmiStatus;
+            fmi3GetVariableDependencies(c: *mut c_void, vr: u32, dependent: *mut usize, independents: *mut u32, elements: *mut usize, kinds: *mut c_int, n: usize) -> FmiStatus;
+            fmi3EnterConfigurationMode(c: *mut c_void) -> FmiStatus;
+            fmi3ExitConfigurationMode(c: *mut c_void) -> FmiStatus;
+            fmi3EvaluateDiscreteStates(c: *mut c_void) -> FmiStatus;
+            fmi3ActivateModelPartition(c: *mut c_void, clock: u32, time: f64) -> FmiStatus;
+        }
     };
+}
+
+/// Runs a call that is refused for this reason if it `asks` for something. The caller promises what
+/// [`run`] asks.
+unsafe fn refuse(component: Component, name: &'static str, asks: bool, reason: &str) -> FmiStatus {
+    let body = |_: &mut Instance| -> Outcome { if asks { error(reason) } else { Ok(()) } };
     // SAFETY: the caller promises what `run` asks.
     unsafe { run(component, &without_use(name), body) }
 }
 
-/// Defines functions for variables of a type that none has.
-macro_rules! without {
-    ($($name:ident $kind:literal ($($rest:ident: $type:ty),*);)*) => {$(
+macro_rules! variables {
+    ($($name:ident($c:ident: $component:ty, $vr:ident: $references:ty, $n:ident: $count:ty
+        $(, $rest:ident: $type:ty)*) -> $result:ty;)*) => {$(
         pub unsafe fn $name(
-            component: Component,
-            vr: *const u32,
-            n: usize,
-            $($rest: $type),*
-        ) -> FmiStatus {
+            $c: $component, $vr: $references, $n: $count, $($rest: $type),*
+        ) -> $result {
+            let _ = ($vr, $($rest),*);
+            // SAFETY: the importer vouches for `component`, as `refuse` requires.
+            unsafe { refuse($c, stringify!($name), $n > 0, "this FMU has no such variables") }
+        }
+    )*};
+}
+
+macro_rules! others {
+    ($($name:ident($c:ident: $component:ty $(, $rest:ident: $type:ty)*) -> $result:ty;)*) => {$(
+        pub unsafe fn $name($c: $component, $($rest: $type),*) -> $result {
             let _ = ($($rest,)*);
-            // SAFETY: the importer vouches for `component` and the array.
-            unsafe { without(component, stringify!($name), $kind, (vr, n)) }
+            let reason = "this FMU has no structural parameters, no clocks, no discrete states to \
+                be evaluated alone, and no dependencies other than in the model description";
+            // SAFETY: the importer vouches for `component`, as `refuse` requires.
+            unsafe { refuse($c, stringify!($name), true, reason) }
         }
     )*};
 }
 
-without! {
-    fmi3GetFloat32 "Float32" (value: *mut f32, m: usize);
-    fmi3GetInt8 "Int8" (value: *mut i8, m: usize);
-    fmi3GetUInt8 "UInt8" (value: *mut u8, m: usize);
-    fmi3GetInt16 "Int16" (value: *mut i16, m: usize);
-    fmi3GetUInt16 "UInt16" (value: *mut u16, m: usize);
-    fmi3GetUInt32 "UInt32" (value: *mut u32, m: usize);
-    fmi3GetUInt64 "UInt64" (value: *mut u64, m: usize);
-    fmi3GetBinary "Binary" (size: *mut usize, value: *mut *const u8, m: usize);
-    fmi3GetClock "Clock" (value: *mut bool);
-    fmi3SetFloat32 "Float32" (value: *const f32, m: usize);
-    fmi3SetInt8 "Int8" (value: *const i8, m: usize);
-    fmi3SetUInt8 "UInt8" (value: *const u8, m: usize);
-    fmi3SetInt16 "Int16" (value: *const i16, m: usize);
-    fmi3SetUInt16 "UInt16" (value: *const u16, m: usize);
-    fmi3SetUInt32 "UInt32" (value: *const u32, m: usize);
-    fmi3SetUInt64 "UInt64" (value: *const u64, m: usize);
-    fmi3SetBinary "Binary" (size: *const usize, value: *const *const u8, m: usize);
-    fmi3SetClock "Clock" (value: *const bool);
-    fmi3GetIntervalDecimal "Clock" (interval: *mut f64, qualifier: *mut c_int);
-    fmi3GetIntervalFraction "Clock" (counter: *mut u64, resolution: *mut u64, qualifier: *mut c_int);
-    fmi3GetShiftDecimal "Clock" (shift: *mut f64);
-    fmi3GetShiftFraction "Clock" (counter: *mut u64, resolution: *mut u64);
-    fmi3SetIntervalDecimal "Clock" (interval: *const f64);
-    fmi3SetIntervalFraction "Clock" (counter: *const u64, resolution: *const u64);
-    fmi3SetShiftDecimal "Clock" (shift: *const f64);
-    fmi3SetShiftFraction "Clock" (counter: *const u64, resolution: *const u64);
-    fmi3GetOutputDerivatives "output with derivatives" (order: *const i32, value: *mut f64, m: usize);
-}
-
-/// Defines functions that are refused, with the reason.
-macro_rules! refused {
-    ($($name:ident($($argument:ident: $type:ty),*) $reason:literal;)*) => {$(
-        pub unsafe fn $name(component: Component, $($argument: $type),*) -> FmiStatus {
-            let _ = ($($argument,)*);
-            let body = |_: &mut Instance| error($reason);
-            // SAFETY: the importer vouches for `component`, as `run` requires.
-            unsafe { run(component, &without_use(stringify!($name)), body) }
-        }
-    )*};
-}
-
-refused! {
-    fmi3GetNumberOfVariableDependencies(vr: u32, n: *mut usize)
-        "dependencies do not change and are in the model description";
-    fmi3GetVariableDependencies(vr: u32, dependent: *mut usize, independents: *mut u32,
-        elements: *mut usize, kinds: *mut c_int, n: usize)
-        "dependencies do not change and are in the model description";
-    fmi3EnterConfigurationMode() "this FMU has no structural parameters";
-    fmi3ExitConfigurationMode() "this FMU has no structural parameters";
-    fmi3EvaluateDiscreteStates() "this FMU evaluates its discrete states with their update";
-    fmi3ActivateModelPartition(clock: u32, time: f64) "this FMU has no scheduled execution";
-}
+without_use! { (variables) (others) }
