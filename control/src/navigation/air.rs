@@ -126,8 +126,8 @@ pub(super) fn side_force(
     Some(Measured { row, residual: ratio - scale * model, variance })
 }
 
-/// Returns what a specific force (m/s², body axes) with a noise (m/s²) shows of the altitude (m), by
-/// the density of the standard atmosphere; the altitude grows along `up`. Lift and drag count
+/// Returns what a specific force (m/s², body axes) with a noise (m/s²) shows of the altitude (m),
+/// by the density of the standard atmosphere; the altitude grows along `up`. Lift and drag count
 /// together, so that an error of the angle of attack does not turn one into the other. The model
 /// times the exponential of `excess` predicts them.
 pub(super) fn drag(
