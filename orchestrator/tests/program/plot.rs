@@ -93,7 +93,8 @@ fn oracle_the_numbers_of_a_page_are_those_of_the_runs() {
     // Doubled at each tick, and half as much again; the norms have a panel of their own.
     assert_eq!(values(0, 0), [1.0, 2.0, 4.0, 8.0]);
     assert_eq!(values(0, 3), [1.0, 1.5, 2.25, 3.375]);
-    assert_eq!(values(1, 1), [1.4142, 2.1213, 3.182, 4.773]);
+    let norms = values(0, 3).into_iter().map(|value| value * 2.0_f64.sqrt());
+    assert!(norms.zip(values(1, 1)).all(|(norm, drawn)| (norm - drawn).abs() < 1e-3));
     // Limits and references differ between the runs.
     let limits = serde_json::json!([
         { "name": "limit of norm, a", "value": 1 }, { "name": "limit of norm, b", "value": 0.5 },
