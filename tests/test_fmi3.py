@@ -48,6 +48,10 @@ def test_the_archive_has_what_fmi_3_asks_for(name, fmu, fmu3):
     assert three.modelVariables[0].name == "time" and three.modelVariables[0].causality == "independent"
     assert [v.name for v in three.modelVariables[len(of[0]) + 1 :]] == [f"eventIndicator[{i}]" for i in range(1, indicators + 1)]
     assert len(three.eventIndicators) == indicators
+    states = {v.derivative.name for v in three.modelVariables if v.derivative is not None}
+    # FMPy does not read that events may set them.
+    root = etree.parse(str(fmu3(name).folder / "modelDescription.xml"))
+    assert {v.get("name") for v in root.iter("Float64") if v.get("reinit") == "true"} == states
     assert three.coSimulation.hasEventMode and three.coSimulation.canSerializeFMUstate
 
 

@@ -4,7 +4,7 @@ mod interfaces;
 mod terminals;
 
 use crate::unit::Unit;
-use crate::variable::{Causality, EnumerationType, Variability, VariableKind};
+use crate::variable::{Causality, EnumerationType, Variability, Variable, VariableKind};
 use crate::{AUTHOR, Error, LICENSE, LOG_CATEGORIES, ModelDescription, Version};
 use quick_xml::Writer;
 use quick_xml::events::{BytesDecl, Event};
@@ -199,6 +199,11 @@ impl ModelDescription {
                 leaf(xml, element, further)?;
                 optional(xml)
             });
+        }
+        let is_state = |other: &Variable| other.derivative_of() == Some(&variable.name);
+        if self.model_exchange && self.variables.iter().any(is_state) {
+            // Events may set it, and the importer sets it with all others only.
+            attributes.push(("reinit", "true".into()));
         }
         let texts = if element == "String" { std::mem::take(&mut further) } else { vec![] };
         attributes.extend(further);
