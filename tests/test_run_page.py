@@ -218,8 +218,8 @@ def test_a_page_fits_a_telephone_in_both_themes(runs, opened, name, scheme):
 def test_a_limit_that_is_exceeded_many_times_is_seen(tmp_path, opened):
     call("run", "lqr", "--set", "controller.limit.moment=10000", "--page", "--quiet", "--out", tmp_path / "run", cwd=os.getcwd())
     page = opened(tmp_path / "run" / "page.html")
-    panel = page.locator("figure.panel").nth(3)
-    assert panel.locator("h2").inner_text() == "control moment, magnitude, kN m"
+    panel = page.locator("figure.panel").nth(4)
+    assert panel.locator("h2").inner_text() == "norm of control moment, kN m"
     assert "limit of norm: 10 kN m" in panel.locator(".legend").inner_text()
     ends = panel.locator("svg[role=img] line[stroke-dasharray='6 4']").evaluate("line => [line.y1.baseVal.value, line.y2.baseVal.value]")
     assert ends[0] == ends[1] and 20 < ends[0] < 150

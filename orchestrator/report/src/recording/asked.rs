@@ -43,9 +43,8 @@ pub fn of_experiments(runs: &[Recording]) -> Result<Vec<Panel>, String> {
         let all: Vec<String> = all.filter(|name| seen.insert(*name)).cloned().collect();
         return grouped(runs, all.into_iter().take(UNASKED).map(|name| (stem(&name).into(), name)));
     }
-    let mut panels: Vec<_> = panels.into_iter().flat_map(|panel| panel.divided(runs)).collect();
-    panels.iter_mut().for_each(Panel::show_limits);
-    Ok(panels)
+    let panels = panels.into_iter().flat_map(|panel| panel.divided(runs));
+    Ok(panels.flat_map(Panel::with_visible_limits).collect())
 }
 
 fn of_experiment(

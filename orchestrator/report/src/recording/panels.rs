@@ -10,7 +10,7 @@ pub const CURVES: usize = 6;
 /// Multiple of a limit from which on values need a logarithmic axis, and part of the limit at which
 /// this axis begins.
 const BEYOND: f64 = 5.0;
-const SHOWN: f64 = 100.0;
+const SHOWN: f64 = 10.0;
 
 /// A panel with curves of one unit.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -114,17 +114,27 @@ impl Panel {
         self.curves.push(Curve { name: "norm".into(), run, place: 0, role: Role::Norm, values });
     }
 
-    /// Gives the panel an axis of magnitudes if its values exceed a limit so much that its line
-    /// could not be distinguished from zero.
-    pub(super) fn show_limits(&mut self) {
+    /// Gives the norms with their limits a panel of their own, with an axis of magnitudes, if values
+    /// exceed a limit so much that its line could not be distinguished from zero.
+    pub(super) fn with_visible_limits(mut self) -> Vec<Self> {
         let limits = self.limits.iter().map(|limit| limit.value).filter(|value| *value > 0.0);
         let least = limits.fold(f64::INFINITY, f64::min);
         let values = self.curves.iter().flat_map(|curve| &curve.values).map(|value| value.abs());
         let most = values.filter(|value| value.is_finite()).fold(0.0, f64::max);
-        self.magnitudes = (most > BEYOND * least).then_some([least / SHOWN, 1.3 * most]);
-        if self.magnitudes.is_some() {
-            self.label += ", magnitude";
+        if most <= BEYOND * least {
+            return vec![self];
         }
+        let magnitudes = Some([least / SHOWN, 1.3 * most]);
+        let (norms, signals): (Vec<_>, Vec<_>) =
+            self.curves.into_iter().partition(|curve| curve.role == Role::Norm);
+        if norms.is_empty() || signals.is_empty() {
+            let curves = if norms.is_empty() { signals } else { norms };
+            return vec![Self { curves, magnitudes, ..self }];
+        }
+        let limits = std::mem::take(&mut self.limits);
+        let (label, unit) = (format!("norm of {}", self.label), self.unit.clone());
+        let limited = Self { label, unit, curves: norms, limits, magnitudes };
+        vec![Self { curves: signals, ..self }, limited]
     }
 
     /// Takes the curves and limits of another run's panel.

@@ -167,15 +167,17 @@ fn angles_are_written_by_their_symbols() {
 
 #[test]
 fn a_limit_that_is_exceeded_many_times_is_seen_on_an_axis_of_magnitudes() {
-    let panel = |most: f64| {
+    let panels = |most: f64| {
         let mut signals = SIGNALS;
         signals[0].2 = [-most, 0.0];
-        of_experiments(&[run("a", &signals, PANELS)]).unwrap().remove(0)
+        of_experiments(&[run("a", &signals, PANELS)]).unwrap()
     };
-    assert_eq!((panel(20.0).magnitudes, panel(20.0).label.as_str()), (None, "rate"));
-    let exceeded = panel(300.0);
-    let [low, high] = exceeded.magnitudes.unwrap();
-    assert!(low == 0.05 && high > 300.0 && exceeded.label == "rate, magnitude");
+    assert_eq!((panels(20.0).len(), panels(20.0)[0].magnitudes), (1, None));
+    let [signals, norm] = &panels(300.0)[..] else { panic!("one panel") };
+    assert_eq!((names(signals), names(norm)), (vec![("p", 0), ("q", 0)], vec![("norm", 0)]));
+    let [low, high] = norm.magnitudes.unwrap();
+    assert!(low == 0.5 && high > 300.0 && norm.label == "norm of rate");
+    assert!(signals.limits.is_empty() && norm.limits[0].value == 5.0);
 }
 
 #[test]
