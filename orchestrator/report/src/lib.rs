@@ -1,4 +1,4 @@
-//! Draws co-simulated runs: the [`plot`] that an experiment asks for, recorded runs as pictures and
+//! Draws co-simulated runs: the plot that an experiment asks for, recorded runs as pictures and
 //! pages, and the figures and pages that studies and campaigns are made of.
 
 mod coast;
