@@ -114,8 +114,8 @@ impl Panel {
         self.curves.push(Curve { name: "norm".into(), run, place: 0, role: Role::Norm, values });
     }
 
-    /// Gives the norms with their limits a panel of their own, with an axis of magnitudes, if values
-    /// exceed a limit so much that its line could not be distinguished from zero.
+    /// Gives the norms with their limits a panel of their own, with an axis of magnitudes, if
+    /// values exceed a limit so much that its line could not be distinguished from zero.
     pub(super) fn with_visible_limits(mut self) -> Vec<Self> {
         let limits = self.limits.iter().map(|limit| limit.value).filter(|value| *value > 0.0);
         let least = limits.fold(f64::INFINITY, f64::min);
