@@ -28,15 +28,11 @@ impl Name {
         ((left, self.y - 0.8 * HEIGHT), (left + self.width, self.y + 0.2 * HEIGHT))
     }
 
-    /// Returns how many of these lines cross the letters.
+    /// Returns how many parts of these lines cross the letters.
     fn crossings(&self, lines: &[Vec<Point>]) -> usize {
         let (low, high) = self.corners();
-        let crosses = |line: &&Vec<Point>| {
-            let ends = line.windows(2).map(|pair| (pair[0], pair[1]));
-            let single = line.first().map(|point| (*point, *point));
-            ends.chain(single).any(|(a, b)| clipped(a, b, low, high).is_some())
-        };
-        lines.iter().filter(crosses).count()
+        let parts = lines.iter().flat_map(|line| line.windows(2));
+        parts.filter(|pair| clipped(pair[0], pair[1], low, high).is_some()).count()
     }
 }
 
