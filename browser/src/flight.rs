@@ -77,7 +77,7 @@ impl Watcher for Flight<'_> {
         let told = self.warnings.take().into_iter().map(|text| Message { time, text });
         self.summary.warnings.extend(told);
         let error = self.summary.take(&self.row, sample.last).to_degrees();
-        if (sample.tick as usize).is_multiple_of(self.scenario.every) {
+        if sample.tick.is_multiple_of(u64::from(self.scenario.every)) {
             self.signals.extend_from_slice(&self.row);
             self.recorded = Some(sample.time);
         }

@@ -84,7 +84,7 @@ fn record(experiment: &mut Table, closed_loop: &ClosedLoop) {
         simulation.insert("step".into(), closed_loop.master.clock().step().into());
     }
     if let Some(Value::Table(record)) = experiment.get_mut("record") {
-        record.insert("every".into(), (closed_loop.scenario.every as i64).into());
+        record.insert("every".into(), i64::from(closed_loop.scenario.every).into());
     }
     let variables = experiment.get_mut("record").and_then(|record| record.get_mut("variables"));
     if let Some(Value::Array(variables)) = variables {

@@ -25,7 +25,7 @@ pub struct Scenario {
     /// Recorded columns; the guarantee comes last.
     pub columns: &'static [&'static str],
     /// Number of communication steps from one recorded row to the next.
-    pub every: usize,
+    pub every: u32,
     /// Whether the plans of the controller are shown.
     pub shows_plans: bool,
 }
