@@ -193,7 +193,10 @@ impl Coefficient {
 
 /// Returns the value of a polynomial with these factors of 1, x, x², ….
 pub(super) fn polynomial(factors: &[f64], x: f64) -> f64 {
-    factors.iter().rev().fold(0.0, |sum, factor| sum * x + factor)
+    let horner = |(last, rest): (&f64, &[f64])| {
+        rest.iter().rev().fold(*last, |sum, factor| sum * x + factor)
+    };
+    factors.split_last().map_or(0.0, horner)
 }
 
 #[cfg(test)]
