@@ -14,9 +14,9 @@ use crate::actuators;
 use crate::aerodynamics::{Aerodynamics, Flow};
 use crate::air::{Air, Conditions};
 use crate::error::Error;
-use crate::kinematics::Kinematics;
-use crate::math::{asin, atan2, sin_cos};
-use crate::platform::{body_from_velocity, velocity_from_level};
+use crate::kinematics::{Kinematics, Sines, sines};
+use crate::math::{asin, atan2};
+use crate::platform::{body_from_velocity, body_from_velocity_at, velocity_from_level};
 use crate::trajectory::Trajectory;
 use crate::translation::Planet;
 use nalgebra::Vector3;
@@ -229,15 +229,16 @@ impl Config {
 
     /// Returns the effect of the air on the vehicle at `time` (s).
     pub fn passage(&self, time: f64, motion: &Motion, angles: &Vector3<f64>) -> Passage {
-        self.passage_through(&self.air.at(time, motion[0]), motion, angles)
+        self.passage_through(&self.air.at(time, motion[0]), motion, (angles, &sines(angles)))
     }
 
-    /// Returns the effect of the air on the vehicle under given conditions.
+    /// Returns the effect of the air on the vehicle under given conditions, at attitude angles with
+    /// these sines and cosines.
     pub(crate) fn passage_through(
         &self,
         conditions: &Conditions,
         motion: &Motion,
-        angles: &Vector3<f64>,
+        (angles, sines): (&Vector3<f64>, &Sines),
     ) -> Passage {
         let [_, _, _, speed, path, heading] = (*motion).into();
         let Conditions { density, known_density, sound_speed, wind } = *conditions;
@@ -246,7 +247,7 @@ impl Config {
         let mut air_angles = [angles.x, angles.y];
         let mut airspeed = speed;
         let is_windy = wind != Vector3::zeros();
-        let body_axes = is_windy.then(|| body_from_velocity(angles));
+        let body_axes = is_windy.then(|| body_from_velocity_at(sines));
         if let Some(body_axes) = &body_axes {
             let course = Trajectory { flight_path_angle: path, heading, ..Trajectory::default() };
             relative -= velocity_from_level(&course) * wind;
@@ -269,7 +270,7 @@ impl Config {
             let body_from_flow = body_from_velocity(&Vector3::new(alpha, beta, 0.0));
             body_axes.transpose() * (body_from_flow * along_flow)
         } else {
-            let (sine, cosine) = sin_cos(angles.z);
+            let (sine, cosine) = sines[2];
             Vector3::new(-drag, cosine * side - sine * lift, -sine * side - cosine * lift)
         };
         Passage {

@@ -6,10 +6,18 @@
 //! without the term α̇ sin β in its bank row; the free functions have it as printed, and
 //! [`Kinematics`] offers both forms.
 
-use crate::math::{cos, sin, sin_cos};
+use crate::math::{sin, sin_cos};
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 use settings::Choice;
+
+/// Sines and cosines of the attitude angles.
+pub type Sines = [(f64, f64); 3];
+
+/// Returns the sines and cosines of the attitude angles.
+pub fn sines(angles: &Vector3<f64>) -> Sines {
+    [angles.x, angles.y, angles.z].map(sin_cos)
+}
 
 /// Matrix R(Θ) of Chai 2022 (2), with which Θ̇ = R ω. It is singular at β = ±π/2.
 pub fn r(angles: &Vector3<f64>) -> Matrix3<f64> {
@@ -32,14 +40,6 @@ pub fn r_inverse(angles: &Vector3<f64>) -> Matrix3<f64> {
 
 fn r_inverse_of(sa: f64, ca: f64, sb: f64, cb: f64) -> Matrix3<f64> {
     Matrix3::new(-sb * ca * cb, sa, -cb * ca, cb * cb, 0.0, -sb, -sa * cb * sb, -ca, -cb * sa)
-}
-
-/// Matrix R(Θ) and its inverse, as [`r`] and [`r_inverse`] return them, from the same sines and
-/// cosines. The last result is sin β.
-fn r_and_inverse(angles: &Vector3<f64>) -> (Matrix3<f64>, Matrix3<f64>, f64) {
-    let (sa, ca) = sin_cos(angles.x);
-    let (sb, cb) = sin_cos(angles.y);
-    (r_of(sa, ca, sb, cb), r_inverse_of(sa, ca, sb, cb), sb)
 }
 
 /// Partial derivative ∂R/∂α of the printed R.
@@ -132,9 +132,10 @@ impl Kinematics {
         inverse
     }
 
-    /// Matrix R in use and its inverse, which together need the sines and cosines once.
-    pub fn r_and_inverse(self, angles: &Vector3<f64>) -> (Matrix3<f64>, Matrix3<f64>) {
-        let (matrix, inverse, sb) = r_and_inverse(angles);
+    /// Matrix R in use and its inverse.
+    pub fn r_and_inverse(self, sines: &Sines) -> (Matrix3<f64>, Matrix3<f64>) {
+        let [(sa, ca), (sb, cb), _] = *sines;
+        let (matrix, inverse) = (r_of(sa, ca, sb, cb), r_inverse_of(sa, ca, sb, cb));
         match self {
             Self::Printed => (matrix, inverse),
             Self::Exact => {
@@ -157,19 +158,24 @@ impl Kinematics {
     /// Matrix that maps [`crate::trajectory::Trajectory::turn_rate`] to the part of Θ̇ that a
     /// turning trajectory adds to R ω, Wu 2015 (1).
     pub fn turn(self, angles: &Vector3<f64>) -> Matrix3<f64> {
-        let matrix = turn(angles);
+        self.turn_at(&sines(angles))
+    }
+
+    /// Matrix of [`Kinematics::turn`], given the sines and cosines of the angles.
+    pub(crate) fn turn_at(self, sines: &Sines) -> Matrix3<f64> {
+        let matrix = turn(sines);
         match self {
             Self::Printed => matrix,
-            Self::Exact => Self::with_alpha_rate(matrix, sin(angles.y)),
+            Self::Exact => Self::with_alpha_rate(matrix, sines[1].0),
         }
     }
 
     /// Partial derivative ∂/∂β of [`Kinematics::turn`].
     pub fn turn_beta(self, angles: &Vector3<f64>) -> Matrix3<f64> {
-        let (sb, cb) = sin_cos(angles.y);
-        let (ss, cs) = sin_cos(angles.z);
+        let sines = sines(angles);
+        let [_, (sb, cb), (ss, cs)] = sines;
         let slope = Matrix3::new(0.0, -cs * sb, ss * sb, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0) / (cb * cb);
-        self.complete(slope, &turn(angles), sb, cb)
+        self.complete(slope, &turn(&sines), sb, cb)
     }
 
     /// Partial derivative ∂/∂σ of [`Kinematics::turn`].
@@ -182,8 +188,6 @@ impl Kinematics {
 }
 
 /// Terms of the trajectory in Wu 2015 (1), without those of α̇ sin β.
-fn turn(angles: &Vector3<f64>) -> Matrix3<f64> {
-    let cb = cos(angles.y);
-    let (ss, cs) = sin_cos(angles.z);
+fn turn(&[_, (_, cb), (ss, cs)]: &Sines) -> Matrix3<f64> {
     Matrix3::new(0.0, -cs / cb, ss / cb, 0.0, ss, cs, 1.0, 0.0, 0.0)
 }

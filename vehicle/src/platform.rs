@@ -7,7 +7,7 @@
 
 use crate::axes::LEVEL;
 use crate::error::Error;
-use crate::kinematics::Kinematics;
+use crate::kinematics::{Kinematics, Sines, sines};
 use crate::math::sin_cos;
 use crate::trajectory::{TRAJECTORY, Trajectory};
 use nalgebra::{Matrix3, SMatrix, Vector3};
@@ -51,9 +51,12 @@ impl Surroundings {
 /// Rotation from the trajectory's axes to the body axes. Its rate of change corresponds to ω of
 /// [`Kinematics::Exact`].
 pub fn body_from_velocity(angles: &Vector3<f64>) -> Matrix3<f64> {
-    let (sa, ca) = sin_cos(angles.x);
-    let (sb, cb) = sin_cos(angles.y);
-    let (ss, cs) = sin_cos(angles.z);
+    body_from_velocity_at(&sines(angles))
+}
+
+/// Rotation of [`body_from_velocity`], given the sines and cosines of the angles.
+pub(crate) fn body_from_velocity_at(sines: &Sines) -> Matrix3<f64> {
+    let [(sa, ca), (sb, cb), (ss, cs)] = *sines;
     let bank = Matrix3::new(1.0, 0.0, 0.0, 0.0, cs, -ss, 0.0, ss, cs);
     let sideslip = Matrix3::new(cb, -sb, 0.0, sb, cb, 0.0, 0.0, 0.0, 1.0);
     let attack = Matrix3::new(ca, 0.0, -sa, 0.0, 1.0, 0.0, sa, 0.0, ca);

@@ -3,7 +3,7 @@
 
 use crate::dynamics::RigidBody;
 use crate::error::Error;
-use crate::kinematics::Kinematics;
+use crate::kinematics::{Kinematics, Sines, sines};
 use crate::state::{BETA_LIMIT, State, angles, rates, state};
 use nalgebra::{Matrix3, Matrix6, Matrix6x3, Vector3};
 
@@ -21,25 +21,36 @@ pub struct Load {
 /// State derivative. The angles follow Wu 2015 (1), and the rates Chai 2022 (1) with Δ = Δ_f-dot +
 /// R Δ_m of (4b) put into the rate equation.
 pub fn derivative(body: &RigidBody, kinematics: Kinematics, state: &State, load: &Load) -> State {
-    let (angles, rates) = (angles(state), rates(state));
-    let (matrix, inverse) = kinematics.r_and_inverse(&angles);
-    let acceleration = body.angular_acceleration(&rates, &load.moment) + inverse * load.delta;
-    let angle_rates = angle_rates(kinematics, &matrix, state, &load.turn_rate);
-    self::state(&angle_rates, &acceleration)
+    derivative_at(body, kinematics, &sines(&angles(state)), &rates(state), load)
 }
 
-/// Rates Θ̇ of the attitude angles (rad/s) by Wu 2015 (1), with R at the state as `matrix`.
+/// State derivative, given the sines and cosines of the angles and the rates.
+pub(super) fn derivative_at(
+    body: &RigidBody,
+    kinematics: Kinematics,
+    sines: &Sines,
+    rates: &Vector3<f64>,
+    load: &Load,
+) -> State {
+    let (matrix, inverse) = kinematics.r_and_inverse(sines);
+    let acceleration = body.angular_acceleration(rates, &load.moment) + inverse * load.delta;
+    let angle_rates = angle_rates(kinematics, &matrix, (sines, rates), &load.turn_rate);
+    state(&angle_rates, &acceleration)
+}
+
+/// Rates Θ̇ of the attitude angles (rad/s) by Wu 2015 (1), with R at these angles as `matrix`, the
+/// sines and cosines of the angles, and the body rates (rad/s).
 pub(super) fn angle_rates(
     kinematics: Kinematics,
     matrix: &Matrix3<f64>,
-    state: &State,
+    (sines, rates): (&Sines, &Vector3<f64>),
     turn_rate: &Vector3<f64>,
 ) -> Vector3<f64> {
-    let angle_rates = matrix * rates(state);
+    let angle_rates = matrix * rates;
     if *turn_rate == Vector3::zeros() {
         return angle_rates;
     }
-    angle_rates + kinematics.turn(&angles(state)) * turn_rate
+    angle_rates + kinematics.turn_at(sines) * turn_rate
 }
 
 /// Partial derivatives of the state derivative [`derivative`].

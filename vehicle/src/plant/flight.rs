@@ -7,6 +7,7 @@ use crate::air::AlongTheWay;
 use crate::entry::{self, Motion, Passage, great_circle};
 use crate::error::Error;
 use crate::integrator::rk4;
+use crate::kinematics::{Sines, sines};
 use crate::math::sin;
 use crate::state::{State, angles, rates, state};
 use crate::trajectory::Trajectory;
@@ -87,26 +88,27 @@ impl Plant {
     }
 
     /// Derivative of the attitude and the rates at the first time (s), which is the second one (s)
-    /// after the instant of the deflections.
+    /// after the instant of the deflections, given the sines and cosines of the attitude.
     pub(super) fn turned(
         &self,
         entry: &entry::Config,
         entering: &Entering,
         (time, elapsed): (f64, f64),
-        attitude: &State,
+        (attitude, sines): (&State, &Sines),
         (input, held): (&Input, &Held),
     ) -> State {
         let Entering { passage, turn_rate, .. } = entering;
-        let (angles, rates) = (angles(attitude), rates(attitude));
+        let rates = rates(attitude);
         if entry.following.active {
-            let matrix = self.kinematics.r(&angles);
+            let (matrix, _) = self.kinematics.r_and_inverse(sines);
             let acceleration = entry.prescribed_acceleration(
                 self.kinematics,
                 &input.prescribed,
-                (&angles, &rates),
+                (&angles(attitude), &rates),
                 turn_rate,
             );
-            let angle_rates = equations::angle_rates(self.kinematics, &matrix, attitude, turn_rate);
+            let angle_rates =
+                equations::angle_rates(self.kinematics, &matrix, (sines, &rates), turn_rate);
             return state(&angle_rates, &acceleration);
         }
         let conditions = (elapsed, passage.conditions());
@@ -117,7 +119,7 @@ impl Plant {
             delta: held.delta(),
             turn_rate: *turn_rate,
         };
-        equations::derivative(&self.body, self.kinematics, attitude, &load)
+        equations::derivative_at(&self.body, self.kinematics, sines, &rates, &load)
     }
 
     /// Returns motion and attitude after an integration step.
@@ -132,10 +134,17 @@ impl Plant {
         let mut f = |t: f64, both: &Joint| {
             let (motion, attitude) = parts(both);
             let conditions = entry.air.deviating(t, motion[0], &air.at(motion[0]));
-            let passage = entry.passage_through(&conditions, &motion, &angles(&attitude));
+            let angles = angles(&attitude);
+            let sines = sines(&angles);
+            let passage = entry.passage_through(&conditions, &motion, (&angles, &sines));
             let entering = Entering::new(entry, &motion, passage);
-            let turned =
-                self.turned(entry, &entering, (t, t - since), &attitude, (&input(t), held));
+            let turned = self.turned(
+                entry,
+                &entering,
+                (t, t - since),
+                (&attitude, &sines),
+                (&input(t), held),
+            );
             joint(&entering.derivative, &turned)
         };
         parts(&rk4(&mut f, begin, &joint(&self.motion, &self.state), h))

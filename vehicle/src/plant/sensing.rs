@@ -5,6 +5,7 @@ use super::equations::angle_rates;
 use super::{Entering, Held, Input, Load, Plant, angles};
 use crate::fixes::Fixes;
 use crate::frames::Place;
+use crate::kinematics::sines;
 use crate::platform::{Pose, Readings};
 use crate::sensors::{Felt, Sample, Sensors};
 use crate::trajectory::TRAJECTORY;
@@ -28,8 +29,9 @@ impl Plant {
         let angle_rates = if self.calibration.is_some() {
             angles(&self.derivative_at(time, &self.state, &Load::default()))
         } else {
-            let matrix = self.kinematics.r(&self.angles());
-            angle_rates(self.kinematics, &matrix, &self.state, &turn_rate)
+            let sines = sines(&self.angles());
+            let (matrix, _) = self.kinematics.r_and_inverse(&sines);
+            angle_rates(self.kinematics, &matrix, (&sines, &self.rates()), &turn_rate)
         };
         Pose {
             kinematics: self.kinematics,
