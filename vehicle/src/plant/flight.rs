@@ -89,6 +89,7 @@ impl Plant {
 
     /// Derivative of the attitude and the rates at the first time (s), which is the second one (s)
     /// after the instant of the deflections, given the sines and cosines of the attitude.
+    #[inline]
     pub(super) fn turned(
         &self,
         entry: &entry::Config,

@@ -55,6 +55,7 @@ impl From<Vector3<f64>> for Input {
 impl Plant {
     /// Disturbing moment (N m) at `time` (s): the sum of the external moment and that of the
     /// disturbance.
+    #[inline]
     pub fn disturbance_moment(&self, time: f64, input: &Input, held: &Held) -> Vector3<f64> {
         let disturbance_moment =
             if held.acts { self.disturbance.moment(time) } else { Vector3::zeros() };
@@ -68,6 +69,7 @@ impl Plant {
 
     /// Control moment (N m) at the time `elapsed` (s) after the present one, provided that the
     /// drive does not change until then.
+    #[inline]
     pub(super) fn control_moment(
         &self,
         input: &Input,
