@@ -290,6 +290,7 @@ impl Config {
     /// Returns the moment of the air about the centre of mass (N m) without that of the surfaces,
     /// at body `rates` (rad/s); `trim` is the input for the angle of attack at which the vehicle is
     /// trimmed, rad.
+    #[inline]
     pub fn moment(&self, passage: &Passage, rates: &Vector3<f64>, trim: f64) -> Vector3<f64> {
         let flow = passage.flow();
         let trim = match self.trim {

@@ -3,7 +3,7 @@
 use super::equations::{self, Load};
 use super::{Held, Input, Plant};
 use crate::actuators::Conditions;
-use crate::air::AlongTheWay;
+use crate::air::{self, AlongTheWay};
 use crate::entry::{self, Motion, Passage, great_circle};
 use crate::error::Error;
 use crate::integrator::rk4;
@@ -31,12 +31,21 @@ pub struct Entering {
     pub trajectory: Trajectory,
     /// Turn rate of the trajectory's axes, rad/s.
     pub turn_rate: Vector3<f64>,
+    /// Sines and cosines of the attitude angles.
+    pub(super) sines: Sines,
 }
 
 impl Entering {
-    fn new(entry: &entry::Config, motion: &Motion, passage: Passage) -> Self {
+    fn new(
+        entry: &entry::Config,
+        motion: &Motion,
+        angles: &Vector3<f64>,
+        air: &air::Conditions,
+    ) -> Self {
+        let sines = sines(angles);
+        let passage = entry.passage_through(air, motion, (angles, &sines));
         let (derivative, trajectory, turn_rate) = entry.derivative(motion, &passage);
-        Self { passage, derivative, trajectory, turn_rate }
+        Self { passage, derivative, trajectory, turn_rate, sines }
     }
 }
 
@@ -55,8 +64,8 @@ impl Plant {
     /// Returns the entry flight at `time` (s), or `None` if there is none.
     pub fn entering(&self, time: f64) -> Option<Entering> {
         let entry = self.entry.as_ref()?;
-        let passage = entry.passage(time, &self.motion, &self.angles());
-        Some(Entering::new(entry, &self.motion, passage))
+        let air = entry.air.at(time, self.motion[0]);
+        Some(Entering::new(entry, &self.motion, &self.angles(), &air))
     }
 
     /// Moment of the air about the body axes (N m), without that of the surfaces.
@@ -88,17 +97,17 @@ impl Plant {
     }
 
     /// Derivative of the attitude and the rates at the first time (s), which is the second one (s)
-    /// after the instant of the deflections, given the sines and cosines of the attitude.
+    /// after the instant of the deflections.
     #[inline]
     pub(super) fn turned(
         &self,
         entry: &entry::Config,
         entering: &Entering,
         (time, elapsed): (f64, f64),
-        (attitude, sines): (&State, &Sines),
+        attitude: &State,
         (input, held): (&Input, &Held),
     ) -> State {
-        let Entering { passage, turn_rate, .. } = entering;
+        let Entering { passage, turn_rate, sines, .. } = entering;
         let rates = rates(attitude);
         if entry.following.active {
             let (matrix, _) = self.kinematics.r_and_inverse(sines);
@@ -135,17 +144,9 @@ impl Plant {
         let mut f = |t: f64, both: &Joint| {
             let (motion, attitude) = parts(both);
             let conditions = entry.air.deviating(t, motion[0], &air.at(motion[0]));
-            let angles = angles(&attitude);
-            let sines = sines(&angles);
-            let passage = entry.passage_through(&conditions, &motion, (&angles, &sines));
-            let entering = Entering::new(entry, &motion, passage);
-            let turned = self.turned(
-                entry,
-                &entering,
-                (t, t - since),
-                (&attitude, &sines),
-                (&input(t), held),
-            );
+            let entering = Entering::new(entry, &motion, &angles(&attitude), &conditions);
+            let turned =
+                self.turned(entry, &entering, (t, t - since), &attitude, (&input(t), held));
             joint(&entering.derivative, &turned)
         };
         parts(&rk4(&mut f, begin, &joint(&self.motion, &self.state), h))

@@ -6,7 +6,6 @@ use super::{Entering, Held, Plant};
 use crate::actuators::{Actuators, Command, Conditions, Drive};
 use crate::effectors::{JETS, SURFACES, Surfaces};
 use crate::entry::Prescribed;
-use crate::kinematics::sines;
 use crate::state::State;
 use crate::trajectory::{TRAJECTORY, Trajectory};
 use nalgebra::{Matrix3, SMatrix, Vector3};
@@ -190,13 +189,7 @@ impl Plant {
         held: &Held,
     ) -> State {
         if let (Some(entry), Some(entering)) = (&self.entry, entering) {
-            return self.turned(
-                entry,
-                entering,
-                (time, 0.0),
-                (&self.state, &sines(&self.angles())),
-                (input, held),
-            );
+            return self.turned(entry, entering, (time, 0.0), &self.state, (input, held));
         }
         let load = self.load((time, 0.0), self.state[0], input, held);
         self.derivative_at(time, &self.state, &load)

@@ -29,7 +29,7 @@ impl Plant {
         let angle_rates = if self.calibration.is_some() {
             angles(&self.derivative_at(time, &self.state, &Load::default()))
         } else {
-            let sines = sines(&self.angles());
+            let sines = entering.map_or_else(|| sines(&self.angles()), |entering| entering.sines);
             let (matrix, _) = self.kinematics.r_and_inverse(&sines);
             angle_rates(self.kinematics, &matrix, (&sines, &self.rates()), &turn_rate)
         };
