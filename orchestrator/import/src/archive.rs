@@ -27,19 +27,34 @@ const LONGEST_NAME_SHOWN: usize = 200;
 /// lead out of the folder, duplicate names, links, encrypted entries, or more content or folders
 /// than any FMU has.
 pub fn unpack(path: &Path) -> Result<TemporaryFolder, Error> {
-    unpack_limited(path, SIZE_LIMIT, ENTRY_LIMIT)
+    unpack_limited(path, SIZE_LIMIT, ENTRY_LIMIT, str::to_string)
+}
+
+/// Unpacks an archive like [`unpack`]. A backslash in the name of an entry is read as a slash,
+/// because some programs for Windows write it so.
+///
+/// # Errors
+/// Returns the errors of [`unpack`].
+pub fn unpack_with_backslashes(path: &Path) -> Result<TemporaryFolder, Error> {
+    unpack_limited(path, SIZE_LIMIT, ENTRY_LIMIT, with_slashes)
+}
+
+/// Returns a path with slashes in place of backslashes.
+pub fn with_slashes(path: &str) -> String {
+    path.replace('\\', "/")
 }
 
 fn unpack_limited(
     path: &Path,
     size_limit: u64,
     entry_limit: usize,
+    normalized: fn(&str) -> String,
 ) -> Result<TemporaryFolder, Error> {
     let refuse = |message: String| Error::Fmu { path: path.to_path_buf(), message };
     let file = File::open(path).map_err(|source| refuse(format!("cannot be opened: {source}")))?;
     let mut archive = ZipArchive::new(file)
         .map_err(|source| refuse(format!("is not a zip archive: {source}")))?;
-    let names = names(&mut archive, entry_limit).map_err(refuse)?;
+    let names = names(&mut archive, entry_limit, normalized).map_err(refuse)?;
 
     let folder = TemporaryFolder::new().map_err(Error::file(std::env::temp_dir()))?;
     let mut left = size_limit;
@@ -72,7 +87,11 @@ fn unpack_limited(
 }
 
 /// Returns the names of the entries, or the reason why nothing of the archive is written.
-fn names(archive: &mut ZipArchive<File>, limit: usize) -> Result<Vec<String>, String> {
+fn names(
+    archive: &mut ZipArchive<File>,
+    limit: usize,
+    normalized: fn(&str) -> String,
+) -> Result<Vec<String>, String> {
     if archive.has_duplicate_names() {
         return Err("refused: two entries of the archive have the same name".into());
     }
@@ -84,8 +103,9 @@ fn names(archive: &mut ZipArchive<File>, limit: usize) -> Result<Vec<String>, St
     for index in 0..count {
         let entry =
             archive.by_index_raw(index).map_err(|source| format!("entry {index}: {source}"))?;
-        let name = String::from_utf8(entry.name_raw().to_vec())
+        let name = std::str::from_utf8(entry.name_raw())
             .map_err(|_| format!("refused: the name of entry {index} is not UTF-8"))?;
+        let name = normalized(name);
         let refuse = |reason: &str| format!("refused: entry \"{}\" {reason}", shown(&name));
         if let Some(reason) = unsafe_name(&name) {
             return Err(refuse(reason));
@@ -153,7 +173,7 @@ mod tests {
     }
 
     fn refusal(file: &tempfile::NamedTempFile) -> String {
-        unpack_limited(file.path(), 1000, 10).unwrap_err().to_string()
+        unpack_limited(file.path(), 1000, 10, str::to_string).unwrap_err().to_string()
     }
 
     #[test]
@@ -185,6 +205,21 @@ mod tests {
     }
 
     #[test]
+    fn backslashes_are_read_as_slashes_only_if_asked_for() {
+        let file = archive(&[("a\\", b""), ("a\\b.txt", b"1")]);
+        assert!(refusal(&file).contains("backslashes"));
+        let folder = unpack_with_backslashes(file.path()).unwrap();
+        assert_eq!(fs::read(folder.path().join("a/b.txt")).unwrap(), b"1");
+        for name in ["..\\evil", "a\\..\\..\\evil", "\\\\server\\evil", "C:\\evil"] {
+            let message = unpack_with_backslashes(archive(&[(name, b"x")]).path()).unwrap_err();
+            assert!(message.to_string().contains("refused: entry"), "{message}");
+        }
+        let twice = archive(&[("a/b", b"1"), ("a\\b", b"2")]);
+        let message = unpack_with_backslashes(twice.path()).unwrap_err().to_string();
+        assert!(message.contains("entry \"a/b\" cannot be unpacked"), "{message}");
+    }
+
+    #[test]
     fn bombs_are_refused_by_what_comes_out() {
         assert!(
             refusal(&archive(&[("a", &[0; 600]), ("b", &[0; 600])]))
@@ -195,7 +230,7 @@ mod tests {
             many.iter().map(|name| (name.as_str(), &b""[..])).collect();
         assert!(refusal(&archive(&entries)).contains("11 entries"));
         let file = archive(&entries[..10]);
-        assert!(unpack_limited(file.path(), 1000, 10).is_ok());
+        assert!(unpack_limited(file.path(), 1000, 10, str::to_string).is_ok());
     }
 
     #[test]
@@ -210,7 +245,7 @@ mod tests {
         let names = ["a", "b", "c"].map(|name| format!("{name}/1/2/3/x"));
         let entries = names.each_ref().map(|name| (name.as_str(), &b""[..]));
         assert!(refusal(&archive(&entries)).contains("more than 10 folders"));
-        assert!(unpack_limited(archive(&entries[..2]).path(), 1000, 10).is_ok());
+        assert!(unpack_limited(archive(&entries[..2]).path(), 1000, 10, str::to_string).is_ok());
     }
 
     #[test]
@@ -218,7 +253,7 @@ mod tests {
         // The disk of the temporary folder is not even accessed.
         let file = archive(&[("good", b"1"), ("../evil", b"x")]);
         let mut zip = ZipArchive::new(File::open(file.path()).unwrap()).unwrap();
-        assert!(names(&mut zip, 10).unwrap_err().contains("leads out"));
+        assert!(names(&mut zip, 10, str::to_string).unwrap_err().contains("leads out"));
     }
 
     #[test]

@@ -105,7 +105,9 @@ fn version(root: &Element) -> Result<String, String> {
     }
     let version = root.required("fmiVersion")?.to_string();
     if version != "2.0" && !version.starts_with("2.0.") {
-        return Err(format!("is an FMU for FMI {version}, this program runs FMI 2.0"));
+        return Err(format!(
+            "is an FMU for FMI {version}, this program runs FMI 2.0: export the model for FMI 2.0"
+        ));
     }
     Ok(version)
 }
@@ -159,7 +161,11 @@ fn interface(element: &Element) -> Result<Interface, String> {
     })
 }
 
-fn unit(element: &Element) -> Result<UnitDefinition, String> {
+/// Reads a unit as FMI and SSP define it.
+///
+/// # Errors
+/// Returns an error if an attribute is missing or is not a number.
+pub fn unit(element: &Element) -> Result<UnitDefinition, String> {
     let scale = |element: &Element| -> Result<(f64, f64), String> {
         Ok((element.number("factor")?.unwrap_or(1.0), element.number("offset")?.unwrap_or(0.0)))
     };

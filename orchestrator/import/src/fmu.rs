@@ -144,7 +144,11 @@ impl Fmu {
     /// # Errors
     /// Returns a line that says what is missing or wrong.
     fn library(&self, archive: &Archive) -> Result<(PathBuf, String), String> {
-        let interface = self.description.co_simulation.as_ref().ok_or("offers no co-simulation")?;
+        let interface = self
+            .description
+            .co_simulation
+            .as_ref()
+            .ok_or("offers no co-simulation: export the model for co-simulation")?;
         let platforms = archive.platforms();
         if !platforms.iter().any(|platform| platform == PLATFORM) {
             let offered = if platforms.is_empty() { "none".into() } else { platforms.join(", ") };
