@@ -93,7 +93,10 @@ pub fn position(
             Err("is an input with a connection, so it cannot have a value of its own".into())
         }
         "parameter" | "input" => Ok(position),
-        other => Err(format!("is of causality {other}, only parameters and inputs can be set")),
+        // FMI 2.0, section 2.2.7: a start value belongs to a variable whose initial value is exact
+        // or approximate, and such variables can be set before initialization.
+        _ if variable.variability != "constant" && variable.start.is_some() => Ok(position),
+        other => Err(format!("is of causality {other} without a start value that can be changed")),
     }
 }
 
@@ -184,4 +187,33 @@ pub fn apply(settings: &[Setting], instance: &mut dyn Instance) -> Outcome {
         instance.set_boolean(&booleans.0, &booleans.1)?;
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::description::ModelDescription;
+
+    #[test]
+    fn start_values_of_all_variables_that_are_not_constant_can_be_set() {
+        let variable = |name: &str, variability: &'static str, start: Option<&str>| Variable {
+            name: name.into(),
+            causality: "local".into(),
+            variability: variability.into(),
+            start: start.map(String::from),
+            ..Variable::default()
+        };
+        let variables = vec![
+            variable("state", "continuous", Some("true")),
+            variable("constant", "constant", Some("true")),
+            variable("calculated", "continuous", None),
+        ];
+        let description = ModelDescription { variables, ..ModelDescription::default() };
+        let part = Part { name: "a", description: &description };
+        assert_eq!(position("state", 0, part, &[], false), Ok(0));
+        for name in ["constant", "calculated"] {
+            let fault = position(name, 0, part, &[], false).unwrap_err();
+            assert!(fault.contains("is of causality local"), "{fault}");
+        }
+    }
 }
