@@ -60,7 +60,7 @@ def test_every_experiment_becomes_a_valid_archive(experiment, tmp_path):
     names = re.findall(r' name="([^"]*)"', text.split("<ssd:Elements>")[0]) + re.findall(r'<ssv:ParameterSet version="1.0" name="([^"]*)"', text)
     assert names and all(name.isidentifier() for name in names)
     assert html.unescape(re.search(r' description="([^"]*)"', text)[1]) == tomllib.loads(experiment.read_text())["title"]
-    assert re.search(r'<oms:FixedStepMaster [^>]*stepSize="0\.\d+"', text)
+    assert re.search(r'<oms:SimulationInformation name="oms_ma_default" method="oms_ma" fixedStepSize="0\.\d+">\s*<oms:FixedStepMaster [^>]*stepSize="0\.\d+"', text)
     again = tmp_path / "again.ssp"
     pack(experiment, again)
     assert path.read_bytes() == again.read_bytes()

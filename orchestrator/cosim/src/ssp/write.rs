@@ -1,6 +1,6 @@
 //! Writes an experiment to an SSP archive.
 
-use super::xml::{Xml, element, leaf, real};
+use super::xml::{Xml, element, identifier, leaf, real};
 use super::{FMU, OPEN_MODELICA, RUN_SETTINGS, STRUCTURE};
 use crate::error::Error;
 use crate::experiment::Coupling;
@@ -126,21 +126,18 @@ fn structure(system: &Source) -> io::Result<Vec<u8>> {
     Ok(bytes)
 }
 
-/// Converts a text to an identifier, because some importers require every name to be one.
-fn identifier(text: &str) -> String {
-    let mut name: String =
-        text.chars().map(|c| if c.is_ascii_alphanumeric() || c == '_' { c } else { '_' }).collect();
-    if !name.starts_with(|c: char| c.is_ascii_alphabetic() || c == '_') {
-        name.insert(0, '_');
-    }
-    name
-}
-
-/// Writes the step in the form of OMSimulator, which other importers read as well.
+/// Writes the step in the form of OMSimulator, which other importers read as well. From version 3
+/// on it reads the attributes, where the name is that of its master for components that name none;
+/// before, it reads the element.
 fn open_modelica(xml: &mut Xml, system: &Source) -> io::Result<()> {
     let schema = "https://raw.githubusercontent.com/OpenModelica/OMSimulator/master/schema/oms.xsd";
     element(xml, "oms:Annotations", &[("xmlns:oms", schema.into())], |xml| {
-        element(xml, "oms:SimulationInformation", &[], |xml| {
+        let solver = [
+            ("name", "oms_ma_default".into()),
+            ("method", "oms_ma".into()),
+            ("fixedStepSize", real(system.clock.step())),
+        ];
+        element(xml, "oms:SimulationInformation", &solver, |xml| {
             let master = [
                 ("description", "oms-ma".into()),
                 ("stepSize", real(system.clock.step())),

@@ -10,6 +10,16 @@ pub(super) fn real(value: f64) -> String {
     format!("{value:?}")
 }
 
+/// Converts a text to an identifier, because some importers require every name to be one.
+pub(super) fn identifier(text: &str) -> String {
+    let mut name: String =
+        text.chars().map(|c| if c.is_ascii_alphanumeric() || c == '_' { c } else { '_' }).collect();
+    if !name.starts_with(|c: char| c.is_ascii_alphabetic() || c == '_') {
+        name.insert(0, '_');
+    }
+    name
+}
+
 /// Writes an element without content.
 pub(super) fn leaf(xml: &mut Xml, name: &str, attributes: &[(&str, String)]) -> io::Result<()> {
     let attributes = attributes.iter().map(|(name, value)| (*name, value.as_str()));
