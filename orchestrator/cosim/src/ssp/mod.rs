@@ -2,8 +2,11 @@
 //! a system of FMUs, its connections and its parameter values for any importer that reads the
 //! format.
 
+mod binding;
+mod flow;
 mod read;
 mod structure;
+mod value;
 mod write;
 mod xml;
 

@@ -1,11 +1,12 @@
 //! Reads an SSP archive as an experiment.
 
 use super::structure::{Structure, SystemComponent};
-use super::{OPEN_MODELICA, RUN_SETTINGS, STRUCTURE};
+use super::{OPEN_MODELICA, RUN_SETTINGS, STRUCTURE, flow};
 use crate::document::Source;
 use crate::error::Error;
 use crate::experiment::{
-    Coupling, Experiment, Given, Observe, OnInvalid, Overrides, Protection, Record, Simulation,
+    Component, Coupling, Experiment, Given, Observe, OnInvalid, Overrides, Protection, Record,
+    Simulation,
 };
 use crate::system::Opened;
 use crate::wiring::wires;
@@ -16,10 +17,10 @@ use fmu_import::error::Error as Import;
 use fmu_import::fmu::Fmu;
 use fmu_import::folder::TemporaryFolder;
 use fmu_import::xml::{self, Element};
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
-use toml::Spanned;
+use toml::{Spanned, Value};
 
 /// An experiment that was read from an archive.
 pub struct Loaded {
@@ -135,9 +136,10 @@ impl RunSettings {
 ///
 /// # Errors
 /// Returns an error if the archive is faulty, or needs what this program does not support:
-/// components other than FMUs for co-simulation, mappings of parameters, or signal dictionaries.
+/// components other than FMUs for co-simulation, signal dictionaries, or mappings of values between
+/// FMUs.
 pub fn load(path: &Path, overrides: &Overrides) -> Result<Loaded, Error> {
-    let folder = archive::unpack(path)?;
+    let folder = archive::unpack_with_backslashes(path)?;
     let refuse = |message: String| Error::from(Import::Fmu { path: path.to_path_buf(), message });
     let bytes = std::fs::read(folder.path().join(STRUCTURE)).map_err(|error| {
         refuse(format!("is not an SSP archive, because {STRUCTURE} cannot be read: {error}"))
@@ -149,39 +151,25 @@ pub fn load(path: &Path, overrides: &Overrides) -> Result<Loaded, Error> {
 
     let mut opened = Opened::default();
     for component in &structure.components {
-        let fmu = structure.folder.join(&component.source);
+        let fmu = folder.path().join(&component.source);
         if !opened.contains_key(&fmu) {
             let archive =
                 Fmu::open(&fmu).map_err(|error| of_entry(error.into(), path, folder.path()))?;
             opened.insert(fmu.clone(), Rc::new(archive));
         }
     }
-    let description_of = |component: &SystemComponent| {
-        &opened[&structure.folder.join(&component.source)].description
-    };
+    let parts = parts(&structure.components, &opened, folder.path());
+    let flow::Resolved { connections, parameters } =
+        flow::resolve(&structure, &parts, path).map_err(in_structure)?;
 
-    let system = root.child("System");
-    let annotation = |kind: &str| {
-        let mut annotations =
-            system.into_iter().flat_map(|system| system.list("Annotations", "Annotation"));
-        annotations.find(|annotation| annotation.attribute("type") == Some(kind))
-    };
-    let stored = annotation(RUN_SETTINGS).and_then(|annotation| annotation.child("Experiment"));
+    let stored = annotations(&root, RUN_SETTINGS).find_map(|tool| tool.child("Experiment"));
     let stored = stored.map(RunSettings::read).transpose().map_err(in_structure)?;
-    let master = annotation(OPEN_MODELICA)
-        .and_then(|annotation| annotation.child("Annotations"))
-        .and_then(|annotations| annotations.child("SimulationInformation"))
-        .and_then(|information| information.child("FixedStepMaster"));
-    let common =
-        master.map_or(Ok(None), |master| master.number("stepSize")).map_err(in_structure)?;
+    let common = common_step(&root).map_err(in_structure)?;
 
     let experiment = root.child("DefaultExperiment");
     let time = |name| experiment.map_or(Ok(None), |e| e.number(name)).map_err(in_structure);
     let stop = overrides.stop.map_or_else(|| time("stopTime"), |stop| Ok(Some(stop)))?;
-    let proposed = structure
-        .components
-        .iter()
-        .filter_map(|component| description_of(component).default_experiment.step);
+    let proposed = parts.iter().filter_map(|part| part.description.default_experiment.step);
     let stated = stored.as_ref().map(|settings| settings.step).or(common);
     let step = overrides.step.or(stated).or(proposed.reduce(f64::min));
     let simulation = Simulation {
@@ -194,18 +182,14 @@ pub fn load(path: &Path, overrides: &Overrides) -> Result<Loaded, Error> {
         order: structure.components.iter().map(|component| component.name.clone()).collect(),
     };
     let text_of = |text: String| Spanned::new(0..0, text);
-    let recorded = structure.components.iter().flat_map(|component| {
+    let recorded = parts.iter().flat_map(|part| {
         let seen = |causality| {
-            description_of(component)
-                .names(causality)
-                .map(|name| format!("{}.{name}", component.name))
+            part.description.names(causality).map(|name| format!("{}.{name}", part.name))
         };
         seen("input").chain(seen("output")).collect::<Vec<_>>()
     });
-    let texts = |name: &String| {
-        // Texts can be neither recorded nor shown.
-        wiring::find(name, &parts(&structure.components, &opened, &structure.folder)).is_some()
-    };
+    // Texts can be neither recorded nor shown.
+    let is_no_text = |name: &String| wiring::find(name, &parts).is_some();
     let mut experiment = Experiment {
         title: root.attribute("name").unwrap_or("system").to_string(),
         description: root.attribute("description").unwrap_or_default().to_string(),
@@ -213,10 +197,11 @@ pub fn load(path: &Path, overrides: &Overrides) -> Result<Loaded, Error> {
         components: structure
             .components
             .iter()
-            .map(|c| (c.name.clone(), c.component(&structure.folder)))
+            .zip(parameters)
+            .map(|(c, values)| (c.name.clone(), component(&folder.path().join(&c.source), values)))
             .collect(),
-        connections: structure.connections,
-        record: Record { variables: recorded.filter(texts).map(text_of).collect(), every: 1 },
+        connections,
+        record: Record { variables: recorded.filter(is_no_text).map(text_of).collect(), every: 1 },
         observe: Observe::default(),
         isolation: Protection::default(),
         leaves_inputs_open: true,
@@ -226,7 +211,6 @@ pub fn load(path: &Path, overrides: &Overrides) -> Result<Loaded, Error> {
         given: Given::default(),
         source: Source::plain(path, text),
     };
-    let parts = parts(&structure.components, &opened, &structure.folder);
     let wires = wires(&experiment, &parts)?;
     experiment.simulation.order = delay::order(&parts, &wires)
         .into_iter()
@@ -237,6 +221,43 @@ pub fn load(path: &Path, overrides: &Overrides) -> Result<Loaded, Error> {
     }
     experiment.apply(overrides)?;
     Ok(Loaded { experiment, opened, entries: Entries { path: path.to_path_buf(), folder } })
+}
+
+/// Returns the content of the system's annotations of this type.
+fn annotations<'a>(root: &'a Element, kind: &'a str) -> impl Iterator<Item = &'a Element> {
+    let system = root.child("System").into_iter();
+    system
+        .flat_map(|system| system.list("Annotations", "Annotation"))
+        .filter(move |annotation| annotation.attribute("type") == Some(kind))
+}
+
+/// Returns the step that OMSimulator's annotation states, as versions before 3 write it or as later
+/// ones do.
+fn common_step(root: &Element) -> Result<Option<f64>, String> {
+    let informations = annotations(root, OPEN_MODELICA)
+        .flat_map(|annotation| annotation.list("Annotations", "SimulationInformation"));
+    for information in informations {
+        let master = information.child("FixedStepMaster");
+        let step = master.map_or(Ok(None), |master| master.number("stepSize"))?;
+        let step = step.map_or_else(|| information.number("fixedStepSize"), |step| Ok(Some(step)));
+        if let Some(step) = step? {
+            return Ok(Some(step));
+        }
+    }
+    Ok(None)
+}
+
+/// Returns a component of the experiment for an FMU with these values.
+fn component(fmu: &Path, values: BTreeMap<String, Value>) -> Component {
+    let text = |text| Spanned::new(0..0, text);
+    Component {
+        fmu: text(fmu.to_string_lossy().into_owned()),
+        every: 1,
+        unconnected: Vec::new(),
+        parameters: values.into_iter().map(|(n, value)| (n, Spanned::new(0..0, value))).collect(),
+        isolate: None,
+        is_exchanged: false,
+    }
 }
 
 fn parts<'a>(
