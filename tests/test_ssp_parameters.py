@@ -212,8 +212,11 @@ def test_oracle_connectors_of_systems_pass_values_on(tmp_path):
         # The direction follows from the kinds of the connectors, not from the order.
         "body.initial.sigma .plain",
     )
+    # An empty name of an element means the system itself.
+    inner = inner.replace('<Connection startConnector="roll"', '<Connection startElement="" startConnector="roll"')
+    assert 'startElement=""' in inner
     outer = connectors(angle="parameter deg", torque="input", unused="parameter") + bindings(
-        bound("angle Real 0.5 rad\n torque Real 3\n vehicle.plain Real 4 deg\n vehicle.body.initial.alpha Real 9")
+        bound("angle Real 0.5 rad\n torque Real 3\n vehicle.plain Real 4 [deg]\n vehicle.body.initial.alpha Real 9")
     )
     links = connected('.angle vehicle.start <c:LinearTransformation offset="1"/>', ".torque vehicle.roll", ".unused law.delay")
     system = f'{outer}{elements(f"""<System name="vehicle">{inner}{elements(BODY.format(""))}</System>""", LAW.format(bindings(bound("delay Real 0.1"))))}{links}'
@@ -282,11 +285,12 @@ def test_archives_with_backslashes_are_read(tmp_path):
     [
         (elements('<Component name="a" source="resources/LQR.fmu" implementation="ModelExchange"/>'), 'write implementation="CoSimulation"'),
         (elements('<Component name="a" source="x.ssp" type="application/x-ssp-package"/>'), "as a System within this one"),
+        (elements('<System name="a"/>'), "has no component that could be run"),
         (elements('<Component name="a" source=""/>'), "has no FMU: put one into the archive"),
         (elements('<SignalDictionaryReference name="bus" dictionary="d"/>'), "connect the components with one another"),
         (bindings('<ParameterBinding source="a.ssv" sourceBase="component"/>'), "leave out sourceBase"),
         (bindings('<ParameterBinding source="a.csv" type="text/csv"/>'), "write them as SSV and SSM files"),
-        (bindings('<ParameterBinding source="a.ssv"/>'), "a.ssv"),
+        (bindings('<ParameterBinding source="a.ssv"/>') + elements(LAW.format("")), "a.ssv: No such file"),
         (bindings("<ParameterBinding/>"), "the parameters of the system: there is a ParameterBinding without values"),
         (elements(LAW.format(bindings(bound("a Real 1").replace("</ParameterBinding>", "<ParameterMapping/></ParameterBinding>")))), "empty ParameterMapping"),
         (elements(LAW.format(bindings(bound("a Real 1", f"a delay {TABLE.format('Integer', 1, 2)}")))), "1.0 is not of the type"),

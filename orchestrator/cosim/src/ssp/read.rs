@@ -234,9 +234,9 @@ fn annotations<'a>(root: &'a Element, kind: &'a str) -> impl Iterator<Item = &'a
 /// Returns the step that OMSimulator's annotation states, as versions before 3 write it or as later
 /// ones do.
 fn common_step(root: &Element) -> Result<Option<f64>, String> {
-    let informations = annotations(root, OPEN_MODELICA)
+    let solvers = annotations(root, OPEN_MODELICA)
         .flat_map(|annotation| annotation.list("Annotations", "SimulationInformation"));
-    for information in informations {
+    for information in solvers {
         let master = information.child("FixedStepMaster");
         let step = master.map_or(Ok(None), |master| master.number("stepSize"))?;
         let step = step.map_or_else(|| information.number("fixedStepSize"), |step| Ok(Some(step)));

@@ -61,6 +61,9 @@ impl Structure {
             structure.units.push(description::unit(unit)?);
         }
         structure.system(root.child("System").ok_or("has no System")?, "", folder)?;
+        if structure.components.is_empty() {
+            return Err("has no component that could be run: put FMUs into the system".into());
+        }
         Ok(structure)
     }
 
@@ -103,7 +106,9 @@ impl Structure {
         }
         for connection in system.list("Connections", "Connection") {
             let node = |element: &str, connector: &str| {
-                let owner = connection.attribute(element).map(inside);
+                // Some tools name the system itself by an empty text.
+                let owner = connection.attribute(element).filter(|name| !name.is_empty());
+                let owner = owner.map(inside);
                 Ok::<_, String>((
                     owner.unwrap_or_else(|| path.to_string()),
                     connection.required(connector)?.to_string(),

@@ -45,7 +45,10 @@ impl Quantity {
         let element = parameter.children.iter().find(is_value);
         let element = element.ok_or_else(|| fault("has no value".into()))?;
         let value = typed(&element.name, element.required("value")?).map_err(fault)?;
-        Ok(Self { value, unit: element.attribute("unit").map(String::from) })
+        // Some tools write units in brackets, which belong to no definition.
+        let bare = |unit: &str| Some(unit.strip_prefix('[')?.strip_suffix(']')?.to_string());
+        let unit = element.attribute("unit").map(|unit| bare(unit).unwrap_or_else(|| unit.into()));
+        Ok(Self { value, unit })
     }
 
     /// Returns the value in this unit. A value without a unit is in that unit already.
