@@ -82,9 +82,9 @@ def packages(folder: Path, names: list[str]) -> Path:
     for each, (content, _) in LIBRARIES.items():
         name = "orchestrator.exe" if each.startswith("windows") else "orchestrator"
         (folder / each / name).write_bytes(content + b"program")
-    (folder / "browser").mkdir()
-    (folder / "browser" / "index.html").write_text("<!doctype html>the page")
-    (folder / "man").mkdir()
+    for name in ("browser", "man"):
+        (folder / name).mkdir()
+    (folder / "browser" / "index.html").write_text("the page")
     for name in ("orchestrator", "orchestrator-run"):
         (folder / "man" / f"{name}.1").write_text(f".TH {name} 1\n")
     return folder
@@ -109,8 +109,7 @@ def dist(tmp_path_factory) -> Path:
 
 @pytest.fixture(scope="module")
 def made(dist, tmp_path_factory) -> Path:
-    output = tmp_path_factory.mktemp("release") / "dist"
-    done = release(dist, output)
+    done = release(dist, output := tmp_path_factory.mktemp("release") / "dist")
     assert done.returncode == 0, done.stderr
     assert "warning: advisories: not checked, no database could be fetched" in done.stderr
     return output
@@ -143,14 +142,10 @@ def content(request, made) -> dict[str, tuple[bytes, int, float]]:
 
 
 def test_a_release_has_these_files(made):
-    files = {path.name for path in made.iterdir()}
     wheels = {f"reentry_fmus-{VERSION}-py3-none-{tag}.whl" for tag in WHEELS}
     others = {"LICENSES.txt", "LICENSES-rust-std.html", "README.md", "SHA256SUMS", "sbom.cdx.json", "try-in-browser.html"}
-    assert files == ARCHIVES | wheels | others
-    # Every wheel carries the page.
-    for wheel in wheels:
-        with zipfile.ZipFile(made / wheel) as archive:
-            assert archive.read("reentry_fmus/data/try.html") == (made / "try-in-browser.html").read_bytes()
+    assert {path.name for path in made.iterdir()} == ARCHIVES | wheels | others
+    assert all(zipfile.ZipFile(made / wheel).read("reentry_fmus/data/try.html") == b"the page" for wheel in wheels)
 
 
 def test_archives_hold_fmus_licences_and_experiments(content, dist):

@@ -113,7 +113,7 @@ def test_what_the_orchestrator_knows_of_a_vehicle_is_what_the_architecture_says(
     crates = [ROOT / "orchestrator" / name / "src" for name in ("master", "import", "cosim", "metrics", "report", "sweep", "study", "campaign", "linear")]
     files = [file for crate in crates for file in crate.rglob("*.rs") if file.stem != "tests"]
     knowing = {file.relative_to(ROOT / "orchestrator").as_posix() for file in files if words.search(code(file))}
-    pictures = {"recording/effectors.rs", "recording/trajectory.rs", "run_page/data.rs", "run_page/mod.rs"}
+    pictures = {"recording/effectors.rs", "recording/trajectory.rs", "run_page/data.rs", "run_page/mod.rs", "run_page/plans.rs"}
     assert knowing == {"cosim/src/experiment/vehicle.rs", "import/src/law.rs", *(f"report/src/{name}" for name in pictures)}
 
 

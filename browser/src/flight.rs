@@ -23,8 +23,8 @@ struct Flight<'a> {
 }
 
 /// Flies the loop. `signals` gets a row of the scenario's columns for each communication point, or
-/// for every so many, in SI units; the last one repeats the responses of the step before. `plans` gets the variables that show a
-/// plan ([`crate::signals::plan`]) whenever there is a new one.
+/// for every so many, in SI units; the last one repeats the responses of the step before. `plans`
+/// gets the variables that show a plan ([`crate::signals::plan`]) whenever there is a new one.
 ///
 /// # Errors
 /// Says which parameter the FMUs refuse. If a step fails or the attitude is lost, the flight ends

@@ -15,8 +15,9 @@
 //! | `plans()`, `plans_length()` | address and number of the plans' values ([`signals::plan`]), as f64 |
 //!
 //! It imports one function, `law` of the module `page`: the control law that the page computes
-//! ([`own_law`]). A request is `{"controller": "crmpc", "set": {"plant.disturbance.bound": "2 deg/s2"}}`, with
-//! values as in experiment files. `describe`, `fly` and `experiment` return 1 if they succeeded.
+//! ([`own_law`]). A request is
+//! `{"controller": "crmpc", "set": {"plant.disturbance.bound": "2 deg/s2"}}`, with values as in
+//! experiment files. `describe`, `fly` and `experiment` return 1 if they succeeded.
 //! Otherwise they return 0, and the answer says why. Addresses are valid until the next call of a
 //! function other than these getters.
 #![cfg_attr(not(test), deny(clippy::disallowed_methods))]

@@ -19,7 +19,6 @@ from reentry_fmus import (
     LawError,
     OrchestratorError,
     OrchestratorWarning,
-    browse,
     experiment,
     experiments,
     fmu,
@@ -37,17 +36,6 @@ def test_every_fmu_is_there_and_simulates():
         assert fmpy.read_model_description(str(fmu(name))).modelName == name
         result = fmpy.simulate_fmu(str(fmu(name)), stop_time=0.2, output_interval=0.04)
         assert len(result) == 6
-
-
-def test_the_page_opens_where_the_package_has_it(monkeypatch):
-    opened = []
-    monkeypatch.setattr("webbrowser.open", opened.append)
-    try:
-        page = browse()
-    except FileNotFoundError as error:
-        assert "without the page" in str(error) and not opened
-    else:
-        assert opened == [page.as_uri()] and "CRMPC" in page.read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize(

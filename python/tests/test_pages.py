@@ -41,3 +41,14 @@ def test_the_docstrings_examples_hold():
 def test_everything_public_has_a_docstring():
     for name in reentry_fmus.__all__:
         assert getattr(reentry_fmus, name).__doc__, name
+
+
+def test_the_page_opens_where_the_package_has_it(monkeypatch):
+    opened = []
+    monkeypatch.setattr("webbrowser.open", opened.append)
+    try:
+        page = reentry_fmus.browse()
+    except FileNotFoundError as error:
+        assert "without the page" in str(error) and not opened
+    else:
+        assert opened == [page.as_uri()] and "CRMPC" in page.read_text(encoding="utf-8")

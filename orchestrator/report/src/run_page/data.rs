@@ -1,16 +1,12 @@
 //! The numbers of a page as JSON: curves, and the vehicle over time.
 
+use super::numbers::{DIGITS, TIME_DIGITS, numbers, rounded};
 use super::{plans, thin};
 use crate::recording::panels::{Panel, Role, symbols};
 use crate::recording::trajectory;
 use crate::recording::{Recording, Track};
 use cosim::experiment::Vehicle;
 use serde_json::{Map, Value, json};
-
-/// Number of significant digits of a value, which is more than a screen can resolve.
-pub(super) const DIGITS: usize = 5;
-/// Number of significant digits of a time.
-pub(super) const TIME_DIGITS: usize = 7;
 
 /// Returns the data that the scripts of a page draw.
 pub fn page(runs: &[Recording], panels: &[Panel], vehicles: &[usize]) -> Value {
@@ -152,24 +148,6 @@ fn words(item: &str) -> String {
         text.extend(letter.to_lowercase());
     }
     text
-}
-
-/// Rounds numbers; those that are not finite become null.
-pub(super) fn numbers(values: impl IntoIterator<Item = f64>, digits: usize) -> Vec<Value> {
-    values.into_iter().map(|value| rounded(value, digits)).collect()
-}
-
-fn rounded(value: f64, digits: usize) -> Value {
-    if !value.is_finite() {
-        return Value::Null;
-    }
-    let rounded: f64 = format!("{value:.*e}", digits - 1).parse().unwrap_or(value);
-    // A whole number is shorter without its point.
-    if rounded.fract() == 0.0 && rounded.abs() < 1e9 {
-        json!(rounded as i64)
-    } else {
-        json!(rounded)
-    }
 }
 
 #[cfg(test)]

@@ -3,6 +3,7 @@
 
 pub mod data;
 pub mod figure;
+mod numbers;
 pub mod plans;
 pub mod thin;
 

@@ -1,6 +1,6 @@
 //! The plans under guarantee as JSON, for the picture of plan, tube and bound.
 
-use super::data::{DIGITS, TIME_DIGITS, numbers};
+use super::numbers::{DIGITS, TIME_DIGITS, numbers};
 use crate::recording::{Recording, Track};
 use serde_json::{Value, json};
 
