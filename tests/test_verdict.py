@@ -15,8 +15,8 @@ ENVIRONMENT = """
 set -euo pipefail
 root=. wasm=wasm target=target fmus=target/fmu dist=target/dist python=python-of-tests
 say() { printf '\\n== %s\\n' "$*"; }
-mkdir -p "$dist/linux-x86_64/fmu"
-touch "$dist/linux-x86_64/fmu/a.fmu"
+mkdir -p "$dist/linux-x86_64/fmu" "$dist/linux-x86_64/fmi3"
+touch "$dist/linux-x86_64/fmu/a.fmu" "$dist/linux-x86_64/fmi3/a.fmu"
 need_rust() { :; }
 need_python() { :; }
 install_tools() { :; }
