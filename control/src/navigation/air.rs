@@ -44,21 +44,15 @@ impl Relative {
     /// Returns the forms of the error that are the errors of these angles: with u the velocity, its
     /// components along the body axes have the error C (δv + [u]× φ − wind).
     pub(super) fn rows(&self) -> [Error; 2] {
-        let along = self.to_body * self.velocity;
-        let speed = along.norm();
-        let flat = hypot(along.x, along.z);
-        let alpha = Vector3::new(-along.z, 0.0, along.x) / (flat * flat);
-        let beta = (Vector3::y() - along * (along.y / (speed * speed))) / flat;
+        let flow = self.to_body * self.velocity;
+        let speed = flow.norm();
+        let flat = hypot(flow.x, flow.z);
+        let alpha = Vector3::new(-flow.z, 0.0, flow.x) / (flat * flat);
+        let beta = (Vector3::y() - flow * (flow.y / (speed * speed))) / flat;
         [alpha, beta].map(|gradient| {
             let by_velocity = self.to_body.transpose() * gradient;
             let by_attitude = self.velocity.cross_matrix().transpose() * by_velocity;
-            let mut row = Error::zeros();
-            row.fixed_rows_mut::<3>(VELOCITY).copy_from(&by_velocity);
-            row.fixed_rows_mut::<3>(ATTITUDE).copy_from(&by_attitude);
-            for (i, direction) in self.level.iter().flatten().enumerate() {
-                row[WIND + i] = -by_velocity.dot(direction);
-            }
-            row
+            self.velocity_row(&by_velocity) + along(ATTITUDE, &by_attitude)
         })
     }
 
@@ -70,10 +64,15 @@ impl Relative {
 
     /// Returns the form of the error that is the relative error of the speed.
     fn speed_row(&self) -> Error {
-        let by_velocity = self.velocity / self.velocity.norm_squared();
-        let mut row = along(VELOCITY, &by_velocity);
-        for (i, direction) in self.level.iter().flatten().enumerate() {
-            row[WIND + i] = -by_velocity.dot(direction);
+        self.velocity_row(&(self.velocity / self.velocity.norm_squared()))
+    }
+
+    /// Returns the form of the error that is the part of the velocity's along a direction; wind is
+    /// a part of a velocity relative to the air.
+    fn velocity_row(&self, direction: &Vector3<f64>) -> Error {
+        let mut row = along(VELOCITY, direction);
+        for (i, blowing) in self.level.iter().flatten().enumerate() {
+            row[WIND + i] = -direction.dot(blowing);
         }
         row
     }
