@@ -240,7 +240,7 @@ fn set_other(s: &mut Settings, name: &str, value: &Value) -> Result<(), String> 
         }
         _ => {
             // No bound depends on these.
-            let free = ["reference.", "weight.", "tube.", "bound.", "observer.", "solver"];
+            let free = ["reference.", "weight.", "tube.", "bound.", "observer.", "solver", "plan."];
             let others = ["saturation", "achievedMoment.used", "trajectory.earthRate"];
             if !(free.iter().any(|prefix| name.starts_with(prefix)) || others.contains(&name)) {
                 return Err(format!("{value} is not understood here"));
