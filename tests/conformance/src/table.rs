@@ -3,6 +3,7 @@
 
 use crate::interface::{DISCARD, ERROR, EventInfo, FmuState, MODEL_EXCHANGE, OK, Status};
 use crate::{Fmu, Instance, c};
+use model_description::ModelDescription;
 use model_description::variable::{Causality, Variable, VariableKind};
 use std::ffi::c_int;
 use std::ptr::{null, null_mut};
@@ -229,14 +230,16 @@ fn indicators(i: &Instance) -> Status {
     c!(i, fmi2GetEventIndicators(i.component, values.as_mut_ptr(), values.len()))
 }
 
-/// Whether a variable may be set in a state: conditions 1, 3, 4, 5 and 6 of the tables. No FMU has
+/// Whether the variable with a value reference may be set in a state: conditions 1, 3, 4, 5 and 6 of the tables. No FMU has
 /// tunable parameters or constants.
 ///
 /// There are two differences from the tables. An input may also be set before initialization,
 /// because importers set all start values there, and section 2.2.7 gives inputs one. Condition 5
 /// allows only continuous inputs in continuous-time mode, but FMPy sets all inputs there: a
 /// discrete Real is accepted and waits for the next event.
-pub fn settable(variable: &Variable, state: State) -> bool {
+pub fn settable(description: &ModelDescription, reference: u32, state: State) -> bool {
+    let position = reference as usize;
+    let Some(variable) = description.variables.get(position) else { return false };
     let real = matches!(variable.kind, VariableKind::Real { .. });
     match variable.causality {
         Causality::Parameter => matches!(state, Instantiated | InitializationMode),
@@ -245,6 +248,9 @@ pub fn settable(variable: &Variable, state: State) -> bool {
             ContinuousTimeMode => real,
             Terminated | Error => false,
         },
-        _ => false,
+        _ => {
+            let is_state = || description.states().iter().any(|state| state.0 == position);
+            state == ContinuousTimeMode && is_state()
+        }
     }
 }

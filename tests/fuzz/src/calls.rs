@@ -325,12 +325,8 @@ impl Model {
 
     /// Whether each variable may be set now.
     fn are_settable(&self, references: &[u32]) -> bool {
-        let variables = &self.instance.fmu.description.variables;
-        references.iter().all(|reference| {
-            variables
-                .get(*reference as usize)
-                .is_some_and(|variable| settable(variable, self.state))
-        })
+        let description = &self.instance.fmu.description;
+        references.iter().all(|reference| settable(description, *reference, self.state))
     }
 
     /// A handle of a saved state with the state, or an invalid one.

@@ -33,6 +33,8 @@ pub(crate) struct Instance {
     description: Arc<ModelDescription>,
     /// Value references of each state and its derivative.
     states: Vec<(usize, usize)>,
+    /// Room for the values of the states.
+    trial: Vec<f64>,
     guid: String,
     version: Version,
     interface: Interface,
@@ -91,6 +93,7 @@ impl Instance {
         Self {
             model: (export.create)(),
             indicators: vec![0.0; indicators],
+            trial: vec![0.0; states.len()],
             states,
             description,
             guid,

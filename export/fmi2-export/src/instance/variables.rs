@@ -190,6 +190,11 @@ impl Instance {
         for (i, &reference) in references.iter().enumerate() {
             let value = value(i).map_err(Failure::Error)?;
             let position = self.position(reference);
+            if let Some(place) = self.states.iter().position(|state| state.0 == position) {
+                value.put(self.model.as_mut(), position);
+                self.set_state(place, position);
+                continue;
+            }
             let same = T::look(self.model.as_mut(), position, |before| before.same(&value));
             if same != Some(true) {
                 value.put(self.model.as_mut(), position);
@@ -202,7 +207,15 @@ impl Instance {
         Ok(())
     }
 
-    /// Checks that a variable may be set now. A discrete Real input is accepted in continuous-time
+    /// Takes a state's variable as the state.
+    fn set_state(&mut self, place: usize, position: usize) {
+        self.model.continuous_states(&mut self.trial);
+        self.trial[place] = *self.model.real(position).expect("only a Real is a state");
+        self.model.set_continuous_states(&self.trial);
+        self.stale = true;
+    }
+
+    /// Checks that a variable may be set now: in continuous-time mode also a state. A discrete Real input is accepted in continuous-time
     /// mode too, although the standard has it set in event mode, because FMPy sets all inputs
     /// whenever it asks for event indicators. It has no effect until the next event.
     fn settable(&self, variable: &Variable) -> Outcome {
@@ -217,6 +230,13 @@ impl Instance {
                 ))
             }
             Causality::Parameter | Causality::Input => Ok(()),
+            _ if state == State::ContinuousTimeMode
+                && self.states.iter().any(|state| {
+                    std::ptr::eq(&raw const self.description.variables[state.0], variable)
+                }) =>
+            {
+                Ok(())
+            }
             _ => error(format!("'{name}' is calculated by the FMU and cannot be set")),
         }
     }
