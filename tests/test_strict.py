@@ -1,13 +1,15 @@
 """Every call between importers and the FMUs, written down by a library between them and checked
 against the state machines of FMI 2.0 and 3.0: what importers may call, and what units may answer."""
 
+import re
 import subprocess
+import sys
 from functools import cache
 
 import pytest
 from fmpy import read_model_description, simulate_fmu
 
-from conftest import EXPERIMENTS, NAMES, ROOT, archive, archive3, program
+from conftest import EXPERIMENTS, NAMES, ROOT, TARGET, archive, archive3, program
 from fmi import Fmu, Instance, Instance3
 from strict.judge import Judge
 from strict.proxy import HEADERS, build, interpose, read
@@ -175,6 +177,29 @@ def again(calls: list[dict], function: str, behind: str) -> list[dict]:
     call = next(call for call in calls if call["call"] == function)
     place = max(place for place, other in enumerate(calls) if other["call"] == behind)
     return [*calls[: place + 1], call, *calls[place + 1 :]]
+
+
+def block(language: str) -> str:
+    """The program of a language in the page about FMI 3.0."""
+    return re.search(rf"```{language}\n(.*?)```", (ROOT / "docs" / "fmi3.md").read_text(), re.S)[1]
+
+
+def test_the_documented_loop_in_c_is_that_in_python_and_keeps_to_the_standard(watched, tmp_path):
+    units = [watched(name, "3") for name in ("ReentryPlant", "CRMPC")]
+    (tmp_path / "loop.c").write_text(block("c"))
+    (tmp_path / "loop.py").write_text(block("python").replace("target/fmi3", str(TARGET / "fmi3")))
+    subprocess.run(["cc", "-Wall", "-Werror", "-I", HEADERS, tmp_path / "loop.c", "-o", tmp_path / "loop", "-ldl"], check=True)
+    arguments = []
+    for unit in units:
+        library = unit.fmu.folder / "binaries" / "x86_64-linux" / unit.log.stem
+        arguments += [library, unit.fmu.description.instantiationToken, str(unit.fmu.variables["moment.x"].valueReference)]
+    commands = [[tmp_path / "loop", *arguments], [sys.executable, tmp_path / "loop.py"]]
+    said = [subprocess.run(command, capture_output=True, text=True, check=True).stdout for command in commands]
+    assert said[0] == said[1] != ""
+    for unit in units:
+        judge = unit.judge()
+        assert judge.broken == []
+        assert {("fmi3DoStep", "step"), ("fmi3UpdateDiscreteStates", "event")} <= judge.seen
 
 
 # A change of a correct run, and what the judge must say of it.

@@ -230,8 +230,8 @@ fn indicators(i: &Instance) -> Status {
     c!(i, fmi2GetEventIndicators(i.component, values.as_mut_ptr(), values.len()))
 }
 
-/// Whether the variable with a value reference may be set in a state: conditions 1, 3, 4, 5 and 6 of the tables. No FMU has
-/// tunable parameters or constants.
+/// Whether the variable with a value reference may be set in a state: conditions 1, 3, 4, 5 and 6
+/// of the tables. No FMU has tunable parameters or constants.
 ///
 /// There are two differences from the tables. An input may also be set before initialization,
 /// because importers set all start values there, and section 2.2.7 gives inputs one. Condition 5

@@ -215,9 +215,10 @@ impl Instance {
         self.stale = true;
     }
 
-    /// Checks that a variable may be set now: in continuous-time mode also a state. A discrete Real input is accepted in continuous-time
-    /// mode too, although the standard has it set in event mode, because FMPy sets all inputs
-    /// whenever it asks for event indicators. It has no effect until the next event.
+    /// Checks that a variable may be set now: in continuous-time mode also a state. A discrete Real
+    /// input is accepted in that mode too, although the standard has it set in event mode, because
+    /// FMPy sets all inputs whenever it asks for event indicators. It has no effect until the next
+    /// event.
     fn settable(&self, variable: &Variable) -> Outcome {
         let name = &variable.name;
         let state = self.progress.state;
