@@ -13,7 +13,6 @@ from conftest import EXPERIMENTS, NAMES, ROOT, TARGET, archive, archive3, progra
 from fmi import Fmu, Instance, Instance3
 from strict.judge import Judge
 from strict.proxy import HEADERS, build, interpose, read
-from strict.rules import rules
 
 ARCHIVES = {"2": archive, "3": archive3}
 
@@ -234,69 +233,3 @@ def test_a_broken_rule_is_found(recorded, what):
     assert Judge(version, description).all(calls) == []
     broken = Judge(version, description).all(alter(calls))
     assert any(said in line for line in broken), broken
-
-
-@pytest.fixture(scope="session")
-def importer(tmp_path_factory):
-    """An importer in C that makes one call in one state."""
-    program = tmp_path_factory.mktemp("importer") / "importer"
-    source = ROOT / "tests" / "strict" / "importer.c"
-    subprocess.run(["cc", "-O1", "-Wall", "-Werror", "-I", HEADERS, source, "-o", program, "-ldl"], check=True)
-    return program
-
-
-KINDS = [(name, "CS", events) for name in NAMES for events in (False, True)] + [("ReentryPlant", "ME", False)]
-# Where the units take more than they must: what FMI 2.0 allows, and what changes nothing. So does
-# fmi3EnterEventMode in event mode.
-NUMBERS = {"initialization", "continuous", "terminated"}
-LENIENT = {
-    "fmi3SetTime": {"event"},
-    "fmi3GetNominalsOfContinuousStates": {"instantiated"},
-    "fmi3GetNumberOfContinuousStates": NUMBERS,
-    "fmi3GetNumberOfEventIndicators": NUMBERS,
-}
-
-
-@pytest.mark.parametrize(("name", "interface", "events"), KINDS)
-def test_calls_are_allowed_where_fmi_3_says(fmu3, importer, name, interface, events):
-    unit = fmu3(name)
-    description = unit.description
-    table, text = rules("3", interface), (unit.folder / "modelDescription.xml").read_text()
-    reals = [variable for variable in description.modelVariables if variable.type == "Float64"]
-    states = {variable.derivative.name for variable in reals if variable.derivative}
-    named = {variable.name: variable.valueReference for variable in reals if variable.causality == "input"}
-    offered = {
-        "fmi3GetDirectionalDerivative": 'providesDirectionalDerivatives="true"' in text,
-        "fmi3GetAdjointDerivative": 'providesAdjointDerivatives="true"' in text,
-        # No unit has derivatives of outputs, or states that are evaluated apart from an update.
-        "fmi3GetOutputDerivatives": False,
-        "fmi3EvaluateDiscreteStates": False,
-    }
-    lines, expected = [], []
-    for (function, state), rule in table.items():
-        if state == "fatal" or state == "event" and interface == "CS" and not events:
-            continue
-        for variable in reals if function == "fmi3Set" else reals[:1]:
-            may = offered.get(function, True) and rule.mark != "."
-            if function == "fmi3Set":
-                # FMPy sets all inputs in continuous-time mode, so that discrete ones are taken too.
-                discrete = state == "continuous" and variable.causality == "input"
-                may = may and (discrete or rule.allows("3", variable, variable.name in states, False))
-            else:
-                may = may or interface == "ME" and state in LENIENT.get(function, [])
-            if function == "fmi3EnterEventMode":
-                may = (may or state == "event") and (events or interface == "ME")
-            lines.append(f"{state} {function} {variable.valueReference}")
-            expected.append((state, function, variable.name, may))
-    known = named.get("moment.x", reals[0].valueReference)
-    unknown = next((variable.valueReference for variable in reals if variable.derivative), reals[-1].valueReference)
-    numbers = [description.numberOfContinuousStates, len(description.eventIndicators), known, unknown]
-    library = unit.folder / "binaries" / "x86_64-linux" / f"{description.coSimulation.modelIdentifier}.so"
-    command = [importer, library, description.instantiationToken, interface, int(events), *numbers]
-    finished = subprocess.run([str(part) for part in command], input="\n".join(lines), capture_output=True, text=True)
-    answers = finished.stdout.splitlines()
-    assert len(answers) == len(expected), finished.stderr
-    wrong = [(*each, answer) for each, answer in zip(expected, answers) if answer[:2] != ("0 " if each[3] else "3 ")]
-    assert wrong == []
-    # Whatever is refused is explained.
-    assert [each for each, answer in zip(expected, answers) if not each[3] and len(answer) < 10] == []
