@@ -85,19 +85,21 @@ pub(crate) fn print(fmu: &Fmu, out: &mut impl Write) -> io::Result<()> {
             "step": experiment.step,
             "tolerance": experiment.tolerance,
         },
-        "variables": d.variables.iter().map(variable).collect::<Vec<_>>(),
+        "scheduled_execution": interface(&d.scheduled_execution),
+        "variables": d.variables.iter().map(|each| variable(d, each)).collect::<Vec<_>>(),
     });
     serde_json::to_writer_pretty(&mut *out, &description)?;
     writeln!(out)
 }
 
-fn variable(variable: &Variable) -> Value {
+fn variable(description: &ModelDescription, variable: &Variable) -> Value {
+    let place = description.place(variable);
     let mut printed = json!({
         "name": variable.name,
-        "value_reference": variable.reference,
+        "value_reference": place.map_or(variable.reference, |place| place.reference),
         "causality": variable.causality,
         "variability": variable.variability,
-        "type": variable.kind.name(),
+        "type": variable.type_name(place),
         "start": variable.start,
         "description": variable.description,
     });
@@ -113,7 +115,8 @@ fn variable(variable: &Variable) -> Value {
             printed["items"] =
                 items.iter().map(|(name, item)| (name.clone(), json!(item))).collect();
         }
-        VariableKind::Boolean | VariableKind::String => {}
+        VariableKind::Clock { interval } => printed["interval"] = json!(interval),
+        VariableKind::Boolean | VariableKind::String | VariableKind::Binary => {}
     }
     printed
 }

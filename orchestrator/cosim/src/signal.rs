@@ -125,7 +125,13 @@ impl TryFrom<String> for Signal {
             None => (text.trim(), None),
         };
         let inside = whole.strip_prefix("norm(").and_then(|rest| rest.strip_suffix(')'));
-        let terms: Vec<_> = inside.unwrap_or(whole).split(',').map(Term::read).collect();
+        let mut depth = 0;
+        // The name of an element of a matrix has a comma in brackets.
+        let is_between = |letter: char| {
+            depth += i32::from(letter == '[') - i32::from(letter == ']');
+            letter == ',' && depth == 0
+        };
+        let terms: Vec<_> = inside.unwrap_or(whole).split(is_between).map(Term::read).collect();
         let signal = Self { terms, norm: inside.is_some(), over };
         let broken = |path: &&str| {
             !path.contains('.') || path.contains(|c: char| c.is_whitespace() || c == '(')
@@ -257,6 +263,8 @@ mod tests {
             "norm(a.x, turn(b.y - c.y))",
             "norm(a.x, a.y - b.y)",
             "norm(a.x, a.y) / b.z",
+            "a.x[1,2]",
+            "norm(a.x[1,2], a.y[2,1])",
         ] {
             assert_eq!(String::from(Signal::try_from(text.to_string()).unwrap()), text);
         }

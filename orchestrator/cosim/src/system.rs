@@ -351,6 +351,6 @@ fn plain_value(description: &ModelDescription, port: Port, value: f64) -> Value 
             .iter()
             .find(|(_, item)| f64::from(*item) == value)
             .map_or_else(|| (value as i64).into(), |(name, _)| name.as_str().into()),
-        VariableKind::Real { .. } | VariableKind::String => value.into(),
+        _ => value.into(),
     }
 }

@@ -181,7 +181,8 @@ fn check_unconnected(experiment: &Experiment, parts: &[Part], wires: &[Wire]) ->
 }
 
 /// Resolves the recorded variables. A pattern matches inputs, outputs and local variables; a
-/// parameter is recorded only if it is named in full, and a text never is.
+/// parameter is recorded only if it is named in full, and a text never is. The name of an array
+/// stands for its elements.
 ///
 /// # Errors
 /// Returns an error if a name does not exist, a pattern matches nothing, or a variable is a text.
@@ -194,8 +195,9 @@ pub(crate) fn columns(experiment: &Experiment, parts: &[Part]) -> Result<Vec<Col
         let is_pattern = reference.written.prefix().is_some();
         let before = columns.len();
         let mut meant = 0;
+        let elements = part.description.elements(rest);
         for (position, variable) in part.description.variables.iter().enumerate() {
-            if !names::matches(rest, &variable.name)
+            if !(names::matches(rest, &variable.name) || elements.contains(&position))
                 || (is_pattern && !matches!(&*variable.causality, "input" | "output" | "local"))
             {
                 continue;
@@ -206,8 +208,9 @@ pub(crate) fn columns(experiment: &Experiment, parts: &[Part]) -> Result<Vec<Col
                     columns.push(Column { name: format!("{}.{}", part.name, variable.name), port });
                 }
             } else if !is_pattern {
+                let what = variable.kind.untransferred().unwrap_or_default();
                 return Err(reference.refuse(format!(
-                    "\"{}\" is a text, which cannot be recorded",
+                    "\"{}\" is {what}, which cannot be recorded",
                     reference.written.text
                 )));
             }

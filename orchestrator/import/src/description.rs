@@ -1,22 +1,32 @@
 //! Reads `modelDescription.xml`. (The reader in `fmi-rs` drops unit definitions and all types but
 //! the first.)
 
+mod fmi3;
+
 use crate::xml::Element;
 use fmi_master::description::{
-    ByName, DefaultExperiment, Interface, ModelDescription, Variable, VariableKind,
+    Array, ByName, DefaultExperiment, Interface, ModelDescription, Place, Variable, VariableKind,
 };
 use fmi_master::quantity::UnitDefinition;
 use std::borrow::Cow;
 use std::collections::BTreeMap;
+use std::str::FromStr;
 
-/// Values of `causality` that FMI 2.0, section 2.2.7, allows.
-pub const CAUSALITIES: [&str; 6] =
-    ["parameter", "calculatedParameter", "input", "output", "local", "independent"];
+/// Values of `causality` that FMI 2.0, section 2.2.7, allows, and the one that FMI 3.0 adds.
+pub const CAUSALITIES: [&str; 7] = [
+    "structuralParameter",
+    "parameter",
+    "calculatedParameter",
+    "input",
+    "output",
+    "local",
+    "independent",
+];
 /// Values of `variability` that the same section allows.
 pub const VARIABILITIES: [&str; 5] = ["constant", "fixed", "tunable", "discrete", "continuous"];
 
-/// Flags of an interface, in the order in which they are shown.
-const FLAGS: [&str; 10] = [
+/// Flags of an interface in FMI 2.0 and 3.0, in the order in which they are shown.
+const FLAGS: [&str; 21] = [
     "needsExecutionTool",
     "canHandleVariableCommunicationStepSize",
     "canInterpolateInputs",
@@ -27,6 +37,17 @@ const FLAGS: [&str; 10] = [
     "canSerializeFMUstate",
     "providesDirectionalDerivative",
     "completedIntegratorStepNotNeeded",
+    "hasEventMode",
+    "mightReturnEarlyFromDoStep",
+    "canReturnEarlyAfterIntermediateUpdate",
+    "providesIntermediateUpdate",
+    "canGetAndSetFMUState",
+    "canSerializeFMUState",
+    "providesDirectionalDerivatives",
+    "providesAdjointDerivatives",
+    "providesPerElementDependencies",
+    "needsCompletedIntegratorStep",
+    "providesEvaluateDiscreteStates",
 ];
 /// Names that the standard gives to the exponents of a base unit.
 const BASE: [&str; 8] = ["kg", "m", "s", "A", "K", "mol", "cd", "rad"];
@@ -94,7 +115,7 @@ impl Variables {
 }
 
 fn types(root: &Element) -> Types {
-    let types = root.list("TypeDefinitions", "SimpleType");
+    let types = root.child("TypeDefinitions").into_iter().flat_map(|list| &list.children);
     types.filter_map(|kind| Some((kind.attribute("name")?.to_string(), kind.clone()))).collect()
 }
 
@@ -104,9 +125,9 @@ fn version(root: &Element) -> Result<String, String> {
         return Err(format!("is not an FMI description: it begins with {}", root.title()));
     }
     let version = root.required("fmiVersion")?.to_string();
-    if version != "2.0" && !version.starts_with("2.0.") {
+    if version != "2.0" && !version.starts_with("2.0.") && !version.starts_with("3.") {
         return Err(format!(
-            "is an FMU for FMI {version}, this program runs FMI 2.0: export the model for FMI 2.0"
+            "is an FMU for FMI {version}, this program runs FMI 2.0 and 3.0: export the model for one of them"
         ));
     }
     Ok(version)
@@ -114,19 +135,27 @@ fn version(root: &Element) -> Result<String, String> {
 
 fn description(root: &Element, variables: Variables) -> Result<ModelDescription, String> {
     let fmi_version = version(root)?;
-    let variables = variables.finish(root)?;
+    let is_fmi3 = fmi_version.starts_with("3.");
+    let Listed { variables, dependencies, places, arrays } = if is_fmi3 {
+        fmi3::read(root, &types(root))?
+    } else {
+        let variables = variables.finish(root)?;
+        let dependencies = dependencies(root, variables.len())?;
+        Listed { variables, dependencies, ..Listed::default() }
+    };
     let text = |name: &str| root.attribute(name).unwrap_or_default().to_string();
     let experiment = root.child("DefaultExperiment");
     let proposed = |name: &str| experiment.map_or(Ok(None), |element| element.number(name));
     let units = root.list("UnitDefinitions", "Unit");
     Ok(ModelDescription {
         model_name: text("modelName"),
-        guid: text("guid"),
+        guid: text(if is_fmi3 { "instantiationToken" } else { "guid" }),
         description: text("description"),
         version: text("version"),
         generation_tool: text("generationTool"),
         co_simulation: root.child("CoSimulation").map(interface).transpose()?,
         model_exchange: root.child("ModelExchange").map(interface).transpose()?,
+        scheduled_execution: root.child("ScheduledExecution").map(interface).transpose()?,
         default_experiment: DefaultExperiment {
             start: proposed("startTime")?,
             stop: proposed("stopTime")?,
@@ -134,13 +163,24 @@ fn description(root: &Element, variables: Variables) -> Result<ModelDescription,
             tolerance: proposed("tolerance")?,
         },
         units: units.map(unit).collect::<Result<_, _>>()?,
-        dependencies: dependencies(root, variables.len())?,
+        dependencies,
+        places,
+        arrays,
         is_lookup_table: false,
         has_structure: root.child("ModelStructure").is_some(),
         variables,
         by_name: ByName::default(),
         fmi_version,
     })
+}
+
+/// The variables of a description.
+#[derive(Default)]
+struct Listed {
+    variables: Vec<Variable>,
+    dependencies: BTreeMap<usize, Vec<usize>>,
+    places: Vec<Place>,
+    arrays: BTreeMap<String, Array>,
 }
 
 fn interface(element: &Element) -> Result<Interface, String> {
@@ -199,48 +239,79 @@ fn variable(element: &Element, types: &Types) -> Result<Variable, String> {
     // An attribute of the variable itself takes precedence over that of its declared type.
     let declared =
         typed.attribute("declaredType").and_then(|name| types.get(name)?.child(&typed.name));
-    let text = |name: &str| {
-        typed.attribute(name).or_else(|| declared?.attribute(name)).map(ToString::to_string)
-    };
     let kind = match typed.name.as_str() {
-        "Real" => {
-            let bound = |name: &str| match typed.number(name)? {
-                None => declared.map_or(Ok(None), |declared| declared.number(name)),
-                bound => Ok(bound),
-            };
-            VariableKind::Real {
-                unit: text("unit"),
-                display_unit: text("displayUnit"),
-                min: bound("min")?,
-                max: bound("max")?,
-                nominal: bound("nominal")?,
-            }
-        }
+        "Real" => real(typed, declared)?,
         "Integer" => {
-            let bound = |name: &str| match typed.parsed(name, "a whole number")? {
-                None => {
-                    declared.map_or(Ok(None), |declared| declared.parsed(name, "a whole number"))
-                }
-                bound => Ok::<_, String>(bound),
-            };
-            VariableKind::Integer { min: bound("min")?, max: bound("max")? }
+            let [min, max] = ["min", "max"].map(|name| bound::<i32>(name, typed, declared));
+            VariableKind::Integer { min: min?, max: max? }
         }
         "Boolean" => VariableKind::Boolean,
         "String" => VariableKind::String,
-        _ => {
-            let declared =
-                declared.ok_or_else(|| format!("{} has no type definition", element.title()))?;
-            let item = |item: &Element| {
-                let value = item.parsed("value", "a whole number")?;
-                let value =
-                    value.ok_or_else(|| format!("{} has no attribute value", item.title()))?;
-                Ok((item.required("name")?.to_string(), value))
-            };
-            let items = declared.children.iter().filter(|child| child.name == "Item");
-            VariableKind::Enumeration { items: items.map(item).collect::<Result<_, String>>()? }
-        }
+        _ => enumeration(element, declared)?,
     };
+    let variable = named(element, kind, "continuous")?;
+    Ok(Variable {
+        reference: reference(element)?,
+        start: typed.attribute("start").map(ToString::to_string),
+        // Indices in the file count from 1.
+        derivative_of: typed
+            .parsed::<usize>("derivative", "an index from 1 on")?
+            .and_then(|index| index.checked_sub(1)),
+        ..variable
+    })
+}
+
+/// Returns a bound of a whole number.
+fn bound<T: FromStr>(
+    name: &str,
+    typed: &Element,
+    declared: Option<&Element>,
+) -> Result<Option<T>, String> {
+    match typed.parsed(name, "a whole number")? {
+        None => declared.map_or(Ok(None), |declared| declared.parsed(name, "a whole number")),
+        bound => Ok(bound),
+    }
+}
+
+fn real(typed: &Element, declared: Option<&Element>) -> Result<VariableKind, String> {
+    let text = |name: &str| {
+        typed.attribute(name).or_else(|| declared?.attribute(name)).map(ToString::to_string)
+    };
+    let bound = |name: &str| match typed.number(name)? {
+        None => declared.map_or(Ok(None), |declared| declared.number(name)),
+        bound => Ok(bound),
+    };
+    Ok(VariableKind::Real {
+        unit: text("unit"),
+        display_unit: text("displayUnit"),
+        min: bound("min")?,
+        max: bound("max")?,
+        nominal: bound("nominal")?,
+    })
+}
+
+fn enumeration(element: &Element, declared: Option<&Element>) -> Result<VariableKind, String> {
+    let declared = declared.ok_or_else(|| format!("{} has no type definition", element.title()))?;
+    let item = |item: &Element| {
+        let value = item.parsed("value", "a whole number of 32 bits")?;
+        let value = value.ok_or_else(|| format!("{} has no attribute value", item.title()))?;
+        Ok((item.required("name")?.to_string(), value))
+    };
+    let items = declared.children.iter().filter(|child| child.name == "Item");
+    Ok(VariableKind::Enumeration { items: items.map(item).collect::<Result<_, String>>()? })
+}
+
+fn reference(element: &Element) -> Result<u32, String> {
     let reference = element.parsed("valueReference", "a whole number from 0 to 4294967295")?;
+    reference.ok_or_else(|| format!("{} has no attribute valueReference", element.title()))
+}
+
+/// Returns a variable of this kind with the name and the attributes that do not depend on its type.
+fn named(
+    element: &Element,
+    kind: VariableKind,
+    variability: &'static str,
+) -> Result<Variable, String> {
     let keyword = |name: &str, default: &'static str| {
         let text = element.attribute(name).unwrap_or(default);
         let keyword = CAUSALITIES.iter().chain(&VARIABILITIES).find(|keyword| **keyword == text);
@@ -249,20 +320,14 @@ fn variable(element: &Element, types: &Types) -> Result<Variable, String> {
     };
     Ok(Variable {
         name: element.required("name")?.to_string(),
-        reference: reference
-            .ok_or_else(|| format!("{} has no attribute valueReference", element.title()))?,
         description: element.attribute("description").unwrap_or_default().to_string(),
         causality: keyword("causality", "local"),
-        variability: keyword("variability", "continuous"),
+        variability: keyword("variability", variability),
         kind,
-        start: typed.attribute("start").map(ToString::to_string),
-        // Indices in the file count from 1.
-        derivative_of: typed
-            .parsed::<usize>("derivative", "an index from 1 on")?
-            .and_then(|index| index.checked_sub(1)),
         is_optional: element.child("Annotations").is_some_and(|annotations| {
             annotations.children.iter().any(|tool| tool.child("Optional").is_some())
         }),
+        ..Variable::default()
     })
 }
 

@@ -8,12 +8,16 @@ use std::collections::{BTreeSet, HashMap, HashSet};
 /// Lists the faults of a description, one line for each, in the order of the file.
 pub fn faults(description: &ModelDescription) -> Vec<String> {
     let mut faults = Vec::new();
-    for (name, text) in [("modelName", &description.model_name), ("guid", &description.guid)] {
+    let identity = if description.is_fmi3() { "instantiationToken" } else { "guid" };
+    for (name, text) in [("modelName", &description.model_name), (identity, &description.guid)] {
         if text.is_empty() {
             faults.push(format!("has no {name}"));
         }
     }
-    if description.co_simulation.is_none() && description.model_exchange.is_none() {
+    if description.co_simulation.is_none()
+        && description.model_exchange.is_none()
+        && description.scheduled_execution.is_none()
+    {
         faults.push("offers neither co-simulation nor model exchange".to_string());
     }
     if description
@@ -36,7 +40,11 @@ pub fn faults(description: &ModelDescription) -> Vec<String> {
         // Other variables may share a reference as aliases. Of two that are both set, the later one
         // would overwrite the first.
         if matches!(&*variable.causality, "input" | "parameter") {
-            let handle = (variable.reference, Carrier::for_kind(&variable.kind));
+            let place = description.place(variable);
+            let handle = place
+                .map_or((variable.reference, Carrier::for_kind(&variable.kind), 0), |place| {
+                    (place.reference, None, place.element)
+                });
             if let Some(other) = handles.insert(handle, name) {
                 faults.push(format!(
                     "\"{other}\" and \"{name}\" have the same value reference {}",
@@ -44,12 +52,17 @@ pub fn faults(description: &ModelDescription) -> Vec<String> {
                 ));
             }
         }
-        check_variable(variable, &units, &mut faults);
+        check_variable(variable, description.is_fmi3(), &units, &mut faults);
     }
     faults
 }
 
-fn check_variable(variable: &Variable, units: &BTreeSet<&str>, faults: &mut Vec<String>) {
+fn check_variable(
+    variable: &Variable,
+    is_fmi3: bool,
+    units: &BTreeSet<&str>,
+    faults: &mut Vec<String>,
+) {
     let Variable { name, causality, variability, kind, .. } = variable;
     if !CAUSALITIES.contains(&&**causality) {
         faults.push(format!(
@@ -81,15 +94,15 @@ fn check_variable(variable: &Variable, units: &BTreeSet<&str>, faults: &mut Vec<
         }
         _ => {}
     }
-    if let Some(fault) = variable.start.as_deref().and_then(|start| start_fault(start.trim(), kind))
-    {
+    let start = variable.start.as_deref();
+    if let Some(fault) = start.and_then(|start| start_fault(start.trim(), kind, is_fmi3)) {
         let start = variable.start.as_deref().unwrap_or_default().escape_default();
         faults.push(format!("the start value \"{start}\" of \"{name}\" {fault}"));
     }
 }
 
-/// Describes the fault of a start value, if it has one.
-fn start_fault(start: &str, kind: &VariableKind) -> Option<String> {
+/// Describes the fault of a start value, if it has one. FMI 3.0 has integers of more than 32 bits.
+fn start_fault(start: &str, kind: &VariableKind, is_fmi3: bool) -> Option<String> {
     let outside = |below: bool, above: bool| {
         (below || above).then(|| "is outside its min and max".to_string())
     };
@@ -101,11 +114,13 @@ fn start_fault(start: &str, kind: &VariableKind) -> Option<String> {
             }
             Err(_) => Some("is not a number".into()),
         },
-        VariableKind::Integer { min, max } => match start.parse::<i32>() {
-            Ok(value) => {
-                outside(min.is_some_and(|min| value < min), max.is_some_and(|max| value > max))
-            }
-            Err(_) => Some("is not a whole number of 32 bits".into()),
+        VariableKind::Integer { min, max } => match start.parse::<i128>() {
+            Ok(value) if is_fmi3 || i32::try_from(value).is_ok() => outside(
+                min.is_some_and(|min| value < min.into()),
+                max.is_some_and(|max| value > max.into()),
+            ),
+            _ if is_fmi3 => Some("is not a whole number".into()),
+            _ => Some("is not a whole number of 32 bits".into()),
         },
         VariableKind::Boolean => (!matches!(start, "true" | "false" | "1" | "0"))
             .then(|| "is neither true nor false".into()),
@@ -114,7 +129,7 @@ fn start_fault(start: &str, kind: &VariableKind) -> Option<String> {
                 start.parse::<i32>().is_ok_and(|value| items.iter().any(|item| item.1 == value));
             (!is_item).then(|| "is no item of its type".into())
         }
-        VariableKind::String => None,
+        VariableKind::String | VariableKind::Binary | VariableKind::Clock { .. } => None,
     }
 }
 

@@ -1,4 +1,4 @@
-//! The types of FMI 2.0's C interface as the master uses them. Values that an instance returns are
+//! The types of FMI 2.0's C interface as the master uses them, of which FMI 3.0 has many as well. Values that an instance returns are
 //! taken as the integers that C passes: an instance may return anything, and a Rust enumeration
 //! must not hold a value that is none of its items.
 
@@ -23,11 +23,11 @@ pub(crate) fn status(code: c_int) -> Result<Status, c_int> {
     Status::try_from(code).map_err(|()| code)
 }
 
-/// Formats the status that a call returned.
-pub(crate) fn name_of(status: Result<Status, c_int>) -> String {
+/// Formats the status that a call returned, as this version of FMI calls it.
+pub(crate) fn name_of(status: Result<Status, c_int>, version: u8) -> String {
     match status {
-        Ok(status) => format!("{status:?}"),
-        Err(code) => format!("status {code}, which FMI 2.0 does not have"),
+        Ok(status) => format!("{status:?}").replace('2', &version.to_string()),
+        Err(code) => format!("status {code}, which FMI {version}.0 does not have"),
     }
 }
 
@@ -106,7 +106,8 @@ mod tests {
     #[test]
     fn a_status_that_fmi_does_not_have_is_kept_as_a_number() {
         assert_eq!(status(2), Ok(Status::Discard));
-        assert_eq!(name_of(status(-7)), "status -7, which FMI 2.0 does not have");
-        assert_eq!(name_of(status(4)), "fmi2Fatal");
+        assert_eq!(name_of(status(-7), 2), "status -7, which FMI 2.0 does not have");
+        assert_eq!(name_of(status(4), 2), "fmi2Fatal");
+        assert_eq!(name_of(status(3), 3), "fmi3Error");
     }
 }

@@ -3,24 +3,23 @@
 
 use crate::archive;
 use crate::crash;
-use crate::description;
-use crate::error::{Error, with_causes};
+use crate::error::Error;
 use crate::faults;
+use crate::fmi3::Layout;
 use crate::folder::TemporaryFolder;
-use crate::functions::Functions;
 use crate::isolation::{self, Isolation, Library, Loaded};
 use crate::law::{LawInstance, Ports};
-use crate::library::FmuInstance;
+use crate::loading::{self, Refusal};
 use crate::log::Log;
 use crate::lookup_table::{self, LookupTable, LookupTableInstance};
 use crate::warnings;
-use crate::xml;
 use fmi_master::description::ModelDescription;
 use fmi_master::instance::Instance;
 use fmi_rs::SHARED_LIBRARY_EXTENSION;
 use fmi_rs::fmi2::PLATFORM;
+use fmi_rs::fmi3::native::PLATFORM_TUPLE;
 use object::{Architecture, BinaryFormat, FileKind, Object, ObjectSegment};
-use std::cell::Cell;
+use std::cell::{Cell, OnceCell};
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
 use url::Url;
@@ -46,6 +45,8 @@ struct Archive {
     folder: Rc<TemporaryFolder>,
     /// Whether the library for this platform has been checked.
     is_sound: Cell<bool>,
+    /// Layout of FMI 3.0, once an instance was made.
+    layout: OnceCell<Rc<Layout>>,
 }
 
 impl Fmu {
@@ -53,7 +54,7 @@ impl Fmu {
     /// `.csv`.
     ///
     /// # Errors
-    /// Returns an error if the archive is unsafe or damaged, or is not an FMI 2.0 FMU, or if the
+    /// Returns an error if the archive is unsafe or damaged, or is no FMU of FMI 2.0 or 3, or if the
     /// lookup table has a fault.
     pub fn open(path: &Path) -> Result<Self, Error> {
         let refuse = |message: String| Error::Fmu { path: path.to_path_buf(), message };
@@ -65,16 +66,12 @@ impl Fmu {
             return Ok(Self { path: path.to_path_buf(), description, content });
         }
         let folder = archive::unpack(path)?;
-        let bytes =
-            std::fs::read(folder.path().join("modelDescription.xml")).map_err(|source| {
-                refuse(format!(
-                    "is not an FMU, because modelDescription.xml cannot be read: {source}"
-                ))
-            })?;
-        let description = xml::decode(&bytes)
-            .and_then(|text| description::parse(&text))
-            .map_err(|reason| refuse(format!("modelDescription.xml: {reason}")))?;
-        let archive = Archive { folder: Rc::new(folder), is_sound: Cell::new(false) };
+        let description = loading::read_description(folder.path()).map_err(refuse)?;
+        let archive = Archive {
+            folder: Rc::new(folder),
+            is_sound: Cell::new(false),
+            layout: OnceCell::new(),
+        };
         Ok(Self { path: path.to_path_buf(), description, content: Content::Archive(archive) })
     }
 
@@ -89,7 +86,9 @@ impl Fmu {
             .map_err(|message| Error::Fmu { path: path.clone(), message })?;
         // Derivatives would be those of the FMU's own law.
         if let Some(interface) = &mut description.co_simulation {
-            interface.capabilities.retain(|name| name != "providesDirectionalDerivative");
+            interface
+                .capabilities
+                .retain(|name| !name.starts_with("providesDirectionalDerivative"));
         }
         Ok(Self { path, description, content: Content::Law(Rc::clone(self), ports) })
     }
@@ -150,9 +149,10 @@ impl Fmu {
             .as_ref()
             .ok_or("offers no co-simulation: export the model for co-simulation")?;
         let platforms = archive.platforms();
-        if !platforms.iter().any(|platform| platform == PLATFORM) {
+        let platform = if self.description.is_fmi3() { PLATFORM_TUPLE } else { PLATFORM };
+        if !platforms.iter().any(|offered| offered == platform) {
             let offered = if platforms.is_empty() { "none".into() } else { platforms.join(", ") };
-            return Err(format!("has no library for {PLATFORM}, only for: {offered}"));
+            return Err(format!("has no library for {platform}, only for: {offered}"));
         }
         let identifier = &interface.model_identifier;
         // The identifier becomes part of a path. FMI 2.0, section 2.2.7, requires a C identifier,
@@ -163,9 +163,9 @@ impl Fmu {
                 identifier.escape_default()
             ));
         }
-        let folder = archive.folder.path().join("binaries").join(PLATFORM);
+        let folder = archive.folder.path().join("binaries").join(platform);
         let name = format!("{identifier}{SHARED_LIBRARY_EXTENSION}");
-        let (file, entry) = (folder.join(&name), format!("binaries/{PLATFORM}/{name}"));
+        let (file, entry) = (folder.join(&name), format!("binaries/{platform}/{name}"));
         if !file.is_file() {
             let files = names_in(&folder);
             let files = if files.is_empty() { "nothing".into() } else { files.join(", ") };
@@ -235,29 +235,49 @@ impl Fmu {
         isolation: Option<&Isolation>,
     ) -> Result<(Box<dyn Instance>, Option<String>), String> {
         let (file, entry) = self.library(archive)?;
-        let resources = Url::from_directory_path(archive.folder.path().join("resources"))
-            .map_err(|()| "the temporary folder has no absolute path")?;
+        let layout = archive.layout(&self.description)?;
+        let resources = archive.folder.path().join("resources");
+        let resources = match &layout {
+            // A path that ends in a separator.
+            Some(_) => resources.join("").display().to_string(),
+            None => Url::from_directory_path(resources)
+                .map_err(|()| "the temporary folder has no absolute path")?
+                .into(),
+        };
         let guid = &self.description.guid;
         if let Some(isolation) = isolation {
-            let library = Library { file, folder: archive.folder.path(), isolation };
-            return match library.instantiate(name, guid, resources.as_str()) {
+            let (folder, is_fmi3) = (archive.folder.path(), layout.is_some());
+            let library = Library { file, folder, isolation, is_fmi3 };
+            return match library.instantiate(name, guid, &resources) {
                 Loaded::Whole(instance, fault) => Ok((instance, fault)),
                 Loaded::Unloadable(reason) => Err(archive.not_loaded(&entry, &reason)),
                 Loaded::Refused(reason) => Err(format!("{title} {reason}")),
             };
         }
         crash::is_loaded(&self.path);
-        let functions = Functions::load(&file)
-            .map_err(|error| archive.not_loaded(&entry, &with_causes(&error)))?;
-        let fault = functions.version_fault();
         let (log, folder) = (Rc::new(Log::new(name)), Some(Rc::clone(&archive.folder)));
-        let instance = FmuInstance::new(functions, log, guid, resources.as_str(), folder)
-            .map_err(|reason| format!("{title} {reason}"))?;
-        Ok((Box::new(instance), fault))
+        loading::loaded(&file, layout, log, guid, &resources, folder).map_err(|refusal| {
+            match refusal {
+                Refusal::Unloadable(reason) => archive.not_loaded(&entry, &reason),
+                Refusal::Refused(reason) => format!("{title} {reason}"),
+            }
+        })
     }
 }
 
 impl Archive {
+    /// Returns the layout of FMI 3.0; `None` in FMI 2.0.
+    fn layout(&self, description: &ModelDescription) -> Result<Option<Rc<Layout>>, String> {
+        if !description.is_fmi3() {
+            return Ok(None);
+        }
+        let layout = match self.layout.get() {
+            Some(layout) => Rc::clone(layout),
+            None => Rc::new(Layout::new(description)?),
+        };
+        Ok(Some(Rc::clone(self.layout.get_or_init(|| layout))))
+    }
+
     fn platforms(&self) -> Vec<String> {
         let binaries = self.folder.path().join("binaries");
         names_in(&binaries).into_iter().filter(|name| binaries.join(name).is_dir()).collect()

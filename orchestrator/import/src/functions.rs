@@ -5,7 +5,7 @@
 use crate::fmi;
 use float_environment::in_default;
 use libloading::Library;
-use std::ffi::{CStr, c_int};
+use std::ffi::{CStr, CString, c_int};
 use std::path::Path;
 
 /// The FMI functions that this program calls, and the library that holds them.
@@ -45,28 +45,53 @@ pub(crate) struct StateFunctions {
 }
 
 impl StateFunctions {
-    /// Returns the functions of a library, if it has all of them.
+    /// Returns the functions of a library that get, set and free a state, if it has all of them.
     ///
     /// # Safety
     /// They must not be called after the library was closed.
-    unsafe fn load(library: &Library) -> Option<Self> {
-        // SAFETY: FMI 2.0 gives each function the type it is loaded as.
+    pub(crate) unsafe fn load(library: &Library, [get, set, free]: [&[u8]; 3]) -> Option<Self> {
+        // SAFETY: FMI gives each function the type it is loaded as.
         unsafe {
             Some(Self {
-                get: *library.get(b"fmi2GetFMUstate\0").ok()?,
-                set: *library.get(b"fmi2SetFMUstate\0").ok()?,
-                free: *library.get(b"fmi2FreeFMUstate\0").ok()?,
+                get: *library.get(get).ok()?,
+                set: *library.get(set).ok()?,
+                free: *library.get(free).ok()?,
             })
         }
     }
 }
 
+/// Functions of one version of FMI, as far as all instances need them.
+pub(crate) trait Table {
+    /// The major version of FMI.
+    const VERSION: u8;
+    fn free_instance(&self) -> fmi::FreeInstance;
+    fn states(&self) -> Option<StateFunctions>;
+}
+
+impl Table for Functions {
+    const VERSION: u8 = 2;
+
+    fn free_instance(&self) -> fmi::FreeInstance {
+        self.free_instance
+    }
+
+    fn states(&self) -> Option<StateFunctions> {
+        self.states
+    }
+}
+
+/// Loads a library.
+pub(crate) fn open(file: &Path) -> Result<Library, libloading::Error> {
+    // SAFETY: loading runs the library's own initializers, which are sound only if the library is.
+    // Whoever runs an FMU trusts its code. Some leave flushing to zero behind, as those of gcc's
+    // option -ffast-math do.
+    in_default(|| unsafe { Library::new(file) })
+}
+
 impl Functions {
     pub(crate) fn load(file: &Path) -> Result<Self, libloading::Error> {
-        // SAFETY: loading runs the library's own initializers, which are sound only if the library
-        // is. Whoever runs an FMU trusts its code. Some leave flushing to zero behind, as those of
-        // gcc's option -ffast-math do.
-        let library = in_default(|| unsafe { Library::new(file) })?;
+        let library = open(file)?;
         // SAFETY: FMI 2.0 gives each function the type it is loaded as, and `_library` keeps the
         // code loaded as long as the pointers exist.
         unsafe {
@@ -89,7 +114,10 @@ impl Functions {
                 get_boolean_status: *library.get(b"fmi2GetBooleanStatus\0")?,
                 get_version: library.get(b"fmi2GetVersion\0").ok().map(|function| *function),
                 reset: library.get(b"fmi2Reset\0").ok().map(|function| *function),
-                states: StateFunctions::load(&library),
+                states: StateFunctions::load(
+                    &library,
+                    [b"fmi2GetFMUstate\0", b"fmi2SetFMUstate\0", b"fmi2FreeFMUstate\0"],
+                ),
                 directional_derivative: library
                     .get(b"fmi2GetDirectionalDerivative\0")
                     .ok()
@@ -101,15 +129,26 @@ impl Functions {
 
     /// Returns a line about the version that the library reports, if it is missing or not FMI 2.0.
     pub(crate) fn version_fault(&self) -> Option<String> {
-        let Some(get_version) = self.get_version else {
-            return Some("its library has no fmi2GetVersion".into());
-        };
-        // SAFETY: FMI 2.0 gives the function this type and allows the call at any time.
-        let version = text_of(in_default(|| unsafe { get_version() }));
-        let is_supported = version == "2.0" || version.starts_with("2.0.");
-        (!is_supported)
-            .then(|| format!("its library reports version \"{}\" of FMI", version.escape_default()))
+        version_fault(self.get_version, "fmi2GetVersion", "2.0")
     }
+}
+
+/// Returns a line about the version that a library reports by this function, if it is missing or
+/// another one. A later revision is not.
+pub(crate) fn version_fault(
+    get_version: Option<fmi::GetText>,
+    name: &str,
+    expected: &str,
+) -> Option<String> {
+    let Some(get_version) = get_version else {
+        return Some(format!("its library has no {name}"));
+    };
+    // SAFETY: FMI gives the function this type and allows the call at any time.
+    let version = text_of(in_default(|| unsafe { get_version() }));
+    let rest = version.strip_prefix(expected);
+    let is_supported = rest.is_some_and(|rest| rest.is_empty() || rest.starts_with('.'));
+    (!is_supported)
+        .then(|| format!("its library reports version \"{}\" of FMI", version.escape_default()))
 }
 
 /// Copies the C string at `text`; a null pointer gives an empty string.
@@ -120,4 +159,12 @@ pub(crate) fn text_of(text: fmi::Text) -> String {
     // SAFETY: FMI passes strings that end with a zero byte and stay valid during the call; the null
     // pointer was excluded above.
     unsafe { CStr::from_ptr(text) }.to_string_lossy().into_owned()
+}
+
+/// Copies texts for C.
+pub(crate) fn c_texts<const N: usize>(texts: [&str; N]) -> Result<[CString; N], String> {
+    let copy =
+        |text: &str| CString::new(text).map_err(|_| format!("\"{text:?}\" contains a zero byte"));
+    let copies = texts.into_iter().map(copy).collect::<Result<Vec<_>, _>>()?;
+    Ok(copies.try_into().expect("as many copies as texts"))
 }

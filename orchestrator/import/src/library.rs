@@ -10,7 +10,7 @@
 use crate::crash::Calling;
 use crate::fmi::{self, Status};
 use crate::folder::TemporaryFolder;
-use crate::functions::{Functions, text_of};
+use crate::functions::{Functions, Table, c_texts};
 use crate::log::Log;
 use crate::logs::{self, Listed};
 use float_environment::in_default;
@@ -37,32 +37,30 @@ unsafe extern "C" fn receive_message(
     category: fmi::Text,
     message: fmi::Text,
 ) {
-    let receive =
-        || logs::receive(environment, fmi::status(status), &text_of(category), &text_of(message));
-    // A panic must not reach the instance. It has been reported on standard error.
-    let _ = in_default(|| std::panic::catch_unwind(receive));
+    logs::receive(environment, status, category, message);
 }
 
 /// Calls a function of a library. Its name is recorded meanwhile, in case it crashes, and the
 /// floating-point environment that it leaves behind is not kept.
 #[inline]
-fn foreign<R>(log: &Log, name: &'static str, function: impl FnOnce() -> R) -> R {
+pub(crate) fn foreign<R>(log: &Log, name: &'static str, function: impl FnOnce() -> R) -> R {
     let _calling = Calling::new(log, name);
     in_default(function)
 }
 
 /// The data that must live as long as an instance.
-struct InstanceData {
-    functions: Functions,
-    _callbacks: Rc<fmi::Callbacks>,
+struct InstanceData<F> {
+    functions: F,
+    _callbacks: Option<Rc<fmi::Callbacks>>,
     _listed: Listed,
     log: Rc<Log>,
 }
 
-/// An instance of an FMU, in this process.
-pub(crate) struct FmuInstance {
+/// An instance of an FMU, in this process. What all versions of FMI have in common is here; as an
+/// [`Instance`] it is one of FMI 2.0.
+pub(crate) struct FmuInstance<F: Table = Functions> {
     handle: fmi::Handle,
-    data: Rc<InstanceData>,
+    data: Rc<InstanceData<F>>,
     /// States that the instance keeps, by their numbers.
     kept: Vec<fmi::StateHandle>,
     fatal: bool,
@@ -79,10 +77,8 @@ impl FmuInstance {
         resources: &str,
         folder: Option<Rc<TemporaryFolder>>,
     ) -> Result<Self, String> {
-        let text = |text: &str| {
-            CString::new(text).map_err(|_| format!("\"{text:?}\" contains a zero byte"))
-        };
-        let (name, guid, resources) = (text(&log.component)?, text(guid)?, text(resources)?);
+        let texts = c_texts([&log.component, guid, resources])?;
+        let [name, guid, resources] = &texts;
 
         // Some FMUs refuse to start without memory functions although they declare that they need
         // none.
@@ -112,53 +108,13 @@ impl FmuInstance {
                 fmi::TRUE,
             )
         });
-        if handle.is_null() {
-            let message =
-                log.take().unwrap_or_else(|| "fmi2Instantiate returned no instance".into());
-            return Err(format!("could not be instantiated: {message}"));
-        }
-        log.is_instantiated();
-        let data = Rc::new(InstanceData { functions, _callbacks: callbacks, _listed: listed, log });
-        Ok(Self { handle, data, kept: Vec::new(), fatal: false, _folder: folder })
-    }
-
-    #[inline]
-    fn call(
-        &mut self,
-        call: &'static str,
-        function: impl FnOnce(&Functions, fmi::Handle) -> c_int,
-    ) -> Outcome {
-        let (data, handle) = (&self.data, self.handle);
-        match fmi::status(foreign(&data.log, call, || function(&data.functions, handle))) {
-            Ok(Status::Ok | Status::Warning) => Ok(()),
-            status => Err(self.failure(call, status)),
-        }
-    }
-
-    fn call_plain(&mut self, call: &'static str, function: fmi::Plain) -> Outcome {
-        // SAFETY: the instance is alive until this value is dropped, and the function is one of its
-        // library with the type that FMI gives it.
-        self.call(call, |_, handle| unsafe { function(handle) })
-    }
-
-    #[cold]
-    fn failure(&mut self, call: &'static str, status: Result<Status, c_int>) -> CallFailure {
-        self.fatal |= status == Ok(Status::Fatal);
-        let message = self.data.log.take();
-        if status == Ok(Status::Discard) && call == "doStep" {
-            return self.discarded(message);
-        }
-        if status == Ok(Status::Pending) {
-            let message = "the step is asynchronous, which is not supported";
-            return CallFailure::new(call, format!("{message} ({:?})", Status::Pending));
-        }
-        let message = message.unwrap_or_else(|| "its log holds no message".into());
-        CallFailure::answer(call, format!("{message} ({})", fmi::name_of(status)))
+        Self::made(handle, functions, Some(callbacks), listed, log, folder)
     }
 
     /// Describes why a step was discarded. FMI 2.0, section 4.2.3, lets an FMU end the simulation
     /// in this way.
-    fn discarded(&mut self, message: Option<String>) -> CallFailure {
+    #[cold]
+    fn discarded(&mut self) -> CallFailure {
         let Functions { get_real_status, get_boolean_status, .. } = self.data.functions;
         let (mut time, mut terminated) = (f64::NAN, fmi::FALSE);
         // SAFETY: the instance is alive, both pointers are valid for the calls, and FMI allows
@@ -171,31 +127,141 @@ impl FmuInstance {
         });
         let [knows_time, knows_end] = statuses.map(|status| fmi::status(status) == Ok(Status::Ok));
         let ends = knows_end && terminated != fmi::FALSE;
-        let told = message.or_else(|| self.data.log.take_event().filter(|_| ends));
+        self.stopped(ends, knows_time.then_some(time), &format!("{:?}", Status::Discard))
+    }
+}
+
+impl<F: Table> FmuInstance<F> {
+    /// Takes over an instance that its library has made, or says why it made none.
+    pub(crate) fn made(
+        handle: fmi::Handle,
+        functions: F,
+        callbacks: Option<Rc<fmi::Callbacks>>,
+        listed: Listed,
+        log: Rc<Log>,
+        folder: Option<Rc<TemporaryFolder>>,
+    ) -> Result<Self, String> {
+        if handle.is_null() {
+            let message = log.take().unwrap_or_else(|| "its library returned no instance".into());
+            return Err(format!("could not be instantiated: {message}"));
+        }
+        log.is_instantiated();
+        let data = Rc::new(InstanceData { functions, _callbacks: callbacks, _listed: listed, log });
+        Ok(Self { handle, data, kept: Vec::new(), fatal: false, _folder: folder })
+    }
+
+    pub(crate) fn functions(&self) -> &F {
+        &self.data.functions
+    }
+
+    #[inline]
+    pub(crate) fn call(
+        &mut self,
+        call: &'static str,
+        function: impl FnOnce(&F, fmi::Handle) -> c_int,
+    ) -> Outcome {
+        let status = self.status(call, function);
+        self.check(call, status)
+    }
+
+    /// Makes a call, and returns its status.
+    #[inline]
+    pub(crate) fn status(
+        &mut self,
+        call: &'static str,
+        function: impl FnOnce(&F, fmi::Handle) -> c_int,
+    ) -> Result<Status, c_int> {
+        let (data, handle) = (&self.data, self.handle);
+        fmi::status(foreign(&data.log, call, || function(&data.functions, handle)))
+    }
+
+    /// Makes a failure of a status that is one.
+    #[inline]
+    pub(crate) fn check(&mut self, call: &'static str, status: Result<Status, c_int>) -> Outcome {
+        match status {
+            Ok(Status::Ok | Status::Warning) => Ok(()),
+            status => Err(self.failure(call, status)),
+        }
+    }
+
+    pub(crate) fn call_plain(&mut self, call: &'static str, function: fmi::Plain) -> Outcome {
+        // SAFETY: the instance is alive until this value is dropped, and the function is one of its
+        // library with the type that FMI gives it.
+        self.call(call, |_, handle| unsafe { function(handle) })
+    }
+
+    #[cold]
+    fn failure(&mut self, call: &'static str, status: Result<Status, c_int>) -> CallFailure {
+        self.fatal |= status == Ok(Status::Fatal);
+        let message = self.data.log.take();
+        if status == Ok(Status::Pending) {
+            let message = "the step is asynchronous, which is not supported";
+            return CallFailure::new(call, format!("{message} ({:?})", Status::Pending));
+        }
+        let message = message.unwrap_or_else(|| "its log holds no message".into());
+        CallFailure::answer(call, format!("{message} ({})", fmi::name_of(status, F::VERSION)))
+    }
+
+    /// Describes a step that an instance did not complete, with the time (s) that it has `reached`
+    /// and what it `returned`. With `ends` it has ended the simulation.
+    #[cold]
+    pub(crate) fn stopped(
+        &mut self,
+        ends: bool,
+        reached: Option<f64>,
+        returned: &str,
+    ) -> CallFailure {
+        let told = self.data.log.take().or_else(|| self.data.log.take_event().filter(|_| ends));
         let mut parts: Vec<String> = told.into_iter().collect();
         if !ends && parts.is_empty() {
             parts.push("its log holds no message".into());
         }
-        let reached = (knows_time && time.is_finite()).then_some(time);
+        let reached = reached.filter(|time| time.is_finite());
         if let Some(time) = reached {
             parts.push(format!("it got as far as t = {} s", rounded(time)));
         }
         CallFailure {
             ends: ends.then_some(reached.unwrap_or(f64::NAN)),
-            ..CallFailure::answer("doStep", format!("{} ({:?})", parts.join("; "), Status::Discard))
+            ..CallFailure::answer("doStep", format!("{} ({returned})", parts.join("; ")))
         }
+    }
+
+    /// Keeps the present state under a number, as [`Instance::save`] does.
+    pub(crate) fn keep(&mut self, number: usize) -> Outcome {
+        let Some(functions) = self.data.functions.states() else {
+            return Err(CallFailure::new("getFMUstate", "its library keeps no states"));
+        };
+        // A null pointer asks for a new state.
+        let mut state = self.kept.get(number).copied().unwrap_or(std::ptr::null_mut());
+        // SAFETY: the instance is alive, and the state is null or one that it made.
+        self.call("getFMUstate", |_, handle| unsafe { (functions.get)(handle, &raw mut state) })?;
+        match self.kept.get_mut(number) {
+            Some(kept) => *kept = state,
+            None => self.kept.push(state),
+        }
+        Ok(())
+    }
+
+    /// Goes back to the state with this number, as [`Instance::restore`] does.
+    pub(crate) fn go_back(&mut self, number: usize) -> Outcome {
+        let (Some(functions), Some(&state)) = (self.data.functions.states(), self.kept.get(number))
+        else {
+            return Err(CallFailure::new("setFMUstate", "no such state was kept"));
+        };
+        // SAFETY: the instance is alive and made this state.
+        self.call("setFMUstate", |_, handle| unsafe { (functions.set)(handle, state) })
     }
 }
 
-impl Drop for FmuInstance {
+impl<F: Table> Drop for FmuInstance<F> {
     fn drop(&mut self) {
         if self.fatal {
             // After a fatal error no function of the FMU may be called, not even fmi2FreeInstance,
             // so the instance is leaked.
             std::mem::forget(Rc::clone(&self.data));
         } else {
-            let Functions { states, free_instance, .. } = &self.data.functions;
-            if let Some(functions) = states {
+            let free_instance = self.data.functions.free_instance();
+            if let Some(functions) = self.data.functions.states() {
                 for state in &mut self.kept {
                     foreign(&self.data.log, "freeFMUstate", || {
                         // SAFETY: the instance is alive, made this state, and frees it only here.
@@ -267,9 +333,13 @@ impl Instance for FmuInstance {
 
     fn do_step(&mut self, time: f64, step: f64) -> Outcome {
         // SAFETY: the instance is alive, and the function has the type FMI gives it.
-        self.call("doStep", |functions, handle| unsafe {
+        let status = self.status("doStep", |functions, handle| unsafe {
             (functions.do_step)(handle, time, step, fmi::TRUE)
-        })
+        });
+        if status == Ok(Status::Discard) {
+            return Err(self.discarded());
+        }
+        self.check("doStep", status)
     }
 
     fn terminate(&mut self) -> Outcome {
@@ -284,27 +354,11 @@ impl Instance for FmuInstance {
     }
 
     fn save(&mut self, number: usize) -> Outcome {
-        let Some(functions) = self.data.functions.states else {
-            return Err(CallFailure::new("getFMUstate", "its library keeps no states"));
-        };
-        // A null pointer asks for a new state.
-        let mut state = self.kept.get(number).copied().unwrap_or(std::ptr::null_mut());
-        // SAFETY: the instance is alive, and the state is null or one that it made.
-        self.call("getFMUstate", |_, handle| unsafe { (functions.get)(handle, &raw mut state) })?;
-        match self.kept.get_mut(number) {
-            Some(kept) => *kept = state,
-            None => self.kept.push(state),
-        }
-        Ok(())
+        self.keep(number)
     }
 
     fn restore(&mut self, number: usize) -> Outcome {
-        let (Some(functions), Some(&state)) = (self.data.functions.states, self.kept.get(number))
-        else {
-            return Err(CallFailure::new("setFMUstate", "no such state was kept"));
-        };
-        // SAFETY: the instance is alive and made this state.
-        self.call("setFMUstate", |_, handle| unsafe { (functions.set)(handle, state) })
+        self.go_back(number)
     }
 
     fn directional_derivative(

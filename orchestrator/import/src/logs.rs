@@ -4,8 +4,10 @@
 #![allow(unsafe_code)]
 
 use crate::crash;
-use crate::fmi::Status;
+use crate::fmi::{self, Status, Text};
+use crate::functions::text_of;
 use crate::log::Log;
+use float_environment::in_default;
 use parking_lot::RwLock;
 use std::collections::BTreeSet;
 use std::ffi::{c_int, c_void};
@@ -41,9 +43,17 @@ impl Drop for Listed {
     }
 }
 
+/// Receives a message, in the callback of any version of FMI.
+pub(crate) fn receive(environment: *const c_void, status: c_int, category: Text, message: Text) {
+    let receive =
+        || hand_over(environment, fmi::status(status), &text_of(category), &text_of(message));
+    // A panic must not reach the instance. It has been reported on standard error.
+    let _ = in_default(|| std::panic::catch_unwind(receive));
+}
+
 /// Hands a message to the log at the address `environment`. If there is none, the message belongs
 /// to the instance that this thread calls, or else to the only one that there is.
-pub(crate) fn receive(
+fn hand_over(
     environment: *const c_void,
     status: Result<Status, c_int>,
     category: &str,

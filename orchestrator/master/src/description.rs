@@ -5,6 +5,7 @@ use crate::quantity::{self, Scaling, UnitDefinition};
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 use std::collections::BTreeMap;
+use std::ops::Range;
 use std::sync::OnceLock;
 
 /// The model description of an FMU.
@@ -26,6 +27,8 @@ pub struct ModelDescription {
     pub co_simulation: Option<Interface>,
     /// Model exchange capabilities, if the FMU offers model exchange.
     pub model_exchange: Option<Interface>,
+    /// Scheduled execution capabilities, if the FMU offers this interface of FMI 3.0.
+    pub scheduled_execution: Option<Interface>,
     /// Simulation settings that the FMU proposes.
     pub default_experiment: DefaultExperiment,
     /// Unit definitions of the FMU.
@@ -41,6 +44,52 @@ pub struct ModelDescription {
     pub has_structure: bool,
     /// Index of the variables by name.
     pub by_name: ByName,
+    /// What FMI 3.0 calls each scalar variable, by [`Variable::reference`]; empty for FMI 2.0.
+    pub places: Vec<Place>,
+    /// Arrays of FMI 3.0 by name, whose elements are variables.
+    pub arrays: BTreeMap<String, Array>,
+}
+
+/// Place of a scalar variable in FMI 3.0, whose value references stand for whole arrays.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Place {
+    /// Type of the variable.
+    pub scalar: ScalarType,
+    /// Value reference of the variable in the file.
+    pub reference: u32,
+    /// Number of the element, in row-major order; 0 for a scalar.
+    pub element: usize,
+    /// Number of elements; 1 for a scalar.
+    pub length: usize,
+}
+
+/// A type of FMI 3.0. An enumeration is an `Int64`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[expect(missing_docs, reason = "the names are those of the standard")]
+pub enum ScalarType {
+    Float64,
+    Float32,
+    Int8,
+    UInt8,
+    Int16,
+    UInt16,
+    Int32,
+    UInt32,
+    Int64,
+    UInt64,
+    Boolean,
+    String,
+    Binary,
+    Clock,
+}
+
+/// An array of FMI 3.0.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Array {
+    /// Number of elements along each dimension.
+    pub shape: Vec<usize>,
+    /// Positions of its elements among the variables, in row-major order.
+    pub elements: Range<usize>,
 }
 
 /// Positions of variables in the order of their names, put in order by the first search. The
@@ -58,9 +107,12 @@ pub struct Interface {
 }
 
 impl Interface {
-    /// Returns whether a capability flag is set.
+    /// Returns whether a capability flag is set, by its name in FMI 2.0. In FMI 3.0 it may have
+    /// capital letters or an s at its end.
     pub fn has(&self, capability: &str) -> bool {
-        self.capabilities.iter().any(|name| name == capability)
+        self.capabilities
+            .iter()
+            .any(|name| name.trim_end_matches('s').eq_ignore_ascii_case(capability))
     }
 }
 
@@ -82,7 +134,8 @@ pub struct DefaultExperiment {
 pub struct Variable {
     /// Name of the variable.
     pub name: String,
-    /// Value reference, which identifies the variable in the get and set calls of its type.
+    /// Value reference, which identifies the variable in the get and set calls of its type. In FMI
+    /// 3.0 it is the index of its [`Place`].
     pub reference: u32,
     /// Description of the variable's meaning.
     pub description: String,
@@ -101,6 +154,16 @@ pub struct Variable {
 }
 
 impl Variable {
+    /// Returns the name of the type in the variable's version of FMI.
+    pub fn type_name(&self, place: Option<&Place>) -> String {
+        match (&self.kind, place) {
+            (VariableKind::Real { .. } | VariableKind::Integer { .. }, Some(place)) => {
+                format!("{:?}", place.scalar)
+            }
+            (kind, _) => kind.name().into(),
+        }
+    }
+
     /// Returns the typical magnitude of the value, in the variable's unit: 1 if none is declared,
     /// as FMI says.
     pub fn nominal(&self) -> f64 {
@@ -144,6 +207,13 @@ pub enum VariableKind {
     },
     /// A text of any length.
     String,
+    /// Bytes of FMI 3.0, which are shown only.
+    Binary,
+    /// A clock of FMI 3.0, which is shown only.
+    Clock {
+        /// What its ticks depend on, from the attribute `intervalVariability`.
+        interval: String,
+    },
 }
 
 impl VariableKind {
@@ -171,11 +241,39 @@ impl VariableKind {
             Self::Boolean => "Boolean",
             Self::Enumeration { .. } => "Enumeration",
             Self::String => "String",
+            Self::Binary => "Binary",
+            Self::Clock { .. } => "Clock",
+        }
+    }
+
+    /// Returns the type in words, if its values are not transferred.
+    pub fn untransferred(&self) -> Option<&'static str> {
+        match self {
+            Self::String => Some("a text"),
+            Self::Binary => Some("of type Binary"),
+            Self::Clock { .. } => Some("of type Clock"),
+            _ => None,
         }
     }
 }
 
 impl ModelDescription {
+    /// Returns the place of a variable in FMI 3.0; `None` in FMI 2.0.
+    pub fn place(&self, variable: &Variable) -> Option<&Place> {
+        self.places.get(variable.reference as usize)
+    }
+
+    /// Returns whether the FMU is one of FMI 3.0 or a later minor version.
+    pub fn is_fmi3(&self) -> bool {
+        self.fmi_version.starts_with("3.")
+    }
+
+    /// Returns the positions of the elements of the array with this name; none if there is no such
+    /// array.
+    pub fn elements(&self, array: &str) -> Range<usize> {
+        self.arrays.get(array).map_or(0..0, |array| array.elements.clone())
+    }
+
     /// Returns the scaling that converts values in a unit of this FMU to values in a unit of
     /// another.
     ///
@@ -236,13 +334,13 @@ pub enum Carrier {
 
 impl Carrier {
     /// Returns the type in which values of variables of this kind are transferred; `None` for
-    /// texts, which are not transferred.
+    /// texts, bytes and clocks, which are not transferred.
     pub fn for_kind(kind: &VariableKind) -> Option<Self> {
         match kind {
             VariableKind::Real { .. } => Some(Self::Real),
             VariableKind::Integer { .. } | VariableKind::Enumeration { .. } => Some(Self::Integer),
             VariableKind::Boolean => Some(Self::Boolean),
-            VariableKind::String => None,
+            VariableKind::String | VariableKind::Binary | VariableKind::Clock { .. } => None,
         }
     }
 }

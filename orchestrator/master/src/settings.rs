@@ -93,6 +93,9 @@ pub fn position(
             Err("is an input with a connection, so it cannot have a value of its own".into())
         }
         "parameter" | "input" => Ok(position),
+        "structuralParameter" => {
+            Err("is a structural parameter, which keeps its start value".into())
+        }
         // FMI 2.0, section 2.2.7: a start value belongs to a variable whose initial value is exact
         // or approximate, and such variables can be set before initialization.
         _ if variable.variability != "constant" && variable.start.is_some() => Ok(position),
@@ -149,6 +152,10 @@ pub fn value(written: &Value, variable: &Variable, part: Part) -> Result<Setting
         }
         (VariableKind::String, Value::String(text)) => Ok(SettingValue::Text(text.clone())),
         (VariableKind::String, _) => mismatch("a text"),
+        (VariableKind::Binary | VariableKind::Clock { .. }, _) => Err(format!(
+            "is {}, which cannot be set",
+            variable.kind.untransferred().unwrap_or_default()
+        )),
     }
 }
 

@@ -1,7 +1,7 @@
 //! Variables of components, and the connections between them. A name that is wrong is refused with
 //! the nearest right name.
 
-use crate::description::{Carrier, ModelDescription, Variable, VariableKind};
+use crate::description::{Array, Carrier, ModelDescription, Variable, VariableKind};
 use crate::names;
 use crate::quantity::Scaling;
 use schemars::JsonSchema;
@@ -55,8 +55,8 @@ pub struct Wire {
     pub scaling: Scaling,
 }
 
-/// Returns the port of a variable at its position in the description; `None` for a text, which is
-/// not transferred.
+/// Returns the port of a variable at its position in the description; `None` if values of its type
+/// are not transferred.
 pub fn port(component: usize, position: usize, variable: &Variable) -> Option<Port> {
     let carrier = Carrier::for_kind(&variable.kind)?;
     Some(Port { component, variable: position, reference: variable.reference, carrier })
@@ -103,6 +103,10 @@ impl<'a> Written<'a> {
         self.rest.strip_suffix('*')
     }
 
+    fn array(&self) -> Option<&'a Array> {
+        self.part.description.arrays.get(self.rest)
+    }
+
     fn unknown(&self, causality: &'a str) -> String {
         let hint = names::hint(self.rest, self.part.description.names(causality));
         format!("\"{}\" has no {causality} \"{}\"{hint}", self.part.name, self.rest)
@@ -120,8 +124,10 @@ impl<'a> Written<'a> {
                 variable.causality
             ));
         }
-        let text = || format!("\"{component}.{name}\" is a text, which cannot be connected");
-        port(self.component, position, variable).ok_or_else(text)
+        port(self.component, position, variable).ok_or_else(|| {
+            let what = variable.kind.untransferred().unwrap_or_default();
+            format!("\"{component}.{name}\" is {what}, which cannot be connected")
+        })
     }
 }
 
@@ -136,13 +142,13 @@ pub enum Fault {
 
 /// Connects outputs with inputs, and determines how values are converted by their units. An output
 /// behind a prefix is connected with the input of the same name behind the other prefix, if there
-/// is one.
+/// is one. An array is connected with an array of the same shape, element by element.
 ///
 /// # Errors
 /// Says which name does not exist or has a wrong causality, or which types or units do not match.
 pub fn connect(from: &Written, to: &Written) -> Result<Vec<Wire>, Fault> {
     let pairs = match (from.prefix(), to.prefix()) {
-        (None, None) => vec![(from.rest.to_string(), to.rest.to_string())],
+        (None, None) => elements(from, to)?,
         (Some(from_prefix), Some(to_prefix)) => expand(from, from_prefix, to, to_prefix)?,
         _ => {
             let (from, to) = (from.text, to.text);
@@ -159,6 +165,32 @@ pub fn connect(from: &Written, to: &Written) -> Result<Vec<Wire>, Fault> {
         Ok(Wire { from: start, to: end, scaling: scaling.map_err(Fault::To)? })
     };
     pairs.into_iter().map(wire).collect()
+}
+
+/// Lists the pairs of names of two variables, or of the elements of two arrays.
+fn elements(from: &Written, to: &Written) -> Result<Vec<(String, String)>, Fault> {
+    let shape = |side: &Written, array: &Array| {
+        let sizes: Vec<String> = array.shape.iter().map(usize::to_string).collect();
+        format!("\"{}\" is an array of {}", side.text, sizes.join(" × "))
+    };
+    let (first, second) = match (from.array(), to.array()) {
+        (None, None) => return Ok(vec![(from.rest.to_string(), to.rest.to_string())]),
+        (Some(a), Some(b)) if a.shape == b.shape => (a, b),
+        (Some(a), Some(b)) => {
+            return Err(Fault::To(format!("{}, and {}", shape(from, a), shape(to, b))));
+        }
+        (Some(a), None) => {
+            return Err(Fault::To(format!("{}, but \"{}\" is none", shape(from, a), to.text)));
+        }
+        (None, Some(b)) => {
+            return Err(Fault::To(format!("{}, but \"{}\" is none", shape(to, b), from.text)));
+        }
+    };
+    let names = |side: &Written, array: &Array| -> Vec<String> {
+        let variables = &side.part.description.variables[array.elements.clone()];
+        variables.iter().map(|variable| variable.name.clone()).collect()
+    };
+    Ok(names(from, first).into_iter().zip(names(to, second)).collect())
 }
 
 /// Lists the pairs of names that two patterns match: an output behind the first prefix is paired

@@ -327,9 +327,7 @@ fn typed<'a>(kind: &Type, values: impl Iterator<Item = &'a SettingValue>) -> Val
             Values::Integer(values.map(|value| value.as_i64().unwrap_or(0) as i32).collect())
         }
         Type::Boolean => Values::Flag(values.map(|value| value == true).collect()),
-        Type::Enumeration { .. } | Type::String => {
-            Values::Text(values.map(|value| value.as_str().unwrap_or_default().into()).collect())
-        }
+        _ => Values::Text(values.map(|value| value.as_str().unwrap_or_default().into()).collect()),
     }
 }
 

@@ -205,8 +205,8 @@ fn connectors<'a>(system: &'a Source, index: usize) -> impl Iterator<Item = &'a 
     variables.iter().enumerate().filter_map(move |(position, variable)| {
         match &*variable.causality {
             "input" if is_connected(position) => Some(variable),
-            "output" => match variable.kind {
-                VariableKind::String => None,
+            "output" => match &variable.kind {
+                kind if kind.untransferred().is_some() => None,
                 VariableKind::Enumeration { .. } => system.enumerations.then_some(variable),
                 _ => Some(variable),
             },

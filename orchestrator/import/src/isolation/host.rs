@@ -4,9 +4,8 @@ use super::channel::{Channel, LARGEST, Slot};
 use super::limits;
 use super::memory;
 use super::protocol::{Action, InstanceArguments, List, Ready, Reply, Request, Set, Setup};
-use crate::error::with_causes;
-use crate::functions::Functions;
-use crate::library::FmuInstance;
+use crate::fmi3::Layout;
+use crate::loading::{self, Refusal};
 use crate::log::{Held, Log};
 use fmi_master::description::Carrier;
 use fmi_master::instance::{Instance, Outcome};
@@ -38,20 +37,25 @@ pub fn serve(arguments: impl Iterator<Item = OsString>) -> io::Result<()> {
     let log = |name: &str| {
         Log::held(name, Arc::clone(&held), move |text| words.put(Slot::LastMessage, 1, text))
     };
+    let refused = |reason| Ready::Refused { reason, messages: held.take() };
+    let layout = setup.fmi3.map(|folder| {
+        loading::read_description(&folder).and_then(|description| Layout::new(&description))
+    });
+    let layout = match layout.transpose() {
+        Ok(layout) => layout.map(Rc::new),
+        Err(reason) => return host.send(&refused(reason)),
+    };
     let without = match limits::apply(&setup.limits) {
         Ok(without) => without,
-        Err(reason) => return host.send(&Ready::Refused { reason, messages: Vec::new() }),
+        Err(reason) => return host.send(&refused(reason)),
     };
-    let functions = match Functions::load(&setup.library) {
-        Ok(functions) => functions,
-        Err(error) => return host.send(&Ready::Unloadable(with_causes(&error))),
-    };
-    let version_fault = functions.version_fault();
     let InstanceArguments { name, guid, resources } = setup.instance;
-    let mut instance =
-        match FmuInstance::new(functions, Rc::new(log(&name)), &guid, &resources, None) {
-            Ok(instance) => instance,
-            Err(reason) => return host.send(&Ready::Refused { reason, messages: held.take() }),
+    let log = Rc::new(log(&name));
+    let (mut instance, version_fault) =
+        match loading::loaded(&setup.library, layout, log, &guid, &resources, None) {
+            Ok(loaded) => loaded,
+            Err(Refusal::Unloadable(reason)) => return host.send(&Ready::Unloadable(reason)),
+            Err(Refusal::Refused(reason)) => return host.send(&refused(reason)),
         };
     host.send(&Ready::Loaded { version_fault, without, messages: held.take() })?;
     let (mut lists, mut values) = (Vec::new(), Vec::new());
@@ -61,7 +65,7 @@ pub fn serve(arguments: impl Iterator<Item = OsString>) -> io::Result<()> {
             drop(instance);
             return host.send(&Reply { messages: held.take(), ..Reply::default() });
         }
-        let reply = answer(&mut instance, request, &mut lists, &mut values);
+        let reply = answer(&mut *instance, request, &mut lists, &mut values);
         host.send_with(&Reply { messages: held.take(), ..reply }, &values)?;
     }
 }
@@ -126,7 +130,7 @@ impl Values {
     }
 
     /// Reads the values and appends their bytes.
-    fn read(&mut self, instance: &mut impl Instance, bytes: &mut Vec<u8>) -> Outcome {
+    fn read(&mut self, instance: &mut dyn Instance, bytes: &mut Vec<u8>) -> Outcome {
         let references = &self.list.references;
         let outcome = match self.list.carrier {
             Carrier::Real => instance.get_real(references, &mut self.reals),
@@ -141,7 +145,7 @@ impl Values {
 
 /// Makes the calls of a request until one fails, and reads the requested variables.
 fn answer(
-    instance: &mut impl Instance,
+    instance: &mut dyn Instance,
     request: Request,
     lists: &mut Vec<Values>,
     bytes: &mut Vec<u8>,
@@ -169,7 +173,7 @@ fn answer(
     reply
 }
 
-fn set(instance: &mut impl Instance, set: &Set) -> Outcome {
+fn set(instance: &mut dyn Instance, set: &Set) -> Outcome {
     match set {
         Set::Real(references, values) => instance.set_real(references, values),
         Set::Integer(references, values) => instance.set_integer(references, values),
@@ -178,7 +182,7 @@ fn set(instance: &mut impl Instance, set: &Set) -> Outcome {
     }
 }
 
-fn act(instance: &mut impl Instance, action: Action) -> Outcome {
+fn act(instance: &mut dyn Instance, action: Action) -> Outcome {
     match action {
         Action::Read | Action::Free => Ok(()),
         Action::EnterInitialization { start, stop } => instance.enter_initialization(start, stop),

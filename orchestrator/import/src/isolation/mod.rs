@@ -73,6 +73,7 @@ pub(crate) struct Library<'a> {
     /// Folder of the unpacked archive.
     pub(crate) folder: &'a Path,
     pub(crate) isolation: &'a Isolation,
+    pub(crate) is_fmi3: bool,
 }
 
 impl Library<'_> {
@@ -109,7 +110,8 @@ impl Library<'_> {
             cpu: self.isolation.cpu,
             folder: self.isolation.sandbox.then(|| self.folder.to_path_buf()),
         };
-        match process.set_up(&Setup { library: self.file, instance, limits }) {
+        let fmi3 = self.is_fmi3.then(|| self.folder.to_path_buf());
+        match process.set_up(&Setup { library: self.file, instance, limits, fmi3 }) {
             Ok(Ready::Loaded { version_fault, without, .. }) => {
                 if let Some(without) = without {
                     crate::warnings::warn_once(format!(

@@ -13,6 +13,9 @@ pub(super) struct Setup {
     pub(super) library: PathBuf,
     pub(super) instance: InstanceArguments,
     pub(super) limits: Limits,
+    /// Folder of the unpacked archive, if it is one of FMI 3.0, whose description says how its
+    /// values are transferred.
+    pub(super) fmi3: Option<PathBuf>,
 }
 
 /// Arguments of fmi2Instantiate.
