@@ -143,11 +143,15 @@ impl Fmu {
     /// # Errors
     /// Returns a line that says what is missing or wrong.
     fn library(&self, archive: &Archive) -> Result<(PathBuf, String), String> {
-        let interface = self
-            .description
-            .co_simulation
-            .as_ref()
-            .ok_or("offers no co-simulation: export the model for co-simulation")?;
+        let interface = self.description.co_simulation.as_ref().ok_or_else(|| {
+            let only = [
+                (&self.description.model_exchange, ", only model exchange"),
+                (&self.description.scheduled_execution, ", only scheduled execution"),
+            ];
+            let only = only.iter().find(|(interface, _)| interface.is_some());
+            let only = only.map_or("", |(_, only)| only);
+            format!("offers no co-simulation{only}: export the model for co-simulation")
+        })?;
         let platforms = archive.platforms();
         let platform = if self.description.is_fmi3() { PLATFORM_TUPLE } else { PLATFORM };
         if !platforms.iter().any(|offered| offered == platform) {

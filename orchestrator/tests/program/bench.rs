@@ -28,8 +28,15 @@ to = "plant.input"
 variables = ["gain.output.direct", "plant.output.integral", "plant.steps"]
 "#;
 
+/// Files of the FMU in C of FMI 2.0, and the folder of its library.
+const FMI2: [&str; 3] = ["model.c", "modelDescription.xml", "linux64"];
+/// Files of the FMU in C of FMI 3.0, and the folder of its library.
+pub(crate) const FMI3: [&str; 3] = ["fmi3.c", "fmi3.xml", "x86_64-linux"];
+
 /// Instructions to make the FMU in C.
 pub(crate) struct Recipe<'a> {
+    /// [`FMI3`], or that of FMI 2.0.
+    pub(crate) files: [&'a str; 3],
     /// Further arguments of the compiler, for instance `-DENDS`.
     pub(crate) flags: &'a [&'a str],
     /// Change to the text of the model description.
@@ -45,6 +52,7 @@ pub(crate) struct Recipe<'a> {
 impl Default for Recipe<'_> {
     fn default() -> Self {
         Self {
+            files: FMI2,
             flags: &[],
             description: &|text| text,
             library: &|bytes| bytes,
@@ -77,7 +85,7 @@ impl Bench {
         let status = Command::new(compiler)
             .args(["-shared", "-fPIC", "-O1", "-Wall", "-Werror", "-o"])
             .arg(&library)
-            .arg(source.join("model.c"))
+            .arg(source.join(recipe.files[0]))
             .args(recipe.flags)
             .status()
             .expect("a C compiler");
@@ -89,10 +97,10 @@ impl Bench {
                 .unwrap();
             zip.write_all(content).unwrap();
         };
-        let description = fs::read_to_string(source.join("modelDescription.xml")).unwrap();
+        let description = fs::read_to_string(source.join(recipe.files[1])).unwrap();
         add("modelDescription.xml", (recipe.description)(description).as_bytes());
         let library = (recipe.library)(fs::read(&library).unwrap());
-        add(&format!("binaries/linux64/{}", recipe.name), &library);
+        add(&format!("binaries/{}/{}", recipe.files[2], recipe.name), &library);
         zip.finish().unwrap();
         fs::write(folder.path().join("loop.toml"), experiment).unwrap();
         Self { folder }

@@ -3,6 +3,7 @@
 mod bench;
 mod campaign;
 mod ends;
+mod fmi3;
 mod foreign;
 #[cfg(target_os = "linux")]
 mod hostile;

@@ -2,8 +2,8 @@
 //!
 //! A unit with event mode is set in event mode, as its inputs jump at a communication point, and
 //! leaves it when it is stepped. A step is cut at the events that the unit announces and where it
-//! returns early. An event at the end of a step is handled when the next one begins, after the
-//! inputs of that point were set.
+//! returns early. An event at the end of a step is handled at once by a unit whose inputs are never
+//! set. Otherwise it waits for the inputs of that point, and is handled when the next step begins.
 
 #![allow(unsafe_code)]
 
@@ -55,6 +55,10 @@ pub(crate) struct Fmi3Instance {
     layout: Rc<Layout>,
     lists: Lists,
     present: Present,
+    /// Start time, s.
+    start: f64,
+    /// Whether inputs were set since the end of initialization.
+    gets_inputs: bool,
     /// Where it stood in the states that it keeps.
     kept: Vec<Present>,
 }
@@ -102,7 +106,14 @@ impl Fmi3Instance {
             )
         });
         let unit = FmuInstance::made(handle, functions, None, listed, log, folder)?;
-        Ok(Self { unit, layout, lists: Lists::default(), present: NEW, kept: Vec::new() })
+        let (lists, kept) = (Lists::default(), Vec::new());
+        Ok(Self { unit, layout, lists, present: NEW, start: 0.0, gets_inputs: false, kept })
+    }
+
+    /// Prepares for values to be set.
+    fn before_set(&mut self) -> Outcome {
+        self.gets_inputs |= self.present.mode != Mode::Initial;
+        self.enter_event_mode()
     }
 
     /// Enters event mode, if the instance has it and steps.
@@ -182,16 +193,23 @@ impl Fmi3Instance {
         }
         self.unit.check("doStep", status)?;
         self.present.is_due = event && self.layout.has_events;
-        match early {
-            true if (time..=time + step).contains(&reached) => Ok(reached),
-            true => {
-                let [from, reached] = [time, reached].map(rounded);
-                let text = format!("its step from t = {from} s ended early at t = {reached} s");
-                Err(CallFailure::answer("doStep", text))
-            }
-            false => Ok(time + step),
+        // The instance may have rounded the time.
+        let (end, slack) = (time + step, tolerance(time, step));
+        if !early {
+            return Ok(end);
         }
+        if (time - slack..=end + slack).contains(&reached) {
+            return Ok(reached.clamp(time, end));
+        }
+        let [from, reached] = [time, reached].map(rounded);
+        let text = format!("its step from t = {from} s ended early at t = {reached} s");
+        Err(CallFailure::answer("doStep", text))
     }
+}
+
+/// Returns the difference below which two times of a step are the same, s.
+fn tolerance(time: f64, step: f64) -> f64 {
+    (TOLERANCE * step).max(4.0 * f64::EPSILON * time.abs())
 }
 
 impl Instance for Fmi3Instance {
@@ -208,22 +226,22 @@ impl Instance for Fmi3Instance {
     }
 
     fn set_real(&mut self, references: &[u32], values: &[f64]) -> Outcome {
-        self.enter_event_mode()?;
+        self.before_set()?;
         self.lists.set(&mut self.unit, &self.layout, references, values)
     }
 
     fn set_integer(&mut self, references: &[u32], values: &[i32]) -> Outcome {
-        self.enter_event_mode()?;
+        self.before_set()?;
         self.lists.set(&mut self.unit, &self.layout, references, values)
     }
 
     fn set_boolean(&mut self, references: &[u32], values: &[i32]) -> Outcome {
-        self.enter_event_mode()?;
+        self.before_set()?;
         self.lists.set(&mut self.unit, &self.layout, references, values)
     }
 
     fn set_string(&mut self, reference: u32, value: &str) -> Outcome {
-        self.enter_event_mode()?;
+        self.before_set()?;
         let Place { reference, element, length, .. } = self.layout.place(reference);
         let [gets, sets] = [false, true].map(|sets| call(ScalarType::String, sets));
         let Functions { get, set, .. } = self.unit.functions();
@@ -251,6 +269,7 @@ impl Instance for Fmi3Instance {
     }
 
     fn enter_initialization(&mut self, start: f64, stop: f64) -> Outcome {
+        self.start = start;
         // SAFETY: the instance is alive, and the function has the type FMI gives it.
         self.unit.call("enterInitializationMode", |functions, handle| unsafe {
             (functions.enter_initialization_mode)(handle, false, 0.0, start, true, stop)
@@ -261,12 +280,11 @@ impl Instance for Fmi3Instance {
         let function = self.unit.functions().exit_initialization_mode;
         self.unit.call_plain("exitInitializationMode", function)?;
         self.present.mode = if self.layout.has_events { Mode::Event } else { Mode::Step };
-        Ok(())
+        if self.layout.has_events { self.update(self.start) } else { Ok(()) }
     }
 
     fn do_step(&mut self, time: f64, step: f64) -> Outcome {
-        let end = time + step;
-        let tolerance = (TOLERANCE * step).max(2.0 * f64::EPSILON * end.abs());
+        let (end, tolerance) = (time + step, tolerance(time, step));
         let (mut now, mut rest, mut idle) = (time, step, 0);
         for _ in 0..PARTS {
             self.enter_step_mode(now)?;
@@ -275,7 +293,7 @@ impl Instance for Fmi3Instance {
             let reached = self.do_part(now, inside.map_or(rest, |next| next - now))?;
             self.present.is_due |= next.is_some_and(|next| next <= reached + tolerance);
             if reached >= end - tolerance {
-                return Ok(());
+                return if self.gets_inputs { Ok(()) } else { self.enter_step_mode(end) };
             }
             idle = if reached > now { 0 } else { idle + 1 };
             if idle > IDLE {
@@ -296,7 +314,7 @@ impl Instance for Fmi3Instance {
 
     fn reset(&mut self) -> Outcome {
         self.unit.call_plain("reset", self.unit.functions().reset)?;
-        self.present = NEW;
+        (self.present, self.gets_inputs) = (NEW, false);
         Ok(())
     }
 

@@ -128,6 +128,7 @@ impl Group {
     fn is_plain<V: Carried>(&self, values: &[V]) -> bool {
         self.scalar == V::OWN
             && self.arrays.count == values.len()
+            && self.places.len() == values.len()
             && self.places == self.arrays.elements
     }
 
