@@ -176,7 +176,7 @@ BAD = {
         lambda: packed(entries() | {DESCRIPTION: entries()[DESCRIPTION].replace(b"Linear", b"\xfcber")}),
         "UTF-8",
     ),
-    "FMI 3": (lambda: packed(changed('fmiVersion="2.0"', 'fmiVersion="3.0"')), "3.0"),
+    "FMI 4": (lambda: packed(changed('fmiVersion="2.0"', 'fmiVersion="4.0"')), "4.0"),
     "another GUID": (lambda: packed(changed('guid="', 'guid="0', 1)), "GUID"),
     "no binary for this platform": (
         lambda: packed({n.replace("linux64", "win64"): c for n, c in entries().items()}),

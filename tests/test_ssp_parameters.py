@@ -315,7 +315,7 @@ def test_refusals_say_what_to_do(system, said, tmp_path):
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        (b'fmiVersion="2.0"', b'fmiVersion="3.0"', "export the model for FMI 2.0"),
+        (b'fmiVersion="2.0"', b'fmiVersion="1.0"', "export the model for one of them"),
         (b"CoSimulation", b"ModelExchange", "export the model for co-simulation"),
     ],
 )

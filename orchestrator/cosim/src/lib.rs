@@ -1,4 +1,4 @@
-//! Steps FMI 2.0 instances as an experiment file describes. Only the experiment knows the meaning
+//! Steps FMI instances as an experiment file describes. Only the experiment knows the meaning
 //! of their variables.
 //!
 //! An [`experiment`] is read ([`document`]) and [checked](mod@check) once, from the top down, into

@@ -110,9 +110,8 @@ impl Interface {
     /// Returns whether a capability flag is set, by its name in FMI 2.0. In FMI 3.0 it may have
     /// capital letters or an s at its end.
     pub fn has(&self, capability: &str) -> bool {
-        self.capabilities
-            .iter()
-            .any(|name| name.trim_end_matches('s').eq_ignore_ascii_case(capability))
+        let plain = |name: &str| name.trim_end_matches('s').to_ascii_lowercase();
+        self.capabilities.iter().any(|name| plain(name) == plain(capability))
     }
 }
 

@@ -1,4 +1,4 @@
-//! Steps instances of FMI 2.0 on integer ticks. Nothing here needs a file, a thread, a process or
+//! Steps instances of FMI on integer ticks. Nothing here needs a file, a thread, a process or
 //! the wall clock, so that it also runs in a browser.
 //!
 //! Components are known by their [`description`]. Their connections become pairs of value

@@ -1,0 +1,116 @@
+"""FMUs of FMI 3.0 in the orchestrator: the results of FMI 2.0, bit for bit."""
+
+import csv
+import json
+import subprocess
+import zipfile
+
+import pytest
+
+from conftest import ROOT, TARGET, program
+from fmi import NOT_REPRODUCIBLE
+
+FOLDER = ROOT / "orchestrator" / "experiments"
+EXPERIMENTS = [
+    "crmpc-2022/lqr",
+    "crmpc-2022/crmpc-robust",
+    "crmpc-2022/dlmpc",
+    "crmpc-2022/estimator",
+    "tvsmc-2015/allocated",
+    "two-loop-smc/two-loop",
+    "exchange/gusts",
+    "reversal/allocated",
+    "entry/surfaces-and-jets",
+]
+PLANT = "ReentryPlant.fmu"
+
+
+def rows(out, experiment, *folders, options=()):
+    command = [program("orchestrator"), "run", FOLDER / f"{experiment}.toml", "--out", out, "--force", "--quiet"]
+    stop = ["--stop", "120"] if experiment.startswith("entry") else []
+    for folder in folders:
+        command += ["--fmu-dir", folder]
+    finished = subprocess.run([*command, *stop, *options], capture_output=True, text=True, timeout=300)
+    assert finished.returncode in (0, 3), finished.stderr
+    with open(out / "results.csv") as file:
+        table = list(csv.reader(file))
+    kept = [place for place, name in enumerate(table[0]) if not name.endswith(tuple(NOT_REPRODUCIBLE))]
+    return [[line[place] for place in kept] for line in table]
+
+
+@pytest.fixture(scope="module")
+def folders(tmp_path_factory):
+    """Folders of FMUs: of FMI 3.0 without event mode, and with one of plant and controllers each."""
+    root = tmp_path_factory.mktemp("fmu")
+    made = {name: root / name for name in ("without event mode", "plant 3.0", "controllers 3.0")}
+    for folder in made.values():
+        folder.mkdir()
+    for path in (TARGET / "fmi3").glob("*.fmu"):
+        with zipfile.ZipFile(path) as file, zipfile.ZipFile(made["without event mode"] / path.name, "w") as other:
+            for name in file.namelist():
+                content = file.read(name)
+                if name == "modelDescription.xml":
+                    assert b' hasEventMode="true"' in content
+                    content = content.replace(b' hasEventMode="true"', b"")
+                other.writestr(name, content)
+        for name, is_three in (("plant 3.0", path.name == PLANT), ("controllers 3.0", path.name != PLANT)):
+            (made[name] / path.name).symlink_to(path if is_three else TARGET / "fmu" / path.name)
+    return {"FMI 3.0": TARGET / "fmi3", **made}
+
+
+@pytest.mark.parametrize("experiment", EXPERIMENTS)
+def test_oracle_the_results_are_those_of_fmi_2(experiment, folders, tmp_path):
+    expected = rows(tmp_path / "two", experiment, TARGET / "fmu")
+    assert len(expected) > 100
+    for name, folder in folders.items():
+        assert rows(tmp_path / "other", experiment, folder, options=["--isolate=false"]) == expected, name
+    if experiment == "crmpc-2022/lqr":
+        assert rows(tmp_path / "other", experiment, TARGET / "fmi3", options=["--isolate"]) == expected
+    jacobi = [rows(tmp_path / "other", experiment, TARGET / each, options=["--coupling", "jacobi"]) for each in ("fmu", "fmi3")]
+    assert jacobi[0] == jacobi[1] != expected
+
+
+@pytest.mark.parametrize("command", ["linearise", "margins"])
+def test_oracle_linear_models_are_those_of_fmi_2(command, tmp_path):
+    found = []
+    for folder in ("fmu", "fmi3"):
+        out = tmp_path / folder
+        arguments = [program("orchestrator"), command, FOLDER / "margins" / "rest.toml", "--out", out, "--fmu-dir", TARGET / folder]
+        assert subprocess.run(arguments, capture_output=True, timeout=60).returncode == 0
+        found.append(out.read_bytes() if out.is_file() else {p.name: p.read_bytes() for p in out.iterdir()})
+    assert found[0] == found[1]
+
+
+def test_oracle_a_campaign_gives_the_cases_of_fmi_2(tmp_path):
+    tables = []
+    for folder in ("fmu", "fmi3"):
+        command = [program("orchestrator"), "campaign", FOLDER / "campaigns" / "corners.toml", "--csv", "--quiet"]
+        command += ["--experiment", FOLDER / "crmpc-2022" / "lqr.toml", "--out", tmp_path / folder]
+        subprocess.run([*command, "--fmu-dir", TARGET / folder], check=True, timeout=120)
+        tables.append((tmp_path / folder / "cases.csv").read_text())
+    assert tables[0] == tables[1] and tables[0].count("\n") == 17
+
+
+def test_an_ssp_archive_takes_both_versions(folders, tmp_path):
+    experiment = FOLDER / "crmpc-2022" / "lqr.toml"
+    subprocess.run(
+        [program("orchestrator"), "pack", experiment, "--out", tmp_path / "x.ssp", "--fmu-dir", folders["plant 3.0"]], check=True
+    )
+    subprocess.run([program("orchestrator"), "run", tmp_path / "x.ssp", "--out", tmp_path / "out", "--quiet"], check=True)
+    with open(tmp_path / "out" / "results.csv") as file:
+        table = list(csv.reader(file))
+    expected = rows(tmp_path / "two", "crmpc-2022/lqr", TARGET / "fmu")
+    columns = [table[0].index(name) for name in ("plant.attitude.alpha", "controller.moment.x")]
+    places = [expected[0].index(name) for name in ("plant.attitude.alpha", "controller.moment.x")]
+    assert [[line[c] for c in columns] for line in table] == [[line[p] for p in places] for line in expected]
+
+
+def test_inspect_shows_what_fmi_3_has():
+    command = [program("orchestrator"), "inspect", TARGET / "fmi3" / "LQR.fmu"]
+    shown = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    assert "LQR (FMI 3.0)" in shown and "hasEventMode" in shown and "x86_64-linux" in shown
+    description = json.loads(subprocess.run([*command, "--json"], capture_output=True, text=True, check=True).stdout)
+    variables = {variable["name"]: variable for variable in description["variables"]}
+    assert variables["attitude.alpha"]["type"] == "Float64" and variables["attitude.alpha"]["value_reference"] == 1
+    checked = subprocess.run([*command, "--check"], capture_output=True, text=True, check=True).stdout
+    assert checked.startswith("LQR: sound, ")
