@@ -1,6 +1,6 @@
-//! The types of FMI 2.0's C interface as the master uses them, of which FMI 3.0 has many as well. Values that an instance returns are
-//! taken as the integers that C passes: an instance may return anything, and a Rust enumeration
-//! must not hold a value that is none of its items.
+//! The types of FMI 2.0's C interface as the master uses them, of which FMI 3.0 has many as well.
+//! Values that an instance returns are taken as the integers that C passes: an instance may return
+//! anything, and a Rust enumeration must not hold a value that is none of its items.
 
 pub(crate) use fmi_rs::fmi2::types::{
     fmi2False as FALSE, fmi2Status as Status, fmi2StatusKind, fmi2True as TRUE, fmi2Type,

@@ -54,8 +54,8 @@ impl Fmu {
     /// `.csv`.
     ///
     /// # Errors
-    /// Returns an error if the archive is unsafe or damaged, or is no FMU of FMI 2.0 or 3, or if the
-    /// lookup table has a fault.
+    /// Returns an error if the archive is unsafe or damaged, or is no FMU of FMI 2.0 or 3, or if
+    /// the lookup table has a fault.
     pub fn open(path: &Path) -> Result<Self, Error> {
         let refuse = |message: String| Error::Fmu { path: path.to_path_buf(), message };
         if lookup_table::is_lookup_table(path) {

@@ -1,6 +1,6 @@
-//! Imports FMUs of FMI 2.0 and 3.0. An [`fmu::Fmu`] is unpacked ([`archive`]), its description is read
-//! ([`description`], [`xml`]), and the description is searched for [`faults`]. Its instances are
-//! called through the trait [`Instance`](fmi_master::instance::Instance) of the master. A
+//! Imports FMUs of FMI 2.0 and 3.0. An [`fmu::Fmu`] is unpacked ([`archive`]), its description is
+//! read ([`description`], [`xml`]), and the description is searched for [`faults`]. Its instances
+//! are called through the trait [`Instance`](fmi_master::instance::Instance) of the master. A
 //! [`lookup_table`] and a [`law`] in another program are opened and called in the same way.
 
 pub mod archive;

@@ -37,7 +37,8 @@ unsafe extern "C" fn receive_message(
     category: fmi::Text,
     message: fmi::Text,
 ) {
-    logs::receive(environment, status, category, message);
+    // SAFETY: the arguments are those of the instance.
+    unsafe { logs::receive(environment, status, category, message) };
 }
 
 /// Calls a function of a library. Its name is recorded meanwhile, in case it crashes, and the

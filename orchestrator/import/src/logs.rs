@@ -43,8 +43,13 @@ impl Drop for Listed {
     }
 }
 
-/// Receives a message, in the callback of any version of FMI.
-pub(crate) fn receive(environment: *const c_void, status: c_int, category: Text, message: Text) {
+/// The logger callback of FMI 3.0, to which that of FMI 2.0 hands on its messages.
+pub(crate) unsafe extern "C" fn receive(
+    environment: *mut c_void,
+    status: c_int,
+    category: Text,
+    message: Text,
+) {
     let receive =
         || hand_over(environment, fmi::status(status), &text_of(category), &text_of(message));
     // A panic must not reach the instance. It has been reported on standard error.

@@ -41,7 +41,7 @@ fn rows(bench: &Bench) -> Vec<String> {
 }
 
 /// Removes event mode from a description.
-fn without_events(text: String) -> String {
+fn without_events(text: &str) -> String {
     let clock = text.lines().find(|line| line.contains("<Clock")).unwrap().to_string();
     let text =
         text.replace(&clock, "").replace("<Output valueReference=\"16\" dependencies=\"\"/>", "");
@@ -51,7 +51,7 @@ fn without_events(text: String) -> String {
 #[test]
 fn oracle_arrays_are_connected_set_and_recorded_whole_and_by_element() {
     for without in [false, true] {
-        let bench = made(CHAIN, &[], &|text| if without { without_events(text) } else { text });
+        let bench = made(CHAIN, &[], &|text| if without { without_events(&text) } else { text });
         for isolation in ["--isolate=false", "--isolate"] {
             let sets =
                 ["--quiet", "--set", "first.u[2]=5", "--set", "first.texts[2]=long", isolation];

@@ -1,5 +1,5 @@
-//! Reads the variables of FMI 3.0. The elements of an array become scalar variables, whose names end
-//! in their indices, such as `x[1,2]`; an alias becomes a variable of the same place.
+//! Reads the variables of FMI 3.0. The elements of an array become scalar variables, whose names
+//! end in their indices, such as `x[1,2]`; an alias becomes a variable of the same place.
 
 use super::{Listed, Types, bound, enumeration, named, real, reference};
 use crate::xml::Element;
@@ -120,10 +120,9 @@ fn variable(element: &Element, scalar: ScalarType, types: &Types) -> Result<Vari
             VariableKind::Integer { min: i32::try_from(min).ok(), max: i32::try_from(max).ok() }
         }
     };
-    let is_parameter =
-        element.attribute("causality").is_some_and(|causality| causality.ends_with("arameter"));
+    let causality = element.attribute("causality").unwrap_or_default();
     let variability = match kind {
-        _ if is_parameter => "fixed",
+        _ if causality.to_lowercase().ends_with("parameter") => "fixed",
         VariableKind::Real { .. } => "continuous",
         _ => "discrete",
     };

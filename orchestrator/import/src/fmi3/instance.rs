@@ -19,7 +19,6 @@ use crate::logs::{self, Listed};
 use fmi_master::description::{Place, ScalarType};
 use fmi_master::instance::{CallFailure, Instance, Outcome};
 use fmi_master::quantity::rounded;
-use std::ffi::{c_int, c_void};
 use std::rc::Rc;
 
 /// Part of a step by which a time may be wrong.
@@ -63,16 +62,6 @@ pub(crate) struct Fmi3Instance {
     kept: Vec<Present>,
 }
 
-/// The logger callback.
-unsafe extern "C" fn receive_message(
-    environment: *mut c_void,
-    status: c_int,
-    category: Text,
-    message: Text,
-) {
-    logs::receive(environment, status, category, message);
-}
-
 impl Fmi3Instance {
     /// Makes an instance with the name in its log. The path of the `resources` ends in a separator.
     /// `folder` holds the unpacked archive, if it would vanish otherwise.
@@ -101,7 +90,7 @@ impl Fmi3Instance {
                 std::ptr::null(),
                 0,
                 Rc::as_ptr(&log).cast_mut().cast(),
-                receive_message,
+                logs::receive,
                 std::ptr::null(),
             )
         });
@@ -340,10 +329,10 @@ impl Instance for Fmi3Instance {
         seed: &[f64],
         added: &mut [f64],
     ) -> Outcome {
+        let call = "getDirectionalDerivative";
         assert_eq!((known.len(), unknown.len()), (seed.len(), added.len()), "one value for each");
-        const CALL: &str = "getDirectionalDerivative";
         let Some(function) = self.unit.functions().directional_derivative else {
-            return Err(CallFailure::new(CALL, "its library computes no derivatives"));
+            return Err(CallFailure::new(call, "its library computes no derivatives"));
         };
         let arrays = |variables: &[u32]| -> Arrays {
             variables.iter().map(|variable| self.layout.place(*variable)).collect()
@@ -355,7 +344,7 @@ impl Instance for Fmi3Instance {
         }
         let mut all = vec![0.0; unknowns.count];
         // SAFETY: the instance is alive, and all arrays have the lengths that are passed.
-        self.unit.call(CALL, |_, handle| unsafe {
+        self.unit.call(call, |_, handle| unsafe {
             function(
                 handle,
                 unknowns.references.as_ptr(),
