@@ -69,7 +69,7 @@ const CONTENTS: &[(&str, Change, &str)] = &[
     ("another root", |e| change(e, "fmiModelDescription", b"html"), "modelDescription.xml"),
     ("no version", |e| change(e, "fmiVersion", b"fmiVersio"), "fmiVersion"),
     ("FMI 1.0", |e| change(e, "fmiVersion=\"2.0\"", b"fmiVersion=\"1.0\""), "FMI 1.0"),
-    ("FMI 3.0", |e| change(e, "fmiVersion=\"2.0\"", b"fmiVersion=\"3.0\""), "FMI 3.0"),
+    ("FMI 4.0", |e| change(e, "fmiVersion=\"2.0\"", b"fmiVersion=\"4.0\""), "FMI 4.0"),
     ("another GUID", |e| change(e, "guid=\"", b"guid=\"x"), "another GUID"),
     ("no interface", |e| change(e, "<CoSimulation", b"<CoSimulatio"), ""),
     ("no identifier", |e| change(e, "modelIdentifier", b"modelIdentifie"), "modelIdentifier"),
