@@ -190,7 +190,7 @@ BAD = {
         "model identifier",
     ),
     "an identifier with a zero byte": (lambda: packed(changed('modelIdentifier="LQR"', 'modelIdentifier="LQR&#0;"')), None),
-    "no co-simulation": (lambda: packed(changed("CoSimulation", "ModelExchange")), "no co-simulation"),
+    "an interface that its library lacks": (lambda: packed(changed("CoSimulation", "ModelExchange")), "could not be instantiated"),
     "an index beyond the end": (lambda: packed(changed('<Unknown index="', '<Unknown index="9', 1)), "variable 9"),
     "a reference that is none": (lambda: packed(changed('valueReference="0"', 'valueReference="-1"')), DESCRIPTION),
     "a number that is none": (lambda: packed(changed('stepSize="0.04"', 'stepSize="four"')), DESCRIPTION),

@@ -240,7 +240,6 @@ def test_oracle_an_archive_of_another_maker_with_subsystems_and_transformations(
     [
         (b'source="resources/LQR.fmu"', b'source="../LQR.fmu"', "leads out"),
         (b'source="resources/LQR.fmu"', b'source="resources/LQ.fmu"', "resources/LQ.fmu"),
-        (b'implementation="any"', b'implementation="ModelExchange"', "model exchange"),
         (b'implementation="any"', b'type="application/x-ssp-package"', "application/x-ssp-package"),
         (b'startConnector="moment.x"', b'startConnector="moment.w"', "moment.w"),
         (b'endConnector="roll"', b'endConnector="yaw"', None),

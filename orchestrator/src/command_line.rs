@@ -8,7 +8,7 @@ use clap::{Arg, CommandFactory, FromArgMatches, Parser, Subcommand};
 use cosim::pacing::{Factor, OnMiss};
 use std::path::PathBuf;
 
-/// Runs co-simulation experiments with FMUs of FMI 2.0 and 3.0.
+/// Runs experiments with FMUs of FMI 2.0 and 3.0, for co-simulation or model exchange.
 ///
 /// The exit code is 0 if all went well, 1 if a run failed, 2 for bad usage or a bad experiment, 3
 /// if the attitude was lost as the experiment defines it, and 130, 143 or 129 if Ctrl-C, SIGTERM or

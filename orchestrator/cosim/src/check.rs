@@ -45,8 +45,9 @@ pub fn check(
             if experiment.is_flown_by_law(&name) { Rc::new(fmu.flown_by_law()?) } else { fmu };
         let component = &experiment.components[&name];
         let is_isolated = experiment.isolation.isolates(component, &fmu, fmu_dirs);
+        let interface = experiment.interface(&name, &fmu)?;
         let (every, settings) = (component.every, Vec::new());
-        components.push(CheckedComponent { name, fmu, every, is_isolated, settings });
+        components.push(CheckedComponent { name, fmu, interface, every, is_isolated, settings });
     }
     let parts = parts(&components);
     if let Some(target) = experiment.unplaced.first() {
@@ -190,12 +191,9 @@ fn check_single_instances(
     experiment: &Experiment,
     components: &[CheckedComponent],
 ) -> Result<(), Error> {
-    for (index, CheckedComponent { name, fmu, is_isolated, .. }) in components.iter().enumerate() {
-        let only_once = fmu
-            .description
-            .co_simulation
-            .as_ref()
-            .is_some_and(|interface| interface.has("canBeInstantiatedOnlyOncePerProcess"));
+    for (index, component) in components.iter().enumerate() {
+        let CheckedComponent { name, fmu, is_isolated, .. } = component;
+        let only_once = component.has("canBeInstantiatedOnlyOncePerProcess");
         if only_once
             && !is_isolated
             && let Some(other) = components[..index].iter().find(|o| Rc::ptr_eq(&o.fmu, fmu))

@@ -5,6 +5,7 @@ use crate::error::Error;
 use crate::files::digest;
 use crate::pacing;
 use crate::system::{CheckedComponent, Parameters, System};
+use fmi_master::description::InterfaceKind;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 
@@ -98,7 +99,11 @@ fn status(failure: Option<&Error>) -> String {
 }
 
 fn component(component: &CheckedComponent, parameters: &Parameters) -> Value {
-    let CheckedComponent { name, fmu, every, settings, .. } = component;
+    let CheckedComponent { name, fmu, interface, every, settings, .. } = component;
+    let tolerance = match interface {
+        InterfaceKind::CoSimulation => None,
+        InterfaceKind::ModelExchange { tolerance } => Some(tolerance),
+    };
     let set: BTreeMap<&str, Value> =
         settings.iter().map(|s| (s.name.as_str(), s.value.to_json())).collect();
     let variables = fmu.description.variables.iter().enumerate();
@@ -115,6 +120,8 @@ fn component(component: &CheckedComponent, parameters: &Parameters) -> Value {
         "model": fmu.description.model_name,
         "version": fmu.description.version,
         "generation_tool": fmu.description.generation_tool,
+        "interface": interface.name(),
+        "tolerance": tolerance,
         "every": every,
         "set": set,
         "parameters": parameters.get(name),

@@ -11,7 +11,7 @@ use crate::watch::Watched;
 use crate::wiring::Column;
 use fmi_master::clock::Clock;
 use fmi_master::delay::{self, FeedbackLoop, Reading};
-use fmi_master::description::{ModelDescription, VariableKind};
+use fmi_master::description::{InterfaceKind, ModelDescription, VariableKind};
 use fmi_master::master::{Master, Member};
 use fmi_master::names;
 use fmi_master::settings::Setting;
@@ -52,6 +52,8 @@ pub struct CheckedComponent {
     pub name: String,
     /// FMU of the component.
     pub fmu: Rc<Fmu>,
+    /// Interface by which the FMU is called.
+    pub interface: InterfaceKind,
     /// Period of the component, in communication steps.
     pub every: u32,
     /// Whether the instance has a process of its own.
@@ -60,6 +62,12 @@ pub struct CheckedComponent {
 }
 
 impl CheckedComponent {
+    /// Returns whether the FMU declares a capability for the interface by which it is called.
+    pub fn has(&self, capability: &str) -> bool {
+        let interface = self.fmu.description.interface(self.interface);
+        interface.is_some_and(|interface| interface.has(capability))
+    }
+
     /// Returns the unit in which a variable is to be displayed, with the factor to that unit. Units
     /// with an offset stay as they are.
     pub(crate) fn display(&self, variable: usize) -> (f64, String) {
@@ -275,13 +283,15 @@ impl System {
         interrupt: &Interrupt,
     ) -> Result<Run, Error> {
         let mut members = Vec::new();
-        for CheckedComponent { name, fmu, every, is_isolated, .. } in &self.components {
+        for component in &self.components {
+            let CheckedComponent { name, fmu, interface, every, is_isolated, .. } = component;
             let limits = is_isolated.then(|| self.experiment.isolation.limits());
-            let instance = fmu.instantiate(name, limits.as_ref())?;
+            let instance = fmu.instantiate(name, *interface, limits.as_ref())?;
             let on_invalid = self.experiment.simulation.on_invalid;
             let instance = Watched::around(instance, name, fmu, on_invalid);
             let (name, every, ahead) = (name.clone(), *every, *is_isolated);
-            members.push(Member { name, every, ahead, varies: fmu.fits_last_step(), instance });
+            let varies = fmu.fits_last_step(*interface);
+            members.push(Member { name, every, ahead, varies, instance });
         }
         let coupling = self.experiment.simulation.coupling;
         let parts = self.parts();

@@ -143,6 +143,7 @@ fn description(root: &Element, variables: Variables) -> Result<ModelDescription,
         let dependencies = dependencies(root, variables.len())?;
         Listed { variables, dependencies, ..Listed::default() }
     };
+    let count = variables.len();
     let text = |name: &str| root.attribute(name).unwrap_or_default().to_string();
     let experiment = root.child("DefaultExperiment");
     let proposed = |name: &str| experiment.map_or(Ok(None), |element| element.number(name));
@@ -163,6 +164,10 @@ fn description(root: &Element, variables: Variables) -> Result<ModelDescription,
             tolerance: proposed("tolerance")?,
         },
         units: units.map(unit).collect::<Result<_, _>>()?,
+        derivatives: if is_fmi3 { Vec::new() } else { derivatives(root, count)? },
+        event_indicators: root
+            .parsed("numberOfEventIndicators", "a whole number from 0 on")?
+            .unwrap_or(0),
         dependencies,
         places,
         arrays,
@@ -331,6 +336,28 @@ fn named(
     })
 }
 
+/// Returns the position of the variable that an entry of the model structure names.
+fn position_of(unknown: &Element, variables: usize) -> Result<usize, String> {
+    let index = unknown.parsed("index", "a whole number from 1 on")?;
+    let index = index.ok_or_else(|| format!("{} has no attribute index", unknown.title()))?;
+    position(unknown, index, variables)
+}
+
+/// Returns the position of an index of the file, which counts from 1.
+fn position(unknown: &Element, index: usize, variables: usize) -> Result<usize, String> {
+    let position = index.checked_sub(1).filter(|&position| position < variables);
+    position.ok_or_else(|| {
+        format!("{} refers to variable {index}, but there are only {variables}", unknown.title())
+    })
+}
+
+/// Returns the positions of the derivatives, in the order of the continuous states.
+fn derivatives(root: &Element, variables: usize) -> Result<Vec<usize>, String> {
+    let structure = root.child("ModelStructure").into_iter();
+    let unknowns = structure.flat_map(|structure| structure.list("Derivatives", "Unknown"));
+    unknowns.map(|unknown| position_of(unknown, variables)).collect()
+}
+
 /// Returns the positions of the inputs that each output depends on, by the position of the
 /// output. Only outputs that declare their dependencies have an entry.
 fn dependencies(root: &Element, variables: usize) -> Result<BTreeMap<usize, Vec<usize>>, String> {
@@ -340,19 +367,8 @@ fn dependencies(root: &Element, variables: usize) -> Result<BTreeMap<usize, Vec<
         .flat_map(|structure| structure.list("Outputs", "Unknown"));
     let mut dependencies = BTreeMap::new();
     for unknown in unknowns {
-        // Indices in the file count from 1.
-        let position = |index: usize| {
-            let position = index.checked_sub(1).filter(|&position| position < variables);
-            position.ok_or_else(|| {
-                format!(
-                    "{} refers to variable {index}, but there are only {variables}",
-                    unknown.title()
-                )
-            })
-        };
-        let index = unknown.parsed("index", "a whole number from 1 on")?;
-        let output =
-            position(index.ok_or_else(|| format!("{} has no attribute index", unknown.title()))?)?;
+        let position = |index: usize| position(unknown, index, variables);
+        let output = position_of(unknown, variables)?;
         if let Some(text) = unknown.attribute("dependencies") {
             let parse = |text: &str| {
                 let fault = || {

@@ -20,11 +20,8 @@ pub fn faults(description: &ModelDescription) -> Vec<String> {
     {
         faults.push("offers neither co-simulation nor model exchange".to_string());
     }
-    if description
-        .co_simulation
-        .as_ref()
-        .is_some_and(|interface| interface.has("needsExecutionTool"))
-    {
+    let interfaces = [&description.co_simulation, &description.model_exchange];
+    if interfaces.into_iter().flatten().any(|interface| interface.has("needsExecutionTool")) {
         faults.push("needs the program that exported it to be installed on this machine (needsExecutionTool)".to_string());
     }
     if !description.has_structure {

@@ -9,6 +9,8 @@ use std::ffi::{c_char, c_int, c_uint, c_void};
 
 /// VariableKind of an instance for co-simulation, fmi2CoSimulation.
 pub(crate) const CO_SIMULATION: c_int = fmi2Type::CoSimulation as c_int;
+/// Kind of an instance for model exchange, fmi2ModelExchange.
+pub(crate) const MODEL_EXCHANGE: c_int = fmi2Type::ModelExchange as c_int;
 /// VariableKind of the status fmi2LastSuccessfulTime.
 pub(crate) const LAST_SUCCESSFUL_TIME: c_int = fmi2StatusKind::LastSuccessfulTime as c_int;
 /// VariableKind of the status fmi2Terminated.
@@ -80,6 +82,32 @@ pub(crate) type DoStep = unsafe extern "C" fn(Handle, f64, f64, c_int) -> c_int;
 /// Type of the functions fmi2GetRealStatus and fmi2GetBooleanStatus. The arguments are the kind of
 /// the status and its value.
 pub(crate) type GetStatus<T> = unsafe extern "C" fn(Handle, c_int, *mut T) -> c_int;
+
+/// Type of the function fmi2SetTime.
+pub(crate) type SetTime = unsafe extern "C" fn(Handle, f64) -> c_int;
+/// Type of the function fmi2SetContinuousStates. The arguments are the values and their number.
+pub(crate) type SetVector = unsafe extern "C" fn(Handle, *const f64, usize) -> c_int;
+/// Type of the functions fmi2GetContinuousStates, fmi2GetDerivatives, fmi2GetEventIndicators and
+/// fmi2GetNominalsOfContinuousStates.
+pub(crate) type GetVector = unsafe extern "C" fn(Handle, *mut f64, usize) -> c_int;
+/// Type of the function fmi2NewDiscreteStates.
+pub(crate) type NewDiscreteStates = unsafe extern "C" fn(Handle, *mut EventInfo) -> c_int;
+/// Type of the function fmi2CompletedIntegratorStep. The arguments are whether the state before
+/// the step will never be restored, whether there is an event, and whether the simulation ends.
+pub(crate) type CompletedStep =
+    unsafe extern "C" fn(Handle, c_int, *mut c_int, *mut c_int) -> c_int;
+
+/// The structure fmi2EventInfo.
+#[derive(Default)]
+#[repr(C)]
+pub(crate) struct EventInfo {
+    pub new_discrete_states_needed: c_int,
+    pub terminate_simulation: c_int,
+    pub nominals_of_states_changed: c_int,
+    pub values_of_states_changed: c_int,
+    pub next_event_time_defined: c_int,
+    pub next_event_time: f64,
+}
 
 /// Pointer to a state that an instance keeps, which FMI calls fmi2FMUstate.
 pub(crate) type StateHandle = *mut c_void;

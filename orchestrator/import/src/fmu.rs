@@ -1,19 +1,20 @@
-//! Opens `.fmu` archives, checks their libraries, and instantiates them for co-simulation. Lookup
-//! tables are opened like archives.
+//! Opens `.fmu` archives, checks their libraries, and instantiates them for co-simulation or model
+//! exchange. Lookup tables are opened like archives.
 
 use crate::archive;
 use crate::crash;
 use crate::error::Error;
+use crate::exchange;
 use crate::faults;
 use crate::fmi3::Layout;
 use crate::folder::TemporaryFolder;
 use crate::isolation::{self, Isolation, Library, Loaded};
 use crate::law::{LawInstance, Ports};
-use crate::loading::{self, Refusal};
+use crate::loading::{self, Kind, Refusal};
 use crate::log::Log;
 use crate::lookup_table::{self, LookupTable, LookupTableInstance};
 use crate::warnings;
-use fmi_master::description::ModelDescription;
+use fmi_master::description::{InterfaceKind, ModelDescription};
 use fmi_master::instance::Instance;
 use fmi_rs::SHARED_LIBRARY_EXTENSION;
 use fmi_rs::fmi2::PLATFORM;
@@ -107,12 +108,14 @@ impl Fmu {
     /// process, or in a process of its own if `isolation` is given.
     pub fn faults(&self, isolation: Option<&Isolation>) -> Vec<String> {
         let mut faults = faults::faults(&self.description);
-        if let (Content::Archive(archive), Some(_)) =
-            (&self.content, &self.description.co_simulation)
-        {
-            match self.try_instance(archive, isolation) {
-                Ok(fault) => faults.extend(fault),
-                Err(fault) => faults.push(fault),
+        let kinds = [InterfaceKind::CoSimulation, InterfaceKind::ModelExchange { tolerance: 1e-6 }];
+        let Content::Archive(archive) = &self.content else { return faults };
+        for kind in kinds.into_iter().filter(|kind| self.description.interface(*kind).is_some()) {
+            let tried = self.try_instance(archive, kind, isolation);
+            let (Ok(Some(fault)) | Err(fault)) = tried else { continue };
+            // What keeps both interfaces from working is told once.
+            if !faults.contains(&fault) {
+                faults.push(fault);
             }
         }
         faults
@@ -131,9 +134,10 @@ impl Fmu {
     /// Returns whether the last step may have a length of its own, so that it ends exactly at the
     /// stop time. Lookup tables and the FMUs of this project tolerate the rounding of whole steps,
     /// and their results are those of whole steps, in every importer.
-    pub fn fits_last_step(&self) -> bool {
-        let interface = self.description.co_simulation.as_ref();
-        interface.is_some_and(|i| i.has("canHandleVariableCommunicationStepSize"))
+    pub fn fits_last_step(&self, kind: InterfaceKind) -> bool {
+        let interface = self.description.interface(kind);
+        (kind != InterfaceKind::CoSimulation
+            || interface.is_some_and(|i| i.has("canHandleVariableCommunicationStepSize")))
             && !self.is_lookup_table()
             && !self.is_made_by_fmu_pack()
     }
@@ -142,15 +146,17 @@ impl Fmu {
     ///
     /// # Errors
     /// Returns a line that says what is missing or wrong.
-    fn library(&self, archive: &Archive) -> Result<(PathBuf, String), String> {
-        let interface = self.description.co_simulation.as_ref().ok_or_else(|| {
+    fn library(&self, archive: &Archive, kind: InterfaceKind) -> Result<(PathBuf, String), String> {
+        let description = &self.description;
+        let interface = description.interface(kind).ok_or_else(|| {
             let only = [
-                (&self.description.model_exchange, ", only model exchange"),
-                (&self.description.scheduled_execution, ", only scheduled execution"),
+                (&description.co_simulation, ", only co-simulation"),
+                (&description.model_exchange, ", only model exchange"),
+                (&description.scheduled_execution, ", only scheduled execution"),
             ];
             let only = only.iter().find(|(interface, _)| interface.is_some());
             let only = only.map_or("", |(_, only)| only);
-            format!("offers no co-simulation{only}: export the model for co-simulation")
+            format!("offers no {0}{only}: export the model for {0}", kind.name())
         })?;
         let platforms = archive.platforms();
         let platform = if self.description.is_fmi3() { PLATFORM_TUPLE } else { PLATFORM };
@@ -184,15 +190,16 @@ impl Fmu {
         Ok((file, entry))
     }
 
-    /// Loads the library and makes an instance called `name` for co-simulation: in this process, or
-    /// in a process of its own if `isolation` is given. A lookup table is always in this process.
+    /// Loads the library and makes an instance called `name` of this kind: in this process, or in a
+    /// process of its own if `isolation` is given. A lookup table is always in this process.
     ///
     /// # Errors
-    /// Returns an error if the FMU has no library for this platform or offers no co-simulation, if
-    /// the library cannot be loaded, or if the FMU refuses.
+    /// Returns an error if the FMU has no library for this platform or does not offer the
+    /// interface, if the library cannot be loaded, or if the FMU refuses.
     pub fn instantiate(
         &self,
         name: &str,
+        kind: InterfaceKind,
         isolation: Option<&Isolation>,
     ) -> Result<Box<dyn Instance>, Error> {
         let archive = match &self.content {
@@ -201,13 +208,13 @@ impl Fmu {
                 return Ok(Box::new(LookupTableInstance::new(name, table.clone())));
             }
             Content::Law(stand_in, ports) => {
-                let stand_in = stand_in.instantiate(name, isolation)?;
+                let stand_in = stand_in.instantiate(name, kind, isolation)?;
                 return Ok(Box::new(LawInstance::new(stand_in, ports.clone())));
             }
         };
         let of_component = format!("the component \"{name}\"");
         let (instance, fault) = self
-            .made(archive, name, &of_component, isolation)
+            .made(archive, (name, &of_component), kind, isolation)
             .map_err(|message| Error::Fmu { path: self.path.clone(), message })?;
         if let Some(fault) = fault {
             warnings::warn_once(format!("{}: {fault}", self.path.display()));
@@ -220,10 +227,11 @@ impl Fmu {
     fn try_instance(
         &self,
         archive: &Archive,
+        kind: InterfaceKind,
         isolation: Option<&Isolation>,
     ) -> Result<Option<String>, String> {
         let name = self.path.file_name().unwrap_or_default().to_string_lossy();
-        let (instance, fault) = self.made(archive, &name, "its instance", isolation)?;
+        let (instance, fault) = self.made(archive, (&name, "its instance"), kind, isolation)?;
         drop(instance);
         let failure = isolation::late_failures().into_iter().next();
         failure.map_or(Ok(fault), Err)
@@ -234,24 +242,28 @@ impl Fmu {
     fn made(
         &self,
         archive: &Archive,
-        name: &str,
-        title: &str,
+        (name, title): (&str, &str),
+        kind: InterfaceKind,
         isolation: Option<&Isolation>,
     ) -> Result<(Box<dyn Instance>, Option<String>), String> {
-        let (file, entry) = self.library(archive)?;
-        let layout = archive.layout(&self.description)?;
+        let (file, entry) = self.library(archive, kind)?;
+        let kind = archive.kind(&self.description, kind)?;
         let resources = archive.folder.path().join("resources");
-        let resources = match &layout {
+        let resources = match &kind {
             // A path that ends in a separator.
-            Some(_) => resources.join("").display().to_string(),
-            None => Url::from_directory_path(resources)
+            Kind::Fmi3(_) => resources.join("").display().to_string(),
+            Kind::Fmi2(_) => Url::from_directory_path(resources)
                 .map_err(|()| "the temporary folder has no absolute path")?
                 .into(),
         };
         let guid = &self.description.guid;
         if let Some(isolation) = isolation {
-            let (folder, is_fmi3) = (archive.folder.path(), layout.is_some());
-            let library = Library { file, folder, isolation, is_fmi3 };
+            let (layout, is_fmi3) = match kind {
+                Kind::Fmi2(layout) => (layout, false),
+                Kind::Fmi3(_) => (None, true),
+            };
+            let folder = archive.folder.path();
+            let library = Library { file, folder, isolation, layout, is_fmi3 };
             return match library.instantiate(name, guid, &resources) {
                 Loaded::Whole(instance, fault) => Ok((instance, fault)),
                 Loaded::Unloadable(reason) => Err(archive.not_loaded(&entry, &reason)),
@@ -260,7 +272,7 @@ impl Fmu {
         }
         crash::is_loaded(&self.path);
         let (log, folder) = (Rc::new(Log::new(name)), Some(Rc::clone(&archive.folder)));
-        loading::loaded(&file, layout, log, guid, &resources, folder).map_err(|refusal| {
+        loading::loaded(&file, kind, log, (guid, &resources), folder).map_err(|refusal| {
             match refusal {
                 Refusal::Unloadable(reason) => archive.not_loaded(&entry, &reason),
                 Refusal::Refused(reason) => format!("{title} {reason}"),
@@ -270,16 +282,24 @@ impl Fmu {
 }
 
 impl Archive {
-    /// Returns the layout of FMI 3.0; `None` in FMI 2.0.
-    fn layout(&self, description: &ModelDescription) -> Result<Option<Rc<Layout>>, String> {
-        if !description.is_fmi3() {
-            return Ok(None);
+    /// Returns what an instance of this kind needs.
+    fn kind(&self, description: &ModelDescription, kind: InterfaceKind) -> Result<Kind, String> {
+        match (kind, description.is_fmi3()) {
+            (InterfaceKind::CoSimulation, false) => Ok(Kind::Fmi2(None)),
+            (InterfaceKind::ModelExchange { tolerance }, false) => {
+                Ok(Kind::Fmi2(Some(exchange::Layout::new(description, tolerance)?)))
+            }
+            (InterfaceKind::CoSimulation, true) => {
+                let layout = match self.layout.get() {
+                    Some(layout) => Rc::clone(layout),
+                    None => Rc::new(Layout::new(description)?),
+                };
+                Ok(Kind::Fmi3(Rc::clone(self.layout.get_or_init(|| layout))))
+            }
+            (InterfaceKind::ModelExchange { .. }, true) => Err(
+                "is for model exchange of FMI 3.0, which this program does not run: export the model for co-simulation or FMI 2.0".into(),
+            ),
         }
-        let layout = match self.layout.get() {
-            Some(layout) => Rc::clone(layout),
-            None => Rc::new(Layout::new(description)?),
-        };
-        Ok(Some(Rc::clone(self.layout.get_or_init(|| layout))))
     }
 
     fn platforms(&self) -> Vec<String> {

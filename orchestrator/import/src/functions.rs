@@ -23,9 +23,7 @@ pub(crate) struct Functions {
     pub(crate) set_integer: fmi::Set<i32>,
     pub(crate) set_boolean: fmi::Set<i32>,
     pub(crate) set_string: fmi::Set<fmi::Text>,
-    pub(crate) do_step: fmi::DoStep,
-    pub(crate) get_real_status: fmi::GetStatus<f64>,
-    pub(crate) get_boolean_status: fmi::GetStatus<c_int>,
+    pub(crate) interface: InterfaceFunctions,
     /// Optional, because nothing depends on it and some libraries lack it.
     pub(crate) get_version: Option<fmi::GetText>,
     /// Optional, because a new instance does the same.
@@ -34,6 +32,67 @@ pub(crate) struct Functions {
     pub(crate) states: Option<StateFunctions>,
     pub(crate) directional_derivative: Option<fmi::DirectionalDerivative>,
     _library: Library,
+}
+
+/// The functions of the interface for which a library is loaded. It may lack those of the other.
+#[derive(Clone, Copy)]
+pub(crate) enum InterfaceFunctions {
+    CoSimulation(StepFunctions),
+    ModelExchange(ExchangeFunctions),
+}
+
+/// The functions of co-simulation.
+#[derive(Clone, Copy)]
+pub(crate) struct StepFunctions {
+    pub(crate) do_step: fmi::DoStep,
+    pub(crate) get_real_status: fmi::GetStatus<f64>,
+    pub(crate) get_boolean_status: fmi::GetStatus<c_int>,
+}
+
+/// The functions of model exchange.
+#[derive(Clone, Copy)]
+pub(crate) struct ExchangeFunctions {
+    pub(crate) set_time: fmi::SetTime,
+    pub(crate) set_states: fmi::SetVector,
+    pub(crate) get_states: fmi::GetVector,
+    pub(crate) get_nominals: fmi::GetVector,
+    pub(crate) get_derivatives: fmi::GetVector,
+    pub(crate) get_indicators: fmi::GetVector,
+    pub(crate) enter_event_mode: fmi::Plain,
+    pub(crate) new_discrete_states: fmi::NewDiscreteStates,
+    pub(crate) enter_continuous_time_mode: fmi::Plain,
+    pub(crate) completed_integrator_step: fmi::CompletedStep,
+}
+
+impl InterfaceFunctions {
+    /// Returns the functions of a library.
+    ///
+    /// # Safety
+    /// They must not be called after the library was closed.
+    unsafe fn load(library: &Library, exchanges: bool) -> Result<Self, libloading::Error> {
+        // SAFETY: FMI 2.0 gives each function the type it is loaded as.
+        unsafe {
+            if !exchanges {
+                return Ok(Self::CoSimulation(StepFunctions {
+                    do_step: *library.get(b"fmi2DoStep\0")?,
+                    get_real_status: *library.get(b"fmi2GetRealStatus\0")?,
+                    get_boolean_status: *library.get(b"fmi2GetBooleanStatus\0")?,
+                }));
+            }
+            Ok(Self::ModelExchange(ExchangeFunctions {
+                set_time: *library.get(b"fmi2SetTime\0")?,
+                set_states: *library.get(b"fmi2SetContinuousStates\0")?,
+                get_states: *library.get(b"fmi2GetContinuousStates\0")?,
+                get_nominals: *library.get(b"fmi2GetNominalsOfContinuousStates\0")?,
+                get_derivatives: *library.get(b"fmi2GetDerivatives\0")?,
+                get_indicators: *library.get(b"fmi2GetEventIndicators\0")?,
+                enter_event_mode: *library.get(b"fmi2EnterEventMode\0")?,
+                new_discrete_states: *library.get(b"fmi2NewDiscreteStates\0")?,
+                enter_continuous_time_mode: *library.get(b"fmi2EnterContinuousTimeMode\0")?,
+                completed_integrator_step: *library.get(b"fmi2CompletedIntegratorStep\0")?,
+            }))
+        }
+    }
 }
 
 /// The functions by which an instance keeps its states.
@@ -90,7 +149,8 @@ pub(crate) fn open(file: &Path) -> Result<Library, libloading::Error> {
 }
 
 impl Functions {
-    pub(crate) fn load(file: &Path) -> Result<Self, libloading::Error> {
+    /// Loads a library for model exchange if it `exchanges`, otherwise for co-simulation.
+    pub(crate) fn load(file: &Path, exchanges: bool) -> Result<Self, libloading::Error> {
         let library = open(file)?;
         // SAFETY: FMI 2.0 gives each function the type it is loaded as, and `_library` keeps the
         // code loaded as long as the pointers exist.
@@ -109,9 +169,7 @@ impl Functions {
                 set_integer: *library.get(b"fmi2SetInteger\0")?,
                 set_boolean: *library.get(b"fmi2SetBoolean\0")?,
                 set_string: *library.get(b"fmi2SetString\0")?,
-                do_step: *library.get(b"fmi2DoStep\0")?,
-                get_real_status: *library.get(b"fmi2GetRealStatus\0")?,
-                get_boolean_status: *library.get(b"fmi2GetBooleanStatus\0")?,
+                interface: InterfaceFunctions::load(&library, exchanges)?,
                 get_version: library.get(b"fmi2GetVersion\0").ok().map(|function| *function),
                 reset: library.get(b"fmi2Reset\0").ok().map(|function| *function),
                 states: StateFunctions::load(

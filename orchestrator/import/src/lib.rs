@@ -7,6 +7,7 @@ pub mod archive;
 pub mod crash;
 pub mod description;
 pub mod error;
+mod exchange;
 pub mod faults;
 mod fmi;
 mod fmi3;

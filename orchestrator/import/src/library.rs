@@ -10,7 +10,9 @@
 use crate::crash::Calling;
 use crate::fmi::{self, Status};
 use crate::folder::TemporaryFolder;
-use crate::functions::{Functions, Table, c_texts};
+use crate::functions::{
+    ExchangeFunctions, Functions, InterfaceFunctions, StepFunctions, Table, c_texts,
+};
 use crate::log::Log;
 use crate::logs::{self, Listed};
 use float_environment::in_default;
@@ -65,6 +67,10 @@ pub(crate) struct FmuInstance<F: Table = Functions> {
     /// States that the instance keeps, by their numbers.
     kept: Vec<fmi::StateHandle>,
     fatal: bool,
+    /// Whether the last call that failed was discarded.
+    pub(crate) is_discarded: bool,
+    /// Relative tolerance that the instance is told of.
+    pub(crate) tolerance: Option<f64>,
     _folder: Option<Rc<TemporaryFolder>>,
 }
 
@@ -96,12 +102,16 @@ impl FmuInstance {
         let callbacks = Rc::new(callbacks);
         let listed = Listed::new(&log);
 
+        let kind = match functions.interface {
+            InterfaceFunctions::CoSimulation(_) => fmi::CO_SIMULATION,
+            InterfaceFunctions::ModelExchange(_) => fmi::MODEL_EXCHANGE,
+        };
         // SAFETY: FMI 2.0 gives the function this type; the texts outlive the call, and the
         // instance keeps callbacks and log alive as long as the instance, as FMI demands.
         let handle = foreign(&log, "instantiate", || unsafe {
             (functions.instantiate)(
                 name.as_ptr(),
-                fmi::CO_SIMULATION,
+                kind,
                 guid.as_ptr(),
                 resources.as_ptr(),
                 Rc::as_ptr(&callbacks),
@@ -112,11 +122,23 @@ impl FmuInstance {
         Self::made(handle, functions, Some(callbacks), listed, log, folder)
     }
 
+    /// Calls a function of model exchange.
+    pub(crate) fn call_exchange(
+        &mut self,
+        call: &'static str,
+        function: impl FnOnce(&ExchangeFunctions, fmi::Handle) -> c_int,
+    ) -> Outcome {
+        self.call(call, |functions, handle| match &functions.interface {
+            InterfaceFunctions::ModelExchange(functions) => function(functions, handle),
+            InterfaceFunctions::CoSimulation(_) => Status::Error as c_int,
+        })
+    }
+
     /// Describes why a step was discarded. FMI 2.0, section 4.2.3, lets an FMU end the simulation
     /// in this way.
     #[cold]
-    fn discarded(&mut self) -> CallFailure {
-        let Functions { get_real_status, get_boolean_status, .. } = self.data.functions;
+    fn discarded(&mut self, functions: StepFunctions) -> CallFailure {
+        let StepFunctions { get_real_status, get_boolean_status, .. } = functions;
         let (mut time, mut terminated) = (f64::NAN, fmi::FALSE);
         // SAFETY: the instance is alive, both pointers are valid for the calls, and FMI allows
         // these calls after fmi2Discard.
@@ -148,7 +170,20 @@ impl<F: Table> FmuInstance<F> {
         }
         log.is_instantiated();
         let data = Rc::new(InstanceData { functions, _callbacks: callbacks, _listed: listed, log });
-        Ok(Self { handle, data, kept: Vec::new(), fatal: false, _folder: folder })
+        Ok(Self {
+            handle,
+            data,
+            kept: Vec::new(),
+            fatal: false,
+            is_discarded: false,
+            tolerance: None,
+            _folder: folder,
+        })
+    }
+
+    /// Takes the last message that reports no problem.
+    pub(crate) fn message(&self) -> Option<String> {
+        self.data.log.take_event()
     }
 
     pub(crate) fn functions(&self) -> &F {
@@ -194,6 +229,7 @@ impl<F: Table> FmuInstance<F> {
     #[cold]
     fn failure(&mut self, call: &'static str, status: Result<Status, c_int>) -> CallFailure {
         self.fatal |= status == Ok(Status::Fatal);
+        self.is_discarded = status == Ok(Status::Discard);
         let message = self.data.log.take();
         if status == Ok(Status::Pending) {
             let message = "the step is asynchronous, which is not supported";
@@ -321,9 +357,11 @@ impl Instance for FmuInstance {
     }
 
     fn enter_initialization(&mut self, start: f64, stop: f64) -> Outcome {
+        let is_told = self.tolerance.map_or(fmi::FALSE, |_| fmi::TRUE);
+        let tolerance = self.tolerance.unwrap_or(0.0);
         // SAFETY: the instance is alive, and the function has the type FMI gives it.
         self.call("setupExperiment", |functions, handle| unsafe {
-            (functions.setup_experiment)(handle, fmi::FALSE, 0.0, start, fmi::TRUE, stop)
+            (functions.setup_experiment)(handle, is_told, tolerance, start, fmi::TRUE, stop)
         })?;
         self.call_plain("enterInitializationMode", self.data.functions.enter_initialization_mode)
     }
@@ -333,12 +371,15 @@ impl Instance for FmuInstance {
     }
 
     fn do_step(&mut self, time: f64, step: f64) -> Outcome {
+        let InterfaceFunctions::CoSimulation(functions) = self.data.functions.interface else {
+            return Err(CallFailure::new("doStep", "it is an instance for model exchange"));
+        };
         // SAFETY: the instance is alive, and the function has the type FMI gives it.
-        let status = self.status("doStep", |functions, handle| unsafe {
+        let status = self.status("doStep", |_, handle| unsafe {
             (functions.do_step)(handle, time, step, fmi::TRUE)
         });
         if status == Ok(Status::Discard) {
-            return Err(self.discarded());
+            return Err(self.discarded(functions));
         }
         self.check("doStep", status)
     }

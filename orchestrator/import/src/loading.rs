@@ -2,10 +2,10 @@
 
 use crate::description;
 use crate::error::with_causes;
+use crate::exchange;
 use crate::fmi3::{self, Fmi3Instance, Layout};
 use crate::folder::TemporaryFolder;
 use crate::functions::Functions;
-use crate::library::FmuInstance;
 use crate::log::Log;
 use crate::xml;
 use fmi_master::description::ModelDescription;
@@ -34,25 +34,36 @@ pub(crate) enum Refusal {
     Refused(String),
 }
 
-/// Loads a library into this process and makes an instance, which is one of FMI 3.0 if there is a
-/// layout. Returns it with what is wrong with the version of FMI that the library names.
+/// Kind of an instance.
+pub(crate) enum Kind {
+    /// One of FMI 2.0, with what model exchange needs if it is one for model exchange.
+    Fmi2(Option<exchange::Layout>),
+    /// One of FMI 3.0 for co-simulation.
+    Fmi3(Rc<Layout>),
+}
+
+/// Loads a library into this process and makes an instance with this identifier and these
+/// resources. Returns it with what is wrong with the version of FMI that the library names.
 pub(crate) fn loaded(
     file: &Path,
-    layout: Option<Rc<Layout>>,
+    kind: Kind,
     log: Rc<Log>,
-    guid: &str,
-    resources: &str,
+    named: (&str, &str),
     folder: Option<Rc<TemporaryFolder>>,
 ) -> Result<(Box<dyn Instance>, Option<String>), Refusal> {
     let unloadable = |error: libloading::Error| Refusal::Unloadable(with_causes(&error));
-    if let Some(layout) = layout {
-        let functions = fmi3::Functions::load(file).map_err(unloadable)?;
-        let fault = functions.version_fault();
-        let instance = Fmi3Instance::new(functions, layout, log, guid, resources, folder);
-        return Ok((Box::new(instance.map_err(Refusal::Refused)?), fault));
+    match kind {
+        Kind::Fmi2(layout) => {
+            let functions = Functions::load(file, layout.is_some()).map_err(unloadable)?;
+            let fault = functions.version_fault();
+            let instance = exchange::fmi2::instantiate(functions, log, named, folder, layout);
+            Ok((instance.map_err(Refusal::Refused)?, fault))
+        }
+        Kind::Fmi3(layout) => {
+            let functions = fmi3::Functions::load(file).map_err(unloadable)?;
+            let fault = functions.version_fault();
+            let instance = Fmi3Instance::new(functions, layout, log, named, folder);
+            Ok((Box::new(instance.map_err(Refusal::Refused)?), fault))
+        }
     }
-    let functions = Functions::load(file).map_err(unloadable)?;
-    let fault = functions.version_fault();
-    let instance = FmuInstance::new(functions, log, guid, resources, folder);
-    Ok((Box::new(instance.map_err(Refusal::Refused)?), fault))
 }

@@ -17,9 +17,9 @@ impl Builder<'_> {
         instance: &mut dyn Instance,
     ) -> Result<Option<Found>, CallFailure> {
         let [component] = self.components else { return Ok(None) };
-        let description = &self.system.components[*component].fmu.description;
-        let offers = description.co_simulation.as_ref();
-        if !offers.is_some_and(|interface| interface.has("providesDirectionalDerivative")) {
+        let checked = &self.system.components[*component];
+        let description = &checked.fmu.description;
+        if !checked.has("providesDirectionalDerivative") {
             return Ok(None);
         }
         let variables = &description.variables;

@@ -29,6 +29,11 @@ pub struct ModelDescription {
     pub model_exchange: Option<Interface>,
     /// Scheduled execution capabilities, if the FMU offers this interface of FMI 3.0.
     pub scheduled_execution: Option<Interface>,
+    /// Positions, in `variables`, of the derivatives of the continuous states, in the order of the
+    /// states.
+    pub derivatives: Vec<usize>,
+    /// Number of event indicators.
+    pub event_indicators: usize,
     /// Simulation settings that the FMU proposes.
     pub default_experiment: DefaultExperiment,
     /// Unit definitions of the FMU.
@@ -112,6 +117,29 @@ impl Interface {
     pub fn has(&self, capability: &str) -> bool {
         let plain = |name: &str| name.trim_end_matches('s').to_ascii_lowercase();
         self.capabilities.iter().any(|name| plain(name) == plain(capability))
+    }
+}
+
+/// The interface by which an instance is called.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum InterfaceKind {
+    /// The instance steps itself.
+    #[default]
+    CoSimulation,
+    /// The program integrates the continuous states of the instance.
+    ModelExchange {
+        /// Relative tolerance of the integration.
+        tolerance: f64,
+    },
+}
+
+impl InterfaceKind {
+    /// Returns the name of the interface in texts.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::CoSimulation => "co-simulation",
+            Self::ModelExchange { .. } => "model exchange",
+        }
     }
 }
 
@@ -288,6 +316,14 @@ impl ModelDescription {
             quantity::named(unit, to_unit, &to.units)
         } else {
             quantity::conversion(unit, &self.units, to_unit, &to.units)
+        }
+    }
+
+    /// Returns an interface, if the FMU offers it.
+    pub fn interface(&self, kind: InterfaceKind) -> Option<&Interface> {
+        match kind {
+            InterfaceKind::CoSimulation => self.co_simulation.as_ref(),
+            InterfaceKind::ModelExchange { .. } => self.model_exchange.as_ref(),
         }
     }
 

@@ -86,9 +86,7 @@ impl Sweep {
             }
         }
         let single = system.components.iter().find(|component| {
-            let interface = component.fmu.description.co_simulation.as_ref();
-            interface.is_some_and(|interface| interface.has("canBeInstantiatedOnlyOncePerProcess"))
-                && !component.is_isolated
+            component.has("canBeInstantiatedOnlyOncePerProcess") && !component.is_isolated
         });
         Ok(Self {
             design,

@@ -203,7 +203,7 @@ fn what_cannot_be_run_is_refused_with_its_reason() {
         ),
         (
             &exchange,
-            "offers no co-simulation, only model exchange: export the model for co-simulation",
+            "is for model exchange of FMI 3.0, which this program does not run: export the model for co-simulation or FMI 2.0",
         ),
         (
             &later,

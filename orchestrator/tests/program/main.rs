@@ -3,6 +3,7 @@
 mod bench;
 mod campaign;
 mod ends;
+mod exchange;
 mod fmi3;
 mod foreign;
 #[cfg(target_os = "linux")]

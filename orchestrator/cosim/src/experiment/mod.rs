@@ -4,6 +4,7 @@
 //! docs/experiments.md explains all keys; `orchestrator/schema/experiment.json` describes them for
 //! editors.
 
+mod interface;
 mod measures;
 mod overrides;
 mod protection;
@@ -13,6 +14,7 @@ mod vehicle;
 
 pub use crate::watch::OnInvalid;
 pub use fmi_master::wiring::Coupling;
+pub use interface::Interface;
 pub use measures::{Curve, Guarantee, Loss, Margins, Measure, MeasureKind, Observe, Panel, Scaled};
 pub use overrides::{Given, Overrides, name_of};
 pub use protection::Protection;
@@ -119,6 +121,12 @@ pub struct Component {
     #[serde(default)]
     #[schemars(with = "BTreeMap<String, Scalar>")]
     pub parameters: BTreeMap<String, Spanned<Value>>,
+    /// Interface by which the FMU is called. By default this is co-simulation if the FMU offers it,
+    /// otherwise model exchange, in which the orchestrator integrates the FMU's states.
+    pub interface: Option<Interface>,
+    /// Relative tolerance of the integration in model exchange. By default it is the one that the
+    /// FMU proposes, or otherwise 1e-6.
+    pub tolerance: Option<f64>,
     /// Whether the instance runs in a process of its own, whatever `[isolation]` says.
     pub isolate: Option<bool>,
     /// Whether the FMU takes the place of another one, as after `--fmu`: settings, recorded

@@ -70,6 +70,8 @@ struct RunSettings {
     ends_with: Option<String>,
     /// Names of the components with their periods, in the order in which their inputs are set.
     order: Vec<(String, u32)>,
+    /// Tolerances of the components that have one.
+    tolerances: Vec<(String, f64)>,
     recorded: Vec<String>,
     record_every: u32,
     observe: Observe,
@@ -102,6 +104,12 @@ impl RunSettings {
             order: those("Component")
                 .map(|child| Ok((child.required("name")?.to_string(), count(child, "every")?)))
                 .collect::<Result<_, String>>()?,
+            tolerances: those("Component")
+                .filter_map(|child| {
+                    let tolerance = child.number("tolerance").transpose()?;
+                    Some(tolerance.and_then(|t| Ok((child.required("name")?.to_string(), t))))
+                })
+                .collect::<Result<_, String>>()?,
             recorded: those("Record")
                 .map(|child| child.required("variable").map(String::from))
                 .collect::<Result<_, String>>()?,
@@ -122,6 +130,11 @@ impl RunSettings {
                 })?
                 .every = *every;
         }
+        for (name, tolerance) in self.tolerances {
+            if let Some(component) = experiment.components.get_mut(&name) {
+                component.tolerance = Some(tolerance);
+            }
+        }
         experiment.simulation.order = self.order.into_iter().map(|(name, _)| name).collect();
         let texts = self.recorded.into_iter().map(|name| Spanned::new(0..0, name));
         experiment.record = Record { variables: texts.collect(), every: self.record_every };
@@ -136,7 +149,7 @@ impl RunSettings {
 ///
 /// # Errors
 /// Returns an error if the archive is faulty, or needs what this program does not support:
-/// components other than FMUs for co-simulation, signal dictionaries, or mappings of values between
+/// components other than FMUs, signal dictionaries, or mappings of values between
 /// FMUs.
 pub fn load(path: &Path, overrides: &Overrides) -> Result<Loaded, Error> {
     let folder = archive::unpack_with_backslashes(path)?;
@@ -198,7 +211,7 @@ pub fn load(path: &Path, overrides: &Overrides) -> Result<Loaded, Error> {
             .components
             .iter()
             .zip(parameters)
-            .map(|(c, values)| (c.name.clone(), component(&folder.path().join(&c.source), values)))
+            .map(|(c, values)| (c.name.clone(), component(c, folder.path(), values)))
             .collect(),
         connections,
         record: Record { variables: recorded.filter(is_no_text).map(text_of).collect(), every: 1 },
@@ -248,13 +261,19 @@ fn common_step(root: &Element) -> Result<Option<f64>, String> {
 }
 
 /// Returns a component of the experiment for an FMU with these values.
-fn component(fmu: &Path, values: BTreeMap<String, Value>) -> Component {
+fn component(
+    component: &SystemComponent,
+    folder: &Path,
+    values: BTreeMap<String, Value>,
+) -> Component {
     let text = |text| Spanned::new(0..0, text);
     Component {
-        fmu: text(fmu.to_string_lossy().into_owned()),
+        fmu: text(folder.join(&component.source).to_string_lossy().into_owned()),
         every: 1,
         unconnected: Vec::new(),
         parameters: values.into_iter().map(|(n, value)| (n, Spanned::new(0..0, value))).collect(),
+        interface: component.interface,
+        tolerance: None,
         isolate: None,
         is_exchanged: false,
     }

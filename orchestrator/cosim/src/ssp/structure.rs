@@ -4,6 +4,7 @@
 use super::FMU;
 use super::binding::{self, Given};
 use super::value::Passage;
+use crate::experiment::Interface;
 use fmi_master::quantity::UnitDefinition;
 use fmu_import::description;
 use fmu_import::xml::Element;
@@ -15,6 +16,8 @@ pub(super) struct SystemComponent {
     pub(super) name: String,
     /// Path of the component's FMU in the archive.
     pub(super) source: String,
+    /// Interface that the structure demands.
+    pub(super) interface: Option<Interface>,
 }
 
 /// A connector or a variable, given by the name of its component or subsystem and its own name.
@@ -133,14 +136,11 @@ impl Structure {
                  System within this one, and put tables of values into an FMU"
             ));
         }
-        if element.attribute("implementation") == Some("ModelExchange") {
-            return refuse(
-                "demands model exchange, only co-simulation is supported: if its FMU offers that, \
-                 write implementation=\"CoSimulation\", otherwise export the model for \
-                 co-simulation"
-                    .into(),
-            );
-        }
+        let interface = match element.attribute("implementation") {
+            Some("ModelExchange") => Some(Interface::ModelExchange),
+            Some("CoSimulation") => Some(Interface::CoSimulation),
+            _ => None,
+        };
         let Some(source) = element.attribute("source").filter(|source| !source.is_empty()) else {
             return refuse(
                 "has no FMU: put one into the archive, and name it in the attribute source".into(),
@@ -151,7 +151,7 @@ impl Structure {
             return refuse("is defined twice".into());
         }
         binding::read(element, &name, folder, &mut self.values, &mut self.units)?;
-        self.components.push(SystemComponent { name, source });
+        self.components.push(SystemComponent { name, source, interface });
         Ok(())
     }
 }

@@ -7,7 +7,7 @@ use crate::experiment::Coupling;
 use crate::files;
 use crate::interrupt::Interrupt;
 use crate::system::{CheckedComponent, System};
-use fmi_master::description::{Variable, VariableKind};
+use fmi_master::description::{InterfaceKind, Variable, VariableKind};
 use fmi_master::quantity::Scaling;
 use fmi_master::settings::SettingValue;
 use fmi_master::wiring::Port;
@@ -168,8 +168,11 @@ fn run_settings(xml: &mut Xml, system: &Source) -> io::Result<()> {
     let ends_with = experiment.simulation.ends_with.clone();
     attributes.extend(ends_with.map(|name| ("endsWith", name)));
     element(xml, "run:Experiment", &attributes, |xml| {
-        for CheckedComponent { name, every, .. } in &system.components {
-            let attributes = [("name", name.clone()), ("every", every.to_string())];
+        for CheckedComponent { name, every, interface, .. } in &system.components {
+            let mut attributes = vec![("name", name.clone()), ("every", every.to_string())];
+            if let InterfaceKind::ModelExchange { tolerance } = interface {
+                attributes.push(("tolerance", format!("{tolerance:?}")));
+            }
             leaf(xml, "run:Component", &attributes)?;
         }
         for column in &system.columns {
@@ -181,11 +184,15 @@ fn run_settings(xml: &mut Xml, system: &Source) -> io::Result<()> {
 }
 
 fn component(xml: &mut Xml, system: &Source, index: usize) -> io::Result<()> {
+    let implementation = match system.components[index].interface {
+        InterfaceKind::CoSimulation => "CoSimulation",
+        InterfaceKind::ModelExchange { .. } => "ModelExchange",
+    };
     let attributes = [
         ("name", system.components[index].name.clone()),
         ("type", FMU.into()),
         ("source", resource(&system.components[index].fmu.path)),
-        ("implementation", "CoSimulation".into()),
+        ("implementation", implementation.into()),
     ];
     element(xml, "ssd:Component", &attributes, |xml| {
         element(xml, "ssd:Connectors", &[], |xml| {

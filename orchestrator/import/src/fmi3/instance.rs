@@ -69,8 +69,7 @@ impl Fmi3Instance {
         functions: Functions,
         layout: Rc<Layout>,
         log: Rc<Log>,
-        token: &str,
-        resources: &str,
+        (token, resources): (&str, &str),
         folder: Option<Rc<TemporaryFolder>>,
     ) -> Result<Self, String> {
         let texts = c_texts([&log.component, token, resources])?;

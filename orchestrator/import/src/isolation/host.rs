@@ -5,7 +5,7 @@ use super::limits;
 use super::memory;
 use super::protocol::{Action, InstanceArguments, List, Ready, Reply, Request, Set, Setup};
 use crate::fmi3::Layout;
-use crate::loading::{self, Refusal};
+use crate::loading::{self, Kind, Refusal};
 use crate::log::{Held, Log};
 use fmi_master::description::Carrier;
 use fmi_master::instance::{Instance, Outcome};
@@ -50,9 +50,10 @@ pub fn serve(arguments: impl Iterator<Item = OsString>) -> io::Result<()> {
         Err(reason) => return host.send(&refused(reason)),
     };
     let InstanceArguments { name, guid, resources } = setup.instance;
+    let kind = layout.map_or(Kind::Fmi2(setup.layout), Kind::Fmi3);
     let log = Rc::new(log(&name));
     let (mut instance, version_fault) =
-        match loading::loaded(&setup.library, layout, log, &guid, &resources, None) {
+        match loading::loaded(&setup.library, kind, log, (&guid, &resources), None) {
             Ok(loaded) => loaded,
             Err(Refusal::Unloadable(reason)) => return host.send(&Ready::Unloadable(reason)),
             Err(Refusal::Refused(reason)) => return host.send(&refused(reason)),
@@ -65,7 +66,7 @@ pub fn serve(arguments: impl Iterator<Item = OsString>) -> io::Result<()> {
             drop(instance);
             return host.send(&Reply { messages: held.take(), ..Reply::default() });
         }
-        let reply = answer(&mut *instance, request, &mut lists, &mut values);
+        let reply = answer(instance.as_mut(), request, &mut lists, &mut values);
         host.send_with(&Reply { messages: held.take(), ..reply }, &values)?;
     }
 }

@@ -26,6 +26,7 @@ pub use host::serve;
 pub use process::late_failures;
 pub use settings::{COMMAND, Isolation};
 
+use crate::exchange::Layout;
 use fmi_master::instance::Instance;
 use process::Process;
 use protocol::{InstanceArguments, Limits, Ready, Setup};
@@ -74,6 +75,8 @@ pub(crate) struct Library<'a> {
     pub(crate) folder: &'a Path,
     pub(crate) isolation: &'a Isolation,
     pub(crate) is_fmi3: bool,
+    /// What model exchange needs; `None` for co-simulation.
+    pub(crate) layout: Option<Layout>,
 }
 
 impl Library<'_> {
@@ -111,7 +114,8 @@ impl Library<'_> {
             folder: self.isolation.sandbox.then(|| self.folder.to_path_buf()),
         };
         let fmi3 = self.is_fmi3.then(|| self.folder.to_path_buf());
-        match process.set_up(&Setup { library: self.file, instance, limits, fmi3 }) {
+        let setup = Setup { library: self.file, instance, layout: self.layout, limits, fmi3 };
+        match process.set_up(&setup) {
             Ok(Ready::Loaded { version_fault, without, .. }) => {
                 if let Some(without) = without {
                     crate::warnings::warn_once(format!(

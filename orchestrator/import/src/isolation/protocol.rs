@@ -1,5 +1,6 @@
 //! Messages between the master and the process of an instance.
 
+use crate::exchange::Layout;
 use crate::log::LogMessage;
 use fmi_master::description::Carrier;
 use fmi_master::instance::CallFailure;
@@ -12,6 +13,8 @@ pub(super) struct Setup {
     /// The instance's library.
     pub(super) library: PathBuf,
     pub(super) instance: InstanceArguments,
+    /// What model exchange needs; `None` for co-simulation.
+    pub(super) layout: Option<Layout>,
     pub(super) limits: Limits,
     /// Folder of the unpacked archive, if it is one of FMI 3.0, whose description says how its
     /// values are transferred.

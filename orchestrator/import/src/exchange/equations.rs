@@ -1,0 +1,115 @@
+//! The equations of a model between two events, as the integrator sees them.
+
+use super::events::Events;
+use super::model::{ContinuousModel, Layout, Refusal};
+use super::radau::{Point, Step, System};
+use nalgebra::DMatrix;
+
+/// The equations of a model between two events.
+pub(super) struct Equations<'a, M> {
+    pub(super) model: &'a mut M,
+    pub(super) layout: &'a Layout,
+    pub(super) nominals: Vec<f64>,
+}
+
+impl<M: ContinuousModel> Equations<'_, M> {
+    /// Brings the model to a time (s) and states.
+    pub(super) fn place(&mut self, time: f64, states: &[f64]) -> Result<(), Refusal> {
+        self.model.set_time(time).map_err(Refusal::Failed)?;
+        if states.is_empty() { Ok(()) } else { self.model.set_states(states) }
+    }
+
+    /// Finds the first event of a step that begins at a time (s). Returns the time (s) after it,
+    /// which differs from one before it by rounding only, and its indicator. Without an event, the
+    /// model is at the end of the step.
+    pub(super) fn event(
+        &mut self,
+        events: &Events,
+        begin: f64,
+        step: &Step,
+    ) -> Result<Option<(f64, usize)>, Refusal> {
+        let count = self.layout.indicators;
+        if count == 0 {
+            return Ok(None);
+        }
+        let end = step.end.time;
+        let mut indicators = vec![0.0; count];
+        let mut states = step.end.states.clone();
+        let mut crossed = |time: f64, this: &mut Self| {
+            if time < end {
+                step.states(time, &mut states);
+            } else {
+                states.copy_from_slice(&step.end.states);
+            }
+            this.place(time, &states)?;
+            this.model.indicators(&mut indicators)?;
+            Ok(events.crossed(&indicators))
+        };
+        // An indicator may cross zero and come back within the step.
+        let (mut low, mut found) = (begin, None);
+        for time in step.nodes(begin) {
+            if let Some(indicator) = crossed(time, self)? {
+                found = Some((time, indicator));
+                break;
+            }
+            low = time;
+        }
+        let Some((mut high, mut indicator)) = found else { return Ok(None) };
+        let shortest = 8.0 * f64::EPSILON * begin.abs().max(end.abs());
+        while high - low > shortest {
+            let middle = f64::midpoint(low, high);
+            match crossed(middle, self)? {
+                Some(other) => (high, indicator) = (middle, other),
+                None => low = middle,
+            }
+        }
+        Ok(Some((high, indicator)))
+    }
+}
+
+impl<M: ContinuousModel> System for Equations<'_, M> {
+    fn derivatives(
+        &mut self,
+        time: f64,
+        states: &[f64],
+        derivatives: &mut [f64],
+    ) -> Result<(), Refusal> {
+        self.place(time, states)?;
+        if states.is_empty() { Ok(()) } else { self.model.derivatives(derivatives) }
+    }
+
+    fn jacobian(&mut self, at: &Point, jacobian: &mut DMatrix<f64>) -> Result<(), Refusal> {
+        let Layout { states, derivatives, .. } = self.layout;
+        if self.layout.has_directional_derivatives {
+            self.place(at.time, &at.states)?;
+            for (known, mut column) in states.iter().zip(jacobian.column_iter_mut()) {
+                let added = column.as_mut_slice();
+                self.model
+                    .directional_derivative(derivatives, &[*known], &[1.0], added)
+                    .map_err(Refusal::Failed)?;
+            }
+            return Ok(());
+        }
+        let mut changed = at.states.clone();
+        for (place, mut column) in jacobian.column_iter_mut().enumerate() {
+            let state = at.states[place];
+            let size = f64::EPSILON.sqrt() * state.abs().max(self.nominals[place]);
+            // Where the model refuses one side, the other one remains.
+            let mut outcome = Ok(());
+            for change in [size, -size] {
+                changed[place] = state + change;
+                outcome = self.derivatives(at.time, &changed, column.as_mut_slice());
+                if !matches!(outcome, Err(Refusal::Discarded(_))) {
+                    break;
+                }
+            }
+            outcome?;
+            let change = changed[place] - state;
+            changed[place] = state;
+            for (value, before) in column.iter_mut().zip(&at.derivatives) {
+                *value = (*value - before) / change;
+            }
+        }
+        Ok(())
+    }
+}

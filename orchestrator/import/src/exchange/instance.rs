@@ -1,0 +1,353 @@
+//! A model together with its integrator, as the master sees it.
+
+use super::equations::Equations;
+use super::events::{Events, MOST_EVENTS};
+use super::model::{Completed, ContinuousModel, Layout, Refusal};
+use super::radau::{Point, Radau, Step};
+use fmi_master::description::Carrier;
+use fmi_master::forward;
+use fmi_master::instance::{CallFailure, Instance, Outcome};
+use fmi_master::quantity::rounded;
+use std::collections::BTreeMap;
+use std::fmt::Display;
+
+/// Number of evaluations after which the discrete states must have settled.
+const MOST_EVALUATIONS: usize = 100;
+/// Number of steps within which a state event must have been located.
+const MOST_LOCATIONS: usize = 20;
+
+/// Mode of the model.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+enum Mode {
+    /// Before the end of initialization.
+    #[default]
+    Initialization,
+    Event,
+    ContinuousTime,
+}
+
+/// What changes during a simulation, beside the model itself.
+#[derive(Clone)]
+struct Progress {
+    mode: Mode,
+    /// Present time and states.
+    point: Point,
+    integrator: Radau,
+    events: Events,
+    /// Values that were set last, by type and value reference.
+    set: BTreeMap<(Carrier, u32), u64>,
+}
+
+/// A model together with its integrator.
+pub(crate) struct Exchange<M> {
+    model: M,
+    layout: Layout,
+    progress: Progress,
+    /// Progress of the states that the model keeps, by their numbers.
+    kept: Vec<Progress>,
+}
+
+impl<M: ContinuousModel> Exchange<M> {
+    /// Adds an integrator to a new instance.
+    pub(crate) fn new(model: M, layout: Layout) -> Self {
+        let progress = Progress::new(&layout);
+        Self { model, layout, progress, kept: Vec::new() }
+    }
+
+    fn through<R>(&mut self, call: impl FnOnce(&mut M) -> R) -> R {
+        call(&mut self.model)
+    }
+
+    /// Sets variables. Values that change after initialization are an event of the environment,
+    /// because they jump.
+    fn set<T: Copy>(
+        &mut self,
+        carrier: Carrier,
+        (references, values): (&[u32], &[T]),
+        bits: impl Fn(T) -> u64,
+        call: impl FnOnce(&mut M) -> Outcome,
+    ) -> Outcome {
+        let mut has_changed = false;
+        for (reference, value) in references.iter().zip(values) {
+            let value = bits(*value);
+            has_changed |= self.progress.set.insert((carrier, *reference), value) != Some(value);
+        }
+        if has_changed { self.set_in_event(call) } else { Ok(()) }
+    }
+
+    fn set_in_event(&mut self, call: impl FnOnce(&mut M) -> Outcome) -> Outcome {
+        if self.progress.mode == Mode::ContinuousTime {
+            self.model.enter_event_mode()?;
+            self.progress.mode = Mode::Event;
+        }
+        call(&mut self.model)
+    }
+
+    /// Integrates to the time `end`, s.
+    fn integrate(&mut self, end: f64) -> Outcome {
+        if self.progress.mode == Mode::Event {
+            self.settle()?;
+        }
+        loop {
+            let Progress { point, events, .. } = &self.progress;
+            let time = point.time;
+            if let Some(event) = events.next_time.filter(|next| is_due(*next, time)) {
+                self.time_event(event)?;
+            } else if is_due(end, time) {
+                return Ok(());
+            } else {
+                // A time event that rounding separates from the end is at the end.
+                let before = events.next_time.filter(|next| !is_due(end, *next));
+                self.advance(before.unwrap_or(end))?;
+            }
+        }
+    }
+
+    /// Makes a step of the integrator, which ends at an event or at the time `stop` (s) at last.
+    fn advance(&mut self, stop: f64) -> Outcome {
+        let (step, indicator) = self.step_to_event(stop)?;
+        self.progress.point = step.end;
+        let mut completed = Completed::default();
+        if self.layout.needs_completed_step {
+            completed = self.model.completed_step()?;
+        }
+        if completed.terminates {
+            return Err(self.ending("completedIntegratorStep"));
+        }
+        match indicator {
+            Some(indicator) => self.state_event(indicator),
+            None if completed.enters_event_mode => self.step_event(),
+            None => Ok(()),
+        }
+    }
+}
+
+/// Returns whether an instant is not later than a time (s), apart from rounding.
+fn is_due(instant: f64, time: f64) -> bool {
+    instant <= time + 1e-12 * time.abs().max(instant.abs())
+}
+
+impl Progress {
+    fn new(layout: &Layout) -> Self {
+        Self {
+            mode: Mode::default(),
+            point: Point::default(),
+            integrator: Radau::new(layout.tolerance),
+            events: Events::default(),
+            set: BTreeMap::new(),
+        }
+    }
+}
+
+impl<M: ContinuousModel> Exchange<M> {
+    /// Makes a step of the integrator, which ends at the first state event, or at the time `stop`
+    /// (s) at last. Returns the indicator of the event.
+    ///
+    /// The polynomial of a step is exact at its ends only, to the tolerance. An event is therefore
+    /// located on the polynomial of a step that ends where the event was found before.
+    fn step_to_event(&mut self, stop: f64) -> Result<(Step, Option<usize>), CallFailure> {
+        let Progress { point, integrator, events, .. } = &mut self.progress;
+        let nominals = integrator.nominals.clone();
+        let mut equations = Equations { model: &mut self.model, layout: &self.layout, nominals };
+        let (mut until, mut trials) = (stop, 0);
+        loop {
+            trials += 1;
+            let before = integrator.pace();
+            let step = if point.states.is_empty() {
+                equations.place(until, &[]).map_err(Refusal::failure)?;
+                Step::empty(until)
+            } else {
+                integrator.step(&mut equations, point, until)?
+            };
+            let instant = match equations.event(events, point.time, &step) {
+                Ok(None) => return Ok((step, None)),
+                Ok(Some((instant, indicator)))
+                    if instant >= step.end.time || trials == MOST_LOCATIONS =>
+                {
+                    let end = &step.end;
+                    equations.place(end.time, &end.states).map_err(Refusal::failure)?;
+                    return Ok((step, Some(indicator)));
+                }
+                Ok(Some((instant, _))) => instant,
+                // The step may reach beyond an event.
+                Err(Refusal::Discarded(_)) if trials < MOST_LOCATIONS => {
+                    f64::midpoint(point.time, step.end.time)
+                }
+                Err(refusal) => return Err(refusal.failure()),
+            };
+            integrator.set_pace(before);
+            until = instant;
+        }
+    }
+
+    /// Carries out the time event at this instant, s.
+    fn time_event(&mut self, instant: f64) -> Outcome {
+        // Rounding may put the instant behind the present time.
+        let point = &mut self.progress.point;
+        if instant > point.time {
+            point.time = instant;
+            self.model.set_time(instant)?;
+        }
+        self.event(&"a time event")
+    }
+
+    fn step_event(&mut self) -> Outcome {
+        self.event(&"a step event")
+    }
+
+    fn state_event(&mut self, indicator: usize) -> Outcome {
+        let count = self.layout.indicators;
+        self.event(&format_args!("event indicator {} of {count}", indicator + 1))
+    }
+
+    fn event(&mut self, cause: &dyn Display) -> Outcome {
+        let time = self.progress.point.time;
+        if self.progress.events.is_stuck(time) {
+            let text = format!(
+                "{MOST_EVENTS} events in a row without an advance in time, the last one at t = {} s by {cause}: the model chatters",
+                rounded(time)
+            );
+            return Err(CallFailure::new("enterEventMode", text));
+        }
+        self.model.enter_event_mode()?;
+        self.progress.mode = Mode::Event;
+        self.settle()
+    }
+
+    /// Evaluates the discrete states until they settle, and returns to continuous-time mode.
+    fn settle(&mut self) -> Outcome {
+        let is_first = self.progress.mode == Mode::Initialization;
+        let (mut has_states, mut has_nominals) = (is_first, is_first);
+        let mut evaluations = 0;
+        loop {
+            let info = self.model.new_discrete_states()?;
+            has_states |= info.changes_states;
+            has_nominals |= info.changes_nominals;
+            self.progress.events.next_time = info.next_event;
+            if info.terminates {
+                return Err(self.ending("newDiscreteStates"));
+            }
+            if !info.needs_another {
+                break;
+            }
+            evaluations += 1;
+            if evaluations == MOST_EVALUATIONS {
+                let time = rounded(self.progress.point.time);
+                let text = format!(
+                    "the discrete states do not settle at t = {time} s: after {MOST_EVALUATIONS} evaluations they still need another one"
+                );
+                return Err(CallFailure::new("newDiscreteStates", text));
+            }
+        }
+        self.resume(has_states, has_nominals)
+    }
+
+    /// Returns to continuous-time mode, and reads what may have changed.
+    fn resume(&mut self, has_states: bool, has_nominals: bool) -> Outcome {
+        let Layout { states, indicators, .. } = &self.layout;
+        self.model.enter_continuous_time_mode()?;
+        let Progress { mode, point, integrator, events, .. } = &mut self.progress;
+        *mode = Mode::ContinuousTime;
+        point.states.resize(states.len(), 0.0);
+        point.derivatives.resize(states.len(), 0.0);
+        if !states.is_empty() {
+            if has_states {
+                self.model.states(&mut point.states)?;
+            }
+            if has_nominals {
+                integrator.nominals.resize(states.len(), 1.0);
+                self.model.nominals(&mut integrator.nominals)?;
+                let usable = |nominal: f64| nominal.is_finite() && nominal > 0.0;
+                integrator.nominals.iter_mut().filter(|n| !usable(**n)).for_each(|n| *n = 1.0);
+            }
+            self.model.derivatives(&mut point.derivatives).map_err(Refusal::failure)?;
+        }
+        integrator.restart();
+        let mut values = vec![0.0; *indicators];
+        if *indicators > 0 {
+            self.model.indicators(&mut values).map_err(Refusal::failure)?;
+        }
+        events.is_positive = values.iter().map(|value| *value > 0.0).collect();
+        Ok(())
+    }
+
+    /// Describes the end of the simulation by the model.
+    fn ending(&mut self, call: &'static str) -> CallFailure {
+        let time = self.progress.point.time;
+        let told = self.model.message();
+        let told = told.unwrap_or_else(|| "it asks to end the simulation".into());
+        let text = format!("{told}; it got as far as t = {} s", rounded(time));
+        CallFailure { ends: Some(time), ..CallFailure::answer(call, text) }
+    }
+}
+
+impl<M: ContinuousModel> Instance for Exchange<M> {
+    forward! { through: get_real, get_integer, get_boolean, terminate, directional_derivative }
+
+    fn set_real(&mut self, references: &[u32], values: &[f64]) -> Outcome {
+        let set = |model: &mut M| model.set_real(references, values);
+        self.set(Carrier::Real, (references, values), f64::to_bits, set)
+    }
+
+    fn set_integer(&mut self, references: &[u32], values: &[i32]) -> Outcome {
+        let set = |model: &mut M| model.set_integer(references, values);
+        self.set(
+            Carrier::Integer,
+            (references, values),
+            |value| u64::from(value.cast_unsigned()),
+            set,
+        )
+    }
+
+    fn set_boolean(&mut self, references: &[u32], values: &[i32]) -> Outcome {
+        let set = |model: &mut M| model.set_boolean(references, values);
+        self.set(
+            Carrier::Boolean,
+            (references, values),
+            |value| u64::from(value.cast_unsigned()),
+            set,
+        )
+    }
+
+    fn set_string(&mut self, reference: u32, value: &str) -> Outcome {
+        self.set_in_event(|model| model.set_string(reference, value))
+    }
+
+    fn enter_initialization(&mut self, start: f64, stop: f64) -> Outcome {
+        self.progress.point.time = start;
+        self.model.enter_initialization(start, stop)
+    }
+
+    fn exit_initialization(&mut self) -> Outcome {
+        self.model.exit_initialization()?;
+        self.settle()
+    }
+
+    fn do_step(&mut self, time: f64, step: f64) -> Outcome {
+        self.progress.events.begin(step);
+        self.integrate(time + step)
+    }
+
+    fn reset(&mut self) -> Outcome {
+        self.progress = Progress::new(&self.layout);
+        self.model.reset()
+    }
+
+    fn save(&mut self, number: usize) -> Outcome {
+        self.model.save(number)?;
+        match self.kept.get_mut(number) {
+            Some(kept) => *kept = self.progress.clone(),
+            None => self.kept.push(self.progress.clone()),
+        }
+        Ok(())
+    }
+
+    fn restore(&mut self, number: usize) -> Outcome {
+        self.model.restore(number)?;
+        // The model has checked the number.
+        if let Some(kept) = self.kept.get(number) {
+            self.progress = kept.clone();
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,222 @@
+//! Units for model exchange, whose states the program integrates. The FMU in C refuses calls that
+//! FMI does not allow in its mode.
+
+use crate::bench::{Bench, Recipe};
+use std::f64::consts::PI;
+use std::fs;
+
+const ALONE: &str = r#"
+title = "exchange"
+[simulation]
+stop = 2.0
+step = 0.1
+[components.m]
+fmu = "Model.fmu"
+unconnected = ["input", "whole"]
+[record]
+variables = ["m.x", "m.v", "m.mark", "m.events", "m.evaluations", "m.steps"]
+"#;
+
+fn bench(kind: &str, experiment: &str, description: &dyn Fn(String) -> String) -> Bench {
+    let flag = format!("-DKIND={kind}");
+    let files = ["exchange.c", "exchange.xml", "linux64"];
+    Bench::made(
+        experiment,
+        &Recipe { files, flags: &[&flag, "-lm"], description, ..Recipe::default() },
+    )
+}
+
+fn made(kind: &str, experiment: &str) -> Bench {
+    bench(kind, experiment, &|text| text)
+}
+
+/// Runs the experiment in this process, or in one of its own, and returns the rows.
+fn rows(bench: &Bench, arguments: &[&str]) -> Vec<Vec<f64>> {
+    let (code, _, errors) = bench.run(&[&["--quiet"], arguments].concat());
+    assert_eq!((code, errors.as_str()), (0, ""));
+    let text = fs::read_to_string(bench.path("out/loop/results.csv")).unwrap();
+    text.lines().skip(1).map(|row| row.split(',').map(|n| n.parse().unwrap()).collect()).collect()
+}
+
+/// Returns the error of a run that must fail.
+fn failure(bench: &Bench, arguments: &[&str]) -> String {
+    let (code, _, errors) = bench.run(&[&["--quiet"], arguments].concat());
+    assert_eq!(code, 1, "{errors}");
+    errors
+}
+
+#[test]
+fn oracle_a_ball_bounces_at_the_instants_of_the_closed_form() {
+    let bench = made("BALL", &ALONE.replace("stop = 2.0", "stop = 1.4"));
+    let results = rows(&bench, &[]);
+    // Height 1 m, 10 m/s²; each flight lasts half as long as the one before.
+    let first = 0.2_f64.sqrt();
+    let flight = |n: i32| 2.0 * first * 0.5_f64.powi(n);
+    let bounces: Vec<f64> = (0..6).map(|n| first + (1..=n).map(flight).sum::<f64>()).collect();
+    for row in &results {
+        let expected = bounces.iter().rev().find(|bounce| **bounce <= row[0]);
+        let [time, height, mark] = [row[0], row[1], row[3]];
+        assert!((mark - expected.unwrap_or(&0.0)).abs() < 1e-9, "{row:?}");
+        let since = time - expected.unwrap_or(&-first);
+        let number = bounces.iter().filter(|bounce| **bounce <= time).count() as i32;
+        let speed = if number >= 6 { 0.0 } else { 5.0 * flight(number) };
+        let closed = if number >= 6 { 0.0 } else { speed * since - 5.0 * since * since };
+        assert!((height - closed).abs() < 1e-8, "{row:?} {closed}");
+    }
+    // A process of its own and another run give the same bits.
+    assert_eq!(results, rows(&bench, &["--isolate"]));
+}
+
+#[test]
+fn oracle_zeros_of_a_swing_are_events_within_a_nanosecond() {
+    let text = ALONE.replace("unconnected", "tolerance = 1e-12\nunconnected");
+    for step in ["0.1", "0.7"] {
+        let results = rows(
+            &made(
+                "SWING",
+                &text
+                    .replace("step = 0.1", &format!("step = {step}"))
+                    .replace("stop = 2.0", "stop = 21.0"),
+            ),
+            &[],
+        );
+        for row in results {
+            let crossings = (row[0] / PI + 0.5).floor();
+            let expected = if crossings < 1.0 { 0.0 } else { (crossings - 0.5) * PI };
+            assert!((row[3] - expected).abs() < 1e-9, "{row:?} {expected}");
+            assert!((row[1] - row[0].cos()).abs() < 1e-9, "{row:?}");
+            assert!((row[4] - crossings - 1.0).abs() < 0.5, "{row:?}");
+        }
+    }
+}
+
+#[test]
+fn a_unit_without_states_has_time_events_and_ends_the_run() {
+    let without = |text: String| {
+        text.replacen(
+            "<Derivatives><Unknown index=\"3\"/><Unknown index=\"4\"/></Derivatives>",
+            "",
+            1,
+        )
+    };
+    let text = ALONE.replace("[components", "ends_with = \"m\"\n[components");
+    let bench = bench("TIMER", &text, &without);
+    let results = rows(&bench, &[]);
+    let marks: Vec<f64> = results.iter().map(|row| row[3]).collect();
+    for (row, mark) in results.iter().zip(&marks) {
+        let events = ((row[0] + 1e-9) / 0.25).floor();
+        assert!((mark - 0.25 * events).abs() < 1e-12, "{row:?}");
+    }
+    assert_eq!(results.len(), 16);
+    assert!((results.last().unwrap()[0] - 1.5).abs() < 1e-12);
+    let metrics = bench.json("out/loop/metrics.json");
+    assert_eq!(metrics["completed"], true);
+    let (_, summary, _) = bench.run(&[]);
+    assert!(
+        summary.contains("by m: it asks to end the simulation; it got as far as t = 1.5 s"),
+        "{summary}"
+    );
+}
+
+#[test]
+fn step_events_are_carried_out_unless_the_unit_needs_no_steps() {
+    for (needs, events) in [(true, 4.0), (false, 1.0)] {
+        let flags = |text: String| match needs {
+            true => text,
+            false => text.replacen(
+                "<ModelExchange",
+                "<ModelExchange completedIntegratorStepNotNeeded=\"true\"",
+                1,
+            ),
+        };
+        let last = rows(&bench("STEPPER", ALONE, &flags), &[]).pop().unwrap();
+        assert_eq!(last[4], events, "{last:?}");
+        assert_eq!(last[6] > 0.0, needs, "{last:?}");
+    }
+}
+
+#[test]
+fn oracle_a_stiff_unit_is_integrated_in_long_steps() {
+    let offers = |text: String| {
+        text.replacen("<ModelExchange", "<ModelExchange providesDirectionalDerivative=\"true\"", 1)
+    };
+    let mut counts = Vec::new();
+    for description in [&offers as &dyn Fn(String) -> String, &|text| text] {
+        let results = rows(&bench("STIFF", ALONE, description), &[]);
+        for row in &results {
+            let closed = (row[0].cos() + 1e-6 * row[0].sin()) / (1.0 + 1e-12);
+            assert!((row[1] - closed).abs() < 1e-8, "{row:?} {closed}");
+        }
+        counts.push(results.last().unwrap()[5]);
+    }
+    // Derivatives by differences take further evaluations.
+    assert!(counts[0] < counts[1] && counts[1] < 3000.0, "{counts:?}");
+}
+
+#[test]
+fn inputs_are_held_over_a_step_and_change_in_events() {
+    let table = "time,rate,whole\n0,0.5,1\n0.1,0.5,1\n0.2,-1,4\n2,-1,4\n";
+    let wires = "[components.table]\nfmu = \"t.csv\"\n[[connections]]\nfrom = \"table.rate\"\nto = \"m.input\"\n[record]";
+    let text = ALONE
+        .replace("unconnected = [\"input\", \"whole\"]", "unconnected = [\"whole\"]")
+        .replace("[simulation]", "[simulation]\norder = [\"table\", \"m\"]")
+        .replace("stop = 2.0", "stop = 0.3")
+        .replace("[record]", wires);
+    let bench = made("HELD", &text);
+    fs::write(bench.path("t.csv"), table).unwrap();
+    let results = rows(&bench, &["--set", "m.whole=3"]);
+    let [states, changes]: [Vec<f64>; 2] =
+        [2, 4].map(|c| results.iter().map(|row| row[c]).collect());
+    for (state, expected) in states.iter().zip([0.0, 0.05, 0.1, 0.0]) {
+        assert!((state - expected).abs() < 1e-12, "{states:?}");
+    }
+    // Initialization, and the change at 0.2 s
+    assert_eq!(changes, [1.0, 1.0, 1.0, 2.0]);
+    assert!((results[3][1] - 0.9).abs() < 1e-12, "{results:?}");
+}
+
+#[test]
+fn states_that_a_unit_discards_shorten_the_step() {
+    for row in rows(&made("DOMAIN", ALONE), &[]) {
+        let expected = if row[0] < 1.0 - 1e-9 { row[0] } else { row[0] - 1.0 };
+        assert!((row[1] - expected).abs() < 1e-9 || (row[0] - 2.0).abs() < 1e-9, "{row:?}");
+    }
+}
+
+#[test]
+fn models_without_progress_are_reported() {
+    for isolation in [&[][..], &["--isolate"]] {
+        let errors = failure(&made("CHATTER", ALONE), isolation);
+        assert!(errors.contains("1000 events in a row without an advance in time"), "{errors}");
+        assert!(
+            errors.contains("t = 0.35")
+                && errors.contains("by event indicator 1 of 1: the model chatters"),
+            "{errors}"
+        );
+        let errors = failure(&made("RESTLESS", ALONE), isolation);
+        assert!(
+            errors.contains("the discrete states do not settle at t = 0.0 s")
+                || errors.contains("do not settle at t = 0 s"),
+            "{errors}"
+        );
+    }
+}
+
+#[test]
+fn the_interface_and_the_tolerance_are_checked() {
+    let key = |keys: &str| ALONE.replace("unconnected", &format!("{keys}\nunconnected"));
+    let refusal = |text: &str| made("BALL", text).refusal(&[]);
+    assert!(
+        refusal(&key("interface = \"coSimulation\""))
+            .contains("[components.m] interface: Model.fmu offers no co-simulation")
+    );
+    assert!(refusal(&key("tolerance = 1.0")).contains("it must be from 1e-13 to 0.1"));
+    let other = Bench::with(
+        &ALONE.replace("[components.m]", "[components.m]\ninterface = \"modelExchange\""),
+    );
+    assert!(other.refusal(&[]).contains("Model.fmu offers no model exchange"));
+    let other = Bench::with(&ALONE.replace("[components.m]", "[components.m]\ntolerance = 1e-6"));
+    assert!(other.refusal(&[]).contains("in co-simulation the FMU chooses its accuracy"));
+    let (_, told, _) = made("BALL", ALONE).call(&["inspect", "--check", "Model.fmu"]);
+    assert!(told.contains("sound"), "{told}");
+}
