@@ -1,6 +1,7 @@
-"""ReentryPlant as model exchange under FMPy's CVode against its own co-simulation. For surfaces and
-jets see test_actuators.py."""
+"""ReentryPlant as model exchange, under FMPy's CVode and in the orchestrator, against its own
+co-simulation. For surfaces and jets see test_actuators.py."""
 
+import subprocess
 from ctypes import c_double
 
 import numpy as np
@@ -8,6 +9,7 @@ import pytest
 from fmpy import simulate_fmu
 from fmpy.fmi2 import FMU2Model
 
+from conftest import EXPERIMENTS, TARGET, program
 from fmi import ANGLES, MOMENT, RATES, Instance
 
 STOP = 20.0
@@ -167,3 +169,22 @@ def test_oracle_euler_converges_to_co_simulation_with_order_one(fmu):
     assert errors[0] < 1e-3
     for coarse, fine in zip(errors, errors[1:]):
         assert coarse / fine == pytest.approx(2.0, abs=0.1)
+
+
+def flown(folder, settings, *lines) -> np.ndarray:
+    """Angles (rad) and rates (rad/s) of a flight of LQR in the orchestrator, with these lines about the plant."""
+    values = [f'"{name}" = {repr(value).replace(chr(39), chr(34))}' for name, value in settings.items()]
+    text = [f"extends = '{EXPERIMENTS / 'lqr.toml'}'", "title = 'Exchange'", "[components.plant]", *lines]
+    recorded = '["plant.attitude.*", "plant.rate.*"]'
+    text += ["[components.plant.parameters]", '"integrator.step" = 0.001', *values, "[record]", f"variables = {recorded}"]
+    (folder / "exchange.toml").write_text("\n".join(text), encoding="utf-8")
+    command = [program("orchestrator"), "run", folder / "exchange.toml", "--stop", "10", "--quiet", "--force"]
+    subprocess.run([*command, "--out", folder / "out", "--fmu-dir", TARGET / "fmu"], check=True)
+    return np.loadtxt(folder / "out" / "results.csv", delimiter=",", skiprows=1)
+
+
+def test_oracle_the_orchestrator_integrates_as_its_co_simulation(settings, tmp_path):
+    own = flown(tmp_path, settings)
+    integrated = flown(tmp_path, settings, 'interface = "modelExchange"', "tolerance = 1e-11")
+    assert np.ptp(own, axis=0).min() > 1e-3
+    assert np.abs(integrated - own).max() < 1e-9

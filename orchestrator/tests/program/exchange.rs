@@ -51,15 +51,15 @@ fn oracle_a_ball_bounces_at_the_instants_of_the_closed_form() {
     let results = rows(&bench, &[]);
     // Height 1 m, 10 m/s²; each flight lasts half as long as the one before.
     let first = 0.2_f64.sqrt();
-    let flight = |n: i32| 2.0 * first * 0.5_f64.powi(n);
+    let flight = |n: u8| 2.0 * first * 0.5_f64.powi(n.into());
     let bounces: Vec<f64> = (0..6).map(|n| first + (1..=n).map(flight).sum::<f64>()).collect();
     for row in &results {
         let expected = bounces.iter().rev().find(|bounce| **bounce <= row[0]);
         let [time, height, mark] = [row[0], row[1], row[3]];
         assert!((mark - expected.unwrap_or(&0.0)).abs() < 1e-9, "{row:?}");
         let since = time - expected.unwrap_or(&-first);
-        let number = bounces.iter().filter(|bounce| **bounce <= time).count() as i32;
-        let speed = if number >= 6 { 0.0 } else { 5.0 * flight(number) };
+        let number = bounces.iter().filter(|bounce| **bounce <= time).count();
+        let speed = if number >= 6 { 0.0 } else { 5.0 * flight(number as u8) };
         let closed = if number >= 6 { 0.0 } else { speed * since - 5.0 * since * since };
         assert!((height - closed).abs() < 1e-8, "{row:?} {closed}");
     }
@@ -121,13 +121,9 @@ fn a_unit_without_states_has_time_events_and_ends_the_run() {
 #[test]
 fn step_events_are_carried_out_unless_the_unit_needs_no_steps() {
     for (needs, events) in [(true, 4.0), (false, 1.0)] {
-        let flags = |text: String| match needs {
-            true => text,
-            false => text.replacen(
-                "<ModelExchange",
-                "<ModelExchange completedIntegratorStepNotNeeded=\"true\"",
-                1,
-            ),
+        let flags = |text: String| {
+            let to = "<ModelExchange completedIntegratorStepNotNeeded=\"true\"";
+            if needs { text } else { text.replacen("<ModelExchange", to, 1) }
         };
         let last = rows(&bench("STEPPER", ALONE, &flags), &[]).pop().unwrap();
         assert_eq!(last[4], events, "{last:?}");
