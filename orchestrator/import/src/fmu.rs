@@ -263,7 +263,7 @@ impl Fmu {
                 Kind::Fmi3(_) => (None, true),
             };
             let folder = archive.folder.path();
-            let library = Library { file, folder, isolation, layout, is_fmi3 };
+            let library = Library { file, folder, isolation, is_fmi3, layout };
             return match library.instantiate(name, guid, &resources) {
                 Loaded::Whole(instance, fault) => Ok((instance, fault)),
                 Loaded::Unloadable(reason) => Err(archive.not_loaded(&entry, &reason)),

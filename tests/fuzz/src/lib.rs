@@ -13,6 +13,7 @@ pub use state::state;
 use campaign::definition::Campaign;
 use cosim::experiment::{Experiment, Overrides};
 use cosim::ssp;
+use fmi_master::description::InterfaceKind;
 use fmi_master::quantity;
 use fmu_import::description;
 use fmu_import::faults::faults;
@@ -142,7 +143,8 @@ pub fn vehicle(data: &[u8]) {
 pub fn table(data: &[u8]) {
     let _ = LookupTable::from_csv("t.csv", data);
     let Ok(fmu) = Fmu::open(&file("t.csv", data)) else { return };
-    let mut instance = fmu.instantiate("t", None).expect("a lookup table needs no library");
+    let instance = fmu.instantiate("t", InterfaceKind::CoSimulation, None);
+    let mut instance = instance.expect("a lookup table needs no library");
     let description = &fmu.description;
     let (_, interpolation) = description.find("interpolation").expect("every lookup table has it");
     for mode in [1, 2] {
