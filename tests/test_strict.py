@@ -110,6 +110,7 @@ USES = {
     "isolated": ["run", "lqr", "--out", "out", "--quiet", "--stop", "2", "--isolate"],
     "linearised": ["linearise", "lqr", "--at", "1", "--open", "plant.moment.*", "--out", "out.json"],
     "response": ["response", "lqr", "--at", "1", "--stop", "4", "--open", "plant.moment.x", "--out", "out"],
+    "exchange": ["run", "exchange.toml", "--out", "out", "--quiet", "--stop", "2"],
     "campaign": ["campaign", "few.toml", "--out", "out", "--jobs", "1", "--quiet", "--stop", "2"],
 }
 CAMPAIGN = f"""#:schema {EXPERIMENTS}/../../schema/campaign.json
@@ -123,18 +124,32 @@ case = 1
 """
 
 
+EXCHANGE = f"""#:schema {EXPERIMENTS}/../../schema/experiment.json
+extends = "{EXPERIMENTS}/lqr.toml"
+title = "The plant integrated by the master"
+
+[components.plant]
+interface = "modelExchange"
+"""
+MODES = {"2": ("complete", "continuous"), "3": ("step", "continuous")}
+
+
 @pytest.mark.parametrize("use", USES)
-@pytest.mark.parametrize("version", ["2"])
+@pytest.mark.parametrize("version", ["2", "3"])
 def test_the_orchestrator_keeps_to_the_standard(watched, tmp_path, version, use):
     units = [watched(name, version) for name in ("ReentryPlant", "LQR")]
     (tmp_path / "few.toml").write_text(CAMPAIGN)
+    (tmp_path / "exchange.toml").write_text(EXCHANGE)
     command = [program("orchestrator"), *USES[use], "--fmu-dir", units[0].folder]
     finished = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
     assert finished.returncode == 0, finished.stderr
     for unit in units:
         judge = unit.judge()
         assert judge.broken == []
-        assert (f"fmi{version}DoStep", "complete" if version == "2" else "step") in judge.seen
+        stepping, integrating = MODES[version]
+        exchanges = use == "exchange" and unit is units[0]
+        made = ("SetContinuousStates", integrating) if exchanges else ("DoStep", stepping)
+        assert (f"fmi{version}{made[0]}", made[1]) in judge.seen
 
 
 @pytest.fixture(scope="module")
