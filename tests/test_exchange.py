@@ -183,6 +183,7 @@ def flown(folder, settings, *lines) -> np.ndarray:
     return np.loadtxt(folder / "out" / "results.csv", delimiter=",", skiprows=1)
 
 
+@pytest.mark.importer("orchestrator", "model exchange", fmu="ReentryPlant", within=1e-9, to="our co-simulation")
 def test_oracle_the_orchestrator_integrates_as_its_co_simulation(settings, tmp_path):
     own = flown(tmp_path, settings)
     integrated = flown(tmp_path, settings, 'interface = "modelExchange"', "tolerance = 1e-11")

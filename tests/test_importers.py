@@ -126,11 +126,11 @@ WIRES = [("plant", "controller", name) for name in ANGLES + RATES] + [("controll
 SIGNALS = [(source, name) for source, _, name in WIRES]
 
 
-def orchestrate(folder, text, *arguments):
-    """Runs the orchestrator and returns the columns of the results by component and variable
-    name."""
+def orchestrate(folder, text, *arguments, fmus="fmu"):
+    """Runs the orchestrator with the FMUs of a folder in `target`, and returns the columns of the
+    results by component and variable name."""
     (folder / "experiment.toml").write_text(text)
-    command = [program("orchestrator"), "run", "experiment.toml", "--out", "out", "--fmu-dir", TARGET / "fmu", "--force", "--quiet"]
+    command = [program("orchestrator"), "run", "experiment.toml", "--out", "out", "--fmu-dir", TARGET / fmus, "--force", "--quiet"]
     done = subprocess.run([*command, *arguments], capture_output=True, text=True, timeout=60, cwd=folder)
     assert done.returncode == 0, done.stderr
     return columns(folder / "out" / "results.csv")
@@ -183,11 +183,23 @@ def test_oracle_fmpy_steps_an_fmu(fmu, by_hand, agree, name):
     agree(np.array([found[column] for column in reals(fmu(name))]).T, by_hand(name, differences))
 
 
+def alone(name) -> str:
+    """An experiment of one FMU."""
+    text = f'title = "alone"\n[simulation]\nstop = {STOP}\nstep = {STEP}\n[components.instance]\nfmu = "{name}.fmu"\nunconnected = ["*"]\n'
+    return text + '[record]\nvariables = ["instance.*"]\n'
+
+
 @each_fmu
 @pytest.mark.importer("orchestrator", "co-simulation", within=0.0)
 def test_oracle_the_orchestrator_steps_an_fmu(fmu, by_hand, agree, tmp_path, name):
-    text = f'title = "alone"\n[simulation]\nstop = {STOP}\nstep = {STEP}\n[components.instance]\nfmu = "{name}.fmu"\nunconnected = ["*"]\n'
-    found = orchestrate(tmp_path, text + '[record]\nvariables = ["instance.*"]\n')
+    found = orchestrate(tmp_path, alone(name))
+    agree(np.array([found[f"instance.{column}"] for column in reals(fmu(name))]).T, by_hand(name))
+
+
+@each_fmu
+@pytest.mark.importer("orchestrator", "FMI 3.0, co-simulation with event mode", within=0.0)
+def test_oracle_the_orchestrator_steps_an_fmu_of_fmi_3(fmu, by_hand, agree, tmp_path, name):
+    found = orchestrate(tmp_path, alone(name), fmus="fmi3")
     agree(np.array([found[f"instance.{column}"] for column in reals(fmu(name))]).T, by_hand(name))
 
 
@@ -272,6 +284,13 @@ def test_oracle_fmi_sim_integrates_the_plant(euler, agree, tmp_path):
 @pytest.mark.importer("orchestrator", "closed loop, sequential", plant=True, within=0.0)
 def test_oracle_the_orchestrator_closes_the_loop(loop, agree, tmp_path, name):
     found = orchestrate(tmp_path, EXPERIMENT.format(name, STOP, STEP))
+    agree(np.array([found[f"{component}.{signal}"] for component, signal in SIGNALS]).T, loop(name, jacobi=False, shifted=True))
+
+
+@each_controller
+@pytest.mark.importer("orchestrator", "FMI 3.0, closed loop, sequential", plant=True, within=0.0)
+def test_oracle_the_orchestrator_closes_the_loop_of_fmi_3(loop, agree, tmp_path, name):
+    found = orchestrate(tmp_path, EXPERIMENT.format(name, STOP, STEP), fmus="fmi3")
     agree(np.array([found[f"{component}.{signal}"] for component, signal in SIGNALS]).T, loop(name, jacobi=False, shifted=True))
 
 

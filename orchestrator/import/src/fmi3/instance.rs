@@ -2,8 +2,8 @@
 //!
 //! A unit with event mode is set in event mode, as its inputs jump at a communication point, and
 //! leaves it when it is stepped. A step is cut at the events that the unit announces and where it
-//! returns early. An event at the end of a step is handled at once by a unit whose inputs are never
-//! set. Otherwise it waits for the inputs of that point, and is handled when the next step begins.
+//! returns early. An event at the end of a step is handled at once by a unit without inputs. Otherwise
+//! it waits for the inputs of that point, and is handled when the next step begins.
 
 #![allow(unsafe_code)]
 
@@ -56,8 +56,6 @@ pub(crate) struct Fmi3Instance {
     present: Present,
     /// Start time, s.
     start: f64,
-    /// Whether inputs were set since the end of initialization.
-    gets_inputs: bool,
     /// Where it stood in the states that it keeps.
     kept: Vec<Present>,
 }
@@ -95,13 +93,7 @@ impl Fmi3Instance {
         });
         let unit = FmuInstance::made(handle, functions, None, listed, log, folder)?;
         let (lists, kept) = (Lists::default(), Vec::new());
-        Ok(Self { unit, layout, lists, present: NEW, start: 0.0, gets_inputs: false, kept })
-    }
-
-    /// Prepares for values to be set.
-    fn before_set(&mut self) -> Outcome {
-        self.gets_inputs |= self.present.mode != Mode::Initial;
-        self.enter_event_mode()
+        Ok(Self { unit, layout, lists, present: NEW, start: 0.0, kept })
     }
 
     /// Enters event mode, if the instance has it and steps.
@@ -214,22 +206,22 @@ impl Instance for Fmi3Instance {
     }
 
     fn set_real(&mut self, references: &[u32], values: &[f64]) -> Outcome {
-        self.before_set()?;
+        self.enter_event_mode()?;
         self.lists.set(&mut self.unit, &self.layout, references, values)
     }
 
     fn set_integer(&mut self, references: &[u32], values: &[i32]) -> Outcome {
-        self.before_set()?;
+        self.enter_event_mode()?;
         self.lists.set(&mut self.unit, &self.layout, references, values)
     }
 
     fn set_boolean(&mut self, references: &[u32], values: &[i32]) -> Outcome {
-        self.before_set()?;
+        self.enter_event_mode()?;
         self.lists.set(&mut self.unit, &self.layout, references, values)
     }
 
     fn set_string(&mut self, reference: u32, value: &str) -> Outcome {
-        self.before_set()?;
+        self.enter_event_mode()?;
         let Place { reference, element, length, .. } = self.layout.place(reference);
         let [gets, sets] = [false, true].map(|sets| call(ScalarType::String, sets));
         let Functions { get, set, .. } = self.unit.functions();
@@ -281,7 +273,7 @@ impl Instance for Fmi3Instance {
             let reached = self.do_part(now, inside.map_or(rest, |next| next - now))?;
             self.present.is_due |= next.is_some_and(|next| next <= reached + tolerance);
             if reached >= end - tolerance {
-                return if self.gets_inputs { Ok(()) } else { self.enter_step_mode(end) };
+                return if self.layout.has_inputs { Ok(()) } else { self.enter_step_mode(end) };
             }
             idle = if reached > now { 0 } else { idle + 1 };
             if idle > IDLE {
@@ -302,7 +294,7 @@ impl Instance for Fmi3Instance {
 
     fn reset(&mut self) -> Outcome {
         self.unit.call_plain("reset", self.unit.functions().reset)?;
-        (self.present, self.gets_inputs) = (NEW, false);
+        self.present = NEW;
         Ok(())
     }
 

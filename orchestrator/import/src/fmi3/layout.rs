@@ -9,6 +9,8 @@ pub(crate) struct Layout {
     names: Vec<String>,
     /// Whether instances have event mode.
     pub(super) has_events: bool,
+    /// Whether there are inputs.
+    pub(super) has_inputs: bool,
 }
 
 impl Layout {
@@ -19,6 +21,7 @@ impl Layout {
     pub(crate) fn new(description: &ModelDescription) -> Result<Self, String> {
         let interface = description.co_simulation.as_ref();
         let has_events = interface.is_some_and(|interface| interface.has("hasEventMode"));
+        let has_inputs = description.variables.iter().any(|known| known.causality == "input");
         let mut names = vec![String::new(); description.places.len()];
         for variable in &description.variables {
             let name = &variable.name;
@@ -40,7 +43,7 @@ impl Layout {
                 known.clone_from(name);
             }
         }
-        Ok(Self { places: description.places.clone(), names, has_events })
+        Ok(Self { places: description.places.clone(), names, has_events, has_inputs })
     }
 
     /// Returns the place of a variable.
