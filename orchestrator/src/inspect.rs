@@ -95,6 +95,11 @@ fn print(fmu: &Fmu, out: &mut impl Write) -> io::Result<()> {
     };
     line("co-simulation", &interface(&d.co_simulation))?;
     line("model exchange", &interface(&d.model_exchange))?;
+    if d.model_exchange.is_some() {
+        let (states, indicators) = (d.derivatives.len(), d.event_indicators);
+        let counts = format!("continuous states: {states}, event indicators: {indicators}");
+        line("integration", &counts)?;
+    }
     line("scheduled", &interface(&d.scheduled_execution))?;
     let experiment = &d.default_experiment;
     let named = [

@@ -136,14 +136,22 @@ fn version(root: &Element) -> Result<String, String> {
 fn description(root: &Element, variables: Variables) -> Result<ModelDescription, String> {
     let fmi_version = version(root)?;
     let is_fmi3 = fmi_version.starts_with("3.");
-    let Listed { variables, dependencies, places, arrays } = if is_fmi3 {
-        fmi3::read(root, &types(root))?
-    } else {
-        let variables = variables.finish(root)?;
-        let dependencies = dependencies(root, variables.len())?;
-        Listed { variables, dependencies, ..Listed::default() }
-    };
-    let count = variables.len();
+    let Listed { variables, dependencies, derivatives, event_indicators, places, arrays } =
+        if is_fmi3 {
+            fmi3::read(root, &types(root))?
+        } else {
+            let variables = variables.finish(root)?;
+            let count = variables.len();
+            Listed {
+                dependencies: dependencies(root, count)?,
+                derivatives: derivatives(root, count)?,
+                event_indicators: root
+                    .parsed("numberOfEventIndicators", "a whole number from 0 on")?
+                    .unwrap_or(0),
+                variables,
+                ..Listed::default()
+            }
+        };
     let text = |name: &str| root.attribute(name).unwrap_or_default().to_string();
     let experiment = root.child("DefaultExperiment");
     let proposed = |name: &str| experiment.map_or(Ok(None), |element| element.number(name));
@@ -164,10 +172,8 @@ fn description(root: &Element, variables: Variables) -> Result<ModelDescription,
             tolerance: proposed("tolerance")?,
         },
         units: units.map(unit).collect::<Result<_, _>>()?,
-        derivatives: if is_fmi3 { Vec::new() } else { derivatives(root, count)? },
-        event_indicators: root
-            .parsed("numberOfEventIndicators", "a whole number from 0 on")?
-            .unwrap_or(0),
+        derivatives,
+        event_indicators,
         dependencies,
         places,
         arrays,
@@ -184,6 +190,8 @@ fn description(root: &Element, variables: Variables) -> Result<ModelDescription,
 struct Listed {
     variables: Vec<Variable>,
     dependencies: BTreeMap<usize, Vec<usize>>,
+    derivatives: Vec<usize>,
+    event_indicators: usize,
     places: Vec<Place>,
     arrays: BTreeMap<String, Array>,
 }

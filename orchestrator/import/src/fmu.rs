@@ -46,8 +46,8 @@ struct Archive {
     folder: Rc<TemporaryFolder>,
     /// Whether the library for this platform has been checked.
     is_sound: Cell<bool>,
-    /// Layout of FMI 3.0, once an instance was made.
-    layout: OnceCell<Rc<Layout>>,
+    /// Layouts of FMI 3.0 for co-simulation and for model exchange, once an instance was made.
+    layouts: [OnceCell<Rc<Layout>>; 2],
 }
 
 impl Fmu {
@@ -71,7 +71,7 @@ impl Fmu {
         let archive = Archive {
             folder: Rc::new(folder),
             is_sound: Cell::new(false),
-            layout: OnceCell::new(),
+            layouts: <_>::default(),
         };
         Ok(Self { path: path.to_path_buf(), description, content: Content::Archive(archive) })
     }
@@ -249,21 +249,17 @@ impl Fmu {
         let (file, entry) = self.library(archive, kind)?;
         let kind = archive.kind(&self.description, kind)?;
         let resources = archive.folder.path().join("resources");
-        let resources = match &kind {
+        let resources = if kind.fmi3.is_some() {
             // A path that ends in a separator.
-            Kind::Fmi3(_) => resources.join("").display().to_string(),
-            Kind::Fmi2(_) => Url::from_directory_path(resources)
+            resources.join("").display().to_string()
+        } else {
+            Url::from_directory_path(resources)
                 .map_err(|()| "the temporary folder has no absolute path")?
-                .into(),
+                .into()
         };
         let guid = &self.description.guid;
         if let Some(isolation) = isolation {
-            let (layout, is_fmi3) = match kind {
-                Kind::Fmi2(layout) => (layout, false),
-                Kind::Fmi3(_) => (None, true),
-            };
-            let folder = archive.folder.path();
-            let library = Library { file, folder, isolation, is_fmi3, layout };
+            let library = Library { file, folder: archive.folder.path(), isolation, kind };
             return match library.instantiate(name, guid, &resources) {
                 Loaded::Whole(instance, fault) => Ok((instance, fault)),
                 Loaded::Unloadable(reason) => Err(archive.not_loaded(&entry, &reason)),
@@ -284,22 +280,18 @@ impl Fmu {
 impl Archive {
     /// Returns what an instance of this kind needs.
     fn kind(&self, description: &ModelDescription, kind: InterfaceKind) -> Result<Kind, String> {
-        match (kind, description.is_fmi3()) {
-            (InterfaceKind::CoSimulation, false) => Ok(Kind::Fmi2(None)),
-            (InterfaceKind::ModelExchange { tolerance }, false) => {
-                Ok(Kind::Fmi2(Some(exchange::Layout::new(description, tolerance)?)))
+        let exchange = match kind {
+            InterfaceKind::CoSimulation => None,
+            InterfaceKind::ModelExchange { tolerance } => {
+                Some(exchange::Layout::new(description, tolerance)?)
             }
-            (InterfaceKind::CoSimulation, true) => {
-                let layout = match self.layout.get() {
-                    Some(layout) => Rc::clone(layout),
-                    None => Rc::new(Layout::new(description)?),
-                };
-                Ok(Kind::Fmi3(Rc::clone(self.layout.get_or_init(|| layout))))
-            }
-            (InterfaceKind::ModelExchange { .. }, true) => Err(
-                "is for model exchange of FMI 3.0, which this program does not run: export the model for co-simulation or FMI 2.0".into(),
-            ),
+        };
+        let layout = &self.layouts[usize::from(exchange.is_some())];
+        if description.is_fmi3() && layout.get().is_none() {
+            let made = Layout::new(description, exchange.is_some())?;
+            layout.get_or_init(|| Rc::new(made));
         }
+        Ok(Kind { fmi3: layout.get().cloned(), exchange })
     }
 
     fn platforms(&self) -> Vec<String> {

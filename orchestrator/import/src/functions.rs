@@ -8,14 +8,11 @@ use libloading::Library;
 use std::ffi::{CStr, CString, c_int};
 use std::path::Path;
 
-/// The FMI functions that this program calls, and the library that holds them.
+/// The functions of FMI 2.0 that this program calls.
 pub(crate) struct Functions {
     pub(crate) instantiate: fmi::Instantiate,
-    pub(crate) free_instance: fmi::FreeInstance,
     pub(crate) setup_experiment: fmi::SetupExperiment,
     pub(crate) enter_initialization_mode: fmi::Plain,
-    pub(crate) exit_initialization_mode: fmi::Plain,
-    pub(crate) terminate: fmi::Plain,
     pub(crate) get_real: fmi::Get<f64>,
     pub(crate) get_integer: fmi::Get<i32>,
     pub(crate) get_boolean: fmi::Get<i32>,
@@ -23,22 +20,17 @@ pub(crate) struct Functions {
     pub(crate) set_integer: fmi::Set<i32>,
     pub(crate) set_boolean: fmi::Set<i32>,
     pub(crate) set_string: fmi::Set<fmi::Text>,
-    pub(crate) interface: InterfaceFunctions,
-    /// Optional, because nothing depends on it and some libraries lack it.
-    pub(crate) get_version: Option<fmi::GetText>,
-    /// Optional, because a new instance does the same.
-    pub(crate) reset: Option<fmi::Plain>,
-    /// Optional, because FMI asks for them only if the description declares them.
-    pub(crate) states: Option<StateFunctions>,
+    /// Optional, because FMI asks for it only if the description declares it.
     pub(crate) directional_derivative: Option<fmi::DirectionalDerivative>,
-    _library: Library,
+    pub(crate) interface: InterfaceFunctions,
+    common: Common,
 }
 
 /// The functions of the interface for which a library is loaded. It may lack those of the other.
 #[derive(Clone, Copy)]
 pub(crate) enum InterfaceFunctions {
     CoSimulation(StepFunctions),
-    ModelExchange(ExchangeFunctions),
+    ModelExchange { new_discrete_states: fmi::NewDiscreteStates, completed: fmi::CompletedStep },
 }
 
 /// The functions of co-simulation.
@@ -49,7 +41,23 @@ pub(crate) struct StepFunctions {
     pub(crate) get_boolean_status: fmi::GetStatus<c_int>,
 }
 
-/// The functions of model exchange.
+/// The functions that have the same types in all versions of FMI, and the library that holds them.
+pub(crate) struct Common {
+    pub(crate) free_instance: fmi::FreeInstance,
+    pub(crate) exit_initialization_mode: fmi::Plain,
+    pub(crate) terminate: fmi::Plain,
+    /// Optional, because a new instance does the same.
+    pub(crate) reset: Option<fmi::Plain>,
+    /// Optional, because FMI asks for them only if the description declares them.
+    pub(crate) states: Option<StateFunctions>,
+    /// Functions of model exchange, for which the library is loaded then.
+    pub(crate) exchange: Option<ExchangeFunctions>,
+    /// Optional, because nothing depends on it and some libraries lack it.
+    get_version: Option<fmi::GetText>,
+    symbols: Symbols,
+}
+
+/// The functions of model exchange that have the same types in all versions of FMI.
 #[derive(Clone, Copy)]
 pub(crate) struct ExchangeFunctions {
     pub(crate) set_time: fmi::SetTime,
@@ -59,40 +67,7 @@ pub(crate) struct ExchangeFunctions {
     pub(crate) get_derivatives: fmi::GetVector,
     pub(crate) get_indicators: fmi::GetVector,
     pub(crate) enter_event_mode: fmi::Plain,
-    pub(crate) new_discrete_states: fmi::NewDiscreteStates,
     pub(crate) enter_continuous_time_mode: fmi::Plain,
-    pub(crate) completed_integrator_step: fmi::CompletedStep,
-}
-
-impl InterfaceFunctions {
-    /// Returns the functions of a library.
-    ///
-    /// # Safety
-    /// They must not be called after the library was closed.
-    unsafe fn load(library: &Library, exchanges: bool) -> Result<Self, libloading::Error> {
-        // SAFETY: FMI 2.0 gives each function the type it is loaded as.
-        unsafe {
-            if !exchanges {
-                return Ok(Self::CoSimulation(StepFunctions {
-                    do_step: *library.get(b"fmi2DoStep\0")?,
-                    get_real_status: *library.get(b"fmi2GetRealStatus\0")?,
-                    get_boolean_status: *library.get(b"fmi2GetBooleanStatus\0")?,
-                }));
-            }
-            Ok(Self::ModelExchange(ExchangeFunctions {
-                set_time: *library.get(b"fmi2SetTime\0")?,
-                set_states: *library.get(b"fmi2SetContinuousStates\0")?,
-                get_states: *library.get(b"fmi2GetContinuousStates\0")?,
-                get_nominals: *library.get(b"fmi2GetNominalsOfContinuousStates\0")?,
-                get_derivatives: *library.get(b"fmi2GetDerivatives\0")?,
-                get_indicators: *library.get(b"fmi2GetEventIndicators\0")?,
-                enter_event_mode: *library.get(b"fmi2EnterEventMode\0")?,
-                new_discrete_states: *library.get(b"fmi2NewDiscreteStates\0")?,
-                enter_continuous_time_mode: *library.get(b"fmi2EnterContinuousTimeMode\0")?,
-                completed_integrator_step: *library.get(b"fmi2CompletedIntegratorStep\0")?,
-            }))
-        }
-    }
 }
 
 /// The functions by which an instance keeps its states.
@@ -103,110 +78,236 @@ pub(crate) struct StateFunctions {
     pub(crate) free: fmi::StateInPlace,
 }
 
-impl StateFunctions {
-    /// Returns the functions of a library that get, set and free a state, if it has all of them.
+/// A library, whose functions begin with the version of FMI.
+pub(crate) struct Symbols {
+    library: Library,
+    version: u8,
+}
+
+impl Symbols {
+    /// Loads a library.
+    pub(crate) fn open(file: &Path, version: u8) -> Result<Self, libloading::Error> {
+        // SAFETY: loading runs the library's own initializers, which are sound only if the library
+        // is. Whoever runs an FMU trusts its code. Some leave flushing to zero behind, as those of
+        // gcc's option -ffast-math do.
+        in_default(|| unsafe { Library::new(file) }).map(|library| Self { library, version })
+    }
+
+    /// Returns a function by its name without `fmi2` or `fmi3`.
     ///
     /// # Safety
-    /// They must not be called after the library was closed.
-    pub(crate) unsafe fn load(library: &Library, [get, set, free]: [&[u8]; 3]) -> Option<Self> {
-        // SAFETY: FMI gives each function the type it is loaded as.
+    /// The function must have this type, and must not be called after the library was closed.
+    pub(crate) unsafe fn get<T: Copy>(&self, name: &str) -> Result<T, libloading::Error> {
+        let name = format!("fmi{}{name}\0", self.version);
+        // SAFETY: as above.
+        unsafe { self.library.get(name.as_bytes()) }.map(|function| *function)
+    }
+}
+
+impl Common {
+    /// Loads the functions, with those of model exchange if it `exchanges`.
+    pub(crate) fn load(symbols: Symbols, exchanges: bool) -> Result<Self, libloading::Error> {
+        // SAFETY: FMI gives each function the type it is loaded as, and `symbols` keeps the code
+        // loaded as long as the pointers exist.
         unsafe {
-            Some(Self {
-                get: *library.get(get).ok()?,
-                set: *library.get(set).ok()?,
-                free: *library.get(free).ok()?,
+            Ok(Self {
+                free_instance: symbols.get("FreeInstance")?,
+                exit_initialization_mode: symbols.get("ExitInitializationMode")?,
+                terminate: symbols.get("Terminate")?,
+                reset: symbols.get("Reset").ok(),
+                states: StateFunctions::load(&symbols),
+                exchange: exchanges.then(|| ExchangeFunctions::load(&symbols)).transpose()?,
+                get_version: symbols.get("GetVersion").ok(),
+                symbols,
             })
         }
     }
+
+    /// Returns a line about the version that the library reports, if it is missing or another one.
+    /// A later revision is not.
+    pub(crate) fn version_fault(&self) -> Option<String> {
+        let version = self.symbols.version;
+        let Some(get_version) = self.get_version else {
+            return Some(format!("its library has no fmi{version}GetVersion"));
+        };
+        // SAFETY: FMI gives the function this type and allows the call at any time.
+        let reported = text_of(in_default(|| unsafe { get_version() }));
+        let rest = reported.strip_prefix(if version == 2 { "2.0" } else { "3" });
+        let is_supported = rest.is_some_and(|rest| rest.is_empty() || rest.starts_with('.'));
+        (!is_supported).then(|| {
+            format!("its library reports version \"{}\" of FMI", reported.escape_default())
+        })
+    }
+}
+
+impl ExchangeFunctions {
+    /// Returns the functions of a library.
+    ///
+    /// # Safety
+    /// They must not be called after the library was closed.
+    unsafe fn load(symbols: &Symbols) -> Result<Self, libloading::Error> {
+        let derivatives = ["GetDerivatives", "GetContinuousStateDerivatives"];
+        // SAFETY: FMI gives each function the type it is loaded as.
+        unsafe {
+            Ok(Self {
+                set_time: symbols.get("SetTime")?,
+                set_states: symbols.get("SetContinuousStates")?,
+                get_states: symbols.get("GetContinuousStates")?,
+                get_nominals: symbols.get("GetNominalsOfContinuousStates")?,
+                get_derivatives: symbols.get(derivatives[usize::from(symbols.version > 2)])?,
+                get_indicators: symbols.get("GetEventIndicators")?,
+                enter_event_mode: symbols.get("EnterEventMode")?,
+                enter_continuous_time_mode: symbols.get("EnterContinuousTimeMode")?,
+            })
+        }
+    }
+}
+
+impl StateFunctions {
+    /// Returns the functions of a library, if it has all of them.
+    ///
+    /// # Safety
+    /// They must not be called after the library was closed.
+    unsafe fn load(symbols: &Symbols) -> Option<Self> {
+        let state = if symbols.version == 2 { "FMUstate" } else { "FMUState" };
+        // SAFETY: FMI gives each function the type it is loaded as.
+        unsafe {
+            Some(Self {
+                get: symbols.get(&format!("Get{state}")).ok()?,
+                set: symbols.get(&format!("Set{state}")).ok()?,
+                free: symbols.get(&format!("Free{state}")).ok()?,
+            })
+        }
+    }
+}
+
+/// Result of an update of the discrete states.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[expect(clippy::struct_excessive_bools, reason = "FMI defines these flags")]
+pub(crate) struct EventInfo {
+    /// Whether the discrete states must be updated again.
+    pub(crate) needs_another: bool,
+    /// Whether the simulation has to end.
+    pub(crate) terminates: bool,
+    /// Whether the nominal values of the continuous states have changed.
+    pub(crate) changes_nominals: bool,
+    /// Whether the continuous states have changed.
+    pub(crate) changes_states: bool,
+    /// Time of the next time event, s.
+    pub(crate) next_event: Option<f64>,
+}
+
+/// Answer to a completed step of the integrator.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Completed {
+    /// Whether there is an event at the end of the step.
+    pub(crate) enters_event_mode: bool,
+    /// Whether the simulation has to end.
+    pub(crate) terminates: bool,
 }
 
 /// Functions of one version of FMI, as far as all instances need them.
 pub(crate) trait Table {
     /// The major version of FMI.
     const VERSION: u8;
-    fn free_instance(&self) -> fmi::FreeInstance;
-    fn states(&self) -> Option<StateFunctions>;
+    /// Names of the calls that compute derivatives and update discrete states, in failures.
+    const DERIVATIVES: &'static str;
+    const UPDATE: &'static str;
+
+    fn common(&self) -> &Common;
+
+    /// Updates the discrete states of an instance. Returns the result and the status.
+    ///
+    /// # Safety
+    /// The instance must be one of the library.
+    unsafe fn update(&self, handle: fmi::Handle) -> (EventInfo, c_int);
+
+    /// Tells an instance that a step of the integrator is complete. Returns the answer and the
+    /// status.
+    ///
+    /// # Safety
+    /// The instance must be one of the library.
+    unsafe fn complete_step(&self, handle: fmi::Handle) -> (Completed, c_int);
 }
+
+/// Status of a call that the interface of the instance does not have.
+pub(crate) const NOT_OFFERED: c_int = fmi::Status::Error as c_int;
 
 impl Table for Functions {
     const VERSION: u8 = 2;
+    const DERIVATIVES: &'static str = "getDerivatives";
+    const UPDATE: &'static str = "newDiscreteStates";
 
-    fn free_instance(&self) -> fmi::FreeInstance {
-        self.free_instance
+    fn common(&self) -> &Common {
+        &self.common
     }
 
-    fn states(&self) -> Option<StateFunctions> {
-        self.states
+    unsafe fn update(&self, handle: fmi::Handle) -> (EventInfo, c_int) {
+        let InterfaceFunctions::ModelExchange { new_discrete_states, .. } = self.interface else {
+            return (EventInfo::default(), NOT_OFFERED);
+        };
+        let mut info = fmi::EventInfo::default();
+        // SAFETY: FMI gives the function this type, and the structure is valid for the call.
+        let status = unsafe { new_discrete_states(handle, &raw mut info) };
+        let is_true = |value| value != fmi::FALSE;
+        let info = EventInfo {
+            needs_another: is_true(info.new_discrete_states_needed),
+            terminates: is_true(info.terminate_simulation),
+            changes_nominals: is_true(info.nominals_of_states_changed),
+            changes_states: is_true(info.values_of_states_changed),
+            next_event: is_true(info.next_event_time_defined).then_some(info.next_event_time),
+        };
+        (info, status)
     }
-}
 
-/// Loads a library.
-pub(crate) fn open(file: &Path) -> Result<Library, libloading::Error> {
-    // SAFETY: loading runs the library's own initializers, which are sound only if the library is.
-    // Whoever runs an FMU trusts its code. Some leave flushing to zero behind, as those of gcc's
-    // option -ffast-math do.
-    in_default(|| unsafe { Library::new(file) })
+    unsafe fn complete_step(&self, handle: fmi::Handle) -> (Completed, c_int) {
+        let InterfaceFunctions::ModelExchange { completed, .. } = self.interface else {
+            return (Completed::default(), NOT_OFFERED);
+        };
+        let (mut event, mut ends) = (fmi::FALSE, fmi::FALSE);
+        // SAFETY: FMI gives the function this type, and both pointers are valid for the call.
+        let status = unsafe { completed(handle, fmi::TRUE, &raw mut event, &raw mut ends) };
+        let [enters_event_mode, terminates] = [event, ends].map(|value| value != fmi::FALSE);
+        (Completed { enters_event_mode, terminates }, status)
+    }
 }
 
 impl Functions {
     /// Loads a library for model exchange if it `exchanges`, otherwise for co-simulation.
     pub(crate) fn load(file: &Path, exchanges: bool) -> Result<Self, libloading::Error> {
-        let library = open(file)?;
-        // SAFETY: FMI 2.0 gives each function the type it is loaded as, and `_library` keeps the
-        // code loaded as long as the pointers exist.
+        let symbols = Symbols::open(file, Self::VERSION)?;
+        // SAFETY: FMI 2.0 gives each function the type it is loaded as, and `common` keeps the code
+        // loaded as long as the pointers exist.
         unsafe {
+            let interface = if exchanges {
+                InterfaceFunctions::ModelExchange {
+                    new_discrete_states: symbols.get("NewDiscreteStates")?,
+                    completed: symbols.get("CompletedIntegratorStep")?,
+                }
+            } else {
+                InterfaceFunctions::CoSimulation(StepFunctions {
+                    do_step: symbols.get("DoStep")?,
+                    get_real_status: symbols.get("GetRealStatus")?,
+                    get_boolean_status: symbols.get("GetBooleanStatus")?,
+                })
+            };
             Ok(Self {
-                instantiate: *library.get(b"fmi2Instantiate\0")?,
-                free_instance: *library.get(b"fmi2FreeInstance\0")?,
-                setup_experiment: *library.get(b"fmi2SetupExperiment\0")?,
-                enter_initialization_mode: *library.get(b"fmi2EnterInitializationMode\0")?,
-                exit_initialization_mode: *library.get(b"fmi2ExitInitializationMode\0")?,
-                terminate: *library.get(b"fmi2Terminate\0")?,
-                get_real: *library.get(b"fmi2GetReal\0")?,
-                get_integer: *library.get(b"fmi2GetInteger\0")?,
-                get_boolean: *library.get(b"fmi2GetBoolean\0")?,
-                set_real: *library.get(b"fmi2SetReal\0")?,
-                set_integer: *library.get(b"fmi2SetInteger\0")?,
-                set_boolean: *library.get(b"fmi2SetBoolean\0")?,
-                set_string: *library.get(b"fmi2SetString\0")?,
-                interface: InterfaceFunctions::load(&library, exchanges)?,
-                get_version: library.get(b"fmi2GetVersion\0").ok().map(|function| *function),
-                reset: library.get(b"fmi2Reset\0").ok().map(|function| *function),
-                states: StateFunctions::load(
-                    &library,
-                    [b"fmi2GetFMUstate\0", b"fmi2SetFMUstate\0", b"fmi2FreeFMUstate\0"],
-                ),
-                directional_derivative: library
-                    .get(b"fmi2GetDirectionalDerivative\0")
-                    .ok()
-                    .map(|function| *function),
-                _library: library,
+                instantiate: symbols.get("Instantiate")?,
+                setup_experiment: symbols.get("SetupExperiment")?,
+                enter_initialization_mode: symbols.get("EnterInitializationMode")?,
+                get_real: symbols.get("GetReal")?,
+                get_integer: symbols.get("GetInteger")?,
+                get_boolean: symbols.get("GetBoolean")?,
+                set_real: symbols.get("SetReal")?,
+                set_integer: symbols.get("SetInteger")?,
+                set_boolean: symbols.get("SetBoolean")?,
+                set_string: symbols.get("SetString")?,
+                directional_derivative: symbols.get("GetDirectionalDerivative").ok(),
+                interface,
+                common: Common::load(symbols, exchanges)?,
             })
         }
     }
-
-    /// Returns a line about the version that the library reports, if it is missing or not FMI 2.0.
-    pub(crate) fn version_fault(&self) -> Option<String> {
-        version_fault(self.get_version, "fmi2GetVersion", "2.0")
-    }
-}
-
-/// Returns a line about the version that a library reports by this function, if it is missing or
-/// another one. A later revision is not.
-pub(crate) fn version_fault(
-    get_version: Option<fmi::GetText>,
-    name: &str,
-    expected: &str,
-) -> Option<String> {
-    let Some(get_version) = get_version else {
-        return Some(format!("its library has no {name}"));
-    };
-    // SAFETY: FMI gives the function this type and allows the call at any time.
-    let version = text_of(in_default(|| unsafe { get_version() }));
-    let rest = version.strip_prefix(expected);
-    let is_supported = rest.is_some_and(|rest| rest.is_empty() || rest.starts_with('.'));
-    (!is_supported)
-        .then(|| format!("its library reports version \"{}\" of FMI", version.escape_default()))
 }
 
 /// Copies the C string at `text`; a null pointer gives an empty string.

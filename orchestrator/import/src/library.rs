@@ -10,9 +10,7 @@
 use crate::crash::Calling;
 use crate::fmi::{self, Status};
 use crate::folder::TemporaryFolder;
-use crate::functions::{
-    ExchangeFunctions, Functions, InterfaceFunctions, StepFunctions, Table, c_texts,
-};
+use crate::functions::{Functions, InterfaceFunctions, StepFunctions, Table, c_texts};
 use crate::log::Log;
 use crate::logs::{self, Listed};
 use float_environment::in_default;
@@ -51,6 +49,14 @@ pub(crate) fn foreign<R>(log: &Log, name: &'static str, function: impl FnOnce() 
     in_default(function)
 }
 
+/// Keeps a state under a number, in place of an earlier one with that number.
+pub(crate) fn put<T>(kept: &mut Vec<T>, number: usize, state: T) {
+    match kept.get_mut(number) {
+        Some(kept) => *kept = state,
+        None => kept.push(state),
+    }
+}
+
 /// The data that must live as long as an instance.
 struct InstanceData<F> {
     functions: F,
@@ -80,8 +86,7 @@ impl FmuInstance {
     pub(crate) fn new(
         functions: Functions,
         log: Rc<Log>,
-        guid: &str,
-        resources: &str,
+        (guid, resources): (&str, &str),
         folder: Option<Rc<TemporaryFolder>>,
     ) -> Result<Self, String> {
         let texts = c_texts([&log.component, guid, resources])?;
@@ -104,7 +109,7 @@ impl FmuInstance {
 
         let kind = match functions.interface {
             InterfaceFunctions::CoSimulation(_) => fmi::CO_SIMULATION,
-            InterfaceFunctions::ModelExchange(_) => fmi::MODEL_EXCHANGE,
+            InterfaceFunctions::ModelExchange { .. } => fmi::MODEL_EXCHANGE,
         };
         // SAFETY: FMI 2.0 gives the function this type; the texts outlive the call, and the
         // instance keeps callbacks and log alive as long as the instance, as FMI demands.
@@ -120,18 +125,6 @@ impl FmuInstance {
             )
         });
         Self::made(handle, functions, Some(callbacks), listed, log, folder)
-    }
-
-    /// Calls a function of model exchange.
-    pub(crate) fn call_exchange(
-        &mut self,
-        call: &'static str,
-        function: impl FnOnce(&ExchangeFunctions, fmi::Handle) -> c_int,
-    ) -> Outcome {
-        self.call(call, |functions, handle| match &functions.interface {
-            InterfaceFunctions::ModelExchange(functions) => function(functions, handle),
-            InterfaceFunctions::CoSimulation(_) => Status::Error as c_int,
-        })
     }
 
     /// Describes why a step was discarded. FMI 2.0, section 4.2.3, lets an FMU end the simulation
@@ -263,25 +256,43 @@ impl<F: Table> FmuInstance<F> {
         }
     }
 
+    /// Leaves initialization mode.
+    pub(crate) fn begin(&mut self) -> Outcome {
+        let function = self.data.functions.common().exit_initialization_mode;
+        self.call_plain("exitInitializationMode", function)
+    }
+
+    /// Ends the simulation.
+    pub(crate) fn end(&mut self) -> Outcome {
+        self.call_plain("terminate", self.data.functions.common().terminate)
+    }
+
+    /// Goes back to the state behind instantiation.
+    pub(crate) fn start_anew(&mut self) -> Outcome {
+        let Some(reset) = self.data.functions.common().reset else {
+            let text = format!("its library has no fmi{}Reset", F::VERSION);
+            return Err(CallFailure::new("reset", text));
+        };
+        self.call_plain("reset", reset)
+    }
+
     /// Keeps the present state under a number, as [`Instance::save`] does.
     pub(crate) fn keep(&mut self, number: usize) -> Outcome {
-        let Some(functions) = self.data.functions.states() else {
+        let Some(functions) = self.data.functions.common().states else {
             return Err(CallFailure::new("getFMUstate", "its library keeps no states"));
         };
         // A null pointer asks for a new state.
         let mut state = self.kept.get(number).copied().unwrap_or(std::ptr::null_mut());
         // SAFETY: the instance is alive, and the state is null or one that it made.
         self.call("getFMUstate", |_, handle| unsafe { (functions.get)(handle, &raw mut state) })?;
-        match self.kept.get_mut(number) {
-            Some(kept) => *kept = state,
-            None => self.kept.push(state),
-        }
+        put(&mut self.kept, number, state);
         Ok(())
     }
 
     /// Goes back to the state with this number, as [`Instance::restore`] does.
     pub(crate) fn go_back(&mut self, number: usize) -> Outcome {
-        let (Some(functions), Some(&state)) = (self.data.functions.states(), self.kept.get(number))
+        let (Some(functions), Some(&state)) =
+            (self.data.functions.common().states, self.kept.get(number))
         else {
             return Err(CallFailure::new("setFMUstate", "no such state was kept"));
         };
@@ -297,8 +308,8 @@ impl<F: Table> Drop for FmuInstance<F> {
             // so the instance is leaked.
             std::mem::forget(Rc::clone(&self.data));
         } else {
-            let free_instance = self.data.functions.free_instance();
-            if let Some(functions) = self.data.functions.states() {
+            let free_instance = self.data.functions.common().free_instance;
+            if let Some(functions) = self.data.functions.common().states {
                 for state in &mut self.kept {
                     foreign(&self.data.log, "freeFMUstate", || {
                         // SAFETY: the instance is alive, made this state, and frees it only here.
@@ -367,7 +378,7 @@ impl Instance for FmuInstance {
     }
 
     fn exit_initialization(&mut self) -> Outcome {
-        self.call_plain("exitInitializationMode", self.data.functions.exit_initialization_mode)
+        self.begin()
     }
 
     fn do_step(&mut self, time: f64, step: f64) -> Outcome {
@@ -385,14 +396,11 @@ impl Instance for FmuInstance {
     }
 
     fn terminate(&mut self) -> Outcome {
-        self.call_plain("terminate", self.data.functions.terminate)
+        self.end()
     }
 
     fn reset(&mut self) -> Outcome {
-        let Some(reset) = self.data.functions.reset else {
-            return Err(CallFailure::new("reset", "its library has no fmi2Reset"));
-        };
-        self.call_plain("reset", reset)
+        self.start_anew()
     }
 
     fn save(&mut self, number: usize) -> Outcome {

@@ -2,10 +2,11 @@
 
 use crate::description;
 use crate::error::with_causes;
-use crate::exchange;
-use crate::fmi3::{self, Fmi3Instance, Layout};
+use crate::exchange::{self, ContinuousModel, Exchange};
+use crate::fmi3::{self, Fmi3Unit, Layout, StepInstance};
 use crate::folder::TemporaryFolder;
-use crate::functions::Functions;
+use crate::functions::{Functions, Table as _};
+use crate::library::FmuInstance;
 use crate::log::Log;
 use crate::xml;
 use fmi_master::description::ModelDescription;
@@ -35,15 +36,16 @@ pub(crate) enum Refusal {
 }
 
 /// Kind of an instance.
-pub(crate) enum Kind {
-    /// One of FMI 2.0, with what model exchange needs if it is one for model exchange.
-    Fmi2(Option<exchange::Layout>),
-    /// One of FMI 3.0 for co-simulation.
-    Fmi3(Rc<Layout>),
+pub(crate) struct Kind {
+    /// What FMI 3.0 calls the variables; `None` for an instance of FMI 2.0.
+    pub(crate) fmi3: Option<Rc<Layout>>,
+    /// What model exchange needs; `None` for co-simulation.
+    pub(crate) exchange: Option<exchange::Layout>,
 }
 
 /// Loads a library into this process and makes an instance with this identifier and these
-/// resources. Returns it with what is wrong with the version of FMI that the library names.
+/// resources, the path of which ends in a separator. Returns it with what is wrong with the version
+/// of FMI that the library names. `folder` holds the unpacked archive, if it would vanish otherwise.
 pub(crate) fn loaded(
     file: &Path,
     kind: Kind,
@@ -52,18 +54,31 @@ pub(crate) fn loaded(
     folder: Option<Rc<TemporaryFolder>>,
 ) -> Result<(Box<dyn Instance>, Option<String>), Refusal> {
     let unloadable = |error: libloading::Error| Refusal::Unloadable(with_causes(&error));
-    match kind {
-        Kind::Fmi2(layout) => {
-            let functions = Functions::load(file, layout.is_some()).map_err(unloadable)?;
-            let fault = functions.version_fault();
-            let instance = exchange::fmi2::instantiate(functions, log, named, folder, layout);
-            Ok((instance.map_err(Refusal::Refused)?, fault))
-        }
-        Kind::Fmi3(layout) => {
-            let functions = fmi3::Functions::load(file).map_err(unloadable)?;
-            let fault = functions.version_fault();
-            let instance = Fmi3Instance::new(functions, layout, log, named, folder);
-            Ok((Box::new(instance.map_err(Refusal::Refused)?), fault))
-        }
+    let Kind { fmi3, exchange } = kind;
+    let exchanges = exchange.is_some();
+    if let Some(layout) = fmi3 {
+        let functions = fmi3::Functions::load(file, exchanges).map_err(unloadable)?;
+        let fault = functions.common().version_fault();
+        let unit = Fmi3Unit::new(functions, layout, log, named, folder);
+        let instance = unit.and_then(|unit| integrated(unit, exchange, StepInstance::new));
+        return Ok((instance.map_err(Refusal::Refused)?, fault));
     }
+    let functions = Functions::load(file, exchanges).map_err(unloadable)?;
+    let fault = functions.common().version_fault();
+    let unit = FmuInstance::new(functions, log, named, folder);
+    let instance = unit.and_then(|unit| integrated(unit, exchange, Ok));
+    Ok((instance.map_err(Refusal::Refused)?, fault))
+}
+
+/// Adds an integrator to an instance for model exchange, or what an instance for co-simulation
+/// needs.
+fn integrated<M: ContinuousModel + 'static, I: Instance + 'static>(
+    model: M,
+    exchange: Option<exchange::Layout>,
+    stepped: impl FnOnce(M) -> Result<I, String>,
+) -> Result<Box<dyn Instance>, String> {
+    Ok(match exchange {
+        Some(layout) => Box::new(Exchange::new(model, layout)),
+        None => Box::new(stepped(model)?),
+    })
 }

@@ -6,10 +6,11 @@
 /* What the states x and v do. */
 enum Kind {
     BALL,    /* bounces with half its speed, and lies still below a speed of 0.1 */
-    SWING,   /* x'' = -x, an event at each zero of x */
+    SWING,   /* x'' = -x, an event at each zero of x, after which the nominal values have changed */
     TIMER,   /* no states: events at 0.25, 0.5, …, that of 1.5 ends the simulation */
     STEPPER, /* x' = 1, a step event behind 0.5 sets x back to 0 */
     CHATTER, /* x' runs towards the zero of x from both sides */
+    ENDING,  /* x' = 1, a completed step behind 0.5 ends the simulation */
     STIFF,   /* x' = -1e6 (x - cos t) */
     HELD,    /* x' = the integer input, v' = the real input */
     DOMAIN,  /* x' = 1 for x up to 1.001 only, an event at 1 sets x back to 0 */
@@ -37,11 +38,11 @@ typedef struct {
     const Callbacks *callbacks;
     enum Mode mode;
     double time, x[2], input, mark, next;
-    int whole, events, evaluations, side, steps;
+    int whole, events, evaluations, side, steps, has_new_nominals;
 } Model;
 
 static Model *start(Model *m, const Callbacks *callbacks) {
-    *m = (Model){.callbacks = callbacks, .mode = INSTANTIATED, .next = 0.25, .side = 1};
+    *m = (Model){.callbacks = callbacks, .mode = INSTANTIATED, .next = 0.25, .side = 1, .has_new_nominals = 1};
     m->x[0] = KIND == STIFF ? 1.0 / (1.0 + 1e-12) : KIND == BALL || KIND == SWING ? 1.0 : KIND == CHATTER ? 0.35 : 0.0;
     return m;
 }
@@ -95,6 +96,7 @@ int fmi2NewDiscreteStates(Model *m, EventInfo *info) {
         m->x[0] = 0.0;
         info->changes_states = 1;
         break;
+    case SWING: info->changes_nominals = m->has_new_nominals = 1; break;
     case CHATTER: m->side = m->x[0] > 0.0; break;
     case RESTLESS: info->needs_another = 1; break;
     default: break;
@@ -107,7 +109,7 @@ int fmi2CompletedIntegratorStep(Model *m, int no_set_state, int *enters_event_mo
     (void)no_set_state;
     m->steps++;
     *enters_event_mode = KIND == STEPPER && m->x[0] > 0.5;
-    *terminates = 0;
+    *terminates = KIND == ENDING && m->x[0] > 0.5;
     return OK;
 }
 
@@ -125,11 +127,14 @@ int fmi2GetContinuousStates(Model *m, double *x, size_t n) {
 }
 int fmi2GetNominalsOfContinuousStates(Model *m, double *x, size_t n) {
     NEEDS(EVENT | CONTINUOUS);
+    if (!m->has_new_nominals) return wrong(m, "a second reading of the nominal values");
+    m->has_new_nominals = 0;
     for (size_t i = 0; i < n; i++) x[i] = 1.0;
     return OK;
 }
 int fmi2GetDerivatives(Model *m, double *d, size_t n) {
     NEEDS(EVENT | CONTINUOUS);
+    if (m->has_new_nominals) return wrong(m, "fmi2GetDerivatives, before the nominal values are read,");
     m->evaluations++;
     d[0] = d[1] = 0.0;
     switch (KIND) {

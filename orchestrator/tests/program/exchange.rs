@@ -17,38 +17,59 @@ unconnected = ["input", "whole"]
 variables = ["m.x", "m.v", "m.mark", "m.events", "m.evaluations", "m.steps"]
 "#;
 
-fn bench(kind: &str, experiment: &str, description: &dyn Fn(String) -> String) -> Bench {
+/// Changes of the descriptions of FMI 2.0 and 3.0, as texts that others replace.
+type Changes = [[&'static str; 2]; 2];
+
+/// Makes the FMU by FMI 2.0 and by 3.0, where its two states are one array.
+fn changed(kind: &str, experiment: &str, changes: Changes) -> [Bench; 2] {
     let flag = format!("-DKIND={kind}");
-    let files = ["exchange.c", "exchange.xml", "linux64"];
-    Bench::made(
-        experiment,
-        &Recipe { files, flags: &[&flag, "-lm"], description, ..Recipe::default() },
-    )
+    let three = experiment.replace("\"m.x\", \"m.v\"", "\"m.x\"");
+    let versions = [
+        (experiment, ["exchange.c", "exchange.xml", "linux64"]),
+        (&three, ["exchange3.c", "exchange3.xml", "x86_64-linux"]),
+    ];
+    [0, 1].map(|version| {
+        let ((experiment, files), [from, to]) = (versions[version], changes[version]);
+        let description = &|text: String| text.replacen(from, to, 1);
+        Bench::made(
+            experiment,
+            &Recipe { files, flags: &[&flag, "-lm"], description, ..Recipe::default() },
+        )
+    })
 }
 
-fn made(kind: &str, experiment: &str) -> Bench {
-    bench(kind, experiment, &|text| text)
+fn made(kind: &str, experiment: &str) -> [Bench; 2] {
+    changed(kind, experiment, [["", ""]; 2])
 }
 
-/// Runs the experiment in this process, or in one of its own, and returns the rows.
-fn rows(bench: &Bench, arguments: &[&str]) -> Vec<Vec<f64>> {
-    let (code, _, errors) = bench.run(&[&["--quiet"], arguments].concat());
-    assert_eq!((code, errors.as_str()), (0, ""));
-    let text = fs::read_to_string(bench.path("out/loop/results.csv")).unwrap();
-    text.lines().skip(1).map(|row| row.split(',').map(|n| n.parse().unwrap()).collect()).collect()
+/// Runs the experiment in this process, or in one of its own, and returns the rows, which are the
+/// same by both versions of FMI.
+fn rows(benches: &[Bench; 2], arguments: &[&str]) -> Vec<Vec<f64>> {
+    let [two, three] = [0, 1].map(|version| -> Vec<Vec<f64>> {
+        let bench = &benches[version];
+        let (code, _, errors) = bench.run(&[&["--quiet"], arguments].concat());
+        assert_eq!((code, errors.as_str()), (0, ""));
+        let text = fs::read_to_string(bench.path("out/loop/results.csv")).unwrap();
+        let numbers = |row: &str| row.split(',').map(|n| n.parse().unwrap()).collect();
+        text.lines().skip(1).map(numbers).collect()
+    });
+    assert_eq!(two, three);
+    two
 }
 
-/// Returns the error of a run that must fail.
-fn failure(bench: &Bench, arguments: &[&str]) -> String {
-    let (code, _, errors) = bench.run(&[&["--quiet"], arguments].concat());
-    assert_eq!(code, 1, "{errors}");
-    errors
+/// Returns the errors of runs that must fail.
+fn failures(benches: &[Bench; 2], arguments: &[&str]) -> [String; 2] {
+    [0, 1].map(|version| {
+        let (code, _, errors) = benches[version].run(&[&["--quiet"], arguments].concat());
+        assert_eq!(code, 1, "{errors}");
+        errors
+    })
 }
 
 #[test]
 fn oracle_a_ball_bounces_at_the_instants_of_the_closed_form() {
-    let bench = made("BALL", &ALONE.replace("stop = 2.0", "stop = 1.4"));
-    let results = rows(&bench, &[]);
+    let benches = made("BALL", &ALONE.replace("stop = 2.0", "stop = 1.4"));
+    let results = rows(&benches, &[]);
     // Height 1 m, 10 m/s²; each flight lasts half as long as the one before.
     let first = 0.2_f64.sqrt();
     let flight = |n: u8| 2.0 * first * 0.5_f64.powi(n.into());
@@ -64,7 +85,7 @@ fn oracle_a_ball_bounces_at_the_instants_of_the_closed_form() {
         assert!((height - closed).abs() < 1e-8, "{row:?} {closed}");
     }
     // A process of its own and another run give the same bits.
-    assert_eq!(results, rows(&bench, &["--isolate"]));
+    assert_eq!(results, rows(&benches, &["--isolate"]));
 }
 
 #[test]
@@ -92,16 +113,13 @@ fn oracle_zeros_of_a_swing_are_events_within_a_nanosecond() {
 
 #[test]
 fn a_unit_without_states_has_time_events_and_ends_the_run() {
-    let without = |text: String| {
-        text.replacen(
-            "<Derivatives><Unknown index=\"3\"/><Unknown index=\"4\"/></Derivatives>",
-            "",
-            1,
-        )
-    };
     let text = ALONE.replace("[components", "ends_with = \"m\"\n[components");
-    let bench = bench("TIMER", &text, &without);
-    let results = rows(&bench, &[]);
+    let without = [
+        ["<Derivatives><Unknown index=\"3\"/><Unknown index=\"4\"/></Derivatives>", ""],
+        ["<ContinuousStateDerivative valueReference=\"2\"/>", ""],
+    ];
+    let benches = changed("TIMER", &text, without);
+    let results = rows(&benches, &[]);
     let marks: Vec<f64> = results.iter().map(|row| row[3]).collect();
     for (row, mark) in results.iter().zip(&marks) {
         let events = ((row[0] + 1e-9) / 0.25).floor();
@@ -109,23 +127,38 @@ fn a_unit_without_states_has_time_events_and_ends_the_run() {
     }
     assert_eq!(results.len(), 16);
     assert!((results.last().unwrap()[0] - 1.5).abs() < 1e-12);
-    let metrics = bench.json("out/loop/metrics.json");
-    assert_eq!(metrics["completed"], true);
-    let (_, summary, _) = bench.run(&[]);
-    assert!(
-        summary.contains("by m: it asks to end the simulation; it got as far as t = 1.5 s"),
-        "{summary}"
-    );
+    ended(&benches, 1.5);
+}
+
+#[test]
+fn a_completed_step_may_end_the_run() {
+    let text = ALONE.replace("[components", "ends_with = \"m\"\n[components");
+    let benches = made("ENDING", &text);
+    let results = rows(&benches, &[]);
+    let [time, x] = [0, 1].map(|column| results.last().unwrap()[column]);
+    assert!(0.5 < x && (x - time).abs() < 1e-12, "{results:?}");
+    ended(&benches, time);
+}
+
+/// Checks that the component has ended the runs at this time, s.
+fn ended(benches: &[Bench; 2], time: f64) {
+    for bench in benches {
+        assert_eq!(bench.json("out/loop/metrics.json")["completed"], true);
+        let (_, summary, _) = bench.run(&[]);
+        let told = format!("by m: it asks to end the simulation; it got as far as t = {time} s");
+        assert!(summary.contains(&told), "{summary}");
+    }
 }
 
 #[test]
 fn step_events_are_carried_out_unless_the_unit_needs_no_steps() {
     for (needs, events) in [(true, 4.0), (false, 1.0)] {
-        let flags = |text: String| {
-            let to = "<ModelExchange completedIntegratorStepNotNeeded=\"true\"";
-            if needs { text } else { text.replacen("<ModelExchange", to, 1) }
-        };
-        let last = rows(&bench("STEPPER", ALONE, &flags), &[]).pop().unwrap();
+        let not_needed = [
+            ["<ModelExchange", "<ModelExchange completedIntegratorStepNotNeeded=\"true\""],
+            [" needsCompletedIntegratorStep=\"true\"", ""],
+        ];
+        let changes = if needs { [["", ""]; 2] } else { not_needed };
+        let last = rows(&changed("STEPPER", ALONE, changes), &[]).pop().unwrap();
         assert_eq!(last[4], events, "{last:?}");
         assert_eq!(last[6] > 0.0, needs, "{last:?}");
     }
@@ -133,12 +166,13 @@ fn step_events_are_carried_out_unless_the_unit_needs_no_steps() {
 
 #[test]
 fn oracle_a_stiff_unit_is_integrated_in_long_steps() {
-    let offers = |text: String| {
-        text.replacen("<ModelExchange", "<ModelExchange providesDirectionalDerivative=\"true\"", 1)
-    };
+    let offers = [
+        ["<ModelExchange", "<ModelExchange providesDirectionalDerivative=\"true\""],
+        ["<ModelExchange", "<ModelExchange providesDirectionalDerivatives=\"true\""],
+    ];
     let mut counts = Vec::new();
-    for description in [&offers as &dyn Fn(String) -> String, &|text| text] {
-        let results = rows(&bench("STIFF", ALONE, description), &[]);
+    for changes in [offers, [["", ""]; 2]] {
+        let results = rows(&changed("STIFF", ALONE, changes), &[]);
         for row in &results {
             let closed = (row[0].cos() + 1e-6 * row[0].sin()) / (1.0 + 1e-12);
             assert!((row[1] - closed).abs() < 1e-8, "{row:?} {closed}");
@@ -158,9 +192,11 @@ fn inputs_are_held_over_a_step_and_change_in_events() {
         .replace("[simulation]", "[simulation]\norder = [\"table\", \"m\"]")
         .replace("stop = 2.0", "stop = 0.3")
         .replace("[record]", wires);
-    let bench = made("HELD", &text);
-    fs::write(bench.path("t.csv"), table).unwrap();
-    let results = rows(&bench, &["--set", "m.whole=3"]);
+    let benches = made("HELD", &text);
+    for bench in &benches {
+        fs::write(bench.path("t.csv"), table).unwrap();
+    }
+    let results = rows(&benches, &["--set", "m.whole=3"]);
     let [states, changes]: [Vec<f64>; 2] =
         [2, 4].map(|c| results.iter().map(|row| row[c]).collect());
     for (state, expected) in states.iter().zip([0.0, 0.05, 0.1, 0.0]) {
@@ -182,37 +218,44 @@ fn states_that_a_unit_discards_shorten_the_step() {
 #[test]
 fn models_without_progress_are_reported() {
     for isolation in [&[][..], &["--isolate"]] {
-        let errors = failure(&made("CHATTER", ALONE), isolation);
-        assert!(errors.contains("1000 events in a row without an advance in time"), "{errors}");
-        assert!(
-            errors.contains("t = 0.35")
-                && errors.contains("by event indicator 1 of 1: the model chatters"),
-            "{errors}"
-        );
-        let errors = failure(&made("RESTLESS", ALONE), isolation);
-        assert!(
-            errors.contains("the discrete states do not settle at t = 0.0 s")
-                || errors.contains("do not settle at t = 0 s"),
-            "{errors}"
-        );
+        for errors in failures(&made("CHATTER", ALONE), isolation) {
+            assert!(errors.contains("1000 events in a row without an advance in time"), "{errors}");
+            assert!(
+                errors.contains("t = 0.35")
+                    && errors.contains("by event indicator 1 of 1: the model chatters"),
+                "{errors}"
+            );
+        }
+        let errors = failures(&made("RESTLESS", ALONE), isolation);
+        for (errors, call) in errors.iter().zip(["newDiscreteStates", "updateDiscreteStates"]) {
+            assert!(errors.contains("the discrete states do not settle at t = 0 s"), "{errors}");
+            assert!(errors.contains(call), "{errors}");
+        }
     }
 }
 
 #[test]
 fn the_interface_and_the_tolerance_are_checked() {
     let key = |keys: &str| ALONE.replace("unconnected", &format!("{keys}\nunconnected"));
-    let refusal = |text: &str| made("BALL", text).refusal(&[]);
-    assert!(
-        refusal(&key("interface = \"coSimulation\""))
-            .contains("[components.m] interface: Model.fmu offers no co-simulation")
-    );
-    assert!(refusal(&key("tolerance = 1.0")).contains("it must be from 1e-13 to 0.1"));
+    for bench in made("BALL", &key("interface = \"coSimulation\"")) {
+        let refusal = bench.refusal(&[]);
+        assert!(
+            refusal.contains("[components.m] interface: Model.fmu offers no co-simulation"),
+            "{refusal}"
+        );
+    }
+    let [bench, _] = made("BALL", &key("tolerance = 1.0"));
+    assert!(bench.refusal(&[]).contains("it must be from 1e-13 to 0.1"));
     let other = Bench::with(
         &ALONE.replace("[components.m]", "[components.m]\ninterface = \"modelExchange\""),
     );
     assert!(other.refusal(&[]).contains("Model.fmu offers no model exchange"));
     let other = Bench::with(&ALONE.replace("[components.m]", "[components.m]\ntolerance = 1e-6"));
     assert!(other.refusal(&[]).contains("in co-simulation the FMU chooses its accuracy"));
-    let (_, told, _) = made("BALL", ALONE).call(&["inspect", "--check", "Model.fmu"]);
-    assert!(told.contains("sound"), "{told}");
+    for bench in made("BALL", ALONE) {
+        let (_, told, _) = bench.call(&["inspect", "--check", "Model.fmu"]);
+        assert!(told.contains("sound"), "{told}");
+        let (_, told, _) = bench.call(&["inspect", "Model.fmu"]);
+        assert!(told.contains("continuous states: 2, event indicators: 1\n"), "{told}");
+    }
 }

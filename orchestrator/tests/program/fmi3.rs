@@ -201,10 +201,7 @@ fn what_cannot_be_run_is_refused_with_its_reason() {
             &scheduled,
             "offers no co-simulation, only scheduled execution: export the model for co-simulation",
         ),
-        (
-            &exchange,
-            "is for model exchange of FMI 3.0, which this program does not run: export the model for co-simulation or FMI 2.0",
-        ),
+        (&exchange, "InstantiateModelExchange"),
         (
             &later,
             "is an FMU for FMI 4.0, this program runs FMI 2.0 and 3.0: export the model for one of them",

@@ -98,6 +98,8 @@ pub(super) fn read(root: &Element, types: &Types) -> Result<Listed, String> {
         }
     }
     listed.dependencies = dependencies(root, &positions)?;
+    listed.derivatives = structured(root, "ContinuousStateDerivative", &positions)?;
+    listed.event_indicators = structured(root, "EventIndicator", &positions)?.len();
     Ok(listed)
 }
 
@@ -202,6 +204,44 @@ fn indices(number: usize, shape: &[usize]) -> String {
     if indices.is_empty() { String::new() } else { format!("[{}]", indices.join(",")) }
 }
 
+/// Returns the entries of the model structure with this name.
+fn entries<'a>(root: &'a Element, name: &'a str) -> impl Iterator<Item = &'a Element> {
+    let all = root.child("ModelStructure").into_iter().flat_map(|list| &list.children);
+    all.filter(move |child| child.name == name)
+}
+
+/// Returns the positions of the variable to which an entry of the model structure refers.
+fn find<'a>(
+    entry: &Element,
+    reference: u32,
+    positions: &'a BTreeMap<u32, Positions>,
+) -> Result<&'a Positions, String> {
+    positions.get(&reference).ok_or_else(|| {
+        format!(
+            "{} refers to the value reference {reference}, which no variable has",
+            entry.title()
+        )
+    })
+}
+
+/// Returns the positions of all elements of the variables that the model structure lists under this
+/// name.
+fn structured(
+    root: &Element,
+    name: &str,
+    positions: &BTreeMap<u32, Positions>,
+) -> Result<Vec<usize>, String> {
+    let mut listed = Vec::new();
+    for entry in entries(root, name) {
+        let Positions { firsts, length } = find(entry, reference(entry)?, positions)?;
+        listed.extend(firsts[0]..firsts[0] + length);
+        if listed.len() > MOST {
+            return Err(format!("lists more than {MOST} elements as {name}"));
+        }
+    }
+    Ok(listed)
+}
+
 /// Returns the positions of the variables that each output depends on, by the position of the
 /// output. Elements of an array depend on all elements of others.
 fn dependencies(
@@ -209,24 +249,15 @@ fn dependencies(
     positions: &BTreeMap<u32, Positions>,
 ) -> Result<BTreeMap<usize, Vec<usize>>, String> {
     let mut dependencies = BTreeMap::new();
-    let outputs = root.child("ModelStructure").into_iter().flat_map(|s| &s.children);
-    for output in outputs.filter(|child| child.name == "Output") {
-        let find = |reference: u32| {
-            positions.get(&reference).ok_or_else(|| {
-                format!(
-                    "{} refers to the value reference {reference}, which no variable has",
-                    output.title()
-                )
-            })
-        };
-        let Positions { firsts, length } = find(reference(output)?)?;
+    for output in entries(root, "Output") {
+        let Positions { firsts, length } = find(output, reference(output)?, positions)?;
         let Some(text) = output.attribute("dependencies") else { continue };
         let mut needed = Vec::new();
         for text in text.split_whitespace() {
             let known = text.parse().map_err(|_| {
                 format!("\"{}\" in {} is no value reference", text.escape_default(), output.title())
             });
-            let Positions { firsts, length } = find(known?)?;
+            let Positions { firsts, length } = find(output, known?, positions)?;
             needed.extend(firsts[0]..firsts[0] + length);
         }
         // Without an entry an output depends on everything.

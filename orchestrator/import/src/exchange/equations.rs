@@ -3,6 +3,7 @@
 use super::events::Events;
 use super::model::{ContinuousModel, Layout, Refusal};
 use super::radau::{Point, Step, System};
+use crate::functions::Table as _;
 use nalgebra::DMatrix;
 
 /// The equations of a model between two events.
@@ -15,8 +16,8 @@ pub(super) struct Equations<'a, M> {
 impl<M: ContinuousModel> Equations<'_, M> {
     /// Brings the model to a time (s) and states.
     pub(super) fn place(&mut self, time: f64, states: &[f64]) -> Result<(), Refusal> {
-        self.model.set_time(time).map_err(Refusal::Failed)?;
-        if states.is_empty() { Ok(()) } else { self.model.set_states(states) }
+        self.model.unit().set_time(time).map_err(Refusal::Failed)?;
+        if states.is_empty() { Ok(()) } else { self.model.unit().set_states(states) }
     }
 
     /// Finds the first event of a step that begins at a time (s). Returns the time (s) after it,
@@ -42,7 +43,7 @@ impl<M: ContinuousModel> Equations<'_, M> {
                 states.copy_from_slice(&step.end.states);
             }
             this.place(time, &states)?;
-            this.model.indicators(&mut indicators)?;
+            this.model.unit().indicators(&mut indicators)?;
             Ok(events.crossed(&indicators))
         };
         // An indicator may cross zero and come back within the step.
@@ -68,6 +69,8 @@ impl<M: ContinuousModel> Equations<'_, M> {
 }
 
 impl<M: ContinuousModel> System for Equations<'_, M> {
+    const CALL: &'static str = M::Functions::DERIVATIVES;
+
     fn derivatives(
         &mut self,
         time: f64,
@@ -75,7 +78,7 @@ impl<M: ContinuousModel> System for Equations<'_, M> {
         derivatives: &mut [f64],
     ) -> Result<(), Refusal> {
         self.place(time, states)?;
-        if states.is_empty() { Ok(()) } else { self.model.derivatives(derivatives) }
+        if states.is_empty() { Ok(()) } else { self.model.unit().derivatives(derivatives) }
     }
 
     fn jacobian(&mut self, at: &Point, jacobian: &mut DMatrix<f64>) -> Result<(), Refusal> {

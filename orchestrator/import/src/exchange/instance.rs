@@ -2,8 +2,10 @@
 
 use super::equations::Equations;
 use super::events::{Events, MOST_EVENTS};
-use super::model::{Completed, ContinuousModel, Layout, Refusal};
+use super::model::{ContinuousModel, Layout, Refusal};
 use super::radau::{Point, Radau, Step};
+use crate::functions::{Completed, Table as _};
+use crate::library::put;
 use fmi_master::description::Carrier;
 use fmi_master::forward;
 use fmi_master::instance::{CallFailure, Instance, Outcome};
@@ -49,7 +51,8 @@ pub(crate) struct Exchange<M> {
 
 impl<M: ContinuousModel> Exchange<M> {
     /// Adds an integrator to a new instance.
-    pub(crate) fn new(model: M, layout: Layout) -> Self {
+    pub(crate) fn new(mut model: M, layout: Layout) -> Self {
+        model.unit().tolerance = Some(layout.tolerance);
         let progress = Progress::new(&layout);
         Self { model, layout, progress, kept: Vec::new() }
     }
@@ -77,7 +80,7 @@ impl<M: ContinuousModel> Exchange<M> {
 
     fn set_in_event(&mut self, call: impl FnOnce(&mut M) -> Outcome) -> Outcome {
         if self.progress.mode == Mode::ContinuousTime {
-            self.model.enter_event_mode()?;
+            self.model.unit().enter_event_mode()?;
             self.progress.mode = Mode::Event;
         }
         call(&mut self.model)
@@ -109,17 +112,24 @@ impl<M: ContinuousModel> Exchange<M> {
         self.progress.point = step.end;
         let mut completed = Completed::default();
         if self.layout.needs_completed_step {
-            completed = self.model.completed_step()?;
+            completed = self.model.unit().complete_step()?;
         }
         if completed.terminates {
             return Err(self.ending("completedIntegratorStep"));
         }
         match indicator {
-            Some(indicator) => self.state_event(indicator),
-            None if completed.enters_event_mode => self.step_event(),
+            Some(indicator) => {
+                let count = self.layout.indicators;
+                self.event(&format_args!("event indicator {} of {count}", indicator + 1))
+            }
+            None if completed.enters_event_mode => self.event(&"a step event"),
             None => Ok(()),
         }
     }
+}
+
+fn bits(value: i32) -> u64 {
+    value.cast_unsigned().into()
 }
 
 /// Returns whether an instant is not later than a time (s), apart from rounding.
@@ -186,18 +196,9 @@ impl<M: ContinuousModel> Exchange<M> {
         let point = &mut self.progress.point;
         if instant > point.time {
             point.time = instant;
-            self.model.set_time(instant)?;
+            self.model.unit().set_time(instant)?;
         }
         self.event(&"a time event")
-    }
-
-    fn step_event(&mut self) -> Outcome {
-        self.event(&"a step event")
-    }
-
-    fn state_event(&mut self, indicator: usize) -> Outcome {
-        let count = self.layout.indicators;
-        self.event(&format_args!("event indicator {} of {count}", indicator + 1))
     }
 
     fn event(&mut self, cause: &dyn Display) -> Outcome {
@@ -209,7 +210,7 @@ impl<M: ContinuousModel> Exchange<M> {
             );
             return Err(CallFailure::new("enterEventMode", text));
         }
-        self.model.enter_event_mode()?;
+        self.model.unit().enter_event_mode()?;
         self.progress.mode = Mode::Event;
         self.settle()
     }
@@ -220,12 +221,12 @@ impl<M: ContinuousModel> Exchange<M> {
         let (mut has_states, mut has_nominals) = (is_first, is_first);
         let mut evaluations = 0;
         loop {
-            let info = self.model.new_discrete_states()?;
+            let info = self.model.unit().update()?;
             has_states |= info.changes_states;
             has_nominals |= info.changes_nominals;
             self.progress.events.next_time = info.next_event;
             if info.terminates {
-                return Err(self.ending("newDiscreteStates"));
+                return Err(self.ending(M::Functions::UPDATE));
             }
             if !info.needs_another {
                 break;
@@ -236,7 +237,7 @@ impl<M: ContinuousModel> Exchange<M> {
                 let text = format!(
                     "the discrete states do not settle at t = {time} s: after {MOST_EVALUATIONS} evaluations they still need another one"
                 );
-                return Err(CallFailure::new("newDiscreteStates", text));
+                return Err(CallFailure::new(M::Functions::UPDATE, text));
             }
         }
         self.resume(has_states, has_nominals)
@@ -245,27 +246,27 @@ impl<M: ContinuousModel> Exchange<M> {
     /// Returns to continuous-time mode, and reads what may have changed.
     fn resume(&mut self, has_states: bool, has_nominals: bool) -> Outcome {
         let Layout { states, indicators, .. } = &self.layout;
-        self.model.enter_continuous_time_mode()?;
+        self.model.unit().enter_continuous_time_mode()?;
         let Progress { mode, point, integrator, events, .. } = &mut self.progress;
         *mode = Mode::ContinuousTime;
         point.states.resize(states.len(), 0.0);
         point.derivatives.resize(states.len(), 0.0);
         if !states.is_empty() {
             if has_states {
-                self.model.states(&mut point.states)?;
+                self.model.unit().states(&mut point.states)?;
             }
             if has_nominals {
                 integrator.nominals.resize(states.len(), 1.0);
-                self.model.nominals(&mut integrator.nominals)?;
+                self.model.unit().nominals(&mut integrator.nominals)?;
                 let usable = |nominal: f64| nominal.is_finite() && nominal > 0.0;
                 integrator.nominals.iter_mut().filter(|n| !usable(**n)).for_each(|n| *n = 1.0);
             }
-            self.model.derivatives(&mut point.derivatives).map_err(Refusal::failure)?;
+            self.model.unit().derivatives(&mut point.derivatives).map_err(Refusal::failure)?;
         }
         integrator.restart();
         let mut values = vec![0.0; *indicators];
         if *indicators > 0 {
-            self.model.indicators(&mut values).map_err(Refusal::failure)?;
+            self.model.unit().indicators(&mut values).map_err(Refusal::failure)?;
         }
         events.is_positive = values.iter().map(|value| *value > 0.0).collect();
         Ok(())
@@ -274,7 +275,7 @@ impl<M: ContinuousModel> Exchange<M> {
     /// Describes the end of the simulation by the model.
     fn ending(&mut self, call: &'static str) -> CallFailure {
         let time = self.progress.point.time;
-        let told = self.model.message();
+        let told = self.model.unit().message();
         let told = told.unwrap_or_else(|| "it asks to end the simulation".into());
         let text = format!("{told}; it got as far as t = {} s", rounded(time));
         CallFailure { ends: Some(time), ..CallFailure::answer(call, text) }
@@ -291,22 +292,12 @@ impl<M: ContinuousModel> Instance for Exchange<M> {
 
     fn set_integer(&mut self, references: &[u32], values: &[i32]) -> Outcome {
         let set = |model: &mut M| model.set_integer(references, values);
-        self.set(
-            Carrier::Integer,
-            (references, values),
-            |value| u64::from(value.cast_unsigned()),
-            set,
-        )
+        self.set(Carrier::Integer, (references, values), bits, set)
     }
 
     fn set_boolean(&mut self, references: &[u32], values: &[i32]) -> Outcome {
         let set = |model: &mut M| model.set_boolean(references, values);
-        self.set(
-            Carrier::Boolean,
-            (references, values),
-            |value| u64::from(value.cast_unsigned()),
-            set,
-        )
+        self.set(Carrier::Boolean, (references, values), bits, set)
     }
 
     fn set_string(&mut self, reference: u32, value: &str) -> Outcome {
@@ -335,10 +326,7 @@ impl<M: ContinuousModel> Instance for Exchange<M> {
 
     fn save(&mut self, number: usize) -> Outcome {
         self.model.save(number)?;
-        match self.kept.get_mut(number) {
-            Some(kept) => *kept = self.progress.clone(),
-            None => self.kept.push(self.progress.clone()),
-        }
+        put(&mut self.kept, number, self.progress.clone());
         Ok(())
     }
 

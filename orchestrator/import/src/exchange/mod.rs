@@ -1,24 +1,24 @@
 //! Model exchange: instances whose continuous states this program integrates.
 //!
-//! A [`ContinuousModel`](model::ContinuousModel) computes derivatives, event indicators and discrete
-//! states. With an integrator it becomes an [`Exchange`](instance::Exchange), which the master steps
-//! like any other instance: its inputs are held over a step. The calls follow FMI 2.0.5, section
-//! 3.2.3.
+//! A [`ContinuousModel`] computes derivatives, event indicators and discrete states. With an
+//! integrator it becomes an [`Exchange`], which the master steps like any other instance: its inputs
+//! are held over a step. The calls follow FMI 2.0.5, section 3.2.3, and FMI 3.0.2, section 3.2.
 //!
 //! | module | content |
 //! |---|---|
-//! | `model` | what a model offers, whatever the version of FMI |
-//! | `fmi2` | the functions of FMI 2.0 |
+//! | `model` | what the integration needs to know of a model |
+//! | `calls` | the calls, whatever the version of FMI |
 //! | `radau` | the integrator |
 //! | `equations` | the equations of a model as the integrator sees them, and finding state events |
 //! | `events` | what is known of events |
 //! | `instance` | the model with its integrator, as the master sees it |
 
+mod calls;
 mod equations;
 mod events;
-pub(crate) mod fmi2;
 mod instance;
 mod model;
 mod radau;
 
-pub(crate) use model::Layout;
+pub(crate) use instance::Exchange;
+pub(crate) use model::{ContinuousModel, Layout};

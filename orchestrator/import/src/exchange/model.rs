@@ -1,7 +1,9 @@
-//! What a model for model exchange offers, whatever the version of FMI.
+//! What the integration needs to know of a model.
 
+use crate::functions::Table;
+use crate::library::FmuInstance;
 use fmi_master::description::ModelDescription;
-use fmi_master::instance::{CallFailure, Instance, Outcome};
+use fmi_master::instance::{CallFailure, Instance};
 use serde::{Deserialize, Serialize};
 
 /// Reason why a model has not computed what was asked for.
@@ -22,55 +24,12 @@ impl Refusal {
     }
 }
 
-/// Result of an evaluation of the discrete states.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-#[expect(clippy::struct_excessive_bools, reason = "FMI defines these flags")]
-pub(crate) struct EventInfo {
-    /// Whether the discrete states must be evaluated again.
-    pub(crate) needs_another: bool,
-    /// Whether the simulation has to end.
-    pub(crate) terminates: bool,
-    /// Whether the nominal values of the continuous states have changed.
-    pub(crate) changes_nominals: bool,
-    /// Whether the continuous states have changed.
-    pub(crate) changes_states: bool,
-    /// Time of the next time event, s.
-    pub(crate) next_event: Option<f64>,
-}
-
-/// Answer to a completed step of the integrator.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct Completed {
-    /// Whether there is an event at the end of the step.
-    pub(crate) enters_event_mode: bool,
-    /// Whether the simulation has to end.
-    pub(crate) terminates: bool,
-}
-
-/// An instance for model exchange. All slices have the lengths that the description gives.
+/// An instance for model exchange, whatever the version of FMI.
 pub(crate) trait ContinuousModel: Instance {
-    /// Sets the time, s.
-    fn set_time(&mut self, time: f64) -> Outcome;
-    /// Sets the continuous states.
-    fn set_states(&mut self, states: &[f64]) -> Result<(), Refusal>;
-    /// Reads the continuous states.
-    fn states(&mut self, states: &mut [f64]) -> Outcome;
-    /// Reads the typical magnitudes of the continuous states.
-    fn nominals(&mut self, nominals: &mut [f64]) -> Outcome;
-    /// Computes the derivatives of the continuous states by time.
-    fn derivatives(&mut self, derivatives: &mut [f64]) -> Result<(), Refusal>;
-    /// Computes the event indicators.
-    fn indicators(&mut self, indicators: &mut [f64]) -> Result<(), Refusal>;
-    /// Enters event mode from continuous-time mode.
-    fn enter_event_mode(&mut self) -> Outcome;
-    /// Evaluates the discrete states in event mode.
-    fn new_discrete_states(&mut self) -> Result<EventInfo, CallFailure>;
-    /// Enters continuous-time mode from event mode.
-    fn enter_continuous_time_mode(&mut self) -> Outcome;
-    /// Tells the model that a step of the integrator is complete.
-    fn completed_step(&mut self) -> Result<Completed, CallFailure>;
-    /// Takes the last message of the model that reports no problem.
-    fn message(&mut self) -> Option<String>;
+    type Functions: Table;
+
+    /// Returns the instance itself, by which the calls of model exchange are made.
+    fn unit(&mut self) -> &mut FmuInstance<Self::Functions>;
 }
 
 /// What the integration of a unit needs to know of its description.
@@ -95,10 +54,15 @@ impl Layout {
     /// Returns a line about an entry of the model structure that is no derivative of a state.
     pub(crate) fn new(description: &ModelDescription, tolerance: f64) -> Result<Self, String> {
         let interface = description.model_exchange.as_ref().ok_or("offers no model exchange")?;
+        let needs_completed_step = if description.is_fmi3() {
+            interface.has("needsCompletedIntegratorStep")
+        } else {
+            !interface.has("completedIntegratorStepNotNeeded")
+        };
         let mut layout = Self {
             indicators: description.event_indicators,
             has_directional_derivatives: interface.has("providesDirectionalDerivative"),
-            needs_completed_step: !interface.has("completedIntegratorStepNotNeeded"),
+            needs_completed_step,
             tolerance,
             ..Self::default()
         };

@@ -11,6 +11,8 @@ use nalgebra::{Complex, DMatrix, DVector, Dyn, LU};
 
 /// A system of ordinary differential equations.
 pub(super) trait System {
+    /// Name of the call that computes the derivatives, in failures.
+    const CALL: &'static str;
     /// Computes the derivatives by time, at a time (s) and for these states.
     fn derivatives(
         &mut self,
@@ -141,9 +143,9 @@ impl Radau {
     }
 
     /// Makes one step, which ends at the time `end` (s) or before it.
-    pub(super) fn step(
+    pub(super) fn step<S: System>(
         &mut self,
-        system: &mut impl System,
+        system: &mut S,
         from: &Point,
         end: f64,
     ) -> Result<Step, CallFailure> {
@@ -175,7 +177,7 @@ impl Radau {
                 return Err(discarded.unwrap_or_else(|| {
                     let time = rounded(from.time);
                     let text = format!("the integration needs steps below {shortest:.0e} s at t = {time} s: the derivatives are not finite, or jump without an event");
-                    CallFailure::new("getDerivatives", text)
+                    CallFailure::new(S::CALL, text)
                 }));
             }
         }

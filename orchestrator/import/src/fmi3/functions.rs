@@ -3,9 +3,8 @@
 #![allow(unsafe_code)]
 
 use crate::fmi::{self, Handle, Text};
-use crate::functions::{self, StateFunctions, Table};
+use crate::functions::{Common, Completed, EventInfo, NOT_OFFERED, Symbols, Table};
 use fmi_master::description::ScalarType;
-use libloading::Library;
 use std::ffi::{c_int, c_void};
 use std::path::Path;
 
@@ -15,7 +14,7 @@ pub(super) type LogMessage = unsafe extern "C" fn(*mut c_void, c_int, Text, Text
 /// resources, visibility, logging, use of event mode, permission of early return, variables of
 /// intermediate updates and their number, environment, and callbacks for messages and for
 /// intermediate updates.
-pub(super) type Instantiate = unsafe extern "C" fn(
+type InstantiateCoSimulation = unsafe extern "C" fn(
     Text,
     Text,
     Text,
@@ -29,6 +28,10 @@ pub(super) type Instantiate = unsafe extern "C" fn(
     LogMessage,
     *const c_void,
 ) -> Handle;
+/// Type of the function fmi3InstantiateModelExchange. The arguments are name, token, path of the
+/// resources, visibility, logging, environment, and the callback for messages.
+type InstantiateModelExchange =
+    unsafe extern "C" fn(Text, Text, Text, bool, bool, *mut c_void, LogMessage) -> Handle;
 /// Type of the function fmi3EnterInitializationMode. The arguments are whether there is a
 /// tolerance, the tolerance, the start time, whether there is a stop time, and the stop time.
 pub(super) type EnterInitialization =
@@ -40,7 +43,7 @@ pub(super) type Access =
 /// Type of the function fmi3UpdateDiscreteStates. The results are whether another update is needed,
 /// whether the simulation ends, whether nominal values and values of states have changed, whether
 /// the time of the next event is known, and that time.
-pub(super) type UpdateDiscreteStates = unsafe extern "C" fn(
+type UpdateDiscreteStates = unsafe extern "C" fn(
     Handle,
     *mut bool,
     *mut bool,
@@ -49,6 +52,10 @@ pub(super) type UpdateDiscreteStates = unsafe extern "C" fn(
     *mut bool,
     *mut f64,
 ) -> c_int;
+/// Type of the function fmi3CompletedIntegratorStep. The argument is whether the state before the
+/// step will never be restored; the results are whether there is an event, and whether the
+/// simulation ends.
+type CompletedStep = unsafe extern "C" fn(Handle, bool, *mut bool, *mut bool) -> c_int;
 /// Type of the function fmi3DoStep. The arguments are the time, the step, and whether the state
 /// before the step will never be restored; the results are whether an event is to be handled,
 /// whether the simulation ends, whether the step ended early, and the time that was reached.
@@ -76,32 +83,39 @@ pub(super) type DirectionalDerivative = unsafe extern "C" fn(
     usize,
 ) -> c_int;
 
-/// The functions that this program calls, and the library that holds them.
+/// The functions of FMI 3.0 that this program calls.
 pub(crate) struct Functions {
-    pub(super) instantiate: Instantiate,
-    free_instance: fmi::FreeInstance,
     pub(super) enter_initialization_mode: EnterInitialization,
-    pub(super) exit_initialization_mode: fmi::Plain,
-    pub(super) enter_event_mode: fmi::Plain,
-    pub(super) update_discrete_states: UpdateDiscreteStates,
-    pub(super) enter_step_mode: fmi::Plain,
-    pub(super) do_step: DoStep,
-    pub(super) terminate: fmi::Plain,
-    pub(super) reset: fmi::Plain,
+    update_discrete_states: UpdateDiscreteStates,
     pub(super) get: [Option<Access>; ACCESS.len()],
     pub(super) set: [Option<Access>; ACCESS.len()],
     pub(super) directional_derivative: Option<DirectionalDerivative>,
-    states: Option<StateFunctions>,
-    get_version: Option<fmi::GetText>,
-    _library: Library,
+    pub(super) interface: InterfaceFunctions,
+    common: Common,
+}
+
+/// The functions of the interface for which a library is loaded. It may lack those of the other.
+#[derive(Clone, Copy)]
+pub(super) enum InterfaceFunctions {
+    CoSimulation(StepFunctions),
+    ModelExchange { instantiate: InstantiateModelExchange, completed: CompletedStep },
+}
+
+/// The functions of co-simulation.
+#[derive(Clone, Copy)]
+pub(super) struct StepFunctions {
+    pub(super) instantiate: InstantiateCoSimulation,
+    pub(super) enter_event_mode: fmi::Plain,
+    pub(super) enter_step_mode: fmi::Plain,
+    pub(super) do_step: DoStep,
 }
 
 /// Functions that get and set values of a type, and the names of the calls in failures.
 macro_rules! access {
     ($($scalar:ident)*) => {
         [$([
-            (concat!("fmi3Get", stringify!($scalar), "\0"), concat!("get", stringify!($scalar))),
-            (concat!("fmi3Set", stringify!($scalar), "\0"), concat!("set", stringify!($scalar))),
+            (concat!("Get", stringify!($scalar)), concat!("get", stringify!($scalar))),
+            (concat!("Set", stringify!($scalar)), concat!("set", stringify!($scalar))),
         ]),*]
     };
 }
@@ -110,7 +124,6 @@ macro_rules! access {
 const ACCESS: [[(&str, &str); 2]; 12] = access!(
     Float64 Float32 Int8 UInt8 Int16 UInt16 Int32 UInt32 Int64 UInt64 Boolean String
 );
-const STATES: [&[u8]; 3] = [b"fmi3GetFMUState\0", b"fmi3SetFMUState\0", b"fmi3FreeFMUState\0"];
 
 /// Returns the name of the call that gets or sets values of a type.
 pub(super) fn call(scalar: ScalarType, sets: bool) -> &'static str {
@@ -118,54 +131,74 @@ pub(super) fn call(scalar: ScalarType, sets: bool) -> &'static str {
 }
 
 impl Functions {
-    pub(crate) fn load(file: &Path) -> Result<Self, libloading::Error> {
-        let library = functions::open(file)?;
-        let access = |place: usize| {
-            // SAFETY: FMI 3.0 gives these functions this type, except for that of the values.
-            ACCESS.map(|names| unsafe { library.get(names[place].0.as_bytes()) }.ok().map(|f| *f))
-        };
-        let (get, set) = (access(0), access(1));
-        // SAFETY: FMI 3.0 gives each function the type it is loaded as, and `_library` keeps the
-        // code loaded as long as the pointers exist.
+    /// Loads a library for model exchange if it `exchanges`, otherwise for co-simulation.
+    pub(crate) fn load(file: &Path, exchanges: bool) -> Result<Self, libloading::Error> {
+        let symbols = Symbols::open(file, Self::VERSION)?;
+        // SAFETY: FMI 3.0 gives each function the type it is loaded as, except for the type of the
+        // values that are got or set, and `common` keeps the code loaded as long as the pointers
+        // exist.
         unsafe {
+            let interface = if exchanges {
+                InterfaceFunctions::ModelExchange {
+                    instantiate: symbols.get("InstantiateModelExchange")?,
+                    completed: symbols.get("CompletedIntegratorStep")?,
+                }
+            } else {
+                InterfaceFunctions::CoSimulation(StepFunctions {
+                    instantiate: symbols.get("InstantiateCoSimulation")?,
+                    enter_event_mode: symbols.get("EnterEventMode")?,
+                    enter_step_mode: symbols.get("EnterStepMode")?,
+                    do_step: symbols.get("DoStep")?,
+                })
+            };
             Ok(Self {
-                instantiate: *library.get(b"fmi3InstantiateCoSimulation\0")?,
-                free_instance: *library.get(b"fmi3FreeInstance\0")?,
-                enter_initialization_mode: *library.get(b"fmi3EnterInitializationMode\0")?,
-                exit_initialization_mode: *library.get(b"fmi3ExitInitializationMode\0")?,
-                enter_event_mode: *library.get(b"fmi3EnterEventMode\0")?,
-                update_discrete_states: *library.get(b"fmi3UpdateDiscreteStates\0")?,
-                enter_step_mode: *library.get(b"fmi3EnterStepMode\0")?,
-                do_step: *library.get(b"fmi3DoStep\0")?,
-                terminate: *library.get(b"fmi3Terminate\0")?,
-                reset: *library.get(b"fmi3Reset\0")?,
-                get,
-                set,
-                directional_derivative: library
-                    .get(b"fmi3GetDirectionalDerivative\0")
-                    .ok()
-                    .map(|function| *function),
-                states: StateFunctions::load(&library, STATES),
-                get_version: library.get(b"fmi3GetVersion\0").ok().map(|function| *function),
-                _library: library,
+                enter_initialization_mode: symbols.get("EnterInitializationMode")?,
+                update_discrete_states: symbols.get("UpdateDiscreteStates")?,
+                get: ACCESS.map(|[(name, _), _]| symbols.get(name).ok()),
+                set: ACCESS.map(|[_, (name, _)]| symbols.get(name).ok()),
+                directional_derivative: symbols.get("GetDirectionalDerivative").ok(),
+                interface,
+                common: Common::load(symbols, exchanges)?,
             })
         }
-    }
-
-    /// Returns a line about the version that the library reports, if it is missing or not FMI 3.
-    pub(crate) fn version_fault(&self) -> Option<String> {
-        functions::version_fault(self.get_version, "fmi3GetVersion", "3")
     }
 }
 
 impl Table for Functions {
     const VERSION: u8 = 3;
+    const DERIVATIVES: &'static str = "getContinuousStateDerivatives";
+    const UPDATE: &'static str = "updateDiscreteStates";
 
-    fn free_instance(&self) -> fmi::FreeInstance {
-        self.free_instance
+    fn common(&self) -> &Common {
+        &self.common
     }
 
-    fn states(&self) -> Option<StateFunctions> {
-        self.states
+    unsafe fn update(&self, handle: Handle) -> (EventInfo, c_int) {
+        let (mut info, mut announces, mut next) = (EventInfo::default(), false, f64::NAN);
+        // SAFETY: FMI gives the function this type, and the pointers are valid for the call.
+        let status = unsafe {
+            (self.update_discrete_states)(
+                handle,
+                &raw mut info.needs_another,
+                &raw mut info.terminates,
+                &raw mut info.changes_nominals,
+                &raw mut info.changes_states,
+                &raw mut announces,
+                &raw mut next,
+            )
+        };
+        info.next_event = announces.then_some(next);
+        (info, status)
+    }
+
+    unsafe fn complete_step(&self, handle: Handle) -> (Completed, c_int) {
+        let InterfaceFunctions::ModelExchange { completed, .. } = self.interface else {
+            return (Completed::default(), NOT_OFFERED);
+        };
+        let mut answer = Completed::default();
+        let Completed { enters_event_mode, terminates } = &mut answer;
+        // SAFETY: FMI gives the function this type, and both pointers are valid for the call.
+        let status = unsafe { completed(handle, true, enters_event_mode, terminates) };
+        (answer, status)
     }
 }

@@ -14,13 +14,14 @@ pub(crate) struct Layout {
 }
 
 impl Layout {
-    /// Lists the variables of an FMU.
+    /// Lists the variables of an FMU, for instances for model exchange if it `exchanges`.
     ///
     /// # Errors
     /// Returns a line that names a clock which this program cannot tick.
-    pub(crate) fn new(description: &ModelDescription) -> Result<Self, String> {
+    pub(crate) fn new(description: &ModelDescription, exchanges: bool) -> Result<Self, String> {
         let interface = description.co_simulation.as_ref();
-        let has_events = interface.is_some_and(|interface| interface.has("hasEventMode"));
+        let has_events =
+            exchanges || interface.is_some_and(|interface| interface.has("hasEventMode"));
         let has_inputs = description.variables.iter().any(|known| known.causality == "input");
         let mut names = vec![String::new(); description.places.len()];
         for variable in &description.variables {

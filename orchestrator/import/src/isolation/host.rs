@@ -38,11 +38,13 @@ pub fn serve(arguments: impl Iterator<Item = OsString>) -> io::Result<()> {
         Log::held(name, Arc::clone(&held), move |text| words.put(Slot::LastMessage, 1, text))
     };
     let refused = |reason| Ready::Refused { reason, messages: held.take() };
-    let layout = setup.fmi3.map(|folder| {
-        loading::read_description(&folder).and_then(|description| Layout::new(&description))
+    let exchange = setup.exchange;
+    let fmi3 = setup.fmi3.map(|folder| {
+        let description = loading::read_description(&folder)?;
+        Layout::new(&description, exchange.is_some()).map(Rc::new)
     });
-    let layout = match layout.transpose() {
-        Ok(layout) => layout.map(Rc::new),
+    let kind = match fmi3.transpose() {
+        Ok(fmi3) => Kind { fmi3, exchange },
         Err(reason) => return host.send(&refused(reason)),
     };
     let without = match limits::apply(&setup.limits) {
@@ -50,7 +52,6 @@ pub fn serve(arguments: impl Iterator<Item = OsString>) -> io::Result<()> {
         Err(reason) => return host.send(&refused(reason)),
     };
     let InstanceArguments { name, guid, resources } = setup.instance;
-    let kind = layout.map_or(Kind::Fmi2(setup.layout), Kind::Fmi3);
     let log = Rc::new(log(&name));
     let (mut instance, version_fault) =
         match loading::loaded(&setup.library, kind, log, (&guid, &resources), None) {

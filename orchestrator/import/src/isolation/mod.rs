@@ -26,7 +26,7 @@ pub use host::serve;
 pub use process::late_failures;
 pub use settings::{COMMAND, Isolation};
 
-use crate::exchange::Layout;
+use crate::loading::Kind;
 use fmi_master::instance::Instance;
 use process::Process;
 use protocol::{InstanceArguments, Limits, Ready, Setup};
@@ -74,9 +74,7 @@ pub(crate) struct Library<'a> {
     /// Folder of the unpacked archive.
     pub(crate) folder: &'a Path,
     pub(crate) isolation: &'a Isolation,
-    pub(crate) is_fmi3: bool,
-    /// What model exchange needs; `None` for co-simulation.
-    pub(crate) layout: Option<Layout>,
+    pub(crate) kind: Kind,
 }
 
 impl Library<'_> {
@@ -113,8 +111,9 @@ impl Library<'_> {
             cpu: self.isolation.cpu,
             folder: self.isolation.sandbox.then(|| self.folder.to_path_buf()),
         };
-        let fmi3 = self.is_fmi3.then(|| self.folder.to_path_buf());
-        let setup = Setup { library: self.file, instance, layout: self.layout, limits, fmi3 };
+        let Kind { fmi3, exchange } = self.kind;
+        let fmi3 = fmi3.map(|_| self.folder.to_path_buf());
+        let setup = Setup { library: self.file, instance, exchange, limits, fmi3 };
         match process.set_up(&setup) {
             Ok(Ready::Loaded { version_fault, without, .. }) => {
                 if let Some(without) = without {

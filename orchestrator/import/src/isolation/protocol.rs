@@ -14,7 +14,7 @@ pub(super) struct Setup {
     pub(super) library: PathBuf,
     pub(super) instance: InstanceArguments,
     /// What model exchange needs; `None` for co-simulation.
-    pub(super) layout: Option<Layout>,
+    pub(super) exchange: Option<Layout>,
     pub(super) limits: Limits,
     /// Folder of the unpacked archive, if it is one of FMI 3.0, whose description says how its
     /// values are transferred.

@@ -4,6 +4,8 @@ use super::*;
 struct Function<F>(F);
 
 impl<F: FnMut(f64, &[f64], &mut [f64])> System for Function<F> {
+    const CALL: &'static str = "derivatives";
+
     fn derivatives(
         &mut self,
         time: f64,
