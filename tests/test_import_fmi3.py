@@ -91,15 +91,18 @@ def test_oracle_a_campaign_gives_the_cases_of_fmi_2(tmp_path):
     assert tables[0] == tables[1] and tables[0].count("\n") == 17
 
 
-def test_an_ssp_archive_takes_both_versions(folders, tmp_path):
-    experiment = FOLDER / "crmpc-2022" / "lqr.toml"
+@pytest.mark.parametrize("interface", ["coSimulation", "modelExchange"])
+def test_an_ssp_archive_takes_both_versions(interface, folders, tmp_path):
+    experiment = tmp_path / "lqr.toml"
+    extended = FOLDER / "crmpc-2022" / "lqr.toml"
+    experiment.write_text(f"extends = '{extended}'\ntitle = 'x'\n[components.plant]\ninterface = '{interface}'\n", encoding="utf-8")
     subprocess.run(
         [program("orchestrator"), "pack", experiment, "--out", tmp_path / "x.ssp", "--fmu-dir", folders["plant 3.0"]], check=True
     )
     subprocess.run([program("orchestrator"), "run", tmp_path / "x.ssp", "--out", tmp_path / "out", "--quiet"], check=True)
     with open(tmp_path / "out" / "results.csv") as file:
         table = list(csv.reader(file))
-    expected = rows(tmp_path / "two", "crmpc-2022/lqr", TARGET / "fmu")
+    expected = rows(tmp_path / "two", str(tmp_path / "lqr"), TARGET / "fmu")
     columns = [table[0].index(name) for name in ("plant.attitude.alpha", "controller.moment.x")]
     places = [expected[0].index(name) for name in ("plant.attitude.alpha", "controller.moment.x")]
     assert [[line[c] for c in columns] for line in table] == [[line[p] for p in places] for line in expected]

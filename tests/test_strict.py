@@ -152,6 +152,18 @@ def test_the_orchestrator_keeps_to_the_standard(watched, tmp_path, version, use)
         assert (f"fmi{version}{made[0]}", made[1]) in judge.seen
 
 
+@pytest.mark.parametrize("version", ["2", "3"])
+def test_the_orchestrator_keeps_to_model_exchange(watched, tmp_path, version):
+    plant, law = (watched(name, version) for name in ("ReentryPlant", "LQR"))
+    lines = [f"extends = '{EXPERIMENTS}/lqr.toml'", "title = 'x'", "[components.plant]", "interface = 'modelExchange'"]
+    (tmp_path / "x.toml").write_text("\n".join(lines))
+    command = [program("orchestrator"), "run", "x.toml", "--out", "out", "--quiet", "--stop", "2"]
+    subprocess.run([*command, "--fmu-dir", plant.folder], cwd=tmp_path, check=True)
+    judges = [unit.judge() for unit in (plant, law)]
+    assert [judge.broken for judge in judges] == [[], []]
+    assert (f"fmi{version}SetContinuousStates", "continuous") in judges[0].seen
+
+
 @pytest.fixture(scope="module")
 def recorded(strict, tmp_path_factory):
     """Calls of correct runs, for one version and interface each."""

@@ -8,9 +8,9 @@ use crate::exchange;
 use crate::faults;
 use crate::fmi3::Layout;
 use crate::folder::TemporaryFolder;
-use crate::isolation::{self, Isolation, Library, Loaded};
+use crate::isolation::{self, Isolation, Library};
 use crate::law::{LawInstance, Ports};
-use crate::loading::{self, Kind, Refusal};
+use crate::loading::{self, Kind, Made, Refusal};
 use crate::log::Log;
 use crate::lookup_table::{self, LookupTable, LookupTableInstance};
 use crate::warnings;
@@ -245,11 +245,11 @@ impl Fmu {
         (name, title): (&str, &str),
         kind: InterfaceKind,
         isolation: Option<&Isolation>,
-    ) -> Result<(Box<dyn Instance>, Option<String>), String> {
+    ) -> Result<Made, String> {
         let (file, entry) = self.library(archive, kind)?;
         let kind = archive.kind(&self.description, kind)?;
         let resources = archive.folder.path().join("resources");
-        let resources = if kind.fmi3.is_some() {
+        let resources: String = if kind.fmi3.is_some() {
             // A path that ends in a separator.
             resources.join("").display().to_string()
         } else {
@@ -258,21 +258,18 @@ impl Fmu {
                 .into()
         };
         let guid = &self.description.guid;
-        if let Some(isolation) = isolation {
+        let named = (&**guid, &*resources);
+        let made = if let Some(isolation) = isolation {
             let library = Library { file, folder: archive.folder.path(), isolation, kind };
-            return match library.instantiate(name, guid, &resources) {
-                Loaded::Whole(instance, fault) => Ok((instance, fault)),
-                Loaded::Unloadable(reason) => Err(archive.not_loaded(&entry, &reason)),
-                Loaded::Refused(reason) => Err(format!("{title} {reason}")),
-            };
-        }
-        crash::is_loaded(&self.path);
-        let (log, folder) = (Rc::new(Log::new(name)), Some(Rc::clone(&archive.folder)));
-        loading::loaded(&file, kind, log, (guid, &resources), folder).map_err(|refusal| {
-            match refusal {
-                Refusal::Unloadable(reason) => archive.not_loaded(&entry, &reason),
-                Refusal::Refused(reason) => format!("{title} {reason}"),
-            }
+            library.instantiate(name, named)
+        } else {
+            crash::is_loaded(&self.path);
+            let (log, folder) = (Rc::new(Log::new(name)), Some(Rc::clone(&archive.folder)));
+            loading::loaded(&file, kind, log, named, folder)
+        };
+        made.map_err(|refusal| match refusal {
+            Refusal::Unloadable(reason) => archive.not_loaded(&entry, &reason),
+            Refusal::Refused(reason) => format!("{title} {reason}"),
         })
     }
 }

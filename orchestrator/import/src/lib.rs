@@ -10,6 +10,7 @@ pub mod error;
 mod exchange;
 pub mod faults;
 mod fmi;
+mod fmi2;
 mod fmi3;
 pub mod fmu;
 pub mod folder;

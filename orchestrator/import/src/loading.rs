@@ -35,6 +35,9 @@ pub(crate) enum Refusal {
     Refused(String),
 }
 
+/// An instance, with what is wrong with the version of FMI that its library names.
+pub(crate) type Made = (Box<dyn Instance>, Option<String>);
+
 /// Kind of an instance.
 pub(crate) struct Kind {
     /// What FMI 3.0 calls the variables; `None` for an instance of FMI 2.0.
@@ -44,15 +47,15 @@ pub(crate) struct Kind {
 }
 
 /// Loads a library into this process and makes an instance with this identifier and these
-/// resources, the path of which ends in a separator. Returns it with what is wrong with the version
-/// of FMI that the library names. `folder` holds the unpacked archive, if it would vanish otherwise.
+/// resources, the path of which ends in a separator. `folder` holds the unpacked archive, if it
+/// would vanish otherwise.
 pub(crate) fn loaded(
     file: &Path,
     kind: Kind,
     log: Rc<Log>,
     named: (&str, &str),
     folder: Option<Rc<TemporaryFolder>>,
-) -> Result<(Box<dyn Instance>, Option<String>), Refusal> {
+) -> Result<Made, Refusal> {
     let unloadable = |error: libloading::Error| Refusal::Unloadable(with_causes(&error));
     let Kind { fmi3, exchange } = kind;
     let exchanges = exchange.is_some();

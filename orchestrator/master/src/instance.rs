@@ -37,8 +37,8 @@ impl CallFailure {
 pub type Outcome = Result<(), CallFailure>;
 
 /// A running copy of an FMU. It is set, stepped and read by value references, in the order that FMI
-/// 2.0 prescribes; one of FMI 3.0 changes its modes itself. Booleans are transferred as 0 and 1, and
-/// enumerations as the values of their items. All slices of one call have the same length.
+/// 2.0 prescribes; one of FMI 3.0 changes its modes itself. Booleans are transferred as 0 and 1,
+/// and enumerations as the values of their items. All slices of one call have the same length.
 pub trait Instance {
     /// Reads real variables.
     ///

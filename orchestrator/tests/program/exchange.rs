@@ -145,7 +145,7 @@ fn ended(benches: &[Bench; 2], time: f64) {
     for bench in benches {
         assert_eq!(bench.json("out/loop/metrics.json")["completed"], true);
         let (_, summary, _) = bench.run(&[]);
-        let told = format!("by m: it asks to end the simulation; it got as far as t = {time} s");
+        let told = format!("by m: it got as far as t = {time} s (terminateSimulation)");
         assert!(summary.contains(&told), "{summary}");
     }
 }

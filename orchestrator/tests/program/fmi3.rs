@@ -117,7 +117,7 @@ fn events_without_end_and_steps_without_progress_are_failures() {
         (
             "-DENDLESS=1",
             "5",
-            "in updateDiscreteStates: its event at t = 0 s needs updates without end",
+            "in updateDiscreteStates: the discrete states do not settle at t = 0 s",
         ),
         (
             "-DSTUCK=1",

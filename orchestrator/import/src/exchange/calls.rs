@@ -7,7 +7,11 @@ use crate::fmi;
 use crate::functions::{Completed, EventInfo, ExchangeFunctions, Functions, NOT_OFFERED, Table};
 use crate::library::FmuInstance;
 use fmi_master::instance::{CallFailure, Outcome};
+use fmi_master::quantity::rounded;
 use std::ffi::c_int;
+
+/// Number of updates after which the discrete states must have settled.
+const MOST_UPDATES: usize = 1000;
 
 impl ContinuousModel for FmuInstance {
     type Functions = Functions;
@@ -100,16 +104,38 @@ impl<F: Table> FmuInstance<F> {
         })
     }
 
-    /// Updates the discrete states in event mode.
-    pub(crate) fn update(&mut self) -> Result<EventInfo, CallFailure> {
-        let mut info = EventInfo::default();
-        // SAFETY: the instance is alive.
-        self.call(F::UPDATE, |functions, handle| unsafe {
-            let status;
-            (info, status) = functions.update(handle);
-            status
-        })?;
-        Ok(info)
+    /// Updates the discrete states in event mode at a time (s), until they settle. Returns the last
+    /// result, with all that has changed since the first one.
+    pub(crate) fn settle(&mut self, time: f64) -> Result<EventInfo, CallFailure> {
+        let (mut info, mut has_states, mut has_nominals) = (EventInfo::default(), false, false);
+        for _ in 0..MOST_UPDATES {
+            // SAFETY: the instance is alive.
+            self.call(F::UPDATE, |functions, handle| unsafe {
+                let status;
+                (info, status) = functions.update(handle);
+                status
+            })?;
+            if info.terminates {
+                return Err(self.ending(time));
+            }
+            has_states |= info.changes_states;
+            has_nominals |= info.changes_nominals;
+            if !info.needs_another {
+                info.changes_states = has_states;
+                info.changes_nominals = has_nominals;
+                return Ok(info);
+            }
+        }
+        let time = rounded(time);
+        let text = format!(
+            "the discrete states do not settle at t = {time} s: after {MOST_UPDATES} updates they still need another one"
+        );
+        Err(CallFailure::answer(F::UPDATE, text))
+    }
+
+    /// Describes the end of the simulation by the model at a time, s.
+    pub(super) fn ending(&mut self, time: f64) -> CallFailure {
+        self.stopped(true, Some(time), "terminateSimulation")
     }
 
     /// Tells the model that a step of the integrator is complete.

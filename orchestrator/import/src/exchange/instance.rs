@@ -4,7 +4,7 @@ use super::equations::Equations;
 use super::events::{Events, MOST_EVENTS};
 use super::model::{ContinuousModel, Layout, Refusal};
 use super::radau::{Point, Radau, Step};
-use crate::functions::{Completed, Table as _};
+use crate::functions::Completed;
 use crate::library::put;
 use fmi_master::description::Carrier;
 use fmi_master::forward;
@@ -13,8 +13,6 @@ use fmi_master::quantity::rounded;
 use std::collections::BTreeMap;
 use std::fmt::Display;
 
-/// Number of evaluations after which the discrete states must have settled.
-const MOST_EVALUATIONS: usize = 100;
 /// Number of steps within which a state event must have been located.
 const MOST_LOCATIONS: usize = 20;
 
@@ -115,7 +113,8 @@ impl<M: ContinuousModel> Exchange<M> {
             completed = self.model.unit().complete_step()?;
         }
         if completed.terminates {
-            return Err(self.ending("completedIntegratorStep"));
+            let time = self.progress.point.time;
+            return Err(self.model.unit().ending(time));
         }
         match indicator {
             Some(indicator) => {
@@ -215,32 +214,12 @@ impl<M: ContinuousModel> Exchange<M> {
         self.settle()
     }
 
-    /// Evaluates the discrete states until they settle, and returns to continuous-time mode.
+    /// Updates the discrete states until they settle, and returns to continuous-time mode.
     fn settle(&mut self) -> Outcome {
         let is_first = self.progress.mode == Mode::Initialization;
-        let (mut has_states, mut has_nominals) = (is_first, is_first);
-        let mut evaluations = 0;
-        loop {
-            let info = self.model.unit().update()?;
-            has_states |= info.changes_states;
-            has_nominals |= info.changes_nominals;
-            self.progress.events.next_time = info.next_event;
-            if info.terminates {
-                return Err(self.ending(M::Functions::UPDATE));
-            }
-            if !info.needs_another {
-                break;
-            }
-            evaluations += 1;
-            if evaluations == MOST_EVALUATIONS {
-                let time = rounded(self.progress.point.time);
-                let text = format!(
-                    "the discrete states do not settle at t = {time} s: after {MOST_EVALUATIONS} evaluations they still need another one"
-                );
-                return Err(CallFailure::new(M::Functions::UPDATE, text));
-            }
-        }
-        self.resume(has_states, has_nominals)
+        let info = self.model.unit().settle(self.progress.point.time)?;
+        self.progress.events.next_time = info.next_event;
+        self.resume(is_first || info.changes_states, is_first || info.changes_nominals)
     }
 
     /// Returns to continuous-time mode, and reads what may have changed.
@@ -270,15 +249,6 @@ impl<M: ContinuousModel> Exchange<M> {
         }
         events.is_positive = values.iter().map(|value| *value > 0.0).collect();
         Ok(())
-    }
-
-    /// Describes the end of the simulation by the model.
-    fn ending(&mut self, call: &'static str) -> CallFailure {
-        let time = self.progress.point.time;
-        let told = self.model.unit().message();
-        let told = told.unwrap_or_else(|| "it asks to end the simulation".into());
-        let text = format!("{told}; it got as far as t = {} s", rounded(time));
-        CallFailure { ends: Some(time), ..CallFailure::answer(call, text) }
     }
 }
 

@@ -1,8 +1,9 @@
 //! Model exchange: instances whose continuous states this program integrates.
 //!
 //! A [`ContinuousModel`] computes derivatives, event indicators and discrete states. With an
-//! integrator it becomes an [`Exchange`], which the master steps like any other instance: its inputs
-//! are held over a step. The calls follow FMI 2.0.5, section 3.2.3, and FMI 3.0.2, section 3.2.
+//! integrator it becomes an [`Exchange`], which the master steps like any other instance: its
+//! inputs are held over a step. The calls follow FMI 2.0.5, section 3.2.3, and FMI 3.0.2, section
+//! 3.2.
 //!
 //! | module | content |
 //! |---|---|

@@ -17,8 +17,6 @@ use fmi_master::quantity::rounded;
 
 /// Part of a step by which a time may be wrong.
 const TOLERANCE: f64 = 1e-9;
-/// Largest number of updates at an event.
-const UPDATES: usize = 1000;
 /// Largest number of parts of a step, and of those without progress.
 const PARTS: usize = 1_000_000;
 const IDLE: usize = 1000;
@@ -84,19 +82,9 @@ impl StepInstance {
 
     /// Handles the event at a time (s), in event mode.
     fn update(&mut self, now: f64) -> Outcome {
-        for _ in 0..UPDATES {
-            let info = self.unit.calls.update()?;
-            if info.terminates {
-                return Err(self.unit.calls.stopped(true, Some(now), "terminateSimulation"));
-            }
-            if !info.needs_another {
-                self.present.is_due = false;
-                self.present.next_event = info.next_event;
-                return Ok(());
-            }
-        }
-        let text = format!("its event at t = {} s needs updates without end", rounded(now));
-        Err(CallFailure::answer("updateDiscreteStates", text))
+        self.present.next_event = self.unit.calls.settle(now)?.next_event;
+        self.present.is_due = false;
+        Ok(())
     }
 
     /// Leaves event mode, after the event at this time (s) was handled.

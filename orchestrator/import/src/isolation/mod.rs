@@ -26,8 +26,7 @@ pub use host::serve;
 pub use process::late_failures;
 pub use settings::{COMMAND, Isolation};
 
-use crate::loading::Kind;
-use fmi_master::instance::Instance;
+use crate::loading::{Kind, Made, Refusal};
 use process::Process;
 use protocol::{InstanceArguments, Limits, Ready, Setup};
 use remote::RemoteInstance;
@@ -58,16 +57,6 @@ pub fn is_enabled() -> bool {
     PROGRAM.get().is_some()
 }
 
-/// Outcome of loading a library in a process of its own.
-pub(crate) enum Loaded<T> {
-    /// It was loaded. The text says what is wrong with the version of FMI that it names.
-    Whole(T, Option<String>),
-    /// The system could not load it, for this reason.
-    Unloadable(String),
-    /// The library or the instance refused or failed, for this reason.
-    Refused(String),
-}
-
 /// A library with the data that its process needs.
 pub(crate) struct Library<'a> {
     pub(crate) file: PathBuf,
@@ -78,33 +67,27 @@ pub(crate) struct Library<'a> {
 }
 
 impl Library<'_> {
-    /// Makes an instance in a process of its own.
+    /// Makes an instance with this identifier and these resources in a process of its own.
     pub(crate) fn instantiate(
         self,
         name: &str,
-        guid: &str,
-        resources: &str,
-    ) -> Loaded<Box<dyn Instance>> {
-        let (guid, resources) = (guid.into(), resources.into());
-        let instance = InstanceArguments { name: name.into(), guid, resources };
-        match self.load(name, instance) {
-            Loaded::Whole(process, fault) => {
-                Loaded::Whole(Box::new(RemoteInstance::new(process)), fault)
-            }
-            Loaded::Unloadable(reason) => Loaded::Unloadable(reason),
-            Loaded::Refused(reason) => Loaded::Refused(reason),
-        }
+        (guid, resources): (&str, &str),
+    ) -> Result<Made, Refusal> {
+        let (name, guid, resources) = (name.into(), guid.into(), resources.into());
+        let (process, fault) = self.load(InstanceArguments { name, guid, resources })?;
+        Ok((Box::new(RemoteInstance::new(process)), fault))
     }
 
-    fn load(self, name: &str, instance: InstanceArguments) -> Loaded<Process> {
+    fn load(self, instance: InstanceArguments) -> Result<(Process, Option<String>), Refusal> {
+        let refused = |reason: String| Err(Refusal::Refused(reason));
         let Some(program) = PROGRAM.get() else {
-            return Loaded::Refused(
-                "has no process of its own, because this program cannot start any".into(),
-            );
+            let reason = "has no process of its own, because this program cannot start any";
+            return refused(reason.into());
         };
-        let mut process = match Process::start(program, name, self.isolation, self.folder) {
+        let mut process = match Process::start(program, &instance.name, self.isolation, self.folder)
+        {
             Ok(process) => process,
-            Err(error) => return Loaded::Refused(format!("has no process of its own: {error}")),
+            Err(error) => return refused(format!("has no process of its own: {error}")),
         };
         let limits = Limits {
             memory: self.isolation.memory,
@@ -121,13 +104,11 @@ impl Library<'_> {
                         "this system cannot limit these for instances: {without}"
                     ));
                 }
-                Loaded::Whole(process, version_fault)
+                Ok((process, version_fault))
             }
-            Ok(Ready::Unloadable(reason)) => Loaded::Unloadable(reason),
-            Ok(Ready::Refused { reason, .. }) => Loaded::Refused(reason),
-            Err(failure) => {
-                Loaded::Refused(format!("failed in {}: {}", failure.call, failure.message))
-            }
+            Ok(Ready::Unloadable(reason)) => Err(Refusal::Unloadable(reason)),
+            Ok(Ready::Refused { reason, .. }) => refused(reason),
+            Err(failure) => refused(format!("failed in {}: {}", failure.call, failure.message)),
         }
     }
 }

@@ -53,8 +53,8 @@ fn integrated(
 
 #[test]
 fn published_van_der_pol_is_met_with_its_stiff_parameter() {
-    // Mazzia and Magherini, Test Set for Initial Value Problem Solvers, release 2.4, VDPOL: ε = 1e-6,
-    // t = 2
+    // Mazzia and Magherini, Test Set for Initial Value Problem Solvers, release 2.4, VDPOL:
+    // ε = 1e-6, t = 2
     let published = [1.706167732170483, -0.8928097010247975];
     for (tolerance, within) in [(1e-6, 1e-5), (1e-8, 1e-6), (1e-10, 1e-8), (1e-12, 1e-10)] {
         let equations = |_: f64, y: &[f64], dy: &mut [f64]| {
