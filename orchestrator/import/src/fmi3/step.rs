@@ -2,8 +2,8 @@
 //!
 //! A unit with event mode is set in event mode, as its inputs jump at a communication point, and
 //! leaves it when it is stepped. A step is cut at the events that the unit announces and where it
-//! returns early. An event at the end of a step is handled at once by a unit without inputs. Otherwise
-//! it waits for the inputs of that point, and is handled when the next step begins.
+//! returns early. An event at the end of a step is handled at once by a unit without inputs.
+//! Otherwise it waits for the inputs of that point, and is handled when the next step begins.
 
 #![allow(unsafe_code)]
 
