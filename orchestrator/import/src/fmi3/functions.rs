@@ -28,6 +28,8 @@ type InstantiateCoSimulation = unsafe extern "C" fn(
     LogMessage,
     *const c_void,
 ) -> Handle;
+/// A truth value that a unit writes, which may be any byte and not only those of a Rust `bool`.
+pub(super) type Truth = u8;
 /// Type of the function fmi3InstantiateModelExchange. The arguments are name, token, path of the
 /// resources, visibility, logging, environment, and the callback for messages.
 type InstantiateModelExchange =
@@ -45,17 +47,17 @@ pub(super) type Access =
 /// the time of the next event is known, and that time.
 type UpdateDiscreteStates = unsafe extern "C" fn(
     Handle,
-    *mut bool,
-    *mut bool,
-    *mut bool,
-    *mut bool,
-    *mut bool,
+    *mut Truth,
+    *mut Truth,
+    *mut Truth,
+    *mut Truth,
+    *mut Truth,
     *mut f64,
 ) -> c_int;
 /// Type of the function fmi3CompletedIntegratorStep. The argument is whether the state before the
 /// step will never be restored; the results are whether there is an event, and whether the
 /// simulation ends.
-type CompletedStep = unsafe extern "C" fn(Handle, bool, *mut bool, *mut bool) -> c_int;
+type CompletedStep = unsafe extern "C" fn(Handle, bool, *mut Truth, *mut Truth) -> c_int;
 /// Type of the function fmi3DoStep. The arguments are the time, the step, and whether the state
 /// before the step will never be restored; the results are whether an event is to be handled,
 /// whether the simulation ends, whether the step ended early, and the time that was reached.
@@ -64,9 +66,9 @@ pub(super) type DoStep = unsafe extern "C" fn(
     f64,
     f64,
     bool,
-    *mut bool,
-    *mut bool,
-    *mut bool,
+    *mut Truth,
+    *mut Truth,
+    *mut Truth,
     *mut f64,
 ) -> c_int;
 /// Type of the function fmi3GetDirectionalDerivative. The arguments are the unknown and the known
@@ -174,20 +176,27 @@ impl Table for Functions {
     }
 
     unsafe fn update(&self, handle: Handle) -> (EventInfo, c_int) {
-        let (mut info, mut announces, mut next) = (EventInfo::default(), false, f64::NAN);
+        let ([mut again, mut ends, mut nominals, mut states, mut announces], mut next) =
+            ([Truth::MIN; 5], f64::NAN);
         // SAFETY: FMI gives the function this type, and the pointers are valid for the call.
         let status = unsafe {
             (self.update_discrete_states)(
                 handle,
-                &raw mut info.needs_another,
-                &raw mut info.terminates,
-                &raw mut info.changes_nominals,
-                &raw mut info.changes_states,
+                &raw mut again,
+                &raw mut ends,
+                &raw mut nominals,
+                &raw mut states,
                 &raw mut announces,
                 &raw mut next,
             )
         };
-        info.next_event = announces.then_some(next);
+        let info = EventInfo {
+            needs_another: again != 0,
+            terminates: ends != 0,
+            changes_nominals: nominals != 0,
+            changes_states: states != 0,
+            next_event: (announces != 0).then_some(next),
+        };
         (info, status)
     }
 
@@ -195,10 +204,9 @@ impl Table for Functions {
         let InterfaceFunctions::ModelExchange { completed, .. } = self.interface else {
             return (Completed::default(), NOT_OFFERED);
         };
-        let mut answer = Completed::default();
-        let Completed { enters_event_mode, terminates } = &mut answer;
+        let [mut enters, mut ends] = [Truth::MIN; 2];
         // SAFETY: FMI gives the function this type, and both pointers are valid for the call.
-        let status = unsafe { completed(handle, true, enters_event_mode, terminates) };
-        (answer, status)
+        let status = unsafe { completed(handle, true, &raw mut enters, &raw mut ends) };
+        (Completed { enters_event_mode: enters != 0, terminates: ends != 0 }, status)
     }
 }

@@ -7,7 +7,7 @@
 
 #![allow(unsafe_code)]
 
-use super::functions::{InterfaceFunctions, StepFunctions};
+use super::functions::{InterfaceFunctions, StepFunctions, Truth};
 use super::unit::Fmi3Unit;
 use crate::fmi::Status;
 use crate::library::put;
@@ -102,7 +102,7 @@ impl StepInstance {
 
     /// Makes a part of a step. Returns the time (s) that the instance has reached.
     fn do_part(&mut self, time: f64, step: f64) -> Result<f64, CallFailure> {
-        let [mut event, mut ends, mut early] = [false; 3];
+        let [mut event, mut ends, mut early] = [Truth::MIN; 3];
         let mut reached = f64::NAN;
         let do_step = self.functions.do_step;
         // SAFETY: the instance is alive, and the pointers are valid for the call.
@@ -118,6 +118,7 @@ impl StepInstance {
                 &raw mut reached,
             )
         });
+        let [event, ends, early] = [event, ends, early].map(|truth| truth != 0);
         let is_discarded = status == Ok(Status::Discard);
         if is_discarded || (ends && matches!(status, Ok(Status::Ok | Status::Warning))) {
             let returned = if ends { "terminateSimulation" } else { "fmi3Discard" };
