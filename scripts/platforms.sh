@@ -197,6 +197,8 @@ join() {
 # macOS also together, as FMI 2.0 has a name for each of these.
 package_fmus() {
     local platform also host
+    # A wheel with archives that are not compressed as well as they can be is larger than 25 MB.
+    local -x FMU_PACK_SMALL=1
     host="$(built linux-x86_64)"
     need_cross
     # The descriptions come from the library that this machine can open.

@@ -87,9 +87,11 @@ fn write_archive(
     file: BufWriter<File>,
     entries: &[(String, Vec<u8>)],
 ) -> zip::result::ZipResult<()> {
+    // Above 9, zopfli compresses: some seconds an archive, for what is shipped.
+    let level = if std::env::var_os("FMU_PACK_SMALL").is_some() { 10 } else { 9 };
     let options = SimpleFileOptions::default()
         .compression_method(CompressionMethod::Deflated)
-        .compression_level(Some(9))
+        .compression_level(Some(level))
         .last_modified_time(DateTime::default());
     let mut archive = ZipWriter::new(file);
     for (name, content) in entries {
