@@ -38,6 +38,9 @@ impl ModelDescription {
             self.write_units(xml, version)?;
             self.write_enumerations(xml, version)?;
             self.write_categories_and_experiment(xml)?;
+            if version == Version::Fmi2 {
+                self.write_optional(xml, ["VendorAnnotations", "Tool", "name"])?;
+            }
             parent(xml, "ModelVariables", vec![], |xml| {
                 if version == Version::Fmi3 {
                     beyond_table(xml, "time", 0, "Simulation time", Causality::Independent)?;
@@ -50,7 +53,28 @@ impl ModelDescription {
                     beyond_table(xml, &name, reference, text, Causality::Local)
                 })
             })?;
-            self.write_structure(xml, version)
+            self.write_structure(xml, version)?;
+            if version == Version::Fmi3 {
+                self.write_optional(xml, ["Annotations", "Annotation", "type"])?;
+            }
+            Ok(())
+        })
+    }
+
+    /// Writes which inputs may stay unconnected. FMI has no attribute for it, and importers ignore
+    /// annotations that they do not know; some refuse those of a single variable.
+    fn write_optional(&self, xml: &mut Xml, names: [&'static str; 3]) -> io::Result<()> {
+        let [list, tool, attribute] = names;
+        let mut optional = self.variables.iter().filter(|variable| variable.is_optional).peekable();
+        if optional.peek().is_none() {
+            return Ok(());
+        }
+        parent(xml, list, vec![], |xml| {
+            parent(xml, tool, vec![(attribute, OPTIONAL.into())], |xml| {
+                optional.try_for_each(|variable| {
+                    leaf(xml, "Optional", vec![("variable", variable.name.clone())])
+                })
+            })
         })
     }
 
@@ -189,16 +213,8 @@ impl ModelDescription {
             ("variability", variable.variability.name().into()),
         ];
         let (element, mut further) = self.element_of(&variable.kind);
-        let optional = |xml: &mut Xml| match version {
-            _ if !variable.is_optional => Ok(()),
-            Version::Fmi2 => write_optional(xml, "Tool", "name"),
-            Version::Fmi3 => write_optional(xml, "Annotation", "type"),
-        };
         if version == Version::Fmi2 {
-            return parent(xml, "ScalarVariable", attributes, |xml| {
-                leaf(xml, element, further)?;
-                optional(xml)
-            });
+            return parent(xml, "ScalarVariable", attributes, |xml| leaf(xml, element, further));
         }
         let is_state = |other: &Variable| other.derivative_of() == Some(&variable.name);
         if self.model_exchange && self.variables.iter().any(is_state) {
@@ -212,11 +228,10 @@ impl ModelDescription {
             "Integer" => "Int32",
             same => same,
         };
-        if texts.is_empty() && !variable.is_optional {
+        if texts.is_empty() {
             return leaf(xml, element, attributes);
         }
         parent(xml, element, attributes, |xml| {
-            optional(xml)?;
             texts.into_iter().try_for_each(|(_, text)| leaf(xml, "Start", vec![("value", text)]))
         })
     }
@@ -319,15 +334,6 @@ fn write_items(xml: &mut Xml, enumeration: &EnumerationType) -> io::Result<()> {
             ("description", description.clone()),
         ];
         leaf(xml, "Item", attributes)
-    })
-}
-
-/// Writes the annotation of an input that may stay unconnected. FMI has no attribute for it, and
-/// importers ignore annotations that they do not know.
-fn write_optional(xml: &mut Xml, element: &str, attribute: &'static str) -> io::Result<()> {
-    parent(xml, "Annotations", vec![], |xml| {
-        let tool = vec![(attribute, OPTIONAL.into())];
-        parent(xml, element, tool, |xml| leaf(xml, "Optional", vec![]))
     })
 }
 

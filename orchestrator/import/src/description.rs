@@ -9,7 +9,7 @@ use fmi_master::description::{
 };
 use fmi_master::quantity::UnitDefinition;
 use std::borrow::Cow;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::str::FromStr;
 
 /// Values of `causality` that FMI 2.0, section 2.2.7, allows, and the one that FMI 3.0 adds.
@@ -136,7 +136,7 @@ fn version(root: &Element) -> Result<String, String> {
 fn description(root: &Element, variables: Variables) -> Result<ModelDescription, String> {
     let fmi_version = version(root)?;
     let is_fmi3 = fmi_version.starts_with("3.");
-    let Listed { variables, dependencies, derivatives, event_indicators, places, arrays } =
+    let Listed { mut variables, dependencies, derivatives, event_indicators, places, arrays } =
         if is_fmi3 {
             fmi3::read(root, &types(root))?
         } else {
@@ -152,6 +152,7 @@ fn description(root: &Element, variables: Variables) -> Result<ModelDescription,
                 ..Listed::default()
             }
         };
+    mark_optional(root, &mut variables);
     let text = |name: &str| root.attribute(name).unwrap_or_default().to_string();
     let experiment = root.child("DefaultExperiment");
     let proposed = |name: &str| experiment.map_or(Ok(None), |element| element.number(name));
@@ -183,6 +184,15 @@ fn description(root: &Element, variables: Variables) -> Result<ModelDescription,
         by_name: ByName::default(),
         fmi_version,
     })
+}
+
+/// Marks the inputs that may stay unconnected, which annotations of the file list.
+fn mark_optional(root: &Element, variables: &mut [Variable]) {
+    let tools =
+        root.list("VendorAnnotations", "Tool").chain(root.list("Annotations", "Annotation"));
+    let entries = tools.flat_map(|tool| tool.children.iter().filter(|it| it.name == "Optional"));
+    let names: BTreeSet<&str> = entries.filter_map(|entry| entry.attribute("variable")).collect();
+    variables.iter_mut().for_each(|it| it.is_optional = names.contains(&*it.name));
 }
 
 /// The variables of a description.
@@ -255,8 +265,8 @@ fn variable(element: &Element, types: &Types) -> Result<Variable, String> {
     let kind = match typed.name.as_str() {
         "Real" => real(typed, declared)?,
         "Integer" => {
-            let [min, max] = ["min", "max"].map(|name| bound::<i32>(name, typed, declared));
-            VariableKind::Integer { min: min?, max: max? }
+            let bound = |name: &str| bound::<i32>(name, "a whole number", typed, declared);
+            VariableKind::Integer { min: bound("min")?, max: bound("max")? }
         }
         "Boolean" => VariableKind::Boolean,
         "String" => VariableKind::String,
@@ -274,14 +284,15 @@ fn variable(element: &Element, types: &Types) -> Result<Variable, String> {
     })
 }
 
-/// Returns a bound of a whole number.
+/// Returns a bound, which messages call a `kind`.
 fn bound<T: FromStr>(
     name: &str,
+    kind: &str,
     typed: &Element,
     declared: Option<&Element>,
 ) -> Result<Option<T>, String> {
-    match typed.parsed(name, "a whole number")? {
-        None => declared.map_or(Ok(None), |declared| declared.parsed(name, "a whole number")),
+    match typed.parsed(name, kind)? {
+        None => declared.map_or(Ok(None), |declared| declared.parsed(name, kind)),
         bound => Ok(bound),
     }
 }
@@ -290,10 +301,7 @@ fn real(typed: &Element, declared: Option<&Element>) -> Result<VariableKind, Str
     let text = |name: &str| {
         typed.attribute(name).or_else(|| declared?.attribute(name)).map(ToString::to_string)
     };
-    let bound = |name: &str| match typed.number(name)? {
-        None => declared.map_or(Ok(None), |declared| declared.number(name)),
-        bound => Ok(bound),
-    };
+    let bound = |name: &str| bound(name, "a number", typed, declared);
     Ok(VariableKind::Real {
         unit: text("unit"),
         display_unit: text("displayUnit"),
@@ -337,9 +345,6 @@ fn named(
         causality: keyword("causality", "local"),
         variability: keyword("variability", variability),
         kind,
-        is_optional: element.child("Annotations").is_some_and(|annotations| {
-            annotations.children.iter().any(|tool| tool.child("Optional").is_some())
-        }),
         ..Variable::default()
     })
 }

@@ -116,8 +116,9 @@ fn variable(element: &Element, scalar: ScalarType, types: &Types) -> Result<Vari
         },
         (_, whole) => {
             let (least, largest) = limits(whole);
-            let min = bound::<i128>("min", element, declared)?.unwrap_or(least).max(least);
-            let max = bound::<i128>("max", element, declared)?.unwrap_or(largest).min(largest);
+            let bound = |name: &str| bound::<i128>(name, "a whole number", element, declared);
+            let min = bound("min")?.unwrap_or(least).max(least);
+            let max = bound("max")?.unwrap_or(largest).min(largest);
             // What is beyond 32 bits bounds none of the values that are transferred.
             VariableKind::Integer { min: i32::try_from(min).ok(), max: i32::try_from(max).ok() }
         }

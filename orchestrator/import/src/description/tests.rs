@@ -14,10 +14,10 @@ const TEXT: &str = r#"<?xml version="1.0" encoding="UTF-8"?>
   </TypeDefinitions>
   <LogCategories><Category name="logAll"/></LogCategories>
   <DefaultExperiment stopTime="50" stepSize="0.04"/>
-  <VendorAnnotations><Tool name="x"><y/></Tool></VendorAnnotations>
+  <VendorAnnotations><Tool name="x"><y/><Optional variable="u"/><Optional/><Optional variable="none"/></Tool></VendorAnnotations>
   <ModelVariables>
 <!-- index 1 -->
-<ScalarVariable name="u" valueReference="7" causality="input"><Real declaredType="Angle" start="0.5"/><Annotations><Tool name="any"><Optional/></Tool></Annotations></ScalarVariable>
+<ScalarVariable name="u" valueReference="7" causality="input"><Real declaredType="Angle" start="0.5"/></ScalarVariable>
 <ScalarVariable name="y" valueReference="8" causality="output"><Real unit="m"/><Annotations><Tool name="z"/></Annotations></ScalarVariable>
 <ScalarVariable name="kind" valueReference="9" causality="parameter" variability="fixed"><Enumeration declaredType="Kind" start="2"/></ScalarVariable>
 <ScalarVariable name="z" valueReference="10" causality="output"><Real/></ScalarVariable>
