@@ -71,7 +71,7 @@ def test_a_run_is_shown_in_a_few_lines():
     run = experiment("crmpc-robust")
     lines = repr(run).splitlines()
     assert lines[0] == f"Run: {experiments()['crmpc-robust']}"
-    assert lines[1] == "  0 to 50 s, 1251 rows, 31 columns"
+    assert lines[1] == "  0 to 50 s, 1251 rows, 33 columns"
     assert 3 <= len(lines) <= 9 and max(map(len, lines)) <= 80
     assert "ems_deg 1.974" in repr(run) and "guarantee_broken no" in repr(run)
     # Computing times would differ from run to run.
