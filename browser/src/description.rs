@@ -3,7 +3,7 @@
 
 use crate::error::Error;
 use crate::scenario::{self, Choice, SCENARIOS, Scenario};
-use fmi2_export::linked::Linked;
+use fmi_export::linked::Linked;
 use model_description::variable::{Causality, Variable};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;

@@ -1,11 +1,11 @@
 //! The FMUs that are linked into the module, as the master knows and calls them.
 
+use fmi_export::linked::Linked;
+use fmi_export::{Export, Failure};
 use fmi_master::description::{ModelDescription, Variable, VariableKind};
 use fmi_master::forward;
 use fmi_master::instance::{CallFailure, Instance, Outcome};
 use fmi_master::quantity::UnitDefinition;
-use fmi2_export::linked::Linked;
-use fmi2_export::{Export, Failure};
 use model_description::unit::Unit;
 use model_description::variable::{self as exported, Causality, VariableKind as Exported};
 use std::cell::RefCell;

@@ -6,7 +6,7 @@ use crate::fmu::Fmu;
 use crate::own_law::OwnLaw;
 use crate::signals;
 use controller_export::{ControllerFmu, Law};
-use fmi2_export::Export;
+use fmi_export::Export;
 use fmu_controller::{
     Btvsmc, BtvsmcDo, Crmpc, Dlmpc, EntryGuidance, Fbl, Lqr, SotvsmcDo, TwoLoopSmc,
 };

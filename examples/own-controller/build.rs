@@ -1,5 +1,5 @@
 //! Keeps the library loaded.
 
 fn main() {
-    fmi2_build::link();
+    fmi_build::link();
 }

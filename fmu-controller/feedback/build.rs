@@ -1,5 +1,5 @@
 //! The link options keep the library loaded.
 
 fn main() {
-    fmi2_build::link();
+    fmi_build::link();
 }

@@ -6,8 +6,8 @@ use control::allocation::{
 use controller_export::own_vehicle::OwnVehicle;
 use controller_export::sampled::{SampledFmu, SampledInstance, Ticks};
 use controller_export::table::{AXES, capital};
-use fmi2_export::table::{Common, discrete_output, input, parameter};
-use fmi2_export::{Context, Description, Failure, VariableTable};
+use fmi_export::table::{Common, discrete_output, input, parameter};
+use fmi_export::{Context, Description, Failure, VariableTable};
 use model_description::DefaultExperiment;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};

@@ -6,7 +6,7 @@ use control::error::DesignError;
 use control::report::SolverReport;
 use controller_export::table::{RATES, sampled_output, shown_vector, vector};
 use controller_export::{ControllerFmu, Law, Vehicle};
-use fmi2_export::VariableTable;
+use fmi_export::VariableTable;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 

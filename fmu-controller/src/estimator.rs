@@ -6,8 +6,8 @@ use control::estimation::{
 };
 use controller_export::sampled::{SampledFmu, SampledInstance, Ticks};
 use controller_export::table::{ANGLES, AXES, RATES, vector};
-use fmi2_export::table::{Common, Real, discrete_input, discrete_output, input};
-use fmi2_export::{Description, Failure, VariableTable};
+use fmi_export::table::{Common, Real, discrete_input, discrete_output, input};
+use fmi_export::{Description, Failure, VariableTable};
 use model_description::DefaultExperiment;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};

@@ -4,8 +4,8 @@ use control::guidance::{Command, Guidance, Loads, Memory, Navigation, PERIOD, Se
 use controller_export::own_vehicle::OwnVehicle;
 use controller_export::sampled::{SampledFmu, SampledInstance, Ticks};
 use controller_export::table::{ANGLES, vector};
-use fmi2_export::table::{Common, Real, discrete_output, input};
-use fmi2_export::{Context, Description, Failure, VariableTable};
+use fmi_export::table::{Common, Real, discrete_output, input};
+use fmi_export::{Context, Description, Failure, VariableTable};
 use model_description::DefaultExperiment;
 use serde::{Deserialize, Serialize};
 use vehicle::entry::{QUANTITIES, Quantity, Start};

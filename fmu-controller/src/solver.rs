@@ -3,7 +3,7 @@
 use control::report::{SolverReport, SolverStatus};
 use controller_export::table::{sampled_output, shown};
 use controller_export::{ControllerFmu, Law};
-use fmi2_export::VariableTable;
+use fmi_export::VariableTable;
 use settings::Choice;
 
 /// Returns the report with finite numbers, as outputs require.

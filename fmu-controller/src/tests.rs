@@ -11,7 +11,7 @@ use crate::{Btvsmc, BtvsmcDo, Crmpc, Dlmpc, Fbl, Lqr, SotvsmcDo};
 use control::error_dynamics::Gain;
 use controller_export::reference::Choice;
 use controller_export::{ControllerFmu, Law};
-use fmi2_export::{Context, Failure, Inputs, LastEvent, Model, describe};
+use fmi_export::{Context, Failure, Inputs, LastEvent, Model, describe};
 use model_description::ModelDescription;
 use model_description::variable::Causality;
 use nalgebra::Vector3;

@@ -6,7 +6,7 @@ use control::sliding::{
 };
 use controller_export::table::{self, ANGLES, sampled_output, shown_vector, vector};
 use controller_export::{ControllerFmu, Law, Vehicle};
-use fmi2_export::VariableTable;
+use fmi_export::VariableTable;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use settings::Declared;

@@ -4,7 +4,7 @@ use control::error::DesignError;
 use control::two_loop::{Loop, TwoLoopMemory, TwoLoopSettings, TwoLoopSmc};
 use controller_export::table::{ANGLES, RATES, sampled_output, shown_vector, vector};
 use controller_export::{ControllerFmu, Law, Vehicle};
-use fmi2_export::VariableTable;
+use fmi_export::VariableTable;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 

@@ -1,5 +1,5 @@
 //! Links the library so that it stays loaded.
 
 fn main() {
-    fmi2_build::link();
+    fmi_build::link();
 }

@@ -2,7 +2,7 @@
 
 use crate::plant::{ATTITUDE, MOTION, Output, ReentryPlant};
 use crate::roles::{Known, Quantity, Unknown};
-use fmi2_export::Failure;
+use fmi_export::Failure;
 use nalgebra::{SMatrix, Vector3};
 
 impl ReentryPlant {

@@ -4,9 +4,7 @@ use crate::parameters::Parameters;
 use crate::plant::{ATTITUDE, Output, ReentryPlant};
 use crate::roles::Unknown;
 use crate::table;
-use fmi2_export::{
-    Context, Description, EventInfo, Failure, Inputs, LastEvent, Model, Restoration,
-};
+use fmi_export::{Context, Description, EventInfo, Failure, Inputs, LastEvent, Model, Restoration};
 use vehicle::actuators::Command;
 use vehicle::effectors::SURFACES;
 use vehicle::entry::{End, Passage};

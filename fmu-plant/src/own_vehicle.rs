@@ -3,7 +3,7 @@
 use crate::entry;
 use crate::parameters::{Actuation, Parameters};
 use crate::plant::ReentryPlant;
-use fmi2_export::{Context, Failure};
+use fmi_export::{Context, Failure};
 use vehicle::Vehicle;
 
 /// Returns the error for a parameter that the file leaves without effect.

@@ -1,7 +1,7 @@
 //! Data of an instance: parameters, inputs, outputs and the plant that computes them.
 
 use crate::parameters::Parameters;
-use fmi2_export::Failure;
+use fmi_export::Failure;
 use nalgebra::{SVector, Vector3};
 use serde::{Deserialize, Serialize};
 use vehicle::Vehicle;

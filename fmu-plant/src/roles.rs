@@ -1,8 +1,8 @@
 //! Roles of the variables in the equations, so that nothing depends on their positions in the
 //! variable table.
 
-use fmi2_export::VariableTable;
-use fmi2_export::table::{Common, Real};
+use fmi_export::VariableTable;
+use fmi_export::table::{Common, Real};
 use settings::Declared;
 
 /// Quantity of the flight.

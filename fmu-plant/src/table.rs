@@ -6,7 +6,7 @@ mod sensors;
 use crate::parameters::TABLE_ROWS;
 use crate::plant::{ATTITUDE, INDICATORS, ReentryPlant};
 use crate::roles::{self, Known, Role, Unknown, Variables};
-use fmi2_export::table::{
+use fmi_export::table::{
     Description, Real, discrete_input, discrete_output, input, output, parameter,
 };
 use model_description::DefaultExperiment;

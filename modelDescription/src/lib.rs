@@ -88,7 +88,7 @@ pub enum Error {
         source: libloading::Error,
     },
     /// The library provides no model descriptions.
-    #[error("library '{}' provides no model descriptions ({problem}): build it with export_fmus! of fmi2-export", path.display())]
+    #[error("library '{}' provides no model descriptions ({problem}): build it with export_fmus! of fmi-export", path.display())]
     NoDescriptions {
         /// Path of the library file.
         path: PathBuf,

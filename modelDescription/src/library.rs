@@ -8,7 +8,7 @@ use std::path::Path;
 /// Returns the descriptions of all FMUs in the library at `path`, in the order in which it exports
 /// them.
 ///
-/// The library must be built with `fmi2-export`: `fmu_model_descriptions` returns a NUL-terminated
+/// The library must be built with `fmi-export`: `fmu_model_descriptions` returns a NUL-terminated
 /// JSON list that the caller gives back to `fmu_free_model_descriptions`.
 ///
 /// # Errors

@@ -23,7 +23,7 @@ pub struct LibraryFile {
     pub suffix: &'static str,
     /// Names of the exported functions.
     pub exports: BTreeSet<String>,
-    /// Digest of its sources, as `fmi2_build::link` made it.
+    /// Digest of its sources, as `fmi_build::link` made it.
     pub sources: Option<String>,
 }
 

@@ -35,4 +35,4 @@ impl Law for Pd {
     }
 }
 
-fmi2_export::export_fmus!(ControllerFmu<Pd>);
+fmi_export::export_fmus!(ControllerFmu<Pd>);

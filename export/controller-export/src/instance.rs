@@ -7,7 +7,7 @@ use crate::table;
 use control::controller::{Controller, Measurement};
 use control::delay::{Delayed, Latency};
 use control::schedule::ControllerInput;
-use fmi2_export::{Context, Description, Failure};
+use fmi_export::{Context, Description, Failure};
 use nalgebra::Vector3;
 use vehicle::Scenario;
 use vehicle::error::rounded_time;

@@ -6,7 +6,7 @@ use control::Controller;
 use control::controller::Measurement;
 use control::delay::Latency;
 use control::error::DesignError;
-use fmi2_export::VariableTable;
+use fmi_export::VariableTable;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use settings::Declared;
@@ -37,7 +37,7 @@ impl Vehicle {
     }
 }
 
-/// A controller as an FMU, to be handed to [`fmi2_export::export_fmus!`].
+/// A controller as an FMU, to be handed to [`fmi_export::export_fmus!`].
 pub type ControllerFmu<L> = SampledFmu<ControllerInstance<L>>;
 
 /// An instance of a controller: its parameters, inputs and outputs.

@@ -32,8 +32,8 @@
 //!     }
 //! }
 //!
-//! // In the crate of the FMU: fmi2_export::export_fmus!(ControllerFmu<Soft>);
-//! let description = fmi2_export::describe::<ControllerFmu<Soft>>();
+//! // In the crate of the FMU: fmi_export::export_fmus!(ControllerFmu<Soft>);
+//! let description = fmi_export::describe::<ControllerFmu<Soft>>();
 //! assert!(description.variables.iter().any(|variable| variable.name == "moment.x"));
 //! ```
 //!

@@ -1,6 +1,6 @@
 //! The vehicle that a file gives in place of the built-in one.
 
-use fmi2_export::{Context, Failure};
+use fmi_export::{Context, Failure};
 use serde::{Deserialize, Serialize};
 use settings::Declared;
 use vehicle::Vehicle;

@@ -2,7 +2,7 @@
 //! or the external inputs.
 
 use control::controller::{Forecast, Preview};
-use fmi2_export::{Context, Failure};
+use fmi_export::{Context, Failure};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 use settings::Declared;

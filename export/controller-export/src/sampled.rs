@@ -1,9 +1,7 @@
 //! An instance that works at ticks: its steps from tick to tick, and its restoration.
 
 use control::schedule::Sampled;
-use fmi2_export::{
-    Context, Description, EventInfo, Failure, Inputs, LastEvent, Model, Restoration,
-};
+use fmi_export::{Context, Description, EventInfo, Failure, Inputs, LastEvent, Model, Restoration};
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use std::ops::{Deref, DerefMut};
 

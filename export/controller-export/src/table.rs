@@ -1,9 +1,7 @@
 //! The variable table that every controller has. Each law adds its own variables.
 
 use crate::law::{ControllerFmu, Law};
-use fmi2_export::table::{
-    Common, Description, Real, VariableTable, discrete_output, input, output,
-};
+use fmi_export::table::{Common, Description, Real, VariableTable, discrete_output, input, output};
 use model_description::DefaultExperiment;
 use model_description::condition::NEVER;
 use nalgebra::Vector3;

@@ -6,7 +6,7 @@ use fmu_controller::{
     TwoLoopSmc,
 };
 
-fmi2_export::export_fmus!(
+fmi_export::export_fmus!(
     Lqr,
     Fbl,
     Btvsmc,

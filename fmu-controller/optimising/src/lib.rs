@@ -4,4 +4,4 @@
 
 use fmu_controller::{ControlAllocator, Crmpc, Dlmpc};
 
-fmi2_export::export_fmus!(Crmpc, Dlmpc, ControlAllocator);
+fmi_export::export_fmus!(Crmpc, Dlmpc, ControlAllocator);

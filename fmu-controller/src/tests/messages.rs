@@ -7,7 +7,7 @@ use crate::{
 };
 use control::crmpc::{Constraints, InitialState};
 use control::error_dynamics::Gain;
-use fmi2_export::Model;
+use fmi_export::Model;
 
 #[allow(clippy::too_many_lines)] // It is a list.
 fn refusals() -> Vec<String> {

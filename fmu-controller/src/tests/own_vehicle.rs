@@ -3,7 +3,7 @@
 use super::{Held, ready, refusal};
 use crate::allocator::ControlAllocator;
 use crate::guidance::EntryGuidance;
-use fmi2_export::{LastEvent, Model};
+use fmi_export::{LastEvent, Model};
 use nalgebra::Vector3;
 use vehicle::Vehicle;
 

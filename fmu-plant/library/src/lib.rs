@@ -3,4 +3,4 @@
 
 use fmu_plant::ReentryPlant;
 
-fmi2_export::export_fmus!(ReentryPlant);
+fmi_export::export_fmus!(ReentryPlant);

@@ -3,7 +3,7 @@
 use super::{ANGLES, AXES, PlantVariables, vector};
 use crate::plant::MOTION;
 use crate::roles::{Known, Quantity, Role, Unknown};
-use fmi2_export::table::{Real, input, output, parameter};
+use fmi_export::table::{Real, input, output, parameter};
 use vehicle::air::{ROWS, Row};
 use vehicle::entry;
 

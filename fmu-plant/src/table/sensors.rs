@@ -2,7 +2,7 @@
 
 use super::{AXES, PlantVariables, RATES, vector};
 use crate::roles::Unknown;
-use fmi2_export::table::{Common, Real, discrete_output, output};
+use fmi_export::table::{Common, Real, discrete_output, output};
 use vehicle::trajectory;
 
 struct Sensor {

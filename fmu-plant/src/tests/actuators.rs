@@ -5,7 +5,7 @@ use super::{actuate, outputs, started, step};
 use crate::parameters::Actuation;
 use crate::plant::INDICATORS;
 use crate::plant::{Output, ReentryPlant};
-use fmi2_export::Model;
+use fmi_export::Model;
 use nalgebra::Vector3;
 use vehicle::disturbance::DisturbanceKind;
 use vehicle::effectors::{Jets, Surfaces};

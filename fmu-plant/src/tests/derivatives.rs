@@ -7,7 +7,7 @@ use super::{
 use crate::plant::ReentryPlant;
 use crate::roles::Known;
 use crate::table::role;
-use fmi2_export::{Model, describe};
+use fmi_export::{Model, describe};
 use nalgebra::Vector3;
 use vehicle::disturbance::DisturbanceKind;
 use vehicle::kinematics::Kinematics;

@@ -4,7 +4,7 @@ use super::MEASURED;
 use crate::plant::ReentryPlant;
 use crate::roles::{Known, Quantity, Unknown};
 use crate::table::role;
-use fmi2_export::describe;
+use fmi_export::describe;
 use model_description::variable::{Causality, Variability, VariableKind};
 use vehicle::Scenario;
 

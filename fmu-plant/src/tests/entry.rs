@@ -6,7 +6,7 @@ use super::{Constant, STATES, outputs, started, step};
 use crate::entry::Translation;
 use crate::plant::{Output, ReentryPlant};
 use crate::table::role;
-use fmi2_export::{Failure, LastEvent, Model, describe};
+use fmi_export::{Failure, LastEvent, Model, describe};
 use nalgebra::Vector3;
 use vehicle::air::Row;
 use vehicle::disturbance::DisturbanceKind;

@@ -12,7 +12,7 @@ mod sensors;
 
 use crate::parameters::Actuation;
 use crate::plant::{Output, ReentryPlant};
-use fmi2_export::{Context, Failure, Inputs, LastEvent, Model};
+use fmi_export::{Context, Failure, Inputs, LastEvent, Model};
 use nalgebra::Vector3;
 use settings::Choice;
 use vehicle::disturbance::{DisturbanceKind, Row};

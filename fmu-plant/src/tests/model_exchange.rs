@@ -2,7 +2,7 @@
 
 use super::{CONTEXT, STATE_COUNT, actuate, all_kinds, outputs, started, step, tabulate};
 use crate::plant::{INDICATORS, Output, ReentryPlant};
-use fmi2_export::{LastEvent, Model};
+use fmi_export::{LastEvent, Model};
 use nalgebra::Vector3;
 use vehicle::disturbance::{DisturbanceKind, Row};
 

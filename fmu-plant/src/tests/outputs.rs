@@ -3,7 +3,7 @@
 use super::{Ramp, delayed, in_model_exchange, outputs, started, step};
 use crate::parameters::Initial;
 use crate::plant::ReentryPlant;
-use fmi2_export::Model;
+use fmi_export::Model;
 use nalgebra::Vector3;
 use vehicle::Scenario;
 use vehicle::disturbance::DisturbanceKind;

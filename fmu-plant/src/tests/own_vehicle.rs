@@ -5,7 +5,7 @@ use super::model_exchange::exchange;
 use super::{CONTEXT, actuate, outputs, started, step};
 use crate::entry::Vehicle::Shuttle;
 use crate::plant::ReentryPlant;
-use fmi2_export::{Model, Restoration};
+use fmi_export::{Model, Restoration};
 use std::path::PathBuf;
 use vehicle::disturbance::DisturbanceKind;
 

@@ -6,7 +6,7 @@ use super::{
 use crate::parameters::Actuation;
 use crate::parameters::Initial;
 use crate::plant::ReentryPlant;
-use fmi2_export::{Failure, LastEvent, Model};
+use fmi_export::{Failure, LastEvent, Model};
 use nalgebra::Vector3;
 use vehicle::disturbance::DisturbanceKind;
 

@@ -3,7 +3,7 @@
 use super::model_exchange::{assert_same_motion, exchange, integrate};
 use super::{Constant, STATE_COUNT, outputs, started, step};
 use crate::plant::ReentryPlant;
-use fmi2_export::{Failure, Model};
+use fmi_export::{Failure, Model};
 use nalgebra::Vector3;
 use vehicle::disturbance::DisturbanceKind;
 use vehicle::kinematics::{Kinematics, r_inverse};

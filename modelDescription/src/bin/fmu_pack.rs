@@ -12,7 +12,7 @@ use std::{fs, io};
 /// Packs every FMU in the given libraries into an archive NAME.fmu for FMI 2.0, and with --fmi3
 /// into another one for FMI 3.0.
 ///
-/// Each library must be built with fmi2-export. The program loads it and asks it for the
+/// Each library must be built with fmi-export. The program loads it and asks it for the
 /// descriptions of its FMUs. Builds of the libraries for other platforms, given by --also, are only
 /// read; they must be built from the same sources and export the same functions. A library may only
 /// need libraries that every system of its platform has. The same input gives the same bytes. Exit
@@ -125,7 +125,7 @@ impl Library {
 fn add(libraries: &mut [Library], also: LibraryFile) -> Result<(), Error> {
     let fault = |problem: String| Error::Library { path: also.path.clone(), problem };
     if also.sources.is_none() {
-        return Err(fault("it has no digest of its sources: see fmi2_build::link".into()));
+        return Err(fault("it has no digest of its sources: see fmi_build::link".into()));
     }
     let Some(library) = libraries.iter_mut().find(|library| library.loaded.sources == also.sources)
     else {

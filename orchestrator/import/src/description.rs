@@ -192,7 +192,9 @@ fn mark_optional(root: &Element, variables: &mut [Variable]) {
         root.list("VendorAnnotations", "Tool").chain(root.list("Annotations", "Annotation"));
     let entries = tools.flat_map(|tool| tool.children.iter().filter(|it| it.name == "Optional"));
     let names: BTreeSet<&str> = entries.filter_map(|entry| entry.attribute("variable")).collect();
-    variables.iter_mut().for_each(|it| it.is_optional = names.contains(&*it.name));
+    for variable in variables {
+        variable.is_optional = names.contains(&*variable.name);
+    }
 }
 
 /// The variables of a description.
@@ -213,9 +215,8 @@ fn interface(element: &Element) -> Result<Interface, String> {
             capabilities.push(name.to_string());
         }
     }
-    let order: Option<u32> =
-        element.parsed("maxOutputDerivativeOrder", "a whole number from 0 on")?;
-    if let Some(order) = order.filter(|&order| order > 0) {
+    let order = element.parsed("maxOutputDerivativeOrder", "a whole number from 0 on")?;
+    if let Some(order) = order.filter(|&order: &u32| order > 0) {
         capabilities.push(format!("maxOutputDerivativeOrder={order}"));
     }
     Ok(Interface {
@@ -364,22 +365,21 @@ fn position(unknown: &Element, index: usize, variables: usize) -> Result<usize, 
     })
 }
 
+/// Returns the entries of a list of the model structure.
+fn unknowns<'a>(root: &'a Element, list: &'a str) -> impl Iterator<Item = &'a Element> {
+    root.child("ModelStructure").into_iter().flat_map(move |it| it.list(list, "Unknown"))
+}
+
 /// Returns the positions of the derivatives, in the order of the continuous states.
 fn derivatives(root: &Element, variables: usize) -> Result<Vec<usize>, String> {
-    let structure = root.child("ModelStructure").into_iter();
-    let unknowns = structure.flat_map(|structure| structure.list("Derivatives", "Unknown"));
-    unknowns.map(|unknown| position_of(unknown, variables)).collect()
+    unknowns(root, "Derivatives").map(|unknown| position_of(unknown, variables)).collect()
 }
 
 /// Returns the positions of the inputs that each output depends on, by the position of the
 /// output. Only outputs that declare their dependencies have an entry.
 fn dependencies(root: &Element, variables: usize) -> Result<BTreeMap<usize, Vec<usize>>, String> {
-    let unknowns = root
-        .child("ModelStructure")
-        .into_iter()
-        .flat_map(|structure| structure.list("Outputs", "Unknown"));
     let mut dependencies = BTreeMap::new();
-    for unknown in unknowns {
+    for unknown in unknowns(root, "Outputs") {
         let position = |index: usize| position(unknown, index, variables);
         let output = position_of(unknown, variables)?;
         if let Some(text) = unknown.attribute("dependencies") {
@@ -389,8 +389,8 @@ fn dependencies(root: &Element, variables: usize) -> Result<BTreeMap<usize, Vec<
                 };
                 text.parse().map_err(|_| fault()).and_then(position)
             };
-            dependencies
-                .insert(output, text.split_whitespace().map(parse).collect::<Result<Vec<_>, _>>()?);
+            let inputs: Result<Vec<_>, _> = text.split_whitespace().map(parse).collect();
+            dependencies.insert(output, inputs?);
         }
     }
     Ok(dependencies)

@@ -1,8 +1,8 @@
 //! The second FMU of the library, for co-simulation only. It has a defect for every place where a
 //! panic can start.
 
-use fmi2_export::table::{discrete_output, input, parameter};
-use fmi2_export::{Context, Description, Failure, Inputs, LastEvent, Model, VariableTable};
+use fmi_export::table::{discrete_output, input, parameter};
+use fmi_export::{Context, Description, Failure, Inputs, LastEvent, Model, VariableTable};
 use model_description::DefaultExperiment;
 use serde::{Deserialize, Serialize};
 use settings::Choice;

@@ -2,7 +2,7 @@
 //! refused.
 
 use crate::support::*;
-use fmi2_export::types::FmiStatus;
+use fmi_export::types::FmiStatus;
 use std::ptr::null_mut;
 
 /// Drives an instance over three steps from `k` on and returns the bits of all its outputs.

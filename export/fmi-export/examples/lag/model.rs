@@ -1,8 +1,8 @@
 //! A first-order lag x' = (k u − x) / T. Its gain changes at a time event, and an event indicator
 //! tells when x crosses 1. Every kind of variable occurs in it.
 
-use fmi2_export::table::{discrete_input, discrete_output, input, local, output, parameter};
-use fmi2_export::{
+use fmi_export::table::{discrete_input, discrete_output, input, local, output, parameter};
+use fmi_export::{
     Context, Description, EventInfo, Failure, Inputs, LastEvent, Model, VariableTable,
 };
 use model_description::DefaultExperiment;

@@ -1,7 +1,7 @@
 //! Tests of the messages that reach the importer's logger, and of their categories.
 
 use crate::support::*;
-use fmi2_export::types::{FmiStatus, LogCallback};
+use fmi_export::types::{FmiStatus, LogCallback};
 use std::ffi::{CStr, c_char, c_void};
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::ptr::null;

@@ -1,7 +1,7 @@
 //! Tests of co-simulation: time, input derivatives and status.
 
 use crate::support::*;
-use fmi2_export::types::FmiStatus;
+use fmi_export::types::FmiStatus;
 use std::ffi::CStr;
 use std::ptr::null;
 

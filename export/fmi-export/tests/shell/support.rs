@@ -2,7 +2,7 @@
 #![allow(unsafe_code)]
 
 use crate::fmi2;
-use fmi2_export::types::{CEventInfo, Callbacks, FmiStatus, LogCallback};
+use fmi_export::types::{CEventInfo, Callbacks, FmiStatus, LogCallback};
 use std::ffi::{CStr, CString, c_char, c_int, c_void};
 use std::ptr::{null, null_mut};
 use std::sync::Mutex;

@@ -1,7 +1,7 @@
 //! Tests of getting and setting values: types, limits, causality and laziness.
 
 use crate::support::*;
-use fmi2_export::types::FmiStatus;
+use fmi_export::types::FmiStatus;
 use std::ptr::null;
 
 fn initializing() -> Instance {

@@ -1,7 +1,7 @@
 //! Tests of instantiation, of several instances and FMUs side by side, and of panics.
 
 use crate::support::*;
-use fmi2_export::types::{Callbacks, FmiStatus, LogCallback};
+use fmi_export::types::{Callbacks, FmiStatus, LogCallback};
 use std::ffi::{CStr, c_char, c_void};
 use std::ptr::{null, null_mut};
 use std::sync::Mutex;

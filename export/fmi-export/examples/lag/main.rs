@@ -3,4 +3,4 @@
 
 pub mod model;
 
-fmi2_export::export_fmus!(model::Lag);
+fmi_export::export_fmus!(model::Lag);

@@ -5,13 +5,13 @@
 #[allow(unreachable_pub)]
 mod lag;
 
-use fmi2_export::types::FmiStatus;
+use fmi_export::types::FmiStatus;
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 use std::ffi::CString;
 use std::ptr::null;
 
-fmi2_export::export_fmus!(lag::Lag);
+fmi_export::export_fmus!(lag::Lag);
 
 thread_local! {
     static COUNT: Cell<usize> = const { Cell::new(0) };
@@ -40,7 +40,7 @@ static ALLOCATOR: Counting = Counting;
 
 #[test]
 fn a_step_allocates_nothing() {
-    let guid = CString::new(fmi2_export::describe::<lag::Lag>().guid()).unwrap();
+    let guid = CString::new(fmi_export::describe::<lag::Lag>().guid()).unwrap();
     let references = [9u32, 10, 12, 13];
     let mut values = [0.0; 4];
     // SAFETY: every pointer is null or points to valid memory for the duration of its call.

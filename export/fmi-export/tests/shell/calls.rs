@@ -1,7 +1,7 @@
 //! Tests of the calls that are allowed in each state.
 
 use crate::support::{CO_SIMULATION, Instance, MODEL_EXCHANGE, U, X, c};
-use fmi2_export::types::{CEventInfo, FmiStatus};
+use fmi_export::types::{CEventInfo, FmiStatus};
 use std::ffi::{c_int, c_void};
 use std::ptr::{null, null_mut};
 

@@ -3,9 +3,9 @@
 use crate::counter::Counter;
 use crate::lag::Lag;
 use crate::support::*;
-use fmi2_export::linked::Linked;
-use fmi2_export::types::FmiStatus;
-use fmi2_export::{Export, Failure};
+use fmi_export::linked::Linked;
+use fmi_export::types::FmiStatus;
+use fmi_export::{Export, Failure};
 
 fn lag() -> Linked {
     Linked::new(&Export::new::<Lag>())

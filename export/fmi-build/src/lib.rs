@@ -1,4 +1,4 @@
-//! Build script of a crate whose library exports FMI 2.0 FMUs. The script's `main` calls [`link`].
+//! Build script of a crate whose library exports FMUs. The script's `main` calls [`link`].
 
 mod exports;
 mod sources;
@@ -24,7 +24,7 @@ pub fn link() {
         ("linux", _) => println!("cargo::rustc-link-arg-cdylib=-Wl,-z,nodelete"),
         ("windows", "gnu") => {
             let folder = PathBuf::from(env::var_os("OUT_DIR").expect("cargo sets OUT_DIR"));
-            let file = folder.join("fmi2.def");
+            let file = folder.join("fmi.def");
             exports::write(&file).unwrap_or_else(|error| panic!("{}: {error}", file.display()));
             println!("cargo::rustc-link-arg-cdylib={}", file.display());
         }

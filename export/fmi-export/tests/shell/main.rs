@@ -16,4 +16,4 @@ mod saved;
 mod steps;
 mod values;
 
-fmi2_export::export_fmus!(lag::Lag, counter::Counter);
+fmi_export::export_fmus!(lag::Lag, counter::Counter);

@@ -11,12 +11,12 @@
 ///
 /// The GUID given to `fmi2Instantiate`, or the equal instantiation token of FMI 3.0, selects the
 /// FMU. The crate needs `crate-type = ["cdylib", …]` and a build script that calls
-/// `fmi2_build::link`. The digest of the library's sources, which that build script makes, is put
+/// `fmi_build::link`. The digest of the library's sources, which that build script makes, is put
 /// into a section of its own.
 ///
 /// ```ignore
-/// fmi2_export::export_fmus!(Plant);
-/// fmi2_export::export_fmus!(crmpc::Crmpc, lqr::Lqr);
+/// fmi_export::export_fmus!(Plant);
+/// fmi_export::export_fmus!(crmpc::Crmpc, lqr::Lqr);
 /// ```
 #[macro_export]
 macro_rules! export_fmus {
