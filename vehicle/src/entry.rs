@@ -43,6 +43,9 @@ pub struct Deviations {
     /// Ratio of the actual to the nominal drag.
     #[setting(name = "drag.scale", min = 0.0, max = 10.0, nominal = 1.0)]
     pub drag: f64,
+    /// Ratio of the actual to the nominal side force.
+    #[setting(name = "side.scale", min = 0.0, max = 10.0, nominal = 1.0)]
+    pub side: f64,
     /// Ratio of the actual to the nominal moments of the air, without those of the surfaces.
     #[setting(name = "moment.scale", min = 0.0, max = 10.0, nominal = 1.0)]
     #[setting(used_with = "aerodynamics.vehicle = papers")]
@@ -55,7 +58,7 @@ pub struct Deviations {
 
 impl Default for Deviations {
     fn default() -> Self {
-        Self { lift: 1.0, drag: 1.0, moment: 1.0, pitch: 0.0 }
+        Self { lift: 1.0, drag: 1.0, side: 1.0, moment: 1.0, pitch: 0.0 }
     }
 }
 
@@ -178,10 +181,11 @@ impl Config {
         if radius <= 0.0 {
             return refuse("planet.radius", format!("= {radius} m must be positive"));
         }
-        let Deviations { lift, drag, moment, pitch } = self.deviations;
+        let Deviations { lift, drag, side, moment, pitch } = self.deviations;
         for (name, value) in [
             ("aerodynamics.lift.scale", lift),
             ("aerodynamics.drag.scale", drag),
+            ("aerodynamics.side.scale", side),
             ("aerodynamics.moment.scale", moment),
         ] {
             if !(value >= 0.0 && value.is_finite()) {
@@ -260,9 +264,9 @@ impl Config {
         let flow =
             Flow { dynamic_pressure, mach: airspeed / sound_speed, speed: airspeed, alpha, beta };
         let mass = self.aerodynamics.mass();
-        let [drag, side, lift] = self.aerodynamics.forces(&flow);
-        let (drag, side, lift) =
-            (drag / mass * self.deviations.drag, side / mass, lift / mass * self.deviations.lift);
+        let Deviations { drag, side, lift, .. } = self.deviations;
+        let nominal = self.aerodynamics.forces(&flow).map(|force| force / mass);
+        let (drag, side, lift) = (nominal[0] * drag, nominal[1] * side, nominal[2] * lift);
         // Along the axes of the flow, drag acts backward and lift upward. The bank angle leads from
         // these axes to the trajectory's, if there is no wind.
         let along_flow = Vector3::new(-drag, side, -lift);
@@ -303,6 +307,7 @@ impl Config {
             // The forces act at the point of the moments, which leaves a lever arm.
             let [_, side, _] = self.aerodynamics.forces(&flow);
             let mass = self.aerodynamics.mass();
+            let side = side * self.deviations.side;
             let force = Vector3::new(-passage.drag * mass, side, -passage.lift * mass);
             let along_flow = Vector3::new(flow.alpha, flow.beta, 0.0);
             moment += point.cross(&(body_from_velocity(&along_flow) * force));

@@ -76,15 +76,18 @@ impl Case {
         self
     }
 
-    /// Tactical sensors in winds up to some 60 m/s, with lift and drag wrong by up to 10 %.
+    /// Tactical sensors in winds up to some 60 m/s, with lift, drag and side force wrong by
+    /// up to 10 %.
     pub(crate) fn windy(seed: u64) -> Self {
         let draws: [f64; 8] = uniform(seed, 99);
+        let [side] = uniform(seed, 97);
         let mut case = Self::new(4, false, seed);
         let low = [60.0 * draws[0], 60.0 * draws[1]];
         let middle = [0.7 * low[0] + 20.0 * draws[2], 0.7 * low[1] + 20.0 * draws[3]];
         case.wind = [low, middle, [20.0 * draws[4], 20.0 * draws[5]]];
         case.deviations.lift = 1.0 + 0.1 * draws[6];
         case.deviations.drag = 1.0 + 0.1 * draws[7];
+        case.deviations.side = 1.0 + 0.1 * side;
         case.settings.wind.deviation = 40.0;
         case
     }

@@ -155,6 +155,7 @@ fn outputs_need_no_start_and_inputs_have_one() {
             "star.attitude.z",
             "aerodynamics.lift.scale",
             "aerodynamics.drag.scale",
+            "aerodynamics.side.scale",
             "aerodynamics.moment.scale",
             "aerodynamics.pitch.offset",
         ];
