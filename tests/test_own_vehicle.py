@@ -38,6 +38,15 @@ def test_the_example_flies_to_the_terminal_area(orchestrate):
     assert metrics["completed"] and metrics["range_off_km"] < 5
 
 
+def test_different_vehicles_in_one_loop_are_warned_of(orchestrate):
+    finished, _ = orchestrate(ENTRY / "own-vehicle.toml", "--stop", "1")
+    assert finished.returncode == 0 and "vehicle.file" not in finished.stderr
+    finished, _ = orchestrate(ENTRY / "own-vehicle.toml", "--stop", "1", "--set", "guidance.vehicle.file=")
+    said = " ".join(finished.stderr.split())
+    assert finished.returncode == 0
+    assert "vehicle.file differs from component to component" in said and '"guidance" reads none' in said, said
+
+
 def test_the_papers_vehicle_from_a_file_flies_with_the_same_bits(orchestrate, tmp_path):
     (tmp_path / "papers.toml").write_text(PAPERS, encoding="utf-8")
     parts = [f'[components.{name}.parameters]\n"vehicle.file" = "papers.toml"\n' for name in ("plant", "guidance", "allocator")]

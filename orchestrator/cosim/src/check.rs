@@ -9,12 +9,15 @@ use crate::system::{CheckedComponent, Opened, System, parts};
 use crate::wiring;
 use fmi_master::clock::Clock;
 use fmi_master::delay;
+use fmi_master::description::{Variable, VariableKind};
 use fmi_master::names;
+use fmi_master::settings::SettingValue;
 use fmi_master::wiring::Part;
 use fmu_import::faults;
 use fmu_import::fmu::Fmu;
 use fmu_import::lookup_table::is_lookup_table;
 use fmu_import::warnings;
+use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
@@ -85,7 +88,36 @@ pub fn check(
     for (component, settings) in components.iter_mut().zip(settings) {
         component.settings = settings;
     }
+    warn_of_different_files(&components);
     Ok(System { experiment, clock, components, loops, wires, columns, probes })
+}
+
+/// Warns if components read different files by a parameter of the same name, such as
+/// `vehicle.file`.
+fn warn_of_different_files(components: &[CheckedComponent]) {
+    let mut files: BTreeMap<&str, Vec<(&str, &str)>> = BTreeMap::new();
+    for CheckedComponent { name, fmu, settings, .. } in components {
+        let is_file =
+            |it: &&Variable| it.kind == VariableKind::String && settings::is_file(&it.name);
+        for variable in fmu.description.variables.iter().filter(is_file) {
+            let given = settings.iter().find(|setting| setting.name == variable.name);
+            let file = match given.map(|setting| &setting.value) {
+                Some(SettingValue::Text(file)) => file,
+                _ => variable.start.as_deref().unwrap_or_default(),
+            };
+            files.entry(&variable.name).or_default().push((name, file));
+        }
+    }
+    for (parameter, read) in files {
+        if read.iter().any(|(_, file)| *file != read[0].1) {
+            let read = read.iter().map(|(component, file)| match *file {
+                "" => format!("\"{component}\" reads none"),
+                file => format!("\"{component}\" reads {file}"),
+            });
+            let read = read.collect::<Vec<_>>().join(", ");
+            warnings::warn_once(format!("{parameter} differs from component to component: {read}"));
+        }
+    }
 }
 
 /// Warns of keys that have no effect beside the others.

@@ -53,12 +53,15 @@ pub(crate) fn resolve(
     Ok(settings)
 }
 
+/// Returns whether a parameter, such as `vehicle.file`, names a file.
+pub(crate) fn is_file(name: &str) -> bool {
+    name.rsplit_once('.').is_some_and(|(_, last)| last == "file")
+}
+
 /// Returns the path of a file beside the experiment, or beside one that it extends, if a parameter
 /// such as `vehicle.file` names it. FMUs themselves look for files in the working directory.
 fn file_beside(experiment: &Experiment, name: &str, written: &Value) -> Option<Value> {
-    let file = written
-        .as_str()
-        .filter(|_| name.rsplit_once('.').is_some_and(|(_, last)| last == "file"))?;
+    let file = written.as_str().filter(|_| is_file(name))?;
     let path = experiment.source.folders().map(|folder| folder.join(file)).find(|p| p.is_file())?;
     Some(Value::from(std::path::absolute(path).ok()?.to_str()?))
 }
