@@ -154,7 +154,7 @@ function compared({ error, ...data }) {
   const { controller } = JSON.parse(ghostRequest ?? "{}");
   if (error || !controller) return;
   const other = read(data, settings.controllers.get(controller).name.split(",")[0]);
-  ghost = { ...other, norms: [norm(other.rates), norm(other.moment)], request: ghostRequest };
+  ghost = { ...other, norms: [norm(other.rates), norm(other.moment)], directions: PhasePicture.directions(other.rates), request: ghostRequest };
   flight.ghost = ghost;
   show();
 }
@@ -199,7 +199,7 @@ function show() {
   if (settings.isEntry) {
     const of = (name) => settings.number(`guidance.${name}`);
     const allowed = Object.fromEntries(LOADS.map(([, name]) => [name, of(`limit.${name}`)]));
-    entry.show({ time: flight.time, of: flight.of, limits: allowed, target: [of("target.longitude") * DEG, of("target.latitude") * DEG] });
+    entry.show({ time: flight.time, of: flight.of, limits: allowed, planet: { radius: of("planet.radius"), gravitation: of("planet.gravitation") }, target: [of("target.longitude") * DEG, of("target.latitude") * DEG] });
   }
   $("ghost-says").textContent = other ? ` Dashed: ${other.name} under the same disturbance.` : "";
   $("faint-says").textContent = other ? ` Pale: ${other.name} under the same disturbance.` : "";

@@ -1,7 +1,8 @@
 // The pictures of an entry flight: altitude over speed with its corridor, and the ground track with the coasts of the Earth.
 //
 //   const pictures = new EntryPictures(parent, (time) => …);
-//   pictures.show({ time, of: (column) => values, limits: { heatFlux, load, pressure }, target: [longitude, latitude] });
+//   pictures.show({ time, of: (column) => values, limits: { heatFlux, load, pressure }, planet: { radius, gravitation },
+//     target: [longitude, latitude] });
 //   pictures.point(time);
 "use strict";
 
@@ -132,11 +133,11 @@ class EntryPictures {
     return EntryPictures.read;
   }
 
-  show({ time, of, limits, target }) {
+  show({ time, of, limits, planet, target }) {
     const zip = (a, b) => Array.from(a, (value, row) => [value, b[row]]);
     const [altitude, speed] = [of("plant.motion.altitude").map((value) => value / 1e3), of("plant.motion.speed").map((value) => value / 1e3)];
     const curves = [
-      ...this.limits(of, altitude, limits).map(([name, values], i) => ({
+      ...this.limits(of, altitude, limits, planet).map(([name, values], i) => ({
         name, points: zip(speed, values), style: { stroke: `var(--c${i + 1})`, "stroke-width": 1.4, "stroke-dasharray": Chart.DASHES[i + 1] },
       })),
       { name: "flight", points: zip(speed, altitude), style: { stroke: "var(--ink)", "stroke-width": 2.4 } },
@@ -165,10 +166,10 @@ class EntryPictures {
     });
   }
 
-  // Altitudes at which each quantity would be at its limit at the speed of the flight. At constant speed load and pressure
-  // are proportional to the density, and the heat flux to its root; the density over altitude is the flight's own.
-  limits(of, altitude, limits) {
-    const density = of("plant.flow.density");
+  // Altitudes at which each quantity would be at its limit at the speed of the flight. At constant speed load, pressure
+  // and lift are proportional to the density, and the heat flux to its root; the density over altitude is the flight's own.
+  limits(of, altitude, limits, { radius, gravitation }) {
+    const [density, speed] = [of("plant.flow.density"), of("plant.motion.speed")];
     const order = Array.from(density.keys()).sort((a, b) => density[a] - density[b]);
     const [logs, heights] = [order.map((row) => Math.log(density[row])), order.map((row) => altitude[row])];
     const height = (wanted) => {
@@ -182,6 +183,11 @@ class EntryPictures {
       ["heat flux limit", at("plant.heating.flux", limits.heatFlux, 0.5)],
       ["load limit", at("plant.loadFactor", limits.load, 1)],
       ["pressure limit", at("plant.flight.dynamicPressure", limits.pressure, 1)],
+      ["equilibrium glide", of("plant.load.lift").map((lift, row) => {
+        const distance = radius + 1e3 * altitude[row];
+        const needed = gravitation / distance ** 2 - speed[row] ** 2 / distance;
+        return height(Math.log(density[row] * needed / lift));
+      })],
     ];
   }
 

@@ -2,24 +2,81 @@
 // limits leave to it.
 //
 //   const picture = new GuaranteePicture(canvas, (time) => …);
-//   picture.show({ stop, time, norms: [rates, moments], limits: [rate, moment], plans, holds: (row) => …, ghost }, cursor);
+//   picture.show({ stop, time, norms: [rates, moments], directions, limits: [rate, moment], plans, holds: (row) => …, ghost }, cursor);
 //   picture.point(cursor);    // time, s
 //
+// PhasePicture, with the same functions, shows the body rates as a point within the ball of their limit.
 // A plan is { began, at: […], norms: [[…], […]], bounds: [[…], […]] }, with times from its beginning on. What a bound
 // leaves of its limit is the tube: the flown norm differs from the plan in force by at most that much. A ghost is
-// { name, time, norms }. Lines of what is flown are thick, of what is planned thin; where the guarantee does not hold,
+// { name, time, norms, directions }. Directions are those of the body rates p and r, rad. Lines of what is flown are thick, of what is planned thin; where the guarantee does not hold,
 // nothing is filled.
 "use strict";
 
-class GuaranteePicture {
-  static PANELS = [{ title: "Body rate ‖ω‖", unit: "deg/s", digits: 2 }, { title: "Control moment ‖m‖", unit: "kN m", digits: 1 }];
-  static LEFT = 40;
-  static RIGHT = 84;
+class Picture {
   // Share of a limit up to which the axes go, whatever is flown.
   static TOP = 1.5;
 
-  constructor(canvas, onPoint) {
+  constructor(canvas) {
     Object.assign(this, { canvas, data: null, cursor: 0 });
+    new ResizeObserver(() => this.draw()).observe(canvas);
+  }
+
+  show(data, cursor) {
+    this.data = data;
+    this.point(cursor);
+  }
+
+  point(cursor) {
+    this.cursor = cursor;
+    this.draw();
+  }
+
+  // Clears the canvas and returns its size; nothing if there is nothing to draw.
+  begin() {
+    const { canvas, data } = this;
+    const [width, height] = [canvas.clientWidth, canvas.clientHeight];
+    if (!data || !width || !height) return null;
+    const ratio = window.devicePixelRatio || 1;
+    [canvas.width, canvas.height] = [Math.round(width * ratio), Math.round(height * ratio)];
+    this.context = canvas.getContext("2d");
+    this.context.scale(ratio, ratio);
+    const style = getComputedStyle(canvas);
+    this.colour = (name) => style.getPropertyValue(`--${name}`).trim();
+    this.context.font = `12px ${style.fontFamily}`;
+    return [width, height];
+  }
+
+  row(time = this.cursor, { time: times } = this.data) {
+    const step = times[1] - times[0] || 1;
+    return Math.max(0, Math.min(times.length - 1, Math.floor((time - times[0]) / step + 1e-6)));
+  }
+
+  // Index of the plan that is followed at a time; −1 before the first.
+  plan(time) {
+    const { plans } = this.data;
+    let index = plans.length - 1;
+    while (index >= 0 && plans[index].began > time + 1e-9) index--;
+    return index;
+  }
+
+  path(points, width, dash = []) {
+    const { context } = this;
+    context.lineWidth = width;
+    context.setLineDash(dash);
+    context.beginPath();
+    points.forEach(([x, y], i) => (i ? context.lineTo(x, y) : context.moveTo(x, y)));
+    context.stroke();
+    context.setLineDash([]);
+  }
+}
+
+class GuaranteePicture extends Picture {
+  static PANELS = [{ title: "Body rate ‖ω‖", unit: "deg/s", digits: 2 }, { title: "Control moment ‖m‖", unit: "kN m", digits: 1 }];
+  static LEFT = 40;
+  static RIGHT = 84;
+
+  constructor(canvas, onPoint) {
+    super(canvas);
     const at = (event) => {
       if (!this.data) return;
       const { left, top, width } = canvas.getBoundingClientRect();
@@ -36,17 +93,6 @@ class GuaranteePicture {
       at(event);
     });
     canvas.addEventListener("pointermove", (event) => { if (event.buttons) at(event); });
-    new ResizeObserver(() => this.draw()).observe(canvas);
-  }
-
-  show(data, cursor) {
-    this.data = data;
-    this.point(cursor);
-  }
-
-  point(cursor) {
-    this.cursor = cursor;
-    this.draw();
   }
 
   // First and last time that the panels show.
@@ -56,31 +102,10 @@ class GuaranteePicture {
     return [from, from + before + after];
   }
 
-  row(time = this.cursor) {
-    const { time: times } = this.data;
-    const step = times[1] - times[0] || 1;
-    return Math.max(0, Math.min(times.length - 1, Math.floor(time / step + 1e-6)));
-  }
-
-  // Index of the plan that is followed at a time; −1 before the first.
-  plan(time) {
-    const { plans } = this.data;
-    let index = plans.length - 1;
-    while (index >= 0 && plans[index].began > time + 1e-9) index--;
-    return index;
-  }
-
   draw() {
-    const { canvas, data } = this;
-    const [width, height] = [canvas.clientWidth, canvas.clientHeight];
-    if (!data || !width || !height) return;
-    const ratio = window.devicePixelRatio || 1;
-    [canvas.width, canvas.height] = [Math.round(width * ratio), Math.round(height * ratio)];
-    const context = (this.context = canvas.getContext("2d"));
-    context.scale(ratio, ratio);
-    const style = getComputedStyle(canvas);
-    this.colour = (name) => style.getPropertyValue(`--${name}`).trim();
-    context.font = `12px ${style.fontFamily}`;
+    const size = this.begin();
+    if (!size) return;
+    const [width, height] = size;
     const [left, right] = [GuaranteePicture.LEFT, width - GuaranteePicture.RIGHT];
     const each = (height - 78) / 2;
     const [from, to] = this.window();
@@ -141,16 +166,6 @@ class GuaranteePicture {
     this.context.strokeStyle = this.colour(colour);
     const y = Math.round(this.y(value)) + 0.5;
     this.path([[box.left, y], [box.right, y]], 1, dash);
-  }
-
-  path(points, width, dash = []) {
-    const { context } = this;
-    context.lineWidth = width;
-    context.setLineDash(dash);
-    context.beginPath();
-    points.forEach(([x, y], i) => (i ? context.lineTo(x, y) : context.moveTo(x, y)));
-    context.stroke();
-    context.setLineDash([]);
   }
 
   label(text, value, box, colour) {
@@ -227,9 +242,7 @@ class GuaranteePicture {
   // Another law under the same disturbance, filled where it is beyond the limit.
   ghost(i, limit, box) {
     const { context, data: { ghost } } = this;
-    const step = ghost.time[1] - ghost.time[0] || 1;
-    const last = Math.min(ghost.time.length - 1, Math.floor(this.cursor / step + 1e-6));
-    const first = Math.max(0, Math.floor(box.from / step));
+    const [first, last] = [box.from, this.cursor].map((time) => this.row(time, ghost));
     let largest = first;
     const points = [];
     for (let row = first; row <= last; row++) {
@@ -319,5 +332,83 @@ class GuaranteePicture {
     context.fillStyle = this.colour("muted");
     context.fillText("100 %", right + 6, y(1));
     context.fillText("guarantee", right + 6, bottom + 6);
+  }
+}
+
+// The body rates within the ball of their limit, seen so that none of it is hidden: the distance from the middle is the norm,
+// the direction that of p and r. Circles, shell and ring are the plan, its bound, what the disturbance can take, and its tube, at the
+// point where the plan comes closest to its bound.
+class PhasePicture extends Picture {
+  static TOP = 1.25;
+  static PAST = 3; // s
+
+  static directions([p, , r]) {
+    return Array.from(p, (roll, row) => Math.atan2(r[row], roll));
+  }
+
+  draw() {
+    const size = this.begin();
+    if (!size) return;
+    const { context, data, cursor } = this;
+    const [[width, height], limit] = [size, data.limits[0]];
+    const [middle, centre] = [width / 2, (height - 14) / 2];
+    const radius = Math.min(middle, centre) - 16;
+    const scale = radius / (limit * PhasePicture.TOP);
+    const ring = (inner, outer, colour, alpha) => {
+      context.globalAlpha = alpha;
+      context.fillStyle = this.colour(colour);
+      context.beginPath();
+      for (const norm of [outer, inner]) {
+        context.moveTo(middle + Math.max(0, norm) * scale, centre);
+        context.arc(middle, centre, Math.max(0, norm) * scale, 0, 2 * Math.PI);
+      }
+      context.fill("evenodd");
+      context.globalAlpha = 1;
+    };
+    const circle = (norm, colour, thick, dash) => {
+      context.strokeStyle = this.colour(colour);
+      const turn = Array.from({ length: 91 }, (_, k) => (k * Math.PI) / 45);
+      this.path(turn.map((angle) => [middle + norm * scale * Math.cos(angle), centre - norm * scale * Math.sin(angle)]), thick, dash);
+    };
+    for (const [x, y] of [[radius, 0], [0, radius]]) {
+      context.strokeStyle = this.colour("line");
+      this.path([[middle - x, centre - y], [middle + x, centre + y]], 1);
+    }
+    const plan = data.plans[this.plan(cursor)];
+    if (plan) {
+      // Where the plan comes closest to its bound. That of its last point is the one of the terminal set.
+      const left = plan.bounds[0].slice(0, -1).map((bound, k) => bound - plan.norms[0][k]);
+      const k = left.indexOf(Math.min(...left));
+      const [norm, bound, holds] = [plan.norms[0][k], plan.bounds[0][k], data.holds(this.row())];
+      if (holds) {
+        ring(bound, limit, "muted", 0.13);
+        ring(norm - (limit - bound), norm + (limit - bound), "x", 0.17);
+      }
+      circle(Math.max(0, bound), "ink", 1.3, holds ? [] : [2, 3]);
+      circle(norm, "x", 1);
+      context.fillStyle = this.colour("muted");
+      Object.assign(context, { textAlign: "center", textBaseline: "alphabetic" });
+      context.fillText(`plan in ${Math.max(0, plan.began + plan.at[k] - cursor).toFixed(1)} s, closest to its bound`, middle, height - 2);
+    }
+    circle(limit, "ink", 1, [7, 4]);
+    const at = ({ norms, directions }, row) => {
+      const norm = Math.min(norms[0][row], limit * PhasePicture.TOP) * scale;
+      return [middle + norm * Math.cos(directions[row]), centre - norm * Math.sin(directions[row])];
+    };
+    const trace = (flown, colour, thick, dash) => {
+      const [first, last] = [cursor - PhasePicture.PAST, cursor].map((time) => this.row(time, flown));
+      context.strokeStyle = context.fillStyle = this.colour(colour);
+      this.path(Array.from({ length: last - first + 1 }, (_, k) => at(flown, first + k)), thick, dash);
+      context.beginPath();
+      context.arc(...at(flown, last), 4, 0, 2 * Math.PI);
+      context.fill();
+    };
+    if (data.ghost) trace(data.ghost, "y", 1.4, [5, 3]);
+    trace(data, "x", 2.6);
+    context.fillStyle = this.colour("muted");
+    Object.assign(context, { textAlign: "left", textBaseline: "middle" });
+    context.fillText("p", middle + radius + 5, centre);
+    Object.assign(context, { textAlign: "center", textBaseline: "alphabetic" });
+    context.fillText("r", middle, centre - radius - 4);
   }
 }

@@ -146,7 +146,10 @@ fn guarantee() -> Markup {
                  its plan (blue tube). It accepts a plan only if the whole tube stays under the limit, \
                  that is, if the plan stays under its bound (black line). Flown: thick." span id="ghost" {}
             }
-            canvas id="plan" role="img" aria-label="Norms of body rates and moment as they were flown and planned at the chosen time, with tube, bound and limit" {}
+            div.pictures {
+                canvas id="plan" role="img" aria-label="Norms of body rates and moment as they were flown and planned at the chosen time, with tube, bound and limit" {}
+                canvas id="phase" role="img" aria-label="Body rates as a point within the ball of their limit: the distance from the middle is their norm, the direction that of p and r" {}
+            }
         }
     }
 }

@@ -59,7 +59,7 @@
   });
 
   const planned = data.runs.find((run) => run.plans);
-  if (planned) parts.push(guaranteePicture(planned, data.runs.find((run) => run !== planned && run.vehicle?.rates), [stop, pointed]));
+  if (planned) parts.push(...guaranteePictures(planned, data.runs.find((run) => run !== planned && run.vehicle?.rates), [stop, pointed]));
 
   play.addEventListener("click", toggle);
   slider.addEventListener("input", () => seek(start + (span * slider.value) / 1000, true));
