@@ -10,6 +10,7 @@ pub mod changes;
 pub mod definition;
 pub mod findings;
 pub mod flight;
+pub mod options;
 pub mod parts;
 pub mod plan;
 pub mod prepare;

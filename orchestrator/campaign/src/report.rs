@@ -6,11 +6,11 @@ mod figures;
 
 use crate::findings::{Answer, Findings, LimitFinding, Measured, chosen, worst};
 use crate::flight::Flight;
+use crate::options::Options;
 use crate::plan::Plan;
 use crate::sensitivity::{Estimate, Sensitivity};
 use cosim::error::Error;
 use cosim::files;
-use cosim::interrupt::Interrupt;
 use cosim_report::figure::{Figure, svg, with_unit};
 use cosim_report::page::{head, script};
 use maud::{DOCTYPE, Markup, PreEscaped, html};
@@ -28,14 +28,9 @@ const SHOWN: usize = 5;
 ///
 /// # Errors
 /// Returns an error if a file cannot be read or written, or if the work was asked to end.
-pub fn write(
-    plan: &Plan,
-    findings: &Findings,
-    out: &Path,
-    interrupt: &Interrupt,
-) -> Result<(), Error> {
+pub fn write(plan: &Plan, findings: &Findings, out: &Path, options: &Options) -> Result<(), Error> {
     let table = Reader::open(&out.join("cases.parquet"))?;
-    let mut flight = Flight::new(plan, false, interrupt)?;
+    let mut flight = Flight::new(plan, false, &options.interrupt)?;
     let kept_cases = chosen(plan, &table)?;
     keep(plan, &mut flight, &kept_cases, out)?;
     let ranking = ranking(plan);
@@ -46,7 +41,7 @@ pub fn write(
     let mut pictures = figures::distributions(plan, findings, &table)?;
     pictures.extend(figures::scatters(plan, &table)?);
     if let Some(worst) = ranked.first() {
-        pictures.extend(cloud::draw(plan, flight.without_ends(), *worst, table.rows())?);
+        pictures.extend(cloud::draw(plan, *worst, table.rows(), options)?);
     }
     let page = page(plan, findings, &pictures, &kept_cases, ranking.zip(Some(ranked)).as_ref());
     files::write(&out.join("report.html"), page)

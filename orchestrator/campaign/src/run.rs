@@ -2,6 +2,7 @@
 
 use crate::findings::{Answer, Findings, findings};
 use crate::flight::{CaseStatus, Flight};
+use crate::options::Options;
 use crate::parts;
 use crate::plan::Plan;
 use crate::prepare::Recorded;
@@ -27,23 +28,6 @@ use sweep::work::{self, Worked};
 
 /// Names of the files of a campaign's results.
 pub const FILES: [&str; 4] = ["cases.parquet", "cases.csv", "summary.json", "report.html"];
-
-/// Options of a campaign.
-#[derive(Clone, Debug, Default)]
-pub struct Options {
-    /// Folder for the results; `out/<campaign>` if it is not given.
-    pub out: Option<PathBuf>,
-    /// Number of threads; 0 means one for each core.
-    pub jobs: usize,
-    /// Whether cases that are kept already are flown again.
-    pub fresh: bool,
-    /// Whether the progress display is suppressed.
-    pub quiet: bool,
-    /// Whether the table is written as CSV as well.
-    pub csv: bool,
-    /// Interrupt through which the work can be ended from outside.
-    pub interrupt: Interrupt,
-}
 
 /// Report on a campaign that was flown.
 #[derive(Debug)]
@@ -246,7 +230,7 @@ pub fn fly(plan: &Plan, options: &Options) -> Result<CampaignReport, Error> {
     }
     check_values(plan, &table)?;
     files::write_json(&out.join("summary.json"), &findings)?;
-    report::write(plan, &findings, &out, &options.interrupt)?;
+    report::write(plan, &findings, &out, options)?;
     Ok(CampaignReport { findings, out, flown, elapsed: begin.elapsed().as_secs_f64(), notes })
 }
 

@@ -2,11 +2,14 @@
 //! experiment draws.
 
 use crate::flight::Flight;
+use crate::options::Options;
 use crate::plan::Plan;
 use crate::track::Track;
 use cosim::error::Error;
+use cosim_metrics::progress::Parts;
 use cosim_report::figure::{self, Color, Curve, Figure, Legend, Shape, with_unit};
-use cosim_report::panels::Panel;
+use cosim_report::panels::{self, Panel};
+use sweep::work::{self, Worked};
 
 /// Number of cases that the band is made of.
 const CASES: u64 = 100;
@@ -19,31 +22,50 @@ const PANELS: usize = 12;
 const BAND: Color = Color::CURVES[0];
 const WORST: Color = Color::CURVES[1];
 
-/// Draws the worst case over the band of the first cases, flown with these instances. There is no
-/// figure if the experiment draws nothing.
+/// Draws the worst case over the band of the first cases, which are flown again on all threads.
+/// There is no figure if the experiment draws nothing.
 pub(super) fn draw(
     plan: &Plan,
-    mut flight: Flight,
     worst: u64,
     cases: u64,
+    options: &Options,
 ) -> Result<Option<Figure>, Error> {
-    let panels = Panel::resolve_all(flight.system())?;
-    let curves = panels.iter().flat_map(|panel| panel.curves.iter().map(move |c| (panel, c)));
-    let curves: Vec<_> = curves.take(PANELS).collect();
+    let begin = || {
+        let mut flight = Flight::new(plan, false, &options.interrupt)?.without_ends();
+        flight.leave_out_margins();
+        let panels = Panel::resolve_all(flight.system())?;
+        Ok::<_, Error>((flight, panels))
+    };
+    let (mut flight, panels) = begin()?;
+    let curves: Vec<_> = curves(&panels).collect();
     if curves.is_empty() {
         return Ok(None);
     }
-    let signals: Vec<_> = curves.iter().map(|(p, c)| (p.factor, c.signal.clone())).collect();
-    flight.leave_out_margins();
     let stride = (flight.system().clock.ticks() / POINTS).max(1);
-    let mut track = |case: u64, stride: u64| {
-        let mut track = Track::new(signals.clone(), stride);
-        flight.fly_with(case, plan.sweep.values(case), &mut [&mut track])?;
-        Ok::<Track, Error>(track)
-    };
-    let mut bad = track(worst, 1)?;
-    let others =
-        (0..cases.min(CASES)).map(|case| track(case, stride)).collect::<Result<Vec<_>, _>>()?;
+    let first = (0..cases.min(CASES)).map(|case| (case, stride));
+    let flights: Vec<(u64, u64)> = std::iter::once((worst, 1)).chain(first).collect();
+    let title = format!("{}, curves of the report", plan.campaign.title);
+    let progress = Parts::new("cases", &title, flights.len() as u64, 0, options.quiet);
+    let Worked { results, failures } = work::on_parts(
+        &flights,
+        work::threads(options.jobs, [&plan.sweep]),
+        begin,
+        |(flight, panels), &(case, stride)| {
+            let signals = self::curves(panels).map(|(p, c)| (p.factor, c.signal.clone())).collect();
+            let mut track = Track::new(signals, stride);
+            flight.fly_with(case, plan.sweep.values(case), &mut [&mut track])?;
+            progress.advance(1);
+            Ok(track)
+        },
+        |_| false,
+    );
+    progress.finish();
+    if let Some(error) = failures.into_values().next() {
+        return Err(error);
+    }
+    let mut tracks = results.into_values();
+    let Some(mut bad) = tracks.next() else { return Ok(None) };
+    let others: Vec<Track> = tracks.collect();
     let Some(longest) = others.iter().max_by_key(|track| track.time.len()) else { return Ok(None) };
     let time = &longest.time;
     let name = format!("case {worst}");
@@ -65,6 +87,11 @@ pub(super) fn draw(
     let title =
         format!("The worst case, over the median and the band of the first {} cases", others.len());
     Ok(Some(Figure { title, columns: 3.min(panels.len()), legend: Legend::Above, panels }))
+}
+
+/// Returns the curves that are drawn, each with its panel.
+fn curves(panels: &[Panel]) -> impl Iterator<Item = (&Panel, &panels::Curve)> {
+    panels.iter().flat_map(|panel| panel.curves.iter().map(move |c| (panel, c))).take(PANELS)
 }
 
 /// Returns the 5 %, 50 % and 95 % quantiles of a curve at each time, over the cases that got there.
