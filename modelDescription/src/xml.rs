@@ -70,9 +70,12 @@ impl ModelDescription {
             return Ok(());
         }
         parent(xml, list, vec![], |xml| {
+            // The schema of FMI 2.0 allows one element of a tool.
             parent(xml, tool, vec![(attribute, OPTIONAL.into())], |xml| {
-                optional.try_for_each(|variable| {
-                    leaf(xml, "Optional", vec![("variable", variable.name.clone())])
+                parent(xml, "Optional", vec![], |xml| {
+                    optional.try_for_each(|input| {
+                        leaf(xml, "Input", vec![("name", input.name.clone())])
+                    })
                 })
             })
         })

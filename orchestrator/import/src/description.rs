@@ -190,8 +190,8 @@ fn description(root: &Element, variables: Variables) -> Result<ModelDescription,
 fn mark_optional(root: &Element, variables: &mut [Variable]) {
     let tools =
         root.list("VendorAnnotations", "Tool").chain(root.list("Annotations", "Annotation"));
-    let entries = tools.flat_map(|tool| tool.children.iter().filter(|it| it.name == "Optional"));
-    let names: BTreeSet<&str> = entries.filter_map(|entry| entry.attribute("variable")).collect();
+    let inputs = tools.flat_map(|tool| tool.list("Optional", "Input"));
+    let names: BTreeSet<&str> = inputs.filter_map(|input| input.attribute("name")).collect();
     for variable in variables {
         variable.is_optional = names.contains(&*variable.name);
     }

@@ -14,7 +14,7 @@ const TEXT: &str = r#"<?xml version="1.0" encoding="UTF-8"?>
   </TypeDefinitions>
   <LogCategories><Category name="logAll"/></LogCategories>
   <DefaultExperiment stopTime="50" stepSize="0.04"/>
-  <VendorAnnotations><Tool name="x"><y/><Optional variable="u"/><Optional/><Optional variable="none"/></Tool></VendorAnnotations>
+  <VendorAnnotations><Tool name="x"><y/><Optional><Input name="u"/><Input/><Input name="none"/></Optional></Tool></VendorAnnotations>
   <ModelVariables>
 <!-- index 1 -->
 <ScalarVariable name="u" valueReference="7" causality="input"><Real declaredType="Angle" start="0.5"/></ScalarVariable>
