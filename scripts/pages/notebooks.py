@@ -1,6 +1,7 @@
 """Runs the notebooks and keeps them with their outputs and pictures: notebooks.py [--check] [NAME…]
 
-The FMUs and the program must be built (`scripts/build-fmus`, `cargo build --release -p orchestrator`).
+The FMUs as they are shipped and the program must be built (`scripts/test`, `cargo build --release -p
+orchestrator`).
 With --check nothing is written, and what differs is printed. Texts and tables must be the same; the
 pictures may differ by what fonts and their smoothing make.
 """
@@ -145,7 +146,8 @@ def main() -> int:
     problems = []
     with tempfile.TemporaryDirectory() as temporary:
         folder = Path(temporary)
-        make = [ROOT / "scripts" / "wheel", "host", TARGET / "fmu", TARGET / "release" / "orchestrator", folder]
+        fmus = TARGET / "dist" / "linux-x86_64" / "fmu"
+        make = [ROOT / "scripts" / "wheel", "host", fmus, TARGET / "release" / "orchestrator", folder]
         subprocess.run(make, check=True, stdout=subprocess.DEVNULL)
         (wheel,) = folder.glob("*.whl")
         package = install(wheel, folder / "package")
