@@ -32,9 +32,9 @@ fn oracle_errors_are_as_large_as_predicted() {
     }
 }
 
-/// With tactical sensors, wind of 60 m/s and lift, drag and side force wrong by 10 %, the bank angle
-/// is known within 0.2°, angle of attack and sideslip within 0.3°, and the sideslip relative to the
-/// air within 0.25° below Mach 5.
+/// With tactical sensors, wind of 60 m/s and lift, drag and side force wrong by 10 %, the bank
+/// angle is known within 0.2°, angle of attack and sideslip within 0.3°, and the sideslip relative
+/// to the air within 0.25° below Mach 5.
 #[test]
 fn regress_wind_is_found_by_the_side_force() {
     let all = figures(Case::windy, 400..410);
