@@ -58,7 +58,9 @@ def run(path: Path, package: Path, folder: Path) -> nbformat.NotebookNode:
     os.environ["PYTHONPATH"] = str(package)
     try:
         where = {"metadata": {"path": str(place)}}
-        client = NotebookClient(notebook, timeout=300, kernel_name="python3", resources=where)
+        # What a cell prints is one output, however long it takes.
+        options = {"timeout": 300, "kernel_name": "python3", "coalesce_streams": True}
+        client = NotebookClient(notebook, resources=where, **options)
         client.execute()
     finally:
         os.environ.pop("PYTHONPATH")
