@@ -33,18 +33,20 @@ def copy_sources() -> None:
             shutil.copyfile(source, target)
 
 
-def failing(package: str, tests: list[str], options: list[str]) -> str | None:
-    """Returns what fails in the tests within a package and in these of its other tests, or None if
-    all of them pass. The package may be another one than that of the fault."""
-    chosen = [part for name in tests for part in ("--test", name)]
-    command = ["cargo", "test", "--locked", "--target-dir", BUILD, "-p", package, *options, "--lib", *chosen]
-    tested = subprocess.run(command, cwd=COPY, capture_output=True, text=True)
-    if tested.returncode == 0:
-        return None
-    failed = [line.split()[1] for line in tested.stdout.splitlines() if line.startswith("test ") and line.endswith("FAILED")]
-    if not failed:
-        sys.exit(f"error: the tests could not be built or run:\n{tested.stderr}")
-    return failed[0]
+def failing(package: str, modules: list[str], options: list[str]) -> str | None:
+    """Returns what fails in the tests within a package, and in these modules of its other tests, or
+    None if all of them pass. The package may be another one than that of the fault."""
+    chosen = [["--lib"]] + ([["--test", "main", "--", *(f"{name}::" for name in modules)]] if modules else [])
+    for tests in chosen:
+        command = ["cargo", "test", "--locked", "--target-dir", BUILD, "-p", package, *options, *tests]
+        tested = subprocess.run(command, cwd=COPY, capture_output=True, text=True)
+        if tested.returncode != 0:
+            lines = tested.stdout.splitlines()
+            failed = [line.split()[1] for line in lines if line.startswith("test ") and line.endswith("FAILED")]
+            if not failed:
+                sys.exit(f"error: the tests could not be built or run:\n{tested.stderr}")
+            return failed[0]
+    return None
 
 
 def main() -> None:
