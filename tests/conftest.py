@@ -38,6 +38,9 @@ NAMES = [
     "EntryNavigation",
 ]
 
+# What `scripts/test` leaves out unless it is told, as it needs more programs or more time.
+TIERS = ("browser", "importers", "manual", "memory", "platforms", "release", "studies", "wheel", "windows")
+
 # The files that take longest. Begun first, none of them runs alone at the end while the other
 # processes of scripts/test have nothing left to do.
 LONGEST = ["test_wheel.py", "test_platforms.py", "test_manual.py"]
@@ -73,8 +76,7 @@ def archive3(name: str) -> Path:
 def library(crate: str) -> Path:
     """Path of the built library of a crate."""
     names = (f"lib{crate}.so", f"lib{crate}.dylib", f"{crate}.dll")
-    folders = [TARGET / "release", TARGET / "x86_64-unknown-linux-gnu" / "release"]
-    return newest(*(folder / name for folder in folders for name in names))
+    return newest(*(TARGET / profile / name for profile in ("release", "debug") for name in names))
 
 
 def example(name: str) -> Path:
@@ -183,7 +185,7 @@ def experiment(orchestrate):
 
 def pytest_addoption(parser):
     parser.addoption("--write-importers", action="store_true", help="write the table of docs/importers.md anew")
-    parser.addoption("--all", action="store_true", help="run what `scripts/test --all` tests as well")
+    parser.addoption("--tier", action="append", default=[], choices=[*TIERS, "all"], help="run these tests as well")
 
 
 def pytest_configure(config):
@@ -192,7 +194,7 @@ def pytest_configure(config):
         "importer(importer, use, fmu, plant, within, to): a row of docs/importers.md. The FMU is that of the parameter `name`, unless "
         "it is given, and with `plant` ReentryPlant too. Results are `within` a share of the largest value `to` a reference.",
     )
-    config.addinivalue_line("markers", "everything: needs what only `scripts/test --all` builds")
+    config.addinivalue_line("markers", "tier(name): left out by `scripts/test`, unless it is called --with this name or --all")
     config.addinivalue_line("markers", "whole_matrix: looks at the outcomes of all tests marked `importer`, so runs last")
     config.stash[importers.FINDINGS] = importers.Findings(NAMES)
 
@@ -216,10 +218,12 @@ def pytest_xdist_make_scheduler(config, log):
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config, items):
-    if not config.getoption("--all"):
-        for item in items:
-            if "everything" in item.keywords:
-                item.add_marker(pytest.mark.skip(reason="scripts/test --all runs this"))
+    chosen = config.getoption("--tier")
+    for item in items:
+        left_out = [] if "all" in chosen else [mark.args[0] for mark in item.iter_markers("tier") if mark.args[0] not in chosen]
+        assert set(left_out) <= set(TIERS), f"{item.nodeid} is of no tier that there is"
+        if left_out:
+            item.add_marker(pytest.mark.skip(reason=f"scripts/test --with {left_out[0]} runs this"))
     config.stash[importers.FINDINGS].expect(items)
     rank = {name: place for place, name in enumerate(LONGEST)}
     # The test that looks at the outcomes of others runs behind them.
