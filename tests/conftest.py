@@ -195,7 +195,6 @@ def pytest_configure(config):
         "it is given, and with `plant` ReentryPlant too. Results are `within` a share of the largest value `to` a reference.",
     )
     config.addinivalue_line("markers", "tier(name): left out by `scripts/test`, unless it is called --with this name or --all")
-    config.addinivalue_line("markers", "whole_matrix: looks at the outcomes of all tests marked `importer`, so runs last")
     config.stash[importers.FINDINGS] = importers.Findings(NAMES)
 
 
@@ -204,7 +203,7 @@ def pytest_xdist_make_scheduler(config, log):
     """Lets one process run all tests of a file, and those of files that belong together."""
     from xdist.scheduler import LoadScopeScheduling
 
-    together = {path.name: "importers" for path in importers.files()} | {"test_importers_page.py": "importers"}
+    together = {path.name: "importers" for path in importers.files()}
     # Both make what scripts/wheel needs.
     together |= {"test_wheel.py": "wheel", "test_release.py": "wheel"}
 
@@ -226,8 +225,7 @@ def pytest_collection_modifyitems(config, items):
             item.add_marker(pytest.mark.skip(reason=f"scripts/test --with {left_out[0]} runs this"))
     config.stash[importers.FINDINGS].expect(items)
     rank = {name: place for place, name in enumerate(LONGEST)}
-    # The test that looks at the outcomes of others runs behind them.
-    items.sort(key=lambda item: ("whole_matrix" in item.keywords, rank.get(item.path.name, len(rank))))
+    items.sort(key=lambda item: rank.get(item.path.name, len(rank)))
 
 
 @pytest.hookimpl(hookwrapper=True)

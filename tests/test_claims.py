@@ -51,16 +51,6 @@ def test_everything_that_a_paper_numbers_has_a_row(name):
     assert places(paper, "statement") == set(printed["statements"])
 
 
-def test_there_are_as_many_items_as_were_counted():
-    # A row that goes missing shows here. Numbers are those of the papers as printed.
-    counted = {"chai-2022": (32, 7, 1, 13), "wu-2015": (66, 11, 2, 12), "jia": (11, 10, 0, 0)}
-    for name, paper in PAPERS.items():
-        printed = paper["printed"]
-        assert (printed["equations"], printed["figures"], len(printed["tables"]), len(printed["statements"])) == counted[name]
-    least = {"chai-2022": 171, "wu-2015": 210, "jia": 45}
-    assert all(len(claims.items(paper)) >= least[name] for name, paper in PAPERS.items())
-
-
 @pytest.mark.parametrize(("name", "item"), ITEMS, ids=map(label, ITEMS))
 def test_an_item_is_complete_and_what_shows_it_exists(name, item):
     assert item.keys() <= claims.KEYS and {"place", "says", "verdict"} <= item.keys()
@@ -82,11 +72,6 @@ def test_an_item_is_complete_and_what_shows_it_exists(name, item):
         assert not heading or heading in headings, page
 
 
-def test_no_item_is_there_twice():
-    seen = [(name, item["place"], item["says"], item.get("setup")) for name, item in ITEMS]
-    assert len(set(seen)) == len(seen)
-
-
 @pytest.mark.parametrize("name", PAPERS)
 def test_every_claim_and_figure_of_the_studies_belongs_to_an_item(name):
     found = STUDIES[name]
@@ -95,16 +80,6 @@ def test_every_claim_and_figure_of_the_studies_belongs_to_an_item(name):
     owed = [one for one in there if one[1] == "claim" or one[1] == "figure" and one[2].startswith("fig-")]
     assert [one for one in owed if one not in referred] == []
     assert len(owed) >= 10
-
-
-def test_a_reference_means_one_setup_or_all_that_begin_so():
-    entries = {"figure": ["fig-3"], "table": [], "overview": [], "claim": ["Direct: they rest.", "Direct, as printed: they rest.", "They: rest."]}
-    means = lambda reference: [name for _, _, name in claims.matches(reference, {"s": entries})]
-    assert means("Direct: they") == ["Direct: they rest."]
-    assert means("Direct…: they") == ["Direct: they rest.", "Direct, as printed: they rest."]
-    assert means("Direct, a…: they") == ["Direct, as printed: they rest."]
-    assert means("They") == ["They: rest."] and means("fig-3") == ["fig-3"]
-    assert means("they") == means("fig") == means("Direct…: rest") == []
 
 
 def test_every_correction_of_an_equation_is_among_the_errata():

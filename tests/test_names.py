@@ -49,15 +49,6 @@ def test_no_experiment_warns_about_itself(tmp_path):
         assert said == MEANT_TO_WARN.get(name, []) and len(warnings) == len(said), name + done.stderr
 
 
-def test_the_list_fits_80_columns_and_has_nothing_of_the_fuzzers():
-    done = call("list")
-    assert done.returncode == 0, done.stderr
-    assert max(map(len, done.stdout.splitlines())) <= 80
-    assert "FAULT" not in done.stdout and "fuzz" not in done.stdout
-    headings = re.findall(r"^(\w+) \(\d+\): orchestrator (\w+) NAME$", done.stdout, re.MULTILINE)
-    assert [kind for kind, _ in headings] == ["experiments", "studies", "campaigns", "FMUs"]
-
-
 def commands() -> list[str]:
     done = call("--help")
     _, _, after = done.stdout.partition("Commands:\n")
@@ -84,28 +75,3 @@ def test_the_examples_of_each_help_run(command, tmp_path):
             continue
         done = call(*words, folder=tmp_path)
         assert done.returncode == 0, line + done.stderr
-
-
-def test_the_names_in_long_examples_are_listed():
-    kinds = {"reproduce": "study", "campaign": "campaign", "falsify": "campaign"}
-    rows = listed()
-    for command, kind in kinds.items():
-        names = {row["name"] for row in rows if row["kind"] == kind}
-        for line in examples(command):
-            assert shlex.split(line)[2] in names, line
-
-
-@pytest.mark.parametrize("name", ["CRMPC", "ReentryPlant"])
-def test_a_sound_fmu_says_so_in_one_line(name):
-    done = call("inspect", name, "--check")
-    assert done.returncode == 0, done.stderr
-    assert re.fullmatch(rf"{name}: sound, \d+ variables for [\w, ]+\n", done.stdout)
-
-
-def test_moments_have_the_same_unit_in_summary_and_plot(tmp_path):
-    done = call("run", "crmpc-robust", "--stop", "4", "--out", tmp_path / "out")
-    assert done.returncode == 0, done.stderr
-    moment = re.search(r"largest moment +(\S+) kN m +within its limit 135\.6000 kN m", done.stdout)
-    metrics = json.loads((tmp_path / "out" / "metrics.json").read_text())
-    assert abs(float(moment[1]) - metrics["max_moment_n_m"] / 1e3) < 1e-4
-    assert "control moment, kN m" in (tmp_path / "out" / "plot.svg").read_text()

@@ -50,7 +50,9 @@ BLOCKS = list(blocks())
 def elsewhere(block):
     """Why a block is not run here."""
     tested = RULES["tested_by"]
-    if test := tested.get(block.page) or tested.get(f"{block.page} {block.language}"):
+    test = tested.get(block.page) or tested.get(f"{block.page} {block.language}")
+    # The tests of the package leave out what reads the FMUs of a build.
+    if test and not (test.startswith("python/") and "target/fmu" in block.text):
         assert (ROOT / test).is_file()
         return test
     for rule in RULES["skip"]:

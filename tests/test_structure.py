@@ -1,5 +1,5 @@
 """The modules of a Rust crate, and those of the Python package, use each other in one direction:
-there are no circles. Files are short.
+there are no circles.
 
 A module uses another if a `use` declaration or a path outside its tests names something of it. A
 module that re-exports its own parts (`pub use`) does not use them.
@@ -7,7 +7,6 @@ module that re-exports its own parts (`pub use`) does not use them.
 
 import ast
 import re
-import subprocess
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
@@ -19,9 +18,6 @@ CRATES = sorted(
     for path in ROOT.glob("**/Cargo.toml")
     if (path.parent / "src").is_dir() and not {"target", ".venv", "out"} & set(path.relative_to(ROOT).parts)
 )
-LONGEST = 400
-# Lists of tests about one subject each: the studies, the platforms and the importers.
-LONGER = {"tests/test_importers.py", "tests/test_platforms.py", "tests/test_reproduce.py"}
 
 
 def module(file: Path, source: Path) -> tuple[str, ...]:
@@ -115,15 +111,3 @@ def test_what_the_orchestrator_knows_of_a_vehicle_is_what_the_architecture_says(
     knowing = {file.relative_to(ROOT / "orchestrator").as_posix() for file in files if words.search(code(file))}
     pictures = {"recording/effectors.rs", "recording/trajectory.rs", "run_page/data.rs", "run_page/mod.rs", "run_page/plans.rs"}
     assert knowing == {"cosim/src/experiment/vehicle.rs", "import/src/law.rs", *(f"report/src/{name}" for name in pictures)}
-
-
-def test_no_file_is_too_long() -> None:
-    tracked = subprocess.run(["git", "ls-files"], cwd=ROOT, check=True, capture_output=True, text=True)
-    files = [Path(name) for name in tracked.stdout.splitlines() if (ROOT / name).is_file()]
-    sources = [
-        file
-        for file in files
-        if file.suffix in (".rs", ".py", ".sh") or (file.parts[0] in ("scripts", ".ci") and not file.suffix)
-    ]
-    lengths = {file.as_posix(): len((ROOT / file).read_text(encoding="utf-8").splitlines()) for file in sources}
-    assert {file for file, length in lengths.items() if length > LONGEST} == LONGER

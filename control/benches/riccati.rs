@@ -8,8 +8,6 @@
 
 #[path = "../tests/harness/mod.rs"]
 mod harness;
-#[path = "../tests/harness/norm_constraints.rs"]
-mod norm_constraints;
 
 use control::Crmpc;
 use control::crmpc::Constraints;
@@ -20,9 +18,9 @@ use control::mpc::problem::{End, Problem, Solution, Start};
 use control::mpc::riccati::Riccati;
 use control::mpc::{self, Chain, Cost, per_axis};
 use criterion::{BatchSize, Criterion, criterion_group, criterion_main};
+use harness::norm_constraints::Sets;
 use harness::settings;
 use nalgebra::Vector3;
-use norm_constraints::Sets;
 use std::hint::black_box;
 use vehicle::scenario::Scenario;
 

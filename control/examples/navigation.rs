@@ -3,10 +3,8 @@
 
 #[path = "../tests/harness/mod.rs"]
 mod harness;
-#[path = "../tests/harness/navigated.rs"]
-mod navigated;
 
-use navigated::{Case, Figures};
+use harness::navigated::{Case, Figures};
 
 fn main() {
     let flights = std::env::args().nth(1).and_then(|text| text.parse().ok()).unwrap_or(50);

@@ -1,13 +1,11 @@
 //! CRMPC with the robust set reaches a reference that jumps and then stays, and its guarantee stays
 //! in force on the way: from rest and in motion, without and with a delay of the loop.
 
-mod harness;
-
+use crate::harness::flight::Random;
+use crate::harness::settings;
 use control::controller::{Controller, Forecast, Measurement, Preview};
 use control::crmpc::{Constraints, Crmpc, GuaranteeStatus, Memory, Settings};
 use control::delay::{Delayed, Latency};
-use harness::flight::Random;
-use harness::settings;
 use nalgebra::Vector3;
 use std::f64::consts::PI;
 use vehicle::Scenario;

@@ -1,14 +1,12 @@
 //! The closed loop of Chai 2022, section 5: 50 s, both inertia errors, with the rates checked
 //! between samples too. `orchestrator campaign white` flies a thousand seeds.
 
-mod harness;
-
+use crate::harness::{
+    Case, adversaries, constant, disturbance, in_parallel, settings, simulate, square, white,
+};
 use control::crmpc::{Constraints, InitialState, Lemmas, Settings, SolverStatus};
 use control::error_dynamics::SampledError;
 use control::{Crmpc, crmpc::Memory};
-use harness::{
-    Case, adversaries, constant, disturbance, in_parallel, settings, simulate, square, white,
-};
 use nalgebra::{Vector2, Vector3, Vector6};
 use vehicle::disturbance::{Disturbance, DisturbanceKind};
 use vehicle::scenario::Scenario;
@@ -21,7 +19,7 @@ fn assert_robust(cases: &[Case]) -> f64 {
 
 fn assert_keeps_limits(settings: &Settings, cases: &[Case]) -> f64 {
     let outcomes = in_parallel(cases, |case| {
-        harness::run(settings, case.inertia_scale, case.disturbance.clone())
+        crate::harness::run(settings, case.inertia_scale, case.disturbance.clone())
     });
     for (case, (outcome, kept)) in cases.iter().zip(&outcomes) {
         let name = &case.name;
@@ -61,7 +59,7 @@ fn robust_keeps_both_limits_under_disturbances_that_look_at_the_motion() {
 
 #[test]
 fn robust_keeps_both_limits_under_adversaries_faster_than_its_feedback() {
-    assert_robust(&adversaries(harness::CHECK));
+    assert_robust(&adversaries(crate::harness::CHECK));
 }
 
 #[test]
@@ -76,8 +74,11 @@ fn robust_with_a_free_initial_state_keeps_both_limits() {
 fn paper_set_tracks_better_and_violates_both_limits() {
     // (6) is an outer set, which implies neither ‖ω‖ ≤ 5°/s nor ‖m‖ ≤ 1.356e5 N m (docs/errata.md).
     for case in white(1..=3, 0.04) {
-        let (outcome, kept) =
-            harness::run(&settings(Constraints::Paper), case.inertia_scale, case.disturbance);
+        let (outcome, kept) = crate::harness::run(
+            &settings(Constraints::Paper),
+            case.inertia_scale,
+            case.disturbance,
+        );
         assert!(outcome.ems_deg <= 1.85, "{}: {outcome:?}", case.name);
         assert!(outcome.rate > 1.0 && outcome.moment > 1.5, "{}: {outcome:?}", case.name);
         assert_eq!((kept.fallbacks, kept.in_force), (0, 0.0), "{}", case.name);
@@ -89,7 +90,7 @@ fn lqr_violates_both_limits() {
     // Chai 2022, section 5.2 says the same.
     for case in white(1..=3, 0.04) {
         let outcome = simulate(
-            &mut harness::lqr(),
+            &mut crate::harness::lqr(),
             &mut (),
             case.inertia_scale,
             case.disturbance,
@@ -183,7 +184,7 @@ fn published_the_nominal_error_converges_to_zero() {
         let (nominal, _) = around_the_nominal_trajectory(constraints, 1.0, Disturbance::default());
         let error_deg = |tick: usize| {
             let angles = Vector3::from_fn(|i, _| f64::from_bits(nominal[tick][i]));
-            let time = tick as f64 * harness::FEEDBACK;
+            let time = tick as f64 * crate::harness::FEEDBACK;
             (angles - reference.at(time).angles).amax().to_degrees()
         };
         assert!(error_deg(0) > 9.9 && error_deg(650) > 1.0, "the start and the jump");
@@ -293,7 +294,7 @@ fn without_disturbance_nothing_is_constrained_once_the_jump_is_over() {
         Disturbance::default(),
         |memory, tick, _| {
             if memory.report.status == SolverStatus::Constrained {
-                constrained.push(tick as f64 * harness::FEEDBACK);
+                constrained.push(tick as f64 * crate::harness::FEEDBACK);
             }
         },
     );

@@ -1,15 +1,13 @@
 //! Prediction over a known delay: it is exact with the right model, far better than no prediction,
 //! and has no effect without a delay.
 
-mod harness;
-
+use crate::harness::{FEEDBACK, disturbance, garbage, lqr, settings};
 use control::controller::{Preview, ReferenceAt, saturated};
 use control::crmpc::{Constraints, Settings};
 use control::delay::{Latency, Memory, Predictor};
 use control::lqr::LqrSettings;
 use control::schedule::Sampled;
 use control::{Controller, Crmpc, Delayed, DesignError, Lqr, Measurement};
-use harness::{FEEDBACK, disturbance, garbage, lqr, settings};
 use nalgebra::Vector3;
 use settings::Invalid;
 use vehicle::Error;
@@ -222,7 +220,7 @@ fn regress_prediction_keeps_tracking_and_effort_that_a_delay_spoils() {
 
 #[test]
 fn a_loop_that_a_delay_makes_unstable_is_stable_with_prediction() {
-    for scale in harness::INERTIA_SCALES {
+    for scale in crate::harness::INERTIA_SCALES {
         let merit_of = |delay, predicts| merit(0.3, delay, predicts, scale, DisturbanceKind::White);
         assert!(
             matches!(merit_of(0.1, false), Err(Error::Singular { .. })),

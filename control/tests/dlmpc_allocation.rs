@@ -1,8 +1,6 @@
 //! No tick of DLMPC allocates memory, apart from the inside of the cone solver.
 #![allow(unsafe_code)]
 
-mod harness;
-
 use control::dlmpc::{Memory, Settings, SolverStatus};
 use control::{Controller, Dlmpc, Measurement};
 use std::alloc::{GlobalAlloc, Layout, System};
@@ -38,10 +36,16 @@ fn ticks_without_the_cone_solver_allocate_nothing() {
     let scenario = Scenario::crmpc2022();
     let mut truth: Vec<Measurement> = Vec::new();
     let mut controller = Dlmpc::new(Settings::published()).unwrap();
-    let noise = harness::disturbance(DisturbanceKind::White);
-    harness::simulate(&mut controller, &mut Memory::default(), 1.05, noise, |_, _, &measured| {
-        truth.push(measured);
-    });
+    let noise = crate::harness::disturbance(DisturbanceKind::White);
+    crate::harness::simulate(
+        &mut controller,
+        &mut Memory::default(),
+        1.05,
+        noise,
+        |_, _, &measured| {
+            truth.push(measured);
+        },
+    );
 
     let reference = |time: f64| scenario.reference.at(time);
     let mut memory = controller.memory();
@@ -52,7 +56,13 @@ fn ticks_without_the_cone_solver_allocate_nothing() {
     for (tick, measured) in (0..).zip(&truth) {
         let counted = COUNT.get();
         before.clone_from(&memory);
-        controller.update(&mut memory, tick, tick as f64 * harness::FEEDBACK, measured, &reference);
+        controller.update(
+            &mut memory,
+            tick,
+            tick as f64 * crate::harness::FEEDBACK,
+            measured,
+            &reference,
+        );
         assert_eq!(COUNT.get() - counted, 0, "tick {tick}");
         if tick % controller.ratio() == 0 {
             unconstrained += usize::from(memory.report.status == SolverStatus::Unconstrained);

@@ -1,12 +1,10 @@
 //! The status of the guarantee where the assumptions are violated: a limit may only be exceeded
 //! while the guarantee is not in force. It stays in force while they are true.
 
-mod harness;
-
+use crate::harness::flight::{BEGIN, Fault, Flight, Random, Shown, Sight, Waveform};
+use crate::harness::{in_parallel, settings};
 use control::crmpc::{Constraints, Settings};
 use control::error_dynamics::Gain;
-use harness::flight::{BEGIN, Fault, Flight, Random, Shown, Sight, Waveform};
-use harness::{in_parallel, settings};
 use nalgebra::Vector3;
 use vehicle::profile::Profile;
 

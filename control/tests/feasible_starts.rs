@@ -1,11 +1,9 @@
 //! Remark 3 of Chai 2022: a longer horizon enlarges the set of starts from which a plan exists.
 
-mod harness;
-
+use crate::harness::flight::Random;
+use crate::harness::settings;
 use control::crmpc::{Constraints, Memory, Settings, SolverStatus};
 use control::{Controller, Crmpc, Measurement};
-use harness::flight::Random;
-use harness::settings;
 use vehicle::scenario::Scenario;
 
 /// Number of starts that are drawn, with angles within 60° of the reference and rates within the

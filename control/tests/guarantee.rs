@@ -1,16 +1,14 @@
 //! The guarantee of the robust set in closed loops: it is in force throughout, and it holds.
 //! `orchestrator campaign` and `orchestrator falsify` fly many more cases.
 
-mod harness;
-
+use crate::harness::flight::{
+    Flight, Random, Shown, Sight, Tried, Waveform, optimised_every, random_settings, tried,
+};
+use crate::harness::{constant, in_parallel, run, settings};
 use control::Measurement;
 use control::crmpc::{Constraints, Design, Guarantee, Settings};
 use control::delay::Predictor;
 use control::error_dynamics::Gain;
-use harness::flight::{
-    Flight, Random, Shown, Sight, Tried, Waveform, optimised_every, random_settings, tried,
-};
-use harness::{constant, in_parallel, run, settings};
 use nalgebra::Vector3;
 use vehicle::disturbance::Disturbance;
 use vehicle::integrator::rk4;
@@ -24,8 +22,8 @@ fn flights(settings: &Settings, sights: &[Sight]) -> Vec<Flight> {
     for (i, disturbance) in Waveform::all().into_iter().enumerate() {
         flights.push(Flight {
             disturbance,
-            inertia_scale: harness::INERTIA_SCALES[i % 2],
-            hold: [0.04, harness::CHECK][i / 2 % 2],
+            inertia_scale: crate::harness::INERTIA_SCALES[i % 2],
+            hold: [0.04, crate::harness::CHECK][i / 2 % 2],
             sight: sights[i % sights.len()].clone(),
             seed: i as u64,
             duration: 30.0,

@@ -1,10 +1,7 @@
 //! Entry guidance: where its flights end, and the limits of its reference.
 
-#[path = "harness/entry.rs"]
-mod entry;
-
+use crate::harness::entry::{Flight, fly, start};
 use control::guidance::{Guidance, Limits, Memory, Navigation, PERIOD, Settings, Shaped};
-use entry::{Flight, fly, start};
 use proptest::prelude::*;
 use vehicle::noise::uniform;
 

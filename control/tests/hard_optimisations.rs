@@ -1,15 +1,13 @@
 //! Optimisations that take long, and those that a budget ends: starts far from the reference,
 //! disturbed starts, and infeasible problems.
 
-mod harness;
-
+use crate::harness::draws::Case;
+use crate::harness::flight::Random;
+use crate::harness::{Optimising, disturbance, in_parallel, settings, simulate};
 use control::crmpc::{Constraints, GuaranteeStatus, Memory, Settings, SolverReport, SolverStatus};
 use control::linearise::InverseKinematics;
 use control::mpc::SolverSettings;
 use control::{Controller, Crmpc, Dlmpc, Measurement, dlmpc};
-use harness::draws::Case;
-use harness::flight::Random;
-use harness::{Optimising, disturbance, in_parallel, settings, simulate};
 use nalgebra::{Matrix3, Vector3};
 use proptest::prelude::*;
 use vehicle::disturbance::DisturbanceKind;
@@ -139,7 +137,7 @@ fn oracle_where_no_optimisation_is_begun_no_moment_keeps_the_rates() {
 
 /// Runs the paper's scenario with a budget of iterations. Returns the outcome, the last memory, the
 /// most iterations of an optimisation, and whether a limit was violated under guarantee.
-fn budgeted(budget: u32, kind: DisturbanceKind) -> (harness::Outcome, Memory, u32, bool) {
+fn budgeted(budget: u32, kind: DisturbanceKind) -> (crate::harness::Outcome, Memory, u32, bool) {
     let settings = settings(Constraints::Robust);
     let solver = SolverSettings { iteration_budget: budget, ..settings.solver };
     let mut controller = Crmpc::new(Settings { solver, ..settings }).unwrap();

@@ -1,19 +1,14 @@
 //! Navigation of entry flights: the error against what the filter predicts, in flights whose
 //! sensors and winds are drawn.
 
-#[path = "harness/mod.rs"]
-mod harness;
-#[path = "harness/navigated.rs"]
-mod navigated;
-
+use crate::harness::navigated::{Case, Figures, fly};
 use control::navigation::{Health, Line, Navigation, Settings};
 use nalgebra::Vector3;
-use navigated::{Case, Figures, fly};
 use vehicle::fixes::Fixes;
 
 fn figures(case: impl Fn(u64) -> Case + Sync, seeds: std::ops::Range<u64>) -> Figures {
     let seeds: Vec<u64> = seeds.collect();
-    let flown = harness::in_parallel(&seeds, |&seed| Figures::of(&case(seed)));
+    let flown = crate::harness::in_parallel(&seeds, |&seed| Figures::of(&case(seed)));
     flown.into_iter().fold(Figures::default(), |sum, one| sum.with(&one))
 }
 
@@ -153,7 +148,7 @@ fn samples_may_be_lost_or_repeated() {
 #[test]
 fn oracle_errors_split_in_a_slow_and_a_fast_part() {
     let (rate, fast) = (0.046_f64.to_radians(), 0.03_f64.to_radians());
-    let flown = harness::in_parallel(&[1, 2, 3, 4, 5, 6, 7, 8], |&seed| {
+    let flown = crate::harness::in_parallel(&[1, 2, 3, 4, 5, 6, 7, 8], |&seed| {
         let mut worst = [0.0_f64; 4];
         for windy in [false, true] {
             let mut case = if windy { Case::windy(seed) } else { Case::new(4, false, seed) };

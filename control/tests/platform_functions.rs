@@ -3,15 +3,13 @@
 //! no optimisation here has such a cone. These three are counted here in place of the C library's.
 #![allow(unsafe_code)]
 
-mod harness;
-
+use crate::harness::{Optimising, disturbance, settings, simulate};
 use control::allocation::{self, Allocator, Command};
 use control::crmpc::{self, Constraints, Settings};
 use control::dlmpc;
 use control::mpc::{Method, SolverSettings};
 use control::report::SolverStatus;
 use control::{Crmpc, Dlmpc};
-use harness::{Optimising, disturbance, settings, simulate};
 use nalgebra::Vector3;
 use std::hint::black_box;
 use std::sync::atomic::{AtomicUsize, Ordering};

@@ -1,15 +1,13 @@
 //! Limit on the moment and bound on the disturbance that change during a flight, as with dynamic
 //! pressure.
 
-mod harness;
-
+use crate::harness::flight::{Flight, Shown, Waveform};
+use crate::harness::{INERTIA_SCALES, in_parallel};
 use control::controller::{Controller, Measurement, Scheduled, saturated};
 use control::crmpc::{
     Constraints, Contradiction, Crmpc, Design, GuaranteeStatus, InitialState, Settings,
 };
 use control::lqr::{Lqr, LqrSettings};
-use harness::flight::{Flight, Shown, Waveform};
-use harness::{INERTIA_SCALES, in_parallel};
 use nalgebra::Vector3;
 use std::f64::consts::TAU;
 use vehicle::reference::Reference;

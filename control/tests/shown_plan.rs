@@ -1,13 +1,11 @@
 //! The plan that CRMPC shows, with the bounds that its certificate has checked: what a picture of
 //! the guarantee draws.
 
-mod harness;
-
+use crate::harness::flight::Random;
+use crate::harness::settings;
 use control::closed_loop::fly;
 use control::crmpc::{Constraints, GuaranteeStatus, Memory, PlanPoint, Settings, points};
 use control::{Controller, Crmpc};
-use harness::flight::Random;
-use harness::settings;
 use vehicle::disturbance::DisturbanceKind;
 use vehicle::scenario::Scenario;
 
@@ -79,7 +77,7 @@ fn leaves_tube(seed: u64) -> (f64, f64) {
 #[test]
 fn oracle_the_shown_tube_contains_the_flight() {
     let seeds: Vec<u64> = (0..FLIGHTS).collect();
-    let flown = harness::in_parallel(&seeds, |&seed| leaves_tube(seed));
+    let flown = crate::harness::in_parallel(&seeds, |&seed| leaves_tube(seed));
     let outside = flown.iter().map(|flight| flight.0).fold(f64::NEG_INFINITY, f64::max);
     let closest = flown.iter().map(|flight| flight.1).fold(0.0, f64::max);
     assert!(outside <= ROUNDING, "{outside}");

@@ -1,13 +1,11 @@
 //! The guarantee of the robust set while the errors of the measured angles change slowly.
 
-mod harness;
-
+use crate::harness::flight::{Flight, Random, Shown, Sight, Slow, Waveform};
+use crate::harness::{in_parallel, settings};
 use control::crmpc::{
     Constraints, Crmpc, Design, GuaranteeStatus, InitialState, Lemmas, Memory, Settings,
 };
 use control::{Controller, Measurement};
-use harness::flight::{Flight, Random, Shown, Sight, Slow, Waveform};
-use harness::{in_parallel, settings};
 use nalgebra::Vector3;
 use vehicle::actuators::Command;
 use vehicle::integrator::rk4;
@@ -59,7 +57,7 @@ fn flights(settings: &Settings, declared: &Settings) -> Vec<Flight> {
                 disturbance,
                 slow: Some(Slow::new(declared, derivative.clone(), begin)),
                 sight: Sight::Errors([Waveform::White, Waveform::AlongMoment(1.0)][i % 2].clone()),
-                inertia_scale: harness::INERTIA_SCALES[j % 2],
+                inertia_scale: crate::harness::INERTIA_SCALES[j % 2],
                 seed: (10 * i + j) as u64,
                 duration: 30.0,
                 ..Flight::new(settings)

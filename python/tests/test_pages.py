@@ -18,7 +18,7 @@ def test_the_page_prints_what_it_says(page, tmp_path, monkeypatch):
     text = page.read_text(encoding="utf-8")
     # A block of Python, and what it prints if the page says so at once.
     blocks = re.findall(r"```python\n(.*?)```(?:\n\n```text\n(.*?)```)?", text, re.DOTALL)
-    # Blocks that read the FMUs of a build are run by tests/test_readme.py.
+    # Blocks that read the FMUs of a build are run by tests/test_snippets.py.
     blocks = [(code, said) for code, said in blocks if "target/fmu" not in code]
     assert len(blocks) >= PAGES[page]
     names: dict[str, object] = {}

@@ -2,7 +2,10 @@
 #![allow(dead_code, unreachable_pub, unused_imports)] // Each user needs a part of it.
 
 pub mod draws;
+pub mod entry;
 pub mod flight;
+pub mod navigated;
+pub mod norm_constraints;
 pub mod platform;
 pub mod recording;
 

@@ -1,6 +1,6 @@
 //! Problems in which the Riccati method fails.
 
-use super::norm_constraints::Sets;
+use crate::harness::norm_constraints::Sets;
 use super::{MAX_ITERATIONS, MODERATE, Shape, published};
 use control::mpc::{
     Bounded, Bounds, Chain, Constraints, ErrorTrajectory, Layout, Optimiser, SolverSettings,

@@ -2,14 +2,14 @@
 
 mod calibration_flight;
 mod faults;
-#[path = "../harness/mod.rs"]
-mod harness;
 
+use crate::harness::platform::{
+    PERIOD, Truth, config, errors, estimates, lines, mems, rest, scenario,
+};
 use control::estimation::ellipsoid::Correction;
 use control::estimation::{
     Alignment, Estimate, Estimator, Health, Settings, angles, mems_corrections,
 };
-use harness::platform::{PERIOD, Truth, config, errors, estimates, lines, mems, rest, scenario};
 use nalgebra::{Matrix3, Rotation3, Vector3};
 use proptest::prelude::*;
 use std::sync::LazyLock;

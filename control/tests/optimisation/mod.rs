@@ -2,16 +2,14 @@
 //! from earlier samples.
 
 mod fallback;
-#[path = "../harness/mod.rs"]
-mod harness;
 mod shortcuts;
 
-use control::Crmpc;
-use control::crmpc::{Constraints, Memory, SolverReport};
-use harness::recording::{
+use crate::harness::recording::{
     Recorded, assert_a_saved_memory_continues, assert_another_evaluation_leaves_no_trace, recorded,
 };
-use harness::{Optimising, settings};
+use crate::harness::{Optimising, settings};
+use control::Crmpc;
+use control::crmpc::{Constraints, Memory, SolverReport};
 
 fn controller(constraints: Constraints) -> Crmpc {
     Crmpc::new(settings(constraints)).unwrap()

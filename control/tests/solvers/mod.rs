@@ -1,10 +1,9 @@
 //! The Riccati method compared with the cone solver: for the same problem both find the same cost,
 //! or neither finds an optimum.
 
-#[path = "../harness/norm_constraints.rs"]
-mod norm_constraints;
 mod takeover;
 
+use crate::harness::norm_constraints::Sets;
 use control::mpc::certificate::Certificate;
 use control::mpc::conic::ConicSolver;
 use control::mpc::constraints::LinearisedConstraints;
@@ -13,7 +12,6 @@ use control::mpc::problem::{End, Outcome, Problem, Solution, Start};
 use control::mpc::riccati::Riccati;
 use control::mpc::{Budget, Chain, Cost, Layout, State};
 use nalgebra::{SMatrix, SVector, Vector3};
-use norm_constraints::Sets;
 use proptest::prelude::*;
 use proptest::test_runner::{RngAlgorithm, TestRng, TestRunner};
 use std::cell::Cell;

@@ -1,17 +1,15 @@
 //! Tests of DLMPC: the optimum of its outer layer, the sliding mode of its inner layer, and the
 //! loop of both.
 
-#[path = "../harness/mod.rs"]
-mod harness;
 mod inner_layer;
 mod outer_layer;
 
-use control::dlmpc::{Memory, Settings, SlidingMode, SolverReport};
-use control::{DesignError, Dlmpc};
-use harness::recording::{
+use crate::harness::recording::{
     assert_a_saved_memory_continues, assert_another_evaluation_leaves_no_trace,
 };
-use harness::{in_parallel, simulate, white};
+use crate::harness::{in_parallel, simulate, white};
+use control::dlmpc::{Memory, Settings, SlidingMode, SolverReport};
+use control::{DesignError, Dlmpc};
 
 fn dlmpc() -> Dlmpc {
     Dlmpc::new(Settings::published()).unwrap()
