@@ -7,6 +7,7 @@ mod counter;
 mod lag;
 mod support;
 
+mod allocation;
 mod calls;
 mod exchange;
 mod instances;

@@ -1,17 +1,12 @@
 //! Test that a step and the calls around it allocate no memory.
-#![allow(unsafe_code, clippy::borrow_as_ptr)]
+#![allow(unsafe_code)]
 
-#[path = "../examples/lag/model.rs"]
-#[allow(unreachable_pub)]
-mod lag;
-
+use crate::{fmi2, lag};
 use fmi_export::types::FmiStatus;
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 use std::ffi::CString;
 use std::ptr::null;
-
-fmi_export::export_fmus!(lag::Lag);
 
 thread_local! {
     static COUNT: Cell<usize> = const { Cell::new(0) };
