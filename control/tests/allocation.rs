@@ -1,6 +1,7 @@
 //! Control allocation compared with the limits and the optimum of Wu et al. (2015) and with the
 //! selector of Jia et al.
 
+use crate::harness::flight::Random;
 use control::allocation::pwpf::{Modulator, Pwpf};
 use control::allocation::{
     AllocationStatus, Allocator, Command, JetCommand, Memory, Method, Settings,
@@ -36,19 +37,6 @@ fn settled(allocator: &mut Allocator, samples: u64, command: &Command) -> Memory
     memory
 }
 
-/// Random numbers uniform in 0..1, the same in every run (splitmix64).
-struct Random(u64);
-
-impl Random {
-    fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
-    }
-}
-
 /// Checks (59) with the numbers of (63), and (65), in degrees.
 fn assert_within_limits(before: &Memory, after: &Memory, what: &str) {
     let min = [-25.0, -25.0, -25.0, -25.0, -10.0, -10.0, 0.0, 0.0];
@@ -68,8 +56,8 @@ fn assert_within_limits(before: &Memory, after: &Memory, what: &str) {
 
 #[test]
 fn published_limits_hold_at_every_sample_of_200_random_cases() {
-    let mut random = Random(1);
-    let mut symmetric = |size: f64| size * (2.0 * random.next() - 1.0);
+    let mut random = Random::new(1);
+    let mut symmetric = |size: f64| random.between(-size, size);
     for case in 0..200 {
         for method in METHODS {
             let mut allocator = allocator(method);
@@ -304,25 +292,6 @@ fn jets_switch_between_allocations() {
     // The dead band of the modulator reduces the moment: the jet fires less than its commanded duty
     // cycle.
     assert!(mean.z > 0.5 * commanded.moment.z && mean.z < commanded.moment.z, "{mean}");
-}
-
-#[test]
-fn runs_repeat_bit_for_bit() {
-    let run = || {
-        let mut allocator = Allocator::new(Settings::published()).unwrap();
-        let mut memory = Memory::default();
-        for tick in 0..500 {
-            let t = tick as f64 * 1e-3;
-            allocator.update(
-                &mut memory,
-                tick,
-                &command([1e5 * t.sin(), 2e5 * t.cos(), -3e4 * t], PRESSURE),
-            );
-        }
-        memory.report.time = 0.0;
-        memory
-    };
-    assert_eq!(run(), run());
 }
 
 #[test]

@@ -1,12 +1,15 @@
 //! Prediction over a known delay: it is exact with the right model, far better than no prediction,
 //! and has no effect without a delay.
 
-use crate::harness::{FEEDBACK, disturbance, garbage, lqr, settings};
-use control::controller::{Preview, ReferenceAt, saturated};
+use crate::harness::recording::{
+    assert_a_saved_memory_continues, assert_another_evaluation_leaves_no_trace,
+};
+use crate::harness::{FEEDBACK, disturbance, lqr, settings};
+use control::closed_loop::fly;
+use control::controller::{ReferenceAt, saturated};
 use control::crmpc::{Constraints, Settings};
 use control::delay::{Latency, Memory, Predictor};
 use control::lqr::LqrSettings;
-use control::schedule::Sampled;
 use control::{Controller, Crmpc, Delayed, DesignError, Lqr, Measurement};
 use nalgebra::Vector3;
 use settings::Invalid;
@@ -157,6 +160,7 @@ fn regulator(q: f64) -> Lqr {
 #[test]
 fn oracle_the_loop_moves_as_one_without_delay_that_begins_later() {
     // At rest and without a moment the vehicle's state is constant until the first command acts.
+    let mut law = lqr();
     for delay in DELAYS {
         let mut late = Late::undisturbed(delay);
         late.run(&mut delayed(lqr(), delay), FEEDBACK, 20.0, |_, _, _| {}).unwrap();
@@ -170,115 +174,56 @@ fn oracle_the_loop_moves_as_one_without_delay_that_begins_later() {
                 rates: plant.rates(),
                 ..Measurement::default()
             };
-            let moment = lqr().update(&mut (), 0, time, &measured, &|time| reference.at(time));
+            let moment = law.update(&mut (), 0, time, &measured, &|time| reference.at(time));
             plant.advance(time, time + 0.04, moment).unwrap();
         }
     }
 }
 
-/// Figures of merit of a loop of 50 s: EMS (deg) over the whole time, EMS between 10 and 25 s, when
-/// the effect of the start has faded, and CMS (1).
-struct Merit {
-    ems_deg: f64,
-    settled_deg: f64,
-    cms: f64,
-}
-
-fn merit(
-    q: f64,
-    delay: f64,
-    predicts: bool,
-    scale: f64,
-    kind: DisturbanceKind,
-) -> Result<Merit, Error> {
-    let mut late = Late::new(delay, scale, disturbance(kind));
-    let mut controller = delayed(regulator(q), if predicts { delay } else { 0.0 });
+/// Returns EMS (deg) and CMS (1) of a fast regulator over 50 s.
+fn merit(delay: f64, predicts: bool, scale: f64) -> Result<[f64; 2], Error> {
+    let mut late = Late::new(delay, scale, disturbance(DisturbanceKind::White));
+    let mut controller = delayed(regulator(0.3), if predicts { delay } else { 0.0 });
     let errors = late.run(&mut controller, FEEDBACK, 50.0, |_, _, _| {})?;
     let limit = Scenario::crmpc2022().limit_moment;
     let efforts: Vec<f64> = late.commands.iter().map(|(_, moment)| moment.norm() / limit).collect();
-    Ok(Merit { ems_deg: rms(&errors), settled_deg: rms(&errors[250..625]), cms: rms(&efforts) })
-}
-
-#[test]
-fn regress_prediction_keeps_tracking_and_effort_that_a_delay_spoils() {
-    let merit_of =
-        |delay, predicts| merit(10.0, delay, predicts, 1.0, DisturbanceKind::None).unwrap();
-    let (none, without, with) = (merit_of(0.0, false), merit_of(0.1, false), merit_of(0.1, true));
-    // The EMS between 10 and 25 s is 0.0040 deg, without prediction 0.0245 deg; the CMS is 0.282,
-    // without prediction 0.340.
-    assert!(
-        with.settled_deg < 1.01 * none.settled_deg && without.settled_deg > 6.0 * none.settled_deg
-    );
-    assert!(with.cms < 1.01 * none.cms && without.cms > 1.2 * none.cms);
-    // The EMS over the whole time does not show the difference, because the start dominates it. A
-    // loop without prediction commands more and is less damped, which hides the dead time: 1.642,
-    // 1.653 and 1.720 deg.
-    assert!(
-        none.ems_deg < without.ems_deg && without.ems_deg < with.ems_deg && with.ems_deg < 1.73
-    );
+    Ok([rms(&errors), rms(&efforts)])
 }
 
 #[test]
 fn a_loop_that_a_delay_makes_unstable_is_stable_with_prediction() {
     for scale in crate::harness::INERTIA_SCALES {
-        let merit_of = |delay, predicts| merit(0.3, delay, predicts, scale, DisturbanceKind::White);
         assert!(
-            matches!(merit_of(0.1, false), Err(Error::Singular { .. })),
+            matches!(merit(0.1, false, scale), Err(Error::Singular { .. })),
             "the attitude is not lost"
         );
-        let (none, with) = (merit_of(0.0, false).unwrap(), merit_of(0.1, true).unwrap());
-        assert!(with.ems_deg < 1.1 * none.ems_deg && with.cms < 1.05 * none.cms);
+        let (none, with) = (merit(0.0, false, scale).unwrap(), merit(0.1, true, scale).unwrap());
+        assert!(with[0] < 1.1 * none[0] && with[1] < 1.05 * none[1], "{with:?} {none:?}");
     }
 }
 
-/// Returns the moments of the disturbed loop of the harness over `ticks`.
-fn moments<C: Controller>(controller: &mut C, ticks: u32) -> Vec<Vector3<f64>> {
-    let scenario = Scenario::crmpc2022();
-    let mut plant = Plant::new(&scenario.config(0.01), 0.0).unwrap();
-    let mut memory = controller.memory();
-    let mut tick = |k: u32| {
-        let (from, to) = (0.04 * f64::from(k), 0.04 * f64::from(k + 1));
-        let measured =
-            Measurement { angles: plant.angles(), rates: plant.rates(), ..Measurement::default() };
-        let reference = |time: f64| scenario.reference.at(time);
-        let moment = controller.update(&mut memory, u64::from(k), from, &measured, &reference);
-        plant.advance(from, to, moment).unwrap();
-        moment
-    };
-    (0..ticks).map(&mut tick).collect()
+/// Returns the moments of the disturbed loop over `duration`, s.
+fn moments<C: Controller>(mut controller: C, duration: f64) -> Vec<Vector3<f64>> {
+    let scenario = Scenario { duration, ..Scenario::crmpc2022() };
+    let (mut memory, mut moments) = (controller.memory(), Vec::new());
+    fly(&mut controller, &mut memory, FEEDBACK, &scenario, |sample| moments.push(sample.moment))
+        .unwrap();
+    moments
 }
 
 #[test]
 fn without_delay_nothing_changes_by_a_bit() {
-    assert_eq!(moments(&mut delayed(lqr(), 0.0), 1250), moments(&mut lqr(), 1250));
+    assert_eq!(moments(delayed(lqr(), 0.0), 50.0), moments(lqr(), 50.0));
     let crmpc = || Crmpc::new(settings(Constraints::Robust)).unwrap();
-    assert_eq!(moments(&mut delayed(crmpc(), 0.0), 100), moments(&mut crmpc(), 100));
+    assert_eq!(moments(delayed(crmpc(), 0.0), 4.0), moments(crmpc(), 4.0));
     assert!(delayed(crmpc(), 0.0).memory().under_way.is_empty());
 }
 
 #[test]
-fn a_tick_evaluated_again_gives_the_same_and_leaves_no_trace() {
-    let reference = Scenario::crmpc2022().reference;
-    let preview = Preview::Profile(&reference);
-    let at = |k: i32| Measurement {
-        angles: Vector3::new(0.13, 0.17, -0.5) * (1.0 - 0.01 * f64::from(k)),
-        rates: Vector3::new(0.01, -0.02, 0.01),
-        ..Measurement::default()
-    };
-    let mut controller = delayed(lqr(), 0.117);
-    let [mut once, mut often] = [0, 1].map(|_| Sampled::new(0.0, FEEDBACK, controller.memory()));
-    for k in 0..10 {
-        once.evaluate(&mut controller, &at(k), &preview);
-        for other in garbage() {
-            often.evaluate(&mut controller, &other, &preview);
-        }
-        often.evaluate(&mut controller, &at(k), &preview);
-        assert_eq!(once.in_force(), often.in_force(), "{k}");
-        once.commit();
-        often.commit();
-        // A memory that was saved and restored continues with the same bits.
-        often = serde_json::from_str(&serde_json::to_string(&often).unwrap()).unwrap();
-    }
+fn another_evaluation_or_a_saved_memory_leaves_no_trace() {
+    let new = || delayed(lqr(), 0.117);
+    assert_another_evaluation_leaves_no_trace(new, Clone::clone);
+    assert_a_saved_memory_continues(new, 1.05, Clone::clone);
 }
 
 /// A controller that records the last input it received.

@@ -1,8 +1,9 @@
 //! Entry guidance: where its flights end, and the limits of its reference.
 
 use crate::harness::entry::{Flight, fly, start};
-use control::guidance::{Guidance, Limits, Memory, Navigation, PERIOD, Settings, Shaped};
+use control::guidance::{Command, Guidance, Limits, Memory, Navigation, PERIOD, Settings, Shaped};
 use proptest::prelude::*;
+use vehicle::entry::Motion;
 use vehicle::noise::uniform;
 
 #[test]
@@ -32,18 +33,6 @@ fn regress_dispersed_flights_end_in_the_terminal_area() {
     }
 }
 
-#[test]
-fn a_target_out_of_reach_is_reported() {
-    let mut settings = Settings::default();
-    settings.target.longitude += 1.5;
-    let guidance = Guidance::new(settings).unwrap();
-    let mut memory = Memory::default();
-    let navigation = Navigation { motion: Flight::nominal().start, ..Navigation::default() };
-    let command = (0..250).map(|tick| guidance.update(&mut memory, tick, &navigation)).last();
-    let command = command.unwrap();
-    assert!(!command.in_reach && command.miss > 1e5, "{command:?}");
-}
-
 /// At the last tick the verdict is the result of the flight. A target in reach at the first tick is
 /// reached, if the vehicle is as the guidance expects. A near target may be reached although no
 /// plan does so at first, because later plans hold the largest bank angle for longer.
@@ -67,37 +56,41 @@ fn oracle_the_verdict_on_reach_is_the_end_of_the_flight() {
     assert!(ends[0] >= 4 && ends[1] >= 4, "{ends:?}");
 }
 
-/// From 120 km with −1° and 7,500 m/s eastward over the equator the vehicle skips at every bank
-/// angle.
-#[test]
-fn a_start_that_skips_is_reported() {
-    let guidance = Guidance::new(Settings::default()).unwrap();
-    let motion = start([120e3, 0.0, 0.0, 7500.0, -1.0, 90.0]);
+/// Returns the command after this many ticks of a motion that stands still.
+fn commanded(settings: &Settings, motion: Motion, ticks: u64) -> Command {
+    let guidance = Guidance::new(*settings).unwrap();
     let mut memory = Memory::default();
     let navigation = Navigation { motion, ..Navigation::default() };
-    let command = guidance.update(&mut memory, 0, &navigation);
-    assert!(!command.in_reach, "{command:?}");
-}
-
-#[test]
-fn a_setting_out_of_range_is_refused_by_name() {
-    let mut settings = Settings::default();
-    settings.shaping.bank_rate = 0.0;
-    let refusal = Guidance::new(settings).unwrap_err().to_string();
-    assert!(refusal.contains("shaping.bankRate"), "{refusal}");
+    (0..ticks).map(|tick| guidance.update(&mut memory, tick, &navigation)).last().unwrap()
 }
 
 /// The first turn is towards the target: a positive bank angle turns to the left.
 #[test]
 fn oracle_the_first_bank_turns_towards_the_target() {
     for (heading, is_positive) in [(70.0, true), (50.0, false)] {
-        let guidance = Guidance::new(Settings::default()).unwrap();
         let motion = start([120e3, 0.0, -10.0, 7450.0, -1.2, heading]);
-        let mut memory = Memory::default();
-        let navigation = Navigation { motion, ..Navigation::default() };
-        let command = guidance.update(&mut memory, 0, &navigation);
+        let command = commanded(&Settings::default(), motion, 1);
         assert_eq!(command.bank > 0.0, is_positive, "{}", command.bank);
     }
+}
+
+/// A target can be too far away. From too steep a start no bank angle keeps the limits, from too
+/// flat a start none reaches the target, and from 120 km with −1° and 7,500 m/s eastward over the
+/// equator the vehicle skips at every bank angle.
+#[test]
+fn a_start_or_a_target_that_is_not_feasible_is_reported() {
+    let mut far = Settings::default();
+    far.target.longitude += 1.5;
+    let command = commanded(&far, Flight::nominal().start, 250);
+    assert!(!command.in_reach && command.miss > 1e5, "{command:?}");
+    for path in [-4.0, -0.5] {
+        let motion = start([120e3, 0.0, -10.0, 7450.0, path, 60.0]);
+        let command = commanded(&Settings::default(), motion, 1);
+        assert!(!command.keeps_limits || !command.in_reach, "{path}: {command:?}");
+    }
+    let skipping = start([120e3, 0.0, 0.0, 7500.0, -1.0, 90.0]);
+    let command = commanded(&Settings::default(), skipping, 1);
+    assert!(!command.in_reach, "{command:?}");
 }
 
 /// Without damping the flight skips several times.
@@ -113,11 +106,8 @@ fn the_damped_flight_descends_without_a_skip() {
         });
         (climbs, outcome.greatest_heat_flux)
     };
-    let ([damped, free], [flux, largest]) = {
-        let (damped, flux) = climbs(Settings::default().damping.gain);
-        let (free, largest) = climbs(0.0);
-        ([damped, free], [flux, largest])
-    };
+    let (damped, flux) = climbs(Settings::default().damping.gain);
+    let (free, largest) = climbs(0.0);
     assert!(damped < 500.0 && free > 5e3, "{damped} m, {free} m");
     assert!(flux < 0.87 * largest, "{flux} W/m², {largest} W/m²");
 }
@@ -148,31 +138,20 @@ fn oracle_a_limit_is_kept_or_called_infeasible() {
     }
 }
 
-/// From too steep a start no bank angle keeps the limits, and from too flat a start none reaches
-/// the target.
 #[test]
-fn a_start_that_exceeds_a_limit_is_reported() {
-    for path in [-4.0, -0.5] {
-        let guidance = Guidance::new(Settings::default()).unwrap();
-        let motion = start([120e3, 0.0, -10.0, 7450.0, path, 60.0]);
-        let mut memory = Memory::default();
-        let navigation = Navigation { motion, ..Navigation::default() };
-        let command = guidance.update(&mut memory, 0, &navigation);
-        assert!(!command.keeps_limits || !command.in_reach, "{path}: {command:?}");
-    }
-}
-
-#[test]
-fn a_limit_below_what_the_target_needs_is_refused() {
-    let refusal = |change: fn(&mut Settings)| {
+fn settings_that_cannot_work_are_refused_by_name() {
+    type Change = fn(&mut Settings);
+    let cases: [(Change, &str); 3] = [
+        (|settings| settings.shaping.bank_rate = 0.0, "shaping.bankRate"),
+        (|settings| settings.limit.pressure = 12e3, "limit.pressure = 12000 is less than"),
+        (|settings| settings.limit.load = 1.1, "limit.load = 1.1 is less than"),
+    ];
+    for (change, part) in cases {
         let mut settings = Settings::default();
         change(&mut settings);
-        Guidance::new(settings).unwrap_err().to_string()
-    };
-    let text = refusal(|settings| settings.limit.pressure = 12e3);
-    assert!(text.starts_with("limit.pressure = 12000 is less than"), "{text}");
-    let text = refusal(|settings| settings.limit.load = 1.1);
-    assert!(text.starts_with("limit.load = 1.1 is less than"), "{text}");
+        let text = Guidance::new(settings).unwrap_err().to_string();
+        assert!(text.contains(part), "{text}");
+    }
 }
 
 proptest! {

@@ -10,39 +10,45 @@ use vehicle::Scenario;
 use vehicle::actuators::Command;
 use vehicle::aerodynamics::{Aerodynamics, Flow};
 use vehicle::disturbance::DisturbanceKind;
-use vehicle::plant::{Input, Plant};
+use vehicle::plant::{Config, Input, Plant};
 use vehicle::profile::Profile;
 
 const PERIOD: f64 = 0.04;
 
-/// Static moment of the papers' vehicle at 2859 Pa, trimmed at the reference's angle of attack.
-fn air(vehicle: &Aerodynamics, angles: &Vector3<f64>, trim: f64, size: f64) -> Vector3<f64> {
-    let flow = Flow {
-        dynamic_pressure: 2859.0,
-        mach: 9.8,
-        speed: 3172.5,
-        alpha: angles.x,
-        beta: angles.y,
-    };
-    vehicle.moment(&flow, &Vector3::zeros(), trim) * size
+/// Returns the static moment of the papers' vehicle at 2859 Pa times this size, trimmed at the
+/// reference's angle of attack.
+fn air(scenario: &Scenario, size: f64) -> impl Fn(f64, &Plant) -> Vector3<f64> {
+    let vehicle = Aerodynamics::papers();
+    move |time, plant| {
+        let angles = plant.angles();
+        let flow = Flow {
+            dynamic_pressure: 2859.0,
+            mach: 9.8,
+            speed: 3172.5,
+            alpha: angles.x,
+            beta: angles.y,
+        };
+        let trim = scenario.reference.at(time).angles.x;
+        vehicle.moment(&flow, &Vector3::zeros(), trim) * size
+    }
 }
 
-/// Flies the scenario of Chai 2022 with static moments of this size. Calls `observe` with the
-/// memory, the command and the plant at each tick.
+/// Flies the scenario for as many ticks as it lasts, while the moment of `acting` acts, which the
+/// law may be told. Calls `observe` with the memory, the command and the plant at each tick.
 fn fly<C: Controller>(
     law: &mut C,
-    scenario: &Scenario,
-    (size, is_told): (f64, bool),
+    (scenario, delay): (&Scenario, f64),
+    acting: impl Fn(f64, &Plant) -> Vector3<f64>,
+    is_told: bool,
     mut observe: impl FnMut(&C::Memory, f64, &Vector3<f64>, &Plant),
 ) {
-    let vehicle = Aerodynamics::papers();
     let mut memory = law.memory();
-    let mut plant = Plant::new(&scenario.config(0.01), 0.0).unwrap();
+    let config = Config { moment_delay: delay, ..scenario.config(0.01) };
+    let mut plant = Plant::new(&config, 0.0).unwrap();
     for tick in 0..(scenario.duration / PERIOD).round() as u64 {
         let time = tick as f64 * PERIOD;
         let (angles, rates) = (plant.angles(), plant.rates());
-        let trim = scenario.reference.at(time).angles.x;
-        let acting = air(&vehicle, &angles, trim, size);
+        let acting = acting(time, &plant);
         let known_moment = if is_told { acting } else { Vector3::zeros() };
         let measured = Measurement { angles, rates, known_moment, ..Measurement::default() };
         let reference = |time: f64| scenario.reference.at(time);
@@ -67,7 +73,7 @@ fn guaranteed(scenario: &Scenario, size: f64, is_told: bool) -> [f64; 3] {
     let mut law = Crmpc::new(settings).unwrap();
     let (mut in_force, mut ticks) = (0_u32, 0_u32);
     let (mut rate, mut effort) = (0.0_f64, 0.0_f64);
-    fly(&mut law, scenario, (size, is_told), |memory, _, moment, plant| {
+    fly(&mut law, (scenario, 0.0), air(scenario, size), is_told, |memory, _, moment, plant| {
         ticks += 1;
         if memory.supervision.status == GuaranteeStatus::InForce {
             in_force += 1;
@@ -88,7 +94,9 @@ fn oracle_a_known_moment_leaves_no_error() {
             Settings::new(Constraints::Robust);
         let mut law = Lqr::new(LqrSettings { body, period, p, q }).unwrap();
         let mut angles = Vec::new();
-        fly(&mut law, &scenario, (size, is_told), |(), _, _, plant| angles.push(plant.angles()));
+        let acting = air(&scenario, size);
+        let observe = |(): &(), _, _: &Vector3<f64>, plant: &Plant| angles.push(plant.angles());
+        fly(&mut law, (&scenario, 0.0), acting, is_told, observe);
         angles
     };
     let calm = path(0.0, true);
@@ -138,33 +146,22 @@ impl Constant {
     /// Returns the number of ticks at which the guarantee is not in force, and the largest moment
     /// of the actuators and rate over their limits.
     fn fly(&self, settings: &Settings) -> (u32, [f64; 2]) {
-        let mut scenario = Scenario::crmpc2022();
+        let mut scenario = Scenario { duration: 40.0, ..Scenario::crmpc2022() };
         scenario.disturbance.kind = self.kind;
         scenario.disturbance.bound = self.disturbance_bound;
-        let mut config = scenario.config(0.01);
-        config.moment_delay = self.delay;
-        let mut plant = Plant::new(&config, 0.0).unwrap();
         let law = Crmpc::new(*settings).unwrap();
         let latency = Latency::of_action(self.delay);
-        let (body, limit) = (settings.body, settings.limit_moment);
-        let mut law = Delayed::new(law, body, PERIOD, latency, limit).unwrap();
-        let mut memory = law.memory();
+        let Settings { body, limit_moment, limit_rate, .. } = *settings;
+        let mut law = Delayed::new(law, body, PERIOD, latency, limit_moment).unwrap();
         let (mut lost, mut largest) = (0, [0.0_f64; 2]);
-        for tick in 0..1000 {
-            let time = tick as f64 * PERIOD;
-            let (angles, rates) = (plant.angles(), plant.rates());
-            let measured =
-                Measurement { angles, rates, known_moment: self.moment, ..Measurement::default() };
-            let reference = |time: f64| scenario.reference.at(time);
-            let moment = law.update(&mut memory, tick, time, &measured, &reference);
-            let input = |_| Input { moment, disturbance_moment: self.moment, ..Input::default() };
-            plant.advance_with(time, time + PERIOD, &Command::default(), input).unwrap();
-            let status = memory.inner.supervision.status;
-            let begins = tick as usize >= delay::ticks(self.delay, PERIOD);
-            lost += u32::from(begins && status != GuaranteeStatus::InForce);
-            largest[0] = largest[0].max(moment.norm() / settings.limit_moment);
-            largest[1] = largest[1].max(plant.rates().norm() / settings.limit_rate);
-        }
+        let acting = |_: f64, _: &Plant| self.moment;
+        let begin = delay::ticks(self.delay, PERIOD) as f64 * PERIOD;
+        fly(&mut law, (&scenario, self.delay), acting, true, |memory, time, moment, plant| {
+            let in_force = memory.inner.supervision.status == GuaranteeStatus::InForce;
+            lost += u32::from(time > begin - 1e-9 && !in_force);
+            largest[0] = largest[0].max(moment.norm() / limit_moment);
+            largest[1] = largest[1].max(plant.rates().norm() / limit_rate);
+        });
         (lost, largest)
     }
 }
@@ -194,7 +191,7 @@ fn oracle_a_constant_known_moment_leaves_the_guarantee_in_force_where_there_is_r
 
 #[test]
 fn a_known_moment_beyond_its_bound_does_not_stop_the_vehicle() {
-    let mut scenario = Scenario::crmpc2022();
+    let mut scenario = Scenario { duration: 60.0, ..Scenario::crmpc2022() };
     scenario.disturbance.kind = DisturbanceKind::None;
     scenario.reference = Profile::step(
         Vector3::new(20.0, 0.0, 0.0).map(f64::to_radians),
@@ -205,22 +202,17 @@ fn a_known_moment_beyond_its_bound_does_not_stop_the_vehicle() {
     let settings =
         Settings { known_bound: 1e4, known_change: 5e3, ..Settings::new(Constraints::Robust) };
     let mut law = Crmpc::new(settings).unwrap();
-    let mut memory = law.memory();
-    let mut plant = Plant::new(&scenario.config(0.01), 0.0).unwrap();
-    for tick in 0..1500 {
-        let time = tick as f64 * PERIOD;
-        let (angles, rates) = (plant.angles(), plant.rates());
-        // The plan that was certified without it must not be kept.
+    // The plan that was certified without it must not be kept.
+    let acting = |time: f64, _: &Plant| {
         let share = (0.05 * (time - 4.0)).clamp(0.0, 0.9);
-        let known = Vector3::y() * (share * settings.limit_moment);
-        let measured = Measurement { angles, rates, known_moment: known, ..Measurement::default() };
-        let reference = |time: f64| scenario.reference.at(time);
-        let moment = law.update(&mut memory, tick, time, &measured, &reference);
-        let input = |_| Input { moment, disturbance_moment: known, ..Input::default() };
-        plant.advance_with(time, time + PERIOD, &Command::default(), input).unwrap();
+        Vector3::y() * (share * settings.limit_moment)
+    };
+    let mut angles = Vector3::zeros();
+    fly(&mut law, (&scenario, 0.0), acting, true, |memory, time, _, plant| {
         assert!(time < 8.0 || memory.supervision.status != GuaranteeStatus::InForce, "{time}");
-    }
-    let error = (plant.angles() - scenario.reference.at(60.0).angles).norm().to_degrees();
+        angles = plant.angles();
+    });
+    let error = (angles - scenario.reference.at(60.0).angles).norm().to_degrees();
     assert!(error < 2.0, "{error}");
 }
 

@@ -1,7 +1,7 @@
 //! Limit on the moment and bound on the disturbance that change during a flight, as with dynamic
 //! pressure.
 
-use crate::harness::flight::{Flight, Shown, Waveform};
+use crate::harness::flight::{Flight, Shown, Waveform, assert_kept};
 use crate::harness::{INERTIA_SCALES, in_parallel};
 use control::controller::{Controller, Measurement, Scheduled, saturated};
 use control::crmpc::{
@@ -58,15 +58,8 @@ fn flights(settings: &Settings) -> Vec<Flight> {
 fn oracle_the_guarantee_is_kept_while_limit_and_disturbance_change() {
     let mut largest = 0.0_f64;
     for delay in [0.0, 0.04, 0.117] {
-        let settings = settings(delay);
-        for (flight, shown) in
-            flights(&settings).iter().zip(in_parallel(&flights(&settings), Flight::fly))
-        {
-            let before = (delay / settings.period_feedback).ceil() * settings.period_feedback;
-            let whole = (shown.in_force - (1.0 - before / flight.duration)).abs() < 1e-12;
-            assert!(!shown.defective() && whole, "{delay} {:?}: {shown:?}", flight.disturbance);
-            largest = largest.max(shown.moment);
-        }
+        let shown = assert_kept(&format!("delay {delay}"), &flights(&settings(delay)));
+        largest = shown.iter().map(|shown| shown.moment).fold(largest, f64::max);
     }
     assert!(largest > 0.8, "{largest}");
 }

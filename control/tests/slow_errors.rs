@@ -1,16 +1,13 @@
 //! The guarantee of the robust set while the errors of the measured angles change slowly.
 
-use crate::harness::flight::{Flight, Random, Shown, Sight, Slow, Waveform};
+use crate::harness::flight::{Flight, Random, Shown, Sight, Slow, Waveform, assert_kept};
 use crate::harness::{in_parallel, settings};
-use control::crmpc::{
-    Constraints, Crmpc, Design, GuaranteeStatus, InitialState, Lemmas, Memory, Settings,
-};
+use control::crmpc::{Constraints, Crmpc, Design, GuaranteeStatus, InitialState, Memory, Settings};
 use control::{Controller, Measurement};
 use nalgebra::Vector3;
 use vehicle::actuators::Command;
-use vehicle::integrator::rk4;
-use vehicle::kinematics::{self, Kinematics};
-use vehicle::plant::{self, Input, Load, Plant};
+use vehicle::kinematics;
+use vehicle::plant::{Input, Plant};
 use vehicle::profile::Profile;
 use vehicle::reference::Reference;
 use vehicle::scenario::Scenario;
@@ -67,26 +64,12 @@ fn flights(settings: &Settings, declared: &Settings) -> Vec<Flight> {
     flights
 }
 
-fn assert_kept(flights: &[Flight]) {
-    for (flight, shown) in flights.iter().zip(in_parallel(flights, Flight::fly)) {
-        let Flight { disturbance, slow, settings, duration, .. } = flight;
-        assert!(shown.assumed && !shown.defective(), "{disturbance:?}, {slow:?}: {shown:?}");
-        let before = (settings.delay / settings.period_feedback).ceil() * settings.period_feedback;
-        assert!(
-            (shown.in_force - (1.0 - before / duration)).abs() < 1e-12,
-            "{disturbance:?}, {slow:?}: {shown:?}"
-        );
+#[test]
+fn guarantee_is_kept_with_slow_errors_without_and_with_a_delay() {
+    for delay in [0.0, 0.04] {
+        let settings = navigated(delay);
+        assert_kept(&format!("delay {delay}"), &flights(&settings, &settings));
     }
-}
-
-#[test]
-fn guarantee_is_kept_with_slow_errors() {
-    assert_kept(&flights(&navigated(0.0), &navigated(0.0)));
-}
-
-#[test]
-fn guarantee_is_kept_with_slow_errors_and_a_delay() {
-    assert_kept(&flights(&navigated(0.04), &navigated(0.04)));
 }
 
 #[test]
@@ -97,7 +80,7 @@ fn guarantee_is_kept_with_slow_errors_and_a_delay_that_is_known_within_an_interv
         let flights = flights(&settings, &settings);
         flights.into_iter().map(move |flight| Flight { late, ..flight }).collect::<Vec<_>>()
     });
-    assert_kept(&late.concat());
+    assert_kept("interval", &late.concat());
 }
 
 /// Returns settings in which the slow errors, large and quick ones, count for more than Δ.
@@ -130,52 +113,6 @@ fn guarantee_is_kept_with_slow_errors_from_the_edge_of_the_certified_states() {
     assert!(flown.len() > 100 && in_force > 0.98 * flown.len() as f64, "{in_force}");
     let (sideslip, rate) = (largest(|shown| shown.sideslip), largest(|shown| shown.rate));
     assert!(sideslip > 0.99 && rate > 0.9, "{sideslip} {rate}");
-}
-
-/// Returns the largest creep of random states, and the largest acceleration of the navigated rates
-/// besides F and Δ, relative to their bounds.
-fn creep_found(s: &Settings) -> [f64; 2] {
-    let Settings { body, sideslip_domain, slow_angle_error, slow_angle_rate, .. } = *s;
-    let bounds = Lemmas::new(s).parts.drive;
-    let random = &mut Random::new(3);
-    let mut largest = [0.0_f64; 2];
-    for _ in 0..20_000 {
-        let side = random.corner().y;
-        let alpha = random.between(-3.1, 3.1);
-        let navigated = Vector3::new(alpha, side * sideslip_domain, random.between(-3.0, 3.0));
-        let (error, derivative) = (random.corner(), random.corner() * slow_angle_rate);
-        let error = error * slow_angle_error;
-        let (rates, moment) = (random.direction(s.limit_rate), random.direction(s.limit_moment));
-        let delta = random.corner() * s.disturbance_bound;
-        let load = Load { moment, delta, ..Load::default() };
-        let mut f = |_: f64, state: &plant::State| {
-            plant::derivative(&body, Kinematics::Printed, state, &load)
-        };
-        // The navigated angles and rates after a time (s).
-        let mut after = |time: f64| {
-            let state = rk4(&mut f, 0.0, &plant::state(&(navigated - error), &rates), time);
-            let angles = plant::angles(&state) + error + derivative * time;
-            (angles, kinematics::r(&angles) * plant::rates(&state))
-        };
-        let h = 1e-4;
-        let [(angles, x), (before, x_before)] = [h, -h].map(&mut after);
-        let [angle_rates, accelerations] = [angles - before, x - x_before].map(|d| d / (2.0 * h));
-        let r = kinematics::r(&navigated);
-        let intended = body.drift(&navigated, &(r * rates)) + r * body.inverse * moment;
-        let creep = (angle_rates - r * rates).norm() / bounds.creep;
-        let further = (accelerations - intended - delta).norm() / bounds.of_creep;
-        largest = [largest[0].max(creep), largest[1].max(further)];
-    }
-    largest
-}
-
-#[test]
-fn oracle_navigated_angles_and_rates_move_as_the_true_ones_but_for_the_creep() {
-    for settings in [navigated(0.0), creeping()] {
-        let [creep, further] = creep_found(&settings);
-        assert!(creep < 1.0 && creep > 0.7, "{creep}");
-        assert!(further < 1.0 && further > 0.4, "{further}");
-    }
 }
 
 /// Returns the largest deviations of the state that the law sees, relative to their bounds: of the

@@ -3,7 +3,7 @@
 use super::dlmpc;
 use crate::harness::recording::{Interrupted, Recorded, recorded, reference};
 use crate::harness::{disturbance, simulate};
-use control::dlmpc::{Memory, Plan, Settings, SolverStatus};
+use control::dlmpc::{Memory, Settings, SolverStatus};
 use control::mpc::{Method, Nonlinearity, SolverSettings};
 use control::{Controller, Dlmpc, Measurement};
 use nalgebra::{DMatrix, DVector, Vector3};
@@ -193,10 +193,4 @@ fn a_solver_that_fails_is_outlived() {
         assert!(outcome.ems_deg < 2.0, "{during:?}: {outcome:?}");
         assert_eq!(memory.report.status, SolverStatus::Unconstrained, "{during:?}");
     }
-}
-
-#[test]
-fn a_memory_starts_with_room_for_its_plan() {
-    let settings = Settings::published();
-    assert_eq!(dlmpc().memory().plan, Plan::new(settings.horizon));
 }

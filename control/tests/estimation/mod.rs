@@ -67,15 +67,13 @@ fn oracle_without_errors_a_steady_turn_is_followed_exactly() {
     // σ turns about the velocity with α and β held, so that the platform's rate is constant about a
     // fixed axis.
     let rate = 5f64.to_radians();
-    let turning = |time: f64| {
+    let turning = |k: u32| {
+        let time = f64::from(k) * PERIOD;
         let angles = Vector3::new(0.2, 0.1, rate * time);
-        Truth {
-            time,
-            angles,
-            rates: Kinematics::Printed.r_inverse(&angles) * Vector3::new(0.0, 0.0, rate),
-        }
+        let rates = Kinematics::Printed.r_inverse(&angles) * Vector3::new(0.0, 0.0, rate);
+        Truth { time, angles, rates }
     };
-    let trajectory: Vec<_> = (0..1000).map(|k| turning(f64::from(k) * PERIOD)).collect();
+    let trajectory: Vec<_> = (0..1000).map(turning).collect();
     let lines = lines(&trajectory, &ideal());
     for (name, settings, limit) in [
         ("without filter", sharp(), 1e-6),
@@ -87,24 +85,9 @@ fn oracle_without_errors_a_steady_turn_is_followed_exactly() {
         assert!(angles.norm() < limit, "{name}: {angles} deg");
         assert!(rates.norm() < limit.min(1.1e-4), "{name}: {rates} deg/s");
     }
-}
-
-#[test]
-fn without_prediction_the_angles_are_late_by_the_delays() {
-    let rate = 5f64.to_radians();
-    let turning = |time: f64| {
-        let angles = Vector3::new(0.0, 0.0, rate * time);
-        Truth {
-            time,
-            angles,
-            rates: Kinematics::Printed.r_inverse(&angles) * Vector3::new(0.0, 0.0, rate),
-        }
-    };
-    let trajectory: Vec<_> = (0..1000).map(|k| turning(f64::from(k) * PERIOD)).collect();
-    let lines = lines(&trajectory, &ideal());
-    let settings = Settings { prediction: false, ..sharp() };
+    // Without prediction the angles are late: a sample arrives one tick after it was taken.
+    let settings = Settings { prediction: false, frozen_samples: 0, ..sharp() };
     let estimate = estimates(&settings, &lines)[900];
-    // A sample arrives one tick after it was taken.
     assert!((trajectory[900].angles.z - estimate.angles.z - rate * PERIOD).abs() < 1e-6);
 }
 

@@ -44,10 +44,10 @@ pub fn recorded<C: Controller>(
     inertia_scale: f64,
     ratio: u64,
 ) -> Vec<Recorded<C::Memory>> {
-    let mut before = C::Memory::default();
+    let mut before = controller.memory();
     let mut samples = Vec::new();
     let noise = disturbance(DisturbanceKind::White);
-    let mut memory = C::Memory::default();
+    let mut memory = controller.memory();
     simulate(controller, &mut memory, inertia_scale, noise, |after, tick, &measured| {
         if tick % ratio == 0 {
             samples.push(Recorded { tick, before: before.clone(), measured });
@@ -103,7 +103,7 @@ pub fn assert_another_evaluation_leaves_no_trace<C: Controller<Memory: Debug + P
     let preview = Preview::Profile(&scenario.reference);
     let garbage = super::garbage();
     let (mut disturbed_controller, mut calm_controller) = (new(), new());
-    let start = || Sampled::new(0.0, FEEDBACK, C::Memory::default());
+    let start = || Sampled::new(0.0, FEEDBACK, new().memory());
     let (mut disturbed, mut calm) = (start(), start());
     for Recorded { tick, measured, .. } in recorded(&mut new(), 1.05, 1).iter().take(300) {
         let wrong = &garbage[*tick as usize / 5 % garbage.len()];
@@ -130,7 +130,7 @@ pub fn assert_a_saved_memory_continues<C: Controller<Memory: Debug + PartialEq>>
     let scenario = Scenario::crmpc2022();
     let preview = Preview::Profile(&scenario.reference);
     let mut used = new();
-    let mut sampled = Sampled::new(0.0, FEEDBACK, C::Memory::default());
+    let mut sampled = Sampled::new(0.0, FEEDBACK, used.memory());
     for (tick, Recorded { measured, .. }) in run.iter().enumerate().take(750) {
         // The saved state is taken within and at the beginning of an optimisation period, with the
         // tick evaluated or not.

@@ -117,6 +117,8 @@ proptest! {
             prop_assert!((gamma.determinant() - expected).abs() < 2e-16 * scale);
             // Its other two minors are positive, so (46) decides whether Γ₁ is positive definite.
             prop_assert_eq!(gamma.cholesky().is_some(), law.condition_46(axis) > 0.0);
+            let of_the_rest = Axis { law, axis }.gamma_2();
+            prop_assert!(of_the_rest.cholesky().is_some());
         }
     }
 
@@ -130,6 +132,9 @@ proptest! {
             prop_assert!(eigenvalues.min() > 0.0);
             prop_assert!(v2 >= eigenvalues.min() * xi.norm_squared() * (1.0 - 1e-13));
             prop_assert!(v2 <= eigenvalues.max() * xi.norm_squared() * (1.0 + 1e-13));
+            // (52)
+            let bound = (v2 / eigenvalues.min()).powf(0.5 / (law.m - 1.0));
+            prop_assert!(s.abs().powf(1.0 / law.m) <= bound * (1.0 + 1e-13));
         }
     }
 

@@ -1,7 +1,7 @@
 //! Problems in which the Riccati method fails.
 
-use crate::harness::norm_constraints::Sets;
 use super::{MAX_ITERATIONS, MODERATE, Shape, published};
+use crate::harness::norm_constraints::Sets;
 use control::mpc::{
     Bounded, Bounds, Chain, Constraints, ErrorTrajectory, Layout, Optimiser, SolverSettings,
     StageConstraints, State,

@@ -5,8 +5,6 @@ mod certificate;
 mod judging;
 mod norms;
 mod planning;
-#[cfg(test)]
-mod tests;
 
 use super::design::Design;
 use super::guarantee::{
@@ -298,3 +296,6 @@ pub(super) fn largest_over_box(m: &Matrix3<f64>) -> f64 {
     let products = (xy + xz + yz).max(xy - xz - yz).max(xz - xy - yz).max(yz - xy - xz);
     (x.norm_squared() + y.norm_squared() + z.norm_squared() + 2.0 * products).sqrt()
 }
+
+#[cfg(test)]
+mod tests;

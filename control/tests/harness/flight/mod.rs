@@ -11,7 +11,7 @@ mod settings;
 mod slow;
 mod waveform;
 
-use super::CHECK;
+use super::{CHECK, in_parallel};
 use control::controller::Scheduled;
 use control::crmpc::{Crmpc, GuaranteeStatus, Memory, Settings};
 use control::delay::{Delayed, Latency};
@@ -158,6 +158,22 @@ impl Flight {
             duration: scenario.duration,
         }
     }
+}
+
+/// Asserts that the guarantee is in force in these flights from the instant at which the first
+/// command acts, and that it holds. Returns their results.
+pub fn assert_kept(name: &str, flights: &[Flight]) -> Vec<Shown> {
+    let shown = in_parallel(flights, Flight::fly);
+    for (flight, shown) in flights.iter().zip(&shown) {
+        let Flight { disturbance, sight, slow, settings, duration, .. } = flight;
+        let before = (settings.delay / settings.period_feedback).ceil() * settings.period_feedback;
+        let is_whole = (shown.in_force - (1.0 - before / duration)).abs() < 1e-12;
+        assert!(
+            shown.assumed && !shown.defective() && is_whole,
+            "{name}, {disturbance:?}, {sight:?}, {slow:?}: {shown:?}"
+        );
+    }
+    shown
 }
 
 impl Flight {
