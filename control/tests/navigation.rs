@@ -13,8 +13,8 @@ fn figures(case: impl Fn(u64) -> Case + Sync, seeds: std::ops::Range<u64>) -> Fi
 }
 
 /// The errors of all angles are as large as the filter says, for every grade, and the innovations
-/// have the size that it expects. It takes half a minute of two cores, as only the mean over whole
-/// flights shows a covariance that is wrong by a third.
+/// have the size that it expects. It takes twenty seconds of two cores, as only the mean over
+/// whole flights shows a covariance that is wrong by a third.
 #[test]
 fn oracle_errors_are_as_large_as_predicted() {
     for (set, stars) in [(3, false), (4, false), (4, true), (5, true)] {
