@@ -31,6 +31,7 @@ CHANGED = "plant.disturbance.bound=1.7+deg/s2&plant.disturbance.seed=7&plant.ini
 DELAYED = f"{CHANGED}&plant.actuation.delay=0.04&controller.delay=0.04&controller.limit.moment=150000"
 
 pytestmark = [
+    pytest.mark.tier("browser"),
     pytest.mark.skipif(not PAGE.is_file(), reason=f"{PAGE.relative_to(ROOT)} does not exist: run scripts/browser"),
     in_chromium,
 ]

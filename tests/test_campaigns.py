@@ -30,12 +30,14 @@ def check(campaign, arguments, folder):
     assert not list(folder.iterdir())
 
 
+@pytest.mark.tier("studies")
 @pytest.mark.parametrize("controller", CONTROLLERS)
 @pytest.mark.parametrize("campaign", FOR_CHAI)
 def test_every_campaign_fits_every_controller(campaign, controller, tmp_path):
     check(campaign, ["--experiment", controller], tmp_path)
 
 
+@pytest.mark.tier("studies")
 @pytest.mark.parametrize("name", FMUS)
 @pytest.mark.parametrize("campaign", FOR_ANY)
 def test_every_campaign_of_any_controller_fits_every_fmu(campaign, name, tmp_path):

@@ -218,7 +218,7 @@ def test_oracle_fmi_rs_steps_an_fmu(fmu, by_hand, agree, tmp_path, name):
 
 
 @each_fmu
-@pytest.mark.everything
+@pytest.mark.tier("importers")
 @pytest.mark.importer("fmi-sim", "co-simulation", within=0.0)
 def test_oracle_fmi_sim_steps_an_fmu(fmu, by_hand, agree, tmp_path, name):
     found = fmi_sim(tmp_path, "co-simulation", archive(name))
@@ -270,7 +270,7 @@ def test_oracle_fmi_rs_integrates_the_plant(euler, agree, tmp_path):
     agree(np.array([found[name] for name in ANGLES + RATES]).T, euler)
 
 
-@pytest.mark.everything
+@pytest.mark.tier("importers")
 @pytest.mark.importer("fmi-sim", "model exchange, Euler", fmu="ReentryPlant", within=0.0, to="FMPy's Euler")
 def test_oracle_fmi_sim_integrates_the_plant(euler, agree, tmp_path):
     found = fmi_sim(tmp_path, "model-exchange", archive("ReentryPlant"))

@@ -17,6 +17,8 @@ import pytest
 from browsing import ARGUMENTS, CHROMIUM, in_chromium
 from conftest import NAMES, ROOT, TARGET
 
+pytestmark = pytest.mark.tier("manual")
+
 if sys.version_info >= (3, 11):
     import tomllib
 else:

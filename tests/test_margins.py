@@ -172,6 +172,7 @@ def test_oracle_flights_are_stable_below_the_margin_and_unstable_above_it(law, a
             assert (growth < 0.5) if is_stable else (growth > 2.0), f"{share} {setting}: {growth}"
 
 
+@pytest.mark.tier("studies")
 @pytest.mark.parametrize("law", ["LQR", "FBL"])
 def test_oracle_the_other_order_of_calls_is_a_step_of_delay_in_flight_too(law, tmp_path):
     jacobi = ["--coupling", "jacobi"]
@@ -186,6 +187,7 @@ def test_oracle_the_other_order_of_calls_is_a_step_of_delay_in_flight_too(law, t
         assert (growth < 0.5) if is_stable else (growth > 2.0), f"{share}: {growth}"
 
 
+@pytest.mark.tier("studies")
 @pytest.mark.parametrize("law", ["FBL", "TwoLoopSMC", "CRMPC"])
 def test_oracle_surfaces_give_small_motions_the_margins_of_the_loop_without_them(law, tmp_path):
     experiment = FOLDER / "margins" / "allocated.toml"
@@ -276,6 +278,7 @@ def test_a_refusal_is_json_where_the_answer_would_be(command):
     assert answer["exit_code"] == done.returncode == 1
 
 
+@pytest.mark.tier("studies")
 # scripts/oracles/margins_in_flight.py holds all delays up to 1 s against flights.
 @pytest.mark.parametrize("law", ["LQR", "FBL"])
 @pytest.mark.parametrize("delay", [0.0, 0.25, 0.3, 0.31, 0.355, 0.5, 0.995, 1.0])

@@ -5,11 +5,14 @@ import csv
 import subprocess
 
 import numpy as np
+import pytest
 from fmpy.validation import validate_fmu
 
 from conftest import EXPERIMENTS, ROOT, program
 from fmi import ANGLES, MOMENT, RATES
 
+# It compiles what the crate needs, in a workspace of its own. `.ci/run` checks that it compiles.
+pytestmark = pytest.mark.tier("importers")
 FOLDER = ROOT / "examples" / "own-controller"
 # The Riccati equation gives these gains for P = 50, Q = 10: sqrt(P/Q), sqrt((P + 2 sqrt(P Q))/Q).
 GAINS = {"gain.p": np.sqrt(5.0), "gain.d": np.sqrt(5.0 + 2.0 * np.sqrt(5.0))}

@@ -12,9 +12,10 @@ from elftools.elf.gnuversions import GNUVerNeedSection
 from conftest import NAMES, TARGET
 from fmi import Fmu, Instance
 
-pytestmark = pytest.mark.skipif(
-    (platform.system(), platform.machine()) != ("Linux", "x86_64"), reason="built on Linux x86_64 only"
-)
+pytestmark = [
+    pytest.mark.tier("platforms"),
+    pytest.mark.skipif((platform.system(), platform.machine()) != ("Linux", "x86_64"), reason="built on Linux x86_64 only"),
+]
 # CentOS 7 and manylinux2014 have this version of glibc and these libraries.
 GLIBC = (2, 17)
 LIBRARIES = {"libc.so.6", "libm.so.6", "libpthread.so.0", "libdl.so.2", "ld-linux-x86-64.so.2"}

@@ -15,7 +15,8 @@ from pathlib import Path
 import lief
 import pytest
 
-from conftest import NAMES, ROOT, TARGET, merged, program
+import conftest
+from conftest import NAMES, ROOT, TARGET, archive, merged, program
 from fmi import NOT_REPRODUCIBLE, Fmu
 
 DIST = TARGET / "dist"
@@ -28,13 +29,12 @@ FOLDERS = {
     "macos-x86_64": {"darwin64": "dylib"},
     "macos-aarch64": {"darwin64": "dylib"},
 }
-# Platforms that `scripts/test` builds; the rest needs `scripts/test --all`.
-ALWAYS = ("linux-x86_64", "windows-x86_64")
 
 
 def marked(platforms) -> list:
     """Parameters of a test, one for each platform."""
-    return [pytest.param(platform, marks=() if platform in ALWAYS else pytest.mark.everything) for platform in platforms]
+    tier = lambda platform: "windows" if platform.startswith("windows") else "platforms"  # noqa: E731
+    return [pytest.param(platform, marks=pytest.mark.tier(tier(platform))) for platform in platforms]
 
 
 # Every file of an experiment that `run` takes: no parts, studies, campaigns or tables of published numbers.
@@ -66,6 +66,9 @@ PROGRAMS = {"windows-x86_64": "orchestrator.exe", "linux-aarch64": "orchestrator
 
 
 def packed(platform: str, name: str):
+    # Where only another platform was packed, it is compared with the FMUs that are tested here.
+    if platform == "linux-x86_64" and not (DIST / platform).is_dir():
+        return archive(name)
     if not (DIST / platform).is_dir():
         pytest.skip(f"no package for {platform}: run scripts/package")
     path = DIST / platform / "fmu" / f"{name}.fmu"
@@ -118,6 +121,7 @@ def test_every_platform_exports_the_same_functions_and_no_others(library, platfo
         assert functions([symbol.name for symbol in part.exported_symbols]) == expected
 
 
+@pytest.mark.tier("windows")
 def test_windows_needs_nothing_but_windows(library):
     windows = lief.PE.parse(list(library("windows-x86_64")))
     foreign = [entry.name for entry in windows.imports if not entry.name.lower().startswith(WINDOWS)]
@@ -180,12 +184,12 @@ def check_macos(universal: bytes):
     assert found == {lief.MachO.Header.CPU_TYPE.ARM64, lief.MachO.Header.CPU_TYPE.X86_64}
 
 
-@pytest.mark.everything
+@pytest.mark.tier("platforms")
 def test_macos_has_both_processors_signed_and_needs_nothing_but_macos(library):
     check_macos(library("macos-universal"))
 
 
-@pytest.mark.everything
+@pytest.mark.tier("platforms")
 def test_the_orchestrator_of_macos_has_both_processors_signed():
     program = DIST / "macos-universal" / "orchestrator"
     if not program.is_file():
@@ -309,6 +313,7 @@ def native(*arguments, **options):
     return subprocess.run(command, capture_output=True, timeout=120, **options)
 
 
+@pytest.mark.tier("platforms")
 @pytest.mark.parametrize("experiment", EXPERIMENTS, ids=lambda path: f"{path.parent.name}/{path.stem}")
 def test_oracle_every_platform_computes_the_same_bits(foreign, experiment, tmp_path):
     """Times of computation are not recorded in results.csv; everything else is compared."""
@@ -326,6 +331,7 @@ def test_oracle_every_platform_computes_the_same_bits(foreign, experiment, tmp_p
     assert (tmp_path / "there" / "results.csv").read_bytes() == expected
 
 
+@pytest.mark.tier("platforms")
 def test_windows_takes_spaces_letters_backslashes_and_drive_letters(wine, tmp_path):
     """The experiment stands in a folder whose path is long, has spaces and letters that are not
     ASCII, and its lines end as those of Windows do."""
@@ -347,6 +353,7 @@ def test_windows_takes_spaces_letters_backslashes_and_drive_letters(wine, tmp_pa
     assert written == (tmp_path / "here" / "results.csv").read_bytes()
 
 
+@pytest.mark.tier("platforms")
 def test_windows_names_a_culprit_in_a_path_with_backslashes(wine):
     emulator, environment = wine
     own = orchestrator("windows-x86_64")
@@ -356,6 +363,7 @@ def test_windows_names_a_culprit_in_a_path_with_backslashes(wine):
     assert "C:\\nö\\such file.toml" in there.stderr.decode()
 
 
+@pytest.mark.tier("platforms")
 @pytest.mark.parametrize(
     ("how", "alone", "together"),
     [
@@ -382,6 +390,7 @@ def test_an_instance_that_ends_its_process_on_windows_is_named(wine, tmp_path, h
     assert there.returncode == 1 and f"model ended this process in doStep {together}" in there.stderr.decode()
 
 
+@pytest.mark.tier("platforms")
 def test_ctrl_c_on_windows_ends_a_run_and_keeps_its_results(wine, tmp_path):
     emulator, environment = wine
     compiled("windows-x86_64", "press_ctrl_c.c", tmp_path / "press.exe")
@@ -399,14 +408,7 @@ def test_ctrl_c_on_windows_ends_a_run_and_keeps_its_results(wine, tmp_path):
     assert 10 < len(rows) < 140
 
 
-def built(platform: str, crate: str) -> Path:
-    names = {"linux-x86_64": f"x86_64-unknown-linux-gnu/release/lib{crate}.so", "windows-x86_64": f"x86_64-pc-windows-gnullvm/release/{crate}.dll"}
-    path = TARGET / names[platform]
-    if not path.is_file():
-        pytest.skip(f"{path} does not exist: run scripts/package")
-    return path
-
-
+@pytest.mark.tier("windows")
 @pytest.mark.parametrize(
     "old, new, words",
     [
@@ -418,7 +420,7 @@ def built(platform: str, crate: str) -> Path:
     ids=["sources", "imports", "exports", "format"],
 )
 def test_a_library_that_does_not_belong_to_the_others_is_refused(old, new, words, tmp_path):
-    host, other = (built(platform, "fmu_plant_library") for platform in ("linux-x86_64", "windows-x86_64"))
+    host, other = conftest.library("fmu_plant_library"), TARGET / "x86_64-pc-windows-gnullvm/release/fmu_plant_library.dll"
     content = other.read_bytes()
     if old is None:
         windows = lief.PE.parse(list(content))

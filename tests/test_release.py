@@ -19,7 +19,7 @@ import pytest
 from conftest import NAMES, ROOT, TARGET, library, program
 
 pytestmark = [
-    pytest.mark.everything,
+    pytest.mark.tier("release"),
     pytest.mark.skipif((platform.system(), platform.machine()) != ("Linux", "x86_64"), reason="made on Linux x86_64 only"),
 ]
 VERSION = re.search(r'(?m)^version = "(.+)"', (ROOT / "Cargo.toml").read_text())[1]

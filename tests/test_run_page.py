@@ -14,7 +14,7 @@ from axe_playwright_python.sync_playwright import Axe
 from browsing import in_chromium
 from conftest import program
 
-pytestmark = in_chromium
+pytestmark = [pytest.mark.tier("browser"), in_chromium]
 
 
 def call(*arguments, cwd):

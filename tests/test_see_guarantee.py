@@ -11,6 +11,7 @@ from browsing import in_chromium
 from test_browser import PAGE, after, flights, opened
 
 pytestmark = [
+    pytest.mark.tier("browser"),
     pytest.mark.skipif(not PAGE.is_file(), reason=f"{PAGE.relative_to(PAGE.parents[2])} does not exist: run scripts/browser"),
     in_chromium,
 ]

@@ -126,6 +126,7 @@ def uncertainty(rates, angles, accelerations, moment) -> np.ndarray:
     return np.einsum("ijk,kj->ki", kinematics(angles[:, 0], angles[:, 1]), accelerations - modelled)
 
 
+@pytest.mark.tier("studies")
 @pytest.mark.parametrize(
     ("law", "ours", "least", "most"),
     [

@@ -11,6 +11,8 @@ import reach
 from conftest import ROOT, TARGET, program
 from figures import check_folder
 
+pytestmark = pytest.mark.tier("studies")
+
 try:
     import tomllib
 except ModuleNotFoundError:  # Python 3.10

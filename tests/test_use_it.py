@@ -38,8 +38,8 @@ def test_the_steps_of_the_page(pytestconfig, libpython, tmp_path):
     programs = Path(sys.executable).parent
     environment = {**os.environ, "LIBPYTHON": libpython, "PATH": f"{programs}:{os.environ['PATH']}"}
     for language, text in BLOCKS:
-        # Only `scripts/test --all` installs fmi-sim.
-        if "bin/fmi-sim" in text and not pytestconfig.getoption("--all"):
+        # Only `scripts/test --with importers` installs fmi-sim.
+        if "bin/fmi-sim" in text and not {"all", "importers"} & set(pytestconfig.getoption("--tier")):
             continue
         if language == "toml":
             (tmp_path / "out" / "pd.toml").write_text(text)
@@ -49,7 +49,7 @@ def test_the_steps_of_the_page(pytestconfig, libpython, tmp_path):
         assert done.returncode == 0, text + done.stdout + done.stderr
     made = [path.name for path in (tmp_path / "out").iterdir()]
     expected = "crmpc paced loop.ssp again plant.csv exchange.csv closed_loop.csv variation.csv closed_loop.png archive loop.fmu container.csv PdController.fmu pd".split()
-    if pytestconfig.getoption("--all"):
+    if {"all", "importers"} & set(pytestconfig.getoption("--tier")):
         expected.append("crmpc.csv")
     assert set(expected) <= set(made)
     assert {language for language, _ in BLOCKS} == {"sh", "python", "toml"}

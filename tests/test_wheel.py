@@ -23,6 +23,8 @@ from matplotlib.image import imread, imsave
 
 from conftest import NAMES, ROOT, TARGET, program
 
+pytestmark = pytest.mark.tier("wheel")
+
 SUPPORTED = [(3, minor) for minor in (10, 11, 12, 13)]
 PACKAGE = "reentry_fmus"
 EXTRAS = ["campaign", "cluster", "control", "czml", "gymnasium", "matlab", "xarray"]
@@ -223,7 +225,7 @@ class Installed:
         return done.stdout
 
 
-@pytest.mark.parametrize("which", ["newest", pytest.param("oldest", marks=pytest.mark.everything)])
+@pytest.mark.parametrize("which", ["newest", "oldest"])
 def test_the_package_works_where_it_is_installed(which, wheel, tmp_path):
     found = interpreters()
     version, interpreter = found[0 if which == "oldest" else -1]

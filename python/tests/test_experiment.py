@@ -14,6 +14,7 @@ import pandas as pd
 import pytest
 from laws import lqr
 from laws import pd as pd_law
+import reentry_fmus
 from reentry_fmus import (
     ClosedLoop,
     LawError,
@@ -25,7 +26,9 @@ from reentry_fmus import (
     fmus,
 )
 
-COMMAND = Path(sysconfig.get_path("scripts"), "orchestrator" + (".exe" if os.name == "nt" else ""))
+# The command is among those of the environment, or beside the package if its wheel is unpacked.
+FOLDERS = (Path(sysconfig.get_path("scripts")), Path(reentry_fmus.__file__).parents[1] / "bin")
+COMMAND = next(path for path in (Path(folder, "orchestrator" + (".exe" if os.name == "nt" else "")) for folder in FOLDERS) if path.is_file())
 ALPHA = "plant.attitude.alpha"
 
 

@@ -7,6 +7,9 @@ from conftest import NAMES, archive
 from fmi import Fmu
 from settable import PAGE, STEPPED, condition, look, page
 
+# Three minutes of flights, one for each value of each setting.
+pytestmark = pytest.mark.tier("studies")
+
 
 @pytest.fixture(scope="module")
 def found(tmp_path_factory):
