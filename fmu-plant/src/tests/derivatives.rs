@@ -1,10 +1,10 @@
 //! Partial derivatives against differences and declared dependencies.
 
+use super::entry::{entering, in_general_motion, prescribed};
 use super::{
-    CONTEXT, MEASURED, STATE_COUNT, STATES, actuate, all_kinds, delayed, in_model_exchange,
-    outputs, started, step,
+    CONTEXT, STATES, actuate, all_kinds, delayed, in_model_exchange, outputs, started, step,
 };
-use crate::plant::ReentryPlant;
+use crate::plant::{MOTION, Output, ReentryPlant};
 use crate::roles::Known;
 use crate::table::role;
 use fmi_export::{Model, describe};
@@ -12,29 +12,6 @@ use nalgebra::Vector3;
 use vehicle::disturbance::DisturbanceKind;
 use vehicle::kinematics::Kinematics;
 use vehicle::trajectory::Trajectory;
-
-/// Calculated variables with their positions in the table.
-fn calculated(instance: &mut ReentryPlant, time: f64) -> Vec<(usize, f64)> {
-    let o = outputs(instance, time);
-    let vectors = [
-        o.angles,
-        o.rates,
-        o.angle_rates,
-        o.angular_acceleration,
-        o.applied_moment,
-        o.delta,
-        o.disturbance_moment,
-    ];
-    let rest = o.deflections.iter().copied().chain([o.passage.dynamic_pressure]);
-    let last = o.deflection_rates.iter().copied();
-    let readings = o.measured.readings;
-    let measured = readings.iter().flatten().copied().chain([o.measured.time]);
-    let groups = (0..21)
-        .zip(vectors.iter().flatten().copied())
-        .chain((27..36).zip(rest))
-        .chain((54..62).zip(last));
-    groups.chain((MEASURED..).zip(measured)).collect()
-}
 
 /// Returns an instance with actuators in model exchange; its jets take a duty cycle or switch.
 fn actuated_in_model_exchange(duty: bool) -> ReentryPlant {
@@ -86,43 +63,37 @@ fn under_a_delayed_moment() -> ReentryPlant {
     instance
 }
 
-fn positions_of_knowns() -> impl Iterator<Item = usize> {
-    (0..69).filter(|&position| role(position).as_known.is_some())
+/// Returns an instance in co-simulation that flies the calibration sequence.
+fn in_the_calibration_sequence() -> ReentryPlant {
+    let mut instance = started(|instance| instance.parameters.sensing.calibrates = true);
+    step(&mut instance, 0.0, 0.02).unwrap();
+    instance
 }
 
-/// Adds a number to the state or input at a position in the table.
-fn nudge(instance: &mut ReentryPlant, known_position: usize, by: f64) {
-    match role(known_position).as_known.unwrap() {
-        Known::State(i) => {
-            let mut states = [0.0; STATE_COUNT];
-            instance.continuous_states(&mut states);
-            states[i] += by;
-            instance.set_continuous_states(&states);
-        }
-        Known::Moment(i) => instance.input.moment[i] += by,
-        Known::DisturbanceMoment(i) => instance.input.disturbance_moment[i] += by,
-        Known::Surface(i) => instance.command.surfaces[i] += by,
-        Known::Jet(j) => instance.command.jets[j] += by,
-        Known::Trajectory(i) => {
-            let t = &mut instance.input.trajectory;
-            *[
-                &mut t.flight_path_angle,
-                &mut t.heading,
-                &mut t.latitude,
-                &mut t.flight_path_angle_rate,
-                &mut t.heading_rate,
-                &mut t.longitude_rate,
-                &mut t.latitude_rate,
-            ][i] += by;
-        }
-        Known::Prescribed(_) | Known::Trim => panic!("only an entry flight has these"),
+/// Outputs at 0.02 s with a state or an input changed by a number.
+fn changed(instance: &ReentryPlant, known: Known, by: f64) -> Output {
+    let mut instance = instance.clone();
+    let t = &mut instance.input.trajectory;
+    let trajectory = [
+        &mut t.flight_path_angle,
+        &mut t.heading,
+        &mut t.latitude,
+        &mut t.flight_path_angle_rate,
+        &mut t.heading_rate,
+        &mut t.longitude_rate,
+        &mut t.latitude_rate,
+    ];
+    if let Known::Trajectory(i) = known {
+        *trajectory[i] += by;
     }
+    instance.nudge(known, by);
+    outputs(&mut instance, 0.02)
 }
 
+/// The derivatives are of closed form at a fixed flight condition, and differences in an entry.
 #[test]
 fn oracle_partial_derivatives_against_differences_and_declared_dependencies() {
-    let description = describe::<ReentryPlant>();
-    let instances = all_kinds()
+    let given = all_kinds()
         .map(in_model_exchange)
         .chain([false, true].map(actuated_in_model_exchange))
         .chain([
@@ -130,36 +101,37 @@ fn oracle_partial_derivatives_against_differences_and_declared_dependencies() {
             along_a_trajectory(DisturbanceKind::Constant, Kinematics::Exact),
             along_a_trajectory(DisturbanceKind::AgainstMoment, Kinematics::Exact),
         ])
-        .chain([at_a_communication_point(), under_a_delayed_moment()]);
-    for (case, mut instance) in instances.enumerate() {
-        for known_position in positions_of_knowns() {
-            let by = match known_position {
-                21..27 => 1e3,
-                36..44 => 1e-3,
-                44..54 => 0.1,
+        .chain([at_a_communication_point(), under_a_delayed_moment()])
+        .chain([in_the_calibration_sequence()]);
+    let entries = [entering as fn(&mut ReentryPlant), prescribed].map(in_general_motion);
+    let instances = given.map(|instance| (instance, false)).chain(entries.map(|e| (e, true)));
+    let variables = describe::<ReentryPlant>().variables;
+    for (case, (mut instance, enters)) in instances.enumerate() {
+        for (known_position, known_variable) in variables.iter().enumerate() {
+            let Some(known) = role(known_position).as_known else { continue };
+            let by = match known {
+                Known::Moment(_) | Known::DisturbanceMoment(_) => 1e3,
+                Known::Jet(_) => 0.1,
+                Known::Surface(_) => 1e-3,
+                Known::State(MOTION) => 1.0,
+                Known::State(i) if i == MOTION + 3 => 0.1,
                 _ => 1e-5,
             };
-            nudge(&mut instance, known_position, by);
-            let above = calculated(&mut instance, 0.02);
-            nudge(&mut instance, known_position, -2.0 * by);
-            let below = calculated(&mut instance, 0.02);
-            nudge(&mut instance, known_position, by);
-            let known_name = &description.variables[known_position].name;
-            for ((unknown, above), (_, below)) in above.iter().zip(&below) {
-                let exact = instance.partial_derivative(0.02, *unknown, known_position).unwrap();
-                let numeric = (above - below) / (2.0 * by);
-                let variable = &description.variables[*unknown];
-                assert!(
-                    (numeric - exact).abs() < 1e-9 * exact.abs().max(1.0),
-                    "{case}: {} by {known_name}: {exact}, not {numeric}",
-                    variable.name
-                );
-                if exact != 0.0 && *unknown != known_position {
-                    assert!(
-                        variable.dependencies.contains(known_name),
-                        "{} depends on {known_name}",
-                        variable.name
-                    );
+            let [below, above] = [-by, by].map(|by| changed(&instance, known, by));
+            for (position, variable) in variables.iter().enumerate() {
+                let Some(unknown) = role(position).as_unknown else { continue };
+                let exact = instance.partial_derivative(0.02, position, known_position).unwrap();
+                let numeric = (above.value(unknown) - below.value(unknown)) / (2.0 * by);
+                let size = above.value(unknown).abs().max(1.0);
+                let (bound, least) = if enters {
+                    (1e-6 * (exact.abs() + size), 1e-9 * size)
+                } else {
+                    (1e-9 * exact.abs().max(1.0), 0.0)
+                };
+                let what = format!("{case}: {} by {}", variable.name, known_variable.name);
+                assert!((numeric - exact).abs() < bound, "{what}: {exact}, not {numeric}");
+                if exact.abs() > least && position != known_position {
+                    assert!(variable.dependencies.contains(&known_variable.name), "{what}");
                 }
             }
         }

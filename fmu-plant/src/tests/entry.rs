@@ -1,11 +1,10 @@
 //! Entry flights: co-simulation against model exchange, the end, partial derivatives, and the
 //! outputs of a fixed flight condition.
 
-use super::model_exchange::exchange;
-use super::{Constant, STATES, outputs, started, step};
+use super::model_exchange::flown;
+use super::{STATES, outputs, started, step};
 use crate::entry::Translation;
 use crate::plant::{Output, ReentryPlant};
-use crate::table::role;
 use fmi_export::{Failure, LastEvent, Model, describe};
 use nalgebra::Vector3;
 use vehicle::air::Row;
@@ -30,7 +29,7 @@ pub(super) fn entering(instance: &mut ReentryPlant) {
 }
 
 /// An entry flight that follows a prescribed attitude.
-fn prescribed(instance: &mut ReentryPlant) {
+pub(super) fn prescribed(instance: &mut ReentryPlant) {
     let entry = &mut instance.parameters.entry;
     entry.translation = Translation::Entry;
     entry.prescribed.active = true;
@@ -40,20 +39,18 @@ fn prescribed(instance: &mut ReentryPlant) {
     instance.input.prescribed.angles = Vector3::new(0.4, 0.0, 0.8);
 }
 
+/// Largest difference of the motion's components, relative to those above 1.
+fn distance(one: &Output, other: &Output) -> f64 {
+    (one.motion - other.motion).component_div(&other.motion.map(|x| x.abs().max(1.0))).amax()
+}
+
 #[test]
 fn oracle_model_exchange_agrees_with_co_simulation_during_an_entry() {
     for set in [entering, prescribed] {
-        let [mut cs, mut me] = [0, 1].map(|_| started(set));
-        for k in 0..50 {
-            step(&mut cs, 0.04 * f64::from(k), 0.04 * f64::from(k + 1)).unwrap();
-        }
-        exchange(&mut me, 0.0, 2.0);
-        let (cs, me) = (outputs(&mut cs, 2.0), outputs(&mut me, 2.0));
+        let ([cs, me], _) = flown(set);
         assert!((cs.angles - me.angles).amax() < 1e-9, "{}", cs.angles - me.angles);
         assert!((cs.rates - me.rates).amax() < 1e-9);
-        let off =
-            (cs.motion - me.motion).component_div(&me.motion.map(|value| value.abs().max(1.0)));
-        assert!(off.amax() < 1e-11, "{off}");
+        assert!(distance(&cs, &me) < 1e-11);
     }
 }
 
@@ -98,14 +95,7 @@ fn oracle_an_ideal_loop_follows_the_prescribed_attitude() {
     assert!(output.angle_rates.amax() < 1e-3);
 }
 
-/// A state or an input as a function of its position in the table, moved by a number.
-fn moved(set: fn(&mut ReentryPlant), position: usize, by: f64) -> ReentryPlant {
-    let mut instance = in_general_motion(set);
-    instance.nudge(role(position).as_known.unwrap(), by);
-    instance
-}
-
-fn in_general_motion(set: fn(&mut ReentryPlant)) -> ReentryPlant {
+pub(super) fn in_general_motion(set: fn(&mut ReentryPlant)) -> ReentryPlant {
     let mut instance = started(set);
     instance.set_continuous_states(&STATES);
     instance.new_discrete_states(0.0).unwrap();
@@ -113,47 +103,9 @@ fn in_general_motion(set: fn(&mut ReentryPlant)) -> ReentryPlant {
 }
 
 #[test]
-fn oracle_partial_derivatives_of_an_entry_against_differences_and_declared_dependencies() {
-    let description = describe::<ReentryPlant>();
-    let count = description.variables.len();
-    let knowns: Vec<_> = (0..count).filter(|&i| role(i).as_known.is_some()).collect();
-    let unknowns: Vec<_> = (0..count).filter(|&i| role(i).as_unknown.is_some()).collect();
-    for set in [entering as fn(&mut ReentryPlant), prescribed] {
-        for &known in &knowns {
-            let by = match description.variables[known].name.as_str() {
-                "motion.altitude" => 1.0,
-                "motion.speed" => 0.1,
-                name if name.contains("oment.") => 100.0,
-                _ => 1e-5,
-            };
-            let at = |by: f64| outputs(&mut moved(set, known, by), 0.02);
-            let (below, above) = (at(-by), at(by));
-            let mut instance = in_general_motion(set);
-            for &unknown in &unknowns {
-                let exact = instance.partial_derivative(0.02, unknown, known).unwrap();
-                let what = role(unknown).as_unknown.unwrap();
-                let numeric = (above.value(what) - below.value(what)) / (2.0 * by);
-                let size = outputs(&mut instance, 0.02).value(what).abs().max(1.0);
-                let (variable, known) =
-                    (&description.variables[unknown], &description.variables[known].name);
-                assert!(
-                    (numeric - exact).abs() < 1e-6 * (exact.abs() + size),
-                    "{} by {known}: {exact}, not {numeric}",
-                    variable.name
-                );
-                if exact.abs() > 1e-9 * size && variable.name != *known {
-                    let declared = variable.dependencies.contains(known);
-                    assert!(declared, "{} depends on {known}: {exact}", variable.name);
-                }
-            }
-        }
-    }
-}
-
-#[test]
 fn a_fixed_flight_condition_shows_its_altitude_and_speed() {
     let mut instance = started(|_| {});
-    instance.step(0.0, 0.04, &Constant, &mut |_| {}).unwrap();
+    step(&mut instance, 0.0, 0.04).unwrap();
     let output = outputs(&mut instance, 0.04);
     assert_eq!(output.motion[0], instance.parameters.flight.altitude);
     assert!((output.motion[3] - 3172.5).abs() < 0.1, "{}", output.motion[3]);
@@ -196,9 +148,7 @@ fn oracle_long_steps_of_an_entry_agree_with_short_ones() {
         })
         .collect();
     for end in &ends[1..] {
-        let off =
-            (end.motion - ends[0].motion).component_div(&ends[0].motion.map(|x| x.abs().max(1.0)));
-        assert!(off.amax() < 1e-11, "{off}");
+        assert!(distance(end, &ends[0]) < 1e-11);
         assert!((end.angles - ends[0].angles).amax() < 1e-9);
     }
 }

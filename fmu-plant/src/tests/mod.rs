@@ -10,7 +10,7 @@ mod own_vehicle;
 mod refusals;
 mod sensors;
 
-use crate::parameters::Actuation;
+use crate::parameters::{Actuation, Parameters};
 use crate::plant::{Output, ReentryPlant};
 use fmi_export::{Context, Failure, Inputs, LastEvent, Model};
 use nalgebra::Vector3;
@@ -53,9 +53,6 @@ fn step(instance: &mut ReentryPlant, from: f64, to: f64) -> Result<(), Failure> 
     instance.step(from, to, &Constant, &mut |_| {})
 }
 
-/// Position of the first sensor reading in the table.
-const MEASURED: usize = 113;
-
 fn outputs(instance: &mut ReentryPlant, time: f64) -> Output {
     instance.calculate(time, LastEvent::InputSet).unwrap();
     instance.output
@@ -94,10 +91,10 @@ fn actuate(instance: &mut ReentryPlant) {
 }
 
 /// Sets the rows of the disturbance's table, and its period in s.
-fn tabulate(instance: &mut ReentryPlant, period: f64, rows: &[(f64, [f64; 3])]) {
-    instance.parameters.table.period = period;
-    instance.parameters.table.used = rows.len();
-    for (row, &(time, direction)) in instance.parameters.table.rows.iter_mut().zip(rows) {
+fn tabulate(parameters: &mut Parameters, period: f64, rows: &[(f64, [f64; 3])]) {
+    parameters.table.period = period;
+    parameters.table.used = rows.len();
+    for (row, &(time, direction)) in parameters.table.rows.iter_mut().zip(rows) {
         *row = Row { time, direction: direction.into() };
     }
 }

@@ -1,5 +1,8 @@
 //! Outputs between steps and events.
 
+use super::actuators::far;
+use super::model_exchange::{exchange, tabulated};
+use super::sensors::mems;
 use super::{Ramp, delayed, in_model_exchange, outputs, started, step};
 use crate::parameters::Initial;
 use crate::plant::ReentryPlant;
@@ -32,23 +35,6 @@ fn at_a_tick_the_outputs_show_the_disturbance_of_the_step_to_come() {
         step(&mut instance, 0.04, 0.08 - 1e-6).unwrap();
         assert_eq!(outputs(&mut instance, 0.08 - 1e-6).delta, announced, "kind {kind:?}");
     }
-}
-
-#[test]
-fn looking_changes_nothing() {
-    let [mut looked_at, mut left_alone] = [0, 1]
-        .map(|_| started(|instance| instance.parameters.kind = DisturbanceKind::AgainstMoment));
-    for k in 0..50 {
-        let [from, to] = [0.04 * f64::from(k), 0.04 * f64::from(k + 1)];
-        looked_at.input.moment = Vector3::repeat(-1e4);
-        outputs(&mut looked_at, from);
-        let moment = Vector3::new(1e4 * from.sin(), 0.0, 1e4);
-        looked_at.input.moment = moment;
-        left_alone.input.moment = moment;
-        step(&mut looked_at, from, to).unwrap();
-        step(&mut left_alone, from, to).unwrap();
-    }
-    assert_eq!(outputs(&mut looked_at, 2.0), outputs(&mut left_alone, 2.0));
 }
 
 #[test]
@@ -104,19 +90,53 @@ fn oracle_a_delayed_moment_is_shown_when_it_acts() {
 }
 
 #[test]
-fn moments_under_way_are_part_of_the_saved_state() {
-    let mut instance = delayed(0.117);
-    let mut restored: Option<ReentryPlant> = None;
-    for k in 0..20_u32 {
-        let time = 0.04 * f64::from(k);
-        for instance in std::iter::once(&mut instance).chain(restored.as_mut()) {
-            instance.input.moment = Vector3::new(1e4 * time.sin(), -1e4 * time.cos(), 5e3);
-            step(instance, time, time + 0.04).unwrap();
+fn looking_changes_nothing() {
+    let [mut looked_at, mut left_alone] = [0, 1].map(|_| {
+        started(|instance| {
+            mems(instance);
+            instance.parameters.kind = DisturbanceKind::AgainstMoment;
+        })
+    });
+    for k in 0..64 {
+        let [from, to] = [f64::from(k), f64::from(k + 1)].map(|tick| tick / 50.0);
+        looked_at.input.moment = Vector3::repeat(-1e4);
+        for _ in 0..3 {
+            outputs(&mut looked_at, from);
         }
-        if k == 7 {
-            restored =
-                Some(serde_json::from_str(&serde_json::to_string(&instance).unwrap()).unwrap());
+        for instance in [&mut looked_at, &mut left_alone] {
+            instance.input.moment = Vector3::new(1e4 * from.sin(), 0.0, 1e4);
+            step(instance, from, to).unwrap();
         }
     }
-    assert_eq!(outputs(&mut instance, 0.8), outputs(&mut restored.unwrap(), 0.8));
+    assert_eq!(outputs(&mut looked_at, 1.28), outputs(&mut left_alone, 1.28));
+}
+
+/// Moments under way, moving surfaces, the row of a table and samples are part of the state.
+#[test]
+fn a_saved_state_goes_on_bit_for_bit() {
+    let delayed: fn(&mut ReentryPlant) = |instance| instance.parameters.converter.delay = 0.117;
+    let in_steps = [delayed, far, tabulated, mems].map(|set| (set, false));
+    let exchanged = [far, tabulated, mems].map(|set| (set, true));
+    for (case, (set, exchanges)) in in_steps.into_iter().chain(exchanged).enumerate() {
+        let mut instances = vec![started(set)];
+        for k in 0..35 {
+            if k == 5 || k == 15 {
+                let saved = serde_json::to_string(&instances[0]).unwrap();
+                instances.push(serde_json::from_str(&saved).unwrap());
+            }
+            let [from, to] = [0.04 * f64::from(k), 0.04 * f64::from(k + 1)];
+            let mut shown = Vec::new();
+            for instance in &mut instances {
+                instance.input.moment = Vector3::new(1e4 * from.sin(), -1e4 * from.cos(), 5e3);
+                let mut events = Vec::new();
+                if exchanges {
+                    events = exchange(instance, from, to);
+                } else {
+                    step(instance, from, to).unwrap();
+                }
+                shown.push((events, outputs(instance, to)));
+            }
+            assert!(shown.iter().all(|end| *end == shown[0]), "case {case}, step {k}");
+        }
+    }
 }
