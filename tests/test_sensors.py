@@ -12,9 +12,9 @@ from conftest import EXPERIMENTS, merged
 from fmi import RATES, Instance
 
 SENSORS = ["gyroscope", "accelerometer", "magnetometer"]
+SAMPLE = ["measured.sample", "measured.time"]
 READINGS = {sensor: [f"measured.{sensor}.{axis}" for axis in "xyz"] for sensor in SENSORS}
 ALL = [name for names in READINGS.values() for name in names]
-SAMPLE = ["measured.sample", "measured.time"]
 REST = {"disturbance.kind": "none"}
 OFF, IDEAL, MEMS = 0, 1, 2
 
@@ -38,30 +38,6 @@ def flown(fmu, parameters: dict, steps: int, step: float, names=SAMPLE + ALL) ->
     return np.array(rows)
 
 
-@pytest.mark.parametrize(
-    "angles, force, field",
-    [
-        # Level flight to the north.
-        ({}, [0, 0, -1], ["north", "east", "down"]),
-        # With the nose up, the belly looks north.
-        ({"initial.alpha": 90.0}, [1, 0, 0], ["-down", "east", "north"]),
-        # The bank turns against the right-hand rule: the right wing is up.
-        ({"initial.sigma": 90.0}, [0, 1, 0], ["north", "-down", "east"]),
-    ],
-)
-def test_oracle_readings_at_rest_by_hand(fmu, angles, force, field):
-    level = {f"initial.{axis}": 0.0 for axis in ("alpha", "beta", "sigma")}
-    parameters = REST | level | {name: np.radians(value) for name, value in angles.items()}
-    with Instance(fmu("ReentryPlant"), parameters).start() as instance:
-        gravity = instance.get(["sensor.gravity"])[0]
-        components = {name: instance.get([f"sensor.field.{name}"])[0] for name in ("north", "east", "down")}
-        expected = [-components[name[1:]] if name[0] == "-" else components[name] for name in field]
-        assert instance.get(READINGS["gyroscope"]) == [0.0] * 3
-        np.testing.assert_allclose(instance.get(READINGS["accelerometer"]), gravity * np.array(force), rtol=0, atol=1e-14)
-        np.testing.assert_allclose(instance.get(READINGS["magnetometer"]), expected, rtol=0, atol=1e-19)
-        assert instance.get(SAMPLE) == [0, 0.0]
-
-
 def test_oracle_mean_and_deviation_at_rest_are_those_of_the_parameters(fmu):
     count = 4000
     rows = flown(fmu, {"sensor.set": MEMS}, count, 0.01)
@@ -80,37 +56,6 @@ def test_oracle_mean_and_deviation_at_rest_are_those_of_the_parameters(fmu):
             assert np.abs(found.mean(axis=0) - expected).max() < 5 * deviation / np.sqrt(count)
             assert np.abs(found.std(axis=0) / deviation - 1).max() < 5 / np.sqrt(2 * count)
             np.testing.assert_allclose(found / step, np.round(found / step), rtol=0, atol=1e-6)
-
-
-@pytest.mark.parametrize("step", [0.01, 0.02, 0.05])
-def test_samples_do_not_depend_on_the_communication_step(fmu, step):
-    parameters = {"sensor.set": MEMS, "sensor.drop.probability": 0.2, "calibration.active": True}
-    expected = flown(fmu, parameters, 100, 0.01)[:: round(step / 0.01)]
-    found = flown(fmu, parameters, round(1.0 / step), step)
-    assert found[:, 0].tolist() == expected[:, 0].tolist()
-    # The readings agree to the bit, because the converter's steps are coarser than the difference
-    # of the integrations.
-    np.testing.assert_array_equal(found[:, 2:], expected[:, 2:])
-
-
-def test_dropped_samples_leave_gaps_and_frozen_sensors_count_on(fmu):
-    parameters = {
-        "sensor.set": MEMS,
-        "sensor.drop.probability": 1.0,
-        "sensor.drop.start": 0.2,
-        "sensor.drop.end": 0.3,
-        "sensor.magnetometer.freeze.start": 0.5,
-        "sensor.magnetometer.freeze.end": 0.6,
-        "calibration.active": True,
-    }
-    rows = flown(fmu, parameters, 100, 0.01)
-    numbers = rows[1:, 0].astype(int)
-    assert set(range(1, 101)) - set(numbers) == set(range(21, 31)), "taken from 0.20 s to 0.29 s"
-    still = np.all(np.diff(rows[1:, 8:11], axis=0) == 0, axis=1)
-    moving = np.any(np.diff(rows[1:, 2:5], axis=0) != 0, axis=1)
-    # Row k arrived at (k + 1) · 0.01 s; it repeats the one before if it was dropped or frozen.
-    assert np.flatnonzero(still).tolist() == list(range(19, 29)) + list(range(49, 59))
-    assert np.flatnonzero(~moving).tolist() == list(range(19, 29))
 
 
 def test_oracle_the_gyroscope_measures_the_change_of_orientation_whatever_the_kinematics(fmu):
@@ -171,46 +116,6 @@ def test_oracle_model_exchange_takes_the_same_samples(fmu, solver):
         tolerance = np.array([0, 1e-9] + [1.4e-4] * 3 + [1.2e-3] * 3 + [1.6e-7] * 3)
         assert (np.abs(values - expected[number]) <= tolerance).all(), number
         assert row["measured.time"] == pytest.approx(0.01 * (number - 1), abs=1e-9) or number == 0
-
-
-def test_a_restored_state_takes_the_same_samples(fmu):
-    parameters = REST | {"sensor.set": MEMS, "sensor.delay": 0.05, "sensor.drop.probability": 0.2, "calibration.active": True}
-    with Instance(fmu("ReentryPlant"), parameters).start() as instance:
-
-        def drive(ticks):
-            rows = []
-            for tick in ticks:
-                rows.append([float(value).hex() for value in instance.get(SAMPLE + ALL)])
-                instance.step(0.013 * tick, 0.013)
-            return rows
-
-        drive(range(50))
-        saved = instance.save()
-        expected = drive(range(50, 120))
-        instance.restore(saved)
-        assert drive(range(50, 120)) == expected
-
-
-@pytest.mark.parametrize(
-    "parameters, name",
-    [
-        ({"sensor.period": 1e-4, "sensor.delay": 5.0}, "sensor.delay"),
-        ({"calibration.active": True, "calibration.beta.amplitude": 1.5}, "calibration.beta.amplitude"),
-    ],
-)
-def test_what_cannot_be_is_refused_by_name(fmu, parameters, name):
-    with Instance(fmu("ReentryPlant"), {"sensor.set": MEMS, **parameters}) as instance:
-        with pytest.raises(Exception):
-            instance.start()
-        assert name in instance.messages()
-
-
-@pytest.mark.parametrize("name, value", [("sensor.set", 6), ("sensor.gyroscope.range", -1.0), ("sensor.period", 0.0)])
-def test_what_is_out_of_its_limits_is_refused_when_it_is_set(fmu, name, value):
-    with Instance(fmu("ReentryPlant")) as instance:
-        with pytest.raises(Exception):
-            instance.set({name: value})
-        assert name in instance.messages()
 
 
 def test_oracle_the_calibration_sequence_determines_hard_and_soft_iron(fmu):
