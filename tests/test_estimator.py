@@ -2,6 +2,7 @@
 accuracy, lost and frozen samples."""
 
 import numpy as np
+import pytest
 
 from fmi import ANGLES, RATES, Instance
 
