@@ -189,15 +189,3 @@ WIDE = """<pre></pre><script>(async () => {
     }
     document.querySelector("pre").textContent = "looked at " + PAGES.length + ": " + wide.join(", ") + ".";
 })();</script>"""
-
-
-@can_build
-@in_chromium
-def test_pages_fit_on_a_telephone(site, tmp_path):
-    # The page of the browser moves, and tests/test_browser.py looks at its widths.
-    shown = [path.as_uri() for path in pages(site) if path.relative_to(site).parts[0] not in ("source", "try.html")]
-    harness = tmp_path / "harness.html"
-    harness.write_text(WIDE.replace("PAGES", json.dumps(shown)))
-    found = re.search(r"looked at (\d+): (.*?)\.</pre>", browse(harness.as_uri(), tmp_path / "profile", "--allow-file-access-from-files"), re.DOTALL)
-    assert found and int(found[1]) == len(shown) >= 60
-    assert found[2] == ""

@@ -176,20 +176,6 @@ def test_the_vehicle_moves_with_the_run(runs, opened):
     assert guaranteed.endswith("guarantee: in force")
 
 
-def test_parameters_are_searched(runs, opened):
-    page = opened(runs / "crmpc-robust" / "page.html")
-    rows = page.locator("#parameter-table tbody tr:visible")
-    few = rows.count()
-    assert 5 < few < 60
-    page.uncheck("#set-only")
-    assert rows.count() > 200
-    page.fill("#search", "LIMIT.RATE")
-    assert rows.count() == 1 and "5 deg/s" in rows.first.inner_text()
-    # Letters and spaces go into the search and do not play.
-    page.type("#search", " ")
-    assert page.get_attribute("#play", "aria-label") == "Play"
-
-
 def test_two_runs_side_by_side(runs, opened):
     page = opened(runs / "both.html")
     assert page.locator(".view").count() == 2
@@ -232,15 +218,6 @@ def test_axe_finds_no_fault(runs, opened):
         page = opened(path, viewport={"width": width, "height": 800}, color_scheme=scheme)
         found = axe.run(page)
         assert found.violations_count == 0, found.generate_report()
-
-
-def test_a_printed_page_keeps_its_colours_and_its_width(runs, opened):
-    page = opened(runs / "both.html", color_scheme="dark")
-    page.emulate_media(media="print", color_scheme="dark")
-    assert page.evaluate("getComputedStyle(document.querySelector('.light')).printColorAdjust") == "exact"
-    assert page.evaluate("getComputedStyle(document.body).color") == "rgb(27, 29, 32)"
-    width = "element => element.getBoundingClientRect().width"
-    assert page.locator("figure.panel").first.evaluate(width) > 0.95 * page.locator("main").evaluate(width)
 
 
 def test_the_page_of_an_entry_flight(tmp_path, opened):
