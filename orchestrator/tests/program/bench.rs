@@ -3,7 +3,9 @@
 use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::process::{Child, Command, Output};
+use std::sync::LazyLock;
+use std::time::{Duration, Instant};
 use tempfile::TempDir;
 use zip::write::SimpleFileOptions;
 
@@ -32,6 +34,42 @@ variables = ["gain.output.direct", "plant.output.integral", "plant.steps"]
 const FMI2: [&str; 3] = ["model.c", "modelDescription.xml", "linux64"];
 /// Files of the FMU in C of FMI 3.0, and the folder of its library.
 pub(crate) const FMI3: [&str; 3] = ["fmi3.c", "fmi3.xml", "x86_64-linux"];
+
+/// Time after which something that is awaited counts as missing. It is far beyond what a busy
+/// machine needs, so that it never decides where nothing is wrong.
+pub(crate) const PATIENCE: Duration = Duration::from_secs(120);
+
+/// Waits until the condition holds.
+pub(crate) fn await_until(what: &str, mut holds: impl FnMut() -> bool) {
+    let begin = Instant::now();
+    while !holds() {
+        assert!(begin.elapsed() < PATIENCE, "in vain: {what}");
+        std::thread::sleep(Duration::from_millis(10));
+    }
+}
+
+/// Waits until the condition holds for a process that is still at work.
+pub(crate) fn await_while_it_runs(child: &mut Child, what: &str, mut holds: impl FnMut() -> bool) {
+    await_until(what, || holds() || child.try_wait().unwrap().is_some());
+    assert!(child.try_wait().unwrap().is_none(), "ended too early: {what}");
+}
+
+/// Whether there is a program that starts another one with all signals as they usually are.
+static RESETS_SIGNALS: LazyLock<bool> = LazyLock::new(|| {
+    let tried = Command::new("env").args(["--default-signal", "true"]).output();
+    tried.is_ok_and(|output| output.status.success())
+});
+
+/// Returns a command that no signal is ignored by, although this process may ignore some: `nohup`
+/// ignores SIGHUP, and a shell that starts it in the background SIGINT.
+pub(crate) fn with_usual_signals(program: &str) -> Command {
+    if !*RESETS_SIGNALS {
+        return Command::new(program);
+    }
+    let mut command = Command::new("env");
+    command.args(["--default-signal", program]);
+    command
+}
 
 /// Instructions to make the FMU in C.
 pub(crate) struct Recipe<'a> {
@@ -111,7 +149,7 @@ impl Bench {
     }
 
     pub(crate) fn command(&self, arguments: &[&str]) -> Command {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_orchestrator"));
+        let mut command = with_usual_signals(env!("CARGO_BIN_EXE_orchestrator"));
         command.args(arguments).current_dir(self.folder.path()).env_remove("RUST_LOG");
         command
     }
@@ -120,6 +158,24 @@ impl Bench {
         let Output { status, stdout, stderr } = self.command(arguments).output().unwrap();
         let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
         (status.code().expect("no signal"), text(stdout), text(stderr))
+    }
+
+    /// Calls the program, which must succeed, and returns what it prints.
+    pub(crate) fn says(&self, arguments: &[&str]) -> String {
+        let (code, said, errors) = self.call(arguments);
+        assert_eq!(code, 0, "{arguments:?}: {errors}");
+        said
+    }
+
+    /// Calls the program, which must end with this exit code and name this on standard error.
+    pub(crate) fn fails(&self, exit_code: i32, arguments: &[&str], named: &str) {
+        let (code, _, errors) = self.call(arguments);
+        assert!(code == exit_code && errors.contains(named), "{arguments:?}: {code} {errors}");
+    }
+
+    /// Runs the experiment, replaces results of an earlier run, and returns the summary.
+    pub(crate) fn flown(&self, arguments: &[&str]) -> String {
+        self.says(&[&["run", "loop.toml", "--force"], arguments].concat())
     }
 
     /// Runs the experiment, and replaces results of an earlier run.
@@ -135,7 +191,16 @@ impl Bench {
         errors
     }
 
+    pub(crate) fn text(&self, name: &str) -> String {
+        fs::read_to_string(self.path(name)).unwrap()
+    }
+
+    /// Returns the rows of the experiment's run.
+    pub(crate) fn results(&self) -> String {
+        self.text("out/loop/results.csv")
+    }
+
     pub(crate) fn json(&self, name: &str) -> serde_json::Value {
-        serde_json::from_str(&fs::read_to_string(self.path(name)).unwrap()).unwrap()
+        serde_json::from_str(&self.text(name)).unwrap()
     }
 }

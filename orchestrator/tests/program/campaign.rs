@@ -45,8 +45,7 @@ pub(crate) fn bench(campaign: &str) -> Bench {
 
 /// Flies a campaign, and returns its table as lines of CSV.
 fn flown(bench: &Bench, arguments: &[&str]) -> Vec<String> {
-    let (code, _, errors) = bench.call(&[&["campaign", "c.toml", "--csv"], arguments].concat());
-    assert_eq!(code, 0, "{errors}");
+    bench.says(&[&["campaign", "c.toml", "--csv"], arguments].concat());
     table(bench, "out/c")
 }
 
@@ -84,7 +83,7 @@ fn oracle_a_case_is_a_row_also_if_its_instance_fails() {
     assert_eq!(summary["status"], json!({ "completed": 3, "ended": 0, "failed": 3, "lost": 0 }));
     assert_eq!(summary["limits"][0]["broken"]["events"], 4);
     assert_eq!(summary["measures"][0]["summary"]["worst"], 4);
-    let page = fs::read_to_string(bench.path("out/c/report.html")).unwrap();
+    let page = bench.text("out/c/report.html");
     assert!(page.contains("4 of 6") && page.contains("orchestrator campaign c.toml --case 4"));
 }
 
@@ -93,7 +92,7 @@ fn the_page_of_a_single_case_has_no_deviation() {
     let campaign = CAMPAIGN.replace("[0.5, 1.0, 2.0]", "[1.0]").replace("[1e9, 2.0]", "[1e9]");
     let bench = bench(&campaign);
     flown(&bench, &[]);
-    let page = fs::read_to_string(bench.path("out/c/report.html")).unwrap();
+    let page = bench.text("out/c/report.html");
     assert!(page.contains("1 case of the experiment") && page.contains("1 case completed."));
     assert!(!page.contains("NaN") && !page.contains("1 cases"), "{page}");
 }
@@ -158,11 +157,7 @@ fn the_same_bytes_however_the_cases_were_flown() {
     assert!((770..880).contains(&calm), "{calm}");
     let bytes = |out: &str| fs::read(bench.path(&format!("{out}/cases.parquet"))).unwrap();
     let whole = bytes("out/c");
-    let call = |arguments: &[&str]| {
-        let (code, out, errors) = bench.call(&[&["campaign", "c.toml"], arguments].concat());
-        assert_eq!(code, 0, "{errors}");
-        out
-    };
+    let call = |arguments: &[&str]| bench.says(&[&["campaign", "c.toml"], arguments].concat());
     // By several processes in one folder, in any order and with a part flown twice.
     let work = |first: u64, last: u64| {
         let parts: Vec<[u64; 2]> = (first..last).step_by(25).map(|at| [at, at + 25]).collect();
@@ -189,9 +184,9 @@ fn the_same_bytes_however_the_cases_were_flown() {
     // One case by itself: the same gain, and everything recorded.
     let cells: Vec<&str> = rows[901].split(',').collect();
     call(&["--case", "900"]);
-    let case = fs::read_to_string(bench.path("out/c/cases/900/case.toml")).unwrap();
+    let case = bench.text("out/c/cases/900/case.toml");
     assert!(case.contains(&format!("gain = {}", cells[1])), "{case}");
-    let results = fs::read_to_string(bench.path("out/c/cases/900/results.csv")).unwrap();
+    let results = bench.text("out/c/cases/900/results.csv");
     assert!(results.lines().last().unwrap().contains(cells[4]), "{results}");
 }
 
@@ -332,8 +327,7 @@ fn impossible_ranges_of_cases_are_refused() {
         assert_eq!(code, 2);
         assert!(errors.contains(said), "{errors}");
     }
-    let (code, _, errors) = bench.call(&["campaign", "c.toml", "--case", "1100"]);
-    assert!(code == 2 && errors.contains("the campaign has 1100 cases"), "{errors}");
+    bench.fails(2, &["campaign", "c.toml", "--case", "1100"], "the campaign has 1100 cases");
 }
 
 #[test]
@@ -368,14 +362,12 @@ fn a_case_by_itself_has_the_changes_of_the_command_line() {
     let bench = bench(RANDOM);
     let changes = ["--stop", "2", "--fmu", "gain=Model.fmu", "--set", "plant.delay=1e-3"];
     let rows = flown(&bench, &changes);
-    let (code, _, errors) =
-        bench.call(&[&["campaign", "c.toml", "--case", "7"], &changes[..]].concat());
-    assert_eq!(code, 0, "{errors}");
-    let results = fs::read_to_string(bench.path("out/c/cases/7/results.csv")).unwrap();
+    bench.says(&[&["campaign", "c.toml", "--case", "7"], &changes[..]].concat());
+    let results = bench.text("out/c/cases/7/results.csv");
     let last: Vec<&str> = results.lines().last().unwrap().split(',').collect();
     assert_eq!(last[0], "2.0");
     assert_eq!(last[2], rows[8].split(',').nth(4).unwrap());
-    let case = fs::read_to_string(bench.path("out/c/cases/7/case.toml")).unwrap();
+    let case = bench.text("out/c/cases/7/case.toml");
     assert!(case.contains("exchanged = true") && case.contains("delay = 0.001"), "{case}");
 }
 

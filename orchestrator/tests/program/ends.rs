@@ -1,6 +1,6 @@
 //! Ends of runs: instances that enforce the exact stop time, and full disks.
 
-use crate::bench::{Bench, LOOP, Recipe};
+use crate::bench::{Bench, LOOP, Recipe, with_usual_signals};
 use crate::campaign::CAMPAIGN;
 use std::fs;
 use std::process::Command;
@@ -15,7 +15,7 @@ fn strict(description: &dyn Fn(String) -> String) -> Bench {
 #[test]
 fn oracle_instances_end_exactly_at_the_stop_time() {
     let bench = strict(&|text| text);
-    let text = fs::read_to_string(bench.path("loop.toml")).unwrap();
+    let text = bench.text("loop.toml");
     // In floating-point arithmetic each of these last steps passes the stop time.
     for (step, stop, start, every) in [
         ("0.2", "0.6", "0.0", 1),
@@ -29,9 +29,8 @@ fn oracle_instances_end_exactly_at_the_stop_time() {
         fs::write(bench.path("loop.toml"), text).unwrap();
         for more in [&[][..], &["--isolate=false"], &["--coupling=jacobi"], &["--real-time=100"]] {
             let times = ["--quiet", "--step", step, "--stop", stop];
-            let (code, _, errors) = bench.run(&[&times[..], more].concat());
-            assert_eq!(code, 0, "{step} {stop} {more:?}: {errors}");
-            let results = fs::read_to_string(bench.path("out/loop/results.csv")).unwrap();
+            bench.flown(&[&times[..], more].concat());
+            let results = bench.results();
             let last: Vec<&str> = results.lines().last().unwrap().split(',').collect();
             assert_eq!((last[0], last[3], last[4]), (stop, stop, stop), "{step} {more:?}");
         }
@@ -49,14 +48,14 @@ fn an_instance_with_steps_of_one_length_is_told_where_the_last_one_ends() {
     let bench = strict(&|text| text.replace("canHandleVariableCommunicationStepSize=\"true\"", ""));
     let (code, _, errors) = bench.run(&["--quiet", "--step=0.2", "--stop=0.6"]);
     assert_eq!((code, errors.as_str()), (0, ""));
-    let results = fs::read_to_string(bench.path("out/loop/results.csv")).unwrap();
+    let results = bench.results();
     let last = results.lines().last().unwrap();
     assert!(last.starts_with("0.6,") && last.ends_with(",0.6000000000000001"), "{last}");
 }
 
 /// Runs a command in a shell that first does something. Returns exit code and standard error.
 fn after(bench: &Bench, first: &str, arguments: &[&str]) -> (i32, String) {
-    let mut command = Command::new("sh");
+    let mut command = with_usual_signals("sh");
     command.args(["-c", &format!("{first}; exec \"$0\" \"$@\"")]);
     command.arg(env!("CARGO_BIN_EXE_orchestrator")).args(arguments);
     let output = command.current_dir(bench.folder.path()).output().unwrap();
@@ -69,7 +68,7 @@ fn a_file_that_may_not_grow_is_named_and_no_folder_is_left() {
     let bench = Bench::new();
     let temporary = bench.path("temporary");
     fs::create_dir(&temporary).unwrap();
-    let limited = format!("export TMPDIR={}; ulimit -f 200", temporary.display());
+    let limited = format!("export TMPDIR='{}'; ulimit -f 200", temporary.display());
     for (file, more) in [("results.csv", &[][..]), ("results.parquet", &["--format=parquet"])] {
         let run = ["run", "loop.toml", "--force", "--quiet", "--step=0.0001", "--isolate=false"];
         let (code, errors) = after(&bench, &limited, &[&run[..], more].concat());
@@ -79,7 +78,7 @@ fn a_file_that_may_not_grow_is_named_and_no_folder_is_left() {
         assert_eq!(fs::read_dir(&temporary).unwrap().count(), 0);
     }
     // Here it is the archive that has no room.
-    let small = format!("export TMPDIR={}; ulimit -f 1", temporary.display());
+    let small = format!("export TMPDIR='{}'; ulimit -f 1", temporary.display());
     let (code, errors) = after(&bench, &small, &["run", "loop.toml", "--force"]);
     let place = format!("cannot be unpacked into {}: File too large", temporary.display());
     assert!(code == 2 && errors.contains(&place), "{errors}");
@@ -97,13 +96,13 @@ fn on_own_disk(
 ) -> Option<(i32, String)> {
     let path = bench.path(folder);
     fs::create_dir_all(&path).unwrap();
-    let mount = format!("mount -t tmpfs -o {options} none {}", path.display());
+    let mount = format!("mount -t tmpfs -o {options} none '{}'", path.display());
     let tried = Command::new("unshare").args(["-rm", "sh", "-c", &mount]).output();
     if !tried.is_ok_and(|tried| tried.status.success()) {
         return None;
     }
     let inner = format!("{mount}; {first}; exec \"$0\" \"$@\"");
-    let mut command = Command::new("unshare");
+    let mut command = with_usual_signals("unshare");
     command.args(["-rm", "sh", "-c", &inner, env!("CARGO_BIN_EXE_orchestrator")]).args(arguments);
     let output = command.current_dir(bench.folder.path()).output().unwrap();
     Some((output.status.code().expect("no signal"), String::from_utf8(output.stderr).unwrap()))
@@ -131,7 +130,7 @@ fn a_temporary_folder_from_which_nothing_can_be_run_is_named() {
     let bench = Bench::new();
     let folder = bench.path("temporary").display().to_string();
     for more in ["--isolate=false", "--isolate"] {
-        let first = format!("export TMPDIR={folder}");
+        let first = format!("export TMPDIR='{folder}'");
         let run = ["run", "loop.toml", "--force", "--quiet", more];
         let outcome = on_own_disk(&bench, "noexec", "temporary", &first, &run);
         let Some((code, errors)) = outcome else { return };

@@ -49,7 +49,7 @@ fn rows(benches: &[Bench; 2], arguments: &[&str]) -> Vec<Vec<f64>> {
         let bench = &benches[version];
         let (code, _, errors) = bench.run(&[&["--quiet"], arguments].concat());
         assert_eq!((code, errors.as_str()), (0, ""));
-        let text = fs::read_to_string(bench.path("out/loop/results.csv")).unwrap();
+        let text = bench.results();
         let numbers = |row: &str| row.split(',').map(|n| n.parse().unwrap()).collect();
         text.lines().skip(1).map(numbers).collect()
     });

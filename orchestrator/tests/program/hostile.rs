@@ -1,12 +1,11 @@
 //! Instances that try to reach resources of others: tests/model/hostile.h.
 
-use crate::bench::{Bench, LOOP, Recipe};
+use crate::bench::{Bench, LOOP, Recipe, await_until, with_usual_signals};
 use crate::campaign::CAMPAIGN;
 use std::fs;
 use std::os::unix::fs::MetadataExt;
 use std::path::Path;
 use std::process::Command;
-use std::time::{Duration, Instant};
 
 /// A bench with a model that makes attempts on a folder outside.
 struct Hostile {
@@ -38,7 +37,7 @@ impl Hostile {
 
     /// Returns a command of the program, which inherits an open file and a key.
     fn command(&self, arguments: &[&str]) -> Command {
-        let mut command = Command::new("sh");
+        let mut command = with_usual_signals("sh");
         command.args(["-c", r#"exec 9>>"$0"; exec "$@""#]).arg(self.outside.path().join("secret"));
         command.arg(env!("CARGO_BIN_EXE_orchestrator")).args(arguments).env_remove("RUST_LOG");
         command.current_dir(self.bench.folder.path()).env("SECRET_KEY", "nobody's");
@@ -65,7 +64,7 @@ impl Hostile {
 }
 
 /// Number of processes with this text in their environment.
-pub(crate) fn processes(mark: &str) -> usize {
+fn processes(mark: &str) -> usize {
     let entries = fs::read_dir("/proc").into_iter().flatten().flatten();
     let has_mark = |folder: &Path| {
         let environment = fs::read(folder.join("environ")).unwrap_or_default();
@@ -191,12 +190,8 @@ fn a_sandbox_needs_no_other_option_and_no_trust() {
 }
 
 /// Asserts that no process of a mark is left, or only for a moment.
-fn assert_gone(mark: &str, what: &str) {
-    let begin = Instant::now();
-    while processes(mark) > 0 {
-        assert!(begin.elapsed() < Duration::from_secs(10), "{what}: {}", processes(mark));
-        std::thread::sleep(Duration::from_millis(10));
-    }
+pub(crate) fn assert_gone(mark: &str, what: &str) {
+    await_until(&format!("no process of {what}"), || processes(mark) == 0);
 }
 
 /// A bench with a model that starts 20 processes in this place, and the mark of its processes.
@@ -224,12 +219,8 @@ fn the_processes_of_an_instance_end_with_a_run_that_is_killed() {
     let (bench, mark) = with_children("INITIALIZE");
     let pause = ["run", "loop.toml", "--quiet", "--set", "gain.pause=30"];
     let mut run = bench.command(&pause).env("HOSTILE", &mark).spawn().unwrap();
-    let begin = Instant::now();
     // The run, two instances and their children.
-    while processes(&mark) < 43 {
-        assert!(begin.elapsed() < Duration::from_secs(20));
-        std::thread::sleep(Duration::from_millis(10));
-    }
+    await_until("43 processes", || processes(&mark) >= 43);
     run.kill().unwrap();
     run.wait().unwrap();
     assert_gone(&mark, "a run that was killed");
@@ -244,7 +235,7 @@ fn a_campaign_does_not_run_out_of_descriptors() {
     fs::write(bench.path("c.toml"), campaign).unwrap();
     let program = env!("CARGO_BIN_EXE_orchestrator");
     let script = format!("ulimit -n 128; exec {program} campaign c.toml --jobs 2 --quiet");
-    let mut command = Command::new("sh");
+    let mut command = with_usual_signals("sh");
     command.args(["-c", &script]).current_dir(bench.folder.path()).env("HOSTILE", &mark);
     let output = command.output().unwrap();
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));

@@ -3,12 +3,12 @@
 
 use crate::bench::Bench;
 use crate::campaign::CAMPAIGN;
-use crate::hostile::processes;
+use crate::hostile::assert_gone;
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 const STUDY: &str = r##"
 title = "seeds"
@@ -132,9 +132,5 @@ fn what_is_killed_leaves_nothing_behind_and_the_same_bytes_after_all() {
     }
     assert!(killed > kills / 3, "{killed} of {kills}");
     assert_eq!(shared_memory(), before);
-    let begin = Instant::now();
-    while processes(&mark) > 0 {
-        assert!(begin.elapsed() < Duration::from_secs(10));
-        std::thread::sleep(Duration::from_millis(10));
-    }
+    assert_gone(&mark, "what was killed");
 }

@@ -60,8 +60,7 @@ fn a_name_of_another_kind_is_told_what_to_call() {
     assert!(errors.contains(both), "{errors}");
     // A campaign that extends another one names no experiment and no varied parameters itself.
     fs::write(bench.path("more.toml"), "extends = \"gains.toml\"\ntitle = \"more\"\n").unwrap();
-    let (code, _, errors) = bench.call(&["campaign", "more", "--quiet"]);
-    assert_eq!(code, 0, "{errors}");
+    bench.says(&["campaign", "more", "--quiet"]);
 }
 
 #[test]
@@ -84,8 +83,7 @@ fn every_command_takes_names() {
         &["inspect", "Model", "seed"],
         &["inspect", "Model", "--check"],
     ] {
-        let (code, _, errors) = bench.call(arguments);
-        assert_eq!(code, 0, "{arguments:?}: {errors}");
+        bench.says(arguments);
     }
     for (arguments, says) in [
         (["run", "lop"], "there is no experiment \"lop\", neither as a file"),
@@ -100,21 +98,8 @@ fn every_command_takes_names() {
     }
     fs::create_dir_all(bench.path("c/b")).unwrap();
     fs::copy(deep.join("Model.fmu"), bench.path("c/b/Model.fmu")).unwrap();
-    let (code, _, errors) = bench.call(&["inspect", "Model"]);
-    assert!(code == 2 && errors.contains("several FMUs are called Model: "), "{errors}");
+    bench.fails(2, &["inspect", "Model"], "several FMUs are called Model: ");
     assert_eq!(bench.call(&["inspect", "c/b/Model"]).0, 0);
-}
-
-#[test]
-fn an_fmu_takes_the_place_of_another_by_its_name() {
-    let bench = bench();
-    fs::copy(bench.path("Model.fmu"), bench.path("Mine.fmu")).unwrap();
-    let (code, _, errors) = bench.run(&["--fmu", "gain=Mine", "--quiet"]);
-    assert_eq!(code, 0, "{errors}");
-    assert_eq!(bench.json("out/loop/results.json")["components"]["gain"]["fmu"], "Mine.fmu");
-    let (code, _, errors) = bench.run(&["--fmu", "gain=Mone"]);
-    assert_eq!(code, 2);
-    assert!(errors.starts_with("error: --fmu gain=Mone.fmu: there is no file"), "{errors}");
 }
 
 #[test]
@@ -127,8 +112,7 @@ fn the_list_has_names_titles_and_nothing_of_a_fuzzer() {
         "a very long title of many words, which takes much more than one line",
     );
     fs::write(bench.path("long.toml"), long).unwrap();
-    let (code, text, errors) = bench.call(&["list", "."]);
-    assert_eq!(code, 0, "{errors}");
+    let text = bench.says(&["list", "."]);
     for heading in [
         "experiments (2): orchestrator run NAME",
         "studies (1): orchestrator reproduce NAME",
@@ -218,8 +202,7 @@ fn manual_pages_are_written() {
         assert!(page(&format!("orchestrator-{command}")).contains("Examples:"), "{command}");
     }
     assert!(page("orchestrator").contains("orchestrator\\-run(1)"));
-    let (code, _, errors) = bench.call(&["man", "loop.toml/man1"]);
-    assert!(code == 1 && errors.contains("loop.toml/man1"), "{errors}");
+    bench.fails(1, &["man", "loop.toml/man1"], "loop.toml/man1");
 }
 
 #[test]

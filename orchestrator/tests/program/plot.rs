@@ -20,22 +20,14 @@ fn flown() -> Bench {
     let bench = Bench::with(&format!("{LOOP}{PANELS}"));
     for (out, gain) in [("a", "1.0"), ("b", "0.5")] {
         let set = format!("gain.gain={gain}");
-        let (code, _, errors) = bench.run(&["--out", out, "--set", &set, "--quiet"]);
-        assert_eq!(code, 0, "{errors}");
+        bench.flown(&["--out", out, "--set", &set, "--quiet"]);
     }
     bench
 }
 
 fn plotted(bench: &Bench, arguments: &[&str]) -> String {
-    let (code, said, errors) = bench.call(&[&["plot"], arguments].concat());
-    assert_eq!(code, 0, "{errors}");
+    let said = bench.says(&[&["plot"], arguments].concat());
     fs::read_to_string(bench.path(said.trim())).unwrap()
-}
-
-fn refusal(bench: &Bench, arguments: &[&str]) -> String {
-    let (code, _, errors) = bench.call(&[&["plot"], arguments].concat());
-    assert_eq!((code, errors.lines().count()), (2, 1), "{errors}");
-    errors
 }
 
 /// Returns the numbers of a page.
@@ -51,7 +43,7 @@ fn a_run_is_drawn_as_its_experiment_says_or_as_it_is_asked_for() {
     assert!(picture.starts_with("<svg") && picture.contains("limit of norm"), "{picture}");
     assert!(picture.contains("α") && picture.contains("gain and integrator"));
     // The norm that has the limit is bold. It exceeds the limit many times, in a panel of its own.
-    for picture in [picture, fs::read_to_string(bench.path("a/plot.svg")).unwrap()] {
+    for picture in [picture, bench.text("a/plot.svg")] {
         let width = |name: &str| {
             let path = picture.split(&format!("<path data-name=\"{name}\"")).nth(1).unwrap();
             path.split("stroke-width=\"").nth(1).unwrap().split('"').next().unwrap().to_string()
@@ -118,9 +110,7 @@ fn oracle_a_table_of_another_form_gives_the_same_picture() {
     let bench = flown();
     let picture = plotted(&bench, &["a"]);
     for (out, options) in [("p", &["--format", "parquet"][..]), ("l", &["--labels"])] {
-        let (code, _, errors) =
-            bench.run(&[&["--out", out, "--set", "gain.gain=1.0", "--quiet"], options].concat());
-        assert_eq!(code, 0, "{errors}");
+        bench.flown(&[&["--out", out, "--set", "gain.gain=1.0", "--quiet"], options].concat());
         assert!(plotted(&bench, &[out]) == picture, "{out}");
     }
     assert!(plotted(&bench, &["p/results.parquet"]) == picture);
@@ -138,7 +128,7 @@ fn a_run_writes_its_own_page_with_what_it_does_not_record() {
     let (code, said, errors) = bench.run(&["--page"]);
     assert_eq!(code, 0, "{errors}");
     assert!(said.contains("page.html"), "{said}");
-    let page = fs::read_to_string(bench.path("out/loop/page.html")).unwrap();
+    let page = bench.text("out/loop/page.html");
     assert_eq!(data(&page)["panels"][0]["curves"][1]["role"], "reference");
     // The page belongs to the results: it is replaced with them.
     let (code, ..) = bench.run(&[]);
@@ -152,9 +142,8 @@ fn a_run_writes_its_own_page_with_what_it_does_not_record() {
 #[test]
 fn the_page_of_a_run_without_panels_draws_what_is_recorded() {
     let bench = Bench::new();
-    let (code, _, errors) = bench.run(&["--page", "--out", "a"]);
-    assert_eq!(code, 0, "{errors}");
-    let page = data(&fs::read_to_string(bench.path("a/page.html")).unwrap());
+    bench.flown(&["--page", "--out", "a"]);
+    let page = data(&bench.text("a/page.html"));
     assert_eq!(page["panels"].as_array().unwrap().len(), 3);
     // The same as `plot` draws from the files.
     assert_eq!(page["panels"], data(&plotted(&bench, &["a", "--out", "a.html"]))["panels"]);
@@ -174,24 +163,23 @@ fn figures_of_margins_and_responses_are_svg_or_png() {
 #[test]
 fn what_cannot_be_drawn_is_refused_by_name() {
     let bench = flown();
-    let fault = refusal(&bench, &["a", "--signals", "plant.output.intgral"]);
-    assert!(fault.contains("did you mean \"plant.output.integral\"?"), "{fault}");
-    let fault = refusal(&bench, &["a", "--signals", "plent.*"]);
-    assert!(fault.contains("no recorded variable matches \"plent.*\""), "{fault}");
-    let fault = refusal(&bench, &["c"]);
-    assert!(fault.contains("there is no run c"), "{fault}");
-    let fault = refusal(&bench, &["."]);
-    assert!(fault.contains("holds neither results.csv nor results.parquet"), "{fault}");
-    let fault = refusal(&bench, &["a", "--out", "a.pdf"]);
-    assert!(fault.contains("must end with .svg, .png or .html"), "{fault}");
-    let fault = refusal(&bench, &["a", "--from", "7"]);
-    assert!(fault.contains("it goes from 0 s to 3 s"), "{fault}");
-    let fault = refusal(&bench, &["a", "--from", "2", "--to", "1"]);
-    assert!(fault.contains("--from 2 must be below --to 1"), "{fault}");
-    let (code, _, fault) = bench.call(&["plot", "a", "--from", "-5", "--to", "nan"]);
-    assert!(code == 2 && fault.contains("'nan' for '--to <SECONDS>'"), "{fault}");
-    let fault = refusal(&bench, &["a/metrics.json"]);
-    assert!(fault.contains("a/metrics.json is no table of recorded variables"), "{fault}");
-    let fault = refusal(&bench, &["a", "a", "a", "a", "a", "a", "a"]);
-    assert!(fault.contains("7 runs: at most 6"), "{fault}");
+    for (arguments, said) in [
+        (
+            &["a", "--signals", "plant.output.intgral"][..],
+            "did you mean \"plant.output.integral\"?",
+        ),
+        (&["a", "--signals", "plent.*"], "no recorded variable matches \"plent.*\""),
+        (&["c"], "there is no run c"),
+        (&["."], "holds neither results.csv nor results.parquet"),
+        (&["a", "--out", "a.pdf"], "must end with .svg, .png or .html"),
+        (&["a", "--from", "7"], "it goes from 0 s to 3 s"),
+        (&["a", "--from", "2", "--to", "1"], "--from 2 must be below --to 1"),
+        (&["a/metrics.json"], "a/metrics.json is no table of recorded variables"),
+        (&["a"; 7], "7 runs: at most 6"),
+    ] {
+        let (code, _, errors) = bench.call(&[&["plot"], arguments].concat());
+        assert_eq!((code, errors.lines().count()), (2, 1), "{errors}");
+        assert!(errors.contains(said), "{errors}");
+    }
+    bench.fails(2, &["plot", "a", "--from", "-5", "--to", "nan"], "'nan' for '--to <SECONDS>'");
 }

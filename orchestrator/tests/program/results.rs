@@ -1,17 +1,16 @@
 //! Tests of the results of a run: measured, written and printed.
 
-use crate::bench::{Bench, LOOP};
+use crate::bench::{Bench, LOOP, await_while_it_runs, with_usual_signals};
 use std::fs;
+use std::process::Command;
 
 #[test]
 fn oracle_a_run_writes_its_results() {
     let bench = Bench::new();
-    let (code, summary, errors) =
-        bench.run(&["--set", "gain.gain=500 mm", "--set", "gain.kind=rough"]);
-    assert_eq!(code, 0, "{errors}");
+    let summary = bench.flown(&["--set", "gain.gain=500 mm", "--set", "gain.kind=rough"]);
     assert!(summary.contains("loop delay        none (gain -> plant -> gain)"), "{summary}");
     // The state follows x⁺ = x + x/2. At the stop time no step begins: the gain keeps its output.
-    let rows = fs::read_to_string(bench.path("out/loop/results.csv")).unwrap();
+    let rows = bench.results();
     let expected = "time,gain.output.direct,plant.output.integral,plant.steps\n\
                     0.0,0.5,1.0,0\n1.0,0.75,1.5,1\n2.0,1.125,2.25,2\n3.0,1.125,3.375,3\n";
     assert_eq!(rows, expected);
@@ -55,8 +54,7 @@ ratio = { kind = "mean", signals = "ratio" }
 none = { kind = "mean", signals = "none", optional = true }
 "#;
     let bench = observed(section);
-    let (code, summary, errors) = bench.run(&["--set", "gain.gain=0.5"]);
-    assert_eq!(code, 0, "{errors}");
+    let summary = bench.flown(&["--set", "gain.gain=0.5"]);
     // The gain gives half of the integral 1, 1.5, 2.25, 3.375; the last point begins no step.
     let metrics = bench.json("out/loop/metrics.json");
     let number = |name: &str| metrics[name].as_f64().unwrap();
@@ -66,7 +64,7 @@ none = { kind = "mean", signals = "none", optional = true }
     assert!(metrics.as_object().unwrap()["none"].is_null());
     assert!(summary.contains("  RMS               0.8323"), "{summary}");
     assert!(summary.contains("within its limit 1.125"), "{summary}");
-    assert!(std::fs::read_to_string(bench.path("out/loop/plot.svg")).unwrap().contains("signals"));
+    assert!(bench.text("out/loop/plot.svg").contains("signals"));
 
     for (from, to, said) in [
         (
@@ -125,8 +123,7 @@ none = { kind = "mean", signals = "none", optional = true }
     assert!(message.contains("there is no variable \"plant.output.integal\""), "{message}");
     let exchanged = section.replace("\"gain.output.direct /", "\"gain.output.dirct /");
     let bench = observed(&exchanged);
-    let (code, _, errors) = bench.run(&["--fmu", "gain=Model.fmu"]);
-    assert_eq!(code, 0, "{errors}");
+    bench.flown(&["--fmu", "gain=Model.fmu"]);
     assert!(bench.json("out/loop/metrics.json")["ratio"].is_null());
 }
 
@@ -197,9 +194,8 @@ margins = {{ rate = "{prefix}.rateMargin", moment = "{prefix}.momentMargin" }}
     };
     let bench = observed(&section("gain.guarantee"));
     let guarantee = |largest: &str| {
-        let (code, summary, errors) =
-            bench.run(&["--set", "gain.gain=0.5", "--set", &format!("gain.largest={largest}")]);
-        assert_eq!(code, 0, "{errors}");
+        let summary =
+            bench.flown(&["--set", "gain.gain=0.5", "--set", &format!("gain.largest={largest}")]);
         let line =
             summary.lines().find(|line| line.starts_with("  guarantee ")).unwrap().to_string();
         (line, bench.json("out/loop/metrics.json"))
@@ -255,10 +251,7 @@ fn a_failing_instance_ends_the_run_with_its_own_words_and_keeps_the_results() {
             "{last}"
         );
         assert!(last.contains(name), "{last}");
-        assert_eq!(
-            fs::read_to_string(bench.path("out/loop/results.csv")).unwrap().lines().count(),
-            4
-        );
+        assert_eq!(bench.results().lines().count(), 4);
         assert_eq!(bench.json("out/loop/metrics.json")["completed"], false);
         let status = bench.json("out/loop/results.json")["status"].as_str().unwrap().to_string();
         assert!(status.contains("out of propellant"), "{status}");
@@ -287,12 +280,10 @@ fn a_warning_is_told_once_with_first_time_and_count() {
 fn results_can_be_left_out_or_labelled() {
     let bench =
         Bench::with(&LOOP.replace("\"plant.steps\"", "\"plant.steps\", \"gain.guarantee.status\""));
-    let (code, summary, errors) = bench.run(&["--no-csv", "--no-plot", "--out", "few"]);
-    assert_eq!(code, 0, "{errors}");
+    let summary = bench.flown(&["--no-csv", "--no-plot", "--out", "few"]);
     assert!(summary.contains("few: results.json, metrics.json\n"), "{summary}");
     assert!(!bench.path("few/results.csv").exists() && !bench.path("few/plot.svg").exists());
-    let (code, summary, errors) = bench.run(&["--format", "parquet", "--out", "columnar"]);
-    assert_eq!(code, 0, "{errors}");
+    let summary = bench.flown(&["--format", "parquet", "--out", "columnar"]);
     assert!(summary.contains("columnar: results.parquet, results.json"), "{summary}");
     assert!(
         bench.path("columnar/results.parquet").exists()
@@ -305,7 +296,7 @@ fn results_can_be_left_out_or_labelled() {
     );
     let head = |arguments: &[&str]| {
         assert_eq!(bench.run(arguments).0, 0);
-        let rows = fs::read_to_string(bench.path("out/loop/results.csv")).unwrap();
+        let rows = bench.results();
         rows.lines().take(2).map(String::from).collect::<Vec<_>>()
     };
     assert_eq!(
@@ -328,21 +319,29 @@ fn results_can_be_left_out_or_labelled() {
 #[test]
 #[cfg(target_os = "linux")]
 fn a_dropped_connection_ends_a_run_in_order_unless_it_is_ignored() {
-    use std::process::Command;
     let bench = Bench::new();
-    for (trap, expected) in [("", 129), ("trap '' HUP;", 0)] {
-        let program = env!("CARGO_BIN_EXE_orchestrator");
-        let run = "run loop.toml --quiet --force --set gain.pause=0.3";
-        let mut child = Command::new("sh")
-            .args(["-c", &format!("{trap} exec {program} {run}")])
+    // The paced run would take thirty hours.
+    for (out, trap, how, expected) in [
+        ("ended", ":", "--real-time=2.7e-5", 129),
+        ("ignored", "trap '' HUP", "--set=gain.pause=0.3", 0),
+    ] {
+        let run = ["run", "loop.toml", "--quiet", "--out", out, how];
+        let mut child = with_usual_signals("sh")
+            .args([
+                "-c",
+                &format!("{trap}; exec \"$0\" \"$@\""),
+                env!("CARGO_BIN_EXE_orchestrator"),
+            ])
+            .args(run)
             .current_dir(bench.folder.path())
             .spawn()
             .unwrap();
-        std::thread::sleep(std::time::Duration::from_millis(450));
+        let results = bench.path(out).join("results.csv");
+        await_while_it_runs(&mut child, "results.csv", || results.exists());
         let hangup = Command::new("kill").args(["-HUP", &child.id().to_string()]).status();
         assert!(hangup.unwrap().success());
         assert_eq!(child.wait().unwrap().code(), Some(expected));
-        let metrics = bench.json("out/loop/metrics.json");
+        let metrics = bench.json(&format!("{out}/metrics.json"));
         assert_eq!(metrics["completed"], expected == 0);
     }
 }

@@ -8,28 +8,23 @@ fn a_search_finds_the_corner_and_writes_it_as_an_experiment() {
     let text = format!("{RANDOM}[search]\nlargest = \"last\"\ncases = 300\n");
     let text = text.replace("uniform = [0.0", "uniform = [-0.9");
     let bench = bench(&text);
-    let (code, said, errors) = bench.call(&["falsify", "c.toml", "--out", "w"]);
-    assert_eq!(code, 0, "{errors}");
+    let said = bench.says(&["falsify", "c.toml", "--out", "w"]);
     assert!(said.contains("breaks small"), "{said}");
     let outcome = bench.json("w/search.json");
     assert!((outcome["largest"].as_f64().unwrap() - 8.0).abs() < 1e-3, "{outcome}");
-    let (code, _, errors) = bench.call(&["run", "w/worst.toml", "--fmu-dir", "."]);
-    assert_eq!(code, 0, "{errors}");
-    let rows = fs::read_to_string(bench.path("out/worst/results.csv")).unwrap();
+    bench.says(&["run", "w/worst.toml", "--fmu-dir", "."]);
+    let rows = bench.text("out/worst/results.csv");
     let last: f64 = rows.lines().last().unwrap().split(',').nth(2).unwrap().parse().unwrap();
     assert!((last - outcome["largest"].as_f64().unwrap()).abs() < 1e-12);
     // The same search gives the same bytes, on any number of threads.
-    let (code, _, errors) = bench.call(&["falsify", "c.toml", "--out", "w1", "--jobs", "1"]);
-    assert_eq!(code, 0, "{errors}");
+    bench.says(&["falsify", "c.toml", "--out", "w1", "--jobs", "1"]);
     for file in ["search.parquet", "worst.toml", "search.json", "history.svg"] {
         let bytes = |out: &str| fs::read(bench.path(&format!("{out}/{file}"))).unwrap();
         assert!(bytes("w") == bytes("w1"), "{file}");
     }
-    let (code, _, errors) = bench.call(&["falsify", "c.toml", "--out", "w"]);
-    assert!(code == 2 && errors.contains("--force replaces them"), "{errors}");
+    bench.fails(2, &["falsify", "c.toml", "--out", "w"], "--force replaces them");
     let without = crate::campaign::bench(RANDOM);
-    let (code, _, errors) = without.call(&["falsify", "c.toml"]);
-    assert!(code == 2 && errors.contains("[search] is missing"), "{errors}");
+    without.fails(2, &["falsify", "c.toml"], "[search] is missing");
 }
 
 #[test]
@@ -39,7 +34,7 @@ fn the_page_of_a_search_shows_the_worst_case_against_its_limit() {
     let (code, said, errors) = bench.call(&["falsify", "c.toml", "--out", "w"]);
     assert_eq!(code, 0, "{errors}");
     assert!(said.contains("w/report.html"), "{said}");
-    let page = fs::read_to_string(bench.path("w/report.html")).unwrap();
+    let page = bench.text("w/report.html");
     let outcome = bench.json("w/search.json");
     assert!(outcome["broken"][0] == "small" && page.contains("verdict not"), "{page}");
     assert!(page.contains("orchestrator run w/worst.toml --page"), "{page}");
@@ -50,7 +45,6 @@ fn the_page_of_a_search_shows_the_worst_case_against_its_limit() {
     // The page has no network and no script.
     assert!(!page.contains("<script") && !page.contains("src="), "{page}");
     // The same search gives the same page.
-    let (code, _, errors) = bench.call(&["falsify", "c.toml", "--out", "w", "--force"]);
-    assert_eq!(code, 0, "{errors}");
-    assert!(fs::read_to_string(bench.path("w/report.html")).unwrap() == page);
+    bench.says(&["falsify", "c.toml", "--out", "w", "--force"]);
+    assert!(bench.text("w/report.html") == page);
 }

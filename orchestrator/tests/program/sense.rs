@@ -67,9 +67,7 @@ fn distributions_that_make_no_sense_are_refused_with_the_parameter() {
     }
     // Values of a small part at the lower end can be distinguished.
     let tail = "normal = { mean = 0.0, deviation = 1.0 }\nwithin = [-8.1, -8.0]";
-    let (code, _, errors) =
-        bench(&RANDOM.replace(UNIFORM, tail)).call(&["campaign", "c.toml", "--work"]);
-    assert_eq!(code, 0, "{errors}");
+    bench(&RANDOM.replace(UNIFORM, tail)).says(&["campaign", "c.toml", "--work"]);
 }
 
 #[test]
@@ -77,8 +75,7 @@ fn a_deviation_keeps_no_limit_of_the_parameter() {
     // It is of a parameter that must not be below 0, about a mean of 1 s.
     let normal = "parameter = \"plant.delay\"\nnormal = { mean = 1.0, deviation = \"0.1 s\" }";
     let text = RANDOM.replace(&format!("parameter = \"gain.gain\"\n{UNIFORM}"), normal);
-    let (code, _, errors) = bench(&text).call(&["campaign", "c.toml", "--work"]);
-    assert_eq!(code, 0, "{errors}");
+    bench(&text).says(&["campaign", "c.toml", "--work"]);
 }
 
 #[test]
@@ -153,8 +150,11 @@ fn keys_that_contradict_each_other_are_refused_with_the_name() {
         assert!(errors.contains(said), "{to}: {errors}");
     }
     let bench = bench(RANDOM);
-    let (code, _, errors) = bench.call(&["campaign", "c.toml", "--set", "gain.gain=0.5"]);
-    assert!(code == 2 && errors.contains("\"gain.gain\" varies, so that --set"), "{errors}");
+    bench.fails(
+        2,
+        &["campaign", "c.toml", "--set", "gain.gain=0.5"],
+        "\"gain.gain\" varies, so that --set",
+    );
 }
 
 #[test]
@@ -194,17 +194,15 @@ fn what_a_design_leaves_without_meaning_is_refused() {
         ("sensitivity", "cases = 41\n", String::new(), "a multiple of 4"),
     ] {
         let text = format!("title = \"x\"\nexperiment = \"loop.toml\"\nmetrics = [\"samples\"]\ndesign = \"{design}\"\n{cases}[[vary]]\n{delays}\n{rest}");
-        let (code, _, errors) = bench(&text).call(&["campaign", "c.toml", "--work"]);
-        assert!(code == 2 && errors.contains(said), "{text}: {errors}");
+        bench(&text).fails(2, &["campaign", "c.toml", "--work"], said);
     }
 }
 
 /// Returns the seeds of the cases of a campaign.
 fn seeds(bench: &Bench, text: &str) -> Vec<i64> {
     fs::write(bench.path("c.toml"), text).unwrap();
-    let (code, _, errors) = bench.call(&["campaign", "c.toml", "--csv", "--quiet"]);
-    assert_eq!(code, 0, "{errors}");
-    let table = fs::read_to_string(bench.path("out/c/cases.csv")).unwrap();
+    bench.says(&["campaign", "c.toml", "--csv", "--quiet"]);
+    let table = bench.text("out/c/cases.csv");
     let (heading, rows) = table.split_once('\n').unwrap();
     let place = heading.split(',').position(|name| name == "plant.noise.seed").unwrap();
     rows.lines().map(|row| row.split(',').nth(place).unwrap().parse().unwrap()).collect()
@@ -243,8 +241,7 @@ fn more_cases_than_seeds_are_refused() {
     assert_eq!(found.iter().collect::<BTreeSet<_>>().len(), 60);
     assert!(found.iter().all(|seed| (0..60).contains(seed)), "{found:?}");
     fs::write(bench.path("c.toml"), text.replace("cases = 60", "cases = 61")).unwrap();
-    let (code, _, errors) = bench.call(&["campaign", "c.toml"]);
-    assert!(code == 2 && errors.contains("61 cases need a seed each"), "{errors}");
+    bench.fails(2, &["campaign", "c.toml"], "61 cases need a seed each");
 }
 
 #[test]
@@ -254,7 +251,7 @@ fn a_campaign_in_which_all_cases_failed_is_no_statistic() {
     assert!(code == 1 && errors.contains("6 cases failed, so there are no statistics"), "{errors}");
     assert!(errors.contains("out of propellant at 1") && out.is_empty(), "{errors}{out}");
     assert!(!bench.path("out/c/summary.json").exists() && !bench.path("out/c/parts").exists());
-    let table = fs::read_to_string(bench.path("out/c/cases.csv")).unwrap();
+    let table = bench.text("out/c/cases.csv");
     assert_eq!(table.matches(",failed,").count(), 6, "{table}");
     let search = format!("{CAMPAIGN}[search]\nlargest = \"largest\"\ncases = 10\n");
     // The first step fails, before anything is measured.
@@ -272,15 +269,13 @@ fn a_campaign_in_which_all_cases_failed_is_no_statistic() {
 fn an_instance_that_refuses_values_fails_and_one_that_lacks_a_file_is_an_error() {
     // The model refuses gains above 100.
     let bench = bench(&CAMPAIGN.replace("[0.5, 1.0, 2.0]", "[0.5, 500.0]"));
-    let (code, _, errors) = bench.call(&["campaign", "c.toml", "--csv"]);
-    assert_eq!(code, 0, "{errors}");
-    let table = fs::read_to_string(bench.path("out/c/cases.csv")).unwrap();
+    bench.says(&["campaign", "c.toml", "--csv"]);
+    let table = bench.text("out/c/cases.csv");
     assert_eq!(table.matches("gain too large: 500").count(), 2, "{table}");
     // It refuses that of the experiment as well: the fault is not in the drawn values.
     let set = "set = { \"plant.gain\" = 500.0 }\n[signals]";
     fs::write(bench.path("c.toml"), CAMPAIGN.replace("[signals]", set)).unwrap();
-    let (code, _, errors) = bench.call(&["campaign", "c.toml"]);
-    assert!(code == 1 && errors.contains("gain too large: 500"), "{errors}");
+    bench.fails(1, &["campaign", "c.toml"], "gain too large: 500");
     assert!(!bench.path("out/c/summary.json").exists());
 }
 
@@ -290,9 +285,7 @@ fn a_file_that_a_text_parameter_names_counts() {
     let bench = bench(&RANDOM.replace("cases = 1100", text));
     let flown = |content: &str| {
         fs::write(bench.path("profile.csv"), content).unwrap();
-        let (code, out, errors) = bench.call(&["campaign", "c.toml"]);
-        assert_eq!(code, 0, "{errors}");
-        out
+        bench.says(&["campaign", "c.toml"])
     };
     assert!(flown("1").contains("30 flown now"));
     assert!(flown("1").contains("0 flown now"));
@@ -304,8 +297,7 @@ fn a_file_that_a_text_parameter_names_counts() {
 fn seeds_have_no_sensitivity_but_the_noise_has_a_share() {
     let text = RANDOM.replace("cases = 1100", "cases = 100\ndesign = \"sensitivity\"");
     let bench = bench(&text);
-    let (code, _, errors) = bench.call(&["campaign", "c.toml"]);
-    assert_eq!(code, 0, "{errors}");
+    bench.says(&["campaign", "c.toml"]);
     let measure = &bench.json("out/c/summary.json")["measures"][0];
     let rows = measure["sensitivities"].as_array().unwrap();
     let names: Vec<&str> = rows.iter().map(|row| row["parameter"].as_str().unwrap()).collect();
@@ -316,12 +308,11 @@ fn seeds_have_no_sensitivity_but_the_noise_has_a_share() {
     }
     // The gain alone decides the last value.
     assert!(rows[0]["total"]["high"].as_f64().unwrap() > 0.8, "{measure}");
-    let page = fs::read_to_string(bench.path("out/c/report.html")).unwrap();
+    let page = bench.text("out/c/report.html");
     assert!(page.contains("noise of the seeds") && page.contains("(plant.noise.seed)"), "{page}");
     let random = RANDOM.replace("uniform = [0.0, \"1000 mm\"]", "uniform = [-1.9, -1.0]");
     fs::write(bench.path("c.toml"), random).unwrap();
-    let (code, _, errors) = bench.call(&["campaign", "c.toml"]);
-    assert_eq!(code, 0, "{errors}");
-    let page = fs::read_to_string(bench.path("out/c/report.html")).unwrap();
+    bench.says(&["campaign", "c.toml"]);
+    let page = bench.text("out/c/report.html");
     assert!(!page.contains("noise of the seeds") && page.contains("have no sensitivity"));
 }

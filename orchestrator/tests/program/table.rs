@@ -31,7 +31,7 @@ fn bench(table: &str) -> Bench {
 fn answers(bench: &Bench, arguments: &[&str]) -> Vec<f64> {
     let (code, _, errors) = bench.run(&[&["--quiet"], arguments].concat());
     assert_eq!((code, errors.as_str()), (0, ""));
-    let results = fs::read_to_string(bench.path("out/loop/results.csv")).unwrap();
+    let results = bench.results();
     let last = |row: &str| row.rsplit(',').next().unwrap().parse().unwrap();
     results.lines().skip(1).map(last).collect()
 }
@@ -139,16 +139,14 @@ fn oracle_a_campaign_varies_the_rows_of_a_table() {
         signals = "out"
     "#;
     fs::write(bench.path("c.toml"), campaign).unwrap();
-    let (code, _, errors) = bench.call(&["campaign", "c.toml", "--csv"]);
-    assert_eq!(code, 0, "{errors}");
-    let rows = fs::read_to_string(bench.path("out/c/cases.csv")).unwrap();
+    bench.says(&["campaign", "c.toml", "--csv"]);
+    let rows = bench.text("out/c/cases.csv");
     let rows: Vec<&str> = rows.lines().skip(1).collect();
     assert_eq!(rows, ["0,7,14,completed,4,", "1,-9,18,completed,4,"]);
     // Other rows are other cases.
     fs::write(bench.path("drive.csv"), TABLE.replace("1,3", "1,30")).unwrap();
-    let (code, _, errors) = bench.call(&["campaign", "c.toml", "--csv"]);
-    assert_eq!(code, 0, "{errors}");
-    let rows = fs::read_to_string(bench.path("out/c/cases.csv")).unwrap();
+    bench.says(&["campaign", "c.toml", "--csv"]);
+    let rows = bench.text("out/c/cases.csv");
     assert!(rows.contains("0,7,60,completed,4,"), "{rows}");
 }
 

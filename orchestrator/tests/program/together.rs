@@ -32,11 +32,11 @@ fn successes(bench: &Bench, arguments: &[&str]) -> usize {
 fn of_twenty_equal_runs_one_writes_the_results() {
     let bench = Bench::new();
     assert_eq!(successes(&bench, &["run", "loop.toml", "--quiet"]), 1);
-    let rows = fs::read_to_string(bench.path("out/loop/results.csv")).unwrap();
+    let rows = bench.results();
     assert_eq!(rows.lines().count(), 5);
     // Those that may replace results do so one after the other.
     assert!(successes(&bench, &["run", "loop.toml", "--quiet", "--force"]) >= 1);
-    assert_eq!(fs::read_to_string(bench.path("out/loop/results.csv")).unwrap(), rows);
+    assert_eq!(bench.results(), rows);
 }
 
 #[test]
@@ -44,7 +44,7 @@ fn of_twenty_equal_campaigns_none_spoils_another() {
     let bench = Bench::new();
     fs::write(bench.path("c.toml"), CAMPAIGN).unwrap();
     assert!(successes(&bench, &["campaign", "c.toml", "--csv", "--quiet"]) >= 1);
-    let table = fs::read_to_string(bench.path("out/c/cases.csv")).unwrap();
+    let table = bench.text("out/c/cases.csv");
     assert_eq!(bench.call(&["campaign", "c.toml", "--csv", "--fresh"]).0, 0);
-    assert_eq!(fs::read_to_string(bench.path("out/c/cases.csv")).unwrap(), table);
+    assert_eq!(bench.text("out/c/cases.csv"), table);
 }

@@ -63,16 +63,14 @@ fn usage_that_is_nearly_right_is_told_what_it_lacks() {
             .refusal(&["--stop", "-1"])
             .starts_with("error: --stop -1: stop = -1 s must be at least one step of 1 s")
     );
-    let (code, _, errors) = bench.call(&["reproduce", "loop", "--members", "0"]);
-    assert!(code == 2 && errors.contains("--members"), "{errors}");
+    bench.fails(2, &["reproduce", "loop", "--members", "0"], "--members");
     // The pattern leaves all inputs of this component unconnected, however many there are.
     let lonely = LOOP.replace(
         "[components.plant]",
         "[components.other]\nfmu = \"Model.fmu\"\nunconnected = [\"*\"]\n[components.plant]",
     );
     let bench = Bench::with(&lonely);
-    let (code, summary, errors) = bench.run(&[]);
-    assert_eq!(code, 0, "{errors}");
+    let summary = bench.flown(&[]);
     // A component that the order leaves out comes last.
     assert!(summary.contains("gain, plant, other"), "{summary}");
 }
@@ -141,20 +139,58 @@ fn inspect_filters_and_speaks_json() {
         ["guarantee.inForce", "guarantee.status", "guarantee.rateMargin", "guarantee.momentMargin"]
     );
     assert_eq!(printed["guid"], "{u-1}");
+    let text = bench.says(&["inspect", "Model.fmu"]);
+    for part in ["linux64", "canHandleVariableCommunicationStepSize", "{calm, rough}"] {
+        assert!(text.contains(part), "{part}: {text}");
+    }
+    assert!(text.lines().all(|line| line.chars().count() <= 80), "{text}");
     let (_, text, _) = bench.call(&["inspect", "Model.fmu", "seed"]);
     assert!(text.contains("noise.seed") && !text.contains("output.direct"), "{text}");
     let (_, text, _) = bench.call(&["inspect", "Model.fmu", "--causality", "input"]);
     assert!(text.contains("input (1)") && !text.contains("parameter ("), "{text}");
-    let (code, _, errors) = bench.call(&["inspect", "Model.fmu", "sed"]);
-    assert!(code == 2 && errors.contains("has no variable that fits \"sed\""), "{errors}");
+    bench.fails(2, &["inspect", "Model.fmu", "sed"], "has no variable that fits \"sed\"");
 }
 
 #[test]
-fn shells_complete_commands() {
-    for shell in ["bash", "zsh", "fish"] {
-        let (code, text, _) = Bench::new().call(&["completions", shell]);
-        assert!(code == 0 && text.contains("reproduce") && text.contains("on-miss"), "{shell}");
+fn wrong_names_and_wiring_are_refused_with_place_and_remedy() {
+    const FROM: &str = "plant.output.integral\"\nto";
+    const TO: &str = "to = \"plant.input\"";
+    const ORDER: &str = "[\"gain\", \"plant\"]";
+    for (from, to, said) in [
+        (
+            FROM,
+            "plant.output.integrall\"\nto",
+            &["toml:12: ", "did you mean \"output.integral\""][..],
+        ),
+        ("to = \"gain.input\"", "to = \"gian.input\"", &["toml:13: ", "did you mean \"gain\""]),
+        ("\"plant.steps\"", "\"plant.step\"", &["toml:18: ", "did you mean \"steps\""]),
+        (
+            "l.fmu\"\n[components.plant]",
+            "e.fmu\"\n[components.plant]",
+            &["toml:8: ", "did you mean \"Model.fmu\""],
+        ),
+        (ORDER, "[\"gain\", \"palnt\"]", &["did you mean \"plant\""]),
+        (ORDER, "[]", &["there is no order", "order = [\"gain\", \"plant\"]"]),
+        ("stop = 3.0", "stopp = 3.0", &["toml:4: ", "`stop`"]),
+        (FROM, "plant.speed\"\nto", &["units", "m/s against m"]),
+        (FROM, "plant.steps\"\nto", &["Integer against Real"]),
+        (FROM, "plant.gain\"\nto", &["is of causality parameter, not an output"]),
+        (FROM, "plant.output.direct\"\nto", &["algebraic loop", "gain.input"]),
+        (TO, "to = \"plant.output.direct\"", &["is of causality output, not an input"]),
+        (TO, "to = \"gain.input\"", &["toml:16: ", "connected twice"]),
+        (
+            "gain.output.direct\"\nto = \"plant.input",
+            "plant.*\"\nto = \"gain.none.*",
+            &["there are: input"],
+        ),
+    ] {
+        let message = refusal_of(from, to);
+        assert!(said.iter().all(|text| message.contains(text)), "{to}: {message}");
     }
+    // A line that was right for the experiment's own FMU is not at fault alone.
+    let changed = LOOP.replace(TO, "to = \"plant.output.direct\"");
+    let message = Bench::with(&changed).refusal(&["--fmu", "plant=Model"]);
+    assert!(message.contains("; --fmu plant=Model replaces the experiment's FMU"), "{message}");
 }
 
 #[test]
@@ -168,39 +204,6 @@ fn bad_usage_exits_with_2() {
     assert_eq!(bench.call(&["inspect", "missing.fmu"]).0, 2);
     assert_eq!(bench.call(&["inspect", "loop.toml"]).0, 2);
     assert_eq!(bench.call(&["list", "missing"]).0, 2);
-}
-
-#[test]
-fn wrong_names_are_refused_with_place_and_remedy() {
-    let message = refusal_of("plant.output.integral\"\nto", "plant.output.integrall\"\nto");
-    assert!(
-        message.contains("loop.toml:12: ") && message.contains("did you mean \"output.integral\""),
-        "{message}"
-    );
-    let message = refusal_of("to = \"gain.input\"", "to = \"gian.input\"");
-    assert!(
-        message.contains("loop.toml:13: ") && message.contains("did you mean \"gain\""),
-        "{message}"
-    );
-    let message = refusal_of("\"plant.steps\"", "\"plant.step\"");
-    assert!(
-        message.contains("loop.toml:18: ") && message.contains("did you mean \"steps\""),
-        "{message}"
-    );
-    let message = refusal_of("Model.fmu\"\n[components.plant]", "Modle.fmu\"\n[components.plant]");
-    assert!(
-        message.contains("loop.toml:8: ") && message.contains("did you mean \"Model.fmu\""),
-        "{message}"
-    );
-    let message = refusal_of("[\"gain\", \"plant\"]", "[\"gain\", \"palnt\"]");
-    assert!(message.contains("did you mean \"plant\""), "{message}");
-    let message = refusal_of("[\"gain\", \"plant\"]", "[]");
-    assert!(
-        message.contains("there is no order") && message.contains("order = [\"gain\", \"plant\"]"),
-        "{message}"
-    );
-    let message = refusal_of("stop = 3.0", "stopp = 3.0");
-    assert!(message.contains("loop.toml:4: ") && message.contains("`stop`"), "{message}");
 }
 
 #[test]
@@ -229,37 +232,11 @@ fn wrong_settings_are_refused() {
         );
     }
     assert!(bench.refusal(&["--stop", "2.5"]).contains("2 s or 3 s"));
-    let (code, _, errors) = bench.run(&["--set", "gain.text=hello", "--set", "gain.flag=true"]);
-    assert_eq!(code, 0, "{errors}");
+    bench.flown(&["--set", "gain.text=hello", "--set", "gain.flag=true"]);
     assert_eq!(
         bench.json("out/loop/results.json")["components"]["gain"]["parameters"]["flag"],
         true
     );
-}
-
-#[test]
-fn wrong_wiring_is_refused() {
-    let message = refusal_of("plant.output.integral\"\nto", "plant.speed\"\nto");
-    assert!(message.contains("units") && message.contains("m/s against m"), "{message}");
-    let message = refusal_of("plant.output.integral\"\nto", "plant.steps\"\nto");
-    assert!(message.contains("Integer against Real"), "{message}");
-    let message = refusal_of("plant.output.integral\"\nto", "plant.gain\"\nto");
-    assert!(message.contains("is of causality parameter, not an output"), "{message}");
-    let message = refusal_of("to = \"plant.input\"", "to = \"plant.output.direct\"");
-    assert!(message.contains("is of causality output, not an input"), "{message}");
-    // A line that was right for the experiment's own FMU is not at fault alone.
-    let changed = LOOP.replace("to = \"plant.input\"", "to = \"plant.output.direct\"");
-    let message = Bench::with(&changed).refusal(&["--fmu", "plant=Model"]);
-    assert!(message.contains("; --fmu plant=Model replaces the experiment's FMU"), "{message}");
-    let message = refusal_of("to = \"plant.input\"", "to = \"gain.input\"");
-    assert!(message.contains("loop.toml:16: ") && message.contains("connected twice"), "{message}");
-    let message = refusal_of("plant.output.integral\"\nto", "plant.output.direct\"\nto");
-    assert!(message.contains("algebraic loop") && message.contains("gain.input"), "{message}");
-    let message = refusal_of(
-        "from = \"gain.output.direct\"\nto = \"plant.input\"",
-        "from = \"plant.*\"\nto = \"gain.none.*\"",
-    );
-    assert!(message.contains("there are: input"), "{message}");
 }
 
 /// A description in which the parameter is an input.
@@ -279,9 +256,8 @@ fn whole_numbers_are_passed_on() {
     let description = |text: String| as_input(&text, "noise.seed");
     let recipe = Recipe { description: &description, ..Recipe::default() };
     let bench = Bench::made(&experiment, &recipe);
-    let (code, _, errors) = bench.run(&[]);
-    assert_eq!(code, 0, "{errors}");
-    let results = fs::read_to_string(bench.path("out/loop/results.csv")).unwrap();
+    bench.flown(&[]);
+    let results = bench.results();
     let seeds: Vec<&str> = results.lines().skip(1).map(|l| l.rsplit(',').next().unwrap()).collect();
     assert_eq!(seeds, ["0", "1", "2", "2"]);
 }
@@ -311,11 +287,7 @@ fn inputs_without_connection_must_be_meant() {
     // A value for the input solves it as well.
     let bench = Bench::with(&open);
     assert_eq!(bench.run(&["--set", "plant.input=3"]).0, 0);
-    assert!(
-        fs::read_to_string(bench.path("out/loop/results.csv"))
-            .unwrap()
-            .contains("\n3.0,14.0,10.0,3\n")
-    );
+    assert!(bench.results().contains("\n3.0,14.0,10.0,3\n"));
     let message = Bench::with(
         &LOOP.replace("[components.plant]\n", "[components.plant]\nunconnected = [\"input\"]\n"),
     )
@@ -324,41 +296,16 @@ fn inputs_without_connection_must_be_meant() {
 }
 
 #[test]
-fn inspect_and_list_show_what_there_is() {
-    let bench = Bench::new();
-    let (code, text, _) = bench.call(&["inspect", "Model.fmu"]);
-    assert_eq!(code, 0);
-    for part in [
-        "{u-1}",
-        "linux64",
-        "canHandleVariableCommunicationStepSize",
-        "output.integral",
-        "{calm, rough}",
-    ] {
-        assert!(text.contains(part), "{part}: {text}");
-    }
-    assert!(text.lines().all(|line| line.chars().count() <= 80), "{text}");
-    let (code, text, _) = bench.call(&["list"]);
-    assert_eq!(code, 0);
-    assert!(
-        lists(&text, "loop", "gain and integrator") && lists(&text, "Model", "gain and integrator"),
-        "{text}"
-    );
-}
-
-#[test]
 fn an_experiment_that_extends_another_is_all_of_them() {
     let bench = Bench::new();
-    let (code, _, errors) = bench.call(&["run", "loop.toml", "--quiet"]);
-    assert_eq!(code, 0, "{errors}");
+    bench.says(&["run", "loop.toml", "--quiet"]);
     let results =
         |name: &str| fs::read_to_string(bench.path(&format!("out/{name}/results.csv"))).unwrap();
     let longer = "extends = \"../loop.toml\"\ntitle = \"longer\"\n[simulation]\nstop = 4.0\n";
     fs::create_dir(bench.path("more")).unwrap();
     fs::write(bench.path("more/longer.toml"), longer).unwrap();
     // The FMU stands beside the file that is extended.
-    let (code, _, errors) = bench.call(&["run", "longer", "--quiet"]);
-    assert_eq!(code, 0, "{errors}");
+    bench.says(&["run", "longer", "--quiet"]);
     // The last row of the shorter run, where no step begins, keeps the outputs of the step before.
     let (longer, shorter) = (results("longer"), results("loop"));
     let common = shorter.lines().count() - 1;
@@ -374,10 +321,8 @@ fn an_experiment_that_extends_another_is_all_of_them() {
     fs::write(bench.path("whole.toml"), shown).unwrap();
     let (code, _, errors) = bench.call(&["run", "whole.toml", "--quiet"]);
     assert!(code == 0 && results("whole") == results("longer"), "{errors}");
-    let (code, _, errors) = bench.call(&["pack", "more/longer.toml", "--out", "longer.ssp"]);
-    assert_eq!(code, 0, "{errors}");
-    let (code, _, errors) = bench.call(&["run", "longer.ssp", "--quiet", "--out", "out/packed"]);
-    assert_eq!(code, 0, "{errors}");
+    bench.says(&["pack", "more/longer.toml", "--out", "longer.ssp"]);
+    bench.says(&["run", "longer.ssp", "--quiet", "--out", "out/packed"]);
     // A fault is reported with the file that contains it. A file without a title is no experiment
     // of its own.
     fs::write(bench.path("loop.toml"), LOOP.replace("plant.steps", "plant.stepz")).unwrap();

@@ -5,16 +5,6 @@ use crate::bench::{Bench, LOOP};
 use crate::campaign::{CAMPAIGN, RANDOM, bench};
 use std::fs;
 
-fn page(bench: &Bench, name: &str) -> String {
-    fs::read_to_string(bench.path(name)).unwrap()
-}
-
-fn told(bench: &Bench, arguments: &[&str]) -> String {
-    let (code, said, errors) = bench.call(arguments);
-    assert_eq!(code, 0, "{errors}");
-    said
-}
-
 #[test]
 fn a_run_names_what_is_within_and_what_is_beyond_its_limit() {
     let section = r#"
@@ -33,9 +23,8 @@ bound = { label = "bound", kind = "last", signals = "bound" }
     let outcome = |largest: &str| {
         let set = format!("gain.largest={largest}");
         let arguments = ["--page", "--set", "gain.gain=0.5", "--set", &set];
-        let (code, said, errors) = bench.run(&arguments);
-        assert_eq!(code, 0, "{errors}");
-        let page = page(&bench, "out/loop/page.html");
+        let said = bench.flown(&arguments);
+        let page = bench.text("out/loop/page.html");
         let verdict = page.split_once("<p class=\"verdict\">").unwrap().1;
         (said, verdict.split_once("</p>").unwrap().0.to_string())
     };
@@ -68,11 +57,9 @@ keeps = "ratio"
     let bench = Bench::with(&format!("{LOOP}{section}"));
     let outcome = |largest: &str| {
         let largest = format!("gain.largest={largest}");
-        let (code, said, errors) =
-            bench.run(&["--page", "--set", "gain.gain=4", "--set", &largest]);
-        assert_eq!(code, 0, "{errors}");
+        let said = bench.flown(&["--page", "--set", "gain.gain=4", "--set", &largest]);
         let line = said.lines().find(|line| line.starts_with("  guarantee ")).unwrap();
-        (line.to_string(), page(&bench, "out/loop/page.html"))
+        (line.to_string(), bench.text("out/loop/page.html"))
     };
     // The integral is 1, 5, 25, and the limit is 4. The guarantee is in force up to `largest`.
     let (line, page) = outcome("1000");
@@ -87,14 +74,14 @@ keeps = "ratio"
 fn a_campaign_says_which_limits_are_kept_and_which_are_broken() {
     let campaign = CAMPAIGN.replace("[1e9, 2.0]", "[1e9]");
     let all_kept = bench(&campaign.replace("at_most = 8.0", "at_most = 27.0"));
-    let said = told(&all_kept, &["campaign", "c.toml"]);
+    let said = all_kept.says(&["campaign", "c.toml"]);
     assert!(said.contains("broken by 0 of 3, probability at most"), "{said}");
-    let text = page(&all_kept, "out/c/report.html");
+    let text = all_kept.text("out/c/report.html");
     assert!(text.contains("kept by all") && !text.contains("verdict not"), "{text}");
     let broken = bench(&campaign);
-    let said = told(&broken, &["campaign", "c.toml"]);
+    let said = broken.says(&["campaign", "c.toml"]);
     assert!(said.contains("broken by 1 of 3, probability "), "{said}");
-    let text = page(&broken, "out/c/report.html");
+    let text = broken.text("out/c/report.html");
     assert!(!text.contains("kept by all"), "{text}");
     assert!(text.contains("<span class=\"verdict not\">broken</span>"), "{text}");
 }
@@ -109,10 +96,10 @@ fn a_question_is_answered_by_yes_by_no_or_not_at_all() {
     ] {
         let text = format!("{RANDOM}[until]\nlimit = \"small\"\nbelow = {below}\n");
         let bench = bench(&text.replace("cases = 1100", &format!("cases = {cases}")));
-        let said = told(&bench, &["campaign", "c.toml"]);
+        let said = bench.says(&["campaign", "c.toml"]);
         let line = format!("P(small broken) < {below} with 95 %: {word}\n");
         assert!(said.contains(&line), "{said}");
-        let text = page(&bench, "out/c/report.html");
+        let text = bench.text("out/c/report.html");
         assert!(text.contains(&format!("<span class=\"{class}\">{word}</span>")), "{text}");
     }
 }
@@ -122,9 +109,9 @@ fn a_search_says_whether_the_worst_case_breaks_a_limit() {
     for (bound, breaks) in [("9.0", false), ("7.0", true)] {
         let text = format!("{RANDOM}[search]\nlargest = \"last\"\ncases = 60\n");
         let bench = bench(&text.replace("at_most = 7.9", &format!("at_most = {bound}")));
-        let said = told(&bench, &["falsify", "c.toml", "--out", "w"]);
+        let said = bench.says(&["falsify", "c.toml", "--out", "w"]);
         assert_eq!(said.contains("breaks small"), breaks, "{said}");
-        let text = page(&bench, "w/report.html");
+        let text = bench.text("w/report.html");
         let verdicts = |class: &str, word: &str| {
             text.matches(&format!("<span class=\"{class}\">{word}</span>")).count()
         };
@@ -160,8 +147,8 @@ claim = [
 ]
 "##;
     fs::write(bench.path("study.toml"), study).unwrap();
-    let said = told(&bench, &["reproduce", "study.toml", "--out", "s", "--fmu-dir", "."]);
-    let text = page(&bench, "s/report.html");
+    let said = bench.says(&["reproduce", "study.toml", "--out", "s", "--fmu-dir", "."]);
+    let text = bench.text("s/report.html");
     for (verdict, class, claim) in [
         ("holds", "verdict holds", "It ends below nine."),
         ("does not hold", "verdict not", "It ends below eight."),
