@@ -2,6 +2,8 @@
 and runs them there; they start in a folder outside the project."""
 
 import gc
+import os
+import signal
 import sys
 import tempfile
 from pathlib import Path
@@ -24,6 +26,16 @@ metrics = ["ems_deg"]
 parameter = "plant.disturbance.seed"
 case = 1
 """
+
+
+def usual_signals():
+    """Ends the ignoring of signals in a new process, for `preexec_fn`: `nohup` and a shell that starts
+    the tests in the background make their processes ignore some."""
+    for number in (signal.SIGHUP, signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, signal.SIG_DFL)
+
+
+USUAL = {} if os.name == "nt" else {"preexec_fn": usual_signals}
 
 
 @pytest.fixture

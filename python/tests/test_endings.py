@@ -13,7 +13,7 @@ from pathlib import Path
 
 import leaks
 import pytest
-from conftest import SHORT
+from conftest import SHORT, USUAL
 from reentry_fmus import ClosedLoop, LawError, OrchestratorError, campaign, experiment
 from reentry_fmus._unpacked import PREFIX, Folder, remove_left
 
@@ -292,13 +292,13 @@ def test_ctrl_c_leaves_nothing_behind(law, short, tmp_path):
         env={**os.environ, "TMPDIR": str(temporary)},
         stderr=subprocess.PIPE,
         text=True,
+        **USUAL,
     )
-    end = time.monotonic() + 120.0
     while not (tmp_path / "begun").exists():
-        assert time.monotonic() < end and process.poll() is None
+        assert process.poll() is None
         time.sleep(0.05)
     process.send_signal(signal.SIGINT)
-    _, error = process.communicate(timeout=60)
+    _, error = process.communicate()
     assert error.rstrip().endswith("KeyboardInterrupt")
     assert not list(temporary.iterdir())
 
