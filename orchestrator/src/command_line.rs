@@ -50,9 +50,8 @@ pub(crate) fn parse() -> Arguments {
 pub(crate) enum Command {
     /// Run an experiment and write results.csv, results.json, metrics.json and plot.svg.
     ///
-    /// With --real-time the run keeps in step with the wall clock; the summary, metrics.json and
-    /// realtime.svg show how well it did. Ctrl-C, SIGTERM and SIGHUP end a run and keep its
-    /// results.
+    /// With --real-time the run keeps in step with the wall clock; the summary and metrics.json show
+    /// how well it did. Ctrl-C, SIGTERM and SIGHUP end a run and keep its results.
     Run {
         /// Experiment to run: a file, an SSP archive, or the name of an experiment that `list`
         /// shows.
@@ -80,16 +79,6 @@ pub(crate) enum Command {
         #[arg(long, value_parser = choice::<OnMiss>(&[]), default_value = "catch-up", requires = "real_time",
               help_heading = "Real time")]
         on_miss: OnMiss,
-        /// Ask for real-time scheduling (SCHED_FIFO with this priority, 1 to 99; 50 if it is left
-        /// out) and for memory that is never swapped out. If the system refuses either, the refusal
-        /// is reported and the run continues without it.
-        #[arg(long, value_name = "PRIORITY", num_args = 0..=1, default_missing_value = "50", requires = "real_time",
-              value_parser = clap::value_parser!(u8).range(1..=99), help_heading = "Real time")]
-        priority: Option<u8>,
-        /// Show the run on the terminal while it is in progress. The key q ends the run and keeps
-        /// its results.
-        #[arg(long, conflicts_with = "quiet", help_heading = "Display")]
-        live: bool,
         #[command(flatten)]
         files: Files,
         /// Replace the results of an earlier run in the folder. Without this option they are left

@@ -7,13 +7,13 @@ use cosim::experiment::Experiment;
 use cosim::search;
 use cosim::search::named::Kind;
 use fmu_import::fmu::Fmu;
-use ratatui::crossterm::terminal;
 use serde::Serialize;
 use std::collections::BTreeSet;
 use std::fs;
-use std::io::{IsTerminal, Write, stdout};
+use std::io::{Write, stdout};
 use std::path::{Path, PathBuf};
 use study::definition::Study;
+use terminal_size::Width;
 
 /// Form in which the list is printed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -71,11 +71,8 @@ const WIDTH: usize = 80;
 
 /// Returns the width to which texts are wrapped.
 pub(crate) fn width() -> usize {
-    if stdout().is_terminal() {
-        terminal::size().map_or(WIDTH, |(columns, _)| usize::from(columns).clamp(40, 120))
-    } else {
-        WIDTH
-    }
+    let columns = terminal_size::terminal_size_of(stdout());
+    columns.map_or(WIDTH, |(Width(columns), _)| usize::from(columns).clamp(40, 120))
 }
 
 /// Largest width of the column of names. A longer name gets a line of its own.

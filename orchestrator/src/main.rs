@@ -11,7 +11,6 @@ mod isolated;
 mod judge;
 mod linear;
 mod list;
-mod live;
 mod man;
 mod pack;
 mod picture;
@@ -32,7 +31,6 @@ use cosim::search::named::{Kind, find};
 use failure::Failure;
 use fmu_import::crash;
 use fmu_import::law::{self, Printed};
-use live::log::Messages;
 use plain::{Plain, plain};
 use run::Options;
 use serde_json::json;
@@ -58,7 +56,9 @@ fn main() -> ExitCode {
     let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new(usual));
     tracing_subscriber::fmt()
         .with_env_filter(filter)
-        .with_writer(Messages::default)
+        .with_writer(stderr)
+        // A message that cannot be written is lost, but the run continues.
+        .log_internal_errors(false)
         .with_ansi(stderr().is_terminal())
         .without_time()
         .with_target(false)
@@ -115,17 +115,14 @@ fn execute(command: Command, out: &mut impl Write, interrupt: &Interrupt) -> Res
             quiet,
             real_time,
             on_miss,
-            priority,
-            live,
             files,
             force,
         } => {
-            let real_time = real_time.map(|factor| pacing::Settings { factor, on_miss, priority });
+            let real_time = real_time.map(|factor| pacing::Settings { factor, on_miss });
             let options = Options {
                 out: folder,
                 quiet,
                 real_time,
-                live,
                 files,
                 force,
                 interrupt: interrupt.clone(),

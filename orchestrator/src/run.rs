@@ -1,18 +1,16 @@
-//! Runs an experiment and writes its results. Observers of the system record, measure, draw and
-//! show it.
+//! Runs an experiment and writes its results. Observers of the system record, measure and
+//! draw it.
 
 use crate::arguments::choice;
 use crate::failure::Failure;
-use crate::live::{self, Live, scene::Scene};
 use crate::summary::{self, RunReport};
 use cosim::check::check;
 use cosim::error::Error;
 use cosim::experiment::{Experiment, Overrides};
 use cosim::files;
-use cosim::interrupt::{Interrupt, Request};
+use cosim::interrupt::Interrupt;
 use cosim::metadata;
 use cosim::pacing;
-use cosim::pacing::priority::{Priority, Scheduling};
 use cosim::pacing::report::RealTime;
 use cosim::pacing::timer::{self, Monotonic};
 use cosim::recorder::Format;
@@ -85,8 +83,6 @@ pub(crate) struct Options {
     pub(crate) quiet: bool,
     /// Settings of a run that is paced by the wall clock; `None` runs as fast as possible.
     pub(crate) real_time: Option<pacing::Settings>,
-    /// Whether the run is shown on the terminal while it is in progress.
-    pub(crate) live: bool,
     /// Choice of the files that the run writes.
     pub(crate) files: Files,
     /// Whether the results of an earlier run may be replaced.
@@ -162,7 +158,7 @@ fn early(outcome: Result<(), Error>, out: &Path) -> Result<Option<Error>, Error>
 /// Returns an error if a run ended early for a reason that is a failure.
 fn ended(reason: Option<Error>, quiet: bool) -> Result<(), Failure> {
     match reason {
-        None | Some(Error::Interrupted { request: Request::Quit, .. }) => Ok(()),
+        None => Ok(()),
         Some(error @ Error::EndedByInstance { .. }) => {
             // The summary has already said so.
             if quiet {
@@ -180,12 +176,10 @@ fn ended(reason: Option<Error>, quiet: bool) -> Result<(), Failure> {
 /// # Errors
 /// Returns an error if an FMU fails, or if a file cannot be written.
 fn record(system: &mut System, options: &Options) -> Result<RunReport, Failure> {
-    if options.live {
-        live::check_terminal()?;
-    }
     options.files.check()?;
     let mut meters = Meters::new(system)?.ending_when_lost();
-    let panels = Panel::resolve_all(system)?;
+    // A panel of a wrong signal is refused before the run, whether it is drawn or not.
+    Panel::resolve_all(system)?;
     let Pictures { no_plot, page } = options.files.pictures;
     let mut watch = (page || !no_plot).then(|| Watch::new(system)).transpose()?;
     for doubt in system.doubts() {
@@ -200,8 +194,6 @@ fn record(system: &mut System, options: &Options) -> Result<RunReport, Failure> 
 
     let warnings = warnings::collect();
     warnings::at(clock.start());
-    let factor = options.real_time.map(|settings| settings.factor.get());
-    let scene = options.live.then(|| Scene::new(system, panels, factor)).transpose()?;
     let mut run = system.start(&options.interrupt)?;
     let parameters = system.parameters(&mut run)?;
 
@@ -215,31 +207,23 @@ fn record(system: &mut System, options: &Options) -> Result<RunReport, Failure> 
     let Files { no_csv, format, labels, .. } = options.files;
     let recorder = (!no_csv).then(|| system.recorder(&out, format, labels));
     let mut recorder = recorder.transpose()?;
-    let silent = options.quiet || options.live;
-    let mut progress = Progress::new(&title, clock.ticks(), silent, options.real_time.is_some());
+    let mut progress =
+        Progress::new(&title, clock.ticks(), options.quiet, options.real_time.is_some());
 
-    let tally = options.real_time.map(|settings| {
+    if let Some(settings) = options.real_time {
         timer::wake_up_sharply();
-        run.pace(settings, Rc::new(Monotonic)).tally()
-    });
-    let live = scene.map(|scene| Live::start(scene, tally, options.interrupt.clone()));
-    let mut live = live.transpose()?;
-    // Requested after the drawing threads have started, because later threads would inherit the
-    // scheduling.
-    let scheduling = Scheduling::request(options.real_time.and_then(|settings| settings.priority));
-    warn_of_priority(system, &scheduling.priority);
+        run.pace(settings, Rc::new(Monotonic));
+    }
 
     let begin = Instant::now();
     let mut observers: Vec<&mut dyn Observer> = vec![&mut progress];
     observers.extend(watch.as_mut().map(|watch| watch as &mut dyn Observer));
     observers.extend(recorder.as_mut().map(|recorder| recorder as &mut dyn Observer));
-    observers.extend(live.as_mut().map(|live| live as &mut dyn Observer));
     // The meters come last, because they may end the run.
     observers.push(&mut meters);
     let outcome = run.run(&mut observers);
     let wall = begin.elapsed().as_secs_f64();
-    let priority = scheduling.priority.clone();
-    drop((scheduling, live, progress, warnings));
+    drop((progress, warnings));
 
     let write = || -> Result<_, Failure> {
         let mut files = vec!["results.json", "metrics.json"];
@@ -261,12 +245,8 @@ fn record(system: &mut System, options: &Options) -> Result<RunReport, Failure> 
             metrics.asked.extend(margins(system, &options.interrupt)?);
         }
         if let Some(pacer) = run.take_pacer() {
-            let (mut real_time, wake_ups, steps) = pacer.report();
-            real_time.priority = priority;
+            let real_time = pacer.report();
             warn(&real_time, options.quiet);
-            let path = out.join("realtime.svg");
-            cosim_report::pacing::draw(&path, &title, &real_time, wake_ups, steps)?;
-            files.push("realtime.svg");
             metrics.real_time = Some(real_time);
         }
         files::write_json(&out.join("metrics.json"), &metrics)?;
@@ -293,18 +273,6 @@ fn record(system: &mut System, options: &Options) -> Result<RunReport, Failure> 
     Ok(RunReport { metrics, out, files, ended, end })
 }
 
-/// Warns of instances that do not get the priority, as they run in processes of their own.
-fn warn_of_priority(system: &System, priority: &Priority) {
-    let isolated = system.components.iter().filter(|component| component.is_isolated);
-    let isolated: Vec<&str> = isolated.map(|component| component.name.as_str()).collect();
-    if matches!(priority, Priority::Fifo { .. }) && !isolated.is_empty() {
-        tracing::warn!(
-            "--priority: the processes of {} keep the usual priority; --isolate=false runs these instances in this process",
-            isolated.join(", ")
-        );
-    }
-}
-
 /// Computes the margins that an experiment asks for. A loop that cannot be linearised has none, and
 /// the run is complete without them.
 fn margins(system: &System, interrupt: &Interrupt) -> Result<Measured, Error> {
@@ -317,17 +285,12 @@ fn margins(system: &System, interrupt: &Interrupt) -> Result<Measured, Error> {
     }
 }
 
-/// Warns of missed deadlines and of a refused priority if no summary is printed.
+/// Warns of missed deadlines if no summary is printed.
 fn warn(real_time: &RealTime, quiet: bool) {
     if !quiet {
         return;
     }
     if let Some(done) = real_time.done_about_it() {
         tracing::warn!("{} of {} deadlines missed; {done}", real_time.misses, real_time.deadlines);
-    }
-    if let Priority::Refused(reason) | Priority::Fifo { unlocked: Some(reason), .. } =
-        &real_time.priority
-    {
-        tracing::warn!("--priority: {reason}");
     }
 }

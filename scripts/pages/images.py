@@ -1,8 +1,7 @@
 """Redraws the pictures of docs/images that are the program's own: images.py STUDIES
 
 STUDIES holds a folder for each study, as `orchestrator reproduce STUDY --out STUDIES/STUDY` writes it. The flights are
-flown here, with the program and the FMUs in target. docs/images/real-time-20.svg shows what was measured on a quiet
-machine, and stays.
+flown here, with the program and the FMUs in target.
 """
 
 import shutil

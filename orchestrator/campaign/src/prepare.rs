@@ -103,7 +103,6 @@ pub(crate) fn observe(campaign: &Campaign, experiment: &Observe) -> Result<Obser
         margins: experiment.margins.clone().filter(|_| !of_margins.is_empty()),
         // The limits of a campaign judge its cases.
         goal: None,
-        readings: BTreeMap::new(),
         ..experiment.clone()
     })
 }

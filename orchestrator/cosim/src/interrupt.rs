@@ -20,40 +20,30 @@ pub struct Interrupt {
     signal: Arc<AtomicUsize>,
     /// Whether a signal has arrived already, so that a second one ends the process at once.
     again: Arc<AtomicBool>,
-    quit: Arc<AtomicBool>,
 }
 
-/// Origin of a request to end the work.
+/// A request to end the work: the signal with this number has arrived.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Request {
-    /// The user pressed a key of the live view.
-    Quit,
-    /// The system sent the signal with this number.
-    Signal(i32),
-}
+pub struct Request(i32);
 
 impl Request {
     /// Request that Ctrl-C makes, which is the signal SIGINT.
-    pub const INTERRUPT: Self = Self::Signal(SIGINT);
+    pub const INTERRUPT: Self = Self(SIGINT);
 
     /// Returns the exit code of a process that this request ended: 128 plus the signal's number, as
-    /// shells count, or 0 for the user.
+    /// shells count.
     pub fn exit_code(self) -> u8 {
-        match self {
-            Self::Quit => 0,
-            Self::Signal(number) => u8::try_from(128 + number).unwrap_or(1),
-        }
+        u8::try_from(128 + self.0).unwrap_or(1)
     }
 }
 
 impl std::fmt::Display for Request {
     fn fmt(&self, out: &mut std::fmt::Formatter) -> std::fmt::Result {
-        match self {
-            Self::Quit => write!(out, "the user"),
-            Self::Signal(SIGHUP) => write!(out, "a signal (SIGHUP)"),
-            Self::Signal(SIGINT) => write!(out, "a signal (SIGINT)"),
-            Self::Signal(SIGTERM) => write!(out, "a signal (SIGTERM)"),
-            Self::Signal(number) => write!(out, "a signal ({number})"),
+        match self.0 {
+            SIGHUP => write!(out, "a signal (SIGHUP)"),
+            SIGINT => write!(out, "a signal (SIGINT)"),
+            SIGTERM => write!(out, "a signal (SIGTERM)"),
+            number => write!(out, "a signal ({number})"),
         }
     }
 }
@@ -106,19 +96,14 @@ impl Interrupt {
 
     /// Records a request to end the work.
     pub fn ask(&self, request: Request) {
-        match request {
-            Request::Quit => self.quit.store(true, Ordering::Relaxed),
-            Request::Signal(number) => {
-                self.signal.store(usize::try_from(number).unwrap_or_default(), Ordering::Relaxed);
-            }
-        }
+        self.signal.store(usize::try_from(request.0).unwrap_or_default(), Ordering::Relaxed);
     }
 
     /// Returns the request that was made, if any.
     pub fn asked(&self) -> Option<Request> {
         match self.signal.load(Ordering::Relaxed) {
-            0 => self.quit.load(Ordering::Relaxed).then_some(Request::Quit),
-            number => Some(Request::Signal(i32::try_from(number).unwrap_or_default())),
+            0 => None,
+            number => Some(Request(i32::try_from(number).unwrap_or_default())),
         }
     }
 }

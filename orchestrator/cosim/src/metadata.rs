@@ -69,7 +69,7 @@ pub fn metadata(
             "start": simulation.start, "stop": simulation.stop, "step": simulation.step,
             "steps": system.clock.ticks(), "coupling": simulation.coupling, "order": system.names(),
         },
-        "real_time": real_time.map(|s| json!({ "factor": s.factor, "on_miss": s.on_miss, "priority": s.priority })),
+        "real_time": real_time.map(|s| json!({ "factor": s.factor, "on_miss": s.on_miss })),
         "components": components,
         "seeds": seeds,
         "connections": connections,

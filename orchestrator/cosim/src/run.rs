@@ -40,13 +40,13 @@ impl Run {
     }
 
     /// Paces the run from now on, so that it keeps in step with the timer.
-    pub fn pace(&mut self, settings: Settings, timer: Rc<dyn Timer>) -> &Pacer {
+    pub fn pace(&mut self, settings: Settings, timer: Rc<dyn Timer>) {
         self.measure(&timer);
         let spent = self.master.members.iter().zip(&self.spent);
         let components =
             spent.map(|(member, spent)| (member.name.clone(), member.every, Rc::clone(spent)));
         let (clock, interrupt) = (self.master.clock(), self.interrupt.clone());
-        self.pacer.insert(Pacer::new(settings, clock, timer, interrupt, components))
+        self.pacer = Some(Pacer::new(settings, clock, timer, interrupt, components));
     }
 
     /// Removes the pacer that kept the run in step and returns it; `None` if the run was not paced.

@@ -7,7 +7,6 @@ use cosim::experiment::Guarantee;
 use cosim::run::{Observer, Sample};
 use cosim::signal::Resolved;
 use cosim::system::{Probed, System};
-use std::sync::Arc;
 
 /// Variables in which a controller reports whether its guarantee is in force.
 #[derive(Clone, Debug, Default)]
@@ -37,9 +36,8 @@ pub struct GuaranteeLoss {
 /// Record of the guarantee up to a tick.
 #[derive(Clone, Debug, Default)]
 pub struct GuaranteeRecord {
-    /// Variables that the record is computed from. They are shared, because the live view copies
-    /// the record at every communication point.
-    pub signals: Arc<GuaranteeSignals>,
+    /// Variables that the record is computed from.
+    pub signals: GuaranteeSignals,
     ticks: u64,
     ticks_in_force: u64,
     status: Option<f64>,
@@ -97,13 +95,14 @@ impl GuaranteeRecord {
     /// Creates a record that has seen no samples.
     pub fn new(signals: GuaranteeSignals) -> Self {
         let margins = vec![None; signals.margins.len()];
-        Self { margins, signals: Arc::new(signals), ..Self::default() }
+        Self { signals, margins, ..Self::default() }
     }
 
     /// Forgets all samples.
     pub fn reset(&mut self) {
         let margins = vec![None; self.signals.margins.len()];
-        *self = Self { margins, signals: Arc::clone(&self.signals), ..Self::default() };
+        let signals = std::mem::take(&mut self.signals);
+        *self = Self { signals, margins, ..Self::default() };
     }
 
     /// Returns the share of the ticks at which the guarantee was in force; `None` before the first
@@ -117,16 +116,6 @@ impl GuaranteeRecord {
         values[self.signals.in_force] != 0.0
     }
 
-    /// Returns the margins in these values.
-    pub fn margins_at(&self, values: &[f64]) -> Vec<Option<f64>> {
-        self.signals.margins.iter().map(|(_, place)| Some(values[*place])).collect()
-    }
-
-    /// Returns the status of the guarantee at the last tick seen.
-    pub fn status_now(&self) -> Option<f64> {
-        self.status
-    }
-
     /// Returns the status at which the guarantee was first lost, or the present status if it never
     /// was.
     pub fn status(&self) -> Option<f64> {
@@ -138,13 +127,6 @@ impl GuaranteeRecord {
         let mut items = self.signals.status.iter().flat_map(|status| &status.items);
         let item = items.find(|(_, item)| f64::from(*item) == status);
         item.map_or_else(|| status.to_string(), |(name, _)| name.clone())
-    }
-
-    /// Formats margins as part of a sentence.
-    pub fn margins_text(&self, margins: &[Option<f64>]) -> String {
-        margins_text(
-            margins.iter().copied().zip(self.signals.margins.iter().map(|(name, _)| name.as_str())),
-        )
     }
 }
 

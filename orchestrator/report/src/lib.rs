@@ -3,7 +3,6 @@
 
 mod coast;
 pub mod figure;
-pub mod pacing;
 pub mod page;
 pub mod panels;
 pub mod recording;

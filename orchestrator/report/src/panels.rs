@@ -1,5 +1,4 @@
-//! The panels of an experiment whose signals have been found, for the figure of a run and for the
-//! live view.
+//! The panels of an experiment whose signals have been found.
 
 use cosim::error::Error;
 use cosim::experiment;
@@ -75,27 +74,5 @@ impl Panel {
             shown.map_or((signal_unit, 1.0), |unit| (unit.name.clone(), unit.factor));
         let label = if requested.label.is_empty() { &requested.name } else { &requested.label };
         Ok(Self { name: requested.name.clone(), label: label.clone(), unit, factor, curves, limit })
-    }
-
-    /// Returns the values of the curves in a sample.
-    pub fn values<'a>(&'a self, sample: &'a [f64]) -> impl Iterator<Item = f64> + 'a {
-        self.curves.iter().map(|curve| self.factor * curve.signal.value(sample))
-    }
-
-    /// Returns whether any of the curves has a reference.
-    pub fn has_references(&self) -> bool {
-        self.curves.iter().any(|curve| curve.reference.is_some())
-    }
-
-    /// Returns the references of the curves in a sample. A value is not a number if a curve has no
-    /// reference.
-    pub fn references<'a>(&'a self, sample: &'a [f64]) -> impl Iterator<Item = f64> + 'a {
-        let scaled = |signal: &Resolved| self.factor * signal.value(sample);
-        self.curves.iter().map(move |curve| curve.reference.as_ref().map_or(f64::NAN, scaled))
-    }
-
-    /// Returns the limit of the norm of all curves in a sample, if there is one.
-    pub fn limit_in(&self, sample: &[f64]) -> Option<f64> {
-        self.limit.as_ref().map(|limit| self.factor * limit.value(sample))
     }
 }

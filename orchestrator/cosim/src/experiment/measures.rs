@@ -29,14 +29,12 @@ pub struct Observe {
     pub loss: Option<Loss>,
     /// Condition at the end of a run under which it has missed its goal and is not completed.
     pub goal: Option<Loss>,
-    /// Panels of the figure of a run and of the live view.
+    /// Panels of the figure of a run.
     pub panels: Vec<Panel>,
     /// Variables by which the page of a run shows the vehicle.
     pub vehicle: Option<Vehicle>,
     /// Variables by which the pictures of a run show a flight over a planet.
     pub trajectory: Option<Trajectory>,
-    /// Further lines of the live view: lists of variables, by the heading of the line.
-    pub readings: BTreeMap<String, Vec<String>>,
 }
 
 /// Stability margins of the loop as metrics: `margin_disk` and so on, each the smallest of all
@@ -213,11 +211,11 @@ pub struct Loss {
     pub beyond: f64,
 }
 
-/// A panel of the figure of a run and of the live view.
+/// A panel of the figure of a run.
 #[derive(Clone, Debug, Deserialize, JsonSchema, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Panel {
-    /// Short name of the panel, for the live view.
+    /// Name of the panel, by which errors name it.
     pub name: String,
     /// Label of the vertical axis, without the unit. By default it is the name of the panel.
     #[serde(default)]

@@ -9,7 +9,6 @@
 
 pub mod distribution;
 pub mod pacer;
-pub mod priority;
 pub mod report;
 pub mod timer;
 
@@ -24,8 +23,6 @@ pub struct Settings {
     pub factor: Factor,
     /// Action taken when a deadline is missed.
     pub on_miss: OnMiss,
-    /// Real-time priority, 1 to 99, if one is requested.
-    pub priority: Option<u8>,
 }
 
 /// A real-time factor, which is finite and positive.
@@ -64,8 +61,6 @@ pub enum OnMiss {
     /// base.
     #[default]
     CatchUp,
-    /// Shift the time base by the delay: the run continues at its pace, and ends that much later.
-    Slip,
     /// End the run with an error. The results so far are kept.
     Stop,
 }

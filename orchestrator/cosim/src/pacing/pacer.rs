@@ -1,14 +1,13 @@
 //! The pacer keeps a run in step with a timer and checks the deadlines.
 
 use super::distribution::Distribution;
-use super::report::{ComponentTiming, Lag, Late, RealTime, Series};
+use super::report::{ComponentTiming, Lag, Late, RealTime};
 use super::timer::Timer;
 use super::{OnMiss, Settings};
 use crate::error::Error;
 use crate::interrupt::Interrupt;
 use crate::stopwatch::Spent;
 use fmi_master::clock::Clock;
-use std::cell::Cell;
 use std::collections::BTreeMap;
 use std::rc::Rc;
 use std::time::Duration;
@@ -44,21 +43,6 @@ pub struct Step {
     pub duration: Duration,
 }
 
-/// State of the pacing while the run goes on.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Tally {
-    /// Number of deadlines checked so far.
-    pub deadlines: u64,
-    /// Number of deadlines missed so far.
-    pub misses: u64,
-    /// The most recent missed deadline, if any.
-    pub last: Option<Miss>,
-    /// Delay with which the current communication point began.
-    pub lag: Duration,
-    /// Sum of all shifts of the time base.
-    pub slipped: Duration,
-}
-
 /// A component with its timing, as the pacer needs it.
 struct Task {
     name: String,
@@ -70,7 +54,6 @@ struct Task {
     responses: Distribution,
     wake_ups: Distribution,
     misses: u64,
-    series: Series,
 }
 
 /// Keeps a run in step with a timer, and records how well it did.
@@ -80,8 +63,7 @@ pub struct Pacer {
     timer: Rc<dyn Timer>,
     interrupt: Interrupt,
     tasks: Vec<Task>,
-    /// Instant of the simulation's start on the timer. A slip moves it.
-    base: Duration,
+    /// Instant of the simulation's start on the timer.
     began: Duration,
     elapsed: Duration,
     /// Instant at which the work of the current tick began. `tick_spent` is the computing time of
@@ -90,19 +72,20 @@ pub struct Pacer {
     tick_spent: Duration,
     /// Wake-up jitter of the current tick, if there was a wait.
     woken: Option<Duration>,
-    /// Whether a deadline was missed since the current tick began.
-    missed: bool,
     longest: Step,
     first: Option<Miss>,
     worst: Option<Miss>,
     late_starts: u64,
     largest_lag: Duration,
-    slips: u64,
-    tally: Rc<Cell<Tally>>,
+    /// Number of deadlines checked so far.
+    deadlines: u64,
+    /// Number of deadlines missed so far.
+    misses: u64,
+    /// Delay with which the current communication point began.
+    lag: Duration,
     /// Time that the orchestrator itself takes at a communication point.
     overhead: Distribution,
     wake_ups: Distribution,
-    wake_up_series: Series,
 }
 
 impl Pacer {
@@ -124,7 +107,6 @@ impl Pacer {
             responses: Distribution::default(),
             wake_ups: Distribution::default(),
             misses: 0,
-            series: Series::new(clock.ticks() / u64::from(every)),
         });
         Self {
             tasks: tasks.collect(),
@@ -132,48 +114,33 @@ impl Pacer {
             clock,
             timer,
             interrupt,
-            base: Duration::ZERO,
             began: Duration::ZERO,
             elapsed: Duration::ZERO,
             tick_began: Duration::ZERO,
             tick_spent: Duration::ZERO,
             woken: None,
-            missed: false,
             longest: Step::default(),
             first: None,
             worst: None,
             late_starts: 0,
             largest_lag: Duration::ZERO,
-            slips: 0,
-            tally: Rc::default(),
+            deadlines: 0,
+            misses: 0,
+            lag: Duration::ZERO,
             overhead: Distribution::default(),
             wake_ups: Distribution::default(),
-            wake_up_series: Series::new(clock.ticks()),
         }
-    }
-
-    /// Shared state of the pacing, which can be read while the run goes on.
-    pub fn tally(&self) -> Rc<Cell<Tally>> {
-        Rc::clone(&self.tally)
     }
 
     /// Waits for a communication point, unless it has passed. Returns early if the run is to end.
     pub fn wait(&mut self, tick: u64) {
         let now = self.timer.now();
         if tick == 0 {
-            (self.base, self.began) = (now, now);
+            self.began = now;
         } else {
             self.count_overhead(now);
         }
-        let mut release = self.release(tick);
-        let lag = now.saturating_sub(release);
-        if self.missed && self.settings.on_miss == OnMiss::Slip {
-            self.base += lag;
-            self.slips += 1;
-            self.update(|tally| tally.slipped += lag);
-            release = now;
-        }
-        self.missed = false;
+        let release = self.release(tick);
         if now < release {
             self.sleep_until(release);
             self.longest = Step::default();
@@ -184,9 +151,8 @@ impl Pacer {
         }
         self.tick_began = self.timer.now();
         self.tick_spent = self.spent();
-        let lag = self.tick_began.saturating_sub(release);
-        self.largest_lag = self.largest_lag.max(lag);
-        self.update(|tally| tally.lag = lag);
+        self.lag = self.tick_began.saturating_sub(release);
+        self.largest_lag = self.largest_lag.max(self.lag);
     }
 
     fn sleep_until(&self, release: Duration) {
@@ -209,7 +175,6 @@ impl Pacer {
         let time = self.clock.time(tick);
         if let Some(woken) = self.woken {
             self.wake_ups.record(woken);
-            self.wake_up_series.add(time, woken);
         }
         let release = self.release(tick);
         for (component, task) in self.tasks.iter_mut().enumerate() {
@@ -219,7 +184,6 @@ impl Pacer {
             let duration = task.spent.time().saturating_sub(task.counted);
             task.counted += duration;
             task.steps.record(duration);
-            task.series.add(time, duration);
             task.responses.record(task.spent.ended().saturating_sub(release));
             if let Some(woken) = self.woken {
                 task.wake_ups.record(woken);
@@ -236,15 +200,9 @@ impl Pacer {
             }
             let late =
                 task.spent.ended().saturating_sub(self.release(tick + u64::from(task.every)));
-            self.update(|tally| tally.deadlines += 1);
+            self.deadlines += 1;
             if !late.is_zero() {
-                let miss = Miss {
-                    component,
-                    time,
-                    late,
-                    lag: self.tally.get().lag,
-                    longest: self.longest,
-                };
+                let miss = Miss { component, time, late, lag: self.lag, longest: self.longest };
                 self.note(miss);
                 if self.settings.on_miss == OnMiss::Stop && outcome.is_ok() {
                     let Late { component, time, late_ms, .. } = self.late(miss);
@@ -256,16 +214,12 @@ impl Pacer {
     }
 
     fn note(&mut self, miss: Miss) {
-        self.missed = true;
+        self.misses += 1;
         self.tasks[miss.component].misses += 1;
         self.first = self.first.or(Some(miss));
         if self.worst.is_none_or(|worst| miss.late > worst.late) {
             self.worst = Some(miss);
         }
-        self.update(|tally| {
-            tally.misses += 1;
-            tally.last = Some(miss);
-        });
     }
 
     /// Records the end of the run.
@@ -285,7 +239,7 @@ impl Pacer {
         };
         let after = Duration::try_from_secs_f64(simulated / self.settings.factor.get())
             .unwrap_or(Duration::MAX);
-        self.base.saturating_add(after)
+        self.began.saturating_add(after)
     }
 
     fn spent(&self) -> Duration {
@@ -295,12 +249,6 @@ impl Pacer {
     fn count_overhead(&mut self, now: Duration) {
         let in_instances = self.spent().saturating_sub(self.tick_spent);
         self.overhead.record(now.saturating_sub(self.tick_began).saturating_sub(in_instances));
-    }
-
-    fn update(&self, change: impl FnOnce(&mut Tally)) {
-        let mut tally = self.tally.get();
-        change(&mut tally);
-        self.tally.set(tally);
     }
 
     fn late(&self, miss: Miss) -> Late {
@@ -316,16 +264,13 @@ impl Pacer {
         }
     }
 
-    /// Returns the timing report of the run, the time series of the wake-up jitter, and the time
-    /// series of each component's step time.
-    pub fn report(self) -> (RealTime, Series, Vec<(String, Series)>) {
+    /// Returns the timing report of the run.
+    pub fn report(self) -> RealTime {
         let (first_miss, worst_miss) =
             (self.first.map(|m| self.late(m)), self.worst.map(|m| self.late(m)));
-        let tally = self.tally.get();
         let milliseconds = |duration: Duration| duration.as_secs_f64() * 1e3;
         let period = self.clock.step() / self.settings.factor.get() * 1e3;
         let mut components = BTreeMap::new();
-        let mut series = Vec::new();
         for task in self.tasks {
             let component = ComponentTiming {
                 period_ms: period * f64::from(task.every),
@@ -334,30 +279,25 @@ impl Pacer {
                 response_ms: task.responses.summary(),
                 wake_up_ms: task.wake_ups.summary(),
             };
-            components.insert(task.name.clone(), component);
-            series.push((task.name, task.series));
+            components.insert(task.name, component);
         }
-        let report = RealTime {
+        RealTime {
             factor: self.settings.factor,
             on_miss: self.settings.on_miss,
-            priority: super::priority::Priority::default(),
             elapsed_s: self.elapsed.as_secs_f64(),
-            deadlines: tally.deadlines,
-            misses: tally.misses,
+            deadlines: self.deadlines,
+            misses: self.misses,
             first_miss,
             worst_miss,
             lag: Lag {
                 late_starts: self.late_starts,
                 largest_ms: milliseconds(self.largest_lag),
-                at_end_ms: milliseconds(tally.lag),
-                slips: self.slips,
-                slipped_ms: milliseconds(tally.slipped),
+                at_end_ms: milliseconds(self.lag),
             },
             components,
             wake_up_ms: self.wake_ups.summary(),
             orchestrator_ms: self.overhead.summary(),
-        };
-        (report, self.wake_up_series, series)
+        }
     }
 }
 

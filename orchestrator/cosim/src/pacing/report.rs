@@ -1,13 +1,11 @@
 //! Timing report of a run that was paced by the wall clock.
 
 use super::distribution::Summary;
-use super::priority::Priority;
 use super::{Factor, OnMiss};
 use fmi_master::quantity::rounded;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::io::{self, Write};
-use std::time::Duration;
 
 /// The timing figures that `metrics.json` holds under `real_time`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -16,8 +14,6 @@ pub struct RealTime {
     pub factor: Factor,
     /// Action requested for a missed deadline.
     pub on_miss: OnMiss,
-    /// Scheduling of the run's thread.
-    pub priority: Priority,
     /// Time from the first communication point to the end of the last, s.
     pub elapsed_s: f64,
     /// Number of deadlines that were checked.
@@ -59,7 +55,7 @@ pub struct Late {
     pub longest_ms: f64,
 }
 
-/// Delay of a run against the wall clock, and the shifts of its time base.
+/// Delay of a run against the wall clock.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Lag {
     /// Number of communication points that began late because earlier work took too long.
@@ -68,10 +64,6 @@ pub struct Lag {
     pub largest_ms: f64,
     /// Delay with which the last communication point began, ms.
     pub at_end_ms: f64,
-    /// Number of shifts of the time base.
-    pub slips: u64,
-    /// Sum of all shifts of the time base, ms.
-    pub slipped_ms: f64,
 }
 
 /// Timing figures of one component.
@@ -88,44 +80,6 @@ pub struct ComponentTiming {
     pub response_ms: Summary,
     /// Wake-up jitter at the component's own communication points.
     pub wake_up_ms: Summary,
-}
-
-/// Approximate upper bound of the number of points of a time series in a figure.
-const POINTS: u64 = 5000;
-
-/// Time series of a duration; each point is the largest value of a stretch of communication points.
-#[derive(Clone, Debug, Default)]
-pub struct Series {
-    stride: u64,
-    count: u64,
-    /// Simulated times of the communication points, s.
-    pub time: Vec<f64>,
-    /// Durations at these times, ms.
-    pub milliseconds: Vec<f64>,
-}
-
-impl Series {
-    /// Creates an empty series with room for this number of durations.
-    pub fn new(expected: u64) -> Self {
-        let stride = expected.div_ceil(POINTS).max(1);
-        let capacity = (expected / stride + 2) as usize;
-        let (time, milliseconds) = (Vec::with_capacity(capacity), Vec::with_capacity(capacity));
-        Self { stride, count: 0, time, milliseconds }
-    }
-
-    /// Adds the duration of one communication point.
-    pub fn add(&mut self, time: f64, duration: Duration) {
-        let milliseconds = duration.as_secs_f64() * 1e3;
-        if self.count.is_multiple_of(self.stride) {
-            self.time.push(time);
-            self.milliseconds.push(milliseconds);
-        } else if let (Some(last), Some(at)) = (self.milliseconds.last_mut(), self.time.last_mut())
-            && milliseconds > *last
-        {
-            (*at, *last) = (time, milliseconds);
-        }
-        self.count += 1;
-    }
 }
 
 impl RealTime {
@@ -220,15 +174,12 @@ impl RealTime {
         if let Some(text) = self.done_about_it() {
             line("done about it", text)?;
         }
-        if let Some(text) = self.scheduling() {
-            line("priority", text)?;
-        }
         Ok(())
     }
 
     /// Describes the action taken on missed deadlines; `None` if there were none.
     pub fn done_about_it(&self) -> Option<String> {
-        let Lag { late_starts, largest_ms, at_end_ms, slips, slipped_ms } = self.lag;
+        let Lag { late_starts, largest_ms, at_end_ms } = self.lag;
         (self.misses > 0).then(|| match self.on_miss {
             OnMiss::CatchUp => format!(
                 "went on at once, {late_starts} times without waiting; at most {} ms behind, {} ms at the last \
@@ -236,24 +187,8 @@ impl RealTime {
                 plain(largest_ms),
                 plain(at_end_ms)
             ),
-            OnMiss::Slip => format!("shifted the time base {slips} times, by {} ms in all", plain(slipped_ms)),
             OnMiss::Stop => "ended the run".into(),
         })
-    }
-
-    fn scheduling(&self) -> Option<String> {
-        match &self.priority {
-            Priority::Usual => None,
-            Priority::Fifo { priority, unlocked: None } => {
-                Some(format!("SCHED_FIFO {priority}, memory locked"))
-            }
-            Priority::Fifo { priority, unlocked: Some(reason) } => {
-                Some(format!("SCHED_FIFO {priority}; memory NOT locked: {reason}"))
-            }
-            Priority::Refused(reason) => {
-                Some(format!("REFUSED, ran with usual scheduling: {reason}"))
-            }
-        }
     }
 }
 
