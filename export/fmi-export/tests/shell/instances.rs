@@ -17,51 +17,6 @@ fn the_library_says_what_it_is() {
 }
 
 #[test]
-fn what_cannot_be_instantiated_is_refused_with_a_message() {
-    let guid_text = guid("Counter");
-    let cases = [
-        (None, CO_SIMULATION, Some(guid_text.as_c_str()), None, "'instanceName' is NULL"),
-        (Some(c""), CO_SIMULATION, Some(&guid_text), None, "instance name is empty"),
-        (Some(c"\xff"), CO_SIMULATION, Some(&guid_text), None, "is not UTF-8"),
-        (Some(c"it"), CO_SIMULATION, None, None, "'fmuGUID' is NULL"),
-        (Some(c"it"), CO_SIMULATION, Some(c"{8c4e810f}"), None, "no FMU with GUID '{8c4e810f}'"),
-        (Some(c"it"), 2, Some(&guid_text), None, "fmuType 2"),
-        (Some(c"it"), MODEL_EXCHANGE, Some(&guid_text), None, "Counter is for co-simulation only"),
-        (
-            Some(c"it"),
-            CO_SIMULATION,
-            Some(&guid_text),
-            Some(c"http://example.org"),
-            "scheme 'http'",
-        ),
-    ];
-    for (name, fmu_type, guid, resources, part) in cases {
-        let refused = instantiate(name, fmu_type, guid, resources, false);
-        assert!(refused.component.is_null(), "{part}");
-        refused.said(&["fmi2Instantiate", part]);
-        assert_eq!(refused.messages()[0].status, FmiStatus::Error);
-    }
-}
-
-#[test]
-fn no_callbacks_and_no_logger_are_fine() {
-    let guid_text = guid("Lag");
-    let mut silent = callbacks(null());
-    silent.logger = None;
-    for callbacks in [null(), &raw const silent] {
-        let component =
-            c!(fmi2Instantiate(c"it".as_ptr(), 1, guid_text.as_ptr(), null(), callbacks, 0, 1));
-        assert!(!component.is_null());
-        assert_eq!(c!(fmi2DoStep(component, 0.0, 0.1, 1)), FmiStatus::Error);
-        c!(fmi2FreeInstance(component));
-        assert_eq!(
-            c!(fmi2Instantiate(c"it".as_ptr(), 1, c"x".as_ptr(), null(), callbacks, 0, 1)),
-            null_mut()
-        );
-    }
-}
-
-#[test]
 fn the_resource_folder_reaches_the_model() {
     const RESOURCES: u32 = 3;
     for (uri, expected) in [
@@ -72,32 +27,6 @@ fn the_resource_folder_reaches_the_model() {
         let instance = instantiate(Some(c"it"), CO_SIMULATION, Some(&guid("Counter")), uri, true);
         instance.initialize();
         assert_eq!(instance.string(RESOURCES), expected);
-    }
-}
-
-#[test]
-fn interleaved_instances_and_fmus_do_not_affect_each_other() {
-    const COUNT: u32 = 2;
-    let alone = |gain: f64| {
-        let instance = Instance::lag(CO_SIMULATION);
-        assert_eq!(instance.set_real(GAIN, gain), FmiStatus::Ok);
-        instance.initialize();
-        assert_eq!(instance.set_real(U, 1.0), FmiStatus::Ok);
-        instance
-    };
-    let steps = |instance: &Instance, k: i32| {
-        assert_eq!(instance.step(f64::from(k) * 0.1, 0.1), FmiStatus::Ok);
-        instance.real(X).to_bits()
-    };
-    let (one, two) = (alone(2.0), alone(-3.0));
-    let expected: Vec<_> =
-        (0..20).map(|k| steps(&one, k)).zip((0..20).map(|k| steps(&two, k))).collect();
-    let (one, two, counter) = (alone(2.0), alone(-3.0), Instance::new("Counter", CO_SIMULATION));
-    counter.initialize();
-    for k in 0..20 {
-        assert_eq!((steps(&one, k), steps(&two, k)), expected[k as usize]);
-        assert_eq!(counter.step(f64::from(k) * 0.1, 0.1), FmiStatus::Ok);
-        assert_eq!(counter.real(COUNT), f64::from(k + 1));
     }
 }
 

@@ -3,7 +3,6 @@
 
 use crate::support::*;
 use fmi_export::types::FmiStatus;
-use std::ptr::null_mut;
 
 /// Drives an instance over three steps from `k` on and returns the bits of all its outputs.
 fn run(instance: &Instance, from: i32) -> Vec<u64> {
@@ -16,22 +15,6 @@ fn run(instance: &Instance, from: i32) -> Vec<u64> {
         bits.push(instance.boolean(SWITCHED) as u64);
     }
     bits
-}
-
-#[test]
-fn a_restored_state_goes_on_bit_for_bit() {
-    let instance = Instance::stepping();
-    run(&instance, 0);
-    let mut state = instance.save();
-    let expected = run(&instance, 3);
-    for _ in 0..2 {
-        assert_eq!(c!(fmi2SetFMUstate(instance.component, state)), FmiStatus::Ok);
-        assert_eq!(run(&instance, 3), expected);
-    }
-    assert_eq!(c!(fmi2FreeFMUstate(instance.component, &mut state)), FmiStatus::Ok);
-    assert!(state.is_null());
-    assert_eq!(c!(fmi2FreeFMUstate(instance.component, &mut state)), FmiStatus::Ok);
-    assert_eq!(c!(fmi2FreeFMUstate(instance.component, null_mut())), FmiStatus::Ok);
 }
 
 #[test]
@@ -76,46 +59,6 @@ fn pending_input_derivatives_are_part_of_the_state() {
 }
 
 #[test]
-fn every_damaged_byte_and_every_truncation_is_refused() {
-    let instance = Instance::stepping();
-    run(&instance, 0);
-    let bytes = instance.serialize();
-    let refused = |bytes: &[u8], what: &str| {
-        let (status, state) = instance.deserialize(bytes);
-        assert_eq!(status, FmiStatus::Error, "{what}");
-        assert!(state.is_null());
-        instance.said(&["fmi2DeSerializeFMUstate", "saved state"]);
-    };
-    for i in 0..bytes.len() {
-        for bit in 0..8 {
-            let mut damaged = bytes.clone();
-            damaged[i] ^= 1 << bit;
-            refused(&damaged, &format!("bit {bit} of byte {i}"));
-        }
-        refused(&bytes[..i], &format!("cut to {i} bytes"));
-    }
-    let longer = [bytes.as_slice(), &[0]].concat();
-    refused(&longer, "one byte more");
-    // The instance is unchanged.
-    assert_eq!(instance.serialize(), bytes);
-    run(&instance, 3);
-}
-
-#[test]
-fn a_state_of_another_fmu_or_interface_is_refused() {
-    let lag = Instance::stepping();
-    let bytes = lag.serialize();
-    let counter = Instance::new("Counter", CO_SIMULATION);
-    assert_eq!(counter.deserialize(&bytes).0, FmiStatus::Error);
-    counter.said(&["belongs to an FMU with GUID"]);
-    let exchange = Instance::lag(MODEL_EXCHANGE);
-    assert_eq!(exchange.deserialize(&bytes).0, FmiStatus::Error);
-    exchange.said(&["other interface"]);
-    let empty = lag.deserialize(&[]);
-    assert_eq!(empty.0, FmiStatus::Error);
-}
-
-#[test]
 fn a_handle_that_is_not_ones_own_is_refused() {
     let (one, other) = (Instance::stepping(), Instance::stepping());
     let state = one.save();
@@ -131,20 +74,6 @@ fn a_handle_that_is_not_ones_own_is_refused() {
     // None of these refusals ends the simulation.
     assert_eq!(one.step(0.0, 0.1), FmiStatus::Ok);
     assert_eq!(other.step(0.0, 0.1), FmiStatus::Ok);
-}
-
-#[test]
-fn a_buffer_that_is_too_small_is_refused() {
-    let instance = Instance::stepping();
-    let state = instance.save();
-    let mut buffer = [0u8; 8];
-    let component = instance.component;
-    assert_eq!(
-        c!(fmi2SerializeFMUstate(component, state, buffer.as_mut_ptr().cast(), 8)),
-        FmiStatus::Error
-    );
-    instance.said(&["room for 8 bytes"]);
-    assert_eq!(buffer, [0; 8]);
 }
 
 #[test]

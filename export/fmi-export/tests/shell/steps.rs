@@ -35,20 +35,6 @@ fn the_last_step_may_be_shorter_by_rounding_or_empty() {
 }
 
 #[test]
-fn a_wrong_communication_point_or_step_is_refused() {
-    for (point, size, part) in [
-        (0.2, 0.1, "communication point 0.2 s, but the instance is at 0 s"),
-        (0.0, -0.1, "cannot step"),
-        (0.0, f64::NAN, "cannot step"),
-        (f64::INFINITY, 0.1, "cannot step"),
-    ] {
-        let instance = Instance::stepping();
-        assert_eq!(instance.step(point, size), FmiStatus::Error);
-        instance.said(&["fmi2DoStep", part]);
-    }
-}
-
-#[test]
 fn the_stop_time_holds_if_it_is_defined() {
     let with_stop = |stop| {
         let instance = Instance::lag(CO_SIMULATION);
@@ -66,33 +52,6 @@ fn the_stop_time_holds_if_it_is_defined() {
     assert_eq!(instance.step(0.0, 0.6), FmiStatus::Error);
     instance.said(&["beyond the stop time 0.5 s"]);
     assert_eq!(Instance::stepping().step(0.0, 100.0), FmiStatus::Ok);
-}
-
-#[test]
-fn a_senseless_experiment_is_refused() {
-    let instance = || Instance::lag(CO_SIMULATION);
-    assert_eq!(
-        c!(fmi2SetupExperiment(instance().component, 0, 0.0, f64::NAN, 0, 0.0)),
-        FmiStatus::Error
-    );
-    assert_eq!(
-        c!(fmi2SetupExperiment(instance().component, 0, 0.0, 1.0, 1, 0.5)),
-        FmiStatus::Error
-    );
-    assert_eq!(
-        c!(fmi2SetupExperiment(instance().component, 1, -1.0, 0.0, 0, 0.0)),
-        FmiStatus::Error
-    );
-    assert_eq!(
-        c!(fmi2SetupExperiment(instance().component, 0, f64::NAN, 0.0, 0, f64::NAN)),
-        FmiStatus::Ok
-    );
-}
-
-#[test]
-fn an_experiment_may_end_where_it_starts() {
-    let instance = Instance::lag(CO_SIMULATION);
-    assert_eq!(c!(fmi2SetupExperiment(instance.component, 0, 0.0, 2.0, 1, 2.0)), FmiStatus::Ok);
 }
 
 /// Returns an instance at that time, which it reached in one step.
@@ -139,34 +98,6 @@ fn set_derivative(instance: &Instance, reference: u32, order: i32, value: f64) -
 }
 
 #[test]
-fn oracle_input_derivatives_make_a_ramp() {
-    let instance = Instance::stepping();
-    let h = 0.01;
-    for k in 0..100 {
-        let t = f64::from(k) * h;
-        assert_eq!(set_derivative(&instance, U, 1, 3.0), FmiStatus::Ok);
-        assert_eq!(instance.set_real(U, 3.0 * t), FmiStatus::Ok);
-        assert_eq!(instance.step(t, h), FmiStatus::Ok);
-    }
-    // The ramp u = a t gives x(t) = k a (t − T) + (x₀ + k a T) e^(−t/T).
-    let (k, a, time_constant) = (2.0, 3.0, 0.5);
-    let exact = k * a * (1.0 - time_constant)
-        + (0.5 + k * a * time_constant) * (-1.0f64 / time_constant).exp();
-    assert!((instance.real(X) - exact).abs() < 1e-9, "{} {exact}", instance.real(X));
-    assert!((instance.real(U) - 3.0).abs() < 1e-12, "the input ends where it was extrapolated to");
-}
-
-#[test]
-fn input_derivatives_hold_for_one_step() {
-    let instance = Instance::stepping();
-    assert_eq!(set_derivative(&instance, U, 2, 4.0), FmiStatus::Ok);
-    assert_eq!(instance.step(0.0, 0.5), FmiStatus::Ok);
-    assert_eq!(instance.real(U), 4.0 * 0.25 / 2.0);
-    assert_eq!(instance.step(0.5, 0.5), FmiStatus::Ok);
-    assert_eq!(instance.real(U), 0.5);
-}
-
-#[test]
 fn oracle_derivatives_of_several_orders_add_up() {
     let instance = Instance::stepping();
     for (order, value) in [(1, 2.0), (2, 6.0), (3, -12.0)] {
@@ -175,32 +106,6 @@ fn oracle_derivatives_of_several_orders_add_up() {
     let h = 0.5;
     assert_eq!(instance.step(0.0, h), FmiStatus::Ok);
     assert_eq!(instance.real(U), 2.0 * h + 6.0 * h * h / 2.0 - 12.0 * h * h * h / 6.0);
-}
-
-#[test]
-fn senseless_input_derivatives_are_refused() {
-    for (reference, order, value, part) in [
-        (U, 0, 1.0, "order 0"),
-        (U, 4, 1.0, "order 4"),
-        (U, 1, f64::NAN, "NaN is not finite"),
-        (X, 1, 1.0, "'x' is not a continuous input"),
-        (OFFSET, 1, 1.0, "'offset' is not a continuous input"),
-        (LABEL, 1, 1.0, "not of type Real"),
-        (99, 1, 1.0, "does not exist"),
-    ] {
-        let instance = Instance::stepping();
-        assert_eq!(set_derivative(&instance, reference, order, value), FmiStatus::Error);
-        instance.said(&["fmi2SetRealInputDerivatives", part]);
-    }
-}
-
-#[test]
-fn output_derivatives_are_not_offered() {
-    let instance = Instance::stepping();
-    let mut value = 0.0;
-    let status = c!(fmi2GetRealOutputDerivatives(instance.component, &X, 1, &1, &mut value));
-    assert_eq!(status, FmiStatus::Error);
-    instance.said(&["maxOutputDerivativeOrder is 0"]);
 }
 
 #[test]

@@ -15,8 +15,6 @@ pub(crate) const TIME_CONSTANT: u32 = 0;
 pub(crate) const GAIN: u32 = 1;
 pub(crate) const INITIAL: u32 = 4;
 pub(crate) const ORDER: u32 = 5;
-pub(crate) const INVERTED: u32 = 6;
-pub(crate) const SHAPE: u32 = 7;
 pub(crate) const LABEL: u32 = 8;
 pub(crate) const U: u32 = 9;
 pub(crate) const X: u32 = 10;
@@ -190,10 +188,6 @@ impl Instance {
 
     pub(crate) fn set_integer(&self, reference: u32, value: i32) -> FmiStatus {
         c!(fmi2SetInteger(self.component, &reference, 1, &value))
-    }
-
-    pub(crate) fn set_boolean(&self, reference: u32, value: i32) -> FmiStatus {
-        c!(fmi2SetBoolean(self.component, &reference, 1, &value))
     }
 
     pub(crate) fn set_string(&self, reference: u32, value: &CStr) -> FmiStatus {
