@@ -25,24 +25,6 @@ pub fn equal_steps(length: f64, step: f64) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use nalgebra::Vector2;
-
-    fn oscillator_error(steps: u32) -> f64 {
-        let h = 1.0 / f64::from(steps);
-        let mut y = Vector2::new(1.0, 0.0);
-        for k in 0..steps {
-            y = rk4(&mut |_, y: &Vector2<f64>| Vector2::new(y.y, -y.x), f64::from(k) * h, &y, h);
-        }
-        (y - Vector2::new(1f64.cos(), -1f64.sin())).norm()
-    }
-
-    #[test]
-    fn oracle_order_is_four_on_the_harmonic_oscillator() {
-        for steps in [10, 20, 40] {
-            let order = (oscillator_error(steps) / oscillator_error(2 * steps)).log2();
-            assert!((order - 4.0).abs() < 0.05, "order {order} at {steps} steps");
-        }
-    }
 
     #[test]
     fn oracle_time_dependent_cubic_is_integrated_exactly() {

@@ -276,13 +276,6 @@ impl FileAngleProfile {
 mod tests {
     use super::*;
 
-    #[test]
-    fn embedded_scenarios_can_be_read() {
-        for (file, text) in [CRMPC_2022, TVSMC_2015, TWO_LOOP_SMC] {
-            Scenario::from_toml(file, text).unwrap();
-        }
-    }
-
     fn degrees(profile: &Profile, time: f64) -> Vector3<f64> {
         profile.at(time).angles.map(f64::to_degrees)
     }

@@ -55,25 +55,15 @@ mod tests {
     use super::*;
 
     #[test]
-    fn ticks_are_found_from_either_side_of_rounding() {
-        for k in 0..100_000 {
-            let time = tick_time(k, 0.1, 0.04);
-            assert_eq!(tick(time, 0.1, 0.04), k);
-            assert_eq!(tick(time.next_down(), 0.1, 0.04), k);
-            assert_eq!(tick(time + 0.039, 0.1, 0.04), k);
-        }
-    }
-
-    #[test]
-    fn ticks_are_found_at_unix_time_too() {
-        let start = 1.7e9;
-        for period in [1e-4, 1e-3, 0.01, 0.04, 0.2] {
+    fn ticks_are_found_from_either_side_of_rounding_at_unix_time_too() {
+        let late = [1e-4, 1e-3, 0.01, 0.04, 0.2].map(|period| (1.7e9, period, 0.85));
+        for (start, period, share) in late.into_iter().chain([(0.1, 0.04, 0.975)]) {
             check_resolution(start, period).unwrap();
             for k in 0..100_000 {
                 let time = tick_time(k, start, period);
                 assert_eq!(tick(time, start, period), k);
                 assert_eq!(tick(time.next_down(), start, period), k);
-                assert_eq!(tick(time + 0.85 * period, start, period), k, "{period}");
+                assert_eq!(tick(time + share * period, start, period), k, "{period}");
             }
         }
     }

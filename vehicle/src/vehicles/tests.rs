@@ -22,14 +22,6 @@ fn flow() -> Flow {
 }
 
 #[test]
-fn the_vehicles_of_the_program_are_read() {
-    let papers = Vehicle::papers();
-    assert!(papers.effectors.is_some() && papers.inertia.is_none());
-    assert!(Aerodynamics::shuttle().mass() > 9e4);
-    assert_ne!(papers.digest, Vehicle::from_toml("", SMALL).unwrap().digest);
-}
-
-#[test]
 fn every_fault_has_its_file_line_and_key() {
     // The line is the first one that begins with these words in the changed file.
     for (from, to, line, named) in [
@@ -44,6 +36,13 @@ fn every_fault_has_its_file_line_and_key() {
             "[10.0, 2.0]",
             "mach",
             "forces.lift.table.mach must increase, but 2 follows",
+        ),
+        ("[0.0, 20.0]", "[0.0, 0.0]", "alpha_deg", "alpha_deg must increase"),
+        (
+            "mach = [2.0, 10.0]",
+            "mach = [2.0]",
+            "values = [[0.0",
+            "one for each of the 1 Mach numbers",
         ),
         ("[0.0, 0.5],", "[0.0],", "values = [[0.0]", "values: row 1 has 1 values"),
         ("[0.0, 0.5],", "[0.0, inf],", "values = [[0.0, inf]", "row 1 holds a value"),
