@@ -38,14 +38,38 @@ fn variable(
 }
 
 fn real(start: Option<f64>) -> VariableKind {
+    with_unit(Unit::new("rad"), start, None)
+}
+
+fn with_unit(unit: Unit, start: Option<f64>, derivative_of: Option<&str>) -> VariableKind {
+    let derivative_of = derivative_of.map(String::from);
     VariableKind::Real {
-        unit: Some(Unit::new("rad")),
+        unit: Some(unit),
         min: None,
         max: None,
         nominal: None,
         start,
-        derivative_of: None,
+        derivative_of,
     }
+}
+
+/// A number between 0 and 10 without a unit.
+fn limited(start: f64) -> VariableKind {
+    let (min, max, start) = (Some(0.0), Some(10.0), Some(start));
+    VariableKind::Real { unit: None, min, max, nominal: None, start, derivative_of: None }
+}
+
+fn shape(start: i32) -> VariableKind {
+    let enumeration_type = EnumerationType {
+        name: "Shape".into(),
+        description: "How".into(),
+        items: vec![("flat".into(), "Nothing".into()), ("steep".into(), "Much".into())],
+    };
+    VariableKind::Enumeration { enumeration_type, start: Some(start) }
+}
+
+fn rate(derivative_of: &str) -> VariableKind {
+    with_unit(Unit::new("rad/s"), None, Some(derivative_of))
 }
 
 /// An FMU with these positions: 0 parameter, 1 enumeration, 2 input, 3 state, 4 derivative, 5
@@ -53,49 +77,15 @@ fn real(start: Option<f64>) -> VariableKind {
 fn fmu() -> ModelDescription {
     use Causality::{Input, Local, Output, Parameter};
     use Variability::{Continuous, Discrete, Fixed};
-    let enumeration_type = EnumerationType {
-        name: "Shape".into(),
-        description: "How".into(),
-        items: vec![("flat".into(), "Nothing".into()), ("steep".into(), "Much".into())],
-    };
-    let rate = VariableKind::Real {
-        unit: Some(Unit::new("rad/s")),
-        min: None,
-        max: None,
-        nominal: None,
-        start: None,
-        derivative_of: Some("angle".into()),
-    };
+    let count = VariableKind::Integer { min: None, max: None, start: None };
     let mut variables = vec![
-        variable(
-            "gain",
-            Parameter,
-            Fixed,
-            VariableKind::Real {
-                unit: None,
-                min: Some(0.0),
-                max: Some(10.0),
-                nominal: None,
-                start: Some(2.5),
-                derivative_of: None,
-            },
-        ),
-        variable(
-            "shape",
-            Parameter,
-            Fixed,
-            VariableKind::Enumeration { enumeration_type, start: Some(2) },
-        ),
+        variable("gain", Parameter, Fixed, limited(2.5)),
+        variable("shape", Parameter, Fixed, shape(2)),
         variable("u[1]", Input, Continuous, real(Some(std::f64::consts::PI / 180.0))),
         variable("angle", Output, Continuous, real(None)),
-        variable("der(angle)", Local, Continuous, rate),
+        variable("der(angle)", Local, Continuous, rate("angle")),
         variable("y", Output, Continuous, real(None)),
-        variable(
-            "count",
-            Output,
-            Discrete,
-            VariableKind::Integer { min: None, max: None, start: None },
-        ),
+        variable("count", Output, Discrete, count),
     ];
     for (i, names) in [(4, vec!["u[1]"]), (5, vec!["angle", "u[1]"])] {
         variables[i].dependencies = names.into_iter().map(String::from).collect();
@@ -151,34 +141,15 @@ fn contradictions_are_found_and_name_the_variable() {
             "'gain' must be both a parameter and fixed",
         ),
         (
-            |fmu| {
-                if let VariableKind::Real { start, .. } = &mut fmu.variables[0].kind {
-                    *start = Some(11.0);
-                }
-            },
+            |fmu| fmu.variables[0].kind = limited(11.0),
             "'gain' has a start value outside its limits",
         ),
+        (|fmu| fmu.variables[1].kind = shape(0), "'shape' has a start value outside its limits"),
+        (|fmu| fmu.variables[4].kind = rate("gain"), "'der(angle)' is the derivative of 'gain'"),
         (
             |fmu| {
-                if let VariableKind::Enumeration { start, .. } = &mut fmu.variables[1].kind {
-                    *start = Some(0);
-                }
-            },
-            "'shape' has a start value outside its limits",
-        ),
-        (
-            |fmu| {
-                if let VariableKind::Real { derivative_of, .. } = &mut fmu.variables[4].kind {
-                    *derivative_of = Some("gain".into());
-                }
-            },
-            "'der(angle)' is the derivative of 'gain'",
-        ),
-        (
-            |fmu| {
-                if let VariableKind::Real { unit: Some(unit), .. } = &mut fmu.variables[5].kind {
-                    unit.m = 1;
-                }
+                let unit = Unit { m: 1, ..Unit::new("rad") };
+                fmu.variables[5].kind = with_unit(unit, None, None);
             },
             "'y' defines unit 'rad' differently",
         ),
@@ -326,6 +297,7 @@ fn a_library_goes_into_every_folder_of_its_platform() {
     fs::write(&library, "machine code").unwrap();
     let aarch64 = LibraryFile { folders: &["aarch64-linux", "linux64"], ..library_file(&library) };
     let path = pack(&fmu(), &[aarch64], folder.path(), &Extras::default(), Version::Fmi2).unwrap();
+    assert!(entries(&path).iter().any(|(name, _)| name == "resources/README.txt"), "no resources");
     let names: Vec<_> = entries(&path).into_iter().map(|(name, _)| name).collect();
     for folder in ["aarch64-linux", "linux64"] {
         assert!(names.contains(&format!("binaries/{folder}/Small.so")), "{names:?}");
@@ -335,17 +307,6 @@ fn a_library_goes_into_every_folder_of_its_platform() {
     let path = pack(&fmu(), &[aarch64], folder.path(), &extras, Version::Fmi2).unwrap();
     let binaries = entries(&path).into_iter().filter(|(name, _)| name.starts_with("binaries/"));
     assert_eq!(binaries.map(|(name, _)| name).collect::<Vec<_>>(), ["binaries/linux64/Small.so"]);
-}
-
-#[test]
-fn an_archive_without_resources_has_the_folder_all_the_same() {
-    let folder = tempfile::tempdir().unwrap();
-    let library = folder.path().join("library");
-    fs::write(&library, "machine code").unwrap();
-    let path =
-        pack(&fmu(), &[library_file(&library)], folder.path(), &Extras::default(), Version::Fmi2)
-            .unwrap();
-    assert!(entries(&path).iter().any(|(name, _)| name == "resources/README.txt"));
 }
 
 #[test]
