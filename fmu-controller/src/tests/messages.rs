@@ -38,10 +38,7 @@ fn refusals() -> Vec<String> {
             |instance| instance.settings.rate_error = 0.01,
             |instance| instance.settings.delay_error = -0.01,
             |instance| instance.settings.delay_error = 0.01,
-            |instance| {
-                instance.parameters.latency.action = 0.04;
-                instance.settings.delay_error = 0.03;
-            },
+            |crmpc| (crmpc.parameters.latency.action, crmpc.settings.delay_error) = (0.04, 0.03),
             |instance| {
                 instance.parameters.latency.action = 0.04;
                 instance.settings.delay_error = 0.01;
@@ -78,10 +75,7 @@ fn refusals() -> Vec<String> {
             |instance| instance.settings.q[2] = 0.0,
             |instance| instance.parameters.latency.action = 1.5,
             |instance| instance.parameters.latency.measurement = -0.1,
-            |instance| {
-                instance.parameters.saturation = true;
-                instance.parameters.limit_moment = 0.0;
-            },
+            |lqr| (lqr.parameters.saturation, lqr.parameters.limit_moment) = (true, 0.0),
         ]),
         messages::<Fbl>(&[
             |instance| instance.settings.kp = 0.0,
@@ -140,10 +134,7 @@ fn refusals() -> Vec<String> {
             |instance| instance.settings.cutoff = 1e3,
             |instance| instance.settings.gains.proportional = 1e3,
             |instance| instance.settings.gains.integral = 1e9,
-            |instance| {
-                instance.settings.sensor_set = 2;
-                instance.settings.sensor_delay = 2.0;
-            },
+            |estimator| (estimator.settings.sensor_set, estimator.settings.sensor_delay) = (2, 2.0),
             |instance| instance.settings.rest_duration = -1.0,
             |instance| instance.settings.gates[0].range = 0.0,
             |instance| instance.settings.gates[2].jump = 0.0,
