@@ -1,6 +1,8 @@
 # Shared by the scripts: where things are, and what they need. Sourced, not run.
 set -euo pipefail
 
+# A service may be started without it.
+export HOME="${HOME:-$(cd ~ && pwd)}"
 root="$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)"
 # A relative CARGO_TARGET_DIR is relative to where the script was started, as cargo takes it.
 target="${CARGO_TARGET_DIR:-$root/target}"
