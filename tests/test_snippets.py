@@ -74,7 +74,7 @@ def commands(block):
             continue
         for rule in RULES["shorten"]:
             if re.search(rule["find"], line):
-                line = re.sub(rule["find"], "", line) if rule.get("drop") else f"{line} {rule['append']}"
+                line = f"{line} {rule['append']}"
         yield line
 
 
