@@ -70,7 +70,8 @@ fn in_the_calibration_sequence() -> ReentryPlant {
     instance
 }
 
-/// Outputs at 0.02 s with a state or an input changed by a number.
+/// Outputs at 0.02 s with a state or an input changed by a number. Where the derivatives are
+/// differences themselves, the input is found without them.
 fn changed(instance: &ReentryPlant, known: Known, by: f64) -> Output {
     let mut instance = instance.clone();
     let t = &mut instance.input.trajectory;
@@ -83,10 +84,15 @@ fn changed(instance: &ReentryPlant, known: Known, by: f64) -> Output {
         &mut t.longitude_rate,
         &mut t.latitude_rate,
     ];
-    if let Known::Trajectory(i) = known {
-        *trajectory[i] += by;
+    match known {
+        Known::Trajectory(i) => *trajectory[i] += by,
+        Known::Prescribed(i @ 0..3) => instance.input.prescribed.angles[i] += by,
+        Known::Prescribed(i) => instance.input.prescribed.rates[i - 3] += by,
+        Known::Trim => instance.input.trim += by,
+        known => {
+            instance.nudge(known, by);
+        }
     }
-    instance.nudge(known, by);
     outputs(&mut instance, 0.02)
 }
 
