@@ -4,12 +4,9 @@ import subprocess
 import zipfile
 from pathlib import Path
 
-import numpy as np
 import pytest
-from fmpy import simulate_fmu
 from fmpy.validation import validate_fmu
 
-from browsing import in_chromium
 from conftest import NAMES, ROOT, TARGET, archive, library, newest, program
 
 # The libraries by the folder with their FMUs' descriptions.
@@ -66,25 +63,6 @@ def test_description_says_what_tools_rely_on(fmu, name):
     assert any(file.startswith("documentation/licenses/LICENSE-") for file in files)
 
 
-@pytest.mark.parametrize("name", NAMES)
-def test_fmpy_simulates_an_fmu_as_it_is(fmu, name):
-    """An FMU that an importer opens and starts flies the paper's scenario with its default
-    values."""
-    result = simulate_fmu(str(archive(name)), output=fmu(name).names("output"), stop_time=10.0, output_interval=0.04)
-    assert len(result) == 251
-    values = np.array(result.tolist())
-    assert np.isfinite(values).all()
-    assert (np.ptp(values, axis=0) > 0.0).sum() >= 6
-
-
-def test_controllers_can_be_exchanged_without_rewiring(fmu):
-    crmpc, lqr = fmu("CRMPC"), fmu("LQR")
-    assert crmpc.names("input") == lqr.names("input")
-    assert set(lqr.names("output")) <= set(crmpc.names("output"))
-    for name in lqr.names("input") + lqr.names("output"):
-        assert crmpc.variables[name].unit == lqr.variables[name].unit, name
-
-
 def test_packing_twice_gives_the_same_bytes(tmp_path):
     for run in ("first", "second"):
         pack(tmp_path / run, folders=["fmu-plant"])
@@ -101,12 +79,3 @@ def test_committed_snapshots_are_what_the_libraries_say(folder, tmp_path):
         name for name in generated.keys() | committed.keys() if generated.get(name) != committed.get(name)
     )
     assert not differing, f"{differing} in {folder}/generated are out of date: run scripts/update-generated"
-
-
-@pytest.mark.tier("browser")
-@in_chromium
-@pytest.mark.parametrize("name", NAMES)
-def test_the_documentation_fits_a_telephone(name, chromium):
-    with zipfile.ZipFile(archive(name)) as file, chromium.new_page(viewport={"width": 390, "height": 800}) as page:
-        page.set_content(file.read("documentation/index.html").decode())
-        assert page.evaluate("document.documentElement.scrollWidth") <= 390

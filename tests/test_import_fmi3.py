@@ -1,7 +1,6 @@
 """FMUs of FMI 3.0 in the orchestrator: the results of FMI 2.0, bit for bit."""
 
 import csv
-import json
 import subprocess
 import zipfile
 
@@ -106,14 +105,3 @@ def test_an_ssp_archive_takes_both_versions(interface, folders, tmp_path):
     columns = [table[0].index(name) for name in ("plant.attitude.alpha", "controller.moment.x")]
     places = [expected[0].index(name) for name in ("plant.attitude.alpha", "controller.moment.x")]
     assert [[line[c] for c in columns] for line in table] == [[line[p] for p in places] for line in expected]
-
-
-def test_inspect_shows_what_fmi_3_has():
-    command = [program("orchestrator"), "inspect", TARGET / "fmi3" / "LQR.fmu"]
-    shown = subprocess.run(command, capture_output=True, text=True, check=True).stdout
-    assert "LQR (FMI 3.0)" in shown and "hasEventMode" in shown and "x86_64-linux" in shown
-    description = json.loads(subprocess.run([*command, "--json"], capture_output=True, text=True, check=True).stdout)
-    variables = {variable["name"]: variable for variable in description["variables"]}
-    assert variables["attitude.alpha"]["type"] == "Float64" and variables["attitude.alpha"]["value_reference"] == 1
-    checked = subprocess.run([*command, "--check"], capture_output=True, text=True, check=True).stdout
-    assert checked.startswith("LQR: sound, ")

@@ -354,16 +354,6 @@ def test_windows_takes_spaces_letters_backslashes_and_drive_letters(wine, tmp_pa
 
 
 @pytest.mark.tier("platforms")
-def test_windows_names_a_culprit_in_a_path_with_backslashes(wine):
-    emulator, environment = wine
-    own = orchestrator("windows-x86_64")
-    command = [*emulator, own, "run", "C:\\nö\\such file.toml"]
-    there = subprocess.run(command, env=environment, capture_output=True, timeout=120)
-    assert there.returncode == 2
-    assert "C:\\nö\\such file.toml" in there.stderr.decode()
-
-
-@pytest.mark.tier("platforms")
 @pytest.mark.parametrize(
     ("how", "alone", "together"),
     [

@@ -309,13 +309,6 @@ def test_missing_and_foreign_fmus_are_named(dist, tmp_path):
     assert f"{of_wheel} does not exist: run scripts/package" in said()
 
 
-def test_options_that_do_not_exist_are_refused(dist, tmp_path):
-    done = release(dist, tmp_path / "dist", "--require-advisory")
-    assert done.returncode == 2 and "--require-advisory is no option" in done.stderr
-    done = release(dist, tmp_path / "dist", "--advisory-db")
-    assert done.returncode == 2 and "--advisory-db is no option or has no value" in done.stderr
-
-
 JUDGE = """
 import inventory
 package = lambda licence, name="some": {"name": name, "version": "1.0.0", "license": licence}
@@ -380,12 +373,6 @@ def test_a_release_says_that_advisories_were_not_checked(made, dist, tmp_path):
     done = release(dist, tmp_path / "dist", "--require-advisories")
     assert done.returncode == 1 and not (tmp_path / "dist").exists()
     assert "error: advisories: not checked, no database could be fetched" in done.stderr
-
-
-def test_a_folder_without_advisories_is_no_database(dist, tmp_path):
-    (tmp_path / "empty" / "crates").mkdir(parents=True)
-    done = release(dist, tmp_path / "dist", "--advisory-db", tmp_path / "empty")
-    assert done.returncode == 1 and "empty is no advisory database" in done.stderr
 
 
 def test_an_advisory_against_a_crate_of_the_lock_file_fails_the_release(dist, tmp_path):

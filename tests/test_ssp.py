@@ -66,21 +66,6 @@ def test_every_experiment_becomes_a_valid_archive(experiment, tmp_path):
     assert path.read_bytes() == again.read_bytes()
 
 
-@pytest.mark.parametrize("name", ["crmpc-2022/crmpc-paper", "crmpc-2022/lqr", "tvsmc-2015/sotvsmc-do"])
-def test_an_archive_runs_as_its_experiment_does(name, tmp_path):
-    experiment = EXPERIMENTS.parent / f"{name}.toml"
-    pack(experiment, tmp_path / "x.ssp", "--stop", "4")
-    finished = run(tmp_path / "x.ssp", tmp_path / "ssp", "--step", "0.04")
-    assert finished.returncode == 0, finished.stderr
-    arguments = ["--stop", "4", "--step", "0.04", "--fmu-dir", TARGET / "fmu"]
-    finished = run(experiment, tmp_path / "toml", *arguments)
-    assert finished.returncode == 0, finished.stderr
-    ssp, toml = columns(tmp_path / "ssp"), columns(tmp_path / "toml")
-    for column, values in toml.items():
-        if not column.endswith(TIMES):
-            assert np.array_equal(ssp[column], values), column
-
-
 @pytest.mark.parametrize("name", ["crmpc-2022/estimator", "tvsmc-2015/sotvsmc-do", "exchange/two-loop-smc-allocated"])
 def test_an_archive_of_ours_is_the_same_run(name, tmp_path):
     """The run needs no option for the step, the order, the recorded variables or the figures of
@@ -97,51 +82,6 @@ def test_an_archive_of_ours_is_the_same_run(name, tmp_path):
     ssp, toml = (json.loads((tmp_path / kind / "results.json").read_text()) for kind in ("ssp", "toml"))
     assert ssp["simulation"] == toml["simulation"] and ssp["title"] == toml["title"]
     assert [component["sha256"] for component in ssp["components"].values()] == [component["sha256"] for component in toml["components"].values()]
-
-
-TABULATED = """
-extends = '{}/lqr.toml'
-[components.plant.parameters]
-"disturbance.kind" = "table"
-"disturbance.bound" = 0.01
-"disturbance.start" = 0.1
-"disturbance.table.rows" = 2
-"disturbance.table.period" = 0.7
-"disturbance.table.time[1]" = 0.21
-"disturbance.table.alpha[1]" = 1
-"disturbance.table.time[2]" = 0.43
-"disturbance.table.beta[2]" = -0.5
-[record]
-variables = ["plant.rate.*", "plant.disturbance.delta.*"]
-"""
-
-
-def test_a_table_of_the_disturbance_is_the_same_in_experiment_command_line_and_archive(tmp_path):
-    experiment = tmp_path / "tabulated.toml"
-    text = TABULATED.format(EXPERIMENTS)
-    experiment.write_text(text)
-    pack(experiment, tmp_path / "x.ssp", "--stop", "2")
-    finished = run(tmp_path / "x.ssp", tmp_path / "ssp")
-    assert finished.returncode == 0, finished.stderr
-    common = ("--stop", "2", "--fmu-dir", TARGET / "fmu")
-    finished = run(experiment, tmp_path / "toml", *common)
-    assert finished.returncode == 0, finished.stderr
-    # The command line has precedence over the file.
-    experiment.write_text(text.replace("time[1]\" = 0.21", "time[1]\" = 0.3").replace("beta[2]\" = -0.5", "beta[2]\" = 1"))
-    settings = ("plant.disturbance.table.time[1]=0.21", "plant.disturbance.table.beta[2]=-0.5")
-    finished = run(experiment, tmp_path / "set", *common, "--set", settings[0], "--set", settings[1])
-    assert finished.returncode == 0, finished.stderr
-    results = [(tmp_path / name / "results.csv").read_bytes() for name in ("toml", "set", "ssp")]
-    assert results[0] == results[1] == results[2]
-    found = columns(tmp_path / "toml")
-    # A row has the disturbance at the end of the step that begins there, as it may depend on the moment;
-    # at the stop time none begins.
-    elapsed = np.append(found["time"][1:], found["time"][-1]) - 0.1
-    phase = np.where(elapsed < 1e-9, 0.0, (elapsed - 1e-9) % 0.7)
-    alpha, beta = (phase > 0.21) & (phase < 0.43), phase > 0.43
-    np.testing.assert_array_equal(found["plant.disturbance.delta.alpha"], 0.01 * alpha)
-    np.testing.assert_array_equal(found["plant.disturbance.delta.beta"], -0.005 * beta)
-    assert alpha.sum() > 9 and beta.sum() > 9
 
 
 def test_enumerations_are_connectors(tmp_path):

@@ -4,7 +4,6 @@ precedence, and what is left out or refused. The expected values follow from SSP
 
 import json
 import math
-import re
 import zipfile
 
 import pytest
@@ -310,25 +309,3 @@ def test_archives_with_backslashes_are_read(tmp_path):
 )
 def test_refusals_say_what_to_do(system, said, tmp_path):
     assert said in refusal(tmp_path, system)
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "said"),
-    [
-        (b'fmiVersion="2.0"', b'fmiVersion="1.0"', "export the model for one of them"),
-        (b"<CoSimulation", b"<Simulation", "export the model for co-simulation"),
-    ],
-)
-def test_refusals_of_instances_say_what_to_do(old, new, said, tmp_path):
-    path = packed(tmp_path, elements(LAW.format("")))
-    with zipfile.ZipFile(archive("LQR")) as fmu, zipfile.ZipFile(tmp_path / "LQR.fmu", "w") as other:
-        for entry in fmu.namelist():
-            content = fmu.read(entry)
-            other.writestr(entry, content.replace(old, new) if entry == "modelDescription.xml" else content)
-    with zipfile.ZipFile(path) as old_archive, zipfile.ZipFile(tmp_path / "y.ssp", "w") as new_archive:
-        for entry in old_archive.namelist():
-            content = (tmp_path / "LQR.fmu").read_bytes() if entry.endswith("LQR.fmu") else old_archive.read(entry)
-            new_archive.writestr(entry, content)
-    finished = run(tmp_path / "y.ssp", tmp_path / "out", "--step", "0.04")
-    assert finished.returncode == 2 and said in finished.stderr and "resources/LQR.fmu" in finished.stderr
-    assert re.fullmatch(r"error: [^\n]*\n", finished.stderr), finished.stderr

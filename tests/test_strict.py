@@ -10,7 +10,7 @@ import pytest
 from fmpy import read_model_description, simulate_fmu
 
 from conftest import EXPERIMENTS, NAMES, ROOT, TARGET, archive, archive3, program
-from fmi import Fmu, Instance, Instance3
+from fmi import Fmu, Instance, Instance3, Loop
 from strict.judge import Judge
 from strict.proxy import HEADERS, build, interpose, read
 
@@ -104,6 +104,14 @@ def test_fmpy_and_the_plant_keep_to_model_exchange(watched, version):
     assert (f"fmi{version}SetContinuousStates", "continuous") in judge.seen
 
 
+@pytest.mark.parametrize("jacobi", [False, True])
+def test_loops_by_hand_keep_to_fmi_2(watched, jacobi):
+    units = [watched(name, "2") for name in ("CRMPC", "ReentryPlant")]
+    with Instance(units[0].fmu) as controller, Instance(units[1].fmu) as plant:
+        Loop(controller, plant, 0.04, jacobi).fly(50)
+    assert [unit.judge().broken for unit in units] == [[], []]
+
+
 # Every way in which the orchestrator uses units.
 USES = {
     "run": ["run", "lqr", "--out", "out", "--quiet", "--stop", "2"],
@@ -150,18 +158,6 @@ def test_the_orchestrator_keeps_to_the_standard(watched, tmp_path, version, use)
         exchanges = use == "exchange" and unit is units[0]
         made = ("SetContinuousStates", integrating) if exchanges else ("DoStep", stepping)
         assert (f"fmi{version}{made[0]}", made[1]) in judge.seen
-
-
-@pytest.mark.parametrize("version", ["2", "3"])
-def test_the_orchestrator_keeps_to_model_exchange(watched, tmp_path, version):
-    plant, law = (watched(name, version) for name in ("ReentryPlant", "LQR"))
-    lines = [f"extends = '{EXPERIMENTS}/lqr.toml'", "title = 'x'", "[components.plant]", "interface = 'modelExchange'"]
-    (tmp_path / "x.toml").write_text("\n".join(lines))
-    command = [program("orchestrator"), "run", "x.toml", "--out", "out", "--quiet", "--stop", "2"]
-    subprocess.run([*command, "--fmu-dir", plant.folder], cwd=tmp_path, check=True)
-    judges = [unit.judge() for unit in (plant, law)]
-    assert [judge.broken for judge in judges] == [[], []]
-    assert (f"fmi{version}SetContinuousStates", "continuous") in judges[0].seen
 
 
 @pytest.fixture(scope="module")
