@@ -189,17 +189,6 @@ def test_the_guarantee_is_told_as_the_orchestrator_tells_it(chromium):
     assert "exceeds the rate limit (129 %) and the moment limit (446 %)" in page.inner_text("#verdict")
 
 
-def test_a_limit_is_drawn_with_the_norm_that_it_is_for(chromium):
-    page = opened(chromium, "controller=lqr")
-    drawn = "(id) => charts[id].panel.curves.map((curve) => [curve.name, charts[id].style(curve)['stroke-width']])"
-    assert page.evaluate(drawn, "rate") == [["‖ω‖", 3], ["p", 1], ["q", 1], ["r", 1]]
-    assert page.evaluate(drawn, "moment") == [["‖m‖", 3], ["x", 1], ["y", 1], ["z", 1]]
-    assert [name for name, _ in page.evaluate(drawn, "error")] == ["α", "β", "σ"]
-    for limit in ("rate", "moment"):
-        largest = page.evaluate(f"Math.max(...charts.{limit}.panel.curves[0].values) / charts.{limit}.panel.limits[0].value")
-        assert largest == pytest.approx(page.evaluate(f"flight.summary.{limit}_ratio"), rel=1e-12)
-
-
 def test_a_slider_changes_flight_and_address_and_the_address_holds_everything(chromium):
     page = opened(chromium)
     before, count = signals(page), flights(page)

@@ -45,19 +45,6 @@ def test_every_erratum_has_a_test_that_exists(cells):
         assert named.exists(test), f"there is no test {test}"
 
 
-# A link to a file, with the symbols of that file behind it.
-PLACE = re.compile(r"\[[^\]]+\]\((\.\./[^)#]+)\)((?:,? `[^`]+`)+)")
-
-
-def test_every_symbol_stands_in_the_file_that_is_named_with_it():
-    text = (ROOT / "docs" / "errata.md").read_text(encoding="utf-8")
-    symbols = [(path, symbol) for path, behind in PLACE.findall(text) for symbol in quoted(behind)]
-    assert len(symbols) > 20
-    for path, symbol in symbols:
-        code = (ROOT / "docs" / path).read_text(encoding="utf-8")
-        assert re.search(rf"\b{re.escape(symbol.split('::')[-1])}\b", code), f"{path} has no {symbol}"
-
-
 # symbols.md
 
 

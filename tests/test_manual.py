@@ -172,20 +172,3 @@ def test_the_search_finds(site, text, place, tmp_path):
     shown = browse(f"{(site / 'search.html').as_uri()}?q={text.replace(' ', '+')}", tmp_path)
     found = re.findall(r'<a href="([^"]+)"', shown[shown.index('id="search-results"') :])
     assert any(link.startswith(place) for link in found[:4]), found
-
-
-# Lists what reaches beyond the right edge of a telephone's screen and does not scroll by itself.
-WIDE = """<pre></pre><script>(async () => {
-    const wide = [], scrolls = (e) => e.tagName !== "ARTICLE" && (["auto", "scroll", "hidden"].includes(getComputedStyle(e).overflowX) || scrolls(e.parentElement));
-    for (const page of PAGES) {
-        const frame = document.createElement("iframe");
-        Object.assign(frame.style, { width: "390px", height: "800px" });
-        frame.src = page;
-        document.body.append(frame);
-        await new Promise((loaded) => (frame.onload = loaded));
-        for (const element of frame.contentDocument.querySelectorAll("article *"))
-            if (element.getBoundingClientRect().right > 391 && !scrolls(element.parentElement)) wide.push(page + " " + element.tagName);
-        frame.remove();
-    }
-    document.querySelector("pre").textContent = "looked at " + PAGES.length + ": " + wide.join(", ") + ".";
-})();</script>"""

@@ -253,29 +253,33 @@ def test_a_signal_has_the_same_margins_whatever_else_is_opened():
     assert beside["together"]["sensitivity"]["value"] < 10.0
 
 
+RESTLESS = "crmpc-2022/crmpc-robust.toml"
+
+
 @pytest.mark.parametrize(
-    ("experiment", "arguments", "code", "problem"),
+    ("command", "experiment", "arguments", "code", "problem"),
     [
         # While the plan turns at a limit, no step is like another; nor does a period of 0.2 s show in 50 steps.
-        ("crmpc-2022/crmpc-robust.toml", ("--at", "1", "--open", SIGNALS), 1, "do not repeat within 25 steps"),
-        ("margins/rest.toml", ("--fmu", "controller=CRMPC.fmu", "--step", "0.002"), 1, "do not repeat within 50 steps"),
-        ("margins/allocated.toml", ("--fmu", "controller=FBL.fmu", "--at", "0"), 1, "off the response to a change within 1 s"),
-        ("entry/from-120km.toml", ("--at", "1900", "--open", SIGNALS), 1, "needs its motion until t = 190"),
+        ("margins", RESTLESS, ("--at", "1", "--open", SIGNALS), 1, "do not repeat within 25 steps"),
+        ("response", RESTLESS, ("--at", "1", "--open", SIGNALS, "--json", "--count", "2"), 1, "do not repeat within 25 steps"),
+        ("margins", "margins/rest.toml", ("--fmu", "controller=CRMPC.fmu", "--step", "0.002"), 1, "do not repeat within 50 steps"),
+        ("margins", "margins/allocated.toml", ("--fmu", "controller=FBL.fmu", "--at", "0"), 1, "off the response to a change within 1 s"),
+        ("margins", "entry/from-120km.toml", ("--at", "1900", "--open", SIGNALS), 1, "needs its motion until t = 190"),
+        ("linearise", "crmpc-2022/lqr.toml", ("--at", "10.01", "--open", SIGNALS), 2, "--at 10.01: must be a communication point"),
+        ("linearise", "crmpc-2022/lqr.toml", ("--at", "10", "--open", "plant.momnt.*"), 2, 'did you mean "plant.moment.'),
+        ("linearise", "crmpc-2022/lqr.toml", ("--at", "10", "--open", SIGNALS, "--isolate"), 2, "--isolate=false puts it into this one"),
     ],
 )
-def test_where_there_is_no_linear_model_none_is_given(experiment, arguments, code, problem):
-    command = [program("orchestrator"), "margins", FOLDER / experiment, "--fmu-dir", TARGET / "fmu", *arguments]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=120)
-    assert done.returncode == code and problem in done.stderr and done.stdout == "", done.stderr
-
-
-@pytest.mark.parametrize("command", [("margins", "--json"), ("linearise",), ("response", "--json", "--count", "2")])
-def test_a_refusal_is_json_where_the_answer_would_be(command):
-    arguments = [FOLDER / "crmpc-2022" / "crmpc-robust.toml", "--at", "1", "--open", SIGNALS, "--fmu-dir", TARGET / "fmu"]
-    done = subprocess.run([program("orchestrator"), *command, *arguments], capture_output=True, text=True, timeout=120)
+def test_where_there_is_no_linear_model_none_is_given(command, experiment, arguments, code, problem):
+    told = [program("orchestrator"), command, FOLDER / experiment, "--fmu-dir", TARGET / "fmu", *arguments]
+    done = subprocess.run(told, capture_output=True, text=True, timeout=300)
+    assert done.returncode == code and problem in done.stderr, done.stderr
+    if command == "margins":
+        assert done.stdout == ""
+        return
+    # Where the answer would be JSON, the refusal is.
     answer = json.loads(done.stdout)
-    assert "do not repeat" in answer["error"] and answer["error"] in done.stderr
-    assert answer["exit_code"] == done.returncode == 1
+    assert problem in answer["error"] and answer["exit_code"] == code
 
 
 @pytest.mark.tier("studies")
@@ -309,19 +313,3 @@ def test_oracle_the_loop_in_flight_has_the_frequency_response_of_the_model(law, 
         )
         assert abs(measured - predicted) <= 0.01 * abs(predicted)
     assert plot.read_text().startswith("<svg")
-
-
-@pytest.mark.parametrize(
-    ("arguments", "problem"),
-    [
-        (("--at", "10.01", "--open", SIGNALS), "--at 10.01: must be a communication point"),
-        (("--at", "-1", "--open", SIGNALS), "must be a communication point"),
-        (("--at", "10", "--open", "plant.momnt.*"), 'there is no such connected input or output; did you mean "plant.moment.'),
-        (("--at", "10", "--open", "plant.massDensity"), "there is no such connected input or output"),
-        (("--at", "10", "--open", SIGNALS, "--isolate"), "--isolate=false puts it into this one"),
-    ],
-)
-def test_what_cannot_be_linearised_is_named(arguments, problem):
-    command = [program("orchestrator"), "linearise", FILES["LQR"], "--fmu-dir", TARGET / "fmu", *arguments]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=60)
-    assert done.returncode == 2 and problem in done.stderr, done.stderr

@@ -25,9 +25,6 @@ EXPERIMENTS_THERE = [
     if path not in CAMPAIGNS and "title" in (table := tomllib.loads(WRITTEN[path])) and "paper" not in table
 ]
 
-PAGES = {page.name: page.read_text(encoding="utf-8") for page in sorted((ROOT / "docs").glob("*.md"))}
-EXAMPLES = [(name, text) for name, page in PAGES.items() for text in re.findall(r"```toml\n(.*?)```", page, re.DOTALL)]
-
 
 def check(kind: str, text: str) -> None:
     schema = json.loads((ROOT / "orchestrator" / "schema" / f"{kind}.json").read_text(encoding="utf-8"))
@@ -60,14 +57,6 @@ def test_every_study_keeps_to_its_schema_and_names_it(path):
 def test_every_campaign_keeps_to_its_schema_and_names_it(path):
     assert WRITTEN[path].startswith("#:schema ../../schema/campaign.json\n")
     check("campaign", WRITTEN[path])
-
-
-@pytest.mark.parametrize(("page", "text"), EXAMPLES)
-def test_the_examples_of_the_pages_are_toml_and_keep_to_the_schemas(page, text):
-    table = tomllib.loads(text)
-    if "title" in table:
-        kinds = [("paper", "study"), ("vary", "campaign"), ("title", "experiment")]
-        check(next(kind for key, kind in kinds if key in table), text)
 
 
 @pytest.mark.parametrize(

@@ -83,18 +83,6 @@ def test_every_block_has_a_language_that_is_known():
     assert [str(block) for block in BLOCKS if block.language not in known] == []
 
 
-def test_every_rule_is_needed():
-    lines = [line for block in BLOCKS for line in block.text.splitlines() if not RULES["tested_by"].get(block.page)]
-    for rule in [*RULES["shorten"], *RULES["skip"]]:
-        fits = any(re.search(rule["find"], line) for line in lines) if "find" in rule else None
-        fits = any((b.page, b.language) == (rule["page"], rule["language"]) for b in BLOCKS) if fits is None else fits
-        assert fits, rule
-    for place in RULES["tested_by"]:
-        page, _, language = place.partition(" ")
-        assert any(block.page == page and block.language in (language or block.language) for block in BLOCKS), place
-    assert set(RULES["languages"]) == {block.language for block in BLOCKS} - {"sh", "toml", "python"}
-
-
 @pytest.fixture(scope="module")
 def folders(tmp_path_factory):
     return cache(lambda page: prepared(tmp_path_factory.mktemp(Path(page).stem)))
