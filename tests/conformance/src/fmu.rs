@@ -49,6 +49,13 @@ pub fn fmus() -> Vec<Fmu> {
     ["fmu_plant_library", "fmu_optimising", "fmu_feedback"].into_iter().flat_map(open).collect()
 }
 
+/// Lists every FMU with each of its interface types.
+pub fn fmus_and_interfaces() -> impl Iterator<Item = (Fmu, c_int)> {
+    fmus()
+        .into_iter()
+        .flat_map(|fmu| fmu.interfaces().iter().map(move |&fmu_type| (fmu.clone(), fmu_type)))
+}
+
 /// Returns the FMU with that name.
 pub fn fmu(name: &str) -> Fmu {
     fmus().into_iter().find(|fmu| fmu.name() == name).unwrap_or_else(|| panic!("no FMU {name}"))
@@ -66,7 +73,7 @@ impl Fmu {
     }
 
     /// Interface types that the FMU supports.
-    pub fn interfaces(&self) -> &[c_int] {
+    pub fn interfaces(&self) -> &'static [c_int] {
         if self.description.model_exchange {
             &[MODEL_EXCHANGE, CO_SIMULATION]
         } else {

@@ -1,7 +1,7 @@
 //! An instance with its log: life cycle, steps and saved states.
 
 use crate::interface::{Component, FATAL, FmuState, Interface, OK, Status};
-use crate::{Fmu, Log, Message, c};
+use crate::{Fmu, Log, Message, c, ok};
 use std::ptr::null_mut;
 use std::sync::Arc;
 
@@ -57,15 +57,15 @@ impl Instance {
 
     /// Enters initialization mode, with start time 0 s and no stop time.
     pub fn enter_initialization(&self) {
-        self.ok(c!(self, fmi2SetupExperiment(self.component, 0, 0.0, 0.0, 0, 0.0)));
-        self.ok(c!(self, fmi2EnterInitializationMode(self.component)));
+        ok!(self, fmi2SetupExperiment(0, 0.0, 0.0, 0, 0.0));
+        ok!(self, fmi2EnterInitializationMode());
     }
 
     /// Enters and leaves initialization mode.
     #[must_use]
     pub fn initialized(self) -> Self {
         self.enter_initialization();
-        self.ok(c!(self, fmi2ExitInitializationMode(self.component)));
+        ok!(self, fmi2ExitInitializationMode());
         self
     }
 
@@ -77,7 +77,7 @@ impl Instance {
     /// Saves the state; the handle is freed with the instance.
     pub fn save(&self) -> FmuState {
         let mut state = null_mut();
-        self.ok(c!(self, fmi2GetFMUstate(self.component, &mut state)));
+        ok!(self, fmi2GetFMUstate(&mut state));
         assert!(!state.is_null());
         state
     }
@@ -85,20 +85,17 @@ impl Instance {
     /// Returns to a saved state.
     #[track_caller]
     pub fn restore(&self, state: FmuState) {
-        self.ok(c!(self, fmi2SetFMUstate(self.component, state)));
+        ok!(self, fmi2SetFMUstate(state));
     }
 
     /// Returns the present state as bytes.
     pub fn serialize(&self) -> Vec<u8> {
         let mut state = self.save();
         let mut size = 0;
-        self.ok(c!(self, fmi2SerializedFMUstateSize(self.component, state, &mut size)));
+        ok!(self, fmi2SerializedFMUstateSize(state, &mut size));
         let mut bytes = vec![0u8; size];
-        self.ok(c!(
-            self,
-            fmi2SerializeFMUstate(self.component, state, bytes.as_mut_ptr().cast(), size)
-        ));
-        self.ok(c!(self, fmi2FreeFMUstate(self.component, &mut state)));
+        ok!(self, fmi2SerializeFMUstate(state, bytes.as_mut_ptr().cast(), size));
+        ok!(self, fmi2FreeFMUstate(&mut state));
         bytes
     }
 

@@ -18,7 +18,7 @@ mod runs;
 pub mod table;
 mod values;
 
-pub use fmu::{Fmu, fmu, fmus, is_continuous_real, library};
+pub use fmu::{Fmu, fmu, fmus, fmus_and_interfaces, is_continuous_real, library};
 pub use instance::Instance;
 pub use log::{Log, Message, callbacks};
 pub use values::Bits;
@@ -35,4 +35,12 @@ macro_rules! c {
         let result = unsafe { function($($argument),*) };
         result
     }};
+}
+
+/// Calls a function for an instance, which must succeed: `ok!(instance, fmi2SetTime(0.0))`.
+#[macro_export]
+macro_rules! ok {
+    ($instance:expr, $function:ident($($argument:expr),* $(,)?)) => {
+        $instance.ok($crate::c!($instance, $function($instance.component $(, $argument)*)))
+    };
 }

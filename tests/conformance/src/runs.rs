@@ -1,7 +1,7 @@
 //! Runs of an instance with an input that moves.
 
 use crate::interface::EventInfo;
-use crate::{Bits, Instance, c};
+use crate::{Bits, Instance, ok};
 
 impl Instance {
     /// Value of the input at a tick of [`Instance::drive`]: small, and different at every tick.
@@ -32,28 +32,25 @@ impl Instance {
         let n = self.fmu.description.states().len();
         let (mut x, mut derivatives) = (vec![0.0; n], vec![0.0; n]);
         let mut indicators = vec![0.0; self.fmu.description.event_indicators];
-        let (component, input, results) = (self.component, self.fmu.input(), self.fmu.results());
+        let (input, results) = (self.fmu.input(), self.fmu.results());
         let mut rows = vec![];
         for tick in ticks {
             self.ok(self.set_real(input, self.input_at(tick)));
             let mut info = EventInfo::default();
-            self.ok(c!(self, fmi2NewDiscreteStates(component, &mut info)));
+            ok!(self, fmi2NewDiscreteStates(&mut info));
             assert_eq!((info.new_discrete_states_needed, info.terminate_simulation), (0, 0));
-            self.ok(c!(self, fmi2EnterContinuousTimeMode(component)));
-            self.ok(c!(self, fmi2GetContinuousStates(component, x.as_mut_ptr(), n)));
-            self.ok(c!(self, fmi2GetDerivatives(component, derivatives.as_mut_ptr(), n)));
+            ok!(self, fmi2EnterContinuousTimeMode());
+            ok!(self, fmi2GetContinuousStates(x.as_mut_ptr(), n));
+            ok!(self, fmi2GetDerivatives(derivatives.as_mut_ptr(), n));
             for (x, derivative) in x.iter_mut().zip(&derivatives) {
                 *x += h * derivative;
             }
-            self.ok(c!(self, fmi2SetTime(component, f64::from(tick + 1) * h)));
-            self.ok(c!(self, fmi2SetContinuousStates(component, x.as_ptr(), n)));
-            self.ok(c!(
-                self,
-                fmi2GetEventIndicators(component, indicators.as_mut_ptr(), indicators.len())
-            ));
+            ok!(self, fmi2SetTime(f64::from(tick + 1) * h));
+            ok!(self, fmi2SetContinuousStates(x.as_ptr(), n));
+            ok!(self, fmi2GetEventIndicators(indicators.as_mut_ptr(), indicators.len()));
             let (mut event, mut end) = (-1, -1);
-            self.ok(c!(self, fmi2CompletedIntegratorStep(component, 1, &mut event, &mut end)));
-            self.ok(c!(self, fmi2EnterEventMode(component)));
+            ok!(self, fmi2CompletedIntegratorStep(1, &mut event, &mut end));
+            ok!(self, fmi2EnterEventMode());
             let mut row = self.bits(&results);
             row.extend(indicators.iter().map(|indicator| indicator.to_bits()));
             rows.push(row);

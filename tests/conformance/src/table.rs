@@ -2,7 +2,7 @@
 //! 2.0.4, sections 3.2.3 (model exchange) and 4.2.4 (co-simulation).
 
 use crate::interface::{DISCARD, ERROR, EventInfo, FmuState, MODEL_EXCHANGE, OK, Status};
-use crate::{Fmu, Instance, c};
+use crate::{Fmu, Instance, c, ok};
 use model_description::ModelDescription;
 use model_description::variable::{Causality, Variable, VariableKind};
 use std::ffi::c_int;
@@ -54,7 +54,6 @@ pub fn states(fmu_type: c_int) -> Vec<State> {
 /// Makes a new instance and brings it to that state.
 pub fn instance_in(fmu: &Fmu, fmu_type: c_int, state: State) -> Instance {
     let instance = fmu.instance(fmu_type);
-    let component = instance.component;
     match state {
         Instantiated => instance,
         InitializationMode => {
@@ -64,13 +63,13 @@ pub fn instance_in(fmu: &Fmu, fmu_type: c_int, state: State) -> Instance {
         EventMode | StepComplete => instance.initialized(),
         ContinuousTimeMode => {
             let instance = instance.initialized();
-            instance.ok(c!(instance, fmi2NewDiscreteStates(component, &mut EventInfo::default())));
-            instance.ok(c!(instance, fmi2EnterContinuousTimeMode(component)));
+            ok!(instance, fmi2NewDiscreteStates(&mut EventInfo::default()));
+            ok!(instance, fmi2EnterContinuousTimeMode());
             instance
         }
         Terminated => {
             let instance = instance.initialized();
-            instance.ok(c!(instance, fmi2Terminate(component)));
+            ok!(instance, fmi2Terminate());
             instance
         }
         Error => {

@@ -1,7 +1,7 @@
 //! Values of an instance's variables.
 
 use crate::interface::{OK, Status, Text};
-use crate::{Instance, c};
+use crate::{Instance, c, ok};
 use model_description::variable::VariableKind;
 use std::ffi::{CStr, c_int};
 use std::ptr::null;
@@ -19,7 +19,7 @@ impl Instance {
     #[track_caller]
     pub fn real(&self, reference: u32) -> f64 {
         let mut value = f64::NAN;
-        self.ok(c!(self, fmi2GetReal(self.component, &reference, 1, &mut value)));
+        ok!(self, fmi2GetReal(&reference, 1, &mut value));
         value
     }
 
@@ -34,7 +34,7 @@ impl Instance {
         let numbered = enumeration_type.items.iter().zip(1..);
         let value: c_int =
             numbered.filter(|((name, _), _)| name == item).map(|(_, i)| i).next().expect("an item");
-        self.ok(c!(self, fmi2SetInteger(self.component, &reference, 1, &value)));
+        ok!(self, fmi2SetInteger(&reference, 1, &value));
     }
 
     /// Sets a String variable to a value.

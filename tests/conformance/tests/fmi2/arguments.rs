@@ -3,7 +3,7 @@
 //! standard or importers need that.
 
 use conformance::interface::{CO_SIMULATION, Callbacks, ERROR, MODEL_EXCHANGE, OK, Status};
-use conformance::{Instance, c, fmus};
+use conformance::{Instance, c, fmus, fmus_and_interfaces, ok};
 use model_description::variable::VariableKind;
 use std::ffi::{CStr, c_int};
 use std::ptr::{null, null_mut};
@@ -164,32 +164,23 @@ fn check(instance: &Instance, calls: &[(Call, &str)]) {
 
 #[test]
 fn wrong_pointers_are_errors_that_name_them() {
-    for fmu in fmus() {
-        for &fmu_type in fmu.interfaces() {
-            let instance = fmu.instance(fmu_type).initialized();
-            check(&instance, NULLS);
-            check(&instance, BETWEEN);
-            check(&instance, OVERLAPS);
-            for call in NOTHING {
-                instance.ok(call(&instance));
-            }
-            let component = instance.component;
-            if fmu_type == CO_SIMULATION {
-                check(&instance, NULLS_OF_SIMULATION);
-                instance.ok(c!(
-                    instance,
-                    fmi2SetRealInputDerivatives(component, null(), 0, null(), null())
-                ));
-                let none = null_mut();
-                instance.ok(c!(
-                    instance,
-                    fmi2GetRealOutputDerivatives(component, null(), 0, null(), none)
-                ));
-            } else {
-                check(&instance, NULLS_OF_EXCHANGE);
-                instance.ok(c!(instance, fmi2EnterContinuousTimeMode(component)));
-                check(&instance, NULLS_OF_CONTINUOUS_TIME);
-            }
+    for (fmu, fmu_type) in fmus_and_interfaces() {
+        let instance = fmu.instance(fmu_type).initialized();
+        check(&instance, NULLS);
+        check(&instance, BETWEEN);
+        check(&instance, OVERLAPS);
+        for call in NOTHING {
+            instance.ok(call(&instance));
+        }
+        if fmu_type == CO_SIMULATION {
+            check(&instance, NULLS_OF_SIMULATION);
+            ok!(instance, fmi2SetRealInputDerivatives(null(), 0, null(), null()));
+            let none = null_mut();
+            ok!(instance, fmi2GetRealOutputDerivatives(null(), 0, null(), none));
+        } else {
+            check(&instance, NULLS_OF_EXCHANGE);
+            ok!(instance, fmi2EnterContinuousTimeMode());
+            check(&instance, NULLS_OF_CONTINUOUS_TIME);
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use conformance::interface::{CO_SIMULATION, ERROR, FUNCTIONS, MODEL_EXCHANGE, OK, Status};
 use conformance::table::{Row, State, TABLE, instance_in, settable, states};
-use conformance::{Instance, c, fmus};
+use conformance::{Instance, c, fmus, fmus_and_interfaces, ok};
 use model_description::variable::VariableKind;
 use std::ffi::{CString, c_int};
 use std::ptr::null_mut;
@@ -93,34 +93,18 @@ fn oracle_calls_of_model_exchange_are_allowed_where_the_standard_says() {
 
 #[test]
 fn after_a_refused_call_a_reset_makes_a_new_instance() {
-    for fmu in fmus() {
-        for &fmu_type in fmu.interfaces() {
-            let drive =
-                if fmu_type == MODEL_EXCHANGE { Instance::integrate } else { Instance::drive };
-            let expected = drive(&fmu.instance(fmu_type).initialized(), 0..3);
-            for state in states(fmu_type) {
-                let instance = instance_in(&fmu, fmu_type, state);
-                assert_eq!(c!(instance, fmi2CancelStep(instance.component)), ERROR);
-                instance.ok(c!(instance, fmi2Reset(instance.component)));
-                assert!(
-                    drive(&instance.initialized(), 0..3) == expected,
-                    "{} from {state:?}",
-                    fmu.name()
-                );
-            }
-        }
-    }
-}
-
-#[test]
-fn an_instance_can_be_freed_in_every_state() {
-    for fmu in fmus() {
-        for &fmu_type in fmu.interfaces() {
-            for state in states(fmu_type) {
-                // The instance is freed at the end of its scope, with a saved state that was not
-                // freed.
-                instance_in(&fmu, fmu_type, state).save();
-            }
+    for (fmu, fmu_type) in fmus_and_interfaces() {
+        let drive = if fmu_type == MODEL_EXCHANGE { Instance::integrate } else { Instance::drive };
+        let expected = drive(&fmu.instance(fmu_type).initialized(), 0..3);
+        for state in states(fmu_type) {
+            let instance = instance_in(&fmu, fmu_type, state);
+            assert_eq!(c!(instance, fmi2CancelStep(instance.component)), ERROR);
+            ok!(instance, fmi2Reset());
+            assert!(
+                drive(&instance.initialized(), 0..3) == expected,
+                "{} from {state:?}",
+                fmu.name()
+            );
         }
     }
 }
@@ -152,25 +136,23 @@ fn set(instance: &Instance, reference: u32) -> (&'static str, Status) {
 
 #[test]
 fn oracle_variables_can_be_set_where_the_standard_says() {
-    for fmu in fmus() {
-        for &fmu_type in fmu.interfaces() {
-            for state in states(fmu_type) {
-                let instance = instance_in(&fmu, fmu_type, state);
-                let saved_state = instance.save();
-                for (variable, reference) in fmu.description.variables.iter().zip(0..) {
-                    instance.forget();
-                    let (function, status) = set(&instance, reference);
-                    let what = format!("{}: {} in {state:?}", fmu.name(), variable.name);
-                    if settable(&fmu.description, reference, state) {
-                        assert_eq!(status, OK, "{what}: {:?}", instance.messages());
-                    } else {
-                        assert_eq!(status, ERROR, "{what}");
-                        let text = &instance.messages()[0].text;
-                        let named = text.contains(&format!("'{}'", variable.name));
-                        assert!(text.starts_with(function), "{what}: {text}");
-                        assert!(named || text.contains("not allowed in state"), "{what}: {text}");
-                        instance.restore(saved_state);
-                    }
+    for (fmu, fmu_type) in fmus_and_interfaces() {
+        for state in states(fmu_type) {
+            let instance = instance_in(&fmu, fmu_type, state);
+            let saved_state = instance.save();
+            for (variable, reference) in fmu.description.variables.iter().zip(0..) {
+                instance.forget();
+                let (function, status) = set(&instance, reference);
+                let what = format!("{}: {} in {state:?}", fmu.name(), variable.name);
+                if settable(&fmu.description, reference, state) {
+                    assert_eq!(status, OK, "{what}: {:?}", instance.messages());
+                } else {
+                    assert_eq!(status, ERROR, "{what}");
+                    let text = &instance.messages()[0].text;
+                    let named = text.contains(&format!("'{}'", variable.name));
+                    assert!(text.starts_with(function), "{what}: {text}");
+                    assert!(named || text.contains("not allowed in state"), "{what}: {text}");
+                    instance.restore(saved_state);
                 }
             }
         }
@@ -203,8 +185,8 @@ fn a_state_set_as_a_variable_is_the_state() {
         let all = fmu.results();
         let one_by_one = instance.bits(&all);
         let as_vector = instance_in(&fmu, MODEL_EXCHANGE, State::ContinuousTimeMode);
-        let (component, count) = (as_vector.component, expected.len());
-        as_vector.ok(c!(as_vector, fmi2SetContinuousStates(component, expected.as_ptr(), count)));
+        let count = expected.len();
+        ok!(as_vector, fmi2SetContinuousStates(expected.as_ptr(), count));
         assert!(as_vector.bits(&all) == one_by_one);
     }
 }

@@ -2,7 +2,7 @@
 //! `fmi2OK` are finite, items of their enumerations, or true or false.
 
 use conformance::interface::{CO_SIMULATION, DISCARD, ERROR, OK};
-use conformance::{Fmu, Instance, c, fmus};
+use conformance::{Fmu, Instance, c, fmus, ok};
 use model_description::variable::{Causality, VariableKind};
 use proptest::collection::vec;
 use proptest::prelude::*;
@@ -67,7 +67,7 @@ fn set(instance: &Instance, reference: u32, &(_, near, real, whole): &Change) {
     if status == ERROR {
         instance.restore(saved_state);
     }
-    instance.ok(c!(instance, fmi2FreeFMUstate(component, &mut saved_state)));
+    ok!(instance, fmi2FreeFMUstate(&mut saved_state));
 }
 
 /// Follows a sequence of calls until the FMU refuses to continue, and counts the steps. Returns the

@@ -3,12 +3,12 @@
 //! (tests/test_states.py).
 
 use conformance::interface::{CO_SIMULATION, ERROR, FATAL, MODEL_EXCHANGE, OK};
-use conformance::{Bits, Fmu, Instance, c, fmus};
+use conformance::{Bits, Fmu, Instance, c, fmus, fmus_and_interfaces, ok};
 use model_description::variable::VariableKind;
 use std::ops::Range;
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::sync::{Arc, Mutex};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 fn driver(fmu_type: i32) -> fn(&Instance, Range<u32>) -> Vec<Bits> {
     if fmu_type == MODEL_EXCHANGE { Instance::integrate } else { Instance::drive }
@@ -24,108 +24,62 @@ fn running(fmu: &Fmu, fmu_type: i32) -> Instance {
 
 #[test]
 fn handles_and_bytes_bring_back_the_same_future() {
-    for fmu in fmus() {
-        for &fmu_type in fmu.interfaces() {
-            let drive = driver(fmu_type);
-            let instance = running(&fmu, fmu_type);
-            let (mut handle, bytes) = (instance.save(), instance.serialize());
-            let expected = drive(&instance, 4..12);
-            instance.restore(handle);
-            assert!(drive(&instance, 4..12) == expected, "{}", fmu.name());
-            // The same handle is overwritten with the present state.
-            let (before, present) = (handle, instance.serialize());
-            instance.ok(c!(instance, fmi2GetFMUstate(instance.component, &mut handle)));
-            assert_eq!(handle, before);
-            instance.ok(c!(instance, fmi2Reset(instance.component)));
-            instance.restore(handle);
-            assert!(instance.serialize() == present, "{}", fmu.name());
-            // A state from bytes works in an instance that was never initialized.
-            let other = fmu.instance(fmu_type);
-            let (status, state) = other.deserialize(&bytes);
-            other.ok(status);
-            other.restore(state);
-            assert!(drive(&other, 4..12) == expected, "{}", fmu.name());
-            // Freeing sets the handle to NULL, and freeing NULL is allowed.
-            instance.ok(c!(instance, fmi2FreeFMUstate(instance.component, &mut handle)));
-            assert!(handle.is_null());
-            instance.ok(c!(instance, fmi2FreeFMUstate(instance.component, &mut handle)));
-            let status = c!(instance, fmi2SetFMUstate(instance.component, before));
-            instance.refused(status, ERROR, &["fmi2SetFMUstate", "was freed"]);
-        }
-    }
-}
-
-/// Medians of the durations of 201 calls, s: of saving, and of restoring the last and the first
-/// state in turn. The parameters are the same in both states.
-fn durations(fmu: &Fmu, fmu_type: i32) -> [f64; 2] {
-    let instance = fmu.instance(fmu_type).initialized();
-    let first = instance.save();
-    driver(fmu_type)(&instance, 0..12);
-    let mut last = instance.save();
-    let median = |call: &mut dyn FnMut()| {
-        let mut durations: Vec<_> = (0..201)
-            .map(|_| {
-                let clock = Instant::now();
-                call();
-                clock.elapsed().as_secs_f64()
-            })
-            .collect();
-        durations.sort_by(f64::total_cmp);
-        durations[100]
-    };
-    let get =
-        median(&mut || instance.ok(c!(instance, fmi2GetFMUstate(instance.component, &mut last))));
-    let mut turn = 0;
-    let set = median(&mut || {
-        turn += 1;
-        instance.restore(if turn % 2 == 0 { first } else { last });
-    });
-    [get, set]
-}
-
-/// Run with `cargo test --release -p conformance --test fmi2 -- --ignored --nocapture taking_back`.
-#[test]
-#[ignore = "measures time"]
-fn taking_back_a_state_takes_little_time() {
-    println!("{:<20} {:>12} {:>12}", "FMU", "get (us)", "set (us)");
-    for fmu in fmus() {
-        for &fmu_type in fmu.interfaces() {
-            let [get, set] = durations(&fmu, fmu_type);
-            println!("{:<20} {:>12.2} {:>12.2}", fmu.name(), get * 1e6, set * 1e6);
-            assert!(set <= 20e-6, "{}: {} us", fmu.name(), set * 1e6);
-        }
+    for (fmu, fmu_type) in fmus_and_interfaces() {
+        let drive = driver(fmu_type);
+        let instance = running(&fmu, fmu_type);
+        let (mut handle, bytes) = (instance.save(), instance.serialize());
+        let expected = drive(&instance, 4..12);
+        instance.restore(handle);
+        assert!(drive(&instance, 4..12) == expected, "{}", fmu.name());
+        // The same handle is overwritten with the present state.
+        let (before, present) = (handle, instance.serialize());
+        ok!(instance, fmi2GetFMUstate(&mut handle));
+        assert_eq!(handle, before);
+        ok!(instance, fmi2Reset());
+        instance.restore(handle);
+        assert!(instance.serialize() == present, "{}", fmu.name());
+        // A state from bytes works in an instance that was never initialized.
+        let other = fmu.instance(fmu_type);
+        let (status, state) = other.deserialize(&bytes);
+        other.ok(status);
+        other.restore(state);
+        assert!(drive(&other, 4..12) == expected, "{}", fmu.name());
+        // Freeing sets the handle to NULL, and freeing NULL is allowed.
+        ok!(instance, fmi2FreeFMUstate(&mut handle));
+        assert!(handle.is_null());
+        ok!(instance, fmi2FreeFMUstate(&mut handle));
+        let status = c!(instance, fmi2SetFMUstate(instance.component, before));
+        instance.refused(status, ERROR, &["fmi2SetFMUstate", "was freed"]);
     }
 }
 
 #[test]
 fn every_truncation_and_every_damaged_byte_is_refused() {
-    for fmu in fmus() {
-        for &fmu_type in fmu.interfaces() {
-            let instance = running(&fmu, fmu_type);
-            let bytes = instance.serialize();
-            let refuse = |bytes: &[u8], what: &str| {
-                let (status, state) = instance.deserialize(bytes);
-                assert_eq!(status, ERROR, "{}: {what}", fmu.name());
-                assert!(state.is_null(), "{}: {what}", fmu.name());
-            };
-            for length in 0..bytes.len() {
-                refuse(&bytes[..length], &format!("cut to {length} bytes"));
-            }
-            let mut damaged = bytes.clone();
-            for i in 0..bytes.len() {
-                // One bit of each byte is changed; the shell's tests change every bit.
-                damaged[i] ^= 1 << (i % 8);
-                refuse(&damaged, &format!("byte {i} damaged"));
-                damaged[i] = bytes[i];
-            }
-            refuse(&[bytes.as_slice(), b"x"].concat(), "one byte more");
-            for message in instance.messages() {
-                assert!(message.text.starts_with("fmi2DeSerializeFMUstate: "), "{}", message.text);
-            }
-            // None of these attempts left a trace.
-            assert!(instance.serialize() == bytes, "{}", fmu.name());
-            driver(fmu_type)(&instance, 4..6);
+    for (fmu, fmu_type) in fmus_and_interfaces() {
+        let instance = running(&fmu, fmu_type);
+        let bytes = instance.serialize();
+        let refuse = |bytes: &[u8], what: &str| {
+            let (status, state) = instance.deserialize(bytes);
+            assert_eq!(status, ERROR, "{}: {what}", fmu.name());
+            assert!(state.is_null(), "{}: {what}", fmu.name());
+        };
+        for length in 0..bytes.len() {
+            refuse(&bytes[..length], &format!("cut to {length} bytes"));
         }
+        let mut damaged = bytes.clone();
+        for i in 0..bytes.len() {
+            // One bit of each byte is changed; the shell's tests change every bit.
+            damaged[i] ^= 1 << (i % 8);
+            refuse(&damaged, &format!("byte {i} damaged"));
+            damaged[i] = bytes[i];
+        }
+        refuse(&[bytes.as_slice(), b"x"].concat(), "one byte more");
+        for message in instance.messages() {
+            assert!(message.text.starts_with("fmi2DeSerializeFMUstate: "), "{}", message.text);
+        }
+        // None of these attempts left a trace.
+        assert!(instance.serialize() == bytes, "{}", fmu.name());
+        driver(fmu_type)(&instance, 4..6);
     }
 }
 
@@ -150,7 +104,7 @@ fn states_of_other_fmus_and_interfaces_are_refused() {
             refused(c!(instance, fmi2FreeFMUstate(component, &mut { foreign })));
             refused(c!(instance, fmi2GetFMUstate(component, &mut { foreign })));
             refused(c!(instance, fmi2SerializedFMUstateSize(component, foreign, &mut 0)));
-            other.ok(c!(other, fmi2FreeFMUstate(other.component, &mut foreign)));
+            ok!(other, fmi2FreeFMUstate(&mut foreign));
         }
         assert!(instance.serialize() == before, "{}", instance.fmu.name());
     }
@@ -249,7 +203,7 @@ fn survive_forgeries(
             instance.ok(status);
             let status = c!(instance, fmi2SetFMUstate(component, state));
             assert!(status == OK || status == ERROR, "{}", doing.lock().unwrap());
-            instance.ok(c!(instance, fmi2FreeFMUstate(component, &mut state)));
+            ok!(instance, fmi2FreeFMUstate(&mut state));
             if status == OK {
                 taken += 1;
                 let mut time = 7.0 * h;
@@ -261,7 +215,7 @@ fn survive_forgeries(
                     time += h;
                 }
             }
-            instance.ok(c!(instance, fmi2Reset(component)));
+            ok!(instance, fmi2Reset());
             instance.forget();
         }
     }
@@ -272,7 +226,7 @@ fn survive_forgeries(
 fn tabulate(instance: &Instance) {
     let reference = |name: &str| instance.fmu.reference(&format!("disturbance.{name}"));
     instance.choose("disturbance.kind", "table");
-    instance.ok(c!(instance, fmi2SetInteger(instance.component, &reference("table.rows"), 1, &3)));
+    ok!(instance, fmi2SetInteger(&reference("table.rows"), 1, &3));
     for (name, value) in [
         ("start", 0.05),
         ("table.period", 0.21),
@@ -321,7 +275,7 @@ fn forged_states_neither_hang_nor_panic() {
         |_| (),
         |instance| {
             let reference = instance.fmu.reference("sensor.set");
-            instance.ok(c!(instance, fmi2SetInteger(instance.component, &reference, 1, &2)));
+            ok!(instance, fmi2SetInteger(&reference, 1, &2));
             instance.choose("actuation", "surfacesAndJets");
         },
         |instance| {

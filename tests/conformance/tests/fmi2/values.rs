@@ -2,7 +2,7 @@
 //! the limits.
 
 use conformance::interface::{CO_SIMULATION, ERROR, MODEL_EXCHANGE, OK, Status};
-use conformance::{Instance, c, fmus};
+use conformance::{Instance, c, fmus, ok};
 use model_description::variable::{Causality, VariableKind};
 use std::ffi::c_int;
 use std::ptr::null;
@@ -135,10 +135,10 @@ fn repeated_references_are_taken_one_after_the_other() {
     for fmu in fmus() {
         let instance = fmu.instance(CO_SIMULATION).initialized();
         let (references, values) = ([fmu.input(); 3], [0.01, -0.02, 0.03]);
-        let (component, list) = (instance.component, references.as_ptr());
-        instance.ok(c!(instance, fmi2SetReal(component, list, 3, values.as_ptr())));
+        let list = references.as_ptr();
+        ok!(instance, fmi2SetReal(list, 3, values.as_ptr()));
         let mut read = [f64::NAN; 3];
-        instance.ok(c!(instance, fmi2GetReal(component, list, 3, read.as_mut_ptr())));
+        ok!(instance, fmi2GetReal(list, 3, read.as_mut_ptr()));
         assert_eq!(read, [0.03; 3]);
         let results = fmu.results();
         let once = instance.bits(&results);
@@ -214,35 +214,19 @@ fn what_is_calculated_from_the_largest_inputs_is_a_number_or_an_error() {
             variable.causality == Causality::Input
                 && matches!(variable.kind, VariableKind::Real { .. })
         });
-        let results =
-            fmu.references(|v| v.is_calculated() && matches!(v.kind, VariableKind::Real { .. }));
         for value in large.into_iter().flat_map(|value| [value, -value]) {
             // Each input is set alone, and then all of them.
             for set in inputs.chunks(1).chain([inputs.as_slice()]) {
                 let instance = fmu.instance(CO_SIMULATION).initialized();
                 for tick in 0..2 {
                     for reference in set {
-                        let (component, name) = (instance.component, fmu.name());
-                        if c!(instance, fmi2SetReal(component, reference, 1, &value)) != OK {
+                        if instance.set_real(*reference, value) != OK {
                             break;
                         }
-                        let mut values = vec![0.0_f64; results.len()];
-                        let (pointer, n) = (results.as_ptr(), results.len());
-                        let status =
-                            c!(instance, fmi2GetReal(component, pointer, n, values.as_mut_ptr()));
-                        assert!(status == OK || status == ERROR, "{name}: status {status}");
-                        let wrong =
-                            values.iter().zip(&results).find(|(value, _)| !value.is_finite());
-                        let which =
-                            wrong.map(|(_, &i)| &fmu.description.variables[i as usize].name);
-                        assert!(
-                            which.is_none(),
-                            "{name}: {which:?} is not finite for {reference} = {value}"
-                        );
+                        let wrong = instance.wrong_value();
+                        assert!(wrong.is_none(), "{}: {wrong:?} for {value}", fmu.name());
                     }
-                    if c!(instance, fmi2DoStep(instance.component, f64::from(tick) * 0.2, 0.2, 1))
-                        != OK
-                    {
+                    if instance.step(f64::from(tick) * 0.2, 0.2) != OK {
                         break;
                     }
                 }
