@@ -68,7 +68,7 @@ fn every_truncation_and_every_damaged_byte_is_refused() {
         }
         let mut damaged = bytes.clone();
         for i in 0..bytes.len() {
-            // One bit of each byte is changed; the shell's tests change every bit.
+            // One bit of each byte is changed, another one from byte to byte.
             damaged[i] ^= 1 << (i % 8);
             refuse(&damaged, &format!("byte {i} damaged"));
             damaged[i] = bytes[i];
