@@ -18,7 +18,6 @@ pytestmark = [
     in_chromium,
 ]
 
-WINDOWS = "Object.values(charts).filter((chart) => !chart.figure.hidden).map((chart) => chart.window)"
 QUIET = "controller=own&plant.disturbance.kind=none&plant.inertia.scale=1"
 
 
@@ -96,24 +95,3 @@ def test_a_law_of_an_address_is_not_run_unasked(chromium):
     page.go_back()
     page.wait_for_function("!busy && !wanted && settings.choice.id === 'own'")
     assert page.input_value("#code") == code
-
-
-def test_curves_are_looked_at_closely_together(chromium):
-    page = opened(chromium, "controller=lqr")
-    panel = page.locator("#charts .panel:visible svg[role=img]").nth(1)
-    panel.scroll_into_view_if_needed()
-    box = panel.bounding_box()
-    page.mouse.move(box["x"] + 0.3 * box["width"], box["y"] + 60)
-    page.mouse.down()
-    page.mouse.move(box["x"] + 0.6 * box["width"], box["y"] + 60, steps=5)
-    page.mouse.up()
-    windows = page.evaluate(WINDOWS)
-    assert all(window == windows[0] for window in windows) and 9 < windows[0][0] < 15 and 26 < windows[0][1] < 33
-    assert page.evaluate("getSelection().toString()") == ""
-    # Another flight is shown in the same window.
-    count = flights(page)
-    page.get_by_label("seed").fill("3")
-    after(page, count)
-    assert page.evaluate("charts.rate.window") == windows[0]
-    panel.dblclick()
-    assert page.evaluate(WINDOWS) == [[0, 50]] * 4
