@@ -33,6 +33,18 @@ def test_a_planted_fault_gives_no_wrong_probability_and_is_told(bench, has_mount
     assert faults.attempt(bench, tmp_path, number) is None
 
 
+def test_a_fault_that_is_hidden_is_seen_by_this_check(bench, tmp_path):
+    """The comparison itself can fail: with results of another seed it does."""
+    trial = faults.Trial(bench, tmp_path / "other", faults.SEEDS[0])
+    done = trial.call()
+    trial.must_be_true(done)
+    trial.seed = faults.SEEDS[1]
+    with pytest.raises(faults.Wrong, match="other results"):
+        trial.must_be_true(done)
+    with pytest.raises(faults.Wrong, match="not told"):
+        trial.must_be_told(done, 2, "has no library")
+
+
 @pytest.mark.tier("studies")
 @pytest.mark.parametrize("file", SEARCHES, ids=lambda file: file.stem)
 def test_a_search_goes_on_when_an_fmu_refuses_values(file, tmp_path):
