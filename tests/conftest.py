@@ -180,18 +180,18 @@ def experiment(orchestrate):
     return run_once
 
 
-# The table of docs/importers.md holds the outcomes of the tests marked `importer`.
+# The table of docs/use-it.md holds the outcomes of the tests marked `importer`.
 
 
 def pytest_addoption(parser):
-    parser.addoption("--write-importers", action="store_true", help="write the table of docs/importers.md anew")
+    parser.addoption("--write-importers", action="store_true", help="write the table of docs/use-it.md anew")
     parser.addoption("--tier", action="append", default=[], choices=[*TIERS, "all"], help="run these tests as well")
 
 
 def pytest_configure(config):
     config.addinivalue_line(
         "markers",
-        "importer(importer, use, fmu, plant, within, to): a row of docs/importers.md. The FMU is that of the parameter `name`, unless "
+        "importer(importer, use, fmu, plant, within, to): a row of docs/use-it.md. The FMU is that of the parameter `name`, unless "
         "it is given, and with `plant` ReentryPlant too. Results are `within` a share of the largest value `to` a reference.",
     )
     config.addinivalue_line("markers", "tier(name): left out by `scripts/test`, unless it is called --with this name or --all")

@@ -1,4 +1,4 @@
-"""The table of docs/importers.md, made from the outcomes of the tests that are marked
+"""The table of docs/use-it.md, made from the outcomes of the tests that are marked
 `importer`."""
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
-PAGE = ROOT / "docs" / "importers.md"
+PAGE = ROOT / "docs" / "use-it.md"
 BEGIN, END = "<!-- From here on: scripts/update-generated -->\n", "<!-- Up to here: scripts/update-generated -->\n"
 FINDINGS = pytest.StashKey()
 # Importers in the order of the table, by the name that the marks use: the title, and the source
@@ -72,7 +72,7 @@ class Findings:
     def write(self) -> None:
         reason = self.missing()
         if reason:
-            raise pytest.UsageError(f"docs/importers.md stays as it is: {reason}")
+            raise pytest.UsageError(f"docs/use-it.md stays as it is: {reason}")
         before, _, after = split()
         PAGE.write_text(before + BEGIN + "\n" + self.table() + "\n" + END + after)
 

@@ -1,7 +1,7 @@
 """Every FMU in every available importer, alone and in the closed loop, against our own stepping
 with the importer's own coupling.
 
-The tests marked `importer` make the table of docs/importers.md (conftest.py). Each of them gives
+The tests marked `importer` make the table of docs/use-it.md (conftest.py). Each of them gives
 two arrays to `agree`, the importer's and ours.
 """
 

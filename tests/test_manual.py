@@ -161,7 +161,7 @@ def browse(address, profile, *options):
     [
         ("guarantee", "docs/guarantee.html"),
         ("k1", "reference/variables/CRMPC.html#CRMPC.feedback.k1"),
-        ("EMS", "docs/glossary.html"),
+        ("EMS", "docs/symbols.html"),
         ("guarantee.rateMargin", "reference/variables/CRMPC.html#CRMPC.guarantee.rateMargin"),
         ("at_most", "reference/campaign-keys.html#campaign.Limit.at_most"),
         ("disk margin", "docs/margins.html"),

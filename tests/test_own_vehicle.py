@@ -1,4 +1,4 @@
-"""A vehicle from a file, as docs/own-vehicle.md explains it: the example's flight, faults, and states of
+"""A vehicle from a file, as docs/vehicle.md explains it: the example's flight, faults, and states of
 another file."""
 
 import json

@@ -153,7 +153,7 @@ def test_regress_what_the_dropped_term_does_to_the_gyroscope_in_the_scenario_of_
     shown, model = (np.array([[float(row[f"plant.{n}"]) for n in names] for row in rows]) for names in (READINGS["gyroscope"], RATES))
     difference = np.degrees(np.linalg.norm(shown - model, axis=1))
     time = np.array([float(row["time"]) for row in rows])
-    # docs/ReentryPlant.md states these values in deg/s.
+    # docs/vehicle.md states these values in deg/s.
     assert difference.max() == pytest.approx(0.277, abs=2e-3)
     assert np.sqrt(np.mean(difference**2)) == pytest.approx(0.0420, abs=1e-3)
     assert difference[time > 5.0].max() == pytest.approx(0.0038, abs=3e-4)

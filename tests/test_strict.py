@@ -202,8 +202,9 @@ def again(calls: list[dict], function: str, behind: str) -> list[dict]:
 
 
 def block(language: str) -> str:
-    """The program of a language in the page about FMI 3.0."""
-    return re.search(rf"```{language}\n(.*?)```", (ROOT / "docs" / "fmi3.md").read_text(), re.S)[1]
+    """The program of a language in the page's section about FMI 3.0."""
+    _, page = (ROOT / "docs" / "use-it.md").read_text().split("\n## FMI 3.0\n")
+    return re.search(rf"```{language}\n(.*?)```", page, re.S)[1]
 
 
 def test_the_documented_loop_in_c_is_that_in_python_and_keeps_to_the_standard(watched, tmp_path):

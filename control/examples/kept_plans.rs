@@ -1,5 +1,5 @@
 //! How far a kept plan is moved towards a far reference if no solver ever succeeds, for
-//! `docs/guarantee.md`:
+//! `docs/proof.md`:
 //!
 //! ```text
 //! cargo run --release -p reentry-control --example kept_plans

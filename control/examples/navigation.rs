@@ -1,4 +1,4 @@
-//! Errors of the navigation in entry flights, by grade of the sensors, as docs/EntryNavigation.md
+//! Errors of the navigation in entry flights, by grade of the sensors, as docs/entry.md
 //! shows them. `cargo run --release --package reentry-control --example navigation -- FLIGHTS`
 
 #[path = "../tests/harness/mod.rs"]

@@ -214,13 +214,13 @@ fn a_jump_of_the_reference_is_followed_under_guarantee() {
 }
 
 #[test]
-#[ignore = "a minute: for the figures of docs/guarantee.md"]
+#[ignore = "a minute: for the figures of docs/proof.md"]
 fn a_thousand_jumps_are_followed_under_guarantee() {
     println!("most iterations: {}", check(Jump::random, SEED, 1000).max(reversal().check()));
 }
 
 #[test]
-#[ignore = "two minutes: for the figures of docs/guarantee.md"]
+#[ignore = "two minutes: for the figures of docs/proof.md"]
 fn a_thousand_jumps_that_set_no_constant_are_followed_from_motion_and_with_delays() {
     println!("most iterations: {}", check(Jump::in_motion, HELD_OUT, 1000));
 }

@@ -201,7 +201,7 @@ fn oracle_deviation_from_the_nominal_motion_obeys_the_error_dynamics() {
         let rate_slack = largest(&deviations(Disturbance::default()), [3, 4, 5]);
         assert!(slack < 0.01 * reach.angle * bound && rate_slack < 0.01 * reach.rate * bound);
 
-        // The other part that drives the deviation is the mismatch (docs/guarantee.md); the
+        // The other part that drives the deviation is the mismatch (docs/proof.md); the
         // vehicle's inertia is the one that the controller uses.
         let bound = bound + Lemmas::new(&chosen).parts.mismatch.mean;
         // Seven seconds between two switches are three time constants of the slow mode of the

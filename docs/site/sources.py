@@ -10,6 +10,8 @@ from sphinx.addnodes import pending_xref
 from sphinx.transforms.post_transforms import SphinxPostTransform
 
 ROOT = Path(__file__).resolve().parents[2]
+# Folders of data of which stage.py has made a page.
+MADE = {"docs/claims": "reference/claims"}
 # Files that a browser shows itself or hands to another program.
 AS_THEY_ARE = {".svg", ".png", ".ipynb"}
 
@@ -26,8 +28,9 @@ class LinkSources(SphinxPostTransform):
             name = posixpath.normpath(posixpath.join(posixpath.dirname(self.env.docname), node["reftarget"].split("#")[0]))
             if name.startswith("..") or not (ROOT / name).exists():
                 continue
-            self.env.linked_sources.add(name)
-            address = self.app.builder.get_relative_uri(self.env.docname, page_of(name))
+            if name not in MADE:
+                self.env.linked_sources.add(name)
+            address = self.app.builder.get_relative_uri(self.env.docname, MADE.get(name) or page_of(name))
             if Path(name).suffix in AS_THEY_ARE:
                 address = address.removesuffix(".html")
             node.replace_self(nodes.reference("", "", *node.children, internal=True, refuri=address))

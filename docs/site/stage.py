@@ -1,6 +1,7 @@
 """Writes the pages of the manual that follow from other files: the variables of every FMU from the
 committed descriptions, the keys of experiments, studies and campaigns from their JSON Schemas, the
-API in Python and Rust, and the gallery. Nothing of it is committed.
+items of the papers from docs/claims, where every setting acts, the API in Python and Rust, and the
+gallery. Nothing of it is committed.
 """
 
 import json
@@ -13,10 +14,20 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 sys.path += [str(ROOT / "scripts" / "pages")]
 
+import claims
 import gallery
 import parameters
 
 CAUSALITIES = {"input": "Inputs", "output": "Outputs", "parameter": "Parameters"}
+# The pages that explain FMUs; the others are controllers in laws.md.
+PAGES = {
+    "ReentryPlant": "vehicle",
+    "CRMPC": "CRMPC",
+    "ControlAllocator": "allocation-estimation",
+    "AttitudeEstimator": "allocation-estimation",
+    "EntryGuidance": "entry",
+    "EntryNavigation": "entry",
+}
 # Where a kind of file is explained with examples.
 EXPLAINED = {"experiment": "experiments", "study": "studies", "campaign": "campaigns"}
 
@@ -40,7 +51,7 @@ def variables(folder):
 
 
 def explained(name):
-    page = "TVSMC" if "TVSMC" in name else name
+    page = PAGES.get(name, "laws")
     return f"Angles are shown in degrees and are in radians in FMI. [{page}.md](../../docs/{page}.md) explains the FMU."
 
 
@@ -119,6 +130,12 @@ def table(key):
     return f"table of {type_of(held)}" if isinstance(held, dict) else "table"
 
 
+def settings(folder, table):
+    """Copies the table of tests/relations/settable.py, if it was made."""
+    made = "# Where every setting acts\n\n`python tests/relations/settable.py` makes this page, before `scripts/manual`.\n"
+    write(folder / "settings.md", table.read_text(encoding="utf-8") if table.is_file() else made)
+
+
 def python_api(folder):
     package = (ROOT / "python" / "src" / "reentry_fmus" / "__init__.py").read_text(encoding="utf-8")
     listed = re.search(r"__all__ = \[(.*?)\]", package, re.S)[1]
@@ -191,17 +208,19 @@ def pages(stage):
     write(stage / "README.md", re.sub(r"<picture>.*?src=\"(.*?)\"\s+alt=\"(.*?)\".*?</picture>", r"![\2](\1)", readme, flags=re.S))
 
 
-def main(stage, pictures, rust):
+def main(stage, pictures, rust, table):
     shutil.rmtree(stage, ignore_errors=True)
     pages(stage)
     folder = stage / "reference"
     variables(folder)
     for kind in EXPLAINED:
         keys(folder, kind)
+    write(folder / "claims.md", claims.page())
+    settings(folder, table)
     python_api(folder)
     rust_api(folder, rust)
     gallery_page(folder, pictures)
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]), Path(sys.argv[2]), Path(sys.argv[3]))
+    main(*map(Path, sys.argv[1:]))

@@ -16,7 +16,7 @@ def pd(state):
 
 
 def lqr(state):
-    """The law of docs/LQR.md with the defaults of the FMU: m = I R⁻¹ (v − Ṙ ω) + ω × I ω."""
+    """The law of docs/laws.md with the defaults of the FMU: m = I R⁻¹ (v − Ṙ ω) + ω × I ω."""
     alpha, beta, _ = state.attitude
     sa, ca, sb, cb = np.sin(alpha), np.cos(alpha), np.sin(beta), np.cos(beta)
     tb = sb / cb

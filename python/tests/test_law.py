@@ -61,7 +61,7 @@ def by_fmu(file, tmp_path_factory):
 
 
 def test_oracle_a_law_flies_what_its_fmu_flies(by_law, by_fmu):
-    """The law of docs/LQR.md in Python against LQR.fmu: equal to rounding."""
+    """The law of docs/laws.md in Python against LQR.fmu: equal to rounding."""
     mine, packaged = by_law.table, by_fmu.table
     assert list(mine) == list(packaged) and mine.attrs == packaged.attrs
     assert mine.shape == (CASES, 11)

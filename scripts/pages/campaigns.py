@@ -1,5 +1,5 @@
 """Flies the campaigns of orchestrator/experiments/campaigns with every controller that they are for, and
-writes who keeps what, with which probability, to docs/campaigns-results.md: campaigns.py [CAMPAIGN…]
+writes who keeps what, with which probability, to docs/results.md: campaigns.py [CAMPAIGN…]
 
 The FMUs are built and packed first. What is flown already in out/campaigns is not flown again; about
 an hour on two processors from nothing. The page is written when all campaigns are flown.
@@ -17,22 +17,8 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 TARGET = Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target")).absolute()
 OUT = ROOT / "out" / "campaigns"
-PAGE = ROOT / "docs" / "campaigns-results.md"
-HEAD = """# Probabilities of breaking the limits
-
-`python scripts/pages/campaigns.py` flies the campaigns in
-[orchestrator/experiments/campaigns](../orchestrator/experiments/campaigns) with each controller and
-writes this page. The probabilities are those of breaking a limit, as 95 % confidence intervals of
-Clopper and Pearson; at corners, levels and for adversaries they are only shares. The last column
-has the mean share of the time in which CRMPC reports that its guarantee is in force, and the number
-of cases that broke a limit while it was. [campaigns.md](campaigns.md) explains the numbers.
-
-Controllers whose names are those of experiments (`crmpc-robust`) have the settings of Chai 2022.
-The others have the default settings of their FMUs: only their inertia, the limits and the reference
-come from the scenario. None was designed for the scenarios of the others. With sensors, CRMPC has
-the softer gain and the bounds of the campaign's experiment.
-"""
-
+PAGE = ROOT / "docs" / "results.md"
+BEGIN, END = "<!-- campaigns: written by scripts/pages/campaigns.py -->\n", "<!-- end of campaigns -->\n"
 PAPER_SETS = ["controller.constraints=paper", "controller.feedback.k1=-5", "controller.feedback.k2=-5"]
 FURTHER = ("FBL", "BTVSMC", "BTVSMC_DO", "SOTVSMC_DO", "TwoLoopSMC")
 
@@ -132,7 +118,7 @@ def section(name: str) -> str:
     heading += [column for what, _, greatest in limits for column in (f"{what} broken", greatest)]
     heading += ["lost", "guarantee in force"]
     lines = [
-        f"\n## {first['title']}\n",
+        f"\n### {first['title']}\n",
         f"[{name}.toml](../orchestrator/experiments/campaigns/{name}.toml)\n",
         f"| {' | '.join(heading)} |",
         "|---" * len(heading) + "|",
@@ -164,7 +150,8 @@ def main() -> None:
     ]
     if missing:
         sys.exit(f"{PAGE} stays as it is: there is no {missing[0]} in {OUT}, and {len(missing) - 1} more are missing")
-    PAGE.write_text(HEAD + "".join(map(section, CAMPAIGNS)), encoding="utf-8")
+    before, rest = PAGE.read_text(encoding="utf-8").split(BEGIN)
+    PAGE.write_text(before + BEGIN + "".join(map(section, CAMPAIGNS)) + "\n" + END + rest.split(END)[1], encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Writes docs/claims.md from docs/claims/*.toml: claims.py [--check]
+"""The manual's page of claims, made of docs/claims/*.toml.
 
 Each file holds one paper: `paper`, its `studies`, how much is `printed` of what is numbered, and
 sections of items. An item has
@@ -31,7 +31,6 @@ else:
 
 ROOT = Path(__file__).resolve().parents[2]
 DATA = ROOT / "docs" / "claims"
-PAGE = ROOT / "docs" / "claims.md"
 STUDIES = ROOT / "orchestrator" / "experiments"
 PAPERS = ["chai-2022", "wu-2015", "jia"]
 
@@ -42,7 +41,7 @@ VERDICTS = {
     "reproduced": "the run gives the printed numbers",
     "redrawn": "the run draws the figure; the paper's own curves were not available, so nothing was compared digit by digit",
     "implemented": "the code computes it, or has the value, as printed",
-    "implemented, corrected": "the code computes it differently from the print; [errata.md](errata.md) has the details of what the code uses",
+    "implemented, corrected": "the code computes it differently from the print; [errata.md](../docs/errata.md) has the details of what the code uses",
     "background": "a definition, a step or a remark for which nothing is computed",
     "not judged": "nothing shows it; the row says why",
 }
@@ -54,14 +53,12 @@ KEYS = {"place", "says", "setup", "verdict", "number", "shown", "study", "page",
 HEAD = """\
 # Every item of the papers, and its verdict
 
-<!-- Written by scripts/pages/claims.py from docs/claims: change that, not this page. -->
-
 This page has a row for each numbered equation, assumption, definition, lemma, theorem, remark,
 figure and table of the three papers, and for each claim of their text. A row has the place, the
 item in our words, the setup in which it was judged, the verdict, and the test or run that shows it;
-an item that was judged in several setups has several rows. [results.md](results.md) has the
-measured results as a report, [errata.md](errata.md) the misprints and the full references, and
-[symbols.md](symbols.md) the symbols.
+an item that was judged in several setups has several rows. [results.md](../docs/results.md) has the
+measured results as a report, [errata.md](../docs/errata.md) the misprints and the full references, and
+[symbols.md](../docs/symbols.md) the symbols.
 
 Setups: *closed form* is a test against a formula, differences or another solver. *Ideal
 measurement* and *sensors and estimator* are the scenario of Chai 2022. *Direct moments* act as
@@ -71,7 +68,7 @@ biases* are an inertia of + 5 %, and air and surfaces 10 % weaker. The laws of W
 signs unless the row says *as printed*. *Our additions* are that the observer uses the achieved
 moment, and that the surface is re-initialised while the actuators fall short; the paper simulates
 surfaces and jets without them. Numbers are those of the tests' bounds, of the studies' reports, of
-[results.md](results.md) or of [errata.md](errata.md).
+[results.md](../docs/results.md) or of [errata.md](../docs/errata.md).
 """
 
 
@@ -148,7 +145,7 @@ def evidence(item: dict, studies: Referable) -> str:
         texts = [shown + (f" ({'; '.join(setups)})" if setups else "") for shown, setups in entries.items()]
         if texts:
             parts.append(f"[{study}](../orchestrator/experiments/{study}/study.toml): {'; '.join(texts)}")
-    parts += [f"[{page.split('#')[0]}]({page})" for page in item.get("page", [])]
+    parts += [f"[{page.split('#')[0]}](../docs/{page})" for page in item.get("page", [])]
     return ", ".join(parts)
 
 
@@ -190,18 +187,3 @@ def page() -> str:
             ]
             lines += [*table(["place", "says", "setup", "verdict", "number", "shown by"], rows), ""]
     return "\n".join(lines)
-
-
-def main() -> int:
-    written = page()
-    if "--check" in sys.argv[1:]:
-        if PAGE.read_text(encoding="utf-8") == written:
-            return 0
-        print("docs/claims.md is out of date: run scripts/pages/claims.py", file=sys.stderr)
-        return 1
-    PAGE.write_text(written, encoding="utf-8")
-    return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())

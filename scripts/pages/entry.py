@@ -1,8 +1,8 @@
-"""Draws the pictures of docs/entry.md and docs/EntryNavigation.md that show more than the plot of a run:
+"""Draws the pictures of docs/entry.md and docs/entry.md that show more than the plot of a run:
 entry.py ACTUATED_DIR NAVIGATED_DIR.
 
 The folders are what `orchestrator run surfaces-and-jets` with `--fmu controller=CRMPC.fmu` and `orchestrator run
-navigated` wrote, the latter with wind (docs/EntryNavigation.md); each holds its results.csv.
+navigated` wrote, the latter with wind (docs/entry.md); each holds its results.csv.
 """
 
 import csv

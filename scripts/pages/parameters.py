@@ -1,21 +1,11 @@
-"""Writes the tables of parameters in docs/ from the committed descriptions of the FMUs, between the lines
-`<!-- parameters of NAME … -->` and `<!-- end -->`. The descriptions follow from the declarations in Rust.
-
-    python scripts/pages/parameters.py            # writes the tables
-    python scripts/pages/parameters.py --check    # fails if one is not up to date
-"""
+"""Variables of FMUs for tables, from the committed descriptions, which follow from the declarations in Rust."""
 
 import math
 import re
-import sys
 from pathlib import Path
 from xml.etree import ElementTree
 
 ROOT = Path(__file__).resolve().parents[2]
-HEAD = "| parameter | start | range | meaning |\n|---|---|---|---|"
-# Parameters of all controllers are described once, on the page of CRMPC.
-COMMON = re.compile(r"reference\.|inertia\.I|limit\.|saturation$|delay$|measurement\.age$|trajectory\.earthRate$")
-BLOCK = re.compile(r"(<!-- parameters of ([\w ]+?)( without common)? -->\n).*?(<!-- end -->)", re.S)
 AXES = [["alpha", "beta", "sigma"], ["p", "q", "r"], ["x", "y", "z"], ["north", "east", "down"]]
 
 
@@ -95,39 +85,3 @@ def grouped(variables):
         else:
             groups.append((key, [(ending, start)]))
     return groups
-
-
-def table(root, leaves_out_common):
-    lines = [HEAD]
-    chosen = [row for row in rows(root) if not (leaves_out_common and COMMON.match(row[0]))]
-    for (stem, span, unit, meaning, _), entries in grouped(chosen):
-        endings, starts = zip(*entries)
-        name = joined(stem, endings)
-        start = starts[0] if len(set(starts)) == 1 else ", ".join(starts) if len(starts) <= 10 else "various"
-        start += f" {unit}" if unit and start != "various" else ""
-        span += f" {unit}" if unit and span else ""
-        lines.append(f"| {name} | {start} | {span} | {meaning} |")
-    return "\n".join(lines)
-
-
-def main():
-    stale = []
-    for page in sorted((ROOT / "docs").glob("*.md")):
-        before = page.read_text()
-
-        def block(match):
-            tables = [table(description(name), match.group(3)) for name in match.group(2).split()]
-            lines = dict.fromkeys(line for one in tables for line in one.splitlines())
-            return f"{match.group(1)}{chr(10).join(lines)}\n{match.group(4)}"
-
-        after = BLOCK.sub(block, before)
-        if after != before:
-            stale.append(page.name)
-            if "--check" not in sys.argv:
-                page.write_text(after)
-    if "--check" in sys.argv and stale:
-        sys.exit(f"docs/{', docs/'.join(stale)}: tables of parameters are not up to date; run scripts/pages/parameters.py")
-
-
-if __name__ == "__main__":
-    main()

@@ -18,7 +18,7 @@ Keys of docs/results.toml:
     [[table]]       name, study, rows, columns; or `kind`:
         "claims"        rows name a claim by its first words; `says` is the text beside the verdict
         "verdicts"      a row for each claim, a column for each `setup` that stands before its colon
-        "campaigns"     rows of docs/campaigns-results.md for one controller
+        "campaigns"     rows of docs/results.md for one controller
     [[sentence]]    page, study, says
     A text `says` has holes {x}; `x` says what is in it, as does a column:
         of              RUN.METRIC, RUN.measure.ID or RUN.within.ID.KEY; a column leaves RUN to its rows
@@ -50,7 +50,6 @@ from cells import Cell, Plain, Study, Text, Verdict
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = ROOT / "docs" / "results.md"
 DATA = ROOT / "docs" / "results.toml"
-CAMPAIGNS = ROOT / "docs" / "campaigns-results.md"
 TABLE = re.compile(r"(<!-- table ([\w-]+): written by scripts/pages/results\.py -->\n\n).*?(\n*<!-- end -->)", re.DOTALL)
 
 
@@ -104,8 +103,8 @@ def rows_of_verdicts(study: Study, table: dict) -> list[list]:
 
 
 def rows_of_campaigns(table: dict) -> list[list]:
-    """A controller's rows, from the page that campaigns.py writes."""
-    page = CAMPAIGNS.read_text(encoding="utf-8")
+    """A controller's rows, from the part of the page that campaigns.py writes."""
+    _, page = PAGE.read_text(encoding="utf-8").split("<!-- campaigns: ")
     rows = []
     for row in table["rows"]:
         section = page.split(f"/{row['campaign']}.toml)")[1]

@@ -6,7 +6,7 @@ driven alone, so what differs at its outputs differs in the experiment's results
 under some settings only says so: its description ends with "; used with CONDITION", and the FMU warns if
 it is set without effect.
 
-    python tests/relations/settable.py      # writes docs/settings.md
+    python tests/relations/settable.py      # writes target/settings.md, for the manual
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ if sys.version_info >= (3, 11):
 else:
     import tomli as tomllib
 
-PAGE = ROOT / "docs" / "settings.md"
+PAGE = TARGET / "settings.md"
 TIMED = {"solver.timeBudget"}
 # Communication points of a run, unless its FMUs end it, and those at which an FMU is driven: first at
 # a few of them. A flight that has not more than the last number is flown to its end as well.

@@ -5,7 +5,7 @@ from fmpy import fmi2
 
 from conftest import NAMES, archive
 from fmi import Fmu
-from settable import PAGE, STEPPED, condition, look, page
+from settable import STEPPED, condition, look
 
 # Three minutes of flights, one for each value of each setting.
 pytestmark = pytest.mark.tier("studies")
@@ -19,11 +19,6 @@ def found(tmp_path_factory):
 def test_every_setting_acts_or_speaks(found):
     _, faults = found
     assert faults == [], "\n".join(faults)
-
-
-def test_the_page_says_where_every_setting_acts(found):
-    rows, _ = found
-    assert PAGE.read_text(encoding="utf-8") == page(rows), "run python tests/relations/settable.py"
 
 
 def test_model_exchange_says_what_acts_in_co_simulation_only(tmp_path):

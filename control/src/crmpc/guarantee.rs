@@ -1,8 +1,8 @@
 //! The basis of the robust set's guarantee: how far the vehicle can be from the plan, and whether
 //! enough of the limits is then left.
 //!
-//! The theorem, its assumptions and its proof are in docs/guarantee.md. The comments beside the
-//! code explain the numbers of its lemmas.
+//! The theorem and its assumptions are in docs/guarantee.md, its proof is in docs/proof.md. The
+//! comments beside the code explain the numbers of its lemmas.
 
 mod assessment;
 mod deviation;

@@ -1,6 +1,6 @@
 //! Double-layered MPC (DLMPC), the comparison of Chai et al. (2022), section 5. An outer MPC
 //! commands body rates that steer the attitude, and an inner terminal sliding mode follows them.
-//! The paper that defines it was not available; docs/DLMPC.md describes our reading.
+//! The paper that defines it was not available; docs/laws.md describes our reading.
 //!
 //! The outer layer predicts Θ⁺ = Θ + h v, where v = R ω is the commanded rate of the angles. The
 //! bound is on the body rates R⁻¹(Θ) v, which are linearised along the previous prediction and

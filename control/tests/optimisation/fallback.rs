@@ -109,7 +109,7 @@ fn published_fallback_is_the_shifted_plan_with_the_terminal_law() {
 
 #[test]
 fn the_robust_plan_is_kept_where_no_optimum_is_found() {
-    // Beyond the horizon the trajectory brakes (docs/guarantee.md), so that the guarantee stays in
+    // Beyond the horizon the trajectory brakes (docs/proof.md), so that the guarantee stays in
     // force. The plan moves towards the unconstrained optimum only as far as that is certified.
     let settings = settings(Constraints::Robust);
     let solver = SolverSettings { max_iterations: 1, ..settings.solver };

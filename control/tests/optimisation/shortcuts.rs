@@ -116,7 +116,7 @@ fn oracle_off_the_nominal_motion_the_input_changes_by_k_times_the_deviation() {
             (angles - nominal.fixed_rows::<3>(0), angle_rates - nominal.fixed_rows::<3>(3));
         let expected = memory.plan.accelerations[0] + angle * feedback.k1 + rate * feedback.k2;
         // This is the state to which that acceleration leads by the middle of the period
-        // (docs/guarantee.md).
+        // (docs/proof.md).
         let half = 0.5 * FEEDBACK;
         let middle = angles + angle_rates * half + expected * (0.5 * half * half);
         if moment.norm() > (1.0 - 1e-12) * settings(Constraints::Robust).limit_moment {

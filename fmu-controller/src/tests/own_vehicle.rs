@@ -7,7 +7,7 @@ use fmi_export::{LastEvent, Model};
 use nalgebra::Vector3;
 use vehicle::Vehicle;
 
-/// Path of the example that docs/own-vehicle.md explains.
+/// Path of the example that docs/vehicle.md explains.
 const EXAMPLE: &str = concat!(
     env!("CARGO_MANIFEST_DIR"),
     "/../orchestrator/experiments/entry/vehicles/lifting-body.toml"

@@ -4,7 +4,7 @@
     python -m reentry_fmus.daveml MODEL.dml -o vehicle.toml --surface "left elevon=DELEL" ...
 
 The model is evaluated and compared with its own check cases. Then its coefficients are sampled on a
-grid of angle of attack, Mach number and deflections, as docs/own-vehicle.md explains.
+grid of angle of attack, Mach number and deflections, as docs/vehicle.md explains.
 """
 
 from __future__ import annotations

@@ -9,7 +9,7 @@
 //! These checks do not cover the steps of the proof that lead from one inequality to the next, the
 //! invariant set of the initial state `tube`, or the optimisation. [`plan`] covers the certificate
 //! as a whole: it bounds what can happen under a recorded plan without any of the controller's
-//! bounds (docs/guarantee-check.md).
+//! bounds (docs/proof.md).
 
 pub mod assessment;
 pub mod draws;

@@ -94,7 +94,7 @@ impl HorizonEnd {
 
 /// Returns the braking, the rate κ_β (1/s) at which the sideslip has to brake beyond the horizon:
 /// the least one with which β, which travels by |β̇|/κ_β, keeps its bound. All limits must hold
-/// meanwhile (docs/guarantee.md, step 6). The result is `None` if that is impossible.
+/// meanwhile (docs/proof.md, step 6). The result is `None` if that is impossible.
 pub(in crate::crmpc) fn braking(
     s: &Settings,
     dynamics: &Dynamics,

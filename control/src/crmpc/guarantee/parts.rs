@@ -1,4 +1,4 @@
-//! The parts of the deviation, by the way in which they add up (docs/guarantee.md, steps 1 and 2).
+//! The parts of the deviation, by the way in which they add up (docs/proof.md, steps 1 and 2).
 
 use super::deviation::Deviation;
 use super::dynamics::Dynamics;
@@ -51,7 +51,7 @@ pub struct InertiaPart {
     pub early_moment: f64,
 }
 
-/// Largest effects at one tick, per unit of their causes (docs/guarantee.md, step 2).
+/// Largest effects at one tick, per unit of their causes (docs/proof.md, step 2).
 pub(super) struct Reaches {
     /// Of the disturbance and of the inertia error.
     pub(super) disturbance: Reach,
@@ -117,7 +117,7 @@ impl Parts {
         changes.times(mean).plus(&of_errors).plus(&shifts.times(self.swing + self.creep))
     }
 
-    /// Returns the deviation at a tick (docs/guarantee.md, steps 2 and 3).
+    /// Returns the deviation at a tick (docs/proof.md, steps 2 and 3).
     ///
     /// With ρ per unit of a bound on each component, and v the norm of the parts with any
     /// direction, two axes deviate by √2 ρ + v and all three by √3 ρ + v. The vehicle itself
@@ -157,7 +157,7 @@ impl Parts {
 impl InertiaPart {
     /// If the vehicle has turned by o since the inertia error caused a part of the deviation, the
     /// moment that compensates for it is larger by up to the share ‖I (W − W′) R′ I⁻¹‖ ≤
-    /// I_max/I_min √2 ‖o‖ ‖R‖ (docs/guarantee.md, step 4).
+    /// I_max/I_min √2 ‖o‖ ‖R‖ (docs/proof.md, step 4).
     fn new(
         s: &Settings,
         dynamics: &Dynamics,

@@ -1,5 +1,5 @@
 //! Pulses by the feedback: jumps of the rates if a command begins to act at another time than
-//! assumed (docs/guarantee.md, step 7). Those by the plan's own changes are in
+//! assumed (docs/proof.md, step 7). Those by the plan's own changes are in
 //! [`super::switching`].
 
 use super::deviation::Deviation;

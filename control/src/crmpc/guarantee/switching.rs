@@ -134,7 +134,7 @@ impl Switching {
     /// Returns `None` if the delay is exact.
     ///
     /// The deviation s along the eigenvectors of Φ with the eigenvalues λ_i, and the pulse p of the
-    /// tick, satisfy (docs/guarantee.md, step 7)
+    /// tick, satisfy (docs/proof.md, step 7)
     ///
     /// |s_i⁺| ≤ |λ_i| |s_i| + g_i p,  p⁺ = δ (‖Δa‖ + Σ κ_i (|1 − λ_i| |s_i| + g_i p)).
     ///

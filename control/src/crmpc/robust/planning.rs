@@ -71,7 +71,7 @@ impl Robust {
 
     /// Returns the moment for an acceleration, N m. It is exact in the middle of the period over
     /// which the moment is held, so that the effects of a changing f on the rate cancel over the
-    /// period (docs/guarantee.md, "The law").
+    /// period (docs/proof.md, "The law").
     fn moment(&self, tick: &Tick, acceleration: &Vector3<f64>) -> Vector3<f64> {
         let half = 0.5 * self.settings.period_feedback;
         let angles = tick.measured.angles + (tick.angle_rates + acceleration * (0.5 * half)) * half;

@@ -299,7 +299,7 @@ fn oracle_no_certified_stage_needs_more_than_its_limits_at_any_instant() {
 }
 
 #[test]
-#[ignore = "a million stages take a minute; their numbers are in docs/guarantee.md"]
+#[ignore = "a million stages take a minute; their numbers are in docs/proof.md"]
 fn oracle_no_certified_stage_of_a_million_needs_more_than_its_limits() {
     assert_stages_need_no_more_than_their_limits(250_000);
 }

@@ -7,7 +7,7 @@ use crate::interval::Interval;
 use crate::sums::Pair;
 use control::crmpc::Settings;
 
-/// Braking rate of angle of attack and bank, 1/s, by step 6 of docs/guarantee.md.
+/// Braking rate of angle of attack and bank, 1/s, by step 6 of docs/proof.md.
 pub(super) const BRAKING: f64 = 0.01;
 
 /// Parts of the mismatch of one tick.

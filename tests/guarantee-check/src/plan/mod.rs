@@ -3,7 +3,7 @@
 //!
 //! It is derived from assumptions 1 to 4 of docs/guarantee.md and from nothing else that the
 //! certificate uses. No number of the controller's design enters, only the settings, the plan and
-//! its age. docs/guarantee-check.md gives the derivation.
+//! its age. docs/proof.md gives the derivation.
 
 mod around;
 mod body;
