@@ -111,7 +111,6 @@ fn with_rows(schema: &mut Schema) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::collections::BTreeSet;
     use std::path::Path;
 
     #[test]
@@ -129,32 +128,6 @@ mod tests {
                 "{} is out of date: run scripts/update-generated",
                 path.display()
             );
-        }
-    }
-
-    #[test]
-    fn the_pages_explain_every_key() {
-        let pages = [
-            (FileKind::Experiment, &["experiments"][..]),
-            // Variations, signals and measures are explained once.
-            (FileKind::Study, &["studies", "campaigns"]),
-            (FileKind::Campaign, &["campaigns", "studies"]),
-        ];
-        for (kind, names) in pages {
-            let docs = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs");
-            let read = |name| std::fs::read_to_string(docs.join(format!("{name}.md"))).unwrap();
-            let page: String = names.iter().map(read).collect();
-            let is_part = |c: char| c.is_alphanumeric() || c == '_';
-            let code =
-                page.split('`').skip(1).step_by(2).flat_map(|code| code.split(|c| !is_part(c)));
-            let explained: BTreeSet<&str> = code.collect();
-            let schema: Value = serde_json::from_str(&text(kind)).unwrap();
-            let definitions = schema["definitions"].as_object().unwrap().values();
-            let tables =
-                definitions.chain([&schema]).filter_map(|table| table["properties"].as_object());
-            for key in tables.flat_map(Map::keys) {
-                assert!(explained.contains(key.as_str()), "{names:?}: {key}");
-            }
         }
     }
 }
