@@ -1,7 +1,7 @@
 //! Messages to the importer, which leave the FMU through the importer's callback only.
 //!
 //! The reason of every failure is always reported, so that nobody has to repeat a run with logging
-//! on to find it: errors, discarded calls and the end of a simulation. FMI 2.0.4, section 2.1.3,
+//! on to find it: errors, discarded calls and the end of a simulation. FMI 2.0.5, section 2.1.3,
 //! has the logger called for these statuses whatever `loggingOn` is; for fmi2Discard the importer's
 //! logger decides whether to show the message. FMI 3.0 allows that for errors only. Everything else
 //! is reported only while logging is on (`loggingOn` of fmi2Instantiate, fmi2SetDebugLogging), and

@@ -1,5 +1,5 @@
 //! The functions that may be called in each state, and for which variables: the tables of FMI
-//! 2.0.4, sections 3.2.3 (model exchange) and 4.2.4 (co-simulation).
+//! 2.0.5, sections 3.2.3 (model exchange) and 4.2.4 (co-simulation).
 
 use crate::interface::{DISCARD, ERROR, EventInfo, FmuState, MODEL_EXCHANGE, OK, Status};
 use crate::{Fmu, Instance, c, ok};

@@ -1,4 +1,4 @@
-//! Tests of every FMU of the built libraries against FMI 2.0.4. The calls allowed in the state
+//! Tests of every FMU of the built libraries against FMI 2.0.5. The calls allowed in the state
 //! stepFailed are tested with the shell, because no FMU discards a step.
 #![allow(clippy::borrow_as_ptr, reason = "calls read better as in C")]
 
