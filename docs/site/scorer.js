@@ -2,7 +2,7 @@
 // then those that explain words, and those about the project itself last.
 const words = (new URLSearchParams(location.search).get("q") ?? "").toLowerCase();
 const about = ["ARCHITECTURE", "CHANGELOG", "CONTRIBUTING", "SECURITY", "README", "python/README"];
-const explain = ["docs/glossary", "docs/symbols"];
+const explain = ["docs/symbols"];
 
 var Scorer = {
     score: ([page, title, , , score]) =>
