@@ -2,7 +2,7 @@
 
     python scripts/pages/gallery.py OUT    # writes OUT/NAME.svg, with the programs and FMUs in target
 
-The manual's gallery shows the plots (docs/site/gallery.py).
+The manual's gallery shows the plots (docs/site/stage.py).
 """
 
 import os
