@@ -132,7 +132,7 @@ def test_an_entry_is_shown_and_answers_to_its_pictures(chromium):
     box = track.bounding_box()
     page.mouse.move(box["x"] + 0.5 * box["width"], box["y"] + 0.5 * box["height"])
     chosen = page.evaluate("time")
-    assert 100 < chosen < 1800 and page.inner_text("#clock") == f"{chosen:.1f} s"
+    assert 100 < chosen < 1800 and page.inner_text("#time") == f"{chosen:.1f} s"
     # An entry that is too steep misses the terminal area, and that is said.
     count = flights(page)
     page.get_by_label("path angle").fill("-2.5")
@@ -164,7 +164,7 @@ def test_a_lost_attitude_ends_the_flight_as_in_the_orchestrator(chromium, tmp_pa
     assert_same_figures(page, metrics)
     assert "loses the attitude" in page.inner_text("#verdict")
     # Time stands where the flight ended.
-    assert float(page.inner_text("#clock").removesuffix(" s")) == pytest.approx(end["time"], abs=0.05)
+    assert float(page.inner_text("#time").removesuffix(" s")) == pytest.approx(end["time"], abs=0.05)
 
 
 def test_the_page_opens_with_the_published_scenario(chromium, tmp_path):

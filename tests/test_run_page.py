@@ -98,7 +98,7 @@ def test_a_recorded_plan_is_drawn_with_its_tube(runs, opened):
     # The picture moves with the time, and answers to the pointer.
     picture = "document.getElementById('plan').toDataURL()"
     first = page.evaluate(picture)
-    page.fill("#seek", "100")
+    page.fill("#seek", "5")
     assert page.evaluate(picture) != first
     box = page.locator("#plan").bounding_box()
     page.mouse.click(box["x"] + 0.5 * box["width"], box["y"] + 60)
@@ -143,7 +143,7 @@ def test_keys_play_and_seek(runs, opened):
     page.click("#play")
     page.wait_for_function("parseFloat(document.getElementById('time').textContent) < 40")
     page.click("#play")
-    page.fill("#seek", "500")
+    page.fill("#seek", "25")
     assert shown_time(page) == 25
     # A view that is turned keeps the arrows.
     page.focus(".view")
@@ -157,7 +157,7 @@ def test_the_vehicle_moves_with_the_run(runs, opened):
     first, label = page.evaluate(picture), page.get_attribute(".view", "aria-label")
     assert "α 7.5, β 10.0, σ −30.0 deg" in label
     assert page.locator(".surface").count() == 8 and page.locator(".jets i").count() == 10
-    page.fill("#seek", "60")
+    page.fill("#seek", "3")
     assert page.evaluate(picture) != first and page.get_attribute(".view", "aria-label") != label
     deflections = page.locator(".surface output").all_inner_texts()
     assert any(text not in ("0.0", "−0.0") for text in deflections)

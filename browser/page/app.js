@@ -27,8 +27,6 @@ const MEANING = {
 };
 // Items of the guarantee's status by what they mean for whoever looks.
 const LIGHTS = { inForce: "good", pending: "good", exceeded: "bad", uncertified: "warn", stale: "warn", refused: "warn" };
-// Playback is five times as fast as the flight, and an entry takes half a minute.
-const SPEED = { attitude: 5, entry: 60 };
 // Columns of the loads, and the parameters with their limits.
 const LOADS = [
   ["plant.heating.flux", "heatFlux"], ["plant.loadFactor", "load"], ["plant.flight.dynamicPressure", "pressure"],
@@ -52,6 +50,7 @@ const view = new Vehicle3D($("view"));
 const zoom = (window) => { for (const chart of Object.values(charts)) chart.zoom(window); };
 const charts = Object.fromEntries(Object.keys(PANELS).map((id) => [id, new Chart($("charts"), { onPoint: point, onZoom: zoom })]));
 let proof = null;
+const player = new Player((at) => point(at));
 const entry = new EntryPictures($("entry"), (at) => point(at));
 // The flight of another law under the same disturbance, and the request that it answers.
 let ghost = null, ghostRequest = null;
@@ -193,7 +192,7 @@ function show() {
   const limits = { rate: summary.limits.rate * DEG, moment: summary.limits.moment * 1e-3 };
   const runs = [{ time: flight.time }, ...(other ? [{ time: other.time, faint: true }] : [])];
   stop = settings.isEntry ? flight.time.at(-1) : settings.scenario.stop;
-  $("time").max = stop;
+  player.range(0, flight.time.at(-1) || stop);
   charts.loads.figure.hidden = $("entry").hidden = !settings.isEntry;
   for (const id of Object.keys(PANELS)) if (!charts[id].figure.hidden) charts[id].show(panel(id, limits), runs, [0, stop]);
   if (settings.isEntry) {
@@ -205,7 +204,7 @@ function show() {
   $("faint-says").textContent = other ? ` Pale: ${other.name} under the same disturbance.` : "";
   proof.show();
   judge(limits);
-  clock();
+  player.show(time);
   pose(time);
   $("cost").textContent = `Computed in ${flight.ms.toFixed(0)} ms.`;
 }
@@ -285,16 +284,9 @@ function judge(limits) {
 
 // --- The chosen time ------------------------------------------------------------------------------------------------
 
-// Shows the chosen time, or the end of a flight that ended before it.
-function clock() {
-  const shown = Math.min(time, flight?.time.at(-1) ?? time);
-  $("time").value = shown;
-  $("clock").textContent = `${shown.toFixed(1)} s`;
-}
-
 function point(at) {
   time = at;
-  clock();
+  player.show(time);
   if (!flight) return;
   for (const chart of Object.values(charts)) if (!chart.figure.hidden) chart.point(at);
   if (settings.isEntry) entry.point(at);
@@ -315,23 +307,6 @@ function pose(at) {
     rateLimit: flight.summary.limits.rate, momentLimit: flight.summary.limits.moment,
     light: { state: LIGHTS[now] ?? "none", text },
   });
-}
-
-function play() {
-  let last = null;
-  const playing = $("play").getAttribute("aria-pressed") !== "true";
-  $("play").setAttribute("aria-pressed", playing);
-  $("play").textContent = playing ? "Pause" : "Play";
-  if (!playing) return;
-  if (time >= stop) point(0);
-  const frame = (now) => {
-    if ($("play").getAttribute("aria-pressed") !== "true") return;
-    if (last !== null) point(Math.min(stop, time + ((now - last) / 1000) * SPEED[settings.flight]));
-    last = now;
-    if (time < stop) requestAnimationFrame(frame);
-    else play();
-  };
-  requestAnimationFrame(frame);
 }
 
 // --- The settings ---------------------------------------------------------------------------------------------------
@@ -471,6 +446,7 @@ function number(input, parameter, { names, low, high, exact, needs }) {
 function begun() {
   $("ghost").value = settings.isEntry ? "" : "lqr";
   time = settings.isEntry ? 900 : 26;
+  player.pace(settings.isEntry ? 1500 : 50);
   for (const chart of Object.values(charts)) chart.zoomed = null;
 }
 
@@ -506,6 +482,7 @@ function begin({ text, error }) {
   proof = new Proof();
   settings.own.listen();
   $("version").textContent = version;
+  player.pace(50);
   point(time);
   const isNew = location.hash.length < 2 && !matchMedia("(prefers-reduced-motion: reduce)").matches;
   load(location.hash.slice(1));
@@ -551,19 +528,6 @@ $("copy").onclick = async () => {
   }
 };
 $("save").onclick = () => worker.postMessage({ call: "experiment", request: settings.request() });
-$("time").oninput = () => point($("time").valueAsNumber);
-$("play").onclick = play;
-// The space bar plays wherever it does nothing else, and arrows move the time where the plan has the focus.
-window.addEventListener("keydown", (event) => {
-  const { target, key } = event;
-  if (key === " " && !target.closest("button, input, select, summary")) {
-    event.preventDefault();
-    play();
-  } else if (target.id === "plan" && /^Arrow(Left|Right)$/.test(key)) {
-    event.preventDefault();
-    point(Math.max(0, Math.min(stop, time + (key === "ArrowLeft" ? -0.2 : 0.2))));
-  }
-});
 window.addEventListener("hashchange", () => load(location.hash.slice(1)));
 for (const what of ["(prefers-color-scheme: dark)", "print"]) matchMedia(what).addEventListener("change", () => flight && show());
 

@@ -21,7 +21,8 @@ const GUARANTEE: &str = include_str!("../guarantee.js");
 const VEHICLE: &str = include_str!("../vehicle3d.js");
 const CHARTS: &str = include_str!("../chart.js");
 const INSTRUMENTS: &str = include_str!("instruments.js");
-const PLAYER: &str = include_str!("player.js");
+const PLAYER: &str = include_str!("../player.js");
+const PAGE: &str = include_str!("page.js");
 
 /// Largest number of runs whose vehicles are shown.
 const VEHICLES: usize = 2;
@@ -85,7 +86,7 @@ fn page(runs: &[Recording], panels: &[Panel]) -> String {
                     section id="origin" { h2 { "Origin" } (origin(runs)) }
                 }
                 script type="application/json" id="run-data" { (PreEscaped(json)) }
-                @for script in [VEHICLE, CHARTS, GUARANTEE, INSTRUMENTS, PLAYER] { script { (PreEscaped(script)) } }
+                @for script in [VEHICLE, CHARTS, GUARANTEE, PLAYER, INSTRUMENTS, PAGE] { script { (PreEscaped(script)) } }
             }
         }
     };
@@ -118,7 +119,7 @@ fn player() -> Markup {
     html! {
         section id="player" aria-label="Playback" {
             button id="play" type="button" aria-label="Play" title="Space" { "▶" }
-            input id="seek" type="range" min="0" max="1000" step="1" value="0" aria-label="Time";
+            input id="seek" type="range" aria-label="Time";
             output id="time" for="seek" {}
             label { span { "speed " } select id="speed" aria-label="Speed" {} }
             div id="guarantees" {}
