@@ -2,7 +2,6 @@
 
 use crate::arguments;
 use crate::failure::Failure;
-use campaign::bundle;
 use campaign::changes::Changes;
 use campaign::definition::Campaign;
 use campaign::findings::Findings;
@@ -63,10 +62,6 @@ pub(crate) struct Fly {
     /// Print which parts of the campaign are not flown yet, as JSON, and fly no case.
     #[arg(long, help_heading = "Part of the campaign", conflicts_with_all = ["fresh", "csv"])]
     work: bool,
-    /// Write the campaign and everything that its cases need into a folder, for another machine,
-    /// which then flies DIR/campaign.toml with --fmu-dir DIR/fmu. No case is flown here.
-    #[arg(long, value_name = "DIR", help_heading = "Part of the campaign", conflicts_with_all = ["case", "cases", "work", "fresh", "csv"])]
-    bundle: Option<PathBuf>,
     /// Fly all cases again, including those that are finished.
     #[arg(long, visible_alias = "force", help_heading = "Results")]
     fresh: bool,
@@ -112,15 +107,6 @@ fn prepare(common: &Common) -> Result<Plan, Error> {
 pub(crate) fn fly(asked: &Fly, out: &mut impl Write, interrupt: &Interrupt) -> Result<(), Failure> {
     let plan = prepare(&asked.common)?;
     let folder = run::folder(&plan, asked.common.out.as_deref());
-    if let Some(folder) = &asked.bundle {
-        let overrides = Overrides::from(asked.common.overrides.clone());
-        if overrides != (Overrides { fmu: overrides.fmu.clone(), ..Overrides::default() }) {
-            let message = "--bundle cannot be combined with changes on the command line: put them into [set] of the campaign";
-            return Err(Error::experiment(message).into());
-        }
-        bundle::write(&plan, folder)?;
-        return Ok(());
-    }
     if asked.work {
         let work =
             serde_json::to_string(&run::remaining(&plan, &folder)).map_err(std::io::Error::from)?;

@@ -1,11 +1,9 @@
 """Campaigns and searches on one machine."""
 
-import json
 import sys
 
 import numpy as np
 import pytest
-import reentry_fmus
 from reentry_fmus import OrchestratorError, campaign, experiment, falsify
 
 CAMPAIGN = """
@@ -138,36 +136,6 @@ def test_a_case_is_run_again_with_everything_recorded(file, flown, tmp_path):
     assert again.table.equals(run.table)
 
 
-def test_parts_do_not_depend_on_where_the_files_are(file, flown, tmp_path):
-    """The experiment is another file with the same text, at another place."""
-    here = tmp_path / "elsewhere"
-    bundled = campaign(file)
-    bundled.call("--bundle", str(here))
-    names = {path.name for path in here.rglob("*") if path.is_file()}
-    assert {"campaign.toml", "experiment.toml"} < names and len(names) == 4
-    taken = campaign(here / "campaign.toml")
-    assert json.loads(taken.call("--work", "--out", str(flown.folder)))["missing"] == []
-    taken.call("--cases", "250..275", "--out", str(tmp_path / "out"))
-    part = "0000000250-0000000275.parquet"
-    assert (tmp_path / "out" / "parts" / part).read_bytes() == (
-        flown.folder / "parts" / part
-    ).read_bytes()
-
-
-def test_a_bundle_holds_what_a_campaign_extends_and_replaces(file, tmp_path):
-    (tmp_path / "deep").mkdir()
-    (tmp_path / "base.toml").write_text(CAMPAIGN.replace("cases = 600", "cases = 250"))
-    extended = tmp_path / "deep" / "own.toml"
-    extended.write_text('extends = "../base.toml"\nseed = 5\n[fmu]\ncontroller = "FBL.fmu"\n')
-    whole = campaign(extended).run(out=tmp_path / "whole")
-    campaign(extended).call("--bundle", str(tmp_path / "bundle"))
-    extended.unlink()
-    (tmp_path / "base.toml").unlink()
-    taken = campaign(tmp_path / "bundle" / "campaign.toml").run(out=tmp_path / "taken")
-    bytes_of = [(run.folder / "cases.parquet").read_bytes() for run in (whole, taken)]
-    assert bytes_of[0] == bytes_of[1]
-
-
 def test_a_search_finds_a_worse_case(file, flown, tmp_path):
     search = falsify(file, out=tmp_path / "search", jobs=1)
     assert search.outcome["measure"] == "rate" and search.outcome["unit"] == "deg/s"
@@ -201,8 +169,6 @@ def test_bad_arguments_are_refused(file, tmp_path, monkeypatch):
         campaign("gust").run()
     with pytest.raises(OrchestratorError, match="the campaign has 600 cases"):
         campaign(file).case(600)
-    with pytest.raises(ValueError, match="an address is for runs with a client"):
-        campaign(file).run(out="memory://somewhere")
     with pytest.raises(ValueError, match='"si" or "deg"'):
         campaign(file).run(units="grad")
 
@@ -212,10 +178,3 @@ def test_a_missing_package_is_named(file, monkeypatch):
     with pytest.raises(ModuleNotFoundError) as caught:
         campaign(file)
     assert 'pip install "reentry-fmus[campaign]"' in str(caught.value)
-    monkeypatch.undo()
-    monkeypatch.setitem(sys.modules, "distributed", None)
-    monkeypatch.delitem(sys.modules, "reentry_fmus.cluster", raising=False)
-    monkeypatch.delattr(reentry_fmus, "cluster", raising=False)
-    with pytest.raises(ModuleNotFoundError) as caught:
-        campaign(file).run(object())
-    assert 'pip install "reentry-fmus[cluster]"' in str(caught.value)

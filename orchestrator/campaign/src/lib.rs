@@ -1,11 +1,10 @@
 //! Campaigns: thousands of cases of one experiment, in which parameters vary.
 //!
 //! A campaign ([`definition`]) is a sweep with limits: it is prepared once ([`plan`]), and a
-//! [`flight`] flies its cases. Their parts are kept until all are merged ([`run`]); other machines
-//! can fly some of them, with the files of a [`bundle`]. [`findings`] and [`sensitivity`] evaluate
-//! the cases, and [`report`] shows the results. [`search`] looks for the worst case.
+//! [`flight`] flies its cases. Their parts are kept until all are merged ([`run`]); several
+//! processes can fly some of them in the same folder. [`findings`] and [`sensitivity`] evaluate the
+//! cases, and [`report`] shows the results. [`search`] looks for the worst case.
 
-pub mod bundle;
 pub mod changes;
 pub mod definition;
 pub mod findings;

@@ -2,8 +2,7 @@
 
 `fmu` gives the path of an FMU for FMPy or any other importer, `ClosedLoop` connects a controller in
 Python to the vehicle, and `experiment` runs a paper's experiment and returns its table. `campaign`
-flies thousands of cases of an experiment, on this machine or on a cluster (`reentry_fmus.cluster`),
-and `falsify` looks for the worst case. `linearise` gives the linear model of a loop, and `margins`
+flies thousands of cases of an experiment, and `falsify` looks for the worst case. `linearise` gives the linear model of a loop, and `margins`
 its stability margins. `reproduce` runs a paper's comparison and judges its claims.
 Quantities are in SI units and radians unless `units="deg"` selects degrees.
 """

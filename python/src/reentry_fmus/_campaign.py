@@ -24,7 +24,6 @@ from ._state import Law, LawError
 from ._table import Units, check_units, convert
 
 if TYPE_CHECKING:
-    from distributed import Client
     from xarray import Dataset
 
 STATUS = ["completed", "ended", "lost", "failed"]
@@ -144,7 +143,6 @@ class Campaign:
 
     def run(
         self,
-        client: Client | None = None,
         out: str | os.PathLike[str] | None = None,
         jobs: int | None = None,
         *,
@@ -153,39 +151,23 @@ class Campaign:
         """Flies the cases that are not flown yet, and returns the results of all.
 
         Finished parts are stored in the folder of the results at once. A run that was ended in any
-        way continues from there when it is started again. The results are the same bytes, however
-        the cases were distributed.
+        way continues from there when it is started again. The results are the same bytes, on any
+        number of processes.
 
         Args:
-            client: Dask client whose workers fly the cases (`reentry_fmus.cluster`). Without one
-                this machine does.
-            out: Folder of the results, by default out/NAME. With a client it may be the address
-                of a folder that all workers reach, such as "s3://bucket/folder", where they store
-                the finished parts; the results are then in out/NAME as well.
-            jobs: Number of threads without a client, or of processes with a law in Python, by
-                default one for each core.
+            out: Folder of the results, by default out/NAME.
+            jobs: Number of threads, or of processes with a law in Python, by default one for each
+                core.
             units: "deg" gives angles and angular rates of the table in degrees.
 
         Raises:
             OrchestratorError: The campaign was refused, or flying it failed.
-            ClusterError: The cluster failed. Finished parts are kept.
             LawError: The law failed. Finished parts are kept.
             """
         check_units(units)
-        is_address = out is not None and "://" in os.fspath(out)
-        if is_address and client is None:
-            raise ValueError(f"out={os.fspath(out or '')!r}: an address is for runs with a client")
-        if client is not None and jobs is not None:
-            raise ValueError("jobs is for runs without a client: workers have threads of their own")
-        folder = Path("out", self.name) if out is None or is_address else Path(out)
+        folder = Path("out", self.name) if out is None else Path(out)
         if self.law is not None:
-            if client is not None:
-                raise ValueError("a law in Python flies on this machine alone, without a client")
             self._fly(self.law, folder, jobs)
-        elif client is not None:
-            from . import cluster
-
-            cluster.fly(self.call, client, folder, os.fspath(out) if out and is_address else None)
         else:
             threads = [] if jobs is None else ["--jobs", str(jobs)]
             self.call("--out", str(folder), *threads)
