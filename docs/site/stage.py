@@ -139,7 +139,7 @@ def settings(folder, table):
 def python_api(folder):
     package = (ROOT / "python" / "src" / "reentry_fmus" / "__init__.py").read_text(encoding="utf-8")
     listed = re.search(r"__all__ = \[(.*?)\]", package, re.S)[1]
-    names = [*re.findall(r'"(\w+)"', listed), "environment.AttitudeEnv"]
+    names = re.findall(r'"(\w+)"', listed)
     text = "# Python API\n\nThe package `reentry_fmus`; [python.md](../docs/python.md) has the examples.\n"
     for name in names:
         kind = "class" if name.split(".")[-1][0].isupper() else "function"

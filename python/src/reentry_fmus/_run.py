@@ -17,7 +17,6 @@ import numpy as np
 import pandas as pd
 
 from ._arrays import dataset, write_mat
-from ._czml import planet_of, write_czml
 from ._table import Units, convert
 
 if TYPE_CHECKING:
@@ -109,17 +108,6 @@ class Run:
             ValueError: a name is too long for MATLAB, or occurs twice.
         """
         write_mat(Path(path), self.table, self._numbers())
-
-    def to_czml(self, path: str | Path, component: str = "plant") -> None:
-        """Writes position, attitude and ground track of an entry flight as CZML, which CesiumJS
-        shows on a globe. `component` is the name of the vehicle in the experiment.
-
-        Raises:
-            ModuleNotFoundError: czml3 is not installed.
-            ValueError: position or attitude of the vehicle are not recorded.
-        """
-        planet = planet_of(self.description, component)
-        write_czml(Path(path), self.table, self.title, planet, component)
 
     def _numbers(self) -> dict[str, float]:
         """Returns the metrics that are numbers, without the number of rows and computing times,
