@@ -10,7 +10,7 @@ from reentry_fmus import ClosedLoop, InstanceError
 
 @pytest.mark.parametrize(
     "value",
-    [2**31, -(2**31) - 1, 2**32 + 7, 2**53 + 1, 2**64, 10**400, 1e10, -1, np.int64(2**40), np.uint64(2**63)]
+    [2**31, -(2**31) - 1, 2**32 + 7, 2**53 + 1, 2**64, 10**400, 1e10, np.int64(2**40), np.uint64(2**63)]
     + [math.nan, math.inf, 1.5, True, np.True_, "7", b"7", None, [7]],
     ids=lambda value: repr(value)[:24],
 )
@@ -39,8 +39,8 @@ def test_numbers_are_numbers(value):
 
 def test_what_cannot_be_made_leaves_nothing_behind(temporary):
     def opened():
-        """Number of unpacked archives; the folder itself is one more entry."""
-        return len(list(temporary.glob("*/*")))
+        """Number of unpacked archives."""
+        return len(list(temporary.iterdir()))
 
     with ClosedLoop(controller="CRMPC") as loop:
         loop.step()

@@ -5,21 +5,17 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 
 from ._data import FMUS, experiment_path, fmu_path
+from ._instance import Value as Value
 from ._law import STAND_IN, Laws, laws_of
 from ._orchestrator import OrchestratorError, orchestrate
 from ._run import Run, read
 from ._state import Law
 from ._table import Units, check_units
-from ._unpacked import Folder
-
-Value = bool | int | float | str
-"""Value of a parameter: a number in the variable's SI unit, a truth value, the name of an
-enumeration's item, or a text with a unit such as "2 deg/s2"."""
-
 
 def experiment(
     name: str | os.PathLike[str],
@@ -44,7 +40,9 @@ def experiment(
 
     Args:
         name: An experiment of `experiments()`, or the path of an experiment file (TOML).
-        set: Parameters by component.parameter, such as {"plant.disturbance.seed": 7}.
+        set: Parameters by component.parameter, such as {"plant.disturbance.seed": 7}: numbers in
+            SI units, truth values, names of enumerations' items, or texts with a unit, such as
+            "2 deg/s2".
         fmu: FMUs that replace those of components, by name as in {"controller": "LQR"} or by path.
         stop: Stop time of the simulation, s.
         step: Length of the communication step, s.
@@ -95,8 +93,8 @@ def recorded(
     laws: Laws | None = None,
 ) -> Run:
     """Calls the orchestrator for one run, and reads what it recorded."""
-    with Folder() as temporary:
-        folder = temporary / "out" if out is None else Path(out)
+    with TemporaryDirectory() as temporary:
+        folder = Path(temporary, "out") if out is None else Path(out)
         command = [*arguments, "--out", str(folder)]
         # A folder of earlier results must not pass for those of a run that was refused.
         stale = folder / "results.json"

@@ -1,37 +1,37 @@
-"""One co-simulation instance of an FMU, driven through FMPy, with variables by name."""
+"""One co-simulation instance of an FMU, driven by FMPy, with variables by name."""
 
 from __future__ import annotations
 
-import operator
 import os
+import shutil
+import sys
+import tempfile
 import warnings
 from collections.abc import Callable, Mapping, Sequence
+from functools import cache
+from multiprocessing.util import Finalize
 from pathlib import Path
 from typing import Any
 
+import fmpy
 import numpy as np
 from fmpy import fmi2
 from fmpy.fmi1 import FMICallException
 
 from ._data import caller, hint
-from ._unpacked import copies
 
 Value = bool | int | float | str
 """Value of a variable: a number in its SI unit, a truth value, a text, or the name of an
 enumeration's item."""
 
-LEAST, MOST = -(2**31), 2**31 - 1
-"""Range of an fmi2Integer. A number beyond it would be cut to its last 32 bits on its way."""
-
-
-def plain(value: Any) -> int | float:
-    """Returns a number as one of Python's. A truth value and a text are none."""
-    if isinstance(value, (str, bytes, bool, np.bool_)):
-        raise TypeError
-    try:
-        return operator.index(value)
-    except TypeError:
-        return float(value)
+NEEDS = {
+    "Real": "a number",
+    "Integer": "an integer of 32 bits",
+    "Boolean": "True or False",
+    "String": "a text",
+    "Enumeration": "one of its items",
+}
+"""Values that a variable takes, by its type."""
 
 
 class InstanceError(RuntimeError):
@@ -42,11 +42,34 @@ class InstanceError(RuntimeError):
         self.fmu = fmu
         """Name of the FMU."""
         self.call = call
-        """Function of FMI 2.0 that was refused, or "loading" if the library cannot be loaded."""
+        """Function of FMI 2.0 that was refused."""
 
 
 class InstanceWarning(UserWarning):
     """A warning of an FMU."""
+
+
+@cache
+def unpacked(archive: Path, changed: int) -> tuple[Path, Any]:
+    """Unpacks an archive, and returns its folder and its description. It is unpacked once in a
+    process, as long as the time of its last change is the same: a library of this project stays
+    loaded until the process ends, and is shared by all instances."""
+    prefix = f"unpacked-fmu-{os.getpid()}-" if sys.platform != "win32" else "reentry-fmus-"
+    folder = Path(tempfile.mkdtemp(prefix=prefix))
+    # After the children of `multiprocessing` have ended, and not at the end of a forked process.
+    Finalize(None, shutil.rmtree, (folder, True), exitpriority=-1)
+    if sys.platform != "win32":
+        import fcntl
+
+        # The orchestrator removes folders of this name that nobody holds, as after a kill.
+        fcntl.flock(os.open(folder, os.O_RDONLY), fcntl.LOCK_EX)
+    fmpy.extract(str(archive), str(folder))
+    return folder, fmpy.read_model_description(str(folder))
+
+
+if hasattr(os, "register_at_fork"):
+    # The parent may remove its folders at any time.
+    os.register_at_fork(after_in_child=unpacked.cache_clear)
 
 
 class Instance:
@@ -55,58 +78,52 @@ class Instance:
     def __init__(self, path: Path, parameters: Mapping[str, Value]) -> None:
         self._messages: list[tuple[int, str]] = []
         self._fmpy: Any = None
-        self._unpacked = copies.open(path)
+        folder, description = unpacked(path, path.stat().st_mtime_ns)
+        if description.fmiVersion != "2.0" or description.coSimulation is None:
+            raise ValueError(f"{path}: a loop needs an FMU for co-simulation by FMI 2.0")
+        self.name: str = description.modelName
+        self.variables: dict[str, Any] = {v.name: v for v in description.modelVariables}
+        self.values(parameters, "parameter")
+        callbacks = fmi2.fmi2CallbackFunctions(
+            fmi2.fmi2CallbackLoggerTYPE(self._log),
+            fmi2.defaultCallbacks.allocateMemory,
+            fmi2.defaultCallbacks.freeMemory,
+        )
+        here = os.getcwd()
         try:
-            description = self._unpacked.description
-            self.name: str = description.modelName
-            self.variables: dict[str, Any] = {v.name: v for v in description.modelVariables}
-            self.values(parameters, "parameter")
-            instance = self._loaded()
-            callbacks = fmi2.fmi2CallbackFunctions()
-            callbacks.logger = fmi2.fmi2CallbackLoggerTYPE(self._log)
-            callbacks.allocateMemory = fmi2.defaultCallbacks.allocateMemory
-            callbacks.freeMemory = fmi2.defaultCallbacks.freeMemory
-            try:
-                instance.instantiate(callbacks=callbacks, loggingOn=True)
-            except Exception as error:
-                instance.freeLibrary()
-                raise InstanceError(self.name, "fmi2Instantiate", self._errors(str(error))) from error
-            self._fmpy = instance
+            instance = fmi2.FMU2Slave(
+                guid=description.guid,
+                modelIdentifier=description.coSimulation.modelIdentifier,
+                unzipDirectory=str(folder),
+                instanceName=self.name,
+            )
+            instance.instantiate(callbacks=callbacks, loggingOn=True)
+        except Exception as error:
+            raise InstanceError(self.name, "fmi2Instantiate", self._errors(error)) from error
+        finally:
+            # FMPy stays in the folder of a library that cannot be loaded.
+            os.chdir(here)
+        self._fmpy = instance
+        try:
             self.set(parameters, "parameter")
         except BaseException:
             self.close()
             raise
 
-    def _loaded(self) -> Any:
-        unpacked = self._unpacked
-        # FMPy looks for the library in its folder, and stays there if it cannot be loaded.
-        here = os.getcwd()
-        try:
-            return fmi2.FMU2Slave(
-                guid=unpacked.description.guid,
-                modelIdentifier=unpacked.interface.modelIdentifier,
-                unzipDirectory=str(unpacked.folder),
-                instanceName=self.name,
-                libraryPath=unpacked.library,
-            )
-        except Exception as error:
-            os.chdir(here)
-            raise InstanceError(self.name, "loading", str(error)) from error
-
     def _log(self, _: Any, __: bytes, status: int, ___: bytes, message: bytes) -> None:
         self._messages.append((status, message.decode(errors="replace")))
 
-    def _errors(self, otherwise: str) -> str:
+    def _errors(self, error: Exception) -> str:
         errors = [message for status, message in self._messages if status > fmi2.fmi2Warning]
-        return "; ".join(errors) or otherwise
+        return "; ".join(errors) or str(error)
 
-    def _call(self, function: Callable[..., Any], *arguments: Any, **named: Any) -> Any:
+    def _call(self, function: str, *arguments: Any) -> Any:
         """Calls a function of the FMU. Its errors become exceptions with the FMU's message."""
         self._messages.clear()
         try:
-            result = function(*arguments, **named)
+            result = getattr(self._fmpy, function)(*arguments)
         except FMICallException as error:
-            raise InstanceError(self.name, error.function, self._errors(str(error))) from None
+            raise InstanceError(self.name, error.function, self._errors(error)) from None
         for status, message in self._messages:
             if status == fmi2.fmi2Warning:
                 warnings.warn(f"{self.name}: {message}", InstanceWarning, stacklevel=caller())
@@ -126,118 +143,72 @@ class Instance:
 
     def get_reals(self, references: list[int]) -> list[float]:
         """Returns real variables by value reference."""
-        values: list[float] = self._call(self._fmpy.getReal, references)
+        values: list[float] = self._call("getReal", references)
         return values
 
     def set_reals(self, references: list[int], values: Sequence[float]) -> None:
         """Sets real variables by value reference."""
-        self._call(self._fmpy.setReal, references, values)
+        self._call("setReal", references, values)
 
-    def reader(self, kind: str, names: Sequence[str]) -> Callable[[], Sequence[float]]:
-        """Returns a function that reads variables of a type as numbers."""
-        functions = {"Real": self._fmpy.getReal, "Boolean": self._fmpy.getBoolean}
-        function = functions.get(kind, self._fmpy.getInteger)
+    def reader(self, kind: str, names: Sequence[str]) -> Callable[[], list[Any]]:
+        """Returns a function that reads variables of a type; of an enumeration, the numbers of its
+        items."""
+        function = "getInteger" if kind == "Enumeration" else f"get{kind}"
         references = self.references(names)
-
-        def read() -> Sequence[float]:
-            values: Sequence[float] = self._call(function, references)
-            return values
-
-        return read
+        return lambda: list(self._call(function, references))
 
     def get(self, name: str) -> Value:
         """Returns a variable; an enumeration as its item's name."""
         variable = self.variable(name)
-        references = [variable.valueReference]
-        if variable.type == "Real":
-            return self.get_reals(references)[0]
-        if variable.type == "String":
-            text = self._call(self._fmpy.getString, references)[0]
-            return text.decode() if isinstance(text, bytes) else str(text)
-        if variable.type == "Boolean":
-            return bool(self._call(self._fmpy.getBoolean, references)[0])
-        number = int(self._call(self._fmpy.getInteger, references)[0])
+        value: Any = self.reader(variable.type, [name])()[0]
         if variable.type == "Enumeration":
-            return next(
-                str(item.name) for item in variable.declaredType.items if int(item.value) == number
-            )
-        return number
+            return {number: item for item, number in items(variable).items()}[value]
+        found: Value = value.decode() if isinstance(value, bytes) else value
+        return bool(found) if variable.type == "Boolean" else found
 
     def values(self, settings: Mapping[str, Value], causality: str) -> list[tuple[Any, Any]]:
-        """Checks settings against the variables' types, before any of them is set."""
+        """Checks settings against the variables' types, before any of them is set. Returns the
+        variables with what FMI knows of the values."""
         pairs = []
         for name, value in settings.items():
             variable = self.variable(name)
             if variable.causality != causality:
                 problem = f"{self.name}: {name} is no {causality}, but has the causality"
                 raise ValueError(f"{problem} {variable.causality}")
-            pairs.append((variable, self._checked(variable, value)))
+            try:
+                pairs.append((variable, converted(variable, value)))
+            except (TypeError, ValueError, OverflowError):
+                unit = f" in {variable.unit}" if getattr(variable, "unit", None) else ""
+                near = hint(str(value), items(variable)) if variable.type == "Enumeration" else ""
+                problem = f"{name} needs {NEEDS[variable.type]}{unit}, not {value!r}{near}"
+                raise TypeError(f"{self.name}: {problem}") from None
         return pairs
-
-    def _checked(self, variable: Any, value: Value) -> Any:
-        needs = f"{self.name}: {variable.name} needs"
-        if variable.type == "Enumeration":
-            items = {str(item.name): int(item.value) for item in variable.declaredType.items}
-            if not isinstance(value, str) or value not in items:
-                raise ValueError(
-                    f"{needs} one of its items, not {value!r}{hint(str(value), items)}"
-                )
-            return items[value]
-        if variable.type == "String":
-            if isinstance(value, str):
-                return value
-            raise TypeError(f"{needs} a text, not {value!r}")
-        if variable.type == "Boolean":
-            if value in (True, False):
-                return bool(value)
-            raise TypeError(f"{needs} True or False, not {value!r}")
-        unit = f" in {variable.unit}" if getattr(variable, "unit", None) else ""
-        try:
-            number = plain(value)
-            if variable.type == "Real":
-                return float(number)
-        except (TypeError, ValueError, OverflowError):
-            kind = "an integer" if variable.type == "Integer" else f"a number{unit}"
-            raise TypeError(f"{needs} {kind}, not {value!r}") from None
-        if number != number or number in (np.inf, -np.inf) or number != int(number):
-            raise TypeError(f"{needs} an integer, not {value!r}")
-        low = LEAST if variable.min is None else int(variable.min)
-        high = MOST if variable.max is None else int(variable.max)
-        if not low <= number <= high:
-            raise ValueError(f"{needs} an integer from {low} to {high}, not {value!r}")
-        return int(number)
 
     def set(self, settings: Mapping[str, Value], causality: str) -> None:
         """Sets variables of a causality by name."""
-        setters = {
-            "Real": self._fmpy.setReal,
-            "Integer": self._fmpy.setInteger,
-            "Enumeration": self._fmpy.setInteger,
-            "Boolean": self._fmpy.setBoolean,
-            "String": self._fmpy.setString,
-        }
         for variable, value in self.values(settings, causality):
-            self._call(setters[variable.type], [variable.valueReference], [value])
+            kind = "Integer" if variable.type == "Enumeration" else variable.type
+            self._call(f"set{kind}", [variable.valueReference], [value])
 
     # States of the instance
 
     def enter(self) -> None:
         """Enters initialization mode at t = 0."""
-        self._call(self._fmpy.setupExperiment, startTime=0.0)
-        self._call(self._fmpy.enterInitializationMode)
+        self._call("setupExperiment")
+        self._call("enterInitializationMode")
 
     def exit(self) -> None:
         """Leaves initialization mode."""
-        self._call(self._fmpy.exitInitializationMode)
+        self._call("exitInitializationMode")
 
     def step(self, time: float, step: float) -> None:
         """Advances by one communication step, s."""
-        self._call(self._fmpy.doStep, currentCommunicationPoint=time, communicationStepSize=step)
+        self._call("doStep", time, step)
 
     def reset(self, parameters: Mapping[str, Value]) -> None:
         """Resets the instance. FMI resets parameters to their start values, so they are set
         again."""
-        self._call(self._fmpy.reset)
+        self._call("reset")
         self.set(parameters, "parameter")
 
     def close(self) -> None:
@@ -245,7 +216,34 @@ class Instance:
         instance, self._fmpy = self._fmpy, None
         if instance is not None:
             instance.freeInstance()
-        self._unpacked.release()
+
+
+def items(variable: Any) -> dict[str, int]:
+    """Returns the numbers of an enumeration's items by their names."""
+    return {str(item.name): int(item.value) for item in variable.declaredType.items}
+
+
+def converted(variable: Any, value: Any) -> Any:
+    """Returns a value as FMI knows it.
+
+    Raises:
+        TypeError, ValueError, OverflowError: The variable takes no such value.
+    """
+    if isinstance(value, (np.generic, np.ndarray)):
+        value = value.item()
+    if variable.type == "Enumeration" and value in (known := items(variable)):
+        return known[value]
+    if variable.type == "String" and isinstance(value, str):
+        return value
+    if variable.type == "Boolean" and value in (True, False):
+        return bool(value)
+    if isinstance(value, (int, float)) and not isinstance(value, bool):
+        if variable.type == "Real":
+            return float(value)
+        if variable.type == "Integer" and value == int(value):
+            # FMPy would cut a larger number to its last 32 bits.
+            return int(np.int32(int(value)))
+    raise TypeError
 
 
 def parted(name: str, components: Mapping[str, object]) -> tuple[str, str]:

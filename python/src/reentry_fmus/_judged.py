@@ -11,17 +11,18 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from ._data import EXPERIMENTS, FMUS, program
+from ._experiment import written
 from ._instance import Value
 from ._orchestrator import OrchestratorError
 from ._recording import RECORDED, Variable
 from ._run import Judgement, read_judgement
-from ._unpacked import Folder
 
 LOST = 3
 """Exit code of the orchestrator for a run in which the attitude was lost."""
@@ -49,9 +50,8 @@ def judged(flown: Flown) -> Judgement:
     Raises:
         OrchestratorError: The orchestrator refused the FMUs.
     """
-    with Folder() as temporary:
-        out = temporary / "out"
-        with asked(flown, temporary, out) as (process, variables):
+    with TemporaryDirectory() as folder:
+        with asked(flown, Path(folder)) as (process, variables):
             rows = [flown.columns[name] for name, _ in variables]
             _, said = process.communicate(np.array(rows, "<f8").T.tobytes())
         # A run in which the attitude was lost is judged up to then.
@@ -60,7 +60,7 @@ def judged(flown: Flown) -> Judgement:
             # The experiment's file was made here, and nobody has seen it.
             problem = re.sub(r"^\S*closed_loop\.toml:(\d+:)? ", "", error.strip())
             raise OrchestratorError(problem, process.returncode, None)
-        judgement = read_judgement(out)
+        judgement = read_judgement(Path(folder, "out"))
     if flown.law is not None:
         judgement.description["law"] = flown.law
     return judgement
@@ -68,13 +68,13 @@ def judged(flown: Flown) -> Judgement:
 
 @contextmanager
 def asked(
-    flown: Flown, folder: Path, out: Path
+    flown: Flown, folder: Path
 ) -> Iterator[tuple[subprocess.Popen[bytes], list[Variable]]]:
-    """Starts the orchestrator, and gives it with the variables whose values it asks for; there are
-    none if it refuses the FMUs."""
+    """Starts the orchestrator, which writes into the folder's `out`, and gives it with the variables
+    whose values it asks for; there are none if it refuses the FMUs."""
     path = folder / "closed_loop.toml"
     path.write_text(experiment_of(flown), encoding="utf-8")
-    command = [str(program()), "judge", str(path), "--out", str(out), "--fmu-dir", str(FMUS)]
+    command = [program(), "judge", path, "--out", folder / "out", "--fmu-dir", FMUS]
     with subprocess.Popen(
         command,
         stdin=subprocess.PIPE,
@@ -91,7 +91,7 @@ def asked(
 def observed_by(plant: Path, controller: Path, changed: Any) -> tuple[Variable, ...]:
     paths = {"plant": plant, "controller": controller}
     nothing = Flown("", (0.0, 1.0, 1.0), paths, {"plant": {}, "controller": {}}, {})
-    with Folder() as folder, asked(nothing, folder, folder / "out") as (process, variables):
+    with TemporaryDirectory() as folder, asked(nothing, Path(folder)) as (process, variables):
         process.communicate()
     # The loop runs also if these FMUs are refused. Whoever asks for its metrics gets the reason.
     return tuple(variables)
@@ -118,19 +118,12 @@ def experiment_of(flown: Flown) -> str:
         lines.append(f"[components.{component}]\nfmu = {text(str(path))}")
         lines.append(f"[components.{component}.parameters]")
         for name, value in flown.parameters[component].items():
-            lines.append(f"{text(name)} = {written(value)}")
+            # Numbers are as on the command line.
+            right = text(value) if isinstance(value, str) else written(name, value)
+            lines.append(f"{text(name)} = {right}")
     return "\n".join(lines) + "\n"
 
 
 def text(value: str) -> str:
     """Writes a text as TOML does, whose escapes are those of JSON."""
     return json.dumps(value, ensure_ascii=False)
-
-
-def written(value: Value) -> str:
-    """Writes the value of a parameter as TOML."""
-    if isinstance(value, str):
-        return text(value)
-    if isinstance(value, (bool, np.bool_)):
-        return "true" if value else "false"
-    return repr(int(value)) if isinstance(value, (int, np.integer)) else repr(float(value))

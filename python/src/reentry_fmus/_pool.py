@@ -12,12 +12,12 @@ import time
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from contextlib import suppress
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 from ._law import PickledLaw, Progress
 from ._orchestrator import OrchestratorError, close, manner
 from ._state import LawError, instant
-from ._unpacked import Folder
 
 PATIENCE = 2.0
 """Time that what a worker has started gets to end by itself, s."""
@@ -108,14 +108,14 @@ class Pool:
             raise ValueError(f"jobs = {jobs}, but at least one process is needed")
         self._law, self._command = law, command
         self._jobs = jobs or cores()
-        self._folder: Folder | None = None
+        self._folder: TemporaryDirectory[str] | None = None
         self._workers: list[Worker] = []
 
     def _begin(self, count: int) -> None:
-        self._folder = self._folder or Folder()
+        self._folder = self._folder or TemporaryDirectory(ignore_cleanup_errors=True)
         for number in range(len(self._workers), count):
             core = self._core(number) if count == cores() else None
-            place = (self._folder.path, number, core)
+            place = (Path(self._folder.name), number, core)
             self._workers.append(Worker(self._law, self._command, *place))
 
     def _core(self, number: int) -> int | None:
@@ -160,7 +160,7 @@ class Pool:
             worker.end()
         self._workers.clear()
         if self._folder is not None:
-            self._folder.remove()
+            self._folder.cleanup()
             self._folder = None
 
     def __enter__(self) -> Pool:
