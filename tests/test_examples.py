@@ -7,9 +7,8 @@ import sys
 
 import numpy as np
 import pytest
-from matplotlib.image import imread
 
-from conftest import EXPERIMENTS, ROOT, TARGET
+from conftest import ROOT, TARGET
 from conftest import example as built_example
 
 EXAMPLES = ROOT / "scripts" / "examples"
@@ -40,24 +39,6 @@ def test_closed_loop_is_the_orchestrators(experiment, tmp_path, controller, name
         assert np.array_equal(found[:, i], [float(row[component + name]) for row in rows]), name
     metrics = json.loads((experiment(named) / "metrics.json").read_text())
     assert f"EMS {metrics['ems_deg']:.3f} deg" in said
-
-
-def test_variation_varies_the_noise(orchestrate, tmp_path):
-    run(tmp_path, "variation.py", "LQR", "--seeds", "20", "--stop", "10")
-    names, found = table(tmp_path / "variation.csv")
-    assert list(found[:, 0]) == list(range(1, 21)) and len(set(found[:, 1])) == 20
-    finished, out = orchestrate(EXPERIMENTS / "lqr.toml", "--stop", "10", "--set", "plant.disturbance.seed=7")
-    assert finished.returncode == 0, finished.stderr
-    metrics = json.loads((out / "metrics.json").read_text())
-    assert found[6, 1:] == pytest.approx([metrics["ems_deg"], metrics["max_rate_deg_s"]], rel=1e-12)
-
-
-def test_plot_makes_a_picture(tmp_path):
-    run(tmp_path, "plot.py", "LQR", "--stop", "10")
-    picture = imread(tmp_path / "closed_loop.png")
-    assert picture.shape[:2] == (900, 1200)
-    # The picture shows more than a frame, because its lines have colours.
-    assert len(np.unique(picture.reshape(-1, picture.shape[2]), axis=0)) > 100
 
 
 @pytest.mark.parametrize(

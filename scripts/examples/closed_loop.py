@@ -81,18 +81,13 @@ def mean_error(rows):
     return math.degrees(math.sqrt(sum(squares) / len(squares)))
 
 
-def arguments(description):
-    parser = argparse.ArgumentParser(description=description.splitlines()[0])
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("controller", nargs="?", default="CRMPC", help="name of a controller's FMU [CRMPC]")
-    parser.add_argument("--stop", type=float, default=50.0, help="s [50]")
     parser.add_argument("--fmus", type=Path, default=FMUS, help="folder of the FMUs [target/fmu]")
     parser.add_argument("--out", type=Path, default=Path("out"), help="folder for the results [out]")
-    return parser
-
-
-if __name__ == "__main__":
-    options = arguments(__doc__).parse_args()
-    result = simulate(options.controller, options.stop, fmus=options.fmus)
+    options = parser.parse_args()
+    result = simulate(options.controller, fmus=options.fmus)
     options.out.mkdir(exist_ok=True)
     with open(options.out / "closed_loop.csv", "w", newline="") as file:
         csv.writer(file).writerows([["time", *ATTITUDE, *RATE, *MOMENT, *REFERENCE], *result])
