@@ -124,6 +124,9 @@ def test_every_end_of_a_law_names_law_case_and_time(end, short, tmp_path, tempor
     assert error.case in range(50) and error.time == pytest.approx(0.52)
     where = f"the law {end.__name__} failed in case {error.case} at t = 0.52 s: "
     assert str(error).startswith(where) and {**ENDS, **CRASHES}[end] in str(error)
+    if end is raises:
+        with pytest.raises(LawError, match=re.escape(str(error).splitlines()[0])):
+            campaign(short, law=at_last(end)).case(error.case)
     # Its part is not kept, and nothing else stays.
     first = 25 * (error.case // 25)
     assert not list(tmp_path.glob(f"out/parts/*{first:010}-*"))

@@ -13,7 +13,6 @@ from collections.abc import Callable
 from mmap import mmap
 from pathlib import Path
 from struct import Struct
-from typing import Any
 
 import numpy as np
 
