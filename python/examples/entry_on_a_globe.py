@@ -32,7 +32,7 @@ def czml(run, component="plant"):
     # From the planet's axes to north, east, down, to the velocity, and to the body. A positive bank
     # angle turns to the left.
     turns = zip("zyzyxzy", [longitude, -latitude - np.pi / 2, heading, climb, -sigma, -beta, alpha])
-    attitude = reduce(mul, (Rotation.from_euler(axis, angle) for axis, angle in turns)).as_quat()
+    attitude = reduce(mul, (Rotation.from_euler(axis, angle[:, None]) for axis, angle in turns)).as_quat()
 
     def sampled(values):
         return np.column_stack([run.table.index, values]).ravel().tolist()

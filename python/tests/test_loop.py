@@ -275,7 +275,7 @@ def test_two_loops_do_not_disturb_each_other():
             "disturbance.bound needs a number in rad/s2, not '2 deg/s2'",
         ),
         ({"parameters": {"plant.disturbance.seed": 1.5}}, "disturbance.seed needs an integer"),
-        ({"parameters": {"plant.disturbance.seed": -1}}, "disturbance.seed = -1 is below the minimum"),
+        ({"parameters": {"plant.disturbance.seed": -1}}, "= -1 is below the minimum 0"),
         ({"parameters": {"plant.moment.x": 1.0}}, "moment.x is no parameter"),
         ({"parameters": {"plant.disturbance.bound": -1.0}}, "= -1.0 is below the minimum 0"),
         (
