@@ -74,7 +74,8 @@ def asked(
     whose values it asks for; there are none if it refuses the FMUs."""
     path = folder / "closed_loop.toml"
     path.write_text(experiment_of(flown), encoding="utf-8")
-    command = [program(), "judge", path, "--out", folder / "out", "--fmu-dir", FMUS]
+    command: list[str | Path] = [program(), "judge", path, "--out", folder / "out"]
+    command += ["--fmu-dir", FMUS]
     with subprocess.Popen(
         command,
         stdin=subprocess.PIPE,
