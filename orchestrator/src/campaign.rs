@@ -33,7 +33,7 @@ pub(crate) struct Common {
     /// Folder for the results [default: out/CAMPAIGN].
     #[arg(long, value_name = "DIR", help_heading = "Results")]
     out: Option<PathBuf>,
-    /// Also look for FMUs in this folder, besides the folder of the experiment and target/fmu. The
+    /// Also look for FMUs in this folder, besides those of the experiment and the program. The
     /// option may be given several times.
     #[arg(long, value_name = "DIR")]
     fmu_dir: Vec<PathBuf>,

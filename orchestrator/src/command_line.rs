@@ -59,7 +59,7 @@ pub(crate) enum Command {
         /// Folder for the results [default: out/EXPERIMENT].
         #[arg(long, value_name = "DIR", help_heading = "Results")]
         out: Option<PathBuf>,
-        /// Also look for FMUs in this folder, besides the folder of the experiment and target/fmu.
+        /// Also look for FMUs in this folder, besides those of the experiment and the program.
         /// The option may be given several times.
         #[arg(long, value_name = "DIR")]
         fmu_dir: Vec<PathBuf>,
@@ -102,7 +102,7 @@ pub(crate) enum Command {
         /// Folder for the results [default: out/STUDY].
         #[arg(long, value_name = "DIR", help_heading = "Results")]
         out: Option<PathBuf>,
-        /// Also look for FMUs in this folder, besides the folder of the study and target/fmu. The
+        /// Also look for FMUs in this folder, besides those of the study and the program. The
         /// option may be given several times.
         #[arg(long, value_name = "DIR")]
         fmu_dir: Vec<PathBuf>,
@@ -166,7 +166,7 @@ pub(crate) enum Command {
         /// Path of the archive [default: EXPERIMENT.ssp].
         #[arg(long, value_name = "FILE", help_heading = "Results")]
         out: Option<PathBuf>,
-        /// Also look for FMUs in this folder, besides the folder of the experiment and target/fmu.
+        /// Also look for FMUs in this folder, besides those of the experiment and the program.
         /// The option may be given several times.
         #[arg(long, value_name = "DIR")]
         fmu_dir: Vec<PathBuf>,
@@ -222,8 +222,7 @@ pub(crate) enum Command {
     },
     /// List experiments, studies, campaigns and FMUs by the names that the other commands take.
     List {
-        /// Folder to search [default: the current one, and those where experiments and FMUs are
-        /// found from any folder].
+        /// Folder to search [default: those beside the program and in ORCHESTRATOR_PATH].
         folder: Option<PathBuf>,
         /// Show titles in full, and the file of each.
         #[arg(long)]

@@ -34,7 +34,7 @@ pub(crate) struct Instant {
     /// option may be given several times [default: those of [observe.margins]].
     #[arg(long, value_name = "SIGNAL", help_heading = "Linearisation")]
     open: Vec<String>,
-    /// Also look for FMUs in this folder, besides the folder of the experiment and target/fmu. The
+    /// Also look for FMUs in this folder, besides those of the experiment and the program. The
     /// option may be given several times.
     #[arg(long, value_name = "DIR")]
     fmu_dir: Vec<PathBuf>,

@@ -4,11 +4,9 @@ use crate::failure::Failure;
 use campaign::definition::Campaign;
 use cosim::error::Error;
 use cosim::experiment::Experiment;
-use cosim::search;
 use cosim::search::named::Kind;
 use fmu_import::fmu::Fmu;
 use serde::Serialize;
-use std::collections::BTreeSet;
 use std::fs;
 use std::io::{Write, stdout};
 use std::path::{Path, PathBuf};
@@ -38,7 +36,7 @@ struct Row {
 }
 
 /// Prints the names and titles of all experiments, studies, campaigns and FMUs: of those below a
-/// folder, or without a folder of all that the program finds.
+/// folder, or without a folder of those that are installed.
 ///
 /// # Errors
 /// Returns an error if the folder does not exist, or if the text cannot be written.
@@ -80,25 +78,22 @@ const NAMES: usize = 32;
 /// Number of lines to which a title is shortened.
 const LINES: usize = 2;
 
-/// Finds everything of a kind below a folder, or everywhere.
+/// Lists what is installed of a kind, or what is below a folder. A file that is not installed is
+/// named by its path.
 fn rows(kind: Kind, folder: Option<&Path>) -> Vec<Row> {
-    let mut seen = BTreeSet::new();
-    let folders = search::folders().into_iter().chain(folder.map(Path::to_path_buf));
-    let mut paths: Vec<PathBuf> = folders.flat_map(|folder| kind.below(&folder)).collect();
-    paths.retain(|path| fs::canonicalize(path).is_ok_and(|path| seen.insert(path)));
-    // Names are those by which the file is found from here, so that all files count.
-    let named: Vec<String> = paths.iter().map(|path| kind.shortest(path, &paths)).collect();
-    let canonical = folder.and_then(|folder| fs::canonicalize(folder).ok());
-    let is_below = |path: &Path| {
-        canonical
-            .as_ref()
-            .is_none_or(|folder| fs::canonicalize(path).is_ok_and(|path| path.starts_with(folder)))
+    let installed = kind.installed();
+    let paths = folder.map_or_else(|| installed.clone(), |folder| kind.below(folder, |_| true));
+    let name = |path: &Path| match fs::canonicalize(path) {
+        Ok(path) if installed.contains(&path) => kind.shortest(&path, &installed),
+        _ => {
+            let name = kind.name(path);
+            name.strip_prefix(".").unwrap_or(&name).display().to_string()
+        }
     };
-    let listed = paths.into_iter().zip(named).filter(|(path, _)| is_below(path));
-    listed.map(|(path, name)| row(kind, path, name)).collect()
+    paths.into_iter().map(|path| row(kind, name(&path), path)).collect()
 }
 
-fn row(kind: Kind, path: PathBuf, name: String) -> Row {
+fn row(kind: Kind, name: String, path: PathBuf) -> Row {
     let title = match kind {
         Kind::Experiment => Experiment::load(&path).map(|found| found.title).map_err(text),
         Kind::Study => Study::load(&path).map(|found| found.title).map_err(text),

@@ -1,5 +1,5 @@
-//! Folders in which experiments, studies and FMUs are found from any folder: those of the project,
-//! those of an environment variable, and those beside this program. [`named`] finds them by name.
+//! Folders in which experiments, studies and FMUs are found from any folder: those of an environment
+//! variable, and those beside this program. [`named`] finds them by name.
 
 pub mod named;
 
@@ -12,43 +12,31 @@ use walkdir::WalkDir;
 /// Environment variable that names further folders, separated as in PATH.
 pub const VARIABLE: &str = "ORCHESTRATOR_PATH";
 
-/// Folder in which the project keeps its experiments.
-const EXPERIMENTS: &str = "orchestrator/experiments";
+/// Places of FMUs beside this program: in a release, and in the folder where it is built.
+const FMUS: [&str; 2] = ["fmu", "../fmu"];
+/// Places of experiments and studies.
+const EXPERIMENTS: [&str; 2] = ["experiments", "../../orchestrator/experiments"];
 
-fn by_variable() -> Vec<PathBuf> {
-    env::var_os(VARIABLE).map(|paths| env::split_paths(&paths).collect()).unwrap_or_default()
-}
-
-fn beside_program(places: &[&str]) -> Vec<PathBuf> {
-    let program = env::current_exe().and_then(fs::canonicalize).ok();
-    let folder = program.as_deref().and_then(Path::parent);
-    folder.into_iter().flat_map(|folder| places.iter().map(|place| folder.join(place))).collect()
-}
-
-/// Keeps the folders that exist, each once, with absolute paths made canonical.
-fn existing(folders: Vec<PathBuf>) -> Vec<PathBuf> {
+/// Returns the folders of the environment variable and those at these places beside the program, as
+/// far as they exist, each once.
+fn installed(places: &[&str]) -> Vec<PathBuf> {
+    let given = env::var_os(VARIABLE).unwrap_or_default();
+    let program = env::current_exe().and_then(fs::canonicalize).unwrap_or_default();
+    let beside = places.iter().filter_map(|place| Some(program.parent()?.join(place)));
+    let folders = env::split_paths(&given).chain(beside);
     let mut seen = BTreeSet::new();
-    let is_new = |folder: &PathBuf| fs::canonicalize(folder).is_ok_and(|path| seen.insert(path));
-    let straight = |folder: PathBuf| {
-        if folder.is_absolute() { fs::canonicalize(&folder).unwrap_or(folder) } else { folder }
-    };
-    folders.into_iter().filter(|folder| folder.is_dir()).filter(is_new).map(straight).collect()
-}
-
-/// Returns the folders that hold experiments and studies.
-pub fn experiments() -> Vec<PathBuf> {
-    let mut folders = vec![PathBuf::from(EXPERIMENTS)];
-    folders.extend(by_variable());
-    folders.extend(beside_program(&["experiments", "../../orchestrator/experiments"]));
-    existing(folders)
+    let canonical = folders.filter_map(|folder| fs::canonicalize(folder).ok());
+    canonical.filter(|folder| folder.is_dir() && seen.insert(folder.clone())).collect()
 }
 
 /// Returns the folders that hold FMUs.
 pub fn fmu_folders() -> Vec<PathBuf> {
-    let mut folders = vec![PathBuf::from("target/fmu")];
-    folders.extend(by_variable());
-    folders.extend(beside_program(&["fmu", "../fmu"]));
-    existing(folders)
+    installed(&FMUS)
+}
+
+/// Returns the folders in which the file of a name is searched.
+pub fn folders() -> Vec<PathBuf> {
+    installed(&[EXPERIMENTS, FMUS].concat())
 }
 
 /// Returns whether an archive lies in one of these folders, or in one that belongs to this program:
@@ -56,31 +44,20 @@ pub fn fmu_folders() -> Vec<PathBuf> {
 /// program, or be trusted by the user.
 pub fn is_installed(archive: &Path, folders: &[PathBuf]) -> bool {
     let canonical = |path: &Path| fs::canonicalize(path).ok();
-    let Some(folder) = canonical(archive).and_then(|path| path.parent().map(Path::to_path_buf))
-    else {
-        return false;
-    };
-    let own = by_variable().into_iter().chain(beside_program(&["fmu", "../fmu"]));
-    own.chain(folders.iter().cloned()).any(|other| canonical(&other).as_ref() == Some(&folder))
-}
-
-/// Returns the folders in which the file of a name is searched: those that hold experiments and
-/// FMUs, and the current one.
-pub fn folders() -> Vec<PathBuf> {
-    let mut folders = experiments();
-    folders.extend(fmu_folders());
-    folders.push(PathBuf::from("."));
-    existing(folders)
+    let own = canonical(archive).and_then(|path| path.parent().map(Path::to_path_buf));
+    let is_own = |folder: &PathBuf| canonical(folder) == own;
+    own.is_some() && fmu_folders().iter().chain(folders).any(is_own)
 }
 
 /// Lists the files with this extension below a folder. Hidden folders, build folders and
-/// those of fuzzers are skipped.
+/// those of fuzzers, which hold faulty experiments, are skipped.
 pub fn files(folder: &Path, extension: &str) -> Vec<PathBuf> {
+    let is_skipped = |name: &str| name.starts_with('.') || name == "target" || name == "fuzz";
     WalkDir::new(folder)
         .sort_by_file_name()
         .into_iter()
         .filter_entry(|entry| {
-            entry.depth() == 0 || !is_passed_over(&entry.file_name().to_string_lossy())
+            entry.depth() == 0 || !is_skipped(&entry.file_name().to_string_lossy())
         })
         .flatten()
         .map(walkdir::DirEntry::into_path)
@@ -91,11 +68,4 @@ pub fn files(folder: &Path, extension: &str) -> Vec<PathBuf> {
 /// Returns whether a path ends with a dot and this extension.
 fn has_extension(path: &Path, extension: &str) -> bool {
     path.extension().is_some_and(|other| other == extension)
-}
-
-/// Returns whether a folder or file is skipped. Hidden folders and build folders are large and hold
-/// nothing to run, except `target/fmu`, which is searched separately. A folder `fuzz` holds the
-/// inputs of a fuzzer, such as faulty experiments.
-fn is_passed_over(name: &str) -> bool {
-    name.starts_with('.') || name == "target" || name == "fuzz"
 }

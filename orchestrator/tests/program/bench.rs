@@ -104,6 +104,8 @@ impl Default for Recipe<'_> {
 pub(crate) struct Bench {
     /// Temporary folder, which is removed when the bench is dropped.
     pub(crate) folder: TempDir,
+    /// Folder that the program's environment variable names.
+    pub(crate) installed: Option<PathBuf>,
 }
 
 impl Bench {
@@ -141,7 +143,7 @@ impl Bench {
         add(&format!("binaries/{}/{}", recipe.files[2], recipe.name), &library);
         zip.finish().unwrap();
         fs::write(folder.path().join("loop.toml"), experiment).unwrap();
-        Self { folder }
+        Self { folder, installed: None }
     }
 
     pub(crate) fn path(&self, name: &str) -> PathBuf {
@@ -151,6 +153,7 @@ impl Bench {
     pub(crate) fn command(&self, arguments: &[&str]) -> Command {
         let mut command = with_usual_signals(env!("CARGO_BIN_EXE_orchestrator"));
         command.args(arguments).current_dir(self.folder.path()).env_remove("RUST_LOG");
+        command.envs(self.installed.iter().map(|folder| ("ORCHESTRATOR_PATH", folder)));
         command
     }
 

@@ -64,13 +64,18 @@ fn a_name_of_another_kind_is_told_what_to_call() {
 }
 
 #[test]
-fn every_command_takes_names() {
+fn every_command_takes_names_of_what_is_installed() {
     let bench = bench();
     let deep = bench.path("a/b");
     fs::create_dir_all(&deep).unwrap();
     for file in ["loop.toml", "gains.toml", "Model.fmu"] {
         fs::rename(bench.path(file), deep.join(file)).unwrap();
     }
+    // What is below the current folder is named by its path.
+    let missing = "there is no experiment \"loop\", neither as a file";
+    bench.fails(2, &["run", "loop"], missing);
+    bench.says(&["show", "a/b/loop"]);
+    let bench = Bench { installed: Some(bench.path("a")), ..bench };
     for arguments in [
         &["run", "loop", "--quiet"][..],
         &["run", "b/loop", "--quiet", "--out", "out/other"],
@@ -96,10 +101,10 @@ fn every_command_takes_names() {
         assert!(code == 2 && errors.contains(says), "{errors}");
         assert!(errors.contains("; did you mean \""), "{errors}");
     }
-    fs::create_dir_all(bench.path("c/b")).unwrap();
-    fs::copy(deep.join("Model.fmu"), bench.path("c/b/Model.fmu")).unwrap();
+    fs::create_dir_all(bench.path("a/c")).unwrap();
+    fs::copy(deep.join("Model.fmu"), bench.path("a/c/Model.fmu")).unwrap();
     bench.fails(2, &["inspect", "Model"], "several FMUs are called Model: ");
-    assert_eq!(bench.call(&["inspect", "c/b/Model"]).0, 0);
+    assert_eq!(bench.call(&["inspect", "c/Model"]).0, 0);
 }
 
 #[test]

@@ -20,14 +20,10 @@ fn refusal_of(from: &str, to: &str) -> String {
 #[test]
 fn experiments_and_fmus_are_found_from_any_folder() {
     let bench = Bench::new();
+    let bench = Bench { installed: Some(bench.path(".")), ..bench };
     let elsewhere = tempfile::tempdir().unwrap();
     let run = |arguments: &[&str]| {
-        let mut command = bench.command(arguments);
-        let output = command
-            .current_dir(elsewhere.path())
-            .env("ORCHESTRATOR_PATH", bench.folder.path())
-            .output()
-            .unwrap();
+        let output = bench.command(arguments).current_dir(elsewhere.path()).output().unwrap();
         let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
         (output.status.code(), text(output.stdout), text(output.stderr))
     };
@@ -305,7 +301,7 @@ fn an_experiment_that_extends_another_is_all_of_them() {
     fs::create_dir(bench.path("more")).unwrap();
     fs::write(bench.path("more/longer.toml"), longer).unwrap();
     // The FMU stands beside the file that is extended.
-    bench.says(&["run", "longer", "--quiet"]);
+    bench.says(&["run", "more/longer", "--quiet"]);
     // The last row of the shorter run, where no step begins, keeps the outputs of the step before.
     let (longer, shorter) = (results("longer"), results("loop"));
     let common = shorter.lines().count() - 1;
@@ -313,7 +309,7 @@ fn an_experiment_that_extends_another_is_all_of_them() {
     assert_eq!(longer.lines().count(), common + 2);
     // The kept, the shown and the packed experiment are the merged whole.
     let metadata = bench.json("out/longer/results.json");
-    let (code, shown, _) = bench.call(&["show", "longer"]);
+    let (code, shown, _) = bench.call(&["show", "more/longer"]);
     assert!(
         code == 0 && metadata["experiment"]["text"] == shown && !shown.contains("extends"),
         "{shown}"
@@ -333,6 +329,6 @@ fn an_experiment_that_extends_another_is_all_of_them() {
     );
     fs::write(bench.path("loop.toml"), LOOP.replace("title = \"gain and integrator\"\n", ""))
         .unwrap();
-    let (_, text, _) = bench.call(&["list"]);
-    assert!(lists(&text, "longer", "longer") && !lists(&text, "loop", "integrator"), "{text}");
+    let (_, text, _) = bench.call(&["list", "."]);
+    assert!(lists(&text, "more/longer", "longer") && !lists(&text, "loop", "integrator"), "{text}");
 }

@@ -1,14 +1,13 @@
 //! Experiments, studies, campaigns and FMUs by their names.
 //!
-//! A name is the path of a file, or the end of one without its extension: `lqr`, or
-//! `reversal/allocated` where several experiments are called `allocated`. A study is called by its
-//! folder.
+//! A name is the path of a file, or the end of the path of one that is installed, both without the
+//! extension: `lqr`, or `reversal/allocated` where several experiments are called `allocated`. A
+//! study is called by its folder.
 
 use super::{files, folders, has_extension};
 use crate::document::Source;
 use crate::error::Error;
 use fmi_master::names;
-use std::collections::BTreeSet;
 use std::ffi::OsString;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -40,16 +39,6 @@ impl Kind {
             Self::Study => "study",
             Self::Campaign => "campaign",
             Self::Fmu => "FMU",
-        }
-    }
-
-    /// Returns the word for a file of this kind with its article.
-    pub fn with_article(self) -> &'static str {
-        match self {
-            Self::Experiment => "an experiment",
-            Self::Study => "a study",
-            Self::Campaign => "a campaign",
-            Self::Fmu => "an FMU",
         }
     }
 
@@ -147,16 +136,20 @@ impl Kind {
         }
     }
 
-    /// Lists the files of this kind below a folder.
-    pub fn below(self, folder: &Path) -> Vec<PathBuf> {
-        self.below_that(folder, |_| true)
-    }
-
     /// Lists the files of this kind below a folder whose paths fit.
-    fn below_that(self, folder: &Path, fits: impl Fn(&Path) -> bool) -> Vec<PathBuf> {
+    pub fn below(self, folder: &Path, fits: impl Fn(&Path) -> bool) -> Vec<PathBuf> {
         let extension = if self == Self::Fmu { "fmu" } else { "toml" };
         let mut paths = files(folder, extension);
         paths.retain(|path| fits(path) && Self::of(path) == Some(self));
+        paths
+    }
+
+    /// Lists the files of this kind that are found from any folder.
+    pub fn installed(self) -> Vec<PathBuf> {
+        let mut paths: Vec<PathBuf> =
+            folders().iter().flat_map(|folder| self.below(folder, |_| true)).collect();
+        paths.sort();
+        paths.dedup();
         paths
     }
 }
@@ -179,8 +172,8 @@ fn with_extension(name: &Path, extension: &str) -> PathBuf {
     PathBuf::from(text)
 }
 
-/// Finds the file that this name denotes: a path, or an entry of this kind that `list` shows, by
-/// its name or the end of its path.
+/// Finds the file that this name denotes: a path, or an installed file of this kind by its name or
+/// the end of its path.
 ///
 /// # Errors
 /// Returns an error if there is nothing of this kind with this name, if there are several, or if
@@ -199,19 +192,16 @@ pub fn find_any(name: &Path, kinds: &[Kind]) -> Result<PathBuf, Error> {
             return Ok(path);
         }
     }
-    let is_other = |kind: &Kind| {
-        let is_there = || !matches!(look(name, *kind), Ok(None));
-        !kinds.contains(kind) && is_there()
-    };
-    let others: Vec<Kind> = Kind::ALL.into_iter().filter(is_other).collect();
+    let mut others = Kind::ALL.to_vec();
+    others.retain(|kind| !kinds.contains(kind) && !matches!(look(name, *kind), Ok(None)));
     let is_fmu = others == [Kind::Fmu] || others.is_empty() && has_extension(name, "fmu");
-    Err(if is_fmu && kinds.contains(&Kind::Experiment) && kinds.len() == 1 {
+    Err(Error::experiment(if is_fmu && kinds == [Kind::Experiment] {
         of_an_fmu(name)
     } else if others.is_empty() {
         unknown(name, kinds)
     } else {
         of_another_kind(name, &others, kinds == [Kind::Fmu])
-    })
+    }))
 }
 
 /// Looks for a name among the files of one kind.
@@ -222,43 +212,41 @@ fn look(name: &Path, kind: Kind) -> Result<Option<PathBuf>, Error> {
     if let Some(path) = [name, &file].into_iter().find(|path| fits(path)) {
         return Ok(Some(path.to_path_buf()));
     }
-    if name.is_absolute() || has_extension(name, "ssp") {
-        return Ok(None);
-    }
     for folder in folders() {
-        let below = kind.below_that(&folder, |path| path.ends_with(&file));
-        match &below[..] {
-            [] => {}
-            [path] => return Ok(Some(path.clone())),
-            [..] => {
-                let paths: Vec<String> =
-                    below.iter().map(|path| path.display().to_string()).collect();
-                return Err(Error::experiment(format!(
-                    "several {} are called {}: {}",
-                    kind.plural(),
-                    name.display(),
-                    paths.join(", ")
-                )));
+        let below = kind.below(&folder, |path| path.ends_with(&file));
+        if let [first, others @ ..] = &below[..] {
+            if others.is_empty() {
+                return Ok(Some(first.clone()));
             }
+            let paths: Vec<String> = below.iter().map(|path| path.display().to_string()).collect();
+            let (several, name) = (kind.plural(), name.display());
+            let message = format!("several {several} are called {name}: {}", paths.join(", "));
+            return Err(Error::experiment(message));
         }
     }
     Ok(None)
 }
 
-/// Returns the error for the name of an FMU in place of that of an experiment.
-fn of_an_fmu(name: &Path) -> Error {
+/// Describes the fault that the name of an FMU stands in place of that of an experiment.
+fn of_an_fmu(name: &Path) -> String {
     let shown = name.display();
-    Error::experiment(format!(
+    format!(
         "{shown} is an FMU, and FMUs are run by an experiment: `orchestrator inspect {shown}` shows its variables, \
          --fmu COMPONENT={} puts it into an existing experiment",
         Kind::Fmu.file(name).display()
-    ))
+    )
 }
 
-/// Returns the error for a name of other kinds, with the commands that take it.
-fn of_another_kind(name: &Path, others: &[Kind], reads: bool) -> Error {
+/// Names the commands that take a name of other kinds.
+fn of_another_kind(name: &Path, others: &[Kind], reads: bool) -> String {
     let shown = name.display();
-    let what: Vec<&str> = others.iter().map(|kind| kind.with_article()).collect();
+    let what: Vec<String> = others
+        .iter()
+        .map(|kind| {
+            let article = if matches!(kind, Kind::Experiment | Kind::Fmu) { "an" } else { "a" };
+            format!("{article} {}", kind.word())
+        })
+        .collect();
     let mut commands: Vec<&str> = others.iter().map(|kind| kind.command()).collect();
     if reads {
         // A user who inspects an FMU may want to see the content of another file, too.
@@ -266,33 +254,33 @@ fn of_another_kind(name: &Path, others: &[Kind], reads: bool) -> Error {
     }
     let calls: Vec<String> =
         commands.iter().map(|command| format!("orchestrator {command} {shown}")).collect();
-    Error::experiment(format!("{shown} is {}: {}", what.join(" and "), calls.join(", or ")))
+    format!("{shown} is {}: {}", what.join(" and "), calls.join(", or "))
 }
 
-/// Returns the error for a name that nothing has.
-fn unknown(name: &Path, kinds: &[Kind]) -> Error {
-    let shown = name.display();
-    if kinds == [Kind::Experiment] && (name.is_absolute() || has_extension(name, "ssp")) {
-        let is_what = if name.is_dir() { "this is a folder" } else { "there is no such file" };
-        return Error::experiment(format!("{shown}: {is_what}"));
-    }
-    let last = |path: PathBuf| Some(path.file_name()?.to_string_lossy().into_owned());
-    let mut there: BTreeSet<String> = BTreeSet::new();
+/// Describes the fault that nothing has this name, with the nearest one that is installed or in the
+/// folder of the path.
+fn unknown(name: &Path, kinds: &[Kind]) -> String {
+    let stem = |kind: Kind, path: &Path| -> Option<String> {
+        Some(kind.name(path).file_name()?.to_string_lossy().into_owned())
+    };
+    let folder = name.parent().filter(|folder| *folder != Path::new("")).unwrap_or(Path::new("."));
+    let beside = || fs::read_dir(folder).into_iter().flatten().flatten();
+    let mut there = Vec::new();
     for kind in kinds {
-        let mut seen = BTreeSet::new();
-        let mut all: Vec<PathBuf> = folders().iter().flat_map(|one| kind.below(one)).collect();
-        all.retain(|path| path.canonicalize().is_ok_and(|path| seen.insert(path)));
-        there.extend(all.iter().map(|path| kind.shortest(path, &all)));
+        let installed = kind.installed();
+        there.extend(installed.iter().map(|path| kind.shortest(path, &installed)));
+        let own = beside().map(|entry| kind.file(&entry.path())).filter(|path| path.is_file());
+        there.extend(own.filter_map(|path| stem(*kind, &path)));
     }
-    let wrong =
-        kinds.first().and_then(|kind| last(kind.name(&kind.file(name)))).unwrap_or_default();
+    let wrong = kinds.first().and_then(|kind| stem(*kind, &kind.file(name))).unwrap_or_default();
     let hint = names::hint(&wrong, there.iter().map(String::as_str));
     let mut words: Vec<&str> = kinds.iter().map(|kind| kind.word()).collect();
     let last = words.pop().unwrap_or_default();
     let before = if words.is_empty() { String::new() } else { words.join(", ") + " or " };
-    Error::experiment(format!(
+    let shown = name.display();
+    format!(
         "there is no {before}{last} \"{shown}\", neither as a file nor among those that `orchestrator list` shows{hint}"
-    ))
+    )
 }
 
 #[cfg(test)]
