@@ -1,7 +1,6 @@
 //! An instance of a lookup table.
 
-use super::description::{HOLD, LINEAR, Place};
-use super::{Form, LONGEST, LookupTable};
+use super::{HOLD, LookupTable};
 use crate::warnings;
 use fmi_master::instance::{CallFailure, Instance, Outcome};
 use fmi_master::quantity::rounded;
@@ -18,118 +17,64 @@ pub(crate) struct LookupTableInstance {
     file: LookupTable,
     /// The table with the values that were set.
     table: LookupTable,
-    places: Vec<Place>,
-    interpolation: i32,
-    shift: f64,
-    /// Factor of each column.
-    scales: Vec<f64>,
-    present: Present,
-    is_running: bool,
-}
-
-/// Place of the present time among the rows.
-#[derive(Clone, Copy, Default)]
-struct Present {
-    last: usize,
-    next: usize,
-    /// Part of the way from the last row to the next.
-    part: f64,
+    /// Row before the present time, the row after it, and the part of the way between them.
+    present: (usize, usize, f64),
 }
 
 impl LookupTableInstance {
     pub(crate) fn new(name: &str, table: LookupTable) -> Self {
-        Self {
-            name: name.into(),
-            places: table.places(),
-            interpolation: HOLD,
-            shift: 0.0,
-            scales: vec![1.0; table.columns.len()],
-            present: Present::default(),
-            is_running: false,
-            file: table.clone(),
-            table,
-        }
+        Self { name: name.into(), file: table.clone(), table, present: <_>::default() }
     }
 
-    fn place(&self, call: &'static str, reference: u32) -> Result<Place, CallFailure> {
-        let place = self.places.get(reference as usize).copied();
-        place.ok_or_else(|| CallFailure::new(call, format!("there is no variable {reference}")))
+    /// Returns the time that is added to the times of all rows, s.
+    fn shift(&self) -> f64 {
+        self.table.numbers[self.table.columns.len() + 1]
     }
 
     /// Goes to a time. Before the first row its values hold, and after the last row the values of
     /// that row.
     fn go_to(&mut self, time: f64) {
-        let (times, time) = (&self.table.times, time - self.shift);
+        let (times, time) = (self.table.times(), time - self.shift());
         let is_past = |row: &f64| *row <= time + TOLERANCE * time.abs().max(1.0);
         let next = times.partition_point(is_past);
         let last = next.saturating_sub(1);
         self.present = if next == 0 || next == times.len() {
-            Present { last, next: last, part: 0.0 }
+            (last, last, 0.0)
         } else {
             let part = (time - times[last]) / (times[next] - times[last]);
-            Present { last, next, part: part.clamp(0.0, 1.0) }
+            (last, next, part.clamp(0.0, 1.0))
         };
     }
 
-    /// Returns the value of a column at the present time.
-    fn at_present(&self, column: usize) -> f64 {
-        let LookupTable { columns, values, .. } = &self.table;
-        let value_in = |row: usize| values[row * columns.len() + column];
-        let Present { last, next, part } = self.present;
-        let is_held = self.interpolation == HOLD || !matches!(columns[column].form, Form::Real(_));
+    /// Returns the number with this value reference. That of an output is a column at the present
+    /// time.
+    fn get(&self, reference: u32) -> f64 {
+        let (table, place) = (&self.table, reference as usize);
+        let count = table.columns.len();
+        let Some(column) = table.columns.get(place) else { return table.numbers[place] };
+        let (last, next, part) = self.present;
+        let is_held = table.numbers[count] == HOLD || !column.form.is_real();
         // Neither the difference of two values nor a product with zero may overflow.
         let value = if is_held || part == 0.0 {
-            value_in(last)
+            table.value(last, place)
         } else {
-            (1.0 - part) * value_in(last) + part * value_in(next)
+            (1.0 - part) * table.value(last, place) + part * table.value(next, place)
         };
-        self.scales[column] * value
-    }
-
-    fn get(&self, call: &'static str, reference: u32) -> Result<f64, CallFailure> {
-        Ok(match self.place(call, reference)? {
-            Place::Output(column) => self.at_present(column),
-            Place::Interpolation => self.interpolation.into(),
-            Place::Shift => self.shift,
-            Place::Scale(column) => self.scales[column],
-            Place::Time(row) => self.table.times[row],
-            Place::Value(index) => self.table.values[index],
-        })
+        table.numbers[count + 2 + place] * value
     }
 
     fn set(&mut self, call: &'static str, reference: u32, value: f64) -> Outcome {
-        let refuse = |problem: String| Err(CallFailure::answer(call, problem));
-        if self.is_running {
-            return refuse("a lookup table can be set only before the run begins".into());
-        }
         if !value.is_finite() {
-            return refuse(format!("{value} is not finite"));
+            return Err(CallFailure::answer(call, format!("{value} is not finite")));
         }
-        match self.place(call, reference)? {
-            Place::Output(_) => return refuse("an output cannot be set".into()),
-            Place::Interpolation if value == f64::from(HOLD) || value == f64::from(LINEAR) => {
-                self.interpolation = value as i32;
-            }
-            Place::Interpolation => {
-                return refuse(format!(
-                    "interpolation = {value} is neither {HOLD} (hold) nor {LINEAR} (linear)"
-                ));
-            }
-            Place::Shift | Place::Time(_) if value.abs() > LONGEST => {
-                return refuse(format!("{value} s is not within {LONGEST:e} s of zero"));
-            }
-            Place::Shift => self.shift = value,
-            Place::Scale(column) => self.scales[column] = value,
-            Place::Time(row) => Arc::make_mut(&mut self.table.times)[row] = value,
-            Place::Value(index) => Arc::make_mut(&mut self.table.values)[index] = value,
-        }
+        Arc::make_mut(&mut self.table.numbers)[reference as usize] = value;
         Ok(())
     }
 
-    fn get_whole(&self, call: &'static str, references: &[u32], values: &mut [i32]) -> Outcome {
+    fn get_whole(&self, references: &[u32], values: &mut [i32]) -> Outcome {
         for (value, reference) in values.iter_mut().zip(references) {
             // Only values of 32 bits are read as whole numbers.
-            *value = self.get(call, *reference)? as i32;
+            *value = self.get(*reference) as i32;
         }
         Ok(())
     }
@@ -143,17 +88,17 @@ impl LookupTableInstance {
 impl Instance for LookupTableInstance {
     fn get_real(&mut self, references: &[u32], values: &mut [f64]) -> Outcome {
         for (value, reference) in values.iter_mut().zip(references) {
-            *value = self.get("getReal", *reference)?;
+            *value = self.get(*reference);
         }
         Ok(())
     }
 
     fn get_integer(&mut self, references: &[u32], values: &mut [i32]) -> Outcome {
-        self.get_whole("getInteger", references, values)
+        self.get_whole(references, values)
     }
 
     fn get_boolean(&mut self, references: &[u32], values: &mut [i32]) -> Outcome {
-        self.get_whole("getBoolean", references, values)
+        self.get_whole(references, values)
     }
 
     fn set_real(&mut self, references: &[u32], values: &[f64]) -> Outcome {
@@ -174,7 +119,7 @@ impl Instance for LookupTableInstance {
     }
 
     fn enter_initialization(&mut self, start: f64, stop: f64) -> Outcome {
-        let times = &self.table.times;
+        let times = self.table.times();
         if let Some(row) = times.windows(2).position(|pair| pair[0] > pair[1]) {
             return Err(CallFailure::answer(
                 "enterInitializationMode",
@@ -187,11 +132,10 @@ impl Instance for LookupTableInstance {
                 ),
             ));
         }
-        self.is_running = true;
         self.go_to(start);
         // One row is a constant.
-        if let [first, .., last] = self.table.times[..] {
-            let [first, last] = [first, last].map(|time| rounded(time + self.shift));
+        if let [first, .., last] = *self.table.times() {
+            let [first, last] = [first, last].map(|time| rounded(time + self.shift()));
             if first > stop || last < start {
                 let held = if first > stop { "first" } else { "last" };
                 warnings::warn(&format!(

@@ -19,18 +19,25 @@ pub fn is_lookup_table(path: &Path) -> bool {
 const LARGEST: u64 = 1 << 30;
 /// Largest number of times and values up to which they are parameters.
 const MOST_PARAMETERS: usize = 1000;
+/// Kinds of interpolation: the value of the row before, or a straight line between two rows.
+const HOLD: f64 = 1.0;
+const LINEAR: f64 = 2.0;
 
 /// Largest magnitude of a time, s, with which all differences of times can be computed.
 const LONGEST: f64 = 1e12;
 
 /// The columns of a file over time.
+///
+/// All numbers lie in one list, in which the position of a number is the value reference of its
+/// variable: a place for each output, the kind of interpolation, the shift of all times, a factor of
+/// each column, the times of the rows (s, none earlier than the one before), and the values row by
+/// row.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct LookupTable {
     columns: Vec<Column>,
-    /// Times of the rows, s, none earlier than the one before.
-    times: Arc<Vec<f64>>,
-    /// Values of the columns, row by row.
-    values: Arc<Vec<f64>>,
+    numbers: Arc<Vec<f64>>,
+    /// Number of rows.
+    rows: usize,
 }
 
 /// A column that is an output.
@@ -139,12 +146,25 @@ impl LookupTable {
         if times.is_empty() {
             return Err("is a lookup table without rows".into());
         }
-        Ok(Self { columns, times: times.into(), values: values.into() })
+        let (count, rows) = (columns.len(), times.len());
+        let numbers = [vec![0.0; count], vec![HOLD, 0.0], vec![1.0; count], times, values].concat();
+        Ok(Self { columns, numbers: numbers.into(), rows })
     }
 
-    /// Returns whether times and values are parameters. Those of a large lookup table are not.
-    fn is_settable(&self) -> bool {
-        self.times.len() + self.values.len() <= MOST_PARAMETERS
+    /// Returns the position of the first time. The position of the kind of interpolation is the
+    /// number of columns.
+    fn first_time(&self) -> usize {
+        2 * self.columns.len() + 2
+    }
+
+    /// Returns the times of the rows, s.
+    fn times(&self) -> &[f64] {
+        &self.numbers[self.first_time()..][..self.rows]
+    }
+
+    /// Returns the value of a column in a row.
+    fn value(&self, row: usize, column: usize) -> f64 {
+        self.numbers[self.first_time() + self.rows + row * self.columns.len() + column]
     }
 }
 
