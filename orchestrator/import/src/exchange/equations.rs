@@ -1,8 +1,8 @@
 //! The equations of a model between two events, as the integrator sees them.
 
-use super::events::Events;
+use super::events::{Events, rounding};
 use super::model::{ContinuousModel, Layout, Refusal};
-use super::radau::{Point, Step, System};
+use super::rodas::{Point, Step, System};
 use crate::functions::Table as _;
 use nalgebra::DMatrix;
 
@@ -20,35 +20,30 @@ impl<M: ContinuousModel> Equations<'_, M> {
         if states.is_empty() { Ok(()) } else { self.model.unit().set_states(states) }
     }
 
-    /// Finds the first event of a step that begins at a time (s). Returns the time (s) after it,
-    /// which differs from one before it by rounding only, and its indicator. Without an event, the
-    /// model is at the end of the step.
+    /// Finds the first event of a step. Returns the time (s) after it, which differs from one before
+    /// it by rounding only, and its indicator. Without an event, the model is at the end of the
+    /// step.
     pub(super) fn event(
         &mut self,
         events: &Events,
-        begin: f64,
         step: &Step,
     ) -> Result<Option<(f64, usize)>, Refusal> {
         let count = self.layout.indicators;
         if count == 0 {
             return Ok(None);
         }
-        let end = step.end.time;
+        let (begin, end) = (step.begin.time, step.end.time);
         let mut indicators = vec![0.0; count];
         let mut states = step.end.states.clone();
         let mut crossed = |time: f64, this: &mut Self| {
-            if time < end {
-                step.states(time, &mut states);
-            } else {
-                states.copy_from_slice(&step.end.states);
-            }
+            step.states(time, &mut states);
             this.place(time, &states)?;
             this.model.unit().indicators(&mut indicators)?;
             Ok(events.crossed(&indicators))
         };
         // An indicator may cross zero and come back within the step.
         let (mut low, mut found) = (begin, None);
-        for time in step.nodes(begin) {
+        for time in [begin + (end - begin) / 3.0, begin + (end - begin) / 1.5, end] {
             if let Some(indicator) = crossed(time, self)? {
                 found = Some((time, indicator));
                 break;
@@ -56,8 +51,7 @@ impl<M: ContinuousModel> Equations<'_, M> {
             low = time;
         }
         let Some((mut high, mut indicator)) = found else { return Ok(None) };
-        let shortest = 8.0 * f64::EPSILON * begin.abs().max(end.abs());
-        while high - low > shortest {
+        while high - low > rounding(high) {
             let middle = f64::midpoint(low, high);
             match crossed(middle, self)? {
                 Some(other) => (high, indicator) = (middle, other),

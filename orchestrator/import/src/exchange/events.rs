@@ -1,5 +1,11 @@
 //! What is known of the events of a model.
 
+/// Returns the distance (s) up to which two times near this one (s) may be the same but for
+/// rounding.
+pub(super) fn rounding(time: f64) -> f64 {
+    4.0 * f64::EPSILON * time.abs()
+}
+
 /// What is known of events.
 #[derive(Clone, Default)]
 pub(super) struct Events {

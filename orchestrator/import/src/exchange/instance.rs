@@ -1,9 +1,9 @@
 //! A model together with its integrator, as the master sees it.
 
 use super::equations::Equations;
-use super::events::{Events, MOST_EVENTS};
+use super::events::{Events, MOST_EVENTS, rounding};
 use super::model::{ContinuousModel, Layout, Refusal};
-use super::radau::{Point, Radau, Step};
+use super::rodas::{Point, Rodas, Step};
 use crate::functions::Completed;
 use crate::library::put;
 use fmi_master::description::Carrier;
@@ -15,6 +15,9 @@ use std::fmt::Display;
 
 /// Number of steps within which a state event must have been located.
 const MOST_LOCATIONS: usize = 20;
+/// Part of a step at either end within which the interpolation is as good as the ends, whose error it
+/// has.
+const NEAR: f64 = 1e-3;
 
 /// Mode of the model.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -32,7 +35,7 @@ struct Progress {
     mode: Mode,
     /// Present time and states.
     point: Point,
-    integrator: Radau,
+    integrator: Rodas,
     events: Events,
     /// Values that were set last, by type and value reference.
     set: BTreeMap<(Carrier, u32), u64>,
@@ -106,8 +109,8 @@ impl<M: ContinuousModel> Exchange<M> {
 
     /// Makes a step of the integrator, which ends at an event or at the time `stop` (s) at last.
     fn advance(&mut self, stop: f64) -> Outcome {
-        let (step, indicator) = self.step_to_event(stop)?;
-        self.progress.point = step.end;
+        let (point, indicator) = self.step_to_event(stop)?;
+        self.progress.point = point;
         let mut completed = Completed::default();
         if self.layout.needs_completed_step {
             completed = self.model.unit().complete_step()?;
@@ -133,7 +136,7 @@ fn bits(value: i32) -> u64 {
 
 /// Returns whether an instant is not later than a time (s), apart from rounding.
 fn is_due(instant: f64, time: f64) -> bool {
-    instant <= time + 1e-12 * time.abs().max(instant.abs())
+    instant <= time + rounding(time)
 }
 
 impl Progress {
@@ -141,7 +144,7 @@ impl Progress {
         Self {
             mode: Mode::default(),
             point: Point::default(),
-            integrator: Radau::new(layout.tolerance),
+            integrator: Rodas::new(layout.tolerance),
             events: Events::default(),
             set: BTreeMap::new(),
         }
@@ -150,42 +153,46 @@ impl Progress {
 
 impl<M: ContinuousModel> Exchange<M> {
     /// Makes a step of the integrator, which ends at the first state event, or at the time `stop`
-    /// (s) at last. Returns the indicator of the event.
+    /// (s) at last. Returns its end and the indicator of the event.
     ///
-    /// The polynomial of a step is exact at its ends only, to the tolerance. An event is therefore
-    /// located on the polynomial of a step that ends where the event was found before.
-    fn step_to_event(&mut self, stop: f64) -> Result<(Step, Option<usize>), CallFailure> {
+    /// The interpolation within a step is exact at its ends only, to the tolerance. An event far
+    /// from both is therefore located again in a step that ends shortly after it. What is found near
+    /// an end is carried out at the interpolated states, where the indicator has its new sign, so
+    /// that no event comes again because of rounding.
+    fn step_to_event(&mut self, stop: f64) -> Result<(Point, Option<usize>), CallFailure> {
         let Progress { point, integrator, events, .. } = &mut self.progress;
         let nominals = integrator.nominals.clone();
         let mut equations = Equations { model: &mut self.model, layout: &self.layout, nominals };
         let (mut until, mut trials) = (stop, 0);
         loop {
             trials += 1;
-            let before = integrator.pace();
-            let step = if point.states.is_empty() {
+            let next = integrator.next;
+            let mut step = if point.states.is_empty() {
                 equations.place(until, &[]).map_err(Refusal::failure)?;
-                Step::empty(until)
+                Step::empty(point, until)
             } else {
                 integrator.step(&mut equations, point, until)?
             };
-            let instant = match equations.event(events, point.time, &step) {
-                Ok(None) => return Ok((step, None)),
-                Ok(Some((instant, indicator)))
-                    if instant >= step.end.time || trials == MOST_LOCATIONS =>
-                {
-                    let end = &step.end;
-                    equations.place(end.time, &end.states).map_err(Refusal::failure)?;
-                    return Ok((step, Some(indicator)));
+            until = match equations.event(events, &step) {
+                Ok(None) => return Ok((step.end, None)),
+                Ok(Some((instant, indicator))) => {
+                    let part = step.part(instant);
+                    if part < NEAR || part > 1.0 - NEAR || trials == MOST_LOCATIONS {
+                        let mut states = step.end.states.clone();
+                        step.states(instant, &mut states);
+                        equations.place(instant, &states).map_err(Refusal::failure)?;
+                        (step.end.time, step.end.states) = (instant, states);
+                        return Ok((step.end, Some(indicator)));
+                    }
+                    point.time + (1.0 + 0.5 * NEAR) * (instant - point.time)
                 }
-                Ok(Some((instant, _))) => instant,
                 // The step may reach beyond an event.
                 Err(Refusal::Discarded(_)) if trials < MOST_LOCATIONS => {
                     f64::midpoint(point.time, step.end.time)
                 }
                 Err(refusal) => return Err(refusal.failure()),
             };
-            integrator.set_pace(before);
-            until = instant;
+            integrator.next = next;
         }
     }
 
@@ -242,7 +249,7 @@ impl<M: ContinuousModel> Exchange<M> {
             }
             self.model.unit().derivatives(&mut point.derivatives).map_err(Refusal::failure)?;
         }
-        integrator.restart();
+        integrator.next = f64::INFINITY;
         let mut values = vec![0.0; *indicators];
         if *indicators > 0 {
             self.model.unit().indicators(&mut values).map_err(Refusal::failure)?;

@@ -9,7 +9,7 @@
 //! |---|---|
 //! | `model` | what the integration needs to know of a model |
 //! | `calls` | the calls, whatever the version of FMI |
-//! | `radau` | the integrator |
+//! | `rodas` | the integrator |
 //! | `equations` | the equations of a model as the integrator sees them, and finding state events |
 //! | `events` | what is known of events |
 //! | `instance` | the model with its integrator, as the master sees it |
@@ -19,7 +19,7 @@ mod equations;
 mod events;
 mod instance;
 mod model;
-mod radau;
+mod rodas;
 
 pub(crate) use instance::Exchange;
 pub(crate) use model::{ContinuousModel, Layout};

@@ -38,14 +38,14 @@ fn integrated(
     tolerance: f64,
 ) -> (Vec<f64>, usize) {
     let mut system = Function(function);
-    let mut radau = Radau::new(tolerance);
-    radau.nominals = vec![1.0; states.len()];
+    let mut rodas = Rodas::new(tolerance);
+    rodas.nominals = vec![1.0; states.len()];
     let mut derivatives = vec![0.0; states.len()];
     system.derivatives(0.0, states, &mut derivatives).unwrap();
     let mut point = Point { time: 0.0, states: states.to_vec(), derivatives };
     let mut steps = 0;
     while point.time < end {
-        point = radau.step(&mut system, &point, end).unwrap().end;
+        point = rodas.step(&mut system, &point, end).unwrap().end;
         steps += 1;
     }
     (point.states, steps)
@@ -81,10 +81,10 @@ fn oracle_an_oscillation_keeps_its_tolerance_with_few_steps() {
 #[test]
 fn oracle_the_polynomial_of_a_step_is_that_of_its_stages() {
     let mut system = Function(|t: f64, _: &[f64], dy: &mut [f64]| dy[0] = 3.0 * t * t);
-    let mut radau = Radau::new(1e-6);
-    radau.nominals = vec![1.0];
+    let mut rodas = Rodas::new(1e-6);
+    rodas.nominals = vec![1.0];
     let from = Point { time: 0.0, states: vec![0.0], derivatives: vec![0.0] };
-    let step = radau.step(&mut system, &from, 0.5).unwrap();
+    let step = rodas.step(&mut system, &from, 0.5).unwrap();
     let mut state = [0.0];
     for part in [0.0, 0.2, 0.7, 1.0] {
         let time = part * step.end.time;
