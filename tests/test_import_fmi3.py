@@ -98,7 +98,8 @@ def test_an_ssp_archive_takes_both_versions(interface, folders, tmp_path):
     subprocess.run(
         [program("orchestrator"), "pack", experiment, "--out", tmp_path / "x.ssp", "--fmu-dir", folders["plant 3.0"]], check=True
     )
-    subprocess.run([program("orchestrator"), "run", tmp_path / "x.ssp", "--out", tmp_path / "out", "--quiet"], check=True)
+    command = [program("orchestrator"), "run", tmp_path / "x.ssp", "--step", "0.04", "--out", tmp_path / "out", "--quiet"]
+    subprocess.run(command, check=True)
     with open(tmp_path / "out" / "results.csv") as file:
         table = list(csv.reader(file))
     expected = rows(tmp_path / "two", str(tmp_path / "lqr"), TARGET / "fmu")

@@ -165,7 +165,7 @@ def packed(tmp_path):
 
     def pack(name):
         (tmp_path / "experiment.toml").write_text(EXPERIMENT.format(name, STOP, STEP))
-        command = [program("orchestrator"), "pack", "experiment.toml", "--no-enumerations", "--out", "loop.ssp", "--fmu-dir", TARGET / "fmu"]
+        command = [program("orchestrator"), "pack", "experiment.toml", "--out", "loop.ssp", "--fmu-dir", TARGET / "fmu"]
         done = subprocess.run(command, capture_output=True, text=True, timeout=60, cwd=tmp_path)
         assert done.returncode == 0, done.stderr
         return tmp_path / "loop.ssp"

@@ -60,7 +60,8 @@ def test_every_experiment_becomes_a_valid_archive(experiment, tmp_path):
     names = re.findall(r' name="([^"]*)"', text.split("<ssd:Elements>")[0]) + re.findall(r'<ssv:ParameterSet version="1.0" name="([^"]*)"', text)
     assert names and all(name.isidentifier() for name in names)
     assert html.unescape(re.search(r' description="([^"]*)"', text)[1]) == tomllib.loads(experiment.read_text())["title"]
-    assert re.search(r'<oms:SimulationInformation name="oms_ma_default" method="oms_ma" fixedStepSize="0\.\d+">\s*<oms:FixedStepMaster [^>]*stepSize="0\.\d+"', text)
+    # libcosim aborts at a connector that is an enumeration.
+    assert "Annotation" not in text and "ssc:Enumeration" not in text
     again = tmp_path / "again.ssp"
     pack(experiment, again)
     assert path.read_bytes() == again.read_bytes()
@@ -68,47 +69,20 @@ def test_every_experiment_becomes_a_valid_archive(experiment, tmp_path):
 
 @pytest.mark.parametrize("name", ["crmpc-2022/estimator", "tvsmc-2015/sotvsmc-do", "exchange/two-loop-smc-allocated"])
 def test_an_archive_of_ours_is_the_same_run(name, tmp_path):
-    """The run needs no option for the step, the order, the recorded variables or the figures of
-    merit."""
+    """The run needs only the step, which SSP has no place for."""
     experiment = EXPERIMENTS.parent / f"{name}.toml"
-    pack(experiment, tmp_path / "x.ssp", "--stop", "2")
-    finished = run(tmp_path / "x.ssp", tmp_path / "ssp")
+    said = pack(experiment, tmp_path / "x.ssp", "--stop", "2")
+    step = re.search(r"--step (\S+)", said)[1]
+    finished = run(tmp_path / "x.ssp", tmp_path / "ssp", "--step", step)
     assert finished.returncode == 0, finished.stderr
     finished = run(experiment, tmp_path / "toml", "--stop", "2", "--fmu-dir", TARGET / "fmu")
     assert finished.returncode == 0, finished.stderr
-    assert (tmp_path / "ssp" / "results.csv").read_bytes() == (tmp_path / "toml" / "results.csv").read_bytes()
-    ssp, toml = (json.loads((tmp_path / kind / "metrics.json").read_text()) for kind in ("ssp", "toml"))
-    assert ssp["ems_deg"] == toml["ems_deg"] and ssp["cms"] == toml["cms"]
+    ssp, toml = columns(tmp_path / "ssp"), columns(tmp_path / "toml")
+    assert len(toml) > 10 and toml.keys() <= ssp.keys()
+    assert all(np.array_equal(ssp[name], values) for name, values in toml.items() if not name.endswith(TIMES))
     ssp, toml = (json.loads((tmp_path / kind / "results.json").read_text()) for kind in ("ssp", "toml"))
-    assert ssp["simulation"] == toml["simulation"] and ssp["title"] == toml["title"]
+    assert ssp["simulation"] == toml["simulation"]
     assert [component["sha256"] for component in ssp["components"].values()] == [component["sha256"] for component in toml["components"].values()]
-
-
-def test_enumerations_are_connectors(tmp_path):
-    pack(EXPERIMENTS / "crmpc-robust.toml", tmp_path / "x.ssp")
-    text = zipfile.ZipFile(tmp_path / "x.ssp").read("SystemStructure.ssd").decode()
-    kind = re.search(r'<ssd:Connector name="solver.status" kind="output">\s*<ssc:Enumeration name="(\w+)"/>', text)[1]
-    assert re.search(rf'<ssc:Enumeration name="{kind}">\s*<ssc:Item name="\w+" value="\d+"/>', text)
-
-
-@pytest.mark.parametrize(
-    "information",
-    [
-        b'<o:SimulationInformation><o:FixedStepMaster stepSize="0.01"/></o:SimulationInformation>',
-        # The form of OMSimulator 3, which lists all solvers.
-        b'<o:SimulationInformation name="b"/><o:SimulationInformation name="a" method="oms_ma" fixedStepSize="0.01"/>',
-    ],
-)
-def test_a_step_by_another_tools_annotation_is_read(information, tmp_path):
-    annotation = b"""<Annotations><c:Annotation type="org.openmodelica"><o:Annotations xmlns:o="o">
-      %s</o:Annotations></c:Annotation></Annotations>
-  </System>
-  <DefaultExperiment""" % information
-    ssd = SSD.replace(b"</System>\n  <DefaultExperiment", annotation)
-    assert ssd != SSD
-    finished = run(foreign(tmp_path / "x.ssp", ssd), tmp_path / "out")
-    assert finished.returncode == 0, finished.stderr
-    assert json.loads((tmp_path / "out" / "results.json").read_text())["simulation"]["step"] == 0.01
 
 
 def test_an_instance_that_fails_in_an_archive_is_named_by_archive_and_entry(tmp_path):

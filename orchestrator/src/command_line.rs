@@ -172,10 +172,6 @@ pub(crate) enum Command {
         fmu_dir: Vec<PathBuf>,
         #[command(flatten)]
         overrides: arguments::Overrides,
-        /// Write no connectors for outputs that are enumerations, because libcosim aborts if there
-        /// is one.
-        #[arg(long, help_heading = "Results")]
-        no_enumerations: bool,
         /// Replace the archive if it exists.
         #[arg(long, help_heading = "Results")]
         force: bool,

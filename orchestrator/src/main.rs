@@ -167,8 +167,8 @@ fn execute(command: Command, out: &mut impl Write, interrupt: &Interrupt) -> Res
         Command::Judge { experiment, out: folder, fmu_dir } => {
             judge::judge(&experiment, &fmu_dir, &folder)
         }
-        Command::Pack { experiment, out: archive, fmu_dir, overrides, no_enumerations, force } => {
-            let archive = pack::Archive { path: archive, enumerations: !no_enumerations, force };
+        Command::Pack { experiment, out: archive, fmu_dir, overrides, force } => {
+            let archive = pack::Archive { path: archive, force };
             pack::pack(&experiment, &overrides.into(), &fmu_dir, archive, out, interrupt)
         }
         Command::Inspect { fmu, filter, json, check, isolation } => {

@@ -15,8 +15,6 @@ use std::path::{Path, PathBuf};
 pub(crate) struct Archive {
     /// Path of the archive; that of the experiment if it is not given.
     pub(crate) path: Option<PathBuf>,
-    /// Whether outputs that are enumerations get connectors.
-    pub(crate) enumerations: bool,
     /// Whether an existing archive may be replaced.
     pub(crate) force: bool,
 }
@@ -37,7 +35,7 @@ pub(crate) fn pack(
         return Err(Error::experiment("an archive cannot hold a law in another program").into());
     }
     let path = find(experiment, Kind::Experiment)?;
-    let Archive { path: archive, enumerations, force } = archive;
+    let Archive { path: archive, force } = archive;
     let archive = archive.unwrap_or_else(|| {
         PathBuf::from(path.file_stem().unwrap_or_default()).with_extension("ssp")
     });
@@ -49,7 +47,7 @@ pub(crate) fn pack(
         .into());
     }
     let (system, _entries) = system(&path, overrides, fmu_dirs)?;
-    ssp::pack(&system, enumerations, &archive, interrupt)?;
+    ssp::pack(&system, &archive, interrupt)?;
     Ok(packed(&system, &archive, out)?)
 }
 
@@ -59,6 +57,6 @@ fn packed(system: &System, archive: &Path, out: &mut impl Write) -> std::io::Res
     let step = system.experiment.simulation.step;
     writeln!(
         out,
-        "  SSP has no place for the communication step, {step} s: it is stored in annotations, which not every importer reads"
+        "  SSP has no place for the communication step: run the archive with --step {step}"
     )
 }

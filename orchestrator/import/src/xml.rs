@@ -1,9 +1,10 @@
 //! Reads XML of any exporter: text in any declared encoding, and elements with any namespace
-//! prefix.
+//! prefix. Writes elements in the same form.
 
 use encoding_rs::{Encoding, UTF_8};
-use quick_xml::events::{BytesStart, Event};
-use quick_xml::{Reader, XmlVersion};
+use quick_xml::events::{BytesDecl, BytesStart, Event};
+use quick_xml::{Reader, Writer, XmlVersion};
+use std::io;
 use std::str::FromStr;
 
 /// Decodes the text of a file. The encoding is that of its byte order mark, or otherwise that of
@@ -39,12 +40,12 @@ fn declared_encoding(bytes: &[u8]) -> Option<String> {
     quoted[1..].split_once(quote).map(|(label, _)| label.to_string())
 }
 
-/// An XML element with its attributes and child elements, but without text.
+/// An XML element with its attributes and child elements, but without text. It is read or made.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Element {
-    /// Name of the element without namespace prefix.
+    /// Name of the element, without namespace prefix if it was read.
     pub name: String,
-    /// Line where the element begins, counted from 1.
+    /// Line where the element begins, counted from 1, if it was read.
     pub line: usize,
     /// Attributes of the element, each a name with prefix and a value.
     attributes: Vec<(String, String)>,
@@ -103,10 +104,10 @@ impl Element {
                         deeper += 1;
                         continue;
                     }
-                    open.push(Self::new(&start, line).map_err(|error| fault(&error))?);
+                    open.push(Self::read(&start, line).map_err(|error| fault(&error))?);
                 }
                 Event::Empty(start) => {
-                    let element = Self::new(&start, line).map_err(|error| fault(&error))?;
+                    let element = Self::read(&start, line).map_err(|error| fault(&error))?;
                     if deeper == 0 {
                         close(&mut open, element)?;
                     }
@@ -134,7 +135,7 @@ impl Element {
         }
     }
 
-    fn new(start: &BytesStart, line: usize) -> Result<Self, String> {
+    fn read(start: &BytesStart, line: usize) -> Result<Self, String> {
         let mut attributes = Vec::new();
         for attribute in start.attributes() {
             let attribute = attribute.map_err(|error| error.to_string())?;
@@ -149,6 +150,41 @@ impl Element {
             attributes,
             children: Vec::new(),
         })
+    }
+
+    /// Makes an element with these attributes.
+    pub fn new<'a>(name: &str, attributes: impl IntoIterator<Item = (&'a str, String)>) -> Self {
+        let attributes = attributes.into_iter().map(|(name, value)| (name.into(), value));
+        Self { name: name.into(), attributes: attributes.collect(), ..Self::default() }
+    }
+
+    /// Adds child elements.
+    #[must_use]
+    pub fn holding(mut self, children: impl IntoIterator<Item = Self>) -> Self {
+        self.children.extend(children);
+        self
+    }
+
+    /// Writes the element as a document.
+    ///
+    /// # Errors
+    /// Returns an error if a name or a value cannot be written as XML.
+    pub fn document(&self) -> io::Result<Vec<u8>> {
+        let mut xml = Writer::new_with_indent(Vec::new(), b' ', 2);
+        xml.write_event(Event::Decl(BytesDecl::new("1.0", Some("UTF-8"), None)))?;
+        self.write(&mut xml)?;
+        Ok([&xml.into_inner()[..], b"\n"].concat())
+    }
+
+    fn write(&self, xml: &mut Writer<Vec<u8>>) -> io::Result<()> {
+        let attributes = self.attributes.iter().map(|(name, value)| (&**name, &**value));
+        let element = xml.create_element(self.name.as_str()).with_attributes(attributes);
+        if self.children.is_empty() {
+            return element.write_empty().map(drop);
+        }
+        let write_children =
+            |xml: &mut _| self.children.iter().try_for_each(|child| child.write(xml));
+        element.write_inner_content(write_children).map(drop)
     }
 
     /// Returns the title of the element for messages: its kind, its name if it has one, and its

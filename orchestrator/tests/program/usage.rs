@@ -318,7 +318,7 @@ fn an_experiment_that_extends_another_is_all_of_them() {
     let (code, _, errors) = bench.call(&["run", "whole.toml", "--quiet"]);
     assert!(code == 0 && results("whole") == results("longer"), "{errors}");
     bench.says(&["pack", "more/longer.toml", "--out", "longer.ssp"]);
-    bench.says(&["run", "longer.ssp", "--quiet", "--out", "out/packed"]);
+    bench.says(&["run", "longer.ssp", "--step", "1", "--quiet", "--out", "out/packed"]);
     // A fault is reported with the file that contains it. A file without a title is no experiment
     // of its own.
     fs::write(bench.path("loop.toml"), LOOP.replace("plant.steps", "plant.stepz")).unwrap();

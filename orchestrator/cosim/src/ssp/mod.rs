@@ -8,16 +8,11 @@ mod read;
 mod structure;
 mod value;
 mod write;
-mod xml;
 
 pub use read::{Entries, Loaded, load};
 pub use write::pack;
 
 /// Path of the system structure in an archive.
 const STRUCTURE: &str = "SystemStructure.ssd";
-/// Type of this program's annotation, which holds the settings for which the standard has no place.
-const RUN_SETTINGS: &str = "orchestrator";
-/// Type of an annotation that other importers read as well, which holds the step.
-const OPEN_MODELICA: &str = "org.openmodelica";
 /// Type of a component that is an FMU, which is also the type of a component that states none.
 const FMU: &str = "application/x-fmu-sharedlibrary";
