@@ -32,8 +32,8 @@ pub(crate) fn definition() -> clap::Command {
         argument.allow_negative_numbers(is_option)
     };
     Arguments::command().mut_subcommands(|command| {
-        let examples = examples::of(command.get_name());
-        command.mut_args(with_negative_values).after_help(examples)
+        let examples = (!command.is_hide_set()).then(|| examples::of(command.get_name()));
+        command.mut_args(with_negative_values).after_help(examples.unwrap_or_default())
     })
 }
 
@@ -199,6 +199,7 @@ pub(crate) enum Command {
         name: PathBuf,
     },
     /// Print the JSON Schema of a kind of file, by which editors complete and check such files.
+    #[command(hide = true)]
     Schema {
         /// Kind of file that the schema describes.
         #[arg(value_enum)]
@@ -206,11 +207,13 @@ pub(crate) enum Command {
     },
     /// Write a script that completes commands and options in a shell, for example `orchestrator
     /// completions bash`.
+    #[command(hide = true)]
     Completions {
         /// Shell that the script is for.
         shell: clap_complete::Shell,
     },
     /// Write the manual pages of the program and of its commands, for `man orchestrator`.
+    #[command(hide = true)]
     Man {
         /// Folder for the pages, for example one called man1 that `man` searches.
         #[arg(value_name = "DIR")]
