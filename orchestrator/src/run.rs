@@ -13,8 +13,8 @@ use cosim::metadata;
 use cosim::pacing;
 use cosim::pacing::report::RealTime;
 use cosim::pacing::timer::{self, Monotonic};
-use cosim::recorder::Format;
-use cosim::run::Observer;
+use cosim::recorder::{Format, Recorder};
+use cosim::run::{Observer, Run, Sample};
 use cosim::ssp;
 use cosim::system::{Opened, System};
 use cosim_metrics::folder::Folder;
@@ -26,6 +26,7 @@ use cosim_report::recording::watch::Watch;
 use cosim_report::run_page;
 use fmu_import::warnings;
 use linear::measures::{self, Measured};
+use serde_json::Value;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
@@ -176,101 +177,164 @@ fn ended(reason: Option<Error>, quiet: bool) -> Result<(), Failure> {
 /// # Errors
 /// Returns an error if an FMU fails, or if a file cannot be written.
 fn record(system: &mut System, options: &Options) -> Result<RunReport, Failure> {
-    options.files.check()?;
-    let mut meters = Meters::new(system)?.ending_when_lost();
-    // A panel of a wrong signal is refused before the run, whether it is drawn or not.
-    Panel::resolve_all(system)?;
-    let Pictures { no_plot, page } = options.files.pictures;
-    let mut watch = (page || !no_plot).then(|| Watch::new(system)).transpose()?;
-    for doubt in system.doubts() {
-        tracing::warn!("{doubt}");
-    }
-    let (clock, title) = (system.clock, system.experiment.title.clone());
-    let source = &system.experiment.source.path;
-    let stem = source.file_stem().map_or("run".into(), |stem| stem.to_string_lossy().into_owned());
-    let out = options.out.clone().unwrap_or_else(|| Path::new("out").join(&stem));
-
-    Folder::check(&out, options.force)?;
-
+    let mut outputs = Outputs::new(system, options)?;
     let warnings = warnings::collect();
-    warnings::at(clock.start());
+    warnings::at(system.clock.start());
     let mut run = system.start(&options.interrupt)?;
     let parameters = system.parameters(&mut run)?;
-
     if let Some(request) = options.interrupt.asked() {
-        return Err(Error::Interrupted { time: clock.start(), request }.into());
+        return Err(Error::Interrupted { time: system.clock.start(), request }.into());
     }
-    let folder = Folder::take(&out)?;
-    // Another process may have written to the folder in the meantime.
-    Folder::check(&out, options.force)?;
-    folder.clear()?;
-    let Files { no_csv, format, labels, .. } = options.files;
-    let recorder = (!no_csv).then(|| system.recorder(&out, format, labels));
-    let mut recorder = recorder.transpose()?;
-    let mut progress =
-        Progress::new(&title, clock.ticks(), options.quiet, options.real_time.is_some());
-
+    let _folder = outputs.begin(system)?;
     if let Some(settings) = options.real_time {
         timer::wake_up_sharply();
         run.pace(settings, Rc::new(Monotonic));
     }
-
     let begin = Instant::now();
-    let mut observers: Vec<&mut dyn Observer> = vec![&mut progress];
-    observers.extend(watch.as_mut().map(|watch| watch as &mut dyn Observer));
-    observers.extend(recorder.as_mut().map(|recorder| recorder as &mut dyn Observer));
-    // The meters come last, because they may end the run.
-    observers.push(&mut meters);
-    let outcome = run.run(&mut observers);
+    let outcome = run.run(&mut [&mut outputs]);
     let wall = begin.elapsed().as_secs_f64();
-    drop((progress, warnings));
+    outputs.progress = None;
+    drop(warnings);
 
-    let write = || -> Result<_, Failure> {
-        let mut files = vec!["results.json", "metrics.json"];
-        if let Some(recorder) = &mut recorder {
-            recorder.finish()?;
-            files.insert(0, format.file());
-        }
-        let metadata =
-            metadata::metadata(system, &parameters, options.real_time, outcome.as_ref().err());
-        files::write_json(&out.join("results.json"), &metadata)?;
-        let reached = clock.step() * meters.seen().saturating_sub(1) as f64;
-        let mut metrics = Metrics {
-            real_time_factor: (wall > 0.0).then(|| reached / wall),
-            wall_s: wall,
-            loop_delay_s: system.loop_delay(),
-            ..meters.metrics()
-        };
-        if outcome.is_ok() {
-            metrics.asked.extend(margins(system, &options.interrupt)?);
-        }
-        if let Some(pacer) = run.take_pacer() {
-            let real_time = pacer.report();
-            warn(&real_time, options.quiet);
-            metrics.real_time = Some(real_time);
-        }
-        files::write_json(&out.join("metrics.json"), &metrics)?;
-        if let Some(watch) = watch.as_ref().filter(|_| !no_plot)
-            && watch.draw(&out.join("plot.svg"), &title)?
-        {
-            files.push("plot.svg");
-        }
-        if let Some(watch) = watch.filter(|_| page) {
-            let mut run = watch.recording(&stem, &metadata);
-            run.summary = summary::lines(&system.experiment.observe, &metrics);
-            let runs = [run];
-            let drawn = asked::of_experiments(&runs).map_err(Error::experiment)?;
-            run_page::write(&runs, &drawn, &out.join("page.html"))?;
-            files.push("page.html");
-        }
-        Ok((metrics, files))
-    };
-    let written = write();
+    let out = outputs.out.clone();
+    let metadata =
+        metadata::metadata(system, &parameters, options.real_time, outcome.as_ref().err());
+    let written = outputs.write(system, &mut run, &metadata, outcome.is_ok(), wall);
     // The reason why the run ended comes first: a disk filled by its results has no room for more.
     let ended = early(outcome, &out)?;
     let (metrics, files) = written?;
     let end = run.master.end().map(String::from);
     Ok(RunReport { metrics, out, files, ended, end })
+}
+
+/// What a run writes and shows. It observes the run.
+struct Outputs<'a> {
+    options: &'a Options,
+    /// Folder of the results.
+    out: PathBuf,
+    /// Name of the experiment's file.
+    name: String,
+    title: String,
+    progress: Option<Progress>,
+    recorder: Option<Recorder>,
+    watch: Option<Watch>,
+    meters: Meters,
+}
+
+impl<'a> Outputs<'a> {
+    /// Resolves what is to be written and drawn. Nothing is written yet.
+    ///
+    /// # Errors
+    /// Returns an error if a signal is unknown, or if there are results that may not be replaced.
+    fn new(system: &mut System, options: &'a Options) -> Result<Self, Failure> {
+        options.files.check()?;
+        let meters = Meters::new(system)?.ending_when_lost();
+        // A panel of a wrong signal is refused before the run, whether it is drawn or not.
+        Panel::resolve_all(system)?;
+        let Pictures { no_plot, page } = options.files.pictures;
+        let watch = (page || !no_plot).then(|| Watch::new(system)).transpose()?;
+        for doubt in system.doubts() {
+            tracing::warn!("{doubt}");
+        }
+        let title = system.experiment.title.clone();
+        let stem = system.experiment.source.path.file_stem();
+        let name = stem.map_or("run".into(), |stem| stem.to_string_lossy().into_owned());
+        let out = options.out.clone().unwrap_or_else(|| Path::new("out").join(&name));
+        Folder::check(&out, options.force)?;
+        Ok(Self { options, out, name, title, progress: None, recorder: None, watch, meters })
+    }
+
+    /// Takes the folder, which stays taken as long as the returned value lives, and begins the file
+    /// of recorded variables.
+    ///
+    /// # Errors
+    /// Returns an error if another process has the folder, or if it cannot be written.
+    fn begin(&mut self, system: &System) -> Result<Folder, Failure> {
+        let Options { force, quiet, real_time, files, .. } = self.options;
+        let folder = Folder::take(&self.out)?;
+        // Another process may have written to the folder in the meantime.
+        Folder::check(&self.out, *force)?;
+        folder.clear()?;
+        let recorder =
+            (!files.no_csv).then(|| system.recorder(&self.out, files.format, files.labels));
+        self.recorder = recorder.transpose()?;
+        let ticks = system.clock.ticks();
+        self.progress = Some(Progress::new(&self.title, ticks, *quiet, real_time.is_some()));
+        Ok(folder)
+    }
+
+    /// Writes the files. Returns the metrics and the files' names.
+    ///
+    /// # Errors
+    /// Returns an error if a file cannot be written.
+    fn write(
+        mut self,
+        system: &System,
+        run: &mut Run,
+        metadata: &Value,
+        is_complete: bool,
+        wall: f64,
+    ) -> Result<(Metrics, Vec<&'static str>), Failure> {
+        let mut files = vec!["results.json", "metrics.json"];
+        if let Some(recorder) = &mut self.recorder {
+            recorder.finish()?;
+            files.insert(0, self.options.files.format.file());
+        }
+        files::write_json(&self.out.join("results.json"), metadata)?;
+        let metrics = self.measured(system, run, is_complete, wall)?;
+        files::write_json(&self.out.join("metrics.json"), &metrics)?;
+        let Pictures { no_plot, page } = self.options.files.pictures;
+        let Some(watch) = self.watch else { return Ok((metrics, files)) };
+        if !no_plot && watch.draw(&self.out.join("plot.svg"), &self.title)? {
+            files.push("plot.svg");
+        }
+        if page {
+            let mut recording = watch.recording(&self.name, metadata);
+            recording.summary = summary::lines(&system.experiment.observe, &metrics);
+            let recordings = [recording];
+            let drawn = asked::of_experiments(&recordings).map_err(Error::experiment)?;
+            run_page::write(&recordings, &drawn, &self.out.join("page.html"))?;
+            files.push("page.html");
+        }
+        Ok((metrics, files))
+    }
+
+    /// Returns the metrics of a run that took this time by the wall clock, s.
+    fn measured(
+        &self,
+        system: &System,
+        run: &mut Run,
+        is_complete: bool,
+        wall: f64,
+    ) -> Result<Metrics, Failure> {
+        let reached = system.clock.step() * self.meters.seen().saturating_sub(1) as f64;
+        let mut metrics = Metrics {
+            real_time_factor: (wall > 0.0).then(|| reached / wall),
+            wall_s: wall,
+            loop_delay_s: system.loop_delay(),
+            ..self.meters.metrics()
+        };
+        if is_complete {
+            metrics.asked.extend(margins(system, &self.options.interrupt)?);
+        }
+        if let Some(pacer) = run.take_pacer() {
+            let real_time = pacer.report();
+            warn(&real_time, self.options.quiet);
+            metrics.real_time = Some(real_time);
+        }
+        Ok(metrics)
+    }
+}
+
+impl Observer for Outputs<'_> {
+    fn observe(&mut self, sample: &Sample) -> Result<(), Error> {
+        let Self { progress, watch, recorder, meters, .. } = self;
+        progress.as_mut().map_or(Ok(()), |progress| progress.observe(sample))?;
+        watch.as_mut().map_or(Ok(()), |watch| watch.observe(sample))?;
+        recorder.as_mut().map_or(Ok(()), |recorder| recorder.observe(sample))?;
+        // The meters come last, because they may end the run.
+        meters.observe(sample)
+    }
 }
 
 /// Computes the margins that an experiment asks for. A loop that cannot be linearised has none, and

@@ -80,100 +80,13 @@ impl LookupTable {
     /// # Errors
     /// Names the file, line and column at fault.
     pub fn from_csv(file: &str, reader: impl Read) -> Result<Self, Error> {
-        let refuse = |line: Option<u64>, column: Option<&str>, problem: String| Error::Table {
+        let named = |Fault { line, column, problem }| Error::Table {
             file: file.into(),
             line,
-            column: column.map(String::from),
+            column,
             problem,
         };
-        let mut reader = csv::ReaderBuilder::new()
-            .comment(Some(b'#'))
-            .trim(csv::Trim::All)
-            .flexible(true)
-            .from_reader(reader);
-        let headings =
-            reader.headers().map_err(|error| refuse(Some(1), None, error.to_string()))?.clone();
-        let heading_line = headings.position().map(csv::Position::line);
-        let mut columns = Vec::new();
-        for (quantity, forms) in COLUMNS {
-            let allowed = || forms.iter().map(|form| form.0).collect::<Vec<_>>().join(" or ");
-            let matching: Vec<_> = headings
-                .iter()
-                .enumerate()
-                .filter_map(|(i, heading)| {
-                    forms.iter().find(|form| form.0 == heading).map(|form| (i, form.1))
-                })
-                .collect();
-            match matching[..] {
-                [column] => columns.push(column),
-                [] => {
-                    return Err(refuse(
-                        heading_line,
-                        Some(quantity),
-                        format!("is missing; its heading is {}", allowed()),
-                    ));
-                }
-                _ => {
-                    return Err(refuse(
-                        heading_line,
-                        Some(quantity),
-                        format!("is given twice; keep one {}", allowed()),
-                    ));
-                }
-            }
-        }
-        if let Some(unknown) =
-            headings.iter().enumerate().find(|(i, _)| columns.iter().all(|column| column.0 != *i))
-        {
-            return Err(refuse(
-                heading_line,
-                Some(unknown.1),
-                "is not a column of a reference table; remove it".into(),
-            ));
-        }
-
-        let (mut times, mut angles) = (Vec::new(), Vec::<Vector3<f64>>::new());
-        for record in reader.records() {
-            let record = record.map_err(|error| {
-                refuse(error.position().map(csv::Position::line), None, error.to_string())
-            })?;
-            let line = record.position().map(csv::Position::line);
-            if record.len() != headings.len() {
-                let problem =
-                    format!("{} values where the headings name {}", record.len(), headings.len());
-                return Err(refuse(line, None, problem));
-            }
-            let mut row = [0.0; 4];
-            for (value, (column, factor)) in row.iter_mut().zip(&columns) {
-                let text = &record[*column];
-                let number = text.parse::<f64>().ok().filter(|number| number.is_finite());
-                let number = number.ok_or_else(|| {
-                    refuse(line, headings.get(*column), format!("'{text}' is not a finite number"))
-                })?;
-                *value = number * factor;
-            }
-            let [time, alpha, beta, sigma] = row;
-            if times.last().is_some_and(|&last| last >= time) {
-                return Err(refuse(
-                    line,
-                    Some("time_s"),
-                    format!("{time} does not come after the line before"),
-                ));
-            }
-            if times.len() == MOST_POINTS {
-                return Err(refuse(line, None, too_many()));
-            }
-            let before = angles.last().copied().unwrap_or_default();
-            let point = Vector3::new(alpha, beta, sigma);
-            times.push(time);
-            angles.push(Vector3::from_fn(|i, _| {
-                let turns = REPEATS[i] && times.len() > 1;
-                if turns { nearest(point[i], before[i]) } else { point[i] }
-            }));
-        }
-        if times.is_empty() {
-            return Err(refuse(None, None, "no points below the headings".into()));
-        }
+        let (times, angles) = points(reader).map_err(named)?;
         Self::new(times, angles)
     }
 
@@ -217,6 +130,104 @@ fn check(times: &[f64], angles: &[Vector3<f64>]) -> Result<(), Error> {
         return refuse(format!("has time {after} s after {before} s; times must increase"));
     }
     Ok(())
+}
+
+/// What is wrong with a file, with the number of the line and the heading of the column.
+struct Fault {
+    line: Option<u64>,
+    column: Option<String>,
+    problem: String,
+}
+
+impl Fault {
+    fn new(place: Option<&csv::Position>, column: Option<&str>, problem: String) -> Self {
+        Self { line: place.map(csv::Position::line), column: column.map(String::from), problem }
+    }
+}
+
+/// Position of a column, and the factor of its values to SI units.
+type Column = (usize, f64);
+
+/// Reads the times and angles of a file.
+fn points(reader: impl Read) -> Result<(Vec<f64>, Vec<Vector3<f64>>), Fault> {
+    let unreadable = |error: csv::Error| Fault::new(error.position(), None, error.to_string());
+    let mut reader = csv::ReaderBuilder::new()
+        .comment(Some(b'#'))
+        .trim(csv::Trim::All)
+        .flexible(true)
+        .from_reader(reader);
+    let headings = reader.headers().map_err(unreadable)?.clone();
+    let columns = columns(&headings)?;
+    let (mut times, mut angles) = (Vec::new(), Vec::<Vector3<f64>>::new());
+    for record in reader.records() {
+        let record = record.map_err(unreadable)?;
+        let [time, alpha, beta, sigma] = row(&record, &headings, columns)?;
+        let fault = |column, problem| Err(Fault::new(record.position(), column, problem));
+        if times.last().is_some_and(|&last| last >= time) {
+            let problem = format!("{time} does not come after the line before");
+            return fault(Some("time_s"), problem);
+        }
+        if times.len() == MOST_POINTS {
+            return fault(None, too_many());
+        }
+        let point = Vector3::new(alpha, beta, sigma);
+        let before = angles.last().copied().unwrap_or(point);
+        let turned = |i: usize, _| if REPEATS[i] { nearest(point[i], before[i]) } else { point[i] };
+        times.push(time);
+        angles.push(Vector3::from_fn(turned));
+    }
+    if times.is_empty() {
+        return Err(Fault::new(None, None, "no points below the headings".into()));
+    }
+    Ok((times, angles))
+}
+
+/// Finds the columns of time, α, β and σ.
+fn columns(headings: &csv::StringRecord) -> Result<[Column; 4], Fault> {
+    let fault = |column, problem| Fault::new(headings.position(), Some(column), problem);
+    let mut columns = [(0, 0.0); 4];
+    for (column, (quantity, forms)) in columns.iter_mut().zip(COLUMNS) {
+        let allowed = forms.iter().map(|form| form.0).collect::<Vec<_>>().join(" or ");
+        let factor = |heading| forms.iter().find(|form| form.0 == heading).map(|form| form.1);
+        let mut matching =
+            headings.iter().enumerate().filter_map(|(i, heading)| Some((i, factor(heading)?)));
+        *column = matching
+            .next()
+            .ok_or_else(|| fault(quantity, format!("is missing; its heading is {allowed}")))?;
+        if matching.next().is_some() {
+            return Err(fault(quantity, format!("is given twice; keep one {allowed}")));
+        }
+    }
+    let is_unknown = |(i, _): &(usize, &str)| columns.iter().all(|column| column.0 != *i);
+    match headings.iter().enumerate().find(is_unknown) {
+        Some((_, heading)) => {
+            Err(fault(heading, "is not a column of a reference table; remove it".into()))
+        }
+        None => Ok(columns),
+    }
+}
+
+/// Reads a line, in SI units.
+fn row(
+    record: &csv::StringRecord,
+    headings: &csv::StringRecord,
+    columns: [Column; 4],
+) -> Result<[f64; 4], Fault> {
+    let place = record.position();
+    if record.len() != headings.len() {
+        let (values, named) = (record.len(), headings.len());
+        let problem = format!("{values} values where the headings name {named}");
+        return Err(Fault::new(place, None, problem));
+    }
+    let mut row = [0.0; 4];
+    for (value, (column, factor)) in row.iter_mut().zip(columns) {
+        let text = &record[column];
+        let number = text.parse::<f64>().ok().filter(|number| number.is_finite());
+        let problem = || format!("'{text}' is not a finite number");
+        *value =
+            factor * number.ok_or_else(|| Fault::new(place, headings.get(column), problem()))?;
+    }
+    Ok(row)
 }
 
 fn too_many() -> String {

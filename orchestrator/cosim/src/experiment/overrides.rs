@@ -147,62 +147,73 @@ impl Experiment {
         let is_needed = overrides.law.is_some() && !overrides.fmu.iter().any(is_given);
         let stand_in = is_needed.then(|| format!("{CONTROLLER}={STAND_IN}"));
         for assignment in overrides.fmu.iter().chain(&stand_in) {
-            let refuse =
-                |message: String| Error::experiment(format!("--fmu {assignment}: {message}"));
-            let (name, fmu) = assignment.split_once('=').ok_or_else(|| {
-                refuse("expected component=file, for example controller=MyLaw.fmu".into())
-            })?;
-            let hint = names::hint(name, self.components.keys().map(String::as_str));
-            let component = self
-                .components
-                .get_mut(name)
-                .ok_or_else(|| refuse(format!("there is no component \"{name}\"{hint}")))?;
-            // A path is relative to the current folder, not to the experiment.
-            let file = Path::new(fmu).is_file().then(|| std::path::absolute(fmu).ok()).flatten();
-            // Its name is that of its file without the extension.
-            let named = if Path::new(fmu).extension().is_none() { ".fmu" } else { "" };
-            let file = file.map_or_else(
-                || format!("{fmu}{named}"),
-                |file| file.to_string_lossy().into_owned(),
-            );
-            let (new, old) = (stem(&file), stem(component.fmu.get_ref()));
-            if let Some(law) = overrides.law.as_deref().filter(|_| name == CONTROLLER) {
-                self.title = format!("law {} in place of {old}: {}", name_of(law), self.title);
-            } else if new != old {
-                // The title of the file is about another FMU.
-                self.title = format!("{new} in place of {old}: {}", self.title);
-            }
-            self.given.fmu.push(name.to_string());
-            (component.fmu, component.is_exchanged) = (Spanned::new(0..0, file), true);
+            self.replace_fmu(assignment, overrides.law.as_deref())
+                .map_err(|fault| Error::experiment(format!("--fmu {assignment}: {fault}")))?;
         }
         self.law = overrides.law.clone().or(self.law.take());
         for assignment in &overrides.set {
-            let malformed = || {
+            self.assign(assignment).ok_or_else(|| {
                 Error::experiment(format!(
                     "--set {assignment}: expected component.parameter=value, for example plant.disturbance.seed=7"
                 ))
-            };
-            let (target, value) = assignment.split_once('=').ok_or_else(malformed)?;
-            let target = target.trim();
-            if target.is_empty() {
-                return Err(malformed());
-            }
-            // A value that is not TOML is taken as text, so that an enumeration's item needs no
-            // quotes within quotes.
-            let value = value.trim();
-            let value = toml::from_str::<BTreeMap<String, Value>>(&format!("x = {value}"))
-                .ok()
-                .filter(|table| table.len() == 1)
-                .and_then(|mut table| table.remove("x"))
-                .unwrap_or_else(|| Value::String(value.to_string()));
-            if self.set(target, value).is_ok() {
-                self.assigned.insert(target.to_string());
-            } else {
-                // The target is resolved later, when the FMUs are known.
-                self.unplaced.push(target.to_string());
-            }
+            })?;
         }
         Ok(())
+    }
+
+    /// Replaces the FMU of a component, or the law of the controller, as `component=file` says.
+    fn replace_fmu(&mut self, assignment: &str, law: Option<&str>) -> Result<(), String> {
+        let (name, fmu) = assignment
+            .split_once('=')
+            .ok_or("expected component=file, for example controller=MyLaw.fmu")?;
+        let hint = names::hint(name, self.components.keys().map(String::as_str));
+        let component = self
+            .components
+            .get_mut(name)
+            .ok_or_else(|| format!("there is no component \"{name}\"{hint}"))?;
+        // A path is relative to the current folder, not to the experiment. A name is that of a file
+        // without the extension.
+        let path = Path::new(fmu);
+        let file = path.is_file().then(|| std::path::absolute(path).ok()).flatten();
+        let file = match file {
+            Some(file) => file.to_string_lossy().into_owned(),
+            None if path.extension().is_none() => format!("{fmu}.fmu"),
+            None => fmu.to_string(),
+        };
+        // The title of the file is about another FMU.
+        let (new, old) = (stem(&file), stem(component.fmu.get_ref()));
+        if let Some(law) = law.filter(|_| name == CONTROLLER) {
+            self.title = format!("law {} in place of {old}: {}", name_of(law), self.title);
+        } else if new != old {
+            self.title = format!("{new} in place of {old}: {}", self.title);
+        }
+        self.given.fmu.push(name.to_string());
+        (component.fmu, component.is_exchanged) = (Spanned::new(0..0, file), true);
+        Ok(())
+    }
+
+    /// Sets a parameter, as `component.parameter=value` says. Returns `None` if the text is
+    /// malformed.
+    fn assign(&mut self, assignment: &str) -> Option<()> {
+        let (target, value) = assignment.split_once('=')?;
+        let (target, value) = (target.trim(), value.trim());
+        if target.is_empty() {
+            return None;
+        }
+        // A value that is not TOML is taken as text, so that an enumeration's item needs no quotes
+        // within quotes.
+        let value = toml::from_str::<BTreeMap<String, Value>>(&format!("x = {value}"))
+            .ok()
+            .filter(|table| table.len() == 1)
+            .and_then(|mut table| table.remove("x"))
+            .unwrap_or_else(|| Value::String(value.to_string()));
+        if self.set(target, value).is_ok() {
+            self.assigned.insert(target.to_string());
+        } else {
+            // The target is resolved later, when the FMUs are known.
+            self.unplaced.push(target.to_string());
+        }
+        Some(())
     }
 }
 
