@@ -6,6 +6,11 @@
 //! 63, 27 (2023). Form of the stages and choice of the step: E. Hairer, G. Wanner, Solving Ordinary
 //! Differential Equations II, 2nd edition, section IV.7. Powers are taken from `libm`, because
 //! those of the system differ in their last bits.
+//!
+//! Libraries were tried. diffsol 0.18 brings faer, whose kernels the processor chooses, and ties a
+//! solver to borrowed equations, which cannot be kept and restored. The Radau5 of
+//! differential-equations 0.7 leaves the scale of the error empty for states whose number is known
+//! at run time only, and panics.
 
 use super::model::Refusal;
 use fmi_master::instance::CallFailure;
