@@ -20,7 +20,6 @@ import time
 from dataclasses import dataclass, field
 
 import casadi as ca
-import matplotlib.pyplot as plt
 import numpy as np
 from scipy import sparse
 
@@ -274,28 +273,6 @@ def table(kind: str, timed_by_solver: dict[str, Timed]) -> None:
         print(text)
 
 
-def draw(by_kind: dict[str, dict[str, Timed]]) -> None:
-    """Draws every time as a point, with median and 99th percentile."""
-    figure, axes = plt.subplots(1, len(by_kind), figsize=(11, 3.8), layout="constrained", sharex=True, sharey=True)
-    scatter = np.random.default_rng(0)
-    for axis, (kind, timed_by_solver) in zip(np.atleast_1d(axes), by_kind.items()):
-        for row, (name, timed) in enumerate(timed_by_solver.items()):
-            ms = np.array(timed.seconds) * 1e3
-            colour = "#0072b2" if name in OURS else "#d55e00"
-            rows = row + scatter.uniform(-0.28, 0.28, len(ms))
-            axis.scatter(ms, rows, s=5, alpha=0.45, color=colour, linewidths=0, rasterized=True)
-            for share, style in ((50, "-"), (99, ":")):
-                axis.plot([np.percentile(ms, share)] * 2, [row - 0.4, row + 0.4], style, color="black", linewidth=1.4)
-        axis.set(title=f"{kind} set", xlabel="one optimisation, ms", xscale="log")
-        axis.set_yticks(range(len(timed_by_solver)), list(timed_by_solver))
-        axis.grid(axis="x", which="major", linewidth=0.5, alpha=0.6)
-    axes = np.atleast_1d(axes)
-    axes[0].invert_yaxis()
-    figure.suptitle("Every optimisation of the 50 s scenario (line: median, dotted: 99th percentile)", fontsize=11)
-    for suffix in ("png", "svg"):
-        figure.savefig(ROOT / "out" / "bench" / f"solvers.{suffix}", dpi=150)
-
-
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--repeat", type=int, default=20, help="repetitions of each sample by ours")
@@ -318,8 +295,7 @@ def main() -> None:
             for name, timed in solvers.items():
                 for row in zip(timed.samples, timed.seconds, timed.iterations, timed.costs):
                     writer.writerow([kind, name, times[row[0]], *row[1:]])
-    draw(by_kind)
-    print(f"\n{out}: solvers.csv, solvers.png, solvers.svg")
+    print(f"\n{out}: solvers.csv")
     others = [(kind, name, difference(by_kind[kind], name)) for kind in by_kind for name in SAME]
     if far := [f"{kind}, {name}: {by:.1e}" for kind, name, by in others if not by <= SAME_COST]:
         sys.exit(f"costs differ from ours by more than {SAME_COST}: {'; '.join(far)}")

@@ -12,7 +12,6 @@ import time
 from pathlib import Path
 
 import fmpy
-import matplotlib.pyplot as plt
 from fmpy import simulate_fmu
 
 import cosim
@@ -85,17 +84,6 @@ def main() -> None:
         for name, value in medians[fmu].items():
             ratio = value / medians[fmu]["orchestrator"]
             print(f"  {name:<14}{value / 1e6:8.3f} million steps/s, {ratio:5.2f} of the orchestrator's")
-
-    figure, axes = plt.subplots(1, len(names), figsize=(10, 3.2), layout="constrained")
-    for axis, fmu in zip(axes, names):
-        bars = axis.barh(list(medians[fmu]), [value / 1e6 for value in medians[fmu].values()], color="#1f77b4")
-        axis.bar_label(bars, fmt="%.3g", padding=3)
-        axis.set(title=fmu, xlabel="million steps per second, all outputs recorded", xscale="log")
-        axis.margins(x=0.25)
-        axis.invert_yaxis()
-    (ROOT / "out").mkdir(exist_ok=True)
-    figure.savefig(ROOT / "out" / "stepping.png", dpi=150)
-    print(f"\n{ROOT / 'out' / 'stepping.png'}")
 
 
 if __name__ == "__main__":
