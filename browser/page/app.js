@@ -153,7 +153,7 @@ function compared({ error, ...data }) {
   const { controller } = JSON.parse(ghostRequest ?? "{}");
   if (error || !controller) return;
   const other = read(data, settings.controllers.get(controller).name.split(",")[0]);
-  ghost = { ...other, norms: [norm(other.rates), norm(other.moment)], directions: PhasePicture.directions(other.rates), request: ghostRequest };
+  ghost = { ...other, norms: [norm(other.rates), norm(other.moment)], request: ghostRequest };
   flight.ghost = ghost;
   show();
 }

@@ -17,7 +17,6 @@ const QUANTITIES = 5;
 class Proof {
   constructor() {
     this.picture = new GuaranteePicture($("plan"), (at) => { this.stop(); point(at); });
-    this.phase = new PhasePicture($("phase"));
     this.tour = null;
     this.buttons = DISTURBANCES.map(([name, meaning], index) => {
       const button = document.createElement("button");
@@ -69,8 +68,8 @@ class Proof {
     const norms = [norm(rates), norm(moment)];
     const limits = [summary.limits.rate * DEG, summary.limits.moment * 1e-3];
     const holds = (row) => LIGHTS[standing(row)[0]] === "good";
-    const shown = { stop, time: at, norms, directions: PhasePicture.directions(rates), limits, plans, holds, ghost };
-    for (const picture of [this.picture, this.phase]) picture.show(shown, Math.min(time, at.at(-1)));
+    const shown = { stop, time: at, norms, limits, plans, holds, ghost };
+    this.picture.show(shown, Math.min(time, at.at(-1)));
     const chosen = this.chosen();
     this.buttons.forEach((button, index) => button.setAttribute("aria-pressed", index === chosen));
     const [acting, assumed] = this.bounds();
@@ -89,7 +88,6 @@ class Proof {
     if (!flight?.plans.length) return;
     const shown = Math.min(at, flight.time.at(-1));
     this.picture.point(shown);
-    this.phase.point(shown);
     const [status, why] = standing(this.picture.row(shown));
     const [rate, moment] = this.limits;
     const holds = LIGHTS[status] === "good";

@@ -2,23 +2,41 @@
 // limits leave to it.
 //
 //   const picture = new GuaranteePicture(canvas, (time) => …);
-//   picture.show({ stop, time, norms: [rates, moments], directions, limits: [rate, moment], plans, holds: (row) => …, ghost }, cursor);
+//   picture.show({ stop, time, norms: [rates, moments], limits: [rate, moment], plans, holds: (row) => …, ghost }, cursor);
 //   picture.point(cursor);    // time, s
 //
-// PhasePicture, with the same functions, shows the body rates as a point within the ball of their limit.
 // A plan is { began, at: […], norms: [[…], […]], bounds: [[…], […]] }, with times from its beginning on. What a bound
 // leaves of its limit is the tube: the flown norm differs from the plan in force by at most that much. A ghost is
-// { name, time, norms, directions }. Directions are those of the body rates p and r, rad. Lines of what is flown are thick, of what is planned thin; where the guarantee does not hold,
+// { name, time, norms }. Lines of what is flown are thick, of what is planned thin; where the guarantee does not hold,
 // nothing is filled.
 "use strict";
 
-class Picture {
+class GuaranteePicture {
   // Share of a limit up to which the axes go, whatever is flown.
   static TOP = 1.5;
+  static PANELS = [{ title: "Body rate ‖ω‖", unit: "deg/s", digits: 2 }, { title: "Control moment ‖m‖", unit: "kN m", digits: 1 }];
+  static LEFT = 40;
+  static RIGHT = 84;
 
-  constructor(canvas) {
+  constructor(canvas, onPoint) {
     Object.assign(this, { canvas, data: null, cursor: 0 });
     new ResizeObserver(() => this.draw()).observe(canvas);
+    const at = (event) => {
+      if (!this.data) return;
+      const { left, top, width } = canvas.getBoundingClientRect();
+      const share = (event.clientX - left - GuaranteePicture.LEFT) / (width - GuaranteePicture.LEFT - GuaranteePicture.RIGHT);
+      // The window would move under the pointer, so that only the part before the cursor is dragged in it.
+      const inStrip = event.clientY - top > this.strip.top - 6;
+      const [from, to] = inStrip ? [0, this.data.stop] : this.pressed;
+      onPoint(Math.max(0, Math.min(this.data.stop, from + share * (to - from))));
+    };
+    canvas.style.touchAction = "pan-y";
+    canvas.addEventListener("pointerdown", (event) => {
+      this.pressed = this.window();
+      canvas.setPointerCapture(event.pointerId);
+      at(event);
+    });
+    canvas.addEventListener("pointermove", (event) => { if (event.buttons) at(event); });
   }
 
   show(data, cursor) {
@@ -67,32 +85,6 @@ class Picture {
     points.forEach(([x, y], i) => (i ? context.lineTo(x, y) : context.moveTo(x, y)));
     context.stroke();
     context.setLineDash([]);
-  }
-}
-
-class GuaranteePicture extends Picture {
-  static PANELS = [{ title: "Body rate ‖ω‖", unit: "deg/s", digits: 2 }, { title: "Control moment ‖m‖", unit: "kN m", digits: 1 }];
-  static LEFT = 40;
-  static RIGHT = 84;
-
-  constructor(canvas, onPoint) {
-    super(canvas);
-    const at = (event) => {
-      if (!this.data) return;
-      const { left, top, width } = canvas.getBoundingClientRect();
-      const share = (event.clientX - left - GuaranteePicture.LEFT) / (width - GuaranteePicture.LEFT - GuaranteePicture.RIGHT);
-      // The window would move under the pointer, so that only the part before the cursor is dragged in it.
-      const inStrip = event.clientY - top > this.strip.top - 6;
-      const [from, to] = inStrip ? [0, this.data.stop] : this.pressed;
-      onPoint(Math.max(0, Math.min(this.data.stop, from + share * (to - from))));
-    };
-    canvas.style.touchAction = "pan-y";
-    canvas.addEventListener("pointerdown", (event) => {
-      this.pressed = this.window();
-      canvas.setPointerCapture(event.pointerId);
-      at(event);
-    });
-    canvas.addEventListener("pointermove", (event) => { if (event.buttons) at(event); });
   }
 
   // First and last time that the panels show.
@@ -332,83 +324,5 @@ class GuaranteePicture extends Picture {
     context.fillStyle = this.colour("muted");
     context.fillText("100 %", right + 6, y(1));
     context.fillText("guarantee", right + 6, bottom + 6);
-  }
-}
-
-// The body rates within the ball of their limit, seen so that none of it is hidden: the distance from the middle is the norm,
-// the direction that of p and r. Circles, shell and ring are the plan, its bound, what the disturbance can take, and its tube, at the
-// point where the plan comes closest to its bound.
-class PhasePicture extends Picture {
-  static TOP = 1.25;
-  static PAST = 3; // s
-
-  static directions([p, , r]) {
-    return Array.from(p, (roll, row) => Math.atan2(r[row], roll));
-  }
-
-  draw() {
-    const size = this.begin();
-    if (!size) return;
-    const { context, data, cursor } = this;
-    const [[width, height], limit] = [size, data.limits[0]];
-    const [middle, centre] = [width / 2, (height - 14) / 2];
-    const radius = Math.min(middle, centre) - 16;
-    const scale = radius / (limit * PhasePicture.TOP);
-    const ring = (inner, outer, colour, alpha) => {
-      context.globalAlpha = alpha;
-      context.fillStyle = this.colour(colour);
-      context.beginPath();
-      for (const norm of [outer, inner]) {
-        context.moveTo(middle + Math.max(0, norm) * scale, centre);
-        context.arc(middle, centre, Math.max(0, norm) * scale, 0, 2 * Math.PI);
-      }
-      context.fill("evenodd");
-      context.globalAlpha = 1;
-    };
-    const circle = (norm, colour, thick, dash) => {
-      context.strokeStyle = this.colour(colour);
-      const turn = Array.from({ length: 91 }, (_, k) => (k * Math.PI) / 45);
-      this.path(turn.map((angle) => [middle + norm * scale * Math.cos(angle), centre - norm * scale * Math.sin(angle)]), thick, dash);
-    };
-    for (const [x, y] of [[radius, 0], [0, radius]]) {
-      context.strokeStyle = this.colour("line");
-      this.path([[middle - x, centre - y], [middle + x, centre + y]], 1);
-    }
-    const plan = data.plans[this.plan(cursor)];
-    if (plan) {
-      // Where the plan comes closest to its bound. That of its last point is the one of the terminal set.
-      const left = plan.bounds[0].slice(0, -1).map((bound, k) => bound - plan.norms[0][k]);
-      const k = left.indexOf(Math.min(...left));
-      const [norm, bound, holds] = [plan.norms[0][k], plan.bounds[0][k], data.holds(this.row())];
-      if (holds) {
-        ring(bound, limit, "muted", 0.13);
-        ring(norm - (limit - bound), norm + (limit - bound), "x", 0.17);
-      }
-      circle(Math.max(0, bound), "ink", 1.3, holds ? [] : [2, 3]);
-      circle(norm, "x", 1);
-      context.fillStyle = this.colour("muted");
-      Object.assign(context, { textAlign: "center", textBaseline: "alphabetic" });
-      context.fillText(`plan in ${Math.max(0, plan.began + plan.at[k] - cursor).toFixed(1)} s, closest to its bound`, middle, height - 2);
-    }
-    circle(limit, "ink", 1, [7, 4]);
-    const at = ({ norms, directions }, row) => {
-      const norm = Math.min(norms[0][row], limit * PhasePicture.TOP) * scale;
-      return [middle + norm * Math.cos(directions[row]), centre - norm * Math.sin(directions[row])];
-    };
-    const trace = (flown, colour, thick, dash) => {
-      const [first, last] = [cursor - PhasePicture.PAST, cursor].map((time) => this.row(time, flown));
-      context.strokeStyle = context.fillStyle = this.colour(colour);
-      this.path(Array.from({ length: last - first + 1 }, (_, k) => at(flown, first + k)), thick, dash);
-      context.beginPath();
-      context.arc(...at(flown, last), 4, 0, 2 * Math.PI);
-      context.fill();
-    };
-    if (data.ghost) trace(data.ghost, "y", 1.4, [5, 3]);
-    trace(data, "x", 2.6);
-    context.fillStyle = this.colour("muted");
-    Object.assign(context, { textAlign: "left", textBaseline: "middle" });
-    context.fillText("p", middle + radius + 5, centre);
-    Object.assign(context, { textAlign: "center", textBaseline: "alphabetic" });
-    context.fillText("r", middle, centre - radius - 4);
   }
 }

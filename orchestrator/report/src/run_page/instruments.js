@@ -135,19 +135,18 @@ const guaranteeStrip = ({ name, guarantee }, isNamed) => {
   return [strip, note];
 };
 
-// The pictures of plan, tube and bound of a run, with another one as its ghost.
-const guaranteePictures = (run, other, [stop, onPoint]) => {
+// The picture of plan, tube and bound of a run, with another one as its ghost.
+const guaranteePicture = (run, other, [stop, onPoint]) => {
   const norm = ([x, y, z], factor) => x.map((_, row) => factor * Math.hypot(x[row], y[row], z[row]));
   const flown = ({ time, rates, moment }) => ({
-    time, norms: [norm(rates, 180 / Math.PI), norm(moment, 1e-3)], directions: PhasePicture.directions(rates),
+    time, norms: [norm(rates, 180 / Math.PI), norm(moment, 1e-3)],
   });
   const { rateLimit, momentLimit } = run.vehicle;
-  const [plan, phase] = ["plan", "phase"].map((id) => document.getElementById(id));
-  const pictures = [new GuaranteePicture(plan, onPoint), new PhasePicture(phase)];
+  const picture = new GuaranteePicture(document.getElementById("plan"), onPoint);
   const ghost = other ? { name: other.name, ...flown(other.vehicle) } : null;
   if (ghost) document.getElementById("ghost").textContent = ` Dashed: ${ghost.name}.`;
   const limits = [(rateLimit * 180) / Math.PI, momentLimit * 1e-3];
   const holds = (row) => run.guarantee?.inForce[row] === 1;
-  for (const picture of pictures) picture.show({ stop, ...flown(run.vehicle), limits, plans: run.plans, holds, ghost }, 0);
-  return pictures;
+  picture.show({ stop, ...flown(run.vehicle), limits, plans: run.plans, holds, ghost }, 0);
+  return picture;
 };

@@ -23,7 +23,7 @@
   });
 
   const planned = data.runs.find((run) => run.plans);
-  if (planned) parts.push(...guaranteePictures(planned, data.runs.find((run) => run !== planned && run.vehicle?.rates), [stop, pointed]));
+  if (planned) parts.push(guaranteePicture(planned, data.runs.find((run) => run !== planned && run.vehicle?.rates), [stop, pointed]));
 
   const rows = [...document.querySelectorAll("#parameter-table tbody tr")];
   const filter = () => {
