@@ -3,6 +3,7 @@
 import json
 import subprocess
 
+import pandas
 import pytest
 
 from conftest import EXPERIMENTS, TARGET, program
@@ -49,12 +50,11 @@ def test_a_case_by_itself_is_the_case_of_the_campaign(controller, tmp_path):
     """All cases but the first are flown by instances that were reset and keep their design."""
     path = CAMPAIGNS / "adversaries.toml"
     told = ["campaign", path, "--experiment", controller, "--out", tmp_path / "out"]
-    said = orchestrator(*told, "--csv", folder=tmp_path)
+    said = orchestrator(*told, folder=tmp_path)
     assert "8 cases, 8 flown now" in said
-    heading, *rows = [line.split(",") for line in (tmp_path / "out" / "cases.csv").read_text().splitlines()]
+    table = pandas.read_parquet(tmp_path / "out" / "cases.parquet")
     for case in (1, 6):
-        row = dict(zip(heading, rows[case], strict=True))
         orchestrator(*told[:-1], tmp_path / str(case), "--case", str(case), "--quiet", folder=tmp_path)
         metrics = json.loads((tmp_path / str(case) / "metrics.json").read_text())
         for name in ("ems_deg", "cms", "max_rate_deg_s", "max_moment_ratio"):
-            assert metrics[name] == float(row[name])
+            assert metrics[name] == table[name][case]

@@ -14,7 +14,7 @@ import pytest
 from conftest import EXPERIMENTS, ROOT, TARGET, program
 
 # Commands that take minutes, and those that write outside the folder.
-LONG = ("reproduce", "campaign white", "falsify", "~", "/usr")
+LONG = ("reproduce", "campaign white", "--worst", "~", "/usr")
 # Runs that the examples of a command take up.
 FLOWN = {"plot": ("lqr", "dlmpc", "crmpc-robust")}
 

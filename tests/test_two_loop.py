@@ -30,7 +30,7 @@ def folder(tmp_path_factory):
     assert finished.returncode == 0, finished.stderr
     study = tomllib.loads((STUDY / "study.toml").read_text(encoding="utf-8"))
     for figure in study["figure"]:
-        assert (out / "figures" / f"{figure['id']}.png").exists()
+        assert (out / "figures" / f"{figure['id']}.svg").exists()
     return out
 
 

@@ -1,5 +1,5 @@
 //! The guarantee of the robust set in closed loops: it is in force throughout, and it holds.
-//! `orchestrator campaign` and `orchestrator falsify` fly many more cases.
+//! `orchestrator campaign` flies many more cases.
 
 use crate::harness::flight::{
     Flight, Random, Shown, Sight, Tried, Waveform, assert_kept, optimised_every, random_settings,

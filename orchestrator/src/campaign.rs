@@ -1,38 +1,59 @@
-//! The commands `campaign` and `falsify`.
+//! The command `campaign`.
 
 use crate::arguments;
 use crate::failure::Failure;
-use campaign::changes::Changes;
 use campaign::definition::Campaign;
 use campaign::findings::Findings;
-use campaign::options::Options;
-use campaign::plan::Plan;
+use campaign::plan::{Changes, Plan};
 use campaign::run;
-use campaign::search;
+use campaign::search::{self, SearchOutcome};
 use clap::Args;
 use cosim::error::Error;
-use cosim::experiment::Overrides;
-use cosim::files;
+use cosim::experiment::{Overrides, name_of};
 use cosim::interrupt::Interrupt;
 use cosim::search::named::{Kind, find};
 use fmu_import::law;
+use std::env;
 use std::io::Write;
 use std::ops::Range;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::Duration;
+use sweep::runner::Options;
 use sweep::statistics::CONFIDENCE;
 
-/// Options that the commands `campaign` and `falsify` share.
+/// Options of `campaign`.
 #[derive(Args)]
-pub(crate) struct Common {
+pub(crate) struct Fly {
     /// Campaign: a file, or the name of one that `list` shows.
     campaign: PathBuf,
     /// Experiment that replaces that of the campaign: a file, or the name of an experiment.
     #[arg(long, value_name = "EXPERIMENT")]
     experiment: Option<PathBuf>,
-    /// Folder for the results [default: out/CAMPAIGN].
+    /// Write the experiment of one case to a file that `orchestrator run` takes, and run it with
+    /// everything recorded.
+    #[arg(long, value_name = "K", help_heading = PART, conflicts_with_all = ["cases", "work", "worst", "fresh"])]
+    case: Option<u64>,
+    /// Fly only the cases from FIRST up to, but not including, LAST. A later command for the whole
+    /// campaign merges them. Several processes may work in the same folder at once.
+    #[arg(long, value_name = "FIRST..LAST", help_heading = PART, value_parser = range, allow_hyphen_values = true, conflicts_with_all = ["work", "worst"])]
+    cases: Option<Range<u64>>,
+    /// Print which parts of the campaign are not flown yet, as JSON, and fly no case.
+    #[arg(long, help_heading = PART, conflicts_with_all = ["worst", "fresh"])]
+    work: bool,
+    /// Look for the worst case instead, as [search] of the campaign says, and write it as an
+    /// experiment and report.html with its curves over those of other cases.
+    #[arg(long, help_heading = "Search")]
+    worst: bool,
+    /// Begin no further cases of the search after this time, s.
+    #[arg(long, value_name = "SECONDS", help_heading = "Search", requires = "worst", value_parser = clap::value_parser!(u64).range(1..))]
+    time: Option<u64>,
+    /// Folder for the results [default: out/CAMPAIGN, for a search out/CAMPAIGN-worst].
     #[arg(long, value_name = "DIR", help_heading = "Results")]
     out: Option<PathBuf>,
+    /// Fly all cases again, including those that are finished, and replace the results of an
+    /// earlier search.
+    #[arg(long, visible_alias = "force", help_heading = "Results")]
+    fresh: bool,
     /// Also look for FMUs in this folder, besides those of the experiment and the program. The
     /// option may be given several times.
     #[arg(long, value_name = "DIR")]
@@ -48,42 +69,8 @@ pub(crate) struct Common {
     pub(crate) overrides: arguments::Overrides,
 }
 
-/// Options of `campaign`.
-#[derive(Args)]
-pub(crate) struct Fly {
-    /// Write the experiment of one case to a file that `orchestrator run` takes, and run it with
-    /// everything recorded.
-    #[arg(long, value_name = "K", help_heading = "Part of the campaign", conflicts_with_all = ["cases", "work", "fresh", "csv"])]
-    case: Option<u64>,
-    /// Fly only the cases from FIRST up to, but not including, LAST. A later command for the whole
-    /// campaign merges them. Several processes may work in the same folder at once.
-    #[arg(long, value_name = "FIRST..LAST", help_heading = "Part of the campaign", value_parser = range, allow_hyphen_values = true, conflicts_with_all = ["work", "csv"])]
-    cases: Option<Range<u64>>,
-    /// Print which parts of the campaign are not flown yet, as JSON, and fly no case.
-    #[arg(long, help_heading = "Part of the campaign", conflicts_with_all = ["fresh", "csv"])]
-    work: bool,
-    /// Fly all cases again, including those that are finished.
-    #[arg(long, visible_alias = "force", help_heading = "Results")]
-    fresh: bool,
-    /// Also write the results table as cases.csv.
-    #[arg(long, help_heading = "Results")]
-    csv: bool,
-    #[command(flatten)]
-    pub(crate) common: Common,
-}
-
-/// Options of `falsify`.
-#[derive(Args)]
-pub(crate) struct Falsify {
-    /// Begin no further cases after this time, s.
-    #[arg(long, value_name = "SECONDS", value_parser = clap::value_parser!(u64).range(1..))]
-    time: Option<u64>,
-    /// Replace the results of an earlier search in the folder.
-    #[arg(long, help_heading = "Results")]
-    force: bool,
-    #[command(flatten)]
-    pub(crate) common: Common,
-}
+/// Heading of the options that fly a part of a campaign.
+const PART: &str = "Part of the campaign";
 
 fn range(text: &str) -> Result<Range<u64>, String> {
     let number = |text: &str| text.trim().parse::<u64>().ok();
@@ -92,21 +79,23 @@ fn range(text: &str) -> Result<Range<u64>, String> {
     Ok(first..last)
 }
 
-fn prepare(common: &Common) -> Result<Plan, Error> {
-    let campaign = Campaign::load(&find(&common.campaign, Kind::Campaign)?)?;
-    let overrides = common.overrides.clone().into();
-    let experiment = common.experiment.clone();
-    let changes = Changes { experiment, overrides };
-    Plan::new(campaign, &changes, &common.fmu_dir)
-}
-
-/// Flies a campaign, a part of it, or one case.
+/// Flies a campaign, a part of it, or one case, or looks for its worst case.
 ///
 /// # Errors
 /// Returns an error if the campaign is faulty, or if a file cannot be written.
 pub(crate) fn fly(asked: &Fly, out: &mut impl Write, interrupt: &Interrupt) -> Result<(), Failure> {
-    let plan = prepare(&asked.common)?;
-    let folder = run::folder(&plan, asked.common.out.as_deref());
+    let campaign = Campaign::load(&find(&asked.campaign, Kind::Campaign)?)?;
+    let overrides = Overrides::from(asked.overrides.clone());
+    let command = match overrides.law.as_deref().map(name_of) {
+        Some(law) => {
+            format!("campaign(\"{}\", law={law}).case(CASE)", campaign.source.path.display())
+        }
+        None => command_of_case(),
+    };
+    let experiment = asked.experiment.clone();
+    let changes = Changes { experiment, overrides: overrides.clone(), command };
+    let plan = Plan::new(campaign, changes, &asked.fmu_dir)?;
+    let folder = run::folder(&plan, asked.out.as_deref());
     if asked.work {
         let work =
             serde_json::to_string(&run::remaining(&plan, &folder)).map_err(std::io::Error::from)?;
@@ -114,60 +103,81 @@ pub(crate) fn fly(asked: &Fly, out: &mut impl Write, interrupt: &Interrupt) -> R
         return Ok(());
     }
     if let Some(case) = asked.case {
-        if case >= plan.sweep.cases() {
-            let message = format!(
-                "--case {case}: the campaign has {} cases, counted from 0",
-                plan.sweep.cases()
-            );
-            return Err(Error::experiment(message).into());
-        }
-        let folder = match &asked.common.out {
-            Some(folder) => folder.clone(),
-            None => folder.join("cases").join(case.to_string()),
-        };
-        let experiment = write_case(&plan, case, &folder)?;
-        let options = crate::run::Options {
-            out: Some(folder),
-            quiet: asked.common.quiet,
-            force: true,
-            interrupt: interrupt.clone(),
-            ..Default::default()
-        };
-        let fmu_dirs = &asked.common.fmu_dir;
-        let law = Overrides::from(asked.common.overrides.clone()).law;
-        let overrides = Overrides { law, ..Overrides::default() };
-        law::in_case(Some(case));
-        return crate::run::run(&experiment, &overrides, fmu_dirs, &options, out);
+        return fly_case(&plan, case, asked, overrides, out, interrupt);
     }
     let options = Options {
-        out: asked.common.out.clone(),
-        jobs: asked.common.jobs,
+        out: asked.out.clone(),
+        jobs: asked.jobs,
         fresh: asked.fresh,
-        quiet: asked.common.quiet,
-        csv: asked.csv,
+        time: asked.time.map(Duration::from_secs),
+        quiet: asked.quiet,
         interrupt: interrupt.clone(),
     };
-    if let Some(cases) = &asked.cases {
+    if asked.worst {
+        let outcome = search::search(&plan, &options)?;
+        if !asked.quiet {
+            worst(&outcome, out)?;
+        }
+    } else if let Some(cases) = &asked.cases {
         let flown = run::fly_range(&plan, cases, &options)?;
-        if !asked.common.quiet {
+        if !asked.quiet {
             writeln!(out, "{flown} cases flown, kept in {}", folder.join("parts").display())?;
         }
-        return Ok(());
-    }
-    let report = run::fly(&plan, &options)?;
-    if !asked.common.quiet {
-        summary(&report, out)?;
+    } else {
+        let report = run::fly(&plan, &options)?;
+        if !asked.quiet {
+            summary(&report, out)?;
+        }
     }
     Ok(())
 }
 
-/// Writes the experiment of a case.
-fn write_case(plan: &Plan, case: u64, folder: &Path) -> Result<PathBuf, Error> {
-    let title = format!("{}, case {case}", plan.campaign.title);
-    let text = plan.sweep.experiment_of(&title, &plan.sweep.values(case))?;
-    let path = folder.join("case.toml");
-    files::write(&path, text)?;
-    Ok(path)
+/// Returns the command that flies one case: this one, without what concerns all cases.
+fn command_of_case() -> String {
+    let mut command = "orchestrator".to_string();
+    let mut words = env::args().skip(1);
+    while let Some(word) = words.next() {
+        match &*word {
+            "--quiet" | "--fresh" | "--force" => {}
+            "--jobs" | "--out" => drop(words.next()),
+            _ if word.starts_with("--jobs=") || word.starts_with("--out=") => {}
+            _ if word.chars().all(|c| c.is_alphanumeric() || "-_./=+:".contains(c)) => {
+                command += &format!(" {word}");
+            }
+            _ => command += &format!(" '{word}'"),
+        }
+    }
+    command + " --case CASE"
+}
+
+/// Runs one case with everything recorded.
+fn fly_case(
+    plan: &Plan,
+    case: u64,
+    asked: &Fly,
+    overrides: Overrides,
+    out: &mut impl Write,
+    interrupt: &Interrupt,
+) -> Result<(), Failure> {
+    let cases = plan.sweep.cases();
+    if case >= cases {
+        let message = format!("--case {case}: the campaign has {cases} cases, counted from 0");
+        return Err(Error::experiment(message).into());
+    }
+    let folder = asked.out.clone();
+    let folder =
+        folder.unwrap_or_else(|| run::folder(plan, None).join("cases").join(case.to_string()));
+    let (_, experiment) = plan.write_case(case, &folder)?;
+    let options = crate::run::Options {
+        out: Some(folder),
+        quiet: asked.quiet,
+        force: true,
+        interrupt: interrupt.clone(),
+        ..Default::default()
+    };
+    let overrides = Overrides { law: overrides.law, ..Overrides::default() };
+    law::in_case(Some(case));
+    crate::run::run(&experiment, &overrides, &asked.fmu_dir, &options, out)
 }
 
 fn summary(report: &run::CampaignReport, out: &mut impl Write) -> std::io::Result<()> {
@@ -222,60 +232,29 @@ fn summary(report: &run::CampaignReport, out: &mut impl Write) -> std::io::Resul
         )?;
     }
     if let Some(answer) = answer {
-        let word = match answer.holds {
-            Some(true) => "yes",
-            Some(false) => "no",
-            None => "not decided",
-        };
         writeln!(
             out,
-            "  P({} broken) < {} with {} %: {word}",
+            "  P({} broken) < {} with {} %: {}",
             answer.question.limit,
             answer.question.below,
-            100.0 * answer.question.confidence
+            100.0 * answer.question.confidence,
+            answer.in_words()
         )?;
     }
     writeln!(out, "  {}", report.out.join("report.html").display())
 }
 
-/// Looks for the worst case of a campaign.
-///
-/// # Errors
-/// Returns an error if the campaign is faulty, or if a file cannot be written.
-pub(crate) fn falsify(
-    asked: &Falsify,
-    out: &mut impl Write,
-    interrupt: &Interrupt,
-) -> Result<(), Failure> {
-    let plan = prepare(&asked.common)?;
-    let options = search::Options {
-        out: asked.common.out.clone(),
-        jobs: asked.common.jobs,
-        time: asked.time.map(Duration::from_secs),
-        quiet: asked.common.quiet,
-        force: asked.force,
-        interrupt: interrupt.clone(),
-    };
-    let outcome = search::search(&plan, &options)?;
-    if asked.common.quiet {
-        return Ok(());
-    }
-    let largest = outcome.largest;
-    writeln!(out, "{}", outcome.title)?;
+fn worst(outcome: &SearchOutcome, out: &mut impl Write) -> std::io::Result<()> {
+    let SearchOutcome { title, measure, largest, unit, cases, elapsed, searches, ended, .. } =
+        outcome;
+    writeln!(out, "{title}")?;
     writeln!(
         out,
-        "  largest {}: {largest:.6} {} ({} cases in {:.0} s, {} searches; {})",
-        outcome.measure,
-        outcome.unit,
-        outcome.cases,
-        outcome.elapsed,
-        outcome.searches,
-        outcome.ended
+        "  largest {measure}: {largest:.6} {unit} ({cases} cases in {elapsed:.0} s, {searches} searches; {ended})"
     )?;
     if !outcome.broken.is_empty() {
         writeln!(out, "  breaks {}", outcome.broken.join(", "))?;
     }
     writeln!(out, "  orchestrator run {}", outcome.out.join("worst.toml").display())?;
-    writeln!(out, "  {}", outcome.out.join("report.html").display())?;
-    Ok(())
+    writeln!(out, "  {}", outcome.out.join("report.html").display())
 }

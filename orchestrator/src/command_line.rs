@@ -126,13 +126,10 @@ pub(crate) enum Command {
     },
     /// Fly thousands of cases of an experiment in which parameters vary, and write cases.parquet,
     /// summary.json and report.html: how often limits are broken, with what confidence, and the
-    /// worst cases.
+    /// worst cases. With --worst look for the worst case.
     ///
     /// Finished cases are kept. After an interruption the same command continues where it stopped.
     Campaign(campaign::Fly),
-    /// Look for the worst case of a campaign, and write it as an experiment and report.html with
-    /// the worst case against its limit.
-    Falsify(campaign::Falsify),
     /// Linearise an experiment at an instant of its run, and write the open loop as a discrete
     /// state-space model (JSON).
     ///
@@ -240,7 +237,6 @@ impl Command {
             Self::Run { .. }
                 | Self::Reproduce { .. }
                 | Self::Campaign(_)
-                | Self::Falsify(_)
                 | Self::Linearise(_)
                 | Self::Margins(_)
                 | Self::Response(_)
@@ -252,8 +248,7 @@ impl Command {
     pub(crate) fn law(&self) -> Option<&str> {
         let overrides = match self {
             Self::Run { overrides, .. } | Self::Pack { overrides, .. } => overrides,
-            Self::Campaign(asked) => &asked.common.overrides,
-            Self::Falsify(asked) => &asked.common.overrides,
+            Self::Campaign(asked) => &asked.overrides,
             Self::Linearise(asked) => &asked.instant.overrides,
             Self::Margins(asked) => &asked.instant.overrides,
             Self::Response(asked) => &asked.instant.overrides,
@@ -292,7 +287,7 @@ mod tests {
             .filter(|command| has(command, "fmu_dir") || has(command, "fmu"))
             .filter(|command| !command.is_hide_set())
             .collect();
-        assert!(loading.len() >= 9, "{}", loading.len());
+        assert!(loading.len() >= 8, "{}", loading.len());
         for command in loading {
             for option in ["sandbox", "isolate", "call_timeout", "memory", "cpu"] {
                 assert!(has(command, option), "{} has no {option}", command.get_name());

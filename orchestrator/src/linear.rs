@@ -9,7 +9,7 @@ use cosim::error::Error;
 use cosim::interrupt::Interrupt;
 use cosim::search::named::{Kind, find};
 use cosim::system::System;
-use cosim_report::figure::{Color, Curve, Figure, Legend, Panel, Shape};
+use cosim_report::figure::{Color, Curve, Figure, Legend, Panel, Shape, svg};
 use fmi_master::quantity::rounded;
 use linear::curves::{ResponseCurves, excluded};
 use linear::linearise::Linearised;
@@ -89,7 +89,7 @@ pub(crate) struct PrintMargins {
     /// Also write the margins to this file, as JSON.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
-    /// File for a Nichols plot of the return ratio and a plot of the sensitivity (.svg, .png).
+    /// File for a Nichols plot of the return ratio and a plot of the sensitivity (.svg).
     #[arg(long, value_name = "FILE")]
     plot: Option<PathBuf>,
     #[command(flatten)]
@@ -143,11 +143,11 @@ pub(crate) fn margins(
     out: &mut impl Write,
     interrupt: &Interrupt,
 ) -> Result<(), Failure> {
-    let plot = picture::asked(asked.plot.as_deref())?;
+    picture::check(asked.plot.as_deref())?;
     let found = asked.instant.linearise(interrupt)?;
     let margins = analysis::margins(&found.net, &found.open);
-    if let Some((path, form)) = plot {
-        picture::write(&figure(&found, &margins)?, form, path)?;
+    if let Some(path) = &asked.plot {
+        svg::write(&figure(&found, &margins)?, path)?;
     }
     let sides = found
         .sides

@@ -38,6 +38,7 @@ use std::io::{BufWriter, IsTerminal, Write, stderr, stdout};
 use std::process::ExitCode;
 use study::definition::Study;
 use study::reproduce;
+use sweep::runner;
 use tracing_subscriber::EnvFilter;
 
 fn main() -> ExitCode {
@@ -50,7 +51,7 @@ fn main() -> ExitCode {
     // a campaign holds the messages of instances.
     let usual = match arguments.command {
         Command::Reproduce { .. } => "error",
-        Command::Campaign(_) | Command::Falsify(_) => "warn,fmu_import=off",
+        Command::Campaign(_) => "warn,fmu_import=off",
         _ => "warn",
     };
     let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new(usual));
@@ -142,17 +143,11 @@ fn execute(command: Command, out: &mut impl Write, interrupt: &Interrupt) -> Res
             isolation,
         } => {
             let study = Study::load_with(&find(&study, Kind::Study)?, members)?;
+            let overrides = Overrides { law, isolation: isolation.into(), ..Default::default() };
             let interrupt = interrupt.clone();
-            let options = reproduce::Options {
-                out: folder,
-                fmu_dirs: fmu_dir,
-                overrides: Overrides { law, isolation: isolation.into(), ..Default::default() },
-                jobs,
-                fresh,
-                quiet,
-                interrupt,
-            };
-            let report = reproduce::reproduce(&study, &options)?;
+            let options =
+                runner::Options { out: folder, jobs, fresh, quiet, interrupt, time: None };
+            let report = reproduce::reproduce(&study, &fmu_dir, &overrides, &options)?;
             if !quiet {
                 summary::reproduction(&report, out)?;
             }
@@ -160,7 +155,6 @@ fn execute(command: Command, out: &mut impl Write, interrupt: &Interrupt) -> Res
         }
         Command::Plot(asked) => plot::plot(&asked, out),
         Command::Campaign(asked) => campaign::fly(&asked, out, interrupt),
-        Command::Falsify(asked) => campaign::falsify(&asked, out, interrupt),
         Command::Linearise(asked) => linear::linearise(&asked, out, interrupt),
         Command::Margins(asked) => linear::margins(&asked, out, interrupt),
         Command::Response(asked) => response::respond(&asked, out, interrupt),

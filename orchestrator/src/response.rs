@@ -7,7 +7,7 @@ use crate::picture;
 use clap::Args;
 use cosim::error::Error;
 use cosim::interrupt::Interrupt;
-use cosim_report::figure::{Color, Curve, Figure, Legend, Panel, Shape};
+use cosim_report::figure::{Color, Curve, Figure, Legend, Panel, Shape, svg};
 use linear::curves::decibel;
 use linear::frequency::{self, Complex, Point, return_ratio};
 use linear::linearise::Lineariser;
@@ -42,7 +42,7 @@ pub(crate) struct Response {
     /// Also write both responses to this file, as JSON.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
-    /// File for a plot of both responses (.svg, .png).
+    /// File for a plot of both responses (.svg).
     #[arg(long, value_name = "FILE")]
     plot: Option<PathBuf>,
     #[command(flatten)]
@@ -55,7 +55,7 @@ pub(crate) fn respond(
     out: &mut impl Write,
     interrupt: &Interrupt,
 ) -> Result<(), Failure> {
-    let plot = picture::asked(asked.plot.as_deref())?;
+    picture::check(asked.plot.as_deref())?;
     let (system, at, open) = asked.instant.system()?;
     if let Some(amplitude) = asked.amplitude
         && !(amplitude > 0.0 && amplitude.is_finite())
@@ -120,8 +120,8 @@ pub(crate) fn respond(
             writeln!(out, "{rows:#}")?;
         }
     }
-    if let Some((path, form)) = plot {
-        picture::write(&figure(&title, &found.open, &all, [asked.from, to]), form, path)?;
+    if let Some(path) = &asked.plot {
+        svg::write(&figure(&title, &found.open, &all, [asked.from, to]), path)?;
     }
     Ok(())
 }

@@ -10,6 +10,7 @@ use schemars::generate::SchemaSettings;
 use schemars::transform::{RecursiveTransform, Transform};
 use schemars::{JsonSchema, Schema};
 use serde_json::{Map, Value, json};
+use std::collections::BTreeSet;
 use study::definition::Study;
 
 /// FileKind of file that a schema describes.
@@ -49,6 +50,16 @@ pub(crate) fn text(kind: FileKind) -> String {
                     "Id of a run before this one, whose keys this one has as far as it lacks them.";
                 run.insert("extends".into(), json!({ "description": extends, "type": "string" }));
             }
+            for name in listed(schema.as_value()) {
+                let each = json!({
+                    "description": "A list of rows, or its name, or several names. The table is repeated for each row, or for each combination of rows, and each name in braces is replaced by the row's value.",
+                    "type": ["string", "array"],
+                    "items": { "type": ["string", "object"] },
+                });
+                if let Some(definition) = schema.pointer_mut(&format!("{name}/properties")) {
+                    definition["for"] = each;
+                }
+            }
             RecursiveTransform(with_rows).transform(&mut schema);
             schema
         }
@@ -79,19 +90,21 @@ fn texts(description: &str) -> Value {
     json!({ "description": description, "type": ["string", "array"], "items": { "type": "string" } })
 }
 
-/// Allows what lists of rows need: `for` in every table, and the name of a row's value in braces in
-/// place of a number, a truth value, a list or values by name.
+/// Returns the places of the definitions of tables in lists, which may have the key `for`.
+fn listed(schema: &Value) -> BTreeSet<String> {
+    let inner: Vec<&Value> = match schema {
+        Value::Object(object) => object.values().collect(),
+        Value::Array(items) => items.iter().collect(),
+        _ => Vec::new(),
+    };
+    let own = schema.pointer("/items/$ref").and_then(Value::as_str);
+    let own = own.and_then(|name| name.strip_prefix('#')).map(str::to_string);
+    inner.into_iter().flat_map(listed).chain(own).collect()
+}
+
+/// Allows the name of a row's value in braces in place of a number, a truth value, a list or values
+/// by name.
 fn with_rows(schema: &mut Schema) {
-    if let Some(properties) =
-        properties(schema).filter(|properties| !properties.contains_key("lists"))
-    {
-        let each = json!({
-            "description": "A list of rows, or its name, or several names. The table is repeated for each row, or for each combination of rows, and each name in braces is replaced by the row's value.",
-            "type": ["string", "array"],
-            "items": { "type": ["string", "object"] },
-        });
-        properties.insert("for".into(), each);
-    }
     let is_map = schema.get("properties").is_none();
     let is_replaced = |name: &Value| {
         ["number", "integer", "boolean", "array"].iter().any(|kind| name == kind)

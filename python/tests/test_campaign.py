@@ -4,7 +4,7 @@ import sys
 
 import numpy as np
 import pytest
-from reentry_fmus import OrchestratorError, campaign, experiment, falsify
+from reentry_fmus import OrchestratorError, campaign, experiment
 
 CAMPAIGN = """
 title = "LQR, inertia and gusts"
@@ -137,7 +137,7 @@ def test_a_case_is_run_again_with_everything_recorded(file, flown, tmp_path):
 
 
 def test_a_search_finds_a_worse_case(file, flown, tmp_path):
-    search = falsify(file, out=tmp_path / "search", jobs=1)
+    search = campaign(file).worst(out=tmp_path / "search", jobs=1)
     assert search.outcome["measure"] == "rate" and search.outcome["unit"] == "deg/s"
     assert search.table["rate"].max() == search.outcome["largest"]
     assert search.figure.startswith("<svg") and search._repr_svg_() == search.figure

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from laws import lqr
 from laws import pd as pd_law
-from reentry_fmus import LawError, OrchestratorError, campaign, experiment, falsify, linearise, margins, reproduce
+from reentry_fmus import LawError, OrchestratorError, campaign, experiment, linearise, margins, reproduce
 from reentry_fmus._data import experiment_path, program
 from test_campaign import CAMPAIGN
 
@@ -172,8 +172,8 @@ def test_oracle_the_memory_of_a_law_is_part_of_its_linear_model(make):
 
 def test_a_search_flies_a_law(tmp_path):
     (tmp_path / "gusts.toml").write_text(CAMPAIGN)
-    by_law = falsify(tmp_path / "gusts.toml", out=tmp_path / "law", jobs=1, law=lqr)
-    by_fmu = falsify(tmp_path / "gusts.toml", out=tmp_path / "fmu", jobs=1)
+    by_law = campaign(tmp_path / "gusts.toml", law=lqr).worst(out=tmp_path / "law", jobs=1)
+    by_fmu = campaign(tmp_path / "gusts.toml").worst(out=tmp_path / "fmu", jobs=1)
     assert by_law.outcome["largest"] == pytest.approx(by_fmu.outcome["largest"], rel=1e-9)
     assert not by_law.table["rate"].equals(by_fmu.table["rate"])
     run = experiment(by_law.worst, law=lqr)
@@ -210,7 +210,7 @@ def fails(state):
         lambda folder, law: experiment("estimator", law=law),
         lambda folder, law: margins("lqr", at=10.0, open="plant.moment.*", law=law),
         lambda folder, law: linearise("lqr", at=10.0, open="plant.moment.*", law=law),
-        lambda folder, law: falsify(folder / "gusts.toml", out=folder / "out", law=law),
+        lambda folder, law: campaign(folder / "gusts.toml", law=law).worst(out=folder / "out"),
         lambda folder, law: reproduce(folder, out=folder / "out", law=law),
     ],
 )
@@ -289,7 +289,7 @@ def test_what_an_fmu_prints_is_no_message_for_a_law(tmp_path):
 def test_a_case_of_a_search_has_no_number(tmp_path):
     (tmp_path / "gusts.toml").write_text(CAMPAIGN)
     with pytest.raises(LawError, match="the law fails failed at t = 0.52 s") as caught:
-        falsify(tmp_path / "gusts.toml", out=tmp_path / "out", law=fails)
+        campaign(tmp_path / "gusts.toml", law=fails).worst(out=tmp_path / "out")
     assert caught.value.case is None
 
 

@@ -51,6 +51,6 @@ def test_a_search_goes_on_when_an_fmu_refuses_values(file, tmp_path):
     """A search tries corners, where two times may be equal: the plant refuses these, and would refuse the file's own values."""
     search = tmp_path / "search.toml"
     search.write_text(f"extends = '{file}'\n[search]\ncases = 24\n")
-    command = [program("orchestrator"), "falsify", search, "--out", tmp_path / "out", "--fmu-dir", TARGET / "fmu"]
+    command = [program("orchestrator"), "campaign", search, "--worst", "--out", tmp_path / "out", "--fmu-dir", TARGET / "fmu"]
     done = subprocess.run(command, capture_output=True, text=True)
     assert done.returncode in (0, 4), done.stderr

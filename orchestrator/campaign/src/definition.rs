@@ -12,7 +12,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
-use sweep::vary::{Correlation, DesignKind, Vary};
+use sweep::vary::{DesignKind, Vary};
 use toml::{Spanned, Value};
 
 /// A campaign: an experiment, the parameters that vary from case to case, and the limits that the
@@ -38,7 +38,7 @@ pub struct Campaign {
     /// Seed of all random numbers. Case k depends on the seed and k alone.
     #[serde(default = "one")]
     pub seed: u64,
-    /// Number of cases, and with `until` the largest number. A factorial design needs none.
+    /// Number of cases, and with `until` the largest number. The design `levels` needs none.
     pub cases: Option<u64>,
     /// Design that places the cases in the space of the varied parameters.
     #[serde(default)]
@@ -46,9 +46,6 @@ pub struct Campaign {
     /// Parameters that differ from case to case.
     #[serde(default)]
     pub vary: Vec<Vary>,
-    /// Correlations between varied parameters.
-    #[serde(default, rename = "correlation")]
-    pub correlations: Vec<Correlation>,
     /// Lists of signals that measures refer to, by name, in addition to those of the experiment.
     #[serde(default)]
     pub signals: BTreeMap<String, Vec<Signal>>,
@@ -67,7 +64,7 @@ pub struct Campaign {
     /// Choice of the cases whose results are kept in full.
     #[serde(default)]
     pub keep: Keep,
-    /// Search for the worst case, for `orchestrator falsify`.
+    /// Search for the worst case, for `orchestrator campaign --worst`.
     pub search: Option<Search>,
     /// The campaign file, together with the files that it extends. This is not a key of the file.
     #[serde(skip)]

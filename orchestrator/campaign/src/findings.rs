@@ -3,7 +3,7 @@
 use crate::definition::{Limit, Until, kept_column};
 use crate::flight::CaseStatus;
 use crate::plan::Plan;
-use crate::sensitivity::{Estimate, Input, Sensitivity, sensitivities};
+use crate::sensitivity::{Input, Sensitivity, sensitivities};
 use cosim::error::Error;
 use serde::Serialize;
 use std::collections::{BTreeMap, BTreeSet};
@@ -51,8 +51,6 @@ pub struct Measured {
     pub summary: Option<Summary>,
     /// Sensitivity of the measure to each parameter that is no seed.
     pub sensitivities: Vec<Sensitivity>,
-    /// Share of the variance due to the noise of the seeds alone, if the design gives it.
-    pub noise: Option<Estimate>,
 }
 
 /// Answer to the question that ends a campaign.
@@ -66,6 +64,17 @@ pub struct Answer {
     pub broken: Probability,
     /// Confidence of each look, so that all together have the confidence of the question.
     pub confidence_of_each_look: f64,
+}
+
+impl Answer {
+    /// Returns the answer in words.
+    pub fn in_words(&self) -> &'static str {
+        match self.holds {
+            Some(true) => "yes",
+            Some(false) => "no",
+            None => "not decided",
+        }
+    }
 }
 
 /// Computes the findings from a table of cases.
@@ -101,14 +110,12 @@ pub(crate) fn findings(
     let mut measures = Vec::new();
     for recorded in &plan.recorded {
         let values = table.column(&recorded.name)?.numbers();
-        let (sensitivities, noise) = sensitivities(plan.campaign.design, &inputs, &values);
         measures.push(Measured {
             name: recorded.name.clone(),
             words: recorded.words.clone(),
             unit: recorded.unit.clone(),
             summary: summary(&values),
-            sensitivities,
-            noise,
+            sensitivities: sensitivities(&inputs, &values),
         });
     }
     Ok(Findings { title: plan.campaign.title.clone(), cases, status, limits, measures, answer })

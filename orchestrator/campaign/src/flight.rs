@@ -107,17 +107,12 @@ impl<'a> Flight<'a> {
     ///
     /// # Errors
     /// The errors are those of [`Self::fly`], and of files that cannot be written.
-    pub fn keep(
-        &mut self,
-        case: u64,
-        values: Vec<SettingValue>,
-        folder: &Path,
-        title: &str,
-    ) -> Result<Row, Error> {
+    pub fn keep(&mut self, case: u64, folder: &Path, title: &str) -> Result<Row, Error> {
         let system = self.instances.system();
         let mut watch = Watch::new(system)?;
         let mut recorder = system.recorder(folder, Format::Csv, false)?;
         let bounds = self.instances.replace_bounds(Vec::new());
+        let values = self.plan.sweep.values(case);
         let row = self.fly_with(case, values, &mut [&mut recorder, &mut watch]);
         self.instances.replace_bounds(bounds);
         recorder.finish()?;

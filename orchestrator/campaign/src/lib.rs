@@ -1,20 +1,17 @@
 //! Campaigns: thousands of cases of one experiment, in which parameters vary.
 //!
 //! A campaign ([`definition`]) is a sweep with limits: it is prepared once ([`plan`]), and a
-//! [`flight`] flies its cases. Their parts are kept until all are merged ([`run`]); several
-//! processes can fly some of them in the same folder. [`findings`] and [`sensitivity`] evaluate the
-//! cases, and [`report`] shows the results. [`search`] looks for the worst case.
+//! [`flight`] flies its cases. Their parts are kept until all are merged ([`run`]). [`findings`] and
+//! [`sensitivity`] evaluate the cases, and [`report`] shows the results. [`search`] looks for the
+//! worst case.
 
-pub mod changes;
+mod cloud;
 pub mod definition;
 pub mod findings;
 pub mod flight;
-pub mod options;
-pub mod parts;
 pub mod plan;
 pub mod prepare;
 pub mod report;
 pub mod run;
 pub mod search;
 pub mod sensitivity;
-mod track;

@@ -1,16 +1,27 @@
 //! A campaign that is ready to be flown: its cases, and the numbers that are recorded of each.
 
-use crate::changes::{Changes, Command};
 use crate::definition::{Campaign, Limit, kept_column};
 use crate::prepare::{Recorded, keys, observe, read_experiment, recorded};
 use cosim::error::Error;
-use cosim::experiment::MeasureKind;
+use cosim::experiment::{MeasureKind, Overrides};
+use cosim::files;
 use cosim::system::Opened;
 use cosim_metrics::metrics::{Meters, Metrics};
 use std::collections::BTreeSet;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use sweep::cases::Sweep;
 use sweep::vary::Variation;
+
+/// Changes that the command line makes to a campaign.
+#[derive(Clone, Debug, Default)]
+pub struct Changes {
+    /// Experiment in place of that of the campaign.
+    pub experiment: Option<PathBuf>,
+    /// Changes to the experiment.
+    pub overrides: Overrides,
+    /// Command that flies one case with these changes, in which `CASE` stands for its number.
+    pub command: String,
+}
 
 /// A campaign that is ready to be flown.
 pub struct Plan {
@@ -20,10 +31,8 @@ pub struct Plan {
     pub sweep: Sweep,
     /// Numbers that are recorded of each case.
     pub recorded: Vec<Recorded>,
-    /// Command that flies the campaign.
-    pub command: Command,
-    /// Experiment that the command line names.
-    replaced: Option<PathBuf>,
+    /// Changes of the command line to the campaign.
+    pub changes: Changes,
 }
 
 impl Plan {
@@ -37,12 +46,11 @@ impl Plan {
     ///
     /// # Errors
     /// Returns an error that names the key at fault, with its line and the nearest right name.
-    pub fn new(campaign: Campaign, changes: &Changes, fmu_dirs: &[PathBuf]) -> Result<Self, Error> {
-        let mut experiment = read_experiment(&campaign, changes)?;
+    pub fn new(campaign: Campaign, changes: Changes, fmu_dirs: &[PathBuf]) -> Result<Self, Error> {
+        let mut experiment = read_experiment(&campaign, &changes)?;
         experiment.observe = observe(&campaign, &experiment.observe)?;
         let variation = Variation {
             vary: &campaign.vary,
-            correlations: &campaign.correlations,
             design: campaign.design,
             seed: campaign.seed,
             cases: campaign.cases,
@@ -55,14 +63,8 @@ impl Plan {
         let meters = Meters::new(&mut system)?;
         let recorded = recorded(&campaign, &system.experiment.observe, &meters);
         let measured = meters.metrics();
-        sweep.keys.insert("campaign".into(), keys(&campaign, changes)?);
-        let plan = Self {
-            command: changes.command(&campaign),
-            replaced: changes.experiment.clone(),
-            campaign,
-            sweep,
-            recorded,
-        };
+        sweep.keys.insert("campaign".into(), keys(&campaign, &changes)?);
+        let plan = Self { changes, campaign, sweep, recorded };
         plan.check_columns()?;
         plan.check_limits(&measured)?;
         Ok(plan)
@@ -72,8 +74,19 @@ impl Plan {
     /// the command line names one.
     pub fn name(&self) -> String {
         let campaign = self.campaign.name();
-        let stem = self.replaced.as_ref().and_then(|path| path.file_stem());
+        let stem = self.changes.experiment.as_ref().and_then(|path| path.file_stem());
         stem.map_or(campaign.clone(), |stem| format!("{campaign}-{}", stem.to_string_lossy()))
+    }
+
+    /// Writes a case as an experiment into a folder, and returns title and path of it.
+    ///
+    /// # Errors
+    /// Returns an error if the file cannot be written.
+    pub fn write_case(&self, case: u64, folder: &Path) -> Result<(String, PathBuf), Error> {
+        let title = format!("{}, case {case}", self.campaign.title);
+        let path = folder.join("case.toml");
+        files::write(&path, self.sweep.experiment_of(&title, &self.sweep.values(case))?)?;
+        Ok((title, path))
     }
 
     /// Returns the limits with the position of their measure in [`Self::recorded`].

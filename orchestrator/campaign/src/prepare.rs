@@ -1,7 +1,7 @@
 //! Looks up what a campaign names: its experiment, its metrics and measures.
 
-use crate::changes::Changes;
 use crate::definition::Campaign;
+use crate::plan::Changes;
 use cosim::error::Error;
 use cosim::experiment::{
     Experiment, Given, Margins, Measure, MeasureKind, Observe, Overrides, Protection,
@@ -149,7 +149,7 @@ pub(crate) fn keys(campaign: &Campaign, changes: &Changes) -> Result<String, Err
     for key in ["title", "description", "extends", "experiment", "fmu", "until", "keep", "search"] {
         table.remove(key);
     }
-    if campaign.design != DesignKind::LatinHypercube && campaign.design != DesignKind::Corners {
+    if campaign.design != DesignKind::Corners {
         table.remove("cases");
     }
     let text = toml::to_string(&table).map_err(|error| Error::experiment(error.to_string()))?;

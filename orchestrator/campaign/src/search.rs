@@ -20,11 +20,10 @@ use serde::Serialize;
 use std::cmp::Ordering;
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, Sender, channel};
-use std::time::{Duration, Instant};
-use sweep::design::Place;
+use std::time::Instant;
 use sweep::error::Error;
+use sweep::runner::{self, Options};
 use sweep::table::Writer;
-use sweep::work;
 
 /// Step size of a search at its beginning, as a share of the range of each parameter.
 const STEP: f64 = 0.3;
@@ -34,23 +33,6 @@ const CASE: u64 = 0;
 /// Names of the files of a search's results.
 const FILES: [&str; 5] =
     ["search.json", "search.parquet", "worst.toml", "report.html", "history.svg"];
-
-/// Options of a search.
-#[derive(Clone, Debug, Default)]
-pub struct Options {
-    /// Folder for the results; `out/<campaign>-worst` if it is not given.
-    pub out: Option<PathBuf>,
-    /// Number of threads; 0 means one for each core.
-    pub jobs: usize,
-    /// Time after which no further generation begins.
-    pub time: Option<Duration>,
-    /// Whether the progress display is suppressed.
-    pub quiet: bool,
-    /// Whether the results of an earlier search may be replaced.
-    pub force: bool,
-    /// Interrupt through which the work can be ended from outside.
-    pub interrupt: Interrupt,
-}
 
 /// Outcome of a search.
 #[derive(Clone, Debug, Serialize)]
@@ -85,7 +67,7 @@ pub struct SearchOutcome {
 
 /// A place that is to be flown, and the channel for its result.
 struct Order {
-    places: Vec<Place>,
+    point: Vec<f64>,
     reply: Sender<Result<Row, Single>>,
 }
 
@@ -113,9 +95,9 @@ pub fn search(plan: &Plan, options: &Options) -> Result<SearchOutcome, Error> {
     }
     let out = options.out.clone();
     let out = out.unwrap_or_else(|| PathBuf::from("out").join(format!("{}-worst", plan.name())));
-    if out.join("search.json").exists() && !options.force {
+    if out.join("search.json").exists() && !options.fresh {
         let message = format!(
-            "{} holds the results of an earlier search: --force replaces them, --out chooses another folder",
+            "{} holds the results of an earlier search: --fresh replaces them, --out chooses another folder",
             out.display()
         );
         return Err(Single::experiment(message).into());
@@ -152,7 +134,7 @@ pub fn search(plan: &Plan, options: &Options) -> Result<SearchOutcome, Error> {
     let title = format!("{}, the worst case that a search found", plan.campaign.title);
     let text = plan.sweep.experiment_of(&title, &worst.row.values)?;
     files::write(&outcome.out.join("worst.toml"), text)?;
-    page::write(plan, &outcome, &tried, &worst.row)?;
+    page::write(plan, &outcome, &tried, &worst.row, options)?;
     files::write_json(&outcome.out.join("search.json"), &outcome)?;
     Ok(outcome)
 }
@@ -185,7 +167,7 @@ fn look_in_threads(
         failure: Mutex::default(),
     };
     let result = std::thread::scope(|scope| {
-        for _ in 0..work::threads(options.jobs, [&plan.sweep]) {
+        for _ in 0..runner::threads(options.jobs, [&plan.sweep]) {
             scope.spawn(|| serve(plan, &options.interrupt, &waiting));
         }
         let result = look(&searched, search, &orders, is_late);
@@ -233,7 +215,7 @@ fn serve(plan: &Plan, interrupt: &Interrupt, waiting: &Mutex<Receiver<Order>>) {
                 // A case that ends at its limit would hide how far it exceeds it.
                 None => Flight::new(plan, false, interrupt)?.without_ends(),
             };
-            let values = plan.sweep.values_at(&order.places, CASE);
+            let values = plan.sweep.values_at(&order.point, CASE);
             flight.insert(current).fly_with(CASE, values, &mut [])
         };
         // If the search no longer waits for the result, it is discarded.
@@ -256,9 +238,8 @@ impl Searched<'_> {
     /// the smallest value; a case without a value counts as the worst point.
     fn evaluate(&self, point: &DVector<f64>, orders: &Sender<Order>) -> f64 {
         let point: Vec<f64> = point.iter().map(|unit| unit.clamp(0.0, 1.0)).collect();
-        let places = point.iter().copied().map(Place::Quantile).collect();
         let (reply, result) = channel();
-        if orders.send(Order { places, reply }).is_err() {
+        if orders.send(Order { point: point.clone(), reply }).is_err() {
             return f64::MAX;
         }
         let row = match result.recv() {

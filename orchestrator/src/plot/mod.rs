@@ -3,9 +3,10 @@
 mod read;
 
 use crate::failure::Failure;
-use crate::picture::{self, Form};
+use crate::picture;
 use clap::Args;
 use cosim::error::Error;
+use cosim_report::figure::svg;
 use cosim_report::recording::{Recording, asked as drawn, panels};
 use cosim_report::run_page;
 use std::io::Write;
@@ -29,7 +30,7 @@ pub(crate) struct Plot {
     /// End at this time, s.
     #[arg(long, value_name = "SECONDS", value_parser = instant, allow_negative_numbers = true)]
     to: Option<f64>,
-    /// File to write: a picture (.svg, .png), or a page with the vehicle in motion (.html).
+    /// File to write: a picture (.svg), or a page with the vehicle in motion (.html).
     #[arg(long, value_name = "FILE", default_value = "plot.svg")]
     out: PathBuf,
 }
@@ -90,7 +91,7 @@ impl Plot {
 /// Returns an error if a run cannot be read, if a signal is recorded in none of them, or if the
 /// file cannot be written.
 pub(crate) fn plot(asked: &Plot, out: &mut impl Write) -> Result<(), Failure> {
-    let form = Form::of(&asked.out, "--out", &Form::RUNS)?;
+    let ending = picture::ending(&asked.out, "--out", &["svg", "html"])?;
     let runs = asked.recordings()?;
     let panels = if asked.signals.is_empty() {
         drawn::of_experiments(&runs)
@@ -101,12 +102,12 @@ pub(crate) fn plot(asked: &Plot, out: &mut impl Write) -> Result<(), Failure> {
     if panels.is_empty() {
         return Err(Error::experiment("nothing that could be drawn is recorded").into());
     }
-    match form {
-        Form::Page => run_page::write(&runs, &panels, &asked.out)?,
-        _ if asked.signals.is_empty() => {
-            picture::write(&run_page::figure::figure(&runs, &panels), form, &asked.out)?;
-        }
-        _ => picture::write(&run_page::figure::of_panels(&runs, &panels), form, &asked.out)?,
+    if ending == "html" {
+        run_page::write(&runs, &panels, &asked.out)?;
+    } else if asked.signals.is_empty() {
+        svg::write(&run_page::figure::figure(&runs, &panels), &asked.out)?;
+    } else {
+        svg::write(&run_page::figure::of_panels(&runs, &panels), &asked.out)?;
     }
     writeln!(out, "{}", asked.out.display())?;
     Ok(())

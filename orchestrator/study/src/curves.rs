@@ -1,11 +1,10 @@
 //! Signals of a run that the figures of a study draw.
 
-use cosim::run::{Observer, Sample};
-use cosim::signal::{Resolved, Signal};
+use cosim::signal::Signal;
 use cosim::system::Parameters;
 use linear::curves::ResponseCurves;
 use serde::{Deserialize, Serialize};
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 /// Results of a part besides its numbers.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -57,69 +56,12 @@ pub(crate) fn widen(
     }
 }
 
-/// Approximate largest number of points of a time series.
-const POINTS: u64 = 4000;
-
-/// An observer that records signals at every n-th communication point.
-pub(crate) struct Watch {
-    stride: u64,
-    resolved: Vec<(Signal, Resolved)>,
-    time: Vec<f64>,
-    values: Vec<Vec<f64>>,
-}
-
-impl Watch {
-    /// Creates a watch for runs of so many communication points.
-    pub(crate) fn new(resolved: Vec<(Signal, Resolved)>, ticks: u64) -> Self {
-        let values = vec![Vec::new(); resolved.len()];
-        Self { stride: ticks.div_ceil(POINTS).max(1), resolved, time: Vec::new(), values }
-    }
-
-    /// Forgets the last run.
-    pub(crate) fn clear(&mut self) {
-        self.time.clear();
-        self.values.iter_mut().for_each(Vec::clear);
-    }
-
-    fn signals(&self) -> impl Iterator<Item = (&Signal, &Vec<f64>)> {
-        self.resolved.iter().map(|(signal, _)| signal).zip(&self.values)
-    }
-
-    /// Returns the time series, to which the single values of metrics are added.
-    pub(crate) fn series(&self, samples: BTreeMap<String, Vec<f64>>) -> Series {
-        let units = self.resolved.iter().map(|(s, resolved)| (s.clone(), resolved.unit.clone()));
-        Series {
-            time: self.time.clone(),
-            signals: self.signals().map(|(s, values)| (s.clone(), values.clone())).collect(),
-            units: units.collect(),
-            samples,
-            response: None,
-        }
-    }
-
-    /// Returns the bands of one run, which have no width.
-    pub(crate) fn bands(&self, drawn: &BTreeSet<Signal>) -> Vec<(Signal, Spread)> {
-        let signals = self.signals().filter(|(signal, _)| drawn.contains(signal));
-        let bands = signals.map(|(signal, values)| {
-            (signal.clone(), Spread { low: values.clone(), high: values.clone() })
-        });
-        bands.collect()
-    }
-}
-
-impl Observer for Watch {
-    fn observe(&mut self, sample: &Sample) -> Result<(), cosim::error::Error> {
-        if !sample.tick.is_multiple_of(self.stride) && !sample.last {
-            return Ok(());
-        }
-        self.time.push(sample.time);
-        for ((_, resolved), values) in self.resolved.iter().zip(&mut self.values) {
-            // At the stop time, a signal with responses keeps its value of the step before.
-            let last = values.last().copied().filter(|_| sample.last && resolved.responds);
-            values.push(last.unwrap_or_else(|| resolved.value(sample.values)));
-        }
-        Ok(())
-    }
+/// Returns the bands of one run, which have no width.
+pub(crate) fn bands<'a>(
+    signals: impl Iterator<Item = (&'a Signal, &'a Vec<f64>)>,
+) -> Vec<(Signal, Spread)> {
+    let band = |values: &Vec<f64>| Spread { low: values.clone(), high: values.clone() };
+    signals.map(|(signal, values)| (signal.clone(), band(values))).collect()
 }
 
 #[cfg(test)]

@@ -35,8 +35,8 @@ fn one() -> usize {
     1
 }
 
-/// A panel of a figure. Exactly one of `signal`, `signals`, `histogram`, `scatter`, `across` and
-/// `response` selects the curves; a panel may also have `points` alone.
+/// A panel of a figure. Exactly one of `signal`, `signals`, `histogram`, `across` and `response`
+/// selects the curves; a panel may also have `points` alone.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Panel {
@@ -63,9 +63,8 @@ pub struct Panel {
     /// Metric of kind `p99` whose single values are shown as a histogram, with a logarithmic
     /// horizontal axis.
     pub histogram: Option<String>,
-    /// Two metrics that are drawn against each other, as one dot for each value of `vary`.
-    pub scatter: Option<Scatter>,
-    /// Two metrics that are drawn against each other, as lines through several runs.
+    /// Two metrics that are drawn against each other: as one dot for each case of the runs, or as
+    /// lines through several runs.
     pub across: Option<Across>,
     /// Frequency response of the loop that `[observe.margins]` linearises, as one curve for each
     /// run.
@@ -97,9 +96,7 @@ pub enum Drawn<'a> {
     Signals,
     /// The single values of a metric.
     Histogram(&'a str),
-    /// Two metrics as one dot for each case.
-    Scatter(&'a Scatter),
-    /// Two metrics as lines through several runs.
+    /// Two metrics against each other.
     Across(&'a Across),
     /// Frequency responses.
     Response(Response),
@@ -117,7 +114,6 @@ impl Panel {
             self.signal.as_ref().map(|_| Drawn::Signals),
             (!self.signals.is_empty()).then_some(Drawn::Signals),
             self.histogram.as_deref().map(Drawn::Histogram),
-            self.scatter.as_ref().map(Drawn::Scatter),
             self.across.as_ref().map(Drawn::Across),
             self.response.map(Drawn::Response),
             (!self.points.is_empty()).then_some(Drawn::Points),
@@ -125,7 +121,7 @@ impl Panel {
         let mut given = keys.into_iter().flatten();
         match (given.next(), given.next()) {
             (Some(drawn), None | Some(Drawn::Points)) => Ok(drawn),
-            _ => Err("a panel needs exactly one of signal, signals, histogram, scatter, across and response, or points alone".into()),
+            _ => Err("a panel needs exactly one of signal, signals, histogram, across and response, or points alone".into()),
         }
     }
 
@@ -160,17 +156,7 @@ pub enum Response {
     Sensitivity,
 }
 
-/// Two metrics of a run that are drawn against each other.
-#[derive(Clone, Debug, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct Scatter {
-    /// Metric along the horizontal axis.
-    pub x: String,
-    /// Metric along the vertical axis.
-    pub y: String,
-}
-
-/// Two metrics that are drawn against each other, as lines through several runs.
+/// Two metrics that are drawn against each other.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Across {
@@ -178,7 +164,9 @@ pub struct Across {
     pub x: Axis,
     /// Metric along the vertical axis, with its factor.
     pub y: Axis,
-    /// Lines that are drawn, each through runs of its own.
+    /// Lines that are drawn, each through runs of its own. Without any, each case of the panel's
+    /// runs is a dot.
+    #[serde(default)]
     pub lines: Vec<Through>,
 }
 

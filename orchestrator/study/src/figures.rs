@@ -1,9 +1,7 @@
 //! Draws the figures of a study from the results of its runs.
 
-use crate::drawings::{
-    Across, Axis, Drawn, Figure, Line, Panel, Point, Response, Scatter, Through,
-};
-use crate::results::{Metric, Results, RunResult};
+use crate::drawings::{Across, Axis, Drawn, Figure, Line, Panel, Point, Response, Through};
+use crate::results::{Results, RunResult};
 use crate::runs::Run;
 use crate::values::Quantity;
 use cosim::signal::Signal;
@@ -39,7 +37,9 @@ fn panel(figure: &Figure, panel: &Panel, results: &Results) -> Result<figure::Pa
     let (x_label, mut curves) = match drawn {
         Drawn::Signals => ("time, s", over_time(panel, &runs)),
         Drawn::Histogram(metric) => (metric, histograms(metric, &runs)),
-        Drawn::Scatter(scatter) => ("time, s", scattered(scatter, &runs, results)?),
+        Drawn::Across(across) if across.lines.is_empty() => {
+            (across.x.metric.as_str(), scattered(across, &runs, results)?)
+        }
         Drawn::Across(across) => (across.x.metric.as_str(), lines_across(across, results)?),
         Drawn::Response(Response::Nichols) => ("phase of L, deg", nichols(panel.disk, &runs)),
         Drawn::Response(Response::Sensitivity) => ("frequency, rad/s", sensitivities(&runs)),
@@ -107,13 +107,13 @@ fn signals<'a>(panel: &'a Panel, run: &'a Run) -> Vec<(&'a Signal, &'a str, Colo
 }
 
 /// Draws each case of a run as a dot.
-fn scattered(scatter: &Scatter, runs: &[Shown], results: &Results) -> Result<Vec<Curve>, String> {
+fn scattered(across: &Across, runs: &[Shown], results: &Results) -> Result<Vec<Curve>, String> {
     let dots = |(run, _): &Shown| {
-        let numbers = |metric: &str| {
-            Metric::parse(metric, results.study, run)?;
-            Ok::<_, String>(results.numbers(&format!("{}.{metric}", run.id.get_ref()))?.0)
+        let numbers = |Axis { metric, factor }: &Axis| {
+            let numbers = results.numbers(&format!("{}.{metric}", run.id.get_ref()))?.0;
+            Ok::<_, String>(numbers.into_iter().map(|number| number * factor).collect())
         };
-        Ok(of_run(run, Shape::Dots, numbers(&scatter.x)?, numbers(&scatter.y)?))
+        Ok(of_run(run, Shape::Dots, numbers(&across.x)?, numbers(&across.y)?))
     };
     runs.iter().map(dots).collect()
 }

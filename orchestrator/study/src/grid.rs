@@ -4,115 +4,56 @@
 use crate::runs::Run;
 use cosim::document::Source;
 use cosim::error::Error;
-use cosim::experiment::Experiment;
-use cosim_report::figure::Color;
 use fmi_master::names;
 use schemars::JsonSchema;
 use serde::Deserialize;
 use std::collections::BTreeMap;
-use std::path::PathBuf;
-use sweep::vary::DesignKind;
-use toml::{Spanned, Value};
+use toml::Spanned;
 
-/// A grid of candidates and scenarios, which defines the runs `SCENARIO-CANDIDATE`.
+/// A grid of candidates and scenarios, which defines the runs `SCENARIO-CANDIDATE`. A candidate has
+/// the keys `fmu`, `set`, `without` and `measures` of its runs. A scenario has the others, and its
+/// label is their group.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Grid {
-    /// Candidates that are compared with each other.
+    /// Candidates that are compared with each other, with the changes that put each into any
+    /// experiment.
     #[serde(rename = "candidate")]
-    candidates: Vec<Candidate>,
+    candidates: Vec<Run>,
     /// Scenarios in which the candidates are compared.
     #[serde(rename = "scenario")]
-    scenarios: Vec<Scenario>,
-}
-
-/// A candidate, with the changes that put it into any experiment.
-#[derive(Clone, Debug, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-struct Candidate {
-    id: String,
-    label: String,
-    color: Color,
-    #[serde(default)]
-    fmu: BTreeMap<String, String>,
-    #[serde(default)]
-    #[schemars(with = "BTreeMap<String, cosim::experiment::Scalar>")]
-    set: BTreeMap<String, Value>,
-    /// Parameters that the candidate does not have. They are left out if an experiment sets them.
-    #[serde(default)]
-    without: Vec<String>,
-    /// Measures of the candidate in all scenarios, in addition to those of the scenario.
-    #[serde(default)]
-    #[schemars(with = "Vec<String>")]
-    measures: Vec<Spanned<String>>,
-}
-
-/// An experiment in which all candidates are run, with the measures of its runs.
-#[derive(Clone, Debug, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-struct Scenario {
-    #[schemars(with = "String")]
-    id: Spanned<String>,
-    /// Heading of the scenario's rows in an overview.
-    label: String,
-    experiment: PathBuf,
-    /// Parameters that differ from those of the experiment, for all candidates that have them.
-    #[serde(default)]
-    #[schemars(with = "BTreeMap<String, cosim::experiment::Scalar>")]
-    set: BTreeMap<String, Value>,
-    /// Parameters of single candidates, by the id of the candidate.
-    #[serde(default)]
-    #[schemars(with = "BTreeMap<String, BTreeMap<String, cosim::experiment::Scalar>>")]
-    set_for: BTreeMap<Spanned<String>, BTreeMap<String, Value>>,
-    #[serde(default)]
-    timed: bool,
-    #[serde(default)]
-    #[schemars(with = "Vec<String>")]
-    within: Vec<Spanned<String>>,
-    #[serde(default)]
-    #[schemars(with = "Vec<String>")]
-    measures: Vec<Spanned<String>>,
+    scenarios: Vec<Run>,
 }
 
 impl Grid {
     /// Returns the runs of the grid, scenario by scenario.
     ///
     /// # Errors
-    /// Returns an error if an experiment cannot be read, or a candidate does not exist.
+    /// Returns an error if `set_for` names a candidate that does not exist.
     pub(crate) fn runs(&self, source: &Source) -> Result<Vec<Run>, Error> {
         let mut runs = Vec::new();
         for scenario in &self.scenarios {
-            let experiment = Experiment::load(&source.beside(&scenario.experiment))?;
-            let ids = self.candidates.iter().map(|candidate| candidate.id.as_str());
+            let ids = self.candidates.iter().map(|candidate| candidate.id.get_ref().as_str());
             source.check_names(scenario.set_for.keys(), "[[grid.candidate]]", ids)?;
             for candidate in &self.candidates {
-                let Candidate { id, without, .. } = candidate;
+                let id = candidate.id.get_ref();
                 let set_for = scenario.set_for.iter().find(|(other, _)| other.get_ref() == id);
-                let set_for = set_for.into_iter().flat_map(|(_, set)| set.clone());
                 let mut set = scenario.set.clone();
-                set.retain(|name, _| !without.contains(name));
+                set.retain(|name, _| !candidate.without.contains(name));
                 set.extend(candidate.set.clone());
-                set.extend(set_for);
-                let unset = without.iter().filter(|name| experiment.sets(name));
+                set.extend(set_for.into_iter().flat_map(|(_, set)| set.clone()));
                 let id = format!("{}-{id}", scenario.id.get_ref());
                 runs.push(Run {
                     id: Spanned::new(scenario.id.span(), id),
                     label: candidate.label.clone(),
                     color: candidate.color,
                     group: scenario.label.clone(),
-                    experiment: scenario.experiment.clone(),
                     fmu: candidate.fmu.clone(),
                     set,
-                    unset: unset.cloned().collect(),
-                    vary: Vec::new(),
-                    correlations: Vec::new(),
-                    cases: None,
-                    design: DesignKind::default(),
-                    seed: 1,
-                    timed: scenario.timed,
-                    within: scenario.within.clone(),
+                    without: candidate.without.clone(),
+                    set_for: BTreeMap::new(),
                     measures: [&scenario.measures[..], &candidate.measures].concat(),
-                    observe: experiment.observe.clone(),
+                    ..scenario.clone()
                 });
             }
         }

@@ -6,7 +6,7 @@ use crate::runs::Run;
 use crate::{grid, rows};
 use cosim::document::Source;
 use cosim::error::Error;
-use cosim::experiment::{Experiment, Observe};
+use cosim::experiment::Experiment;
 use serde::de::DeserializeOwned;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -47,7 +47,7 @@ impl Study {
         for file in &study.value_files {
             study.values.load(&study.source.beside(file))?;
         }
-        study.learn_metrics();
+        study.learn_of_experiments();
         study.check()?;
         let most = cases.unwrap_or(u64::MAX).max(1);
         study.most_cases = study.runs.iter().any(|run| run.count() > most).then_some(most);
@@ -66,16 +66,19 @@ impl Study {
         Ok(spelled_out::<toml::Table>(&Source::load(path)?)?.to_string())
     }
 
-    /// Reads the metrics that the experiments define. An experiment that cannot be read is reported
-    /// later, when it is to be run.
-    fn learn_metrics(&mut self) {
-        let mut observed: BTreeMap<PathBuf, Observe> = BTreeMap::new();
+    /// Reads the metrics that the experiments define, and which parameters they set that runs do
+    /// not have. An experiment that cannot be read is reported later, when it is to be run.
+    fn learn_of_experiments(&mut self) {
+        let mut experiments: BTreeMap<PathBuf, Option<Experiment>> = BTreeMap::new();
         for run in &mut self.runs {
             let path = self.source.beside(&run.experiment);
-            let asked = observed.entry(path).or_insert_with_key(|path| {
-                Experiment::load(path).map(|read| read.observe).unwrap_or_default()
-            });
-            run.observe.clone_from(asked);
+            let read =
+                experiments.entry(path).or_insert_with_key(|path| Experiment::load(path).ok());
+            if let Some(experiment) = read {
+                run.observe.clone_from(&experiment.observe);
+                let set = run.without.iter().filter(|name| experiment.sets(name));
+                run.unset.extend(set.cloned());
+            }
         }
     }
 
@@ -147,6 +150,8 @@ impl Study {
                 Some("an id consists of letters, digits and -")
             }
             _ if !is_first => Some("there is another run with this id"),
+            _ if run.experiment.as_os_str().is_empty() => Some("experiment is missing"),
+            _ if !run.set_for.is_empty() => Some("set_for is a key of a scenario in a grid"),
             Some(0) => Some("cases = 0, but it must be at least 1"),
             Some(_) if run.vary.is_empty() => Some("cases needs vary"),
             None if !run.vary.is_empty() => Some("vary needs cases, their number"),

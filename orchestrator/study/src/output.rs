@@ -9,7 +9,7 @@ use crate::runs::Run;
 use crate::{figures, origin, page};
 use cosim::error::Error;
 use cosim::files;
-use cosim_report::figure::{self, png, svg};
+use cosim_report::figure::{self, svg};
 use fmi_master::quantity::rounded;
 use maud::Markup;
 use serde_json::{Value, json};
@@ -37,7 +37,7 @@ impl Report {
     pub(crate) fn new(results: &Results) -> Result<Self, String> {
         let Study { claims, figures, tables, .. } = results.study;
         let judged = claims.iter().map(|claim| claims::judge(claim, results));
-        let tables = tables.iter().map(|table| page::table(table, results));
+        let tables = tables.iter().map(|table| page::comparison(table, results));
         let figures = figures.iter().map(|figure| figures::figure(figure, results));
         Ok(Self {
             judged: judged.collect::<Result<_, _>>()?,
@@ -53,11 +53,9 @@ impl Report {
     pub(crate) fn write(&self, results: &Results, out: &Path) -> Result<Vec<String>, Error> {
         let mut files = vec!["report.html".to_string(), "results.json".to_string()];
         for (Figure { id, .. }, drawn) in results.study.figures.iter().zip(&self.figures) {
-            let path = out.join("figures").join(format!("{id}.svg"));
-            let text = svg::text(drawn);
-            files::write(&path, &text)?;
-            png::write(&text, &path.with_extension("png"))?;
-            files.push(format!("figures/{id}.svg, .png"));
+            let name = format!("figures/{id}.svg");
+            svg::write(drawn, &out.join(&name))?;
+            files.push(name);
         }
         files::write(&out.join("results.json"), numbers(results, &self.judged))?;
         let origin = origin::origin(results.study);

@@ -1,6 +1,6 @@
 //! One part of the work of a study: some cases of a run, from its experiment to stored results.
 
-use crate::curves::{Curves, Series, Watch, widen};
+use crate::curves::{Curves, Series, bands, widen};
 use crate::definition::Study;
 use crate::runs::Run;
 use crate::table::table;
@@ -14,25 +14,19 @@ use cosim::system::Opened;
 use cosim_metrics::metrics::{Meters, Metrics, Value};
 use linear::curves::ResponseCurves;
 use serde_json::json;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 use std::path::PathBuf;
-use std::sync::OnceLock;
 use sweep::cases::Sweep;
 use sweep::error::Error;
 use sweep::flight::{Flight, Flown, can_reset};
 use sweep::parts::PartResult;
+use sweep::runner::Part;
+use sweep::track::Track;
 use toml::Spanned;
 
-/// A part of a study's work: some cases of a run, counted from 0.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) struct Part {
-    /// Position of the run in the study.
-    pub run: usize,
-    /// Cases of the run that belong to this part.
-    pub range: Range<u64>,
-}
-
+/// Approximate largest number of points of a time series.
+const POINTS: u64 = 4000;
 /// Number of times that a timed case is run; the least of each computing time counts.
 const REPETITIONS: u32 = 5;
 /// Number of cases from which on it is worth trying whether instances can be reset.
@@ -74,8 +68,6 @@ pub(crate) struct Preparation<'a> {
     drawn: DrawnSignals,
     /// Cases of the run.
     pub sweep: Sweep,
-    /// Whether instances can be reset, once this is known.
-    resets: OnceLock<bool>,
 }
 
 impl<'a> Preparation<'a> {
@@ -106,7 +98,7 @@ impl<'a> Preparation<'a> {
         }
         Meters::new(&mut system).map_err(failed)?;
         sweep.keys.insert("study".into(), key(run, &drawn, &sweep.experiment().observe));
-        Ok(Self { study, run, drawn, sweep, resets: OnceLock::new() })
+        Ok(Self { study, run, drawn, sweep })
     }
 
     /// Returns whether a part is measured, for which it has the machine for itself.
@@ -125,21 +117,19 @@ impl<'a> Preparation<'a> {
         // A fault that shows here shows again where it can be reported.
         let resets = !is_timed
             && self.sweep.cases() >= WORTH_A_RESET
-            && *self
-                .resets
-                .get_or_init(|| can_reset(&self.sweep, opened, interrupt).unwrap_or(false));
+            && can_reset(&self.sweep, opened, interrupt).unwrap_or(false);
         let mut flight = Flight::new(&self.sweep, opened, resets, interrupt)?;
         if is_timed {
             flight.measure_times();
         }
         let resolved = self.drawn.series.iter().map(|signal| {
             let resolved = flight.system().resolve(signal);
-            let fault = |message: String| self.study.run_fault(self.run, &message);
-            Ok((signal.clone(), resolved.map_err(fault)?))
+            resolved.map_err(|message| self.study.run_fault(self.run, &message))
         });
         let resolved = resolved.collect::<Result<Vec<_>, Single>>()?;
-        let watch = Watch::new(resolved, flight.system().clock.ticks());
-        Ok(Instances { preparation: self, flight, watch })
+        let units = resolved.iter().map(|resolved| resolved.unit.clone()).collect();
+        let stride = flight.system().clock.ticks().div_ceil(POINTS).max(1);
+        Ok(Instances { preparation: self, flight, track: Track::new(resolved, stride), units })
     }
 }
 
@@ -174,7 +164,6 @@ fn key(run: &Run, drawn: &DrawnSignals, observe: &Observe) -> String {
         run.set,
         run.unset,
         run.vary,
-        run.correlations,
         run.design,
         run.seed,
         run.timed,
@@ -190,7 +179,9 @@ fn key(run: &Run, drawn: &DrawnSignals, observe: &Observe) -> String {
 pub(crate) struct Instances<'a> {
     preparation: &'a Preparation<'a>,
     flight: Flight<'a>,
-    watch: Watch,
+    /// Signals that are drawn, in the order of [`DrawnSignals::series`].
+    track: Track,
+    units: Vec<String>,
 }
 
 /// State that a thread keeps from one part to the next: opened archives, and the instances of the
@@ -214,14 +205,14 @@ impl<'a> Bench<'a> {
     ) -> Result<PartResult, Single> {
         // A timed part is flown by instances of its own.
         let kept = self.instances.take();
-        let kept = kept.filter(|(run, _)| *run == part.run && part.range.start > 0);
+        let kept = kept.filter(|(run, _)| *run == part.sweep && part.cases.start > 0);
         let mut instances = match kept {
             Some((_, instances)) => instances,
-            None => preparation.instances(&part.range, &mut self.opened, interrupt)?,
+            None => preparation.instances(&part.cases, &mut self.opened, interrupt)?,
         };
-        let result = instances.fly(&part.range)?;
-        if !preparation.is_timed(&part.range) {
-            self.instances = Some((part.run, instances));
+        let result = instances.fly(&part.cases)?;
+        if !preparation.is_timed(&part.cases) {
+            self.instances = Some((part.sweep, instances));
         }
         Ok(result)
     }
@@ -247,13 +238,15 @@ impl Instances<'_> {
                     }
                 }
             }
-            widen(&mut curves.spread, self.watch.bands(&drawn.spread));
+            let signals = drawn.series.iter().zip(&self.track.values);
+            let spread = signals.filter(|(signal, _)| drawn.spread.contains(*signal));
+            widen(&mut curves.spread, bands(spread));
             if case == 0 {
                 curves.parameters = self.flight.parameters()?;
                 samples.retain(|name, _| !name.starts_with("measure."));
                 let response = self.flight.linearised().filter(|_| drawn.response);
                 let response = response.and_then(ResponseCurves::of);
-                curves.series = Some(Series { response, ..self.watch.series(samples) });
+                curves.series = Some(Series { response, ..self.series(samples) });
             }
             cases.push(flown);
         }
@@ -263,12 +256,24 @@ impl Instances<'_> {
         Ok(PartResult { rows: table(sweep, &cases), units: units.unwrap_or_default(), curves })
     }
 
-    /// Flies one case, which the watch sees if any of its signals is drawn.
+    /// Returns the time series of the last case, to which the single values of metrics are added.
+    fn series(&self, samples: BTreeMap<String, Vec<f64>>) -> Series {
+        let signals = || self.preparation.drawn.series.iter().cloned();
+        Series {
+            time: self.track.time.clone(),
+            signals: signals().zip(self.track.values.iter().cloned()).collect(),
+            units: signals().zip(self.units.iter().cloned()).collect(),
+            samples,
+            response: None,
+        }
+    }
+
+    /// Flies one case, which the track sees if any of its signals is drawn.
     fn one(&mut self, case: u64) -> Result<Flown, Single> {
-        self.watch.clear();
+        self.track.clear();
         let is_drawn = case == 0 || !self.preparation.drawn.spread.is_empty();
-        let mut watch: [&mut dyn Observer; 1] = [&mut self.watch];
-        let seen = if is_drawn { &mut watch[..] } else { &mut [] };
+        let mut track: [&mut dyn Observer; 1] = [&mut self.track];
+        let seen = if is_drawn { &mut track[..] } else { &mut [] };
         let mut flown = self.flight.fly(case, seen)?;
         std::mem::replace(&mut flown.outcome, Ok(()))?;
         Ok(flown)

@@ -7,44 +7,18 @@
 use crate::claims;
 use crate::definition::Study;
 use crate::output::{Judgement, Report, notes};
-use crate::part::{Bench, Part, Preparation};
+use crate::part::{Bench, Preparation};
 use crate::results::{Results, RunResult};
 use crate::runs::Run;
-use cosim::error::Error as Single;
 use cosim::experiment::Overrides;
-use cosim::interrupt::Interrupt;
 use cosim::system::Opened;
 use cosim_metrics::folder::Folder;
-use cosim_metrics::progress::Parts;
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 use sweep::error::Error;
-use sweep::parts::{self, PartResult, Remarks, Store};
-use sweep::work::{self, Worked};
+use sweep::parts::{self, PartResult, Store};
+use sweep::runner::{self, Options, Part, Work};
 use toml::Spanned;
-
-/// Number of cases of a run that make up one part.
-const CASES_PER_PART: u64 = 25;
-
-/// Options for the reproduction of a study.
-#[derive(Clone, Debug, Default)]
-pub struct Options {
-    /// Folder for the results; `out/<folder of the study>` if it is not given.
-    pub out: Option<PathBuf>,
-    /// Further folders in which FMUs are looked for.
-    pub fmu_dirs: Vec<PathBuf>,
-    /// Changes of the command line to all experiments.
-    pub overrides: Overrides,
-    /// Number of threads; 0 means one for each core.
-    pub jobs: usize,
-    /// Whether parts that are complete already are run again.
-    pub fresh: bool,
-    /// Whether the progress display is suppressed.
-    pub quiet: bool,
-    /// Interrupt through which the work can be ended from outside.
-    pub interrupt: Interrupt,
-}
 
 /// Report on a study that was reproduced.
 #[derive(Debug)]
@@ -67,70 +41,63 @@ pub struct StudyReport {
     pub files: Vec<String>,
 }
 
-/// Runs those parts of a study that are not finished yet, and writes its report.
+/// Runs those parts of a study that are not finished yet, and writes its report. FMUs are also
+/// looked for in `fmu_dirs`; `overrides` change all experiments.
 ///
 /// # Errors
 /// Returns an error before anything is run if the study is faulty. It also returns one if an FMU
 /// fails, if a file cannot be written, or if the work was asked to end; the parts that are finished
 /// by then are kept.
-pub fn reproduce(study: &Study, options: &Options) -> Result<StudyReport, Error> {
+pub fn reproduce(
+    study: &Study,
+    fmu_dirs: &[PathBuf],
+    overrides: &Overrides,
+    options: &Options,
+) -> Result<StudyReport, Error> {
     let begin = Instant::now();
     let out = options.out.clone().unwrap_or_else(|| Path::new("out").join(name(study)));
     let mut opened = Opened::default();
-    let Options { fmu_dirs, overrides, .. } = options;
     let prepare = |run| Preparation::new(study, run, fmu_dirs, overrides, &mut opened);
     let preparations = study.runs.iter().map(prepare).collect::<Result<Vec<_>, _>>()?;
     check(study).map_err(|message| study.fault(message))?;
     let locked = Folder::take_for_many(&out)?;
+    let stores = study.runs.iter().zip(&preparations).map(|(run, preparation)| Store {
+        folder: out.join("runs").join(run.id.get_ref()),
+        keys: &preparation.sweep.keys,
+    });
+    let mut work = Work::new(&study.title, &out, stores.collect(), PartResult::clone);
     let all_parts = all_parts(study);
-    let store = |part: &Part| Store {
-        folder: out.join("runs").join(study.runs[part.run].id.get_ref()),
-        keys: &preparations[part.run].sweep.keys,
-    };
-    let Found { mut done, missing, remarks } = look(&all_parts, &store, options.fresh);
+    let total = all_parts.len();
+    let missing = if options.fresh { all_parts } else { work.missing(all_parts) };
     if !missing.is_empty() {
         // An earlier report is removed, because it would not fit the new results if the work is
         // ended early.
         locked.remove(&["report.html", "results.json"])?;
     }
 
-    let interrupt = &options.interrupt;
-    let (total, before) = (all_parts.len(), done.len());
-    let progress = Parts::new("parts", &study.title, total as u64, before as u64, options.quiet);
-    let is_timed = |part: &Part| study.runs[part.run].timed && part.range.start == 0;
+    let cases = study.runs.iter().map(Run::count).sum();
+    let flown = missing.len();
+    let is_timed = |part: &Part| study.runs[part.sweep].timed && part.cases.start == 0;
     let (timed, others): (Vec<Part>, Vec<Part>) = missing.into_iter().partition(is_timed);
     let sweeps = preparations.iter().map(|preparation| &preparation.sweep);
-    let threads = work::threads(options.jobs, sweeps);
+    let threads = runner::threads(options.jobs, sweeps);
     // Timed parts have the machine for themselves.
     for (parts, threads) in [(timed, 1), (others, threads)] {
-        let worked = work::on_parts(
+        work.fly(
             &parts,
-            threads,
+            (threads, cases),
+            options,
             || Ok(Bench::default()),
-            |bench, part| {
-                let run = &study.runs[part.run];
-                let preparation = &preparations[part.run];
-                let result = bench.fly(part, preparation, interrupt);
-                let result = result.map_err(|error| run.failed(error))?;
-                store(part).write(&part.range, result.clone())?;
-                progress.finished(&run.label);
-                Ok(result)
+            |bench, part, progress| {
+                let result = bench.fly(part, &preparations[part.sweep], &options.interrupt);
+                progress.advance(part.cases.end - part.cases.start);
+                result.map_err(|error| study.runs[part.sweep].failed(error))
             },
-            // An FMU that failed does not concern the other runs, which are kept.
-            |error| matches!(error, Error::Run { source: Single::Call { .. }, .. }),
-        );
-        done.extend(finished(&parts, worked)?);
-        if let Some(request) = interrupt.asked() {
-            progress.finish();
-            let (done, total) = (done.len() as u64, total as u64);
-            let what = "parts are finished";
-            return Err(Error::Unfinished { what, done, total, out, request });
-        }
+        )?;
     }
-    progress.finish();
 
     let mut runs = vec![RunResult::default(); study.runs.len()];
-    for ((run, _), result) in done {
+    for ((run, _), (_, result)) in std::mem::take(&mut work.done) {
         runs[run].push(result).map_err(|error| study.fault(error.to_string()))?;
     }
     let results = Results { study, runs };
@@ -140,33 +107,13 @@ pub fn reproduce(study: &Study, options: &Options) -> Result<StudyReport, Error>
     Ok(StudyReport {
         title: study.title.clone(),
         page: out.join("report.html"),
-        parts: (total - before, before),
+        parts: (flown, total - flown),
         runs: results.runs.iter().map(RunResult::cases).sum(),
         elapsed: begin.elapsed().as_secs_f64(),
-        notes: remarks.texts().into_iter().chain(notes(&results)).collect(),
+        notes: std::mem::take(&mut work.notes).into_iter().chain(notes(&results)).collect(),
         verdicts: judged.map(|(claim, judged)| (claim.says.clone(), judged.verdict)).collect(),
         files,
     })
-}
-
-/// Parts that are finished, and those that are not.
-struct Found {
-    done: Done,
-    missing: Vec<Part>,
-    remarks: Remarks,
-}
-
-fn look<'a>(parts: &[Part], store: &dyn Fn(&Part) -> Store<'a>, fresh: bool) -> Found {
-    let mut found = Found { done: Done::new(), missing: Vec::new(), remarks: Remarks::default() };
-    for part in parts {
-        let state = store(part).find(&part.range);
-        if let Some(result) = found.remarks.take(state).filter(|_| !fresh) {
-            found.done.insert((part.run, part.range.start), result);
-        } else {
-            found.missing.push(part.clone());
-        }
-    }
-    found
 }
 
 /// Returns the name of a study, which is that of its folder.
@@ -202,34 +149,10 @@ fn check(study: &Study) -> Result<(), String> {
 fn all_parts(study: &Study) -> Vec<Part> {
     let of_run = |(run, description): (usize, &Run)| {
         let first = u64::from(description.timed);
-        let others = parts::parts(description.count() - first, CASES_PER_PART);
+        let others = parts::parts(description.count() - first);
         let others = others.map(move |part| part.start + first..part.end + first);
         let timed = description.timed.then_some(0..1);
-        timed.into_iter().chain(others).map(move |range| Part { run, range })
+        timed.into_iter().chain(others).map(move |cases| Part { sweep: run, cases })
     };
     study.runs.iter().enumerate().flat_map(of_run).collect()
-}
-
-/// Number of failures that are reported besides the first one, which ends the study.
-const FAILURES_REPORTED: usize = 9;
-
-/// Results of parts, by the position of the run and the number of the part's first case.
-type Done = BTreeMap<(usize, u64), PartResult>;
-
-/// Returns the results of parts, unless one has failed.
-fn finished(parts: &[Part], worked: Worked<PartResult, Error>) -> Result<Done, Error> {
-    let Worked { results, mut failures } = worked;
-    failures.retain(|_, error| !matches!(error, Error::Single(Single::Interrupted { .. })));
-    let mut failures = failures.into_values();
-    let Some(first) = failures.next() else {
-        let place = |place: usize| (parts[place].run, parts[place].range.start);
-        return Ok(results.into_iter().map(|(at, result)| (place(at), result)).collect());
-    };
-    for error in failures.by_ref().take(FAILURES_REPORTED) {
-        tracing::error!("{error}");
-    }
-    if failures.len() > 0 {
-        tracing::error!("{} further parts failed", failures.len());
-    }
-    Err(first)
 }

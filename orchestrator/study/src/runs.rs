@@ -9,7 +9,7 @@ use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use sweep::error::Error;
-use sweep::vary::{Correlation, DesignKind, Variation, Vary};
+use sweep::vary::{DesignKind, Variation, Vary};
 use toml::{Spanned, Value};
 
 /// A line of the table that describes the scenario.
@@ -43,13 +43,16 @@ pub struct Run {
     #[schemars(with = "String")]
     pub id: Spanned<String>,
     /// Name of the run in legends and tables.
+    #[serde(default)]
     pub label: String,
-    /// Colour of the run's curves.
+    /// Colour of the run's curves, by default black.
+    #[serde(default)]
     pub color: Color,
     /// Heading of the run's rows in an overview. Without it there is no heading.
     #[serde(default)]
     pub group: String,
     /// Path of the experiment file, relative to the study.
+    #[serde(default)]
     pub experiment: PathBuf,
     /// FMUs that replace those of the experiment, by component.
     #[serde(default)]
@@ -61,12 +64,16 @@ pub struct Run {
     /// Parameters that the experiment sets, but that are left at the FMU's own value.
     #[serde(default)]
     pub unset: Vec<String>,
+    /// Parameters that the run's FMUs do not have. They are left out if the experiment sets them.
+    #[serde(default)]
+    pub without: Vec<String>,
+    /// In a grid: parameters of single candidates, by the id of the candidate.
+    #[serde(default)]
+    #[schemars(with = "BTreeMap<String, BTreeMap<String, cosim::experiment::Scalar>>")]
+    pub set_for: BTreeMap<Spanned<String>, BTreeMap<String, Value>>,
     /// Parameters that vary from case to case, as in a campaign. Without them there is one case.
     #[serde(default)]
     pub vary: Vec<Vary>,
-    /// Correlations between varied parameters.
-    #[serde(default, rename = "correlation")]
-    pub correlations: Vec<Correlation>,
     /// Number of cases of the run, which `vary` needs.
     pub cases: Option<u64>,
     /// Design that places the cases in the space of the varied parameters.
@@ -106,7 +113,6 @@ impl Run {
     pub fn variation(&self) -> Variation<'_> {
         Variation {
             vary: &self.vary,
-            correlations: &self.correlations,
             design: self.design,
             seed: self.seed,
             cases: Some(self.count()),
@@ -116,9 +122,14 @@ impl Run {
 
     /// Names the run in an error. An interrupt concerns no single run.
     pub(crate) fn failed(&self, source: Single) -> Error {
+        let run = self.id.get_ref();
         match source {
             Single::Interrupted { .. } => Error::Single(source),
-            source => Error::Run { run: self.id.get_ref().as_str().into(), source },
+            source @ Single::Call { .. } => {
+                let case = format!("a case of the run {run}");
+                Error::Case { case, more: 0, source: Box::new(source) }
+            }
+            source => Error::Run { run: run.as_str().into(), source },
         }
     }
 

@@ -1,28 +1,7 @@
 //! Formats numbers for a page.
 
 use crate::results::Numbers;
-use sweep::texts::trimmed;
-
-/// Formats a number with as many digits as papers print.
-pub(crate) fn shown(value: f64) -> String {
-    let magnitude = value.abs();
-    let text = if value == 0.0 {
-        "0".into()
-    } else if !value.is_finite() {
-        value.to_string()
-    } else if !(1e-3..1e5).contains(&magnitude) {
-        format!("{value:.3e}")
-    } else {
-        // The tables of the papers have four places after the point; small numbers get more, to
-        // keep three significant digits.
-        let digits =
-            (4 - magnitude.log10().floor() as i32).clamp(0, if magnitude < 0.1 { 6 } else { 4 });
-        let digits = if magnitude < 0.1 { digits - 2 } else { digits } as usize;
-        trimmed(value, digits)
-    };
-    // A line is not broken at this sign.
-    text.replace('-', "−")
-}
+use sweep::texts::shown;
 
 pub(crate) fn signed(value: f64) -> String {
     let sign = if value < 0.0 { "−" } else { "+" };
@@ -68,23 +47,6 @@ fn percent(fractions: &Numbers) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn numbers_are_shown_as_papers_print_them() {
-        for (value, text) in [
-            (1.6055, "1.6055"),
-            (0.3552, "0.3552"),
-            (116.8, "116.8"),
-            (12_345.6, "12346"),
-            (0.08511, "0.0851"),
-            (0.23413, "0.2341"),
-            (2e-5, "2.000e−5"),
-            (-0.0123, "−0.0123"),
-            (100.0, "100"),
-        ] {
-            assert_eq!(shown(value), text);
-        }
-    }
 
     #[test]
     fn several_numbers_show_their_mean_and_extent() {

@@ -1,10 +1,9 @@
 //! A sweep that is ready to be flown: all names are looked up, and every parameter that varies has
 //! its distribution.
 
-use crate::correlation::{Correlated, correlation};
-use crate::design::{Design, Place};
+use crate::design::Design;
 use crate::varied::{Varied, distributions};
-use crate::vary::{Correlation, DesignKind, Variation};
+use crate::vary::{DesignKind, Variation};
 use cosim::check::check;
 use cosim::document::Source;
 use cosim::error::Error;
@@ -14,6 +13,7 @@ use cosim::search;
 use cosim::system::{CheckedComponent, Opened, System};
 use cosim::variation::{SettingValue, Target};
 use fmi_master::names;
+use parking_lot::Mutex;
 use serde_json::{Map, Value, json};
 use std::cmp::Ordering;
 use std::collections::BTreeMap;
@@ -40,7 +40,8 @@ pub struct Sweep {
     /// Paths of the archives, by component.
     archives: BTreeMap<String, PathBuf>,
     fmu_dirs: Vec<PathBuf>,
-    correlation: Option<Correlated>,
+    /// Whether instances can be reset, once this is known.
+    pub(crate) resets: Mutex<Option<bool>>,
 }
 
 impl Sweep {
@@ -65,10 +66,9 @@ impl Sweep {
         let paths = varied.iter().flat_map(|entry| &entry.paths).map(String::as_str);
         system.experiment.warn_of_idle(paths.chain(variation.set.iter().copied()));
         check_design(&varied, variation, source)?;
-        let correlation = correlation(variation.correlations, source, &varied)?;
         let levels = varied.iter().map(|entry| {
             let levels = match variation.design {
-                DesignKind::Factorial => entry.distribution.levels(),
+                DesignKind::Levels => entry.distribution.levels(),
                 DesignKind::Corners => entry.distribution.check_ends().map(|()| 0),
                 _ => Ok(0),
             };
@@ -77,11 +77,11 @@ impl Sweep {
         let levels = levels.collect::<Result<Vec<_>, _>>()?;
         let design = Design::new(variation.design, variation.seed, variation.cases, levels)
             .map_err(|problem| source.error(&(0..0), problem))?;
-        let samples = design.sample(design.cases().saturating_sub(1)) + 1;
+        let cases = design.cases();
         for entry in &varied {
-            if let Some(seeds) = entry.distribution.seeds().filter(|seeds| *seeds < samples) {
+            if let Some(seeds) = entry.distribution.seeds().filter(|seeds| *seeds < cases) {
                 let problem =
-                    format!("case: {samples} cases need a seed each, but it takes {seeds} only");
+                    format!("case: {cases} cases need a seed each, but it takes {seeds} only");
                 return Err(entry.refusal(&problem, source));
             }
         }
@@ -97,7 +97,7 @@ impl Sweep {
             archives: system.components.into_iter().map(|c| (c.name, c.fmu.path.clone())).collect(),
             experiment,
             fmu_dirs: fmu_dirs.to_vec(),
-            correlation,
+            resets: Mutex::default(),
         })
     }
 
@@ -122,18 +122,14 @@ impl Sweep {
 
     /// Returns the values of a case, one for each entry of [`Self::varied`].
     pub fn values(&self, case: u64) -> Vec<SettingValue> {
-        self.values_at(&self.design.place(case), self.design.sample(case))
+        self.values_at(&self.design.place(case), case)
     }
 
-    /// Returns the values at a place. Seeds that differ from case to case are those of this sample
-    /// of the design.
-    pub fn values_at(&self, places: &[Place], sample: u64) -> Vec<SettingValue> {
-        let mut places = places.to_vec();
-        if let Some(correlated) = &self.correlation {
-            correlated.apply(&mut places);
-        }
-        let value = |(varied, place): (&Varied, Place)| varied.distribution.value(place, sample);
-        let mut values: Vec<SettingValue> = self.varied.iter().zip(places).map(value).collect();
+    /// Returns the values at a place, a probability for each of them. Seeds that differ from case to
+    /// case are those of this case.
+    pub fn values_at(&self, place: &[f64], case: u64) -> Vec<SettingValue> {
+        let value = |(varied, unit): (&Varied, &f64)| varied.distribution.value(*unit, case);
+        let mut values: Vec<SettingValue> = self.varied.iter().zip(place).map(value).collect();
         let groups = self.varied.iter().enumerate().filter(|(_, varied)| varied.sorted > 0);
         for (first, varied) in groups {
             values[first..first + varied.sorted].sort_by(|a, b| match (a, b) {
@@ -248,35 +244,14 @@ fn check_twice(
 
 /// Refuses settings that have no effect, or no meaning, in the design of a sweep.
 fn check_design(varied: &[Varied], variation: &Variation, source: &Source) -> Result<(), Error> {
-    let design = json!(variation.design);
-    let design = design.as_str().unwrap_or_default();
-    let is_factorial = variation.design == DesignKind::Factorial;
-    let draws_all = !is_factorial && variation.design != DesignKind::Sensitivity;
-    let refused = |correlation: &Correlation, problem: &str| {
-        source.error(&correlation.between.span(), format!("[[correlation]] {problem}"))
-    };
-    if let Some(first) = variation.correlations.first().filter(|_| !draws_all) {
-        let problem = format!("the design {design} takes its parameters to be independent");
-        return Err(refused(first, &problem));
-    }
-    for vary in variation.vary {
-        let faults = [
-            (vary.sorted && !draws_all, "sorted has no meaning in the design"),
-            (vary.weights.is_some() && is_factorial, "weights have no effect in the design"),
-            (vary.levels.is_some() && !is_factorial, "levels have no effect in the design"),
-        ];
-        let fault = faults.iter().find(|(is_there, _)| *is_there);
-        let entry = varied.iter().find(|entry| vary.names().any(|name| *name == entry.name));
-        if let Some(((_, problem), entry)) = fault.zip(entry) {
-            return Err(entry.refusal(&format!("{problem} {design}"), source));
-        }
-    }
-    for (first, entry) in varied.iter().enumerate() {
-        let group = &varied[first..first + entry.sorted];
-        let is_sorted = |name: &String| group.iter().any(|entry| entry.name == *name);
-        let mut correlations = variation.correlations.iter();
-        if let Some(both) = correlations.find(|c| c.between.get_ref().iter().any(is_sorted)) {
-            return Err(refused(both, "sorted values cannot be correlated as well"));
+    for vary in variation.vary.iter().filter(|_| variation.design == DesignKind::Levels) {
+        let problem = match (vary.sorted, &vary.weights) {
+            (true, _) => "sorted has no meaning in the design levels",
+            (false, Some(_)) => "weights have no effect in the design levels",
+            (false, None) => continue,
+        };
+        if let Some(entry) = varied.iter().find(|entry| vary.names().any(|n| *n == entry.name)) {
+            return Err(entry.refusal(problem, source));
         }
     }
     Ok(())

@@ -3,8 +3,7 @@
 mod reader;
 mod shape;
 
-use crate::design::Place;
-use crate::texts::short;
+use crate::texts::shown;
 use crate::vary::Vary;
 use cosim::system::System;
 use cosim::variation::{SettingValue, Target};
@@ -25,9 +24,8 @@ impl Distribution {
         let reader = Reader { system, target, seed };
         let mut shape = reader.shape(&vary.asked()?)?;
         let Shape::Continuous(continuous) = &mut shape else {
-            let given = [("within", vary.within.is_some()), ("levels", vary.levels.is_some())];
-            return match given.iter().find(|(_, is_given)| *is_given) {
-                Some((key, _)) => Err(format!("{key} is for continuous distributions only")),
+            return match vary.within {
+                Some(_) => Err("within is for continuous distributions only".into()),
                 None => Ok(Self(shape)),
             };
         };
@@ -35,10 +33,6 @@ impl Distribution {
             let [low, high] = within;
             continuous.truncate(reader.number(low)?, reader.number(high)?)?;
         }
-        if vary.levels.is_some_and(|levels| levels < 2) {
-            return Err("levels must be at least 2".into());
-        }
-        continuous.levels = vary.levels.map(u64::from);
         // All values that can be drawn must be within the limits of the variable.
         for end in continuous.ends.into_iter().flatten() {
             reader.checked(end)?;
@@ -46,25 +40,17 @@ impl Distribution {
         Ok(Self(shape))
     }
 
-    /// Returns the number of levels in a factorial design.
+    /// Returns the number of values, of which the design `levels` combines each with all others.
     ///
     /// # Errors
-    /// Returns an error if the distribution has none.
+    /// Returns an error if they cannot be counted.
     pub fn levels(&self) -> Result<u64, String> {
         match &self.0 {
             Shape::List { values, .. } => Ok(values.len() as u64),
             Shape::Whole(ends) => Ok(count(*ends)),
-            Shape::Case(_) => {
-                Err("a factorial design cannot vary a parameter by case, which has no levels"
-                    .into())
+            Shape::Continuous(_) | Shape::Case(_) => {
+                Err("the design levels needs single values: list, range, sign or integers".into())
             }
-            Shape::Continuous(Continuous { levels: None, .. }) => {
-                Err("a factorial design needs levels here".into())
-            }
-            Shape::Continuous(Continuous { ends: None, .. }) => {
-                Err("the distribution is unbounded: a factorial design needs within here".into())
-            }
-            Shape::Continuous(Continuous { levels: Some(levels), .. }) => Ok(*levels),
         }
     }
 
@@ -88,25 +74,13 @@ impl Distribution {
             Shape::Whole([low, high]) => format!("integers, {low} to {high}"),
             Shape::List { values, .. } => {
                 let shown = values.iter().take(6).map(|value| match value {
-                    SettingValue::Real(value) => short(*value),
+                    SettingValue::Real(value) => shown(*value),
                     other => other.to_json().to_string(),
                 });
                 let more = if values.len() > 6 { ", …" } else { "" };
                 format!("one of {}{more}", shown.collect::<Vec<_>>().join(", "))
             }
             Shape::Case(seeds) => format!("number of the case + {}", seeds.first),
-        }
-    }
-
-    /// Returns whether values can be between any two of them, so that correlations and searches
-    /// make sense.
-    pub fn is_ordered(&self) -> bool {
-        match &self.0 {
-            Shape::Continuous(_) | Shape::Whole(_) => true,
-            Shape::List { values, .. } => {
-                matches!(values.first(), Some(SettingValue::Real(_) | SettingValue::Integer(_)))
-            }
-            Shape::Case(_) => false,
         }
     }
 
@@ -125,36 +99,21 @@ impl Distribution {
         if let Shape::Case(seeds) = &self.0 { Some(seeds.count()) } else { None }
     }
 
-    /// Returns the value at a place for the case with this number.
-    pub fn value(&self, place: Place, case: u64) -> SettingValue {
+    /// Returns the quantile of this probability for the case with this number. Those of 0 and 1 are
+    /// the ends.
+    pub fn value(&self, unit: f64, case: u64) -> SettingValue {
         match &self.0 {
-            Shape::Continuous(continuous) => SettingValue::Real(continuous.value(place)),
+            Shape::Continuous(continuous) => SettingValue::Real(continuous.value(unit)),
             Shape::Whole(ends) => {
-                let index = match place {
-                    Place::Quantile(unit) => (unit * count(*ends) as f64) as u64,
-                    place => index(place),
-                };
-                let offset = index.min(count(*ends) - 1);
+                let offset = ((unit * count(*ends) as f64) as u64).min(count(*ends) - 1);
                 SettingValue::Integer((i64::from(ends[0]) + offset.cast_signed()) as i32)
             }
             Shape::List { values, sums } => {
-                let index = match place {
-                    Place::Quantile(unit) => sums.partition_point(|sum| *sum <= unit),
-                    place => index(place) as usize,
-                };
+                let index = sums.partition_point(|sum| *sum <= unit);
                 values[index.min(values.len().saturating_sub(1))].clone()
             }
             // The ends of the seeds are those of an integer.
             Shape::Case(seeds) => SettingValue::Integer(seeds.of(case) as i32),
         }
-    }
-}
-
-/// Returns the index of a level or an end; that of the upper end is larger than any index.
-fn index(place: Place) -> u64 {
-    match place {
-        Place::Level(level) => level,
-        Place::End(true) => u64::MAX,
-        Place::End(false) | Place::Quantile(_) => 0,
     }
 }

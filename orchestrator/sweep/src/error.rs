@@ -20,12 +20,12 @@ pub enum Error {
     },
     /// Cases could not be flown, for a reason that is independent of their values.
     #[error(
-        "case {case} could not be flown: {source}{}; the same command flies what is missing",
+        "{case} could not be flown: {source}{}; the same command flies what is missing",
         if *more > 0 { format!(" ({more} more parts have such cases)") } else { String::new() }
     )]
     Case {
-        /// Number of the first of them.
-        case: u64,
+        /// The first of them in words, for example `case 12`.
+        case: String,
         /// Number of other parts with such cases.
         more: usize,
         /// Reason of the first of them.
@@ -36,13 +36,11 @@ pub enum Error {
     Failed(String),
     /// The work was asked to end before it was complete.
     #[error(
-        "ended by {request}: {done} of {total} {} and kept in {}; the same command continues from there",
-        what, out.display()
+        "ended by {request}: {done} of {total} cases are flown and kept in {}; the same command continues from there",
+        out.display()
     )]
     Unfinished {
-        /// Noun and verb of the count, for example `cases are flown`.
-        what: &'static str,
-        /// Number that is complete and kept.
+        /// Number of cases that are flown and kept.
         done: u64,
         /// Number of all.
         total: u64,

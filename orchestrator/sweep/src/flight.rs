@@ -332,11 +332,26 @@ fn typed<'a>(kind: &Type, values: impl Iterator<Item = &'a SettingValue>) -> Val
 }
 
 /// Returns whether instances can be reset: a case that is flown with instances that were reset
-/// after another case gives the same result as with new ones.
+/// after another case gives the same result as with new ones. This is tried once.
 ///
 /// # Errors
 /// The errors are those of [`Flight::fly`] for the first case.
 pub fn can_reset(sweep: &Sweep, opened: &mut Opened, interrupt: &Interrupt) -> Result<bool, Error> {
+    let mut known = sweep.resets.lock();
+    let resets = match *known {
+        Some(resets) => return Ok(resets),
+        None => try_to_reset(sweep, opened, interrupt)?,
+    };
+    if !resets {
+        tracing::warn!(
+            "a case gave another result after fmi2Reset than with a new instance: each case gets new instances"
+        );
+    }
+    *known = Some(resets);
+    Ok(resets)
+}
+
+fn try_to_reset(sweep: &Sweep, opened: &mut Opened, interrupt: &Interrupt) -> Result<bool, Error> {
     if sweep.experiment().law.is_some() {
         // A trial would ask the law for flights that nobody requested.
         let components = sweep.system(opened)?.components;

@@ -8,9 +8,21 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 use std::path::PathBuf;
 
-/// Returns the parts of the cases below `cases`, each of `length` cases but the last.
-pub fn parts(cases: u64, length: u64) -> impl Iterator<Item = Range<u64>> {
-    (0..cases.div_ceil(length)).map(move |i| i * length..cases.min((i + 1) * length))
+/// Number of cases in a part beyond the first `FEW` cases.
+pub const LENGTH: u64 = 250;
+
+/// Number of cases that are flown in parts of a tenth of this length, so that little work occupies
+/// all cores and loses little when it ends early.
+const FEW: u64 = 2500;
+
+/// Returns the parts of so many cases. Those of fewer cases are the first of them, except for the
+/// last.
+pub fn parts(cases: u64) -> impl Iterator<Item = Range<u64>> {
+    let of = move |length: u64, cases: u64| {
+        (0..cases.div_ceil(length)).map(move |i| i * length..cases.min((i + 1) * length))
+    };
+    let others = of(LENGTH, cases).skip_while(|part| part.start < FEW);
+    of(LENGTH / 10, cases.min(FEW)).chain(others)
 }
 
 /// Folder of the parts that are made from inputs with these hashes.
@@ -168,6 +180,19 @@ mod tests {
     use super::*;
     use crate::table::{Column, Values};
     use std::fs;
+
+    #[test]
+    fn parts_follow_one_another_and_do_not_change_when_cases_are_added() {
+        for cases in [1, 25, 1100, 2500, 2510, 10_000] {
+            let some: Vec<_> = parts(cases).collect();
+            let more: Vec<_> = parts(20_000).take(some.len()).collect();
+            assert_eq!((some[0].start, some[some.len() - 1].end), (0, cases));
+            assert!(some.windows(2).all(|pair| pair[0].end == pair[1].start));
+            assert_eq!(some[..some.len() - 1], more[..some.len() - 1]);
+        }
+        let lengths: Vec<u64> = parts(3000).map(|part| part.end - part.start).collect();
+        assert_eq!((lengths.len(), lengths[99], lengths[100]), (102, 25, 250));
+    }
 
     #[test]
     fn no_changed_byte_goes_unseen() {

@@ -2,29 +2,50 @@
 
 /// Formats a share as percent.
 pub fn percent(share: f64) -> String {
-    format!("{} %", short(100.0 * share))
+    format!("{} %", shown(100.0 * share))
 }
 
-/// Formats a number with four significant digits.
-pub fn short(value: f64) -> String {
-    if value == 0.0 || !value.is_finite() {
-        return format!("{value}");
-    }
-    let text = if (1e-3..1e6).contains(&value.abs()) {
-        let digits = (3 - value.abs().log10().floor() as i32).max(0) as usize;
-        trimmed(value, digits)
-    } else {
+/// Formats a number with as many digits as papers print.
+pub fn shown(value: f64) -> String {
+    let magnitude = value.abs();
+    let text = if value == 0.0 {
+        "0".into()
+    } else if !value.is_finite() {
+        value.to_string()
+    } else if !(1e-3..1e5).contains(&magnitude) {
         format!("{value:.3e}")
+    } else {
+        // The tables of the papers have four places after the point; small numbers get more, to
+        // keep three significant digits.
+        let digits =
+            (4 - magnitude.log10().floor() as i32).clamp(0, if magnitude < 0.1 { 6 } else { 4 });
+        let digits = if magnitude < 0.1 { digits - 2 } else { digits } as usize;
+        let text = format!("{value:.digits$}");
+        let is_fraction = text.contains('.');
+        text.trim_end_matches(|c| is_fraction && c == '0').trim_end_matches('.').to_string()
     };
+    // A line is not broken at this sign.
     text.replace('-', "−")
 }
 
-/// Formats a number with at most so many digits after the point.
-pub fn trimmed(value: f64, digits: usize) -> String {
-    let text = format!("{value:.digits$}");
-    if text.contains('.') {
-        text.trim_end_matches('0').trim_end_matches('.').to_string()
-    } else {
-        text
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_shown_as_papers_print_them() {
+        for (value, text) in [
+            (1.6055, "1.6055"),
+            (0.3552, "0.3552"),
+            (116.8, "116.8"),
+            (12_345.6, "12346"),
+            (0.08511, "0.0851"),
+            (0.23413, "0.2341"),
+            (2e-5, "2.000e−5"),
+            (-0.0123, "−0.0123"),
+            (100.0, "100"),
+        ] {
+            assert_eq!(shown(value), text);
+        }
     }
 }

@@ -49,9 +49,6 @@ pub struct Vary {
     pub within: Option<[Value; 2]>,
     /// Probabilities of the values of `list`, which are scaled to a sum of 1.
     pub weights: Option<Vec<f64>>,
-    /// Number of levels of a continuous distribution in a factorial design, equally spaced in
-    /// probability, ends included.
-    pub levels: Option<u32>,
 }
 
 /// The one distribution that a [`Vary`] asks for.
@@ -170,31 +167,11 @@ pub enum DesignKind {
     /// Each case is drawn independently of all others.
     #[default]
     Random,
-    /// The range of each parameter is divided into as many strata of equal probability as there are
-    /// cases, and each stratum holds one case.
-    LatinHypercube,
-    /// Points of Sobol's sequence, scrambled by Owen's method.
-    Sobol,
-    /// All combinations of the levels of the varied parameters.
-    Factorial,
+    /// All combinations of the values of the varied parameters.
+    Levels,
     /// The corners of the parameter space, and random cases. If there are more corners than cases,
     /// every other case is a corner that is chosen at random.
     Corners,
-    /// Pairs of random points with exchanged coordinates, from which Sobol's indices are computed.
-    /// The number of cases is a multiple of the number of parameters plus two.
-    Sensitivity,
-}
-
-/// Correlation of two varied parameters. It is the correlation of the normal scores behind their
-/// distributions (a Gaussian copula).
-#[derive(Clone, Debug, Deserialize, JsonSchema, Serialize)]
-#[serde(deny_unknown_fields)]
-pub struct Correlation {
-    /// The two parameters.
-    #[schemars(with = "[String; 2]")]
-    pub between: Spanned<[String; 2]>,
-    /// Coefficient of the correlation, above -1 and below 1.
-    pub coefficient: f64,
 }
 
 /// Everything that differs between the cases of a sweep, as a file describes it.
@@ -202,13 +179,11 @@ pub struct Correlation {
 pub struct Variation<'a> {
     /// Parameters that vary.
     pub vary: &'a [Vary],
-    /// Correlations between them.
-    pub correlations: &'a [Correlation],
     /// Design that places the cases.
     pub design: DesignKind,
     /// Seed of all random numbers.
     pub seed: u64,
-    /// Number of cases, which a factorial design may leave out.
+    /// Number of cases, which the design `levels` may leave out.
     pub cases: Option<u64>,
     /// Parameters that the file sets to one value in all cases.
     pub set: Vec<&'a str>,

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output};
 use std::sync::LazyLock;
 use std::time::{Duration, Instant};
+use sweep::table::{CaseTable, Reader, Values};
 use tempfile::TempDir;
 use zip::write::SimpleFileOptions;
 
@@ -201,6 +202,23 @@ impl Bench {
     /// Returns the rows of the experiment's run.
     pub(crate) fn results(&self) -> String {
         self.text("out/loop/results.csv")
+    }
+
+    /// Returns the table of cases in a folder of results: a line for its heading and one for each
+    /// row, whose cells are separated by commas.
+    pub(crate) fn cases(&self, folder: &str) -> Vec<String> {
+        let path = self.path(folder).join("cases.parquet");
+        let CaseTable { columns } = Reader::open(&path).unwrap().table().unwrap();
+        let cell = |values: &Values, row: usize| match values {
+            Values::Real(values) => values[row].to_string(),
+            Values::Text(values) => values[row].clone(),
+            Values::Optional(values) => values[row].map(|v| v.to_string()).unwrap_or_default(),
+            values => values.json(row).to_string(),
+        };
+        let heading: Vec<&str> = columns.iter().map(|column| column.name.as_str()).collect();
+        let row = |row| columns.iter().map(|c| cell(&c.values, row)).collect::<Vec<_>>().join(",");
+        let rows = (0..columns[0].values.len()).map(row);
+        std::iter::once(heading.join(",")).chain(rows).collect()
     }
 
     pub(crate) fn json(&self, name: &str) -> serde_json::Value {

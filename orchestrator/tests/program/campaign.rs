@@ -8,7 +8,7 @@ use std::fs;
 pub(crate) const CAMPAIGN: &str = r#"
 title = "gains"
 experiment = "loop.toml"
-design = "factorial"
+design = "levels"
 
 [signals]
 out = ["plant.output.integral"]
@@ -43,15 +43,10 @@ pub(crate) fn bench(campaign: &str) -> Bench {
     bench
 }
 
-/// Flies a campaign, and returns its table as lines of CSV.
+/// Flies a campaign, and returns its table.
 fn flown(bench: &Bench, arguments: &[&str]) -> Vec<String> {
-    bench.says(&[&["campaign", "c.toml", "--csv"], arguments].concat());
-    table(bench, "out/c")
-}
-
-fn table(bench: &Bench, out: &str) -> Vec<String> {
-    let text = fs::read_to_string(bench.path(&format!("{out}/cases.csv"))).unwrap();
-    text.lines().map(str::to_string).collect()
+    bench.says(&[&["campaign", "c.toml"], arguments].concat());
+    bench.cases("out/c")
 }
 
 fn refusal(campaign: &str) -> String {
@@ -212,12 +207,12 @@ fn an_instance_that_cannot_be_reset_is_made_anew() {
     let flags = ["-DRESETS=0"];
     let bench = Bench::made(LOOP, &Recipe { flags: &flags, ..Recipe::default() });
     fs::write(bench.path("c.toml"), RANDOM).unwrap();
-    let (code, _, errors) = bench.call(&["campaign", "c.toml", "--csv"]);
+    let (code, _, errors) = bench.call(&["campaign", "c.toml"]);
     assert_eq!(code, 0);
     assert!(errors.contains("another result after fmi2Reset than with a new instance"), "{errors}");
     let other = self::bench(RANDOM);
     flown(&other, &[]);
-    assert_eq!(table(&bench, "out/c"), table(&other, "out/c"));
+    assert_eq!(bench.cases("out/c"), other.cases("out/c"));
 }
 
 #[test]
@@ -240,7 +235,7 @@ fn a_campaign_ends_when_its_question_is_answered() {
 fn a_wrong_file_is_refused_with_the_key_the_line_and_the_nearest_name() {
     for (from, to, said) in [
         ("title = ", "titel = ", "did you mean \"title\"?"),
-        ("design = \"factorial\"", "design = \"factoriel\"", "did you mean \"factorial\"?"),
+        ("design = \"levels\"", "design = \"levles\"", "did you mean \"levels\"?"),
         ("list = [0.5", "lst = [0.5", "c.toml:11: unknown field `lst`, expected"),
         ("loop.toml", "lop.toml", "c.toml:3: "),
         (
@@ -261,7 +256,7 @@ fn a_wrong_file_is_refused_with_the_key_the_line_and_the_nearest_name() {
         (
             "list = [0.5, 1.0, 2.0]",
             "normal = { mean = 1.0, deviation = 0.1 }",
-            "a factorial design needs levels here",
+            "the design levels needs single values: list, range, sign or integers",
         ),
         ("list = [0.5, 1.0, 2.0]", "uniform = [2.0, 1.0]", "must be larger than the first one"),
         ("list = [0.5, 1.0, 2.0]", "list = [1.0]\nsign = 2.0", "one distribution is needed"),
@@ -292,19 +287,19 @@ fn a_wrong_file_is_refused_with_the_key_the_line_and_the_nearest_name() {
             "ends needs a measure of the kind largest",
         ),
         (
-            "design = \"factorial\"",
-            "cases = 5\ndesign = \"factorial\"",
-            "the levels have 6 combinations",
+            "design = \"levels\"",
+            "cases = 5\ndesign = \"levels\"",
+            "the values have 6 combinations",
         ),
-        ("design = \"factorial\"", "design = \"random\"", "cases is missing"),
+        ("design = \"levels\"", "design = \"random\"", "cases is missing"),
         (
-            "design = \"factorial\"",
-            "cases = 5\ndesign = \"factorial\"\nset = { \"gain.flig\" = true }",
+            "design = \"levels\"",
+            "cases = 5\ndesign = \"levels\"\nset = { \"gain.flig\" = true }",
             "did you mean",
         ),
         (
-            "design = \"factorial\"",
-            "design = \"factorial\"\nmetrics = [\"sampels\"]",
+            "design = \"levels\"",
+            "design = \"levels\"\nmetrics = [\"sampels\"]",
             "did you mean \"samples\"?",
         ),
     ] {
@@ -328,33 +323,6 @@ fn impossible_ranges_of_cases_are_refused() {
         assert!(errors.contains(said), "{errors}");
     }
     bench.fails(2, &["campaign", "c.toml", "--case", "1100"], "the campaign has 1100 cases");
-}
-
-#[test]
-fn oracle_correlated_parameters_have_their_correlation() {
-    let text = RANDOM.replace(
-        "parameter = \"gain.kind\"\nlist = [\"calm\", \"rough\"]\nweights = [3.0, 1.0]",
-        "parameter = \"gain.largest\"\nnormal = { mean = 5.0, deviation = 2.0 }",
-    );
-    let text = format!(
-        "{text}[[correlation]]\nbetween = [\"gain.gain\", \"gain.largest\"]\ncoefficient = -0.8\n"
-    );
-    let rows = flown(&bench(&text), &[]);
-    let cell =
-        |row: &String, place: usize| row.split(',').nth(place).unwrap().parse::<f64>().unwrap();
-    let columns =
-        [1, 2].map(|place| rows[1..].iter().map(|row| cell(row, place)).collect::<Vec<_>>());
-    let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
-    let centred =
-        columns.map(|values| values.iter().map(|v| v - mean(&values)).collect::<Vec<_>>());
-    let product = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
-    let [x, y] = &centred;
-    let coefficient = product(x, y) / (product(x, x) * product(y, y)).sqrt();
-    // A uniform and a normal variable: the coefficient times the root of 3 / pi.
-    assert!(
-        (coefficient + 0.8 * (3.0 / std::f64::consts::PI).sqrt()).abs() < 0.05,
-        "{coefficient}"
-    );
 }
 
 #[test]

@@ -311,9 +311,9 @@ fn a_campaign_is_the_same_with_instances_in_processes_of_their_own() {
     let campaign = CAMPAIGN.replace("plant.fail.time", "gain.fail.time");
     fs::write(bench.path("c.toml"), campaign).unwrap();
     let table = |isolate| {
-        let arguments = ["campaign", "c.toml", "--csv", "--fresh", isolate];
+        let arguments = ["campaign", "c.toml", "--fresh", isolate];
         bench.says(&arguments);
-        bench.text("out/c/cases.csv")
+        bench.cases("out/c").join("\n")
     };
     let isolated = table("--isolate");
     assert_eq!(isolated, table("--isolate=false"));
@@ -328,11 +328,11 @@ fn a_campaign_goes_on_after_an_instance_that_does_harm_but_has_no_result() {
     let gains: Vec<String> = (1..=60).map(|gain| format!("{gain}.0")).collect();
     let campaign = CAMPAIGN.replace("[0.5, 1.0, 2.0]", &format!("[{}]", gains.join(", ")));
     fs::write(bench.path("c.toml"), campaign.replace("[1e9, 2.0]", "[1e9]")).unwrap();
-    let (code, out, errors) = bench.call(&["campaign", "c.toml", "--csv"]);
+    let (code, out, errors) = bench.call(&["campaign", "c.toml"]);
     let says =
         "case 12 could not be flown: gain failed at t = 0 s in doStep: its process was killed";
     assert!(code == 1 && errors.contains(says) && out.is_empty(), "{errors}");
-    assert!(!bench.path("out/c/summary.json").exists() && !bench.path("out/c/cases.csv").exists());
+    assert!(!bench.path("out/c/summary.json").exists() && !bench.path("out/c/cases.parquet").exists());
     // The parts without such a case are kept.
     let (code, out, _) = bench.call(&["campaign", "c.toml", "--work"]);
     assert!(code == 0 && out.contains("\"missing\":[[0,25]]"), "{out}");

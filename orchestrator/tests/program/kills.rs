@@ -39,9 +39,9 @@ panel = [{ label = "output", signal = "plant.output.integral" }]
 /// Commands with their results.
 const COMMANDS: [(&[&str], &str); 5] = [
     (&["run", "loop.toml", "--force", "--set", "gain.pause=0.02"], "out/loop"),
-    (&["campaign", "c.toml", "--csv"], "out/c"),
+    (&["campaign", "c.toml"], "out/c"),
     (&["reproduce", "study.toml", "--out", "out/study"], "out/study"),
-    (&["falsify", "c.toml", "--force"], "out/c-worst"),
+    (&["campaign", "c.toml", "--worst", "--force"], "out/c-worst"),
     (&["pack", "loop.toml", "--force", "--out", "out/packed/loop.ssp"], "out/packed"),
 ];
 

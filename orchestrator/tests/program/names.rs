@@ -38,8 +38,8 @@ fn a_name_of_another_kind_is_told_what_to_call() {
         ("reproduce", "Model", "Model is an FMU: orchestrator inspect Model"),
         ("campaign", "loop", "loop is an experiment: orchestrator run loop"),
         ("campaign", "papers", "papers is a study: orchestrator reproduce papers"),
-        ("falsify", "loop.toml", "loop.toml is an experiment: orchestrator run loop.toml"),
-        ("falsify", "Model", "Model is an FMU: orchestrator inspect Model"),
+        ("campaign", "loop.toml", "loop.toml is an experiment: orchestrator run loop.toml"),
+        ("campaign", "Model", "Model is an FMU: orchestrator inspect Model"),
         (
             "inspect",
             "loop",
@@ -164,7 +164,7 @@ fn a_bad_value_is_blamed_on_its_option() {
         (&["campaign", "gains", "--case", "-1"], "'-1' for '--case"),
         (&["campaign", "gains", "--case", "6"], "--case 6: "),
         (&["campaign", "gains", "--cases", "-5..3"], "'-5..3' for '--cases"),
-        (&["falsify", "gains", "--time", "-1"], "'-1' for '--time"),
+        (&["campaign", "gains", "--worst", "--time", "-1"], "'-1' for '--time"),
         (&["reproduce", "papers", "--members", "-1"], "'-1' for '--members"),
         (&["margins", "loop", "--at", "-5", "--open", "plant.input"], "--at -5: "),
         (

@@ -62,9 +62,6 @@ fn a_run_is_drawn_as_its_experiment_says_or_as_it_is_asked_for() {
     for name in ["limit of norm, a", "limit of norm, b", "reference", "reference of α, b"] {
         assert_eq!(picture.matches(&format!(">{name}</text>")).count(), 1, "{name}: {picture}");
     }
-    let (code, said, errors) = bench.call(&["plot", "a", "b", "--out", "both.png"]);
-    assert_eq!((code, said.as_str()), (0, "both.png\n"), "{errors}");
-    assert!(fs::read(bench.path("both.png")).unwrap().starts_with(b"\x89PNG"));
     // A run below out is found by its name.
     fs::create_dir(bench.path("out")).unwrap();
     fs::rename(bench.path("b"), bench.path("out/b")).unwrap();
@@ -150,12 +147,12 @@ fn the_page_of_a_run_without_panels_draws_what_is_recorded() {
 }
 
 #[test]
-fn figures_of_margins_and_responses_are_svg_or_png() {
+fn figures_of_margins_and_responses_are_svg() {
     let bench = flown();
     for command in ["margins", "response"] {
         let (code, _, errors) = bench.call(&[command, "loop.toml", "--plot", "a.pdf"]);
         assert_eq!(code, 2, "{errors}");
-        let said = "--plot a.pdf: the name must end with .svg or .png, which selects the format";
+        let said = "--plot a.pdf: the name must end with .svg";
         assert!(errors.contains(said), "{errors}");
     }
 }
@@ -171,7 +168,7 @@ fn what_cannot_be_drawn_is_refused_by_name() {
         (&["a", "--signals", "plent.*"], "no recorded variable matches \"plent.*\""),
         (&["c"], "there is no run c"),
         (&["."], "holds neither results.csv nor results.parquet"),
-        (&["a", "--out", "a.pdf"], "must end with .svg, .png or .html"),
+        (&["a", "--out", "a.pdf"], "must end with .svg or .html"),
         (&["a", "--from", "7"], "it goes from 0 s to 3 s"),
         (&["a", "--from", "2", "--to", "1"], "--from 2 must be below --to 1"),
         (&["a/metrics.json"], "a/metrics.json is no table of recorded variables"),

@@ -43,8 +43,8 @@ fn of_twenty_equal_runs_one_writes_the_results() {
 fn of_twenty_equal_campaigns_none_spoils_another() {
     let bench = Bench::new();
     fs::write(bench.path("c.toml"), CAMPAIGN).unwrap();
-    assert!(successes(&bench, &["campaign", "c.toml", "--csv", "--quiet"]) >= 1);
-    let table = bench.text("out/c/cases.csv");
-    assert_eq!(bench.call(&["campaign", "c.toml", "--csv", "--fresh"]).0, 0);
-    assert_eq!(bench.text("out/c/cases.csv"), table);
+    assert!(successes(&bench, &["campaign", "c.toml", "--quiet"]) >= 1);
+    let table = bench.cases("out/c");
+    assert_eq!(bench.call(&["campaign", "c.toml", "--fresh"]).0, 0);
+    assert_eq!(bench.cases("out/c"), table);
 }

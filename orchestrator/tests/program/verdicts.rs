@@ -109,7 +109,7 @@ fn a_search_says_whether_the_worst_case_breaks_a_limit() {
     for (bound, breaks) in [("9.0", false), ("7.0", true)] {
         let text = format!("{RANDOM}[search]\nlargest = \"last\"\ncases = 60\n");
         let bench = bench(&text.replace("at_most = 7.9", &format!("at_most = {bound}")));
-        let said = bench.says(&["falsify", "c.toml", "--out", "w"]);
+        let said = bench.says(&["campaign", "c.toml", "--worst", "--out", "w"]);
         assert_eq!(said.contains("breaks small"), breaks, "{said}");
         let text = bench.text("w/report.html");
         let verdicts = |class: &str, word: &str| {

@@ -2,12 +2,13 @@
 
 `fmu` gives the path of an FMU for FMPy or any other importer, `ClosedLoop` connects a controller in
 Python to the vehicle, and `experiment` runs a paper's experiment and returns its table. `campaign`
-flies thousands of cases of an experiment, and `falsify` looks for the worst case. `linearise` gives the linear model of a loop, and `margins`
-its stability margins. `reproduce` runs a paper's comparison and judges its claims.
+flies thousands of cases of an experiment, and looks for the worst one. `linearise` gives the linear
+model of a loop, and `margins` its stability margins. `reproduce` runs a paper's comparison and
+judges its claims.
 Quantities are in SI units and radians unless `units="deg"` selects degrees.
 """
 
-from ._campaign import Campaign, Flown, Search, campaign, falsify
+from ._campaign import Campaign, Flown, Search, campaign
 from ._data import browse, experiments, fmu, fmus
 from ._experiment import experiment
 from ._instance import InstanceError, InstanceWarning
@@ -37,7 +38,6 @@ __all__ = [
     "campaign",
     "experiment",
     "experiments",
-    "falsify",
     "fmu",
     "fmus",
     "linearise",

@@ -192,15 +192,50 @@ class Campaign:
             LawError: The law failed.
         """
         check_units(units)
-        command = [*self.command("campaign"), "--case", str(number)]
+        command = [*self.command(), "--case", str(number)]
         with self._laws(number) as laws:
             return recorded(command, out, units, laws=laws)
+
+    def worst(
+        self,
+        out: str | os.PathLike[str] | None = None,
+        time: int | None = None,
+        jobs: int | None = None,
+        *,
+        units: Units = "si",
+    ) -> Search:
+        """Looks for the worst case of a campaign that has a [search].
+
+        Args:
+            out: Folder of the results, by default out/NAME-worst. Those of an earlier search in it
+                are replaced.
+            time: Time after which no further cases are begun, s.
+            jobs: Number of threads, by default one for each core.
+            units: "deg" gives angles and angular rates of the table in degrees.
+
+        Raises:
+            OrchestratorError: The campaign was refused, or the search failed.
+            LawError: The law failed. `experiment` takes it together with the worst case.
+        """
+        check_units(units)
+        folder = Path("out", f"{self.name}-worst") if out is None else Path(out)
+        arguments = ["--worst", "--out", str(folder), "--fresh"]
+        for option, value in (("--time", time), ("--jobs", jobs)):
+            if value is not None:
+                arguments += [option, str(value)]
+        self.call(*arguments)
+        return Search(
+            table=read_cases(folder / "search.parquet", units),
+            outcome=json.loads((folder / "search.json").read_text("utf-8")),
+            figure=Figure((folder / "history.svg").read_text("utf-8")),
+            folder=folder.absolute(),
+        )
 
     def _fly(self, law: PickledLaw, folder: Path, jobs: int | None) -> None:
         """Flies the missing parts with a law, and lets the orchestrator merge and judge them."""
         flown: set[int] = set()
         # The workers share the cores.
-        command = [*self.command("campaign"), "--out", str(folder.absolute()), "--jobs", "1"]
+        command = [*self.command(), "--out", str(folder.absolute()), "--jobs", "1"]
         with Pool(law, command, jobs) as pool:
             # A campaign that ends with an answer needs more cases at each look.
             while missing := missing_parts(self.call, folder):
@@ -210,9 +245,9 @@ class Campaign:
                 pool.fly(missing)
             pool.finish()
 
-    def command(self, name: str) -> list[str]:
-        """Returns the arguments of a command of the orchestrator for this campaign."""
-        command = [name, self.path, "--fmu-dir", str(FMUS), "--quiet"]
+    def command(self) -> list[str]:
+        """Returns the arguments of the orchestrator for this campaign."""
+        command = ["campaign", self.path, "--fmu-dir", str(FMUS), "--quiet"]
         if self.law is not None:
             command += ["--fmu", f"controller={fmu(STAND_IN)}"]
         return command
@@ -226,12 +261,12 @@ class Campaign:
             assert self.law is not None
             raise error.in_file(self.law.file) from error.__cause__
 
-    def call(self, *arguments: str, command: str = "campaign") -> str:
+    def call(self, *arguments: str) -> str:
         """Calls the orchestrator with this campaign, and returns what it prints."""
-        command_line = [*self.command(command), *arguments]
+        command_line = [*self.command(), *arguments]
         with self._laws() as laws:
             if laws is not None:
-                laws.has_cases = command != "falsify"
+                laws.has_cases = "--worst" not in arguments
             exit_code, error, printed = orchestrate(command_line, laws=laws)
         if exit_code != 0:
             raise OrchestratorError(error, exit_code, None)
@@ -253,47 +288,6 @@ def campaign(name: str | os.PathLike[str], law: Law | None = None) -> Campaign:
     need("pyarrow", "campaign")
     path = Path(name)
     return Campaign(str(path.absolute()) if path.is_file() else os.fspath(name), law)
-
-
-def falsify(
-    name: str | os.PathLike[str],
-    out: str | os.PathLike[str] | None = None,
-    time: int | None = None,
-    jobs: int | None = None,
-    *,
-    units: Units = "si",
-    law: Law | None = None,
-) -> Search:
-    """Looks for the worst case of a campaign that has a [search].
-
-    Args:
-        name: Path of a campaign file (TOML), or the name of a campaign of this package.
-        out: Folder of the results, by default out/NAME-worst. Those of an earlier search in it
-            are replaced.
-        time: Time after which no further cases are begun, s.
-        jobs: Number of threads, by default one for each core.
-        units: "deg" gives angles and angular rates of the table in degrees.
-        law: Law in Python that replaces the controller, as in `campaign`. `experiment` takes it
-            together with the worst case.
-
-    Raises:
-        OrchestratorError: The campaign was refused, or the search failed.
-        LawError: The law failed.
-    """
-    check_units(units)
-    searched = campaign(name, law)
-    folder = Path("out", f"{searched.name}-worst") if out is None else Path(out)
-    arguments = ["--out", str(folder), "--force"]
-    for option, value in (("--time", time), ("--jobs", jobs)):
-        if value is not None:
-            arguments += [option, str(value)]
-    searched.call(*arguments, command="falsify")
-    return Search(
-        table=read_cases(folder / "search.parquet", units),
-        outcome=json.loads((folder / "search.json").read_text("utf-8")),
-        figure=Figure((folder / "history.svg").read_text("utf-8")),
-        folder=folder.absolute(),
-    )
 
 
 def near(path: Path) -> Path:

@@ -1,4 +1,4 @@
-//! Histograms, empirical distributions and scatter plots of a campaign's cases.
+//! Histograms and scatter plots of a campaign's cases.
 
 use crate::findings::{Findings, breaking};
 use crate::plan::Plan;
@@ -13,12 +13,12 @@ const FIRST: Color = Color::CURVES[0];
 const SECOND: Color = Color::CURVES[1];
 /// Largest number of bins of a histogram.
 const BINS: usize = 60;
-/// Approximate largest number of points of a curve or of dots in a panel.
+/// Approximate largest number of dots in a panel.
 const POINTS: usize = 600;
 /// Largest number of cases that are marked in a panel.
 const MARKED: usize = 300;
-/// Largest number of values of a parameter whose cases are spread to strips.
-const STRIPS: usize = 5;
+/// Number of panels side by side.
+const COLUMNS: usize = 3;
 /// Largest number of parameters and of measures whose scatter plots are drawn.
 const PARAMETERS: usize = 12;
 const MEASURES: usize = 3;
@@ -31,13 +31,13 @@ fn panel(x_label: &str, y_label: &str, curves: Vec<Curve>) -> Panel {
     Panel { x_label: x_label.into(), y_label: y_label.into(), curves, ..Panel::default() }
 }
 
-/// Draws the histogram and the empirical distribution of each measure.
+/// Draws the histogram of each measure that differs from case to case.
 pub(super) fn distributions(
     plan: &Plan,
     findings: &Findings,
     table: &Reader,
-) -> Result<Vec<Figure>, Error> {
-    let mut figures = Vec::new();
+) -> Result<Option<Figure>, Error> {
+    let mut panels = Vec::new();
     for measure in &plan.recorded {
         let mut values = table.column(&measure.name)?.numbers();
         values.retain(|value| value.is_finite());
@@ -48,35 +48,17 @@ pub(super) fn distributions(
         if low == high {
             continue;
         }
-        let limits = plan.limits().filter(|(limit, _)| limit.measure.get_ref() == &measure.name);
-        let limits: Vec<f64> =
-            limits.filter_map(|(limit, _)| limit.at_most.or(limit.at_least)).collect();
-        let marks = || {
-            let mark = |limit: &f64| {
-                Curve::new("limit", Color::LIMIT, Shape::Vertical, vec![*limit], vec![f64::NAN])
-            };
-            limits.iter().map(mark)
-        };
         let (edges, counts) = histogram(&values, low, high);
-        let mut bars = vec![Curve::new("cases", FIRST, Shape::Steps, edges, counts)];
-        bars.extend(marks());
-        let mut panels = vec![panel(&label(measure), "number of cases", bars)];
-        let n = values.len();
-        // Every value at the upper end, where values are few and matter most; fewer below.
-        let tail = n.saturating_sub(POINTS / 3);
-        let stride = tail.div_ceil(POINTS).max(1);
-        let places = || (0..tail).step_by(stride).chain(tail..n);
-        let x = places().map(|i| values[i]).collect();
-        let y = places().map(|i| (i + 1) as f64 / n as f64).collect();
-        let mut steps =
-            vec![Curve::new("share of cases up to this value", SECOND, Shape::Line, x, y)];
-        steps.extend(marks());
-        panels.push(panel(&label(measure), "share of cases", steps));
-        let title =
-            format!("Distribution of {} over {}", measure.words, super::cases(findings.cases));
-        figures.push(Figure { title, columns: 2, legend: Legend::Above, panels });
+        let mut curves = vec![Curve::new("cases", FIRST, Shape::Steps, edges, counts)];
+        let limits = plan.limits().filter(|(limit, _)| limit.measure.get_ref() == &measure.name);
+        curves.extend(limits.filter_map(|(limit, _)| limit.at_most.or(limit.at_least)).map(|at| {
+            Curve::new("limit", Color::LIMIT, Shape::Vertical, vec![at], vec![f64::NAN])
+        }));
+        panels.push(panel(&label(measure), "number of cases", curves));
     }
-    Ok(figures)
+    let title = format!("Distributions over {}", super::cases(findings.cases));
+    let columns = COLUMNS.min(panels.len());
+    Ok((columns > 0).then_some(Figure { title, columns, legend: Legend::Above, panels }))
 }
 
 /// Returns the edges of a histogram's bins and the number of values in each; the last edge has no
@@ -120,7 +102,6 @@ pub(super) fn scatters(plan: &Plan, table: &Reader) -> Result<Vec<Figure>, Error
             continue;
         }
         let panels = shown.iter().map(|(varied, x)| {
-            let x = strips(x);
             let pick = |cases: &mut dyn Iterator<Item = usize>| -> (Vec<f64>, Vec<f64>) {
                 cases.filter(|i| y[*i].is_finite()).map(|i| (x[i], y[i])).unzip()
             };
@@ -136,47 +117,16 @@ pub(super) fn scatters(plan: &Plan, table: &Reader) -> Result<Vec<Figure>, Error
         let panels: Vec<Panel> = panels.collect();
         if !panels.is_empty() {
             let title = format!("{} against the varied parameters", measure.words);
-            let columns = 3.min(panels.len());
+            let columns = COLUMNS.min(panels.len());
             figures.push(Figure { title, columns, legend: Legend::Above, panels });
         }
     }
     Ok(figures)
 }
 
-/// Returns the values of a parameter as places in a scatter plot. Few values are spread to strips,
-/// in which the cases can be told apart.
-fn strips(values: &[f64]) -> Vec<f64> {
-    let mut distinct: Vec<f64> = Vec::new();
-    for value in values.iter().filter(|value| value.is_finite()) {
-        if !distinct.contains(value) {
-            distinct.push(*value);
-        }
-        if distinct.len() > STRIPS {
-            return values.to_vec();
-        }
-    }
-    distinct.sort_by(f64::total_cmp);
-    let gaps = distinct.windows(2).map(|pair| pair[1] - pair[0]);
-    let gap = gaps.reduce(f64::min).unwrap_or(0.0);
-    // Fractions of multiples of the golden ratio are evenly spread.
-    let shift = |place: usize| (place as f64 * 0.618_034).fract() - 0.5;
-    values.iter().enumerate().map(|(place, value)| value + 0.4 * gap * shift(place)).collect()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn few_values_of_a_parameter_become_strips_that_do_not_meet() {
-        let two: Vec<f64> = (0..100).map(|i| if i % 2 == 0 { 0.0 } else { 3.0 }).collect();
-        let spread = strips(&two);
-        assert!(two.iter().zip(&spread).all(|(value, place)| (place - value).abs() < 0.61));
-        assert!(spread[0] != spread[2] && spread[1] != spread[3]);
-        let many: Vec<f64> = (0..100).map(f64::from).collect();
-        assert_eq!(strips(&many), many);
-        assert_eq!(strips(&[1.0, 1.0]), [1.0, 1.0]);
-    }
 
     #[test]
     fn oracle_a_histogram_by_hand() {

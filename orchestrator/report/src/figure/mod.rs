@@ -1,9 +1,7 @@
-//! A figure of panels with curves. It is drawn as SVG ([`svg`]) for papers and pages, and as PNG
-//! ([`png`]).
+//! A figure of panels with curves. It is drawn as SVG ([`svg`]) for papers and pages.
 
 pub(crate) mod clip;
 pub mod dash;
-pub mod png;
 pub mod svg;
 mod thin;
 mod ticks;
@@ -13,7 +11,7 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 /// A colour as red, green and blue, which a file writes as `#rrggbb`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(try_from = "String")]
 pub struct Color(pub u8, pub u8, pub u8);
 

@@ -5,14 +5,15 @@ pub mod data;
 pub mod figure;
 mod numbers;
 pub mod plans;
-pub mod thin;
+pub(crate) mod thin;
 
 use crate::figure::{Figure, Legend, svg};
+use crate::page::document;
 use crate::recording::panels::Panel;
 use crate::recording::{Parameter, Recording, SummaryLine, trajectory};
 use cosim::error::Error;
 use cosim::files;
-use maud::{DOCTYPE, Markup, PreEscaped, html};
+use maud::{Markup, PreEscaped, html};
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -51,46 +52,35 @@ fn page(runs: &[Recording], panels: &[Panel]) -> String {
         1 => "single",
         _ => "pair",
     };
-    let markup = html! {
-        (DOCTYPE)
-        html lang="en" {
-            head {
-                meta charset="utf-8";
-                meta name="viewport" content="width=device-width, initial-scale=1";
-                title { (heading) }
-                @for style in STYLES { style { (PreEscaped(style)) } }
-            }
-            body {
-                header {
-                    h1 { (heading) }
-                    @if runs.len() > 1 { ul { @for run in runs { li { b { (run.name) } ": " (run.title) } } } }
-                    @for run in runs { (verdict(run, runs.len() > 1)) }
-                }
-                (player())
-                main class=(layout) {
-                    @if !vehicles.is_empty() {
-                        section id="vehicles" aria-label="Vehicle" {
-                            @for run in vehicles { (vehicle(*run, &runs[*run], runs.len() > 1)) }
-                            p.note { "Drag to turn the view, double click to turn it back." }
-                        }
-                    }
-                    div id="pictures" {
-                        (flight(runs))
-                        @if vehicles.iter().any(|run| plans::of(&runs[*run]).is_some()) { (guarantee()) }
-                        section id="curves" aria-label="Curves" {
-                            p.note { "Drag over curves to look closer, and click twice to see all." }
-                        }
-                    }
-                    section id="summary" { h2 { "Summary" } (summary(runs)) }
-                    section id="parameters" { h2 { "Parameters" } (parameters(runs)) }
-                    section id="origin" { h2 { "Origin" } (origin(runs)) }
-                }
-                script type="application/json" id="run-data" { (PreEscaped(json)) }
-                @for script in [VEHICLE, CHARTS, GUARANTEE, PLAYER, INSTRUMENTS, PAGE] { script { (PreEscaped(script)) } }
-            }
+    let body = html! {
+        header {
+            h1 { (heading) }
+            @if runs.len() > 1 { ul { @for run in runs { li { b { (run.name) } ": " (run.title) } } } }
+            @for run in runs { (verdict(run, runs.len() > 1)) }
         }
+        (player())
+        main class=(layout) {
+            @if !vehicles.is_empty() {
+                section id="vehicles" aria-label="Vehicle" {
+                    @for run in vehicles { (vehicle(*run, &runs[*run], runs.len() > 1)) }
+                    p.note { "Drag to turn the view, double click to turn it back." }
+                }
+            }
+            div id="pictures" {
+                (flight(runs))
+                @if vehicles.iter().any(|run| plans::of(&runs[*run]).is_some()) { (guarantee()) }
+                section id="curves" aria-label="Curves" {
+                    p.note { "Drag over curves to look closer, and click twice to see all." }
+                }
+            }
+            section id="summary" { h2 { "Summary" } (summary(runs)) }
+            section id="parameters" { h2 { "Parameters" } (parameters(runs)) }
+            section id="origin" { h2 { "Origin" } (origin(runs)) }
+        }
+        script type="application/json" id="run-data" { (PreEscaped(json)) }
+        @for script in [VEHICLE, CHARTS, GUARANTEE, PLAYER, INSTRUMENTS, PAGE] { script { (PreEscaped(script)) } }
     };
-    markup.into_string()
+    document(&heading, &STYLES, &body)
 }
 
 /// Returns the outcome of a run in one line: the comparisons with limits, and how the run ended.
@@ -147,10 +137,7 @@ fn guarantee() -> Markup {
                  its plan (blue tube). It accepts a plan only if the whole tube stays under the limit, \
                  that is, if the plan stays under its bound (black line). Flown: thick." span id="ghost" {}
             }
-            div.pictures {
-                canvas id="plan" role="img" aria-label="Norms of body rates and moment as they were flown and planned at the chosen time, with tube, bound and limit" {}
-                canvas id="phase" role="img" aria-label="Body rates as a point within the ball of their limit: the distance from the middle is their norm, the direction that of p and r" {}
-            }
+            canvas id="plan" role="img" aria-label="Norms of body rates and moment as they were flown and planned at the chosen time, with tube, bound and limit" {}
         }
     }
 }

@@ -14,14 +14,14 @@ fn columns(rows: usize) -> Option<impl Iterator<Item = Range<usize>>> {
 }
 
 /// Returns the times of the values that [`values`] keeps.
-pub fn times(time: &[f64]) -> Vec<f64> {
+pub(crate) fn times(time: &[f64]) -> Vec<f64> {
     let Some(columns) = columns(time.len()) else { return time.to_vec() };
     columns.flat_map(|rows| [time[rows.start], time[rows.end - 1]]).collect()
 }
 
 /// Returns the smallest and the largest value of each pixel column, in the order in which they
 /// occur; all values if they are few.
-pub fn values(values: &[f64]) -> Vec<f64> {
+pub(crate) fn values(values: &[f64]) -> Vec<f64> {
     let Some(columns) = columns(values.len()) else { return values.to_vec() };
     let extremes = |rows: Range<usize>| {
         let rank = |row: &usize| values[*row];
@@ -36,7 +36,7 @@ pub fn values(values: &[f64]) -> Vec<f64> {
 }
 
 /// Returns the rows at which a vehicle is shown, evenly spaced, the last one among them.
-pub fn frames(rows: usize) -> Vec<usize> {
+pub(crate) fn frames(rows: usize) -> Vec<usize> {
     let stride = rows.div_ceil(FRAMES).max(1);
     let mut frames: Vec<usize> = (0..rows).step_by(stride).collect();
     if rows > 0 && frames.last() != Some(&(rows - 1)) {

@@ -3,10 +3,10 @@
 use crate::claims::{Checked, Judged, Verdict};
 use crate::comparisons::{Check, Claim, Relation};
 use crate::results::Numbers;
-use crate::texts::{difference, several, shown};
+use crate::texts::{difference, several};
 use maud::{Markup, html};
 use std::fmt::Write as _;
-use sweep::texts::short;
+use sweep::texts::shown;
 
 /// Returns the number that stands beside a verdict: the two sides of a single check, or how many
 /// checks hold.
@@ -68,7 +68,7 @@ fn evidence(check: &Check, checked: &Checked) -> Markup {
     };
     let mut count = String::new();
     if let Some(probability) = checked.probability() {
-        let [low, high] = [probability.low, probability.high].map(|share| short(100.0 * share));
+        let [low, high] = [probability.low, probability.high].map(|share| shown(100.0 * share));
         let _ = write!(count, ", in {held} of {pairs} runs, hence {low} to {high}\u{a0}%");
     }
     let missing = pairs - checked.difference.0.len();

@@ -3,11 +3,13 @@
 use crate::comparisons::{ComparisonRow, ComparisonTable, Overview};
 use crate::definition::Study;
 use crate::results::{Numbers, Results};
-use crate::texts::{difference, several, shown, signed};
+use crate::texts::{difference, several, signed};
 use crate::values::{Quantity, ValueKind};
 use cosim_report::figure::Color;
+use cosim_report::page::table;
 use maud::{Markup, html};
 use std::collections::BTreeSet;
+use sweep::texts::shown;
 
 /// Rows and columns of the table on the first screen.
 const ROWS: usize = 9;
@@ -26,25 +28,20 @@ pub(super) fn small(full: &Overview, results: &Results) -> Markup {
     }
 }
 
-pub(crate) fn table(table: &ComparisonTable, results: &Results) -> Result<Markup, String> {
-    let rows = table.rows.iter().map(|r| row(r, !table.beside.is_empty(), results));
+pub(crate) fn comparison(compared: &ComparisonTable, results: &Results) -> Result<Markup, String> {
+    let has_beside = !compared.beside.is_empty();
+    let mut headings = vec!["Quantity", &compared.against, &compared.ours, "Difference"];
+    headings.extend(has_beside.then_some(compared.beside.as_str()));
+    headings.push("Remark");
+    let rows = compared.rows.iter().map(|compared| row(compared, has_beside, results));
     let rows = rows.collect::<Result<Vec<_>, _>>()?;
     Ok(html! {
-        table.numbers {
-            thead {
-                tr {
-                    th { "Quantity" } th { (table.against) } th { (table.ours) } th { "Difference" }
-                    @if !table.beside.is_empty() { th { (table.beside) } }
-                    th { "Remark" }
-                }
-            }
-            tbody { @for row in rows { (row) } }
-        }
-        @if !table.note.is_empty() { p.note { (table.note) } }
+        (table(&headings, rows))
+        @if !compared.note.is_empty() { p.note { (compared.note) } }
     })
 }
 
-fn row(row: &ComparisonRow, has_beside: bool, results: &Results) -> Result<Markup, String> {
+fn row(row: &ComparisonRow, has_beside: bool, results: &Results) -> Result<Vec<Markup>, String> {
     let ours = results.numbers(&row.ours)?;
     let beside = row.beside.as_ref().map(|beside| results.numbers(beside)).transpose()?;
     let paper = row.paper.as_ref().map(|paper| results.study.values.number(paper)).transpose()?;
@@ -60,16 +57,15 @@ fn row(row: &ComparisonRow, has_beside: bool, results: &Results) -> Result<Marku
         }
         format!("{} ({})", signed(absolute), difference(&Numbers(vec![ours.mean() / paper - 1.0])))
     });
-    Ok(html! {
-        tr {
-            td { (row.label) }
-            td title=[origin] { @match paper { Some(paper) => (shown(paper)), None => "–" } }
-            td { (several(&ours)) }
-            td { (difference.as_deref().unwrap_or("–")) }
-            @if has_beside { td { (beside.as_ref().map_or("–".into(), several)) } }
-            td.remark { (row.note) }
-        }
-    })
+    let mut cells = vec![
+        html! { span title=[origin] { (row.label) } },
+        html! { (paper.map_or("–".into(), shown)) },
+        html! { (several(&ours)) },
+        html! { (difference.as_deref().unwrap_or("–")) },
+    ];
+    cells.extend(has_beside.then(|| html! { (beside.as_ref().map_or("–".into(), several)) }));
+    cells.push(html! { span.remark { (row.note) } });
+    Ok(cells)
 }
 
 /// Returns all rows and columns of an overview.
@@ -84,7 +80,7 @@ fn names(study: &Study, color: Color) -> BTreeSet<&String> {
     let curves = panels.flat_map(|(figure, panel)| {
         let lines = panel.lines_across();
         // Signals with names of their own have colours of their own.
-        let is_by_run = panel.signals.is_empty() && panel.across.is_none();
+        let is_by_run = panel.signals.is_empty() && lines.is_empty();
         let runs = study.runs_of(figure, panel).filter(move |_| is_by_run);
         let runs = runs.map(|run| (run.color, &run.label));
         runs.chain(lines.iter().map(|line| (line.color, &line.label)))
@@ -108,7 +104,7 @@ fn rows(overview: &Overview, results: &Results, cell: &dyn Fn(&Numbers) -> Strin
         rows.push((run, numbers.collect::<Vec<_>>()));
     }
     html! {
-        table.numbers.overview {
+        div.scroll { table.numbers.overview {
             thead { tr { th { "Run" } @for column in &overview.metrics { th { (column.label) } } } }
             tbody {
                 @for (place, (run, numbers)) in rows.iter().enumerate() {
@@ -130,7 +126,7 @@ fn rows(overview: &Overview, results: &Results, cell: &dyn Fn(&Numbers) -> Strin
                     }
                 }
             }
-        }
+        } }
         @if !overview.note.is_empty() { p.note { (overview.note) } }
     }
 }
@@ -147,21 +143,15 @@ pub(super) fn all_values(results: &Results) -> Markup {
         ValueKind::Figure => "figure, read off",
         ValueKind::Computed => "not printed, computed",
     };
-    html! {
-        table {
-            thead { tr { th { "Id" } th { "Value" } th { "Printed in" } th { "Source" } } }
-            tbody {
-                @for value in &results.study.values.0 {
-                    tr {
-                        td { code { (value.id) } }
-                        td { (shown(value.value)) " " (value.unit) }
-                        td { (kind(value.kind)) }
-                        td { (value.source) }
-                    }
-                }
-            }
-        }
-    }
+    let rows = results.study.values.0.iter().map(|value| {
+        vec![
+            html! { code { (value.id) } },
+            html! { (shown(value.value)) " " (value.unit) },
+            html! { (kind(value.kind)) },
+            html! { (value.source) },
+        ]
+    });
+    table(&["Id", "Value", "Printed in", "Source"], rows)
 }
 
 #[cfg(test)]

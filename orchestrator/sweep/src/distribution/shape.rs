@@ -1,7 +1,6 @@
 //! The shapes of distributions, and their quantile functions.
 
-use crate::design::Place;
-use crate::texts::short;
+use crate::texts::shown;
 use cosim::variation::SettingValue;
 use statrs::distribution::{ContinuousCDF, LogNormal, Normal, Triangular, Uniform};
 use statrs::statistics::{Distribution as _, Max, Min, Mode};
@@ -71,8 +70,6 @@ pub(super) struct Continuous {
     between: [f64; 2],
     /// Smallest and largest value, if there are any.
     pub(super) ends: Option<[f64; 2]>,
-    /// Number of levels in a factorial design.
-    pub(super) levels: Option<u64>,
 }
 
 /// A continuous distribution before a truncation.
@@ -103,7 +100,7 @@ impl Whole {
 impl From<Whole> for Shape {
     fn from(whole: Whole) -> Self {
         let ends = whole.ends();
-        Self::Continuous(Continuous { whole, between: [0.0, 1.0], ends, levels: None })
+        Self::Continuous(Continuous { whole, between: [0.0, 1.0], ends })
     }
 }
 
@@ -136,30 +133,25 @@ impl Continuous {
         self.ends.unwrap_or([f64::NEG_INFINITY, f64::INFINITY])
     }
 
-    pub(super) fn value(&self, place: Place) -> f64 {
-        let last_level = self.levels.map_or(0, |levels| levels - 1);
-        match place {
-            Place::End(is_last) => self.ends.map_or(f64::NAN, |ends| ends[usize::from(is_last)]),
-            Place::Level(level) if level == 0 || level >= last_level => {
-                self.value(Place::End(level > 0))
-            }
-            Place::Level(level) => self.value(Place::Quantile(level as f64 / last_level as f64)),
-            Place::Quantile(unit) => {
-                let [from, to] = self.between;
-                let mut unit = from + unit * (to - from);
-                if self.whole.ends().is_none() {
-                    // The ends of an unbounded distribution are infinite.
-                    unit = unit.clamp(f64::MIN_POSITIVE, 1.0 - f64::EPSILON / 2.0);
-                }
-                let [low, high] = self.bounds();
-                self.whole.function().inverse_cdf(unit).clamp(low, high)
-            }
+    pub(super) fn value(&self, unit: f64) -> f64 {
+        let [low, high] = match self.ends {
+            // Rounding must not miss an end.
+            Some([low, _]) if unit <= 0.0 => return low,
+            Some([_, high]) if unit >= 1.0 => return high,
+            _ => self.bounds(),
+        };
+        let [from, to] = self.between;
+        let mut unit = from + unit * (to - from);
+        if self.whole.ends().is_none() {
+            // The ends of an unbounded distribution are infinite.
+            unit = unit.clamp(f64::MIN_POSITIVE, 1.0 - f64::EPSILON / 2.0);
         }
+        self.whole.function().inverse_cdf(unit).clamp(low, high)
     }
 
     pub(super) fn in_words(&self) -> String {
-        let ends = |[low, high]: [f64; 2]| format!("{} to {}", short(low), short(high));
-        let number = |number: Option<f64>| short(number.unwrap_or(f64::NAN));
+        let ends = |[low, high]: [f64; 2]| format!("{} to {}", shown(low), shown(high));
+        let number = |number: Option<f64>| shown(number.unwrap_or(f64::NAN));
         let whole = match &self.whole {
             Whole::Uniform(uniform) => format!("uniform, {}", ends([uniform.min(), uniform.max()])),
             Whole::Normal(normal) => {
@@ -167,7 +159,7 @@ impl Continuous {
                 format!("normal, mean {mean}, deviation {deviation}")
             }
             Whole::LogNormal(log_normal) => {
-                format!("log-normal, median {}", short(log_normal.inverse_cdf(0.5)))
+                format!("log-normal, median {}", shown(log_normal.inverse_cdf(0.5)))
             }
             Whole::Triangular(triangular) => format!(
                 "triangular, {}, most likely {}",

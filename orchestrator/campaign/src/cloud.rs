@@ -2,14 +2,14 @@
 //! experiment draws.
 
 use crate::flight::Flight;
-use crate::options::Options;
 use crate::plan::Plan;
-use crate::track::Track;
 use cosim::error::Error;
+use cosim::variation::SettingValue;
 use cosim_metrics::progress::Parts;
 use cosim_report::figure::{self, Color, Curve, Figure, Legend, Shape, with_unit};
 use cosim_report::panels::{self, Panel};
-use sweep::work::{self, Worked};
+use sweep::runner::{self, Options, Worked};
+use sweep::track::Track;
 
 /// Number of cases that the band is made of.
 const CASES: u64 = 100;
@@ -22,11 +22,12 @@ const PANELS: usize = 12;
 const BAND: Color = Color::CURVES[0];
 const WORST: Color = Color::CURVES[1];
 
-/// Draws the worst case over the band of the first cases, which are flown again on all threads.
-/// There is no figure if the experiment draws nothing.
-pub(super) fn draw(
+/// Draws the worst case, which has a name and these values, over the band of the first of so many
+/// cases. All are flown again on all threads. There is no figure if the experiment draws nothing.
+pub(crate) fn draw(
     plan: &Plan,
-    worst: u64,
+    name: &str,
+    worst: (u64, &[SettingValue]),
     cases: u64,
     options: &Options,
 ) -> Result<Option<Figure>, Error> {
@@ -42,18 +43,19 @@ pub(super) fn draw(
         return Ok(None);
     }
     let stride = (flight.system().clock.ticks() / POINTS).max(1);
-    let first = (0..cases.min(CASES)).map(|case| (case, stride));
-    let flights: Vec<(u64, u64)> = std::iter::once((worst, 1)).chain(first).collect();
+    let first = (0..cases.min(CASES)).map(|case| (case, plan.sweep.values(case), stride));
+    let worst = (worst.0, worst.1.to_vec(), 1);
+    let flights: Vec<_> = std::iter::once(worst).chain(first).collect();
     let title = format!("{}, curves of the report", plan.campaign.title);
     let progress = Parts::new("cases", &title, flights.len() as u64, 0, options.quiet);
-    let Worked { results, failures } = work::on_parts(
+    let Worked { results, failures } = runner::on_parts(
         &flights,
-        work::threads(options.jobs, [&plan.sweep]),
+        runner::threads(options.jobs, [&plan.sweep]),
         begin,
-        |(flight, panels), &(case, stride)| {
-            let signals = self::curves(panels).map(|(p, c)| (p.factor, c.signal.clone())).collect();
-            let mut track = Track::new(signals, stride);
-            flight.fly_with(case, plan.sweep.values(case), &mut [&mut track])?;
+        |(flight, panels), (case, values, stride)| {
+            let signals = self::curves(panels).map(|(_, curve)| curve.signal.clone()).collect();
+            let mut track = Track::new(signals, *stride);
+            flight.fly_with(*case, values.clone(), &mut [&mut track])?;
             progress.advance(1);
             Ok(track)
         },
@@ -68,17 +70,17 @@ pub(super) fn draw(
     let others: Vec<Track> = tracks.collect();
     let Some(longest) = others.iter().max_by_key(|track| track.time.len()) else { return Ok(None) };
     let time = &longest.time;
-    let name = format!("case {worst}");
     let panels = curves.iter().enumerate().map(|(place, (panel, curve))| {
-        let [low, median, high] = bands(&others, place, time.len());
-        let values = std::mem::take(&mut bad.values[place]);
+        let scaled = |values: Vec<f64>| values.into_iter().map(|v| v * panel.factor).collect();
+        let [low, median, high] = bands(&others, place, time.len()).map(scaled);
+        let values = scaled(std::mem::take(&mut bad.values[place]));
         figure::Panel {
             x_label: "time, s".into(),
             y_label: with_unit(&format!("{} {}", panel.label, curve.name), &panel.unit),
             curves: vec![
                 Curve::new("5 % to 95 %", BAND, Shape::Band(high), time.clone(), low),
                 Curve::new("median", BAND, Shape::Line, time.clone(), median),
-                Curve::new(&name, WORST, Shape::Line, bad.time.clone(), values),
+                Curve::new(name, WORST, Shape::Line, bad.time.clone(), values),
             ],
             ..figure::Panel::default()
         }

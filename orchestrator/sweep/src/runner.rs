@@ -1,0 +1,224 @@
+//! Flies the parts of sweeps on several threads, for studies and campaigns, and keeps what is
+//! finished. A part that is kept is not flown again.
+
+use crate::cases::Sweep;
+use crate::error::Error;
+use crate::parts::{PartResult, Remarks, Store};
+use cosim::error::Error as Single;
+use cosim::interrupt::Interrupt;
+use cosim_metrics::progress::Parts;
+use parking_lot::Mutex;
+use std::collections::BTreeMap;
+use std::num::NonZero;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::thread;
+use std::time::Duration;
+
+/// Options of the work on many cases.
+#[derive(Clone, Debug, Default)]
+pub struct Options {
+    /// Folder for the results, in place of the usual one below `out`.
+    pub out: Option<PathBuf>,
+    /// Number of threads; 0 means one for each core.
+    pub jobs: usize,
+    /// Whether cases that are kept already are flown again, and the results of an earlier search
+    /// replaced.
+    pub fresh: bool,
+    /// Time after which a search begins no further generation.
+    pub time: Option<Duration>,
+    /// Whether the progress display is suppressed.
+    pub quiet: bool,
+    /// Interrupt through which the work can be ended from outside.
+    pub interrupt: Interrupt,
+}
+
+/// A part of the work: some cases of one of several sweeps.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Part {
+    /// Position of the sweep.
+    pub sweep: usize,
+    /// Cases of the sweep that belong to this part.
+    pub cases: Range<u64>,
+}
+
+impl Part {
+    fn count(&self) -> u64 {
+        self.cases.end - self.cases.start
+    }
+}
+
+/// Work of which the results are kept in files. `R` is what is remembered of a part.
+pub struct Work<'a, R> {
+    /// Title of the work, for the progress display.
+    pub title: &'a str,
+    /// Folder of the results.
+    pub out: &'a Path,
+    /// Files of the parts, for each sweep.
+    pub stores: Vec<Store<'a>>,
+    /// Returns what is remembered of a part.
+    pub remember: Box<dyn Fn(&PartResult) -> R + Sync + 'a>,
+    /// What is remembered of the parts that are there, by the position of the sweep and the first
+    /// case, and their numbers of cases.
+    pub done: BTreeMap<(usize, u64), (u64, R)>,
+    /// Remarks, for example why cases are flown again.
+    pub notes: Vec<String>,
+}
+
+impl<'a, R: Send> Work<'a, R> {
+    /// Returns work of which nothing is known to be done.
+    pub fn new(
+        title: &'a str,
+        out: &'a Path,
+        stores: Vec<Store<'a>>,
+        remember: impl Fn(&PartResult) -> R + Sync + 'a,
+    ) -> Self {
+        let remember = Box::new(remember);
+        Self { title, out, stores, remember, done: BTreeMap::new(), notes: Vec::new() }
+    }
+
+    /// Returns the number of cases whose results are there.
+    pub fn cases(&self) -> u64 {
+        self.done.values().map(|(cases, _)| cases).sum()
+    }
+
+    /// Looks for those of these parts that are not known to be there, and returns the missing ones.
+    pub fn missing(&mut self, parts: impl IntoIterator<Item = Part>) -> Vec<Part> {
+        let mut missing = Vec::new();
+        let mut remarks = Remarks::default();
+        for part in parts {
+            let place = (part.sweep, part.cases.start);
+            if self.done.contains_key(&place) {
+                continue;
+            }
+            if let Some(found) = remarks.take(self.stores[part.sweep].find(&part.cases)) {
+                self.done.insert(place, (part.count(), (self.remember)(&found)));
+            } else {
+                missing.push(part);
+            }
+        }
+        self.notes.extend(remarks.texts());
+        missing
+    }
+
+    /// Flies parts on several threads, each with a state of its own. If an FMU fails, the other
+    /// parts are flown and kept, so that little is left for the next time.
+    ///
+    /// # Errors
+    /// Returns an error if the work was asked to end before all `total` cases are there, if a case
+    /// could not be flown, or if a file cannot be written.
+    pub fn fly<S>(
+        &mut self,
+        parts: &[Part],
+        (threads, total): (usize, u64),
+        options: &Options,
+        begin: impl Fn() -> Result<S, Error> + Sync,
+        fly: impl Fn(&mut S, &Part, &Parts) -> Result<PartResult, Error> + Sync,
+    ) -> Result<(), Error> {
+        if parts.is_empty() {
+            return Ok(());
+        }
+        let (done, left) = (self.cases(), parts.iter().map(Part::count).sum::<u64>());
+        let progress = Parts::new("cases", self.title, done + left, done, options.quiet);
+        let (stores, remember) = (&self.stores, &self.remember);
+        let Worked { results, failures } = on_parts(
+            parts,
+            threads,
+            begin,
+            |state, part| {
+                let result = fly(state, part, &progress)?;
+                let remembered = remember(&result);
+                stores[part.sweep].write(&part.cases, result)?;
+                Ok(remembered)
+            },
+            |error| matches!(error, Error::Case { .. }),
+        );
+        progress.finish();
+        self.done.extend(results.into_iter().map(|(at, remembered)| {
+            let part = &parts[at];
+            ((part.sweep, part.cases.start), (part.count(), remembered))
+        }));
+        let (cases, mut others): (Vec<Error>, Vec<Error>) =
+            failures.into_values().partition(|error| matches!(error, Error::Case { .. }));
+        let more = cases.len().saturating_sub(1);
+        others.extend(cases);
+        match others.into_iter().next() {
+            None => Ok(()),
+            Some(Error::Single(Single::Interrupted { request, .. })) => {
+                let (done, out) = (self.cases(), self.out.into());
+                Err(Error::Unfinished { done, total, out, request })
+            }
+            Some(Error::Case { case, source, .. }) => Err(Error::Case { case, more, source }),
+            Some(error) => Err(error),
+        }
+    }
+}
+
+/// Results of the parts, by their position.
+#[derive(Debug)]
+pub struct Worked<R, E> {
+    /// Results of the parts that are finished.
+    pub results: BTreeMap<usize, R>,
+    /// Errors of the parts that failed.
+    pub failures: BTreeMap<usize, E>,
+}
+
+/// Returns the number of threads for `jobs`, where 0 means one for each core. It is one if an FMU
+/// can be instantiated only once in a process.
+pub fn threads<'a>(jobs: usize, sweeps: impl IntoIterator<Item = &'a Sweep>) -> usize {
+    if let Some(path) = sweeps.into_iter().find_map(|sweep| sweep.single.as_ref()) {
+        tracing::warn!(
+            "{} can be instantiated only once per process: one thread flies all cases",
+            path.display()
+        );
+        return 1;
+    }
+    match jobs {
+        0 => thread::available_parallelism().map_or(1, NonZero::get),
+        jobs => jobs,
+    }
+}
+
+/// Works on parts in their order. Each thread begins with a state of its own, because instances
+/// stay in the thread that made them. After a failure that does not `go_on` no further part is
+/// begun; parts that other threads are working on are finished.
+pub fn on_parts<P: Sync, S, R: Send, E: Send>(
+    parts: &[P],
+    threads: usize,
+    begin: impl Fn() -> Result<S, E> + Sync,
+    work: impl Fn(&mut S, &P) -> Result<R, E> + Sync,
+    goes_on: impl Fn(&E) -> bool + Sync,
+) -> Worked<R, E> {
+    let next = AtomicUsize::new(0);
+    let results: Mutex<BTreeMap<usize, R>> = Mutex::default();
+    let failures: Mutex<BTreeMap<usize, E>> = Mutex::default();
+    let turn = || {
+        let mut state = None;
+        loop {
+            let place = next.fetch_add(1, Ordering::Relaxed);
+            let Some(part) = parts.get(place) else { break };
+            let outcome = match &mut state {
+                Some(state) => work(state, part),
+                none => begin().and_then(|begun| work(none.insert(begun), part)),
+            };
+            match outcome {
+                Ok(result) => {
+                    results.lock().insert(place, result);
+                }
+                Err(error) => {
+                    if !goes_on(&error) {
+                        next.fetch_max(parts.len(), Ordering::Relaxed);
+                    }
+                    failures.lock().insert(place, error);
+                }
+            }
+        }
+    };
+    thread::scope(|scope| {
+        for _ in 0..threads.clamp(1, parts.len().max(1)) {
+            scope.spawn(turn);
+        }
+    });
+    Worked { results: results.into_inner(), failures: failures.into_inner() }
+}
