@@ -64,7 +64,7 @@ impl Controller for Asked {
 }
 
 /// The law as an FMU.
-#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize, Declared)]
 pub struct OwnLaw;
 
 impl Law for OwnLaw {

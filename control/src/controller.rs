@@ -2,6 +2,7 @@
 
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
+use settings::Declared;
 use vehicle::kinematics::{Kinematics, r_inverse};
 use vehicle::profile::Profile;
 use vehicle::reference::Reference;
@@ -33,11 +34,15 @@ pub struct Measurement {
 
 /// Limits that change during a flight, for example with dynamic pressure, as far as they are
 /// smaller than those of the settings.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Declared)]
 pub struct Scheduled {
-    /// Limit on ‖m‖ of the actuators, N m.
+    /// Limit on the norm of the control moment that holds at present; the command is scaled down to
+    /// it.
+    #[setting(unit = "N.m", min = 0.0, nominal = 1e5)]
     pub limit_moment: f64,
-    /// Bound on each component of the disturbance of the angles' second derivatives, rad/s².
+    /// Bound on each component of the disturbance of the angles' second derivatives that holds at
+    /// present, if it is smaller than disturbance.bound.
+    #[setting(unit = "rad/s2", min = 0.0, nominal = 0.03)]
     pub disturbance_bound: f64,
 }
 

@@ -90,20 +90,6 @@ pub enum DesignError {
         /// Feedback period, s.
         feedback: f64,
     },
-    /// The limits of a control surface are inconsistent.
-    #[error(
-        "surface {index}: the limits limit.surfaceMin = {min} and limit.surfaceMax = {max} must be finite and hold zero, and limit.surfaceRate = {rate} must be finite and not negative"
-    )]
-    Surface {
-        /// Number of the surface, from 1.
-        index: usize,
-        /// Smallest deflection, rad.
-        min: f64,
-        /// Largest deflection, rad.
-        max: f64,
-        /// Largest deflection rate, rad/s.
-        rate: f64,
-    },
     /// The period of the allocation is not a multiple of the modulator's.
     #[error("period = {period} s must be a whole multiple of pwpf.period = {pwpf} s")]
     Modulation {

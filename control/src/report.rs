@@ -3,7 +3,7 @@
 use crate::clock::Instant;
 use crate::mpc;
 use serde::{Deserialize, Serialize};
-use settings::Choice;
+use settings::{Choice, Declared};
 
 /// Origin of the plan in force.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Choice)]
@@ -29,24 +29,26 @@ pub enum SolverStatus {
 }
 
 /// Report of an optimisation.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Declared)]
 pub struct SolverReport {
     /// Origin of the plan in force.
     pub status: SolverStatus,
-    /// Cost of the optimum, or of the shifted plan in a fallback.
+    /// Cost of the plan in force.
     pub cost: f64,
-    /// Iterations of the solvers, summed over their passes.
-    pub iterations: u32,
-    /// Relative residual of the conditions of optimality with the constraints as functions of the
-    /// trajectory; in a fallback that of the shifted plan.
-    pub residual: f64,
-    /// Wall-clock time of the last optimisation, s; not reproducible.
+    /// Wall-clock time of the last optimisation; not reproducible.
+    #[setting(unit = "s", nominal = 1e-3)]
     pub time: f64,
+    /// Number of iterations in the last optimisation, summed over all solvers and passes.
+    pub iterations: u32,
+    /// Relative residual of the optimality conditions for the plan in force, evaluated with the
+    /// nonlinear constraints.
+    #[setting(nominal = 1e-8)]
+    pub residual: f64,
     /// Number of optimisations so far.
     pub solves: u32,
-    /// Number of fallbacks so far.
+    /// Number of optimisations so far that failed.
     pub fallbacks: u32,
-    /// Number of optimisations so far that the budget ended early.
+    /// Number of optimisations so far that were ended early by the time or iteration budget.
     pub exhausted: u32,
 }
 

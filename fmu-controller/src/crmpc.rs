@@ -6,41 +6,71 @@ use control::crmpc::{
     Settings, Supervision, points,
 };
 use control::error::DesignError;
-use control::error_dynamics::Gain;
 use control::report::SolverReport;
-use controller_export::table::{self, ANGLES, sampled_output, shown, shown_vector, vector};
-use controller_export::{ControllerFmu, Law, Vehicle};
-use fmi_export::VariableTable;
-use fmi_export::table::discrete_local;
+use controller_export::table::{shown, shown_vector};
+use controller_export::{Law, Vehicle};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
-use settings::Choice;
+use settings::Declared;
+use vehicle::axes::{ANGLES, Entry};
 
 /// Share of the moment limit for the plan below which optimisations take several times as long
 /// (docs/guarantee.md has iterations for other disturbance bounds).
 const LITTLE_MOMENT: f64 = 0.1;
 
 /// Outputs of CRMPC.
-#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize, Declared)]
 pub struct CrmpcLaw {
+    /// Nominal {} at the last tick.
+    #[setting(name = "nominal", each = ANGLES, unit = "rad", nominal = 0.1)]
     angles: Vector3<f64>,
+    /// Derivative of the nominal {} at the last tick.
+    #[setting(name = "nominalRate", each = ANGLES, unit = "rad/s", nominal = 0.05)]
     rates: Vector3<f64>,
+    /// Whether the guarantee of the robust set is in force at the last tick.
+    #[setting(name = "guarantee.inForce")]
     in_force: bool,
+    #[setting(name = "guarantee")]
     supervision: Supervision,
+    #[setting(name = "guarantee")]
     margins: Margins,
+    /// Share of limit.moment that remains for the plan at rest, after the reserve for disturbances,
+    /// errors and delay.
+    #[setting(name = "guarantee.momentLeft")]
     moment_left: f64,
-    gain: Gain,
+    /// Gain K of the feedback law in force: factor on the {}.
+    #[setting(name = "feedback.gain", each = GAINS, units = ["1/s2", "1/s"], nominal = 5.0)]
+    gain: [f64; 2],
+    /// Observer's estimate of the disturbance of the second derivative of the {}.
+    #[setting(name = "disturbanceEstimate", each = ANGLES, unit = "rad/s2", nominal = 0.03)]
     disturbance: Vector3<f64>,
+    #[setting(name = "solver")]
     report: SolverReport,
+    // As locals, these variables need no ports in block diagrams.
+    #[setting(local, depends_on = [])]
     plan: ShownPlan,
 }
 
+const GAINS: [Entry; 2] = [(".k1", "angle"), (".k2", "rate")];
+
 /// The plan in force, if the settings ask for it.
-#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize, Declared)]
 struct ShownPlan {
+    /// Time at which the plan begins, later than its optimisation by the delay; 0 unless plan.shown.
+    #[setting(unit = "s", nominal = 10.0)]
     began: f64,
-    times: [f64; POINTS],
-    points: [PlanPoint; POINTS],
+    #[setting(name = "")]
+    points: [ShownPoint; POINTS],
+}
+
+/// One point of the plan.
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize, Declared)]
+struct ShownPoint {
+    /// Time from plan.began to this point of the plan.
+    #[setting(unit = "s")]
+    time: f64,
+    #[setting(name = "")]
+    norms: PlanPoint,
 }
 
 impl Law for CrmpcLaw {
@@ -66,10 +96,6 @@ impl Law for CrmpcLaw {
         Crmpc::new(Settings { body, limit_rate, limit_moment, delay: latency.total(), ..settings })
     }
 
-    fn outputs(table: Controller) -> Controller {
-        outputs(table)
-    }
-
     fn show(&mut self, settings: &Settings, memory: &Memory) {
         if settings.shows_plan && memory.shown.len() == POINTS {
             self.plan.show(settings, memory);
@@ -82,7 +108,7 @@ impl Law for CrmpcLaw {
         self.margins =
             Margins { rate: shown(memory.margins.rate), moment: shown(memory.margins.moment) };
         self.moment_left = shown(memory.moment_left);
-        self.gain = memory.gain;
+        self.gain = [memory.gain.k1, memory.gain.k2];
         self.disturbance = shown_vector(&memory.observed.disturbance);
         self.report = solver::shown_report(&memory.report);
     }
@@ -143,107 +169,15 @@ impl Law for CrmpcLaw {
 impl ShownPlan {
     fn show(&mut self, settings: &Settings, memory: &Memory) {
         self.began = memory.planned;
-        for (time, step) in self.times.iter_mut().zip(points(settings.horizon)) {
-            *time = step as f64 * settings.period_optimisation;
-        }
-        for (to, from) in self.points.iter_mut().zip(&memory.shown) {
-            *to = PlanPoint {
-                rate: shown(from.rate),
-                rate_bound: shown(from.rate_bound),
-                moment: shown(from.moment),
-                moment_bound: shown(from.moment_bound),
+        let steps = points(settings.horizon).into_iter().zip(&memory.shown);
+        for (point, (step, norms)) in self.points.iter_mut().zip(steps) {
+            point.time = step as f64 * settings.period_optimisation;
+            point.norms = PlanPoint {
+                rate: shown(norms.rate),
+                rate_bound: shown(norms.rate_bound),
+                moment: shown(norms.moment),
+                moment_bound: shown(norms.moment_bound),
             };
         }
     }
-}
-
-type Controller = VariableTable<ControllerFmu<CrmpcLaw>>;
-fn outputs(table: Controller) -> Controller {
-    let sampled = sampled_output;
-    let nominal = |axis: &str, meaning: &str| {
-        let text = format!("Nominal {meaning} at the last tick");
-        sampled(&format!("nominal.{axis}"), &text).real().unit("rad").nominal(0.1)
-    };
-    let rate = |axis: &str, meaning: &str| {
-        let text = format!("Derivative of the nominal {meaning} at the last tick");
-        sampled(&format!("nominalRate.{axis}"), &text).real().unit("rad/s").nominal(0.05)
-    };
-    let table = vector(table, ANGLES, nominal, |m| &mut m.law.angles);
-    let table = vector(table, ANGLES, rate, |m| &mut m.law.rates);
-    let margin = |name: &str, limit: &str| {
-        let text = format!(
-            "Unused share of {limit} in the plan's first interval, after the reserve for deviations from the plan"
-        );
-        sampled(&format!("guarantee.{name}"), &text).real()
-    };
-    let left = sampled(
-        "guarantee.momentLeft",
-        "Share of limit.moment that remains for the plan at rest, after the reserve for disturbances, errors and delay",
-    );
-    let gain = |name: &str, of: &str| {
-        let text = format!("Gain K of the feedback law in force: factor on the {of}");
-        sampled(&format!("feedback.gain.{name}"), &text).real().nominal(5.0)
-    };
-    let disturbance =
-        |axis: &str, meaning: &str| table::disturbance_estimate(axis, meaning).nominal(0.03);
-    let table = table
-        .boolean(
-            sampled(
-                "guarantee.inForce",
-                "Whether the guarantee of the robust set is in force at the last tick",
-            ),
-            |m| &mut m.law.in_force,
-        )
-        .choice(sampled("guarantee.status", GuaranteeStatus::TEXT), |m| {
-            &mut m.law.supervision.status
-        })
-        .choice(sampled("guarantee.contradiction", Contradiction::TEXT), |m| {
-            &mut m.law.supervision.contradiction
-        })
-        .real(margin("rateMargin", "limit.rate"), |m| &mut m.law.margins.rate)
-        .real(margin("momentMargin", "limit.moment"), |m| &mut m.law.margins.moment)
-        .real(left.real(), |m| &mut m.law.moment_left)
-        .real(gain("k1", "angle").unit("1/s2"), |m| &mut m.law.gain.k1)
-        .real(gain("k2", "rate").unit("1/s"), |m| &mut m.law.gain.k2);
-    let table = vector(table, ANGLES, disturbance, |m| &mut m.law.disturbance);
-    plan_shown(solver::outputs(table, |law| &mut law.report))
-}
-
-/// Adds the variables that show the plan. As locals they need no ports in block diagrams.
-fn plan_shown(table: Controller) -> Controller {
-    let began = "Time at which the plan begins, later than its optimisation by the delay; 0 unless plan.shown";
-    let began = discrete_local("plan.began", began).real().unit("s").nominal(10.0);
-    let table = table.real(began, |m| &mut m.law.plan.began);
-    let declare = |i: usize, name: &str, text: &str| {
-        discrete_local(&format!("plan.{name}[{}]", i + 1), text).real()
-    };
-    (0..POINTS).fold(table, |table, i| {
-        let time = declare(i, "time", "Time from plan.began to this point of the plan");
-        let rate = declare(i, "rate", "Norm of the planned body rates at this point");
-        let rate_bound = declare(
-            i,
-            "rateBound",
-            "Bound on plan.rate here; what is missing to limit.rate is the tube, the largest difference to the flown norm",
-        );
-        let moment = declare(
-            i,
-            "moment",
-            "Norm of the moment planned from this point on, less the known moment",
-        );
-        let moment_bound = declare(
-            i,
-            "momentBound",
-            "Bound on plan.moment here; what is missing to limit.moment is the tube, the largest difference to the flown norm",
-        );
-        table
-            .real(time.unit("s"), move |m| &mut m.law.plan.times[i])
-            .real(rate.unit("rad/s").nominal(0.1), move |m| &mut m.law.plan.points[i].rate)
-            .real(rate_bound.unit("rad/s").nominal(0.1), move |m| {
-                &mut m.law.plan.points[i].rate_bound
-            })
-            .real(moment.unit("N.m").nominal(1e5), move |m| &mut m.law.plan.points[i].moment)
-            .real(moment_bound.unit("N.m").nominal(1e5), move |m| {
-                &mut m.law.plan.points[i].moment_bound
-            })
-    })
 }

@@ -4,18 +4,26 @@ use crate::solver;
 use control::dlmpc::{Dlmpc, Memory, Settings};
 use control::error::DesignError;
 use control::report::SolverReport;
-use controller_export::table::{RATES, sampled_output, shown_vector, vector};
-use controller_export::{ControllerFmu, Law, Vehicle};
-use fmi_export::VariableTable;
+use controller_export::table::shown_vector;
+use controller_export::{Law, Vehicle};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
+use settings::Declared;
+use vehicle::axes::RATES;
 
 /// Outputs of DLMPC.
-#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize, Declared)]
 pub struct DlmpcLaw {
+    /// Body {} commanded by the outer layer, held for period.optimisation.
+    #[setting(each = RATES, unit = "rad/s", nominal = 0.05)]
     rate_command: Vector3<f64>,
+    /// Sliding variable of the {} at the last tick.
+    #[setting(name = "slidingVariable", each = RATES, unit = "rad/s", nominal = 0.01)]
     sliding: Vector3<f64>,
+    #[setting(name = "solver")]
     report: SolverReport,
+    /// Wall-clock time of the last evaluation of the inner layer; not reproducible.
+    #[setting(name = "innerLaw.time", unit = "s", nominal = 1e-6)]
     inner_time: f64,
 }
 
@@ -41,10 +49,6 @@ impl Law for DlmpcLaw {
         Dlmpc::new(Settings { body, limit_rate, limit_moment, ..settings })
     }
 
-    fn outputs(table: Controller) -> Controller {
-        outputs(table)
-    }
-
     fn show(&mut self, _settings: &Settings, memory: &Memory) {
         *self = Self {
             rate_command: shown_vector(&memory.rate_command),
@@ -57,28 +61,4 @@ impl Law for DlmpcLaw {
     fn warning(before: &Memory, after: &Memory) -> Option<&'static str> {
         solver::warning(&before.report, &after.report)
     }
-}
-
-type Controller = VariableTable<ControllerFmu<DlmpcLaw>>;
-
-fn outputs(table: Controller) -> Controller {
-    let sampled = sampled_output;
-    let command = |axis: &str, meaning: &str| {
-        let text = format!(
-            "Body {meaning} rate commanded by the outer layer, held for period.optimisation"
-        );
-        sampled(&format!("rateCommand.{axis}"), &text).real().unit("rad/s").nominal(0.05)
-    };
-    let sliding = |axis: &str, meaning: &str| {
-        let text = format!("Sliding variable of the {meaning} rate at the last tick");
-        sampled(&format!("slidingVariable.{axis}"), &text).real().unit("rad/s").nominal(0.01)
-    };
-    let time = sampled(
-        "innerLaw.time",
-        "Wall-clock time of the last evaluation of the inner layer; not reproducible",
-    );
-    let table = vector(table, RATES, command, |m| &mut m.law.rate_command);
-    let table = vector(table, RATES, sliding, |m| &mut m.law.sliding);
-    solver::outputs(table, |law| &mut law.report)
-        .real(time.real().unit("s").nominal(1e-6), |m| &mut m.law.inner_time)
 }

@@ -1,18 +1,16 @@
 //! `AttitudeEstimator`: attitude and rates from gyroscope, accelerometer and magnetometer.
 
 use control::estimation::{
-    Calibration, CalibrationStatus, Estimate, Estimator, Health, Line, Memory, Settings,
-    mems_corrections,
+    Calibration, Estimate, Estimator, Health, Line, Memory, Settings, mems_corrections,
 };
 use controller_export::sampled::{SampledFmu, SampledInstance, Ticks};
-use controller_export::table::{ANGLES, AXES, RATES, vector};
-use fmi_export::table::{Common, Real, discrete_input, discrete_output, input};
 use fmi_export::{Description, Failure, VariableTable};
 use model_description::DefaultExperiment;
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
-use settings::Choice;
+use settings::Declared;
 use vehicle::Scenario;
+use vehicle::axes::LETTERS;
 use vehicle::error::rounded_time;
 use vehicle::kinematics::Kinematics;
 use vehicle::platform::Pose;
@@ -22,22 +20,32 @@ use vehicle::trajectory::Trajectory;
 /// The estimator as an FMU.
 pub type AttitudeEstimator = SampledFmu<EstimatorInstance>;
 
-/// An instance of the estimator: its parameters, inputs and outputs.
-#[derive(Serialize, Deserialize)]
+/// An instance of the estimator: its inputs, outputs and parameters.
+#[derive(Serialize, Deserialize, Declared)]
 pub struct EstimatorInstance {
-    pub(crate) settings: Settings,
-    /// Sensor set as in the plant: 0, 1 for sensors without errors, [`MEMS_SENSORS`] for those with
-    /// errors.
+    #[setting(name = "", input)]
     line: Line,
+    #[setting(name = "", output, discrete, depends_on = ["*"])]
     output: Output,
+    #[setting(name = "")]
+    pub(crate) settings: Settings,
 }
 
 /// Outputs of the estimator.
-#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize, Declared)]
 struct Output {
+    #[setting(name = "")]
     estimate: Estimate,
+    /// Phase delay of the sensors and the low-pass filter at low frequencies.
+    #[setting(name = "filter.delay", unit = "s", nominal = 0.01)]
     filter_delay: f64,
     calibration: Calibration,
+    /// Magnetometer bias along {} in force, including hard iron.
+    #[setting(name = "calibration.bias", each = LETTERS, unit = "T", nominal = 5e-5)]
+    bias: Vector3<f64>,
+    /// Correction matrix of the magnetometer in force, entry ({}, {}); its unit is 1/T after a fit.
+    #[setting(name = "calibration.matrix", each = LETTERS, columns = LETTERS)]
+    matrix: Matrix3<f64>,
 }
 
 impl SampledInstance for EstimatorInstance {
@@ -47,21 +55,20 @@ impl SampledInstance for EstimatorInstance {
     type Output = ();
 
     fn description() -> Description<AttitudeEstimator> {
+        let table = VariableTable::new(|m: &mut AttitudeEstimator| &mut **m);
         Description {
-            name: "AttitudeEstimator",
-            description: "Attitude and rates from gyroscope, accelerometer and magnetometer, as on the platform of Chai et al. (2022)",
             documentation: include_str!("estimator.html").into(),
             version: env!("CARGO_PKG_VERSION"),
-            model_exchange: false,
-            event_indicators: 0,
             default_experiment: DefaultExperiment {
-                start: 0.0,
                 stop: Scenario::crmpc2022().duration,
-                tolerance: 1e-6,
                 step: Settings::ours().period,
+                ..DefaultExperiment::default()
             },
-            table: outputs(inputs(VariableTable::new()))
-                .settings(|m: &mut AttitudeEstimator| &mut m.settings),
+            ..Description::new(
+                "AttitudeEstimator",
+                "Attitude and rates from gyroscope, accelerometer and magnetometer, as on the platform of Chai et al. (2022)",
+                table.before("filter.delay", "estimatedBias"),
+            )
         }
     }
 
@@ -116,6 +123,8 @@ impl SampledInstance for EstimatorInstance {
             estimate: memory.estimate,
             filter_delay: estimator.filter_delay(),
             calibration: memory.calibration,
+            bias: memory.calibration.correction.bias,
+            matrix: memory.calibration.correction.matrix,
         };
     }
 }
@@ -156,129 +165,4 @@ fn warning(before: &Memory, after: &Memory) -> Option<&'static str> {
     } else {
         None
     }
-}
-
-type Variables = VariableTable<AttitudeEstimator>;
-
-struct Sensor {
-    name: &'static str,
-    quantity: &'static str,
-    unit: &'static str,
-    nominal: f64,
-}
-
-const SENSORS: [Sensor; 3] = [
-    Sensor { name: "gyroscope", quantity: "Angular rate about", unit: "rad/s", nominal: 0.05 },
-    Sensor { name: "accelerometer", quantity: "Specific force along", unit: "m/s2", nominal: 10.0 },
-    Sensor { name: "magnetometer", quantity: "Magnetic field along", unit: "T", nominal: 5e-5 },
-];
-
-const MEASURED: [&str; 11] = [
-    "measured.gyroscope.x",
-    "measured.gyroscope.y",
-    "measured.gyroscope.z",
-    "measured.accelerometer.x",
-    "measured.accelerometer.y",
-    "measured.accelerometer.z",
-    "measured.magnetometer.x",
-    "measured.magnetometer.y",
-    "measured.magnetometer.z",
-    "measured.time",
-    "measured.sample",
-];
-
-fn seconds(common: Common) -> Real {
-    common.real().unit("s")
-}
-
-fn inputs(mut table: Variables) -> Variables {
-    for (i, sensor) in SENSORS.iter().enumerate() {
-        let declare = |axis: &str, _: &str| {
-            let text = format!("{} {axis}, measured by the {}", sensor.quantity, sensor.name);
-            let common = input(&format!("measured.{}.{axis}", sensor.name), &text);
-            common.real().unit(sensor.unit).nominal(sensor.nominal)
-        };
-        table = vector(table, AXES, declare, move |m| &mut m.line.readings[i]);
-    }
-    let time = input("measured.time", "Time at which the newest sample was taken");
-    let sample = discrete_input(
-        "measured.sample",
-        "Number of the newest sample, counted from 1; 0 before the first sample, or always if samples are not counted",
-    );
-    table.real(seconds(time).nominal(1.0), |m| &mut m.line.time).integer(
-        sample,
-        (Some(0), None),
-        |m| &mut m.line.sample,
-    )
-}
-
-fn sampled(name: &str, text: &str) -> Common {
-    discrete_output(name, text).depends_on(MEASURED)
-}
-
-fn outputs(table: Variables) -> Variables {
-    let angle = |axis: &str, meaning: &str| {
-        let common = sampled(&format!("attitude.{axis}"), &format!("Estimated {meaning}"));
-        common.real().unit("rad").nominal(0.1)
-    };
-    let rate = |axis: &str, meaning: &str| {
-        let common = sampled(&format!("rate.{axis}"), &format!("Estimated body {meaning} rate"));
-        common.real().unit("rad/s").nominal(0.05)
-    };
-    let bias = |axis: &str, _: &str| {
-        let text = format!(
-            "Estimated gyroscope bias about {axis}: sum of the given bias, the one measured at rest and the learned one"
-        );
-        let common = sampled(&format!("estimatedBias.{axis}"), &text);
-        common.real().unit("rad/s").nominal(0.01)
-    };
-    let hard_iron = |axis: &str, _: &str| {
-        let text = format!("Magnetometer bias along {axis} in force, including hard iron");
-        let common = sampled(&format!("calibration.bias.{axis}"), &text);
-        common.real().unit("T").nominal(5e-5)
-    };
-    let table = vector(table, ANGLES, angle, |m| &mut m.output.estimate.angles);
-    let table = vector(table, RATES, rate, |m| &mut m.output.estimate.rates);
-    let health = sampled("health", Health::TEXT);
-    let age = sampled("age", "Time since the newest sample was taken");
-    let dropped = sampled("droppedSamples", "Number of samples so far that never arrived");
-    let rejected = sampled(
-        "rejectedSamples",
-        "Number of samples so far that were ignored in whole or in part because a reading or the time was implausible",
-    );
-    let delay = sampled(
-        "filter.delay",
-        "Phase delay of the sensors and the low-pass filter at low frequencies",
-    );
-    let status = sampled("calibration.status", CalibrationStatus::TEXT);
-    let residual = sampled(
-        "calibration.residual",
-        "Root mean square distance of the readings from the fitted ellipsoid, relative to its size",
-    );
-    let condition = sampled(
-        "calibration.condition",
-        "Condition number of the ellipsoid fit; 16 for uniform coverage, above 1000 rejected",
-    );
-    let table = table
-        .choice(health, |m| &mut m.output.estimate.health)
-        .real(seconds(age).nominal(0.01), |m| &mut m.output.estimate.age)
-        .integer(dropped, (None, None), |m| &mut m.output.estimate.dropped)
-        .integer(rejected, (None, None), |m| &mut m.output.estimate.rejected)
-        .real(seconds(delay).nominal(0.01), |m| &mut m.output.filter_delay);
-    let table = vector(table, AXES, bias, |m| &mut m.output.estimate.gyroscope_bias)
-        .choice(status, |m| &mut m.output.calibration.status)
-        .real(residual.real(), |m| &mut m.output.calibration.residual)
-        .real(condition.real(), |m| &mut m.output.calibration.condition);
-    let mut table = vector(table, AXES, hard_iron, |m| &mut m.output.calibration.correction.bias);
-    for (row, column) in (0..3).flat_map(|row| (0..3).map(move |column| (row, column))) {
-        let name = format!("calibration.matrix[{},{}]", row + 1, column + 1);
-        let text = format!(
-            "Correction matrix of the magnetometer in force, entry ({}, {}); its unit is 1/T after a fit",
-            AXES[row].0, AXES[column].0
-        );
-        table = table.real(sampled(&name, &text).real(), move |m| {
-            &mut m.output.calibration.correction.matrix[(row, column)]
-        });
-    }
-    table
 }

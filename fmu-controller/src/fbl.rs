@@ -4,9 +4,10 @@ use control::error::DesignError;
 use control::sliding::{Fbl, FblSettings};
 use controller_export::{Law, Vehicle};
 use serde::{Deserialize, Serialize};
+use settings::Declared;
 
 /// The feedback linearisation, which has no outputs of its own.
-#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize, Declared)]
 pub struct FblLaw;
 
 impl Law for FblLaw {

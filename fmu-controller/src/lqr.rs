@@ -5,9 +5,10 @@ use control::error::DesignError;
 use control::lqr::{Lqr, LqrSettings};
 use controller_export::{Law, Vehicle};
 use serde::{Deserialize, Serialize};
+use settings::Declared;
 
 /// The regulator, which has no outputs of its own.
-#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize, Declared)]
 pub struct LqrLaw;
 
 impl Law for LqrLaw {

@@ -27,6 +27,9 @@ impl<M> Inputs<M> for Held {
     fn are_extrapolated(&self) -> bool {
         false
     }
+    fn integrate(&self, _model: &mut M, _from: f64, _to: f64) -> Result<(), Failure> {
+        unreachable!("sampled instances have no states")
+    }
 }
 
 fn context() -> Context<'static> {
@@ -81,11 +84,11 @@ fn descriptions_are_consistent_and_interchangeable() {
 fn a_tick_evaluated_with_other_inputs_leaves_no_trace() {
     let mut once: Crmpc = ready(|_| ());
     let mut twice: Crmpc = ready(|_| ());
-    let measured = once.input.measured;
-    twice.input.measured.angles *= 1.1;
+    let angles = once.input.angles;
+    twice.input.angles *= 1.1;
     twice.calculate(0.0, LastEvent::InputSet).unwrap();
     let other = twice.output.moment;
-    twice.input.measured = measured;
+    twice.input.angles = angles;
     for instance in [&mut once, &mut twice] {
         instance.calculate(0.0, LastEvent::InputSet).unwrap();
         step(instance, 0.0, 0.2);
@@ -134,7 +137,7 @@ fn moments_are_held_between_ticks() {
     let mut instance: Lqr = ready(|_| ());
     step(&mut instance, 0.0, 0.05);
     let held = instance.output.moment;
-    instance.input.measured.angles *= 2.0;
+    instance.input.angles *= 2.0;
     step(&mut instance, 0.05, 0.07);
     assert_eq!(instance.output.moment, held);
     step(&mut instance, 0.07, 0.08);
@@ -148,7 +151,7 @@ fn the_external_reference_is_followed() {
             instance.parameters.reference.profile = Choice::External;
             instance.parameters.latency.action = delay;
         });
-        let angles = instance.input.measured.angles;
+        let angles = instance.input.angles;
         instance.input.reference = Reference { angles, ..Reference::default() };
         change(&mut instance.input.reference);
         instance.calculate(0.0, LastEvent::InputSet).unwrap();
@@ -201,8 +204,7 @@ fn saturated_loop(start: f64, delay: f64, ticks: u32) -> Vec<State> {
     let mut plant = Plant::new(&config, start).unwrap();
     let mut go = |k: u32| {
         let [from, to] = [k, k + 1].map(|k| start + 0.04 * f64::from(k));
-        (instance.input.measured.angles, instance.input.measured.rates) =
-            (plant.angles(), plant.rates());
+        (instance.input.angles, instance.input.rates) = (plant.angles(), plant.rates());
         instance.calculate(from, LastEvent::InputSet).unwrap();
         plant.advance(from, to, instance.output.moment).unwrap();
         instance.step(from, to, &Held, &mut |text| panic!("{text}")).unwrap();
@@ -251,7 +253,7 @@ fn oracle_a_known_trajectory_is_taken_out_of_the_rates() {
     let told = |rate: f64, rates: Vector3<f64>| {
         let mut instance = ready::<Lqr>(|instance| {
             let input = &mut instance.input;
-            input.measured.rates = rates;
+            input.rates = rates;
             input.trajectory.heading = 0.7;
             input.trajectory.flight_path_angle = -0.02;
             input.trajectory.heading_rate = rate;
@@ -274,7 +276,7 @@ fn oracle_a_known_trajectory_is_taken_out_of_the_rates() {
 #[test]
 fn a_measurement_that_is_not_finite_is_an_error_not_a_number() {
     let mut instance: Lqr = ready(|_| ());
-    instance.input.measured.angles.y = f64::NAN;
+    instance.input.angles.y = f64::NAN;
     let Err(Failure::Error(text)) = instance.calculate(0.0, LastEvent::InputSet) else {
         panic!("accepted")
     };

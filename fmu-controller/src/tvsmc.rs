@@ -1,16 +1,15 @@
 //! `BTVSMC`, `BTVSMC_DO` and `SOTVSMC_DO`, the time-varying sliding modes, as FMUs.
 
 use control::error::DesignError;
-use control::sliding::{
-    BoundaryLayer, Estimate, Memory, Observer, Reaching, SecondOrder, Settings, Tvsmc,
-};
-use controller_export::table::{self, ANGLES, sampled_output, shown_vector, vector};
+use control::sliding::{BoundaryLayer, Memory, Observer, Reaching, SecondOrder, Settings, Tvsmc};
+use controller_export::table::shown_vector;
 use controller_export::{ControllerFmu, Law, Vehicle};
 use fmi_export::VariableTable;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use settings::Declared;
 use std::marker::PhantomData;
+use vehicle::axes::ANGLES;
 
 /// The parts in which the time-varying sliding modes differ.
 pub trait Variant: Sized + Send + Sync + 'static {
@@ -82,18 +81,27 @@ where
 }
 
 /// Outputs of a time-varying sliding mode.
-#[derive(Clone, Debug, Serialize, Deserialize)]
+#[derive(Clone, Debug, Serialize, Deserialize, Declared)]
 #[serde(bound = "")]
 pub struct TvsmcLaw<V: Variant> {
+    /// Sliding variable of the {} at the last tick.
+    #[setting(name = "slidingVariable", each = ANGLES, unit = "rad/s", nominal = 1e-3)]
     sliding: Vector3<f64>,
-    estimate: Estimate,
+    /// Observer's estimate z0 of the sliding variable of the {}.
+    #[setting(name = "slidingEstimate", each = ANGLES, unit = "rad/s", nominal = 1e-3)]
+    sliding_estimate: Vector3<f64>,
+    /// Observer's estimate of the disturbance of the second derivative of the {}.
+    #[setting(name = "disturbanceEstimate", each = ANGLES, unit = "rad/s2", nominal = 0.01)]
+    disturbance: Vector3<f64>,
     #[serde(skip)]
+    #[setting(skip)]
     variant: PhantomData<V>,
 }
 
 impl<V: Variant> Default for TvsmcLaw<V> {
     fn default() -> Self {
-        Self { sliding: Vector3::zeros(), estimate: Estimate::default(), variant: PhantomData }
+        let zero = Vector3::zeros();
+        Self { sliding: zero, sliding_estimate: zero, disturbance: zero, variant: PhantomData }
     }
 }
 
@@ -122,7 +130,10 @@ impl<V: Variant> Law for TvsmcLaw<V> {
     }
 
     fn outputs(table: VariableTable<ControllerFmu<Self>>) -> VariableTable<ControllerFmu<Self>> {
-        outputs(table)
+        if V::OBSERVER {
+            return table;
+        }
+        table.without("slidingEstimate").without("disturbanceEstimate")
     }
 
     fn show(
@@ -131,32 +142,8 @@ impl<V: Variant> Law for TvsmcLaw<V> {
         memory: &Memory<<V::Reaching as Reaching>::Memory>,
     ) {
         self.sliding = shown_vector(&memory.sliding);
-        self.estimate = memory.estimate;
-        self.estimate.sliding = shown_vector(&memory.estimate.sliding);
-        self.estimate.disturbance = shown_vector(&memory.estimate.disturbance);
-    }
-}
-
-fn outputs<V: Variant>(
-    table: VariableTable<ControllerFmu<TvsmcLaw<V>>>,
-) -> VariableTable<ControllerFmu<TvsmcLaw<V>>> {
-    let sampled = |name: String, text: String| sampled_output(&name, &text);
-    let sliding = |axis: &str, meaning: &str| {
-        let text = format!("Sliding variable of the {meaning} at the last tick");
-        sampled(format!("slidingVariable.{axis}"), text).real().unit("rad/s").nominal(1e-3)
-    };
-    let sliding_estimate = |axis: &str, meaning: &str| {
-        let text = format!("Observer's estimate z0 of the sliding variable of the {meaning}");
-        sampled(format!("slidingEstimate.{axis}"), text).real().unit("rad/s").nominal(1e-3)
-    };
-    let disturbance =
-        |axis: &str, meaning: &str| table::disturbance_estimate(axis, meaning).nominal(0.01);
-    let table = vector(table, ANGLES, sliding, |m| &mut m.law.sliding);
-    if V::OBSERVER {
-        let table = vector(table, ANGLES, sliding_estimate, |m| &mut m.law.estimate.sliding);
-        vector(table, ANGLES, disturbance, |m| &mut m.law.estimate.disturbance)
-    } else {
-        table
+        self.sliding_estimate = shown_vector(&memory.estimate.sliding);
+        self.disturbance = shown_vector(&memory.estimate.disturbance);
     }
 }
 

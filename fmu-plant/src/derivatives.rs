@@ -1,9 +1,11 @@
 //! Partial derivatives of the calculated variables.
 
 use crate::plant::{ATTITUDE, MOTION, Output, ReentryPlant};
-use crate::roles::{Known, Quantity, Unknown};
+use crate::roles::{Known, Unknown, role};
 use fmi_export::Failure;
 use nalgebra::{SMatrix, Vector3};
+use settings::{Field, Settings};
+use std::sync::LazyLock;
 
 impl ReentryPlant {
     /// Returns the partial derivative at a fixed flight condition, in closed form.
@@ -70,9 +72,12 @@ impl ReentryPlant {
     pub(crate) fn difference(
         &mut self,
         time: f64,
-        unknown: Unknown,
+        unknown: &str,
         known: Known,
     ) -> Result<f64, Failure> {
+        if role(unknown).as_unknown == Some(Unknown::Held) {
+            return Ok(0.0);
+        }
         if let Known::Jet(j) = known {
             return self.difference_by_jet(time, unknown, j);
         }
@@ -81,7 +86,8 @@ impl ReentryPlant {
         let mut values = [0.0; 4];
         for (value, steps) in values.iter_mut().zip([-2.0, -1.0, 1.0, 2.0]) {
             let before = self.nudge(known, steps * h);
-            *value = self.output_at(self.ready()?, time, &held).value(unknown);
+            let shown = self.output_at(self.ready()?, time, &held).value(unknown);
+            *value = shown.unwrap_or_default();
             if let Some(place) = self.place(known) {
                 *place = before;
             }
@@ -101,20 +107,15 @@ impl ReentryPlant {
     /// Returns the partial derivative with respect to the command to a jet. Its thrust has an edge
     /// at no and at full thrust, so that its moment is taken in closed form, as without an entry
     /// flight.
-    fn difference_by_jet(
-        &mut self,
-        time: f64,
-        unknown: Unknown,
-        jet: usize,
-    ) -> Result<f64, Failure> {
+    fn difference_by_jet(&mut self, time: f64, unknown: &str, jet: usize) -> Result<f64, Failure> {
         // In model exchange, commands are taken at events only.
         if self.event_driven {
             return Ok(0.0);
         }
         let by_jets = self.ready()?.applied_moment_by_jets(&self.command);
-        match unknown {
-            Unknown::AppliedMoment(i) => Ok(by_jets[(i, jet)]),
-            Unknown::Derivative(_) => (0..3).try_fold(0.0, |sum, axis| {
+        match role(unknown).as_unknown {
+            Some(Unknown::AppliedMoment(i)) => Ok(by_jets[(i, jet)]),
+            Some(Unknown::Derivative(_)) => (0..3).try_fold(0.0, |sum, axis| {
                 let by_moment = self.difference(time, unknown, Known::DisturbanceMoment(axis))?;
                 Ok(sum + by_moment * by_jets[(axis, jet)])
             }),
@@ -154,41 +155,13 @@ fn width(known: Known) -> f64 {
 }
 
 impl Output {
-    /// Returns the value of a calculated variable.
-    pub(crate) fn value(&self, unknown: Unknown) -> f64 {
-        match unknown {
-            Unknown::State(i @ 0..3) => self.angles[i],
-            Unknown::State(i @ 3..ATTITUDE) => self.rates[i - 3],
-            Unknown::State(i @ ATTITUDE..MOTION) => self.deflections[i - ATTITUDE],
-            Unknown::State(i) => self.motion[i - MOTION],
-            Unknown::Derivative(i @ 0..3) => self.angle_rates[i],
-            Unknown::Derivative(i @ 3..ATTITUDE) => self.angular_acceleration[i - 3],
-            Unknown::Derivative(i @ ATTITUDE..MOTION) => self.deflection_rates[i - ATTITUDE],
-            Unknown::Derivative(i) => self.motion_rate[i - MOTION],
-            Unknown::AppliedMoment(i) => self.applied_moment[i],
-            Unknown::Delta(i) => self.delta[i],
-            Unknown::DisturbanceMoment(i) => self.disturbance_moment[i],
-            Unknown::Flight(quantity) => self.flight(quantity),
-            Unknown::Measured(i) => self.measured.readings[i / 3][i % 3],
-            Unknown::MeasuredTime => self.measured.time,
-        }
-    }
-
-    fn flight(&self, quantity: Quantity) -> f64 {
-        let passage = &self.passage;
-        match quantity {
-            Quantity::DynamicPressure => passage.dynamic_pressure,
-            Quantity::KnownPressure => passage.known_pressure,
-            Quantity::Mach => passage.mach,
-            Quantity::Airspeed => passage.airspeed,
-            Quantity::Density => passage.density,
-            Quantity::AirAngle(i) => passage.air_angles[i],
-            Quantity::Lift => passage.lift,
-            Quantity::Drag => passage.drag,
-            Quantity::LoadFactor => self.load_factor,
-            Quantity::HeatFlux => self.heat_flux,
-            Quantity::Range => self.range,
-            Quantity::AirMoment(i) => self.air_moment[i],
+    /// Returns the number that an output variable has.
+    pub(crate) fn value(&mut self, name: &str) -> Option<f64> {
+        static OUTPUTS: LazyLock<Settings<Output>> = LazyLock::new(settings::settings);
+        let index = OUTPUTS.iter().position(|output| output.place.name == name)?;
+        match OUTPUTS.field(self, index) {
+            Field::Real(value) => Some(*value),
+            _ => None,
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::parameters::Parameters;
 use crate::plant::{ATTITUDE, Output, ReentryPlant};
-use crate::roles::Unknown;
+use crate::roles::{Unknown, role};
 use crate::table;
 use fmi_export::{Context, Description, EventInfo, Failure, Inputs, LastEvent, Model, Restoration};
 use vehicle::actuators::Command;
@@ -189,22 +189,18 @@ impl Model for ReentryPlant {
     fn partial_derivative(
         &mut self,
         time: f64,
-        unknown_variable: usize,
-        known_variable: usize,
-    ) -> Result<f64, Failure> {
+        unknown: &str,
+        known: &str,
+    ) -> Result<Option<f64>, Failure> {
         self.check(&self.ready()?.state, time)?;
-        let (unknown, known) =
-            (table::role(unknown_variable).as_unknown, table::role(known_variable).as_known);
-        let (Some(unknown), Some(known)) = (unknown, known) else {
+        let (Some(role), Some(by)) = (role(unknown).as_unknown, role(known).as_known) else {
             let text = "derivatives exist only of outputs with respect to states and inputs";
-            return Err(Failure::Error(format!(
-                "variable {unknown_variable} by variable {known_variable}: {text}"
-            )));
+            return Err(Failure::Error(format!("'{unknown}' by '{known}': {text}")));
         };
         let is_curved = self.ready()?.has_surface_tables();
-        if is_curved || self.parameters.entry.is_entry() || matches!(unknown, Unknown::Flight(_)) {
-            return self.difference(time, unknown, known);
+        if is_curved || self.parameters.entry.is_entry() || role == Unknown::Flight {
+            return self.difference(time, unknown, by).map(Some);
         }
-        self.given_derivative(time, unknown, known)
+        self.given_derivative(time, role, by).map(Some)
     }
 }

@@ -113,15 +113,15 @@ pub(crate) struct Parameters {
     #[setting(name = "trajectory.earthRate", unit = "rad/s", min = 0.0, max = 1.0, nominal = 1e-4)]
     #[setting(used_with = "translation = given")]
     pub(crate) earth_rate: f64,
-    #[setting(skip)]
+    #[setting(name = "")]
     pub(crate) sensing: Sensing,
-    #[setting(skip)]
+    #[setting(name = "")]
     pub(crate) converter: Converter,
-    #[setting(skip)]
+    #[setting(name = "")]
     pub(crate) table: Table,
-    #[setting(skip)]
+    #[setting(name = "")]
     pub(crate) entry: EntryParameters,
-    #[setting(skip)]
+    #[setting(name = "")]
     pub(crate) vehicle: VehicleFile,
 }
 
@@ -185,8 +185,9 @@ pub(crate) struct Table {
     #[setting(name = "disturbance.table.period", unit = "s", min = 0.0, nominal = 10.0)]
     #[setting(used_with = "disturbance.kind = table and disturbance.table.rows > 0")]
     pub(crate) period: f64,
-    /// The rows, whose variables are declared column by column.
-    #[setting(skip)]
+    /// The rows.
+    #[setting(name = "disturbance.table", by_column)]
+    #[setting(used_with = "disturbance.kind = table and disturbance.table.rows >= {#}")]
     pub(crate) rows: [Row; TABLE_ROWS],
 }
 

@@ -4,10 +4,12 @@ use crate::parameters::Parameters;
 use fmi_export::Failure;
 use nalgebra::{SVector, Vector3};
 use serde::{Deserialize, Serialize};
+use settings::Declared;
 use vehicle::Vehicle;
 use vehicle::actuators::Command;
-use vehicle::effectors::{SURFACES, Surfaces};
-use vehicle::entry::{Motion, Passage};
+use vehicle::axes::{ANGLES, AXES, RATES};
+use vehicle::effectors::{SURFACE_NAMES, SURFACES, Surfaces};
+use vehicle::entry::{MOTION as MOTION_NAMES, Motion, NOMINALS, Passage, RATE_UNITS, UNITS};
 use vehicle::plant::{Held, Input, Plant};
 use vehicle::sensors::Sample;
 
@@ -25,48 +27,107 @@ const GRAVITY: f64 = 9.80665;
 const AT_REST: f64 = 1.0;
 
 /// Instance of the re-entry vehicle's FMU.
-#[derive(Clone, Debug, Serialize, Deserialize)]
+#[derive(Clone, Debug, Serialize, Deserialize, Declared)]
 pub struct ReentryPlant {
-    pub(crate) parameters: Parameters,
-    pub(crate) input: Input,
-    pub(crate) command: Command,
+    #[setting(name = "", output)]
     pub(crate) output: Output,
+    #[setting(name = "", input)]
+    pub(crate) input: Input,
+    #[setting(name = "", input, discrete, used_with = "actuation = surfacesAndJets")]
+    pub(crate) command: Command,
+    #[setting(name = "")]
+    pub(crate) parameters: Parameters,
     /// Vehicle that was read from vehicle.file at initialization.
+    #[setting(skip)]
     pub(crate) vehicle: Option<Box<Vehicle>>,
     /// Simulated plant, which exists from initialization on. Every step takes it out and puts it
     /// back: the box spares moving all of it.
+    #[setting(skip)]
     pub(crate) plant: Option<Box<Plant>>,
     /// Fixed flight condition, in use without an entry flight.
+    #[setting(skip)]
     pub(crate) fixed: Passage,
     /// Whether the instance runs in model exchange: held quantities then change at events only, and
     /// not when time passes a tick or an input is set.
+    #[setting(skip)]
     pub(crate) event_driven: bool,
 }
 
-/// Outputs of the instance at one moment of time.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+/// Outputs of the instance at one moment of time. An entry flight computes the trajectory from the
+/// motion and from the air's forces, which depend on the attitude.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Declared)]
 pub(crate) struct Output {
+    /// {} relative to the ground velocity.
+    #[setting(name = "attitude", each = ANGLES, unit = "rad", nominal = 0.1)]
     pub(crate) angles: Vector3<f64>,
+    /// Body {}.
+    #[setting(name = "rate", each = RATES, unit = "rad/s", nominal = 0.05)]
     pub(crate) rates: Vector3<f64>,
+    /// Time derivative of the {}.
+    // They follow Wu 2015 (1), and depend on sigma through the trajectory.
+    #[setting(name = "attitudeRate", each = ANGLES, unit = "rad/s", nominal = 0.05)]
+    #[setting(derivative = "attitude{.}")]
+    #[setting(depends_on = ["motion.*", "attitude.*", "trajectory.*", "rate.*"])]
     pub(crate) angle_rates: Vector3<f64>,
+    /// Time derivative of the body {}.
+    #[setting(each = RATES, unit = "rad/s2", nominal = 0.05, derivative = "rate{.}")]
+    #[setting(depends_on = ["attitude.alpha", "attitude.beta", "rate.*", "moment.*",
+        "disturbanceMoment.*", "jet[*", "deflection[*", "motion.*", "attitude.*", "prescribed.*",
+        "prescribedRate.*", "trim.alpha"])]
     pub(crate) angular_acceleration: Vector3<f64>,
+    /// Control moment that acts on the vehicle about the {}.
+    #[setting(each = AXES, unit = "N.m", nominal = 1e5)]
+    #[setting(depends_on = ["moment{.}", "jet[*", "deflection[*", "motion.*", "attitude.*"])]
     pub(crate) applied_moment: Vector3<f64>,
+    /// Disturbance that acts on the second time derivative of the {}.
+    #[setting(name = "disturbance.delta", each = ANGLES, unit = "rad/s2", nominal = 0.03, discrete)]
+    #[setting(depends_on = ["attitude.alpha", "attitude.beta", "rate.*", "moment.*", "jet[*",
+        "deflection[*", "motion.*", "attitude.*"])]
     pub(crate) delta: Vector3<f64>,
+    /// Disturbance moment about the {}: external input plus sine.
+    #[setting(name = "disturbance.moment", each = AXES, unit = "N.m", nominal = 1e4)]
+    #[setting(depends_on = ["disturbanceMoment{.}"])]
     pub(crate) disturbance_moment: Vector3<f64>,
+    /// Deflection of the {}, trailing edge down positive.
+    #[setting(name = "deflection", each = SURFACE_NAMES, unit = "rad", nominal = 0.1)]
     pub(crate) deflections: Surfaces,
+    /// Deflection rate of the {}: its positive or negative limit while moving, 0 at rest.
+    #[setting(name = "deflectionRate", each = SURFACE_NAMES, unit = "rad/s", nominal = 0.1)]
+    #[setting(derivative = "deflection{.}", depends_on = ["surface{.}", "deflection{.}"])]
     pub(crate) deflection_rates: Surfaces,
+    #[setting(skip)]
     pub(crate) indicators: SVector<f64, INDICATORS>,
+    #[setting(name = "")]
+    #[setting(depends_on = ["attitude.*", "rate.*", "trajectory.*", "motion.*"])]
     pub(crate) measured: Sample,
+    /// {}.
+    #[setting(each = MOTION_NAMES, units = UNITS, nominals = NOMINALS)]
     pub(crate) motion: Motion,
+    /// Time derivative of motion{.}; 0 without an entry flight.
+    #[setting(each = MOTION_NAMES, units = RATE_UNITS, nominals = RATE_NOMINALS)]
+    #[setting(derivative = "motion{.}", depends_on = ["motion.*", "attitude.*"])]
     pub(crate) motion_rate: Motion,
+    #[setting(name = "", depends_on = ["motion.*", "attitude.*"])]
     pub(crate) passage: Passage,
-    /// Magnitude of the specific force in units of the standard gravity.
+    /// Specific force in units of 9.80665 m/s2; 0 without an entry flight.
+    #[setting(nominal = 1.0, depends_on = ["motion.*", "attitude.*"])]
     pub(crate) load_factor: f64,
-    /// Heat flux into the leading edge, W/m².
+    /// Heat flux into the leading edge; 0 without an entry flight.
+    #[setting(name = "heating.flux", unit = "W/m2", nominal = 1e5)]
+    #[setting(depends_on = ["motion.*", "attitude.*"])]
     pub(crate) heat_flux: f64,
-    pub(crate) air_moment: Vector3<f64>,
+    /// Distance over ground from the start.
+    #[setting(name = "downrange", unit = "m", nominal = 1e6)]
+    #[setting(depends_on = ["motion.*", "attitude.*"])]
     pub(crate) range: f64,
+    /// Moment of the air about the {}, without that of the surfaces.
+    #[setting(each = AXES, unit = "N.m", nominal = 1e4)]
+    #[setting(depends_on = ["motion.*", "attitude.*", "rate.*", "trim.alpha"])]
+    pub(crate) air_moment: Vector3<f64>,
 }
+
+/// Typical magnitudes of the rates of the motion.
+const RATE_NOMINALS: [f64; 6] = [1e3, 0.01, 0.01, 10.0, 1e-3, 0.01];
 
 impl ReentryPlant {
     pub(crate) fn ready(&self) -> Result<&Plant, Failure> {

@@ -1,28 +1,11 @@
-//! Roles of the variables in the equations, so that nothing depends on their positions in the
-//! variable table.
+//! Roles of the variables in the equations, which follow from their names.
 
-use fmi_export::VariableTable;
-use fmi_export::table::{Common, Real};
-use settings::Declared;
-
-/// Quantity of the flight.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum Quantity {
-    DynamicPressure,
-    /// Dynamic pressure as an on-board computer knows it.
-    KnownPressure,
-    Mach,
-    Airspeed,
-    Density,
-    /// Angle of attack or sideslip relative to the air.
-    AirAngle(usize),
-    Lift,
-    Drag,
-    LoadFactor,
-    HeatFlux,
-    Range,
-    AirMoment(usize),
-}
+use crate::plant::{ATTITUDE, MOTION, Output};
+use settings::{Kind, settings};
+use std::collections::HashMap;
+use std::sync::LazyLock;
+use vehicle::actuators::Command;
+use vehicle::plant::Input;
 
 /// Role of a calculated variable. States and derivatives are counted in the order attitude, rates,
 /// deflections, motion.
@@ -31,12 +14,12 @@ pub(crate) enum Unknown {
     State(usize),
     Derivative(usize),
     AppliedMoment(usize),
-    Delta(usize),
     DisturbanceMoment(usize),
-    Flight(Quantity),
     Measured(usize),
-    /// Time of a sample, or a part of a fix, which depend on nothing.
-    MeasuredTime,
+    /// Quantity of the flight.
+    Flight,
+    /// Disturbance, time of a sample, or part of a fix, which are held and depend on nothing.
+    Held,
 }
 
 /// Role of a state or an input.
@@ -79,54 +62,56 @@ impl From<Known> for Role {
     }
 }
 
-/// Variable table with the role of each variable.
-pub(crate) struct Variables<M> {
-    pub(crate) table: VariableTable<M>,
-    pub(crate) roles: Vec<Role>,
+/// Returns the role of the variable with this name.
+pub(crate) fn role(name: &str) -> Role {
+    static ROLES: LazyLock<HashMap<String, Role>> = LazyLock::new(roles);
+    ROLES.get(name).copied().unwrap_or_default()
 }
 
-impl<M: 'static> Variables<M> {
-    pub(crate) fn new() -> Self {
-        Self { table: VariableTable::new(), roles: Vec::new() }
+/// Returns the roles of all numbers among outputs and inputs.
+fn roles() -> HashMap<String, Role> {
+    let lists = (settings::<Output>(), settings::<Input>(), settings::<Command>());
+    let declared = lists.0.iter().chain(lists.1.iter()).chain(lists.2.iter());
+    let mut numbers = HashMap::new();
+    let mut roles = HashMap::new();
+    for setting in declared.filter(|setting| matches!(setting.kind, Kind::Real)) {
+        let name = &setting.place.name;
+        let group = name.rfind(['.', '[']).map_or(name.as_str(), |end| &name[..end]);
+        let number = numbers.entry(group).or_insert(0);
+        roles.insert(name.clone(), Role::of(group, *number));
+        *number += 1;
     }
+    roles
+}
 
-    fn add(mut self, declare: impl FnOnce(VariableTable<M>) -> VariableTable<M>) -> Self {
-        self.roles.push(Role::default());
-        Self { table: declare(self.table), ..self }
-    }
-
-    /// Gives the last variable its role.
-    pub(crate) fn role(mut self, role: impl Into<Role>) -> Self {
-        if let Some(last) = self.roles.last_mut() {
-            *last = role.into();
+impl Role {
+    /// Returns the role of the variable with this number in a group of variables.
+    fn of(group: &str, i: usize) -> Self {
+        match group {
+            "attitude" => Self::state(i),
+            "rate" => Self::state(3 + i),
+            "deflection" => Self::state(ATTITUDE + i),
+            "motion" => Self::state(MOTION + i),
+            "attitudeRate" => Unknown::Derivative(i).into(),
+            "angularAcceleration" => Unknown::Derivative(3 + i).into(),
+            "deflectionRate" => Unknown::Derivative(ATTITUDE + i).into(),
+            "motionRate" => Unknown::Derivative(MOTION + i).into(),
+            "appliedMoment" => Unknown::AppliedMoment(i).into(),
+            "disturbance.moment" => Unknown::DisturbanceMoment(i).into(),
+            "measured.gyroscope" => Unknown::Measured(i).into(),
+            "measured.accelerometer" => Unknown::Measured(3 + i).into(),
+            "measured.magnetometer" => Unknown::Measured(6 + i).into(),
+            "disturbance.delta" | "measured" | "gnss" | "gnss.position" | "gnss.velocity"
+            | "star" | "star.attitude" => Unknown::Held.into(),
+            "moment" => Known::Moment(i).into(),
+            "disturbanceMoment" => Known::DisturbanceMoment(i).into(),
+            "surface" => Known::Surface(i).into(),
+            "jet" => Known::Jet(i).into(),
+            "trajectory" => Known::Trajectory(i).into(),
+            "prescribed" => Known::Prescribed(i).into(),
+            "prescribedRate" => Known::Prescribed(3 + i).into(),
+            "trim" => Known::Trim.into(),
+            _ => Unknown::Flight.into(),
         }
-        self
-    }
-
-    pub(crate) fn real(
-        self,
-        declaration: Real,
-        field: impl Fn(&mut M) -> &mut f64 + Send + Sync + 'static,
-    ) -> Self {
-        self.add(|table| table.real(declaration, field))
-    }
-
-    pub(crate) fn integer<I: Copy + TryFrom<i32> + TryInto<i32>>(
-        self,
-        common: Common,
-        limits: (Option<i32>, Option<i32>),
-        field: impl Fn(&mut M) -> &mut I + Copy + Send + Sync + 'static,
-    ) -> Self {
-        self.add(|table| table.integer(common, limits, field))
-    }
-
-    /// Adds the declared settings of a part of the model, which have no role.
-    pub(crate) fn settings<S: Declared + 'static>(
-        self,
-        part: impl Fn(&mut M) -> &mut S + Send + Sync + 'static,
-    ) -> Self {
-        let mut roles = self.roles;
-        roles.extend(settings::names::<S>().iter().map(|_| Role::default()));
-        Self { table: self.table.settings(part), roles }
     }
 }

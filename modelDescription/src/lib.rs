@@ -163,6 +163,13 @@ pub struct DefaultExperiment {
     pub step: f64,
 }
 
+impl Default for DefaultExperiment {
+    /// Returns an experiment of one second in steps of 10 ms.
+    fn default() -> Self {
+        Self { start: 0.0, stop: 1.0, tolerance: 1e-6, step: 0.01 }
+    }
+}
+
 impl ModelDescription {
     /// Returns the GUID: SHA-256 over the description as JSON, cut to 128 bits and written as a
     /// UUID (version 8). Two FMUs have the same GUID exactly if their variable tables, texts

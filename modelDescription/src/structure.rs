@@ -10,6 +10,14 @@ impl Variable {
         !matches!(self.causality, Causality::Parameter | Causality::Input)
     }
 
+    /// Typical magnitude of the variable: what is declared, or 1.
+    pub fn nominal(&self) -> f64 {
+        match self.kind {
+            VariableKind::Real { nominal: Some(nominal), .. } => nominal,
+            _ => 1.0,
+        }
+    }
+
     /// Name of the state whose time derivative this variable is.
     pub fn derivative_of(&self) -> Option<&str> {
         match &self.kind {
@@ -17,6 +25,18 @@ impl Variable {
             _ => None,
         }
     }
+}
+
+/// Continuous states and their derivatives as pairs of positions among the variables, in the order of
+/// the states.
+pub fn states(variables: &[&Variable]) -> Vec<(usize, usize)> {
+    let position = |name: &str| variables.iter().position(|variable| variable.name == name);
+    let pair = |(derivative, variable): (usize, &&Variable)| {
+        Some((position(variable.derivative_of()?)?, derivative))
+    };
+    let mut states: Vec<_> = variables.iter().enumerate().filter_map(pair).collect();
+    states.sort_unstable();
+    states
 }
 
 impl ModelDescription {
@@ -28,16 +48,7 @@ impl ModelDescription {
     /// Continuous states and their derivatives as pairs of value references, in the order of the
     /// states in the variable table.
     pub fn states(&self) -> Vec<(usize, usize)> {
-        let mut states: Vec<_> = self
-            .variables
-            .iter()
-            .enumerate()
-            .filter_map(|(derivative, variable)| {
-                Some((self.position(variable.derivative_of()?)?, derivative))
-            })
-            .collect();
-        states.sort_unstable();
-        states
+        states(&self.variables.iter().collect::<Vec<_>>())
     }
 
     /// Whether the FMU provides directional derivatives, as exactly the FMUs with continuous states

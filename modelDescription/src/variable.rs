@@ -135,3 +135,14 @@ pub struct Variable {
     /// Whether an input may stay unconnected without a warning.
     pub is_optional: bool,
 }
+
+impl Variable {
+    /// Declares the [condition](crate::condition) under which the variable has an effect; empty for
+    /// always. The importer is warned if it sets the variable without effect.
+    pub fn use_with(&mut self, condition: &str) {
+        if !condition.is_empty() {
+            self.description = format!("{}; used with {condition}", self.description);
+            self.used_with = condition.into();
+        }
+    }
+}

@@ -12,11 +12,14 @@
 //! solution are both available.
 
 use crate::aerodynamics::{Flow, SurfaceTable};
-use crate::effectors::{Effectors, JETS, Jets, SURFACES, Surfaces, moment_of_tables};
+use crate::effectors::{
+    Effectors, JETS, Jets, SURFACE_NAMES, SURFACES, Surfaces, moment_of_tables,
+};
 use crate::error::Error;
 use crate::time::tolerance;
 use nalgebra::{SMatrix, Vector3};
 use serde::{Deserialize, Serialize};
+use settings::Declared;
 
 /// Command at or above which a jet in on-off mode is switched on.
 pub const THRESHOLD: f64 = 0.5;
@@ -47,11 +50,13 @@ pub struct Config {
 }
 
 /// Commands to the surfaces and jets.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Declared)]
 pub struct Command {
-    /// Commanded deflection of each surface, rad.
+    /// Commanded deflection of the {}, trailing edge down positive.
+    #[setting(name = "surface", each = SURFACE_NAMES, unit = "rad", nominal = 0.1)]
     pub surfaces: Surfaces,
-    /// Command to each jet: 0 is off, 1 is full thrust.
+    /// Command to jet {}: 0 for off, 1 for full thrust.
+    #[setting(name = "jet", nominal = 1.0)]
     pub jets: Jets,
 }
 

@@ -1,7 +1,7 @@
 //! The air through which a vehicle enters: its density, its speed of sound, and winds.
 
 use crate::atmosphere::air_anywhere;
-use crate::axes::LEVEL;
+use crate::axes::{HORIZONTAL, LEVEL};
 use crate::error::Error;
 use crate::math::{cos, exp};
 use nalgebra::Vector3;
@@ -41,8 +41,8 @@ pub struct Air {
     /// Number of rows of the air's profile that are used.
     #[setting(name = "air.rows", min = 0, max = ROWS)]
     pub rows: usize,
-    /// Rows of the profile, whose variables are declared column by column.
-    #[setting(skip)]
+    /// Rows of the profile.
+    #[setting(name = "air", by_column, used_with = "air.rows >= {#}")]
     pub profile: [Row; ROWS],
     /// Discrete gust.
     #[setting(name = "gust")]
@@ -53,13 +53,16 @@ pub struct Air {
 }
 
 /// Deviations at one altitude. They are linear between the rows and constant beyond them.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Declared)]
 pub struct Row {
-    /// Altitude of the row, m.
+    /// Altitude of a row of the air's profile (row {#}).
+    #[setting(unit = "m", nominal = 1e4)]
     pub altitude: f64,
-    /// Ratio of the density to that of the undisturbed air.
+    /// Ratio of the density to that of the undisturbed air (row {#}).
+    #[setting(name = "densityRatio", min = 0.0, nominal = 1.0)]
     pub density: f64,
-    /// Wind to the north and to the east, m/s.
+    /// Wind {} (row {#}).
+    #[setting(each = HORIZONTAL, unit = "m/s", nominal = 10.0)]
     pub wind: [f64; 2],
 }
 

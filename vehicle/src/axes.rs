@@ -3,8 +3,7 @@
 
 use std::f64::consts::TAU;
 
-/// Ending of a name, and the meaning of the entry.
-pub type Entry = (&'static str, &'static str);
+pub use settings::Entry;
 
 /// Components of Θ by name.
 pub const ANGLES: [Entry; 3] =
@@ -20,11 +19,22 @@ pub const NUMBERED_RATES: [Entry; 3] =
 /// Level axes by name.
 pub const LEVEL: [Entry; 3] =
     [(".north", "to the north"), (".east", "to the east"), (".down", "downward")];
+/// Horizontal axes by name.
+pub const HORIZONTAL: [Entry; 2] = [(".north", "to the north"), (".east", "to the east")];
+/// Angles of the flow past the vehicle by name.
+pub const FLOW: [Entry; 2] = [(".alpha", "angle of attack"), (".beta", "sideslip angle")];
+/// Parts of a quaternion by name.
+pub const QUATERNION: [Entry; 4] = [(".w", "w"), (".x", "x"), (".y", "y"), (".z", "z")];
 /// Body axes by number.
 pub const NUMBERED_AXES: [Entry; 3] =
     [("[1]", "roll axis"), ("[2]", "pitch axis"), ("[3]", "yaw axis")];
 /// Body axes by name.
 pub const AXES: [Entry; 3] = [(".x", "roll axis"), (".y", "pitch axis"), (".z", "yaw axis")];
+/// Components of a moment by name.
+pub const MOMENTS: [Entry; 3] =
+    [(".x", "roll moment"), (".y", "pitch moment"), (".z", "yaw moment")];
+/// Axes that have no name but their letter.
+pub const LETTERS: [Entry; 3] = [(".x", "x"), (".y", "y"), (".z", "z")];
 /// Components of (Θ, Θ̇) by number.
 pub const NUMBERED_STATE: [Entry; 6] = [
     ("[1]", "angle of attack"),

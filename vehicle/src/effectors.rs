@@ -5,13 +5,27 @@ mod given;
 pub(crate) use given::{GivenJets, GivenSurfaces};
 
 use crate::aerodynamics::{Flow, SurfaceTable};
+use crate::axes::{Entry, MOMENTS};
 use nalgebra::{SMatrix, SVector, Vector3};
 use serde::{Deserialize, Serialize};
+use settings::Declared;
 
 /// Number of aerodynamic surfaces of the vehicle.
 pub const SURFACES: usize = 8;
 /// Number of reaction control jets of the vehicle.
 pub const JETS: usize = 10;
+
+/// Names of the surfaces of the papers' vehicle.
+pub const SURFACE_NAMES: [Entry; SURFACES] = [
+    ("[1]", "left outer elevon"),
+    ("[2]", "right outer elevon"),
+    ("[3]", "left inner elevon"),
+    ("[4]", "right inner elevon"),
+    ("[5]", "left flap"),
+    ("[6]", "right flap"),
+    ("[7]", "left rudder"),
+    ("[8]", "right rudder"),
+];
 
 /// Vector with one number for each surface.
 pub type Surfaces = SVector<f64, SURFACES>;
@@ -20,32 +34,58 @@ pub type Jets = SVector<f64, JETS>;
 
 /// Moments and limits of the surfaces and jets. Moments act about the body axes x forward, y right,
 /// z down; a deflection with the trailing edge down is positive.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, Declared)]
 pub struct Effectors {
-    /// Surface effectiveness D_A of Wu 2015 (58) at the reference dynamic pressure, N m/rad. The
-    /// values are representative, as the paper prints none.
-    pub effectiveness: SMatrix<f64, 3, SURFACES>,
-    /// Dynamic pressure for which `effectiveness` holds, Pa.
-    pub reference_pressure: f64,
-    /// Lower limit of each deflection, rad.
+    /// Lower limit on the deflection of the {}.
+    #[setting(name = "limit.surfaceMin", each = SURFACE_NAMES, unit = "rad", max = 0.0, nominal = 0.1)]
+    #[setting(used_with = "surfaceAllowed[{#}] = true")]
     pub min: Surfaces,
-    /// Upper limit of each deflection, rad.
+    /// Upper limit on the deflection of the {}.
+    #[setting(name = "limit.surfaceMax", each = SURFACE_NAMES, unit = "rad", min = 0.0, nominal = 0.1)]
+    #[setting(used_with = "surfaceAllowed[{#}] = true")]
     pub max: Surfaces,
-    /// Largest deflection rate of each surface in either direction, rad/s.
+    /// Upper limit on the magnitude of the deflection rate of the {}.
+    #[setting(name = "limit.surfaceRate", each = SURFACE_NAMES, unit = "rad/s", min = 0.0)]
+    #[setting(nominal = 0.1)]
+    #[setting(
+        used_with = "surfaceAllowed[{#}] = true and (surfaceMoment[1,{#}] != 0 or surfaceMoment[2,{#}] != 0 or surfaceMoment[3,{#}] != 0)"
+    )]
     pub rate: Surfaces,
-    /// Whether control may use each surface, Wu 2015 (65).
+    /// Whether the {} may be used; otherwise it is kept at zero.
+    ///
+    /// In Wu 2015 (65) all but the rudders may.
+    #[setting(name = "surfaceAllowed", each = SURFACE_NAMES)]
+    #[setting(
+        used_with = "(surfaceMoment[1,{#}] != 0 or surfaceMoment[2,{#}] != 0 or surfaceMoment[3,{#}] != 0)"
+    )]
     pub allowed: [bool; SURFACES],
+    /// Dynamic pressure for which surfaceMoment is given.
+    #[setting(name = "dynamicPressure.reference", unit = "Pa", above = 0.0, nominal = 1e3)]
+    pub reference_pressure: f64,
+    /// {} per deflection of the {} (matrix D_A).
+    ///
+    /// Wu 2015 (58); the values are representative, as the paper prints none.
+    #[setting(name = "surfaceMoment", each = MOMENTS, columns = SURFACE_NAMES)]
+    #[setting(unit = "N.m/rad", nominal = 1e5, used_with = "surfaceAllowed[{#}] = true")]
+    pub effectiveness: SMatrix<f64, 3, SURFACES>,
+    /// {} of jet {} at full thrust (matrix D_RCS).
+    ///
+    /// Wu 2015 (64).
+    #[setting(name = "jetMoment", each = MOMENTS, unit = "N.m", nominal = 1e4)]
+    pub jet_moments: SMatrix<f64, 3, JETS>,
     /// Name of each aerodynamic surface.
+    #[setting(skip)]
     pub names: [String; SURFACES],
     /// Moments of surfaces that depend on the angle of attack and the Mach number. They add to
     /// those of `effectiveness`.
+    #[setting(skip)]
     pub tables: Vec<SurfaceTable>,
-    /// Jet effectiveness D_RCS of Wu 2015 (64): the moment of each jet at full thrust, N m.
-    pub jet_moments: SMatrix<f64, 3, JETS>,
     /// Thrust of one jet when it is on, N.
+    #[setting(skip)]
     pub jet_force: f64,
     /// Replacement for the fourth column of `jet_moments` that mirrors the eighth, N m;
     /// [`Effectors::symmetric`] uses it.
+    #[setting(skip)]
     pub symmetric_jet_4: Vector3<f64>,
 }
 

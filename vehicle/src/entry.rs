@@ -7,12 +7,15 @@
 mod motion;
 mod start;
 
-pub use motion::{Motion, QUANTITIES, Quantity, STEEPEST, check, great_circle, motion_rate};
+pub use motion::{
+    MOTION, Motion, NOMINALS, RATE_UNITS, STEEPEST, UNITS, check, great_circle, motion_rate,
+};
 pub use start::Start;
 
 use crate::actuators;
 use crate::aerodynamics::{Aerodynamics, Flow};
 use crate::air::{Air, Conditions};
+use crate::axes::{ANGLES, FLOW};
 use crate::error::Error;
 use crate::kinematics::{Kinematics, Sines, sines};
 use crate::math::{asin, atan2};
@@ -105,37 +108,52 @@ pub struct Config {
 }
 
 /// Attitude that an ideal loop follows.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Declared)]
 pub struct Prescribed {
-    /// Angles Θ, rad.
+    /// Prescribed {}.
+    #[setting(name = "", each = ANGLES, unit = "rad", nominal = 0.1)]
     pub angles: Vector3<f64>,
-    /// Their rates, rad/s.
+    /// Time derivative of the prescribed {}.
+    #[setting(name = "+Rate", each = ANGLES, unit = "rad/s", nominal = 0.1)]
     pub rates: Vector3<f64>,
 }
 
 /// The vehicle in the air at one instant.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Declared)]
 pub struct Passage {
-    /// Density of the air, kg/m³.
-    pub density: f64,
-    /// Dynamic pressure as an on-board computer knows it: by the density without deviations, and
-    /// without wind, Pa.
-    pub known_pressure: f64,
-    /// Dynamic pressure, Pa.
+    /// Actual dynamic pressure, with density.scale applied.
+    #[setting(name = "flight.dynamicPressure", unit = "Pa", nominal = 1e3)]
+    #[setting(depends_on = ["motion.*"])]
     pub dynamic_pressure: f64,
+    /// Dynamic pressure without density.scale, the air's profile and wind.
+    ///
+    /// An on-board computer knows this one.
+    #[setting(name = "flight.standardDynamicPressure", unit = "Pa", nominal = 1e3)]
+    #[setting(depends_on = ["motion.*"])]
+    pub known_pressure: f64,
     /// Mach number.
+    #[setting(name = "flow.mach", nominal = 10.0)]
     pub mach: f64,
-    /// Speed relative to the air, m/s.
+    /// Speed relative to the air.
+    #[setting(name = "flow.speed", unit = "m/s", nominal = 1e3)]
     pub airspeed: f64,
-    /// Angles of attack and sideslip relative to the air, rad.
+    /// Density of the air.
+    #[setting(name = "flow.density", unit = "kg/m3", nominal = 1e-3)]
+    pub density: f64,
+    /// {} relative to the air.
+    #[setting(name = "flow", each = FLOW, unit = "rad", nominal = 0.1)]
     pub air_angles: [f64; 2],
-    /// Lift per mass, m/s².
+    /// Lift per mass; 0 without an entry flight.
+    #[setting(name = "load.lift", unit = "m/s2", nominal = 10.0)]
     pub lift: f64,
-    /// Drag per mass, m/s².
+    /// Drag per mass; 0 without an entry flight.
+    #[setting(name = "load.drag", unit = "m/s2", nominal = 10.0)]
     pub drag: f64,
     /// Specific force along the trajectory's axes, m/s².
+    #[setting(skip)]
     pub specific_force: Vector3<f64>,
     /// Moment of the surfaces relative to that at 1 Pa.
+    #[setting(skip)]
     pub surface_pressure: f64,
 }
 
@@ -201,9 +219,9 @@ impl Config {
             return refuse("prescribed.frequency", problem);
         }
         self.air.check()?;
-        for (Quantity { name, .. }, value) in QUANTITIES.iter().zip(motion) {
+        for ((ending, _), value) in MOTION.iter().zip(motion) {
             if !value.is_finite() {
-                return Err(Error::parameter(format!("initial.{name}"), "is not finite"));
+                return Err(Error::parameter(format!("initial{ending}"), "is not finite"));
             }
         }
         let [altitude, _, latitude, speed, path, _] = (*motion).into();

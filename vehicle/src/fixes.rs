@@ -3,6 +3,7 @@
 //! A fix is taken with the first sample of the other sensors at or after each multiple of its
 //! period, and it travels with this sample on the line.
 
+use crate::axes::{Entry, QUATERNION};
 use crate::error::Error;
 use crate::frames::Place;
 use crate::noise::{normal_pair, uniform};
@@ -78,31 +79,43 @@ impl Default for Devices {
 }
 
 /// Latest fix of the satellite navigation.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Declared)]
 pub struct GnssFix {
-    /// Number of the fix, counted from 1; 0 before the first.
-    pub number: i32,
-    /// Time at which it was taken, s.
-    pub time: f64,
-    /// Position along the planet-fixed axes, m.
+    /// Position along the {}, of the latest fix.
+    #[setting(each = FIXED, unit = "m", nominal = 1e6)]
     pub position: Vector3<f64>,
-    /// Velocity relative to the planet, along these axes, m/s.
+    /// Velocity relative to the planet along the {}, of the latest fix.
+    #[setting(each = FIXED, unit = "m/s", nominal = 1e3)]
     pub velocity: Vector3<f64>,
+    /// Time at which the latest fix was taken.
+    #[setting(unit = "s", nominal = 1.0)]
+    pub time: f64,
+    /// Number of the latest fix, counted from 1; 0 before the first.
+    #[setting(name = "fix", min = 0)]
+    pub number: i32,
 }
 
+/// Planet-fixed axes.
+const FIXED: [Entry; 3] =
+    [(".x", "axis through longitude 0"), (".y", "axis through 90 deg east"), (".z", "polar axis")];
+
 /// Latest fix of the star tracker.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Declared)]
 pub struct StarFix {
-    /// Number of the fix, counted from 1; 0 before the first.
-    pub number: i32,
-    /// Time at which it was taken, s.
-    pub time: f64,
-    /// Quaternion (w, x, y, z) of the rotation from the inertial axes to those of the body.
+    /// Part {} of the quaternion from inertial to body axes, of the latest fix; the inertial axes
+    /// are the planet's at time 0.
+    #[setting(each = QUATERNION, nominal = 1.0)]
     pub attitude: [f64; 4],
+    /// Time at which the latest fix was taken.
+    #[setting(unit = "s", nominal = 1.0)]
+    pub time: f64,
+    /// Number of the latest fix, counted from 1; 0 before the first.
+    #[setting(name = "fix", min = 0)]
+    pub number: i32,
 }
 
 /// Latest fixes of both devices.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Declared)]
 pub struct Fixes {
     /// Of the satellite navigation.
     pub gnss: GnssFix,

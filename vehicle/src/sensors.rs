@@ -5,6 +5,7 @@
 //! evaluated from the state committed before its tick, so it can be evaluated again at the same
 //! tick. It is committed when time moves on.
 
+use crate::axes::AXES;
 use crate::error::Error;
 use crate::fixes::{Devices, Fixes};
 use crate::frames;
@@ -14,27 +15,33 @@ use crate::time::{check_resolution, tick, tick_time, tick_tolerance};
 use crate::triad::{Draws, Memory, Triad, Window};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
-use settings::{About, Declared, Field, Place, Setting};
+use settings::{Declared, Entry};
 use std::ops::{Deref, DerefMut};
 
 /// Largest number of samples that may be on their way at a time.
 pub const IN_FLIGHT: usize = 1000;
 
 /// One value for each sensor: gyroscope, accelerometer, magnetometer.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct PerSensor<T>(pub [T; 3]);
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Declared)]
+pub struct PerSensor<T>(
+    #[setting(text = "{}", each = SENSORS, units = UNITS, nominals = NOMINALS)] pub [T; 3],
+);
 
-/// Name, sentence, unit and typical magnitude of what each sensor measures.
-const SENSORS: [(&str, &str, &str, f64); 3] = [
-    ("gyroscope", "Gyroscope", "rad/s", 0.05),
-    ("accelerometer", "Accelerometer", "m/s2", 10.0),
-    ("magnetometer", "Magnetometer", "T", 5e-5),
+/// Units of what each sensor measures.
+const UNITS: [&str; 3] = ["rad/s", "m/s2", "T"];
+/// Typical magnitudes of what each sensor measures.
+const NOMINALS: [f64; 3] = [0.05, 10.0, 5e-5];
+/// Endings of names, and names of the sensors.
+const SENSORS: [Entry; 3] = [
+    (".gyroscope", "gyroscope"),
+    (".accelerometer", "accelerometer"),
+    (".magnetometer", "magnetometer"),
 ];
 
 impl<T> PerSensor<T> {
     /// Returns the values, each with the name of its sensor.
     pub fn named(&self) -> impl Iterator<Item = (&'static str, &T)> {
-        SENSORS.iter().map(|sensor| sensor.0).zip(&self.0)
+        SENSORS.iter().map(|sensor| sensor.1).zip(&self.0)
     }
 }
 
@@ -48,19 +55,6 @@ impl<T> Deref for PerSensor<T> {
 impl<T> DerefMut for PerSensor<T> {
     fn deref_mut(&mut self) -> &mut [T; 3] {
         &mut self.0
-    }
-}
-
-impl<T: Declared> Declared for PerSensor<T> {
-    fn declare(place: &Place, list: &mut Vec<Setting>) {
-        for (name, text, unit, nominal) in SENSORS {
-            let about = About { name, text, unit, nominal: Some(nominal), ..About::default() };
-            T::declare(&place.at(&about), list);
-        }
-    }
-
-    fn field(&mut self, index: usize) -> Result<Field<'_>, usize> {
-        self.0.field(index)
     }
 }
 
@@ -110,17 +104,28 @@ pub struct Instant {
 }
 
 /// Sample of the three sensors as it arrives.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Declared)]
 pub struct Sample {
-    /// Number of the sample, counted from 1; it is 0 before the first arrives.
-    pub number: i32,
-    /// Time at which the sample was taken, s.
-    pub time: f64,
     /// Readings of the three sensors, with their errors.
+    #[setting(name = "measured", text = "{}", each = READINGS, columns = AXES)]
+    #[setting(units = UNITS, nominals = NOMINALS)]
     pub readings: Readings,
+    /// Time at which the latest received sample was taken.
+    #[setting(name = "measured.time", unit = "s", nominal = 1.0, depends_on = [])]
+    pub time: f64,
+    /// Number of the latest received sample, counted from 1; 0 before the first.
+    #[setting(name = "measured.sample", min = 0, depends_on = [])]
+    pub number: i32,
     /// Latest fixes, if there is an entry flight.
+    #[setting(name = "", discrete, depends_on = [])]
     pub fixes: Fixes,
 }
+
+const READINGS: [Entry; 3] = [
+    (".gyroscope", "Gyroscope reading of the angular rate about the {}"),
+    (".accelerometer", "Accelerometer reading of the specific force along the {}"),
+    (".magnetometer", "Magnetometer reading of the magnetic field along the {}"),
+];
 
 /// What the sensors would measure without errors.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -3,23 +3,39 @@
 use crate::math::sin_cos;
 use nalgebra::{SMatrix, Vector3};
 use serde::{Deserialize, Serialize};
+use settings::Declared;
 
 /// Direction of flight and its change: the angles and rates of the trajectory in Wu 2015 (1).
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Declared)]
 pub struct Trajectory {
-    /// Flight path angle γ above the horizon, rad.
+    /// Flight path angle, positive above the horizon.
+    ///
+    /// It is γ in the paper.
+    #[setting(unit = "rad", nominal = 0.1)]
     pub flight_path_angle: f64,
-    /// Heading ψ, counted from north to east, rad.
+    /// Heading of the velocity, measured from north towards east.
+    ///
+    /// It is ψ in the paper.
+    #[setting(unit = "rad", nominal = 0.1)]
     pub heading: f64,
-    /// Latitude φ of the vehicle, rad.
+    /// Latitude, positive to the north.
+    ///
+    /// It is φ in the paper.
+    #[setting(unit = "rad", nominal = 0.1)]
     pub latitude: f64,
-    /// Rate γ̇ of the flight path angle, rad/s.
+    /// Time derivative of the flight path angle.
+    #[setting(unit = "rad/s", nominal = 1e-3)]
     pub flight_path_angle_rate: f64,
-    /// Rate ψ̇ of the heading, rad/s.
+    /// Time derivative of the heading.
+    #[setting(unit = "rad/s", nominal = 1e-3)]
     pub heading_rate: f64,
-    /// Longitude rate θ̇, positive to the east, rad/s.
+    /// Time derivative of the longitude, positive to the east.
+    ///
+    /// The longitude is θ in the paper.
+    #[setting(unit = "rad/s", nominal = 1e-3)]
     pub longitude_rate: f64,
-    /// Rate φ̇ of the latitude, rad/s.
+    /// Time derivative of the latitude.
+    #[setting(unit = "rad/s", nominal = 1e-3)]
     pub latitude_rate: f64,
 }
 
@@ -101,66 +117,3 @@ impl Trajectory {
         ])
     }
 }
-
-/// An angle or a rate of the trajectory, as users see it.
-#[derive(Clone, Copy, Debug)]
-pub struct Quantity {
-    /// Name of the variable.
-    pub name: &'static str,
-    /// Description of the quantity.
-    pub meaning: &'static str,
-    /// Its unit.
-    pub unit: &'static str,
-    /// Its typical magnitude.
-    pub nominal: f64,
-    /// Its field.
-    pub field: fn(&mut Trajectory) -> &mut f64,
-}
-
-const fn angle(
-    name: &'static str,
-    meaning: &'static str,
-    field: fn(&mut Trajectory) -> &mut f64,
-) -> Quantity {
-    Quantity { name, meaning, unit: "rad", nominal: 0.1, field }
-}
-
-const fn rate(
-    name: &'static str,
-    meaning: &'static str,
-    field: fn(&mut Trajectory) -> &mut f64,
-) -> Quantity {
-    Quantity { name, meaning, unit: "rad/s", nominal: 1e-3, field }
-}
-
-/// The fields of [`Trajectory`], in their order.
-pub const QUANTITIES: [Quantity; TRAJECTORY] = [
-    angle("trajectory.flightPathAngle", "Flight path angle, positive above the horizon", |t| {
-        &mut t.flight_path_angle
-    }),
-    angle("trajectory.heading", "Heading of the velocity, measured from north towards east", |t| {
-        &mut t.heading
-    }),
-    angle("trajectory.latitude", "Latitude, positive to the north", |t| &mut t.latitude),
-    rate("trajectory.flightPathAngleRate", "Time derivative of the flight path angle", |t| {
-        &mut t.flight_path_angle_rate
-    }),
-    rate("trajectory.headingRate", "Time derivative of the heading", |t| &mut t.heading_rate),
-    rate(
-        "trajectory.longitudeRate",
-        "Time derivative of the longitude, positive to the east",
-        |t| &mut t.longitude_rate,
-    ),
-    rate("trajectory.latitudeRate", "Time derivative of the latitude", |t| &mut t.latitude_rate),
-];
-
-/// The names of [`QUANTITIES`].
-pub const NAMES: [&str; TRAJECTORY] = {
-    let mut names = [""; TRAJECTORY];
-    let mut i = 0;
-    while i < TRAJECTORY {
-        names[i] = QUANTITIES[i].name;
-        i += 1;
-    }
-    names
-};

@@ -9,27 +9,34 @@ pub use settings::{JetCommand, Method, Settings};
 
 use crate::clock::Instant;
 use crate::error::DesignError;
-use ::settings::Choice;
+use ::settings::{Choice, Declared};
 use nalgebra::{SMatrix, Vector3};
 use optimum::{OptimalAllocation, Weights};
 use pwpf::Modulator;
 use serde::{Deserialize, Serialize};
 use vehicle::aerodynamics::Flow;
-use vehicle::effectors::{Effectors, JETS, Jets, SURFACES, Surfaces};
+use vehicle::axes::MOMENTS;
+use vehicle::effectors::{Effectors, JETS, Jets, SURFACE_NAMES, SURFACES, Surfaces};
 
 /// Effectiveness D_RCS of the jets, N m at full thrust.
 type JetMatrix = SMatrix<f64, 3, JETS>;
 
 /// Input of the allocation: the commanded moment and the flight condition.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Declared)]
 pub struct Command {
-    /// Commanded moment M_c, N m.
+    /// Commanded {}.
+    ///
+    /// It is M_c in the paper.
+    #[setting(each = MOMENTS, unit = "N.m", nominal = 1e5)]
     pub moment: Vector3<f64>,
-    /// Dynamic pressure of the flow, Pa.
+    /// Dynamic pressure, to which the moments of the surfaces are proportional.
+    #[setting(unit = "Pa", min = 0.0, nominal = 1e3)]
     pub dynamic_pressure: f64,
-    /// Angle of attack, on which surfaces with tables depend, rad.
+    /// Angle of attack, on which the moments of surfaces with tables in vehicle.file depend.
+    #[setting(name = "flow.alpha", optional, unit = "rad", nominal = 0.1)]
     pub alpha: f64,
-    /// Mach number, on which surfaces with tables depend.
+    /// Mach number, on which the moments of surfaces with tables in vehicle.file depend.
+    #[setting(name = "flow.mach", optional, min = 0.0, nominal = 10.0)]
     pub mach: f64,
 }
 
@@ -54,39 +61,57 @@ pub enum AllocationStatus {
 }
 
 /// Report of an allocation.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Declared)]
 pub struct AllocationReport {
     /// Origin of the allocation in force.
     pub status: AllocationStatus,
-    /// Number of iterations of the cone solver.
+    /// Number of iterations in the last allocation.
     pub iterations: u32,
-    /// Wall-clock time of the last allocation, s; not reproducible.
-    pub time: f64,
-    /// Number of allocations so far that did not succeed.
+    /// Number of allocations so far that failed.
     pub fallbacks: u32,
+    /// Wall-clock time of the last allocation; not reproducible.
+    #[setting(unit = "s", nominal = 1e-4)]
+    pub time: f64,
 }
 
 /// The state that the allocator carries from tick to tick.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Declared)]
 pub struct Memory {
-    /// Deflections δ_A of the surfaces, rad.
+    /// Commanded deflection of the {}.
+    ///
+    /// It is δ_A in the paper.
+    #[setting(name = "surface", each = SURFACE_NAMES, unit = "rad", nominal = 0.1)]
     pub surfaces: Surfaces,
-    /// Duty cycles δ_RCS of (60), before modulation.
-    pub duty: Jets,
-    /// Modulators of the jets, one for each.
-    pub modulators: [Modulator; JETS],
-    /// Commands to the jets: 0 or 1, or the duty cycle.
+    /// Command to jet {}: 1 for on and 0 for off, or the duty cycle with jets = duty.
+    #[setting(name = "jet")]
     pub jets: Jets,
-    /// Moment D δ of the last allocation, with the duty cycles of the jets, N m.
+    /// Duty cycle of jet {} before modulation.
+    ///
+    /// It is δ_RCS of (60).
+    #[setting(name = "jetDuty")]
+    pub duty: Jets,
+    /// {} achieved by the last allocation, with the jets' duty cycles before modulation.
+    ///
+    /// It is D δ.
+    #[setting(name = "achievedMoment", each = MOMENTS, unit = "N.m", nominal = 1e5)]
     pub achieved: Vector3<f64>,
-    /// Residual M_c − D δ of the last allocation, with the duty cycles of the jets, N m.
+    /// {} missing in the last allocation: commanded minus achieved, before modulation.
+    ///
+    /// It is M_c − D δ.
+    #[setting(each = MOMENTS, unit = "N.m", nominal = 1e5)]
     pub residual: Vector3<f64>,
-    /// Moment D δ with the present commands to the jets, N m.
+    /// {} of the present commands to surfaces and jets, after modulation.
+    #[setting(name = "modulatedMoment", each = MOMENTS, unit = "N.m", nominal = 1e5)]
     pub modulated: Vector3<f64>,
-    /// Outcome of the last allocation.
-    pub report: AllocationReport,
-    /// Moment of the surfaces in the last allocation, N m.
+    /// {} of the surfaces in the last allocation.
+    #[setting(name = "momentBySurfaces", each = MOMENTS, unit = "N.m", nominal = 1e5)]
     pub by_surfaces: Vector3<f64>,
+    /// Outcome of the last allocation.
+    #[setting(name = "solver")]
+    pub report: AllocationReport,
+    /// Modulators of the jets, one for each.
+    #[setting(skip)]
+    pub modulators: [Modulator; JETS],
 }
 
 /// The allocator: settings and solver. All state that later ticks depend on is in [`Memory`].

@@ -1,14 +1,14 @@
 //! Settings of the allocator, with the published ones from `data/allocation.toml`.
 
 use super::pwpf::Pwpf;
-use crate::error::{DesignError, invalid, positive};
+use crate::error::DesignError;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 use settings::{Choice, Declared};
 use std::sync::LazyLock;
 use vehicle::axes::NUMBERED_AXES;
 use vehicle::data::Tables;
-use vehicle::effectors::{Effectors, SURFACES, Surfaces};
+use vehicle::effectors::{Effectors, Surfaces};
 
 /// Method that divides the moment among the effectors.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Choice)]
@@ -60,9 +60,9 @@ pub struct Settings {
     #[setting(name = "weight.surface", min = 0.0)]
     pub weight_surface: f64,
     /// Model of surfaces and jets and of their limits that the allocator uses.
-    #[setting(skip)]
+    #[setting(name = "")]
     pub effectors: Effectors,
-    /// Modulator of the jets, whose settings are declared after those of the effectors.
+    /// Modulator of the jets, whose settings count with `jets` = pwpf alone.
     #[setting(skip)]
     pub pwpf: Pwpf,
 }
@@ -94,20 +94,6 @@ impl Settings {
     /// Returns an error that names the setting at fault.
     pub(super) fn ratio(&self) -> Result<u64, DesignError> {
         settings::check(self)?;
-        positive("dynamicPressure.reference", self.effectors.reference_pressure)?;
-        let Effectors { effectiveness, jet_moments, min, max, rate, .. } = &self.effectors;
-        if let Some(&value) =
-            effectiveness.iter().chain(jet_moments).find(|value| !value.is_finite())
-        {
-            return Err(invalid("surfaceMoment, jetMoment", value, "must be finite"));
-        }
-        for i in 0..SURFACES {
-            let (min, max, rate) = (min[i], max[i], rate[i]);
-            let holds_zero = min <= 0.0 && 0.0 <= max && min.is_finite() && max.is_finite();
-            if !(holds_zero && (0.0..f64::INFINITY).contains(&rate)) {
-                return Err(DesignError::Surface { index: i + 1, min, max, rate });
-            }
-        }
         if self.jets == JetCommand::Duty {
             return Ok(1);
         }

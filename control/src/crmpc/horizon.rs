@@ -5,6 +5,7 @@ use super::plan::Plan;
 use super::stages::Point;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
+use settings::Declared;
 
 /// Number of points at which a plan is shown.
 pub const POINTS: usize = 25;
@@ -15,16 +16,27 @@ const DENSE: usize = 8;
 ///
 /// What is missing from a bound to its limit is the tube: as long as the assumptions hold, the norm
 /// differs from the planned one by at most that much while the plan is followed.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Declared)]
 pub struct PlanPoint {
-    /// Norm of the planned body rates, ‖ω̃‖, rad/s.
+    /// Norm of the planned body rates at this point.
+    #[setting(unit = "rad/s", nominal = 0.1)]
     pub rate: f64,
-    /// Bound on it, rad/s; negative if nothing is left of the limit.
+    /// Bound on plan.rate here; what is missing to limit.rate is the tube, the largest difference
+    /// to the flown norm.
+    ///
+    /// It is negative if nothing is left of the limit.
+    #[setting(unit = "rad/s", nominal = 0.1)]
     pub rate_bound: f64,
-    /// Norm of the planned moment, less the known one, in the interval that begins at the point
-    /// (in the last one at the end of the horizon), N m.
+    /// Norm of the moment planned from this point on, less the known moment.
+    ///
+    /// In the last point it is that at the end of the horizon.
+    #[setting(unit = "N.m", nominal = 1e5)]
     pub moment: f64,
-    /// Bound on it, N m; negative if nothing is left of the limit.
+    /// Bound on plan.moment here; what is missing to limit.moment is the tube, the largest
+    /// difference to the flown norm.
+    ///
+    /// It is negative if nothing is left of the limit.
+    #[setting(unit = "N.m", nominal = 1e5)]
     pub moment_bound: f64,
 }
 

@@ -11,6 +11,7 @@ use crate::error_dynamics::Gain;
 use crate::report::SolverReport;
 use nalgebra::{Vector3, Vector6};
 use serde::{Deserialize, Serialize};
+use settings::Declared;
 
 /// The state that CRMPC carries from tick to tick.
 #[derive(Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -92,10 +93,14 @@ impl Acting {
 
 /// Margins that the first interval of a plan leaves to the limits, beyond the reserve for
 /// deviations from the plan, as shares of the limits.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Declared)]
 pub struct Margins {
-    /// Margin to the rate limit at the interval's end.
+    /// Unused share of limit.rate in the plan's first interval, after the reserve for deviations
+    /// from the plan.
+    #[setting(name = "rateMargin")]
     pub rate: f64,
-    /// Margin to the moment limit in the interval.
+    /// Unused share of limit.moment in the plan's first interval, after the reserve for deviations
+    /// from the plan.
+    #[setting(name = "momentMargin")]
     pub moment: f64,
 }

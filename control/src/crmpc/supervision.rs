@@ -5,7 +5,7 @@
 //! the guarantee is in force again only after nothing has contradicted them for a while.
 
 use serde::{Deserialize, Serialize};
-use settings::Choice;
+use settings::{Choice, Declared};
 
 /// Time without contradiction after which the assumptions are trusted again, s.
 const PROBATION: f64 = 1.0;
@@ -69,15 +69,17 @@ pub enum Contradiction {
 }
 
 /// Status of the guarantee that is shown.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Declared)]
 pub struct Supervision {
-    /// Status of the guarantee at the last tick.
+    /// Status of the guarantee of the robust set at the last tick.
     pub status: GuaranteeStatus,
-    /// Last contradiction, until the assumptions are trusted again.
+    /// Contradiction of an assumption of the guarantee within the last second.
     pub contradiction: Contradiction,
-    /// Ticks left until they are.
+    /// Ticks left until the assumptions are trusted again.
+    #[setting(skip)]
     probation: u32,
     /// Number of times that a guarantee in force or pending has ended.
+    #[setting(skip)]
     pub ended: u32,
 }
 

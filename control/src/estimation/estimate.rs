@@ -5,18 +5,30 @@ use super::fusion::Fusion;
 use super::lowpass;
 use nalgebra::{SVector, Vector3};
 use serde::{Deserialize, Serialize};
-use settings::Choice;
+use settings::{Choice, Declared};
+use vehicle::axes::{ANGLES, LETTERS, RATES};
 
 /// The newest sample on the line from the sensors.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Declared)]
 pub struct Line {
-    /// Number of the sample, from 1; 0 before the first. A line without numbers shows 0 throughout.
-    pub sample: i32,
-    /// Time at which the sample was taken, s.
-    pub time: f64,
-    /// Readings of gyroscope (rad/s), accelerometer (specific force, m/s²) and magnetometer (T).
+    /// Readings of gyroscope, accelerometer and magnetometer.
+    #[setting(name = "measured", text = "{}", each = READINGS, columns = LETTERS)]
+    #[setting(units = ["rad/s", "m/s2", "T"], nominals = [0.05, 10.0, 5e-5])]
     pub readings: [Vector3<f64>; 3],
+    /// Time at which the newest sample was taken.
+    #[setting(name = "measured.time", unit = "s", nominal = 1.0)]
+    pub time: f64,
+    /// Number of the newest sample, counted from 1; 0 before the first sample, or always if samples
+    /// are not counted.
+    #[setting(name = "measured.sample", min = 0)]
+    pub sample: i32,
 }
+
+const READINGS: [(&str, &str); 3] = [
+    (".gyroscope", "Angular rate about {}, measured by the gyroscope"),
+    (".accelerometer", "Specific force along {}, measured by the accelerometer"),
+    (".magnetometer", "Magnetic field along {}, measured by the magnetometer"),
+];
 
 /// Health of the estimate: how far it can be trusted.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Choice)]
@@ -57,35 +69,45 @@ pub enum CalibrationStatus {
 }
 
 /// The calibration of the magnetometer with its origin.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Declared)]
 pub struct Calibration {
-    /// Origin and state of the calibration.
+    #[allow(missing_docs)] // Its type says what it is.
     pub status: CalibrationStatus,
     /// Correction that is in force.
+    #[setting(skip)]
     pub correction: Correction,
-    /// Residual of the fit, see [`super::ellipsoid::Fit`].
+    /// Root mean square distance of the readings from the fitted ellipsoid, relative to its size.
     pub residual: f64,
-    /// Condition number of the fit, see [`super::ellipsoid::Fit`].
+    /// Condition number of the ellipsoid fit; 16 for uniform coverage, above 1000 rejected.
     pub condition: f64,
 }
 
 /// The estimate at a tick.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Declared)]
 pub struct Estimate {
-    /// Estimated angles Θ, rad.
+    /// Estimated {}.
+    #[setting(name = "attitude", each = ANGLES, unit = "rad", nominal = 0.1)]
     pub angles: Vector3<f64>,
-    /// Estimated body rates ω with the kinematics of the settings, rad/s.
+    /// Estimated body {}.
+    ///
+    /// The kinematics are those of the settings.
+    #[setting(name = "rate", each = RATES, unit = "rad/s", nominal = 0.05)]
     pub rates: Vector3<f64>,
     /// Health of the estimate: how far it can be trusted.
     pub health: Health,
-    /// Time since the newest sample was taken, s.
+    /// Time since the newest sample was taken.
+    #[setting(unit = "s", nominal = 0.01)]
     pub age: f64,
     /// Number of samples so far that never arrived.
+    #[setting(name = "droppedSamples")]
     pub dropped: i32,
-    /// Number of samples so far that were left out as a whole or in part.
+    /// Number of samples so far that were ignored in whole or in part because a reading or the time
+    /// was implausible.
+    #[setting(name = "rejectedSamples")]
     pub rejected: i32,
-    /// Bias of the gyroscope, rad/s: the sum of the given one, the one found at rest and the
+    /// Estimated gyroscope bias about {}: sum of the given bias, the one measured at rest and the
     /// learned one.
+    #[setting(name = "estimatedBias", each = LETTERS, unit = "rad/s", nominal = 0.01)]
     pub gyroscope_bias: Vector3<f64>,
 }
 

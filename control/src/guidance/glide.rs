@@ -4,6 +4,7 @@
 
 use super::model::Model;
 use super::settings::{Limit, Settings, over_speed};
+use settings::Declared;
 use vehicle::math::{cos, hypot, ln, tan};
 
 /// Least share of gravity that is taken to be left to the lift, where the speed is almost that of
@@ -19,13 +20,17 @@ const ROOM: f64 = 0.2;
 const GRAVITY: f64 = 9.80665;
 
 /// Quantities that have limits: heat flux, load and dynamic pressure.
-#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
+#[derive(
+    Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize, Declared,
+)]
 pub struct Loads {
-    /// Heat flux into the leading edge, W/m².
+    /// Heat flux into the leading edge.
+    #[setting(unit = "W/m2", nominal = 1e5)]
     pub heat_flux: f64,
-    /// Load, in 9.80665 m/s².
+    /// Load, in 9.80665 m/s2.
     pub load: f64,
-    /// Dynamic pressure, Pa.
+    /// Dynamic pressure.
+    #[setting(unit = "Pa", nominal = 1e4)]
     pub pressure: f64,
 }
 

@@ -22,11 +22,12 @@ pub use settings::{
 pub use shaping::{Limits, Shaped};
 
 use crate::error::DesignError;
+use ::settings::Declared;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 use vehicle::aerodynamics::Aerodynamics;
 use vehicle::axes::nearest;
-use vehicle::entry::{Motion, great_circle};
+use vehicle::entry::{MOTION, Motion, NOMINALS, UNITS, great_circle};
 use vehicle::math::{atan2, cos, exp, sin_cos};
 use vehicle::reference::Reference;
 
@@ -45,43 +46,62 @@ const BISECTIONS: u32 = 20;
 const FROZEN: f64 = 0.01;
 
 /// Measurements of the guidance.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Declared)]
 pub struct Navigation {
-    /// Motion relative to the rotating planet.
+    /// {}.
+    #[setting(each = MOTION, units = UNITS, nominals = NOMINALS)]
     pub motion: Motion,
-    /// Lift per mass, m/s².
+    /// Measured lift per mass.
+    #[setting(name = "load.lift", unit = "m/s2", nominal = 10.0)]
     pub lift: f64,
-    /// Drag per mass, m/s².
+    /// Measured drag per mass.
+    #[setting(name = "load.drag", unit = "m/s2", nominal = 10.0)]
     pub drag: f64,
 }
 
 /// Commands of the guidance, and what is worth plotting.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Declared)]
 pub struct Command {
     /// Reference of the attitude.
+    #[setting(each = OF_ANGLES)]
     pub reference: Reference,
-    /// Commanded angle of attack and bank angle, before they are shaped, rad.
+    /// Angle of attack of the schedule.
+    #[setting(name = "command.alpha", unit = "rad", nominal = 0.1)]
     pub alpha: f64,
-    /// Commanded bank angle, rad.
+    /// Bank angle before it is shaped.
+    #[setting(name = "command.bank", unit = "rad", nominal = 1.0)]
     pub bank: f64,
-    /// Distance over ground to the target, m.
+    /// Distance over ground to the runway point.
+    #[setting(unit = "m", nominal = 1e6)]
     pub range: f64,
-    /// Direction to the target less the heading, positive to the right, rad.
+    /// Direction to the runway point less the heading, positive to the right.
+    #[setting(unit = "rad", nominal = 0.1)]
     pub heading_error: f64,
-    /// Excess of the distance to the target at the end of the predicted flight, m.
+    /// By how much the predicted flight ends too far from the target.
+    #[setting(unit = "m", nominal = 1e3)]
     pub miss: f64,
-    /// Whether a plan reaches the target within the tolerance: the present one, or, as long as the
-    /// bank angle is corrected, one between those with the least and the largest bank angle.
+    /// Whether a bank angle brings the predicted flight within target.tolerance of the target.
+    ///
+    /// As long as the bank angle is corrected, it is one between the least and the largest.
     pub in_reach: bool,
     /// Present heat flux, load and dynamic pressure.
     pub loads: Loads,
-    /// Heat load of the leading edge so far, J/m².
+    /// Heat load of the leading edge so far.
+    #[setting(name = "loads.heatLoad", unit = "J/m2", nominal = 1e8)]
     pub heat_load: f64,
-    /// Whether a limit has made the present command.
+    /// Whether a limit makes the bank angle smaller.
+    #[setting(name = "limits.active")]
     pub is_limited: bool,
     /// Whether the predicted flight keeps all limits.
+    #[setting(name = "limits.feasible")]
     pub keeps_limits: bool,
 }
+
+const OF_ANGLES: [(&str, &str); 3] = [
+    (".alpha", "of the angle of attack"),
+    (".beta", "of the sideslip angle"),
+    (".sigma", "of the bank angle"),
+];
 
 /// State that is carried from tick to tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]

@@ -7,63 +7,92 @@ use super::filter::{self, Covariance, Error, along};
 use super::strapdown::{Felt, State};
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
-use vehicle::axes::nearest;
-use vehicle::entry::{Motion, motion_rate};
+use settings::Declared;
+use vehicle::axes::{ANGLES, Entry, FLOW, HORIZONTAL, LETTERS, RATES, nearest};
+use vehicle::entry::{MOTION, Motion, NOMINALS, RATE_UNITS, UNITS, motion_rate};
 use vehicle::frames::{attitude_angles, fixed_from_inertial, level_from_fixed};
 use vehicle::math::sin_cos;
 use vehicle::platform::{body_from_velocity, velocity_from_level};
 use vehicle::trajectory::Trajectory;
 
 /// Standard deviations that the filter predicts.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Declared)]
 pub struct Deviations {
-    /// Of the attitude angles relative to the ground velocity, rad.
+    /// Predicted standard deviation of the {} relative to the ground velocity.
+    #[setting(name = "attitude", each = ANGLES, unit = "rad", nominal = 0.01)]
     pub angles: Vector3<f64>,
-    /// Of angle of attack and sideslip relative to the air, rad.
+    /// Predicted standard deviation of the {} relative to the air.
+    #[setting(each = FLOW, unit = "rad", nominal = 0.01)]
     pub flow: [f64; 2],
-    /// Of the position, root mean square over the axes, m.
-    pub position: f64,
-    /// Of the velocity, root mean square over the axes, m/s.
-    pub velocity: f64,
-    /// Of the wind to the north and to the east, m/s.
+    /// Predicted standard deviation of the wind {}.
+    #[setting(each = HORIZONTAL, unit = "m/s", nominal = 10.0)]
     pub wind: [f64; 2],
-    /// Of the altitude, m.
+    /// Predicted standard deviation of the position, root mean square over the axes.
+    #[setting(unit = "m", nominal = 10.0)]
+    pub position: f64,
+    /// Predicted standard deviation of the velocity, root mean square over the axes.
+    #[setting(unit = "m/s", nominal = 0.1)]
+    pub velocity: f64,
+    /// Predicted standard deviation of the altitude.
+    #[setting(unit = "m", nominal = 10.0)]
     pub altitude: f64,
-    /// Of the ratio of the drag to that of the model, relative to it.
+    /// Predicted standard deviation of drag.ratio, relative to it.
+    #[setting(nominal = 0.1)]
     pub drag: f64,
 }
 
 /// The navigated state.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Declared)]
 pub struct Shown {
-    /// Motion relative to the rotating planet.
+    /// {}.
+    #[setting(each = MOTION, units = UNITS, nominals = NOMINALS)]
     pub motion: Motion,
-    /// Its time derivative.
+    /// Rate of motion{.}.
+    #[setting(each = MOTION, units = RATE_UNITS, nominals = NOMINALS)]
     pub motion_rate: Motion,
-    /// Attitude angles Θ relative to the ground velocity, rad.
+    /// Navigated {} relative to the ground velocity.
+    #[setting(name = "attitude", each = ANGLES, unit = "rad", nominal = 0.1)]
     pub angles: Vector3<f64>,
-    /// Angle of attack and sideslip relative to the air, rad.
-    pub flow: [f64; 2],
-    /// Body rates ω, rad/s.
+    /// Navigated body {}.
+    #[setting(name = "rate", each = RATES, unit = "rad/s", nominal = 0.05)]
     pub rates: Vector3<f64>,
-    /// Lift per mass, m/s².
+    /// Measured lift per mass.
+    #[setting(name = "load.lift", unit = "m/s2", nominal = 10.0)]
     pub lift: f64,
-    /// Drag per mass, m/s².
+    /// Measured drag per mass.
+    #[setting(name = "load.drag", unit = "m/s2", nominal = 10.0)]
     pub drag: f64,
-    /// Wind to the north and to the east, m/s.
+    /// Navigated {} relative to the air.
+    #[setting(each = FLOW, unit = "rad", nominal = 0.1)]
+    pub flow: [f64; 2],
+    /// Estimated wind {}.
+    #[setting(each = HORIZONTAL, unit = "m/s", nominal = 10.0)]
     pub wind: [f64; 2],
-    /// Standard deviations that the filter predicts.
-    pub deviations: Deviations,
-    /// Squares of the normalised innovations per component, of the latest fix of satellite
-    /// navigation and star tracker and of the latest side force and drag; they are 1 on average.
-    pub innovations: [f64; 4],
-    /// Estimated biases of gyroscope (rad/s) and accelerometer (m/s²).
-    pub biases: [Vector3<f64>; 2],
     /// Estimated ratio of lift and drag to those of the model in the standard atmosphere.
+    #[setting(name = "drag.ratio", nominal = 1.0)]
     pub drag_ratio: f64,
-    /// Number of fixes that were rejected.
+    /// Standard deviations that the filter predicts.
+    #[setting(name = "deviation")]
+    pub deviations: Deviations,
+    /// Square of the normalised innovation per component of the latest {}, 1 on average.
+    #[setting(name = "innovation", each = SOURCES)]
+    pub innovations: [f64; 4],
+    /// Estimated bias of the {} about or along {}.
+    #[setting(name = "bias", each = INERTIAL, columns = LETTERS)]
+    #[setting(units = ["rad/s", "m/s2"], nominals = [1e-5, 1e-2])]
+    pub biases: [Vector3<f64>; 2],
+    /// Number of fixes so far that were rejected.
+    #[setting(name = "rejectedFixes", min = 0)]
     pub rejected: u32,
 }
+
+const SOURCES: [Entry; 4] = [
+    (".gnss", "fix of satellite navigation"),
+    (".star", "fix of the star tracker"),
+    (".side", "side force"),
+    (".drag", "drag"),
+];
+const INERTIAL: [Entry; 2] = [(".gyroscope", "gyroscope"), (".accelerometer", "accelerometer")];
 
 impl Navigation {
     /// Returns the motion of a state at a time (s), and the rotation from inertial to level axes.

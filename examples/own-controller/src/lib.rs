@@ -25,14 +25,18 @@ impl Controller for Pd {
     }
 }
 
-impl Law for Pd {
-    type Controller = Self;
-    type Settings = Self;
+/// The law as an FMU, without outputs of its own.
+#[derive(Default, Serialize, Deserialize, Declared)]
+pub struct PdFmu;
+
+impl Law for PdFmu {
+    type Controller = Pd;
+    type Settings = Pd;
     const NAME: &'static str = "PD";
     const DESCRIPTION: &'static str = "Proportional and derivative attitude control";
-    fn design(settings: Self, vehicle: &Vehicle) -> Result<Self, DesignError> {
-        Ok(Self { body: vehicle.body, ..settings })
+    fn design(settings: Pd, vehicle: &Vehicle) -> Result<Pd, DesignError> {
+        Ok(Pd { body: vehicle.body, ..settings })
     }
 }
 
-fmi_export::export_fmus!(ControllerFmu<Pd>);
+fmi_export::export_fmus!(ControllerFmu<PdFmu>);

@@ -44,11 +44,18 @@ impl<L: Law> ControllerInstance<L> {
     ) -> Result<(), Failure> {
         let Self { settings, input, source, .. } = self;
         let controller = &mut device.controller;
-        let known_moment = input.known_moment;
-        let achieved_moment =
-            L::uses_achieved_moment(settings).then_some(input.achieved_moment + known_moment);
+        let Input { angles, rates, achieved_moment, known_moment, scheduled, .. } = *input;
         let turn_rate = input.trajectory.turn_rate(self.parameters.earth_rate);
-        let measured = Measurement { achieved_moment, known_moment, stale, ..input.measured };
+        let measured = Measurement {
+            angles,
+            rates,
+            achieved_moment: L::uses_achieved_moment(settings)
+                .then_some(achieved_moment + known_moment),
+            known_moment,
+            scheduled,
+            stale,
+            ..Measurement::default()
+        };
         let measured = measured.relative_to(&turn_rate);
         let now = ticks.next_time();
         let times = [now, now + controller.acts_after()];
@@ -88,11 +95,8 @@ impl<L: Law> SampledInstance for ControllerInstance<L> {
             },
             settings: L::settings(),
             input: Input {
-                measured: Measurement {
-                    angles: scenario.initial_angles,
-                    rates: scenario.initial_rates,
-                    ..Measurement::default()
-                },
+                angles: scenario.initial_angles,
+                rates: scenario.initial_rates,
                 reference: Reference {
                     angles: scenario.reference.at(0.0).angles,
                     ..Reference::default()

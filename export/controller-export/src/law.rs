@@ -3,13 +3,14 @@
 use crate::reference::{self, Source};
 use crate::sampled::SampledFmu;
 use control::Controller;
-use control::controller::Measurement;
+use control::controller::Scheduled;
 use control::delay::Latency;
 use control::error::DesignError;
 use fmi_export::VariableTable;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use settings::Declared;
+use vehicle::axes::{ANGLES, Entry, MOMENTS, RATES};
 use vehicle::dynamics::{Inertia, RigidBody};
 use vehicle::reference::Reference;
 use vehicle::trajectory::Trajectory;
@@ -41,21 +42,31 @@ impl Vehicle {
 pub type ControllerFmu<L> = SampledFmu<ControllerInstance<L>>;
 
 /// An instance of a controller: its parameters, inputs and outputs.
-#[derive(Serialize, Deserialize)]
+#[derive(Serialize, Deserialize, Declared)]
 #[serde(bound = "")]
 pub struct ControllerInstance<L: Law> {
-    /// Parameters that every controller has.
-    pub parameters: Parameters,
     /// Inputs that every controller has.
+    #[setting(name = "", input)]
     pub input: Input,
     /// Outputs that every controller has.
+    #[setting(name = "", output)]
     pub output: Output,
+    /// Parameters that every controller has.
+    #[setting(name = "")]
+    pub parameters: Parameters,
     /// Parameters of the law alone.
+    #[setting(name = "")]
     pub settings: L::Settings,
     /// Outputs of the law alone.
+    #[setting(name = "", output, discrete, depends_on = SAMPLED)]
     pub law: L,
+    #[setting(skip)]
     pub(crate) source: Source,
 }
+
+/// Inputs on which the outputs of a tick depend.
+const SAMPLED: [&str; 6] =
+    ["attitude.*", "rate.*", "reference.external*", "trajectory.*", "knownMoment.*", "scheduled.*"];
 
 /// Parameters that every controller has.
 #[derive(Clone, Debug, Serialize, Deserialize, Declared)]
@@ -82,35 +93,66 @@ pub struct Parameters {
 }
 
 /// Inputs that every controller has.
-#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize, Declared)]
 pub struct Input {
-    /// Measured angles and rates.
-    pub measured: Measurement,
-    /// Moment that the actuators give, N m.
+    /// Measured {}.
+    #[setting(name = "attitude", each = MEASURED, unit = "rad", nominal = 0.1)]
+    pub angles: Vector3<f64>,
+    /// Measured body {}.
+    #[setting(name = "rate", each = RATES, unit = "rad/s", nominal = 0.05)]
+    pub rates: Vector3<f64>,
+    /// {} achieved by the actuators.
+    ///
+    /// All controllers have it, so that they can be exchanged.
+    #[setting(each = MOMENTS, unit = "N.m", nominal = 1e5)]
     pub achieved_moment: Vector3<f64>,
-    /// Moment that is known to act besides that of the actuators, N m.
-    pub known_moment: Vector3<f64>,
-    /// Trajectory as it is known, which turns the axes from which the angles are counted.
-    pub trajectory: Trajectory,
     /// Reference from outside the FMU.
+    #[setting(name = "reference.external", each = ANGLES)]
+    #[setting(used_with = "reference.profile = external")]
     pub reference: Reference,
+    /// {} that is known to act besides that of the actuators, such as the air's; the command is the
+    /// remainder.
+    #[setting(each = MOMENTS, unit = "N.m", nominal = 1e5)]
+    pub known_moment: Vector3<f64>,
+    /// Limits that hold at present. All controllers have them, so that they can be exchanged.
+    #[setting(optional)]
+    pub scheduled: Scheduled,
+    /// {}, as it is known.
+    ///
+    /// The trajectory turns the axes from which the angles are counted.
+    pub trajectory: Trajectory,
 }
 
+const MEASURED: [Entry; 3] = [
+    (".alpha", "angle of attack relative to the air"),
+    (".beta", "sideslip angle relative to the air"),
+    (".sigma", "bank angle relative to the ground velocity"),
+];
+
 /// Outputs that every controller has.
-#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize, Declared)]
 pub struct Output {
-    /// Commanded moment of the controller, N m.
+    /// Commanded {}, held between the ticks of period.feedback.
+    #[setting(each = MOMENTS, unit = "N.m", nominal = 1e5, discrete, depends_on = SAMPLED)]
     pub moment: Vector3<f64>,
-    /// Reference that is in force.
+    /// {} at the present time.
+    ///
+    /// It is the reference in force, which may come from outside.
+    #[setting(each = ANGLES)]
     pub reference: Reference,
-    /// Estimated delay of the loop, s.
+    /// Estimated delay from a measurement to the resulting moment; equals delay + measurement.age
+    /// until the response of the vehicle allows an estimate.
+    #[setting(name = "loopDelay.estimate", unit = "s", nominal = 0.1)]
+    #[setting(discrete, depends_on = SAMPLED)]
     pub loop_delay: f64,
-    /// Whether it differs from the given delay by more than half a period.
+    /// Whether loopDelay.estimate differs from delay + measurement.age by more than half of
+    /// period.feedback.
+    #[setting(name = "loopDelay.differs", depends_on = SAMPLED)]
     pub has_other_delay: bool,
 }
 
 /// A control law as an FMU. The value holds the outputs that only this law has.
-pub trait Law: Default + Serialize + DeserializeOwned + Send + 'static {
+pub trait Law: Declared + Default + Serialize + DeserializeOwned + Send + 'static {
     /// Sampled controller of the law.
     type Controller: Controller + Send;
     /// Settings of the law, which become parameters of the FMU.
@@ -151,7 +193,7 @@ pub trait Law: Default + Serialize + DeserializeOwned + Send + 'static {
     fn design(settings: Self::Settings, vehicle: &Vehicle)
     -> Result<Self::Controller, DesignError>;
 
-    /// Adds the outputs of the law to the table.
+    /// Changes the table, which has the outputs that the law declares.
     fn outputs(table: VariableTable<ControllerFmu<Self>>) -> VariableTable<ControllerFmu<Self>> {
         table
     }

@@ -17,7 +17,7 @@
 //! }
 //!
 //! /// The regulator has no outputs of its own.
-//! #[derive(Default, Serialize, Deserialize)]
+//! #[derive(Default, Serialize, Deserialize, Declared)]
 //! struct Soft;
 //!
 //! impl Law for Soft {

@@ -1,6 +1,43 @@
 //! The C interfaces of FMI 2.0 and 3.0, written once: the model of an FMU implements [`Model`], and
 //! [`export_fmus!`] makes a library of it.
 //!
+//! ```
+//! use fmi_export::prelude::*;
+//!
+//! /// The equation x' = −k x.
+//! #[derive(Default, Serialize, Deserialize, Declared)]
+//! struct Dahlquist {
+//!     /// Rate k at which the state decays.
+//!     #[setting(unit = "1/s", start = 1.0)]
+//!     k: f64,
+//!     /// State x.
+//!     #[setting(output, start = 1.0)]
+//!     x: f64,
+//!     /// Time derivative of x.
+//!     #[setting(name = "der(x)", output, unit = "1/s", derivative = "x", depends_on = ["x"])]
+//!     derivative: f64,
+//! }
+//!
+//! impl Model for Dahlquist {
+//!     fn description() -> Description<Self> {
+//!         Description::new("Dahlquist", "Test equation of Dahlquist", VariableTable::new(|m| m))
+//!     }
+//!     fn new() -> Self {
+//!         settings::start()
+//!     }
+//!     fn calculate(&mut self, _time: f64, _last: LastEvent) -> Result<(), Failure> {
+//!         self.derivative = -self.k * self.x;
+//!         Ok(())
+//!     }
+//! }
+//!
+//! // In the crate of the FMU: fmi_export::export_fmus!(Dahlquist);
+//! assert_eq!(fmi_export::describe::<Dahlquist>().states(), [(1, 2)]);
+//! ```
+//!
+//! The keys of `#[setting(…)]` are those of the crate [`settings`]. The shell integrates the states,
+//! and takes differences as partial derivatives, unless the model does it itself.
+//!
 //! | module | content |
 //! |---|---|
 //! | [`model`], [`table`] | the interface that a model must implement, and its variable table |
@@ -45,3 +82,12 @@ pub use model::{Context, EventInfo, Failure, Inputs, LastEvent, Model, Restorati
 pub use model_instance::{Export, describe};
 pub use progress::MAX_INPUT_DERIVATIVE_ORDER;
 pub use table::{Description, VariableTable};
+
+/// Items that the crate of a model needs, besides dependencies on `serde` and `settings`.
+pub mod prelude {
+    pub use crate::{
+        Context, Description, EventInfo, Failure, Inputs, LastEvent, Model, VariableTable,
+    };
+    pub use serde::{Deserialize, Serialize};
+    pub use settings::{Choice, Declared};
+}

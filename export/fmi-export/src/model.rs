@@ -53,6 +53,13 @@ pub trait Inputs<M> {
 
     /// Returns whether the importer gave derivatives, so that the inputs move during the step.
     fn are_extrapolated(&self) -> bool;
+
+    /// Integrates the states of the model from `from` to `to` (both s) by the Runge–Kutta method of
+    /// fourth order, in equal steps no longer than that of the default experiment.
+    ///
+    /// # Errors
+    /// Returns that of [`Model::calculate`].
+    fn integrate(&self, model: &mut M, from: f64, to: f64) -> Result<(), Failure>;
 }
 
 /// Last event before outputs are read. In co-simulation it determines the meaning of the outputs of
@@ -120,12 +127,14 @@ pub trait Model: Serialize + DeserializeOwned + Send + Sized + 'static {
     }
 
     /// Checks the parameters, loads files, computes the values that follow from them and sets the
-    /// initial state. The shell calls it on leaving initialization mode, and earlier in that mode
+    /// initial state. By default, states begin with their values in [`Self::new`]. The shell calls it on leaving initialization mode, and earlier in that mode
     /// if an output is requested; it calls it again whenever a parameter changed meanwhile.
     ///
     /// # Errors
     /// Names the parameter at fault.
-    fn initialize(&mut self, context: &Context) -> Result<(), Failure>;
+    fn initialize(&mut self, _context: &Context) -> Result<(), Failure> {
+        Ok(())
+    }
 
     /// Updates all outputs and local variables to the state, the inputs and `time`, as they are to
     /// be read after `last`. It must not change anything on which a later call depends. The shell
@@ -137,7 +146,8 @@ pub trait Model: Serialize + DeserializeOwned + Send + Sized + 'static {
 
     /// Performs a co-simulation step from communication point `from` to `to` (both s). It is never
     /// called with `to < from`; `to == from` is a step of zero length. Outputs are not read here
-    /// but after a call of [`Model::calculate`]. `log` takes warnings.
+    /// but after a call of [`Model::calculate`]. `log` takes warnings. By default the states are
+    /// integrated by [`Inputs::integrate`].
     ///
     /// # Errors
     /// Says why the step failed, or why the simulation ends within it.
@@ -146,8 +156,10 @@ pub trait Model: Serialize + DeserializeOwned + Send + Sized + 'static {
         from: f64,
         to: f64,
         inputs: &dyn Inputs<Self>,
-        log: &mut dyn FnMut(&str),
-    ) -> Result<(), Failure>;
+        _log: &mut dyn FnMut(&str),
+    ) -> Result<(), Failure> {
+        inputs.integrate(self, from, to)
+    }
 
     /// Prepares a model that was restored from a saved state, before it replaces another one. It
     /// makes scratch space again or takes over that of the other model, which is no longer used if
@@ -160,10 +172,12 @@ pub trait Model: Serialize + DeserializeOwned + Send + Sized + 'static {
     }
 
     /// Copies the continuous states for model exchange, in the order of the state variables in the
-    /// variable table.
+    /// variable table, if they are kept elsewhere than in these variables. `states` has the values
+    /// of the variables.
     fn continuous_states(&self, _states: &mut [f64]) {}
 
-    /// Sets the continuous states in model exchange.
+    /// Sets the continuous states in model exchange, if they are kept elsewhere than in the state
+    /// variables, which the shell sets.
     fn set_continuous_states(&mut self, _states: &[f64]) {}
 
     /// Handles the event at `time`: it takes discrete inputs, makes the changes that are due, and
@@ -181,18 +195,18 @@ pub trait Model: Serialize + DeserializeOwned + Send + Sized + 'static {
     /// the shell calls before if something changed.
     fn event_indicators(&self, _indicators: &mut [f64]) {}
 
-    /// Returns the partial derivative of the variable with value reference `unknown_variable` with
-    /// respect to the one with value reference `known_variable`, at the current `time`, state and
-    /// inputs. It is called only if the FMU has continuous states.
+    /// Returns the partial derivative of the variable named `unknown` with respect to the input or
+    /// state named `known`, at the current `time`, state and inputs, or `None` if the shell is to
+    /// take a difference of fourth order. It is called only if the FMU has continuous states.
     ///
     /// # Errors
-    /// Names a pair of variables that has no derivative.
+    /// Says why there is no derivative.
     fn partial_derivative(
         &mut self,
         _time: f64,
-        _unknown_variable: usize,
-        _known_variable: usize,
-    ) -> Result<f64, Failure> {
-        Err(Failure::Error("this FMU provides no directional derivatives".into()))
+        _unknown: &str,
+        _known: &str,
+    ) -> Result<Option<f64>, Failure> {
+        Ok(None)
     }
 }

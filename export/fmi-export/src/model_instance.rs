@@ -4,10 +4,13 @@ use crate::call::State;
 use crate::model::{Context, EventInfo, Failure, Inputs, LastEvent, Model, Restoration};
 use crate::numbers::are_numbers;
 use crate::progress::{Extrapolation, Progress};
-use crate::table::{Access, Description, VariableTable};
+use crate::table::{Description, VariableTable, number, resolved};
 use crate::types::Interface;
 use model_description::ModelDescription;
-use model_description::variable::VariableKind;
+use model_description::structure::states;
+use model_description::variable::{Variable, VariableKind};
+use settings::Field;
+use std::cell::RefCell;
 use std::sync::{Arc, OnceLock};
 
 /// A model together with its variable table, seen without the model's type.
@@ -38,35 +41,91 @@ pub(crate) trait ModelInstance: Send {
     /// error the model is unchanged.
     fn restore(&mut self, payload: &[u8], usage: (Interface, bool)) -> Result<Progress, Failure>;
 
-    fn continuous_states(&self, states: &mut [f64]);
+    fn continuous_states(&mut self, states: &mut [f64]);
     fn set_continuous_states(&mut self, states: &[f64]);
     fn new_discrete_states(&mut self, time: f64) -> Result<EventInfo, Failure>;
     fn event_indicators(&self, indicators: &mut [f64]);
     fn partial_derivative(
         &mut self,
         time: f64,
-        unknown_variable: usize,
-        known_variable: usize,
-    ) -> Result<f64, Failure>;
+        unknown: usize,
+        known: usize,
+    ) -> Result<Option<f64>, Failure>;
 }
 
 struct Bound<M> {
     model: M,
     table: VariableTable<M>,
+    /// Value references of each state and its derivative.
+    states: Vec<(usize, usize)>,
+    /// Longest step with which the shell integrates the states, s.
+    longest: f64,
+    scratch: Scratch,
+}
+
+/// Room for the integration: states, derivatives, and their weighted sum.
+type Scratch = [Vec<f64>; 3];
+
+impl<M> Bound<M> {
+    fn field(&mut self, reference: usize) -> Option<Field<'_>> {
+        Some(self.table.entries.get(reference)?.field(&mut self.model))
+    }
 }
 
 /// Inputs of one step, for the model with its type.
 struct Extrapolated<'a, M> {
     table: &'a VariableTable<M>,
+    states: &'a [(usize, usize)],
+    longest: f64,
+    scratch: RefCell<&'a mut Scratch>,
     from: f64,
     inputs: &'a [Extrapolation],
 }
 
-impl<M> Inputs<M> for Extrapolated<'_, M> {
+impl<M: Model> Extrapolated<'_, M> {
+    fn real<'m>(&self, model: &'m mut M, reference: usize) -> Option<&'m mut f64> {
+        match self.table.entries[reference].field(model) {
+            Field::Real(field) => Some(field),
+            _ => None,
+        }
+    }
+
+    /// Makes a step of length `h` (s) of the Runge–Kutta method of fourth order.
+    fn runge_kutta(&self, model: &mut M, time: f64, h: f64) -> Result<(), Failure> {
+        let value = |model: &mut M, reference| self.real(model, reference).map_or(0.0, |x| *x);
+        let move_by = |model: &mut M, start: &[f64], h: f64, slopes: &[f64]| {
+            for ((&(state, _), start), slope) in self.states.iter().zip(start).zip(slopes) {
+                if let Some(state) = self.real(model, state) {
+                    *state = start + h * slope;
+                }
+            }
+        };
+        let mut scratch = self.scratch.borrow_mut();
+        let [start, slopes, sum] = &mut **scratch;
+        for (start, &(state, _)) in start.iter_mut().zip(self.states) {
+            *start = value(model, state);
+        }
+        slopes.fill(0.0);
+        sum.fill(0.0);
+        for (part, weight) in [(0.0, 1.0), (0.5, 2.0), (0.5, 2.0), (1.0, 1.0)] {
+            move_by(model, start, part * h, slopes);
+            self.advance(model, time + part * h);
+            model.calculate(time + part * h, LastEvent::InputSet)?;
+            for (i, &(_, derivative)) in self.states.iter().enumerate() {
+                slopes[i] = value(model, derivative);
+                sum[i] += weight * slopes[i];
+            }
+        }
+        move_by(model, start, h / 6.0, sum);
+        Ok(())
+    }
+}
+
+impl<M: Model> Inputs<M> for Extrapolated<'_, M> {
     fn advance(&self, model: &mut M, time: f64) {
         for input in self.inputs {
-            if let Access::Real(field) = &self.table.entries[input.reference].access {
-                *field(model) = input.at(time - self.from);
+            if let Some(field) = self.real(model, input.reference) {
+                *field = input.at(time - self.from);
             }
         }
     }
@@ -74,41 +133,44 @@ impl<M> Inputs<M> for Extrapolated<'_, M> {
     fn are_extrapolated(&self) -> bool {
         !self.inputs.is_empty()
     }
+
+    fn integrate(&self, model: &mut M, from: f64, to: f64) -> Result<(), Failure> {
+        let count = ((to - from) / self.longest).ceil().max(1.0);
+        let h = (to - from) / count;
+        (0..count as u64).try_for_each(|k| self.runge_kutta(model, from + k as f64 * h, h))
+    }
 }
 
 impl<M: Model> ModelInstance for Bound<M> {
     fn real(&mut self, reference: usize) -> Option<&mut f64> {
-        match &self.table.entries.get(reference)?.access {
-            Access::Real(field) => Some(field(&mut self.model)),
+        match self.field(reference)? {
+            Field::Real(field) => Some(field),
             _ => None,
         }
     }
 
     fn integer(&mut self, reference: usize) -> Option<i32> {
-        match &self.table.entries.get(reference)?.access {
-            Access::Integer(field) => Some((field.get)(&mut self.model)),
-            _ => None,
-        }
+        number(&self.field(reference)?)
     }
 
     fn set_integer(&mut self, reference: usize, value: i32) {
-        if let Some(Access::Integer(field)) =
-            self.table.entries.get(reference).map(|entry| &entry.access)
-        {
-            (field.set)(&mut self.model, value);
-        }
+        match self.field(reference) {
+            Some(Field::Integer(field)) => field.set_number(value.into()),
+            Some(Field::Choice(field)) => field.set_number(i64::from(value) - 1),
+            _ => false,
+        };
     }
 
     fn boolean(&mut self, reference: usize) -> Option<&mut bool> {
-        match &self.table.entries.get(reference)?.access {
-            Access::Boolean(field) => Some(field(&mut self.model)),
+        match self.field(reference)? {
+            Field::Boolean(field) => Some(field),
             _ => None,
         }
     }
 
     fn string(&mut self, reference: usize) -> Option<&mut String> {
-        match &self.table.entries.get(reference)?.access {
-            Access::String(field) => Some(field(&mut self.model)),
+        match self.field(reference)? {
+            Field::Text(field) => Some(field),
             _ => None,
         }
     }
@@ -136,9 +198,11 @@ impl<M: Model> ModelInstance for Bound<M> {
         inputs: &[Extrapolation],
         log: &mut dyn FnMut(&str),
     ) -> Result<(), Failure> {
-        let inputs = Extrapolated { table: &self.table, from, inputs };
-        self.model.step(from, to, &inputs, log)?;
-        inputs.advance(&mut self.model, to);
+        let Self { model, table, states, longest, scratch } = self;
+        let (longest, scratch) = (*longest, RefCell::new(scratch));
+        let inputs = Extrapolated { table, states, longest, scratch, from, inputs };
+        model.step(from, to, &inputs, log)?;
+        inputs.advance(model, to);
         Ok(())
     }
 
@@ -179,11 +243,19 @@ impl<M: Model> ModelInstance for Bound<M> {
         Ok(progress)
     }
 
-    fn continuous_states(&self, states: &mut [f64]) {
+    fn continuous_states(&mut self, states: &mut [f64]) {
+        for (i, value) in states.iter_mut().enumerate() {
+            *value = self.real(self.states[i].0).map_or(0.0, |state| *state);
+        }
         self.model.continuous_states(states);
     }
 
     fn set_continuous_states(&mut self, states: &[f64]) {
+        for (i, value) in states.iter().enumerate() {
+            if let Some(state) = self.real(self.states[i].0) {
+                *state = *value;
+            }
+        }
         self.model.set_continuous_states(states);
     }
 
@@ -198,10 +270,11 @@ impl<M: Model> ModelInstance for Bound<M> {
     fn partial_derivative(
         &mut self,
         time: f64,
-        unknown_variable: usize,
-        known_variable: usize,
-    ) -> Result<f64, Failure> {
-        self.model.partial_derivative(time, unknown_variable, known_variable)
+        unknown: usize,
+        known: usize,
+    ) -> Result<Option<f64>, Failure> {
+        let name = |reference: usize| self.table.entries[reference].variable.name.as_str();
+        self.model.partial_derivative(time, name(unknown), name(known))
     }
 }
 
@@ -234,7 +307,12 @@ impl Export {
 }
 
 fn create<M: Model>() -> Box<dyn ModelInstance> {
-    Box::new(Bound { model: M::new(), table: M::description().table })
+    let Description { table, default_experiment, .. } = M::description();
+    let variables: Vec<&Variable> = table.variables().collect();
+    let states = states(&variables);
+    let scratch = [(); 3].map(|()| vec![0.0; states.len()]);
+    let longest = default_experiment.step;
+    Box::new(Bound { model: M::new(), table, states, longest, scratch })
 }
 
 /// Returns the description of the FMU whose model is `M`. The start values of parameters and
@@ -248,35 +326,24 @@ pub fn describe<M: Model>() -> ModelDescription {
         model_exchange,
         event_indicators,
         default_experiment,
-        table,
+        mut table,
     } = M::description();
     let mut model = M::new();
-    let mut variables = Vec::with_capacity(table.entries.len());
-    for entry in table.entries {
-        let mut variable = entry.variable;
-        if !variable.is_calculated() {
-            match (&mut variable.kind, &entry.access) {
-                (VariableKind::Real { start, .. }, Access::Real(field)) => {
-                    *start = Some(*field(&mut model));
-                }
-                (
-                    VariableKind::Integer { start, .. } | VariableKind::Enumeration { start, .. },
-                    Access::Integer(field),
-                ) => {
-                    *start = Some((field.get)(&mut model));
-                }
-                (VariableKind::Boolean { start }, Access::Boolean(field)) => {
-                    *start = Some(*field(&mut model));
-                }
-                (VariableKind::String { start }, Access::String(field)) => {
-                    *start = Some(field(&mut model).clone());
-                }
-                _ => unreachable!(
-                    "VariableTable::push is called with a kind and a field of the same type only"
-                ),
-            }
+    for entry in &mut table.entries {
+        if entry.variable.is_calculated() {
+            continue;
         }
-        variables.push(variable);
+        let field = entry.field(&mut model);
+        let item = number(&field);
+        match (&mut entry.variable.kind, field) {
+            (VariableKind::Real { start, .. }, Field::Real(value)) => *start = Some(*value),
+            (VariableKind::Boolean { start }, Field::Boolean(value)) => *start = Some(*value),
+            (VariableKind::String { start }, Field::Text(value)) => *start = Some(value.clone()),
+            (VariableKind::Integer { start, .. } | VariableKind::Enumeration { start, .. }, _) => {
+                *start = item;
+            }
+            _ => unreachable!("kind and field come from one declaration"),
+        }
     }
     ModelDescription {
         name: name.into(),
@@ -287,6 +354,6 @@ pub fn describe<M: Model>() -> ModelDescription {
         model_exchange,
         event_indicators,
         default_experiment,
-        variables,
+        variables: resolved(table.entries.into_iter().map(|entry| entry.variable).collect()),
     }
 }

@@ -2,9 +2,9 @@
 
 use crate::call::State;
 use crate::model::LastEvent;
-use crate::table::{Access, VariableTable};
+use crate::table::VariableTable;
 use crate::types::Interface;
-use model_description::variable::{Causality, Variability, Variable};
+use model_description::variable::{Causality, Variability, Variable, VariableKind};
 use serde::{Deserialize, Serialize};
 
 /// Highest order of derivatives that fmi2SetRealInputDerivatives accepts.
@@ -88,8 +88,8 @@ impl Progress {
         let continuous = |input: &Extrapolation| {
             let entry = table.entries.get(input.reference);
             let right = entry.is_some_and(|entry| {
-                let Variable { causality, variability, .. } = &entry.variable;
-                matches!(entry.access, Access::Real(_))
+                let Variable { causality, variability, kind, .. } = &entry.variable;
+                matches!(kind, VariableKind::Real { .. })
                     && *causality == Causality::Input
                     && *variability == Variability::Continuous
             });

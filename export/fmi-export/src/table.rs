@@ -1,106 +1,56 @@
-//! Variable table of an FMU: the FMI attributes of each, and the field of the model that holds
-//! its value.
-//!
-//! FMUs declare hundreds of variables, so the functions that a declaration calls are not inlined:
-//! libraries are smaller that way.
-
-mod real;
-
-pub use real::Real;
+//! Variable table of an FMU: the FMI attributes of each variable, and the field of the model that
+//! holds its value. Both follow from the declarations of the model's fields, which the crate
+//! [`settings`] explains.
 
 use crate::scalar::Scalar;
 use model_description::DefaultExperiment;
+use model_description::unit::Unit;
 use model_description::variable::{
     Causality, EnumerationType, Variability, Variable, VariableKind,
 };
-use settings::{Choice, Declared, Field, Numbered, Setting};
+use settings::{Declared, Field, Kind, Role, Setting};
 use std::sync::Arc;
 
-type Setter<M> = Box<dyn Fn(&mut M, i32) + Send + Sync>;
-type Lens<M, T> = Box<dyn Fn(&mut M) -> &mut T + Send + Sync>;
-/// A part of the model with declared settings.
-type Part<M> = Arc<dyn Fn(&mut M) -> &mut (dyn Declared + 'static) + Send + Sync>;
-
-/// Access to the field that holds a variable's value.
-pub(crate) enum Access<M> {
-    Real(Lens<M, f64>),
-    /// Access to an integer or enumeration field.
-    Integer(Integer<M>),
-    Boolean(Lens<M, bool>),
-    String(Lens<M, String>),
-}
-
-/// Access to a field of some type that FMI sees as an integer.
-pub(crate) struct Integer<M> {
-    pub(crate) get: Box<dyn Fn(&mut M) -> i32 + Send + Sync>,
-    /// Setter that is called only with values that the declaration allows.
-    pub(crate) set: Setter<M>,
-}
-
-/// Message for an impossible case, as the declaration of a setting and its field have one source.
-const NO_FIELD: &str = "a setting has a field of its declared type";
-
-/// Returns access to a setting with numbered values, which FMI numbers from `first` on where the
-/// setting numbers them from 0. A value without a number is 0 or less.
-fn numbered<M: 'static>(part: Part<M>, index: usize, first: i32) -> Access<M> {
-    let other = Arc::clone(&part);
-    let get = move |model: &mut M| match part(model).field(index) {
-        Ok(Field::Integer(field) | Field::Choice(field)) => fmi_number(field, first),
-        _ => unreachable!("{NO_FIELD}"),
-    };
-    let set = move |model: &mut M, value: i32| match other(model).field(index) {
-        Ok(Field::Integer(field) | Field::Choice(field)) => {
-            field.set_number(i64::from(value) - i64::from(first));
-        }
-        _ => unreachable!("{NO_FIELD}"),
-    };
-    Access::Integer(Integer { get: Box::new(get), set: Box::new(set) })
-}
-
-fn fmi_number(value: &dyn Numbered, first: i32) -> i32 {
-    i32::try_from(value.number()).map_or(i32::MAX, |number| number.saturating_add(first))
-}
-
-/// Returns access to a setting whose field is of one variant of [`Field`].
-macro_rules! access {
-    ($variant:ident, $part:ident, $index:ident) => {
-        Box::new(move |model| match $part(model).field($index) {
-            Ok(Field::$variant(field)) => field,
-            _ => unreachable!("{NO_FIELD}"),
-        })
-    };
-}
-
-fn described(items: &settings::Items) -> VariableKind {
-    let listed = items.items.iter().map(|(name, text)| ((*name).into(), (*text).into()));
-    let enumeration_type = EnumerationType {
-        name: items.name.into(),
-        description: items.text.into(),
-        items: listed.collect(),
-    };
-    VariableKind::Enumeration { enumeration_type, start: None }
-}
+/// Access to the fields of a part of the model by their positions in it.
+type Part<M> = Arc<dyn Fn(&mut M, usize) -> Field<'_> + Send + Sync>;
 
 /// A declared variable together with its field.
 pub struct Entry<M> {
     pub(crate) variable: Variable,
-    pub(crate) access: Access<M>,
+    part: Part<M>,
+    /// Position in the part of the model.
+    index: usize,
 }
 
 impl<M> Entry<M> {
+    /// Returns the field that holds the value of the variable.
+    pub(crate) fn field<'a>(&self, model: &'a mut M) -> Field<'a> {
+        (self.part)(model, self.index)
+    }
+
     /// Says why the model's value is not allowed, if the variable is set from outside.
     pub(crate) fn problem(&self, model: &mut M) -> Option<String> {
         let Variable { name, kind, .. } = &self.variable;
         if self.variable.is_calculated() {
             return None;
         }
-        let problem = match &self.access {
-            Access::Real(field) => field(model).problem(kind),
-            Access::Integer(field) => (field.get)(model).problem(kind),
-            Access::Boolean(_) | Access::String(_) => None,
+        let problem = match self.field(model) {
+            Field::Real(field) => field.problem(kind),
+            field => number(&field).and_then(|number| number.problem(kind)),
         };
         problem.map(|problem| format!("'{name}' {problem}"))
     }
+}
+
+/// Returns the number of an integer or a choice in FMI, which counts the items of a choice from 1.
+/// A choice that is none of the items is 0.
+pub(crate) fn number(field: &Field) -> Option<i32> {
+    let (number, first) = match field {
+        Field::Integer(number) => (number.number(), 0),
+        Field::Choice(item) => (item.number(), 1),
+        _ => return None,
+    };
+    Some(i32::try_from(number).map_or(i32::MAX, |number| number.saturating_add(first)))
 }
 
 /// Description of an FMU: its texts, its default experiment and its variable table.
@@ -123,82 +73,67 @@ pub struct Description<M> {
     pub table: VariableTable<M>,
 }
 
+impl<M> Description<M> {
+    /// Describes an FMU for co-simulation and, if it has continuous states, for model exchange, by
+    /// its name, its purpose and its variables.
+    pub fn new(name: &'static str, description: &'static str, table: VariableTable<M>) -> Self {
+        let model_exchange = table.variables().any(|variable| variable.derivative_of().is_some());
+        Self {
+            name,
+            description,
+            documentation: String::new(),
+            version: "",
+            model_exchange,
+            event_indicators: 0,
+            default_experiment: DefaultExperiment::default(),
+            table,
+        }
+    }
+}
+
 /// The variables of an FMU in order; the position of each is its value reference.
 pub struct VariableTable<M> {
     pub(crate) entries: Vec<Entry<M>>,
 }
 
-impl<M> Default for VariableTable<M> {
-    fn default() -> Self {
-        Self { entries: Vec::new() }
+impl<M> VariableTable<M> {
+    pub(crate) fn variables(&self) -> impl Iterator<Item = &Variable> {
+        self.entries.iter().map(|entry| &entry.variable)
     }
 }
 
 impl<M: 'static> VariableTable<M> {
-    /// Makes an empty variable table.
-    pub fn new() -> Self {
-        Self::default()
-    }
-
-    /// Adds a real variable.
-    #[must_use]
-    pub fn real(
-        mut self,
-        declaration: Real,
-        field: impl Fn(&mut M) -> &mut f64 + Send + Sync + 'static,
+    /// Makes the table of the declared fields of a part of the model, or of all of it.
+    pub fn new<S: Declared + 'static>(
+        part: impl Fn(&mut M) -> &mut S + Send + Sync + 'static,
     ) -> Self {
-        self.push_real(declaration, Box::new(field));
-        self
+        Self { entries: Vec::new() }.and(part)
     }
 
-    /// Adds an integer variable, whose field may have any integer type. Values set from outside are
-    /// checked against the limits, and a type without negative numbers raises the lower limit to
-    /// zero.
+    /// Adds the declared fields of another part of the model.
     #[must_use]
-    pub fn integer<I>(
-        mut self,
-        common: Common,
-        (min, max): (Option<i32>, Option<i32>),
-        field: impl Fn(&mut M) -> &mut I + Copy + Send + Sync + 'static,
-    ) -> Self
-    where
-        I: Copy + TryFrom<i32> + TryInto<i32>,
-    {
-        let is_set = matches!(common.0.causality, Causality::Parameter | Causality::Input);
-        let min = min.or((is_set && I::try_from(-1).is_err()).then_some(0));
-        let access = Integer {
-            get: Box::new(move |model| (*field(model)).try_into().unwrap_or(i32::MAX)),
-            set: Box::new(move |model, value| {
-                if let Ok(value) = I::try_from(value) {
-                    *field(model) = value;
-                }
-            }),
-        };
-        self.push(common, VariableKind::Integer { min, max, start: None }, Access::Integer(access));
-        self
-    }
-
-    /// Adds a boolean variable.
-    #[must_use]
-    pub fn boolean(
-        mut self,
-        common: Common,
-        field: impl Fn(&mut M) -> &mut bool + Send + Sync + 'static,
-    ) -> Self {
-        self.push(common, VariableKind::Boolean { start: None }, Access::Boolean(Box::new(field)));
-        self
-    }
-
-    /// Adds the declared settings of a part of the model as parameters.
-    #[must_use]
-    pub fn settings<S: Declared + 'static>(
+    pub fn and<S: Declared + 'static>(
         mut self,
         part: impl Fn(&mut M) -> &mut S + Send + Sync + 'static,
     ) -> Self {
-        let part: Part<M> = Arc::new(move |model| part(model));
-        for (index, setting) in settings::settings::<S>().into_iter().enumerate() {
-            self.push_setting(setting, index, Arc::clone(&part));
+        let settings = settings::settings::<S>();
+        let variables: Vec<Variable> = settings.iter().map(variable).collect();
+        let part: Part<M> = Arc::new(move |model, index| settings.field(part(model), index));
+        for (index, variable) in variables.into_iter().enumerate() {
+            self.entries.push(Entry { variable, part: Arc::clone(&part), index });
         }
+        self
+    }
+
+    /// Moves the variables whose names begin so before the first one whose name begins with `next`.
+    #[must_use]
+    pub fn before(mut self, beginning: &str, next: &str) -> Self {
+        let begins = |entry: &Entry<M>, with: &str| entry.variable.name.starts_with(with);
+        let moved = self.entries.extract_if(.., |entry| begins(entry, beginning));
+        let moved: Vec<Entry<M>> = moved.collect();
+        let place = self.entries.iter().position(|entry| begins(entry, next));
+        let place = place.unwrap_or(self.entries.len());
+        self.entries.splice(place..place, moved);
         self
     }
 
@@ -209,158 +144,95 @@ impl<M: 'static> VariableTable<M> {
         self
     }
 
-    #[inline(never)]
-    fn push_setting(&mut self, Setting { place, kind }: Setting, index: usize, part: Part<M>) {
-        let common = parameter(&place.name, &place.text).used_with(&place.used_with);
-        let (min, max) = (place.min.or(place.above), place.max.or(place.below));
-        match kind {
-            settings::Kind::Real => {
-                let real = Real { min, max, nominal: place.nominal, ..common.real() };
-                self.push_real(real.unit(&place.unit), access!(Real, part, index));
-            }
-            settings::Kind::Integer(is_signed) => {
-                let min = min.or((!is_signed).then_some(0.0)).map(|min| min as i32);
-                let max = max.map(|max| max as i32);
-                let kind = VariableKind::Integer { min, max, start: None };
-                self.push(common, kind, numbered(part, index, 0));
-            }
-            settings::Kind::Boolean => {
-                let kind = VariableKind::Boolean { start: None };
-                self.push(common, kind, Access::Boolean(access!(Boolean, part, index)));
-            }
-            settings::Kind::Choice(items) => {
-                self.push(common, described(&items), numbered(part, index, 1));
-            }
-            settings::Kind::Text => {
-                let kind = VariableKind::String { start: None };
-                self.push(common, kind, Access::String(access!(Text, part, index)));
+    /// Changes the variables whose names begin so.
+    #[must_use]
+    pub fn change(mut self, beginning: &str, change: impl Fn(&mut Variable)) -> Self {
+        for Entry { variable, .. } in &mut self.entries {
+            if variable.name.starts_with(beginning) {
+                change(variable);
             }
         }
+        self
     }
+}
 
-    /// Adds a variable whose field is a [`Choice`].
-    #[must_use]
-    pub fn choice<T: Choice>(
-        mut self,
-        common: Common,
-        field: impl Fn(&mut M) -> &mut T + Send + Sync + 'static,
-    ) -> Self {
-        let field = Arc::new(field);
-        let other = Arc::clone(&field);
-        let access = Integer {
-            get: Box::new(move |model| fmi_number(field(model), 1)),
-            set: Box::new(move |model, value| {
-                other(model).set_number(i64::from(value) - 1);
-            }),
+/// Returns the variables of a table, in which the beginnings of names among the dependencies are
+/// replaced by the names of the inputs and states that begin so.
+pub(crate) fn resolved(mut variables: Vec<Variable>) -> Vec<Variable> {
+    let states: Vec<String> =
+        variables.iter().filter_map(|variable| variable.derivative_of().map(Into::into)).collect();
+    let is_known = |variable: &&Variable| {
+        variable.causality == Causality::Input || states.contains(&variable.name)
+    };
+    let known: Vec<String> =
+        variables.iter().filter(is_known).map(|variable| variable.name.clone()).collect();
+    for variable in &mut variables {
+        let resolve = |name: &String| match name.strip_suffix('*') {
+            Some(beginning) => {
+                known.iter().filter(|name| name.starts_with(beginning)).cloned().collect()
+            }
+            None => vec![name.clone()],
         };
-        self.push(common, described(&T::items()), Access::Integer(access));
-        self
+        variable.dependencies = variable.dependencies.iter().flat_map(resolve).collect();
     }
-
-    /// Adds a text variable.
-    #[must_use]
-    pub fn string(
-        mut self,
-        common: Common,
-        field: impl Fn(&mut M) -> &mut String + Send + Sync + 'static,
-    ) -> Self {
-        self.push(common, VariableKind::String { start: None }, Access::String(Box::new(field)));
-        self
-    }
-
-    #[inline(never)]
-    fn push_real(&mut self, declaration: Real, field: Lens<M, f64>) {
-        let Real { common, unit, min, max, nominal, derivative_of } = declaration;
-        let kind = VariableKind::Real { unit, min, max, nominal, start: None, derivative_of };
-        self.push(common, kind, Access::Real(field));
-    }
-
-    #[inline(never)]
-    fn push(&mut self, common: Common, kind: VariableKind, access: Access<M>) {
-        self.entries.push(Entry { variable: Variable { kind, ..common.0 }, access });
-    }
+    variables
 }
 
-/// Common part of every declaration: name, description and role.
-#[derive(Clone, Debug)]
-pub struct Common(Variable);
-
-impl Common {
-    #[inline(never)]
-    fn new(name: &str, description: &str, causality: Causality, variability: Variability) -> Self {
-        Self(Variable {
-            name: name.into(),
-            description: description.into(),
-            causality,
-            variability,
-            // The declaration of the type follows.
-            kind: VariableKind::Boolean { start: None },
-            dependencies: Vec::new(),
-            used_with: String::new(),
-            is_optional: false,
-        })
-    }
-
-    /// Declares that an input may stay unconnected without a warning.
-    #[must_use]
-    pub fn optional(mut self) -> Self {
-        self.0.is_optional = true;
-        self
-    }
-
-    /// Declares the inputs and states on which the value of a calculated variable depends at the
-    /// same instant.
-    #[must_use]
-    pub fn depends_on<'a>(mut self, names: impl IntoIterator<Item = &'a str>) -> Self {
-        self.0.dependencies.extend(names.into_iter().map(String::from));
-        self
-    }
-
-    /// Declares the [condition](model_description::condition) under which the variable has an
-    /// effect. The importer is warned if it sets the variable without effect.
-    #[must_use]
-    pub fn used_with(mut self, condition: &str) -> Self {
-        if !condition.is_empty() {
-            self.0.description = format!("{}; used with {condition}", self.0.description);
-            self.0.used_with = condition.into();
-        }
-        self
-    }
-
-    /// Continues the declaration as that of a real variable.
-    #[inline(never)]
-    pub fn real(self) -> Real {
-        Real { common: self, unit: None, min: None, max: None, nominal: None, derivative_of: None }
-    }
+/// Returns the variable that a field is.
+fn variable(Setting { place, kind }: &Setting) -> Variable {
+    let causality = match place.role {
+        Role::Parameter => Causality::Parameter,
+        Role::Input => Causality::Input,
+        Role::Output => Causality::Output,
+        Role::Local => Causality::Local,
+    };
+    let variability = if causality == Causality::Parameter {
+        Variability::Fixed
+    } else if place.is_discrete || !matches!(kind, Kind::Real) {
+        Variability::Discrete
+    } else {
+        Variability::Continuous
+    };
+    let is_set = matches!(causality, Causality::Parameter | Causality::Input);
+    let (min, max) = (place.min.or(place.above), place.max.or(place.below));
+    let kind = match kind {
+        Kind::Real => VariableKind::Real {
+            unit: (!place.unit.is_empty()).then(|| Unit::new(&place.unit)),
+            min,
+            max,
+            nominal: place.nominal,
+            start: None,
+            derivative_of: (!place.derivative.is_empty()).then(|| place.derivative.clone()),
+        },
+        Kind::Integer(is_signed, _) => VariableKind::Integer {
+            min: min.or((is_set && !is_signed).then_some(0.0)).map(|min| min as i32),
+            max: max.map(|max| max as i32),
+            start: None,
+        },
+        Kind::Boolean => VariableKind::Boolean { start: None },
+        Kind::Choice(items, _) => described(items),
+        Kind::Text => VariableKind::String { start: None },
+    };
+    let mut variable = Variable {
+        name: place.name.clone(),
+        description: place.text.clone(),
+        causality,
+        variability,
+        kind,
+        dependencies: place.depends_on.clone(),
+        used_with: String::new(),
+        is_optional: place.is_optional,
+    };
+    variable.use_with(&place.used_with);
+    variable
 }
 
-/// Declares a fixed parameter with a start value.
-pub fn parameter(name: &str, description: &str) -> Common {
-    Common::new(name, description, Causality::Parameter, Variability::Fixed)
-}
-/// Declares a continuous input.
-pub fn input(name: &str, description: &str) -> Common {
-    Common::new(name, description, Causality::Input, Variability::Continuous)
-}
-/// Declares an input that changes only at events or communication points. It has no input
-/// derivatives. In model exchange a model takes it in
-/// [`Model::new_discrete_states`](crate::Model::new_discrete_states) and nowhere else.
-pub fn discrete_input(name: &str, description: &str) -> Common {
-    Common::new(name, description, Causality::Input, Variability::Discrete)
-}
-/// Declares a continuous output.
-pub fn output(name: &str, description: &str) -> Common {
-    Common::new(name, description, Causality::Output, Variability::Continuous)
-}
-/// Declares an output that changes only at events or communication points.
-pub fn discrete_output(name: &str, description: &str) -> Common {
-    Common::new(name, description, Causality::Output, Variability::Discrete)
-}
-/// Declares a local variable that changes at ticks only. Importers show it, but give it no port.
-pub fn discrete_local(name: &str, description: &str) -> Common {
-    Common::new(name, description, Causality::Local, Variability::Discrete)
-}
-/// Declares a continuous local variable, which can be observed.
-pub fn local(name: &str, description: &str) -> Common {
-    Common::new(name, description, Causality::Local, Variability::Continuous)
+fn described(items: &settings::Items) -> VariableKind {
+    let listed = items.items.iter().map(|(name, text)| ((*name).into(), (*text).into()));
+    let enumeration_type = EnumerationType {
+        name: items.name.into(),
+        description: items.text.into(),
+        items: listed.collect(),
+    };
+    VariableKind::Enumeration { enumeration_type, start: None }
 }

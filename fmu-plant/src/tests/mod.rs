@@ -28,6 +28,9 @@ impl Inputs<ReentryPlant> for Constant {
     fn are_extrapolated(&self) -> bool {
         false
     }
+    fn integrate(&self, _: &mut ReentryPlant, _: f64, _: f64) -> Result<(), Failure> {
+        unreachable!("the plant integrates its states itself")
+    }
 }
 
 /// Pitch moment that rises with time.
@@ -39,6 +42,9 @@ impl Inputs<ReentryPlant> for Ramp {
     }
     fn are_extrapolated(&self) -> bool {
         true
+    }
+    fn integrate(&self, _: &mut ReentryPlant, _: f64, _: f64) -> Result<(), Failure> {
+        unreachable!("the plant integrates its states itself")
     }
 }
 

@@ -1,6 +1,9 @@
-//! Access to the field of a setting.
+//! Access to the fields of declared values by their offsets.
 
 use crate::choice::Choice;
+use crate::{Declared, Kind, Place, Setting};
+use std::marker::PhantomData;
+use std::ops::Deref;
 
 /// The field of a setting.
 pub enum Field<'a> {
@@ -14,6 +17,50 @@ pub enum Field<'a> {
     Choice(&'a mut dyn Numbered),
     /// A text.
     Text(&'a mut String),
+}
+
+/// Conversion of the address of an integer or a choice to a pointer of its type.
+pub type Number = fn(*mut u8) -> *mut dyn Numbered;
+
+/// The settings of a type, in the order of its fields.
+#[derive(Clone, Debug)]
+pub struct Settings<S> {
+    list: Vec<Setting>,
+    holder: PhantomData<fn(S)>,
+}
+
+impl<S: Declared> Settings<S> {
+    pub(crate) fn new() -> Self {
+        let mut list = Vec::new();
+        S::declare(&Place::default(), &mut list);
+        Self { list, holder: PhantomData }
+    }
+
+    /// Returns the field of the setting at a position in this list.
+    #[allow(unsafe_code, reason = "the field is found by its offset")]
+    pub fn field<'a>(&self, value: &'a mut S, index: usize) -> Field<'a> {
+        let Setting { place, kind } = &self.list[index];
+        let start = (&raw mut *value).cast::<u8>();
+        // SAFETY: `S` promises that this offset of its values holds a field of this type, and the
+        // value is borrowed for as long as the field.
+        unsafe {
+            let field = start.add(place.offset);
+            match kind {
+                Kind::Real => Field::Real(&mut *field.cast()),
+                Kind::Integer(_, number) => Field::Integer(&mut *number(field)),
+                Kind::Boolean => Field::Boolean(&mut *field.cast()),
+                Kind::Choice(_, number) => Field::Choice(&mut *number(field)),
+                Kind::Text => Field::Text(&mut *field.cast()),
+            }
+        }
+    }
+}
+
+impl<S> Deref for Settings<S> {
+    type Target = [Setting];
+    fn deref(&self) -> &[Setting] {
+        &self.list
+    }
 }
 
 /// A value that is encoded as an integer.

@@ -20,14 +20,15 @@ pub struct Invalid {
 /// Returns the first setting that is not.
 pub fn check<S: Declared + Clone>(value: &S) -> Result<(), Invalid> {
     let mut value = value.clone();
-    for (index, Setting { place, .. }) in settings::<S>().into_iter().enumerate() {
-        let number = match value.field(index) {
-            Ok(Field::Real(field)) => *field,
-            Ok(Field::Integer(field)) => field.number() as f64,
+    let settings = settings::<S>();
+    for (index, Setting { place, .. }) in settings.iter().enumerate() {
+        let number = match settings.field(&mut value, index) {
+            Field::Real(field) => *field,
+            Field::Integer(field) => field.number() as f64,
             _ => continue,
         };
         if let Some(problem) = place.problem(number) {
-            return Err(Invalid { name: place.name, value: number, problem });
+            return Err(Invalid { name: place.name.clone(), value: number, problem });
         }
     }
     Ok(())
@@ -35,5 +36,5 @@ pub fn check<S: Declared + Clone>(value: &S) -> Result<(), Invalid> {
 
 /// Returns the names of all settings of a type.
 pub fn names<S: Declared>() -> Vec<String> {
-    settings::<S>().into_iter().map(|setting| setting.place.name).collect()
+    settings::<S>().iter().map(|setting| setting.place.name.clone()).collect()
 }

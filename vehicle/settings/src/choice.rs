@@ -24,7 +24,7 @@ pub trait Choice: Copy + PartialEq + Send + Sync + 'static {
         if place.text.is_empty() {
             Self::TEXT.clone_into(&mut place.text);
         }
-        Setting { place, kind: Kind::Choice(Self::items()) }
+        Setting { place, kind: Kind::Choice(Self::items(), |field| field.cast::<Self>()) }
     }
 }
 

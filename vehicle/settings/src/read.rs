@@ -1,6 +1,6 @@
 //! Values from files.
 
-use crate::{Declared, Field, Kind, Setting, settings};
+use crate::{Declared, Field, Kind, Settings, settings};
 use toml::{Table, Value};
 
 /// A value of a file that cannot be that of a setting.
@@ -57,15 +57,14 @@ fn flatten(structure: &str, table: &Table, entries: &mut Vec<(String, Value)>) {
 
 fn set<S: Declared>(
     value: &mut S,
-    list: &[Setting],
+    list: &Settings<S>,
     name: &str,
     entry: &Value,
 ) -> Result<(), String> {
     let index = list.iter().position(|setting| setting.place.name == name);
     let index = index.ok_or("there is no such setting")?;
-    let field = value.field(index).map_err(|_| "its field cannot be reached")?;
     let not = |kind: &str| Err(format!("{entry} is not {kind}"));
-    match (field, entry) {
+    match (list.field(value, index), entry) {
         (Field::Real(field), Value::String(text)) => {
             *field = quantity(text, &list[index].place.unit)?;
         }
@@ -81,7 +80,7 @@ fn set<S: Declared>(
         (Field::Boolean(field), Value::Boolean(value)) => *field = *value,
         (Field::Boolean(_), _) => return not("true or false"),
         (Field::Choice(field), Value::String(text)) => {
-            let Kind::Choice(items) = &list[index].kind else { return not("a choice") };
+            let Kind::Choice(items, _) = &list[index].kind else { return not("a choice") };
             let number = items.items.iter().position(|item| item.0 == text);
             let number = number.and_then(|number| i64::try_from(number).ok());
             if !number.is_some_and(|number| field.set_number(number)) {

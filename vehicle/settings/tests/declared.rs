@@ -1,7 +1,7 @@
 //! Declarations of nested structures, arrays and choices.
 
-use nalgebra::{Matrix3, Vector3};
-use settings::{Choice, Declared, Kind, change, check, names, read, settings, start};
+use nalgebra::{Matrix3, SMatrix, Vector3};
+use settings::{Choice, Declared, Field, Kind, Role, change, check, names, read, settings, start};
 use toml::{Table, Value};
 
 const AXES: [(&str, &str); 3] = [(".x", "roll axis"), (".y", "pitch axis"), (".z", "yaw axis")];
@@ -86,7 +86,7 @@ fn names_texts_and_units_follow_from_the_fields() {
     assert_eq!(shown[12], ("matrix[1,1]", "Matrix of the sensor (row 1, column 1)", ""));
     let last = ["weight.P[1]", "weight.P[2]", "file", "isOn"];
     assert_eq!(names::<Law>()[21..], last);
-    let Kind::Choice(items) = &list[0].kind else { panic!("a choice") };
+    let Kind::Choice(items, _) = &list[0].kind else { panic!("a choice") };
     assert_eq!(items.items, [("off", "no action"), ("full", "R is used as it is")]);
 }
 
@@ -140,4 +140,105 @@ fn values_out_of_range_are_refused_by_name() {
     assert_eq!(refusal(|law| law.outer.exponent = 1.5), "outer.exponent = 1.5 must be at most 1");
     let text = refusal(|law| law.matrix[(0, 0)] = f64::NAN);
     assert_eq!(text, "matrix[1,1] = NaN must be a finite number");
+}
+
+const SIDES: [(&str, &str); 2] = [(".left", "left side"), (".right", "right side")];
+
+#[derive(Clone, Copy, Debug, Default, Declared)]
+struct Row {
+    /// Time of row {#}.
+    #[setting(unit = "s")]
+    time: f64,
+    /// Force on the {} (row {#}).
+    #[setting(name = "", each = SIDES)]
+    force: [f64; 2],
+}
+
+#[derive(Clone, Copy, Debug, Default, Declared)]
+struct Motion {
+    /// Angle of the {}.
+    #[setting(name = "", unit = "rad")]
+    angles: [f64; 2],
+    /// Rate of the {}.
+    #[setting(name = "+Rate", unit = "rad/s", derivative = "motion{.}")]
+    rates: [f64; 2],
+}
+
+#[derive(Clone, Debug, Default, Declared)]
+struct Machine {
+    /// {} at present.
+    #[setting(output, each = SIDES, depends_on = ["u*"])]
+    motion: Motion,
+    /// Table.
+    #[setting(by_column, used_with = "rows >= {#}")]
+    table: [Row; 2],
+    /// {} by the {}.
+    #[setting(each = AXES, columns = SIDES)]
+    moment: SMatrix<f64, 3, 2>,
+    /// {}.
+    #[setting(each = SIDES, columns = AXES, units = ["m", "km"], nominals = [1.0, 2.0])]
+    points: [Vector3<f64>; 2],
+    /// Switch of the {}: {.}.
+    #[setting(input, discrete, optional, each = SIDES)]
+    switches: [bool; 2],
+}
+
+#[test]
+fn sentences_and_names_of_entries_follow_from_the_structure() {
+    let list = settings::<Machine>();
+    let shown: Vec<(&str, &str)> = list
+        .iter()
+        .map(|setting| (setting.place.name.as_str(), setting.place.text.as_str()))
+        .collect();
+    assert_eq!(
+        shown[..11],
+        [
+            ("motion.left", "Angle of the left side at present"),
+            ("motion.right", "Angle of the right side at present"),
+            ("motionRate.left", "Rate of the left side at present"),
+            ("motionRate.right", "Rate of the right side at present"),
+            ("table.time[1]", "Time of row 1"),
+            ("table.time[2]", "Time of row 2"),
+            ("table.left[1]", "Force on the left side (row 1)"),
+            ("table.left[2]", "Force on the left side (row 2)"),
+            ("table.right[1]", "Force on the right side (row 1)"),
+            ("table.right[2]", "Force on the right side (row 2)"),
+            ("moment[1,1]", "Roll axis by the left side"),
+        ]
+    );
+    assert_eq!(shown[16], ("points.left.x", "Left side (roll axis)"));
+    assert_eq!(shown[22], ("switches.left", "Switch of the left side: .left"));
+    assert_eq!(list[5].place.used_with, "rows >= 2");
+    assert_eq!((list[19].place.unit.as_ref(), list[19].place.nominal), ("km", Some(2.0)));
+}
+
+#[test]
+fn roles_and_dependencies_are_those_of_the_structure() {
+    let list = settings::<Machine>();
+    let rate = &list[3].place;
+    assert_eq!((rate.role, rate.derivative.as_str()), (Role::Output, "motion.right"));
+    assert_eq!(rate.depends_on, ["u*"]);
+    let switch = &list[22].place;
+    assert!(switch.role == Role::Input && switch.is_discrete && switch.is_optional);
+    assert_eq!(list[4].place.role, Role::Parameter);
+}
+
+#[test]
+fn each_field_is_reached_by_its_offset() {
+    let mut machine = Machine::default();
+    let list = settings::<Machine>();
+    for index in 0..list.len() {
+        match list.field(&mut machine, index) {
+            Field::Real(field) => *field = index as f64,
+            Field::Boolean(field) => *field = true,
+            _ => unreachable!("there are numbers and switches only"),
+        }
+    }
+    let Machine { motion, table, moment, points, switches } = machine;
+    assert_eq!((motion.angles, motion.rates), ([0.0, 1.0], [2.0, 3.0]));
+    assert_eq!(table.map(|row| row.time), [4.0, 5.0]);
+    assert_eq!(table.map(|row| row.force), [[6.0, 8.0], [7.0, 9.0]]);
+    assert_eq!(moment.row(2).iter().copied().collect::<Vec<_>>(), [14.0, 15.0]);
+    assert_eq!(points[1], Vector3::new(19.0, 20.0, 21.0));
+    assert!(switches[0] && switches[1]);
 }

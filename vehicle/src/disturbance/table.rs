@@ -1,10 +1,12 @@
 //! Disturbance as a lookup table: every row has a time and a direction, which holds until the next
 //! row.
 
+use crate::axes::ANGLES;
 use crate::error::Error;
 use crate::time::tolerance;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
+use settings::Declared;
 
 /// Shortest period with which a table repeats, s.
 const SHORTEST_PERIOD: f64 = 1e-3;
@@ -24,12 +26,14 @@ pub struct DisturbanceTable {
 }
 
 /// One row of the table.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Declared)]
 #[serde(deny_unknown_fields)]
 pub struct Row {
-    /// Time from which the row holds, counted from the start of the disturbance, s.
+    /// Time after disturbance.start at which a row takes effect (row {#}).
+    #[setting(unit = "s", min = 0.0, nominal = 10.0)]
     pub time: f64,
-    /// Factors by which the row scales each component of the bound, in [−1, 1].
+    /// Factor on disturbance.bound for the {} (row {#}).
+    #[setting(name = "", each = ANGLES, min = -1, max = 1, nominal = 1)]
     pub direction: Vector3<f64>,
 }
 

@@ -20,6 +20,7 @@ fn published_limits_of_the_surfaces() {
         assert!((effectors.max[i].to_degrees() - max).abs() < 1e-12);
         assert!((effectors.rate[i].to_degrees() - 10.0).abs() < 1e-12);
         assert_eq!(effectors.allowed[i], i < 6, "(65)");
+        assert_eq!(effectors.names[i], SURFACE_NAMES[i].1);
     }
 }
 

@@ -1,5 +1,6 @@
 //! The motion of the centre of mass as six numbers, and the range in which they are defined.
 
+use crate::axes::Entry;
 use crate::error::Error;
 use crate::math::{atan2, hypot, sin_cos};
 use crate::translation::{self, Planet, derivative_at};
@@ -13,41 +14,21 @@ pub type Motion = SVector<f64, 6>;
 /// used: they have no meaning in vertical flight and at the poles.
 pub const STEEPEST: f64 = std::f64::consts::FRAC_PI_2 - 1e-4;
 
-/// A component of [`Motion`], as users see it.
-#[derive(Clone, Copy, Debug)]
-pub struct Quantity {
-    /// Name of the variable.
-    pub name: &'static str,
-    /// Description of the component.
-    pub meaning: &'static str,
-    /// Its unit, and that of its rate.
-    pub units: [&'static str; 2],
-    /// Its typical magnitude.
-    pub nominal: f64,
-}
-
-const fn quantity(
-    name: &'static str,
-    meaning: &'static str,
-    units: [&'static str; 2],
-    nominal: f64,
-) -> Quantity {
-    Quantity { name, meaning, units, nominal }
-}
-
-const LENGTH: [&str; 2] = ["m", "m/s"];
-const SPEED: [&str; 2] = ["m/s", "m/s2"];
-const ANGLE: [&str; 2] = ["rad", "rad/s"];
-
-/// The components of [`Motion`], in their order.
-pub const QUANTITIES: [Quantity; 6] = [
-    quantity("altitude", "Altitude above the planet's ellipsoid", LENGTH, 1e5),
-    quantity("longitude", "Longitude, positive to the east", ANGLE, 1.0),
-    quantity("latitude", "Latitude, positive to the north", ANGLE, 1.0),
-    quantity("speed", "Speed relative to the rotating planet", SPEED, 1e3),
-    quantity("flightPathAngle", "Flight path angle, positive above the horizon", ANGLE, 0.1),
-    quantity("heading", "Heading of the velocity, measured from north towards east", ANGLE, 1.0),
+/// Endings of the names of the components of [`Motion`], and their descriptions.
+pub const MOTION: [Entry; 6] = [
+    (".altitude", "Altitude above the planet's ellipsoid"),
+    (".longitude", "Longitude, positive to the east"),
+    (".latitude", "Latitude, positive to the north"),
+    (".speed", "Speed relative to the rotating planet"),
+    (".flightPathAngle", "Flight path angle, positive above the horizon"),
+    (".heading", "Heading of the velocity, measured from north towards east"),
 ];
+/// Units of the components of [`Motion`].
+pub const UNITS: [&str; 6] = ["m", "rad", "rad", "m/s", "rad", "rad"];
+/// Units of their rates.
+pub const RATE_UNITS: [&str; 6] = ["m/s", "rad/s", "rad/s", "m/s2", "rad/s", "rad/s"];
+/// Typical magnitudes of the components of [`Motion`].
+pub const NOMINALS: [f64; 6] = [1e5, 1.0, 1.0, 1e3, 0.1, 1.0];
 
 /// Checks that the motion's angles have a meaning at `time` (s).
 ///

@@ -4,28 +4,39 @@ use super::config::Calibration;
 use super::equations::{self, Load, Partials};
 use super::{Entering, Held, Plant};
 use crate::actuators::{Actuators, Command, Conditions, Drive};
+use crate::axes::AXES;
 use crate::effectors::{JETS, SURFACES, Surfaces};
 use crate::entry::Prescribed;
 use crate::state::State;
 use crate::trajectory::{TRAJECTORY, Trajectory};
 use nalgebra::{Matrix3, SMatrix, Vector3};
 use serde::{Deserialize, Serialize};
+use settings::Declared;
 
 /// Continuous inputs of the plant. Commands to the actuators are taken at instants and are
 /// therefore not among them.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Declared)]
 pub struct Input {
-    /// Control moment about the body axes, N m. It acts at once unless there are actuators or a
-    /// transport delay.
+    /// Control moment about the {}.
+    ///
+    /// It acts at once unless there are actuators or a transport delay.
+    #[setting(each = AXES, unit = "N.m", nominal = 1e5, used_with = "actuation = moment")]
     pub moment: Vector3<f64>,
-    /// Further moment about the body axes, N m.
+    /// External disturbance moment about the {}.
+    #[setting(each = AXES, unit = "N.m", nominal = 1e4)]
     pub disturbance_moment: Vector3<f64>,
     /// Trajectory of the vehicle, which turns the axes from which the angles are counted. During
     /// an entry flight the plant computes it.
+    #[setting(used_with = "translation = given")]
     pub trajectory: Trajectory,
     /// Attitude that a prescribed attitude follows.
+    #[setting(used_with = "translation = entry and prescribed.active = true")]
     pub prescribed: Prescribed,
-    /// Angle of attack at which the vehicle is trimmed, rad.
+    /// Angle of attack at which the vehicle is trimmed.
+    #[setting(name = "trim.alpha", unit = "rad", nominal = 0.1)]
+    #[setting(
+        used_with = "translation = entry and aerodynamics.vehicle = papers and aerodynamics.trim = input"
+    )]
     pub trim: f64,
 }
 

@@ -1,49 +1,79 @@
 //! A first-order lag x' = (k u − x) / T. Its gain changes at a time event, and an event indicator
 //! tells when x crosses 1. Every kind of variable occurs in it.
 
-use fmi_export::table::{discrete_input, discrete_output, input, local, output, parameter};
 use fmi_export::{
     Context, Description, EventInfo, Failure, Inputs, LastEvent, Model, VariableTable,
 };
 use model_description::DefaultExperiment;
 use serde::{Deserialize, Serialize};
-use settings::Choice;
+use settings::{Choice, Declared};
 
 /// Number of Runge–Kutta steps in a communication step.
 const SUBSTEPS: i32 = 4;
 /// Limiter at the output.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Choice)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Choice)]
 enum Shape {
     /// No limiter.
+    #[default]
     Linear,
     /// Output limited to between -1 and 1.
     Saturated,
 }
 
 /// Model of the lag: its parameters, input, state and outputs.
-#[derive(Clone, Debug, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize, Declared)]
 pub struct Lag {
+    /// Time constant T.
+    #[setting(unit = "s", min = 1e-3, max = 1e3, start = 0.5)]
     time_constant: f64,
+    /// Gain k before the switch.
+    #[setting(name = "gain.early", start = 2.0)]
     gain: f64,
+    /// Gain k after the switch.
+    #[setting(name = "gain.late", start = 1.0)]
     late_gain: f64,
+    /// Time at which the gain changes.
+    #[setting(unit = "s", start = 1.25)]
     switch_time: f64,
+    /// Initial state.
+    #[setting(name = "initial.x", unit = "rad", start = 0.5)]
     initial: f64,
+    /// Order of the lag; only 1 is supported.
+    #[setting(min = 1, max = 2, start = 1)]
     order: i32,
+    /// If true, the sign of the gain is inverted.
     inverted: bool,
     shape: Shape,
+    /// Text that is passed on; "boom" makes the FMU panic.
     label: String,
 
+    /// Input.
+    #[setting(input, unit = "rad", min = -100.0, max = 100.0)]
     u: f64,
+    /// State.
+    #[setting(output, unit = "rad", nominal = 2.0)]
     x: f64,
+    /// Derivative of the state.
+    #[setting(name = "der(x)", local, unit = "rad/s", derivative = "x", depends_on = ["u", "x"])]
+    derivative: f64,
+    /// Sum of state, input and offset, after the limiter.
+    #[setting(output, unit = "rad", depends_on = ["u", "x", "offset"])]
+    y: f64,
+    /// Current gain k.
+    #[setting(name = "gain.now", output, discrete)]
+    gain_now: f64,
+    /// True after the gain has changed.
+    #[setting(output)]
     switched: bool,
+    /// Label as passed on.
+    #[setting(name = "text", output)]
+    description: String,
+    /// Offset that is added to the output.
+    #[setting(input, discrete, unit = "rad")]
     offset: f64,
     /// Offset as of the last event in model exchange.
+    #[setting(skip)]
     offset_held: Option<f64>,
-
-    derivative: f64,
-    y: f64,
-    gain_now: f64,
-    description: String,
 }
 
 impl Lag {
@@ -77,94 +107,21 @@ impl Lag {
 
 impl Model for Lag {
     fn description() -> Description<Self> {
-        let table = VariableTable::new()
-            .real(
-                parameter("timeConstant", "Time constant T").real().unit("s").min(1e-3).max(1e3),
-                |m: &mut Self| &mut m.time_constant,
-            )
-            .real(parameter("gain.early", "Gain k before the switch").real(), |m| &mut m.gain)
-            .real(parameter("gain.late", "Gain k after the switch").real(), |m| &mut m.late_gain)
-            .real(parameter("switchTime", "Time at which the gain changes").real().unit("s"), |m| {
-                &mut m.switch_time
-            })
-            .real(parameter("initial.x", "Initial state").real().unit("rad"), |m| &mut m.initial)
-            .integer(
-                parameter("order", "Order of the lag; only 1 is supported"),
-                (Some(1), Some(2)),
-                |m| &mut m.order,
-            )
-            .boolean(parameter("inverted", "If true, the sign of the gain is inverted"), |m| {
-                &mut m.inverted
-            })
-            .choice(parameter("shape", Shape::TEXT), |m| &mut m.shape)
-            .string(
-                parameter("label", "Text that is passed on; \"boom\" makes the FMU panic"),
-                |m| &mut m.label,
-            )
-            .real(input("u", "Input").real().unit("rad").min(-100.0).max(100.0), |m| &mut m.u)
-            .real(output("x", "State").real().unit("rad").nominal(2.0), |m| &mut m.x)
-            .real(
-                local("der(x)", "Derivative of the state")
-                    .depends_on(["u", "x"])
-                    .real()
-                    .unit("rad/s")
-                    .derivative_of("x"),
-                |m| &mut m.derivative,
-            )
-            .real(
-                output("y", "Sum of state, input and offset, after the limiter")
-                    .depends_on(["u", "x", "offset"])
-                    .real()
-                    .unit("rad"),
-                |m| &mut m.y,
-            )
-            .real(discrete_output("gain.now", "Current gain k").real(), |m| &mut m.gain_now)
-            .boolean(discrete_output("switched", "True after the gain has changed"), |m| {
-                &mut m.switched
-            })
-            .string(discrete_output("text", "Label as passed on"), |m| &mut m.description)
-            .real(
-                discrete_input("offset", "Offset that is added to the output").real().unit("rad"),
-                |m| &mut m.offset,
-            );
         Description {
-            name: "Lag",
-            description: "First-order lag with a gain that changes at a time event",
             documentation: "<p>x' = (k u − x) / T, y = x + u + offset.</p>".into(),
             version: env!("CARGO_PKG_VERSION"),
-            model_exchange: true,
             event_indicators: 1,
-            default_experiment: DefaultExperiment {
-                start: 0.0,
-                stop: 2.0,
-                tolerance: 1e-6,
-                step: 0.1,
-            },
-            table,
+            default_experiment: DefaultExperiment { stop: 2.0, step: 0.1, ..Default::default() },
+            ..Description::new(
+                "Lag",
+                "First-order lag with a gain that changes at a time event",
+                VariableTable::new(|model| model),
+            )
         }
     }
 
     fn new() -> Self {
-        Self {
-            time_constant: 0.5,
-            gain: 2.0,
-            late_gain: 1.0,
-            switch_time: 1.25,
-            initial: 0.5,
-            order: 1,
-            inverted: false,
-            shape: Shape::Linear,
-            label: "lag".into(),
-            u: 0.0,
-            x: 0.0,
-            switched: false,
-            offset: 0.0,
-            offset_held: None,
-            derivative: 0.0,
-            y: 0.0,
-            gain_now: 0.0,
-            description: String::new(),
-        }
+        Self { label: "lag".into(), ..settings::start() }
     }
 
     fn initialize(&mut self, context: &Context) -> Result<(), Failure> {
@@ -210,14 +167,6 @@ impl Model for Lag {
         Ok(())
     }
 
-    fn continuous_states(&self, states: &mut [f64]) {
-        states[0] = self.x;
-    }
-
-    fn set_continuous_states(&mut self, states: &[f64]) {
-        self.x = states[0];
-    }
-
     fn new_discrete_states(&mut self, time: f64) -> Result<EventInfo, Failure> {
         self.switched = time >= self.switch_time;
         self.offset_held = Some(self.offset);
@@ -232,15 +181,15 @@ impl Model for Lag {
     fn partial_derivative(
         &mut self,
         time: f64,
-        unknown_variable: usize,
-        known_variable: usize,
-    ) -> Result<f64, Failure> {
+        unknown: &str,
+        known: &str,
+    ) -> Result<Option<f64>, Failure> {
         let gain = self.gain(time);
-        match (unknown_variable, known_variable) {
-            (11, 9) => Ok(gain / self.time_constant),
-            (11, 10) => Ok(-1.0 / self.time_constant),
-            (10, 10) | (12, 9 | 10) => Ok(1.0),
-            _ => Ok(0.0),
-        }
+        Ok(Some(match (unknown, known) {
+            ("der(x)", "u") => gain / self.time_constant,
+            ("der(x)", "x") => -1.0 / self.time_constant,
+            ("x", "x") | ("y", "u" | "x") => 1.0,
+            _ => 0.0,
+        }))
     }
 }

@@ -5,7 +5,6 @@ use crate::call::{Outcome, State, error};
 use crate::model::{EventInfo, Failure, LastEvent};
 use crate::pointer::Room;
 use crate::types::Interface;
-use model_description::variable::VariableKind;
 
 impl Instance {
     pub(crate) fn set_time(&mut self, time: f64) -> Outcome {
@@ -107,10 +106,7 @@ impl Instance {
     pub(crate) fn nominals(&self, mut nominals: Room<f64>) -> Outcome {
         Self::expect_length("nominal values", nominals.len(), self.states.len())?;
         let variables = &self.description.variables;
-        nominals.fill(self.states.iter().map(|&(state, _)| match variables[state].kind {
-            VariableKind::Real { nominal: Some(nominal), .. } => nominal,
-            _ => 1.0,
-        }));
+        nominals.fill(self.states.iter().map(|&(state, _)| variables[state].nominal()));
         Ok(())
     }
 }

@@ -1,19 +1,19 @@
 //! The second FMU of the library, for co-simulation only. It has a defect for every place where a
 //! panic can start.
 
-use fmi_export::table::{discrete_output, input, parameter};
 use fmi_export::{Context, Description, Failure, Inputs, LastEvent, Model, VariableTable};
 use model_description::DefaultExperiment;
 use serde::{Deserialize, Serialize};
-use settings::Choice;
+use settings::{Choice, Declared, Place, Setting};
 use std::path::Path;
 
 /// Time (s) at which the simulation ends with the defect `end`.
 pub(crate) const ENDS_AT: f64 = 0.75;
 
 /// Whether the count is even. The enumeration below leaves one out, as an FMU's author might.
-#[derive(Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 enum Parity {
+    #[default]
     Even,
     Odd,
 }
@@ -24,15 +24,34 @@ impl Choice for Parity {
     const ITEMS: &'static [(Self, &'static str, &'static str)] = &[(Self::Even, "even", "")];
 }
 
+// SAFETY: The only field is the value itself.
+#[allow(unsafe_code, reason = "the derive macro would list all items")]
+unsafe impl Declared for Parity {
+    fn declare(place: &Place, list: &mut Vec<Setting>) {
+        list.push(Self::setting(place));
+    }
+}
+
 /// Model that counts its steps.
-#[derive(Serialize, Deserialize)]
+#[derive(Default, Serialize, Deserialize, Declared)]
 pub(crate) struct Counter {
+    /// Where to panic.
     defect: String,
+    /// What a step adds.
+    #[setting(input, start = 1.0)]
     increment: f64,
+    #[setting(skip)]
     count: f64,
+    /// Sum of the increments.
+    #[setting(name = "count", output, discrete)]
     seen: f64,
+    /// The resource folder.
+    #[setting(output)]
     resources: String,
+    #[setting(output)]
     parity: Parity,
+    /// Resets of this model.
+    #[setting(output)]
     resets: i32,
 }
 
@@ -45,40 +64,14 @@ impl Counter {
 impl Model for Counter {
     fn description() -> Description<Self> {
         Description {
-            name: "Counter",
-            description: "Counts its steps",
-            documentation: String::new(),
             version: "1",
-            model_exchange: false,
-            event_indicators: 0,
-            default_experiment: DefaultExperiment {
-                start: 0.0,
-                stop: 1.0,
-                tolerance: 1e-6,
-                step: 0.1,
-            },
-            table: VariableTable::new()
-                .string(parameter("defect", "Where to panic"), |m: &mut Self| &mut m.defect)
-                .real(input("increment", "What a step adds").real(), |m| &mut m.increment)
-                .real(discrete_output("count", "Sum of the increments").real(), |m| &mut m.seen)
-                .string(discrete_output("resources", "The resource folder"), |m| &mut m.resources)
-                .choice(discrete_output("parity", Parity::TEXT), |m| &mut m.parity)
-                .integer(discrete_output("resets", "Resets of this model"), (None, None), |m| {
-                    &mut m.resets
-                }),
+            default_experiment: DefaultExperiment { step: 0.1, ..DefaultExperiment::default() },
+            ..Description::new("Counter", "Counts its steps", VariableTable::new(|model| model))
         }
     }
 
     fn new() -> Self {
-        Self {
-            defect: String::new(),
-            increment: 1.0,
-            count: 0.0,
-            seen: 0.0,
-            resources: String::new(),
-            parity: Parity::Even,
-            resets: 0,
-        }
+        settings::start()
     }
 
     fn reset(&mut self) {

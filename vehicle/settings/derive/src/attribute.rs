@@ -1,9 +1,10 @@
 //! The attribute `#[setting(…)]`.
 
 use crate::sentence::{camel, sentence};
-use proc_macro2::TokenStream;
-use quote::quote;
-use syn::{Attribute, Expr, LitStr, Result};
+use proc_macro2::{Group, Ident, TokenStream};
+use quote::{ToTokens, format_ident, quote};
+use syn::parse::ParseStream;
+use syn::{Attribute, Expr, LitStr, Result, token};
 
 /// Keys of the attribute on a field, on an enumeration or on a variant.
 #[derive(Default)]
@@ -24,7 +25,25 @@ pub(crate) struct Keys {
     below: Option<Expr>,
     nominal: Option<Expr>,
     start: Option<Expr>,
-    each: Option<Expr>,
+    each: Option<TokenStream>,
+    columns: Option<TokenStream>,
+    units: Option<TokenStream>,
+    nominals: Option<TokenStream>,
+    by_column: bool,
+    /// Variant of `settings::Role`.
+    role: Option<Ident>,
+    discrete: bool,
+    optional: bool,
+    derivative: Option<LitStr>,
+    depends_on: Option<TokenStream>,
+}
+
+/// Parses a list: a constant, or an array in brackets.
+fn list(value: ParseStream) -> Result<TokenStream> {
+    if value.peek(token::Bracket) {
+        return value.parse::<Group>().map(Group::into_token_stream);
+    }
+    value.parse::<Expr>().map(Expr::into_token_stream)
 }
 
 impl Keys {
@@ -48,7 +67,18 @@ impl Keys {
                     "below" => keys.below = Some(meta.value()?.parse()?),
                     "nominal" => keys.nominal = Some(meta.value()?.parse()?),
                     "start" => keys.start = Some(meta.value()?.parse()?),
-                    "each" => keys.each = Some(meta.value()?.parse()?),
+                    "each" => keys.each = Some(list(meta.value()?)?),
+                    "columns" => keys.columns = Some(list(meta.value()?)?),
+                    "units" => keys.units = Some(list(meta.value()?)?),
+                    "nominals" => keys.nominals = Some(list(meta.value()?)?),
+                    "by_column" => keys.by_column = true,
+                    "input" => keys.role = Some(format_ident!("Input")),
+                    "output" => keys.role = Some(format_ident!("Output")),
+                    "local" => keys.role = Some(format_ident!("Local")),
+                    "discrete" => keys.discrete = true,
+                    "optional" => keys.optional = true,
+                    "derivative" => keys.derivative = Some(meta.value()?.parse()?),
+                    "depends_on" => keys.depends_on = Some(list(meta.value()?)?),
                     _ => return Err(meta.error("no key of #[setting(…)]")),
                 }
                 Ok(())
@@ -74,16 +104,30 @@ impl Keys {
         let [min, max, above, below, nominal, start] =
             [&self.min, &self.max, &self.above, &self.below, &self.nominal, &self.start]
                 .map(number);
-        let [unit, used_with] = [&self.unit, &self.used_with]
+        let [unit, used_with, derivative] = [&self.unit, &self.used_with, &self.derivative]
             .map(|text| text.as_ref().map(LitStr::value).unwrap_or_default());
-        let (part, rate) = (self.part, self.rate);
-        let each = self.each.as_ref().map_or(quote!([]), |each| quote!(#each));
+        let [each, columns, units, nominals] =
+            [&self.each, &self.columns, &self.units, &self.nominals]
+                .map(|list| list.clone().unwrap_or(quote!([])));
+        let depends_on = match &self.depends_on {
+            Some(names) => quote!(::core::option::Option::Some(&#names)),
+            None => quote!(::core::option::Option::None),
+        };
+        let Self { part, rate, by_column, discrete, optional, .. } = self;
+        let role = match &self.role {
+            Some(role) => quote!(::core::option::Option::Some(::settings::Role::#role)),
+            None => quote!(::core::option::Option::None),
+        };
         quote! {
             ::settings::About {
                 name: #name,
                 text: #text,
                 unit: #unit,
                 each: &#each,
+                columns: &#columns,
+                units: &#units,
+                nominals: &#nominals,
+                by_column: #by_column,
                 is_part: #part,
                 is_rate: #rate,
                 min: #min,
@@ -93,6 +137,11 @@ impl Keys {
                 nominal: #nominal,
                 start: #start,
                 used_with: #used_with,
+                role: #role,
+                is_discrete: #discrete,
+                is_optional: #optional,
+                derivative: #derivative,
+                depends_on: #depends_on,
             }
         }
     }

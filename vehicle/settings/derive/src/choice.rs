@@ -32,25 +32,15 @@ pub(crate) fn expand(input: &DeriveInput) -> Result<TokenStream> {
             const ITEMS: &'static [(Self, &'static str, &'static str)] = &[#(#items),*];
         }
 
+        // SAFETY: The only field is the value itself.
         #[automatically_derived]
-        impl ::settings::Declared for #ident {
+        #[allow(unsafe_code)]
+        unsafe impl ::settings::Declared for #ident {
             fn declare(
                 place: &::settings::Place,
                 list: &mut ::std::vec::Vec<::settings::Setting>,
             ) {
                 list.push(<Self as ::settings::Choice>::setting(place));
-            }
-
-            fn field(
-                &mut self,
-                index: usize,
-            ) -> ::core::result::Result<::settings::Field<'_>, usize> {
-                match index.checked_sub(1) {
-                    ::core::option::Option::None => {
-                        ::core::result::Result::Ok(::settings::Field::Choice(self))
-                    }
-                    ::core::option::Option::Some(rest) => ::core::result::Result::Err(rest),
-                }
             }
         }
     })
