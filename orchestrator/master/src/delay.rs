@@ -260,18 +260,16 @@ fn follow(
 
 /// Parameter by which a component states the loop delay that its law is designed for, s.
 const COUNTED_ON: &str = "delay";
-/// Parameter by which a component states how far the loop delay may be from that, s.
-const COUNTED_ERROR: &str = "delayError";
 /// Parameter by which a component states how much later than commanded its actuators act, s.
 const TRANSPORT: &str = "actuation.delay";
 
 /// Returns one warning for each component whose control law is designed for another delay than its
-/// feedback loop has, beyond the error that the law allows for. The loop's delay is its ticks times
-/// `step` (s), plus the transport delays of the other components on it. If there are several loops,
-/// the one with the longest delay counts; the warning says so if another one has the delay that the
-/// law is designed for. If the component responds to some of its loops at once, those through its
-/// states alone do not count: the values that they carry, as the moment that actuators achieved,
-/// are a record of earlier ticks and not the measurement that the law acts upon.
+/// feedback loop has. The loop's delay is its ticks times `step` (s), plus the transport delays of
+/// the other components on it. If there are several loops, the one with the longest delay counts;
+/// the warning says so if another one has the delay that the law is designed for. If the component
+/// responds to some of its loops at once, those through its states alone do not count: the values
+/// that they carry, as the moment that actuators achieved, are a record of earlier ticks and not
+/// the measurement that the law acts upon.
 pub fn warnings(
     parts: &[Part],
     settings: &[Vec<Setting>],
@@ -283,16 +281,14 @@ pub fn warnings(
         let Some(counted_on) = duration(COUNTED_ON, parts[component], &settings[component]) else {
             continue;
         };
-        let error = duration(COUNTED_ERROR, parts[component], &settings[component]).unwrap_or(0.0);
         let mut its_loops: Vec<&FeedbackLoop> =
             loops.iter().filter(|feedback| feedback.components.contains(&component)).collect();
         let is_at_once = |feedback: &&FeedbackLoop| !feedback.stateful.contains(&component);
         if its_loops.iter().any(is_at_once) {
             its_loops.retain(is_at_once);
         }
-        let fits = |delay: f64| {
-            (delay - counted_on).abs() <= error + 1e-9 * delay.abs().max(counted_on.abs())
-        };
+        let fits =
+            |delay: f64| (delay - counted_on).abs() <= 1e-9 * delay.abs().max(counted_on.abs());
         let delays = its_loops.into_iter().map(|feedback| {
             let others = feedback.components.iter().filter(|other| **other != component);
             let transport: f64 = others

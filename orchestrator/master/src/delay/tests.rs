@@ -143,30 +143,6 @@ fn oracle_a_law_that_counts_on_another_delay_is_told_the_right_one() {
 }
 
 #[test]
-fn a_delay_within_the_error_that_a_law_allows_for_is_not_warned_of() {
-    let controller =
-        with_duration(with_duration(description(&[Some(true)]), "delay", "s"), "delayError", "s");
-    let plant = description(&[Some(false)]);
-    let parts = [
-        Part { name: "controller", description: &controller },
-        Part { name: "plant", description: &plant },
-    ];
-    let loops =
-        feedback_loops(&parts, &[1, 1], &[wire((0, 1), 1), wire((1, 1), 0)], Coupling::Jacobi);
-    let warned = |delay: f64, error: f64| {
-        let real = |name: &str, value| Setting {
-            name: name.into(),
-            reference: 0,
-            value: SettingValue::Real(value),
-        };
-        let settings = [vec![real("delay", delay), real("delayError", error)], Vec::new()];
-        warnings(&parts, &settings, &loops, 0.04).len()
-    };
-    assert_eq!((warned(0.05, 0.01), warned(0.03, 0.01)), (0, 0));
-    assert_eq!((warned(0.051, 0.01), warned(0.05, 0.0)), (1, 1));
-}
-
-#[test]
 fn the_longest_loop_counts_and_what_is_on_no_loop_does_not() {
     // The loop 0 -> 1 -> 0 has a delay of one tick, 0 -> 2 -> 0 has none, and 3 is on no loop.
     let law = with_duration(description(&[Some(true)]), "delay", "s");
