@@ -91,8 +91,6 @@ pub struct Explained {
     pub disturbance: f64,
     /// Largest part relative to the acceleration by the moment.
     pub share: f64,
-    /// Largest difference of the delay from the declared one, s.
-    pub delay_error: f64,
 }
 
 /// The reference as a function of time (s), so that a controller with preview can also ask for the

@@ -51,19 +51,6 @@ pub enum DesignError {
     /// The limits leave too little room for a guarantee.
     #[error("constraints = robust cannot be guaranteed: {0}")]
     NoGuarantee(Box<Refusal>),
-    /// The delay could be negative, or a command could begin to act after the next one should.
-    #[error(
-        "delayError = {value} s must be at most {largest} s, the smaller of the delay and the period of the feedback law"
-    )]
-    DelayError {
-        /// Value of the setting, s.
-        value: f64,
-        /// Largest value that is accepted, s.
-        largest: f64,
-    },
-    /// Changes of the plan's acceleration are carried along from a measured state only.
-    #[error("initialState = tube needs an exact delay, delayError = 0")]
-    DelayErrorWithTube,
     /// A gain violates Lemma 2 or 3 of Chai 2022.
     #[error(
         "{name}.k1 and {name}.k2 need k1 < 0, k2 < 0 and k2² + 4 k1 > 0 (real, distinct, stable eigenvalues)"
@@ -182,8 +169,6 @@ pub struct Refusal {
     pub slow_errors: Option<(f64, f64)>,
     /// Largest accepted delay, s.
     pub delay: Option<f64>,
-    /// Largest accepted error of the delay, s.
-    pub delay_error: Option<f64>,
 }
 
 impl std::fmt::Display for Refusal {
@@ -205,7 +190,6 @@ fn no_guarantee(refusal: &Refusal) -> String {
         errors,
         slow_errors,
         delay,
-        delay_error,
     } = refusal;
     let mut reasons = Vec::new();
     for (what, left, limit) in [
@@ -255,9 +239,6 @@ fn no_guarantee(refusal: &Refusal) -> String {
     }
     if let Some(delay) = delay {
         accepted.push(format!("at most delay = {:.4} s", down(*delay)));
-    }
-    if let Some(error) = delay_error {
-        accepted.push(format!("at most delayError = {:.4} s", down(*error)));
     }
     format!(
         "with feedback.k1 = {k1} and feedback.k2 = {k2}, {}; accepted with the other settings unchanged: {}; guarantee.policy = bestEffort runs without a guarantee",

@@ -40,6 +40,8 @@ const PERIODS: u32 = 20;
 const PAUSE: u32 = 5;
 /// Parts of a period to which a delay is estimated.
 const PARTS: usize = 4;
+/// Difference from the declared delay up to which an estimate agrees with it, in periods.
+const SLACK: f64 = 0.5;
 /// Residual of a period with the best delay, relative to the root mean square, above which the
 /// period has a smaller weight.
 const USUAL: f64 = 3.0;
@@ -69,9 +71,8 @@ pub struct LoopDelay {
     pub is_unexplained: bool,
     /// Estimated delay, s, if the measurements suffice for an estimate.
     pub estimate: Option<f64>,
-    /// Whether it differs from the declared delay by more than half a period plus the declared
-    /// error of the delay, and the law's assumptions do not explain the measurements with the
-    /// declared delay.
+    /// Whether it differs from the declared delay by more than half a period, and the law's
+    /// assumptions do not explain the measurements with the declared delay.
     pub is_other: bool,
 }
 
@@ -136,6 +137,11 @@ impl LoopDelaySettings {
         (self.declared / self.period).ceil() as usize + FURTHER + 1 - self.first()
     }
 
+    /// Returns the declared delay beyond the smallest one that is examined, in periods.
+    fn place(&self) -> f64 {
+        self.declared / self.period - self.first() as f64
+    }
+
     /// Returns the number of commands that are remembered.
     fn remembered(&self) -> usize {
         self.first() + self.candidates() + ORDERS - 1
@@ -188,31 +194,20 @@ impl LoopDelaySettings {
     }
 
     /// Returns whether the law's assumptions explain the acceleration over the last period with the
-    /// declared delay or with one in its interval.
+    /// declared delay.
     fn explains(&self, explained: Explained, memory: &LoopDelay, angles: &Vector3<f64>) -> bool {
-        let Explained { disturbance, share, delay_error } = explained;
+        let Explained { disturbance, share } = explained;
         let r = kinematics::r(angles);
-        let last = (self.candidates() - 1) as f64;
-        let place = |delay: f64| (delay / self.period - self.first() as f64).clamp(0.0, last);
-        let command = self.command(memory, place(self.declared));
-        // With another delay the mean is one of the commands that act then, or lies between them.
-        let [newest, oldest] = [-delay_error, delay_error].map(|s| place(self.declared + s));
-        let others = &memory.commands[self.first()..][newest as usize..=oldest.ceil() as usize];
-        let beside = match delay_error {
-            0.0 => Vector3::zeros(),
-            _ => others.iter().fold(Vector3::zeros(), |largest: Vector3<f64>, other| {
-                largest.sup(&(r * (other - command)).abs())
-            }),
-        };
+        let command = self.command(memory);
         let (left, command) = (r * (memory.accelerations[0] - command), (r * command).abs());
-        let explained = (command + beside) * share + beside;
-        (0..3).all(|i| left[i].abs() <= disturbance + explained[i] + FLOOR)
+        (0..3).all(|i| left[i].abs() <= disturbance + command[i] * share + FLOOR)
     }
 
-    /// Returns the acceleration by the moment that acts over the last period if the delay is the
-    /// first one and this many periods, rad/s².
-    fn command(&self, memory: &LoopDelay, place: f64) -> Vector3<f64> {
+    /// Returns the acceleration by the moment that acts over the last period with the declared
+    /// delay, rad/s².
+    fn command(&self, memory: &LoopDelay) -> Vector3<f64> {
         let commands = &memory.commands[self.first()..];
+        let place = self.place();
         let j = (place as usize).min(self.candidates() - 2);
         let f = place - j as f64;
         commands[j] * (1.0 - f) + commands[j + 1] * f
@@ -258,17 +253,15 @@ impl LoopDelaySettings {
 
     fn estimate(&self, memory: &mut LoopDelay) {
         let places = memory.fits.each_mut().map(Fit::least);
-        let declared = self.declared / self.period - self.first() as f64;
-        let error = self.explained.map_or(0.0, |explained| explained.delay_error);
-        let slack = 0.5 + error / self.period;
+        let declared = self.place();
         // Among fits with nearly the same residual, a smooth disturbance misleads that of the
         // highest difference least.
         let best = memory.fits.iter().zip(places).rev();
         let best = best.min_by(|(a, _), (b, _)| a.scale.total_cmp(&b.scale));
         let Some((fit, place)) = best else { return };
         let delay = (self.first() as f64 + place) * self.period;
-        memory.estimate = fit.suffices(place, (declared, slack)).then_some(delay);
-        let is_other = memory.estimate.is_some() && (place - declared).abs() > slack;
+        memory.estimate = fit.suffices(place, declared).then_some(delay);
+        let is_other = memory.estimate.is_some() && (place - declared).abs() > SLACK;
         memory.is_other = is_other && (self.explained.is_none() || memory.unexplained > 0);
     }
 }
@@ -325,17 +318,16 @@ impl Fit {
     }
 
     /// Returns whether the evidence suffices to prefer `place`, which has the smallest residual, to
-    /// the `declared` delay with some slack, or to a delay that differs by a period; all in
-    /// periods. The commands must also explain a part of y, which they do not while the vehicle is
-    /// at rest.
-    fn suffices(&self, place: f64, (declared, slack): (f64, f64)) -> bool {
+    /// the `declared` delay, or to a delay that differs by a period; all in periods. The commands
+    /// must also explain a part of y, which they do not while the vehicle is at rest.
+    fn suffices(&self, place: f64, declared: f64) -> bool {
         let least = self.unexplained(place);
         let is_evidence = |left: f64| left - least > EVIDENCE * self.scale;
         let against = |other: f64| is_evidence(self.unexplained(other));
         if !is_evidence(self.square) {
             return false;
         }
-        if (place - declared).abs() > slack {
+        if (place - declared).abs() > SLACK {
             return against(declared);
         }
         against(place + 1.0) && (place < 1.0 || against(place - 1.0))

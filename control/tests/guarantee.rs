@@ -34,22 +34,6 @@ fn flights(settings: &Settings, sights: &[Sight]) -> Vec<Flight> {
     flights
 }
 
-#[test]
-fn guarantee_is_kept_with_a_delay_that_is_known_within_an_interval() {
-    let settings = Settings {
-        delay: 0.04,
-        delay_error: 0.01,
-        disturbance_bound: f64::to_radians(1.9),
-        ..settings(Constraints::Robust)
-    };
-    let late = [-0.01, -0.006, 0.004, 0.01];
-    let flights = late.map(|late| {
-        let flights = flights(&settings, &[Sight::Exact]);
-        flights.into_iter().map(move |flight| Flight { late, ..flight }).collect::<Vec<_>>()
-    });
-    assert_kept("interval", &flights.concat());
-}
-
 /// Returns errors of every kind within their bounds.
 fn erroneous() -> [Sight; 4] {
     let waveforms = [

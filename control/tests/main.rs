@@ -4,7 +4,6 @@ mod allocation;
 mod arrival;
 mod closed_loop;
 mod delay;
-mod delay_interval;
 mod design;
 mod dlmpc;
 mod dlmpc_allocation;

@@ -72,17 +72,6 @@ fn guarantee_is_kept_with_slow_errors_without_and_with_a_delay() {
     }
 }
 
-#[test]
-fn guarantee_is_kept_with_slow_errors_and_a_delay_that_is_known_within_an_interval() {
-    let settings =
-        Settings { delay_error: 0.01, disturbance_bound: f64::to_radians(1.5), ..navigated(0.04) };
-    let late = [-0.01, 0.01].map(|late| {
-        let flights = flights(&settings, &settings);
-        flights.into_iter().map(move |flight| Flight { late, ..flight }).collect::<Vec<_>>()
-    });
-    assert_kept("interval", &late.concat());
-}
-
 /// Returns settings in which the slow errors, large and quick ones, count for more than Δ.
 fn creeping() -> Settings {
     Settings {

@@ -122,7 +122,7 @@ impl Law for CrmpcLaw {
                     "the guarantee is no longer in force: a tick used inputs that had been set before it; step with period.feedback or a whole fraction of it"
                 }
                 Contradiction::Delay => {
-                    "the guarantee is no longer in force: the loop delay differs from delay + measurement.age by more than delayError"
+                    "the guarantee is no longer in force: the loop delay differs from delay + measurement.age by more than half a period"
                 }
                 Contradiction::Disturbance => {
                     "the guarantee is no longer in force: the observed disturbance is larger than disturbance.bound, inertia.error and estimation.rateError allow with the given delay"

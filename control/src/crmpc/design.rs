@@ -4,7 +4,7 @@
 use super::guarantee::{self, Assessment, Tightening};
 use super::refusal;
 use super::rule::{self, Tightened};
-use super::settings::{Constraints, Guarantee, InitialState, Settings};
+use super::settings::{Constraints, Guarantee, Settings};
 use crate::delay;
 use crate::error::{DesignError, positive};
 use crate::error_dynamics::{Gain, InvariantSet, SampledError};
@@ -220,13 +220,6 @@ fn ratio(s: &Settings) -> Result<usize, DesignError> {
     positive("limit.moment", s.limit_moment)?;
     if !(0.0..=delay::LONGEST).contains(&s.delay) {
         return Err(DesignError::Delay { value: s.delay, longest: delay::LONGEST });
-    }
-    if s.delay_error > 0.0 && s.initial_state == InitialState::Tube {
-        return Err(DesignError::DelayErrorWithTube);
-    }
-    let largest = s.delay.min(s.period_feedback);
-    if s.delay_error > largest {
-        return Err(DesignError::DelayError { value: s.delay_error, largest });
     }
     let (optimisation, feedback) = (s.period_optimisation, s.period_feedback);
     let ratio = (optimisation / feedback).round();

@@ -1,6 +1,5 @@
 //! The state that CRMPC carries from tick to tick.
 
-use super::commands::Commands;
 use super::horizon::PlanPoint;
 use super::observer::Observed;
 use super::plan::{Plan, Terms};
@@ -52,8 +51,6 @@ pub struct Memory {
     pub pending: u32,
     /// Estimate of the disturbance with its filter state.
     pub observed: Observed,
-    /// Recent changes of the command, if the delay is not exact.
-    pub commands: Commands,
     /// Time at which the plan begins: that of its optimisation, later by the delay, s.
     pub planned: f64,
     /// The plan in force at [`super::points`] of its horizon; empty unless the settings ask for it.
@@ -74,7 +71,7 @@ impl Memory {
     }
 }
 
-clone_in_place!([] Memory { plan, commands, shown });
+clone_in_place!([] Memory { plan, shown });
 
 /// Terms of a plan that hold until the commands of the next one act.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]

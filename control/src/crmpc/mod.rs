@@ -1,7 +1,6 @@
 //! Centralised robust MPC of Chai et al. (2022): an optimisation plans a nominal trajectory, and a
 //! feedback law keeps the vehicle near it.
 
-mod commands;
 mod design;
 mod feedback;
 mod guarantee;
@@ -22,11 +21,10 @@ mod supervision;
 mod terminal;
 
 pub use crate::report::{SolverReport, SolverStatus};
-pub use commands::Commands;
 pub use design::{
     Design, PaperConstants, held_terminal_weight, step_response_peak, terminal_weight,
 };
-pub use guarantee::{Assessment, Carried, Deviation, Onset, Switching, Tightening};
+pub use guarantee::{Assessment, Deviation, Tightening};
 #[doc(hidden)]
 pub use guarantee::{
     BRAKING, CURVATURE, DRIFT_BY_ANGLES_TWICE, DRIFT_MIXED, Domain, FOURTH, Lemmas, TURN,
@@ -154,7 +152,6 @@ impl Controller for Crmpc {
                 Law::Paper(_) => 0.0,
             },
             gain: self.settings.feedback,
-            commands: Commands::new(&self.settings),
             shown: vec![PlanPoint::default(); self.settings.points_shown()],
             ..Memory::default()
         }
@@ -167,7 +164,6 @@ impl Controller for Crmpc {
             && accelerations.len() == n
             && multipliers.len() == n
             && memory.shown.len() == self.settings.points_shown()
-            && memory.commands.fits(&self.settings)
     }
 
     fn command(

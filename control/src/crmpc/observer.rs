@@ -20,13 +20,11 @@ struct Mean {
     residual: Vector3<f64>,
     /// Size of the acceleration by the commanded moment in each component, rad/s².
     by_moment: Vector3<f64>,
-    /// Acceleration by changes of the command that act at another time than assumed, rad/s².
-    by_pulses: f64,
 }
 
 impl Mean {
     fn explained(&self, observable: &Observable) -> Vector3<f64> {
-        observable.largest(&self.by_moment, self.by_pulses)
+        observable.largest(&self.by_moment)
     }
 }
 
@@ -46,15 +44,11 @@ impl Observed {
     /// Updates the estimate with the rates x_ω at a tick. Their change beyond the commanded
     /// acceleration is the mean of Δ over the period. It is filtered by a first-order lag and
     /// limited to twice the bound of Δ.
-    ///
-    /// `pulse` is the mean acceleration over the period by a change of the command that acts at
-    /// another time than assumed, rad/s².
     pub(super) fn observe(
         &mut self,
         s: &Settings,
         observable: &[Observable; MEANS],
         rates: &Vector3<f64>,
-        pulse: f64,
     ) {
         let Some([angles, before, commanded]) = self.last else { return };
         let residual = (rates - before) / s.period_feedback - commanded;
@@ -65,34 +59,24 @@ impl Observed {
         for (mean, observable) in self.means.iter_mut().zip(observable) {
             let weight = observable.weight;
             mean.by_moment += (by_moment - mean.by_moment) * weight;
-            mean.by_pulses += (pulse - mean.by_pulses) * weight;
             mean.residual += (residual - mean.residual) * weight;
             let bound = mean.explained(observable) * ABOVE;
             mean.residual = mean.residual.sup(&-bound).inf(&bound);
         }
     }
 
-    /// Returns whether the assumptions explain all that was observed.
+    /// Returns whether the assumptions explain all that was observed. Without a bound they explain
+    /// nothing.
     pub(super) fn is_explained(&self, observable: &[Observable; MEANS]) -> bool {
         self.means.iter().zip(observable).all(|(mean, observable)| {
             let explained = mean.explained(observable);
-            (0..3).all(|i| mean.residual[i].abs() <= explained[i])
+            (0..3).all(|i| explained[i].is_finite() && mean.residual[i].abs() <= explained[i])
         })
     }
 
     /// Stores angles, rates and commanded acceleration for the next tick.
     pub(super) fn remember(&mut self, last: [Vector3<f64>; 3]) {
         self.last = Some(last);
-    }
-
-    /// Returns the acceleration commanded at the last tick, rad/s²; `None` before the first.
-    pub(super) fn commanded(&self) -> Option<Vector3<f64>> {
-        self.last.map(|[_, _, commanded]| commanded)
-    }
-
-    /// Returns the acceleration at the last tick without moment, rad/s²; `None` before the first.
-    pub(super) fn without_moment(&self, body: &RigidBody) -> Option<Vector3<f64>> {
-        self.last.map(|[angles, rates, _]| body.drift(&angles, &rates))
     }
 
     /// Replaces the stored command by the acceleration that `applied` (N m) gives.

@@ -1,6 +1,5 @@
 //! The plan: a nominal trajectory over the horizon.
 
-use super::guarantee::{Carried, Onset, Switching};
 use super::stages::Stages;
 use super::state::{self, join};
 use crate::clone_in_place::clone_in_place;
@@ -39,8 +38,6 @@ pub struct Plan {
     pub shift: Vector3<f64>,
     /// Terms under which the plan was certified.
     pub terms: Terms,
-    /// History of commands before the plan, if the delay is not exact.
-    pub onset: Onset,
 }
 
 clone_in_place!([] Plan { states, accelerations, multipliers });
@@ -57,16 +54,6 @@ impl Plan {
         self.states.resize(horizon + 1, Vector6::zeros());
         self.accelerations.resize(horizon, Vector3::zeros());
         self.multipliers.resize(horizon, [0.0; 2]);
-    }
-
-    /// Returns the deviation by changes of the acceleration when the plan's first command acts.
-    pub(super) fn begins_with(&self, switching: &Switching) -> Carried {
-        switching.begin(&self.onset.carried, self.first_change())
-    }
-
-    /// Returns the change of acceleration with which the plan begins, rad/s².
-    pub(super) fn first_change(&self) -> f64 {
-        self.accelerations.first().map_or(0.0, |a| (a - self.onset.before).norm())
     }
 
     /// Shifts the plan as in (31): drops the first interval and appends one of `h` (s) with the

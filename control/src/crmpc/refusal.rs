@@ -69,10 +69,7 @@ pub(super) fn refusal(s: &Settings, closest: &Tightened) -> DesignError {
         delay: (s.delay > 0.0)
             .then(|| largest(s.delay, &|delay| Settings { delay, ..*s }))
             .flatten()
-            .filter(|&delay| delay > s.delay_error),
-        delay_error: (s.delay_error > 0.0)
-            .then(|| largest(s.delay_error, &|delay_error| Settings { delay_error, ..*s }))
-            .flatten(),
+            .filter(|&delay| delay > 0.0),
         errors: errors.map(|share| (share * s.angle_error, share * s.rate_error)),
         slow_errors: are_slow
             .then(|| largest(1.0, &with_slow))

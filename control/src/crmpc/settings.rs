@@ -137,11 +137,6 @@ pub struct Settings {
     #[setting(name = "inertia.tensorError", min = 0.0, max = 0.9, nominal = 0.05)]
     #[setting(used_with = "constraints = robust")]
     pub tensor_error: f64,
-    /// Bound on the difference between the loop delay, which must be constant, and delay +
-    /// measurement.age; the robust set is tightened for it.
-    #[setting(unit = "s", min = 0.0, max = 1.0, nominal = 0.01)]
-    #[setting(used_with = "constraints = robust")]
-    pub delay_error: f64,
     /// Largest magnitude of the sideslip angle for which the bounds of the paper's design hold.
     #[setting(name = "bound.sideslip", unit = "rad", min = 0.0, max = 1.5, nominal = 0.2)]
     #[setting(used_with = "constraints = paper")]

@@ -45,7 +45,7 @@ pub enum Contradiction {
     None,
     /// a tick used inputs that had been set before it, because of the communication step.
     Step,
-    /// loopDelay.estimate differs from delay + measurement.age by more than delayError.
+    /// loopDelay.estimate differs from delay + measurement.age by more than half a period.
     Delay,
     /// The observed disturbance is larger than disturbance.bound, inertia.error and
     /// estimation.rateError allow.

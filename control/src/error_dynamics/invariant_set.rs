@@ -43,9 +43,8 @@ impl InvariantSet {
             middle_angle: middle(0),
             middle_rate: middle(1),
             feedback: self.support(&gain.row().transpose()),
-            // These fields are not used.
+            // This field is not used.
             feedback_age: 0.0,
-            change: 0.0,
         }
     }
 }

@@ -24,8 +24,6 @@ pub struct Reach {
     pub feedback: f64,
     /// Sum of the parts of the feedback, each multiplied by the time since it was caused, s.
     pub feedback_age: f64,
-    /// Largest change of K o from one tick to the next, dimensionless.
-    pub change: f64,
 }
 
 impl Reach {
@@ -61,7 +59,6 @@ impl Reach {
             middle_rate: combine(self.middle_rate, other.middle_rate),
             feedback: combine(self.feedback, other.feedback),
             feedback_age: combine(self.feedback_age, other.feedback_age),
-            change: combine(self.change, other.change),
         }
     }
 

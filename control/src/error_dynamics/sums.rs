@@ -49,45 +49,20 @@ impl SampledError {
             rate: self.latency,
             ..Reach::default()
         };
-        self.sums(steps, unseen, integral_of_size)
-    }
-
-    /// Returns the largest effect of pulses of Δ, by which the rate jumps by at most 1 in any time
-    /// as long as a period, within 0, 1, …, `steps` periods from o = 0. The units are those for a
-    /// jump of the rate in rad/s: s for an angle, 1 for a rate, and 1/s for K o. A pulse may also
-    /// act later, through the mismatch, so that it counts with its largest response over the whole
-    /// time until it is seen.
-    pub fn pulses(&self, steps: usize) -> Vec<Reach> {
-        // A latency that is a whole number of periods may be inexact by rounding.
-        let unseen = (self.latency / self.period - 1e-9).ceil().max(0.0);
-        let unseen = Reach { angle: unseen * self.latency, rate: unseen, ..Reach::default() };
-        self.sums(steps, unseen, |c0, c1, (_, end)| largest_size(c0, c1, (0.0, end)))
-    }
-
-    /// Returns the sums of the responses to what acted in each period. `size` takes the size of a
-    /// response c₀ + c₁ u over the times u at which it is seen first.
-    fn sums(
-        &self,
-        steps: usize,
-        unseen: Reach,
-        size: fn(f64, f64, (f64, f64)) -> f64,
-    ) -> Vec<Reach> {
         let within = (self.latency, self.latency + self.period);
         let mut reach = unseen;
         let mut reaches = Vec::with_capacity(steps + 1);
         reaches.push(reach);
-        let (mut power, mut before) = (Matrix2::identity(), Matrix2::zeros());
+        let mut power = Matrix2::identity();
         for n in 0..steps {
             // By now [u; 1] has become Φⁿ [u; 1].
-            let size = |row: RowVector2<f64>| size(row.y, row.x, within);
+            let size = |row: RowVector2<f64>| integral_of_size(row.y, row.x, within);
             let faded = self.faded(&power, size);
             reach = reach.plus(&Reach {
                 feedback_age: faded.feedback * (within.1 + n as f64 * self.period),
-                change: size(self.gain.row() * (power - before)),
                 ..faded
             });
             reaches.push(reach);
-            before = power;
             power = self.phi * power;
         }
         reaches
@@ -140,12 +115,7 @@ impl SampledError {
             });
             let actual = sum_of(sum, self.sizes(&first).map(|size| weight(0) * size));
             let seen = sum_of(actual, self.sizes(&newest).map(|size| weight(n) * size));
-            reaches.push(Reach {
-                angle: actual[0],
-                rate: actual[1],
-                change: 2.0 * seen[4],
-                ..Reach::seen(seen)
-            });
+            reaches.push(Reach { angle: actual[0], rate: actual[1], ..Reach::seen(seen) });
             first = phi * first;
         }
         reaches
@@ -155,17 +125,15 @@ impl SampledError {
     /// to the period in all before each tick, at any time since the measurement before that of the
     /// tick's command. The units are those of [`Self::reach`].
     pub fn changes(&self, steps: usize) -> Vec<Reach> {
-        let Self { gain, period, latency, phi, .. } = *self;
+        let Self { period, latency, phi, .. } = *self;
         let mut sum = Reach::default();
-        let (mut power, mut before) = (Matrix2::identity(), Matrix2::zeros());
+        let mut power = Matrix2::identity();
         let mut reaches = vec![sum];
         for _ in 0..steps {
             // A change at the time u before the tick has become Φⁿ [u; 1].
             let most =
                 |row: RowVector2<f64>| period * largest_size(row.y, row.x, (0.0, latency + period));
-            let change = most(gain.row() * (power - before));
-            sum = sum.plus(&Reach { change, ..self.faded(&power, most) });
-            before = power;
+            sum = sum.plus(&self.faded(&power, most));
             reaches.push(sum);
             power = phi * power;
         }
@@ -180,8 +148,7 @@ impl SampledError {
         let mut reaches = Vec::with_capacity(steps + 1);
         reaches.push(reach);
         for _ in 0..steps {
-            let sum = reach.plus(&Reach::seen(self.sizes(&shift)));
-            reach = Reach { change: 2.0 * sum.feedback, ..sum };
+            reach = reach.plus(&Reach::seen(self.sizes(&shift)));
             reaches.push(reach);
             shift = self.phi * shift;
         }

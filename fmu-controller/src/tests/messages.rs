@@ -36,14 +36,6 @@ fn refusals() -> Vec<String> {
             |instance| instance.settings.angle_error = 1.0,
             |instance| instance.settings.rate_error = 1.0,
             |instance| instance.settings.rate_error = 0.01,
-            |instance| instance.settings.delay_error = -0.01,
-            |instance| instance.settings.delay_error = 0.01,
-            |crmpc| (crmpc.parameters.latency.action, crmpc.settings.delay_error) = (0.04, 0.03),
-            |instance| {
-                instance.parameters.latency.action = 0.04;
-                instance.settings.delay_error = 0.01;
-                instance.settings.initial_state = InitialState::Tube;
-            },
             |instance| instance.settings.sideslip_domain = 0.9,
             |instance| instance.settings.disturbance_bound = -1.0,
             |instance| instance.settings.feedback = Gain { k1: -700.0, k2: -50.0 },

@@ -135,15 +135,15 @@ fn needed(lemmas: &Lemmas, forever: &Deviations, x: f64) -> [Interval; 2] {
 }
 
 /// Checks the sums and the inequality for a tightening with its terminal rate (rad/s). Returns
-/// `None` if the dynamics are not certain to be stable, if the initial state is `tube`, whose
-/// invariant set is not checked, or if the delay is not exact.
+/// `None` if the dynamics are not certain to be stable, or if the initial state is `tube`, whose
+/// invariant set is not checked.
 pub fn check(
     s: &Settings,
     lemmas: &Lemmas,
     tightening: &Tightening,
     terminal_rate: f64,
 ) -> Option<Vec<Finding>> {
-    if s.initial_state == InitialState::Tube || s.delay_error > 0.0 {
+    if s.initial_state == InitialState::Tube {
         return None;
     }
     let error = SampledError::delayed(s.feedback, s.period_feedback, s.delay);

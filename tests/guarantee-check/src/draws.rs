@@ -85,12 +85,11 @@ fn slow(random: &mut Random, published: &Settings) -> Settings {
     }
 }
 
-/// A delay that is known within an interval.
+/// A delay, and plans that go on or begin anew.
 fn late(random: &mut Random, published: &Settings) -> Settings {
     let delay = random.between(0.01, 0.12);
     let initial_state = [InitialState::Measured, InitialState::Nominal][random.below(2) as usize];
-    let delay_error = random.between(0.0, 0.012_f64.min(delay));
-    Settings { delay, delay_error, initial_state, ..*published }
+    Settings { delay, initial_state, ..*published }
 }
 
 /// An error of the whole tensor of inertia.
@@ -109,13 +108,9 @@ fn anything(random: &mut Random, published: &Settings) -> Settings {
     let longest = (0.3 / period_feedback) as u64;
     let initial_state = states[random.below(3) as usize];
     let delay = random.between(0.0, 0.1);
-    // The set of `tube` has no room for a delay that is not exact.
-    let exact = initial_state == InitialState::Tube || random.below(2) == 0;
-    let most = delay.min(0.02).min(period_feedback);
     Settings {
         feedback: Gain { k1: -random.between(0.5, 8.0), k2: -random.between(1.0, 8.0) },
         delay,
-        delay_error: if exact { 0.0 } else { random.between(0.0, most) },
         inertia_error: random.between(0.0, 0.1),
         tensor_error: random.between(-0.05, 0.05).max(0.0),
         horizon: 20 + random.below(81) as usize,

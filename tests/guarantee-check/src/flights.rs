@@ -1,7 +1,6 @@
 //! Flights whose accepted plans are recorded for the check: any start, reference, disturbance,
 //! inertia and measurement error within the assumptions of the guarantee.
 
-use crate::plan::Past;
 pub use crate::random::Random;
 use crate::random::sign;
 use control::crmpc::{Crmpc, Plan, Settings};
@@ -9,7 +8,6 @@ use control::delay::{Delayed, Latency};
 use control::error::DesignError;
 use control::{Controller, Measurement};
 use nalgebra::{Matrix3, Rotation3, Vector3, Vector6};
-use std::collections::VecDeque;
 use vehicle::dynamics::RigidBody;
 use vehicle::integrator::rk4;
 use vehicle::kinematics::{self, Kinematics};
@@ -31,10 +29,6 @@ pub struct Recorded {
     pub deviation: Vector6<f64>,
     /// Whether the previous plan was kept.
     pub is_kept: bool,
-    /// Earlier commands, as far as they may have an effect if the delay is not exact.
-    pub past: Past,
-    /// Size of R I⁻¹ (m − m′) for the change of the command with which the plan begins, rad/s².
-    pub change: f64,
 }
 
 /// How a bounded vector changes over time, relative to its bound.
@@ -71,8 +65,6 @@ pub struct Flight {
     errors: Waveform,
     /// Derivative of the slow errors of the angles, and their present values, rad.
     slow: (Waveform, Vector3<f64>),
-    /// Difference of the delay from the assumed one, s.
-    late: f64,
     random: Random,
     duration: f64,
 }
@@ -124,7 +116,6 @@ impl Flight {
             disturbance: Waveform::random(&mut random),
             errors: Waveform::random(&mut random),
             slow,
-            late: settings.delay_error * Random::new(!seed).between(-2.0, 2.0).clamp(-1.0, 1.0),
             random,
             duration,
         })
@@ -153,23 +144,18 @@ impl Flight {
         let latency = Latency::of_action(s.delay);
         let mut controller = Delayed::new(law, s.body, s.period_feedback, latency, s.limit_moment)?;
         let mut memory = controller.memory();
-        let mut transport = Transport::new(s.delay + self.late).unwrap_or_default();
+        let mut transport = Transport::new(s.delay).unwrap_or_default();
         let (profile, begin) = (self.reference.clone(), self.begin);
         let reference = |time: f64| profile.at(begin + time);
         let mut state = self.start;
         let mut acting = Vector3::zeros();
-        let mut history = History::new(&s);
         for tick in 0..(self.duration / s.period_feedback).round() as u64 {
             let time = tick as f64 * s.period_feedback;
             let measured = self.measure(&state, &acting, time);
             let predicted = controller.predictor().predict(&memory.under_way, &measured);
             let moment = controller.update(&mut memory, tick, time, &measured, &reference);
-            history.add(&s, &predicted, moment);
-            if tick % ratio == 0 {
-                history.plan(&memory.inner);
-                if memory.inner.assured() {
-                    observe(&recorded(&memory.inner, &predicted, time, &history));
-                }
+            if tick % ratio == 0 && memory.inner.assured() {
+                observe(&recorded(&memory.inner, &predicted, time));
             }
             match &mut transport {
                 Some(transport) => drop(transport.command(time, moment)),
@@ -264,46 +250,6 @@ impl Flight {
     }
 }
 
-/// Commands and plans so far.
-struct History {
-    moment: Vector3<f64>,
-    /// Sizes of the last changes of the command, the oldest first, rad/s².
-    changes: VecDeque<f64>,
-    past: Past,
-    /// First acceleration of the plan in force, rad/s².
-    first: Vector3<f64>,
-}
-
-impl History {
-    fn new(s: &Settings) -> Self {
-        // Commands that a measurement may not show, and the one that follows from it.
-        let count = ((s.delay + s.delay_error) / s.period_feedback).ceil() as usize + 1;
-        Self {
-            moment: Vector3::zeros(),
-            changes: std::iter::repeat_n(0.0, count).collect(),
-            past: Past::default(),
-            first: Vector3::zeros(),
-        }
-    }
-
-    fn add(&mut self, s: &Settings, predicted: &Measurement, moment: Vector3<f64>) {
-        let change = s.body.inverse * (moment - self.moment);
-        self.moment = moment;
-        self.changes.pop_front();
-        self.changes.push_back((kinematics::r(&predicted.angles) * change).norm());
-    }
-
-    fn plan(&mut self, memory: &control::crmpc::Memory) {
-        if memory.age == 0 {
-            let changes = self.changes.iter().copied().collect();
-            self.past = Past { changes, accelerations: vec![] };
-        } else {
-            self.past.accelerations.push(self.first);
-        }
-        self.first = memory.plan.accelerations[0];
-    }
-}
-
 /// The inertia with an error of the tensor within its bound, often at it.
 fn erroneous(s: &Settings, seed: u64) -> Matrix3<f64> {
     if s.tensor_error == 0.0 {
@@ -321,12 +267,7 @@ fn erroneous(s: &Settings, seed: u64) -> Matrix3<f64> {
     (inertia + inertia.transpose()) * 0.5
 }
 
-fn recorded(
-    memory: &control::crmpc::Memory,
-    predicted: &Measurement,
-    time: f64,
-    history: &History,
-) -> Recorded {
+fn recorded(memory: &control::crmpc::Memory, predicted: &Measurement, time: f64) -> Recorded {
     let rates = kinematics::r(&predicted.angles) * predicted.rates;
     let mut deviation = -memory.plan.states[0];
     for i in 0..3 {
@@ -339,8 +280,6 @@ fn recorded(
         time,
         deviation,
         is_kept: memory.report.status == control::crmpc::SolverStatus::Kept,
-        past: history.past.clone(),
-        change: history.changes.back().copied().unwrap_or_default(),
     }
 }
 

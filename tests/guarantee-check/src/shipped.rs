@@ -199,7 +199,6 @@ fn set(s: &mut Settings, inertia: &mut Inertia, name: &str, value: &Value) -> Re
         "estimation.slowAngleRate" => &mut s.slow_angle_rate,
         "inertia.error" => &mut s.inertia_error,
         "inertia.tensorError" => &mut s.tensor_error,
-        "delayError" => &mut s.delay_error,
         "inertia.Ixx" => &mut inertia.Ixx,
         "inertia.Iyy" => &mut inertia.Iyy,
         "inertia.Izz" => &mut inertia.Izz,

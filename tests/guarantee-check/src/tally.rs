@@ -59,10 +59,9 @@ impl Tally {
         self.plans > 0 && self.not_confirmed == 0 && self.outside == 0
     }
 
-    /// Checks a plan. The command of the next plan, which may act before the interval of this one
-    /// ends, changes the acceleration by `next` (rad/s²).
-    fn record(&mut self, seed: u64, recorded: &Recorded, next: f64, check: &PlanCheck) {
-        let verdict = check.check_after(&recorded.past, &recorded.plan, recorded.age, next);
+    /// Checks a plan.
+    fn record(&mut self, seed: u64, recorded: &Recorded, check: &PlanCheck) {
+        let verdict = check.check(&recorded.plan, recorded.age);
         self.plans += 1;
         self.kept_plans += u64::from(recorded.is_kept);
         self.aged += u64::from(recorded.age > 0);
@@ -90,18 +89,8 @@ pub fn check_flights(
     let mut tally = Tally::default();
     for seed in seeds {
         let flight = Flight::random(settings, seed, duration)?;
-        let mut last: Option<Recorded> = None;
-        let observe = |recorded: &Recorded| {
-            if let Some(last) = last.replace(recorded.clone()) {
-                let follows = recorded.time < last.time + 1.5 * settings.period_optimisation;
-                let next = if follows { recorded.change } else { 0.0 };
-                tally.record(seed, &last, next, &check);
-            }
-        };
+        let observe = |recorded: &Recorded| tally.record(seed, recorded, &check);
         flight.record(observe).map_err(|error| error.to_string())?;
-        if let Some(last) = last {
-            tally.record(seed, &last, 0.0, &check);
-        }
     }
     Ok(tally)
 }

@@ -56,7 +56,6 @@ fn settings(experiment: &str) -> Settings {
             "estimation.slowAngleRate" => s.slow_angle_rate = quantity(value),
             "inertia.error" => s.inertia_error = quantity(value),
             "inertia.tensorError" => s.tensor_error = quantity(value),
-            "delayError" => s.delay_error = quantity(value),
             "limit.rate" => s.limit_rate = quantity(value),
             "limit.moment" => s.limit_moment = quantity(value),
             "constraints" => assert_eq!(value.as_str(), Some("robust")),

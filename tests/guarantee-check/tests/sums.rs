@@ -12,7 +12,6 @@ fn the_sums_hold_for_every_kind_of_drawn_settings() {
         let error = 0.01_f64.to_radians();
         let settings = Settings {
             delay: drawn.delay.max(0.03),
-            delay_error: 0.0,
             tensor_error: drawn.tensor_error.max(0.01),
             angle_error: drawn.angle_error.max(error),
             rate_error: drawn.rate_error.max(error),

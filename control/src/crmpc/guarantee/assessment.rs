@@ -3,8 +3,7 @@
 use super::deviation::Deviation;
 use super::dynamics::Dynamics;
 use super::geometry::BRAKING;
-use super::losses::{MomentLoss, RateLoss};
-use super::switching::{Carried, Switching};
+use super::losses::RateLoss;
 use super::tightening::Tightening;
 use crate::crmpc::settings::Settings;
 use crate::linearise::TURN_BY_ANGLES as TURN_OF_RATES;
@@ -35,22 +34,15 @@ impl Assessment {
 pub(super) const SMALLEST_TERMINAL_RATE: f64 = 3.5e-3;
 
 /// Returns the remainder of the limits (rad/s, N m) beyond a motion with ‖x̃_ω‖ ≤ `x` and ‖a‖ ≤
-/// `a`, with the deviation that is never exceeded and `more` of it, at any attitude.
+/// `a`, with the deviation that is never exceeded, at any attitude.
 pub(super) fn left(
     s: &Settings,
     dynamics: &Dynamics,
     tightening: &Tightening,
-    more: Option<&Deviation>,
     (x, a): (f64, f64),
 ) -> (f64, f64) {
-    let mut deviation = *tightening.forever();
-    let mut moment_loss = tightening.tick(usize::MAX).moment_loss;
-    if let Some(more) = more {
-        deviation = deviation.plus(more);
-        moment_loss =
-            MomentLoss::new(dynamics, &deviation, tightening.bearing, s.period_optimisation);
-    }
-    let Deviation { angle, rate, .. } = deviation;
+    let Deviation { angle, rate, .. } = *tightening.forever();
+    let moment_loss = tightening.tick(usize::MAX).moment_loss;
     let of_rates = s.limit_rate - RateLoss::new(angle, rate, 0.0, 0.0).at(TURN_OF_RATES * x, x);
     let loss = moment_loss.at(tightening.bearing, dynamics.slopes(x, a), (x, a));
     let of_moment = s.limit_moment - s.needed_by_known();
@@ -63,10 +55,6 @@ pub(in crate::crmpc) struct HorizonEnd {
     pub sideslip: f64,
     /// Rates x̃_ω, rad/s.
     pub rates: Vector3<f64>,
-    /// Norm of the acceleration before it, rad/s².
-    pub pull: f64,
-    /// Deviation that the plan's pulses have left.
-    pub carried: Carried,
     /// Part of the rate limit that the turn of the trajectory needs, rad/s.
     pub turn: f64,
 }
@@ -75,20 +63,6 @@ impl HorizonEnd {
     /// Returns the acceleration, except for its sign, of a motion that begins to brake.
     fn braked(&self, braking: f64) -> Vector3<f64> {
         self.rates.component_mul(&Vector3::new(BRAKING, braking, BRAKING))
-    }
-
-    /// Returns the deviation by changes of the acceleration while the motion at first brakes by no
-    /// more than the rate `most` (1/s). The first change is that from the acceleration before; from
-    /// step to step the acceleration then changes by less than κ h of itself.
-    pub(in crate::crmpc) fn while_braking(
-        &self,
-        s: &Settings,
-        switching: &Switching,
-        most: f64,
-    ) -> Deviation {
-        let a = self.braked(most).norm();
-        let first = switching.begin(&self.carried, self.pull + a);
-        switching.forever(&first, most * s.period_optimisation * a)
     }
 }
 
@@ -102,38 +76,26 @@ pub(in crate::crmpc) fn braking(
     end: &HorizonEnd,
 ) -> Option<f64> {
     let rate_of_sideslip = end.rates.y.abs();
-    let with = |more: Option<&Deviation>| {
-        let angle = tightening.forever().angle + more.map_or(0.0, |more| more.angle);
-        let room = s.sideslip_domain - angle - end.sideslip.abs();
-        let by_room = if rate_of_sideslip == 0.0 { 0.0 } else { rate_of_sideslip / room };
-        // A κ beyond 1/h would reverse the motion.
-        (room >= 0.0 && by_room * s.period_optimisation <= 1.0).then_some(by_room.max(BRAKING))
-    };
-    let mut braking = with(None)?;
-    let mut more = None;
-    if let Some(switching) = &tightening.switching {
-        let most = 2.0 * braking;
-        let left = end.while_braking(s, switching, most);
-        braking = with(Some(&left)).filter(|&braking| braking <= most)?;
-        more = Some(left);
-    }
+    let room = s.sideslip_domain - tightening.forever().angle - end.sideslip.abs();
+    let by_room = if rate_of_sideslip == 0.0 { 0.0 } else { rate_of_sideslip / room };
+    // A κ beyond 1/h would reverse the motion.
+    let is_possible = room >= 0.0 && by_room * s.period_optimisation <= 1.0;
+    let braking = is_possible.then_some(by_room.max(BRAKING))?;
     let sizes = (end.rates.norm(), end.braked(braking).norm());
-    let (rate, moment) = left(s, dynamics, tightening, more.as_ref(), sizes);
+    let (rate, moment) = left(s, dynamics, tightening, sizes);
     (rate >= end.turn && moment >= 0.0).then_some(braking)
 }
 
 /// Returns the largest ‖x̃_ω‖ at the end of the horizon from which the motion can brake while the
-/// trajectory's turn needs `turn` of the rate limit, rad/s. `more` is the deviation by changes of
-/// the acceleration meanwhile, if the delay is not exact.
+/// trajectory's turn needs `turn` of the rate limit, rad/s.
 pub(in crate::crmpc) fn terminal_rate(
     s: &Settings,
     dynamics: &Dynamics,
     tightening: &Tightening,
-    more: Option<&Deviation>,
     turn: f64,
 ) -> f64 {
     let is_left = |x: f64| {
-        let (rate, moment) = left(s, dynamics, tightening, more, (x, BRAKING * x));
+        let (rate, moment) = left(s, dynamics, tightening, (x, BRAKING * x));
         rate - turn > 0.0 && moment > 0.0
     };
     let (mut low, mut high) = (0.0, s.limit_rate);
@@ -149,10 +111,10 @@ pub(in crate::crmpc) fn terminal_rate(
 /// Computes the remainder of the limits at rest and for the motion beyond the horizon, at any
 /// attitude.
 pub(super) fn assess(s: &Settings, dynamics: &Dynamics, tightening: &Tightening) -> Assessment {
-    let (rate, moment) = left(s, dynamics, tightening, None, (0.0, 0.0));
+    let (rate, moment) = left(s, dynamics, tightening, (0.0, 0.0));
     Assessment {
         rate_left: rate / s.limit_rate,
         moment_left: moment / s.limit_moment,
-        terminal_rate: terminal_rate(s, dynamics, tightening, None, 0.0),
+        terminal_rate: terminal_rate(s, dynamics, tightening, 0.0),
     }
 }

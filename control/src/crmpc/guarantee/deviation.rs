@@ -28,16 +28,7 @@ pub struct Deviation {
 impl Deviation {
     /// Returns the larger value of each component.
     pub(super) fn or(&self, other: &Self) -> Self {
-        self.with(other, f64::max)
-    }
-
-    /// Returns the sum of each component and its counterpart.
-    #[must_use]
-    pub fn plus(&self, other: &Self) -> Self {
-        self.with(other, |own, other| own + other)
-    }
-
-    pub(super) fn with(&self, other: &Self, of: impl Fn(f64, f64) -> f64) -> Self {
+        let of = f64::max;
         Self {
             angle: of(self.angle, other.angle),
             rate: of(self.rate, other.rate),

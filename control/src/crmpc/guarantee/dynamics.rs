@@ -56,11 +56,6 @@ impl Dynamics {
         Drive::new(s, &self.vehicle, (self.smallest, self.largest))
     }
 
-    /// Returns a bound on the speed of the angles (α, β) of the vehicle, with the creep, rad/s.
-    pub(in crate::crmpc) fn travel(&self, s: &Settings) -> f64 {
-        self.rate + self.drive(s).creep
-    }
-
     /// Computes the bounds for all states within the limits.
     pub(in crate::crmpc) fn new(s: &Settings) -> Self {
         Self::around(s, Domain { rate: s.limit_rate, sideslip: s.sideslip_domain })
@@ -122,20 +117,12 @@ impl Dynamics {
         let vehicle = self.vehicle;
         let end = s.delay + s.period_feedback;
         let drive = self.drive(s);
-        // The moment that acts is the assumed one, shifted by up to the error of the delay. The
-        // integrals of both over any time therefore differ by no more than this much at both ends,
-        // and R changes little in the meantime.
-        let turned = 1.0 + TURN * self.geometry.r * self.travel(s) * end;
-        let jumps = 2.0 * s.delay_error * s.limit_moment * self.geometry.r * turned
-            / ((1.0 - s.inertia_error) * (1.0 - s.tensor_error) * self.smallest);
-        let by_jumps = (self.by_rates + self.by_angles * end) * jumps;
-        let f = (self.apart(&drive, end) + by_jumps) * self.growth(end);
+        let f = self.apart(&drive, end) * self.growth(end);
         let beside = 0.25 * self.slope * powi(s.period_feedback, 2);
-        let rates = drive.rate_error + (drive.all + f) * end + beside + jumps;
+        let rates = drive.rate_error + (drive.all + f) * end + beside;
         let angles = drive.angle_error
             + (drive.rate_error_of_two + drive.creep + (0.5 * drive.of_two + 0.5 * f) * end) * end
-            + beside * s.period_feedback
-            + jumps * end;
+            + beside * s.period_feedback;
         Domain {
             rate: vehicle.rate + rates + TURN * angles * self.geometry.r * vehicle.rate,
             sideslip: vehicle.sideslip + angles,
@@ -245,12 +232,8 @@ impl Dynamics {
         // afterwards this prediction from the next one. Both distances grow from zero. On average
         // over time, and over the straight line between two motions, the states therefore exceed
         // the vehicle's domain by half of the largest excess. The bound on ∂F/∂x_ω is proportional
-        // to that on ‖ω‖. The jumps by commands that begin early or late come at any time.
-        let halfway = if s.delay_error > 0.0 {
-            1.0
-        } else {
-            0.5 + 0.5 * self.vehicle.rate / self.domain.rate
-        };
+        // to that on ‖ω‖.
+        let halfway = 0.5 + 0.5 * self.vehicle.rate / self.domain.rate;
         let revised = halfway * by_rates * all * (d + 0.5 * tau)
             + by_angles * of_two * (tau * tau / 6.0 + 0.5 * d * end)
             + by_angles * creep * (d + 0.5 * tau);
@@ -286,37 +269,6 @@ impl Dynamics {
         }
         let square = tau * tau;
         self.slope * (self.by_rates * square / 8.0 + self.by_angles * square * tau / 24.0)
-    }
-
-    /// Returns by how much the change of acceleration from one command to the next, at any instant
-    /// within the error of the delay about the tick, differs from the change that the law intends:
-    /// an amount (rad/s²), and a share of the change.
-    ///
-    /// The law gives the accelerations a′ = F(y, m) at the states y that it predicts for the
-    /// middles of two periods. F with the older moment differs between these two states, which lie
-    /// one period of the motion apart, and by what the newer measurement adds. The attitude at the
-    /// instant differs from the predicted one.
-    pub(super) fn between_commands(&self, s: &Settings, drive: &Drive) -> (f64, f64) {
-        let (tau, error) = (s.period_feedback, s.delay_error);
-        let end = s.delay + tau + error;
-        let growth = self.growth(end);
-        let Drive { all, of_two, creep, rate_error, rate_error_of_two, angle_error, .. } = *drive;
-        let rates = self.acceleration * tau
-            + 0.25 * self.slope * tau * tau
-            + (all * tau + 2.0 * rate_error) * growth;
-        let angles = self.rate * tau
-            + 0.25 * self.acceleration * tau * tau
-            + (of_two * tau * end
-                + creep * tau
-                + 2.0 * angle_error
-                + 2.0 * rate_error_of_two * end)
-                * growth;
-        let apart = self.rate * (0.5 * tau + error)
-            + (angle_error + (rate_error_of_two + creep + 0.5 * of_two * end) * end) * growth;
-        (
-            self.by_rates * rates + self.by_angles * angles,
-            TURN * self.geometry.r * self.geometry.r * apart,
-        )
     }
 
     /// Returns the ratio of the distance of two motions after a time (s) to the distance that the

@@ -35,8 +35,6 @@ pub(in crate::crmpc) struct RateLoss {
     pub(super) by_size: f64,
     /// Coefficients of ‖a‖, ‖x_ω‖ ‖a‖, ‖x_ω‖² and ‖x_ω‖³ in [`Self::within`].
     pub(super) within: [f64; 4],
-    /// Change of the angles' deviation over an optimisation period, rad.
-    pub(super) change: f64,
 }
 
 impl RateLoss {
@@ -52,7 +50,6 @@ impl RateLoss {
         // |o₁² − o₂²| = |o₁ − o₂| (o₁ + o₂).
         let squares = 0.125 * CURVATURE * change * (2.0 * angle + change) * h;
         Self {
-            change,
             constant: rate,
             by_angles: angle,
             by_size: 0.5 * CURVATURE * angle * angle,
@@ -63,11 +60,6 @@ impl RateLoss {
                 curved * CURVATURE + two * DRIFT_BY_ANGLES_TWICE,
             ],
         }
-    }
-
-    /// Returns the loss of this deviation and some more of the angles and rates (rad, rad/s).
-    pub(in crate::crmpc) fn with(&self, (angle, rate): (f64, f64), h: f64) -> Self {
-        Self::new(self.by_angles + angle, self.constant + rate, self.change + angle, h)
     }
 
     /// Returns the loss at a stage with ‖∂ω/∂(α, β)‖ = `by_angles` and ‖x̃_ω‖ = `size`, rad/s.

@@ -23,8 +23,6 @@ pub(in crate::crmpc) struct Observable {
     /// Share of the mean acceleration by the commanded moments, by the common factor of the
     /// inertia.
     of_moment: f64,
-    /// Factor of the mean acceleration by pulses.
-    of_pulses: f64,
 }
 
 impl Observable {
@@ -44,7 +42,7 @@ impl Observable {
             + mismatch.mean * (1.0 + early[0].excess)
             + parts.drive.of_creep;
         // The effect of a command shows later than the command, and is forgotten later.
-        let late = ticks(s.delay + s.delay_error, s.period_feedback) + 1;
+        let late = ticks(s.delay, s.period_feedback) + 1;
         let remembered = exp(late as f64 * s.period_feedback / time_constant);
         Self {
             weight: -exp_m1(-s.period_feedback / time_constant),
@@ -53,17 +51,12 @@ impl Observable {
             of_moment: relative(s.inertia_error)
                 * (1.0 + parts.inertia.turning * elapsed)
                 * remembered,
-            of_pulses: dynamics.growth(elapsed) * remembered,
         }
     }
 
-    /// Returns the largest explained mean, rad/s², with the means of the acceleration by the
-    /// commanded moments in each component, and by pulses.
-    pub(in crate::crmpc) fn largest(
-        &self,
-        by_moment: &Vector3<f64>,
-        by_pulses: f64,
-    ) -> Vector3<f64> {
-        (by_moment * self.of_moment).add_scalar(self.others + by_pulses * self.of_pulses)
+    /// Returns the largest explained mean, rad/s², with the mean of the acceleration by the
+    /// commanded moments in each component.
+    pub(in crate::crmpc) fn largest(&self, by_moment: &Vector3<f64>) -> Vector3<f64> {
+        (by_moment * self.of_moment).add_scalar(self.others)
     }
 }

@@ -3,7 +3,7 @@
 use super::deviation::Deviation;
 use super::dynamics::Dynamics;
 use super::geometry::TURN;
-use super::mismatch::{Drive, InertiaMoments, Mismatch, relative};
+use super::mismatch::{Drive, InertiaMoments, Mismatch};
 use crate::crmpc::settings::Settings;
 use crate::error_dynamics::{Early, Reach};
 use std::f64::consts::SQRT_2;
@@ -28,8 +28,6 @@ pub struct Parts {
     pub norm: f64,
     /// Moment of the inertia error.
     pub inertia: InertiaPart,
-    /// Factors that enlarge a pulse.
-    pub pulse: PulseFactors,
 }
 
 /// The part of K ô that compensates for the inertia error, as a moment.
@@ -65,8 +63,6 @@ pub(super) struct Reaches {
     pub(super) mispredictions: Reach,
     /// Of shifts of the angle by the swing.
     pub(super) shifts: Reach,
-    /// Of pulses at each tick.
-    pub(super) pulses: Reach,
 }
 
 impl Parts {
@@ -102,7 +98,6 @@ impl Parts {
             between: before.between(s),
             norm: drive.all + mismatch.mean,
             inertia: InertiaPart::new(s, dynamics, &before, [&drive, &larger]),
-            pulse: PulseFactors::new(s, &before, &larger),
             drive,
             mismatch,
         }
@@ -197,49 +192,5 @@ impl Reaches {
     /// Returns the effect of the errors of measurement.
     pub(super) fn of_errors(&self, s: &Settings) -> Reach {
         self.errors[0].times(s.angle_error).plus(&self.errors[1].times(s.rate_error))
-    }
-}
-
-/// Factors that enlarge a pulse beyond δ times the change of acceleration that the law intends.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PulseFactors {
-    /// Factor 1/(1 − ι) by the common factor of the inertia.
-    pub common: f64,
-    /// Factor by the whole inertia error and by the turn of the attitude until the command acts,
-    /// with the jump `revised`.
-    pub inertia: f64,
-    /// Jump of the rates at the next command because of a pulse, relative to the pulse.
-    pub revised: f64,
-    /// Jump of the rates by the mismatch that a pulse causes until a prediction includes it,
-    /// relative to the pulse.
-    pub mismatch: f64,
-    /// Change of the acceleration from one command to the next while the vehicle turns, rad/s².
-    pub turn: f64,
-}
-
-impl PulseFactors {
-    /// `before` and `drive` are the bounds before the nominal trajectory began, the larger ones.
-    ///
-    /// With the growth g over d + τ the pulse's share in the mismatch is (‖∂F/∂x‖ + ½ ‖∂F/∂Θ‖
-    /// (d + τ)) (d + τ) g, and a pulse revises the next command by δ (‖∂F/∂x‖ + ‖∂F/∂Θ‖ (d + τ)) g
-    /// of itself.
-    pub(super) fn new(s: &Settings, before: &Dynamics, drive: &Drive) -> Self {
-        let Dynamics { by_rates, by_angles, largest, smallest, geometry, .. } = before;
-        let common = relative(s.inertia_error);
-        let tensor = relative(s.tensor_error);
-        let root_condition = (largest / smallest).sqrt();
-        let elapsed = s.delay + s.period_feedback;
-        let growth = before.growth(elapsed);
-        let (turn, attitude) = before.between_commands(s, drive);
-        let inertia =
-            (1.0 + common) * (1.0 + tensor * root_condition * geometry.r) * (1.0 + attitude);
-        let revised = s.delay_error * inertia * (by_rates + by_angles * elapsed) * growth;
-        Self {
-            common: 1.0 + common,
-            inertia: inertia / (1.0 - revised),
-            revised,
-            mismatch: (by_rates + 0.5 * by_angles * elapsed) * elapsed * growth,
-            turn,
-        }
     }
 }

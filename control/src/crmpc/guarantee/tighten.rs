@@ -7,8 +7,6 @@ use super::losses::{MomentLoss, RateLoss, bearing};
 use super::mismatch::relative;
 use super::observable::Observable;
 use super::parts::{Parts, Reaches};
-use super::pulse::Pulse;
-use super::switching::Switching;
 use super::tightening::{AtTick, Tightening};
 use crate::controller::Explained;
 use crate::crmpc::settings::{InitialState, Settings};
@@ -31,23 +29,19 @@ pub(in crate::crmpc) fn tighten(s: &Settings) -> Result<(Tightening, Assessment)
     })?;
     let dynamics = Dynamics::new(s);
     let parts = Parts::new(s, &dynamics);
-    let switching = Switching::new(s, &error, &parts)?.map(Box::new);
     let sequence = Sequence::new(s, &error, &parts, steps)?;
     let bearing = bearing(s, dynamics.domain.sideslip);
     let h = s.period_optimisation;
-    let at = |(n, (deviation, pulse)): (usize, &(Deviation, f64))| AtTick {
+    let at = |(n, deviation): (usize, &Deviation)| AtTick {
         deviation: *deviation,
         bulge: sequence.bulge(n, |d| d.angle),
         moment_loss: MomentLoss::new(&dynamics, &sequence.within(n), bearing, h),
         rate_loss: sequence.rate_loss(n, h),
-        pulse: *pulse,
     };
     let tightening = Tightening {
         ticks: sequence.ticks.iter().enumerate().map(at).collect(),
-        switching,
         explained: explained(s, &dynamics, &parts),
         bearing,
-        norm: parts.norm,
         observable: Observable::all(s, &dynamics, &parts),
     };
     let assessment = assess(s, &dynamics, &tightening);
@@ -67,14 +61,13 @@ fn explained(s: &Settings, dynamics: &Dynamics, parts: &Parts) -> Explained {
             + 2.0 * (s.rate_error + of_angles) / s.period_feedback
             + parts.drive.of_creep,
         share: relative(s.inertia_error),
-        delay_error: s.delay_error,
     }
 }
 
-/// The deviation at each feedback tick since the nominal trajectory began, with the largest pulse
-/// (rad/s) by a change of K ô there. The last tick represents all later ones.
+/// The deviation at each feedback tick since the nominal trajectory began. The last tick represents
+/// all later ones.
 struct Sequence {
-    ticks: Vec<(Deviation, f64)>,
+    ticks: Vec<Deviation>,
     /// Feedback ticks per optimisation.
     ratio: usize,
 }
@@ -100,7 +93,6 @@ impl Sequence {
         let changes = early[0].count(&error.changes(steps));
         let mispredictions = error.mispredictions(steps, early[1]);
         let shifts = early[2].count(&error.shifts(steps));
-        let pulses = error.pulses(steps);
         let reaches = |n: usize| Reaches {
             disturbance: set.map_or(disturbance[n], |set| disturbance[steps].or(&set)),
             early_feedback: disturbance[n].feedback
@@ -109,20 +101,13 @@ impl Sequence {
             changes: changes[n],
             mispredictions: mispredictions[n],
             shifts: shifts[n],
-            pulses: pulses[n],
         };
-        // Between two ticks the pulse of the next one may show already; pulses only grow.
-        let largest = Pulse::new(s, parts, &reaches(steps)).norm();
-        let at = |n: usize| {
-            let (reaches, pulse) = (reaches(n), Pulse::new(s, parts, &reaches(n)));
-            let of_pulses = pulse.deviation(s, &reaches.pulses, largest);
-            (parts.deviation(s, &reaches).plus(&of_pulses), pulse.norm())
-        };
-        let mut ticks: Vec<(Deviation, f64)> = (0..=steps).map(at).collect();
+        let at = |n: usize| parts.deviation(s, &reaches(n));
+        let mut ticks: Vec<Deviation> = (0..=steps).map(at).collect();
         // By errors of the measurement the deviation may be larger at an early tick than at the
         // last. As the last entry represents all later ticks, and for every tick with `tube`, it
         // takes the largest of all.
-        ticks[steps].0 = ticks.iter().fold(Deviation::default(), |most, at| most.or(&at.0));
+        ticks[steps] = ticks.iter().fold(Deviation::default(), |most, at| most.or(at));
         if is_tube {
             ticks.drain(..steps);
         }
@@ -131,7 +116,7 @@ impl Sequence {
     }
 
     fn at(&self, tick: usize) -> &Deviation {
-        &self.ticks[tick.min(self.ticks.len() - 1)].0
+        &self.ticks[tick.min(self.ticks.len() - 1)]
     }
 
     /// Returns the largest deviation within the optimisation period that begins at a tick.
@@ -178,7 +163,6 @@ pub(in crate::crmpc) fn with_share(s: &Settings, share: f64) -> Settings {
         rate_error: share * s.rate_error,
         slow_angle_error: share * s.slow_angle_error,
         slow_angle_rate: share * s.slow_angle_rate,
-        delay_error: share * s.delay_error,
         known_bound: share * s.known_bound,
         known_change: share * s.known_change,
         ..*s

@@ -3,7 +3,6 @@
 use super::deviation::Deviation;
 use super::losses::{MomentLoss, RateLoss};
 use super::observable::{MEANS, Observable};
-use super::switching::Switching;
 use crate::controller::Explained;
 
 /// Tightening of the robust set, by feedback ticks since the nominal trajectory began at the
@@ -14,14 +13,10 @@ pub struct Tightening {
     pub(super) ticks: Vec<AtTick>,
     /// Largest ‖I W s‖ over the corners s of the unit box at any attitude of the domain, kg m².
     pub bearing: f64,
-    /// Bound on the norm of everything that drives the deviation, rad/s².
-    pub norm: f64,
     /// Largest means of an observed disturbance that the assumptions explain.
     pub(in crate::crmpc) observable: [Observable; MEANS],
     /// Largest mean acceleration over a period that the assumptions explain.
     pub explained: Explained,
-    /// Addition for an unknown part of the delay; `None` if the delay is exact.
-    pub switching: Option<Box<Switching>>,
 }
 
 /// Parts of the limits that are reserved for the deviation at a feedback tick.
@@ -37,9 +32,6 @@ pub(in crate::crmpc) struct AtTick {
     /// Loss of rate by the deviation at the tick, and in the intervals of the plan before and after
     /// it.
     pub rate_loss: RateLoss,
-    /// Pulse by a change of K ô at the tick: the largest jump of the rates if the command begins to
-    /// act earlier or later than assumed, rad/s.
-    pub pulse: f64,
 }
 
 impl Tightening {
@@ -51,11 +43,6 @@ impl Tightening {
     /// Returns the deviation `tick` feedback ticks after the nominal trajectory began.
     pub fn at(&self, tick: usize) -> &Deviation {
         &self.tick(tick).deviation
-    }
-
-    /// Returns the largest deviation at the `ratio` ticks from `tick` on.
-    pub(in crate::crmpc) fn within(&self, tick: usize, ratio: usize) -> Deviation {
-        (tick..tick + ratio).fold(Deviation::default(), |largest, n| largest.or(self.at(n)))
     }
 
     /// Returns the deviation that is never exceeded.

@@ -2,10 +2,9 @@
 //! that the plan leaves.
 
 use super::{Interval, RESERVE, Robust, norm_of_columns};
-use crate::crmpc::guarantee::{self, Dynamics, Onset};
+use crate::crmpc::guarantee;
 use crate::crmpc::horizon::{PlanPoint, points};
 use crate::crmpc::memory::{Margins, Memory};
-use crate::crmpc::set::ROUNDING;
 use crate::crmpc::settings::Settings;
 use crate::crmpc::stages::Point;
 use crate::mpc::ErrorTrajectory;
@@ -32,7 +31,6 @@ impl Robust {
         {
             return None;
         }
-        self.carry(motion);
         // The first state, which no optimisation can change, and the last one, beyond which the
         // motion brakes, are checked separately.
         let [first, second, last] = [0, 1, n].map(|k| stages.point(motion, k));
@@ -47,36 +45,13 @@ impl Robust {
             self.keeps_sideslip(k, [beta, rate], a, sideslip(k + 1)[0])
         });
         let (size, bound) = (rates.rates.norm(), bound + self.reserves().0);
-        if !inside || size > bound || !self.keeps_before(&first, (size, bound)) {
+        if !inside || size > bound {
             return None;
         }
-        let end = self.horizon_end(&last, &stages.point(motion, n - 1));
+        let end = self.horizon_end(&last);
         let (settings, tightening) = (self.settings_of_plan(), self.tightening());
         let braking = guarantee::braking(&settings, dynamics, tightening, &end)?;
         Some(Certified { margins: self.margins_of_first(&first, &second), braking })
-    }
-
-    /// Returns whether the limits hold also in the last instants before the motion, in which its
-    /// first command already acts if the delay is shorter than assumed. `size` is ‖ω̃‖ at the first
-    /// stage and `bound` its bound, `sideslip` is β̃ there.
-    ///
-    /// Either the plan before left room for such a command, or the motion does not come near the
-    /// limits in that time.
-    fn keeps_before(&self, first: &Point, (size, bound): (f64, f64)) -> bool {
-        let Some((switching, carried)) = self.switching(0) else { return true };
-        let Onset { before, allowed, .. } = self.onset;
-        let change = (first.acceleration - before).norm();
-        if switching.pulse_of_command(change) <= allowed * (1.0 + ROUNDING) {
-            return true;
-        }
-        let tightening = &self.design.tightening;
-        let Settings { delay_error, sideslip_domain, .. } = self.settings;
-        let of_angle = tightening.at(self.age).angle + switching.deviation(&carried).angle;
-        let Dynamics { geometry, rate, .. } = &self.dynamics;
-        let travel = self.dynamics.travel(&self.settings);
-        let most = first.pull.max(before.norm()) + tightening.norm + switching.turn;
-        size + delay_error * (most + geometry.drift * rate * rate) <= bound
-            && first.angles.y.abs() + of_angle + delay_error * travel <= sideslip_domain
     }
 
     /// Returns whether |β| stays within its bound throughout interval `k`, whatever the error
@@ -90,11 +65,7 @@ impl Robust {
     pub(super) fn keeps_sideslip(&self, k: usize, here: [f64; 2], a: f64, end: f64) -> bool {
         let Settings { period_optimisation: h, sideslip_domain, .. } = self.settings;
         let tightening = self.tightening();
-        let more = self.switching(k).map_or(0.0, |(switching, carried)| {
-            let next = self.carried.borrow().get(k + 1).copied().unwrap_or_default();
-            switching.deviation(&carried).angle + switching.begun_early(&next).0
-        });
-        let [from, to] = [k, k + 1].map(|k| tightening.at(self.tick(k)).angle + more);
+        let [from, to] = [k, k + 1].map(|k| tightening.at(self.tick(k)).angle);
         let slope = (to - from) / h;
         let largest = |sign: f64| {
             let (rate, a) = (sign * here[1] + slope, sign * a);
@@ -131,7 +102,6 @@ impl Robust {
 
     /// Returns the margins of a trajectory.
     pub(super) fn margins(&self, motion: &ErrorTrajectory<2>) -> Margins {
-        self.carry(motion);
         self.margins_of_first(&self.stages.point(motion, 0), &self.stages.point(motion, 1))
     }
 

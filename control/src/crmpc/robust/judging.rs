@@ -172,10 +172,7 @@ impl Robust {
         feedback: &Vector3<f64>,
     ) -> bool {
         let tick = memory.age as usize + tick as usize;
-        let mut bounds = *self.design.at_level(memory.plan.terms.level).at(tick);
-        if let Some(switching) = &self.design.tightening.switching {
-            bounds = bounds.plus(&switching.deviation(&memory.plan.begins_with(switching)));
-        }
+        let bounds = self.design.at_level(memory.plan.terms.level).at(tick);
         let r = 1.0 / cos(self.settings.sideslip_domain);
         let norm_part =
             bounds.feedback_norm + bounds.feedback_moment * r / self.design.smallest_inertia;

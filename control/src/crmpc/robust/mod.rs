@@ -7,17 +7,12 @@ mod norms;
 mod planning;
 
 use super::design::Design;
-use super::guarantee::{
-    self, BRAKING, Carried, Dynamics, End, Held, HorizonEnd, MomentLoss, Onset, Switching,
-    Tightening,
-};
+use super::guarantee::{self, Dynamics, End, Held, HorizonEnd, Tightening};
 use super::plan::Terms;
 use super::settings::Settings;
 use super::stages::{Point, Stages};
 use crate::linearise::Linear;
-use crate::mpc::ErrorTrajectory;
 use nalgebra::{Matrix3, Vector3, Vector6};
-use std::cell::RefCell;
 use vehicle::math::cos;
 
 /// The robust set: the data from which its bounds follow.
@@ -33,15 +28,10 @@ pub(super) struct Robust {
     pub share: f64,
     /// Whether another optimisation follows if this one finds no optimum.
     pub another: bool,
-    /// History before the motion.
-    pub onset: Onset,
     /// Terms of the plan.
     terms: Terms,
     /// Part of the rate limit that the turn of the trajectory needs, rad/s.
     turn: f64,
-    /// Deviation by changes of the acceleration at the stages of the motion that was propagated
-    /// last; empty if the delay is exact.
-    carried: RefCell<Vec<Carried>>,
 }
 
 /// Share of the limits that the bounds of the robust set leave free, and that the check of a motion
@@ -77,7 +67,6 @@ struct Beginning {
     state: Vector6<f64>,
     /// Feedback ticks since the nominal trajectory began at a measured state.
     age: u32,
-    onset: Onset,
     /// Level of the bound on the disturbance, see [`crate::crmpc::Terms::level`].
     level: usize,
 }
@@ -95,16 +84,14 @@ impl Robust {
             age: 0,
             share: 1.0,
             another: false,
-            onset: Onset::default(),
-            carried: RefCell::new(Vec::with_capacity(settings.horizon + 1)),
         }
     }
 
     /// Prepares the bounds for a nominal trajectory with this beginning and this share of the
     /// tightening.
     fn begin(&mut self, beginning: &Beginning, share: f64) {
-        let Beginning { age, onset, level, .. } = *beginning;
-        (self.age, self.share, self.onset) = (age as usize, share, onset);
+        let Beginning { age, level, .. } = *beginning;
+        (self.age, self.share) = (age as usize, share);
         self.terms.level = level;
         self.another = false;
     }
@@ -117,27 +104,6 @@ impl Robust {
     /// Returns the settings with the limit that the plan assumes.
     fn settings_of_plan(&self) -> Settings {
         Settings { limit_moment: self.terms.limit_moment, ..self.settings }
-    }
-
-    /// Returns the addition for an unknown part of the delay, with the deviation at stage `k`.
-    fn switching(&self, k: usize) -> Option<(&Switching, Carried)> {
-        let switching = self.design.tightening.switching.as_deref()?;
-        Some((switching, self.carried.borrow().get(k).copied().unwrap_or_default()))
-    }
-
-    /// Propagates the deviation that the changes of acceleration of a trajectory leave.
-    pub(super) fn carry(&self, motion: &ErrorTrajectory<2>) {
-        let Some(switching) = &self.design.tightening.switching else { return };
-        let mut carried_at_stages = self.carried.borrow_mut();
-        carried_at_stages.clear();
-        let (mut carried, mut before) = (self.onset.carried, self.onset.before);
-        for (input, reference) in motion.inputs.iter().zip(&self.stages.references) {
-            let a = input + reference.accelerations;
-            carried = switching.begin(&carried, (a - before).norm());
-            carried_at_stages.push(carried);
-            (carried, before) = (switching.next(&carried), a);
-        }
-        carried_at_stages.push(carried);
     }
 
     /// Returns the parts of the rate limit and of the moment limit that the bounds leave free.
@@ -193,80 +159,37 @@ impl Robust {
         let a = here.pull.max(before.pull).max(typical);
         let size = here.size + 2.0 * h * a;
         let loss = &self.tightening().tick(self.tick(k)).rate_loss;
-        let more = self.more_of_the_deviation(k, here, before).map(|more| loss.with(more, h));
-        let loss = more.as_ref().unwrap_or(loss);
         let loss = loss.at(by_angles, here.size) + loss.within(size, a);
         let bound = limit_rate - self.turn - reserve - self.share * loss;
         // This uses ‖x̃_ω‖ ≤ sec β ‖ω̃‖.
         if k == horizon {
-            let terminal_rate = self.terminal_rate(here, before);
-            bound.min(terminal_rate * cos(here.angles.y) - reserve)
+            bound.min(self.terminal_rate() * cos(here.angles.y) - reserve)
         } else {
             bound
         }
     }
 
     /// Returns the largest ‖x̃_ω‖ at the end of the horizon, rad/s.
-    fn terminal_rate(&self, last: &Point, before: &Point) -> f64 {
+    fn terminal_rate(&self) -> f64 {
         let Self { settings, dynamics, design, terms, .. } = self;
-        let switching = design.tightening.switching.as_deref();
         let is_scheduled = terms.level > 0 || terms.limit_moment < settings.limit_moment;
-        if switching.is_none() && self.turn == 0.0 && !is_scheduled {
+        if self.turn == 0.0 && !is_scheduled {
             return design.assessment.terminal_rate;
         }
-        let (settings, tightening) = (self.settings_of_plan(), self.tightening());
-        let braking = switching.map(|switching| {
-            let end = self.horizon_end(last, before);
-            end.while_braking(&settings, switching, 2.0 * BRAKING)
-        });
-        guarantee::terminal_rate(&settings, dynamics, tightening, braking.as_ref(), self.turn)
+        let settings = self.settings_of_plan();
+        guarantee::terminal_rate(&settings, dynamics, self.tightening(), self.turn)
     }
 
-    /// Returns the end of a plan with these last two stages.
-    fn horizon_end(&self, last: &Point, before: &Point) -> HorizonEnd {
-        let carried = self.switching(self.settings.horizon).map(|(_, carried)| carried);
-        HorizonEnd {
-            sideslip: last.angles.y,
-            rates: last.rates,
-            pull: before.pull,
-            carried: carried.unwrap_or_default(),
-            turn: self.turn,
-        }
-    }
-
-    /// Returns the deviation of angles and rates (rad, rad/s) by the plan's changes of acceleration
-    /// at prediction step k and in the intervals before and after, if the delay is not exact.
-    fn more_of_the_deviation(&self, k: usize, here: &Point, before: &Point) -> Option<(f64, f64)> {
-        let (switching, mut carried) = self.switching(k)?;
-        let Settings { horizon, period_optimisation: h, .. } = self.settings;
-        if k == horizon {
-            // The motion brakes from here on, with less than 1/h.
-            carried = switching.begin(&carried, before.pull + here.size / h);
-        }
-        let after = switching.deviation(&carried);
-        let Some(before) = k.checked_sub(1).and_then(|k| self.switching(k)) else {
-            return Some((after.angle, after.rate));
-        };
-        let (in_between, early) = (switching.deviation(&before.1), switching.begun_early(&carried));
-        let largest = |after: f64, before: f64, early: f64| after.max(before + early);
-        Some((
-            largest(after.angle, in_between.angle, early.0),
-            largest(after.rate, in_between.rate, early.1),
-        ))
+    /// Returns the end of a plan with this last stage.
+    fn horizon_end(&self, last: &Point) -> HorizonEnd {
+        HorizonEnd { sideslip: last.angles.y, rates: last.rates, turn: self.turn }
     }
 
     /// Returns the bound on ‖m̃‖ at the start of prediction interval k, between these ends and with
     /// an acceleration of this norm, for which ‖m‖ keeps its limit at each of its feedback ticks.
     pub(super) fn moment_bound(&self, k: usize, ends: &[End; 2], acceleration: f64) -> f64 {
         let held = Held { acceleration, ratio: self.design.ratio, share: self.share };
-        let tightening = self.tightening();
-        let more = self.switching(k).map(|(switching, carried)| {
-            let deviation = tightening.within(self.tick(k), self.design.ratio);
-            let deviation = deviation.plus(&switching.deviation(&carried));
-            let h = self.settings.period_optimisation;
-            MomentLoss::new(&self.dynamics, &deviation, tightening.bearing, h)
-        });
-        let loss = more.as_ref().unwrap_or_else(|| &tightening.tick(self.tick(k)).moment_loss);
+        let loss = &self.tightening().tick(self.tick(k)).moment_loss;
         let needed = loss.largest_moment(&self.dynamics, ends, held);
         let limit = self.terms.limit_moment - self.settings.known_change;
         limit - self.reserves().1 - (needed - ends[0].moment)

@@ -41,7 +41,6 @@ impl Robust {
         intervals: Range<usize>,
         mut keep: impl FnMut(usize, (f64, f64)),
     ) -> Option<Range<usize>> {
-        self.carry(motion);
         self.stages.first_and_last(motion, intervals, |k, here, next, anchor| {
             let (Interval { rate_bound, moment_bound, .. }, kept) =
                 self.examine(k, here, next, anchor);
@@ -176,7 +175,6 @@ impl Bounded<2> for Robust {
         intervals: Range<usize>,
         bounds: &mut mpc::Bounds,
     ) {
-        self.carry(motion);
         let mut here = self.stages.point(motion, intervals.start);
         for k in intervals {
             let next = self.stages.point(motion, k + 1);

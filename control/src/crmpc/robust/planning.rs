@@ -4,7 +4,7 @@
 use super::certificate::Certified;
 use super::{Beginning, Robust};
 use crate::crmpc::feedback::{Feedback, Tick};
-use crate::crmpc::guarantee::{BRAKING, Onset};
+use crate::crmpc::guarantee::BRAKING;
 use crate::crmpc::memory::Memory;
 use crate::crmpc::planner::Planner;
 use crate::crmpc::settings::{InitialState, Settings};
@@ -60,13 +60,7 @@ impl Robust {
         memory.pending = memory.pending.saturating_sub(1);
         memory.recent_bound = self.recent_bound(memory);
         memory.acting.ticks = memory.acting.ticks.saturating_sub(1);
-        let Memory { commands, observed, .. } = memory;
-        let (settings, tightening) = (&self.settings, &self.design.tightening);
-        let pulse = tightening
-            .switching
-            .as_ref()
-            .map_or(0.0, |switching| commands.observe(settings, switching, observed));
-        observed.observe(settings, &tightening.observable, angle_rates, pulse);
+        memory.observed.observe(&self.settings, &self.design.tightening.observable, angle_rates);
     }
 
     /// Returns the moment for an acceleration, N m. It is exact in the middle of the period over
@@ -113,17 +107,12 @@ impl Robust {
     }
 
     /// Shifts the plan by one step as in (31). Beyond the horizon it brakes, α̈ = −κ α̇,
-    /// β̈ = −κ_β β̇ and σ̈ = −κ σ̇ (step 6 of the proof). What it carries is moved on to its new
-    /// beginning.
+    /// β̈ = −κ_β β̇ and σ̈ = −κ σ̇ (step 6 of the proof).
     fn shift(&self, memory: &mut Memory) {
         let Settings { horizon, period_optimisation, .. } = self.settings;
         let plan = &mut memory.plan;
         let braking = Vector3::new(BRAKING, plan.braking, BRAKING);
         let a = -plan.states[horizon].fixed_rows::<3>(3).component_mul(&braking);
-        if let Some(switching) = &self.design.tightening.switching {
-            plan.onset.carried = switching.next(&plan.begins_with(switching));
-            plan.onset.before = plan.accelerations[0];
-        }
         plan.shift(&a, period_optimisation);
         memory.age = memory.age.saturating_add(self.design.ratio as u32);
     }
@@ -150,43 +139,22 @@ impl Robust {
         if is_told { turn.norm() + self.settings.turn_change } else { 0.0 }
     }
 
-    /// Returns the beginning of a nominal trajectory at the measured state. It begins with the
-    /// pulses that the measurement may not show yet, and its first command may cause a pulse as
-    /// large as the one for which the plan before leaves room (step 7 of the proof).
-    fn anew(&self, memory: &Memory, measured: &Vector6<f64>) -> Beginning {
-        let begins = |onset| Beginning { state: *measured, age: 0, onset, level: self.terms.level };
-        let Some(switching) = &self.design.tightening.switching else {
-            return begins(Onset::default());
-        };
-        let at_rest = || {
-            let (angles, rates) = split(measured);
-            self.settings.body.drift(&angles, &rates)
-        };
-        let allowed = memory.plan.begins_with(switching).z
-            + self.design.at_level(memory.plan.terms.level).tick(memory.age as usize).pulse;
-        begins(Onset {
-            carried: switching.unseen(memory.commands.changes()),
-            before: memory.observed.commanded().unwrap_or_else(at_rest),
-            allowed: if memory.assured() { allowed } else { f64::INFINITY },
-        })
+    /// Returns the beginning of a nominal trajectory at the measured state.
+    fn anew(&self, measured: &Vector6<f64>) -> Beginning {
+        Beginning { state: *measured, age: 0, level: self.terms.level }
     }
 
     /// Returns the beginning of the present plan, if it goes on. It assumes a disturbance no
     /// smaller than the one that drives the deviation already.
     fn going_on(&self, memory: &Memory) -> Beginning {
         let plan = &memory.plan;
-        let mut onset = plan.onset;
-        if let Some(switching) = &self.design.tightening.switching {
-            let allowed = switching.pulse_of_command(plan.first_change());
-            onset.allowed = if memory.assured() { allowed } else { f64::INFINITY };
-        }
         let level = self.terms.level.min(plan.terms.level);
-        Beginning { state: plan.states[0], age: memory.age, onset, level }
+        Beginning { state: plan.states[0], age: memory.age, level }
     }
 
     /// Returns the beginnings that are tried, in this order.
     fn beginnings(&self, memory: &Memory, measured: &Vector6<f64>) -> [Option<Beginning>; 2] {
-        let (anew, going_on) = (self.anew(memory, measured), self.going_on(memory));
+        let (anew, going_on) = (self.anew(measured), self.going_on(memory));
         match self.settings.initial_state {
             InitialState::Nominal if memory.assured() => [Some(going_on), None],
             InitialState::Measured if memory.assured() => [Some(anew), Some(going_on)],
@@ -238,7 +206,7 @@ impl Robust {
         beginning: &Beginning,
         before: Before,
     ) -> OptimiserReport {
-        let Beginning { state, age, onset, .. } = beginning;
+        let Beginning { state, age, .. } = beginning;
         let about_itself = before != Before::Followed;
         let report = planner.solve(self, &self.stages, memory, state, about_itself);
         if report.status == SolverStatus::Fallback {
@@ -252,7 +220,7 @@ impl Robust {
             return OptimiserReport { status: SolverStatus::Fallback, ..report };
         }
         planner.follow_optimum(&self.stages, memory, state);
-        (memory.age, memory.plan.onset) = (*age, *onset);
+        memory.age = *age;
         self.take_over(planner, memory, certified);
         report
     }
@@ -306,8 +274,8 @@ impl Robust {
         let measured = planner.measured;
         memory.guarantee = self.without_guarantee(memory);
         self.terms = self.terms(memory);
-        let beginning = self.anew(memory, &measured);
-        (memory.age, memory.plan.onset, memory.plan.terms) = (0, beginning.onset, self.terms);
+        let beginning = self.anew(&measured);
+        (memory.age, memory.plan.terms) = (0, self.terms);
         let mut iterations = tried;
         for share in LESS {
             if planner.optimiser.is_exhausted() {

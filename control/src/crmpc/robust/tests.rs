@@ -4,7 +4,7 @@ use super::*;
 use crate::crmpc::settings::Constraints;
 use crate::error_dynamics::Gain;
 use crate::linearise::{self, InverseKinematics};
-use crate::mpc::{self, Bounded};
+use crate::mpc::{self, Bounded, ErrorTrajectory};
 use proptest::prelude::*;
 use proptest::test_runner::{Config, RngAlgorithm, TestRng, TestRunner};
 use std::cell::Cell;

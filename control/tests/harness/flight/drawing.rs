@@ -21,10 +21,6 @@ impl Flight {
             1 => 1.0 + settings.inertia_error,
             _ => 1.0 + settings.inertia_error * random.between(-1.0, 1.0),
         };
-        if settings.delay_error > 0.0 {
-            flight.late =
-                settings.delay_error * [-1.0, 1.0, random.between(-1.0, 1.0)][random.below(3)];
-        }
         if settings.tensor_error > 0.0 {
             flight.tensor_error = Self::tensor_of(settings.tensor_error, random);
         }

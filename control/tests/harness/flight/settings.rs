@@ -59,9 +59,6 @@ pub fn random_settings(seed: u64) -> Settings {
         tensor_error: half(random, 0.08),
         ..published
     };
-    if settings.initial_state != InitialState::Tube && settings.feedback.eigenvalues().is_some() {
-        settings.delay_error = half(random, 0.5) * settings.delay.min(period_feedback);
-    }
     settings.slow_angle_error = half(random, 1.0).to_radians();
     settings.slow_angle_rate = half(random, 0.1).to_radians();
     settings
@@ -76,7 +73,7 @@ pub fn tried(settings: &Settings, seed: u64) -> Tried {
     let DesignError::NoGuarantee(bounds) = &error else {
         return Tried::Invalid(error.to_string());
     };
-    let Refusal { disturbance, errors, slow_errors, delay, delay_error, .. } = **bounds;
+    let Refusal { disturbance, errors, slow_errors, delay, .. } = **bounds;
     // The bounds are rounded as the message prints them.
     let down = |value: f64| (value * 1e4).floor() / 1e4;
     let down_angle = |value: f64| down(value.to_degrees()).to_radians();
@@ -93,7 +90,6 @@ pub fn tried(settings: &Settings, seed: u64) -> Tried {
             ..*settings
         }),
         delay.map(|delay| Settings { delay: down(delay), ..*settings }),
-        delay_error.map(|error| Settings { delay_error: down(error), ..*settings }),
     ];
     let named: Vec<Settings> = with.into_iter().flatten().collect();
     let refusal = |settings: &Settings| Crmpc::new(*settings).err();

@@ -21,43 +21,6 @@ pub(super) struct Mismatch {
     pub(super) revised: Interval,
     /// Largest distance of the rates (rad/s) and of the angles α, β (rad) from their prediction.
     pub(super) apart: [Interval; 2],
-    /// The same between two successive predictions.
-    updated: [Interval; 2],
-}
-
-/// How the change of a command becomes a pulse if it begins to act up to δ early or late.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Switched {
-    /// Bound δ on the error of the delay, s.
-    pub(super) error: Interval,
-    /// Largest ratio of R I_v⁻¹ (m − m′) to R I⁻¹ (m − m′) at the predicted attitude, and its part
-    /// that keeps the direction.
-    pub(super) factor: Interval,
-    pub(super) straight: Interval,
-    /// Change of the rates by F, relative to a pulse, until the prediction contains the pulse.
-    pub(super) share: Interval,
-    /// Bound on ‖F(y, m) − F(y′, m)‖ for the predicted middles y and y′ of two periods, rad/s².
-    pub(super) turn: Interval,
-}
-
-impl Switched {
-    /// R I_v⁻¹ I W′ = R (1 + D) W′/(1 + c) with ‖D‖ ≤ √(I_max/I_min) ε/(1 − ε), and ‖R W′ − 1‖ ≤
-    /// ‖R‖ ‖W′ − W‖. From one middle to the next lie a period and the change by a measurement.
-    fn new(s: &Settings, bounds: &Smoothness, inertia: &InertiaError, later: &Mismatch) -> Self {
-        let [error, tau] = [s.delay_error, s.period_feedback].map(number);
-        let one = Interval::ONE;
-        let [common, tensor] = [s.inertia_error, s.tensor_error].map(number);
-        let straight = one / (one - common);
-        let away = bounds.angle_rate * (number(0.5) * tau + error) + later.apart[1];
-        let turned = number(3.0).sqrt() * away + inertia.root_condition * tensor / (one - tensor);
-        let swing = bounds.slope * tau.square();
-        let [rate, angle] = later.updated;
-        let turn = bounds.by_rates * (bounds.force * tau + swing + rate)
-            + bounds.by_angles * (bounds.angle_rate * tau + swing * tau + angle);
-        let end = number(s.delay) + tau;
-        let share = end * (bounds.by_rates + bounds.by_angles * end) / slack(bounds, end);
-        Self { error, factor: straight * (one + bounds.r[0] * turned), straight, share, turn }
-    }
 }
 
 /// Everything that drives the deviation.
@@ -72,8 +35,6 @@ pub(super) struct Causes {
     /// may exceed their limit, and the number of such ticks.
     pub(super) first: (Mismatch, usize),
     pub(super) smoothness: Smoothness,
-    /// How changes of the command become pulses.
-    pub(super) switched: Switched,
     /// Difference of F at the predicted middle of the period from the intended acceleration,
     /// rad/s².
     pub(super) middle: Interval,
@@ -104,8 +65,6 @@ pub(super) struct InertiaError {
     pub(super) direct: Interval,
     /// Moment on which M acts, times ‖I^½ M I^½‖, N m.
     pub(super) turned: Interval,
-    /// Change of the body rates by 2 δ of the largest moment, rad/s.
-    displaced: Interval,
     /// √(I_max/I_min), by which the latter grows if it is expressed as a moment: I M = I^½ D I^−½
     /// with ‖D‖ ≤ ε/(1 − ε).
     pub(super) root_condition: Interval,
@@ -127,8 +86,6 @@ impl InertiaError {
             acceleration: (direct + turned) * secant / smallest,
             direct,
             turned,
-            displaced: number(2.0) * number(s.delay_error) * limit
-                / ((one - common) * (one - tensor) * smallest),
             root_condition: (largest / smallest).sqrt(),
         }
     }
@@ -161,33 +118,11 @@ impl SlowErrors {
 /// Bounds how F differs along the true and the predicted trajectory. The distance z of the rates
 /// grows by what drives them apart and by the difference f of F itself, for which the function
 /// finds an upper bound.
-///
-/// If commands begin to act early or late, the integral of the moment over any time differs by that
-/// at both ends of this time, so that the rates are displaced by no more than `jump`. This counts
-/// for the distances; the difference of F by it belongs to each pulse.
 fn mismatch(
     s: &Settings,
     bounds: &Smoothness,
     inertia: &InertiaError,
     slow: SlowErrors,
-) -> Option<Mismatch> {
-    let end = number(s.delay) + number(s.period_feedback);
-    let jump = inertia.displaced * (bounds.r[0] + bounds.r[1] * end);
-    let Mismatch { apart, updated, .. } = mismatch_with(s, bounds, (inertia, slow), jump)?;
-    let without = mismatch_with(s, bounds, (inertia, slow), Interval::ZERO)?;
-    Some(Mismatch { apart, updated, ..without })
-}
-
-/// Part of one that remains when F drives two motions further apart in turn.
-fn slack(bounds: &Smoothness, end: Interval) -> Interval {
-    Interval::ONE - bounds.by_rates * end - number(0.5) * bounds.by_angles * end.square()
-}
-
-fn mismatch_with(
-    s: &Settings,
-    bounds: &Smoothness,
-    (inertia, slow): (&InertiaError, SlowErrors),
-    jump: Interval,
 ) -> Option<Mismatch> {
     let (d, tau, half) = (number(s.delay), number(s.period_feedback), number(0.5));
     let (root2, root3) = (number(2.0).sqrt(), number(3.0).sqrt());
@@ -197,11 +132,12 @@ fn mismatch_with(
     let end = d + tau;
     let lasting = inertia.acceleration + slow.acceleration;
     let (drive, drive_of_two) = (root3 * delta + lasting, root2 * delta + lasting);
-    let rates = |drive: Interval, t: Interval| root3 * e + jump + drive * t;
+    let rates = |drive: Interval, t: Interval| root3 * e + drive * t;
     let angles = |drive: Interval, t: Interval| {
-        root2 * (eta + e * t) + (jump + slow.creep) * t + half * drive * t.square()
+        root2 * (eta + e * t) + slow.creep * t + half * drive * t.square()
     };
-    let slack = slack(bounds, end);
+    // Part of one that remains when F drives two motions further apart in turn.
+    let slack = Interval::ONE - by_rates * end - half * by_angles * end.square();
     if slack.low <= 0.1 {
         return None;
     }
@@ -210,9 +146,9 @@ fn mismatch_with(
     // Integrals over [0, t] of the two distances.
     let sixth = Interval::ONE / number(6.0);
     let sum = |t: Interval| {
-        let rates = (root3 * e + jump) * t + half * drive * t.square();
+        let rates = root3 * e * t + half * drive * t.square();
         let angles = root2 * (eta * t + half * e * t.square())
-            + half * (jump + slow.creep) * t.square()
+            + half * slow.creep * t.square()
             + sixth * drive_of_two * t.square() * t;
         by_rates * rates + by_angles * angles
     };
@@ -227,7 +163,6 @@ fn mismatch_with(
         unseen: [d * unseen, unseen],
         revised: upper(sum(tau) + since),
         apart: [rates(drive, end), angles(drive_of_two, end)],
-        updated: [rate, apart[1] + rate * d],
     })
 }
 
@@ -265,7 +200,6 @@ impl Causes {
                 return Some(Self {
                     disturbance: number(s.disturbance_bound),
                     errors: [number(s.angle_error), number(s.rate_error)],
-                    switched: Switched::new(s, &wider, &inertia, &first),
                     inertia,
                     slow,
                     later,

@@ -15,15 +15,6 @@ impl Extent {
         Self { half: self.half.max(other.half), norm: self.norm.max(other.norm) }
     }
 
-    pub(super) fn more(self, half: Interval, norm: Interval) -> Self {
-        Self { half: upper(self.half + half), norm: upper(self.norm + norm) }
-    }
-
-    /// The same with more, of which `size` is per unit of each.
-    pub(super) fn pulsed(self, [half, norm]: [Interval; 2], size: f64) -> Self {
-        self.more(half * Interval::from(size), norm * Interval::from(size))
-    }
-
     /// Bound on one component.
     pub(super) fn component(self) -> Interval {
         self.half + self.norm
@@ -58,20 +49,6 @@ impl Deviation {
             feedback: self.feedback.max(other.feedback),
             inertia: self.inertia.max(other.inertia),
             bulge: self.bulge.max(other.bulge),
-        }
-    }
-}
-
-impl Deviation {
-    /// The same with the effects of pulses of these sizes along each row.
-    pub(super) fn pulsed(&self, by: [Interval; 2], sums: &[f64; 6]) -> Self {
-        Self {
-            angle: self.angle.pulsed(by, sums[0]),
-            rate: self.rate.pulsed(by, sums[1]),
-            law_angle: self.law_angle.pulsed(by, sums[2]),
-            law_rate: self.law_rate.pulsed(by, sums[3]),
-            feedback: self.feedback.pulsed(by, sums[4]),
-            ..*self
         }
     }
 }

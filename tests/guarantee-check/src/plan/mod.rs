@@ -5,26 +5,22 @@
 //! certificate uses. No number of the controller's design enters, only the settings, the plan and
 //! its age. docs/proof.md gives the derivation.
 
-mod around;
 mod body;
 mod causes;
 mod deviation;
 mod jet;
 mod law;
-mod pulses;
 mod reach;
 mod rest;
 mod smoothness;
 
 use crate::interval::Interval;
-use around::Around;
 use body::Body;
 use control::crmpc::{Constraints, Design, InitialState, Plan, Settings};
 use control::error_dynamics::InvariantSet;
 use deviation::Deviation;
 use law::Range;
 use nalgebra::Vector6;
-pub use pulses::Past;
 use reach::Reach;
 
 /// Smallest shares of the limits that a plan leaves unused; negative where the check does not
@@ -130,29 +126,19 @@ impl PlanCheck {
 
     /// Checks a plan whose nominal trajectory began `age` feedback ticks before the plan.
     pub fn check(&self, plan: &Plan, age: usize) -> Verdict {
-        self.check_after(&Past::default(), plan, age, 0.0)
-    }
-
-    /// Checks a plan with the commands before it. The command that ends its first interval changes
-    /// the acceleration by `next` (rad/s²), if that is more than the plan itself does; it may begin
-    /// to act before that end.
-    pub fn check_after(&self, past: &Past, plan: &Plan, age: usize, next: f64) -> Verdict {
         let mut verdict =
             Verdict { left: Left::ALL, at: [0.0; 3], consistent: self.is_consistent(plan) };
-        let around = self.reach.around(&self.settings, plan, age, past);
         for k in 0..plan.accelerations.len() {
             let stage = Stage::new(&self.settings, plan, k);
             let tick = k * self.ratio;
-            let of_moment = self.moment(&around, &stage, tick);
+            let of_moment = self.moment(&stage, age + tick);
             for j in 0..self.ratio {
                 let time = (tick + j) as f64 * self.settings.period_feedback;
-                let last = tick + j + 1 == self.ratio;
-                let more = around.unforeseen(self.ratio, if last { next } else { 0.0 });
-                let left = self.sideslip_and_rates(&around, &stage, (j, tick + j), more);
+                let left = self.sideslip_and_rates(&stage, j, age + tick + j);
                 verdict.record(time, &Left { moment: of_moment, ..left });
             }
         }
-        verdict.record(f64::INFINITY, &self.rest(plan, &around.forever()));
+        verdict.record(f64::INFINITY, &self.rest(plan, &self.reach.forever));
         verdict
     }
 
@@ -182,17 +168,12 @@ impl PlanCheck {
         whole && (0..plan.accelerations.len()).all(next)
     }
 
-    /// Bounds sideslip and body rates from feedback tick `j` of a stage until the next.
-    fn sideslip_and_rates(
-        &self,
-        around: &Around,
-        stage: &Stage,
-        (j, tick): (usize, usize),
-        more: [Interval; 2],
-    ) -> Left {
-        let ends = [0, 1].map(|i| (stage.at((j + i) as f64), around.at(tick + i)));
+    /// Bounds sideslip and body rates from feedback tick `j` of a stage, `n` ticks after the nominal
+    /// trajectory began, until the next.
+    fn sideslip_and_rates(&self, stage: &Stage, j: usize, n: usize) -> Left {
+        let ends = [0, 1].map(|i| (stage.at((j + i) as f64), self.reach.at(n + i)));
         let angles = ends.map(|(_, deviation)| deviation.angle.component());
-        let off = angles[0].max(angles[1]) + ends[0].1.bulge + more[0];
+        let off = angles[0].max(angles[1]) + ends[0].1.bulge;
         let swept = stage.sideslip(j).abs();
         // The plan's rates are straight lines, and the deviation is convex except for the swing, so
         // that ‖ω‖ is largest at an end.
@@ -201,9 +182,9 @@ impl PlanCheck {
         let rate = ends.map(|(state, deviation)| {
             let size = |i: usize| state[3 + i].abs() + deviation.rate.half;
             let squares = (cosine * size(0)).square() + size(1).square() + size(2).square();
-            squares.sqrt() + deviation.rate.norm + self.reach.swing + more[1]
+            squares.sqrt() + deviation.rate.norm + self.reach.swing
         });
-        let size = stage.farthest_sideslip(j, angles) + ends[0].1.bulge + more[0];
+        let size = stage.farthest_sideslip(j, angles) + ends[0].1.bulge;
         let Settings { sideslip_domain, limit_rate, .. } = self.settings;
         Left {
             sideslip: (sideslip_domain - size.high) / sideslip_domain,
@@ -212,15 +193,17 @@ impl PlanCheck {
         }
     }
 
-    /// Bounds the commands of a stage; the result is the smallest unused share of the limit.
-    fn moment(&self, around: &Around, stage: &Stage, tick: usize) -> f64 {
-        let ranges = (0..self.ratio).map(|j| Self::range(stage, j, &around.at(tick + j)));
+    /// Bounds the commands of a stage that begins `n` ticks after the nominal trajectory; the result
+    /// is the smallest unused share of the limit.
+    fn moment(&self, stage: &Stage, n: usize) -> f64 {
+        let deviation = |j: usize| self.reach.at(n + j);
+        let ranges = (0..self.ratio).map(|j| Self::range(stage, j, deviation(j)));
         let Some(hull) = ranges.clone().reduce(|a, b| a.hull(&b)) else { return f64::NAN };
         let remainder = law::remainder(&self.body, &hull);
         // The flights have no known moment, but one might begin to act while the plan is followed.
         let limit = self.settings.limit_moment - self.settings.known_change;
         let largest = ranges.enumerate().map(|(j, range)| {
-            let added = self.added(&around.at(tick + j));
+            let added = self.added(deviation(j));
             let bound = (Interval::from(law::largest(&self.body, &range)) + remainder + added).high;
             if bound <= limit {
                 return bound;

@@ -15,7 +15,6 @@
 use super::body::Body;
 use super::causes::{Causes, InertiaError, Mismatch};
 use super::deviation::{Deviation, Extent, upper};
-use super::pulses::Pulses;
 use super::smoothness::{Growth, Smoothness};
 use crate::interval::Interval;
 use crate::sums::{Axis, Matrix, Pair, integral_of_size, product};
@@ -53,10 +52,6 @@ pub(super) struct Reach {
     pub(super) forever: Deviation,
     /// Largest additional deviation of the rates between two ticks, rad/s.
     pub(super) swing: Interval,
-    pub(super) pulses: Option<Pulses>,
-    /// Sizes of the pulses by changes of K ô at each tick, as a box and as a norm, rad/s.
-    pub(super) sizes: Vec<[Interval; 2]>,
-    pub(super) fades: [usize; 2],
 }
 
 struct Builder<'a> {
@@ -81,6 +76,11 @@ impl Reach {
     /// unit of the disturbance bound. `None` if the settings leave no bound.
     pub(super) fn new(s: &Settings, start: Option<(&InvariantSet, f64)>) -> Option<Self> {
         Builder::new(s)?.build(start)
+    }
+
+    /// Returns the deviation `n` feedback ticks after the nominal trajectory began.
+    pub(super) fn at(&self, n: usize) -> &Deviation {
+        self.deviations.get(n).unwrap_or(&self.forever)
     }
 }
 
@@ -112,8 +112,8 @@ impl<'a> Builder<'a> {
         direct * self.growth.after(one, angle) + turned * self.growth.after(root_condition, angle)
     }
 
-    /// Sums the responses of a row, or the changes of its responses from tick to tick.
-    fn respond(&self, row: Pair, changes: bool) -> Response {
+    /// Sums the responses of a row.
+    fn respond(&self, row: Pair) -> Response {
         let (zero, tau, d) = (Interval::ZERO, number(self.s.period_feedback), number(self.s.delay));
         let mut sums = [zero; 5];
         let mut response = Response {
@@ -127,14 +127,8 @@ impl<'a> Builder<'a> {
         };
         let mut excess = VecDeque::new();
         let mut earlier = zero;
-        let mut before = [zero; 2];
         for (i, power) in self.axis.transitions(self.steps).enumerate() {
-            let mut reached = [0, 1].map(|j| row[0] * power[0][j] + row[1] * power[1][j]);
-            if changes {
-                let now = reached;
-                reached = [0, 1].map(|j| now[j] - before[j]);
-                before = now;
-            }
+            let reached = [0, 1].map(|j| row[0] * power[0][j] + row[1] * power[1][j]);
             let wave = integral_of_size(&reached, d, tau);
             let small = self.mismatched(&reached, &self.causes.later);
             let first = self.mismatched(&reached, &self.causes.first.0);
@@ -156,8 +150,7 @@ impl<'a> Builder<'a> {
             response.erred.push(earlier + self.erred(&reached, 1));
             earlier = earlier + self.erred(&reached, 0);
         }
-        let times = number(if changes { 2.0 } else { 1.0 });
-        let tail = times * self.axis.tails(self.steps).0 * (row[0].abs() + row[1].abs());
+        let tail = self.axis.tails(self.steps).0 * (row[0].abs() + row[1].abs());
         self.end(&mut response, tail, earlier);
         response
     }
@@ -223,20 +216,10 @@ impl<'a> Builder<'a> {
             [half * tau * k1, one + half * tau * k2],
             [k1, k2],
         ];
-        let responses = rows.map(|row| self.respond(row, false));
+        let responses = rows.map(|row| self.respond(row));
         let starts = rows.map(|row| self.starts(row, start));
         let unseen = [half * number(self.s.delay).square(), number(self.s.delay)];
         let at = |n: usize| self.deviation(n, &rows, &responses, &starts, &unseen);
-        let (pulses, sizes) = self.pulses(&rows, &responses[4])?;
-        let at = |n: usize| match &pulses {
-            None => at(n),
-            // A command that begins to act early shows before its tick.
-            Some(pulses) => {
-                let next = sizes[(n + 1).min(self.steps + 1)];
-                let at = at(n).pulsed(sizes[n], pulses.sums(n));
-                Deviation { rate: at.rate.pulsed(next, 1.0), ..at }
-            }
-        };
         // K ô is held between two ticks.
         let at = |n: usize| {
             let at = at(n);
@@ -248,38 +231,8 @@ impl<'a> Builder<'a> {
         let forever = deviations.iter().fold(at(self.steps + 1), |most, at| most.max(at));
         let Smoothness { slope, bend, .. } = self.causes.smoothness;
         let swing = eighth * tau.square() * (slope + bend * tau);
-        let fades = [8, 16].map(|times| self.axis.halved(times));
         let bounded = forever.rate.norm.high.is_finite();
-        bounded.then_some(Reach { deviations, forever, swing, pulses, sizes, fades })
-    }
-
-    /// Returns the responses to pulses, and the sizes at each tick of those by changes of K ô.
-    /// They grow with the tick, so that each may count for all before it.
-    fn pulses(
-        &self,
-        rows: &[Pair; 5],
-        feedback: &Response,
-    ) -> Option<(Option<Pulses>, Vec<[Interval; 2]>)> {
-        let (s, causes) = (self.s, &self.causes);
-        if s.delay_error == 0.0 {
-            return Some((None, vec![]));
-        }
-        let pulses = Pulses::new(s, &self.axis, rows, causes.switched, self.steps)?;
-        let changes = self.respond(rows[4], true);
-        let mut erred = Interval::ZERO;
-        let size = |n: usize| {
-            if n > 0 {
-                erred = erred.max(feedback.erred[n] + self.erred(&rows[4], 2));
-            }
-            let half = causes.disturbance * changes.seen[n] + number(2.0) * erred;
-            let lasting = causes.inertia.acceleration + causes.slow.acceleration;
-            let norm = lasting * changes.seen[n]
-                + causes.slow.creep * changes.crept[n]
-                + changes.revised[n];
-            pulses.sizes(half, norm).map(upper)
-        };
-        let sizes = (0..=self.steps + 1).map(size).collect();
-        Some((Some(pulses), sizes))
+        bounded.then_some(Reach { deviations, forever, swing })
     }
 
     /// Support of the start set along r Φⁿ for each n.
@@ -309,8 +262,6 @@ impl<'a> Builder<'a> {
     ) -> Deviation {
         let Causes { disturbance, inertia, slow, .. } = &self.causes;
         let (inertia, delay) = (inertia.acceleration, number(self.s.delay));
-        // The change of F by pulses is summed along the predictions only.
-        let is_exact = self.s.delay_error == 0.0;
         let half = |i: usize| {
             let Response { seen, erred, .. } = &responses[i];
             *disturbance * seen[n] + erred[n] + starts[i][n]
@@ -319,7 +270,7 @@ impl<'a> Builder<'a> {
             let Response { seen, crept, mismatched, revised, begun, .. } = &responses[i];
             let erred = if n == 0 { self.erred(&rows[i], 2) } else { Interval::ZERO };
             let (along, revised) = (mismatched[n] + begun[n], revised[n] + self.unseen(&rows[i]));
-            let small = if is_exact { along.min(revised) } else { revised };
+            let small = along.min(revised);
             let pulses = seen[n] + unseen[i];
             let half = half(i) + *disturbance * unseen[i] + erred;
             let crept = slow.creep * (crept[n] + rows[i][0].abs() * delay);
@@ -333,7 +284,7 @@ impl<'a> Builder<'a> {
             if n > 0 {
                 half = half + self.erred(&rows[i], 2);
                 let along = mismatched[n] + begun[n] + self.unseen(&rows[i]);
-                small = if is_exact { along.min(revised[n]) } else { revised[n] };
+                small = along.min(revised[n]);
             }
             let inertia = if compensated { inertia * seen[n] } else { Interval::ZERO };
             let slow = slow.acceleration * seen[n] + slow.creep * crept[n];

@@ -25,12 +25,8 @@ pub(super) struct Smoothness {
     pub(super) slope: Interval,
     /// Bound on ‖F″‖ along a trajectory with m held, rad/s⁴.
     pub(super) bend: Interval,
-    /// Bound on ‖F‖, rad/s².
-    pub(super) force: Interval,
     /// Bound on ‖ω̇‖, rad/s².
     pub(super) turning: Interval,
-    /// Bounds on ‖R‖ and on ‖Ṙ‖, 1/s.
-    pub(super) r: [Interval; 2],
     /// Bound on the rate of (α, β), rad/s.
     pub(super) angle_rate: Interval,
 }
@@ -125,8 +121,7 @@ impl Smoothness {
             + first * gamma
             + r * spin.bilinear * omega * number(3.0).sqrt() * size;
         let by_rates = (drift_by_rates(sideslip) + r * spin.bilinear) * omega;
-        let r = [r, first * angle_rate];
-        Some(Self { by_rates, by_angles, slope, bend, force, turning: gamma, r, angle_rate })
+        Some(Self { by_rates, by_angles, slope, bend, turning: gamma, angle_rate })
     }
 }
 
