@@ -11,7 +11,7 @@ mod harness;
 
 use control::crmpc::{self, Constraints};
 use control::dlmpc;
-use control::mpc::{Method, Nonlinearity, SolverSettings};
+use control::mpc::{Method, SolverSettings};
 use control::report::SolverStatus;
 use control::{Crmpc, Dlmpc, Measurement};
 use criterion::{BatchSize, Criterion, criterion_group, criterion_main};
@@ -106,18 +106,13 @@ fn print_distribution<C: Optimising>(name: &str, controller: &mut C, ticks: &[Ti
 }
 
 /// The solvers and shortcuts that are compared.
-const WAYS: [(&str, SolverSettings); 4] = [
+const WAYS: [(&str, SolverSettings); 3] = [
     ("shortcuts, then riccati", WAY),
     ("riccati", SolverSettings { shortcuts: false, ..WAY }),
-    (
-        "riccati, frozen",
-        SolverSettings { shortcuts: false, nonlinearity: Nonlinearity::Frozen, ..WAY },
-    ),
     ("cone", SolverSettings { shortcuts: false, method: Method::Cone, ..WAY }),
 ];
 const WAY: SolverSettings = SolverSettings {
     method: Method::Riccati,
-    nonlinearity: Nonlinearity::Exact,
     max_iterations: 50,
     shortcuts: true,
     time_budget: 0.0,

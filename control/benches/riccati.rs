@@ -86,7 +86,7 @@ fn iterations<'a, C: mpc::Constraints<2> + 'a>(
     for (name, most) in
         [("1 iteration", 1), ("2 iterations", 2), ("3 iterations", 3), ("to the optimum", 50)]
     {
-        let mut riccati = Riccati::new(problem.affine.len(), 0, most);
+        let mut riccati = Riccati::new(problem.affine.len(), most);
         let outcome =
             riccati.solve(&problem, &mut cold.clone(), 0, false, &mut Budget::unlimited(), None);
         // With fewer iterations the benchmark's name would be wrong.

@@ -4,10 +4,10 @@
 use crate::harness::{
     Case, adversaries, constant, disturbance, in_parallel, settings, simulate, square, white,
 };
-use control::crmpc::{Constraints, InitialState, Lemmas, Settings, SolverStatus};
+use control::crmpc::{Constraints, InitialState, Lemmas, Settings};
 use control::error_dynamics::SampledError;
 use control::{Crmpc, crmpc::Memory};
-use nalgebra::{Vector2, Vector3, Vector6};
+use nalgebra::{Vector3, Vector6};
 use vehicle::disturbance::{Disturbance, DisturbanceKind};
 use vehicle::scenario::Scenario;
 
@@ -49,10 +49,8 @@ fn robust_keeps_both_limits_under_disturbances_of_every_kind() {
 #[test]
 fn robust_keeps_both_limits_wherever_the_nominal_motion_begins() {
     let cases = [white(1..=2, 0.04), adversaries(0.04), square(&[2.5])].concat();
-    for initial_state in [InitialState::Nominal, InitialState::Tube] {
-        let settings = Settings { initial_state, ..settings(Constraints::Robust) };
-        assert_keeps_limits(&settings, &cases);
-    }
+    let initial_state = InitialState::Nominal;
+    assert_keeps_limits(&Settings { initial_state, ..settings(Constraints::Robust) }, &cases);
 }
 
 #[test]
@@ -83,41 +81,6 @@ fn lqr_violates_both_limits() {
         );
         assert!(outcome.rate > 1.0 && outcome.moment > 1.0, "{}: {outcome:?}", case.name);
     }
-}
-
-#[test]
-fn paper_set_with_a_free_initial_state_never_falls_back_and_starts_inside_its_set() {
-    let settings = Settings { initial_state: InitialState::Tube, ..settings(Constraints::Paper) };
-    let mut controller = Crmpc::new(settings).unwrap();
-    let design = controller.design().clone();
-    let normals = design.invariant.as_ref().unwrap().normals();
-    let mut largest = 0.0f64;
-    let mut memory = Memory::default();
-    simulate(
-        &mut controller,
-        &mut memory,
-        1.05,
-        disturbance(DisturbanceKind::White),
-        |memory, tick, measured| {
-            if tick % design.ratio as u64 == 0 {
-                assert_eq!(memory.report.status, SolverStatus::Constrained);
-                let angle_rates = vehicle::kinematics::r(&measured.angles) * measured.rates;
-                for i in 0..3 {
-                    let o = Vector2::new(measured.angles[i], angle_rates[i])
-                        - Vector2::new(memory.nominal[i], memory.nominal[3 + i]);
-                    let bound = settings.disturbance_bound;
-                    let size = normals
-                        .iter()
-                        .map(|normal| normal.dot(&o).abs() / bound)
-                        .fold(0.0, f64::max);
-                    assert!(size <= 1.0 + 1e-6, "tick {tick}: {size}");
-                    largest = largest.max(size);
-                }
-            }
-        },
-    );
-    assert_eq!(memory.report.fallbacks, 0);
-    assert!(largest > 0.9, "the freedom is not used: {largest}");
 }
 
 /// Returns the nominal trajectory at every tick, bit for bit, and the deviation O_e = x − x̃ there,

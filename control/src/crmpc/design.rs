@@ -7,7 +7,7 @@ use super::rule::{self, Tightened};
 use super::settings::{Constraints, Guarantee, Settings};
 use crate::delay;
 use crate::error::{DesignError, positive};
-use crate::error_dynamics::{Gain, InvariantSet, SampledError};
+use crate::error_dynamics::{Gain, SampledError};
 use nalgebra::{Matrix2, Vector2};
 use serde::{Deserialize, Serialize};
 use vehicle::math::{exp, hypot, ln, powi, tan};
@@ -102,9 +102,6 @@ pub struct Design {
     pub g: [Matrix2<f64>; 3],
     /// Constants of the paper; `None` if its assumptions (real distinct eigenvalues) do not hold.
     pub paper: Option<PaperConstants>,
-    /// Invariant set of the deviation of one axis per unit of its disturbance bound; `None` if the
-    /// eigenvalues are complex.
-    pub invariant: Option<InvariantSet>,
     /// Tightening of the robust set.
     pub tightening: Tightening,
     /// Tightenings for smaller bounds on the disturbance, by equal parts of it.
@@ -147,7 +144,6 @@ impl Design {
         let (Tightened { settings, tightening, assessment }, accepted_share) = robust(s)?;
         let s = &settings;
         let lower = if accepted_share < 1.0 { Vec::new() } else { lower(s)? };
-        let error = SampledError::delayed(s.feedback, s.period_feedback, s.delay);
 
         let held = SampledError::new(s.terminal, s.period_optimisation);
         let g: [Matrix2<f64>; 3] = std::array::from_fn(|i| {
@@ -165,12 +161,10 @@ impl Design {
         let eigenvalues = s.body.inertia.symmetric_eigenvalues();
         let (smallest_inertia, largest_inertia) = (eigenvalues.min(), eigenvalues.max());
 
-        let invariant = error.invariant_set(guarantee::lateral(s));
         Ok(Self {
             feedback: s.feedback,
             paper: paper_constants(s, smallest_inertia, largest_inertia),
             g,
-            invariant,
             tightening,
             lower,
             assessment,

@@ -24,5 +24,5 @@ pub use geometry::{BRAKING, CURVATURE, DRIFT_BY_ANGLES_TWICE, DRIFT_MIXED, Domai
 pub use lemmas::Lemmas;
 pub(super) use losses::{End, Held};
 pub(super) use observable::{MEANS, Observable};
-pub(super) use tighten::{lateral, tighten, with_share};
+pub(super) use tighten::{tighten, with_share};
 pub use tightening::Tightening;

@@ -1,7 +1,7 @@
 //! The plan: a nominal trajectory over the horizon.
 
 use super::stages::Stages;
-use super::state::{self, join};
+use super::state;
 use crate::clone_in_place::clone_in_place;
 use crate::mpc::ErrorTrajectory;
 use nalgebra::{Vector3, Vector6};
@@ -97,20 +97,17 @@ impl Plan {
         }
     }
 
-    /// Sets the plan from a motion of the errors, rolled out from `start` (or from the motion's own
-    /// first state) so that it is an exact motion of the nominal model.
+    /// Sets the plan from the inputs v = a − Θ̈_r of a trajectory, rolled out from `start` so that
+    /// it is an exact trajectory of the nominal model.
     pub(super) fn follow(
         &mut self,
-        motion: &ErrorTrajectory<2>,
-        start: Option<Vector6<f64>>,
+        inputs: &[Vector3<f64>],
+        start: &Vector6<f64>,
         references: &[Reference],
         h: f64,
     ) {
-        self.states[0] = start.unwrap_or_else(|| {
-            let [angles, rates] = motion.states[0];
-            join(&(angles + references[0].angles), &(rates + references[0].rates))
-        });
-        for (k, (v, reference)) in motion.inputs.iter().zip(references).enumerate() {
+        self.states[0] = *start;
+        for (k, (v, reference)) in inputs.iter().zip(references).enumerate() {
             self.accelerations[k] = v + reference.accelerations;
             self.states[k + 1] = advance(&self.states[k], &self.accelerations[k], h);
         }

@@ -8,12 +8,11 @@ use super::design::Design;
 use super::feedback::Tick;
 use super::memory::Memory;
 use super::plan::Plan;
-use super::settings::{Constraints, InitialState, Settings};
+use super::settings::{Constraints, Settings};
 use super::stages::Stages;
 use super::state::error;
 use crate::clock::Instant;
 use crate::error::DesignError;
-use crate::error_dynamics::InvariantSet;
 use crate::mpc::{self, Bounded, Chain, Cost, ErrorTrajectory, Layout, Optimiser, State, per_axis};
 use nalgebra::{Vector3, Vector6};
 use std::f64::consts::PI;
@@ -28,9 +27,6 @@ const ANGLE_SCALE: f64 = 0.1;
 /// limit leaves within the horizon, between two angles, rad.
 const SHARE_OF_THE_WAY: f64 = 0.8;
 const DISTANCES: [f64; 2] = [20.0 * PI / 180.0, 50.0 * PI / 180.0];
-/// Smallest disturbance bound for which the invariant set is computed, rad/s², so that the set has
-/// an interior.
-const SMALLEST_DISTURBANCE: f64 = 1e-5;
 /// Share by which a window of the horizon is wider than the violated intervals, at each end. With
 /// the robust set most intervals of a window are near their bounds, and an iteration costs more.
 const PAPER_MARGIN: f64 = 0.5;
@@ -38,7 +34,6 @@ const ROBUST_MARGIN: f64 = 0.25;
 
 /// The optimiser with its scratch memory.
 pub(super) struct Planner {
-    pub settings: Settings,
     pub optimiser: Box<Optimiser<2>>,
     /// The plan as errors from the reference.
     pub previous: ErrorTrajectory<2>,
@@ -63,12 +58,6 @@ impl Planner {
     /// Returns the solver's message if it refuses the data.
     pub(super) fn new(settings: &Settings, design: &Design) -> Result<Self, DesignError> {
         let Settings { horizon: n, period_optimisation: h, p, q, .. } = *settings;
-        let start = (settings.initial_state == InitialState::Tube).then(|| {
-            let normals = design.invariant.as_ref().map(InvariantSet::normals).unwrap_or_default();
-            let size =
-                (design.accepted_share * settings.disturbance_bound).max(SMALLEST_DISTURBANCE);
-            std::array::from_fn(|_| normals.iter().map(|n| n / size).collect())
-        });
         let chain = Chain::new(h);
         // Cost (10), sampled: Σ h (EᵀPE + vᵀQv) + E_NᵀG E_N.
         let cost = Cost {
@@ -84,7 +73,6 @@ impl Planner {
             horizon: n,
             constrains_states: true,
             terminal: is_of_paper,
-            start,
             margin: if is_of_paper { PAPER_MARGIN } else { ROBUST_MARGIN },
             scale: [ANGLE_SCALE, settings.limit_rate],
             standstill: STANDSTILL,
@@ -93,7 +81,6 @@ impl Planner {
         let way = design.assessment.rate_left * settings.limit_rate * n as f64 * h;
         let reach = (SHARE_OF_THE_WAY * way).clamp(DISTANCES[0], DISTANCES[1]);
         Ok(Self {
-            settings: *settings,
             optimiser: Box::new(optimiser),
             previous: ErrorTrajectory::new(n),
             chain,
@@ -171,8 +158,8 @@ impl Planner {
         memory: &mut Memory,
         start: &Vector6<f64>,
     ) {
-        let start = (self.settings.initial_state != InitialState::Tube).then_some(*start);
-        memory.plan.follow(self.optimiser.trajectory(), start, &stages.references, stages.step);
+        let inputs = &self.optimiser.trajectory().inputs;
+        memory.plan.follow(inputs, start, &stages.references, stages.step);
         memory.plan.shift = self.shift;
         memory.plan.multipliers.clear();
         memory.plan.multipliers.extend(self.optimiser.multipliers());

@@ -33,8 +33,6 @@ pub enum InitialState {
     /// Measured state.
     #[default]
     Measured,
-    /// State in an invariant set around the measured state, chosen by the optimisation.
-    Tube,
     /// State predicted by the previous plan; at the first optimisation the measured state.
     ///
     /// The nominal trajectory then never depends on a disturbance, and the deviation obeys the

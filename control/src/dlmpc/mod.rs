@@ -100,7 +100,6 @@ impl Dlmpc {
             horizon: n,
             constrains_states: false,
             terminal: false,
-            start: None,
             margin: MARGIN,
             scale: [ANGLE_SCALE],
             standstill: STANDSTILL,

@@ -5,11 +5,9 @@
 //! they are sums of absolute impulse responses (L1 norms) under zero-order hold. The paper's c̄ is
 //! the peak of the step response instead, which holds for a constant Δ only.
 
-mod invariant_set;
 mod reach;
 mod sums;
 
-pub use invariant_set::InvariantSet;
 pub use reach::{Early, Reach};
 
 use nalgebra::{Matrix2, RowVector2, Vector2};
@@ -108,17 +106,6 @@ impl SampledError {
         let radius = self.spectral_radius();
         // The response falls at least as fast as n·radiusⁿ.
         (radius <= LARGEST_RADIUS).then(|| (60.0 / -ln(radius.max(0.5))).ceil() as usize)
-    }
-
-    /// Returns the eigenvalues of Φ and their eigenvectors, if they are real, distinct and stable.
-    pub fn modes(&self) -> Option<([f64; 2], [Vector2<f64>; 2])> {
-        let (trace, det) = (self.phi.trace(), self.phi.determinant());
-        let discriminant = 0.25 * trace * trace - det;
-        if discriminant <= 0.0 || self.spectral_radius() > LARGEST_RADIUS {
-            return None;
-        }
-        let values = [0.5 * trace + discriminant.sqrt(), 0.5 * trace - discriminant.sqrt()];
-        Some((values, values.map(|lambda| Vector2::new(self.phi.m12, lambda - self.phi.m11))))
     }
 
     /// Returns the sampling period, s.

@@ -1,50 +1,6 @@
 //! Tests of the sampled error dynamics against simulations of what may have acted.
 
-use super::invariant_set::EXPLICIT;
 use super::*;
-
-/// Returns the limit of [`SampledError::reach`] for infinitely many periods.
-fn forever(error: &SampledError) -> Reach {
-    error.reach(error.settling().unwrap()).pop().unwrap()
-}
-
-#[test]
-fn oracle_no_step_leads_out_of_the_invariant_set() {
-    // Condition on the support function h: h(Φᵀn) + |nᵀΓ| ≤ h(n) for every facet of the set.
-    let cases = [(-5.0, 0.04), (-5.0, 0.2), (-10.0, 0.04), (-4.5, 0.1)];
-    for ((k, period), delay) in
-        cases.into_iter().flat_map(|case| [0.0, 0.03, 0.1].map(|d| (case, d)))
-    {
-        let error = SampledError::delayed(Gain { k1: k, k2: k }, period, delay);
-        let lateral = 0.25 * period * period;
-        let set = error.invariant_set(lateral).unwrap();
-        let normals = set.normals();
-        assert!(normals.len() > EXPLICIT);
-        let pushed = transition(delay) * error.gamma;
-        for normal in normals {
-            assert!((set.support(&normal) - 1.0).abs() < 1e-12);
-            let driven = normal.dot(&pushed).abs() + lateral * normal.x.abs();
-            let after = set.support(&(error.phi.transpose() * normal)) + driven;
-            assert!(after <= 1.0 + 1e-12, "K = {k} at {period} s, {delay} s: {after}");
-        }
-        // Without shifts the set is that of held disturbances, which reach no further than
-        // disturbances that change at any time.
-        let (set, held) = (set.reach(), error.invariant_set(0.0).unwrap().reach());
-        let reach = forever(&error);
-        for (outer, held, exact) in [
-            (set.angle, held.angle, reach.angle),
-            (set.rate, held.rate, reach.rate),
-            (set.feedback, held.feedback, reach.feedback),
-        ] {
-            let ratios = (outer / exact, held / exact);
-            assert!(ratios.0 >= 1.0 - 1e-12, "K = {k} at {period} s, {delay} s: {ratios:?}");
-            assert!(
-                ratios.0 < 1.5 && ratios.1 < 1.25,
-                "K = {k} at {period} s, {delay} s: {ratios:?}"
-            );
-        }
-    }
-}
 
 /// Largest |angle|, |rate| and |K ô| at each tick over all signs of the sources' responses
 /// (`respond`): by superposition this is the sum over the sources.

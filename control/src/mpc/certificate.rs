@@ -2,7 +2,7 @@
 //! multipliers come from them.
 
 use super::constraints::{Constraints, StageConstraints};
-use super::problem::{ErrorTrajectory, Problem, Solution, Start, State, dot};
+use super::problem::{ErrorTrajectory, Problem, Solution, State, dot};
 use nalgebra::Vector3;
 
 /// Residuals of the conditions of Karush, Kuhn and Tucker, with the constraints as functions of the
@@ -38,7 +38,7 @@ impl Certificate {
         let n = trajectory.inputs.len();
         let constrains_states = problem.constraints.constrains_states();
 
-        let (mut largest, mut gap, mut least) = (1.0_f64, multipliers.start_gap, 0.0_f64);
+        let (mut largest, mut gap, mut least) = (1.0_f64, 0.0, 0.0_f64);
         let mut count = |square: f64, multiplier: f64| {
             largest = largest.max(square);
             gap += 0.5 * (multiplier * (square - 1.0)).abs();
@@ -94,10 +94,6 @@ impl Certificate {
                 }
                 count(squares.0, by_state);
             }
-        }
-        if let Start::Within(..) = problem.start {
-            add(&mut p, |i| multipliers.start[i]);
-            slope = p.iter().fold(slope, |slope, p| slope.max(p.amax()));
         }
         let cost = cost.total(trajectory);
         let half_cost = (0.5 * cost).max(f64::MIN_POSITIVE);

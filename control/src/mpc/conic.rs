@@ -9,7 +9,7 @@ use super::layout::Layout;
 use super::problem::{Outcome, Problem, Solution, Start, State, of_axis, zero_state};
 use crate::conic_program::{ConicProgram, Optimum, Triplets};
 use clarabel::algebra::CscMatrix;
-use clarabel::solver::SupportedConeT::{self, NonnegativeConeT, SecondOrderConeT, ZeroConeT};
+use clarabel::solver::SupportedConeT::{self, SecondOrderConeT, ZeroConeT};
 use nalgebra::{Matrix3, SMatrix, Vector3};
 
 /// The cone program together with its solver.
@@ -79,7 +79,7 @@ impl<const O: usize> ConicSolver<O> {
         // The dual of ‖y‖ ≤ 1 is the multiplier of ½(‖y‖² − 1) for the whole cost; the factor ½
         // converts it to half the cost.
         multipliers.clear();
-        let (start_duals, norm_duals) = duals.split_at(self.first_norm);
+        let norm_duals = &duals[self.first_norm..];
         let stages = if *constrains_states { *n } else { 0 };
         let mut norms = norm_duals.iter().step_by(4).map(|dual| 0.5 * dual);
         for (interval, dual) in multipliers.intervals[..stages].iter_mut().zip(&mut norms) {
@@ -90,22 +90,6 @@ impl<const O: usize> ConicSolver<O> {
         }
         if let (true, Some(radius)) = (*terminal, problem.end.radius) {
             multipliers.terminal = 0.5 * norm_duals[4 * (stages + n)] * radius / scale[0];
-        }
-        if let Start::Within(given, normals) = &problem.start {
-            let mut pairs = start_duals[3 * (O - 1) * n..].chunks_exact(2);
-            for (axis, normals) in normals.iter().enumerate() {
-                for (normal, pair) in normals.iter().zip(&mut pairs) {
-                    let force = 0.5 * (pair[0] - pair[1]);
-                    let deviation: f64 = (0..O)
-                        .map(|i| normal[i] * (given[i][axis] - trajectory.states[0][i][axis]))
-                        .sum();
-                    for i in 0..O {
-                        multipliers.start[i][axis] -= normal[i] * force;
-                    }
-                    multipliers.start_gap += 0.5
-                        * (pair[0] * (deviation - 1.0).abs() + pair[1] * (deviation + 1.0).abs());
-                }
-            }
         }
         Outcome::Solved(iterations)
     }
@@ -190,36 +174,15 @@ impl Rows {
         }
     }
 
-    /// Adds the condition on the first state: its value, or the faces ±nᵀ(E_given − E_0) ≤ 1 of the
-    /// initial set.
+    /// Adds the first state's value. Only windows have an arrival cost instead, and they are not
+    /// solved here.
     fn add_start<const O: usize>(&mut self, layout: &Layout<O>, start: &Start<O>) {
-        let (scale, first) = (&layout.scale, self.b.len());
-        match start {
-            Start::Fixed(given) => {
-                for i in 0..3 * O {
-                    self.a.push(self.b.len(), i, 1.0);
-                    self.b.push(given[i / 3][i % 3] / scale[i / 3]);
-                }
-                self.cones.push(ZeroConeT(3 * O));
-            }
-            Start::Within(given, normals) => {
-                for (axis, normals) in normals.iter().enumerate() {
-                    for normal in normals {
-                        let at: f64 = (0..O).map(|i| normal[i] * given[i][axis]).sum();
-                        for (sign, b) in [(1.0, 1.0 - at), (-1.0, 1.0 + at)] {
-                            for i in 0..O {
-                                let by_state = -sign * normal[i] * scale[i];
-                                self.a.push(self.b.len(), column::<O>(0, i, axis), by_state);
-                            }
-                            self.b.push(b);
-                        }
-                    }
-                }
-                self.cones.push(NonnegativeConeT(self.b.len() - first));
-            }
-            // Only windows have an arrival cost, and they are not solved here.
-            Start::Arrival(..) => {}
+        let Start::Fixed(given) = start else { return };
+        for i in 0..3 * O {
+            self.a.push(self.b.len(), i, 1.0);
+            self.b.push(given[i / 3][i % 3] / layout.scale[i / 3]);
         }
+        self.cones.push(ZeroConeT(3 * O));
     }
 
     /// Adds a norm constraint at stage `k`, with the derivatives of its vector by the state and by

@@ -1,7 +1,6 @@
 //! Structure of an optimisation problem, which does not change between samples.
 
 use super::problem::{Chain, Cost, End, ErrorTrajectory, Problem, Start, State, zero_state};
-use nalgebra::SVector;
 use std::ops::Range;
 
 /// Structure of a controller's optimisation problem.
@@ -17,8 +16,6 @@ pub struct Layout<const O: usize> {
     pub constrains_states: bool,
     /// Whether there is a terminal constraint.
     pub terminal: bool,
-    /// Normals of the set of admissible initial states; `None` if the initial state is given.
-    pub start: Option<[Vec<SVector<f64, O>>; 3]>,
     /// Intervals that a window adds before and after the violated ones, as a share of these, beside
     /// the fixed number. A wider window is more expensive, and grows less often.
     pub margin: f64,
@@ -43,11 +40,8 @@ impl<const O: usize> Layout<O> {
         constraints: &'a C,
         radius: Option<f64>,
     ) -> Problem<'a, O, C> {
-        let Self { chain, cost, start, .. } = self;
-        let start = match start {
-            None => Start::Fixed(*measured),
-            Some(normals) => Start::Within(*measured, normals),
-        };
+        let Self { chain, cost, .. } = self;
+        let start = Start::Fixed(*measured);
         let end = End { weight: &cost.end, slope: zero_state(), radius };
         Problem { chain, cost, start, affine, constraints, end }
     }

@@ -38,4 +38,4 @@ pub use constraints::{Constraints, NormConstraint, StageConstraints};
 pub use layout::Layout;
 pub use optimiser::{Optimiser, OptimiserReport};
 pub use problem::{Chain, Cost, ErrorTrajectory, State, per_axis};
-pub use settings::{Method, Nonlinearity, SolverSettings};
+pub use settings::{Method, SolverSettings};

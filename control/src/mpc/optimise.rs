@@ -6,6 +6,7 @@ use super::certificate::Certificate;
 use super::optimiser::{Optimiser, OptimiserReport, Sample};
 use super::problem::{ErrorTrajectory, State};
 use super::search::Search;
+use super::settings::Method;
 use crate::report::SolverStatus;
 
 impl<const O: usize> Optimiser<O> {
@@ -25,7 +26,7 @@ impl<const O: usize> Optimiser<O> {
             self.layout.ends_outside(&self.solution.trajectory, bounded.terminal_radius());
         self.search = Search::new(outside);
         let mut found = None;
-        if self.settings.shortcuts && self.layout.start.is_none() {
+        if self.settings.shortcuts {
             found = self.by_shortcut(&sample);
         }
         let status = found.unwrap_or_else(|| self.over_whole_horizon(&sample));
@@ -44,7 +45,7 @@ impl<const O: usize> Optimiser<O> {
     /// Finds the optimum by the solvers for the whole horizon.
     fn over_whole_horizon(&mut self, sample: &Sample<O>) -> SolverStatus {
         self.prepare(sample);
-        if sample.previous.is_none() && self.settings.is_exact_riccati() {
+        if sample.previous.is_none() && self.settings.method == Method::Riccati {
             if let Some(status) = self.settle(sample, Self::by_riccati) {
                 return status;
             }

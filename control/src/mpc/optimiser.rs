@@ -12,7 +12,7 @@ use super::lq::Unconstrained;
 use super::problem::{Cost, End, ErrorTrajectory, Outcome, Problem, Solution, Start, State};
 use super::riccati::{Rest, Riccati};
 use super::search::Search;
-use super::settings::{Method, Nonlinearity, SolverSettings};
+use super::settings::{Method, SolverSettings};
 use crate::report::SolverStatus;
 use std::mem::replace;
 use std::ops::Range;
@@ -73,11 +73,11 @@ impl<const O: usize> Optimiser<O> {
     /// Returns the cone solver's message if it refuses the data.
     pub fn new(layout: Layout<O>, settings: SolverSettings) -> Result<Self, String> {
         let cone = ConicSolver::new(layout.clone(), settings.max_iterations)?;
-        let Layout { chain, cost, horizon, start, .. } = &layout;
-        let (n, faces) = (*horizon, start.iter().flatten().map(Vec::len).sum());
+        let Layout { chain, cost, horizon: n, .. } = &layout;
+        let n = *n;
         Ok(Self {
             unconstrained: Unconstrained::new(n, chain, cost),
-            riccati: Riccati::new(n, faces, settings.max_iterations),
+            riccati: Riccati::new(n, settings.max_iterations),
             cone,
             linearised: LinearisedConstraints::new(n),
             linearisation_point: ErrorTrajectory::new(n),
@@ -191,7 +191,6 @@ impl<const O: usize> Optimiser<O> {
             budget,
             unconstrained,
             riccati,
-            linearised,
             linearisation_point,
             bounds,
             solution,
@@ -209,17 +208,12 @@ impl<const O: usize> Optimiser<O> {
         }
         problem.affine = &sample.affine[range];
         problem.end = End { weight, slope, radius };
-        let outcome = if self.settings.nonlinearity == Nonlinearity::Exact {
-            // A warm search knows its window; bounds that depend on the trajectory rarely hold
-            // beyond it.
-            let extends = !warm || !bounded.depends_on_trajectory();
-            let rest = Rest { unconstrained: &*unconstrained, affine: sample.affine };
-            let rest = Some(&rest).filter(|_| extends && radius.is_none());
-            riccati.solve(&problem, solution, first, warm, budget, rest)
-        } else {
-            linearised.set(&within, linearisation_point, first);
-            riccati.solve(&problem.with(&*linearised), solution, first, warm, budget, None)
-        };
+        // A warm search knows its window; bounds that depend on the trajectory rarely hold beyond
+        // it.
+        let extends = !warm || !bounded.depends_on_trajectory();
+        let rest = Rest { unconstrained: &*unconstrained, affine: sample.affine };
+        let rest = Some(&rest).filter(|_| extends && radius.is_none());
+        let outcome = riccati.solve(&problem, solution, first, warm, budget, rest);
         self.search.iterations += outcome.iterations();
         outcome
     }

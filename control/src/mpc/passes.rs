@@ -5,7 +5,7 @@
 use super::layout::MARGIN;
 use super::optimiser::{Optimiser, Sample};
 use super::problem::Solution;
-use super::settings::{Method, Nonlinearity};
+use super::settings::Method;
 use crate::report::SolverStatus;
 use std::mem::replace;
 
@@ -27,8 +27,7 @@ impl<const O: usize> Optimiser<O> {
         if self.search.has_begun() {
             return;
         }
-        let is_given = self.layout.start.is_none();
-        if is_given && sample.bounded.out_of_reach(sample.start) {
+        if sample.bounded.out_of_reach(sample.start) {
             self.search.give_up();
             return;
         }
@@ -38,15 +37,10 @@ impl<const O: usize> Optimiser<O> {
             return;
         };
         self.linearisation_point.states[0] = *sample.start;
-        if is_given {
-            self.unconstrained.track(previous, sample.affine, &mut self.linearisation_point);
-        } else {
-            self.linearisation_point.clone_from(previous);
-            self.linearisation_point.states[0] = *sample.start;
-        }
+        self.unconstrained.track(previous, sample.affine, &mut self.linearisation_point);
         // Where the terminal constraint is active, each sample has one more stage to reach it, and
         // successive plans differ too much for a warm start.
-        if self.settings.method == Method::Riccati && is_given && self.search.outside.is_none() {
+        if self.settings.method == Method::Riccati && self.search.outside.is_none() {
             self.start_warm(sample, active);
         }
     }
@@ -93,7 +87,7 @@ impl<const O: usize> Optimiser<O> {
             None => sample.bounded.follows_at_first(),
             Some(_) => sample.bounded.depends_on_trajectory(),
         };
-        self.search.begin_cold(follows && self.settings.is_exact_riccati());
+        self.search.begin_cold(follows && self.settings.method == Method::Riccati);
     }
 
     /// Repeats `solve_pass` with the bounds (and linearised constraints) computed about its last
@@ -120,10 +114,7 @@ impl<const O: usize> Optimiser<O> {
             layout, settings, linearisation_point, bounds, checked_bounds, solution, ..
         } = self;
         let trajectory = &solution.trajectory;
-        if sample.previous.is_some() && settings.nonlinearity == Nonlinearity::Frozen {
-            return true;
-        }
-        if sample.previous.is_none() && !settings.is_exact_riccati() {
+        if sample.previous.is_none() && settings.method == Method::Cone {
             let moved = linearisation_point.distance(trajectory);
             linearisation_point.clone_from(trajectory);
             return moved < layout.standstill || self.search.pass == FIRST_PASSES;

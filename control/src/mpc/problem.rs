@@ -129,8 +129,6 @@ pub(super) fn dot<const O: usize>(a: &State<O>, b: &State<O>) -> f64 {
 pub enum Start<'a, const O: usize> {
     /// The first state E_0 is given.
     Fixed(State<O>),
-    /// The first state E_0 is free within |nᵀ(E_given − E_0)| ≤ 1 for each normal n of each axis.
-    Within(State<O>, &'a [Vec<SVector<f64, O>>; 3]),
     /// The first state E_0 is free at the arrival cost (E_0 − Ē)ᵀ Π⁻¹ (E_0 − Ē), given by Π⁻¹ and
     /// Ē.
     Arrival(&'a PerAxis<O>, State<O>),
@@ -171,14 +169,6 @@ pub struct Problem<'a, const O: usize, C> {
     pub constraints: &'a C,
     /// Cost of the last state E_N, with its terminal constraint.
     pub end: End<'a, O>,
-}
-
-impl<'a, const O: usize, C> Problem<'a, O, C> {
-    /// Returns the problem with other norm constraints.
-    pub(super) fn with<D>(&self, constraints: &'a D) -> Problem<'a, O, D> {
-        let Self { chain, cost, start, affine, end, .. } = *self;
-        Problem { chain, cost, start, affine, constraints, end }
-    }
 }
 
 /// A trajectory of the tracking error over the horizon.
@@ -229,38 +219,26 @@ impl<const O: usize> ErrorTrajectory<O> {
     }
 }
 
-/// Multipliers for half the cost, of the norm constraints written as ½(‖y‖² − 1) ≤ 0 and of the
-/// faces of the initial set.
+/// Multipliers for half the cost, of the norm constraints written as ½(‖y‖² − 1) ≤ 0.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Multipliers<const O: usize> {
+pub struct Multipliers {
     /// Multipliers of each interval: of the state constraint at its end, and of the norm constraint
     /// on its input.
     pub intervals: Vec<[f64; 2]>,
     /// Multiplier of the terminal constraint.
     pub terminal: f64,
-    /// Signed sum Σ λ n over the faces of the initial set: their slope in E_0.
-    pub start: State<O>,
-    /// Complementarity Σ λ |c| of these faces.
-    pub start_gap: f64,
 }
 
-impl<const O: usize> Multipliers<O> {
+impl Multipliers {
     /// Returns multipliers that are all zero.
     pub fn new(horizon: usize) -> Self {
-        Self {
-            intervals: vec![[0.0; 2]; horizon],
-            terminal: 0.0,
-            start: zero_state(),
-            start_gap: 0.0,
-        }
+        Self { intervals: vec![[0.0; 2]; horizon], terminal: 0.0 }
     }
 
     /// Sets all multipliers to zero.
     pub fn clear(&mut self) {
         self.intervals.fill([0.0; 2]);
         self.terminal = 0.0;
-        self.start = zero_state();
-        self.start_gap = 0.0;
     }
 }
 
@@ -270,7 +248,7 @@ pub struct Solution<const O: usize> {
     /// Trajectory of the tracking error.
     pub trajectory: ErrorTrajectory<O>,
     /// Multipliers of the constraints for this trajectory.
-    pub multipliers: Multipliers<O>,
+    pub multipliers: Multipliers,
 }
 
 impl<const O: usize> Solution<O> {

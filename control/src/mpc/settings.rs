@@ -15,26 +15,12 @@ pub enum Method {
     Cone,
 }
 
-/// Form of the constraints for the Riccati method; the cone solver always uses linearised ones.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Choice)]
-#[serde(rename_all = "camelCase")]
-pub enum Nonlinearity {
-    /// Constraints as nonlinear functions of the plan.
-    #[default]
-    Exact,
-    /// Constraints linearised at the previous plan.
-    Frozen,
-}
-
 /// Settings that choose and limit the solvers of an optimisation.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Declared)]
 pub struct SolverSettings {
     #[allow(missing_docs)] // Its type says what it is.
     #[setting(name = "")]
     pub method: Method,
-    #[allow(missing_docs)]
-    #[setting(used_with = "solver = riccati")]
-    pub nonlinearity: Nonlinearity,
     /// Maximum number of iterations of each solver in each pass.
     #[setting(min = 1, max = 1000)]
     pub max_iterations: u32,
@@ -57,19 +43,10 @@ impl Default for SolverSettings {
     fn default() -> Self {
         Self {
             method: Method::default(),
-            nonlinearity: Nonlinearity::default(),
             max_iterations: 1000,
             shortcuts: true,
             time_budget: 0.0,
             iteration_budget: 0,
         }
-    }
-}
-
-impl SolverSettings {
-    /// Returns whether the Riccati method is tried first, with the norm constraints as functions of
-    /// the trajectory.
-    pub(super) fn is_exact_riccati(&self) -> bool {
-        (self.method, self.nonlinearity) == (Method::Riccati, Nonlinearity::Exact)
     }
 }

@@ -4,7 +4,7 @@ use super::{controller, optimisations};
 use crate::harness::recording::reference;
 use crate::harness::{FEEDBACK, settings};
 use control::crmpc::{Constraints, InitialState, Memory, Settings, SolverReport, SolverStatus};
-use control::mpc::{Method, Nonlinearity, SolverSettings};
+use control::mpc::{Method, SolverSettings};
 use control::{Controller, Crmpc, Measurement};
 use nalgebra::{Vector2, Vector3};
 use proptest::prelude::*;
@@ -133,33 +133,28 @@ fn oracle_off_the_nominal_motion_the_input_changes_by_k_times_the_deviation() {
 
 #[test]
 fn shortcuts_change_nothing_along_a_run() {
-    // The first solver has the norm constraints as functions of the trajectory; the second, the
-    // cone solver, has them linearised.
-    let solvers = [(Nonlinearity::Exact, Method::Riccati), (Nonlinearity::Frozen, Method::Cone)];
     for constraints in [Constraints::Robust, Constraints::Paper] {
-        for (nonlinearity, method) in solvers {
-            let settings = settings(constraints);
-            let solver = SolverSettings { nonlinearity, ..settings.solver };
-            let mut with = Crmpc::new(Settings { solver, ..settings }).unwrap();
-            let solver = SolverSettings { method, shortcuts: false, ..solver };
-            let mut without = Crmpc::new(Settings { solver, ..settings }).unwrap();
-            let limit = settings.limit_moment;
-            let mut counts = [0, 0];
-            for sample in optimisations(constraints).iter().step_by(3) {
-                let (memory, moment) = sample.update(&mut with);
-                let (whole, moment_whole) = sample.update(&mut without);
-                counts[usize::from(memory.report.status == SolverStatus::Constrained)] += 1;
-                let (cost, cost_whole) = (memory.report.cost, whole.report.cost);
-                let tick = sample.tick;
-                assert!(
-                    (cost - cost_whole).abs() <= 1e-7 * cost_whole,
-                    "tick {tick}: {cost} {cost_whole}"
-                );
-                let difference = (moment - moment_whole).norm() / limit;
-                assert!(difference < 1e-4, "tick {tick}: {difference}");
-            }
-            assert!(counts.iter().all(|&count| count > 1), "{constraints:?}: {counts:?}");
+        let settings = settings(constraints);
+        let [mut with, mut without] = [true, false].map(|shortcuts| {
+            let solver = SolverSettings { shortcuts, ..settings.solver };
+            Crmpc::new(Settings { solver, ..settings }).unwrap()
+        });
+        let limit = settings.limit_moment;
+        let mut counts = [0, 0];
+        for sample in optimisations(constraints).iter().step_by(3) {
+            let (memory, moment) = sample.update(&mut with);
+            let (whole, moment_whole) = sample.update(&mut without);
+            counts[usize::from(memory.report.status == SolverStatus::Constrained)] += 1;
+            let (cost, cost_whole) = (memory.report.cost, whole.report.cost);
+            let tick = sample.tick;
+            assert!(
+                (cost - cost_whole).abs() <= 1e-7 * cost_whole,
+                "tick {tick}: {cost} {cost_whole}"
+            );
+            let difference = (moment - moment_whole).norm() / limit;
+            assert!(difference < 1e-4, "tick {tick}: {difference}");
         }
+        assert!(counts.iter().all(|&count| count > 1), "{constraints:?}: {counts:?}");
     }
 }
 
@@ -168,7 +163,7 @@ fn oracle_without_a_disturbance_bound_all_solvers_agree_however_the_plan_begins(
     let measured =
         Measurement { angles: Scenario::crmpc2022().initial_angles, ..Measurement::default() };
     for constraints in [Constraints::Robust, Constraints::Paper] {
-        for initial_state in [InitialState::Measured, InitialState::Nominal, InitialState::Tube] {
+        for initial_state in [InitialState::Measured, InitialState::Nominal] {
             let [cost, cost_cone] = [Method::Riccati, Method::Cone].map(|method| {
                 let settings = Settings {
                     disturbance_bound: 0.0,

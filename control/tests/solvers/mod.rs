@@ -11,7 +11,7 @@ use control::mpc::lq::Unconstrained;
 use control::mpc::problem::{End, Outcome, Problem, Solution, Start};
 use control::mpc::riccati::Riccati;
 use control::mpc::{Budget, Chain, Cost, Layout, State};
-use nalgebra::{SMatrix, SVector, Vector3};
+use nalgebra::{SMatrix, Vector3};
 use proptest::prelude::*;
 use proptest::test_runner::{RngAlgorithm, TestRng, TestRunner};
 use std::cell::Cell;
@@ -99,16 +99,14 @@ struct Solvers {
 type Verdict = [(Outcome, f64, Certificate); 2];
 
 impl Solvers {
-    fn new(shape: Shape, start: Option<[Vec<SVector<f64, 2>>; 3]>) -> Self {
+    fn new(shape: Shape) -> Self {
         let chain = Chain::new(0.2);
-        let faces = start.iter().flatten().map(Vec::len).sum();
         let layout = Layout {
             chain,
             cost: shape.cost,
             horizon: shape.horizon,
             constrains_states: true,
             terminal: shape.terminal,
-            start,
             margin: 0.5,
             scale: [0.1, 0.1],
             standstill: 1e-6,
@@ -117,7 +115,7 @@ impl Solvers {
         Self {
             chain,
             unconstrained: Unconstrained::new(shape.horizon, &chain, &shape.cost),
-            riccati: Riccati::new(shape.horizon, faces, MAX_ITERATIONS),
+            riccati: Riccati::new(shape.horizon, MAX_ITERATIONS),
             cone: cone.unwrap(),
             linearised: LinearisedConstraints::new(shape.horizon),
             affine: vec![[Vector3::zeros(); 2]; shape.horizon],
@@ -127,7 +125,7 @@ impl Solvers {
 
     /// Solves the sample's problem with both solvers, with its norm constraints linearised about
     /// the unconstrained optimum.
-    fn solve(&mut self, sample: &Sample, normals: Option<&[Vec<SVector<f64, 2>>; 3]>) -> Verdict {
+    fn solve(&mut self, sample: &Sample) -> Verdict {
         let Self { shape, chain, unconstrained, riccati, cone, linearised, affine } = self;
         affine.fill([Vector3::zeros(); 2]);
         let at = (sample.jump.0 * shape.horizon as f64) as usize;
@@ -150,8 +148,7 @@ impl Solvers {
         let problem = Problem {
             chain,
             cost: &shape.cost,
-            start: normals
-                .map_or(Start::Fixed(sample.start), |normals| Start::Within(sample.start, normals)),
+            start: Start::Fixed(sample.start),
             affine,
             constraints: &*linearised,
             end: End { weight: &shape.cost.end, slope: zero, radius },
@@ -188,9 +185,9 @@ fn oracle_riccati_and_cone_agree_on_the_cost_of_5500_random_problems() {
     let problems = (shape(), prop::collection::vec(sample(), PER_SHAPE));
     runner(SHAPES)
         .run(&problems, |(shape, samples)| {
-            let mut solvers = Solvers::new(shape.clone(), None);
+            let mut solvers = Solvers::new(shape.clone());
             for sample in samples {
-                let [(ours, cost, certificate), (judge, judged, judged_certificate)] = solvers.solve(&sample, None);
+                let [(ours, cost, certificate), (judge, judged, judged_certificate)] = solvers.solve(&sample);
                 let context = || format!("{shape:?} {sample:?}: {ours:?} {cost} {certificate:?}, {judge:?} {judged} {judged_certificate:?}");
                 let which = match (ours.solved(), judge.solved()) {
                     (true, true) => {
@@ -257,65 +254,42 @@ fn assert_agree([(ours, cost, certificate), (judge, judged, _)]: Verdict, contex
 
 #[test]
 fn oracle_riccati_and_cone_agree_in_degenerate_cases() {
-    let mut solvers = Solvers::new(published(), None);
+    let mut solvers = Solvers::new(published());
     // The first state is as fast as permitted, so that the first input must keep the rate or reduce
     // it.
     let limit = 5.0_f64.to_radians();
     let start = [Vector3::new(0.3, 0.05, -0.2), Vector3::new(0.0, 0.0, 0.999 * limit)];
     assert_agree(
-        solvers.solve(&Sample { start, ..MODERATE }, None),
+        solvers.solve(&Sample { start, ..MODERATE }),
         "rate at its bound at the start",
     );
     // These bounds are so large that no constraint is active; then the end state is almost given.
     assert_agree(
-        solvers.solve(&Sample { bounds: (3.0, 3.0), ..MODERATE }, None),
+        solvers.solve(&Sample { bounds: (3.0, 3.0), ..MODERATE }),
         "no constraint active",
     );
     let jump = (0.99, [0.012, 0.0, -0.087]);
     assert_agree(
-        solvers.solve(&Sample { radius: 1e-3, jump, ..MODERATE }, None),
+        solvers.solve(&Sample { radius: 1e-3, jump, ..MODERATE }),
         "tiny terminal constraint",
     );
     // One axis is already at its reference.
     let start = [Vector3::new(0.3, 0.0, 0.0), Vector3::zeros()];
-    assert_agree(solvers.solve(&Sample { start, ..MODERATE }, None), "one axis only");
+    assert_agree(solvers.solve(&Sample { start, ..MODERATE }), "one axis only");
 }
 
 #[test]
 fn an_infeasible_problem_is_recognised_within_the_iteration_limit() {
-    let mut solvers = Solvers::new(published(), None);
+    let mut solvers = Solvers::new(published());
     // The start is three times as fast as permitted, with hardly any moment.
     let start = [Vector3::zeros(), Vector3::new(0.0, 0.26, 0.0)];
     for moment in [0.0, -1.0, -3.0] {
         let [(ours, ..), (judge, ..)] =
-            solvers.solve(&Sample { start, bounds: (0.0, moment), ..MODERATE }, None);
+            solvers.solve(&Sample { start, bounds: (0.0, moment), ..MODERATE });
         assert!(!ours.solved() && !judge.solved(), "{ours:?} {judge:?}");
         // The search must not end by its last iteration but because it is recognised as hopeless.
         assert!(ours.hopeless() && ours.iterations() < MAX_ITERATIONS, "{ours:?}");
     }
-}
-
-#[test]
-fn oracle_riccati_and_cone_agree_where_the_start_is_free_within_a_set() {
-    use control::error_dynamics::{Gain, SampledError};
-    let set = SampledError::new(Gain { k1: -5.0, k2: -5.0 }, 0.04).invariant_set(0.0).unwrap();
-    let normals: [Vec<SVector<f64, 2>>; 3] =
-        [0.03, 0.05, 0.1].map(|bound| set.normals().iter().map(|normal| normal / bound).collect());
-    let mut solvers = Solvers::new(published(), Some(normals.clone()));
-    let solved = Cell::new(0);
-    let mut runner = runner(200);
-    let solvers = std::cell::RefCell::new(&mut solvers);
-    runner
-        .run(&sample(), |sample| {
-            let verdict = solvers.borrow_mut().solve(&sample, Some(&normals));
-            if verdict[1].0.solved() {
-                solved.update(|count| count + 1);
-                assert_agree(verdict, &format!("{sample:?}"));
-            }
-            Ok(())
-        })
-        .unwrap();
-    assert!(solved.get() > 150, "{}", solved.get());
 }
 
 #[test]
@@ -339,7 +313,7 @@ fn oracle_constraints_that_only_the_iterates_come_near_are_found() {
     Unconstrained::new(horizon, &chain, &cost).solve(&start, &affine, &mut fast.trajectory);
     still.trajectory.states.fill(start);
     let optima = [fast, still].map(|mut solution| {
-        let outcome = Riccati::new(horizon, 0, MAX_ITERATIONS).solve(
+        let outcome = Riccati::new(horizon, MAX_ITERATIONS).solve(
             &problem,
             &mut solution,
             0,

@@ -77,7 +77,6 @@ fn the_cone_solver_takes_over_where_the_riccati_method_fails() {
         horizon,
         constrains_states: true,
         terminal: false,
-        start: None,
         margin: 0.5,
         scale: [0.1, 0.1],
         standstill: 1e-6,

@@ -5,7 +5,7 @@ use crate::{
     AttitudeEstimator, Btvsmc, BtvsmcDo, ControlAllocator, Crmpc, Dlmpc, Fbl, Lqr, SotvsmcDo,
     TwoLoopSmc,
 };
-use control::crmpc::{Constraints, InitialState};
+use control::crmpc::Constraints;
 use control::error_dynamics::Gain;
 use fmi_export::Model;
 
@@ -43,10 +43,6 @@ fn refusals() -> Vec<String> {
             |instance| instance.settings.terminal = Gain { k1: -1.0, k2: -1.0 },
             |instance| instance.settings.terminal = Gain { k1: -20.0, k2: -11.0 },
             |instance| instance.settings.tube = Gain { k1: -1.0, k2: -1.0 },
-            |instance| {
-                instance.settings.initial_state = InitialState::Tube;
-                instance.settings.feedback = Gain { k1: -5.0, k2: -2.0 };
-            },
             |instance| {
                 instance.settings.constraints = Constraints::Paper;
                 instance.settings.disturbance_bound = 1.0;

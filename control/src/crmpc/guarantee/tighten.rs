@@ -9,7 +9,7 @@ use super::observable::Observable;
 use super::parts::{Parts, Reaches};
 use super::tightening::{AtTick, Tightening};
 use crate::controller::Explained;
-use crate::crmpc::settings::{InitialState, Settings};
+use crate::crmpc::settings::Settings;
 use crate::error::DesignError;
 use crate::error_dynamics::SampledError;
 use vehicle::math::powi;
@@ -17,8 +17,7 @@ use vehicle::math::powi;
 /// Computes tightening and assessment of `settings`.
 ///
 /// # Errors
-/// Returns an error that names the gain that does not stabilise, with its spectral radius, or the
-/// gain for which no invariant set can be computed.
+/// Returns an error that names the gain that does not stabilise, with its spectral radius.
 pub(in crate::crmpc) fn tighten(s: &Settings) -> Result<(Tightening, Assessment), DesignError> {
     let error = SampledError::delayed(s.feedback, s.period_feedback, s.delay);
     let steps = error.settling().ok_or_else(|| DesignError::Unstable {
@@ -29,7 +28,7 @@ pub(in crate::crmpc) fn tighten(s: &Settings) -> Result<(Tightening, Assessment)
     })?;
     let dynamics = Dynamics::new(s);
     let parts = Parts::new(s, &dynamics);
-    let sequence = Sequence::new(s, &error, &parts, steps)?;
+    let sequence = Sequence::new(s, &error, &parts, steps);
     let bearing = bearing(s, dynamics.domain.sideslip);
     let h = s.period_optimisation;
     let at = |(n, deviation): (usize, &Deviation)| AtTick {
@@ -73,20 +72,7 @@ struct Sequence {
 }
 
 impl Sequence {
-    fn new(
-        s: &Settings,
-        error: &SampledError,
-        parts: &Parts,
-        steps: usize,
-    ) -> Result<Self, DesignError> {
-        // A plan of `tube` may begin anywhere in the set that Δ cannot drive the deviation out of,
-        // so that the deviation is fully grown from the start.
-        let is_tube = s.initial_state == InitialState::Tube;
-        let set = is_tube.then(|| {
-            let set = error.invariant_set(lateral(s));
-            set.ok_or(DesignError::NotReal { name: "feedback" })
-        });
-        let set = set.transpose()?.map(|set| set.reach());
+    fn new(s: &Settings, error: &SampledError, parts: &Parts, steps: usize) -> Self {
         let early = &parts.early;
         let disturbance = error.reach(steps);
         let [of_angles, of_rates] = error.errors(steps);
@@ -94,7 +80,7 @@ impl Sequence {
         let mispredictions = error.mispredictions(steps, early[1]);
         let shifts = early[2].count(&error.shifts(steps));
         let reaches = |n: usize| Reaches {
-            disturbance: set.map_or(disturbance[n], |set| disturbance[steps].or(&set)),
+            disturbance: disturbance[n],
             early_feedback: disturbance[n].feedback
                 - disturbance[n - n.min(early[0].ticks)].feedback,
             errors: [of_angles[n], of_rates[n]],
@@ -105,14 +91,10 @@ impl Sequence {
         let at = |n: usize| parts.deviation(s, &reaches(n));
         let mut ticks: Vec<Deviation> = (0..=steps).map(at).collect();
         // By errors of the measurement the deviation may be larger at an early tick than at the
-        // last. As the last entry represents all later ticks, and for every tick with `tube`, it
-        // takes the largest of all.
+        // last. As the last entry represents all later ticks, it takes the largest of all.
         ticks[steps] = ticks.iter().fold(Deviation::default(), |most, at| most.or(at));
-        if is_tube {
-            ticks.drain(..steps);
-        }
         let ratio = (s.period_optimisation / s.period_feedback).round().max(1.0) as usize;
-        Ok(Self { ticks, ratio })
+        Self { ticks, ratio }
     }
 
     fn at(&self, tick: usize) -> &Deviation {
@@ -147,12 +129,6 @@ impl Sequence {
         let change = change.max((angle(tick + self.ratio) - angle(tick)).abs());
         RateLoss::new(with_bulge(|d| d.angle), with_bulge(|d| d.rate), change, h)
     }
-}
-
-/// Returns the largest shift of the angle by a disturbance that changes within a period, beyond the
-/// effect of its mean, relative to the disturbance bound, s².
-pub(in crate::crmpc) fn lateral(s: &Settings) -> f64 {
-    0.25 * s.period_feedback * s.period_feedback
 }
 
 /// Returns these settings with the given share of the disturbance bound and the errors.

@@ -6,7 +6,7 @@ use crate::crmpc::feedback::{Feedback, Tick};
 use crate::crmpc::memory::{Acting, Memory};
 use crate::crmpc::plan::Terms;
 use crate::crmpc::set::ROUNDING;
-use crate::crmpc::settings::{InitialState, Settings};
+use crate::crmpc::settings::Settings;
 use crate::crmpc::supervision::{Contradiction, GuaranteeStatus};
 use crate::linearise;
 use nalgebra::Vector3;
@@ -149,11 +149,7 @@ impl Robust {
             self.settings;
         let parts = disturbance_parts as f64;
         let needed = memory.recent_bound / disturbance_bound * parts;
-        // A nominal state in the invariant set belongs to the whole bound.
-        let level = match self.settings.initial_state {
-            InitialState::Tube => 0.0,
-            _ => parts - needed - self.settings.parts_to_spare(),
-        };
+        let level = parts - needed - self.settings.parts_to_spare();
         Terms {
             known: memory.known,
             turn: memory.turn,

@@ -12,7 +12,7 @@ use crate::crmpc::state::split;
 use crate::crmpc::supervision::{Contradiction, GuaranteeStatus};
 use crate::crmpc::terminal;
 use crate::linearise;
-use crate::mpc::{Nonlinearity, OptimiserReport};
+use crate::mpc::OptimiserReport;
 use crate::report::SolverStatus;
 use nalgebra::{Vector3, Vector6};
 
@@ -213,10 +213,7 @@ impl Robust {
             return report;
         }
         let certified = self.certify(planner.optimiser.trajectory(), report.settled);
-        // Linearised constraints serve for comparison, so their optimum is accepted without
-        // guarantee.
-        let is_compared = self.settings.solver.nonlinearity == Nonlinearity::Frozen;
-        if certified.is_none() && memory.assured() && !is_compared {
+        if certified.is_none() && memory.assured() {
             return OptimiserReport { status: SolverStatus::Fallback, ..report };
         }
         planner.follow_optimum(&self.stages, memory, state);

@@ -90,13 +90,9 @@ impl<const O: usize> Riccati<O> {
             p = add(&add(&problem.chain.adjoint(&p), &q), &through);
         }
         let mut change = zero_state();
-        if !matches!(problem.start, Start::Fixed(_)) {
-            let slope = add(&p, &self.start_slope(problem, &Pair::effective));
+        if let Start::Arrival(..) = problem.start {
+            let slope = add(&p, &self.start_slope(problem));
             change = minimiser(&self.first.0, &slope).unwrap_or(change);
-        }
-        for face in &mut self.faces {
-            let of_face: f64 = (0..O).map(|i| -face.normal[i] * change[i][face.axis]).sum();
-            face.pair.set_direction(of_face, 0.0);
         }
         for (k, stage) in self.stages[..=last].iter_mut().enumerate() {
             stage.d_state = change;

@@ -1,7 +1,7 @@
 //! The iterate of the interior point method.
 
 use super::pair::Pair;
-use super::stage::{Face, Stage};
+use super::stage::Stage;
 use super::sweep::Blocks;
 use crate::mpc::lq::Unconstrained;
 use crate::mpc::problem::{State, zero_state};
@@ -19,7 +19,6 @@ pub struct Rest<'a, const O: usize> {
 pub struct Riccati<const O: usize> {
     pub(super) stages: Vec<Stage<O>>,
     pub(super) terminal: Pair,
-    pub(super) faces: Vec<Face<O>>,
     /// Weight P and slope p of the first stage.
     pub(super) first: (Blocks<O>, State<O>),
     /// Number of intervals of the whole horizon before the present problem.
@@ -30,12 +29,11 @@ pub struct Riccati<const O: usize> {
 }
 
 impl<const O: usize> Riccati<O> {
-    /// Allocates a solver for `horizon` intervals and at most `faces` normals of the initial set.
-    pub fn new(horizon: usize, faces: usize, max_iterations: u32) -> Self {
+    /// Allocates a solver for `horizon` intervals.
+    pub fn new(horizon: usize, max_iterations: u32) -> Self {
         Self {
             stages: vec![Stage::new(); horizon + 1],
             terminal: Pair::default(),
-            faces: Vec::with_capacity(2 * faces),
             first: ([[Matrix3::zeros(); O]; O], zero_state()),
             before: 0,
             horizon,

@@ -23,7 +23,7 @@ pub use iterate::{Rest, Riccati};
 
 use super::budget::Budget;
 use super::constraints::Constraints;
-use super::problem::{Outcome, Problem, Solution, Start};
+use super::problem::{Outcome, Problem, Solution};
 use direction::Direction;
 use pair::Pair;
 use progress::{Progress, give_up};
@@ -94,11 +94,6 @@ impl<const O: usize> Riccati<O> {
         }
         if problem.end.radius.is_some() {
             multipliers.terminal = self.terminal.multiplier;
-        }
-        if let Start::Within(..) = problem.start {
-            multipliers.start = self.start_slope(problem, &|pair| pair.multiplier);
-            multipliers.start_gap =
-                self.faces.iter().map(|face| face.pair.multiplier * face.pair.c.abs()).sum();
         }
     }
 }

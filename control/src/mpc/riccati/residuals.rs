@@ -63,19 +63,13 @@ impl<const O: usize> Riccati<O> {
                 scale = scale.max(present.amax()).max(future.amax());
             },
         );
-        match problem.start {
-            Start::Fixed(_) => (),
-            Start::Within(..) => {
-                largest = self.first.1.iter().fold(largest, |largest, p| largest.max(p.amax()));
-            }
-            // A slope in E_0 remains as a slope in the inputs before; for a double integrator it is
-            // largest in the first or the last of them.
-            Start::Arrival(..) => {
-                let way = self.before.saturating_sub(1) as f64 * problem.chain.step;
-                let first = Chain::new(way).adjoint(&self.first.1);
-                for costate in [&self.first.1, &first] {
-                    largest = largest.max(problem.chain.input_adjoint(costate).amax());
-                }
+        // A slope in E_0 remains as a slope in the inputs before; for a double integrator it is
+        // largest in the first or the last of them.
+        if let Start::Arrival(..) = problem.start {
+            let way = self.before.saturating_sub(1) as f64 * problem.chain.step;
+            let first = Chain::new(way).adjoint(&self.first.1);
+            for costate in [&self.first.1, &first] {
+                largest = largest.max(problem.chain.input_adjoint(costate).amax());
             }
         }
         Residuals {
@@ -116,7 +110,7 @@ impl<const O: usize> Riccati<O> {
             visit(r, problem.chain.input_adjoint(&p));
             p = add(&problem.chain.adjoint(&p), &q);
         }
-        self.first.1 = add(&p, &self.start_slope(problem, &multiplier));
+        self.first.1 = add(&p, &self.start_slope(problem));
     }
 
     /// Returns the slope ∂L/∂E_N at the last stage.
@@ -140,21 +134,13 @@ impl<const O: usize> Riccati<O> {
         slope
     }
 
-    /// Returns the part of ∂L/∂E_0 that comes from the conditions on the start.
-    pub(super) fn start_slope<C>(
-        &self,
-        problem: &Problem<O, C>,
-        multiplier: &impl Fn(&Pair) -> f64,
-    ) -> State<O> {
-        let mut slope = zero_state();
-        if let Start::Arrival(weight, mean) = &problem.start {
-            slope = apply(weight, &std::array::from_fn(|i| self.stages[0].state[i] - mean[i]));
-        }
-        for face in &self.faces {
-            for (i, slope) in slope.iter_mut().enumerate() {
-                slope[face.axis] -= face.normal[i] * multiplier(&face.pair);
+    /// Returns the part of ∂L/∂E_0 that comes from the arrival cost.
+    pub(super) fn start_slope<C>(&self, problem: &Problem<O, C>) -> State<O> {
+        match &problem.start {
+            Start::Fixed(_) => zero_state(),
+            Start::Arrival(weight, mean) => {
+                apply(weight, &std::array::from_fn(|i| self.stages[0].state[i] - mean[i]))
             }
         }
-        slope
     }
 }

@@ -38,7 +38,7 @@ impl<const O: usize> Riccati<O> {
             stage.add_constraints(&mut quadratic);
             stage.gain = Gain::factor(&quadratic, problem.chain, &mut p)?;
         }
-        self.add_start_weight(problem, &mut p);
+        Self::add_start_weight(problem, &mut p);
         self.first.0 = p;
         Some(())
     }
@@ -71,16 +71,8 @@ impl<const O: usize> Riccati<O> {
         quadratic.q
     }
 
-    /// Adds to P_0 the part of the conditions on the start.
-    fn add_start_weight<C>(&self, problem: &Problem<O, C>, p: &mut Blocks<O>) {
-        for face in &self.faces {
-            for i in 0..O {
-                for j in i..O {
-                    p[i][j][(face.axis, face.axis)] +=
-                        face.pair.scaling() * face.normal[i] * face.normal[j];
-                }
-            }
-        }
+    /// Adds to P_0 the arrival cost.
+    fn add_start_weight<C>(problem: &Problem<O, C>, p: &mut Blocks<O>) {
         if let Start::Arrival(weight, _) = &problem.start {
             for i in 0..O {
                 for j in i..O {

@@ -4,7 +4,7 @@ use super::pair::Pair;
 use super::sweep::Gain;
 use crate::mpc::constraints::{Constraints, StageConstraints};
 use crate::mpc::problem::{Problem, State, zero_state};
-use nalgebra::{SVector, Vector3};
+use nalgebra::Vector3;
 
 /// One stage of the horizon: the iterate, its norm constraints and the direction.
 #[derive(Clone, Copy, Debug)]
@@ -27,14 +27,6 @@ pub(super) struct Stage<const O: usize> {
 pub(super) struct Slopes<const O: usize> {
     pub state: State<O>,
     pub input: (State<O>, Vector3<f64>),
-}
-
-/// A face ±nᵀ(E_given − E_0) ≤ 1 of the set of admissible initial states.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Face<const O: usize> {
-    pub axis: usize,
-    pub normal: SVector<f64, O>,
-    pub pair: Pair,
 }
 
 impl<const O: usize> Stage<O> {

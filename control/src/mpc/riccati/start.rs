@@ -3,9 +3,9 @@
 use super::iterate::Riccati;
 use super::pair::Pair;
 use super::residuals::Residuals;
-use super::stage::{Face, Stage};
+use super::stage::Stage;
 use crate::mpc::constraints::Constraints;
-use crate::mpc::problem::{Multipliers, Problem, Solution, Start, dot};
+use crate::mpc::problem::{Multipliers, Problem, Solution, dot};
 use nalgebra::Vector3;
 
 /// A norm constraint is near when ‖y‖² exceeds this value.
@@ -49,26 +49,14 @@ impl<const O: usize> Riccati<O> {
         let last = &mut self.stages[self.horizon];
         last.input = trajectory.inputs.get(first + self.horizon).copied().unwrap_or_default();
         last.d_input = Vector3::zeros();
-        self.faces.clear();
-        if let Start::Within(_, normals) = problem.start {
-            for (axis, normals) in normals.iter().enumerate() {
-                for normal in normals {
-                    let face = |normal| Face { axis, normal, pair: Pair::default() };
-                    self.faces.extend([face(*normal), face(-normal)]);
-                }
-            }
-        }
         self.evaluate(problem);
         let cost = self.cost(problem);
         let (smallest, gap) = if warm { WARM } else { COLD };
         let per_stage = if problem.constraints.constrains_states() { 2 } else { 1 };
-        let share = cost / (per_stage * self.horizon + self.faces.len() + 1) as f64;
+        let share = cost / (per_stage * self.horizon + 1) as f64;
         let mean = gap * share;
         let Multipliers { intervals, terminal, .. } = multipliers;
         self.terminal.begin(smallest, mean, if warm { *terminal } else { 0.0 });
-        for face in &mut self.faces {
-            face.pair.begin(smallest, mean, 0.0);
-        }
         self.watch(problem, smallest, mean, |k| {
             let given = |k: usize| intervals.get(k).copied().filter(|_| warm).unwrap_or_default();
             let [state, _] = (first + k).checked_sub(1).map_or([0.0; 2], given);
@@ -140,14 +128,6 @@ impl<const O: usize> Riccati<O> {
             self.terminal.c =
                 0.5 * (dot(end, &problem.end.weighted(end)) / (radius * radius) - 1.0);
         }
-        if let Start::Within(given, _) = &problem.start {
-            let first = self.stages[0].state;
-            for Face { axis, normal, pair } in &mut self.faces {
-                let deviation: f64 =
-                    (0..O).map(|i| normal[i] * (given[i][*axis] - first[i][*axis])).sum();
-                pair.c = deviation - 1.0;
-            }
-        }
     }
 
     /// Visits the pairs of all included inequalities.
@@ -162,9 +142,6 @@ impl<const O: usize> Riccati<O> {
         pairs.filter(|pair| pair.watched).for_each(&mut visit);
         if problem.end.radius.is_some() {
             visit(&mut self.terminal);
-        }
-        for face in &mut self.faces {
-            visit(&mut face.pair);
         }
     }
 }
