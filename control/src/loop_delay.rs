@@ -236,6 +236,8 @@ impl LoopDelaySettings {
         let commands = &memory.commands[self.first()..];
         let best = memory.fits.iter().map(|fit| fit.scale).fold(f64::INFINITY, f64::min);
         for (order, fit) in memory.fits.iter_mut().enumerate() {
+            // A memory that begins as the default one has no sums yet.
+            fit.sums.resize(self.candidates(), Sums::default());
             let y = difference(order, &memory.accelerations);
             let weight = fit.add(retained, &y, |j| difference(order, &commands[j..]));
             if weight < 1.0 && fit.scale <= best {

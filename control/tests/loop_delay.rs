@@ -2,7 +2,8 @@
 
 use control::controller::{Controller, Measurement};
 use control::crmpc::{Constraints, Contradiction, Crmpc, Guarantee, GuaranteeStatus, Settings};
-use control::delay::{Delayed, Latency};
+use control::delay::{Delayed, Latency, Memory};
+use nalgebra::Vector3;
 use vehicle::Scenario;
 use vehicle::disturbance::DisturbanceKind;
 use vehicle::plant::Plant;
@@ -94,4 +95,28 @@ fn oracle_commands_that_do_not_act_tell_no_delay() {
         law.update(&mut memory, tick, time, &Measurement::default(), &reference);
         assert!(!memory.loop_delay.is_other, "{time} s");
     }
+}
+
+#[test]
+fn a_memory_that_begins_as_the_default_one_gives_the_same_estimate() {
+    let (scenario, settings) = (Scenario::crmpc2022(), Settings::new(Constraints::Robust));
+    let (body, latency) = (settings.body, Latency::of_action(PERIOD));
+    let law = Crmpc::new(settings).unwrap();
+    let mut law = Delayed::new(law, body, PERIOD, latency, f64::INFINITY).unwrap();
+    let mut memories = [law.memory(), Memory::default()];
+    for tick in 0..60 {
+        let time = tick as f64 * PERIOD;
+        let measured = Measurement {
+            angles: scenario.initial_angles,
+            rates: Vector3::new(0.01, -0.02, 0.015) * (3.0 * time).sin(),
+            ..Measurement::default()
+        };
+        let reference = |time: f64| scenario.reference.at(time);
+        let [made, default] = memories
+            .each_mut()
+            .map(|memory| law.update(memory, tick, time, &measured, &reference));
+        assert_eq!(made, default, "{time} s");
+    }
+    assert_eq!(memories[0].loop_delay, memories[1].loop_delay);
+    assert_ne!(memories[0].loop_delay, law.memory().loop_delay);
 }
