@@ -112,9 +112,8 @@ fn a_memory_that_begins_as_the_default_one_gives_the_same_estimate() {
             ..Measurement::default()
         };
         let reference = |time: f64| scenario.reference.at(time);
-        let [made, default] = memories
-            .each_mut()
-            .map(|memory| law.update(memory, tick, time, &measured, &reference));
+        let [made, default] =
+            memories.each_mut().map(|memory| law.update(memory, tick, time, &measured, &reference));
         assert_eq!(made, default, "{time} s");
     }
     assert_eq!(memories[0].loop_delay, memories[1].loop_delay);

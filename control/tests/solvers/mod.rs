@@ -259,15 +259,9 @@ fn oracle_riccati_and_cone_agree_in_degenerate_cases() {
     // it.
     let limit = 5.0_f64.to_radians();
     let start = [Vector3::new(0.3, 0.05, -0.2), Vector3::new(0.0, 0.0, 0.999 * limit)];
-    assert_agree(
-        solvers.solve(&Sample { start, ..MODERATE }),
-        "rate at its bound at the start",
-    );
+    assert_agree(solvers.solve(&Sample { start, ..MODERATE }), "rate at its bound at the start");
     // These bounds are so large that no constraint is active; then the end state is almost given.
-    assert_agree(
-        solvers.solve(&Sample { bounds: (3.0, 3.0), ..MODERATE }),
-        "no constraint active",
-    );
+    assert_agree(solvers.solve(&Sample { bounds: (3.0, 3.0), ..MODERATE }), "no constraint active");
     let jump = (0.99, [0.012, 0.0, -0.087]);
     assert_agree(
         solvers.solve(&Sample { radius: 1e-3, jump, ..MODERATE }),

@@ -2,12 +2,12 @@
 //! the bounds and rounded outwards.
 
 use crate::driven::{Driven, driven};
-use crate::interval::Interval;
+use crate::interval::{Interval, number};
 use crate::lemmas::{Finding, ROUNDING};
 use crate::sums::{Axis, Bounds};
 use control::crmpc::{
-    BRAKING, CURVATURE, DRIFT_BY_ANGLES_TWICE, DRIFT_MIXED, Deviation, Domain, InitialState,
-    Lemmas, Settings, Tightening,
+    BRAKING, CURVATURE, DRIFT_BY_ANGLES_TWICE, DRIFT_MIXED, Deviation, Domain, Lemmas, Settings,
+    Tightening,
 };
 use control::error_dynamics::SampledError;
 use control::linearise::TURN_BY_ANGLES;
@@ -16,27 +16,16 @@ use control::linearise::TURN_BY_ANGLES;
 type Deviations = [Interval; 9];
 
 fn values(deviation: &Deviation) -> [f64; 9] {
-    let Deviation {
-        angle,
-        rate,
-        seen_angle,
-        seen_rate,
-        middle_angle,
-        middle_rate,
-        feedback,
-        feedback_norm,
-        feedback_moment,
-    } = *deviation;
     [
-        angle,
-        rate,
-        seen_angle,
-        seen_rate,
-        middle_angle,
-        middle_rate,
-        feedback,
-        feedback_norm,
-        feedback_moment,
+        deviation.angle,
+        deviation.rate,
+        deviation.seen_angle,
+        deviation.seen_rate,
+        deviation.middle_angle,
+        deviation.middle_rate,
+        deviation.feedback,
+        deviation.feedback_norm,
+        deviation.feedback_moment,
     ]
 }
 
@@ -52,7 +41,6 @@ struct Effects<'a> {
 }
 
 fn deviation(s: &Settings, driven: &Driven, effects: &Effects) -> Deviations {
-    let number = Interval::from;
     let (root2, root3) = (number(2.0).sqrt(), number(3.0).sqrt());
     let [rate_error, angle_error, tau, delay] =
         [s.rate_error, s.angle_error, s.period_feedback, s.delay].map(number);
@@ -95,7 +83,6 @@ fn deviation(s: &Settings, driven: &Driven, effects: &Effects) -> Deviations {
 /// Rate (rad/s) and moment (N m) needed for ‖x‖ ≤ `x` beyond the horizon, where the trajectory
 /// brakes. Both grow with `x`, so limits that hold for `x` hold for all smaller ones as well.
 fn needed(lemmas: &Lemmas, forever: &Deviations, x: f64) -> [Interval; 2] {
-    let number = Interval::from;
     let half = number(0.5);
     let [angle, rate, _, _, middle_angle, middle_rate, feedback, feedback_norm, feedback_moment] =
         *forever;
@@ -135,17 +122,13 @@ fn needed(lemmas: &Lemmas, forever: &Deviations, x: f64) -> [Interval; 2] {
 }
 
 /// Checks the sums and the inequality for a tightening with its terminal rate (rad/s). Returns
-/// `None` if the dynamics are not certain to be stable, or if the initial state is `tube`, whose
-/// invariant set is not checked.
+/// `None` if the dynamics are not certain to be stable.
 pub fn check(
     s: &Settings,
     lemmas: &Lemmas,
     tightening: &Tightening,
     terminal_rate: f64,
 ) -> Option<Vec<Finding>> {
-    if s.initial_state == InitialState::Tube {
-        return None;
-    }
     let error = SampledError::delayed(s.feedback, s.period_feedback, s.delay);
     let steps = error.settling()?;
     let axis = Axis::new(s.feedback, s.period_feedback, s.delay)?;
@@ -171,45 +154,29 @@ pub fn check(
     let mut note = |statement: &str, bound: f64, truth: Interval| {
         findings.push(Finding { statement: statement.into(), bound, truth });
     };
-    let Driven { mismatch, .. } = &driven;
-    note(
-        "mismatch of the cancellation, mean of a period",
-        lemmas.parts.mismatch.mean,
-        mismatch.mean,
-    );
-    note("mismatch at any time", lemmas.parts.mismatch.peak, mismatch.peak);
-    note("mismatch since a measurement", lemmas.parts.mismatch.unseen_rate, mismatch.unseen_rate);
-    note(
-        "mismatch of a prediction by errors",
-        lemmas.parts.mismatch.mispredicted,
-        mismatch.mispredicted,
-    );
+    let (Driven { mismatch, .. }, bound) = (&driven, &lemmas.parts.mismatch);
+    note("mismatch of the cancellation, mean of a period", bound.mean, mismatch.mean);
+    note("mismatch at any time", bound.peak, mismatch.peak);
+    note("mismatch since a measurement", bound.unseen_rate, mismatch.unseen_rate);
+    note("mismatch of a prediction by errors", bound.mispredicted, mismatch.mispredicted);
     note("swing of the cancelled drift", lemmas.parts.swing, mismatch.swing);
     note("creep", lemmas.parts.creep, driven.creep);
     note("‖drive‖", lemmas.parts.norm, driven.drive.of_three + mismatch.mean);
-    let (Domain { rate, sideslip }, [of_rate, of_sideslip]) =
-        (lemmas.dynamics.domain, mismatch.domain);
-    note("‖ω‖ of predictions", rate, of_rate);
-    note("|β| of predictions", sideslip, of_sideslip);
+    let mut domains = vec![("of predictions", lemmas.dynamics.domain, mismatch.domain)];
     if s.delay > 0.0 {
-        let (Domain { rate, sideslip }, [of_rate, of_sideslip]) =
-            (before.dynamics.vehicle, driven.vehicle_before);
-        note("‖ω‖ before the trajectory began", rate, of_rate);
-        note("|β| before the trajectory began", sideslip, of_sideslip);
-        let (Domain { rate, sideslip }, [of_rate, of_sideslip]) =
-            (before.dynamics.domain, driven.domain_before);
-        note("‖ω‖ of predictions before", rate, of_rate);
-        note("|β| of predictions before", sideslip, of_sideslip);
+        let (vehicle, domain) = (before.dynamics.vehicle, before.dynamics.domain);
+        domains.push(("before the trajectory began", vehicle, driven.vehicle_before));
+        domains.push(("of predictions before", domain, driven.domain_before));
     }
-    let limit = error.reach(steps).pop()?;
-    let sums = [limit.angle, limit.rate, limit.feedback, limit.feedback_age];
-    let last = reach.last()?;
-    let names = ["Σ angle", "Σ rate", "Σ feedback", "Σ feedback times age"];
-    for ((name, bound), truth) in
-        names.into_iter().zip(sums).zip([last[0], last[1], last[6], last[7]])
-    {
-        note(&format!("{name} of a disturbance, for ever"), bound, truth);
+    for (whose, Domain { rate, sideslip }, truth) in domains {
+        note(&format!("‖ω‖ {whose}"), rate, truth[0]);
+        note(&format!("|β| {whose}"), sideslip, truth[1]);
     }
+    let (limit, last) = (error.reach(steps).pop()?, reach.last()?);
+    note("Σ angle of a disturbance, for ever", limit.angle, last[0]);
+    note("Σ rate of a disturbance, for ever", limit.rate, last[1]);
+    note("Σ feedback of a disturbance, for ever", limit.feedback, last[6]);
+    note("Σ feedback times age of a disturbance, for ever", limit.feedback_age, last[7]);
     let names = [
         "deviation of the angles",
         "deviation of the rates",

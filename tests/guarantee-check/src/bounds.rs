@@ -1,51 +1,20 @@
 //! The check of the bounds behind the guarantee for settings of the command line.
 
 use clap::Args;
-use control::crmpc::{Constraints, Settings};
-use control::error_dynamics::Gain;
+use control::crmpc::Settings;
 use guarantee_check::CheckReport;
+use guarantee_check::given::Given;
 use guarantee_check::lemmas::Finding;
-use vehicle::dynamics::Inertia;
+use std::str::FromStr;
+use toml::Value;
 
 /// Options for the settings whose bounds are checked.
 #[derive(Args)]
 pub(crate) struct Bounds {
-    /// Gain of the feedback law on the angle, 1/s².
-    #[arg(long)]
-    k1: Option<f64>,
-    /// Gain of the feedback law on the rate, 1/s.
-    #[arg(long)]
-    k2: Option<f64>,
-    /// Time from a measurement until its moment acts, s.
-    #[arg(long)]
-    delay: Option<f64>,
-    /// Bound on the disturbance of each axis, deg/s².
-    #[arg(long)]
-    disturbance_deg: Option<f64>,
-    /// Relative error of the inertia, as a common factor of all entries of the tensor.
-    #[arg(long)]
-    inertia_error: Option<f64>,
-    /// Relative error of the inertia tensor, in any of its six entries.
-    #[arg(long)]
-    tensor_error: Option<f64>,
-    /// Bound on the error of each measured angle, deg.
-    #[arg(long)]
-    angle_error_deg: Option<f64>,
-    /// Bound on the error of each measured rate, deg/s.
-    #[arg(long)]
-    rate_error_deg: Option<f64>,
-    /// Bound on the slow part of the errors of angle of attack and sideslip, deg.
-    #[arg(long)]
-    slow_angle_error_deg: Option<f64>,
-    /// Bound on the rate of change of the slow part of each angle's error, deg/s.
-    #[arg(long)]
-    slow_angle_rate_deg: Option<f64>,
-    /// Largest sideslip angle of the domain, deg.
-    #[arg(long)]
-    sideslip_deg: Option<f64>,
-    /// Inertia of the vehicle: Ixx, Iyy, Izz and Ixz, kg m².
-    #[arg(long, num_args = 4)]
-    inertia: Option<Vec<f64>>,
+    /// Setting of CRMPC as its FMU names it, such as `delay=0.04` or `inertia.error=0.02`; a number
+    /// is in SI units, and a text such as `guarantee.sideslip="20 deg"` says its unit.
+    #[arg(long = "set", value_name = "NAME=VALUE")]
+    set: Vec<String>,
     /// Relative width of the enclosures at which the search stops.
     #[arg(long, default_value_t = 1e-3)]
     gap: f64,
@@ -76,24 +45,15 @@ impl Bounds {
     }
 
     fn settings(&self) -> Result<Settings, String> {
-        let mut s = Settings::new(Constraints::Robust);
-        let degrees = |value: Option<f64>, otherwise: f64| value.map_or(otherwise, f64::to_radians);
-        s.feedback =
-            Gain { k1: self.k1.unwrap_or(s.feedback.k1), k2: self.k2.unwrap_or(s.feedback.k2) };
-        s.delay = self.delay.unwrap_or(s.delay);
-        s.disturbance_bound = degrees(self.disturbance_deg, s.disturbance_bound);
-        s.inertia_error = self.inertia_error.unwrap_or(s.inertia_error);
-        s.tensor_error = self.tensor_error.unwrap_or(s.tensor_error);
-        s.angle_error = degrees(self.angle_error_deg, s.angle_error);
-        s.rate_error = degrees(self.rate_error_deg, s.rate_error);
-        s.slow_angle_error = degrees(self.slow_angle_error_deg, s.slow_angle_error);
-        s.slow_angle_rate = degrees(self.slow_angle_rate_deg, s.slow_angle_rate);
-        s.sideslip_domain = degrees(self.sideslip_deg, s.sideslip_domain);
-        if let Some(&[ixx, iyy, izz, ixz]) = self.inertia.as_deref() {
-            let inertia = Inertia { Ixx: ixx, Iyy: iyy, Izz: izz, Ixz: ixz };
-            s.body = inertia.body(1.0).map_err(|error| error.to_string())?;
+        let mut given = Given::default();
+        for set in &self.set {
+            let (name, text) =
+                set.split_once('=').ok_or_else(|| format!("{set}: no NAME=VALUE"))?;
+            // The quotes of a text may be left out.
+            let value = Value::from_str(text).unwrap_or_else(|_| text.into());
+            given.set(name, &value)?;
         }
-        Ok(s)
+        given.settings()
     }
 }
 
@@ -143,6 +103,20 @@ mod tests {
         assert_eq!(finding(1.0, f64::NAN, f64::NAN), "NOT SHOWN");
         assert_eq!(verdict(true), "Every bound holds.");
         assert_eq!(verdict(false), "NOT every bound is shown to hold.");
+    }
+
+    #[test]
+    fn settings_have_the_names_and_units_of_the_fmu() {
+        let settings = |set: &[&str]| {
+            let set = set.iter().map(ToString::to_string).collect();
+            Bounds { set, gap: 0.1 }.settings()
+        };
+        let with = ["delay=0.03", "measurement.age=0.01", "guarantee.sideslip=10 deg"];
+        let given = settings(&with).unwrap();
+        assert!((given.delay - 0.04).abs() < 1e-15);
+        assert_eq!(given.sideslip_domain, 10.0_f64.to_radians());
+        assert!(settings(&["delai=0.03"]).is_err() && settings(&["delay"]).is_err());
+        assert!(settings(&["inertia.Ixx=0"]).is_err());
     }
 
     #[test]

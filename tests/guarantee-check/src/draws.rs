@@ -50,11 +50,11 @@ fn drawn(kind: u64, random: &mut Random) -> Settings {
         1 => Settings { delay: 0.04, ..published },
         2 => Settings { delay: random.between(0.0, 0.15), ..published },
         3 => Settings { initial_state: InitialState::Nominal, ..published },
-        4 => Settings { initial_state: InitialState::Tube, ..published },
         5 => erroneous(random, &published),
         6 => slow(random, &published),
         7 => late(random, &published),
         8 => turned(random, &published),
+        // Two of the kinds are this one.
         _ => anything(random, &published),
     }
 }
@@ -88,8 +88,7 @@ fn slow(random: &mut Random, published: &Settings) -> Settings {
 /// A delay, and plans that go on or begin anew.
 fn late(random: &mut Random, published: &Settings) -> Settings {
     let delay = random.between(0.01, 0.12);
-    let initial_state = [InitialState::Measured, InitialState::Nominal][random.below(2) as usize];
-    Settings { delay, initial_state, ..*published }
+    Settings { delay, initial_state: either(random), ..*published }
 }
 
 /// An error of the whole tensor of inertia.
@@ -102,11 +101,14 @@ fn turned(random: &mut Random, published: &Settings) -> Settings {
     }
 }
 
+fn either(random: &mut Random) -> InitialState {
+    [InitialState::Measured, InitialState::Nominal][random.below(2) as usize]
+}
+
 fn anything(random: &mut Random, published: &Settings) -> Settings {
     let period_feedback = [0.02, 0.04, 0.05, 0.1][random.below(4) as usize];
-    let states = [InitialState::Measured, InitialState::Nominal, InitialState::Tube];
     let longest = (0.3 / period_feedback) as u64;
-    let initial_state = states[random.below(3) as usize];
+    let initial_state = either(random);
     let delay = random.between(0.0, 0.1);
     Settings {
         feedback: Gain { k1: -random.between(0.5, 8.0), k2: -random.between(1.0, 8.0) },

@@ -1,7 +1,7 @@
 //! Causes of the deviation from the nominal trajectory, computed anew from the bounds and rounded
 //! outwards.
 
-use crate::interval::Interval;
+use crate::interval::{Interval, number};
 use control::crmpc::{Domain, Lemmas, Settings, TURN};
 use control::error_dynamics::Early;
 
@@ -53,7 +53,6 @@ pub(crate) struct Driven {
 }
 
 fn drive(s: &Settings, lemmas: &Lemmas) -> Drive {
-    let number = Interval::from;
     let (root2, root3) = (number(2.0).sqrt(), number(3.0).sqrt());
     let [limit, smallest, largest, disturbance] =
         [s.limit_total(), lemmas.dynamics.smallest, lemmas.dynamics.largest, s.disturbance_bound]
@@ -93,7 +92,6 @@ fn drive(s: &Settings, lemmas: &Lemmas) -> Drive {
 }
 
 fn mismatch(s: &Settings, lemmas: &Lemmas, drive: &Drive) -> Mismatch {
-    let number = Interval::from;
     let (half, sixth) = (number(0.5), Interval::ONE / number(6.0));
     let [tau, d] = [s.period_feedback, s.delay].map(number);
     let [by_rates, by_angles, jerk] =
@@ -147,7 +145,6 @@ fn mismatch(s: &Settings, lemmas: &Lemmas, drive: &Drive) -> Mismatch {
 }
 
 pub(crate) fn driven(s: &Settings, lemmas: &Lemmas, before: &Lemmas) -> Driven {
-    let number = Interval::from;
     let (half, tau, d) = (number(0.5), number(s.period_feedback), number(s.delay));
     let [smallest, largest] = [lemmas.dynamics.smallest, lemmas.dynamics.largest].map(number);
     let (drive, larger) = (self::drive(s, lemmas), self::drive(s, before));

@@ -7,7 +7,7 @@ use control::crmpc::{Crmpc, Plan, Settings};
 use control::delay::{Delayed, Latency};
 use control::error::DesignError;
 use control::{Controller, Measurement};
-use nalgebra::{Matrix3, Rotation3, Vector3, Vector6};
+use nalgebra::{Matrix3, Rotation3, Vector3};
 use vehicle::dynamics::RigidBody;
 use vehicle::integrator::rk4;
 use vehicle::kinematics::{self, Kinematics};
@@ -25,8 +25,6 @@ pub struct Recorded {
     pub age: usize,
     /// Time of the optimisation, s.
     pub time: f64,
-    /// Deviation of the predicted state from the plan's first state, rad and rad/s.
-    pub deviation: Vector6<f64>,
     /// Whether the previous plan was kept.
     pub is_kept: bool,
 }
@@ -121,18 +119,6 @@ impl Flight {
         })
     }
 
-    /// The same flight from other angles (rad) and body rates (rad/s), towards constant angles
-    /// (rad).
-    #[must_use]
-    pub fn between(
-        self,
-        angles: &Vector3<f64>,
-        rates: &Vector3<f64>,
-        towards: Vector3<f64>,
-    ) -> Self {
-        Self { start: plant::state(angles, rates), reference: Profile::constant(towards), ..self }
-    }
-
     /// Flies, and hands every plan that the controller accepts under guarantee to `observe`.
     ///
     /// # Errors
@@ -152,10 +138,9 @@ impl Flight {
         for tick in 0..(self.duration / s.period_feedback).round() as u64 {
             let time = tick as f64 * s.period_feedback;
             let measured = self.measure(&state, &acting, time);
-            let predicted = controller.predictor().predict(&memory.under_way, &measured);
             let moment = controller.update(&mut memory, tick, time, &measured, &reference);
             if tick % ratio == 0 && memory.inner.assured() {
-                observe(&recorded(&memory.inner, &predicted, time));
+                observe(&recorded(&memory.inner, time));
             }
             match &mut transport {
                 Some(transport) => drop(transport.command(time, moment)),
@@ -267,18 +252,11 @@ fn erroneous(s: &Settings, seed: u64) -> Matrix3<f64> {
     (inertia + inertia.transpose()) * 0.5
 }
 
-fn recorded(memory: &control::crmpc::Memory, predicted: &Measurement, time: f64) -> Recorded {
-    let rates = kinematics::r(&predicted.angles) * predicted.rates;
-    let mut deviation = -memory.plan.states[0];
-    for i in 0..3 {
-        deviation[i] += predicted.angles[i];
-        deviation[3 + i] += rates[i];
-    }
+fn recorded(memory: &control::crmpc::Memory, time: f64) -> Recorded {
     Recorded {
         plan: memory.plan.clone(),
         age: memory.age as usize,
         time,
-        deviation,
         is_kept: memory.report.status == control::crmpc::SolverStatus::Kept,
     }
 }

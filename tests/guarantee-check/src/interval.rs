@@ -102,11 +102,14 @@ impl Interval {
         self.low <= value && value <= self.high
     }
 
-    /// Encloses eˣ for 0 ≤ x ≤ 1; the result is [`Interval::ALL`] outside.
+    /// Encloses eˣ for x ≥ 0; the result is [`Interval::ALL`] for others.
     #[must_use]
     pub fn exp(self) -> Self {
-        if !(self.low >= 0.0 && self.high <= 1.0) {
+        if !(self.low >= 0.0 && self.high < f64::INFINITY) {
             return Self::ALL;
+        }
+        if self.high > 1.0 {
+            return (self * Self::from(0.5)).exp().square();
         }
         // The remainder after xⁿ/n! is below that term for x ≤ 1 and n ≥ 2.
         let (mut sum, mut term) = (Self::ONE, Self::ONE);
@@ -117,11 +120,34 @@ impl Interval {
         sum + Self::new(0.0, term.high)
     }
 
-    /// Encloses sin x and cos x for 0 ≤ x ≤ 1; the result is [`Interval::ALL`] outside.
+    /// Encloses sin x and cos x, x in rad.
     pub fn sin_cos(self) -> (Self, Self) {
-        if !(self.low >= 0.0 && self.high <= 1.0) {
-            return (Self::ALL, Self::ALL);
+        let middle = self.middle();
+        if !middle.is_finite() || middle.abs() > 1e3 {
+            return (Self::ONE.to_both_sides(), Self::ONE.to_both_sides());
         }
+        // By doubling a part of the middle that is at most 1, which is exact.
+        let (mut part, mut doublings) = (middle.abs(), 0);
+        while part > 1.0 {
+            (part, doublings) = (0.5 * part, doublings + 1);
+        }
+        let (sine, cosine) = Self::point(part).sin_cos_by_series();
+        let doubled = |(s, c): (Self, Self), _| ((s + s) * c, Self::ONE - (s + s) * s);
+        let (sine, cosine) = (0..doublings).fold((sine, cosine), doubled);
+        let (s, c) = (if middle < 0.0 { -sine } else { sine }, cosine);
+        if self.low == self.high {
+            return (s, c);
+        }
+        // sin(m + δ) = sin m cos δ + cos m sin δ with |sin δ| ≤ |δ| and 1 − δ²/2 ≤ cos δ ≤ 1.
+        let reach = (self - Self::point(middle)).abs().upper();
+        let low = (Self::ONE - Self::from(0.5) * reach.square()).low;
+        let (sine, cosine) = (reach.to_both_sides(), Self::new(low.max(-1.0), 1.0));
+        let within = |value: Self| Self::new(value.low.max(-1.0), value.high.min(1.0));
+        (within(s * cosine + c * sine), within(c * cosine - s * sine))
+    }
+
+    /// Encloses sin x and cos x for 0 ≤ x ≤ 1.
+    fn sin_cos_by_series(self) -> (Self, Self) {
         // Both series alternate with decreasing terms, so each remainder is smaller than the first
         // term left out.
         let square = self.square();
@@ -133,9 +159,33 @@ impl Interval {
             even = -(even * square) / Self::from((n - 1.0) * n);
             odd = -(odd * square) / Self::from(n * (n + 1.0));
         }
-        let remainder = |term: Self| Self::new(-term.abs().high, term.abs().high);
-        (sine + remainder(odd), cosine + remainder(even))
+        (sine + odd.abs().to_both_sides(), cosine + even.abs().to_both_sides())
     }
+
+    /// Keeps the upper end of a bound.
+    #[must_use]
+    pub fn upper(self) -> Self {
+        Self::point(self.high)
+    }
+
+    /// Interval of all numbers whose size is within this bound.
+    #[must_use]
+    pub fn to_both_sides(self) -> Self {
+        Self::new(-self.high, self.high)
+    }
+
+    /// Divides the interval into `count` parts.
+    pub fn parts(self, count: u32) -> impl Iterator<Item = Self> + Clone {
+        let share = move |i: u32| f64::from(i) / f64::from(count);
+        let at = move |i: u32| self.low + (self.high - self.low) * share(i);
+        let end = move |i: u32| if i == count { self.high } else { at(i) };
+        (0..count).map(move |i| Self::new(at(i), end(i + 1)))
+    }
+}
+
+/// Makes the interval that contains only `value`.
+pub(crate) fn number(value: f64) -> Interval {
+    Interval::point(value)
 }
 
 impl From<f64> for Interval {
@@ -244,6 +294,15 @@ mod tests {
                 );
             }
             assert!((sine.square() + cosine.square()).contains(1.0));
+        }
+        for i in -200..=200 {
+            let angle = f64::from(i) * 0.0371;
+            let (s, c) = Interval::new(angle - 0.01, angle + 0.02).sin_cos();
+            for inside in [angle - 0.01, angle, angle + 0.02] {
+                assert!(s.contains(inside.sin()) && c.contains(inside.cos()), "{angle}");
+            }
+            assert!(s.width() < 0.032 && c.width() < 0.032);
+            assert!(Interval::point(angle).sin_cos().0.width() < 1e-13);
         }
     }
 }

@@ -12,7 +12,7 @@ pub type Vector<T> = [T; 3];
 
 /// Returns the sine and cosine of an angle δ from u = tan(δ/2).
 pub fn sine_cosine<T: Number>(u: T) -> (T, T) {
-    let one = T::constant(1.0);
+    let one = T::constant(1);
     let square = u.squared();
     let scale = one / (one + square);
     ((u + u) * scale, (one - square) * scale)
@@ -29,18 +29,23 @@ pub fn square<T: Number>(a: &Vector<T>) -> T {
 }
 
 /// Returns the sum a + b.
-pub fn sum<T: Number>(a: Vector<T>, b: Vector<T>) -> Vector<T> {
+pub fn sum<T: Number, const M: usize>(a: [T; M], b: [T; M]) -> [T; M] {
     std::array::from_fn(|i| a[i] + b[i])
 }
 
 /// Returns the product a x of a number and a vector.
-pub fn scaled<T: Number>(a: T, x: Vector<T>) -> Vector<T> {
+pub fn scaled<T: Number, const M: usize>(a: T, x: [T; M]) -> [T; M] {
     x.map(|x| a * x)
 }
 
 /// Returns the vector product of a and b.
 pub fn cross<T: Number>(a: &Vector<T>, b: &Vector<T>) -> Vector<T> {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
+
+/// Returns the unit vector along axis `i`.
+pub fn unit<T: Number>(i: usize) -> Vector<T> {
+    std::array::from_fn(|j| T::constant(i32::from(i == j)))
 }
 
 /// Returns the product M x, given the rows of M.
@@ -68,13 +73,13 @@ impl<T: Number> Turn<T> {
     /// y₃ sin β, y₂].
     pub fn by_sideslip(&self, order: usize, y: &Vector<T>) -> Vector<T> {
         let Self { sine: s, cosine: c, double: (s2, c2) } = *self;
-        let [two, four, eight] = [2.0, 4.0, 8.0].map(T::constant);
+        let [two, four, eight] = [2, 4, 8].map(T::constant);
         match order {
             0 => [-(c * (s * y[0] + y[2])), c.squared() * y[0] - s * y[2], y[1]],
-            1 => [s * y[2] - c2 * y[0], -(s2 * y[0] + c * y[2]), T::constant(0.0)],
-            2 => [two * s2 * y[0] + c * y[2], s * y[2] - two * c2 * y[0], T::constant(0.0)],
-            3 => [four * c2 * y[0] - s * y[2], four * s2 * y[0] + c * y[2], T::constant(0.0)],
-            _ => [-(eight * s2 * y[0] + c * y[2]), eight * c2 * y[0] - s * y[2], T::constant(0.0)],
+            1 => [s * y[2] - c2 * y[0], -(s2 * y[0] + c * y[2]), T::constant(0)],
+            2 => [two * s2 * y[0] + c * y[2], s * y[2] - two * c2 * y[0], T::constant(0)],
+            3 => [four * c2 * y[0] - s * y[2], four * s2 * y[0] + c * y[2], T::constant(0)],
+            _ => [-(eight * s2 * y[0] + c * y[2]), eight * c2 * y[0] - s * y[2], T::constant(0)],
         }
     }
 
@@ -82,7 +87,7 @@ impl<T: Number> Turn<T> {
     pub fn derivative(&self, by_alpha: usize, by_beta: usize, y: &Vector<T>) -> Vector<T> {
         let mut value = self.by_sideslip(by_beta, y);
         for _ in 0..by_alpha {
-            value = [value[2], T::constant(0.0), -value[0]];
+            value = [value[2], T::constant(0), -value[0]];
         }
         value
     }
@@ -111,7 +116,10 @@ impl<T: Number> Turn<T> {
 
     /// Drift term Ẇ x = ∂W[x₁, x₂] x.
     pub fn drift(&self, x: &Vector<T>) -> Vector<T> {
-        self.along(&[[x[0], x[1]]], x)
+        let Self { sine: s, cosine: c, .. } = *self;
+        let once = s * x[0] + x[2];
+        let twice = s * x[0] + once;
+        [s * x[1] * twice, -(c * x[1] * twice), c * x[0] * once]
     }
 }
 
@@ -137,6 +145,8 @@ mod tests {
         for (i, direction) in [[1.0, 0.0], [0.0, 1.0]].into_iter().enumerate() {
             assert!((theirs.1[i] - with_t(turn.along(&[direction], &x))).norm() < 1e-15);
         }
+        let drift: Vector<f64> = turn.along(&[[x[0], x[1]]], &x);
+        assert!((Vector3::from(turn.drift(&x)) - Vector3::from(drift)).norm() < 1e-15);
         let back = turn.r(&turn.along(&[], &x));
         assert!((Vector3::from(back) - Vector3::from(x)).norm() < 1e-15);
     }

@@ -7,12 +7,10 @@
 //! arguments (Banach 1938). Therefore ‖∂²W[o, x̂] v + ∂²W[o, v̂] x‖ ≤ b ‖o‖ ‖x‖ ‖v‖ for all x and v
 //! follows from the case x = v, and likewise for third derivatives.
 
-use crate::dual::{Dual, Number};
+use crate::dual::{Dual, Number, Real};
 use crate::identity;
 use crate::interval::Interval;
-use crate::kinematics::{
-    Turn, Vector, cross, dot, scaled, sine_cosine, square, sum, times, turned,
-};
+use crate::kinematics::{Turn, Vector, cross, dot, sine_cosine, square, sum, times, turned, unit};
 use crate::search::{Effort, supremum};
 use control::crmpc::{
     CURVATURE, DRIFT_BY_ANGLES_TWICE, DRIFT_MIXED, Domain, FOURTH, Lemmas, Settings, TURN,
@@ -79,19 +77,17 @@ pub struct Suprema {
     pub inverse: Interval,
     /// Largest ‖R y‖ over unit vectors y.
     pub r: Interval,
-    /// Largest ‖I W s‖ over the corners s of the unit box.
-    pub bearing: Interval,
 }
 
 /// Direction in the plane, on side `chart` < 2 of the square.
 fn plane<const N: usize>(chart: usize, a: Dual<N>) -> [Dual<N>; 2] {
-    let one = Dual::constant(1.0);
+    let one = Dual::constant(1);
     if chart == 0 { [one, a] } else { [a, one] }
 }
 
 /// Direction in space, on face `chart` < 3 of the cube.
 fn space<const N: usize>(chart: usize, a: Dual<N>, b: Dual<N>) -> Vector<Dual<N>> {
-    let one = Dual::constant(1.0);
+    let one = Dual::constant(1);
     match chart {
         0 => [one, a, b],
         1 => [a, one, b],
@@ -170,9 +166,8 @@ fn gyroscopic<const N: usize>(
     omega: &Vector<Dual<N>>,
 ) -> [Vector<Dual<N>>; 3] {
     let momentum = times(inertia, omega);
-    std::array::from_fn(|j| {
-        let unit: Vector<Dual<N>> =
-            std::array::from_fn(|i| Dual::constant(if i == j { 1.0 } else { 0.0 }));
+    [0, 1, 2].map(|j| {
+        let unit = unit(j);
         sum(cross(&unit, &momentum), cross(omega, &times(inertia, &unit)))
     })
 }
@@ -192,7 +187,7 @@ pub fn check(s: &Settings, lemmas: &Lemmas, gap: f64) -> (Vec<Finding>, Suprema)
     let [drift, curvature, turn, mixed, twice, fourth] = geometry(&mut search, lemmas);
     let r = lemma1(&mut search, lemmas, s.sideslip_domain);
     let (spin, spin_inverse, largest, inverse) = inertia(&mut search, s, lemmas);
-    let bearing = bearing(&mut search, s, lemmas);
+    bearing(&mut search, s, lemmas);
     let suprema = Suprema {
         drift,
         curvature,
@@ -205,7 +200,6 @@ pub fn check(s: &Settings, lemmas: &Lemmas, gap: f64) -> (Vec<Finding>, Suprema)
         largest,
         inverse,
         r,
-        bearing,
     };
     (search.findings, suprema)
 }
@@ -213,36 +207,22 @@ pub fn check(s: &Settings, lemmas: &Lemmas, gap: f64) -> (Vec<Finding>, Suprema)
 fn geometry(search: &mut Search, lemmas: &Lemmas) -> [Interval; 6] {
     let u = search.u;
     let three = [u, SIDE, SIDE];
-    let drift = search.check(
-        "‖Ẇ x‖ ≤ b ‖x‖²",
-        lemmas.dynamics.geometry.drift,
-        1.0,
-        3,
-        three,
-        |chart, &[u, a, b]| {
-            let x = space(chart, a, b);
-            square(&turn(u).drift(&x)) / square(&x).squared()
-        },
-    );
-    search.check(
-        "‖∂(Ẇ x)/∂x‖ ≤ b ‖x‖ (Frobenius)",
-        lemmas.dynamics.geometry.drift_by_rates,
-        1.0,
-        3,
-        three,
-        |chart, &[u, a, b]| {
-            let (x, turn) = (space(chart, a, b), turn(u));
-            let column = |j: usize| {
-                let unit: Vector<Dual<3>> =
-                    std::array::from_fn(|i| Dual::constant(if i == j { 1.0 } else { 0.0 }));
-                square(&sum(
-                    turn.along(&[[x[0], x[1]]], &unit),
-                    turn.along(&[[unit[0], unit[1]]], &x),
-                ))
-            };
-            (column(0) + column(1) + column(2)) / square(&x)
-        },
-    );
+    let (statement, bound) = ("‖Ẇ x‖ ≤ b ‖x‖²", lemmas.dynamics.geometry.drift);
+    let drift = search.check(statement, bound, 1.0, 3, three, |chart, &[u, a, b]| {
+        let x = space(chart, a, b);
+        square(&turn(u).drift(&x)) / square(&x).squared()
+    });
+    let statement = "‖∂(Ẇ x)/∂x‖ ≤ b ‖x‖ (Frobenius)";
+    let bound = lemmas.dynamics.geometry.drift_by_rates;
+    search.check(statement, bound, 1.0, 3, three, |chart, &[u, a, b]| {
+        let (x, turn) = (space(chart, a, b), turn(u));
+        let column = |j: usize| {
+            let unit = unit(j);
+            let by_turn = turn.along(&[[x[0], x[1]]], &unit);
+            square(&sum(by_turn, turn.along(&[[unit[0], unit[1]]], &x)))
+        };
+        (column(0) + column(1) + column(2)) / square(&x)
+    });
     let statement = "‖∂²(W y)/∂(α, β)²‖ ≤ b ‖y‖ (Frobenius)";
     let curvature = search.check(statement, CURVATURE, 1.0, 3, three, |chart, &[u, a, b]| {
         let (y, turn) = (space(chart, a, b), turn(u));
@@ -264,7 +244,7 @@ fn geometry(search: &mut Search, lemmas: &Lemmas) -> [Interval; 6] {
     let mixed = search.check(statement, DRIFT_MIXED, 1.0, 6, four, |chart, &[u, o, a, b]| {
         let (o, x) = (plane(chart % 2, o), space(chart / 2, a, b));
         let value = turn(u).along(&[o, [x[0], x[1]]], &x);
-        Dual::constant(4.0) * square(&value) / (length(&o) * square(&x).squared())
+        Dual::constant(4) * square(&value) / (length(&o) * square(&x).squared())
     });
     let statement = "‖∂²(Ẇ x)/∂(α, β)²‖ ≤ b ‖x‖²";
     let twice =
@@ -309,36 +289,23 @@ fn inertia(
     lemmas: &Lemmas,
 ) -> (Interval, Interval, Interval, Interval) {
     // The inertia is divided by its largest moment, so that all numbers are near one.
-    let unit = lemmas.dynamics.largest;
-    let rows = rows(&s.body.inertia, unit);
+    let scale = lemmas.dynamics.largest;
+    let rows = rows(&s.body.inertia, scale);
     let inverse = fixed::<2>(&inverse(&rows));
     let rows = fixed::<2>(&rows);
     let two = [SIDE, SIDE];
-    let largest = search.check(
-        "‖I y‖ ≤ b ‖y‖",
-        lemmas.dynamics.largest,
-        unit,
-        3,
-        two,
-        |chart, &[a, b]| {
-            let y = space(chart, a, b);
-            square(&times(&rows, &y)) / square(&y)
-        },
-    );
-    let statement = "‖I⁻¹ y‖ ≤ b ‖y‖";
-    let of_inverse = search.check(
-        statement,
-        1.0 / lemmas.dynamics.smallest,
-        1.0 / unit,
-        3,
-        two,
-        |chart, &[a, b]| {
-            let y = space(chart, a, b);
-            square(&times(&inverse, &y)) / square(&y)
-        },
-    );
+    let statement = "‖I y‖ ≤ b ‖y‖";
+    let largest = search.check(statement, scale, scale, 3, two, |chart, &[a, b]| {
+        let y = space(chart, a, b);
+        square(&times(&rows, &y)) / square(&y)
+    });
+    let (statement, bound) = ("‖I⁻¹ y‖ ≤ b ‖y‖", 1.0 / lemmas.dynamics.smallest);
+    let of_inverse = search.check(statement, bound, 1.0 / scale, 3, two, |chart, &[a, b]| {
+        let y = space(chart, a, b);
+        square(&times(&inverse, &y)) / square(&y)
+    });
     let statement = "‖∂(ω × I ω)/∂ω‖ ≤ b ‖ω‖ (Frobenius)";
-    search.check(statement, lemmas.gyroscopic.0, unit, 3, two, |chart, &[a, b]| {
+    search.check(statement, lemmas.gyroscopic.0, scale, 3, two, |chart, &[a, b]| {
         let omega = space(chart, a, b);
         let [x, y, z] = gyroscopic(&rows, &omega);
         (square(&x) + square(&y) + square(&z)) / square(&omega)
@@ -352,7 +319,7 @@ fn inertia(
     let spread = lemmas.dynamics.largest - lemmas.dynamics.smallest;
     let gyroscopic_moment = |omega: &Vector<Dual<2>>| cross(omega, &times(&rows, omega));
     let statement = "‖ω × I ω‖ ≤ b ‖ω‖²";
-    let spin = search.check(statement, 0.5 * spread, unit, 3, two, |chart, &[a, b]| {
+    let spin = search.check(statement, 0.5 * spread, scale, 3, two, |chart, &[a, b]| {
         let omega = space(chart, a, b);
         square(&gyroscopic_moment(&omega)) / square(&omega).squared()
     });
@@ -365,18 +332,18 @@ fn inertia(
     (spin, spin_inverse, largest, of_inverse)
 }
 
-fn bearing(search: &mut Search, s: &Settings, lemmas: &Lemmas) -> Interval {
+fn bearing(search: &mut Search, s: &Settings, lemmas: &Lemmas) {
     let unit = lemmas.dynamics.largest;
     let rows = fixed::<2>(&rows(&s.body.inertia, unit));
     // There are two charts of α, half a turn apart, and four corners up to their common sign.
     let sides = [search.u, SIDE];
     let statement = "‖I W s‖ ≤ b over the corners s of the unit box";
     search.check(statement, lemmas.bearing, unit, 8, sides, |chart, &[u, v]| {
-        let one = Dual::constant(1.0);
-        let sign = |bit: usize| Dual::constant(if chart & bit == 0 { 1.0 } else { -1.0 });
+        let one = Dual::constant(1);
+        let sign = |bit: usize| Dual::constant(if chart & bit == 0 { 1 } else { -1 });
         let corner = [one, sign(1), sign(2)];
         let (sine, cosine) = sine_cosine(v);
         let y = turn(u).along(&[], &corner);
-        square(&times(&rows, &turned(sign(4) * sine, sign(4) * cosine, &scaled(one, y))))
-    })
+        square(&times(&rows, &turned(sign(4) * sine, sign(4) * cosine, &y)))
+    });
 }

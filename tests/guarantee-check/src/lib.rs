@@ -6,17 +6,18 @@
 //! calls true is true for the exact numbers, apart from errors in this program or the compiler. The
 //! formulas are written anew; only the bounds come from the controller.
 //!
-//! These checks do not cover the steps of the proof that lead from one inequality to the next, the
-//! invariant set of the initial state `tube`, or the optimisation. [`plan`] covers the certificate
-//! as a whole: it bounds what can happen under a recorded plan without any of the controller's
-//! bounds (docs/proof.md).
+//! These checks do not cover the steps of the proof that lead from one inequality to the next, or
+//! the optimisation. [`plan`] covers the certificate as a whole: it bounds what can happen under a
+//! recorded plan without any of the controller's bounds (docs/proof.md).
 
 pub mod assessment;
+mod body;
 pub mod draws;
 mod driven;
 pub mod dual;
 pub mod dynamics;
 pub mod flights;
+pub mod given;
 mod identity;
 pub mod interval;
 pub mod kinematics;

@@ -1,7 +1,7 @@
 //! Checks the bounds of CRMPC's guarantee for given settings, and the plans that rest on them.
 //!
 //! ```text
-//! cargo run --release -p reentry-guarantee-check -- --k1 -3 --k2 -4 --delay 0.04
+//! cargo run --release -p reentry-guarantee-check -- --set delay=0.04 --set disturbance.bound=0.02
 //! cargo run --release -p reentry-guarantee-check -- plans --flights 200
 //! cargo run --release -p reentry-guarantee-check -- shipped orchestrator/experiments
 //! ```
@@ -22,7 +22,7 @@ use std::process::ExitCode;
 /// Settings that are not given are the published ones. The exit code is 0 if all bounds are true, 1
 /// if one is not certain to be, 2 if the settings are refused.
 #[derive(Parser)]
-#[command(version, allow_negative_numbers = true, args_conflicts_with_subcommands = true)]
+#[command(version, args_conflicts_with_subcommands = true)]
 struct Arguments {
     #[command(subcommand)]
     command: Option<Command>,

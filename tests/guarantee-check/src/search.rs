@@ -144,7 +144,7 @@ mod tests {
     #[test]
     fn oracle_largest_value_of_a_polynomial() {
         // The function x y (1 − x − y) is largest at x = y = 1/3, where it is 1/27.
-        let f = |_: usize, [x, y]: &[Dual<2>; 2]| *x * *y * (Dual::constant(1.0) - *x - *y);
+        let f = |_: usize, [x, y]: &[Dual<2>; 2]| *x * *y * (Dual::constant(1) - *x - *y);
         let unit = Interval::new(0.0, 1.0);
         let effort = Effort { gap: 1e-9, goal: f64::INFINITY, boxes: 100_000 };
         let largest = supremum(&f, 1, [unit, unit], effort);

@@ -1,15 +1,15 @@
 //! The settings with which CRMPC flies in the experiments, studies and campaigns of a folder.
 
+use crate::given::Given;
 use campaign::definition::Campaign;
-use control::crmpc::{Constraints, Guarantee, InitialState, Settings};
+use control::crmpc::Settings;
 use cosim::document::Source;
 use cosim::error::Error;
 use cosim::experiment::{Component, Experiment};
 use std::path::{Path, PathBuf};
 use study::definition::Study;
 use sweep::vary::Vary;
-use toml::{Table, Value};
-use vehicle::dynamics::Inertia;
+use toml::Table;
 
 /// Settings of one CRMPC in one file.
 #[derive(Clone, Debug)]
@@ -150,101 +150,27 @@ fn files(folder: &Path) -> Result<Vec<PathBuf>, String> {
     Ok(paths)
 }
 
-/// Converts a value to SI units.
-fn quantity(value: &Value) -> Result<f64, String> {
-    let refused = || format!("{value} is not a number, or a number with a known unit");
-    match value {
-        Value::Float(number) => Ok(*number),
-        Value::Integer(number) => i32::try_from(*number).map(f64::from).map_err(|_| refused()),
-        Value::String(text) => {
-            let (number, unit) = text.split_once(' ').ok_or_else(refused)?;
-            let number: f64 = number.parse().map_err(|_| refused())?;
-            match unit {
-                "s" => Ok(number),
-                "deg" | "deg/s" | "deg/s2" => Ok(number.to_radians()),
-                _ => Err(refused()),
-            }
-        }
-        _ => Err(refused()),
-    }
-}
+/// Beginnings of the names of parameters on which no bound depends.
+const FREE: [&str; 10] = [
+    "reference.",
+    "weight.",
+    "tube.",
+    "bound.",
+    "observer.",
+    "solver",
+    "plan.",
+    "saturation",
+    "achievedMoment.used",
+    "trajectory.earthRate",
+];
 
 /// Settings of a component, from the defaults of the FMU and the parameters that the file sets.
 fn settings(component: &Component) -> Result<Settings, String> {
-    let mut s = Settings::new(Constraints::Robust);
-    let mut inertia = Inertia {
-        Ixx: s.body.inertia[(0, 0)],
-        Iyy: s.body.inertia[(1, 1)],
-        Izz: s.body.inertia[(2, 2)],
-        Ixz: -s.body.inertia[(0, 2)],
-    };
+    let mut given = Given::default();
     for (name, value) in &component.parameters {
-        set(&mut s, &mut inertia, name, value.get_ref())
-            .map_err(|error| format!("{name}: {error}"))?;
-    }
-    s.body = inertia.body(1.0).map_err(|error| error.to_string())?;
-    s.resolved().map_err(|error| error.to_string())
-}
-
-fn set(s: &mut Settings, inertia: &mut Inertia, name: &str, value: &Value) -> Result<(), String> {
-    let place: &mut f64 = match name {
-        "feedback.k1" => &mut s.feedback.k1,
-        "feedback.k2" => &mut s.feedback.k2,
-        "terminal.k1" => &mut s.terminal.k1,
-        "terminal.k2" => &mut s.terminal.k2,
-        "disturbance.bound" => &mut s.disturbance_bound,
-        "estimation.angleError" => &mut s.angle_error,
-        "estimation.rateError" => &mut s.rate_error,
-        "estimation.slowAngleError" => &mut s.slow_angle_error,
-        "estimation.slowAngleRate" => &mut s.slow_angle_rate,
-        "inertia.error" => &mut s.inertia_error,
-        "inertia.tensorError" => &mut s.tensor_error,
-        "inertia.Ixx" => &mut inertia.Ixx,
-        "inertia.Iyy" => &mut inertia.Iyy,
-        "inertia.Izz" => &mut inertia.Izz,
-        "inertia.Ixz" => &mut inertia.Ixz,
-        "limit.rate" => &mut s.limit_rate,
-        "limit.moment" => &mut s.limit_moment,
-        "knownMoment.bound" => &mut s.known_bound,
-        "knownMoment.change" => &mut s.known_change,
-        "scheduled.limitMomentFall" => &mut s.limit_fall,
-        "trajectory.turnChange" => &mut s.turn_change,
-        "guarantee.sideslip" => &mut s.sideslip_domain,
-        "period.feedback" => &mut s.period_feedback,
-        "period.optimisation" => &mut s.period_optimisation,
-        "delay" | "measurement.age" => {
-            // Both are parts of the time from a measurement to its moment.
-            s.delay += quantity(value)?;
-            return Ok(());
-        }
-        _ => return set_other(s, name, value),
-    };
-    *place = quantity(value)?;
-    Ok(())
-}
-
-fn set_other(s: &mut Settings, name: &str, value: &Value) -> Result<(), String> {
-    match (name, value.as_str()) {
-        ("constraints", Some("robust")) => s.constraints = Constraints::Robust,
-        ("constraints", Some("paper")) => s.constraints = Constraints::Paper,
-        ("initialState", Some("measured")) => s.initial_state = InitialState::Measured,
-        ("initialState", Some("nominal")) => s.initial_state = InitialState::Nominal,
-        ("initialState", Some("tube")) => s.initial_state = InitialState::Tube,
-        ("guarantee.policy", Some("required")) => s.guarantee = Guarantee::Required,
-        ("guarantee.policy", Some("bestEffort")) => s.guarantee = Guarantee::BestEffort,
-        ("horizon" | "scheduled.disturbanceParts", _) => {
-            let number = value.as_integer().and_then(|number| usize::try_from(number).ok());
-            let number = number.ok_or("is no whole number")?;
-            *(if name == "horizon" { &mut s.horizon } else { &mut s.disturbance_parts }) = number;
-        }
-        _ => {
-            // No bound depends on these.
-            let free = ["reference.", "weight.", "tube.", "bound.", "observer.", "solver", "plan."];
-            let others = ["saturation", "achievedMoment.used", "trajectory.earthRate"];
-            if !(free.iter().any(|prefix| name.starts_with(prefix)) || others.contains(&name)) {
-                return Err(format!("{value} is not understood here"));
-            }
+        if !FREE.iter().any(|beginning| name.starts_with(beginning)) {
+            given.set(name, value.get_ref())?;
         }
     }
-    Ok(())
+    given.settings()
 }

@@ -285,7 +285,8 @@ fn spread([angle, rate, of_angle, of_rate, feedback]: &[Interval; 5]) -> Bounds 
     [*angle, *rate, *angle, *rate, *of_angle, *of_rate, *feedback, Interval::ZERO]
 }
 
-const NEVER: Early = Early { ticks: 0, excess: 0.0 };
+/// No effect is larger for the first ticks.
+pub(crate) const NEVER: Early = Early { ticks: 0, excess: 0.0 };
 
 /// Counts effects that are larger for the first ticks of a nominal trajectory.
 fn counted(early: Early, sums: &[Bounds]) -> Vec<Bounds> {

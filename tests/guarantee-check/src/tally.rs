@@ -24,8 +24,6 @@ pub struct Tally {
     pub kept_plans: u64,
     /// Number of plans whose nominal trajectory began at an earlier optimisation.
     pub aged: u64,
-    /// Number of plans with the initial state `tube` that begin outside the permitted set.
-    pub outside: u64,
     /// Smallest share of each limit that any plan leaves unused; `None` without plans.
     pub left: Option<Left>,
     /// Number of plans that were not confirmed.
@@ -43,7 +41,6 @@ impl Tally {
         self.plans += other.plans;
         self.kept_plans += other.kept_plans;
         self.aged += other.aged;
-        self.outside += other.outside;
         self.not_confirmed += other.not_confirmed;
         self.refuted.extend(other.refuted);
         self.refuted.truncate(SHOWN);
@@ -56,7 +53,7 @@ impl Tally {
 
     /// Whether plans were checked, and all of them confirmed.
     pub fn confirmed(&self) -> bool {
-        self.plans > 0 && self.not_confirmed == 0 && self.outside == 0
+        self.plans > 0 && self.not_confirmed == 0
     }
 
     /// Checks a plan.
@@ -65,7 +62,6 @@ impl Tally {
         self.plans += 1;
         self.kept_plans += u64::from(recorded.is_kept);
         self.aged += u64::from(recorded.age > 0);
-        self.outside += u64::from(recorded.age == 0 && !check.may_begin(&recorded.deviation));
         self.left = Some(self.left.map_or(verdict.left, |left| left.min(&verdict.left)));
         if !verdict.confirmed() {
             self.not_confirmed += 1;

@@ -1,6 +1,6 @@
 //! Tests that the check succeeds for published and other settings, and that it can fail.
 
-use control::crmpc::{Constraints, Design, Guarantee, InitialState, Lemmas, Settings};
+use control::crmpc::{Constraints, Design, Guarantee, Lemmas, Settings};
 use control::error_dynamics::Gain;
 use guarantee_check::lemmas::{self, Finding};
 use guarantee_check::{CheckReport, assessment, dynamics};
@@ -50,13 +50,10 @@ fn bounds_of_the_geometry_hold_in_the_widest_domain_and_for_another_vehicle() {
         guarantee: Guarantee::BestEffort,
         ..Settings::new(Constraints::Robust).resolved().unwrap()
     };
-    for initial_state in [InitialState::Measured, InitialState::Tube] {
-        let settings = Settings { initial_state, ..settings };
-        let bounds = Lemmas::new(&settings);
-        let (findings, suprema) = lemmas::check(&settings, &bounds, GAP);
-        assert_all(&findings);
-        assert_all(&dynamics::check(&settings, &bounds, &suprema, 0.05));
-    }
+    let bounds = Lemmas::new(&settings);
+    let (findings, suprema) = lemmas::check(&settings, &bounds, GAP);
+    assert_all(&findings);
+    assert_all(&dynamics::check(&settings, &bounds, &suprema, 0.05));
 }
 
 #[test]

@@ -1,15 +1,40 @@
 //! Search for the state in which a quantity is largest, which bounds it from below.
 
-use super::body::Body;
-use super::series::{Series, coefficient, line, vector};
-use crate::dual::Number;
-use crate::kinematics::{Turn, Vector, scaled, sum, turned};
+use crate::body::Body;
+use crate::dual::{Dual, Real};
+use crate::kinematics::{Turn, Vector, scaled, square, sum, turned};
 use control::crmpc::Settings;
 use std::f64::consts::PI;
 use std::ops::Neg;
 
+/// Function of time, with its first and second derivative.
+type Series = Dual<1, Dual<1, f64>>;
+
+fn series(value: f64, first: f64, second: f64) -> Series {
+    Dual { value: Dual { value, slope: [first] }, slope: [Dual { value: first, slope: [second] }] }
+}
+
+/// Values that do not change.
+fn held<const M: usize>(values: [f64; M]) -> [Series; M] {
+    values.map(|value| series(value, 0.0, 0.0))
+}
+
+/// Values that change with these derivatives.
+fn line<const M: usize>(values: [f64; M], slopes: [f64; M]) -> [Series; M] {
+    std::array::from_fn(|i| series(values[i], slopes[i], 0.0))
+}
+
+/// Size of the derivative of this order.
+fn size(vector: &Vector<Series>, order: usize) -> f64 {
+    norm(&vector.map(|x| match order {
+        0 => x.value.value,
+        1 => x.slope[0].value,
+        _ => x.slope[0].slope[0],
+    }))
+}
+
 fn norm(value: &Vector<f64>) -> f64 {
-    crate::kinematics::square(value).sqrt()
+    square(value).sqrt()
 }
 
 /// Maps coordinates in [−1, 1] to a vector in the ball of this radius.
@@ -19,12 +44,12 @@ fn ball(z: &[f64], radius: f64) -> Vector<f64> {
     scaled(radius / size.max(1.0), value)
 }
 
-/// Number of coordinates of a trial point: β, α, ω or x, m or a, a direction of the angles, and one
-/// of the rates.
-const COORDINATES: usize = 13;
+/// Coordinates of a trial point: β, α, ω or x, m or a, a direction of the angles, and one of the
+/// rates.
+type Point = [f64; 13];
 
 /// Returns the largest value of `f` that repeated ascents by random steps find.
-fn ascent(f: impl Fn(&[f64; COORDINATES]) -> f64) -> f64 {
+fn ascent(f: impl Fn(&Point) -> f64) -> f64 {
     let mut state = 0x9e37_79b9_7f4a_7c15_u64;
     let mut random = move || {
         state ^= state << 13;
@@ -34,7 +59,7 @@ fn ascent(f: impl Fn(&[f64; COORDINATES]) -> f64) -> f64 {
     };
     let mut largest = 0.0_f64;
     for _ in 0..40 {
-        let mut at: [f64; COORDINATES] = std::array::from_fn(|_| random());
+        let mut at: Point = std::array::from_fn(|_| random());
         let (mut value, mut step) = (f(&at), 1.0);
         for _ in 0..400 {
             let tried = at.map(|z| (z + step * random()).clamp(-1.0, 1.0));
@@ -50,149 +75,132 @@ fn ascent(f: impl Fn(&[f64; COORDINATES]) -> f64) -> f64 {
     largest
 }
 
-/// Direction of the angles at a trial point.
-fn angle_unit(z: &[f64; COORDINATES]) -> [f64; 2] {
-    let size = z[8].hypot(z[9]).max(1e-9);
-    [z[8] / size, z[9] / size]
+/// Direction of these coordinates.
+fn unit<const M: usize>(z: &[f64]) -> [f64; M] {
+    let size = z[..M].iter().map(|z| z * z).sum::<f64>().sqrt().max(1e-9);
+    std::array::from_fn(|i| z[i] / size)
 }
 
-/// Direction of these three coordinates.
-fn unit(z: &[f64]) -> Vector<f64> {
-    let size = norm(&[z[0], z[1], z[2]]).max(1e-9);
-    scaled(1.0 / size, [z[0], z[1], z[2]])
+/// Product T y at this angle of attack, from the body's axes to those of [`Body`] or back.
+fn turned_by(alpha: Series, y: &Vector<Series>) -> Vector<Series> {
+    let (sine, cosine) = alpha.sin_cos();
+    turned(sine, cosine, y)
 }
 
-/// Returns the largest values that the search found, in the order of [`super::from_lemmas`].
-pub(super) fn attained(s: &Settings, sizes: (f64, f64), curved: (f64, f64)) -> [f64; 12] {
-    let body = Body::new(s);
-    let angles = |z: &[f64; COORDINATES]| [PI * z[1], s.sideslip_domain * z[0]];
+/// The dynamics in the body's axes, along a trajectory.
+struct Dynamics(Body);
+
+impl Dynamics {
+    fn acceleration(
+        &self,
+        angles: [Series; 2],
+        x: &Vector<Series>,
+        m: Vector<f64>,
+    ) -> Vector<Series> {
+        self.0.at(angles).acceleration(x, &turned_by(angles[0], &held(m)))
+    }
+
+    fn moment(
+        &self,
+        angles: [Series; 2],
+        x: &Vector<Series>,
+        a: &Vector<Series>,
+    ) -> Vector<Series> {
+        turned_by(angles[0], &self.0.at(angles).moment(x, a))
+    }
+}
+
+/// Returns the largest values that the search found, in the order of [`super::from_lemmas`]; zeros
+/// for a body that is not symmetric about its x–z plane.
+pub(super) fn attained(s: &Settings, sizes: (f64, f64), curved: (f64, f64)) -> Vec<f64> {
+    let Some(body) = Body::new(s).map(Dynamics) else { return vec![0.0; 12] };
+    let angles = |z: &Point| [PI * z[1], s.sideslip_domain * z[0]];
     // This gives the state (α, β), x and m, with x = R ω.
-    let state = |z: &[f64; COORDINATES]| {
+    let state = |z: &Point| {
         let [alpha, beta] = angles(z);
         let (omega, m) = (ball(&z[2..5], s.limit_rate), ball(&z[5..8], s.limit_total()));
         let x = Turn::new(beta.sin(), beta.cos()).r(&turned(alpha.sin(), alpha.cos(), &omega));
         ([alpha, beta], x, m)
     };
-    let held = |[alpha, beta]: [f64; 2]| [Series::constant(alpha), Series::constant(beta)];
-    let along = |[alpha, beta]: [f64; 2], o: [f64; 2]| {
-        [Series::line(alpha, o[0]), Series::line(beta, o[1])]
-    };
-    let acceleration = |z: &[f64; COORDINATES]| {
-        let (angles, x, m) = state(z);
-        norm(&coefficient(&body.acceleration(&held(angles), &vector(&x), &vector(&m)), 0))
-    };
-    let by_rates = |z: &[f64; COORDINATES]| {
-        let (angles, x, m) = state(z);
-        norm(&coefficient(
-            &body.acceleration(&held(angles), &line(&x, &unit(&z[10..])), &vector(&m)),
-            1,
-        ))
-    };
-    let by_angles = |z: &[f64; COORDINATES]| {
-        let (angles, x, m) = state(z);
-        norm(&coefficient(
-            &body.acceleration(&along(angles, angle_unit(z)), &vector(&x), &vector(&m)),
-            1,
-        ))
-    };
-    let jerk = |z: &[f64; COORDINATES]| {
-        let (from, x, m) = state(z);
-        let m = vector(&m);
-        let mut series = vector(&x);
-        for _ in 0..2 {
-            let angles = std::array::from_fn(|i| Series([from[i], x[i], 0.5 * series[i].0[1]]));
-            let a = body.acceleration(&angles, &series, &m);
-            series = std::array::from_fn(|i| Series([x[i], a[i].0[0], 0.5 * a[i].0[1]]));
-        }
-        let angles = std::array::from_fn(|i| Series([from[i], x[i], 0.5 * series[i].0[1]]));
-        2.0 * norm(&coefficient(&body.acceleration(&angles, &series, &m), 2))
-    };
-    let nominal = |z: &[f64; COORDINATES], (x, a): (f64, f64)| {
-        (angles(z), ball(&z[2..5], x), ball(&z[5..8], a))
-    };
-    let moment_by_angles = |z: &[f64; COORDINATES]| {
-        let (angles, x, a) = nominal(z, sizes);
-        norm(&coefficient(&body.moment(&along(angles, angle_unit(z)), &vector(&x), &vector(&a)), 1))
-    };
-    let moment_by_rates = |z: &[f64; COORDINATES]| {
-        let (angles, x, a) = nominal(z, sizes);
-        norm(&coefficient(&body.moment(&held(angles), &line(&x, &unit(&z[10..])), &vector(&a)), 1))
-    };
-    let moment = |z: &[f64; COORDINATES]| {
-        let (angles, x, a) = nominal(z, sizes);
-        norm(&coefficient(&body.moment(&held(angles), &vector(&x), &vector(&a)), 0))
-    };
-    let [moment_curvature, rate_curvature, by_angles_curvature, by_rates_curvature, bearing] =
-        attained_along_a_trajectory(s, &body, curved);
-    [
-        ascent(acceleration),
-        ascent(by_rates),
-        ascent(by_angles),
-        ascent(jerk),
-        ascent(moment_by_angles),
-        ascent(moment_by_rates),
-        ascent(moment),
-        moment_curvature,
-        rate_curvature,
-        by_angles_curvature,
-        by_rates_curvature,
-        bearing,
-    ]
+    let nominal = |z: &Point| (angles(z), ball(&z[2..5], sizes.0), held(ball(&z[5..8], sizes.1)));
+    let mut found = vec![
+        ascent(|z| {
+            let (angles, x, m) = state(z);
+            size(&body.acceleration(held(angles), &held(x), m), 0)
+        }),
+        ascent(|z| {
+            let (angles, x, m) = state(z);
+            size(&body.acceleration(held(angles), &line(x, unit(&z[10..])), m), 1)
+        }),
+        ascent(|z| {
+            let (angles, x, m) = state(z);
+            size(&body.acceleration(line(angles, unit(&z[8..])), &held(x), m), 1)
+        }),
+        ascent(|z| {
+            let (angles, x, m) = state(z);
+            let along = |x: &Vector<Series>| {
+                let angle = |i: usize| series(angles[i], x[i].value.value, x[i].slope[0].value);
+                body.acceleration([0, 1].map(angle), x, m)
+            };
+            // Each time the derivatives of x are right up to one order more.
+            let next = |a: Vector<Series>| {
+                std::array::from_fn(|i| series(x[i], a[i].value.value, a[i].slope[0].value))
+            };
+            size(&along(&next(along(&next(along(&held(x)))))), 2)
+        }),
+        ascent(|z| {
+            let (angles, x, a) = nominal(z);
+            size(&body.moment(line(angles, unit(&z[8..])), &held(x), &a), 1)
+        }),
+        ascent(|z| {
+            let (angles, x, a) = nominal(z);
+            size(&body.moment(held(angles), &line(x, unit(&z[10..])), &a), 1)
+        }),
+        ascent(|z| {
+            let (angles, x, a) = nominal(z);
+            size(&body.moment(held(angles), &held(x), &a), 0)
+        }),
+    ];
+    found.extend(along_trajectories(s, &body, curved));
+    found
 }
 
 /// Returns the largest second derivatives that the search found along trajectories with a held.
-fn attained_along_a_trajectory(s: &Settings, body: &Body, curved: (f64, f64)) -> [f64; 5] {
-    let angles = |z: &[f64; COORDINATES]| [PI * z[1], s.sideslip_domain * z[0]];
-    // This gives a trajectory along which a is held.
-    let trajectory = |z: &[f64; COORDINATES]| {
-        let from = angles(z);
+fn along_trajectories(s: &Settings, body: &Dynamics, curved: (f64, f64)) -> [f64; 5] {
+    let trajectory = |z: &Point| {
+        let from = [PI * z[1], s.sideslip_domain * z[0]];
         let (x, a) = (ball(&z[2..5], curved.0), ball(&z[5..8], curved.1));
-        let angles: [Series; 2] = std::array::from_fn(|i| Series([from[i], x[i], 0.5 * a[i]]));
-        (angles, line(&x, &a), vector(&a))
-    };
-    let moment_curvature = |z: &[f64; COORDINATES]| {
-        let (angles, x, a) = trajectory(z);
-        2.0 * norm(&coefficient(&body.moment(&angles, &x, &a), 2))
-    };
-    let rate_curvature = |z: &[f64; COORDINATES]| {
-        let (angles, x, _) = trajectory(z);
-        2.0 * norm(&coefficient(&Body::rates(&angles, &x), 2))
+        let angles: [Series; 2] = std::array::from_fn(|i| series(from[i], x[i], a[i]));
+        (angles, line(x, a), held(a))
     };
     // The derivatives by the angles and rates are those of differences over a short distance.
     let short = 1e-4;
-    let difference = |after: Vector<Series>, before: Vector<Series>| {
-        let change = sum(after, before.map(Neg::neg));
-        norm(&coefficient(&change, 2)) / short
-    };
-    let curvature_by_angles = |z: &[f64; COORDINATES]| {
-        let (angles, x, a) = trajectory(z);
-        let o = angle_unit(z);
-        let moved = |side: f64| {
-            let turned = std::array::from_fn(|i| angles[i] + Series::constant(side * short * o[i]));
-            body.moment(&turned, &x, &a)
-        };
-        difference(moved(1.0), moved(-1.0))
-    };
-    let curvature_by_rates = |z: &[f64; COORDINATES]| {
-        let (angles, x, a) = trajectory(z);
-        let v = unit(&z[10..]);
-        let moved = |side: f64| {
-            let changed = std::array::from_fn(|i| x[i] + Series::constant(side * short * v[i]));
-            body.moment(&angles, &changed, &a)
-        };
-        difference(moved(1.0), moved(-1.0))
-    };
-    let curvature_of_bearing = |z: &[f64; COORDINATES]| {
-        let (angles, ..) = trajectory(z);
-        let corner = [z[10], z[11], z[12]].map(|z| if z < 0.0 { -1.0 } else { 1.0 });
-        let at_rest = vector(&[0.0; 3]);
-        2.0 * norm(&coefficient(&body.moment(&angles, &at_rest, &vector(&corner)), 2))
+    let difference = |moved: &dyn Fn(f64) -> Vector<Series>| {
+        size(&sum(moved(short), moved(-short).map(Neg::neg)), 2) / (2.0 * short)
     };
     [
-        ascent(moment_curvature),
-        ascent(rate_curvature),
-        ascent(curvature_by_angles),
-        ascent(curvature_by_rates),
-        ascent(curvature_of_bearing),
+        ascent(|z| {
+            let (angles, x, a) = trajectory(z);
+            size(&body.moment(angles, &x, &a), 2)
+        }),
+        ascent(|z| {
+            let (angles, x, _) = trajectory(z);
+            let rates = body.0.at(angles).turn.by_sideslip(0, &x);
+            size(&turned_by(angles[0], &rates), 2)
+        }),
+        ascent(|z| {
+            let (angles, x, a) = trajectory(z);
+            let o = unit::<2>(&z[8..]);
+            difference(&|by| body.moment(sum(angles, held(scaled(by, o))), &x, &a))
+        }),
+        ascent(|z| {
+            let (angles, x, a) = trajectory(z);
+            let v = unit::<3>(&z[10..]);
+            difference(&|by| body.moment(angles, &sum(x, held(scaled(by, v))), &a))
+        }),
+        ascent(|z| {
+            let corner = [z[10], z[11], z[12]].map(f64::signum);
+            size(&body.moment(trajectory(z).0, &held([0.0; 3]), &held(corner)), 2)
+        }),
     ]
 }

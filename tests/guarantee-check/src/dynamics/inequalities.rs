@@ -1,6 +1,6 @@
 //! Bounds of the same quantities from the verified inequalities of the lemmas.
 
-use crate::interval::Interval;
+use crate::interval::{Interval, number};
 use crate::lemmas::Suprema;
 use control::crmpc::Settings;
 
@@ -11,7 +11,6 @@ pub(super) fn from_lemmas(
     sizes: (f64, f64),
     curved: (f64, f64),
 ) -> [Interval; 12] {
-    let number = Interval::from;
     let (two, half) = (number(2.0), number(0.5));
     let upper = |value: Interval| number(value.high);
     let [drift, curvature, turn, mixed, third, fourth, r] =

@@ -6,9 +6,7 @@
 //! verified bound. As g″ is bilinear and symmetric, its norm is twice that of g on the unit sphere.
 
 mod attained;
-mod body;
 mod inequalities;
-mod series;
 
 use crate::interval::Interval;
 use crate::lemmas::{Finding, Suprema, over_the_domain};
@@ -44,14 +42,13 @@ pub fn check(s: &Settings, lemmas: &Lemmas, sup: &Suprema, terminal_rate: f64) -
         ("‖d²/dt² ∂m/∂x‖ ≤ b at the largest sizes", curvature_by_rates),
         ("d²/dt² ‖I W s‖ ≤ b at the largest sizes", curvature_of_bearing),
     ];
-    let (below, above) = (attained(s, sizes, curved), from_lemmas(s, sup, sizes, curved));
-    bounds
-        .into_iter()
-        .zip(below.into_iter().zip(above))
-        .map(|((statement, bound), (low, high))| Finding {
-            statement: statement.into(),
-            bound,
-            truth: Interval::new(low, high.high),
-        })
-        .collect()
+    let above = from_lemmas(s, sup, sizes, curved);
+    let truths = attained(s, sizes, curved).into_iter().zip(above);
+    let truths = truths.map(|(low, above)| Interval::new(low, above.high));
+    let finding = |((statement, bound), truth): ((&str, f64), Interval)| Finding {
+        statement: statement.into(),
+        bound,
+        truth,
+    };
+    bounds.into_iter().zip(truths).map(finding).collect()
 }

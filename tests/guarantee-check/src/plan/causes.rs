@@ -1,9 +1,9 @@
 //! Causes that drive the vehicle off a nominal trajectory: Δ, the inertia error, the errors of
 //! measurement, and the change of F between where the law evaluates it and where the vehicle is.
 
-use super::body::{Body, sin_cos};
 use super::smoothness::{Smoothness, turns};
-use crate::interval::Interval;
+use crate::body::Body;
+use crate::interval::{Interval, number};
 use crate::sums::Pair;
 use control::crmpc::Settings;
 
@@ -42,15 +42,6 @@ pub(super) struct Causes {
     pub(super) sideslip: f64,
 }
 
-fn number(value: f64) -> Interval {
-    Interval::from(value)
-}
-
-/// Keeps the upper end of a bound.
-fn upper(value: Interval) -> Interval {
-    Interval::point(value.high)
-}
-
 /// Effect ν of the inertia error. With I_v = (1 + c) S, S = I^½ (1 + E) I^½ and M = S⁻¹ − I⁻¹,
 ///
 /// ν = R [−c/(1 + c) I⁻¹ m + M (m/(1 + c) − ω × S ω) − I⁻¹ (ω × (S − I) ω)].
@@ -81,7 +72,7 @@ impl InertiaError {
         let range = (one + tensor) * largest - (one - tensor) * smallest;
         let direct = common / (one - common) * limit + tensor * largest * square;
         let turned = tensor / (one - tensor) * (limit / (one - common) + half * range * square);
-        let secant = one / sin_cos(number(sideslip)).1;
+        let secant = one / number(sideslip).sin_cos().1;
         Self {
             acceleration: (direct + turned) * secant / smallest,
             direct,
@@ -159,9 +150,9 @@ fn mismatch(
     let rate = apart[0] + grown * d;
     let since = by_rates * rate * d + by_angles * (apart[1] * d + half * rate * d.square());
     Some(Mismatch {
-        drifted: upper(sum(end)) - unseen,
+        drifted: sum(end).upper() - unseen,
         unseen: [d * unseen, unseen],
-        revised: upper(sum(tau) + since),
+        revised: (sum(tau) + since).upper(),
         apart: [rates(drive, end), angles(drive_of_two, end)],
     })
 }

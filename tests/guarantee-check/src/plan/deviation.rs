@@ -52,8 +52,3 @@ impl Deviation {
         }
     }
 }
-
-/// Keeps the upper end of a bound.
-pub(super) fn upper(value: Interval) -> Interval {
-    Interval::point(value.high)
-}

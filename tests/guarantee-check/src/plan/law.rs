@@ -4,12 +4,18 @@
 //! k. At each corner of k it is expanded in o to first order about the nominal state; interval
 //! enclosures of the second derivatives over the whole box bound the rest.
 
-use super::body::{Attitude, Body};
-use super::jet::{COORDINATES, Jet};
-use crate::dual::Dual;
+use crate::body::{Attitude, Body};
+use crate::dual::{Dual, Real};
 use crate::interval::Interval;
+use crate::kinematics::{self, dot, square};
 
-type Vector = [Interval; 3];
+type Vector = kinematics::Vector<Interval>;
+
+/// Number of coordinates: angle of attack, sideslip, and the derivatives of the three angles.
+pub(super) const COORDINATES: usize = 5;
+
+/// Function of the coordinates with its first and second derivatives.
+type Jet = Dual<COORDINATES, Dual<COORDINATES>>;
 
 /// States and accelerations for which the moment is bounded.
 #[derive(Clone, Copy, Debug)]
@@ -33,7 +39,7 @@ impl Range {
 
     /// Smallest range with the coordinates of both.
     pub(super) fn hull(&self, other: &Self) -> Self {
-        let wider = |a: Interval, b: Interval| Interval::point(a.high.max(b.high));
+        let wider = |a: Interval, b: Interval| a.max(b).upper();
         Self {
             centre: std::array::from_fn(|i| self.centre[i].hull(other.centre[i])),
             radii: std::array::from_fn(|i| wider(self.radii[i], other.radii[i])),
@@ -44,32 +50,28 @@ impl Range {
     }
 }
 
-/// Interval from −`size` to `size`.
-fn about_zero(size: Interval) -> Interval {
-    Interval::new(-size.high, size.high)
-}
-
-fn dot(a: &Vector, b: &Vector) -> Interval {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-fn square(a: &Vector) -> Interval {
-    a[0].square() + a[1].square() + a[2].square()
-}
-
 /// Upper bound of the remainder of the first-order expansion, as a norm, N m.
 pub(super) fn remainder(body: &Body, range: &Range) -> Interval {
     let reach = range.reach();
-    let [alpha, beta] = [0, 1].map(|i| range.centre[i] + about_zero(reach[i]));
-    let rate = |i: usize| {
-        let value = range.centre[2 + i] + about_zero(reach[2 + i]);
-        Jet::of_coordinate(2 + i, value, Interval::ONE, Interval::ZERO)
+    let coordinate = |i: usize| {
+        let value = range.centre[i] + reach[i].to_both_sides();
+        Jet::coordinate(i, Dual::coordinate(i, value))
     };
-    let acceleration = |i: usize| Jet::fixed(range.acceleration[i] + about_zero(range.feedback[i]));
-    let at = body.bent([alpha, beta]);
-    let moment = at.moment(&std::array::from_fn(rate), &std::array::from_fn(acceleration));
-    let parts = moment.map(|component| component.remainder(&reach));
-    Interval::point(square(&parts).sqrt().high)
+    let acceleration =
+        |i: usize| Jet::fixed(range.acceleration[i] + range.feedback[i].to_both_sides());
+    let rates = [2, 3, 4].map(coordinate);
+    let moment = body.at([0, 1].map(coordinate)).moment(&rates, &[0, 1, 2].map(acceleration));
+    square(&moment.map(|component| second_order(&component, &reach))).sqrt().upper()
+}
+
+/// Upper bound of ½ |oᵀ H o| over |o_i| ≤ `radii`.
+fn second_order(function: &Jet, radii: &[Interval; COORDINATES]) -> Interval {
+    let row = |(slope, radius): (&Dual<COORDINATES>, &Interval)| {
+        let parts = slope.slope.iter().zip(radii).map(|(bend, other)| bend.abs() * *other);
+        parts.fold(Interval::ZERO, |sum, part| sum + part) * *radius
+    };
+    let rows = function.slope.iter().zip(radii).map(row);
+    rows.fold(Interval::ZERO, |sum, row| sum + row) * Interval::from(0.5)
 }
 
 impl Range {
@@ -119,8 +121,9 @@ struct Expansion {
 
 impl Expansion {
     fn new(body: &Body, range: &Range) -> Self {
-        let at: Attitude<Dual<COORDINATES>> = body.sloped([range.centre[0], range.centre[1]]);
-        let rates = std::array::from_fn(|i| Dual::coordinate(2 + i, range.centre[2 + i]));
+        let coordinate = |i: usize| Dual::coordinate(i, range.centre[i]);
+        let at: Attitude<Dual<COORDINATES>> = body.at([0, 1].map(coordinate));
+        let rates = [2, 3, 4].map(coordinate);
         let moment = at.moment(&rates, &range.acceleration.map(Dual::fixed));
         let column = |i: usize| at.column(i).map(|entry| entry.value * range.feedback[i]);
         let slope = |i: usize, j: usize| at.column(i).map(|e| e.slope[j] * range.feedback[i]);

@@ -5,22 +5,18 @@
 //! certificate uses. No number of the controller's design enters, only the settings, the plan and
 //! its age. docs/proof.md gives the derivation.
 
-mod body;
 mod causes;
 mod deviation;
-mod jet;
 mod law;
 mod reach;
 mod rest;
 mod smoothness;
 
+use crate::body::Body;
 use crate::interval::Interval;
-use body::Body;
-use control::crmpc::{Constraints, Design, InitialState, Plan, Settings};
-use control::error_dynamics::InvariantSet;
+use control::crmpc::{Constraints, Plan, Settings};
 use deviation::Deviation;
 use law::Range;
-use nalgebra::Vector6;
 use reach::Reach;
 
 /// Smallest shares of the limits that a plan leaves unused; negative where the check does not
@@ -92,8 +88,6 @@ pub struct PlanCheck {
     reach: Reach,
     /// Number of feedback ticks per optimisation.
     ratio: usize,
-    /// Set in which the deviation of each axis begins, with its size; only for `tube`.
-    start: Option<(InvariantSet, f64)>,
 }
 
 /// Number of times that a range of angles is halved before a moment counts as too large.
@@ -113,15 +107,10 @@ impl PlanCheck {
         }
         let settings = &settings.resolved().map_err(|error| error.to_string())?;
         let body = Body::new(settings).ok_or("the body is not symmetric about its x-z plane")?;
-        let start = match settings.initial_state {
-            InitialState::Measured | InitialState::Nominal => None,
-            InitialState::Tube => Some(start_set(settings)?),
-        };
-        let borrowed = start.as_ref().map(|(set, size)| (set, *size));
-        let reach = Reach::new(settings, borrowed)
+        let reach = Reach::new(settings)
             .ok_or("the feedback is too slow, or its delay too long, for a bound")?;
         let ratio = (settings.period_optimisation / settings.period_feedback).round() as usize;
-        Ok(Self { settings: *settings, body, reach, ratio, start })
+        Ok(Self { settings: *settings, body, reach, ratio })
     }
 
     /// Checks a plan whose nominal trajectory began `age` feedback ticks before the plan.
@@ -140,17 +129,6 @@ impl PlanCheck {
         }
         verdict.record(f64::INFINITY, &self.rest(plan, &self.reach.forever));
         verdict
-    }
-
-    /// Whether a deviation of the predicted state from the plan's first state lies in the set in
-    /// which `tube` lets a nominal trajectory begin. It is always true otherwise.
-    pub fn may_begin(&self, deviation: &Vector6<f64>) -> bool {
-        let Some((set, size)) = &self.start else { return true };
-        let inside = |axis: usize| {
-            let value = nalgebra::Vector2::new(deviation[axis], deviation[3 + axis]);
-            set.normals().iter().all(|normal| normal.dot(&value).abs() <= size * (1.0 + 1e-9))
-        };
-        (0..3).all(inside)
     }
 
     fn is_consistent(&self, plan: &Plan) -> bool {
@@ -177,12 +155,9 @@ impl PlanCheck {
         let swept = stage.sideslip(j).abs();
         // The plan's rates are straight lines, and the deviation is convex except for the swing, so
         // that ‖ω‖ is largest at an end.
-        let near = (swept - off).low.max(0.0);
-        let cosine = body::sin_cos(Interval::from(near)).1;
+        let near = swept - off;
         let rate = ends.map(|(state, deviation)| {
-            let size = |i: usize| state[3 + i].abs() + deviation.rate.half;
-            let squares = (cosine * size(0)).square() + size(1).square() + size(2).square();
-            squares.sqrt() + deviation.rate.norm + self.reach.swing
+            self.body_rates(near, [3, 4, 5].map(|i| state[i].abs()), deviation)
         });
         let size = stage.farthest_sideslip(j, angles) + ends[0].1.bulge;
         let Settings { sideslip_domain, limit_rate, .. } = self.settings;
@@ -191,6 +166,19 @@ impl PlanCheck {
             rate: (limit_rate - rate[0].high.max(rate[1].high)) / limit_rate,
             moment: 1.0,
         }
+    }
+
+    /// Bounds ‖ω‖ where |β| is at least `sideslip` and the plan's rates have these sizes.
+    fn body_rates(
+        &self,
+        sideslip: Interval,
+        sizes: [Interval; 3],
+        deviation: &Deviation,
+    ) -> Interval {
+        let cosine = Interval::from(sideslip.low.max(0.0)).sin_cos().1;
+        let [alpha, beta, sigma] = sizes.map(|size| size + deviation.rate.half);
+        let squares = (cosine * alpha).square() + beta.square() + sigma.square();
+        squares.sqrt() + deviation.rate.norm + self.reach.swing
     }
 
     /// Bounds the commands of a stage that begins `n` ticks after the nominal trajectory; the result
@@ -233,14 +221,6 @@ impl PlanCheck {
             feedback: [feedback.half; 3],
         }
     }
-}
-
-/// The set in which `tube` lets the deviation of an axis begin, and its size: this defines the
-/// constraint of the optimisation, and is not a bound.
-fn start_set(settings: &Settings) -> Result<(InvariantSet, f64), String> {
-    let design = Design::new(settings).map_err(|error| error.to_string())?;
-    let set = design.invariant.ok_or("no set exists in which a nominal trajectory may begin")?;
-    Ok((set, (design.accepted_share * settings.disturbance_bound).max(1e-5)))
 }
 
 /// One interval of the plan, with its acceleration held.

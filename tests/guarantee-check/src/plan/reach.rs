@@ -12,38 +12,34 @@
 //! e_k, and a part φ_k because F differs along the two trajectories. The linear parts are summed
 //! exactly; mismatch and φ are bounded as vectors.
 
-use super::body::Body;
 use super::causes::{Causes, InertiaError, Mismatch};
-use super::deviation::{Deviation, Extent, upper};
+use super::deviation::{Deviation, Extent};
 use super::smoothness::{Growth, Smoothness};
-use crate::interval::Interval;
-use crate::sums::{Axis, Matrix, Pair, integral_of_size, product};
+use crate::body::Body;
+use crate::interval::{Interval, number};
+use crate::sums::{Axis, Bounds, NEVER, Pair, integral_of_size};
 use control::crmpc::Settings;
-use control::error_dynamics::InvariantSet;
-use nalgebra::Vector2;
 use std::collections::VecDeque;
 
-fn number(value: f64) -> Interval {
-    Interval::from(value)
+/// Bounds at one tick on the effect of mismatch and φ along one row r.
+#[derive(Clone, Copy)]
+struct Response {
+    /// Part by mismatch and φ.
+    mismatched: Interval,
+    /// Part by the mismatch, if it is summed along the predictions.
+    revised: Interval,
+    /// Part by φ of the first tick, which is the deviation of the vehicle there.
+    begun: Interval,
+    /// Moment that compensates the inertia error, if the row is that of K ô, N m.
+    inertia: Interval,
 }
 
-/// Sums over the responses of one row r to everything that drives the deviation, by the number of
-/// periods since the nominal trajectory began.
-struct Response {
-    /// ∫ |r Φⁱ [u; 1]| du over all unit pulses that have been seen.
-    seen: Vec<Interval>,
-    /// Parts by measurement errors: of earlier ticks, and of the first.
-    erred: Vec<Interval>,
-    /// Sums of |r Φⁱ [1; 0]| over all unit shifts of the angle per time that have been seen, s.
-    crept: Vec<Interval>,
-    /// Part by mismatch and φ.
-    mismatched: Vec<Interval>,
-    /// Part by the mismatch, if it is summed along the predictions.
-    revised: Vec<Interval>,
-    /// Part by φ of the first tick, which is the deviation of the vehicle there.
-    begun: Vec<Interval>,
-    /// Moment that compensates the inertia error, if the row is that of K ô, N m.
-    inertia: Vec<Interval>,
+/// Bounds at one tick on the effects of unit disturbances, of all errors of measurement, and of unit
+/// shifts of the angle per time.
+struct Effects {
+    disturbance: Bounds,
+    errors: Bounds,
+    shifts: Bounds,
 }
 
 /// The tube of deviations around any nominal trajectory for one set of settings.
@@ -60,8 +56,6 @@ struct Builder<'a> {
     causes: Causes,
     /// Growth of the moment that compensates ν.
     growth: Growth,
-    /// Matrices of the errors: Γ K A_d, A A_d and A_d.
-    errors: [Matrix; 3],
     /// Number of periods after which no response is followed one by one.
     steps: usize,
 }
@@ -72,10 +66,9 @@ const HALVINGS: usize = 34;
 const LONGEST: usize = 20_000;
 
 impl Reach {
-    /// Computes the tube; `start` is the set in which the deviation of each axis may begin, per
-    /// unit of the disturbance bound. `None` if the settings leave no bound.
-    pub(super) fn new(s: &Settings, start: Option<(&InvariantSet, f64)>) -> Option<Self> {
-        Builder::new(s)?.build(start)
+    /// Computes the tube; `None` if the settings leave no bound.
+    pub(super) fn new(s: &Settings) -> Option<Self> {
+        Builder::new(s)?.build()
     }
 
     /// Returns the deviation `n` feedback ticks after the nominal trajectory began.
@@ -88,17 +81,9 @@ impl<'a> Builder<'a> {
     fn new(s: &'a Settings) -> Option<Self> {
         let axis = Axis::new(s.feedback, s.period_feedback, s.delay)?;
         let causes = Causes::new(s)?;
-        let (zero, one, d, tau) =
-            (Interval::ZERO, Interval::ONE, number(s.delay), number(s.period_feedback));
-        let transition = |h: Interval| [[one, h], [zero, one]];
-        let (k, half) = ([s.feedback.k1, s.feedback.k2].map(number), number(0.5));
-        let gamma = [half * tau.square(), tau];
-        let fed = gamma.map(|g| k.map(|k| g * k));
-        let delayed = transition(d);
-        let errors = [product(&fed, &delayed), product(&transition(tau), &delayed), delayed];
         let steps = Some(axis.halved(HALVINGS)).filter(|&steps| steps <= LONGEST)?;
         let growth = Growth::new(&Body::new(s)?, causes.sideslip);
-        Some(Self { s, axis, causes, growth, errors, steps })
+        Some(Self { s, axis, causes, growth, steps })
     }
 
     /// Moment that compensates ν after the vehicle has turned for `age`, faster than its limit
@@ -112,78 +97,60 @@ impl<'a> Builder<'a> {
         direct * self.growth.after(one, angle) + turned * self.growth.after(root_condition, angle)
     }
 
-    /// Sums the responses of a row.
-    fn respond(&self, row: Pair) -> Response {
-        let (zero, tau, d) = (Interval::ZERO, number(self.s.period_feedback), number(self.s.delay));
-        let mut sums = [zero; 5];
-        let mut response = Response {
-            seen: vec![zero],
-            erred: vec![zero],
-            crept: vec![zero],
-            mismatched: vec![zero],
-            revised: vec![zero],
-            begun: vec![],
-            inertia: vec![zero],
+    /// Bounds the effects of the linear causes, by the number of periods; last for ever.
+    fn effects(&self) -> Vec<Effects> {
+        let by_error = self.axis.errors(self.steps);
+        let shifts = self.axis.shifts(self.steps, NEVER);
+        let errors = |n: usize| {
+            std::array::from_fn(|i| {
+                by_error[0][n][i] * self.causes.errors[0]
+                    + by_error[1][n][i] * self.causes.errors[1]
+            })
         };
+        let reach = self.axis.reach(self.steps).into_iter().enumerate();
+        reach
+            .map(|(n, disturbance)| Effects { disturbance, errors: errors(n), shifts: shifts[n] })
+            .collect()
+    }
+
+    /// Sums the responses of a row to mismatch and φ, by the number of periods; last for ever, with
+    /// a bound on all responses that are not followed.
+    fn respond(&self, row: Pair) -> Vec<Response> {
+        let (zero, tau, d) = (Interval::ZERO, number(self.s.period_feedback), number(self.s.delay));
+        let (mut small, mut inertia) = ([zero; 2], zero);
+        let mut response =
+            Response { mismatched: zero, revised: zero, begun: self.unseen(&row), inertia };
+        let mut responses = Vec::with_capacity(self.steps + 2);
         let mut excess = VecDeque::new();
-        let mut earlier = zero;
         for (i, power) in self.axis.transitions(self.steps).enumerate() {
             let reached = [0, 1].map(|j| row[0] * power[0][j] + row[1] * power[1][j]);
-            let wave = integral_of_size(&reached, d, tau);
-            let small = self.mismatched(&reached, &self.causes.later);
+            responses.push(Response { begun: self.unseen(&reached), ..response });
+            let later = self.mismatched(&reached, &self.causes.later);
             let first = self.mismatched(&reached, &self.causes.first.0);
-            excess.push_back([0, 1].map(|j| first[j] - small[j]));
+            excess.push_back([0, 1].map(|j| first[j] - later[j]));
             if excess.len() > self.causes.first.1 {
                 excess.pop_front();
             }
             let age = number(i as f64) * tau + d + tau + number(0.5) * tau;
-            response.begun.push(self.unseen(&reached));
-            let inertia = wave * self.compensating(age);
-            let parts = [wave, small[0], inertia, small[1], reached[0].abs() * tau];
-            sums = std::array::from_fn(|j| sums[j] + parts[j]);
-            response.seen.push(sums[0]);
-            response.crept.push(sums[4]);
-            let more = |j: usize| excess.iter().fold(zero, |sum, part| sum + part[j]);
-            response.mismatched.push(sums[1] + more(0));
-            response.revised.push(sums[3] + more(1));
-            response.inertia.push(sums[2]);
-            response.erred.push(earlier + self.erred(&reached, 1));
-            earlier = earlier + self.erred(&reached, 0);
+            inertia = inertia + integral_of_size(&reached, d, tau) * self.compensating(age);
+            small = [0, 1].map(|j| small[j] + later[j]);
+            let [mismatched, revised] =
+                [0, 1].map(|j| excess.iter().fold(small[j], |sum, part| sum + part[j]));
+            response = Response { mismatched, revised, inertia, ..response };
         }
-        let tail = self.axis.tails(self.steps).0 * (row[0].abs() + row[1].abs());
-        self.end(&mut response, tail, earlier);
-        response
-    }
-
-    /// Adds the remainder when every response has faded, bounded by the sum `tail` of its size.
-    fn end(&self, response: &mut Response, tail: Interval, earlier: Interval) {
-        let tau = number(self.s.period_feedback);
-        let end = number(self.s.delay) + tau;
-        let last = |values: &[Interval]| values.last().copied().unwrap_or(Interval::ALL);
         let one = [Interval::ONE, Interval::ONE];
-        let more = tail * end.max(Interval::ONE);
-        let seen = last(&response.seen) + more * tau;
-        let crept = last(&response.crept) + tail * tau;
-        let small = self.mismatched(&one, &self.causes.first.0);
-        let revised = last(&response.revised) + more * small[1];
-        let small = last(&response.mismatched) + more * small[0];
-        let inertia = last(&response.inertia) + more * tau * self.compensating(number(1e9));
-        let erred = earlier + more * (self.erred(&one, 0) + self.erred(&one, 1));
-        response.seen.push(seen);
-        response.crept.push(crept);
-        response.mismatched.push(small);
-        response.revised.push(revised);
-        response.inertia.push(inertia);
-        response.erred.push(erred);
+        let tail = self.axis.tails(self.steps).0 * (row[0].abs() + row[1].abs());
         let begun = tail * self.unseen(&one);
-        response.begun.extend([begun, begun]);
-    }
-
-    /// Effect of the errors through one of the matrices.
-    fn erred(&self, row: &Pair, matrix: usize) -> Interval {
-        let m = &self.errors[matrix];
-        let by = |j: usize| (row[0] * m[0][j] + row[1] * m[1][j]).abs() * self.causes.errors[j];
-        by(0) + by(1)
+        responses.push(Response { begun, ..response });
+        let more = tail * (d + tau).max(Interval::ONE);
+        let rest = self.mismatched(&one, &self.causes.first.0);
+        responses.push(Response {
+            mismatched: response.mismatched + more * rest[0],
+            revised: response.revised + more * rest[1],
+            begun,
+            inertia: inertia + more * tau * self.compensating(number(1e9)),
+        });
+        responses
     }
 
     /// Effect of the mismatch of one tick, summed along the true trajectory with φ, and along the
@@ -205,7 +172,7 @@ impl<'a> Builder<'a> {
         [most * mismatch.drifted + fed + swing, late * mismatch.revised + swing]
     }
 
-    fn build(&self, start: Option<(&InvariantSet, f64)>) -> Option<Reach> {
+    fn build(&self) -> Option<Reach> {
         let (tau, half, eighth) = (number(self.s.period_feedback), number(0.5), number(0.125));
         let [k1, k2] = [self.s.feedback.k1, self.s.feedback.k2].map(number);
         let (zero, one) = (Interval::ZERO, Interval::ONE);
@@ -216,16 +183,13 @@ impl<'a> Builder<'a> {
             [half * tau * k1, one + half * tau * k2],
             [k1, k2],
         ];
-        let responses = rows.map(|row| self.respond(row));
-        let starts = rows.map(|row| self.starts(row, start));
-        let unseen = [half * number(self.s.delay).square(), number(self.s.delay)];
-        let at = |n: usize| self.deviation(n, &rows, &responses, &starts, &unseen);
+        let (responses, effects) = (rows.map(|row| self.respond(row)), self.effects());
         // K ô is held between two ticks.
         let at = |n: usize| {
-            let at = at(n);
-            let held =
-                at.feedback.component() + self.causes.inertia.acceleration * responses[4].seen[n];
-            Deviation { bulge: upper(eighth * tau.square() * held), ..at }
+            let at = self.deviation(n, &rows, responses.each_ref().map(|row| &row[n]), &effects[n]);
+            let held = at.feedback.component()
+                + self.causes.inertia.acceleration * effects[n].disturbance[6];
+            Deviation { bulge: (eighth * tau.square() * held).upper(), ..at }
         };
         let deviations: Vec<Deviation> = (0..=self.steps).map(at).collect();
         let forever = deviations.iter().fold(at(self.steps + 1), |most, at| most.max(at));
@@ -235,60 +199,36 @@ impl<'a> Builder<'a> {
         bounded.then_some(Reach { deviations, forever, swing })
     }
 
-    /// Support of the start set along r Φⁿ for each n.
-    fn starts(&self, row: Pair, start: Option<(&InvariantSet, f64)>) -> Vec<Interval> {
-        let Some((set, size)) = start else { return vec![Interval::ZERO; self.steps + 2] };
-        let support = |power: &Matrix| {
-            let [x, y] = [0, 1].map(|j| row[0] * power[0][j] + row[1] * power[1][j]);
-            // The slack covers rounding of the row and of the sum.
-            let along = set.support(&Vector2::new(x.middle(), y.middle()));
-            number(along * size * (1.0 + 1e-9) + 1e-15)
-        };
-        let powers = self.axis.transitions(self.steps + 1);
-        let mut supports: Vec<Interval> = powers.map(|power| support(&power)).collect();
-        let largest = set.support(&Vector2::x()).max(set.support(&Vector2::y()));
-        let tail = self.axis.tails(self.steps).0 * (row[0].abs() + row[1].abs());
-        supports.push(tail * number(largest * size));
-        supports
-    }
-
+    /// Bounds the deviation after `n` periods. The vehicle's angle and rate are entries 0 and 1 of
+    /// the effects, what the law computes are the entries from 2 on.
     fn deviation(
         &self,
         n: usize,
         rows: &[Pair; 5],
-        responses: &[Response; 5],
-        starts: &[Vec<Interval>; 5],
-        unseen: &Pair,
+        responses: [&Response; 5],
+        effects: &Effects,
     ) -> Deviation {
         let Causes { disturbance, inertia, slow, .. } = &self.causes;
         let (inertia, delay) = (inertia.acceleration, number(self.s.delay));
-        let half = |i: usize| {
-            let Response { seen, erred, .. } = &responses[i];
-            *disturbance * seen[n] + erred[n] + starts[i][n]
-        };
+        let half = |i: usize| (*disturbance * effects.disturbance[i] + effects.errors[i]).upper();
         let vehicle = |i: usize| {
-            let Response { seen, crept, mismatched, revised, begun, .. } = &responses[i];
-            let erred = if n == 0 { self.erred(&rows[i], 2) } else { Interval::ZERO };
-            let (along, revised) = (mismatched[n] + begun[n], revised[n] + self.unseen(&rows[i]));
-            let small = along.min(revised);
-            let pulses = seen[n] + unseen[i];
-            let half = half(i) + *disturbance * unseen[i] + erred;
-            let crept = slow.creep * (crept[n] + rows[i][0].abs() * delay);
-            let lasting = (inertia + slow.acceleration) * pulses;
-            Extent { half: upper(half), norm: upper(lasting + crept + small) }
+            let Response { mismatched, revised, begun, .. } = *responses[i];
+            let small = (mismatched + begun).min(revised + self.unseen(&rows[i]));
+            let crept = slow.creep * (effects.shifts[i] + rows[i][0].abs() * delay);
+            let lasting = (inertia + slow.acceleration) * effects.disturbance[i];
+            Extent { half: half(i), norm: (lasting + crept + small).upper() }
         };
         let law = |i: usize, compensated: bool| {
-            let Response { seen, crept, mismatched, revised, begun, .. } = &responses[i];
+            let Response { mismatched, revised, begun, .. } = *responses[i];
             // The first predicted state is known exactly.
-            let (mut half, mut small) = (half(i), Interval::ZERO);
-            if n > 0 {
-                half = half + self.erred(&rows[i], 2);
-                let along = mismatched[n] + begun[n] + self.unseen(&rows[i]);
-                small = along.min(revised[n]);
-            }
-            let inertia = if compensated { inertia * seen[n] } else { Interval::ZERO };
-            let slow = slow.acceleration * seen[n] + slow.creep * crept[n];
-            Extent { half: upper(half), norm: upper(inertia + slow + small) }
+            let along = mismatched + begun + self.unseen(&rows[i]);
+            let small = if n > 0 { along.min(revised) } else { Interval::ZERO };
+            let at = i + 2;
+            let inertia =
+                if compensated { inertia * effects.disturbance[at] } else { Interval::ZERO };
+            let slow =
+                slow.acceleration * effects.disturbance[at] + slow.creep * effects.shifts[at];
+            Extent { half: half(at), norm: (inertia + slow + small).upper() }
         };
         Deviation {
             angle: vehicle(0),
@@ -296,7 +236,7 @@ impl<'a> Builder<'a> {
             law_angle: law(2, true),
             law_rate: law(3, true),
             feedback: law(4, false),
-            inertia: upper(responses[4].inertia[n]),
+            inertia: responses[4].inertia.upper(),
             bulge: Interval::ZERO,
         }
     }

@@ -11,12 +11,12 @@ use super::deviation::Deviation;
 use super::law::{self, Range};
 use super::{Left, PlanCheck};
 use crate::interval::Interval;
-use control::crmpc::Plan;
+use control::crmpc::{Plan, Settings};
 
 /// Width of the boxes of angles with which the search begins, rad.
 const WIDTH: f64 = 0.1;
-/// Smallest width of a box that is halved, rad.
-const NARROWEST: f64 = 2e-3;
+/// Number of times that a box is halved before the moment counts as too large.
+const HALVINGS: u32 = 12;
 
 /// Interval between zero and `value`.
 fn down_to_zero(value: f64) -> Interval {
@@ -41,27 +41,14 @@ impl PlanCheck {
         };
         let angles = [travelled(0), travelled(1)];
         let rates: [f64; 3] = std::array::from_fn(|i| last[3 + i]);
-        let left = self.sideslip_and_rates_at_rest(angles[1], &rates, forever);
-        Left { moment: self.moment_at_rest(angles, &rates, &braking, forever), ..left }
-    }
-
-    fn sideslip_and_rates_at_rest(
-        &self,
-        sideslip: Interval,
-        rates: &[f64; 3],
-        forever: &Deviation,
-    ) -> Left {
         let off = forever.angle.component() + forever.bulge;
-        let near = (sideslip.abs() - off).low.max(0.0);
-        let cosine = super::body::sin_cos(Interval::from(near)).1;
-        let size = |i: usize| Interval::from(rates[i].abs()) + forever.rate.half;
-        let squares = (cosine * size(0)).square() + size(1).square() + size(2).square();
-        let rate = squares.sqrt() + forever.rate.norm + self.reach.swing;
-        let (domain, limit) = (self.settings.sideslip_domain, self.settings.limit_rate);
+        let (size, sizes) = (angles[1].abs(), rates.map(|rate| Interval::from(rate.abs())));
+        let rate = self.body_rates(size - off, sizes, forever);
+        let Settings { sideslip_domain, limit_rate, .. } = self.settings;
         Left {
-            sideslip: (domain - (sideslip.abs() + off).high) / domain,
-            rate: (limit - rate.high) / limit,
-            moment: 1.0,
+            sideslip: (sideslip_domain - (size + off).high) / sideslip_domain,
+            rate: (limit_rate - rate.high) / limit_rate,
+            moment: self.moment_at_rest(angles, &rates, &braking, forever),
         }
     }
 
@@ -74,29 +61,24 @@ impl PlanCheck {
         forever: &Deviation,
     ) -> f64 {
         // The law evaluates the moment at the predicted attitude, which deviates from the plan's.
-        let off = forever.law_angle.component().high;
-        let mut boxes = divided(angles.map(|angle| angle + Interval::new(-off, off)));
-        let mut least = 1.0_f64;
-        while let Some(angles) = boxes.pop() {
+        let off = forever.law_angle.component().to_both_sides();
+        let [alpha, beta] = angles.map(|angle| angle + off);
+        // The moment has the period 2π in α.
+        let turn = 2.0 * std::f64::consts::PI.next_up();
+        let alpha = Interval::new(alpha.low, alpha.high.min(alpha.low + turn));
+        let boxes =
+            |angle: Interval| angle.parts((angle.width() / WIDTH).ceil().clamp(1.0, 1e4) as u32);
+        let added = self.added(forever);
+        let limit = self.settings.limit_moment - self.settings.needed_by_known();
+        let (rest, mut most) = ((Interval::from(limit) - added).low, 0.0_f64);
+        for angles in boxes(alpha).flat_map(|alpha| boxes(beta).map(move |beta| [alpha, beta])) {
             let range = at_rest(angles, rates, braking, forever);
-            let added = law::remainder(&self.body, &range) + self.added(forever);
-            let limit = self.settings.limit_moment;
-            let moment = law::largest(&self.body, &range) + added.high;
-            let left = (limit - self.settings.needed_by_known() - moment) / limit;
-            let wide = usize::from(angles[1].width() > angles[0].width());
-            if left < 0.0 && angles[wide].width() > NARROWEST {
-                let middle = angles[wide].middle();
-                let (mut below, mut above) = (angles, angles);
-                (below[wide].high, above[wide].low) = (middle, middle);
-                boxes.extend([below, above]);
-            } else {
-                least = if left.is_nan() { f64::NAN } else { least.min(left) };
-                if least.is_nan() || least < 0.0 {
-                    return least;
-                }
+            most = most.max(law::divided(&self.body, &range, rest, HALVINGS));
+            if most > rest {
+                break;
             }
         }
-        least
+        (limit - (Interval::from(most) + added).high) / self.settings.limit_moment
     }
 }
 
@@ -121,18 +103,4 @@ fn at_rest(
         acceleration: std::array::from_fn(|i| -(braking[i] * middle(rates[i]))),
         feedback: std::array::from_fn(|i| Interval::from((feedback.half + largest(i)).high)),
     }
-}
-
-/// Divides a box of angles into boxes of at most [`WIDTH`]. The moment has the period 2π in α.
-fn divided(angles: [Interval; 2]) -> Vec<[Interval; 2]> {
-    let turn = 2.0 * std::f64::consts::PI.next_up();
-    let once = |angle: Interval| Interval::new(angle.low, angle.high.min(angle.low + turn));
-    let parts = |angle: Interval| {
-        let count = (angle.width() / WIDTH).ceil().clamp(1.0, 1e4) as usize;
-        let at = move |i: usize| angle.low + (angle.high - angle.low) * (i as f64 / count as f64);
-        (0..count)
-            .map(move |i| Interval::new(at(i), if i + 1 == count { angle.high } else { at(i + 1) }))
-    };
-    let beside = |alpha: Interval| parts(angles[1]).map(move |beta| [alpha, beta]);
-    parts(once(angles[0])).flat_map(beside).collect()
 }

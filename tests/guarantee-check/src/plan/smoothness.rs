@@ -9,8 +9,9 @@
 //! γ″, as ẋ = (R ω)′. The derivatives of R are those of V⁻¹ [p, t, q] = [t − p tan β, q, −(c p + s
 //! t)] by β, and by α those of T, which has the norm 1.
 
-use super::body::{Body, sin_cos};
-use crate::interval::Interval;
+use crate::body::Body;
+use crate::interval::{Interval, number};
+use crate::kinematics::{Turn, unit};
 use control::crmpc::Settings;
 use std::f64::consts::PI;
 
@@ -31,21 +32,8 @@ pub(super) struct Smoothness {
     pub(super) angle_rate: Interval,
 }
 
-fn number(value: f64) -> Interval {
-    Interval::from(value)
-}
-
 fn hypot(values: &[Interval]) -> Interval {
     values.iter().fold(Interval::ZERO, |sum, value| sum + value.square()).sqrt()
-}
-
-/// Divides the interval into `count` parts.
-fn parts(range: Interval, count: u32) -> impl Iterator<Item = Interval> + Clone {
-    let at = move |i: u32| range.low + (range.high - range.low) * f64::from(i) / f64::from(count);
-    (0..count).map(move |i| {
-        let high = if i + 1 == count { range.high } else { at(i + 1) };
-        Interval::new(at(i), high)
-    })
 }
 
 /// Largest sizes of the derivatives of R by angles, for |β| up to the one with this sine and
@@ -60,7 +48,7 @@ struct Kinematics {
 
 impl Kinematics {
     fn new(sideslip: f64) -> Self {
-        let (s, c) = sin_cos(number(sideslip));
+        let (s, c) = number(sideslip).sin_cos();
         let (one, t, secant) = (Interval::ONE, s / c, Interval::ONE / c);
         let (t2, sec2) = (t.square(), secant.square());
         // Frobenius norms of V⁻¹ and its derivatives by β, with Nⁱ, i > 0, for those by α, too
@@ -167,10 +155,10 @@ fn drift(kinematics: &Kinematics) -> (Interval, Interval) {
 /// [2 s x₂, z, x₂]/c and −c [z, 0, x₁], z = 2 s x₁ + x₃, on all faces of a cube. A change of the
 /// signs of β and x₁ does not change the eigenvalues.
 fn drift_by_rates(sideslip: f64) -> Interval {
-    let sides = parts(Interval::new(-1.0, 1.0), 40);
+    let sides = Interval::new(-1.0, 1.0).parts(40);
     let mut largest = Interval::ZERO;
-    for beta in parts(Interval::new(0.0, sideslip), 10) {
-        let (s, c) = sin_cos(beta);
+    for beta in Interval::new(0.0, sideslip).parts(10) {
+        let (s, c) = beta.sin_cos();
         for first in sides.clone() {
             for second in sides.clone() {
                 for face in 0..3 {
@@ -214,48 +202,44 @@ pub(super) struct Growth {
 
 impl Growth {
     /// Finds the bounds over all α and |β| ≤ `sideslip`. Ẇ R = T (N α̇ + B β̇) T with N [p, t, q] =
-    /// [q, 0, −p] and B = [[−s³/c, −c², 0], [1 + s², −c s, 0], 0], and Ẇ = T (N V α̇ + ∂V/∂β β̇).
+    /// [q, 0, −p] and B = [[−s³/c, −c², 0], [1 + s², −c s, 0], 0].
     pub(super) fn new(body: &Body, sideslip: f64) -> Self {
         let [x, z, y] = body.principal();
-        let secant = Interval::ONE / sin_cos(number(sideslip)).1;
+        let secant = Interval::ONE / number(sideslip).sin_cos().1;
         let cap = secant * x.max(z).max(y) / x.min(z).min(y);
         let (mut exponential, mut turning) = (Interval::ZERO, Interval::ZERO);
-        let tensors: Vec<[Matrix; 2]> =
-            parts(Interval::new(0.0, PI.next_up()), 60).map(|alpha| body.tensors(alpha)).collect();
-        for beta in parts(Interval::new(-sideslip, sideslip), 10) {
-            let (s, c) = sin_cos(beta);
-            for direction in parts(Interval::new(0.0, PI.next_up()), 60) {
-                let (by_beta, by_alpha) = sin_cos(direction);
+        let half_turn = Interval::new(0.0, PI.next_up());
+        // J and its inverse are symmetric, so that their columns are their rows.
+        let tensors = |alpha: Interval| {
+            let at = body.at([alpha, Interval::ZERO]);
+            [[0, 1, 2].map(|i| at.inertia(unit(i))), [0, 1, 2].map(|i| at.inverse(unit(i)))]
+        };
+        let tensors: Vec<[Matrix; 2]> = half_turn.parts(60).map(tensors).collect();
+        for beta in Interval::new(-sideslip, sideslip).parts(10) {
+            let (s, c) = beta.sin_cos();
+            for direction in half_turn.parts(60) {
+                let (by_beta, by_alpha) = direction.sin_cos();
                 let rates = [by_alpha / c, by_beta];
                 let turn = turn(rates, s, c);
-                turning = turning.max(size(&derivative(rates, s, c)));
+                let at = Turn::new(s, c);
+                turning = turning.max(size(&[0, 1, 2].map(|i| at.along(&[rates], &unit(i)))));
                 for [inertia, inverse] in &tensors {
                     let growth = size(&product(inertia, &product(&turn, inverse)));
                     exponential = exponential.max(growth);
                 }
             }
         }
-        let upper = |value: Interval| Interval::point(value.high);
-        Self { exponential: upper(exponential), linear: upper(cap * turning), cap: upper(cap) }
+        let linear = (cap * turning).upper();
+        Self { exponential: exponential.upper(), linear, cap: cap.upper() }
     }
 
     /// Upper bound of ‖I W R₀ I⁻¹ X‖ after turning by up to `angle` = ∫ ‖ω‖, with ‖X‖ ≤ `size` and
     /// ‖I⁻¹ X‖ ≤ ‖I⁻¹‖.
     pub(super) fn after(&self, size: Interval, angle: Interval) -> Interval {
-        let exponential = size * large_exp(self.exponential * angle);
+        let exponential = size * (self.exponential * angle).exp();
         let linear = size + self.linear * angle;
         Interval::point(exponential.high.min(linear.high).min(self.cap.high))
     }
-}
-
-/// Encloses eˣ for any x ≥ 0, by squaring.
-fn large_exp(x: Interval) -> Interval {
-    let (mut halvings, mut part) = (0, x);
-    while part.high > 1.0 && halvings < 60 {
-        part = part * number(0.5);
-        halvings += 1;
-    }
-    (0..halvings).fold(part.exp(), |value, _| value.square())
 }
 
 type Matrix = [[Interval; 3]; 3];
@@ -266,17 +250,6 @@ fn turn([alpha, beta]: [Interval; 2], s: Interval, c: Interval) -> Matrix {
         [-(beta * s.square() * s / c), -(beta * c.square()), alpha],
         [beta * (one + s.square()), -(beta * c * s), zero],
         [-alpha, zero, zero],
-    ]
-}
-
-/// Returns N V α̇ + ∂V/∂β β̇.
-fn derivative([alpha, beta]: [Interval; 2], s: Interval, c: Interval) -> Matrix {
-    let (zero, double) = (Interval::ZERO, c.square() - s.square());
-    let twice = number(2.0) * s * c;
-    [
-        [-(beta * double), alpha, beta * s],
-        [-(beta * twice), zero, -(beta * c)],
-        [alpha * c * s, zero, alpha * c],
     ]
 }
 

@@ -2,7 +2,7 @@
 
 use super::*;
 use control::linearise;
-use nalgebra::Vector3;
+use nalgebra::{Vector3, Vector6};
 use vehicle::dynamics::RigidBody;
 use vehicle::integrator::rk4;
 use vehicle::kinematics::{self, Kinematics};
