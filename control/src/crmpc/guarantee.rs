@@ -5,6 +5,7 @@
 //! comments beside the code explain the numbers of its lemmas.
 
 mod assessment;
+mod derivatives;
 mod deviation;
 mod dynamics;
 mod geometry;

@@ -1,12 +1,9 @@
 //! Bounds on the dynamics in the part of the state space that the vehicle does not leave.
 
-use super::geometry::{
-    CURVATURE, DOMAINS, DRIFT_BY_ANGLES_TWICE, DRIFT_MIXED, Domain, FOURTH, Geometry,
-    LARGEST_IN_TURN, TURN, WIDEST,
-};
+use super::derivatives::{Acceleration, Curvatures};
+use super::geometry::{DOMAINS, Domain, Geometry, LARGEST_IN_TURN, TURN, WIDEST};
 use super::mismatch::{Drive, Mismatch, gyroscopic};
 use crate::crmpc::settings::Settings;
-use std::f64::consts::SQRT_2;
 use vehicle::math::{exp, powi};
 
 /// Bounds on the dynamics ẋ_ω = F(Θ, x_ω, m) = R (I⁻¹ (m − ω × I ω) − Ẇ x_ω) in the domain, with
@@ -133,61 +130,14 @@ impl Dynamics {
         let eigenvalues = s.body.inertia.symmetric_eigenvalues();
         let (smallest, largest) = (eigenvalues.min(), eigenvalues.max());
         let geometry = Geometry::new(domain.sideslip);
-        let Geometry { drift, drift_by_rates, r } = geometry;
         let spread = (largest - smallest) / smallest;
-        let rate = r * domain.rate;
+        let rate = geometry.r * domain.rate;
         let (gyroscopic, spinning) = gyroscopic(s);
         // Gyroscopic term: ‖ω × I ω‖ ≤ ½ (I_max − I_min) ‖ω‖².
-        let spin = s.limit_total() / smallest + 0.5 * spread * powi(domain.rate, 2);
-        let acceleration = r * (spin + drift * rate * rate);
-        let by_rates = r * (drift_by_rates * rate + spinning * domain.rate);
-        // The derivative of R is ∂R = −R ∂W R; that of Ẇ x by the angles takes second derivatives
-        // of W.
-        let of_r = TURN * r * r;
-        let by_angles = of_r * (spin + drift * rate * rate)
-            + r * (CURVATURE * rate * rate + spinning * domain.rate * TURN * rate);
-        // F_xx [a, a] + 2 F_xθ [a, x] + F_θθ [x, x] + F_θ a + F_x ȧ with a = F and ȧ = F_x a + F_θ
-        // x. The second derivatives follow from the first ones with one more derivative of R or W.
-        let second = 2.0 * (by_rates / rate);
-        let mixed = of_r * by_rates + r * (DRIFT_MIXED + 4.0 * spread) * rate;
-        let angles_twice = 2.0 * of_r * by_angles
-            + (CURVATURE * r * r + 2.0 * of_r * of_r) * (spin + drift * rate * rate)
-            + r * (DRIFT_BY_ANGLES_TWICE + 12.0 * spread) * rate * rate;
-        let jerk = second * acceleration * acceleration
-            + 2.0 * mixed * acceleration * rate
-            + angles_twice * rate * rate
-            + by_angles * acceleration
-            + by_rates * (by_rates * acceleration + by_angles * rate);
-        // I Ẅ a gives ∂²W [x, x] a + ∂W [a] a. The rest is as in `MomentLoss`, with ẋ_ω = a and
-        // Θ̈ = a.
-        let twisted = largest - smallest;
-        let curvature = [
-            largest * TURN + 2.0 * (largest * drift + 0.5 * twisted),
-            2.0 * largest * CURVATURE
-                + 2.0 * (largest * DRIFT_MIXED + 4.0 * twisted)
-                + TURN * SQRT_2 * twisted,
-            largest * DRIFT_BY_ANGLES_TWICE + 12.0 * twisted,
-        ];
-        // With P = ∂W[o] x and the symmetric bilinear form B(ω, ω) = 2 ω × I ω, ∂m/∂(α, β) [o] is
-        // I (∂W[o] a + ∂²W[x, o] x) + B(ω, P). Here ‖P‖ ≤ t x, ‖Ṗ‖ ≤ c x² + t a and ‖P̈‖ ≤ d x³ +
-        // 3 c x a with the bounds t, c and d on the first three derivatives of W; ‖ω̇‖ ≤ t x² + a,
-        // and ‖ω̈‖ ≤ 3 t x a + c x³. Likewise ∂m/∂x_ω [v] is I (∂W[v] x + ∂W[x] v) +
-        // B(ω, W v). Two and three columns make the norm one of Frobenius.
-        let root3 = 3.0_f64.sqrt();
-        let curvature_by_angles = [
-            SQRT_2 * (3.0 * largest * CURVATURE + 2.0 * twisted * TURN),
-            SQRT_2
-                * (6.0 * largest * DRIFT_BY_ANGLES_TWICE
-                    + 5.0 * twisted * (TURN * TURN + CURVATURE)),
-            SQRT_2
-                * (largest * FOURTH + twisted * (3.0 * TURN * CURVATURE + DRIFT_BY_ANGLES_TWICE)),
-        ];
-        let curvature_by_rates = [
-            root3 * (6.0 * largest * CURVATURE + 6.0 * twisted * TURN),
-            root3
-                * (2.0 * largest * DRIFT_BY_ANGLES_TWICE
-                    + 2.0 * twisted * (CURVATURE + TURN * TURN)),
-        ];
+        let driven = s.limit_total() / smallest + 0.5 * spread * powi(domain.rate, 2);
+        let f = Acceleration { geometry, omega: domain.rate, rate, driven, spread, spinning };
+        let (acceleration, by_rates, by_angles) = (f.size(), f.by_rates(), f.by_angles());
+        let curvatures = Curvatures { largest, spread: largest - smallest };
         Self {
             vehicle: domain,
             domain,
@@ -200,11 +150,11 @@ impl Dynamics {
             by_rates,
             by_angles,
             slope: by_rates * acceleration + by_angles * rate,
-            jerk,
-            curvature,
-            curvature_by_angles,
-            curvature_by_rates,
-            curvature_of_bearing: [root3 * largest * TURN, root3 * largest * CURVATURE],
+            jerk: f.jerk(),
+            curvature: curvatures.of_moment(geometry.drift),
+            curvature_by_angles: curvatures.by_angles(),
+            curvature_by_rates: curvatures.by_rates(),
+            curvature_of_bearing: curvatures.of_box(),
         }
     }
 

@@ -1,5 +1,6 @@
 //! Parts of the limits on ‖ω‖ and ‖m‖ that a deviation uses.
 
+use super::derivatives::{SPIN_BY_ANGLES_TWICE, SPIN_MIXED};
 use super::deviation::Deviation;
 use super::dynamics::Dynamics;
 use super::geometry::{CURVATURE, DRIFT_BY_ANGLES_TWICE, DRIFT_MIXED, TURN};
@@ -131,9 +132,9 @@ impl MomentLoss {
             bearing,
             constant: feedback_norm * largest + feedback_moment + by_rates_twice,
             by_acceleration: 0.5 * largest * CURVATURE * angle * angle,
-            by_size: (largest * DRIFT_MIXED + 4.0 * spread) * angle * rate,
+            by_size: (largest * DRIFT_MIXED + SPIN_MIXED * spread) * angle * rate,
             by_size_squared: 0.5
-                * (largest * DRIFT_BY_ANGLES_TWICE + 12.0 * spread)
+                * (largest * DRIFT_BY_ANGLES_TWICE + SPIN_BY_ANGLES_TWICE * spread)
                 * angle
                 * angle,
         }
