@@ -139,6 +139,11 @@ impl Crmpc {
             linearisation_point: linearisation_point.clone(),
         }
     }
+
+    /// Returns the number of points at which the plan is shown.
+    fn points_shown(&self) -> usize {
+        if self.settings.shows_plan { POINTS } else { 0 }
+    }
 }
 
 impl Controller for Crmpc {
@@ -152,7 +157,7 @@ impl Controller for Crmpc {
                 Law::Paper(_) => 0.0,
             },
             gain: self.settings.feedback,
-            shown: vec![PlanPoint::default(); self.settings.points_shown()],
+            shown: vec![PlanPoint::default(); self.points_shown()],
             ..Memory::default()
         }
     }
@@ -163,7 +168,7 @@ impl Controller for Crmpc {
         states.len() == n + 1
             && accelerations.len() == n
             && multipliers.len() == n
-            && memory.shown.len() == self.settings.points_shown()
+            && memory.shown.len() == self.points_shown()
     }
 
     fn command(

@@ -1,6 +1,5 @@
 //! Settings of CRMPC, with the published ones from `data/crmpc-2022.toml`.
 
-use super::horizon::POINTS;
 use crate::error_dynamics::Gain;
 use crate::mpc::SolverSettings;
 use serde::{Deserialize, Serialize};
@@ -307,11 +306,6 @@ impl Settings {
     pub fn parts_to_spare(&self) -> f64 {
         let past = 2.0 * self.delay + self.period_feedback;
         (past / self.period_optimisation).ceil().max(1.0)
-    }
-
-    /// Returns the number of points at which the plan is shown.
-    pub(super) fn points_shown(&self) -> usize {
-        if self.shows_plan { POINTS } else { 0 }
     }
 
     /// Returns the part of limit.moment that the known moment may need at any time, N m.
