@@ -15,9 +15,9 @@
 
 use crate::clone_in_place::clone_in_place;
 use crate::controller::{Controller, Doubt, Measurement, ReferenceAt};
+use crate::delay_estimate::{LoopDelay, LoopDelaySettings};
 use crate::error::{DesignError, invalid};
 use crate::frozen::Frozen;
-use crate::loop_delay::{LoopDelay, LoopDelaySettings};
 use crate::turns::{Turns, turned_reference};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};

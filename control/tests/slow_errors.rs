@@ -73,7 +73,7 @@ fn guarantee_is_kept_with_slow_errors_without_and_with_a_delay() {
 }
 
 /// Returns settings in which the slow errors, large and quick ones, count for more than Δ.
-fn creeping() -> Settings {
+fn drifting() -> Settings {
     Settings {
         slow_angle_error: f64::to_radians(1.0),
         slow_angle_rate: f64::to_radians(0.3),
@@ -84,7 +84,7 @@ fn creeping() -> Settings {
 
 #[test]
 fn guarantee_is_kept_with_slow_errors_from_the_edge_of_the_certified_states() {
-    let settings = creeping();
+    let settings = drifting();
     let seeds: Vec<u64> = (1..=150).collect();
     let shown = in_parallel(&seeds, |&seed| {
         let flight = Flight::at_the_edge(&settings, seed)?;
@@ -137,7 +137,7 @@ fn no_slow_error_drives_the_vehicle_beyond_the_bound_and_the_worst_comes_half_wa
         disturbance_bound: 0.0,
         inertia_error: 0.0,
         initial_state: InitialState::Nominal,
-        ..creeping()
+        ..drifting()
     };
     let mut flights = Vec::new();
     for period in [0.16, 0.4, 0.8, 1.4, 2.0, 2.8, 4.0, 8.0, 60.0] {

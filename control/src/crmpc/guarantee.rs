@@ -14,7 +14,7 @@ mod losses;
 mod mismatch;
 mod observable;
 mod parts;
-mod tighten;
+mod sequence;
 mod tightening;
 
 pub use assessment::Assessment;
@@ -25,5 +25,5 @@ pub use geometry::{BRAKING, CURVATURE, DRIFT_BY_ANGLES_TWICE, DRIFT_MIXED, Domai
 pub use lemmas::Lemmas;
 pub(super) use losses::{End, Held};
 pub(super) use observable::{MEANS, Observable};
-pub(super) use tighten::{tighten, with_share};
 pub use tightening::Tightening;
+pub(super) use tightening::{tighten, with_share};

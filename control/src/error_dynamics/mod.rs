@@ -8,7 +8,7 @@
 mod reach;
 mod sums;
 
-pub use reach::{Early, Reach};
+pub use reach::{InitialTicks, Reach};
 
 use nalgebra::{Matrix2, RowVector2, Vector2};
 use serde::{Deserialize, Serialize};

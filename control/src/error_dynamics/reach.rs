@@ -84,14 +84,14 @@ impl Reach {
 /// The first ticks of a nominal trajectory, before which the prediction has begun, and the share by
 /// which an effect is larger there.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Early {
+pub struct InitialTicks {
     /// Number of these ticks.
     pub ticks: usize,
     /// Share by which the effect is larger.
     pub excess: f64,
 }
 
-impl Early {
+impl InitialTicks {
     /// Counts the larger effects in sums over 0, 1, … ticks, of which the first ticks are the
     /// oldest parts.
     #[must_use]

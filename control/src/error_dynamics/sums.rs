@@ -1,6 +1,6 @@
 //! Sums of the responses of sampled error dynamics to everything that may have acted.
 
-use super::{Early, Reach, SampledError, transition};
+use super::{InitialTicks, Reach, SampledError, transition};
 use nalgebra::{Matrix2, RowVector2, Vector2};
 
 /// Returns the largest |c₀ + c₁ u| over `within`.
@@ -72,7 +72,7 @@ impl SampledError {
     /// 0, 1, …, `steps` periods, per unit of their bound. The errors may take any value within the
     /// bound at every tick. The nominal trajectory begins at the measured state.
     pub fn errors(&self, steps: usize) -> [Vec<Reach>; 2] {
-        let always = Early { ticks: 0, excess: 0.0 };
+        let always = InitialTicks { ticks: 0, excess: 0.0 };
         [Vector2::new(1.0, 0.0), Vector2::new(self.latency, 1.0)]
             .map(|newest| self.errors_along(newest, steps, always))
     }
@@ -80,22 +80,27 @@ impl SampledError {
     /// Returns the largest effect, within 0, 1, …, `steps` periods, of changes of the predicted
     /// rate, which the vehicle does not make, by up to 1 in all at any time between each
     /// measurement and its command, in s, 1 and 1/s.
-    pub fn mispredictions(&self, steps: usize, early: Early) -> Vec<Reach> {
+    pub fn mispredictions(&self, steps: usize, initial: InitialTicks) -> Vec<Reach> {
         // The sums are convex in the direction, so that the largest one belongs to an end.
         let [last, first] =
-            [0.0, self.latency].map(|u| self.errors_along(Vector2::new(u, 1.0), steps, early));
+            [0.0, self.latency].map(|u| self.errors_along(Vector2::new(u, 1.0), steps, initial));
         last.iter().zip(&first).map(|(a, b)| a.or(b)).collect()
     }
 
     /// With an error e of the measurement the predicted state is wrong by `newest` = A_d e, where
     /// A_d is the transition over `latency`. Then ô_n = A_d e_n + Σ_{0<j<n} Φ^{n−1−j} Γ K A_d e_j −
     /// Φ^{n−1} A A_d e_0, and the vehicle itself deviates by o_n = ô_n − A_d e_n.
-    fn errors_along(&self, newest: Vector2<f64>, steps: usize, early: Early) -> Vec<Reach> {
+    fn errors_along(
+        &self,
+        newest: Vector2<f64>,
+        steps: usize,
+        initial: InitialTicks,
+    ) -> Vec<Reach> {
         let Self { gain, period, phi, gamma, .. } = *self;
         let sum_of = |a: [f64; 5], b: [f64; 5]| std::array::from_fn(|i| a[i] + b[i]);
         let mut older = gamma * (gain.row() * newest).x;
         let mut first = -(transition(period) * newest);
-        let weight = |j: usize| if j < early.ticks { 1.0 + early.excess } else { 1.0 };
+        let weight = |j: usize| if j < initial.ticks { 1.0 + initial.excess } else { 1.0 };
         // Sums of the sizes of the older responses.
         let mut sums = vec![[0.0; 5]];
         let mut reaches = Vec::with_capacity(steps + 1);
@@ -107,11 +112,11 @@ impl SampledError {
                 sums.push(next);
                 older = phi * older;
             }
-            // The errors j = 1, …, `early.ticks` − 1 have become the oldest of these responses.
-            let oldest = sums[(n - 1) - (n - 1).min(early.ticks.saturating_sub(1))];
+            // The errors j = 1, …, `initial.ticks` − 1 have become the oldest of these responses.
+            let oldest = sums[(n - 1) - (n - 1).min(initial.ticks.saturating_sub(1))];
             let sum: [f64; 5] = std::array::from_fn(|i| {
                 let sum = sums[n - 1][i];
-                sum + early.excess * (sum - oldest[i])
+                sum + initial.excess * (sum - oldest[i])
             });
             let actual = sum_of(sum, self.sizes(&first).map(|size| weight(0) * size));
             let seen = sum_of(actual, self.sizes(&newest).map(|size| weight(n) * size));

@@ -3,7 +3,7 @@
 //! | | |
 //! |---|---|
 //! | [`problem`], [`constraints`], [`bounds`] | problem, norm constraints, and their bounds as a function of the trajectory |
-//! | `optimise`, `shortcuts`, `passes` | one optimisation, its shortcuts, its passes |
+//! | `strategy`, `shortcuts`, `passes` | one optimisation, its shortcuts, its passes |
 //! | [`optimiser`] | the solvers of one controller with their memory |
 //! | [`lq`] | the unconstrained problem |
 //! | [`riccati`] | the interior point method |
@@ -22,7 +22,6 @@ pub mod conic;
 pub mod constraints;
 pub mod layout;
 pub mod lq;
-mod optimise;
 pub mod optimiser;
 mod passes;
 pub mod problem;
@@ -30,6 +29,7 @@ pub mod riccati;
 mod search;
 mod settings;
 mod shortcuts;
+mod strategy;
 
 pub use bounds::{Bounded, Bounds};
 pub use budget::Budget;

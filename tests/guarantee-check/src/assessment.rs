@@ -33,7 +33,7 @@ fn values(deviation: &Deviation) -> [f64; 9] {
 struct Effects<'a> {
     reach: &'a Bounds,
     /// Part of the feedback by causes before the nominal trajectory began.
-    early_feedback: Interval,
+    initial_feedback: Interval,
     errors: [&'a Bounds; 2],
     changes: &'a Bounds,
     mispredictions: &'a Bounds,
@@ -44,14 +44,14 @@ fn deviation(s: &Settings, driven: &Driven, effects: &Effects) -> Deviations {
     let (root2, root3) = (number(2.0).sqrt(), number(3.0).sqrt());
     let [rate_error, angle_error, tau, delay] =
         [s.rate_error, s.angle_error, s.period_feedback, s.delay].map(number);
-    let Effects { reach, early_feedback, errors, changes, mispredictions, shifts } = effects;
+    let Effects { reach, initial_feedback, errors, changes, mispredictions, shifts } = effects;
     let Driven { drive, mismatch, .. } = driven;
     let errors: Bounds =
         std::array::from_fn(|i| errors[0][i] * angle_error + errors[1][i] * rate_error);
     let in_norm: Bounds = std::array::from_fn(|i| {
         changes[i] * mismatch.mean
             + mispredictions[i] * mismatch.mispredicted
-            + shifts[i] * (mismatch.swing + driven.creep)
+            + shifts[i] * (mismatch.angle_shift + driven.angle_drift)
     });
     let accelerated = drive.of_three * (Interval::ONE + reach[6])
         + root3 * errors[6]
@@ -62,7 +62,7 @@ fn deviation(s: &Settings, driven: &Driven, effects: &Effects) -> Deviations {
     let any_and_along = drive.inertia[0] + drive.inertia[1];
     [
         of_angles(0)
-            + (mismatch.unseen_rate + driven.creep) * delay
+            + (mismatch.unseen_rate + driven.angle_drift) * delay
             + tau.square() / number(8.0) * accelerated,
         of_rates(1) + mismatch.unseen_rate + driven.between,
         of_angles(2),
@@ -70,13 +70,13 @@ fn deviation(s: &Settings, driven: &Driven, effects: &Effects) -> Deviations {
         of_angles(4),
         of_rates(5),
         reach[6] * number(s.disturbance_bound) + errors[6],
-        in_norm[6] + reach[6] * drive.of_creep,
+        in_norm[6] + reach[6] * drive.of_angle_drift,
         (drive.inertia[0] + driven.root_condition * drive.inertia[1]) * reach[6]
             + any_and_along
                 * (driven.turning * (reach[7] + number(0.5) * tau * reach[6])
                     + driven.turned[0] * reach[6]
-                    + driven.turned[1] * *early_feedback)
-            + driven.early_moment * *early_feedback,
+                    + driven.turned[1] * *initial_feedback)
+            + driven.initial_moment * *initial_feedback,
     ]
 }
 
@@ -106,7 +106,8 @@ fn needed(lemmas: &Lemmas, forever: &Deviations, x: f64) -> [Interval; 2] {
         + turn_by_angles * gyroscopic * x.square();
     let slope_by_rates =
         (largest * number(lemmas.dynamics.geometry.drift_by_rates) + gyroscopic) * x;
-    let by_feedback = feedback * number(lemmas.bearing) + feedback_norm * largest + feedback_moment;
+    let by_feedback =
+        feedback * number(lemmas.induced_norm) + feedback_norm * largest + feedback_moment;
     let (four, twelve, further) = (number(4.0), number(12.0), x + middle_rate);
     let second = half * largest * curvature * a * middle_angle.square()
         + (largest * drift + half * spread) * middle_rate.square()
@@ -135,12 +136,12 @@ pub fn check(
     let before = Lemmas::before(s);
     let driven = driven(s, lemmas, &before);
     let (reach, errors) = (axis.reach(steps), axis.errors(steps));
-    let changes = axis.changes(steps, driven.early[0]);
-    let mispredictions = axis.mispredictions(steps, driven.early[1]);
-    let shifts = axis.shifts(steps, driven.early[2]);
+    let changes = axis.changes(steps, driven.initial[0]);
+    let mispredictions = axis.mispredictions(steps, driven.initial[1]);
+    let shifts = axis.shifts(steps, driven.initial[2]);
     let effects = |n: usize| Effects {
         reach: &reach[n],
-        early_feedback: reach[n][6] - reach[n - n.min(driven.early[0].ticks)][6],
+        initial_feedback: reach[n][6] - reach[n - n.min(driven.initial[0].ticks)][6],
         errors: [&errors[0][n], &errors[1][n]],
         changes: &changes[n],
         mispredictions: &mispredictions[n],
@@ -159,8 +160,12 @@ pub fn check(
     note("mismatch at any time", bound.peak, mismatch.peak);
     note("mismatch since a measurement", bound.unseen_rate, mismatch.unseen_rate);
     note("mismatch of a prediction by errors", bound.mispredicted, mismatch.mispredicted);
-    note("swing of the cancelled drift", lemmas.parts.swing, mismatch.swing);
-    note("creep", lemmas.parts.creep, driven.creep);
+    note(
+        "shift of the angle by the cancelled drift",
+        lemmas.parts.angle_shift,
+        mismatch.angle_shift,
+    );
+    note("angle drift", lemmas.parts.angle_drift, driven.angle_drift);
     note("‖drive‖", lemmas.parts.norm, driven.drive.of_three + mismatch.mean);
     let mut domains = vec![("of predictions", lemmas.dynamics.domain, mismatch.domain)];
     if s.delay > 0.0 {

@@ -3,7 +3,7 @@
 
 use crate::interval::{Interval, number};
 use control::crmpc::{Domain, Lemmas, Settings, TURN};
-use control::error_dynamics::Early;
+use control::error_dynamics::InitialTicks;
 
 /// Causes that drive the vehicle off its prediction, apart from the mismatch.
 pub(crate) struct Drive {
@@ -12,8 +12,8 @@ pub(crate) struct Drive {
     pub of_inertia: Interval,
     /// Difference of the derivative of the navigated angles from the navigated rates, and the
     /// acceleration that it amounts to.
-    pub creep: Interval,
-    pub of_creep: Interval,
+    pub angle_drift: Interval,
+    pub of_angle_drift: Interval,
     /// Errors of all rates, of two of them, and of two angles.
     pub errors: [Interval; 3],
     /// Moments that the inertia error amounts to: along the acting one, and in any direction.
@@ -28,7 +28,7 @@ pub(crate) struct Mismatch {
     pub mispredicted: Interval,
     /// Bound on ‖dF/dt‖, and the shift of the angle by it over a period.
     pub slope: Interval,
-    pub swing: Interval,
+    pub angle_shift: Interval,
     /// Largest ‖ω‖ and |β| of predictions.
     pub domain: [Interval; 2],
 }
@@ -37,14 +37,14 @@ pub(crate) struct Mismatch {
 pub(crate) struct Driven {
     pub drive: Drive,
     pub mismatch: Mismatch,
-    pub early: [Early; 3],
-    /// Largest creep at any time.
-    pub creep: Interval,
+    pub initial: [InitialTicks; 3],
+    /// Largest angle drift at any time.
+    pub angle_drift: Interval,
     /// Deviation of the rates between two ticks.
     pub between: Interval,
     pub turning: Interval,
     pub turned: [Interval; 2],
-    pub early_moment: Interval,
+    pub initial_moment: Interval,
     /// Largest ‖I^½ D I^−½‖ of a symmetric D with ‖D‖ ≤ 1.
     pub root_condition: Interval,
     /// Largest ‖ω‖ and |β| of the vehicle before the nominal trajectory began.
@@ -74,14 +74,15 @@ fn drive(s: &Settings, lemmas: &Lemmas) -> Drive {
     let r = Interval::ONE / cosine;
     let navigated_rate = r * number(rate);
     let at_true_angles = Interval::ONE / (number(sideslip) + slow).sin_cos().1;
-    let creep = root3 * number(s.slow_angle_rate) + at_true_angles * turned * navigated_rate;
-    let of_creep = r * number(TURN) * creep * navigated_rate + r * turned * root3 * disturbance;
+    let angle_drift = root3 * number(s.slow_angle_rate) + at_true_angles * turned * navigated_rate;
+    let of_angle_drift =
+        r * number(TURN) * angle_drift * navigated_rate + r * turned * root3 * disturbance;
     Drive {
-        of_three: root3 * disturbance + of_inertia + of_creep,
-        of_two: root2 * disturbance + of_inertia + of_creep,
+        of_three: root3 * disturbance + of_inertia + of_angle_drift,
+        of_two: root2 * disturbance + of_inertia + of_angle_drift,
         of_inertia,
-        creep,
-        of_creep,
+        angle_drift,
+        of_angle_drift,
         errors: [
             root3 * number(s.rate_error),
             root2 * number(s.rate_error),
@@ -96,7 +97,7 @@ fn mismatch(s: &Settings, lemmas: &Lemmas, drive: &Drive) -> Mismatch {
     let [tau, d] = [s.period_feedback, s.delay].map(number);
     let [by_rates, by_angles, jerk] =
         [lemmas.dynamics.by_rates, lemmas.dynamics.by_angles, lemmas.dynamics.jerk].map(number);
-    let Drive { of_three, of_two, creep, errors: [rates, rates_of_two, angles], .. } = *drive;
+    let Drive { of_three, of_two, angle_drift, errors: [rates, rates_of_two, angles], .. } = *drive;
     let end = d + tau;
     let growth = ((by_rates + by_angles * end) * end).exp();
     let square = tau.square();
@@ -112,19 +113,22 @@ fn mismatch(s: &Settings, lemmas: &Lemmas, drive: &Drive) -> Mismatch {
     // drive causes. Up to τ it acts, and from then on both are predictions.
     let of_rates = half * of_three * square + of_three * tau * d;
     let of_angles = of_two * (sixth * square * tau + half * square * d + half * tau * d.square())
-        + creep * (half * square + tau * d);
+        + angle_drift * (half * square + tau * d);
     let [inner, outer] = [lemmas.dynamics.vehicle.rate, lemmas.dynamics.domain.rate];
     let halfway = half * (number(inner) + number(outer)) / number(outer);
     let revised = halfway * by_rates * of_rates + by_angles * of_angles;
     let erred =
         by_rates * rates * tau + by_angles * (angles * tau + rates_of_two * tau * (d + half * tau));
     let apart = by_rates * (of_three * end + rates)
-        + by_angles * (half * of_two * end.square() + angles + (rates_of_two + creep) * end);
+        + by_angles * (half * of_two * end.square() + angles + (rates_of_two + angle_drift) * end);
     let f = apart * growth;
     let off = number(0.25) * slope * square;
     let far = [
         rates + (of_three + f) * end + off,
-        angles + (rates_of_two + creep) * end + half * (of_two + f) * end.square() + off * tau,
+        angles
+            + (rates_of_two + angle_drift) * end
+            + half * (of_two + f) * end.square()
+            + off * tau,
     ];
     let Domain { rate: vehicle_rate, sideslip: vehicle_sideslip } = lemmas.dynamics.vehicle;
     let turned = number(TURN) * far[1] * number(lemmas.dynamics.geometry.r) * number(vehicle_rate);
@@ -133,13 +137,13 @@ fn mismatch(s: &Settings, lemmas: &Lemmas, drive: &Drive) -> Mismatch {
         peak: f + beside + jerk * square / number(8.0) + half * slope * tau,
         unseen_rate: (half * by_rates * of_three * d.square()
             + sixth * by_angles * of_two * d.square() * d
-            + half * by_angles * creep * d.square())
+            + half * by_angles * angle_drift * d.square())
             * growth,
         mispredicted: (by_rates * rates * d
             + by_angles * (angles * d + half * rates_of_two * d.square()))
             * growth,
         slope,
-        swing: slope * square / number(12.0),
+        angle_shift: slope * square / number(12.0),
         domain: [number(vehicle_rate) + far[0] + turned, number(vehicle_sideslip) + far[1]],
     }
 }
@@ -150,17 +154,17 @@ pub(crate) fn driven(s: &Settings, lemmas: &Lemmas, before: &Lemmas) -> Driven {
     let (drive, larger) = (self::drive(s, lemmas), self::drive(s, before));
     let mut mismatch = self::mismatch(s, lemmas, &drive);
     let first = self::mismatch(s, before, &larger);
-    let lasting = |drive: &Drive| drive.of_inertia + drive.of_creep;
+    let lasting = |drive: &Drive| drive.of_inertia + drive.of_angle_drift;
     let more = (lasting(&larger) - lasting(&drive)).max(Interval::ZERO);
     let ticks = (s.delay / s.period_feedback).ceil() as usize;
-    let early = |first: Interval, later: Interval| Early {
+    let initial = |first: Interval, later: Interval| InitialTicks {
         ticks,
         excess: if later.low > 0.0 { (first / later - Interval::ONE).high.max(0.0) } else { 0.0 },
     };
-    let early = [
-        early(first.mean + more, mismatch.mean),
-        early(first.mispredicted, mismatch.mispredicted),
-        early(first.swing, mismatch.swing),
+    let initial = [
+        initial(first.mean + more, mismatch.mean),
+        initial(first.mispredicted, mismatch.mispredicted),
+        initial(first.angle_shift, mismatch.angle_shift),
     ];
     (mismatch.peak, mismatch.unseen_rate) = (first.peak + more, first.unseen_rate + more * d);
     let by_turn = largest / smallest * number(TURN) * number(before.dynamics.geometry.r);
@@ -168,22 +172,22 @@ pub(crate) fn driven(s: &Settings, lemmas: &Lemmas, before: &Lemmas) -> Driven {
     let spin =
         (number(s.limit_total()) + half * (largest - smallest) * number(rate).square()) / smallest;
     Driven {
-        early,
-        creep: larger.creep,
+        initial,
+        angle_drift: larger.angle_drift,
         between: first.slope * tau.square() / number(8.0)
             + number(before.dynamics.jerk) * tau.square() * tau
                 / (number(36.0) * number(12.0).sqrt()),
-        turning: by_turn * (number(lemmas.dynamics.rate) + larger.creep),
+        turning: by_turn * (number(lemmas.dynamics.rate) + larger.angle_drift),
         turned: [
             by_turn * drive.errors[2],
             by_turn * (number(before.dynamics.rate) - number(lemmas.dynamics.rate)) * d,
         ],
-        early_moment: (larger.inertia[1] - drive.inertia[1]) * largest / smallest
+        initial_moment: (larger.inertia[1] - drive.inertia[1]) * largest / smallest
             * number(before.dynamics.geometry.r),
         root_condition: (largest / smallest).sqrt(),
         vehicle_before: [
             number(s.limit_rate) + (spin + larger.of_three) * d,
-            number(s.sideslip_domain) + (number(rate) + larger.creep) * d,
+            number(s.sideslip_domain) + (number(rate) + larger.angle_drift) * d,
         ],
         domain_before: first.domain,
         drive,

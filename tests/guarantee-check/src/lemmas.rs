@@ -187,7 +187,7 @@ pub fn check(s: &Settings, lemmas: &Lemmas, gap: f64) -> (Vec<Finding>, Suprema)
     let [drift, curvature, turn, mixed, twice, fourth] = geometry(&mut search, lemmas);
     let r = lemma1(&mut search, lemmas, s.sideslip_domain);
     let (spin, spin_inverse, largest, inverse) = inertia(&mut search, s, lemmas);
-    bearing(&mut search, s, lemmas);
+    induced_norm(&mut search, s, lemmas);
     let suprema = Suprema {
         drift,
         curvature,
@@ -332,13 +332,13 @@ fn inertia(
     (spin, spin_inverse, largest, of_inverse)
 }
 
-fn bearing(search: &mut Search, s: &Settings, lemmas: &Lemmas) {
+fn induced_norm(search: &mut Search, s: &Settings, lemmas: &Lemmas) {
     let unit = lemmas.dynamics.largest;
     let rows = fixed::<2>(&rows(&s.body.inertia, unit));
     // There are two charts of α, half a turn apart, and four corners up to their common sign.
     let sides = [search.u, SIDE];
     let statement = "‖I W s‖ ≤ b over the corners s of the unit box";
-    search.check(statement, lemmas.bearing, unit, 8, sides, |chart, &[u, v]| {
+    search.check(statement, lemmas.induced_norm, unit, 8, sides, |chart, &[u, v]| {
         let one = Dual::constant(1);
         let sign = |bit: usize| Dual::constant(if chart & bit == 0 { 1 } else { -1 });
         let corner = [one, sign(1), sign(2)];

@@ -7,7 +7,7 @@
 
 use crate::interval::Interval;
 use control::crmpc::{Settings, held_terminal_weight, terminal_weight};
-use control::error_dynamics::{Early, Gain, SampledError};
+use control::error_dynamics::{Gain, InitialTicks, SampledError};
 use nalgebra::{Matrix2, Vector2};
 
 /// Matrix of one axis, by rows.
@@ -204,30 +204,30 @@ impl Axis {
 
     /// Bounds on the effect of parts of the predictions that are wrong by changes of the rate by
     /// up to 1 in all, between each measurement and its tick.
-    pub fn mispredictions(&self, steps: usize, early: Early) -> Vec<Bounds> {
+    pub fn mispredictions(&self, steps: usize, initial: InitialTicks) -> Vec<Bounds> {
         let [last, first] = [Interval::ZERO, self.latency]
-            .map(|u| self.errors_along(&[u, Interval::ONE], steps, early));
+            .map(|u| self.errors_along(&[u, Interval::ONE], steps, initial));
         let largest = |a: &Bounds, b: &Bounds| std::array::from_fn(|i| a[i].max(b[i]));
         last.iter().zip(&first).map(|(a, b)| largest(a, b)).collect()
     }
 
     /// Bounds on the effect of errors along one direction: at every tick the predicted state is off
     /// by up to `newest`, and by more at the first ticks.
-    fn errors_along(&self, newest: &Pair, steps: usize, early: Early) -> Vec<Bounds> {
+    fn errors_along(&self, newest: &Pair, steps: usize, initial: InitialTicks) -> Vec<Bounds> {
         let half = Interval::from(0.5) * self.period.square();
         let held = along(&self.gain, newest);
         let sums = self.series(&[half * held, self.period * held], steps);
-        let excess = Interval::from(early.excess);
+        let excess = Interval::from(initial.excess);
         let weight =
-            |tick: usize| if tick < early.ticks { Interval::ONE + excess } else { Interval::ONE };
+            |tick: usize| if tick < initial.ticks { Interval::ONE + excess } else { Interval::ONE };
         // The first error contributes −Φⁿ⁻¹ A A_d e₀.
         let first = [newest[0] + self.period * newest[1], newest[1]];
         let newest_sizes = self.sizes(newest);
         let bounds = |tick: usize, first: &[Interval; 5]| {
-            // The other early errors are the oldest parts of the sum.
+            // The other initial errors are the oldest parts of the sum.
             let parts = tick - 1;
             let (sum, young) =
-                (&sums[parts], &sums[parts - parts.min(early.ticks.saturating_sub(1))]);
+                (&sums[parts], &sums[parts - parts.min(initial.ticks.saturating_sub(1))]);
             let actual: [Interval; 5] = std::array::from_fn(|i| {
                 sum[i] + excess * (sum[i] - young[i]) + weight(0) * first[i]
             });
@@ -255,7 +255,7 @@ impl Axis {
 
     /// Bounds on the effect of changes of the rate by up to the period in all before each tick, at
     /// any time since the measurement before that of the tick, as in [`Self::reach`].
-    pub fn changes(&self, steps: usize, early: Early) -> Vec<Bounds> {
+    pub fn changes(&self, steps: usize, initial: InitialTicks) -> Vec<Bounds> {
         let end = self.latency + self.period;
         // Each part may have another time, so that its largest size counts.
         let mut sum = [Interval::ZERO; 5];
@@ -269,14 +269,14 @@ impl Axis {
         let tail = self.tails(steps).0 * self.period * end.max(Interval::ONE);
         let more = self.sizes_within(tail);
         by_tick.push(std::array::from_fn(|i| sum[i] + Interval::new(0.0, more[i].high)));
-        counted(early, &by_tick.iter().map(spread).collect::<Vec<Bounds>>())
+        counted(initial, &by_tick.iter().map(spread).collect::<Vec<Bounds>>())
     }
 
     /// Bounds on the effect of shifts of the angle by up to the period at every tick, as in
     /// [`Self::reach`].
-    pub fn shifts(&self, steps: usize, early: Early) -> Vec<Bounds> {
+    pub fn shifts(&self, steps: usize, initial: InitialTicks) -> Vec<Bounds> {
         let sums = self.series(&[self.period, Interval::ZERO], steps);
-        counted(early, &sums.iter().map(spread).collect::<Vec<Bounds>>())
+        counted(initial, &sums.iter().map(spread).collect::<Vec<Bounds>>())
     }
 }
 
@@ -286,13 +286,13 @@ fn spread([angle, rate, of_angle, of_rate, feedback]: &[Interval; 5]) -> Bounds 
 }
 
 /// No effect is larger for the first ticks.
-pub(crate) const NEVER: Early = Early { ticks: 0, excess: 0.0 };
+pub(crate) const NEVER: InitialTicks = InitialTicks { ticks: 0, excess: 0.0 };
 
 /// Counts effects that are larger for the first ticks of a nominal trajectory.
-fn counted(early: Early, sums: &[Bounds]) -> Vec<Bounds> {
-    let excess = Interval::from(early.excess);
+fn counted(initial: InitialTicks, sums: &[Bounds]) -> Vec<Bounds> {
+    let excess = Interval::from(initial.excess);
     let at = |n: usize| -> Bounds {
-        let young = &sums[n - n.min(early.ticks)];
+        let young = &sums[n - n.min(initial.ticks)];
         std::array::from_fn(|i| sums[n][i] + excess * (sums[n][i] - young[i]))
     };
     (0..sums.len()).map(at).collect()

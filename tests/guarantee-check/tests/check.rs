@@ -64,7 +64,7 @@ fn bounds_that_are_too_small_are_found_false() {
     bounds.dynamics.geometry.drift_by_rates *= 0.99;
     bounds.gyroscopic.1 *= 0.99;
     bounds.dynamics.geometry.drift *= 0.97;
-    bounds.bearing *= 0.98;
+    bounds.induced_norm *= 0.98;
     // At rest the moment alone accelerates the vehicle by more than 90 % of the bound.
     bounds.dynamics.acceleration *= 0.9;
     let (mut findings, suprema) = lemmas::check(&settings, &bounds, GAP);

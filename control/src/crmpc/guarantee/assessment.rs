@@ -44,7 +44,7 @@ pub(super) fn left(
     let Deviation { angle, rate, .. } = *tightening.forever();
     let moment_loss = tightening.tick(usize::MAX).moment_loss;
     let of_rates = s.limit_rate - RateLoss::new(angle, rate, 0.0, 0.0).at(TURN_OF_RATES * x, x);
-    let loss = moment_loss.at(tightening.bearing, dynamics.slopes(x, a), (x, a));
+    let loss = moment_loss.at(tightening.induced_norm, dynamics.slopes(x, a), (x, a));
     let of_moment = s.limit_moment - s.needed_by_known();
     (of_rates - x, of_moment - loss - dynamics.nominal_moment(x, a))
 }

@@ -44,7 +44,7 @@ pub struct Dynamics {
     pub curvature_by_rates: [f64; 2],
     /// Coefficients of ‖a‖ and ‖x_ω‖² in the second derivative of the largest ‖I W s‖
     /// over the corners s of the unit box.
-    pub curvature_of_bearing: [f64; 2],
+    pub curvature_of_induced_norm: [f64; 2],
 }
 
 impl Dynamics {
@@ -68,7 +68,8 @@ impl Dynamics {
             let spin = s.limit_total() / smallest
                 + 0.5 * (largest - smallest) / smallest * powi(vehicle.rate, 2);
             let rate = s.limit_rate + (spin + dynamics.drive(s).all) * s.delay;
-            let sideslip = s.sideslip_domain + (vehicle.rate + dynamics.drive(s).creep) * s.delay;
+            let sideslip =
+                s.sideslip_domain + (vehicle.rate + dynamics.drive(s).angle_drift) * s.delay;
             if rate <= vehicle.rate && sideslip <= vehicle.sideslip || !dynamics.is_bounded() {
                 return dynamics;
             }
@@ -118,7 +119,8 @@ impl Dynamics {
         let beside = 0.25 * self.slope * powi(s.period_feedback, 2);
         let rates = drive.rate_error + (drive.all + f) * end + beside;
         let angles = drive.angle_error
-            + (drive.rate_error_of_two + drive.creep + (0.5 * drive.of_two + 0.5 * f) * end) * end
+            + (drive.rate_error_of_two + drive.angle_drift + (0.5 * drive.of_two + 0.5 * f) * end)
+                * end
             + beside * s.period_feedback;
         Domain {
             rate: vehicle.rate + rates + TURN * angles * self.geometry.r * vehicle.rate,
@@ -154,7 +156,7 @@ impl Dynamics {
             curvature: curvatures.of_moment(geometry.drift),
             curvature_by_angles: curvatures.by_angles(),
             curvature_by_rates: curvatures.by_rates(),
-            curvature_of_bearing: curvatures.of_box(),
+            curvature_of_induced_norm: curvatures.of_box(),
         }
     }
 
@@ -165,7 +167,7 @@ impl Dynamics {
             + self.by_angles
                 * (0.5 * drive.of_two * t * t
                     + drive.angle_error
-                    + (drive.rate_error_of_two + drive.creep) * t)
+                    + (drive.rate_error_of_two + drive.angle_drift) * t)
     }
 
     /// Returns how F differs from the acceleration that the law intended, see [`Mismatch`].
@@ -176,7 +178,8 @@ impl Dynamics {
         if !self.is_bounded() {
             return Mismatch::UNBOUNDED;
         }
-        let Drive { all, of_two, creep, rate_error, rate_error_of_two, angle_error, .. } = *drive;
+        let Drive { all, of_two, angle_drift, rate_error, rate_error_of_two, angle_error, .. } =
+            *drive;
         let Self { by_rates, by_angles, .. } = *self;
         // Until the next measurement the drive separates the vehicle from its prediction, and
         // afterwards this prediction from the next one. Both distances grow from zero. On average
@@ -186,7 +189,7 @@ impl Dynamics {
         let halfway = 0.5 + 0.5 * self.vehicle.rate / self.domain.rate;
         let revised = halfway * by_rates * all * (d + 0.5 * tau)
             + by_angles * of_two * (tau * tau / 6.0 + 0.5 * d * end)
-            + by_angles * creep * (d + 0.5 * tau);
+            + by_angles * angle_drift * (d + 0.5 * tau);
         let erred =
             by_rates * rate_error + by_angles * (angle_error + rate_error_of_two * (d + 0.5 * tau));
         let itself = self.jerk * tau * tau / 24.0 + self.middle(tau) * growth;
@@ -199,7 +202,7 @@ impl Dynamics {
             peak,
             unseen_rate: (0.5 * by_rates * all * d * d
                 + by_angles * of_two * d * d * d / 6.0
-                + 0.5 * by_angles * creep * d * d)
+                + 0.5 * by_angles * angle_drift * d * d)
                 * growth,
             mispredicted: (by_rates * rate_error
                 + by_angles * (angle_error + 0.5 * rate_error_of_two * d))
@@ -230,7 +233,7 @@ impl Dynamics {
     /// The law cancels f at the predicted middle of the interval in which its moment acts. The
     /// change of F of first order in time therefore cancels in the rate over the interval, and
     /// shifts the angle by τ³ ‖dF/dt‖/12. Returns this shift over τ, rad/s.
-    pub(super) fn swing(&self, s: &Settings) -> f64 {
+    pub(super) fn angle_shift(&self, s: &Settings) -> f64 {
         self.slope * powi(s.period_feedback, 2) / 12.0
     }
 

@@ -2,7 +2,7 @@
 
 use super::dynamics::Dynamics;
 use super::geometry::{CURVATURE, TURN};
-use super::losses::bearing;
+use super::losses::induced_norm;
 use super::mismatch::gyroscopic;
 use super::parts::Parts;
 use crate::crmpc::settings::Settings;
@@ -19,7 +19,7 @@ pub struct Lemmas {
     /// Bounds of ∂(ω × I ω)/∂ω, and of I⁻¹ times that derivative.
     pub gyroscopic: (f64, f64),
     /// Largest ‖I W s‖ over the corners s of the unit box in the domain, kg m².
-    pub bearing: f64,
+    pub induced_norm: f64,
 }
 
 impl Lemmas {
@@ -35,8 +35,8 @@ impl Lemmas {
 
     fn of(s: &Settings, dynamics: Dynamics) -> Self {
         let parts = Parts::new(s, &dynamics);
-        let bearing = bearing(s, dynamics.domain.sideslip);
-        Self { dynamics, parts, gyroscopic: gyroscopic(s), bearing }
+        let induced_norm = induced_norm(s, dynamics.domain.sideslip);
+        Self { dynamics, parts, gyroscopic: gyroscopic(s), induced_norm }
     }
 
     /// Returns bounds on ‖∂m/∂(α, β)‖, ‖∂m/∂x_ω‖ and ‖m‖ for ‖x_ω‖ ≤ x and ‖a‖ ≤ a.
@@ -53,12 +53,12 @@ impl Lemmas {
             curvature,
             curvature_by_angles,
             curvature_by_rates,
-            curvature_of_bearing,
+            curvature_of_induced_norm,
             ..
         } = self.dynamics;
         let square = x * x;
         let ([aa, xxa, xxxx], [by_aa, by_xxa, by_xxxx]) = (curvature, curvature_by_angles);
-        let ([xa, xxx], [of_a, xx]) = (curvature_by_rates, curvature_of_bearing);
+        let ([xa, xxx], [of_a, xx]) = (curvature_by_rates, curvature_of_induced_norm);
         [
             aa * a * a + x * x * (xxa * a + xxxx * x * x),
             3.0 * TURN * x * a + CURVATURE * powi(x, 3),

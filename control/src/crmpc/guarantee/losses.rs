@@ -13,7 +13,7 @@ use vehicle::math::{powi, sin};
 /// kg m².
 /// With the larger eigenvalue λ of I² in the plane of symmetry, ‖I y‖² ≤ λ (y_x² + y_z²) + I_yy²
 /// y_y² for y = W s. α turns y in that plane, and y_x² + y_z² = cos²β (s₁ sin β + s₃)² + s₂².
-pub(super) fn bearing(s: &Settings, sideslip: f64) -> f64 {
+pub(super) fn induced_norm(s: &Settings, sideslip: f64) -> f64 {
     let square = s.body.inertia * s.body.inertia;
     let any = s.body.inertia.symmetric_eigenvalues().max() * 3.0_f64.sqrt();
     if square[(0, 1)] != 0.0 || square[(1, 2)] != 0.0 {
@@ -93,7 +93,7 @@ pub(in crate::crmpc) struct MomentLoss {
     pub(super) rate: f64,
     /// Half width of the box part of K ô, rad/s².
     pub(super) feedback: f64,
-    pub(super) bearing: f64,
+    pub(super) induced_norm: f64,
     pub(super) constant: f64,
     pub(super) by_acceleration: f64,
     pub(super) by_size: f64,
@@ -104,12 +104,12 @@ pub(in crate::crmpc) struct MomentLoss {
 }
 
 impl MomentLoss {
-    /// Computes the loss of a deviation; `bearing` is [`Tightening::bearing`].
+    /// Computes the loss of a deviation; `induced_norm` is [`Tightening::induced_norm`].
     /// The optimisation period is `h` (s).
     pub(in crate::crmpc) fn new(
         dynamics: &Dynamics,
         deviation: &Deviation,
-        bearing: f64,
+        induced_norm: f64,
         h: f64,
     ) -> Self {
         let Deviation { feedback, feedback_norm, feedback_moment, .. } = *deviation;
@@ -123,13 +123,13 @@ impl MomentLoss {
             dynamics.curvature[i] + angle * dynamics.curvature_by_angles[i]
         });
         let [xa, xxx] = dynamics.curvature_by_rates.map(|c| rate * c);
-        let [of_a, xx] = dynamics.curvature_of_bearing.map(|c| feedback * c);
+        let [of_a, xx] = dynamics.curvature_of_induced_norm.map(|c| feedback * c);
         Self {
             curved: [aa, of_a, xa, xxa, xx, xxx, xxxx].map(|c| 0.125 * h * h * c),
             angle,
             rate,
             feedback,
-            bearing,
+            induced_norm,
             constant: feedback_norm * largest + feedback_moment + by_rates_twice,
             by_acceleration: 0.5 * largest * CURVATURE * angle * angle,
             by_size: (largest * DRIFT_MIXED + SPIN_MIXED * spread) * angle * rate,
@@ -140,13 +140,18 @@ impl MomentLoss {
         }
     }
 
-    /// Returns the loss at a point of the plan, N m. `bearing` is the largest ‖I W s‖ over the
+    /// Returns the loss at a point of the plan, N m. `induced_norm` is the largest ‖I W s‖ over the
     /// corners s of the unit box, at the vehicle's angles (kg m²), `slopes` holds ‖∂m/∂(α, β)‖ and
     /// ‖∂m/∂x_ω‖, and `sizes` holds ‖x̃_ω‖ and ‖a‖.
     #[inline]
-    pub(in crate::crmpc) fn at(&self, bearing: f64, slopes: (f64, f64), sizes: (f64, f64)) -> f64 {
+    pub(in crate::crmpc) fn at(
+        &self,
+        induced_norm: f64,
+        slopes: (f64, f64),
+        sizes: (f64, f64),
+    ) -> f64 {
         let (x, a) = (sizes.0 + self.rate, sizes.1);
-        self.feedback * bearing
+        self.feedback * induced_norm
             + self.constant
             + slopes.0 * self.angle
             + slopes.1 * self.rate
@@ -161,7 +166,7 @@ pub(in crate::crmpc) struct End {
     /// Norm of the moment, ‖m̃‖, N m.
     pub moment: f64,
     /// Largest ‖I W s‖ over the corners s of the unit box, kg m².
-    pub bearing: f64,
+    pub induced_norm: f64,
     /// Norms of ∂m/∂(α, β) and of ∂m/∂x_ω.
     pub slopes: (f64, f64),
     /// Norm of the rates, ‖x̃_ω‖, rad/s.
@@ -204,11 +209,13 @@ impl MomentLoss {
         let [apart, to_apart] =
             [from, to].map(|end| end.moment + share * self.at(0.0, end.slopes, (end.size, a)));
         let feedback = share * self.feedback;
-        // The deviation turns the vehicle, but no attitude needs more than `bearing`.
+        // The deviation turns the vehicle, but no attitude needs more than `induced_norm`.
         let turned = feedback * dynamics.largest * TURN * 3.0_f64.sqrt() * self.angle;
-        let along =
-            on_the_line(apart + feedback * from.bearing, to_apart + feedback * to.bearing) + turned;
-        let anywhere = on_the_line(apart, to_apart) + feedback * self.bearing;
+        let along = on_the_line(
+            apart + feedback * from.induced_norm,
+            to_apart + feedback * to.induced_norm,
+        ) + turned;
+        let anywhere = on_the_line(apart, to_apart) + feedback * self.induced_norm;
         let x = from.size.max(to.size);
         let [aa, of_a, xa, xxa, xx, xxx, xxxx] = self.curved;
         let curved = a * (aa * a + of_a + x * (xa + x * xxa)) + x * x * (xx + x * (xxx + x * xxxx));

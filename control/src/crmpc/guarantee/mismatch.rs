@@ -8,17 +8,17 @@ use vehicle::math::{cos, powi};
 /// All causes that drive the vehicle off its prediction, except the mismatch.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Drive {
-    /// Bound on the norm of Δ and the effects of the inertia error and the creep, rad/s².
+    /// Bound on the norm of Δ and the effects of the inertia error and the angle drift, rad/s².
     pub all: f64,
     /// The same bound for two axes, rad/s².
     pub of_two: f64,
     /// Bound on the norm of the effect of the inertia error, rad/s².
     pub of_inertia: f64,
-    /// Bound on the creep: the norm of the difference between the derivative of the navigated
+    /// Bound on the angle drift: the norm of the difference between the derivative of the navigated
     /// angles and the navigated rates, rad/s.
-    pub creep: f64,
+    pub angle_drift: f64,
     /// Bound on the norm of the acceleration that the slow errors amount to, rad/s².
-    pub of_creep: f64,
+    pub of_angle_drift: f64,
     /// Bound on the norm of the error of the measured rates, rad/s.
     pub rate_error: f64,
     /// The same bound for two rates, rad/s.
@@ -38,14 +38,14 @@ impl Drive {
         let turned = TURN * SQRT_2 * s.slow_angle_error;
         let secant = |more: f64| 1.0 / cos((vehicle.sideslip + more).min(FRAC_PI_2));
         let (r, x) = (secant(0.0), secant(0.0) * vehicle.rate);
-        let creep = root3 * s.slow_angle_rate + secant(s.slow_angle_error) * turned * x;
-        let of_creep = r * (TURN * creep * x + turned * root3 * s.disturbance_bound);
+        let angle_drift = root3 * s.slow_angle_rate + secant(s.slow_angle_error) * turned * x;
+        let of_angle_drift = r * (TURN * angle_drift * x + turned * root3 * s.disturbance_bound);
         Self {
             of_inertia,
-            all: root3 * s.disturbance_bound + of_inertia + of_creep,
-            of_two: SQRT_2 * s.disturbance_bound + of_inertia + of_creep,
-            creep,
-            of_creep,
+            all: root3 * s.disturbance_bound + of_inertia + of_angle_drift,
+            of_two: SQRT_2 * s.disturbance_bound + of_inertia + of_angle_drift,
+            angle_drift,
+            of_angle_drift,
             rate_error: root3 * s.rate_error,
             rate_error_of_two: SQRT_2 * s.rate_error,
             angle_error: SQRT_2 * s.angle_error,
@@ -60,7 +60,7 @@ pub(super) fn smallest_in_rates(vehicle: &Domain, smallest: f64) -> f64 {
 }
 
 /// How F differs from the acceleration that the law intended, besides
-/// [`super::dynamics::Dynamics::swing`].
+/// [`super::dynamics::Dynamics::angle_shift`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Mismatch {
     /// Sum of all differences that belong to one tick, per period, rad/s².

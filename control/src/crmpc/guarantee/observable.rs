@@ -18,7 +18,7 @@ pub(in crate::crmpc) struct Observable {
     /// Weight of the newest value in the mean.
     pub(in crate::crmpc) weight: f64,
     /// Part that may last (Δ̄, the mismatch, the effect of the inertia error in any direction, and
-    /// that of the creep), and the part by the errors of predicted rates, rad/s².
+    /// that of the angle drift), and the part by the errors of predicted rates, rad/s².
     others: f64,
     /// Share of the mean acceleration by the commanded moments, by the common factor of the
     /// inertia.
@@ -34,13 +34,13 @@ impl Observable {
     }
 
     fn new(s: &Settings, dynamics: &Dynamics, parts: &Parts, time_constant: f64) -> Self {
-        let Parts { mismatch, early, .. } = parts;
+        let Parts { mismatch, initial, .. } = parts;
         let elapsed = s.delay + s.period_feedback;
-        let predicted = s.rate_error + mismatch.mispredicted * (1.0 + early[1].excess);
+        let predicted = s.rate_error + mismatch.mispredicted * (1.0 + initial[1].excess);
         let lasting = s.disturbance_bound
             + parts.inertia.moments.any / smallest_in_rates(&dynamics.vehicle, dynamics.smallest)
-            + mismatch.mean * (1.0 + early[0].excess)
-            + parts.drive.of_creep;
+            + mismatch.mean * (1.0 + initial[0].excess)
+            + parts.drive.of_angle_drift;
         // The effect of a command shows later than the command, and is forgotten later.
         let late = ticks(s.delay, s.period_feedback) + 1;
         let remembered = exp(late as f64 * s.period_feedback / time_constant);

@@ -5,7 +5,7 @@ use super::dynamics::Dynamics;
 use super::geometry::TURN;
 use super::mismatch::{Drive, InertiaMoments, Mismatch};
 use crate::crmpc::settings::Settings;
-use crate::error_dynamics::{Early, Reach};
+use crate::error_dynamics::{InitialTicks, Reach};
 use std::f64::consts::SQRT_2;
 
 /// Causes of the deviation, separated by the way in which they add up.
@@ -15,13 +15,13 @@ pub struct Parts {
     pub drive: Drive,
     /// Difference between the acceleration and the one that the law intended.
     pub mismatch: Mismatch,
-    /// Larger effects of the ticks before the nominal trajectory began, see [`Early`]: on the mean
-    /// of the mismatch, on the predictions, and on the swing.
-    pub early: [Early; 3],
-    /// Shift of the angle per time, see [`Dynamics::swing`], rad/s.
-    pub swing: f64,
-    /// Largest creep, before the nominal trajectory began or later, see [`Drive`], rad/s.
-    pub creep: f64,
+    /// Larger effects of the ticks before the nominal trajectory began, see [`InitialTicks`]: on the mean
+    /// of the mismatch, on the predictions, and on the angle shift.
+    pub initial: [InitialTicks; 3],
+    /// Shift of the angle per time, see [`Dynamics::angle_shift`], rad/s.
+    pub angle_shift: f64,
+    /// Largest angle drift, before the nominal trajectory began or later, see [`Drive`], rad/s.
+    pub angle_drift: f64,
     /// Deviation of the rates between two ticks, see [`Dynamics::between`], rad/s.
     pub between: f64,
     /// Bound on the norm of all parts together, rad/s².
@@ -44,9 +44,9 @@ pub struct InertiaPart {
     pub turned: f64,
     /// Share by which the moment is larger because the vehicle was faster before the nominal
     /// trajectory began.
-    pub turned_early: f64,
+    pub turned_initially: f64,
     /// Moment by which the inertia error amounts to more before the nominal trajectory began, N m.
-    pub early_moment: f64,
+    pub initial_moment: f64,
 }
 
 /// Largest effects at one tick, per unit of their causes (docs/proof.md, step 2).
@@ -54,14 +54,14 @@ pub(super) struct Reaches {
     /// Of the disturbance and of the inertia error.
     pub(super) disturbance: Reach,
     /// Part of its feedback by causes before the nominal trajectory began.
-    pub(super) early_feedback: f64,
+    pub(super) initial_feedback: f64,
     /// Of the errors of measured angles and rates.
     pub(super) errors: [Reach; 2],
     /// Of changes of the rates from one prediction to the next.
     pub(super) changes: Reach,
     /// Of changes of the predicted rates within a prediction.
     pub(super) mispredictions: Reach,
-    /// Of shifts of the angle by the swing.
+    /// Of shifts of the angle by the angle shift.
     pub(super) shifts: Reach,
 }
 
@@ -76,25 +76,26 @@ impl Parts {
             mismatch = Mismatch::UNBOUNDED;
         }
         // The peak and the unseen rate are those from before the beginning, where the inertia error
-        // and the creep have a larger effect, too; `early` enlarges the others.
-        let more = (larger.of_inertia + larger.of_creep) - (drive.of_inertia + drive.of_creep);
+        // and the angle drift have a larger effect, too; `initial` enlarges the others.
+        let more =
+            (larger.of_inertia + larger.of_angle_drift) - (drive.of_inertia + drive.of_angle_drift);
         mismatch.peak = first.peak + more;
         mismatch.unseen_rate = first.unseen_rate + more * s.delay;
         // The first ⌈d/τ⌉ predictions begin before the nominal trajectory does.
         let ticks = (s.delay / s.period_feedback).ceil() as usize;
-        let early = |first: f64, later: f64| Early {
+        let initial = |first: f64, later: f64| InitialTicks {
             ticks,
             excess: if first > later { first / later - 1.0 } else { 0.0 },
         };
-        let swing = dynamics.swing(s);
+        let angle_shift = dynamics.angle_shift(s);
         Self {
-            early: [
-                early(first.mean + more, mismatch.mean),
-                early(first.mispredicted, mismatch.mispredicted),
-                early(before.swing(s), swing),
+            initial: [
+                initial(first.mean + more, mismatch.mean),
+                initial(first.mispredicted, mismatch.mispredicted),
+                initial(before.angle_shift(s), angle_shift),
             ],
-            swing,
-            creep: larger.creep,
+            angle_shift,
+            angle_drift: larger.angle_drift,
             between: before.between(s),
             norm: drive.all + mismatch.mean,
             inertia: InertiaPart::new(s, dynamics, &before, [&drive, &larger]),
@@ -104,12 +105,15 @@ impl Parts {
     }
 
     /// Returns the effect of the mismatch, which may have any direction: `mean` by the changes,
-    /// `mispredicted` by the mispredictions, and the swing and the creep by the shifts.
+    /// `mispredicted` by the mispredictions, and the angle shift and the angle drift by the shifts.
     pub(super) fn mismatched(&self, reaches: &Reaches) -> Reach {
         let Mismatch { mean, mispredicted, .. } = self.mismatch;
         let Reaches { changes, mispredictions, shifts, .. } = reaches;
         let of_errors = mispredictions.times(mispredicted);
-        changes.times(mean).plus(&of_errors).plus(&shifts.times(self.swing + self.creep))
+        changes
+            .times(mean)
+            .plus(&of_errors)
+            .plus(&shifts.times(self.angle_shift + self.angle_drift))
     }
 
     /// Returns the deviation at a tick (docs/proof.md, steps 2 and 3).
@@ -122,7 +126,7 @@ impl Parts {
     /// the inertia error. Angles in rad, rates in rad/s, K ô in rad/s² or N m.
     pub(super) fn deviation(&self, s: &Settings, reaches: &Reaches) -> Deviation {
         let root3 = 3.0_f64.sqrt();
-        let Drive { all, of_two, of_creep, .. } = self.drive;
+        let Drive { all, of_two, of_angle_drift, .. } = self.drive;
         let Mismatch { peak, unseen_rate, .. } = self.mismatch;
         let (errors, of_mismatch) = (reaches.of_errors(s), self.mismatched(reaches));
         let reach = &reaches.disturbance;
@@ -135,7 +139,7 @@ impl Parts {
             all * (1.0 + reach.feedback) + root3 * errors.feedback + of_mismatch.feedback + peak;
         Deviation {
             angle: on_two(|reach| reach.angle)
-                + (unseen_rate + self.creep) * s.delay
+                + (unseen_rate + self.angle_drift) * s.delay
                 + tau * tau / 8.0 * accelerated,
             rate: on_all(|reach| reach.rate) + unseen_rate + self.between,
             seen_angle: on_two(|reach| reach.seen_angle),
@@ -143,8 +147,8 @@ impl Parts {
             middle_angle: on_two(|reach| reach.middle_angle),
             middle_rate: on_all(|reach| reach.middle_rate),
             feedback: reach.feedback * s.disturbance_bound + errors.feedback,
-            feedback_norm: of_mismatch.feedback + reach.feedback * of_creep,
-            feedback_moment: self.inertia.feedback_moment(reach, reaches.early_feedback, tau),
+            feedback_norm: of_mismatch.feedback + reach.feedback * of_angle_drift,
+            feedback_moment: self.inertia.feedback_moment(reach, reaches.initial_feedback, tau),
         }
     }
 }
@@ -167,24 +171,24 @@ impl InertiaPart {
         Self {
             moments,
             root_condition: (largest / smallest).sqrt(),
-            turning: by_turn * (rate + larger.creep),
+            turning: by_turn * (rate + larger.angle_drift),
             turned: by_turn * drive.angle_error,
-            turned_early: by_turn * (before.rate - rate) * s.delay,
+            turned_initially: by_turn * (before.rate - rate) * s.delay,
             // No turn makes a moment larger than ‖I‖ ‖R‖ ‖I⁻¹‖ does.
-            early_moment: (any_before - moments.any) * largest / smallest * before.geometry.r,
+            initial_moment: (any_before - moments.any) * largest / smallest * before.geometry.r,
         }
     }
 
     /// Returns the moment that K ô requires for the inertia error, N m. Each part has grown by
     /// `turning` since it was caused, on average half a period τ more than at the ticks.
-    fn feedback_moment(&self, reach: &Reach, early_feedback: f64, tau: f64) -> f64 {
+    fn feedback_moment(&self, reach: &Reach, initial_feedback: f64, tau: f64) -> f64 {
         let InertiaMoments { along, any } = self.moments;
         (along + self.root_condition * any) * reach.feedback
             + (along + any)
                 * (self.turning * (reach.feedback_age + 0.5 * tau * reach.feedback)
                     + self.turned * reach.feedback
-                    + self.turned_early * early_feedback)
-            + self.early_moment * early_feedback
+                    + self.turned_initially * initial_feedback)
+            + self.initial_moment * initial_feedback
     }
 }
 

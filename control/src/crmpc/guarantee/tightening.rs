@@ -1,9 +1,18 @@
-//! The tightening of the robust set, tick by tick.
+//! The tightening of the robust set, tick by tick, and how it is computed.
 
+use super::assessment::{Assessment, assess};
 use super::deviation::Deviation;
-use super::losses::{MomentLoss, RateLoss};
+use super::dynamics::Dynamics;
+use super::losses::{MomentLoss, RateLoss, induced_norm};
+use super::mismatch::relative;
 use super::observable::{MEANS, Observable};
+use super::parts::Parts;
+use super::sequence::Sequence;
 use crate::controller::Explained;
+use crate::crmpc::settings::Settings;
+use crate::error::DesignError;
+use crate::error_dynamics::SampledError;
+use vehicle::math::powi;
 
 /// Tightening of the robust set, by feedback ticks since the nominal trajectory began at the
 /// measured state.
@@ -12,7 +21,7 @@ pub struct Tightening {
     /// Reserves at each tick; the last ones apply to all later ticks.
     pub(super) ticks: Vec<AtTick>,
     /// Largest ‖I W s‖ over the corners s of the unit box at any attitude of the domain, kg m².
-    pub bearing: f64,
+    pub induced_norm: f64,
     /// Largest means of an observed disturbance that the assumptions explain.
     pub(in crate::crmpc) observable: [Observable; MEANS],
     /// Largest mean acceleration over a period that the assumptions explain.
@@ -48,5 +57,68 @@ impl Tightening {
     /// Returns the deviation that is never exceeded.
     pub fn forever(&self) -> &Deviation {
         self.at(usize::MAX)
+    }
+}
+
+/// Computes tightening and assessment of `settings`.
+///
+/// # Errors
+/// Returns an error that names the gain that does not stabilise, with its spectral radius.
+pub(in crate::crmpc) fn tighten(s: &Settings) -> Result<(Tightening, Assessment), DesignError> {
+    let error = SampledError::delayed(s.feedback, s.period_feedback, s.delay);
+    let steps = error.settling().ok_or_else(|| DesignError::Unstable {
+        k1: s.feedback.k1,
+        k2: s.feedback.k2,
+        period: s.period_feedback,
+        radius: error.spectral_radius(),
+    })?;
+    let dynamics = Dynamics::new(s);
+    let parts = Parts::new(s, &dynamics);
+    let sequence = Sequence::new(s, &error, &parts, steps);
+    let induced_norm = induced_norm(s, dynamics.domain.sideslip);
+    let h = s.period_optimisation;
+    let at = |(n, deviation): (usize, &Deviation)| AtTick {
+        deviation: *deviation,
+        bulge: sequence.bulge(n, |d| d.angle),
+        moment_loss: MomentLoss::new(&dynamics, &sequence.within(n), induced_norm, h),
+        rate_loss: sequence.rate_loss(n, h),
+    };
+    let tightening = Tightening {
+        ticks: sequence.ticks.iter().enumerate().map(at).collect(),
+        explained: explained(s, &dynamics, &parts),
+        induced_norm,
+        observable: Observable::all(s, &dynamics, &parts),
+    };
+    let assessment = assess(s, &dynamics, &tightening);
+    Ok((tightening, assessment))
+}
+
+/// Returns the largest mean acceleration over one period that the assumptions explain, rad/s²: Δ̄,
+/// the tensor's error in any direction, the effect of the angle drift, and both errors of the rates at
+/// the period's ends. The measured rates become x_ω at an attitude that is wrong, with ‖∂R[o]‖ ≤
+/// √2 sec²β ‖o‖.
+fn explained(s: &Settings, dynamics: &Dynamics, parts: &Parts) -> Explained {
+    let Dynamics { domain, geometry, smallest, .. } = dynamics;
+    let of_angles = 2.0 * powi(geometry.r, 2) * domain.rate * s.angle_error;
+    Explained {
+        disturbance: s.disturbance_bound
+            + parts.inertia.moments.any * geometry.r / smallest
+            + 2.0 * (s.rate_error + of_angles) / s.period_feedback
+            + parts.drive.of_angle_drift,
+        share: relative(s.inertia_error),
+    }
+}
+
+/// Returns these settings with the given share of the disturbance bound and the errors.
+pub(in crate::crmpc) fn with_share(s: &Settings, share: f64) -> Settings {
+    Settings {
+        disturbance_bound: share * s.disturbance_bound,
+        angle_error: share * s.angle_error,
+        rate_error: share * s.rate_error,
+        slow_angle_error: share * s.slow_angle_error,
+        slow_angle_rate: share * s.slow_angle_rate,
+        known_bound: share * s.known_bound,
+        known_change: share * s.known_change,
+        ..*s
     }
 }

@@ -3,8 +3,8 @@
 
 mod certificate;
 mod judging;
+mod law;
 mod norms;
-mod planning;
 
 use super::design::Design;
 use super::guarantee::{self, Dynamics, End, Held, HorizonEnd, Tightening};
@@ -200,7 +200,7 @@ impl Robust {
 fn end(moment: &Linear, size: f64) -> End {
     End {
         moment: moment.value.norm(),
-        bearing: largest_over_box(&moment.by_acceleration),
+        induced_norm: largest_over_box(&moment.by_acceleration),
         slopes: (moment.by_angles.norm(), moment.by_rates.norm()),
         size,
     }

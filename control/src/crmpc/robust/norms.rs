@@ -27,9 +27,9 @@ pub(super) struct Anchor {
     size: f64,
     pub(super) motion: BodyMotion,
     /// Largest ‖I W s‖ over the corners s of the unit box.
-    bearing: f64,
-    /// Upper bound on the growth of `bearing` with the angles.
-    bearing_by_angles: f64,
+    induced_norm: f64,
+    /// Upper bound on the growth of `induced_norm` with the angles.
+    induced_norm_by_angles: f64,
 }
 
 impl Robust {
@@ -76,11 +76,11 @@ impl Robust {
     /// Evaluates a stage from which its neighbours are estimated.
     pub(super) fn anchor(&self, here: &Point) -> Anchor {
         let motion = here.motion(&self.settings.body);
-        let bearing = largest_over_box(&motion.moment_by_acceleration);
+        let induced_norm = largest_over_box(&motion.moment_by_acceleration);
         // ‖∂W/∂α‖² and ‖∂W/∂β‖² are at most 2, and the two are orthogonal.
-        let bearing_by_angles = self.design.largest_inertia * SQRT_2 * 3.0_f64.sqrt();
+        let induced_norm_by_angles = self.design.largest_inertia * SQRT_2 * 3.0_f64.sqrt();
         let Point { angles, rates, size, .. } = *here;
-        Anchor { angles, rates, size, motion, bearing, bearing_by_angles }
+        Anchor { angles, rates, size, motion, induced_norm, induced_norm_by_angles }
     }
 
     /// Returns bounds that are at most those of [`Self::interval`], and norms that are at least
@@ -106,15 +106,17 @@ impl Robust {
             + by_rates * (here.rates - anchor.rates).norm();
         let turn_within = (next.angles - here.angles).xy().norm();
         let after = moment + by_angles * turn_within + by_rates * (next.rates - here.rates).norm();
-        let bearing = anchor.bearing + anchor.bearing_by_angles * turn;
-        let end = |moment: f64, bearing: f64| End {
+        let induced_norm = anchor.induced_norm + anchor.induced_norm_by_angles * turn;
+        let end = |moment: f64, induced_norm: f64| End {
             moment,
-            bearing,
+            induced_norm,
             slopes: (by_angles, by_rates),
             size,
         };
-        let ends =
-            [end(moment, bearing), end(after, bearing + anchor.bearing_by_angles * turn_within)];
+        let ends = [
+            end(moment, induced_norm),
+            end(after, induced_norm + anchor.induced_norm_by_angles * turn_within),
+        ];
         Interval {
             rate: next.size,
             rate_bound: self.rate_bound(k + 1, TURN_BY_ANGLES * next.size, next, here),

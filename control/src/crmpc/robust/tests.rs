@@ -196,7 +196,8 @@ fn needs(robust: &Robust, stage: &Stage, samples: usize, random: &mut Random) ->
         let at = InverseKinematics::at(&angles).linearise(&body, &rates, &a).moment;
         let (angle, rate, x) = (now.middle_angle, now.middle_rate, rates.norm());
         let turned = now.feedback * largest_inertia * (2.0_f64 * 3.0).sqrt() * angle;
-        let bearing = now.feedback * super::super::robust::largest_over_box(&at.by_acceleration);
+        let induced_norm =
+            now.feedback * super::super::robust::largest_over_box(&at.by_acceleration);
         let further = x + rate;
         let drift = robust.dynamics.geometry.drift;
         let second = 0.5 * largest_inertia * curvature * a.norm() * angle * angle
@@ -206,7 +207,7 @@ fn needs(robust: &Robust, stage: &Stage, samples: usize, random: &mut Random) ->
         let moment = at.value.norm()
             + at.by_angles.norm() * angle
             + at.by_rates.norm() * rate
-            + (bearing + turned).min(now.feedback * tightening.bearing)
+            + (induced_norm + turned).min(now.feedback * tightening.induced_norm)
             + now.feedback_norm * largest_inertia
             + now.feedback_moment
             + second;

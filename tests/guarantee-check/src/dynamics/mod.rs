@@ -26,7 +26,7 @@ pub fn check(s: &Settings, lemmas: &Lemmas, sup: &Suprema, terminal_rate: f64) -
         rate_curvature,
         curvature_by_angles,
         curvature_by_rates,
-        curvature_of_bearing,
+        curvature_of_induced_norm,
     ] = lemmas.curvatures(curved.0, curved.1);
     let bounds = [
         ("‖F‖ ≤ b", lemmas.dynamics.acceleration),
@@ -40,7 +40,7 @@ pub fn check(s: &Settings, lemmas: &Lemmas, sup: &Suprema, terminal_rate: f64) -
         ("‖d²ω/dt²‖ ≤ b at the largest sizes, a held", rate_curvature),
         ("‖d²/dt² ∂m/∂(α, β)‖ ≤ b at the largest sizes", curvature_by_angles),
         ("‖d²/dt² ∂m/∂x‖ ≤ b at the largest sizes", curvature_by_rates),
-        ("d²/dt² ‖I W s‖ ≤ b at the largest sizes", curvature_of_bearing),
+        ("d²/dt² ‖I W s‖ ≤ b at the largest sizes", curvature_of_induced_norm),
     ];
     let above = from_lemmas(s, sup, sizes, curved);
     let truths = attained(s, sizes, curved).into_iter().zip(above);

@@ -87,7 +87,7 @@ impl InertiaError {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct SlowErrors {
     /// Bound on ‖ζ‖, rad/s.
-    pub(super) creep: Interval,
+    pub(super) angle_drift: Interval,
     /// Bound on the norm of the acceleration besides F and Δ, rad/s².
     pub(super) acceleration: Interval,
 }
@@ -99,10 +99,10 @@ impl SlowErrors {
         let [_, first, ..] = turns(sideslip + s.slow_angle_error);
         // The difference of R at both attitudes, as R⁻¹ has the norm 1.
         let turned = first * root2 * number(s.slow_angle_error);
-        let creep = root3 * number(s.slow_angle_rate) + turned * number(rate);
+        let angle_drift = root3 * number(s.slow_angle_rate) + turned * number(rate);
         let disturbance = root3 * number(s.disturbance_bound);
-        let acceleration = first * creep * number(rate) + turned * disturbance;
-        Self { creep, acceleration }
+        let acceleration = first * angle_drift * number(rate) + turned * disturbance;
+        Self { angle_drift, acceleration }
     }
 }
 
@@ -125,7 +125,7 @@ fn mismatch(
     let (drive, drive_of_two) = (root3 * delta + lasting, root2 * delta + lasting);
     let rates = |drive: Interval, t: Interval| root3 * e + drive * t;
     let angles = |drive: Interval, t: Interval| {
-        root2 * (eta + e * t) + slow.creep * t + half * drive * t.square()
+        root2 * (eta + e * t) + slow.angle_drift * t + half * drive * t.square()
     };
     // Part of one that remains when F drives two motions further apart in turn.
     let slack = Interval::ONE - by_rates * end - half * by_angles * end.square();
@@ -139,7 +139,7 @@ fn mismatch(
     let sum = |t: Interval| {
         let rates = root3 * e * t + half * drive * t.square();
         let angles = root2 * (eta * t + half * e * t.square())
-            + half * slow.creep * t.square()
+            + half * slow.angle_drift * t.square()
             + sixth * drive_of_two * t.square() * t;
         by_rates * rates + by_angles * angles
     };
@@ -166,25 +166,25 @@ impl Causes {
         for _ in 0..12 {
             let sideslip = s.sideslip_domain + margin[1];
             let most = 2.0 * s.limit_rate;
-            let early = sideslip + (d * number(most)).high;
-            let creep = SlowErrors::new(s, most, early).creep.high;
-            let early = early + (d * number(creep)).high;
-            if early > 0.95 {
+            let sideslip_before = sideslip + (d * number(most)).high;
+            let angle_drift = SlowErrors::new(s, most, sideslip_before).angle_drift.high;
+            let sideslip_before = sideslip_before + (d * number(angle_drift)).high;
+            if sideslip_before > 0.95 {
                 return None;
             }
             let bounds = Smoothness::new(s, s.limit_rate + margin[0], sideslip)?;
             let before = margin[0] + (bounds.turning * d).high;
-            let inertia = InertiaError::new(s, &body, s.limit_rate + before, early);
-            let slow = SlowErrors::new(s, s.limit_rate + before, early);
-            if slow.creep.high > creep {
+            let inertia = InertiaError::new(s, &body, s.limit_rate + before, sideslip_before);
+            let slow = SlowErrors::new(s, s.limit_rate + before, sideslip_before);
+            if slow.angle_drift.high > angle_drift {
                 return None;
             }
             let later = mismatch(s, &bounds, &inertia, slow)?;
             let [rate, angle] = later.apart;
-            let swing = bounds.slope * tau.square();
-            let outside = [rate + angle * bounds.angle_rate + swing, angle + swing * tau];
+            let ripple = bounds.slope * tau.square();
+            let outside = [rate + angle * bounds.angle_rate + ripple, angle + ripple * tau];
             if outside[0].high <= margin[0] && outside[1].high <= margin[1] {
-                let wider = Smoothness::new(s, s.limit_rate + before, early)?;
+                let wider = Smoothness::new(s, s.limit_rate + before, sideslip_before)?;
                 let first = mismatch(s, &wider, &inertia, slow)?;
                 let ticks = (s.delay / s.period_feedback).ceil() as usize;
                 let middle = middle(&bounds, tau);
@@ -197,7 +197,7 @@ impl Causes {
                     first: (first, ticks),
                     smoothness: bounds,
                     middle,
-                    sideslip: early,
+                    sideslip: sideslip_before,
                 });
             }
             margin = [0, 1].map(|i| (1.2 * outside[i].high).max(margin[i]));

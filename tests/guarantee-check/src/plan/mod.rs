@@ -153,7 +153,7 @@ impl PlanCheck {
         let angles = ends.map(|(_, deviation)| deviation.angle.component());
         let off = angles[0].max(angles[1]) + ends[0].1.bulge;
         let swept = stage.sideslip(j).abs();
-        // The plan's rates are straight lines, and the deviation is convex except for the swing, so
+        // The plan's rates are straight lines, and the deviation is convex except for the ripple, so
         // that ‖ω‖ is largest at an end.
         let near = swept - off;
         let rate = ends.map(|(state, deviation)| {
@@ -178,7 +178,7 @@ impl PlanCheck {
         let cosine = Interval::from(sideslip.low.max(0.0)).sin_cos().1;
         let [alpha, beta, sigma] = sizes.map(|size| size + deviation.rate.half);
         let squares = (cosine * alpha).square() + beta.square() + sigma.square();
-        squares.sqrt() + deviation.rate.norm + self.reach.swing
+        squares.sqrt() + deviation.rate.norm + self.reach.ripple
     }
 
     /// Bounds the commands of a stage that begins `n` ticks after the nominal trajectory; the result

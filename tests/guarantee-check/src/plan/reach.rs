@@ -7,7 +7,7 @@
 //! o(T_k+1) = Φ o(T_k) − Γ K q_k + ∫ [T_k+1 − v; 1] w(v) dv,
 //!
 //! w = Δ + ν + F(x, m) − F(mid-period, m): disturbance, the effect ν of the inertia error, and the
-//! mismatch. With slow errors all of them are those of the navigated state, and the creep ζ adds
+//! mismatch. With slow errors all of them are those of the navigated state, and the angle drift ζ adds
 //! ∫ [ζ(v); 0] dv. q_k holds what Δ, ν and ζ did since t_k, −A_d e_k for the measurement's error
 //! e_k, and a part φ_k because F differs along the two trajectories. The linear parts are summed
 //! exactly; mismatch and φ are bounded as vectors.
@@ -47,7 +47,7 @@ pub(super) struct Reach {
     pub(super) deviations: Vec<Deviation>,
     pub(super) forever: Deviation,
     /// Largest additional deviation of the rates between two ticks, rad/s.
-    pub(super) swing: Interval,
+    pub(super) ripple: Interval,
 }
 
 struct Builder<'a> {
@@ -89,10 +89,10 @@ impl<'a> Builder<'a> {
     /// Moment that compensates ν after the vehicle has turned for `age`, faster than its limit
     /// before the nominal trajectory began, while the angles are measured with errors.
     fn compensating(&self, age: Interval) -> Interval {
-        let early = self.causes.smoothness.turning * number(self.s.delay).square();
-        let jump = number(2.0).sqrt() * self.causes.errors[0] + early;
+        let faster = self.causes.smoothness.turning * number(self.s.delay).square();
+        let jump = number(2.0).sqrt() * self.causes.errors[0] + faster;
         let (one, rate) = (Interval::ONE, number(self.s.limit_rate) + self.causes.later.apart[0]);
-        let angle = (rate + self.causes.slow.creep) * age + jump;
+        let angle = (rate + self.causes.slow.angle_drift) * age + jump;
         let InertiaError { direct, turned, root_condition, .. } = self.causes.inertia;
         direct * self.growth.after(one, angle) + turned * self.growth.after(root_condition, angle)
     }
@@ -166,10 +166,10 @@ impl<'a> Builder<'a> {
         let k = [self.s.feedback.k1, self.s.feedback.k2].map(|k| number(k).abs());
         let fed = (row[0] * half * tau + row[1] * tau).abs()
             * (k[0] * mismatch.unseen[0] + k[1] * mismatch.unseen[1]);
-        let swing = most * smoothness.bend * cube / number(24.0)
+        let ripple = most * smoothness.bend * cube / number(24.0)
             + at(half) * tau * *middle
             + row[0].abs() * smoothness.slope * cube / number(12.0);
-        [most * mismatch.drifted + fed + swing, late * mismatch.revised + swing]
+        [most * mismatch.drifted + fed + ripple, late * mismatch.revised + ripple]
     }
 
     fn build(&self) -> Option<Reach> {
@@ -194,9 +194,9 @@ impl<'a> Builder<'a> {
         let deviations: Vec<Deviation> = (0..=self.steps).map(at).collect();
         let forever = deviations.iter().fold(at(self.steps + 1), |most, at| most.max(at));
         let Smoothness { slope, bend, .. } = self.causes.smoothness;
-        let swing = eighth * tau.square() * (slope + bend * tau);
+        let ripple = eighth * tau.square() * (slope + bend * tau);
         let bounded = forever.rate.norm.high.is_finite();
-        bounded.then_some(Reach { deviations, forever, swing })
+        bounded.then_some(Reach { deviations, forever, ripple })
     }
 
     /// Bounds the deviation after `n` periods. The vehicle's angle and rate are entries 0 and 1 of
@@ -214,9 +214,9 @@ impl<'a> Builder<'a> {
         let vehicle = |i: usize| {
             let Response { mismatched, revised, begun, .. } = *responses[i];
             let small = (mismatched + begun).min(revised + self.unseen(&rows[i]));
-            let crept = slow.creep * (effects.shifts[i] + rows[i][0].abs() * delay);
+            let shifted = slow.angle_drift * (effects.shifts[i] + rows[i][0].abs() * delay);
             let lasting = (inertia + slow.acceleration) * effects.disturbance[i];
-            Extent { half: half(i), norm: (lasting + crept + small).upper() }
+            Extent { half: half(i), norm: (lasting + shifted + small).upper() }
         };
         let law = |i: usize, compensated: bool| {
             let Response { mismatched, revised, begun, .. } = *responses[i];
@@ -227,7 +227,7 @@ impl<'a> Builder<'a> {
             let inertia =
                 if compensated { inertia * effects.disturbance[at] } else { Interval::ZERO };
             let slow =
-                slow.acceleration * effects.disturbance[at] + slow.creep * effects.shifts[at];
+                slow.acceleration * effects.disturbance[at] + slow.angle_drift * effects.shifts[at];
             Extent { half: half(at), norm: (inertia + slow + small).upper() }
         };
         Deviation {

@@ -162,7 +162,7 @@ fn oracle_no_adversary_exceeds_the_deviation_and_the_worst_one_comes_near() {
 
 /// Largest deviations of the bank angle from a plan at rest, as the law sees them, under the slow
 /// error that is worst for one of them. Nothing else drives it.
-fn crept(s: &Settings, row: [f64; 2], ticks: usize) -> [f64; 3] {
+fn drifted(s: &Settings, row: [f64; 2], ticks: usize) -> [f64; 3] {
     let rest = Vector3::new(10.0, 2.0, -30.0).map(f64::to_radians);
     let (tau, k) = (s.period_feedback, s.feedback);
     let mut response = [tau, 0.0];
@@ -212,7 +212,7 @@ fn oracle_no_slow_error_exceeds_the_deviation_and_the_worst_one_comes_near() {
         let bounds = [deviation.angle, deviation.rate, deviation.feedback];
         let bounds = bounds.map(|bound| bound.component().high);
         for (i, row) in rows.into_iter().enumerate() {
-            let deviations = crept(&s, row, ticks);
+            let deviations = drifted(&s, row, ticks);
             assert!((0..3).all(|j| deviations[j] <= bounds[j]), "{ticks} {i}: {deviations:?}");
             // The bound is that of a norm with three components.
             let share = 3.0_f64.sqrt() * deviations[i] / bounds[i];
