@@ -220,11 +220,8 @@ pub(crate) enum Command {
     List {
         /// Folder to search [default: those beside the program and in ORCHESTRATOR_PATH].
         folder: Option<PathBuf>,
-        /// Show titles in full, and the file of each.
+        /// Print JSON with the file of each, for other programs.
         #[arg(long)]
-        long: bool,
-        /// Print JSON, for other programs.
-        #[arg(long, conflicts_with = "long")]
         json: bool,
     },
 }

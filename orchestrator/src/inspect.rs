@@ -138,7 +138,7 @@ fn print(fmu: &Fmu, out: &mut impl Write) -> io::Result<()> {
 const MARGIN: &str = "      ";
 
 /// Writes a text in lines of this width, with these margins of the first line and of the others.
-fn wrapped(
+pub(crate) fn wrapped(
     text: &str,
     [first, others]: [&str; 2],
     width: usize,

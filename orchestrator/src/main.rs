@@ -183,13 +183,6 @@ fn execute(command: Command, out: &mut impl Write, interrupt: &Interrupt) -> Res
             Ok(())
         }
         Command::Man { folder } => man::write(definition(), &folder),
-        Command::List { folder, long, json } => {
-            let form = match (json, long) {
-                (true, _) => list::Form::Json,
-                (false, true) => list::Form::Long,
-                (false, false) => list::Form::Short,
-            };
-            list::list(folder.as_deref(), form, out)
-        }
+        Command::List { folder, json } => list::list(folder.as_deref(), json, out),
     }
 }

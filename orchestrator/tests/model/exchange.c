@@ -13,9 +13,16 @@ enum Kind {
     ENDING,  /* x' = 1, a completed step behind 0.5 ends the simulation */
     STIFF,   /* x' = -1e6 (x - cos t) */
     HELD,    /* x' = the integer input, v' = the real input */
+    COOLING, /* x' = -(x - AMBIENT) from START on, an event where x passes THRESHOLD */
     DOMAIN,  /* x' = 1 for x up to 1.001 only, an event at 1 sets x back to 0 */
     RESTLESS /* the discrete states never settle */
 };
+
+#if !defined(START)
+#define START 0.0
+#define AMBIENT 0.0
+#define THRESHOLD 0.0
+#endif
 
 typedef struct {
     void (*logger)(void *, const char *, int, const char *, const char *, ...);
@@ -43,7 +50,7 @@ typedef struct {
 
 static Model *start(Model *m, const Callbacks *callbacks) {
     *m = (Model){.callbacks = callbacks, .mode = INSTANTIATED, .next = 0.25, .side = 1, .has_new_nominals = 1};
-    m->x[0] = KIND == STIFF ? 1.0 / (1.0 + 1e-12) : KIND == BALL || KIND == SWING ? 1.0 : KIND == CHATTER ? 0.35 : 0.0;
+    m->x[0] = KIND == STIFF ? 1.0 / (1.0 + 1e-12) : KIND == BALL || KIND == SWING ? 1.0 : KIND == CHATTER ? 0.35 : START;
     return m;
 }
 
@@ -142,6 +149,7 @@ int fmi2GetDerivatives(Model *m, double *d, size_t n) {
     case SWING: d[0] = m->x[1], d[1] = -m->x[0]; break;
     case CHATTER: d[0] = m->side ? -1.0 : 1.0; break;
     case STIFF: d[0] = -1e6 * (m->x[0] - cos(m->time)); break;
+    case COOLING: d[0] = AMBIENT - m->x[0]; break;
     case HELD: d[0] = m->whole, d[1] = m->input; break;
     default: d[0] = 1.0;
     }
@@ -155,7 +163,7 @@ int fmi2GetDirectionalDerivative(Model *m, const unsigned *unknown, size_t rows,
 }
 int fmi2GetEventIndicators(Model *m, double *z, size_t n) {
     NEEDS(EVENT | CONTINUOUS);
-    z[0] = KIND == BALL || KIND == SWING || KIND == CHATTER ? m->x[0] : KIND == DOMAIN ? 1.0 - m->x[0] : 1.0;
+    z[0] = KIND == BALL || KIND == SWING || KIND == CHATTER ? m->x[0] : KIND == DOMAIN ? 1.0 - m->x[0] : KIND == COOLING ? m->x[0] - THRESHOLD : 1.0;
     return n == 1 ? OK : ERROR;
 }
 

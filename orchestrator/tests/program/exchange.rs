@@ -22,7 +22,11 @@ type Changes = [[&'static str; 2]; 2];
 
 /// Makes the FMU by FMI 2.0 and by 3.0, where its two states are one array.
 fn changed(kind: &str, experiment: &str, changes: Changes) -> [Bench; 2] {
-    let flag = format!("-DKIND={kind}");
+    defined(&[&format!("-DKIND={kind}"), "-lm"], experiment, changes)
+}
+
+/// Makes the FMUs as [`changed`] does, with these arguments of the compiler.
+fn defined(flags: &[&str], experiment: &str, changes: Changes) -> [Bench; 2] {
     let three = experiment.replace("\"m.x\", \"m.v\"", "\"m.x\"");
     let versions = [
         (experiment, ["exchange.c", "exchange.xml", "linux64"]),
@@ -31,10 +35,7 @@ fn changed(kind: &str, experiment: &str, changes: Changes) -> [Bench; 2] {
     [0, 1].map(|version| {
         let ((experiment, files), [from, to]) = (versions[version], changes[version]);
         let description = &|text: String| text.replacen(from, to, 1);
-        Bench::made(
-            experiment,
-            &Recipe { files, flags: &[&flag, "-lm"], description, ..Recipe::default() },
-        )
+        Bench::made(experiment, &Recipe { files, flags, description, ..Recipe::default() })
     })
 }
 
@@ -107,6 +108,38 @@ fn oracle_zeros_of_a_swing_are_events_within_a_nanosecond() {
             assert!((row[3] - expected).abs() < 1e-9, "{row:?} {expected}");
             assert!((row[1] - row[0].cos()).abs() < 1e-9, "{row:?}");
             assert!((row[4] - crossings - 1.0).abs() < 0.5, "{row:?}");
+        }
+    }
+}
+
+/// Where a change of the state within the rounding of time is below the rounding of the state, the
+/// integrated state may not have passed a threshold that the interpolated one has passed.
+#[test]
+fn oracle_thresholds_of_any_size_are_passed_once() {
+    for (start, ambient, threshold) in [
+        (310.0, 290.0, 300.0),
+        (80_000.0, 79_000.0, 79_900.0),
+        (1e6 + 1.0, 1e6 - 1.0, 1e6),
+        (-1e-6, 1e-6, 0.0),
+        (1e9, 0.0, 9e8),
+    ] {
+        let values = [("START", start), ("AMBIENT", ambient), ("THRESHOLD", threshold)];
+        let values = values.map(|(name, value): (_, f64)| format!("-D{name}={value:?}"));
+        let flags: Vec<&str> = ["-DKIND=COOLING", "-lm"]
+            .into_iter()
+            .chain(values.iter().map(String::as_str))
+            .collect();
+        let passed = ((start - ambient) / (threshold - ambient)).abs().ln();
+        // A state of this magnitude, known to the tolerance, passes at this speed.
+        let rate = (threshold - ambient).abs();
+        for (begin, digits) in [(0.0, 1e-9), (1.7e9, 2e-6)] {
+            let text = ALONE
+                .replace("unconnected", "tolerance = 1e-13\nunconnected")
+                .replace("stop = 2.0", &format!("start = {begin:?}\nstop = {:?}", begin + 2.0));
+            let last = rows(&defined(&flags, &text, [["", ""]; 2]), &[]).pop().unwrap();
+            let known = digits + 1e-12 * (1.0 + threshold.abs()) / rate;
+            assert!((last[3] - begin - passed).abs() < known, "{last:?}, expected {passed}");
+            assert_eq!(last[4], 2.0, "{last:?}");
         }
     }
 }
