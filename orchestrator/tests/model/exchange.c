@@ -8,7 +8,7 @@ enum Kind {
     BALL,    /* bounces with half its speed, and lies still below a speed of 0.1 */
     SWING,   /* x'' = -x, an event at each zero of x, after which the nominal values have changed */
     TIMER,   /* no states: events at 0.25, 0.5, …, that of 1.5 ends the simulation */
-    STEPPER, /* x' = 1, a step event behind 0.5 sets x back to 0 */
+    STEPPER, /* x' = 1, a step event behind 0.55 sets x back to 0 */
     CHATTER, /* x' runs towards the zero of x from both sides */
     ENDING,  /* x' = 1, a completed step behind 0.5 ends the simulation */
     STIFF,   /* x' = -1e6 (x - cos t) */
@@ -115,7 +115,7 @@ int fmi2CompletedIntegratorStep(Model *m, int no_set_state, int *enters_event_mo
     NEEDS(CONTINUOUS);
     (void)no_set_state;
     m->steps++;
-    *enters_event_mode = KIND == STEPPER && m->x[0] > 0.5;
+    *enters_event_mode = KIND == STEPPER && m->x[0] > 0.55;
     *terminates = KIND == ENDING && m->x[0] > 0.5;
     return OK;
 }
