@@ -71,15 +71,18 @@ def test_every_experiment_becomes_a_valid_archive(experiment, tmp_path):
 def test_an_archive_of_ours_is_the_same_run(name, tmp_path):
     """The run needs only the step, which SSP has no place for."""
     experiment = EXPERIMENTS.parent / f"{name}.toml"
-    said = pack(experiment, tmp_path / "x.ssp", "--stop", "2")
+    said = pack(experiment, tmp_path / "x.ssp", "--stop", "1")
     step = re.search(r"--step (\S+)", said)[1]
     finished = run(tmp_path / "x.ssp", tmp_path / "ssp", "--step", step)
     assert finished.returncode == 0, finished.stderr
-    finished = run(experiment, tmp_path / "toml", "--stop", "2", "--fmu-dir", TARGET / "fmu")
+    finished = run(experiment, tmp_path / "toml", "--stop", "1", "--fmu-dir", TARGET / "fmu")
     assert finished.returncode == 0, finished.stderr
     ssp, toml = columns(tmp_path / "ssp"), columns(tmp_path / "toml")
     assert len(toml) > 10 and toml.keys() <= ssp.keys()
-    assert all(np.array_equal(ssp[name], values) for name, values in toml.items() if not name.endswith(TIMES))
+    # The experiment may record fewer rows.
+    rows = np.isin(ssp["time"], toml["time"])
+    differ = [name for name, values in toml.items() if not np.array_equal(ssp[name][rows], values) and not name.endswith(TIMES)]
+    assert rows.sum() == len(toml["time"]) and not differ
     ssp, toml = (json.loads((tmp_path / kind / "results.json").read_text()) for kind in ("ssp", "toml"))
     assert ssp["simulation"] == toml["simulation"]
     assert [component["sha256"] for component in ssp["components"].values()] == [component["sha256"] for component in toml["components"].values()]
