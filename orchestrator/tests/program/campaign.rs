@@ -286,11 +286,7 @@ fn a_wrong_file_is_refused_with_the_key_the_line_and_the_nearest_name() {
             "measure = \"last\"\nat_most = 8.0\nends = true",
             "ends needs a measure of the kind largest",
         ),
-        (
-            "design = \"levels\"",
-            "cases = 5\ndesign = \"levels\"",
-            "the values have 6 combinations",
-        ),
+        ("design = \"levels\"", "cases = 5\ndesign = \"levels\"", "the values have 6 combinations"),
         ("design = \"levels\"", "design = \"random\"", "cases is missing"),
         (
             "design = \"levels\"",

@@ -332,7 +332,9 @@ fn a_campaign_goes_on_after_an_instance_that_does_harm_but_has_no_result() {
     let says =
         "case 12 could not be flown: gain failed at t = 0 s in doStep: its process was killed";
     assert!(code == 1 && errors.contains(says) && out.is_empty(), "{errors}");
-    assert!(!bench.path("out/c/summary.json").exists() && !bench.path("out/c/cases.parquet").exists());
+    assert!(
+        !bench.path("out/c/summary.json").exists() && !bench.path("out/c/cases.parquet").exists()
+    );
     // The parts without such a case are kept.
     let (code, out, _) = bench.call(&["campaign", "c.toml", "--work"]);
     assert!(code == 0 && out.contains("\"missing\":[[0,25]]"), "{out}");

@@ -164,12 +164,20 @@ fn an_alias_is_the_same_parameter() {
 #[test]
 fn what_the_design_levels_leaves_without_meaning_is_refused() {
     for (vary, said) in [
-        ("each = [\"gain.gain\", \"plant.gain\"]\nlist = [1.0, 2.0]\nsorted = true", "sorted has no meaning"),
-        ("parameter = \"gain.gain\"\nlist = [1.0, 2.0]\nweights = [1.0, 2.0]", "weights have no effect"),
+        (
+            "each = [\"gain.gain\", \"plant.gain\"]\nlist = [1.0, 2.0]\nsorted = true",
+            "sorted has no meaning",
+        ),
+        (
+            "parameter = \"gain.gain\"\nlist = [1.0, 2.0]\nweights = [1.0, 2.0]",
+            "weights have no effect",
+        ),
         ("parameter = \"gain.gain\"\nuniform = [0.0, 1.0]", "needs single values"),
         ("parameter = \"gain.noise.seed\"\ncase = 1", "needs single values"),
     ] {
-        let text = format!("title = \"x\"\nexperiment = \"loop.toml\"\nmetrics = [\"samples\"]\ndesign = \"levels\"\n[[vary]]\n{vary}\n");
+        let text = format!(
+            "title = \"x\"\nexperiment = \"loop.toml\"\nmetrics = [\"samples\"]\ndesign = \"levels\"\n[[vary]]\n{vary}\n"
+        );
         bench(&text).fails(2, &["campaign", "c.toml", "--work"], said);
     }
 }

@@ -20,7 +20,7 @@ pub enum Field<'a> {
 }
 
 /// Conversion of the address of an integer or a choice to a pointer of its type.
-pub type Number = fn(*mut u8) -> *mut dyn Numbered;
+pub type Number = fn(*mut ()) -> *mut dyn Numbered;
 
 /// The settings of a type, in the order of its fields.
 #[derive(Clone, Debug)]
@@ -44,7 +44,7 @@ impl<S: Declared> Settings<S> {
         // SAFETY: `S` promises that this offset of its values holds a field of this type, and the
         // value is borrowed for as long as the field.
         unsafe {
-            let field = start.add(place.offset);
+            let field = start.add(place.offset).cast::<()>();
             match kind {
                 Kind::Real => Field::Real(&mut *field.cast()),
                 Kind::Integer(_, number) => Field::Integer(&mut *number(field)),

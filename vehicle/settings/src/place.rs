@@ -21,6 +21,7 @@ pub enum Role {
 
 /// Declarations in the attribute of a field.
 #[derive(Clone, Copy, Debug, Default)]
+#[expect(clippy::struct_excessive_bools, reason = "they are keys without a value")]
 pub struct About {
     /// Name; empty for a structure whose fields are named by themselves.
     pub name: &'static str,

@@ -9,12 +9,8 @@ use syn::{Attribute, Expr, LitStr, Result, token};
 /// Keys of the attribute on a field, on an enumeration or on a variant.
 #[derive(Default)]
 pub(crate) struct Keys {
-    /// The field is no setting.
-    pub(crate) skip: bool,
-    /// The sentence of the field continues that of the field that holds its structure.
-    part: bool,
-    /// The unit is that of the time derivative of the field that holds the structure.
-    rate: bool,
+    /// Keys without a value.
+    flags: Vec<String>,
     pub(crate) name: Option<String>,
     text: Option<String>,
     used_with: Option<LitStr>,
@@ -29,11 +25,8 @@ pub(crate) struct Keys {
     columns: Option<TokenStream>,
     units: Option<TokenStream>,
     nominals: Option<TokenStream>,
-    by_column: bool,
     /// Variant of `settings::Role`.
     role: Option<Ident>,
-    discrete: bool,
-    optional: bool,
     derivative: Option<LitStr>,
     depends_on: Option<TokenStream>,
 }
@@ -54,9 +47,9 @@ impl Keys {
             attribute.parse_nested_meta(|meta| {
                 let key = meta.path.get_ident().map(ToString::to_string).unwrap_or_default();
                 match key.as_str() {
-                    "skip" => keys.skip = true,
-                    "part" => keys.part = true,
-                    "rate" => keys.rate = true,
+                    "skip" | "part" | "rate" | "by_column" | "discrete" | "optional" => {
+                        keys.flags.push(key);
+                    }
                     "name" => keys.name = Some(meta.value()?.parse::<LitStr>()?.value()),
                     "text" => keys.text = Some(meta.value()?.parse::<LitStr>()?.value()),
                     "used_with" => keys.used_with = Some(meta.value()?.parse()?),
@@ -71,12 +64,9 @@ impl Keys {
                     "columns" => keys.columns = Some(list(meta.value()?)?),
                     "units" => keys.units = Some(list(meta.value()?)?),
                     "nominals" => keys.nominals = Some(list(meta.value()?)?),
-                    "by_column" => keys.by_column = true,
                     "input" => keys.role = Some(format_ident!("Input")),
                     "output" => keys.role = Some(format_ident!("Output")),
                     "local" => keys.role = Some(format_ident!("Local")),
-                    "discrete" => keys.discrete = true,
-                    "optional" => keys.optional = true,
                     "derivative" => keys.derivative = Some(meta.value()?.parse()?),
                     "depends_on" => keys.depends_on = Some(list(meta.value()?)?),
                     _ => return Err(meta.error("no key of #[setting(…)]")),
@@ -85,6 +75,11 @@ impl Keys {
             })?;
         }
         Ok(keys)
+    }
+
+    /// Whether a key without a value is there.
+    pub(crate) fn has(&self, flag: &str) -> bool {
+        self.flags.iter().any(|key| key == flag)
     }
 
     /// Returns name and sentence of what the attributes belong to.
@@ -96,11 +91,12 @@ impl Keys {
     /// Returns an expression for the `settings::About` of a field.
     pub(crate) fn about(&self, ident: &str, attributes: &[Attribute]) -> TokenStream {
         let (name, text) = self.name_and_text(ident, attributes);
-        let number = |value: &Option<Expr>| {
+        let option = |value: Option<TokenStream>| {
             let none = quote!(::core::option::Option::None);
-            let some = |value| quote!(::core::option::Option::Some((#value) as f64));
-            value.as_ref().map_or(none, some)
+            value.map_or(none, |value| quote!(::core::option::Option::Some(#value)))
         };
+        let number =
+            |value: &Option<Expr>| option(value.as_ref().map(|value| quote!((#value) as f64)));
         let [min, max, above, below, nominal, start] =
             [&self.min, &self.max, &self.above, &self.below, &self.nominal, &self.start]
                 .map(number);
@@ -109,15 +105,10 @@ impl Keys {
         let [each, columns, units, nominals] =
             [&self.each, &self.columns, &self.units, &self.nominals]
                 .map(|list| list.clone().unwrap_or(quote!([])));
-        let depends_on = match &self.depends_on {
-            Some(names) => quote!(::core::option::Option::Some(&#names)),
-            None => quote!(::core::option::Option::None),
-        };
-        let Self { part, rate, by_column, discrete, optional, .. } = self;
-        let role = match &self.role {
-            Some(role) => quote!(::core::option::Option::Some(::settings::Role::#role)),
-            None => quote!(::core::option::Option::None),
-        };
+        let depends_on = option(self.depends_on.as_ref().map(|names| quote!(&#names)));
+        let role = option(self.role.as_ref().map(|role| quote!(::settings::Role::#role)));
+        let [part, rate, by_column, discrete, optional] =
+            ["part", "rate", "by_column", "discrete", "optional"].map(|flag| self.has(flag));
         quote! {
             ::settings::About {
                 name: #name,

@@ -14,7 +14,7 @@ pub(crate) fn expand(input: &DeriveInput) -> Result<TokenStream> {
     let mut declarations = Vec::new();
     for (index, field) in data.fields.iter().enumerate() {
         let keys = Keys::new(&field.attrs)?;
-        if keys.skip {
+        if keys.has("skip") {
             continue;
         }
         // The only field of a tuple has no name.
