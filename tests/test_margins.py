@@ -267,7 +267,7 @@ RESTLESS = "crmpc-2022/crmpc-robust.toml"
         ("margins", "entry/from-120km.toml", ("--at", "1900", "--open", SIGNALS), 1, "needs its motion until t = 190"),
         ("linearise", "crmpc-2022/lqr.toml", ("--at", "10.01", "--open", SIGNALS), 2, "--at 10.01: must be a communication point"),
         ("linearise", "crmpc-2022/lqr.toml", ("--at", "10", "--open", "plant.momnt.*"), 2, 'did you mean "plant.moment.'),
-        ("linearise", "crmpc-2022/lqr.toml", ("--at", "10", "--open", SIGNALS, "--isolate"), 2, "--isolate=false puts it into this one"),
+        ("linearise", "crmpc-2022/lqr.toml", ("--at", "10", "--open", SIGNALS, "--isolate"), 2, "--isolate=false puts them into this one"),
     ],
 )
 def test_where_there_is_no_linear_model_none_is_given(command, experiment, arguments, code, problem):

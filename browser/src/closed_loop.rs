@@ -88,7 +88,7 @@ impl ClosedLoop {
             }
             settings.push(own);
             let (name, instance) = (part.name.into(), Box::new(fmu.instance(&warnings)));
-            members.push(Member { name, every: 1, ahead: false, varies: false, instance });
+            members.push(Member { name, every: 1, varies: false, instance });
         }
 
         let stop = read(experiment, "simulation.stop")?;

@@ -1,6 +1,5 @@
 //! The command `campaign`.
 
-use crate::arguments;
 use crate::failure::Failure;
 use campaign::definition::Campaign;
 use campaign::findings::Findings;
@@ -66,7 +65,7 @@ pub(crate) struct Fly {
     quiet: bool,
     // Its heading would apply to all arguments that follow.
     #[command(flatten)]
-    pub(crate) overrides: arguments::Overrides,
+    pub(crate) overrides: Overrides,
 }
 
 /// Heading of the options that fly a part of a campaign.
@@ -85,7 +84,7 @@ fn range(text: &str) -> Result<Range<u64>, String> {
 /// Returns an error if the campaign is faulty, or if a file cannot be written.
 pub(crate) fn fly(asked: &Fly, out: &mut impl Write, interrupt: &Interrupt) -> Result<(), Failure> {
     let campaign = Campaign::load(&find(&asked.campaign, Kind::Campaign)?)?;
-    let overrides = Overrides::from(asked.overrides.clone());
+    let overrides = asked.overrides.clone();
     let command = match overrides.law.as_deref().map(name_of) {
         Some(law) => {
             format!("campaign(\"{}\", law={law}).case(CASE)", campaign.source.path.display())
@@ -175,7 +174,8 @@ fn fly_case(
         interrupt: interrupt.clone(),
         ..Default::default()
     };
-    let overrides = Overrides { law: overrides.law, ..Overrides::default() };
+    let Overrides { law, process, .. } = overrides;
+    let overrides = Overrides { law, process, ..Overrides::default() };
     law::in_case(Some(case));
     crate::run::run(&experiment, &overrides, &asked.fmu_dir, &options, out)
 }

@@ -1,10 +1,11 @@
 //! The command line: commands, their arguments and help texts.
 
-use crate::arguments::{self, choice};
 use crate::catalogue::Filter;
 use crate::run::Files;
 use crate::{campaign, examples, linear, plot, response, schema};
 use clap::{Arg, CommandFactory, FromArgMatches, Parser, Subcommand};
+use cosim::choice::choice;
+use cosim::experiment::{Overrides, Process};
 use cosim::pacing::{Factor, OnMiss};
 use std::path::PathBuf;
 
@@ -64,7 +65,7 @@ pub(crate) enum Command {
         #[arg(long, value_name = "DIR")]
         fmu_dir: Vec<PathBuf>,
         #[command(flatten)]
-        overrides: arguments::Overrides,
+        overrides: Overrides,
         /// Show neither progress nor summary.
         #[arg(long, help_heading = "Display")]
         quiet: bool,
@@ -122,7 +123,7 @@ pub(crate) enum Command {
         #[arg(long, hide = true)]
         law: Option<String>,
         #[command(flatten)]
-        isolation: arguments::Protection,
+        process: Process,
     },
     /// Fly thousands of cases of an experiment in which parameters vary, and write cases.parquet,
     /// summary.json and report.html: how often limits are broken, with what confidence, and the
@@ -168,7 +169,7 @@ pub(crate) enum Command {
         #[arg(long, value_name = "DIR")]
         fmu_dir: Vec<PathBuf>,
         #[command(flatten)]
-        overrides: arguments::Overrides,
+        overrides: Overrides,
         /// Replace the archive if it exists.
         #[arg(long, help_heading = "Results")]
         force: bool,
@@ -187,7 +188,7 @@ pub(crate) enum Command {
         #[arg(long, conflicts_with_all = ["json", "pattern", "causality"])]
         check: bool,
         #[command(flatten)]
-        isolation: arguments::Protection,
+        process: Process,
     },
     /// Print an experiment, a study or a campaign with all that it extends, and with lists
     /// expanded.
@@ -274,7 +275,7 @@ mod tests {
     /// Commands with an option for folders of FMUs load them. A hidden one is for programs that
     /// have loaded the same FMUs already.
     #[test]
-    fn whatever_loads_fmus_can_do_so_in_a_sandbox() {
+    fn whatever_loads_fmus_can_do_so_in_a_closed_process() {
         let definition = definition();
         let has = |command: &clap::Command, name: &str| {
             command.get_arguments().any(|argument| argument.get_id() == name)
@@ -286,9 +287,7 @@ mod tests {
             .collect();
         assert!(loading.len() >= 8, "{}", loading.len());
         for command in loading {
-            for option in ["sandbox", "isolate", "call_timeout", "memory", "cpu"] {
-                assert!(has(command, option), "{} has no {option}", command.get_name());
-            }
+            assert!(has(command, "isolate"), "{} has no --isolate", command.get_name());
         }
     }
 }

@@ -4,13 +4,14 @@ use crate::catalogue::{self, Filter};
 use crate::failure::Failure;
 use crate::list;
 use cosim::error::Error;
-use cosim::experiment::Protection;
+use cosim::experiment::Process;
 use fmi_master::description::{Interface, ModelDescription, ScalarType, Variable, VariableKind};
 use fmu_import::description::CAUSALITIES;
 use fmu_import::fmu::Fmu;
-use fmu_import::isolation;
+use fmu_import::isolation::{self, Closed, Closing, Ended};
 use std::io::{self, Write};
-use std::path::Path;
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
 use textwrap::Options;
 
 /// Prints the interfaces and platforms of an archive, and those of its variables that fit the
@@ -39,18 +40,12 @@ pub(crate) fn inspect(
 /// fault, or that the FMU is sound.
 ///
 /// # Errors
-/// Returns an error if there are faults, if the archive is no FMU at all, if a limit is none, or if
-/// the text cannot be written.
-pub(crate) fn check(
-    path: &Path,
-    protection: &Protection,
-    out: &mut impl Write,
-) -> Result<(), Failure> {
-    protection.check().map_err(|problem| Error::experiment(format!("--check: {problem}")))?;
+/// Returns an error if there are faults, if the archive is no FMU at all, or if the
+/// text cannot be written.
+pub(crate) fn check(path: &Path, process: Process, out: &mut impl Write) -> Result<(), Failure> {
     let fmu = Fmu::open(path)?;
-    let shares = protection.isolate == Some(false) && protection.sandbox != Some(true);
-    let limits = (isolation::is_enabled() && !shares).then(|| protection.limits());
-    let faults = fmu.faults(limits.as_ref());
+    let is_closed = process.isolate.unwrap_or_else(isolation::can_close);
+    let faults = if is_closed { faults(&fmu)? } else { fmu.faults() };
     for fault in &faults {
         writeln!(out, "{}: {fault}", path.display())?;
     }
@@ -66,6 +61,28 @@ pub(crate) fn check(
         }
         count => Err(Failure::Faults { path: path.to_path_buf(), count }),
     }
+}
+
+/// Finds the faults of an FMU in a closed process.
+fn faults(fmu: &Fmu) -> Result<Vec<String>, Error> {
+    let folders = fmu.folder().map(PathBuf::from).into_iter().collect();
+    let closing = Closing { folders, ..Closing::default() };
+    let mut faults: Vec<String> = Vec::new();
+    let begun = Closed::begin(&closing, |link| {
+        let _ = link.send(&fmu.faults());
+    });
+    let hear = |found| {
+        faults = found;
+        ControlFlow::Continue(())
+    };
+    match begun.and_then(|mut closed| closed.hear(|| None, hear)) {
+        Ok(()) => {}
+        Err(Ended::Refused(reason)) => return Err(Error::experiment(reason)),
+        Err(Ended::Failed { failure, .. }) => {
+            faults.push(format!("its instance failed in {}: {}", failure.call, failure.message));
+        }
+    }
+    Ok(faults)
 }
 
 fn print(fmu: &Fmu, out: &mut impl Write) -> io::Result<()> {

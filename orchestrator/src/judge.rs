@@ -12,10 +12,11 @@ use cosim::files;
 use cosim::interrupt::Interrupt;
 use cosim::metadata;
 use cosim::run::{Observer, Sample};
-use cosim::system::{Opened, System};
+use cosim::system::{Opened, Parameters, System};
 use cosim_metrics::folder::Folder;
 use cosim_metrics::metrics::{Meters, Metrics};
 use cosim_report::recording::watch::Watch;
+use serde_json::json;
 use std::io::{Read, Write, stdin, stdout};
 use std::path::{Path, PathBuf};
 
@@ -33,8 +34,13 @@ pub(crate) fn judge(experiment: &Path, fmu_dirs: &[PathBuf], out: &Path) -> Resu
         return Err(error.into());
     }
     let _folder = Folder::take(out)?;
-    let mut master = system.start(&Interrupt::default())?;
-    let parameters = system.parameters(&mut master)?;
+    let interrupt = Interrupt::default();
+    let parameters = system.apart(&interrupt, &[], || {
+        let mut run = system.start(&interrupt)?;
+        Ok(json!(system.parameters(&mut run)?).to_string())
+    })?;
+    let parameters: Parameters =
+        serde_json::from_str(&parameters).map_err(|error| Error::experiment(error.to_string()))?;
     let metadata = metadata::metadata(&system, &parameters, None, outcome.as_ref().err());
     files::write_json(&out.join("results.json"), &metadata)?;
     // How long the other program took is not known here.

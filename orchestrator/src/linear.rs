@@ -1,18 +1,18 @@
 //! The commands `linearise` and `margins`.
 
-use crate::arguments;
 use crate::failure::Failure;
 use crate::picture;
 use crate::run;
 use clap::Args;
 use cosim::error::Error;
+use cosim::experiment::Overrides;
 use cosim::interrupt::Interrupt;
 use cosim::search::named::{Kind, find};
 use cosim::system::System;
 use cosim_report::figure::{Color, Curve, Figure, Legend, Panel, Shape, svg};
 use fmi_master::quantity::rounded;
 use linear::curves::{ResponseCurves, excluded};
-use linear::linearise::Linearised;
+use linear::linearise::{Linearised, Lineariser};
 use linear::margins::{Crossing, LoopMargins};
 use linear::model::{OpenLoop, Step};
 use linear::{Matrix, margins as analysis};
@@ -39,7 +39,7 @@ pub(crate) struct Instant {
     #[arg(long, value_name = "DIR")]
     fmu_dir: Vec<PathBuf>,
     #[command(flatten)]
-    pub(crate) overrides: arguments::Overrides,
+    pub(crate) overrides: Overrides,
 }
 
 impl Instant {
@@ -47,7 +47,7 @@ impl Instant {
     /// signals at which the loop is opened.
     pub(crate) fn system(&self) -> Result<(System, f64, Vec<String>), Failure> {
         let path = find(&self.experiment, Kind::Experiment)?;
-        let (system, _) = run::system(&path, &self.overrides.clone().into(), &self.fmu_dir)?;
+        let (system, _) = run::system(&path, &self.overrides, &self.fmu_dir)?;
         let asked = system.experiment.observe.margins.clone();
         let missing = |option: &str| {
             let problem = format!(
@@ -66,8 +66,21 @@ impl Instant {
 
     fn linearise(&self, interrupt: &Interrupt) -> Result<Linearised, Failure> {
         let (system, at, open) = self.system()?;
+        // What is wrong with the arguments comes first.
+        Lineariser::new(system.clone(), at, &open)?;
+        refuse_closed(&system)?;
         Ok(linear::linearise::linearise(system, at, &open, interrupt)?)
     }
+}
+
+/// Refuses a system whose instances are to run in a closed process, as a model is needed in this
+/// one.
+pub(crate) fn refuse_closed(system: &System) -> Result<(), Error> {
+    if !system.is_closed {
+        return Ok(());
+    }
+    let problem = "its FMUs are to run in a closed process, which gives no model: --isolate=false puts them into this one";
+    Err(Error::experiment(problem))
 }
 
 /// Arguments of `linearise`.

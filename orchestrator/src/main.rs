@@ -1,13 +1,12 @@
 //! The orchestrator: runs the command of the command line, and ends with its exit code.
 
-mod arguments;
 mod campaign;
 mod catalogue;
 mod command_line;
 mod examples;
 mod failure;
+mod flight;
 mod inspect;
-mod isolated;
 mod judge;
 mod linear;
 mod list;
@@ -24,12 +23,13 @@ mod summary;
 
 use command_line::{Command, definition};
 use cosim::error::Error;
-use cosim::experiment::{Overrides, Protection};
+use cosim::experiment::{Overrides, Process};
 use cosim::interrupt::Interrupt;
 use cosim::pacing;
 use cosim::search::named::{Kind, find};
 use failure::Failure;
 use fmu_import::crash;
+use fmu_import::isolation::Messages;
 use fmu_import::law::{self, Printed};
 use plain::{Plain, plain};
 use run::Options;
@@ -42,9 +42,6 @@ use sweep::runner;
 use tracing_subscriber::EnvFilter;
 
 fn main() -> ExitCode {
-    if let Some(code) = isolated::serve() {
-        return code;
-    }
     let _watch = crash::watch();
     let arguments = command_line::parse();
     // A study may have a thousand runs, and its report counts their warnings. The results table of
@@ -57,7 +54,7 @@ fn main() -> ExitCode {
     let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new(usual));
     tracing_subscriber::fmt()
         .with_env_filter(filter)
-        .with_writer(stderr)
+        .with_writer(|| Messages)
         // A message that cannot be written is lost, but the run continues.
         .log_internal_errors(false)
         .with_ansi(stderr().is_terminal())
@@ -79,11 +76,10 @@ fn main() -> ExitCode {
     let answers_in_json = arguments.command.answers_in_json();
     let outcome = execute(arguments.command, &mut out, &interrupt)
         .and_then(|()| out.flush().map_err(Failure::from));
-    let all_freed = isolated::all_freed();
+    // Those that killed processes have left.
+    fmu_import::folder::remove_left();
     match outcome {
-        Ok(()) if all_freed => ExitCode::SUCCESS,
-        // The results are complete, but freeing an instance failed.
-        Ok(()) => ExitCode::FAILURE,
+        Ok(()) => ExitCode::SUCCESS,
         Err(error) if error.is_broken_pipe() => {
             // Output that could not be written must not be written again when the writer is
             // dropped.
@@ -129,7 +125,7 @@ fn execute(command: Command, out: &mut impl Write, interrupt: &Interrupt) -> Res
                 interrupt: interrupt.clone(),
             };
             let experiment = find(&experiment, Kind::Experiment)?;
-            run::run(&experiment, &overrides.into(), &fmu_dir, &options, out)
+            run::run(&experiment, &overrides, &fmu_dir, &options, out)
         }
         Command::Reproduce {
             study,
@@ -140,10 +136,10 @@ fn execute(command: Command, out: &mut impl Write, interrupt: &Interrupt) -> Res
             fresh,
             quiet,
             law,
-            isolation,
+            process,
         } => {
             let study = Study::load_with(&find(&study, Kind::Study)?, members)?;
-            let overrides = Overrides { law, isolation: isolation.into(), ..Default::default() };
+            let overrides = Overrides { law, process, ..Default::default() };
             let interrupt = interrupt.clone();
             let options =
                 runner::Options { out: folder, jobs, fresh, quiet, interrupt, time: None };
@@ -163,14 +159,14 @@ fn execute(command: Command, out: &mut impl Write, interrupt: &Interrupt) -> Res
         }
         Command::Pack { experiment, out: archive, fmu_dir, overrides, force } => {
             let archive = pack::Archive { path: archive, force };
-            pack::pack(&experiment, &overrides.into(), &fmu_dir, archive, out, interrupt)
+            pack::pack(&experiment, &overrides, &fmu_dir, archive, out, interrupt)
         }
-        Command::Inspect { fmu, filter, json, check, isolation } => {
-            let (fmu, isolation) = (find(&fmu, Kind::Fmu)?, isolation.into());
+        Command::Inspect { fmu, filter, json, check, process } => {
+            let fmu = find(&fmu, Kind::Fmu)?;
             if check {
-                inspect::check(&fmu, &isolation, out)
-            } else if isolation != Protection::default() {
-                let problem = "options of the process of an instance go with --check, as nothing else runs the FMU";
+                inspect::check(&fmu, process, out)
+            } else if process != Process::default() {
+                let problem = "--isolate goes with --check, as nothing else runs the FMU";
                 Err(Error::experiment(problem).into())
             } else {
                 inspect::inspect(&fmu, &filter, json, out)

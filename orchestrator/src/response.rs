@@ -2,7 +2,7 @@
 //! model.
 
 use crate::failure::Failure;
-use crate::linear::{Instant, keep};
+use crate::linear::{Instant, keep, refuse_closed};
 use crate::picture;
 use clap::Args;
 use cosim::error::Error;
@@ -65,6 +65,7 @@ pub(crate) fn respond(
     }
     let title = system.experiment.title.clone();
     let lineariser = Lineariser::new(system, at, &open)?;
+    refuse_closed(lineariser.system())?;
     let mut master = lineariser.system().start(interrupt)?;
     let found = lineariser.linearise(&mut master, interrupt)?;
     drop(master);

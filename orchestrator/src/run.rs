@@ -1,10 +1,11 @@
 //! Runs an experiment and writes its results. Observers of the system record, measure and
 //! draw it.
 
-use crate::arguments::choice;
 use crate::failure::Failure;
+use crate::flight::{self, Flown, Heard};
 use crate::summary::{self, RunReport};
 use cosim::check::check;
+use cosim::choice::choice;
 use cosim::error::Error;
 use cosim::experiment::{Experiment, Overrides};
 use cosim::files;
@@ -12,11 +13,10 @@ use cosim::interrupt::Interrupt;
 use cosim::metadata;
 use cosim::pacing;
 use cosim::pacing::report::RealTime;
-use cosim::pacing::timer::{self, Monotonic};
 use cosim::recorder::{Format, Recorder};
-use cosim::run::{Observer, Run, Sample};
+use cosim::run::{Observer, Sample};
 use cosim::ssp;
-use cosim::system::{Opened, System};
+use cosim::system::{Opened, Parameters, System};
 use cosim_metrics::folder::Folder;
 use cosim_metrics::metrics::{Meters, Metrics};
 use cosim_metrics::progress::Progress;
@@ -24,13 +24,9 @@ use cosim_report::panels::Panel;
 use cosim_report::recording::asked;
 use cosim_report::recording::watch::Watch;
 use cosim_report::run_page;
-use fmu_import::warnings;
-use linear::measures::{self, Measured};
-use serde_json::Value;
+use linear::measures::Measured;
 use std::io::Write;
 use std::path::{Path, PathBuf};
-use std::rc::Rc;
-use std::time::Instant;
 
 /// Choice of the pictures that a run draws.
 #[derive(Clone, Copy, Debug, Default, clap::Args)]
@@ -113,7 +109,9 @@ pub(crate) fn run(
         summary::summary(&system, &report, out)?;
         out.flush()?;
     }
-    ended(report.ended, options.quiet)
+    ended(report.ended, options.quiet)?;
+    // The results are complete, but an instance failed when it was freed.
+    report.late.map_or(Ok(()), |error| Err(error.into()))
 }
 
 /// Checks an experiment or the system of an SSP archive. The entries of an archive are needed for
@@ -178,43 +176,27 @@ fn ended(reason: Option<Error>, quiet: bool) -> Result<(), Failure> {
 /// Returns an error if an FMU fails, or if a file cannot be written.
 fn record(system: &mut System, options: &Options) -> Result<RunReport, Failure> {
     let mut outputs = Outputs::new(system, options)?;
-    let warnings = warnings::collect();
-    warnings::at(system.clock.start());
-    let mut run = system.start(&options.interrupt)?;
-    let parameters = system.parameters(&mut run)?;
-    if let Some(request) = options.interrupt.asked() {
-        return Err(Error::Interrupted { time: system.clock.start(), request }.into());
-    }
-    let _folder = outputs.begin(system)?;
-    if let Some(settings) = options.real_time {
-        timer::wake_up_sharply();
-        run.pace(settings, Rc::new(Monotonic));
-    }
-    let begin = Instant::now();
-    let outcome = run.run(&mut [&mut outputs]);
-    let wall = begin.elapsed().as_secs_f64();
-    outputs.progress = None;
-    drop(warnings);
-
+    let flown = flight::fly(outputs.system, options, &mut outputs)?;
+    let Flown { outcome, wall, end, real_time, margins, late } = flown;
     let out = outputs.out.clone();
-    let metadata =
-        metadata::metadata(system, &parameters, options.real_time, outcome.as_ref().err());
-    let written = outputs.write(system, &mut run, &metadata, outcome.is_ok(), wall);
+    let written = outputs.write(outcome.as_ref().err(), wall, real_time, margins);
     // The reason why the run ended comes first: a disk filled by its results has no room for more.
     let ended = early(outcome, &out)?;
     let (metrics, files) = written?;
-    let end = run.master.end().map(String::from);
-    Ok(RunReport { metrics, out, files, ended, end })
+    Ok(RunReport { metrics, out, files, ended, end, late })
 }
 
 /// What a run writes and shows. It observes the run.
 struct Outputs<'a> {
+    system: &'a System,
     options: &'a Options,
+    parameters: Parameters,
+    /// The folder of the results, which is taken as long as this value lives.
+    folder: Option<Folder>,
     /// Folder of the results.
     out: PathBuf,
     /// Name of the experiment's file.
     name: String,
-    title: String,
     progress: Option<Progress>,
     recorder: Option<Recorder>,
     watch: Option<Watch>,
@@ -226,7 +208,7 @@ impl<'a> Outputs<'a> {
     ///
     /// # Errors
     /// Returns an error if a signal is unknown, or if there are results that may not be replaced.
-    fn new(system: &mut System, options: &'a Options) -> Result<Self, Failure> {
+    fn new(system: &'a mut System, options: &'a Options) -> Result<Self, Failure> {
         options.files.check()?;
         let meters = Meters::new(system)?.ending_when_lost();
         // A panel of a wrong signal is refused before the run, whether it is drawn or not.
@@ -236,31 +218,22 @@ impl<'a> Outputs<'a> {
         for doubt in system.doubts() {
             tracing::warn!("{doubt}");
         }
-        let title = system.experiment.title.clone();
         let stem = system.experiment.source.path.file_stem();
         let name = stem.map_or("run".into(), |stem| stem.to_string_lossy().into_owned());
         let out = options.out.clone().unwrap_or_else(|| Path::new("out").join(&name));
         Folder::check(&out, options.force)?;
-        Ok(Self { options, out, name, title, progress: None, recorder: None, watch, meters })
-    }
-
-    /// Takes the folder, which stays taken as long as the returned value lives, and begins the file
-    /// of recorded variables.
-    ///
-    /// # Errors
-    /// Returns an error if another process has the folder, or if it cannot be written.
-    fn begin(&mut self, system: &System) -> Result<Folder, Failure> {
-        let Options { force, quiet, real_time, files, .. } = self.options;
-        let folder = Folder::take(&self.out)?;
-        // Another process may have written to the folder in the meantime.
-        Folder::check(&self.out, *force)?;
-        folder.clear()?;
-        let recorder =
-            (!files.no_csv).then(|| system.recorder(&self.out, files.format, files.labels));
-        self.recorder = recorder.transpose()?;
-        let ticks = system.clock.ticks();
-        self.progress = Some(Progress::new(&self.title, ticks, *quiet, real_time.is_some()));
-        Ok(folder)
+        Ok(Self {
+            system,
+            options,
+            parameters: Parameters::new(),
+            folder: None,
+            out,
+            name,
+            progress: None,
+            recorder: None,
+            watch,
+            meters,
+        })
     }
 
     /// Writes the files. Returns the metrics and the files' names.
@@ -269,27 +242,33 @@ impl<'a> Outputs<'a> {
     /// Returns an error if a file cannot be written.
     fn write(
         mut self,
-        system: &System,
-        run: &mut Run,
-        metadata: &Value,
-        is_complete: bool,
+        failure: Option<&Error>,
         wall: f64,
+        real_time: Option<RealTime>,
+        margins: Result<Measured, Error>,
     ) -> Result<(Metrics, Vec<&'static str>), Failure> {
+        let Self { system, options, .. } = self;
+        let metadata = metadata::metadata(system, &self.parameters, options.real_time, failure);
         let mut files = vec!["results.json", "metrics.json"];
         if let Some(recorder) = &mut self.recorder {
             recorder.finish()?;
             files.insert(0, self.options.files.format.file());
         }
-        files::write_json(&self.out.join("results.json"), metadata)?;
-        let metrics = self.measured(system, run, is_complete, wall)?;
+        files::write_json(&self.out.join("results.json"), &metadata)?;
+        let mut metrics = self.measured(wall);
+        metrics.asked.extend(margins?);
+        if let Some(real_time) = real_time {
+            warn(&real_time, options.quiet);
+            metrics.real_time = Some(real_time);
+        }
         files::write_json(&self.out.join("metrics.json"), &metrics)?;
         let Pictures { no_plot, page } = self.options.files.pictures;
         let Some(watch) = self.watch else { return Ok((metrics, files)) };
-        if !no_plot && watch.draw(&self.out.join("plot.svg"), &self.title)? {
+        if !no_plot && watch.draw(&self.out.join("plot.svg"), &system.experiment.title)? {
             files.push("plot.svg");
         }
         if page {
-            let mut recording = watch.recording(&self.name, metadata);
+            let mut recording = watch.recording(&self.name, &metadata);
             recording.summary = summary::lines(&system.experiment.observe, &metrics);
             let recordings = [recording];
             let drawn = asked::of_experiments(&recordings).map_err(Error::experiment)?;
@@ -300,29 +279,44 @@ impl<'a> Outputs<'a> {
     }
 
     /// Returns the metrics of a run that took this time by the wall clock, s.
-    fn measured(
-        &self,
-        system: &System,
-        run: &mut Run,
-        is_complete: bool,
-        wall: f64,
-    ) -> Result<Metrics, Failure> {
-        let reached = system.clock.step() * self.meters.seen().saturating_sub(1) as f64;
-        let mut metrics = Metrics {
+    fn measured(&self, wall: f64) -> Metrics {
+        let reached = self.system.clock.step() * self.meters.seen().saturating_sub(1) as f64;
+        Metrics {
             real_time_factor: (wall > 0.0).then(|| reached / wall),
             wall_s: wall,
-            loop_delay_s: system.loop_delay(),
+            loop_delay_s: self.system.loop_delay(),
             ..self.meters.metrics()
-        };
-        if is_complete {
-            metrics.asked.extend(margins(system, &self.options.interrupt)?);
         }
-        if let Some(pacer) = run.take_pacer() {
-            let real_time = pacer.report();
-            warn(&real_time, self.options.quiet);
-            metrics.real_time = Some(real_time);
+    }
+}
+
+impl Heard for Outputs<'_> {
+    /// Takes the folder and begins the file of recorded variables.
+    fn begin(&mut self, parameters: Parameters) -> Result<(), Error> {
+        let Options { force, quiet, real_time, files, interrupt, .. } = self.options;
+        let clock = self.system.clock;
+        if let Some(request) = interrupt.asked() {
+            return Err(Error::Interrupted { time: clock.start(), request });
         }
-        Ok(metrics)
+        let folder = Folder::take(&self.out)?;
+        // Another process may have written to the folder in the meantime.
+        Folder::check(&self.out, *force)?;
+        folder.clear()?;
+        let recorder =
+            (!files.no_csv).then(|| self.system.recorder(&self.out, files.format, files.labels));
+        self.recorder = recorder.transpose()?;
+        let title = &self.system.experiment.title;
+        self.progress = Some(Progress::new(title, clock.ticks(), *quiet, real_time.is_some()));
+        (self.parameters, self.folder) = (parameters, Some(folder));
+        Ok(())
+    }
+
+    fn has_begun(&self) -> bool {
+        self.folder.is_some()
+    }
+
+    fn stop(&mut self) {
+        self.progress = None;
     }
 }
 
@@ -334,18 +328,6 @@ impl Observer for Outputs<'_> {
         recorder.as_mut().map_or(Ok(()), |recorder| recorder.observe(sample))?;
         // The meters come last, because they may end the run.
         meters.observe(sample)
-    }
-}
-
-/// Computes the margins that an experiment asks for. A loop that cannot be linearised has none, and
-/// the run is complete without them.
-fn margins(system: &System, interrupt: &Interrupt) -> Result<Measured, Error> {
-    match measures::asked(system, interrupt) {
-        Err(error @ Error::Call { .. }) => {
-            tracing::warn!("the margins are left out: {error}");
-            Ok(measures::none())
-        }
-        outcome => outcome,
     }
 }
 

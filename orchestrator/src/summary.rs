@@ -25,6 +25,8 @@ pub(crate) struct RunReport {
     pub ended: Option<Error>,
     /// How the instance that may do so ended the run.
     pub end: Option<String>,
+    /// Failure of an instance when it was freed.
+    pub late: Option<Error>,
 }
 
 /// Prints the summary of a run.

@@ -154,9 +154,10 @@ class Trial:
             raise Wrong(f"{words} not told: {done.stdout}")
 
 
-def bad_library(unit: str, code: int, *words: str, options: tuple[str, ...] = ()) -> Callable[[Trial, random.Random], None]:
+def bad_library(unit: str, code: int, *words: str, options: tuple[str, ...] = (), limits: str = "") -> Callable[[Trial, random.Random], None]:
     def fault(trial: Trial, _: random.Random) -> None:
         trial.fly_with(unit)
+        (trial.folder / "loop.toml").write_text(EXPERIMENT + limits)
         trial.must_be_told(trial.call(*options), code, *words)
 
     return fault
@@ -217,7 +218,7 @@ def killed_program(trial: Trial, chance: random.Random) -> None:
 
 
 def killed_unit(trial: Trial, chance: random.Random) -> None:
-    """The process of an instance is killed at any time, by the system or a person."""
+    """The closed process is killed at any time, by the system or a person."""
     process = trial.start("--isolate")
     children = Path(f"/proc/{process.pid}/task")
     end = time.monotonic() + chance.uniform(0.0, 0.6)
@@ -233,7 +234,7 @@ def killed_unit(trial: Trial, chance: random.Random) -> None:
     out, errors = process.communicate(timeout=300)
     done = subprocess.CompletedProcess(process.args, process.returncode, out, errors)
     if done.returncode == 0:
-        # It came too late, or while it was tried whether instances can be reset.
+        # It came too late, or the parts were flown by another process.
         trial.must_be_true(done)
     elif (trial.folder / "out" / "c" / "summary.json").exists():
         # It came after the last case; the results are complete.
@@ -248,14 +249,14 @@ FAULTS: dict[str, Callable[[Trial, random.Random], None]] = {
     "library without its dependency": bad_library("lonely", 2, "needs libgone.so, which is not on this system"),
     "library that is cut": bad_library("cut", 2, "is damaged"),
     "unit that crashes": bad_library("crashes", 1, "could not be flown", "killed by signal 11", options=("--isolate",)),
-    "unit that never answers": bad_library("endless", 1, "no answer within", options=("--isolate", "--call-timeout=0.3")),
+    "unit that never answers": bad_library("endless", 1, "no answer within", options=("--isolate",), limits="[isolation]\ncall_timeout = 0.3\n"),
     "folder without execution": noexec,
     "no folder to unpack into": no_folder,
     "part of another campaign": foreign_part,
     "damaged part": corrupt_part,
     "cases twice": doubled_cases,
     "program killed": killed_program,
-    "process of a unit killed": killed_unit,
+    "closed process killed": killed_unit,
 }
 
 

@@ -28,7 +28,6 @@ def run(folder, *lines, arguments=()):
         (["[isolation]", "memory = 512"], [], "[isolation] memory has no effect"),
         (["[isolation]", "cpu = 60"], [], "[isolation] cpu has no effect"),
         (["[isolation]", "call_timeout = 5"], [], "[isolation] call_timeout has no effect"),
-        ([], ["--call-timeout", "5"], "[isolation] call_timeout has no effect"),
         (["[simulation]", 'coupling = "jacobi"', ORDER], [], "[simulation] order has no effect"),
         ([CONNECTION], [], 'convert_units has no effect on the connection to "controller.attitude.*"'),
         (["[components.plant.parameters]", '"aerodynamics.lift.scale" = 0.9', '"planet.rate" = 0.0'], [], "planet.rate, aerodynamics.lift.scale have no effect: they are used with translation = entry"),

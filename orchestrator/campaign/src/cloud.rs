@@ -8,6 +8,7 @@ use cosim::variation::SettingValue;
 use cosim_metrics::progress::Parts;
 use cosim_report::figure::{self, Color, Curve, Figure, Legend, Shape, with_unit};
 use cosim_report::panels::{self, Panel};
+use sweep::closed;
 use sweep::runner::{self, Options, Worked};
 use sweep::track::Track;
 
@@ -48,19 +49,31 @@ pub(crate) fn draw(
     let flights: Vec<_> = std::iter::once(worst).chain(first).collect();
     let title = format!("{}, curves of the report", plan.campaign.title);
     let progress = Parts::new("cases", &title, flights.len() as u64, 0, options.quiet);
-    let Worked { results, failures } = runner::on_parts(
-        &flights,
-        runner::threads(options.jobs, [&plan.sweep]),
-        begin,
-        |(flight, panels), (case, values, stride)| {
-            let signals = self::curves(panels).map(|(_, curve)| curve.signal.clone()).collect();
-            let mut track = Track::new(signals, *stride);
-            flight.fly_with(*case, values.clone(), &mut [&mut track])?;
+    let threads = runner::threads(options.jobs, [&plan.sweep]);
+    let fly = |(flight, panels): &mut (Flight, Vec<Panel>),
+               (case, values, stride): &(u64, Vec<SettingValue>, u64)| {
+        let signals = self::curves(panels).map(|(_, curve)| curve.signal.clone()).collect();
+        let mut track = Track::new(signals, *stride);
+        flight.fly_with(*case, values.clone(), &mut [&mut track])?;
+        Ok(track)
+    };
+    let Worked { results, failures } = if let Some(closing) = flight.system().closing() {
+        progress.draw_here();
+        let keep = |_: &_, track| {
             progress.advance(1);
             Ok(track)
-        },
-        |_| false,
-    );
+        };
+        let apart = (&closing, &options.interrupt);
+        let system = flight.system().clone();
+        let failed = |_: &_, ended| system.ended(ended);
+        closed::on_parts(&flights, threads, apart, begin, fly, keep, failed, |_| false)
+    } else {
+        let fly = |state: &mut _, flight: &_| {
+            progress.advance(1);
+            fly(state, flight)
+        };
+        runner::on_parts(&flights, threads, begin, fly, |_| false)
+    };
     progress.finish();
     if let Some(error) = failures.into_values().next() {
         return Err(error);

@@ -9,12 +9,13 @@ use cosim::run::Observer;
 use cosim::system::{Opened, System};
 use cosim::variation::SettingValue;
 use cosim_report::recording::watch::Watch;
+use serde::{Deserialize, Serialize};
 use std::path::Path;
 use sweep::flight::{Bound, Flown, columns};
 use sweep::table::{CaseTable, Column, Values};
 
 /// How a case ended.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub enum CaseStatus {
     /// It reached its stop time.
     Completed,
@@ -42,7 +43,7 @@ impl CaseStatus {
 }
 
 /// Result of a case.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Row {
     /// Number of the case.
     pub case: u64,

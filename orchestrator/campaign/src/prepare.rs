@@ -3,9 +3,7 @@
 use crate::definition::Campaign;
 use crate::plan::Changes;
 use cosim::error::Error;
-use cosim::experiment::{
-    Experiment, Given, Margins, Measure, MeasureKind, Observe, Overrides, Protection,
-};
+use cosim::experiment::{Experiment, Margins, Measure, MeasureKind, Observe, Overrides, Process};
 use cosim::files;
 use cosim::search::named::{Kind, find};
 use cosim_metrics::metrics::{Meters, Metrics};
@@ -47,7 +45,7 @@ pub(crate) fn read_experiment(campaign: &Campaign, changes: &Changes) -> Result<
     }
     experiment.apply(&overrides)?;
     // A fault of these is that of the campaign's file, not of an option.
-    experiment.given = Given::default();
+    experiment.given = Overrides::default();
     for (name, value) in &campaign.set {
         let outcome = experiment.set(name, value.get_ref().clone());
         outcome.map_err(|problem| source.error(&value.span(), format!("[set] {problem}")))?;
@@ -153,9 +151,9 @@ pub(crate) fn keys(campaign: &Campaign, changes: &Changes) -> Result<String, Err
         table.remove("cases");
     }
     let text = toml::to_string(&table).map_err(|error| Error::experiment(error.to_string()))?;
-    // FMUs count by their content here as well, and it is the same for a case in which processes
-    // its instances run.
-    let isolation = Protection::default();
-    let overrides = Overrides { fmu: Vec::new(), isolation, ..changes.overrides.clone() };
+    // FMUs count by their content here as well, and it is the same for a case in which process its
+    // instances run.
+    let process = Process::default();
+    let overrides = Overrides { fmu: Vec::new(), process, ..changes.overrides.clone() };
     Ok(files::digest(format!("{text}{overrides:?}")))
 }

@@ -10,6 +10,7 @@ use crate::plan::Plan;
 use crate::sensitivity::{Estimate, Sensitivity};
 use cosim::error::Error;
 use cosim::files;
+use cosim::interrupt::Interrupt;
 use cosim_report::figure::{Figure, with_unit};
 use cosim_report::page::{Page, Section, figure, paragraphs, table, verdict};
 use maud::{Markup, html};
@@ -33,7 +34,7 @@ pub fn write(plan: &Plan, findings: &Findings, out: &Path, options: &Options) ->
     let cases = Reader::open(&out.join("cases.parquet"))?;
     let mut flight = Flight::new(plan, false, &options.interrupt)?;
     let kept_cases = chosen(plan, &cases)?;
-    keep(plan, &mut flight, &kept_cases, out)?;
+    keep(plan, &mut flight, &kept_cases, out, &options.interrupt)?;
     let ranking = ranking(plan);
     let ranked = match &ranking {
         Some(name) => worst(&cases.column(name)?.numbers(), SHOWN),
@@ -59,11 +60,19 @@ fn ranking(plan: &Plan) -> Option<String> {
 }
 
 /// Flies cases again and writes their full results.
-fn keep(plan: &Plan, flight: &mut Flight, cases: &BTreeSet<u64>, out: &Path) -> Result<(), Error> {
+fn keep(
+    plan: &Plan,
+    flight: &mut Flight,
+    cases: &BTreeSet<u64>,
+    out: &Path,
+    interrupt: &Interrupt,
+) -> Result<(), Error> {
+    let system = flight.system().clone();
     for case in cases {
         let folder = out.join("cases").join(case.to_string());
         let (title, _) = plan.write_case(*case, &folder)?;
-        flight.keep(*case, &folder, &title)?;
+        let fly = || flight.keep(*case, &folder, &title).map(drop);
+        system.apart(interrupt, &[&folder], fly)?;
     }
     Ok(())
 }

@@ -219,13 +219,14 @@ fn fly_parts(
         return Ok(());
     }
     let interrupt = &options.interrupt;
-    let resets = can_reset(&plan.sweep, &mut Opened::default(), interrupt);
-    let resets = resets.map_err(|error| of_case(0, error))?;
+    let system = plan.sweep.system(&mut Opened::default())?;
+    let try_it = || can_reset(&plan.sweep, &mut Opened::default(), interrupt);
+    let resets = system.apart(interrupt, &[], try_it).map_err(|error| of_case(0, error))?;
     let threads = runner::threads(options.jobs, [&plan.sweep]);
     work.fly(
         missing,
         (threads, plan.sweep.cases()),
-        options,
+        (&[system], options),
         || Ok(Flight::new(plan, resets, interrupt)?),
         |flight, part, progress| {
             let rows = part.cases.clone().map(|case| {
@@ -236,6 +237,7 @@ fn fly_parts(
             let rows = table(plan, &rows.collect::<Result<Vec<_>, _>>()?);
             Ok(PartResult { rows, units: plan.units(), curves: String::new() })
         },
+        |part, case, error| of_case(case.unwrap_or(part.cases.start), error),
     )
 }
 

@@ -11,12 +11,13 @@ use cmaes::{CMAESOptions, DVector};
 use cosim::error::Error as Single;
 use cosim::files;
 use cosim::interrupt::Interrupt;
+use cosim::system::Opened;
 use cosim_metrics::folder::Folder;
 use cosim_metrics::progress::Parts;
 use parking_lot::Mutex;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::cmp::Ordering;
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, Sender, channel};
@@ -56,7 +57,7 @@ pub struct SearchOutcome {
     /// Number of cases in which an FMU failed. They are in the table with their messages.
     pub failed: u64,
     /// Why the search ended.
-    pub ended: &'static str,
+    pub ended: String,
     /// Folder of the results.
     #[serde(skip)]
     pub out: PathBuf,
@@ -72,6 +73,7 @@ struct Order {
 }
 
 /// A case that was tried: its place and its result.
+#[derive(Serialize, Deserialize)]
 struct Tried {
     point: Vec<f64>,
     value: f64,
@@ -108,8 +110,10 @@ pub fn search(plan: &Plan, options: &Options) -> Result<SearchOutcome, Error> {
     let mut names = plan.recorded.iter().map(|recorded| &recorded.name);
     let measure = names.position(|name| name == search.largest.get_ref()).unwrap_or_default();
     let is_late = || options.time.is_some_and(|time| begin.elapsed() >= time);
-    let Found { searches, ended, tried } =
-        look_in_threads(plan, search, measure, options, &is_late)?;
+    let system = plan.sweep.system(&mut Opened::default())?;
+    let quiet = options.quiet || system.is_closed;
+    let look = || look_in_threads(plan, search, measure, (options, quiet), &is_late);
+    let Found { searches, ended, tried } = system.apart(&options.interrupt, &[], look)?;
     let worst = tried.iter().filter(|case| !case.value.is_nan());
     let worst = worst.max_by(|a, b| a.value.total_cmp(&b.value)).or(tried.first());
     let worst = worst.ok_or_else(|| Single::experiment("no case was flown"))?;
@@ -140,11 +144,12 @@ pub fn search(plan: &Plan, options: &Options) -> Result<SearchOutcome, Error> {
 }
 
 /// All cases of a search.
+#[derive(Serialize, Deserialize)]
 struct Found {
     /// Number of searches from different starts.
     searches: u64,
     /// Why the last one ended.
-    ended: &'static str,
+    ended: String,
     tried: Vec<Tried>,
 }
 
@@ -153,10 +158,10 @@ fn look_in_threads(
     plan: &Plan,
     search: &Search,
     measure: usize,
-    options: &Options,
+    (options, quiet): (&Options, bool),
     is_late: &dyn Fn() -> bool,
 ) -> Result<Found, Single> {
-    let progress = Parts::new("cases", &plan.campaign.title, search.cases, 0, options.quiet);
+    let progress = Parts::new("cases", &plan.campaign.title, search.cases, 0, quiet);
     let (orders, waiting) = channel::<Order>();
     let waiting = Mutex::new(waiting);
     let searched = Searched {
@@ -177,7 +182,7 @@ fn look_in_threads(
     });
     progress.finish();
     let (searches, ended) = result?;
-    Ok(Found { searches, ended, tried: searched.tried.into_inner() })
+    Ok(Found { searches, ended: ended.into(), tried: searched.tried.into_inner() })
 }
 
 /// Writes the table of all cases, of which the worst must have a value of the measure.

@@ -15,6 +15,7 @@ use fmi_master::settings::SettingValue;
 use fmi_master::wiring::Part;
 use fmu_import::faults;
 use fmu_import::fmu::Fmu;
+use fmu_import::isolation;
 use fmu_import::lookup_table::is_lookup_table;
 use fmu_import::warnings;
 use std::collections::BTreeMap;
@@ -36,7 +37,7 @@ pub fn check(
     let clock = Clock::new(simulation.start, simulation.stop, simulation.step)
         .map_err(|problem| experiment.time_error(&problem))?;
 
-    let mut components = Vec::new();
+    let (mut components, mut foreign) = (Vec::new(), None);
     for name in order(&experiment)? {
         let path = find_fmu(&experiment, &name, fmu_dirs)?;
         let fmu = match opened.get(&path) {
@@ -47,17 +48,25 @@ pub fn check(
         let fmu =
             if experiment.is_flown_by_law(&name) { Rc::new(fmu.flown_by_law()?) } else { fmu };
         let component = &experiment.components[&name];
-        let is_isolated = experiment.isolation.isolates(component, &fmu, fmu_dirs);
+        // The declaration alone proves nothing, but others do not write to these folders.
+        let is_trusted = fmu.is_lookup_table()
+            || fmu.is_made_by_fmu_pack() && search::is_installed(&fmu.path, fmu_dirs);
+        if !is_trusted {
+            foreign.get_or_insert(fmu.path.clone());
+        }
         let interface = experiment.interface(&name, &fmu)?;
         let (every, settings) = (component.every, Vec::new());
-        components.push(CheckedComponent { name, fmu, interface, every, is_isolated, settings });
+        components.push(CheckedComponent { name, fmu, interface, every, settings });
     }
     let parts = parts(&components);
     if let Some(target) = experiment.unplaced.first() {
         return Err(Error::experiment(format!("--set {target}: {}", whereabouts(target, &parts))));
     }
-    experiment.isolation.check().map_err(|problem| experiment.isolation_error(&problem))?;
-    warn_of_idle_keys(&experiment, &components);
+    let fault =
+        |problem: String| experiment.source.error(&(0..0), format!("[isolation] {problem}"));
+    experiment.isolation.check().map_err(fault)?;
+    let is_closed = is_closed(&experiment, foreign.as_deref());
+    warn_of_idle_keys(&experiment, is_closed);
     experiment.warn_of_idle(experiment.assigned.iter().map(String::as_str));
     check_single_instances(&experiment, &components)?;
     if let Some(name) = &experiment.simulation.ends_with
@@ -89,7 +98,7 @@ pub fn check(
         component.settings = settings;
     }
     warn_of_different_files(&components);
-    Ok(System { experiment, clock, components, loops, wires, columns, probes })
+    Ok(System { experiment, clock, components, is_closed, loops, wires, columns, probes })
 }
 
 /// Warns if components read different files by a parameter of the same name, such as
@@ -120,32 +129,33 @@ fn warn_of_different_files(components: &[CheckedComponent]) {
     }
 }
 
+/// Returns whether the instances run in a closed process, if an FMU is `foreign` or none is.
+fn is_closed(experiment: &Experiment, foreign: Option<&Path>) -> bool {
+    match (experiment.isolation.isolate, foreign) {
+        (None, Some(path)) if !isolation::can_close() => {
+            let path = path.display();
+            warnings::warn_once(format!(
+                "{path} runs with your rights: no process can be closed here"
+            ));
+            false
+        }
+        (isolate, _) => isolate.unwrap_or(foreign.is_some()),
+    }
+}
+
 /// Warns of keys that have no effect beside the others.
-fn warn_of_idle_keys(experiment: &Experiment, components: &[CheckedComponent]) {
+fn warn_of_idle_keys(experiment: &Experiment, is_closed: bool) {
     let Experiment { isolation, simulation, source, .. } = experiment;
     let warn = |keys: &str, why: &str| {
         warnings::warn_once(format!("{}: {keys} has no effect {why}", source.path.display()));
     };
-    let has_processes = components.iter().any(|component| component.is_isolated);
-    for key in isolation.idle(has_processes) {
-        let why = match key {
-            "isolate" => "beside sandbox = true",
-            _ => "where no instance has a process of its own: it is used with isolate = true",
-        };
+    for key in isolation.limits().filter(|_| !is_closed) {
+        let why = "where the process is not closed: it is used with isolate = true";
         warn(&format!("[isolation] {key}"), why);
-    }
-    let asked = |part: &&CheckedComponent| experiment.components[&part.name].isolate.is_some();
-    for CheckedComponent { name, fmu, .. } in components.iter().filter(asked) {
-        let key = format!("[components.{name}] isolate");
-        if isolation.sandbox == Some(true) {
-            warn(&key, "beside sandbox = true");
-        } else if fmu.is_lookup_table() {
-            warn(&key, "on a lookup table");
-        }
     }
     if simulation.coupling == Coupling::Jacobi
         && !simulation.order.is_empty()
-        && !experiment.given.coupling
+        && experiment.given.coupling.is_none()
     {
         warn("[simulation] order", "with coupling = \"jacobi\"");
     }
@@ -224,14 +234,13 @@ fn check_single_instances(
     components: &[CheckedComponent],
 ) -> Result<(), Error> {
     for (index, component) in components.iter().enumerate() {
-        let CheckedComponent { name, fmu, is_isolated, .. } = component;
+        let CheckedComponent { name, fmu, .. } = component;
         let only_once = component.has("canBeInstantiatedOnlyOncePerProcess");
         if only_once
-            && !is_isolated
             && let Some(other) = components[..index].iter().find(|o| Rc::ptr_eq(&o.fmu, fmu))
         {
             let message = format!(
-                "\"{}\" and \"{name}\" both use {}, which can be instantiated only once per process: give one of them isolate = true",
+                "\"{}\" and \"{name}\" both use {}, which can be instantiated only once per process: give one of them a copy of the file",
                 other.name,
                 fmu.path.display()
             );

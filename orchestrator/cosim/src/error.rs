@@ -6,10 +6,11 @@ use fmi_master::instance::CallFailure;
 use fmi_master::master::Failed;
 use fmi_master::quantity::rounded;
 use fmu_import::error::Error as Import;
+use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
 /// An error that occurs between reading an experiment and writing its results.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, Serialize, Deserialize)]
 pub enum Error {
     /// The experiment or the command line asks for something that cannot be done.
     #[error("{at}{message}")]
@@ -83,6 +84,7 @@ pub enum Error {
         /// Path of the file or folder.
         path: PathBuf,
         /// Reason that the system gave.
+        #[serde(with = "fmu_import::error::reason")]
         source: std::io::Error,
     },
 }

@@ -1,6 +1,7 @@
 //! Requests from outside to end the work. The results so far are kept, and temporary files are
 //! removed.
 
+use serde::{Deserialize, Serialize};
 #[cfg(unix)]
 use signal_hook::flag;
 use std::io;
@@ -23,7 +24,7 @@ pub struct Interrupt {
 }
 
 /// A request to end the work: the signal with this number has arrived.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Request(i32);
 
 impl Request {
@@ -97,6 +98,11 @@ impl Interrupt {
     /// Records a request to end the work.
     pub fn ask(&self, request: Request) {
         self.signal.store(usize::try_from(request.0).unwrap_or_default(), Ordering::Relaxed);
+    }
+
+    /// Returns the number of the signal that made the request, if any.
+    pub fn signal(&self) -> Option<i32> {
+        self.asked().map(|request| request.0)
     }
 
     /// Returns the request that was made, if any.

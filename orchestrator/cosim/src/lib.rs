@@ -8,6 +8,8 @@
 //! finished run, and [`ssp`] reads and writes systems as SSP archives.
 
 pub mod check;
+pub mod choice;
+pub mod closing;
 pub mod document;
 pub mod error;
 pub mod experiment;

@@ -65,9 +65,7 @@ impl Run {
         (self.master.members, self.spent) = members
             .map(|member| {
                 let (instance, spent) = Stopwatch::new(member.instance, Rc::clone(timer));
-                // Computing times of two instances that work at the same time could not be
-                // separated.
-                (Member { ahead: false, instance: Box::new(instance), ..member }, spent)
+                (Member { instance: Box::new(instance), ..member }, spent)
             })
             .unzip();
     }

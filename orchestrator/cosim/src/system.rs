@@ -37,6 +37,8 @@ pub struct System {
     pub clock: Clock,
     /// The components, in the order in which they are stepped.
     pub components: Vec<CheckedComponent>,
+    /// Whether the instances run in a closed process.
+    pub is_closed: bool,
     /// Feedback loops with their delays, in ticks.
     pub loops: Vec<FeedbackLoop>,
     pub(crate) wires: Vec<Wire>,
@@ -56,8 +58,6 @@ pub struct CheckedComponent {
     pub interface: InterfaceKind,
     /// Period of the component, in communication steps.
     pub every: u32,
-    /// Whether the instance has a process of its own.
-    pub is_isolated: bool,
     pub(crate) settings: Vec<Setting>,
 }
 
@@ -284,14 +284,13 @@ impl System {
     ) -> Result<Run, Error> {
         let mut members = Vec::new();
         for component in &self.components {
-            let CheckedComponent { name, fmu, interface, every, is_isolated, .. } = component;
-            let limits = is_isolated.then(|| self.experiment.isolation.limits());
-            let instance = fmu.instantiate(name, *interface, limits.as_ref())?;
+            let CheckedComponent { name, fmu, interface, every, .. } = component;
+            let instance = fmu.instantiate(name, *interface)?;
             let on_invalid = self.experiment.simulation.on_invalid;
             let instance = Watched::around(instance, name, fmu, on_invalid);
-            let (name, every, ahead) = (name.clone(), *every, *is_isolated);
+            let (name, every) = (name.clone(), *every);
             let varies = fmu.fits_last_step(*interface);
-            members.push(Member { name, every, ahead, varies, instance });
+            members.push(Member { name, every, varies, instance });
         }
         let coupling = self.experiment.simulation.coupling;
         let parts = self.parts();

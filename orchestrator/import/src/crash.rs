@@ -3,6 +3,7 @@
 
 #![allow(unsafe_code)]
 
+use crate::isolation::page;
 use crate::log::Log;
 use parking_lot::Mutex;
 use std::cell::Cell;
@@ -25,6 +26,7 @@ impl<'a> Calling<'a> {
     #[inline]
     pub(crate) fn new(log: &'a Log, call: &'static str) -> Self {
         CURRENT.set(Some((log, call)));
+        page::begin(&log.component, call);
         Self(PhantomData)
     }
 }
@@ -33,6 +35,7 @@ impl Drop for Calling<'_> {
     #[inline]
     fn drop(&mut self) {
         CURRENT.set(None);
+        page::end();
     }
 }
 
@@ -90,10 +93,9 @@ pub fn unwatch() {
     WATCHED.store(0, Ordering::SeqCst);
 }
 
-/// Watches from now on for signals that end this process, and for calls of `exit`; under Linux with
-/// the GNU C library also for those of `_exit`, `_Exit` and `quick_exit`. One line on standard
-/// error names the instance that was being called, or the FMUs that were loaded. An exit is then a
-/// failure, with code 1. A file that grows beyond the limit of the user (`ulimit -f`) ends nothing:
+/// Watches from now on for signals that end this process, and for calls of `exit`. One line on
+/// standard error names the instance that was being called, or the FMUs that were loaded. An exit
+/// is then a failure, with code 1. A file that grows beyond the limit of the user (`ulimit -f`) ends nothing:
 /// whoever writes it gets an error.
 pub fn watch() -> Watch {
     WATCHED.store(std::process::id(), Ordering::SeqCst);
@@ -118,8 +120,6 @@ fn listen() {
     unsafe {
         libc::signal(libc::SIGXFSZ, libc::SIG_IGN);
         libc::atexit(on_exit);
-        #[cfg(all(target_os = "linux", target_env = "gnu"))]
-        gnu::at_quick_exit(gnu::on_quick_exit);
     }
 }
 
@@ -171,6 +171,7 @@ extern "C" fn on_signal(
     information: *mut libc::siginfo_t,
     _context: *mut libc::c_void,
 ) {
+    page::ends();
     for (place, (number, name)) in SIGNALS.iter().enumerate() {
         if *number == signal {
             tell(name);
@@ -192,6 +193,7 @@ extern "C" fn on_signal(
 
 #[cfg(any(unix, windows))]
 extern "C" fn on_exit() {
+    page::ends();
     refuse_exit("exit");
 }
 
@@ -203,47 +205,6 @@ fn refuse_exit(what: &str) {
         unwatch();
         // SAFETY: this ends the process at once.
         unsafe { libc::_exit(1) };
-    }
-}
-
-/// Functions of the GNU C library that end a process without the functions of `atexit`.
-#[cfg(all(target_os = "linux", target_env = "gnu"))]
-mod gnu {
-    use super::refuse_exit;
-    use std::ffi::c_int;
-
-    unsafe extern "C" {
-        pub(super) fn at_quick_exit(function: extern "C" fn()) -> c_int;
-    }
-
-    pub(super) extern "C" fn on_quick_exit() {
-        refuse_exit("quick_exit");
-    }
-
-    /// Takes the place of the C library's function for all libraries that are loaded, because the
-    /// linker exports from a program what a library of the system defines as well.
-    // SAFETY: the function has the name, the type and the effect of that in the C library.
-    #[unsafe(no_mangle)]
-    extern "C" fn _exit(code: c_int) -> ! {
-        end("_exit", code)
-    }
-
-    /// Takes the place of the C library's function, as [`_exit`] does.
-    // SAFETY: the function has the name, the type and the effect of that in the C library.
-    #[unsafe(no_mangle)]
-    extern "C" fn _Exit(code: c_int) -> ! {
-        end("_Exit", code)
-    }
-
-    fn end(what: &str, code: c_int) -> ! {
-        // The program itself ends with the number of a signal when that comes a second time.
-        if code < 128 {
-            refuse_exit(what);
-        }
-        loop {
-            // SAFETY: this ends the process at once.
-            unsafe { libc::syscall(libc::SYS_exit_group, code) };
-        }
     }
 }
 
@@ -271,6 +232,7 @@ fn tell(what: &str) -> bool {
         write(&[", perhaps by a thread of an FMU that was loaded: ", newest]);
         names.for_each(|name| write(&[", ", name]));
     }
-    write(&["; with --isolate the run would end in order and keep its results\n"]);
+    let remedy = "; with --isolate the run would end in order and keep its results";
+    write(&[if cfg!(target_os = "linux") { remedy } else { "" }, "\n"]);
     true
 }

@@ -8,7 +8,6 @@ use crate::exchange;
 use crate::faults;
 use crate::fmi3::Layout;
 use crate::folder::TemporaryFolder;
-use crate::isolation::{self, Isolation, Library};
 use crate::law::{LawInstance, Ports};
 use crate::loading::{self, Kind, Made, Refusal};
 use crate::log::Log;
@@ -104,14 +103,13 @@ impl Fmu {
     }
 
     /// Lists the faults of the archive that do not keep it from being opened: one line for each
-    /// fault of the description and of the library for this platform. The library is loaded in this
-    /// process, or in a process of its own if `isolation` is given.
-    pub fn faults(&self, isolation: Option<&Isolation>) -> Vec<String> {
+    /// fault of the description and of the library for this platform, which is loaded.
+    pub fn faults(&self) -> Vec<String> {
         let mut faults = faults::faults(&self.description);
         let kinds = [InterfaceKind::CoSimulation, InterfaceKind::ModelExchange { tolerance: 1e-6 }];
         let Content::Archive(archive) = &self.content else { return faults };
         for kind in kinds.into_iter().filter(|kind| self.description.interface(*kind).is_some()) {
-            let tried = self.try_instance(archive, kind, isolation);
+            let tried = self.try_instance(archive, kind);
             let (Ok(Some(fault)) | Err(fault)) = tried else { continue };
             // What keeps both interfaces from working is told once.
             if !faults.contains(&fault) {
@@ -124,6 +122,15 @@ impl Fmu {
     /// Returns whether the file is a lookup table, which runs no code of its own.
     pub fn is_lookup_table(&self) -> bool {
         self.description.is_lookup_table
+    }
+
+    /// Returns the folder of the unpacked archive; a lookup table has none.
+    pub fn folder(&self) -> Option<&Path> {
+        match &self.content {
+            Content::Archive(archive) => Some(archive.folder.path()),
+            Content::LookupTable(_) => None,
+            Content::Law(stand_in, _) => stand_in.folder(),
+        }
     }
 
     /// Returns whether this project's fmu-pack made the FMU, as it says.
@@ -190,31 +197,25 @@ impl Fmu {
         Ok((file, entry))
     }
 
-    /// Loads the library and makes an instance called `name` of this kind: in this process, or in a
-    /// process of its own if `isolation` is given. A lookup table is always in this process.
+    /// Loads the library and makes an instance called `name` of this kind.
     ///
     /// # Errors
     /// Returns an error if the FMU has no library for this platform or does not offer the
     /// interface, if the library cannot be loaded, or if the FMU refuses.
-    pub fn instantiate(
-        &self,
-        name: &str,
-        kind: InterfaceKind,
-        isolation: Option<&Isolation>,
-    ) -> Result<Box<dyn Instance>, Error> {
+    pub fn instantiate(&self, name: &str, kind: InterfaceKind) -> Result<Box<dyn Instance>, Error> {
         let archive = match &self.content {
             Content::Archive(archive) => archive,
             Content::LookupTable(table) => {
                 return Ok(Box::new(LookupTableInstance::new(name, table.clone())));
             }
             Content::Law(stand_in, ports) => {
-                let stand_in = stand_in.instantiate(name, kind, isolation)?;
+                let stand_in = stand_in.instantiate(name, kind)?;
                 return Ok(Box::new(LawInstance::new(stand_in, ports.clone())));
             }
         };
         let of_component = format!("the component \"{name}\"");
         let (instance, fault) = self
-            .made(archive, (name, &of_component), kind, isolation)
+            .made(archive, (name, &of_component), kind)
             .map_err(|message| Error::Fmu { path: self.path.clone(), message })?;
         if let Some(fault) = fault {
             warnings::warn_once(format!("{}: {fault}", self.path.display()));
@@ -228,13 +229,11 @@ impl Fmu {
         &self,
         archive: &Archive,
         kind: InterfaceKind,
-        isolation: Option<&Isolation>,
     ) -> Result<Option<String>, String> {
         let name = self.path.file_name().unwrap_or_default().to_string_lossy();
-        let (instance, fault) = self.made(archive, (&name, "its instance"), kind, isolation)?;
+        let (instance, fault) = self.made(archive, (&name, "its instance"), kind)?;
         drop(instance);
-        let failure = isolation::late_failures().into_iter().next();
-        failure.map_or(Ok(fault), Err)
+        Ok(fault)
     }
 
     /// Makes an instance, which a refusal calls `title`. Returns it with what is wrong with the
@@ -244,7 +243,6 @@ impl Fmu {
         archive: &Archive,
         (name, title): (&str, &str),
         kind: InterfaceKind,
-        isolation: Option<&Isolation>,
     ) -> Result<Made, String> {
         let (file, entry) = self.library(archive, kind)?;
         let kind = archive.kind(&self.description, kind)?;
@@ -259,14 +257,9 @@ impl Fmu {
         };
         let guid = &self.description.guid;
         let named = (&**guid, &*resources);
-        let made = if let Some(isolation) = isolation {
-            let library = Library { file, folder: archive.folder.path(), isolation, kind };
-            library.instantiate(name, named)
-        } else {
-            crash::is_loaded(&self.path);
-            let (log, folder) = (Rc::new(Log::new(name)), Some(Rc::clone(&archive.folder)));
-            loading::loaded(&file, kind, log, named, folder)
-        };
+        crash::is_loaded(&self.path);
+        let (log, folder) = (Rc::new(Log::new(name)), Some(Rc::clone(&archive.folder)));
+        let made = loading::loaded(&file, kind, log, named, folder);
         made.map_err(|refusal| match refusal {
             Refusal::Unloadable(reason) => archive.not_loaded(&entry, &reason),
             Refusal::Refused(reason) => format!("{title} {reason}"),
@@ -305,7 +298,7 @@ impl Archive {
         if runs_nothing(self.folder.path()) {
             return format!(
                 "{entry} cannot be loaded from {}, whose files may not be run (noexec): set TMPDIR to another folder",
-                std::env::temp_dir().display()
+                self.folder.path().parent().unwrap_or(Path::new("/")).display()
             );
         }
         // The path of the temporary folder is removed, because it means nothing to a reader.

@@ -6,6 +6,7 @@
 //! moment. A message is its kind as one byte, the number of a flight's law (u64), a time in s
 //! (f64), the length of what follows (u32), and what follows, all in little-endian order.
 
+use crate::isolation::page;
 use fmi_master::description::{ModelDescription, VariableKind};
 use fmi_master::forward;
 use fmi_master::instance::{CallFailure, Instance, Outcome};
@@ -50,6 +51,7 @@ thread_local! {
 /// Says which case the flights of this thread belong to from now on.
 pub fn in_case(case: Option<u64>) {
     CASE.set(case);
+    page::in_case(case);
 }
 
 /// Standard output as it was when this program began.
@@ -72,6 +74,12 @@ pub fn begin() -> io::Result<()> {
     }
     let _ = MESSAGES.set(messages.into());
     Ok(())
+}
+
+/// Returns the descriptor at which messages are written, if there is a law in another program.
+#[cfg(target_os = "linux")]
+pub(crate) fn descriptor() -> Option<std::os::fd::RawFd> {
+    MESSAGES.get().map(std::os::fd::AsRawFd::as_raw_fd)
 }
 
 /// Sends a message, and reads the answer.

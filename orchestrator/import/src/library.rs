@@ -12,6 +12,7 @@ use float_environment::in_default;
 use fmi_master::instance::{CallFailure, Outcome};
 use fmi_master::quantity::rounded;
 use std::ffi::c_int;
+use std::mem::ManuallyDrop;
 use std::rc::Rc;
 
 /// Calls a function of a library. Its name is recorded meanwhile, in case it crashes, and the
@@ -32,10 +33,19 @@ pub(crate) fn put<T>(kept: &mut Vec<T>, number: usize, state: T) {
 
 /// The data that must live as long as an instance.
 struct InstanceData<F> {
-    functions: F,
+    functions: ManuallyDrop<F>,
     _callbacks: Option<Rc<fmi::Callbacks>>,
     _listed: Listed,
     log: Rc<Log>,
+}
+
+impl<F> Drop for InstanceData<F> {
+    fn drop(&mut self) {
+        // Unloading the library runs code of it as well.
+        let _calling = Calling::new(&self.log, "freeInstance");
+        // SAFETY: the functions are dropped only here.
+        unsafe { ManuallyDrop::drop(&mut self.functions) };
+    }
 }
 
 /// An instance of an FMU, in this process.
@@ -67,6 +77,7 @@ impl<F: Table> FmuInstance<F> {
             return Err(format!("could not be instantiated: {message}"));
         }
         log.is_instantiated();
+        let functions = ManuallyDrop::new(functions);
         let data = Rc::new(InstanceData { functions, _callbacks: callbacks, _listed: listed, log });
         Ok(Self {
             handle,

@@ -1,5 +1,6 @@
 //! Reads unpacked archives and makes instances of their libraries, in any process.
 
+use crate::crash::Calling;
 use crate::description;
 use crate::error::with_causes;
 use crate::exchange::{self, ContinuousModel, Exchange};
@@ -59,14 +60,18 @@ pub(crate) fn loaded(
     let unloadable = |error: libloading::Error| Refusal::Unloadable(with_causes(&error));
     let Kind { fmi3, exchange } = kind;
     let exchanges = exchange.is_some();
+    // Loading runs code of the library as well.
+    let loads = Calling::new(&log, "instantiate");
     if let Some(layout) = fmi3 {
         let functions = fmi3::Functions::load(file, exchanges).map_err(unloadable)?;
+        drop(loads);
         let fault = functions.common().version_fault();
         let unit = Fmi3Unit::new(functions, layout, log, named, folder);
         let instance = unit.and_then(|unit| integrated(unit, exchange, StepInstance::new));
         return Ok((instance.map_err(Refusal::Refused)?, fault));
     }
     let functions = Functions::load(file, exchanges).map_err(unloadable)?;
+    drop(loads);
     let fault = functions.common().version_fault();
     let unit = FmuInstance::new(functions, log, named, folder);
     let instance = unit.and_then(|unit| integrated(unit, exchange, Ok));

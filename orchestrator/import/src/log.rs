@@ -1,27 +1,17 @@
 //! Log messages of instances.
 
 use crate::fmi::Status;
+use crate::isolation::page;
 use crate::warnings;
 use parking_lot::Mutex;
-use serde::{Deserialize, Serialize};
 use std::ffi::c_int;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-/// Largest number of messages of an instance that are printed in a second, or held until they are
-/// taken.
+/// Largest number of messages of an instance that are printed in a second.
 const MOST: u64 = 100;
 /// Largest number of bytes of a message.
 const LONGEST: usize = 2000;
-
-/// A message that an instance logged.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub(crate) struct LogMessage {
-    pub(crate) status: c_int,
-    pub(crate) category: String,
-    pub(crate) text: String,
-}
 
 /// Forwards the log messages of an instance, and stores the last one that reports a problem.
 pub(crate) struct Log {
@@ -31,22 +21,8 @@ pub(crate) struct Log {
     /// Whether the instance is being instantiated. Messages about problems are then part of the
     /// error that follows.
     instantiates: AtomicBool,
-    sink: Sink,
+    pace: Mutex<Pace>,
 }
-
-/// Function that is handed a text.
-type ReportProblem = Box<dyn Fn(&[u8]) + Send + Sync>;
-
-enum Sink {
-    /// Prints messages as `tracing` does.
-    Printed(Mutex<Pace>),
-    /// Holds messages for another process, and passes on the text of problems at once.
-    Held(Arc<Held>, ReportProblem),
-}
-
-/// Messages that are held until they are taken.
-#[derive(Default)]
-pub(crate) struct Held(Mutex<(Vec<LogMessage>, u64)>);
 
 /// Number of messages in the current second.
 #[derive(Default)]
@@ -75,50 +51,15 @@ impl Pace {
     }
 }
 
-impl Held {
-    /// Takes the messages that came since the last call.
-    pub(crate) fn take(&self) -> Vec<LogMessage> {
-        let (mut messages, lost) = std::mem::take(&mut *self.0.lock());
-        if lost > 0 {
-            let text = format!("{lost} further messages are left out");
-            messages.push(LogMessage {
-                status: Status::Warning as c_int,
-                category: "log".into(),
-                text,
-            });
-        }
-        messages
-    }
-
-    fn add(&self, message: LogMessage) {
-        let mut held = self.0.lock();
-        if (held.0.len() as u64) < MOST { held.0.push(message) } else { held.1 += 1 }
-    }
-}
-
 impl Log {
-    /// Creates a log of a component whose messages are printed.
+    /// Creates a log of a component.
     pub(crate) fn new(component: &str) -> Self {
-        Self::with(component, Sink::Printed(Mutex::default()))
-    }
-
-    /// Creates a log of a component whose messages are held. The text of a problem also goes to
-    /// `problem` at once.
-    pub(crate) fn held(
-        component: &str,
-        held: Arc<Held>,
-        problem: impl Fn(&[u8]) + Send + Sync + 'static,
-    ) -> Self {
-        Self::with(component, Sink::Held(held, Box::new(problem)))
-    }
-
-    fn with(component: &str, sink: Sink) -> Self {
         Self {
             component: component.to_string(),
             last: Mutex::default(),
             event: Mutex::default(),
             instantiates: AtomicBool::new(true),
-            sink,
+            pace: Mutex::default(),
         }
     }
 
@@ -139,17 +80,10 @@ impl Log {
     pub(crate) fn message(&self, status: Result<Status, c_int>, category: &str, message: &str) {
         let message = cut(message).trim_end().replace('\n', " ");
         let is_problem = !matches!(status, Ok(Status::Ok | Status::Pending | Status::Warning));
-        match &self.sink {
-            Sink::Held(held, problem) => {
-                if is_problem {
-                    problem(message.as_bytes());
-                }
-                let status = status.map_or_else(|code| code, |status| status as c_int);
-                let (category, text) = (cut(category).to_string(), message.clone());
-                held.add(LogMessage { status, category, text });
-            }
-            Sink::Printed(pace) => self.print(pace, status, cut(category), &message),
+        if is_problem {
+            page::problem(&message);
         }
+        self.print(status, cut(category), &message);
         let place = if is_problem { &self.last } else { &self.event };
         *place.lock() = Some(message);
     }
@@ -160,13 +94,7 @@ impl Log {
         }
     }
 
-    fn print(
-        &self,
-        pace: &Mutex<Pace>,
-        status: Result<Status, c_int>,
-        category: &str,
-        message: &str,
-    ) {
+    fn print(&self, status: Result<Status, c_int>, category: &str, message: &str) {
         let component = &self.component;
         match status {
             Ok(Status::Ok | Status::Pending | Status::Discard)
@@ -182,7 +110,7 @@ impl Log {
             }
             _ => {}
         }
-        let (may_print, lost) = pace.lock().count();
+        let (may_print, lost) = self.pace.lock().count();
         self.report_lost(lost);
         if !may_print {
             return;
@@ -210,10 +138,8 @@ const _: () = {
 
 impl Drop for Log {
     fn drop(&mut self) {
-        if let Sink::Printed(pace) = &self.sink {
-            let lost = pace.lock().lost();
-            self.report_lost(lost);
-        }
+        let lost = self.pace.lock().lost();
+        self.report_lost(lost);
     }
 }
 
@@ -229,20 +155,13 @@ mod tests {
 
     #[test]
     fn a_flood_is_counted_and_a_long_message_cut() {
-        let held = Arc::new(Held::default());
-        let words = Arc::new(Mutex::new(Vec::new()));
-        let heard = Arc::clone(&words);
-        let log = Log::held("a", Arc::clone(&held), move |text| *heard.lock() = text.to_vec());
+        let log = Log::new("a");
         for number in 0..1000 {
             log.message(Ok(Status::Error), "c", &format!("{number} {}", "é".repeat(2000)));
         }
-        let messages = held.take();
-        assert_eq!(messages.len() as u64, MOST + 1);
-        assert_eq!(messages[MOST as usize].text, "900 further messages are left out");
-        assert!(messages.iter().all(|message| message.text.len() <= LONGEST));
-        assert!(words.lock().starts_with(b"999 "));
-        assert!(log.take().unwrap().starts_with("999 ") && log.take().is_none());
-        assert!(held.take().is_empty());
+        assert_eq!(log.pace.lock().lost(), 1000 - MOST);
+        let last = log.take().unwrap();
+        assert!(last.starts_with("999 ") && last.len() <= LONGEST && log.take().is_none());
 
         let mut pace = Pace::default();
         let printed = (0..1000).filter(|_| pace.count().0).count() as u64;

@@ -1,6 +1,7 @@
 //! Collects the warnings of instances during a run. Each is printed once, at the end, with the time
 //! at which it first came and with its count.
 
+use crate::isolation;
 use parking_lot::Mutex;
 use std::cell::RefCell;
 use std::collections::BTreeSet;
@@ -52,6 +53,7 @@ impl Drop for Silence {
 
 /// Sets the current simulated time, s.
 pub fn at(time: f64) {
+    isolation::page::at(time);
     COLLECTED.with_borrow_mut(|collection| {
         if let Some(collection) = collection {
             collection.now = time;
@@ -73,6 +75,7 @@ pub(crate) fn collected(text: &str) -> bool {
         if let Some(warning) = warnings.iter_mut().find(|warning| warning.text == text) {
             warning.count += 1;
         } else if warnings.len() < MOST {
+            isolation::tell_warning(text);
             warnings.push(Warning { text: text.to_string(), first: *now, count: 1 });
         } else {
             return false;

@@ -93,17 +93,10 @@ impl Lineariser {
     /// Prepares a system to be linearised at `time` (s), with the loop opened at these signals.
     ///
     /// # Errors
-    /// Returns an error if the time is not a communication point, if a signal is not connected, or
-    /// if an instance has a process of its own.
+    /// Returns an error if the time is not a communication point, or if a signal is not connected.
     pub fn new(mut system: System, time: f64, open: &[String]) -> Result<Self, Error> {
         let first = tick_at(&system.clock, time)?;
         let time = system.clock.time(first);
-        if let Some(isolated) = system.components.iter().find(|component| component.is_isolated) {
-            return Err(Error::experiment(format!(
-                "the instance of {} is in a process of its own, where it keeps no states: --isolate=false puts it into this one",
-                isolated.name
-            )));
-        }
         let (signals, opened) = opened(&system, open)?;
         let wired = wired(&mut system, first)?;
         let responds = |component: usize| wired.iter().any(|one| one.component == component);

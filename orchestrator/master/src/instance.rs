@@ -85,15 +85,6 @@ pub trait Instance {
     /// # Errors
     /// Returns an error if the instance reports a failure.
     fn exit_initialization(&mut self) -> Outcome;
-    /// Lets the instance begin a step, which [`Self::do_step`] with the same arguments, as the next
-    /// call, completes. An instance in a process of its own computes meanwhile; others do nothing
-    /// yet.
-    ///
-    /// # Errors
-    /// Returns an error if the instance cannot be reached.
-    fn begin_step(&mut self, _time: f64, _step: f64) -> Outcome {
-        Ok(())
-    }
     /// Steps the instance from the communication point `time` by `step`, both in s.
     ///
     /// # Errors
@@ -175,9 +166,6 @@ macro_rules! forward {
     };
     (@signature $through:ident enter_initialization) => {
         $crate::forward!(@call $through enter_initialization(start: f64, stop: f64));
-    };
-    (@signature $through:ident begin_step) => {
-        $crate::forward!(@call $through begin_step(time: f64, step: f64));
     };
     (@signature $through:ident do_step) => {
         $crate::forward!(@call $through do_step(time: f64, step: f64));

@@ -18,7 +18,7 @@ pub use transfer::Member;
 
 use crate::clock::Clock;
 use crate::delay::Reading;
-use crate::instance::{CallFailure, Instance, Outcome};
+use crate::instance::{CallFailure, Outcome};
 use crate::settings::{self, Setting};
 use crate::wiring::{Coupling, Port, Wire};
 use transfer::{Inputs, Row, Values};
@@ -78,8 +78,6 @@ pub struct Master {
     pub members: Vec<Member>,
     clock: Clock,
     coupling: Coupling,
-    /// Instances that are stepping in a process of their own, while others work.
-    stepping: Vec<bool>,
     inputs: Vec<Inputs>,
     values: Values,
     row: Row,
@@ -105,7 +103,6 @@ impl Master {
         Self {
             clock,
             coupling,
-            stepping: vec![false; members.len()],
             inputs: (0..members.len()).map(|target| Inputs::new(&values, wires, target)).collect(),
             row: Row::new(&values, probes),
             members,
@@ -255,14 +252,11 @@ impl Master {
     fn step_one_by_one(&mut self, tick: u64) -> Result<(), Culprit> {
         for index in 0..self.members.len() {
             if self.begins(index, tick) {
-                for place in 0..self.inputs[index].awaited.len() {
-                    self.finish(self.inputs[index].awaited[place], tick)?;
-                }
                 self.set(index)?;
-                self.begin(index, tick)?;
+                self.step(index, tick)?;
             }
         }
-        self.finish_all(tick)
+        Ok(())
     }
 
     fn step_all_at_once(&mut self, tick: u64) -> Result<(), Culprit> {
@@ -271,15 +265,12 @@ impl Master {
                 self.set(index)?;
             }
         }
-        // Instances in processes of their own compute while the others are stepped.
-        for ahead in [true, false] {
-            for index in 0..self.members.len() {
-                if self.begins(index, tick) && self.members[index].ahead == ahead {
-                    self.begin(index, tick)?;
-                }
+        for index in 0..self.members.len() {
+            if self.begins(index, tick) {
+                self.step(index, tick)?;
             }
         }
-        self.finish_all(tick)
+        Ok(())
     }
 
     fn begins(&self, index: usize, tick: u64) -> bool {
@@ -292,38 +283,13 @@ impl Master {
         inputs.scatter(self.members[index].instance.as_mut()).map_err(|failure| (index, failure))
     }
 
-    /// Begins the step of an instance at this tick. Only an instance in a process of its own still
-    /// computes when this returns.
-    fn begin(&mut self, index: usize, tick: u64) -> Result<(), Culprit> {
-        self.stepping[index] = true;
-        if !self.members[index].ahead {
-            return self.finish(index, tick);
-        }
-        self.step(index, tick, Instance::begin_step)
-    }
-
-    fn finish(&mut self, index: usize, tick: u64) -> Result<(), Culprit> {
-        if !std::mem::take(&mut self.stepping[index]) {
-            return Ok(());
-        }
-        self.step(index, tick, Instance::do_step)?;
-        self.read_instance(index, true)
-    }
-
-    fn finish_all(&mut self, tick: u64) -> Result<(), Culprit> {
-        (0..self.members.len()).try_for_each(|index| self.finish(index, tick))
-    }
-
-    fn step(
-        &mut self,
-        index: usize,
-        tick: u64,
-        call: impl Fn(&mut (dyn Instance + 'static), f64, f64) -> Outcome,
-    ) -> Result<(), Culprit> {
+    /// Steps an instance at this tick, and reads it.
+    fn step(&mut self, index: usize, tick: u64) -> Result<(), Culprit> {
         let Member { every, varies, instance, .. } = &mut self.members[index];
         let clock = self.clock;
         let length = if *varies { clock.length(tick, *every) } else { clock.whole(*every) };
-        call(instance.as_mut(), clock.time(tick), length).map_err(|failure| (index, failure))
+        instance.do_step(clock.time(tick), length).map_err(|failure| (index, failure))?;
+        self.read_instance(index, true)
     }
 
     fn read_instance(&mut self, index: usize, probed: bool) -> Result<(), Culprit> {

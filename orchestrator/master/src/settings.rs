@@ -5,6 +5,7 @@ use crate::instance::{Instance, Outcome};
 use crate::names;
 use crate::quantity;
 use crate::wiring::{Part, Wire};
+use serde::{Deserialize, Serialize};
 use toml::Value;
 
 /// A variable that is set before initialization.
@@ -19,7 +20,7 @@ pub struct Setting {
 }
 
 /// A value together with its type.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum SettingValue {
     /// A value of type Real.
     Real(f64),

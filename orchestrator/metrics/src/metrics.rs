@@ -261,7 +261,7 @@ impl Meters {
         let record = signals.map_err(fault)?.flatten().map(GuaranteeRecord::new);
         let loss = Loss::new("loss", "lost", &observe, observe.loss.as_ref(), system)?;
         let goal = Loss::new("goal", "missed", &observe, observe.goal.as_ref(), system)?;
-        let cut_off = system.experiment.given.has_stop().then(|| system.clock.ticks());
+        let cut_off = system.experiment.given.stop.map(|_| system.clock.ticks());
         let guarantee = (guarantee, record);
         Ok(Self { gauges, guarantee, loss, goal, cut_off, samples: 0, completed: false })
     }

@@ -119,6 +119,11 @@ impl Parts {
         Self { bar, what, quiet, total, last_line: Mutex::new(Instant::now()) }
     }
 
+    /// Lets no thread of its own draw the display any more, so that this process can be forked.
+    pub fn draw_here(&self) {
+        self.bar.disable_steady_tick();
+    }
+
     /// Counts one more part as finished.
     pub fn finished(&self, what: &str) {
         self.bar.set_message(format!(", {what}"));

@@ -81,18 +81,21 @@ pub fn reproduce(
     let (timed, others): (Vec<Part>, Vec<Part>) = missing.into_iter().partition(is_timed);
     let sweeps = preparations.iter().map(|preparation| &preparation.sweep);
     let threads = runner::threads(options.jobs, sweeps);
+    let system = |preparation: &Preparation| preparation.sweep.system(&mut opened);
+    let systems = preparations.iter().map(system).collect::<Result<Vec<_>, _>>()?;
     // Timed parts have the machine for themselves.
     for (parts, threads) in [(timed, 1), (others, threads)] {
         work.fly(
             &parts,
             (threads, cases),
-            options,
+            (&systems, options),
             || Ok(Bench::default()),
             |bench, part, progress| {
                 let result = bench.fly(part, &preparations[part.sweep], &options.interrupt);
                 progress.advance(part.cases.end - part.cases.start);
                 result.map_err(|error| study.runs[part.sweep].failed(error))
             },
+            |part, _, error| study.runs[part.sweep].failed(error),
         )?;
     }
 

@@ -86,7 +86,7 @@ impl Sweep {
             }
         }
         let single = system.components.iter().find(|component| {
-            component.has("canBeInstantiatedOnlyOncePerProcess") && !component.is_isolated
+            component.has("canBeInstantiatedOnlyOncePerProcess") && !system.is_closed
         });
         Ok(Self {
             design,

@@ -2,10 +2,11 @@
 
 use cosim::error::Error as Single;
 use cosim::interrupt::Request;
+use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
 /// An error that occurs between reading a campaign or a study and writing its report.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, Serialize, Deserialize)]
 pub enum Error {
     /// The file is faulty, or something outside any case failed.
     #[error(transparent)]

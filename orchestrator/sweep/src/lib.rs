@@ -9,6 +9,7 @@
 //! built on this: a campaign asks how often limits are broken, a study compares with a paper.
 
 pub mod cases;
+pub mod closed;
 pub mod design;
 pub mod distribution;
 pub mod error;

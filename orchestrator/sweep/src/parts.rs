@@ -4,6 +4,7 @@
 use crate::table::{CaseTable, Reader, Writer};
 use cosim::error::Error;
 use cosim::files;
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::ops::Range;
 use std::path::PathBuf;
@@ -34,7 +35,7 @@ pub struct Store<'a> {
 }
 
 /// Results of a part.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct PartResult {
     /// A row for each case.
     pub rows: CaseTable,

@@ -2,11 +2,14 @@
 //! finished. A part that is kept is not flown again.
 
 use crate::cases::Sweep;
+use crate::closed;
 use crate::error::Error;
 use crate::parts::{PartResult, Remarks, Store};
 use cosim::error::Error as Single;
 use cosim::interrupt::Interrupt;
+use cosim::system::System;
 use cosim_metrics::progress::Parts;
+use fmu_import::isolation::Ended;
 use parking_lot::Mutex;
 use std::collections::BTreeMap;
 use std::num::NonZero;
@@ -102,8 +105,9 @@ impl<'a, R: Send> Work<'a, R> {
         missing
     }
 
-    /// Flies parts on several threads, each with a state of its own. If an FMU fails, the other
-    /// parts are flown and kept, so that little is left for the next time.
+    /// Flies parts of these `systems` on several threads, each with a state of its own. If an FMU
+    /// fails, the other parts are flown and kept, so that little is left for the next time.
+    /// `failed` names what could not be flown: the case, if it is known, or the part.
     ///
     /// # Errors
     /// Returns an error if the work was asked to end before all `total` cases are there, if a case
@@ -112,9 +116,10 @@ impl<'a, R: Send> Work<'a, R> {
         &mut self,
         parts: &[Part],
         (threads, total): (usize, u64),
-        options: &Options,
+        (systems, options): (&[System], &Options),
         begin: impl Fn() -> Result<S, Error> + Sync,
         fly: impl Fn(&mut S, &Part, &Parts) -> Result<PartResult, Error> + Sync,
+        failed: impl Fn(&Part, Option<u64>, Single) -> Error,
     ) -> Result<(), Error> {
         if parts.is_empty() {
             return Ok(());
@@ -122,18 +127,35 @@ impl<'a, R: Send> Work<'a, R> {
         let (done, left) = (self.cases(), parts.iter().map(Part::count).sum::<u64>());
         let progress = Parts::new("cases", self.title, done + left, done, options.quiet);
         let (stores, remember) = (&self.stores, &self.remember);
-        let Worked { results, failures } = on_parts(
-            parts,
-            threads,
-            begin,
-            |state, part| {
-                let result = fly(state, part, &progress)?;
-                let remembered = remember(&result);
-                stores[part.sweep].write(&part.cases, result)?;
-                Ok(remembered)
-            },
-            |error| matches!(error, Error::Case { .. }),
-        );
+        let keep = |part: &Part, result: PartResult| {
+            let remembered = remember(&result);
+            stores[part.sweep].write(&part.cases, result)?;
+            Ok(remembered)
+        };
+        let goes_on = |error: &Error| matches!(error, Error::Case { .. });
+        let Worked { results, failures } = if let Some(closing) = closed::closing(systems) {
+            progress.draw_here();
+            let begin = || Ok((begin()?, Parts::new("cases", "", 0, 0, true)));
+            closed::on_parts(
+                parts,
+                threads,
+                (&closing, &options.interrupt),
+                begin,
+                |(state, hidden), part| fly(state, part, hidden),
+                |part, result| {
+                    progress.advance(part.count());
+                    keep(part, result)
+                },
+                |part, ended| {
+                    let case = if let Ended::Failed { case, .. } = ended { case } else { None };
+                    failed(part, case, systems[part.sweep].ended(ended))
+                },
+                goes_on,
+            )
+        } else {
+            let work = |state: &mut S, part: &Part| keep(part, fly(state, part, &progress)?);
+            on_parts(parts, threads, begin, work, goes_on)
+        };
         progress.finish();
         self.done.extend(results.into_iter().map(|(at, remembered)| {
             let part = &parts[at];

@@ -10,12 +10,13 @@ use parquet::basic::Type as Physical;
 use parquet::column::writer::ColumnWriter;
 use parquet::data_type::ByteArray;
 use parquet::errors::ParquetError;
+use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
 use std::ops::Range;
 
 /// Values of a column.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Values {
     /// Real numbers.
     Real(Vec<f64>),
@@ -153,7 +154,7 @@ impl Values {
 }
 
 /// A column with its name and values.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Column {
     /// Name of the column, unique in its table.
     pub name: String,
@@ -162,7 +163,7 @@ pub struct Column {
 }
 
 /// A table of cases, whose columns have the same length.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct CaseTable {
     /// Columns of the table, in order.
     pub columns: Vec<Column>,

@@ -3,9 +3,12 @@
 use cosim::error::Error;
 use cosim::run::{Observer, Sample};
 use cosim::signal::Resolved;
+use serde::{Deserialize, Serialize};
 
 /// An observer that records signals at every n-th communication point, and at the last.
+#[derive(Serialize, Deserialize)]
 pub struct Track {
+    #[serde(skip)]
     signals: Vec<Resolved>,
     stride: u64,
     /// Times of the recorded communication points, s.

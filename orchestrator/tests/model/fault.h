@@ -5,7 +5,6 @@
 #include <string.h>
 #ifndef _WIN32
 #include <pthread.h>
-#include <sys/mman.h>
 #endif
 #ifdef REACHES
 #include <sys/socket.h>
@@ -13,7 +12,7 @@
 #include <unistd.h>
 
 enum { NOWHERE, LOAD, INSTANTIATE, INITIALIZE, GET, STEP, FREE, UNLOAD };
-enum { EXIT, QUICK_EXIT, ABORT, SEGFAULT, DIVISION, ENDLESS, OVERWRITE, MEMORY, FLOOD, CHILDREN, SHARED, THREAD_EXIT, THREAD_SEGFAULT, LOGS, FLOATS };
+enum { EXIT, QUICK_EXIT, ABORT, SEGFAULT, DIVISION, ENDLESS, OVERWRITE, MEMORY, FLOOD, THREAD_EXIT, THREAD_SEGFAULT, LOGS, FLOATS };
 
 #ifndef PLACE
 #define PLACE NOWHERE
@@ -69,10 +68,6 @@ static void fault(int place, Logger logger, void *environment) {
             memset(more, 1, 1 << 20);
         }
 #ifndef _WIN32
-    case SHARED:
-        /* Memory that several processes may share is not counted by the limit of one. */
-        memset(mmap(NULL, 1 << 28, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0), 1, 1 << 28);
-        for (;;) pause();
     case THREAD_EXIT: in_thread(exits); break;
     case THREAD_SEGFAULT: in_thread(crashes); break;
     /* Some FMUs hand back no pointer to the environment, or their own. */
@@ -86,11 +81,6 @@ static void fault(int place, Logger logger, void *environment) {
         in_thread(logs);
         break;
     }
-    case CHILDREN:
-        for (int i = 0; i < 20; i++)
-            if (fork() == 0)
-                for (;;) pause();
-        break;
 #endif
 #ifdef __x86_64__
     case FLOATS: {

@@ -79,9 +79,11 @@ static int large_file(void) {
     while (written < 200 && write(file, block, sizeof block) == sizeof block) written++;
     return file >= 0 && written == 200;
 }
+/* Pipes are the way to the orchestrator, to which the process may say what it likes. */
 static int inherited_file(void) {
     int is_written = 0;
-    for (int file = 3; file < 64; file++) is_written |= write(file, "x", 1) == 1;
+    struct stat about;
+    for (int file = 3; file < 64; file++) is_written |= fstat(file, &about) == 0 && !S_ISFIFO(about.st_mode) && write(file, "x", 1) == 1;
     return is_written;
 }
 static int environment(void) { return getenv("SECRET_KEY") != NULL; }

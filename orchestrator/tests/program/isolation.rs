@@ -1,4 +1,4 @@
-//! Instances that harm the process they are in.
+//! Instances that harm the process they are in, which is closed unless an option opens it.
 
 use crate::bench::{Bench, LOOP, PATIENCE, Recipe, await_until, await_while_it_runs};
 use crate::campaign::CAMPAIGN;
@@ -20,35 +20,29 @@ const HARM: [(&str, &str); 8] = [
 ];
 
 /// Limits with which an instance that never answers, or takes all memory, does so soon.
-const LIMITS: [&str; 2] = ["--call-timeout=3", "--unit-memory=64"];
+const LIMITS: &str = "[isolation]\ncall_timeout = 3.0\nmemory = 64\n";
 
 fn harmful(place: &str, how: &str) -> Bench {
+    harmful_within(LIMITS, place, how)
+}
+
+fn harmful_within(limits: &str, place: &str, how: &str) -> Bench {
     let (place, how) = (format!("-DPLACE={place}"), format!("-DHOW={how}"));
     // The compiled form of a write past an array is part of the harm.
     let flags = [place.as_str(), how.as_str(), "-Wno-error", "-w"];
-    Bench::made(LOOP, &Recipe { flags: &flags, ..Recipe::default() })
+    Bench::made(&format!("{LOOP}{limits}"), &Recipe { flags: &flags, ..Recipe::default() })
 }
 
-/// Runs the experiment with these limits and a temporary folder of its own, which must be empty
-/// afterwards.
+/// Runs the experiment with a temporary folder of its own, which must be empty afterwards.
 fn run(bench: &Bench, arguments: &[&str]) -> (i32, String) {
-    run_within(bench, &LIMITS, arguments)
-}
-
-fn run_within(bench: &Bench, limits: &[&str], arguments: &[&str]) -> (i32, String) {
     let folder = bench.path("temporary");
     fs::create_dir_all(&folder).unwrap();
     let mut command = bench.command(&["run", "loop.toml", "--force", "--quiet"]);
     let begin = Instant::now();
-    command.args(limits).args(arguments).env("TMPDIR", &folder);
-    let child = command.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
-    let prefix = format!("fmu-{}-", child.id());
-    let output = child.wait_with_output().unwrap();
+    command.args(arguments).env("TMPDIR", &folder);
+    let output = command.stdout(Stdio::null()).stderr(Stdio::piped()).output().unwrap();
     assert!(begin.elapsed() < PATIENCE, "{:?}", begin.elapsed());
     assert_eq!(fs::read_dir(&folder).unwrap().count(), 0);
-    let memory = fs::read_dir("/dev/shm").into_iter().flatten().flatten();
-    let left = memory.filter(|file| file.file_name().to_string_lossy().starts_with(&prefix));
-    assert_eq!(left.count(), 0);
     (output.status.code().expect("no signal"), String::from_utf8(output.stderr).unwrap())
 }
 
@@ -67,16 +61,17 @@ fn told(errors: &str) -> &str {
 
 #[test]
 fn harm_in_a_step_or_a_get_call_ends_the_run_with_all_rows() {
-    // Values are read with the step that goes before.
-    for (place, time, kept) in [("STEP", 2, 3), ("GET", 1, 2)] {
+    // Values are read after the step that goes before.
+    for (place, time, call) in [("STEP", 2, "doStep"), ("GET", 1, "getReal")] {
         for (how, says) in HARM {
             let bench = harmful(place, how);
             let (code, errors) = run(&bench, &[]);
             assert_eq!(code, 1, "{place} {how}: {errors}");
-            let begin = format!("error: gain failed at t = {time} s in doStep: ");
+            let begin = format!("error: gain failed at t = {time} s in {call}: ");
             assert!(told(&errors).starts_with(&begin), "{errors}");
             assert!(errors.contains(says), "{place} {how}: {errors}");
-            assert_eq!(rows(&bench), kept, "{place} {how}");
+            // Those of all communication points before.
+            assert_eq!(rows(&bench), time, "{place} {how}");
         }
     }
 }
@@ -102,16 +97,14 @@ fn harm_before_a_run_is_told_with_the_component_and_the_call() {
 #[test]
 fn harm_after_a_run_keeps_the_results_but_is_no_success() {
     for (how, says) in HARM {
-        for place in ["FREE", "UNLOAD"] {
+        // The library of both is unloaded with the last one.
+        for (place, name) in [("FREE", "gain"), ("UNLOAD", "plant")] {
             let bench = harmful(place, how);
             let (code, errors) = run(&bench, &[]);
             assert_eq!(code, 1, "{place} {how}: {errors}");
-            // Both components are of this FMU.
-            assert_eq!(errors.lines().count(), 2, "{errors}");
-            for (line, name) in errors.lines().zip(["gain", "plant"]) {
-                let begin = format!("error: {name} failed in freeInstance: ");
-                assert!(line.starts_with(&begin) && line.contains(says), "{place} {how}: {line}");
-            }
+            let begin = format!("error: {name} failed at t = 3 s in freeInstance: ");
+            assert!(told(&errors).starts_with(&begin), "{place}: {errors}");
+            assert!(errors.contains(says), "{place} {how}: {errors}");
             assert_eq!(rows(&bench), 4);
             assert_eq!(bench.json("out/loop/metrics.json")["completed"], true);
         }
@@ -122,7 +115,6 @@ fn harm_after_a_run_keeps_the_results_but_is_no_success() {
 fn harm_in_the_same_process_names_the_component_and_the_call() {
     for (how, what) in [
         ("EXIT", "exit"),
-        ("QUICK_EXIT", "_exit"),
         ("ABORT", "SIGABRT"),
         ("SEGFAULT", "SIGSEGV"),
         ("DIVISION", "SIGFPE"),
@@ -169,9 +161,8 @@ fn messages_with_any_pointer_reach_the_component_that_is_called() {
         for text in ["two", "nothing", "its own"] {
             assert!(errors.contains(&format!("gain: [odd] {text}")), "{isolate}: {errors}");
         }
-        // In a process of its own there is one instance; here there are two.
-        let name = if isolate == "--isolate" { "gain" } else { "an FMU" };
-        assert!(errors.contains(&format!("{name}: [odd] from a thread")), "{isolate}: {errors}");
+        // There are two instances that it could come from.
+        assert!(errors.contains("an FMU: [odd] from a thread"), "{isolate}: {errors}");
     }
 }
 
@@ -195,7 +186,6 @@ fn rows_are_on_disk_within_a_second() {
 #[test]
 fn an_instance_ends_with_the_process_that_asked_for_it() {
     let bench = harmful("STEP", "ENDLESS");
-    // The name of the instance's memory is an argument of its process, which is found by it.
     let children_of = |pid: u32| {
         let entries = fs::read_dir("/proc").into_iter().flatten().flatten();
         let parent = format!("PPid:\t{pid}\n");
@@ -207,9 +197,9 @@ fn an_instance_ends_with_the_process_that_asked_for_it() {
     let mut child = bench.command(&["run", "loop.toml", "--quiet"]).spawn().unwrap();
     let mut instances = Vec::new();
     if Path::new("/proc/self/status").exists() {
-        await_until("two instances", || {
+        await_until("a closed process", || {
             instances = children_of(child.id());
-            instances.len() == 2
+            instances.len() == 1
         });
     }
     child.kill().unwrap();
@@ -219,9 +209,9 @@ fn an_instance_ends_with_the_process_that_asked_for_it() {
 
 #[test]
 fn a_flood_of_messages_is_held_back() {
-    let bench = harmful("STEP", "FLOOD");
+    let bench = harmful_within("", "STEP", "FLOOD");
     for isolate in ["--isolate", "--isolate=false"] {
-        let (code, errors) = run_within(&bench, &["--call-timeout=20"], &[isolate]);
+        let (code, errors) = run(&bench, &[isolate]);
         assert_eq!(code, 0, "{errors}");
         assert!(errors.lines().count() < 500, "{isolate}: {}", errors.lines().count());
         assert!(errors.contains("further messages are left out"), "{isolate}: {errors}");
@@ -230,7 +220,7 @@ fn a_flood_of_messages_is_held_back() {
 }
 
 #[test]
-fn results_are_the_same_in_processes_of_their_own() {
+fn results_are_the_same_in_a_closed_process() {
     let bench = Bench::new();
     let results = || fs::read(bench.path("out/loop/results.csv")).unwrap();
     assert_eq!(run(&bench, &["--isolate=false"]).0, 0);
@@ -242,19 +232,26 @@ fn results_are_the_same_in_processes_of_their_own() {
 }
 
 #[test]
-fn a_component_says_for_itself_whether_it_is_isolated() {
-    let bench = harmful("STEP", "SEGFAULT");
-    let experiment = LOOP.replace("[components.gain]", "[components.gain]\nisolate = true");
-    fs::write(bench.path("loop.toml"), experiment.clone() + "[isolation]\nisolate = false\n")
-        .unwrap();
-    assert_eq!(run(&bench, &[]).0, 1);
-    let wrong = experiment + "[isolation]\ncall_timeout = 0.0\n";
-    fs::write(bench.path("loop.toml"), wrong).unwrap();
-    let errors = bench.refusal(&["--quiet"]);
-    assert!(
-        errors.contains("[isolation] call_timeout = 0: it must be from 0.001 to 1e6 s"),
-        "{errors}"
-    );
+fn the_command_line_decides_before_the_experiment_whose_limits_are_checked() {
+    let bench = harmful_within("[isolation]\nisolate = false\n", "STEP", "SEGFAULT");
+    let (code, errors) = run(&bench, &["--isolate"]);
+    assert!(code == 1 && errors.contains("its process was killed by signal 11"), "{errors}");
+    for (wrong, says) in [
+        ("call_timeout = 0.0", "call_timeout = 0: it must be from 0.001 to 1e6 s"),
+        ("cpu = 0", "cpu = 0: it must be at least 1 s"),
+    ] {
+        fs::write(bench.path("loop.toml"), format!("{LOOP}[isolation]\n{wrong}\n")).unwrap();
+        let errors = bench.refusal(&["--quiet"]);
+        assert!(errors.contains(&format!("[isolation] {says}")), "{errors}");
+    }
+}
+
+#[test]
+fn a_run_that_takes_all_processor_time_ends_by_its_limit() {
+    let bench = harmful_within("[isolation]\ncpu = 1\n", "STEP", "ENDLESS");
+    let (code, errors) = run(&bench, &[]);
+    let says = "gain failed at t = 2 s in doStep: its process was killed by signal 24";
+    assert!(code == 1 && errors.contains(says), "{errors}");
 }
 
 #[test]
@@ -273,39 +270,38 @@ fn what_an_archive_says_of_its_origin_is_not_trusted() {
 }
 
 #[test]
-fn instances_that_may_be_in_a_process_only_once_have_processes_of_their_own() {
+fn an_fmu_that_may_be_in_a_process_only_once_is_used_once() {
     let only_once = |text: String| {
         text.replace("<CoSimulation", "<CoSimulation canBeInstantiatedOnlyOncePerProcess=\"true\"")
     };
     let bench = Bench::made(LOOP, &Recipe { description: &only_once, ..Recipe::default() });
+    for isolate in ["--isolate", "--isolate=false"] {
+        let errors = bench.refusal(&["--quiet", isolate]);
+        assert!(errors.contains("only once per process"), "{errors}");
+    }
+    fs::copy(bench.path("Model.fmu"), bench.path("Copy.fmu")).unwrap();
+    let experiment = LOOP.replacen("Model.fmu", "Copy.fmu", 1);
+    fs::write(bench.path("loop.toml"), experiment).unwrap();
     assert_eq!(run(&bench, &[]).0, 0);
-    let errors = bench.refusal(&["--quiet", "--isolate=false"]);
-    assert!(errors.contains("only once per process"), "{errors}");
 }
 
 #[test]
-fn a_sandbox_keeps_an_instance_from_files_and_network() {
+fn a_closed_process_keeps_an_instance_from_files_and_network() {
     let outside = Path::new(env!("CARGO_TARGET_TMPDIR")).join("written-by-an-instance");
     let _ = fs::remove_file(&outside);
     let flags = format!("-DREACHES=\"{}\"", outside.display());
     let bench = Bench::made(LOOP, &Recipe { flags: &[&flags], ..Recipe::default() });
-    let (code, errors) = run(&bench, &[]);
+    let (code, errors) = run(&bench, &["--isolate=false"]);
     assert_eq!(code, 0, "{errors}");
     assert!(outside.is_file());
     fs::remove_file(&outside).unwrap();
-    let (code, errors) = run(&bench, &["--sandbox"]);
-    // Where the system has no Landlock, a message says so.
-    assert!(
-        !outside.exists() || errors.contains("cannot limit these for instances: files"),
-        "{errors}"
-    );
+    let (code, errors) = run(&bench, &[]);
+    assert!(!outside.exists() && errors.contains("no file, no network"), "{errors}");
     assert_eq!(code, 0, "{errors}");
-    assert!(outside.exists() || errors.contains("no file, no network"), "{errors}");
-    let _ = fs::remove_file(&outside);
 }
 
 #[test]
-fn a_campaign_is_the_same_with_instances_in_processes_of_their_own() {
+fn a_campaign_is_the_same_in_closed_processes() {
     let bench = Bench::new();
     // The first component of the order fails while the other one is stepped.
     let campaign = CAMPAIGN.replace("plant.fail.time", "gain.fail.time");

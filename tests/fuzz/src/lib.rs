@@ -143,7 +143,7 @@ pub fn vehicle(data: &[u8]) {
 pub fn table(data: &[u8]) {
     let _ = LookupTable::from_csv("t.csv", data);
     let Ok(fmu) = Fmu::open(&file("t.csv", data)) else { return };
-    let instance = fmu.instantiate("t", InterfaceKind::CoSimulation, None);
+    let instance = fmu.instantiate("t", InterfaceKind::CoSimulation);
     let mut instance = instance.expect("a lookup table needs no library");
     let description = &fmu.description;
     let (_, interpolation) = description.find("interpolation").expect("every lookup table has it");

@@ -16,7 +16,7 @@ pub use crate::watch::OnInvalid;
 pub use fmi_master::wiring::Coupling;
 pub use interface::Interface;
 pub use measures::{Curve, Guarantee, Loss, Margins, Measure, MeasureKind, Observe, Panel, Scaled};
-pub use overrides::{Given, Overrides, name_of};
+pub use overrides::{Overrides, Process, name_of};
 pub use protection::Protection;
 pub use quantity::{Band, Quantity};
 pub use trajectory::{Bound, Equilibrium, Trajectory};
@@ -53,7 +53,7 @@ pub struct Experiment {
     /// Signals that are measured, watched and drawn.
     #[serde(default)]
     pub observe: Observe,
-    /// Processes of instances and their limits.
+    /// The process of the instances and its limits.
     #[serde(default)]
     pub isolation: Protection,
     /// Whether inputs may stay unconnected without being named. This is not a key of an experiment
@@ -70,9 +70,9 @@ pub struct Experiment {
     /// Settings of the command line that name no component of the experiment.
     #[serde(skip)]
     pub unplaced: Vec<String>,
-    /// Settings of the command line that replace those of the file.
+    /// Changes that the command line made last.
     #[serde(skip)]
-    pub given: Given,
+    pub given: Overrides,
     /// The experiment file, together with the files that it extends.
     #[serde(skip)]
     pub source: Source,
@@ -127,8 +127,6 @@ pub struct Component {
     /// Relative tolerance of the integration in model exchange. By default it is the one that the
     /// FMU proposes, or otherwise 1e-6.
     pub tolerance: Option<f64>,
-    /// Whether the instance runs in a process of its own, whatever `[isolation]` says.
-    pub isolate: Option<bool>,
     /// Whether the FMU takes the place of another one, as after `--fmu`: settings, recorded
     /// variables and unconnected inputs that it does not have are left out.
     #[serde(default, rename = "exchanged")]

@@ -1,8 +1,10 @@
 //! Changes that the command line makes to an experiment.
 
-use super::{Coupling, Experiment, Protection};
+use super::{Coupling, Experiment};
+use crate::choice::choice;
 use crate::error::Error;
 use crate::watch::OnInvalid;
+use clap::Args;
 use fmi_master::names;
 use fmu_import::warnings::warn_once;
 use std::collections::BTreeMap;
@@ -25,53 +27,56 @@ const GROUPS_OF_LAW: [&str; 6] =
 /// The other parameter that does.
 const PERIOD_OF_LAW: &str = "period.feedback";
 
-/// Settings of an experiment that the command line may change.
-#[derive(Clone, Debug, Default, PartialEq)]
+/// Changes that the command line makes to an experiment.
+#[derive(Clone, Debug, Default, PartialEq, Args)]
+#[command(next_help_heading = "Changes of the experiment")]
 pub struct Overrides {
-    /// Values of parameters, as `component.parameter=value`.
+    /// Set a parameter: `plant.disturbance.seed=7`, `controller.constraints=paper`,
+    /// `plant.disturbance.bound="1 deg/s2"`.
+    #[arg(long, value_name = "COMPONENT.PARAMETER=VALUE")]
     pub set: Vec<String>,
-    /// FMUs in place of those of components, as `component=file`.
+    /// Replace the FMU of a component: `controller=MyLaw.fmu`, or by its name `controller=LQR`.
+    /// Settings, recorded variables and unconnected inputs of the experiment that the new FMU does
+    /// not have are left out.
+    #[arg(long, value_name = "COMPONENT=FMU")]
     pub fmu: Vec<String>,
-    /// Law in another program that takes the place of that of the controller: its name, and what
-    /// identifies it.
-    pub law: Option<String>,
     /// Stop time of the simulation, s.
+    #[arg(long, value_name = "SECONDS")]
     pub stop: Option<f64>,
     /// Length of the communication step, s.
+    #[arg(long, value_name = "SECONDS")]
     pub step: Option<f64>,
-    /// Way in which components are stepped and values are passed on.
+    /// Choose how components are stepped and values are passed on.
+    #[arg(long, value_parser = choice::<Coupling>(&[("sequential", "gauss-seidel")]))]
     pub coupling: Option<Coupling>,
-    /// Action taken if an instance gives a value that is not finite, or not valid for its type.
+    /// Choose what happens if an instance gives a value that is not finite, or not valid for its
+    /// type.
+    #[arg(long, value_parser = choice::<OnInvalid>(&[]))]
     pub on_invalid: Option<OnInvalid>,
-    /// Processes of instances and their limits.
-    pub isolation: Protection,
+    /// Let the program at the other end of standard input and output give the moment in place of
+    /// the controller: the law's name, and what identifies it. The Python package does so.
+    #[arg(long, value_name = "NAME HASH", hide = true)]
+    pub law: Option<String>,
+    /// Process in which the instances run.
+    #[command(flatten)]
+    pub process: Process,
 }
 
-/// Settings of the command line that replace those of an experiment's file. A fault in them is
-/// attributed to the option.
-#[derive(Clone, Debug, Default)]
-pub struct Given {
-    stop: Option<f64>,
-    step: Option<f64>,
-    call_timeout: Option<f64>,
-    /// Whether the coupling is given.
-    pub(crate) coupling: bool,
-    /// Components whose FMU is given.
-    fmu: Vec<String>,
-}
-
-impl Given {
-    /// Returns whether the command line gives the stop time.
-    pub fn has_stop(&self) -> bool {
-        self.stop.is_some()
-    }
+/// Process in which the instances run.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Args)]
+pub struct Process {
+    /// Run the FMUs in a closed process, which reaches nothing outside of itself (true), or in this
+    /// one (false), whatever `[isolation]` of the experiment says. By default only FMUs of this
+    /// project that lie beside the program, or in a folder that `--fmu-dir` names, run in this one.
+    #[arg(long, value_name = "BOOL", num_args = 0..=1, default_missing_value = "true", require_equals = true)]
+    pub isolate: Option<bool>,
 }
 
 impl Experiment {
     /// Returns the error for a fault of start, stop and step. It blames the option that gives the
     /// value, or the file if none does.
     pub(crate) fn time_error(&self, problem: &str) -> Error {
-        let Given { stop, step, .. } = self.given;
+        let Overrides { stop, step, .. } = self.given;
         // A step that is no step at all is the fault, whatever the stop time is.
         let is_step = step.is_some_and(|step| stop.is_none() || !(step > 0.0 && step.is_finite()));
         match (stop, step) {
@@ -85,22 +90,15 @@ impl Experiment {
     /// the file if none does.
     pub(crate) fn fmu_error(&self, component: &str, problem: &str) -> Error {
         let written = &self.components[component].fmu;
-        if self.given.fmu.iter().any(|name| name == component) {
+        let is_it =
+            |given: &String| given.split_once('=').is_some_and(|(name, _)| name == component);
+        if self.given.fmu.iter().any(is_it) || self.is_flown_by_law(component) {
             return Error::experiment(format!(
                 "--fmu {component}={}: {problem}",
                 written.get_ref()
             ));
         }
         self.source.error(&written.span(), format!("[components.{component}] {problem}"))
-    }
-
-    /// Returns the error for a fault of the limits of isolated instances. It blames the option that
-    /// gives the value, or the file if none does.
-    pub(crate) fn isolation_error(&self, problem: &str) -> Error {
-        match self.given.call_timeout {
-            Some(time) => Error::experiment(format!("--call-timeout {time}: {problem}")),
-            None => self.source.error(&(0..0), format!("[isolation] {problem}")),
-        }
     }
 
     /// Returns whether a law in another program gives the moment of a component.
@@ -134,15 +132,8 @@ impl Experiment {
         self.simulation.step = overrides.step.unwrap_or(self.simulation.step);
         self.simulation.coupling = overrides.coupling.unwrap_or(self.simulation.coupling);
         self.simulation.on_invalid = overrides.on_invalid.unwrap_or(self.simulation.on_invalid);
-        self.isolation.apply(&overrides.isolation);
-        self.given.coupling |= overrides.coupling.is_some();
-        self.given.stop = overrides.stop.or(self.given.stop);
-        self.given.step = overrides.step.or(self.given.step);
-        self.given.call_timeout = overrides.isolation.call_timeout.or(self.given.call_timeout);
-        if overrides.isolation.isolate.is_some() {
-            // The command line decides for components that decide for themselves, too.
-            self.components.values_mut().for_each(|component| component.isolate = None);
-        }
+        self.isolation.isolate = overrides.process.isolate.or(self.isolation.isolate);
+        self.given = overrides.clone();
         let is_given = |assignment: &String| assignment.starts_with(&format!("{CONTROLLER}="));
         let is_needed = overrides.law.is_some() && !overrides.fmu.iter().any(is_given);
         let stand_in = is_needed.then(|| format!("{CONTROLLER}={STAND_IN}"));
@@ -187,7 +178,6 @@ impl Experiment {
         } else if new != old {
             self.title = format!("{new} in place of {old}: {}", self.title);
         }
-        self.given.fmu.push(name.to_string());
         (component.fmu, component.is_exchanged) = (Spanned::new(0..0, file), true);
         Ok(())
     }

@@ -1,101 +1,61 @@
-//! Protects an experiment from instances that crash, never answer, or take all memory.
+//! Protects an experiment from instances that crash, never answer, or do harm.
 
-use super::Component;
-use crate::search;
-use fmu_import::fmu::Fmu;
-use fmu_import::isolation::{self, Isolation};
+use fmu_import::isolation::Closing;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use std::path::PathBuf;
 use std::time::Duration;
 
-/// Processes of instances and their limits. Keys that are left out keep their defaults.
+/// The process of a run's instances and its limits. Keys that are left out keep their defaults.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize, JsonSchema, Serialize)]
 #[serde(deny_unknown_fields)]
 pub struct Protection {
-    /// Run every instance in a process of its own (true), or all of them in this process (false).
-    /// By default the instances of this project's FMUs that lie beside the program, or in a folder
-    /// that the command line names, share its process.
+    /// Run the instances in a closed process (true), or in that of the program (false). By default
+    /// the process is closed unless all FMUs are this project's own and lie beside the program, or
+    /// in a folder that the command line names. Only Linux can close a process.
     pub isolate: Option<bool>,
-    /// Time within which an instance in a process of its own must answer each call, s [default:
-    /// 60].
+    /// Time within which an instance in a closed process must answer each call, s [default: 60].
     pub call_timeout: Option<f64>,
-    /// Memory that an instance in a process of its own may write, MiB; 0 means no limit [default:
-    /// 4096].
+    /// Memory that a closed process may write, MiB; 0 means no limit [default: 4096].
     pub memory: Option<u64>,
-    /// Processor time that an instance in a process of its own may take, s [default: no limit].
+    /// Processor time that a closed process may take, s [default: no limit].
     pub cpu: Option<u64>,
-    /// Run every instance in a closed process of its own, which can read the system's libraries and
-    /// write in the folder of its archive, and reach nothing else. This works on Linux only; other
-    /// systems refuse to run instances then.
-    pub sandbox: Option<bool>,
 }
 
 impl Protection {
-    /// Takes over the values that `other` gives.
-    pub(super) fn apply(&mut self, other: &Self) {
-        self.isolate = other.isolate.or(self.isolate);
-        self.call_timeout = other.call_timeout.or(self.call_timeout);
-        self.memory = other.memory.or(self.memory);
-        self.cpu = other.cpu.or(self.cpu);
-        self.sandbox = other.sandbox.or(self.sandbox);
-    }
-
-    /// Checks that the time limit of calls is in its range.
+    /// Checks that the limits are in their ranges.
     ///
     /// # Errors
-    /// Returns a line that names the value if it is not.
-    pub fn check(&self) -> Result<(), String> {
-        match self.call_timeout {
-            Some(seconds) if !(1e-3..=1e6).contains(&seconds) => {
+    /// Returns a line that names the value if one is not.
+    pub(crate) fn check(&self) -> Result<(), String> {
+        match (self.call_timeout, self.cpu) {
+            (Some(seconds), _) if !(1e-3..=1e6).contains(&seconds) => {
                 Err(format!("call_timeout = {seconds}: it must be from 0.001 to 1e6 s"))
             }
+            (_, Some(0)) => Err("cpu = 0: it must be at least 1 s".into()),
             _ => Ok(()),
         }
     }
 
-    /// Returns the keys of `[isolation]` that are given and have no effect, provided that some
-    /// instance has a process of its own, or that none has.
-    pub(crate) fn idle(&self, has_processes: bool) -> Vec<&'static str> {
+    /// Returns the keys that have an effect on a closed process only and are given.
+    pub(crate) fn limits(&self) -> impl Iterator<Item = &'static str> {
         let keys = [
-            ("isolate", self.isolate.is_some() && self.sandbox == Some(true)),
-            ("call_timeout", self.call_timeout.is_some() && !has_processes),
-            ("memory", self.memory.is_some() && !has_processes),
-            ("cpu", self.cpu.is_some() && !has_processes),
+            ("call_timeout", self.call_timeout.is_some()),
+            ("memory", self.memory.is_some()),
+            ("cpu", self.cpu.is_some()),
         ];
-        keys.into_iter().filter(|(_, is_idle)| *is_idle).map(|(key, _)| key).collect()
+        keys.into_iter().filter(|(_, is_given)| *is_given).map(|(key, _)| key)
     }
 
-    /// Returns whether a component gets a process of its own. By default FMUs share the process of
-    /// the program if they declare that this project's fmu-pack made them, and if they lie in a
-    /// folder of the program or in one of `fmu_dirs`, which the command line names: the declaration
-    /// alone proves nothing, and others do not write to these folders.
-    pub fn isolates(&self, component: &Component, fmu: &Fmu, fmu_dirs: &[PathBuf]) -> bool {
-        if fmu.is_lookup_table() {
-            return false;
-        }
-        let asked = component.isolate.or(self.isolate);
-        // A sandbox is a process of its own. Where it is impossible, the instance is refused.
-        self.sandbox == Some(true)
-            || isolation::is_enabled()
-                && asked.unwrap_or_else(|| {
-                    !(fmu.is_made_by_fmu_pack() && search::is_installed(&fmu.path, fmu_dirs))
-                })
-    }
-
-    /// Returns the limits that the process of an instance gets.
-    pub fn limits(&self) -> Isolation {
-        let usual = Isolation::default();
-        let timeout = self.call_timeout.map(Duration::try_from_secs_f64);
-        Isolation {
-            call_timeout: timeout.and_then(Result::ok).unwrap_or(usual.call_timeout),
-            memory: match self.memory {
-                None => usual.memory,
-                Some(0) => None,
-                Some(mib) => Some(mib.saturating_mul(1 << 20)),
-            },
-            cpu: self.cpu,
-            sandbox: self.sandbox.unwrap_or(usual.sandbox),
-        }
+    /// Returns the limits that a closed process gets.
+    pub(crate) fn closing(&self) -> Closing {
+        let usual = Closing::default();
+        let timeout = self.call_timeout.map(Duration::from_secs_f64);
+        let memory = match self.memory {
+            None => usual.memory,
+            Some(0) => None,
+            Some(mib) => Some(mib.saturating_mul(1 << 20)),
+        };
+        let call_timeout = timeout.unwrap_or(usual.call_timeout);
+        Closing { call_timeout, memory, cpu: self.cpu, ..usual }
     }
 }

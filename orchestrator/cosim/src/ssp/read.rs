@@ -5,8 +5,7 @@ use super::{STRUCTURE, flow};
 use crate::document::Source;
 use crate::error::Error;
 use crate::experiment::{
-    Component, Coupling, Experiment, Given, Observe, OnInvalid, Overrides, Protection, Record,
-    Simulation,
+    Component, Coupling, Experiment, Observe, OnInvalid, Overrides, Protection, Record, Simulation,
 };
 use crate::system::Opened;
 use crate::wiring::wires;
@@ -101,7 +100,7 @@ pub fn load(path: &Path, overrides: &Overrides) -> Result<Loaded, Error> {
         assigned: BTreeSet::new(),
         law: None,
         unplaced: Vec::new(),
-        given: Given::default(),
+        given: Overrides::default(),
         source: Source::plain(path, text),
     };
     let wires = wires(&experiment, &parts)?;
@@ -176,7 +175,6 @@ fn component(
         parameters: values.into_iter().map(|(n, value)| (n, Spanned::new(0..0, value))).collect(),
         interface: component.interface,
         tolerance: None,
-        isolate: None,
         is_exchanged: false,
     }
 }

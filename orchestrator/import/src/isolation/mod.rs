@@ -1,114 +1,104 @@
-//! Instances in processes of their own. An instance that crashes, ends its process, or never
-//! answers then fails like one that returns an error: the master goes on, and names the instance
-//! and the call.
+//! Runs in closed processes. The process forks one for a run, closes it, and lets it make the
+//! instances and step them; it sends what it has found through a pipe. Instances that crash, end
+//! their process or never answer end the run with an error that names the instance and the call,
+//! and everything that was sent before is kept.
 //!
 //! | module | content |
 //! |---|---|
-//! | `memory`, `channel` | memory that both processes share, and how it is used |
-//! | `protocol` | the messages in it |
-//! | `host` | the process of the instance, which makes the calls |
-//! | `process`, `ended`, `remote` | the master's side: the process that is watched, how it has ended, and the instance in it |
-//! | `settings`, `limits`, `sandbox` | resources that the process may use |
+//! | `page` | the calls that are being made, in memory that both processes see |
+//! | `closed` | the supervisor's side: the process is forked, heard, watched and ended |
+//! | `inside` | the closed process: what it gives up, and the messages that it sends |
+//! | `sandbox` | what it may still reach |
+//! | `ended` | how it has ended, in words |
+//!
+//! Other systems than Linux cannot close a process.
 
-mod channel;
+#[cfg(target_os = "linux")]
+mod closed;
+#[cfg(target_os = "linux")]
 mod ended;
-mod host;
-mod limits;
-mod memory;
-mod process;
-mod protocol;
-mod remote;
+#[cfg(target_os = "linux")]
+mod inside;
+#[cfg(not(target_os = "linux"))]
+mod open;
+#[cfg(target_os = "linux")]
+pub(crate) mod page;
 #[cfg(target_os = "linux")]
 mod sandbox;
-mod settings;
 
-pub use host::serve;
-pub use process::late_failures;
-pub use settings::{COMMAND, Isolation};
+#[cfg(target_os = "linux")]
+pub use closed::Closed;
+#[cfg(target_os = "linux")]
+pub(crate) use inside::tell_warning;
+#[cfg(target_os = "linux")]
+pub use inside::{Link, Messages};
+#[cfg(not(target_os = "linux"))]
+pub use open::{Closed, Link, Messages};
+#[cfg(not(target_os = "linux"))]
+pub(crate) use open::{page, tell_warning};
 
-use crate::loading::{Kind, Made, Refusal};
-use process::Process;
-use protocol::{InstanceArguments, Limits, Ready, Setup};
-use remote::RemoteInstance;
-use std::path::{Path, PathBuf};
-use std::sync::OnceLock;
+use fmi_master::instance::CallFailure;
+use std::path::PathBuf;
+use std::time::Duration;
 
-/// Program that is started for each instance.
-static PROGRAM: OnceLock<PathBuf> = OnceLock::new();
-
-/// Declares that this program has the command [`COMMAND`], so that instances can have processes of
-/// their own.
-pub fn enable() {
-    // On Linux this is the running program, even if its file was replaced since. Other systems may
-    // have such a file, too: under Wine it is Wine itself.
-    let program = Path::new("/proc/self/exe");
-    let program = if cfg!(target_os = "linux") && program.exists() {
-        Ok(program.to_path_buf())
-    } else {
-        std::env::current_exe()
-    };
-    if let Ok(program) = program {
-        PROGRAM.get_or_init(|| program);
-    }
+/// What a closed process may use.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Closing {
+    /// Time within which an instance must answer a call.
+    pub call_timeout: Duration,
+    /// Number of bytes of memory that the process may write; `None` if it has no limit.
+    pub memory: Option<u64>,
+    /// Processor time that the process may take, s; `None` if it has no limit.
+    pub cpu: Option<u64>,
+    /// Folders of unpacked archives, in which it may write.
+    pub folders: Vec<PathBuf>,
+    /// Files that it may read.
+    pub files: Vec<PathBuf>,
 }
 
-/// Returns whether instances can have processes of their own.
-pub fn is_enabled() -> bool {
-    PROGRAM.get().is_some()
-}
-
-/// A library with the data that its process needs.
-pub(crate) struct Library<'a> {
-    pub(crate) file: PathBuf,
-    /// Folder of the unpacked archive.
-    pub(crate) folder: &'a Path,
-    pub(crate) isolation: &'a Isolation,
-    pub(crate) kind: Kind,
-}
-
-impl Library<'_> {
-    /// Makes an instance with this identifier and these resources in a process of its own.
-    pub(crate) fn instantiate(
-        self,
-        name: &str,
-        (guid, resources): (&str, &str),
-    ) -> Result<Made, Refusal> {
-        let (name, guid, resources) = (name.into(), guid.into(), resources.into());
-        let (process, fault) = self.load(InstanceArguments { name, guid, resources })?;
-        Ok((Box::new(RemoteInstance::new(process)), fault))
-    }
-
-    fn load(self, instance: InstanceArguments) -> Result<(Process, Option<String>), Refusal> {
-        let refused = |reason: String| Err(Refusal::Refused(reason));
-        let Some(program) = PROGRAM.get() else {
-            let reason = "has no process of its own, because this program cannot start any";
-            return refused(reason.into());
-        };
-        let mut process = match Process::start(program, &instance.name, self.isolation, self.folder)
-        {
-            Ok(process) => process,
-            Err(error) => return refused(format!("has no process of its own: {error}")),
-        };
-        let limits = Limits {
-            memory: self.isolation.memory,
-            cpu: self.isolation.cpu,
-            folder: self.isolation.sandbox.then(|| self.folder.to_path_buf()),
-        };
-        let Kind { fmi3, exchange } = self.kind;
-        let fmi3 = fmi3.map(|_| self.folder.to_path_buf());
-        let setup = Setup { library: self.file, instance, exchange, limits, fmi3 };
-        match process.set_up(&setup) {
-            Ok(Ready::Loaded { version_fault, without, .. }) => {
-                if let Some(without) = without {
-                    crate::warnings::warn_once(format!(
-                        "this system cannot limit these for instances: {without}"
-                    ));
-                }
-                Ok((process, version_fault))
-            }
-            Ok(Ready::Unloadable(reason)) => Err(Refusal::Unloadable(reason)),
-            Ok(Ready::Refused { reason, .. }) => refused(reason),
-            Err(failure) => refused(format!("failed in {}: {}", failure.call, failure.message)),
+impl Default for Closing {
+    fn default() -> Self {
+        Self {
+            call_timeout: Duration::from_secs(60),
+            memory: Some(4 << 30),
+            cpu: None,
+            folders: Vec::new(),
+            files: Vec::new(),
         }
     }
+}
+
+/// Why a closed process has ended before its work was done.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Ended {
+    /// There is no such process, because the system cannot start or close it.
+    Refused(String),
+    /// It failed.
+    Failed {
+        /// Component that was being called; `None` if none was.
+        component: Option<String>,
+        /// Simulated time, s.
+        time: f64,
+        /// Case of a campaign or a study, if it is known.
+        case: Option<u64>,
+        /// Part of the work that the case belongs to, if it is known.
+        part: Option<usize>,
+        /// The call, and how the process has ended.
+        failure: CallFailure,
+    },
+}
+
+impl Ended {
+    /// A process that has done its work and said nothing.
+    pub fn silent() -> Self {
+        Self::Refused("the closed process gave no result".into())
+    }
+}
+
+/// Returns whether this system can close a process.
+pub fn can_close() -> bool {
+    #[cfg(target_os = "linux")]
+    return sandbox::is_there();
+    #[cfg(not(target_os = "linux"))]
+    return false;
 }

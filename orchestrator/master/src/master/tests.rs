@@ -149,7 +149,7 @@ fn run_on(
                 journal: Rc::clone(&journal),
             };
             let name = name.to_string();
-            Member { name, every, ahead: false, varies, instance: Box::new(mock) }
+            Member { name, every, varies, instance: Box::new(mock) }
         })
         .collect();
     let gain = order.iter().position(|name| *name == "gain").unwrap();

@@ -15,8 +15,6 @@ pub struct Member {
     pub name: String,
     /// Period of the instance: it steps at every n-th tick.
     pub every: u32,
-    /// Whether others may work while it steps, because it has a process of its own.
-    pub ahead: bool,
     /// Whether its last step is fitted to the stop time. Otherwise all its steps are whole, and it
     /// is given the end of the last one.
     pub varies: bool,
@@ -161,8 +159,6 @@ pub(super) struct Inputs {
     real: Bundle<f64>,
     integer: Bundle<i32>,
     boolean: Bundle<i32>,
-    /// Instances that must have stepped before the values are there.
-    pub(super) awaited: Vec<usize>,
     /// Instances that give any of the values.
     pub(super) sources: Vec<usize>,
 }
@@ -200,19 +196,13 @@ impl<T: Copy + Default> Bundle<T> {
 
 impl Inputs {
     pub(super) fn new(values: &Values, wires: &[(Wire, Reading)], target: usize) -> Self {
-        let sources = |readings: &[Reading]| {
-            let chosen = wires.iter().filter(|(wire, reading)| {
-                wire.to.component == target && readings.contains(reading)
-            });
-            let sources: BTreeSet<usize> = chosen.map(|(wire, _)| wire.from.component).collect();
-            sources.into_iter().collect()
-        };
+        let given = wires.iter().filter(|(wire, _)| wire.to.component == target);
+        let sources: BTreeSet<usize> = given.map(|(wire, _)| wire.from.component).collect();
         Self {
             real: Bundle::new(values, wires, target, Carrier::Real),
             integer: Bundle::new(values, wires, target, Carrier::Integer),
             boolean: Bundle::new(values, wires, target, Carrier::Boolean),
-            awaited: sources(&[Reading::AfterStep]),
-            sources: sources(&[Reading::BeforeStep, Reading::AfterStep]),
+            sources: sources.into_iter().collect(),
         }
     }
 
