@@ -15,7 +15,7 @@ import fmpy
 from fmpy import simulate_fmu
 
 import cosim
-from conftest import ROOT, TARGET, archive, program
+from conftest import TARGET, archive, program
 
 STEP = 0.04
 
@@ -69,9 +69,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--repeat", type=int, default=5, help="runs of each, of which the median counts")
     repeat = parser.parse_args().repeat
-    names = ["LQR", "ReentryPlant"]
-    medians: dict[str, dict[str, float]] = {}
-    for fmu in names:
+    for fmu in ("LQR", "ReentryPlant"):
         description = fmpy.read_model_description(str(archive(fmu)))
         outputs = [v.name for v in description.modelVariables if v.causality == "output" and v.type == "Real"]
         rates: dict[str, list[float]] = {name: [] for name in IMPORTERS}
@@ -79,10 +77,10 @@ def main() -> None:
         for _ in range(repeat):
             for name, (run, steps) in IMPORTERS.items():
                 rates[name].append(rate(run, archive(fmu), outputs, steps))
-        medians[fmu] = {name: statistics.median(values) for name, values in rates.items()}
+        medians = {name: statistics.median(values) for name, values in rates.items()}
         print(f"\n{fmu}, {len(outputs)} outputs recorded at every step of {STEP} s, median of {repeat}")
-        for name, value in medians[fmu].items():
-            ratio = value / medians[fmu]["orchestrator"]
+        for name, value in medians.items():
+            ratio = value / medians["orchestrator"]
             print(f"  {name:<14}{value / 1e6:8.3f} million steps/s, {ratio:5.2f} of the orchestrator's")
 
 
