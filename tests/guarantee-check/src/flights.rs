@@ -25,8 +25,6 @@ pub struct Recorded {
     pub age: usize,
     /// Time of the optimisation, s.
     pub time: f64,
-    /// Whether the previous plan was kept.
-    pub is_kept: bool,
 }
 
 /// How a bounded vector changes over time, relative to its bound.
@@ -140,7 +138,8 @@ impl Flight {
             let measured = self.measure(&state, &acting, time);
             let moment = controller.update(&mut memory, tick, time, &measured, &reference);
             if tick % ratio == 0 && memory.inner.assured() {
-                observe(&recorded(&memory.inner, time));
+                let (plan, age) = (memory.inner.plan.clone(), memory.inner.age as usize);
+                observe(&Recorded { plan, age, time });
             }
             match &mut transport {
                 Some(transport) => drop(transport.command(time, moment)),
@@ -250,15 +249,6 @@ fn erroneous(s: &Settings, seed: u64) -> Matrix3<f64> {
     let inertia = root * (Matrix3::identity() + error) * root;
     // Products are symmetric except for rounding.
     (inertia + inertia.transpose()) * 0.5
-}
-
-fn recorded(memory: &control::crmpc::Memory, time: f64) -> Recorded {
-    Recorded {
-        plan: memory.plan.clone(),
-        age: memory.age as usize,
-        time,
-        is_kept: memory.report.status == control::crmpc::SolverStatus::Kept,
-    }
 }
 
 fn degrees(values: [f64; 3]) -> Vector3<f64> {

@@ -47,10 +47,8 @@ impl Plans {
 
 /// Returns the outcomes of the checks of plans as lines.
 pub(crate) fn report(title: &str, tally: &Tally) -> String {
-    let mut lines = format!(
-        "{title}: {} plans ({} kept from the previous optimisation, {} on an older trajectory), {} not confirmed\n",
-        tally.plans, tally.kept_plans, tally.aged, tally.not_confirmed
-    );
+    let Tally { plans, not_confirmed, .. } = tally;
+    let mut lines = format!("{title}: {plans} plans, {not_confirmed} not confirmed\n");
     if let Some(left) = &tally.left {
         lines.extend([format!(
             "  least left: sideslip {:.3} %, rate {:.3} %, moment {:.3} %\n",
@@ -81,7 +79,7 @@ mod tests {
     fn a_plan_that_is_not_confirmed_is_named_with_its_flight() {
         let good = Tally { plans: 3, ..Tally::default() };
         assert!(good.confirmed() && !report("all", &good).contains("NOT"));
-        assert!(report("all", &good).starts_with("all: 3 plans (0 kept"));
+        assert!(report("all", &good).starts_with("all: 3 plans, 0 not"));
         // A plan whose states do not follow from its accelerations is invalid.
         let settings = Settings::new(Constraints::Robust);
         let check = PlanCheck::new(&settings).unwrap();

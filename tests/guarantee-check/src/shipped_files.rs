@@ -29,27 +29,23 @@ impl ShippedFiles {
         for (file, reason) in &scan.left_out {
             println!("Left out: {}: {}", file.display(), reason.lines().next().unwrap_or_default());
         }
-        let mut done: Vec<(Settings, Option<Tally>)> = Vec::new();
-        let mut confirmed = true;
-        for Shipped { file, place, settings } in &scan.shipped {
-            let earlier = done.iter().find(|(other, _)| other == settings);
-            let (tally, new) = match earlier {
-                Some((_, tally)) => (tally.clone(), false),
-                None => (self.check(settings)?, true),
-            };
-            let title = format!("{} {place}", file.display());
-            match &tally {
-                None => println!("{title}: no guarantee is given"),
-                Some(_) if !new => println!("{title}: as above"),
-                Some(tally) => print!("{}", report(&title, tally)),
-            }
-            confirmed &= tally.as_ref().is_none_or(Tally::confirmed);
-            if new {
-                done.push((*settings, tally));
-            }
-        }
+        let mut done: Vec<&Settings> = Vec::new();
         // A folder without a guarantee confirms nothing.
-        let is_any = done.iter().any(|(_, tally)| tally.is_some());
+        let (mut confirmed, mut is_any) = (true, false);
+        for Shipped { file, place, settings } in &scan.shipped {
+            let title = format!("{} {place}", file.display());
+            if done.contains(&settings) {
+                println!("{title}: as above");
+                continue;
+            }
+            done.push(settings);
+            let Some(tally) = self.check(settings)? else {
+                println!("{title}: no guarantee is given");
+                continue;
+            };
+            print!("{}", report(&title, &tally));
+            (confirmed, is_any) = (confirmed && tally.confirmed(), true);
+        }
         println!("{}", verdict(confirmed, is_any));
         Ok(confirmed && is_any)
     }

@@ -128,57 +128,52 @@ impl Axis {
         (first / rest, first * length / rest.square())
     }
 
+    /// Rows of what the sums bound: angle, rate, both in the middle of the period, and K o.
+    pub(crate) fn rows(&self) -> [Pair; 5] {
+        let (one, zero) = (Interval::ONE, Interval::ZERO);
+        [[one, zero], [zero, one], self.to_middle[0], self.to_middle[1], self.gain]
+    }
+
     /// Bounds on the effect of any |Δ| ≤ 1 within 0, 1, …, `steps` periods, and last for ever.
     pub fn reach(&self, steps: usize) -> Vec<Bounds> {
-        let unseen = [Interval::from(0.5) * self.latency.square(), self.latency];
-        let (mut seen, mut middle) = ([Interval::ZERO; 2], [Interval::ZERO; 2]);
-        let (mut feedback, mut age) = (Interval::ZERO, Interval::ZERO);
-        let mut by_tick = Vec::with_capacity(steps + 2);
-        let bounds = |seen: &Pair, middle: &Pair, feedback: Interval, age: Interval| {
-            let [angle, rate] = *seen;
-            let [of_angle, of_rate] = *middle;
-            [angle + unseen[0], rate + unseen[1], angle, rate, of_angle, of_rate, feedback, age]
-        };
-        by_tick.push(bounds(&seen, &middle, feedback, age));
         let end = self.latency + self.period;
+        let bounds = |sums: &[Interval; 5], age: Interval| {
+            let mut bounds = spread(sums);
+            bounds[0] = bounds[0] + Interval::from(0.5) * self.latency.square();
+            bounds[1] = bounds[1] + self.latency;
+            bounds[7] = age;
+            bounds
+        };
+        let (mut sums, mut age) = ([Interval::ZERO; 5], Interval::ZERO);
+        let mut by_tick = vec![bounds(&sums, age)];
         for (n, power) in self.transitions(steps).enumerate() {
-            let size = |row: &Pair| integral_of_size(row, self.latency, self.period);
-            seen = std::array::from_fn(|i| seen[i] + size(&power[i]));
-            let in_the_middle = product(&self.to_middle, &power);
-            middle = std::array::from_fn(|i| middle[i] + size(&in_the_middle[i]));
-            let fed = size(&applied(&transposed(&power), &self.gain));
-            feedback = feedback + fed;
-            age = age + fed * (end + Interval::from(n as f64) * self.period);
-            by_tick.push(bounds(&seen, &middle, feedback, age));
+            let sizes = self.rows().map(|row| {
+                integral_of_size(&applied(&transposed(&power), &row), self.latency, self.period)
+            });
+            sums = std::array::from_fn(|i| sums[i] + sizes[i]);
+            age = age + sizes[4] * (end + Interval::from(n as f64) * self.period);
+            by_tick.push(bounds(&sums, age));
         }
         // The tail uses ‖Φⁿ [u, 1]‖ ≤ ‖Φⁿ‖ max(u, 1).
         let scale = self.period * end.max(Interval::ONE);
         let (tail, moment) = self.tails(steps);
-        let (tail, moment) = (tail * scale, moment * scale * self.period);
-        let gain = self.gain[0].abs() + self.gain[1].abs();
         let old = end + Interval::from(steps as f64) * self.period;
-        let more = |value: Interval, by: Interval| value + Interval::new(0.0, by.high);
-        let seen = seen.map(|seen| more(seen, tail));
-        let middle = middle.map(|middle| more(middle, norm(&self.to_middle) * tail));
-        by_tick.push(bounds(
-            &seen,
-            &middle,
-            more(feedback, gain * tail),
-            more(age, gain * (tail * old + moment)),
-        ));
+        let more = self.sizes_within(tail * scale);
+        let aged = self.sizes_within((tail * old + moment * self.period) * scale)[4];
+        let up_to = |value: Interval| Interval::new(0.0, value.high);
+        let last = std::array::from_fn(|i| sums[i] + up_to(more[i]));
+        by_tick.push(bounds(&last, age + up_to(aged)));
         by_tick
     }
 
     /// Sizes of the components of x, of those in the middle of the period, and of K x.
     fn sizes(&self, x: &Pair) -> [Interval; 5] {
-        let middle = applied(&self.to_middle, x);
-        [x[0], x[1], middle[0], middle[1], along(&self.gain, x)].map(Interval::abs)
+        self.rows().map(|row| along(&row, x).abs())
     }
 
     /// Bounds of [`Self::sizes`] for components of at most `largest`.
     fn sizes_within(&self, largest: Interval) -> [Interval; 5] {
-        let middle = norm(&self.to_middle) * largest;
-        [largest, largest, middle, middle, (self.gain[0].abs() + self.gain[1].abs()) * largest]
+        self.rows().map(|row| (row[0].abs() + row[1].abs()) * largest)
     }
 
     /// Sums of [`Self::sizes`] of Φʲ x over j < 0, 1, …, `steps`, and last over all j.

@@ -20,10 +20,6 @@ pub struct Refuted {
 pub struct Tally {
     /// Number of plans that were checked.
     pub plans: u64,
-    /// Number of these that are previous plans, kept because no optimum was certified.
-    pub kept_plans: u64,
-    /// Number of plans whose nominal trajectory began at an earlier optimisation.
-    pub aged: u64,
     /// Smallest share of each limit that any plan leaves unused; `None` without plans.
     pub left: Option<Left>,
     /// Number of plans that were not confirmed.
@@ -39,16 +35,10 @@ impl Tally {
     /// Adds the outcomes of another tally.
     pub fn add(&mut self, other: Self) {
         self.plans += other.plans;
-        self.kept_plans += other.kept_plans;
-        self.aged += other.aged;
         self.not_confirmed += other.not_confirmed;
         self.refuted.extend(other.refuted);
         self.refuted.truncate(SHOWN);
-        let both = |a: Left, b: Left| a.min(&b);
-        self.left = match (self.left, other.left) {
-            (Some(a), Some(b)) => Some(both(a, b)),
-            (a, b) => a.or(b),
-        };
+        self.left = self.left.into_iter().chain(other.left).reduce(|a, b| a.min(&b));
     }
 
     /// Whether plans were checked, and all of them confirmed.
@@ -60,8 +50,6 @@ impl Tally {
     fn record(&mut self, seed: u64, recorded: &Recorded, check: &PlanCheck) {
         let verdict = check.check(&recorded.plan, recorded.age);
         self.plans += 1;
-        self.kept_plans += u64::from(recorded.is_kept);
-        self.aged += u64::from(recorded.age > 0);
         self.left = Some(self.left.map_or(verdict.left, |left| left.min(&verdict.left)));
         if !verdict.confirmed() {
             self.not_confirmed += 1;

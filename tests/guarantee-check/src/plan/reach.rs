@@ -173,16 +173,8 @@ impl<'a> Builder<'a> {
     }
 
     fn build(&self) -> Option<Reach> {
-        let (tau, half, eighth) = (number(self.s.period_feedback), number(0.5), number(0.125));
-        let [k1, k2] = [self.s.feedback.k1, self.s.feedback.k2].map(number);
-        let (zero, one) = (Interval::ZERO, Interval::ONE);
-        let rows = [
-            [one, zero],
-            [zero, one],
-            [one + eighth * tau.square() * k1, half * tau + eighth * tau.square() * k2],
-            [half * tau * k1, one + half * tau * k2],
-            [k1, k2],
-        ];
+        let (tau, eighth) = (number(self.s.period_feedback), number(0.125));
+        let rows = self.axis.rows();
         let (responses, effects) = (rows.map(|row| self.respond(row)), self.effects());
         // K ô is held between two ticks.
         let at = |n: usize| {
