@@ -25,7 +25,7 @@ from scipy import sparse
 
 import nlp
 from conftest import ROOT, TARGET
-from samples import SCALE, H, N, Sample, flat, hessian, taken, target
+from samples import SCALE, H, N, Sample, hessian, taken, target
 
 OURS = ["shortcuts, riccati", "riccati", "cone"]
 # Largest relative difference of two costs of the same problem.
