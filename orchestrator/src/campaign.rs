@@ -28,17 +28,6 @@ pub(crate) struct Fly {
     /// Experiment that replaces that of the campaign: a file, or the name of an experiment.
     #[arg(long, value_name = "EXPERIMENT")]
     experiment: Option<PathBuf>,
-    /// Write the experiment of one case to a file that `orchestrator run` takes, and run it with
-    /// everything recorded.
-    #[arg(long, value_name = "K", help_heading = PART, conflicts_with_all = ["cases", "work", "worst", "fresh"])]
-    case: Option<u64>,
-    /// Fly only the cases from FIRST up to, but not including, LAST. A later command for the whole
-    /// campaign merges them. Several processes may work in the same folder at once.
-    #[arg(long, value_name = "FIRST..LAST", help_heading = PART, value_parser = range, allow_hyphen_values = true, conflicts_with_all = ["work", "worst"])]
-    cases: Option<Range<u64>>,
-    /// Print which parts of the campaign are not flown yet, as JSON, and fly no case.
-    #[arg(long, help_heading = PART, conflicts_with_all = ["worst", "fresh"])]
-    work: bool,
     /// Look for the worst case instead, as [search] of the campaign says, and write it as an
     /// experiment and report.html with its curves over those of other cases.
     #[arg(long, help_heading = "Search")]
@@ -63,13 +52,29 @@ pub(crate) struct Fly {
     /// Show neither progress nor summary.
     #[arg(long)]
     quiet: bool,
-    // Its heading would apply to all arguments that follow.
+    // The headings of these would apply to all arguments that follow.
+    #[command(flatten)]
+    part: Part,
     #[command(flatten)]
     pub(crate) overrides: Overrides,
 }
 
-/// Heading of the options that fly a part of a campaign.
-const PART: &str = "Part of the campaign";
+/// Options that fly a part of a campaign.
+#[derive(Args)]
+#[command(next_help_heading = "Part of the campaign")]
+struct Part {
+    /// Write the experiment of one case to a file that `orchestrator run` takes, and run it with
+    /// everything recorded.
+    #[arg(long, value_name = "K", conflicts_with_all = ["cases", "work", "worst", "fresh"])]
+    case: Option<u64>,
+    /// Fly only the cases from FIRST up to, but not including, LAST. A later command for the whole
+    /// campaign merges them. Several processes may work in the same folder at once.
+    #[arg(long, value_name = "FIRST..LAST", value_parser = range, allow_hyphen_values = true, conflicts_with_all = ["work", "worst"])]
+    cases: Option<Range<u64>>,
+    /// Print which parts of the campaign are not flown yet, as JSON, and fly no case.
+    #[arg(long, conflicts_with_all = ["worst", "fresh"])]
+    work: bool,
+}
 
 fn range(text: &str) -> Result<Range<u64>, String> {
     let number = |text: &str| text.trim().parse::<u64>().ok();
@@ -95,13 +100,13 @@ pub(crate) fn fly(asked: &Fly, out: &mut impl Write, interrupt: &Interrupt) -> R
     let changes = Changes { experiment, overrides: overrides.clone(), command };
     let plan = Plan::new(campaign, changes, &asked.fmu_dir)?;
     let folder = run::folder(&plan, asked.out.as_deref());
-    if asked.work {
+    if asked.part.work {
         let work =
             serde_json::to_string(&run::remaining(&plan, &folder)).map_err(std::io::Error::from)?;
         writeln!(out, "{work}")?;
         return Ok(());
     }
-    if let Some(case) = asked.case {
+    if let Some(case) = asked.part.case {
         return fly_case(&plan, case, asked, overrides, out, interrupt);
     }
     let options = Options {
@@ -117,7 +122,7 @@ pub(crate) fn fly(asked: &Fly, out: &mut impl Write, interrupt: &Interrupt) -> R
         if !asked.quiet {
             worst(&outcome, out)?;
         }
-    } else if let Some(cases) = &asked.cases {
+    } else if let Some(cases) = &asked.part.cases {
         let flown = run::fly_range(&plan, cases, &options)?;
         if !asked.quiet {
             writeln!(out, "{flown} cases flown, kept in {}", folder.join("parts").display())?;
@@ -133,7 +138,7 @@ pub(crate) fn fly(asked: &Fly, out: &mut impl Write, interrupt: &Interrupt) -> R
 
 /// Returns the command that flies one case: this one, without what concerns all cases.
 fn command_of_case() -> String {
-    let mut command = "orchestrator".to_string();
+    let mut kept = vec!["orchestrator".to_string()];
     let mut words = env::args().skip(1);
     while let Some(word) = words.next() {
         match &*word {
@@ -141,12 +146,12 @@ fn command_of_case() -> String {
             "--jobs" | "--out" => drop(words.next()),
             _ if word.starts_with("--jobs=") || word.starts_with("--out=") => {}
             _ if word.chars().all(|c| c.is_alphanumeric() || "-_./=+:".contains(c)) => {
-                command += &format!(" {word}");
+                kept.push(word);
             }
-            _ => command += &format!(" '{word}'"),
+            _ => kept.push(format!("'{word}'")),
         }
     }
-    command + " --case CASE"
+    kept.join(" ") + " --case CASE"
 }
 
 /// Runs one case with everything recorded.

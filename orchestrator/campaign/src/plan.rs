@@ -64,7 +64,7 @@ impl Plan {
         let recorded = recorded(&campaign, &system.experiment.observe, &meters);
         let measured = meters.metrics();
         sweep.keys.insert("campaign".into(), keys(&campaign, &changes)?);
-        let plan = Self { changes, campaign, sweep, recorded };
+        let plan = Self { campaign, sweep, recorded, changes };
         plan.check_columns()?;
         plan.check_limits(&measured)?;
         Ok(plan)

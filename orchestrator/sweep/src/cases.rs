@@ -70,7 +70,7 @@ impl Sweep {
             let levels = match variation.design {
                 DesignKind::Levels => entry.distribution.levels(),
                 DesignKind::Corners => entry.distribution.check_ends().map(|()| 0),
-                _ => Ok(0),
+                DesignKind::Random => Ok(0),
             };
             levels.map_err(|problem| entry.refusal(&problem, source))
         });
