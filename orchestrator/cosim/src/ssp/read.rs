@@ -16,6 +16,7 @@ use fmu_import::error::Error as Import;
 use fmu_import::fmu::Fmu;
 use fmu_import::folder::TemporaryFolder;
 use fmu_import::xml::{self, Element};
+use std::collections::btree_map::Entry;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
@@ -116,10 +117,10 @@ pub fn load(path: &Path, overrides: &Overrides) -> Result<Loaded, Error> {
 fn open(structure: &Structure, path: &Path, folder: &Path) -> Result<Opened, Error> {
     let mut opened = Opened::default();
     for component in &structure.components {
-        let fmu = folder.join(&component.source);
-        if !opened.contains_key(&fmu) {
-            let archive = Fmu::open(&fmu).map_err(|error| of_entry(error.into(), path, folder))?;
-            opened.insert(fmu, Rc::new(archive));
+        if let Entry::Vacant(place) = opened.entry(folder.join(&component.source)) {
+            let fmu = Fmu::open(place.key());
+            let fmu = fmu.map_err(|error| of_entry(error.into(), path, folder))?;
+            place.insert(Rc::new(fmu));
         }
     }
     Ok(opened)

@@ -177,7 +177,8 @@ impl<M: ContinuousModel> Exchange<M> {
                 Ok(None) => return Ok((step.end, None)),
                 Ok(Some((instant, indicator))) => {
                     let part = step.part(instant);
-                    if part < NEAR || part > 1.0 - NEAR || trials == MOST_LOCATIONS {
+                    let is_near = !(NEAR..=1.0 - NEAR).contains(&part);
+                    if is_near || trials == MOST_LOCATIONS {
                         let mut states = step.end.states.clone();
                         step.states(instant, &mut states);
                         equations.place(instant, &states).map_err(Refusal::failure)?;

@@ -71,12 +71,11 @@ impl LookupTableInstance {
         Ok(())
     }
 
-    fn get_whole(&self, references: &[u32], values: &mut [i32]) -> Outcome {
+    fn get_whole(&self, references: &[u32], values: &mut [i32]) {
         for (value, reference) in values.iter_mut().zip(references) {
             // Only values of 32 bits are read as whole numbers.
             *value = self.get(*reference) as i32;
         }
-        Ok(())
     }
 
     fn set_whole(&mut self, call: &'static str, references: &[u32], values: &[i32]) -> Outcome {
@@ -94,11 +93,13 @@ impl Instance for LookupTableInstance {
     }
 
     fn get_integer(&mut self, references: &[u32], values: &mut [i32]) -> Outcome {
-        self.get_whole(references, values)
+        self.get_whole(references, values);
+        Ok(())
     }
 
     fn get_boolean(&mut self, references: &[u32], values: &mut [i32]) -> Outcome {
-        self.get_whole(references, values)
+        self.get_whole(references, values);
+        Ok(())
     }
 
     fn set_real(&mut self, references: &[u32], values: &[f64]) -> Outcome {
