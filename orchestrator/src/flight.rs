@@ -3,6 +3,7 @@
 use crate::run::Options;
 use cosim::error::Error;
 use cosim::interrupt::Interrupt;
+use cosim::pacing::pacer::Pacer;
 use cosim::pacing::report::RealTime;
 use cosim::pacing::timer::{self, Monotonic};
 use cosim::run::{Observer, Sample};
@@ -90,7 +91,7 @@ fn fly_here(
         Err(_) => Ok(Measured::new()),
     };
     let end = run.master.end().map(String::from);
-    let real_time = run.take_pacer().map(|pacer| pacer.report());
+    let real_time = run.take_pacer().map(Pacer::report);
     let flown = Flown { outcome, wall, end, real_time, margins, late: None };
     tell(&flown);
     Ok(flown)

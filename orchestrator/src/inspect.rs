@@ -6,6 +6,7 @@ use crate::list;
 use cosim::error::Error;
 use cosim::experiment::Process;
 use fmi_master::description::{Interface, ModelDescription, ScalarType, Variable, VariableKind};
+use fmi_master::instance::CallFailure;
 use fmu_import::description::CAUSALITIES;
 use fmu_import::fmu::Fmu;
 use fmu_import::isolation::{self, Closed, Closing, Ended};
@@ -78,8 +79,9 @@ fn faults(fmu: &Fmu) -> Result<Vec<String>, Error> {
     match begun.and_then(|mut closed| closed.hear(|| None, hear)) {
         Ok(()) => {}
         Err(Ended::Refused(reason)) => return Err(Error::experiment(reason)),
-        Err(Ended::Failed { failure, .. }) => {
-            faults.push(format!("its instance failed in {}: {}", failure.call, failure.message));
+        Err(Ended::Failed(last)) => {
+            let CallFailure { call, message, .. } = last.failure;
+            faults.push(format!("its instance failed in {call}: {message}"));
         }
     }
     Ok(faults)

@@ -63,7 +63,7 @@ impl System {
                     "{reason}: with --isolate=false it is not closed"
                 ));
             }
-            Ended::Failed { component, time, failure, .. } => (component, time, failure),
+            Ended::Failed(last) => (last.component, last.time, last.failure),
         };
         let named =
             |name: &String| self.components.iter().find(|component| component.name == *name);

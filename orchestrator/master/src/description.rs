@@ -2,7 +2,6 @@
 //! enumerations, and the dependencies of outputs on inputs.
 
 use crate::quantity::{self, Scaling, UnitDefinition};
-use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -357,7 +356,7 @@ impl ModelDescription {
 }
 
 /// Type in which a value is transferred.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Carrier {
     /// A real number as `f64`.
     Real,

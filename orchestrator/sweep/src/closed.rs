@@ -72,10 +72,10 @@ where
         left.retain(|place| there.contains(place));
         let Err(ended) = ended else { break };
         let part = match &ended {
-            Ended::Failed { part, .. } => part.filter(|part| left.contains(part)),
+            Ended::Failed(last) => last.part.filter(|part| left.contains(part)),
             Ended::Refused(_) => None,
         };
-        if part.is_none() && threads > 1 && matches!(ended, Ended::Failed { .. }) {
+        if part.is_none() && threads > 1 && matches!(ended, Ended::Failed(_)) {
             // Alone, a part shows whether it is the one.
             threads = 1;
             continue;

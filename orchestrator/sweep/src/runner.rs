@@ -147,7 +147,7 @@ impl<'a, R: Send> Work<'a, R> {
                     keep(part, result)
                 },
                 |part, ended| {
-                    let case = if let Ended::Failed { case, .. } = ended { case } else { None };
+                    let case = if let Ended::Failed(last) = &ended { last.case } else { None };
                     failed(part, case, systems[part.sweep].ended(ended))
                 },
                 goes_on,

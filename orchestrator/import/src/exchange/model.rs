@@ -4,7 +4,6 @@ use crate::functions::Table;
 use crate::library::FmuInstance;
 use fmi_master::description::ModelDescription;
 use fmi_master::instance::{CallFailure, Instance};
-use serde::{Deserialize, Serialize};
 
 /// Reason why a model has not computed what was asked for.
 #[derive(Debug)]
@@ -33,7 +32,7 @@ pub(crate) trait ContinuousModel: Instance {
 }
 
 /// What the integration of a unit needs to know of its description.
-#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default)]
 pub(crate) struct Layout {
     /// Value references of the continuous states.
     pub(super) states: Vec<u32>,

@@ -5,7 +5,7 @@
 use super::ended::ended;
 use super::inside::{self, Link};
 use super::page::{Doing, Page, SLOTS};
-use super::{Closing, Ended};
+use super::{Closing, Ended, LastCall};
 use crate::folder::TemporaryFolder;
 use fmi_master::instance::CallFailure;
 use rustix::fs::{OFlags, fcntl_setfl};
@@ -215,12 +215,11 @@ impl Closed {
     }
 
     fn has_ended(&mut self) -> bool {
-        let mut status = 0;
-        // SAFETY: the pointer is valid for the call, and the process was not waited for yet.
-        if self.status.is_none()
-            && unsafe { libc::waitpid(self.process, &raw mut status, libc::WNOHANG) } != 0
-        {
-            self.status = Some(ExitStatus::from_raw(status));
+        if self.status.is_none() {
+            let mut status = 0;
+            // SAFETY: the pointer is valid for the call, and the process was not waited for yet.
+            let ended = unsafe { libc::waitpid(self.process, &raw mut status, libc::WNOHANG) };
+            self.status = (ended != 0).then(|| ExitStatus::from_raw(status));
         }
         self.status.is_some()
     }
@@ -336,14 +335,14 @@ impl Closed {
         let output = output.into_iter().find(|text| !text.is_empty());
         let output = output.map(|text| format!("; its last output: {text}")).unwrap_or_default();
         let message = reason.to_string() + &output;
-        let Some(doing) = self.page.culprit(self.late) else {
-            let failure = CallFailure::new("a thread of its own", message);
-            let time = self.page.time();
-            return Ended::Failed { component: None, time, case: None, part: None, failure };
-        };
-        let Doing { component, call, time, case, part } = doing;
-        let failure = CallFailure { call: call.into(), ..CallFailure::new("", message) };
-        Ended::Failed { component: Some(component), time, case, part, failure }
+        let failure = CallFailure::new("a thread of its own", message);
+        let mut last =
+            LastCall { component: None, time: self.page.time(), case: None, part: None, failure };
+        if let Some(Doing { component, call, time, case, part }) = self.page.culprit(self.late) {
+            let failure = CallFailure { call: call.into(), ..last.failure };
+            last = LastCall { component: Some(component), time, case, part, failure };
+        }
+        Ended::Failed(Box::new(last))
     }
 }
 

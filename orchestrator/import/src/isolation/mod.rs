@@ -73,19 +73,23 @@ impl Default for Closing {
 pub enum Ended {
     /// There is no such process, because the system cannot start or close it.
     Refused(String),
-    /// It failed.
-    Failed {
-        /// Component that was being called; `None` if none was.
-        component: Option<String>,
-        /// Simulated time, s.
-        time: f64,
-        /// Case of a campaign or a study, if it is known.
-        case: Option<u64>,
-        /// Part of the work that the case belongs to, if it is known.
-        part: Option<usize>,
-        /// The call, and how the process has ended.
-        failure: CallFailure,
-    },
+    /// It failed in this call.
+    Failed(Box<LastCall>),
+}
+
+/// The call in which a closed process has failed.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LastCall {
+    /// Component that was being called; `None` if none was.
+    pub component: Option<String>,
+    /// Simulated time, s.
+    pub time: f64,
+    /// Case of a campaign or a study, if it is known.
+    pub case: Option<u64>,
+    /// Part of the work that the case belongs to, if it is known.
+    pub part: Option<usize>,
+    /// The call, and how the process has ended.
+    pub failure: CallFailure,
 }
 
 impl Ended {
