@@ -20,8 +20,8 @@ pub(crate) trait Typed: Scalar {
         reference: usize,
         look: impl FnOnce(&Self) -> R,
     ) -> Option<R>;
-    /// Sets the variable, which must have this type.
-    fn put(self, model: &mut dyn ModelInstance, reference: usize);
+    /// Sets the variable, which must have this type, and returns whether its value changed.
+    fn put(self, model: &mut dyn ModelInstance, reference: usize) -> bool;
 }
 
 macro_rules! typed {
@@ -34,10 +34,9 @@ macro_rules! typed {
             ) -> Option<R> {
                 model.$field(reference).map(|value| look(value))
             }
-            fn put(self, model: &mut dyn ModelInstance, reference: usize) {
-                if let Some(field) = model.$field(reference) {
-                    *field = self;
-                }
+            fn put(self, model: &mut dyn ModelInstance, reference: usize) -> bool {
+                let field = model.$field(reference).filter(|field| !field.same(&self));
+                field.map(|field| *field = self).is_some()
             }
         }
     )*};
@@ -53,8 +52,12 @@ impl Typed for i32 {
     ) -> Option<R> {
         model.integer(reference).map(|value| look(&value))
     }
-    fn put(self, model: &mut dyn ModelInstance, reference: usize) {
-        model.set_integer(reference, self);
+    fn put(self, model: &mut dyn ModelInstance, reference: usize) -> bool {
+        let changes = model.integer(reference) != Some(self);
+        if changes {
+            model.set_integer(reference, self);
+        }
+        changes
     }
 }
 
@@ -195,9 +198,7 @@ impl Instance {
                 self.set_state(place, position);
                 continue;
             }
-            let same = T::look(self.model.as_mut(), position, |before| before.same(&value));
-            if same != Some(true) {
-                value.put(self.model.as_mut(), position);
+            if value.put(self.model.as_mut(), position) {
                 self.stale = true;
                 if self.description.variables[position].causality == Causality::Parameter {
                     self.progress.initialized = false;
