@@ -116,8 +116,7 @@ def test_loops_by_hand_keep_to_fmi_2(watched, jacobi):
 USES = {
     "run": ["run", "lqr", "--out", "out", "--quiet", "--stop", "2"],
     "isolated": ["run", "lqr", "--out", "out", "--quiet", "--stop", "2", "--isolate"],
-    "linearised": ["linearise", "lqr", "--at", "1", "--open", "plant.moment.*", "--out", "out.json"],
-    "response": ["response", "lqr", "--at", "1", "--stop", "4", "--open", "plant.moment.x", "--out", "out"],
+    "margins": ["margins", "lqr", "--at", "1", "--open", "plant.moment.*", "--model", "out.json"],
     "exchange": ["run", "exchange.toml", "--out", "out", "--quiet", "--stop", "2"],
     "campaign": ["campaign", "few.toml", "--out", "out", "--jobs", "1", "--quiet", "--stop", "2"],
 }

@@ -2,7 +2,7 @@
 
 use crate::catalogue::Filter;
 use crate::run::Files;
-use crate::{campaign, examples, linear, plot, response, schema};
+use crate::{campaign, examples, margins, plot, schema};
 use clap::{Arg, CommandFactory, FromArgMatches, Parser, Subcommand};
 use cosim::choice::choice;
 use cosim::experiment::{Overrides, Process};
@@ -131,18 +131,12 @@ pub(crate) enum Command {
     ///
     /// Finished cases are kept. After an interruption the same command continues where it stopped.
     Campaign(campaign::Fly),
-    /// Linearise an experiment at an instant of its run, and write the open loop as a discrete
-    /// state-space model (JSON).
-    ///
-    /// Components with derivatives give them; of all others the responses to small changes are
-    /// taken from a kept state and realised as a model.
-    Linearise(linear::Linearise),
     /// Print the stability margins of an experiment at an instant of its run: gain, phase and delay
     /// of each signal, disk margins of each and of all together.
-    Margins(linear::PrintMargins),
-    /// Measure the frequency response of an experiment's loop in flight, with a sine added at each
-    /// opened signal, and compare it with that of the linear model.
-    Response(response::Response),
+    ///
+    /// The loop is opened at the signals, and its responses to small changes are taken from the
+    /// kept state of the run.
+    Margins(margins::PrintMargins),
     /// Judge a run that the program at the other end of standard input and output has flown, as
     /// the Python package does, and write the files that `run` writes.
     #[command(hide = true)]
@@ -235,9 +229,7 @@ impl Command {
             Self::Run { .. }
                 | Self::Reproduce { .. }
                 | Self::Campaign(_)
-                | Self::Linearise(_)
                 | Self::Margins(_)
-                | Self::Response(_)
                 | Self::Pack { .. }
         )
     }
@@ -247,9 +239,7 @@ impl Command {
         let overrides = match self {
             Self::Run { overrides, .. } | Self::Pack { overrides, .. } => overrides,
             Self::Campaign(asked) => &asked.overrides,
-            Self::Linearise(asked) => &asked.instant.overrides,
-            Self::Margins(asked) => &asked.instant.overrides,
-            Self::Response(asked) => &asked.instant.overrides,
+            Self::Margins(asked) => &asked.overrides,
             Self::Reproduce { law, .. } => return law.as_deref(),
             _ => return None,
         };
@@ -259,9 +249,7 @@ impl Command {
     /// Returns whether standard output is to hold JSON, errors included.
     pub(crate) fn answers_in_json(&self) -> bool {
         match self {
-            Self::Linearise(asked) => asked.out.is_none(),
             Self::Margins(asked) => asked.json,
-            Self::Response(asked) => asked.json,
             Self::Inspect { json, .. } | Self::List { json, .. } => *json,
             _ => false,
         }

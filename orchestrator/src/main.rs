@@ -8,14 +8,13 @@ mod failure;
 mod flight;
 mod inspect;
 mod judge;
-mod linear;
 mod list;
 mod man;
+mod margins;
 mod pack;
 mod picture;
 mod plain;
 mod plot;
-mod response;
 mod run;
 mod schema;
 mod show;
@@ -151,9 +150,7 @@ fn execute(command: Command, out: &mut impl Write, interrupt: &Interrupt) -> Res
         }
         Command::Plot(asked) => plot::plot(&asked, out),
         Command::Campaign(asked) => campaign::fly(&asked, out, interrupt),
-        Command::Linearise(asked) => linear::linearise(&asked, out, interrupt),
-        Command::Margins(asked) => linear::margins(&asked, out, interrupt),
-        Command::Response(asked) => response::respond(&asked, out, interrupt),
+        Command::Margins(asked) => margins::print(&asked, out, interrupt),
         Command::Judge { experiment, out: folder, fmu_dir } => {
             judge::judge(&experiment, &fmu_dir, &folder)
         }

@@ -37,7 +37,6 @@ def main(studies: Path) -> None:
         for name, experiment in FLIGHTS.items():
             call("run", experiment, "--no-csv", "--quiet", "--out", f"{folder}/{name}")
             shutil.copyfile(f"{folder}/{name}/plot.svg", IMAGES / f"{name}.svg")
-    call("response", "rest", "--fmu", "controller=CRMPC.fmu", "--plot", IMAGES / "response-crmpc.svg")
 
 
 if __name__ == "__main__":

@@ -1,9 +1,8 @@
 //! Frequency responses of a loop as curves that figures draw.
 
 use crate::Matrix;
-use crate::frequency::return_ratio;
 use crate::linearise::Linearised;
-use crate::margins::disk::{Responses, largest_gain, sensitivity};
+use crate::margins::disk::{Responses, largest_gain, return_ratio, sensitivity};
 use crate::spectrum::spectral_radius;
 use nalgebra::Complex;
 use serde::{Deserialize, Serialize};

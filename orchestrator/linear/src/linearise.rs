@@ -1,72 +1,70 @@
 //! From an experiment to the linear model of its loop at an instant.
+//!
+//! The loop is opened, and a short change is put in at each opened signal. What then arrives at all
+//! of them is the response of the open loop, which is realised as a model of the fewest states.
 
 use crate::Matrix;
-use crate::components::Component;
-use crate::identification::{Builder, Found};
-use crate::model::{OpenLoop, Signal};
-use crate::opening::{opened, tick_at};
-use crate::pair::{Joined, Pair};
-use crate::propagation::{Link, Net};
-use crate::replay::Recorded;
-use crate::spectrum::spectral_radius;
-use crate::windows::needed_steps;
+use crate::flights::{Flights, Response};
+use crate::margins::rate;
+use crate::model::{OpenLoop, Step};
+use crate::opening::Opening;
+use crate::realisation::{Lags, realise};
+use crate::spectrum::dominant;
 use cosim::error::Error;
 use cosim::interrupt::Interrupt;
 use cosim::run::Run;
 use cosim::system::System;
 use fmi_master::clock::Clock;
-use fmi_master::delay::Reading;
-use fmi_master::description::Carrier;
 use fmi_master::instance::CallFailure;
 use fmi_master::quantity::rounded;
-use fmi_master::wiring::{Port, Wire};
 use fmu_import::warnings;
-use std::ops::Range;
 
-/// Growth of a closed loop with a pair that is not distinguished from none, and growth of the open
-/// loop that a vehicle does not have, 1/s.
-const SLOWEST_GROWTH: f64 = 0.1;
-const OWN_GROWTH: f64 = 1.0;
+/// Longest period that is looked for: a time (s), but so many samples at least and at most.
+const LONGEST_PERIOD: f64 = 0.25;
+const LONGEST: [usize; 2] = [25, 50];
+/// Time over which responses are followed at least, s. A delay may be as long.
+const LONGEST_TIME: f64 = 1.0;
+/// Samples after which the state of a model shows in all that was put in: the number that is tried
+/// first, and the largest.
+const MEMORY: [usize; 2] = [24, 200];
+/// Number of samples, from the first response on, that are compared to find a period.
+const COMPARED: usize = 6;
+/// Changes that are tried, in relation to the typical magnitude of a signal. A loop that is not
+/// smooth needs a small one, and one that iterates a larger one.
+const CHANGES: [f64; 4] = [1e-3, 1e-5, 1e-7, 1e-9];
+/// Difference of responses, relative to the largest, that counts as none. Differences of periods
+/// count as equal if they are in this relation to the least one.
+const EQUAL: f64 = 1e-6;
+const AS_EQUAL: f64 = 3.0;
+/// Difference of two periods, relative to the largest response, above which the response is not
+/// periodic.
+const REPEATS: f64 = 0.1;
+/// Least share of the responses that a state must add, also in relation to their error.
+const SMALLEST: f64 = 1e-9;
+const ERRORS: f64 = 10.0;
+/// Difference of a model from the responses, relative to the largest, from which on it does not
+/// describe them.
+const DEVIATES: f64 = 0.05;
+/// Factor from the rate of a motion that the responses just show to the one that counts.
+const CERTAIN: f64 = 3.0;
 
-/// The loop of an experiment at an instant.
+/// A linearised loop.
 #[derive(Clone, Debug)]
 pub struct Linearised {
     /// Time of the instant, s.
     pub time: f64,
-    /// The loop with its components.
-    pub net: Net,
-    /// The loop for increases and for decreases of every input, if a component has no derivative.
-    pub sides: Option<[Net; 2]>,
-    /// The open loop of `net`.
+    /// The open loop.
     pub open: OpenLoop,
-    /// How each component's model was found.
-    pub notes: Vec<String>,
-}
-
-/// A component that responds to others, with what is connected to it.
-struct Wired {
-    component: usize,
-    /// Number of communication steps in one of its steps.
-    every: u64,
-    /// Its inputs, of which nothing is recorded yet.
-    recorded: Recorded,
-    /// Places of the recorded inputs among a sample's values.
-    places: Vec<usize>,
-    first: u64,
-    inputs: Vec<Port>,
-    outputs: Vec<Port>,
+    /// The open loop for increases and for decreases of the signals, if these differ.
+    pub sides: Option<[OpenLoop; 2]>,
+    /// How the model was found.
+    pub note: String,
 }
 
 /// Linearises runs of a system at one instant.
 pub struct Lineariser {
     system: System,
-    time: f64,
-    /// Communication points at which components keep their states and their inputs are recorded.
-    ticks: Range<u64>,
-    wired: Vec<Wired>,
-    signals: Vec<Signal>,
-    /// The opened variables, in the order of the signals.
-    opened: Vec<Port>,
+    opening: Opening,
 }
 
 /// Linearises an experiment at `time` (s), with the loop opened at signals that are named as
@@ -84,9 +82,19 @@ pub fn linearise(
     let lineariser = Lineariser::new(system, time, open)?;
     let collection = warnings::collect();
     let mut run = lineariser.system.start(interrupt)?;
-    let found = lineariser.linearise(&mut run, interrupt);
+    let found = lineariser.linearise(&mut run);
     drop(collection);
     found
+}
+
+/// What a trial shows of a loop.
+struct Trial {
+    /// Change with the most exact responses, in relation to the typical magnitudes.
+    change: f64,
+    /// Number of samples after which the responses repeat.
+    period: usize,
+    /// Difference of the responses of two periods, relative to the largest.
+    drift: f64,
 }
 
 impl Lineariser {
@@ -95,29 +103,15 @@ impl Lineariser {
     /// # Errors
     /// Returns an error if the time is not a communication point, or if a signal is not connected.
     pub fn new(mut system: System, time: f64, open: &[String]) -> Result<Self, Error> {
-        let first = tick_at(&system.clock, time)?;
-        let time = system.clock.time(first);
-        let (signals, opened) = opened(&system, open)?;
-        let wired = wired(&mut system, first)?;
-        let responds = |component: usize| wired.iter().any(|one| one.component == component);
-        for (port, signal) in opened.iter().zip(&signals) {
-            let carries = |wire: &Wire| wire.from == *port || wire.to == *port;
-            let mut sources = system.wires().into_iter().map(|(wire, _)| wire).filter(carries);
-            if !sources.any(|wire| responds(wire.from.component)) {
-                let problem =
-                    format!("--open {}: no component that responds gives this signal", signal.name);
-                return Err(Error::experiment(problem));
-            }
-        }
-        let needed =
-            |one: &Wired| one.first + one.every * (needed_steps(one.recorded.length) as u64 + 1);
-        let last = wired.iter().map(needed).max().unwrap_or(first + 1);
+        let opening = Opening::new(&system, time, open)?;
         let (start, step) = (system.clock.start(), system.clock.step());
+        let sample = LONGEST_PERIOD.max(opening.held as f64 * step);
+        let samples = 2 * LONGEST[1] + 2 * MEMORY[1] + COMPARED;
         // No step that is repeated reaches the stop time, so that all of them are whole.
-        let longest = system.components.iter().map(|component| component.every).max();
-        let stop = start + (last + u64::from(longest.unwrap_or(1))) as f64 * step;
-        system.clock = Clock::new(start, stop, step).map_err(Error::experiment)?;
-        Ok(Self { system, time, ticks: first..last, wired, signals, opened })
+        let stop = system.clock.time(opening.first) + samples as f64 * sample + LONGEST_TIME;
+        system.clock = Clock::new(start, start + ((stop - start) / step).ceil() * step, step)
+            .map_err(Error::experiment)?;
+        Ok(Self { system, opening })
     }
 
     /// Returns the system, from which runs are started.
@@ -125,248 +119,256 @@ impl Lineariser {
         &self.system
     }
 
-    /// Returns the communication point at which runs are linearised.
-    pub fn first(&self) -> u64 {
-        self.ticks.start
-    }
-
-    /// Returns the opened variables, in the order of the signals.
-    pub fn opened(&self) -> &[Port] {
-        &self.opened
-    }
-
     /// Linearises a run of the system after its initialisation.
     ///
     /// # Errors
-    /// Returns an error if an instance fails or keeps no states, if the loop does not respond to
-    /// changes of the opened signals, or if the run was asked to end.
-    pub fn linearise(&self, run: &mut Run, interrupt: &Interrupt) -> Result<Linearised, Error> {
-        let Self { system, time, ticks, wired, signals, opened } = self;
-        let recorded = record(system, wired, ticks.clone(), run).map_err(|error| match error {
+    /// Returns an error if an instance fails or keeps no states, if the loop does not respond, or
+    /// has no linear model, or if the run was asked to end.
+    pub fn linearise(&self, run: &mut Run) -> Result<Linearised, Error> {
+        let model = |run: &mut Run| {
+            let first = self.opening.first;
+            for tick in 0..first {
+                run.advance(tick)?;
+            }
+            let _silence = warnings::silence();
+            self.model(&mut Flights::new(&self.opening, run, first)?)
+        };
+        model(run).map_err(|error| match error {
             Error::EndedByInstance { component, time, message } => {
-                let end = rounded(system.clock.time(ticks.end));
-                let message =
-                    format!("{message}, but a linear model needs its motion until t = {end} s");
+                let message = format!("{message}, but a linear model needs its motion beyond");
                 Error::Call { component, time, failure: CallFailure::answer("linearise", message) }
             }
             error => error,
-        })?;
-        let _silence = warnings::silence();
-        let mut found: Vec<Found> = Vec::new();
-        let (mut next, mut has_pair) = (0, false);
-        while next < wired.len() {
-            if let Some(request) = interrupt.asked() {
-                return Err(Error::Interrupted { time: *time, request });
+        })
+    }
+
+    fn model(&self, flights: &mut Flights) -> Result<Linearised, Error> {
+        self.find_sample(flights)?;
+        let sampling = self.sampling(flights);
+        let trial = self.trial(flights)?;
+        let Trial { change, period, drift } = trial;
+        let mut memory = MEMORY[0].max(2 * period);
+        loop {
+            let count = window(sampling).max(2 * memory);
+            flights.record(period + count, period)?;
+            let phases = self.responses(flights, &trial, count)?;
+            let lags = |of: &dyn Fn(&Response) -> &Matrix| -> Vec<Lags> {
+                phases.iter().map(|phase| joined(phase, of)).collect()
+            };
+            let central = lags(&|response| &response.central);
+            let largest = largest(&central);
+            let all = || phases.iter().flatten();
+            let noise = all().map(|one| one.error / largest).fold(0.0, f64::max);
+            let error = noise.max(drift);
+            let tolerance = SMALLEST.max(drift).max(ERRORS * noise);
+            // A loop that changes from period to period has changed by the sum at the end.
+            let drifted = error.max(drift * (count / period) as f64);
+            let steps = realise(&central, memory, tolerance);
+            let deviation = deviation(&steps, &central) / largest;
+            if deviation > EQUAL.max(ERRORS * drifted) && memory < MEMORY[1] {
+                memory = (2 * memory).min(MEMORY[1]);
+                continue;
             }
-            if let Some(pair) = self.pair(next, &recorded, run)? {
-                found.push(pair);
-                (next, has_pair) = (next + 2, true);
+            if deviation > DEVIATES {
+                return Err(self.failure(format!(
+                    "a linear model is {:.0} % off the response to a change within {} s: its steps show too little of the motion, or it is not linear here",
+                    1e2 * deviation,
+                    rounded(count as f64 * sampling)
+                )));
+            }
+            // A motion of the rate s differs from none by about (s t)²/2 after the time t.
+            let seen = 2.0 * drifted.max(deviation).max(SMALLEST);
+            let slowest = CERTAIN * seen.sqrt() / (count as f64 * sampling);
+            let open =
+                |steps: &[Step]| OpenLoop::new(steps, &self.opening.signals, sampling, slowest);
+            let side = |side: usize| {
+                open(&realise(&lags(&|response| &response.sides[side]), memory, tolerance))
+            };
+            let has_edge = all().any(|response| response.has_edge);
+            let open = open(&steps);
+            self.check_verdict(&open)?;
+            let repeats = if period == 1 {
+                String::new()
             } else {
-                found.push(self.alone(next, &recorded[next], run)?);
-                next += 1;
-            }
-        }
-        let models: Vec<&Component> = found.iter().map(|found| &found.model).collect();
-        let links = links(system, &models, opened);
-        let net = |of: &dyn Fn(&Found) -> Component| Net {
-            components: found.iter().map(of).collect(),
-            links: links.clone(),
-            coupling: system.experiment.simulation.coupling,
-            first: ticks.start,
-            length: system.clock.step(),
-            signals: signals.clone(),
-        };
-        let side = |side: usize| {
-            net(&|found| found.sides.as_ref().map_or(&found.model, |sides| &sides[side]).clone())
-        };
-        let has_edge = found.iter().any(|found| found.sides.is_some());
-        let sides = has_edge.then(|| [side(0), side(1)]);
-        let net = net(&|found| found.model.clone());
-        let open = net.open();
-        if open.step.b.amax().max(open.step.d.amax()) == 0.0 || open.step.c.amax() == 0.0 {
-            let silent: Vec<&str> =
-                found.iter().filter(|found| found.is_silent).map(|found| &*found.note).collect();
-            let message = format!(
-                "the loop does not respond to a change of {}. {}",
-                open.signals[0].name,
-                silent.join("; ")
+                format!(", which repeat after {period} of them")
+            };
+            let note = format!(
+                "responses to changes of {change:.0e} of the typical magnitudes, for {count} samples of {} s{repeats}; their relative error is {error:.0e}, that of the model {deviation:.0e}",
+                rounded(sampling)
             );
-            let component = system.components[opened[0].component].name.clone();
-            let failure = CallFailure::new("linearise", message);
-            return Err(Error::Call { component, time: *time, failure });
-        }
-        if has_pair && let Some(growth) = noise(&open) {
-            let names: Vec<&str> = models.iter().map(|model| model.name.as_str()).collect();
-            return Err(Error::Call {
-                component: names.join(" with "),
-                time: *time,
-                failure: CallFailure::answer(
-                    "linearise",
-                    format!(
-                        "the stability of the loop is undecided, because the allocator's noise hides a growth of {growth:.1e}/s"
-                    ),
-                ),
+            let sides = has_edge.then(|| [side(0), side(1)]);
+            return Ok(Linearised {
+                time: self.system.clock.time(self.opening.first),
+                open,
+                sides,
+                note,
             });
         }
-        let notes = found.into_iter().map(|found| found.note).collect();
-        Ok(Linearised { time: *time, net, sides, open, notes })
-    }
-}
-
-impl Lineariser {
-    /// Finds the model of a component by itself.
-    fn alone(&self, place: usize, recorded: &Recorded, run: &mut Run) -> Result<Found, Error> {
-        let one = &self.wired[place];
-        let builder = self.builder(one, recorded);
-        Ok(run.master.call(one.component, self.time, |instance| builder.find(instance))?)
     }
 
-    fn builder<'a>(&'a self, one: &'a Wired, recorded: &'a Recorded) -> Builder<'a> {
-        Builder {
-            system: &self.system,
-            components: std::slice::from_ref(&one.component),
-            first: one.first,
-            recorded,
-            inputs: one.inputs.clone(),
-            outputs: one.outputs.clone(),
+    /// Finds the communication points between which nothing that arrives changes, because a
+    /// controller samples. Samples then begin and end with these.
+    fn find_sample(&self, flights: &mut Flights) -> Result<(), Error> {
+        let step = self.sampling(flights);
+        let longest = (LONGEST_PERIOD / step + 1e-9) as usize;
+        if longest < 2 {
+            return Ok(());
         }
+        let count = window(step) + 4 * longest;
+        flights.record(count, 0)?;
+        let response = flights.fly(0, &self.direction(CHANGES[0]), count)?;
+        let least = EQUAL * response.amax();
+        let changes: Vec<usize> = (1..count)
+            .filter(|lag| (response.column(*lag) - response.column(lag - 1)).amax() > least)
+            .collect();
+        let [begin, _, _, ..] = changes[..] else { return Ok(()) };
+        let divides =
+            |group: &usize| changes.iter().all(|lag| (lag - begin).is_multiple_of(*group));
+        let group = (1..=longest).rev().find(divides).unwrap_or(1);
+        let held = self.opening.held;
+        flights.resample((begin % group) as u64 * held, group as u64 * held)
     }
 
-    /// Finds the model of a component together with the next one, if it has an edge by itself and
-    /// none together with what it acts on.
-    fn pair(
+    /// Finds the change with the most exact responses, and the period of the loop.
+    fn trial(&self, flights: &mut Flights) -> Result<Trial, Error> {
+        let sampling = self.sampling(flights);
+        let longest = ((LONGEST_PERIOD / sampling + 1e-9) as usize).clamp(LONGEST[0], LONGEST[1]);
+        flights.record(2 * longest + window(sampling), 2 * longest)?;
+        let (at, begin) = self.first_response(flights, longest, window(sampling))?;
+        let count = begin + COMPARED;
+        let mut best = (CHANGES[0], f64::INFINITY);
+        for change in CHANGES {
+            let response = flights.response(at, &self.direction(1.0), change, count)?;
+            let error = response.error / response.central.amax().max(f64::MIN_POSITIVE);
+            if error < best.1 {
+                best = (change, error);
+            }
+            if error <= EQUAL {
+                break;
+            }
+        }
+        let change = best.0;
+        let (mut responses, mut drifts): (Vec<Matrix>, Vec<f64>) = (Vec::new(), Vec::new());
+        while drifts.last().is_none_or(|drift| *drift > EQUAL) && drifts.len() < longest {
+            let period = drifts.len() + 1;
+            for sample in responses.len()..longest + period {
+                let [more, less] =
+                    flights.difference(sample, &self.direction(1.0), change, count)?;
+                responses.push((more + less) * 0.5);
+            }
+            let largest = responses.iter().map(Matrix::amax).fold(f64::MIN_POSITIVE, f64::max);
+            let pairs = responses.iter().zip(&responses[period..]);
+            drifts.push(pairs.map(|(a, b)| (a - b).amax()).fold(0.0, f64::max) / largest);
+        }
+        let least = drifts.iter().copied().fold(f64::INFINITY, f64::min);
+        let equal = EQUAL.max(AS_EQUAL * least);
+        let place = drifts.iter().position(|drift| *drift <= equal).unwrap_or(0);
+        let drift = drifts[place];
+        if drift > REPEATS {
+            return Err(self.failure(format!("responses to a change do not repeat within {longest} steps of {} s, but differ by {:.0} %: the loop has no linear model here, or a longer period", rounded(sampling), 1e2 * drift)));
+        }
+        Ok(Trial { change, period: place + 1, drift })
+    }
+
+    /// Finds a sample at which the loop responds to a change, and the lag at which all signals do
+    /// that respond. A component may look at its inputs at some samples only.
+    fn first_response(
         &self,
-        place: usize,
-        recorded: &[Recorded],
-        run: &mut Run,
-    ) -> Result<Option<Found>, Error> {
-        let [first, second] = match self.wired.get(place..place + 2) {
-            Some([first, second]) if first.every == second.every => [first, second],
-            _ => return Ok(None),
-        };
-        let components = [first.component, second.component];
-        let joined = Joined::new(
-            &self.system,
-            components,
-            [&recorded[place], &recorded[place + 1]],
-            [&first.outputs, &second.outputs],
-            &self.opened,
-        );
-        let Some(joined) = joined else { return Ok(None) };
-        let builder = self.builder(first, &recorded[place]);
-        if !run.master.call(first.component, self.time, |instance| builder.has_edge(instance))? {
-            return Ok(None);
-        }
-        let builder = Builder {
-            system: &self.system,
-            components: &components,
-            first: first.first,
-            recorded: &joined.recorded,
-            inputs: joined.inputs.clone(),
-            outputs: joined.outputs.clone(),
-        };
-        let found = run.master.call_both(components, self.time, |instances| {
-            let mut pair = Pair::new(&joined, instances);
-            builder.find(&mut pair).map_err(|failure| (pair.last, failure))
-        })?;
-        Ok(Some(found).filter(|found| found.sides.is_none()))
-    }
-}
-
-/// Returns the growth, 1/s, of a closed loop with a pair if noise alone may make it unstable: a
-/// model of a pair may have motions that grow by themselves, and cannot distinguish a very slow
-/// growth from none.
-fn noise(open: &OpenLoop) -> Option<f64> {
-    let growth = |a: &Matrix| spectral_radius(a).ln() / open.period;
-    let closed = open.closed(&vec![1.0; open.channels()]).map(|a| growth(&a))?;
-    let is_own = || growth(&open.step.a) > OWN_GROWTH;
-    (closed >= 0.0 && (closed < SLOWEST_GROWTH || is_own())).then_some(closed)
-}
-
-/// Finds the components that respond to others. The inputs of each are seen at every communication
-/// point from now on.
-fn wired(system: &mut System, first: u64) -> Result<Vec<Wired>, Error> {
-    let wires = system.wires();
-    let is_real = |port: &Port| port.carrier == Carrier::Real;
-    let mut wired = Vec::new();
-    for component in 0..system.components.len() {
-        let into = wires.iter().filter(|(wire, _)| wire.to.component == component);
-        let ports: Vec<Port> = into.map(|(wire, _)| wire.to).collect();
-        let mut outputs: Vec<Port> = Vec::new();
-        for (wire, _) in wires.iter().filter(|(wire, _)| wire.from.component == component) {
-            if is_real(&wire.from) && !outputs.contains(&wire.from) {
-                outputs.push(wire.from);
+        flights: &mut Flights,
+        longest: usize,
+        count: usize,
+    ) -> Result<(usize, usize), Error> {
+        for sample in 0..longest {
+            let response = flights.fly(sample, &self.direction(CHANGES[0]), count)?;
+            let begins = response.row_iter().filter_map(|row| row.iter().position(|by| *by != 0.0));
+            if let Some(begin) = begins.max() {
+                return Ok((sample, begin));
             }
         }
-        // A signal that responds to nothing does not change.
-        if ports.is_empty() || outputs.is_empty() {
-            continue;
-        }
-        let places = ports
-            .iter()
-            .map(|port| Ok(system.probe(&system.name(*port))?.place))
-            .collect::<Result<Vec<_>, String>>()
-            .map_err(Error::experiment)?;
-        let every = u64::from(system.components[component].every);
-        let length = every as f64 * system.clock.step();
-        wired.push(Wired {
-            component,
-            every,
-            recorded: Recorded { ports: ports.clone(), length, ..Recorded::default() },
-            places,
-            first: first.div_ceil(every) * every,
-            inputs: ports.into_iter().filter(is_real).collect(),
-            outputs,
-        });
+        Err(self.failure(format!(
+            "the loop does not respond to a change of {} within {} s: a component may delay it for longer, or round or hold its outputs",
+            self.opening.signals[0].name,
+            rounded(count as f64 * self.sampling(flights))
+        )))
     }
-    Ok(wired)
+
+    /// Takes the responses to a change of each signal at each sample of a period.
+    fn responses(
+        &self,
+        flights: &mut Flights,
+        trial: &Trial,
+        count: usize,
+    ) -> Result<Vec<Vec<Response>>, Error> {
+        let channels = self.opening.signals.len();
+        let mut one = |sample: usize, signal: usize| {
+            let mut direction = vec![0.0; channels];
+            direction[signal] = 1.0;
+            flights.response(sample, &direction, trial.change, count)
+        };
+        let mut phase = |sample| (0..channels).map(|signal| one(sample, signal)).collect();
+        (0..trial.period).map(&mut phase).collect()
+    }
+
+    /// Returns a change of all signals at a time, by different multiples of their typical
+    /// magnitudes.
+    fn direction(&self, change: f64) -> Vec<f64> {
+        (0..self.opening.signals.len()).map(|signal| change / (1.0 + 0.3 * signal as f64)).collect()
+    }
+
+    /// Returns the time between two samples, s.
+    fn sampling(&self, flights: &Flights) -> f64 {
+        flights.ticks as f64 * self.system.clock.step()
+    }
+
+    /// Checks that the responses show whether the closed loop is stable.
+    fn check_verdict(&self, open: &OpenLoop) -> Result<(), Error> {
+        let closed = open.closed(&vec![1.0; open.channels()]);
+        let Some(eigenvalue) = closed.map(|a| dominant(&a)) else { return Ok(()) };
+        let rate = rate(eigenvalue, open);
+        if eigenvalue.norm() < 1.0 || rate > open.slowest {
+            return Ok(());
+        }
+        Err(self.failure(format!(
+            "the stability of the loop is undecided, because the error of the responses hides a motion of {rate:.1e}/s"
+        )))
+    }
+
+    fn failure(&self, message: String) -> Error {
+        let receiver = &self.opening.receivers[0].port;
+        let component = self.system.components[receiver.component].name.clone();
+        let time = self.system.clock.time(self.opening.first);
+        Error::Call { component, time, failure: CallFailure::answer("linearise", message) }
+    }
 }
 
-/// Runs to the end of some communication points, at whose beginning every component keeps its
-/// state. Returns the components' inputs at them.
-fn record(
-    system: &System,
-    wired: &[Wired],
-    ticks: Range<u64>,
-    run: &mut Run,
-) -> Result<Vec<Recorded>, Error> {
-    for tick in 0..ticks.start {
-        run.advance(tick)?;
-    }
-    let time = system.clock.time(ticks.start);
-    for one in wired {
-        run.master.call(one.component, time, |instance| instance.save(0))?;
-    }
-    let mut all: Vec<Recorded> = wired.iter().map(|one| one.recorded.clone()).collect();
-    for tick in ticks {
-        let values = run.advance(tick)?;
-        for (one, recorded) in wired.iter().zip(&mut all) {
-            if tick.is_multiple_of(one.every) {
-                recorded.rows.push(one.places.iter().map(|place| values[*place]).collect());
-                recorded.times.push(system.clock.time(tick));
-            }
-        }
-    }
-    Ok(all)
+/// Returns the number of samples for which responses are followed at least.
+fn window(sampling: f64) -> usize {
+    (LONGEST_TIME / sampling).ceil() as usize + 2 * COMPARED
 }
 
-/// Finds the connections between the components.
-fn links(system: &System, models: &[&Component], opened: &[Port]) -> Vec<Link> {
-    // A pair counts its references anew.
-    let is_same = |a: &Port, b: &Port| a.component == b.component && a.variable == b.variable;
-    let place = |port: &Port, of: fn(&Component) -> &Vec<Port>| {
-        models.iter().enumerate().find_map(|(one, model)| {
-            Some((one, of(model).iter().position(|other| is_same(port, other))?))
-        })
-    };
-    let link = |(wire, reading): (Wire, Reading)| {
-        Some(Link {
-            from: place(&wire.from, |one| &one.outputs)?,
-            to: place(&wire.to, |one| &one.inputs)?,
-            factor: wire.scaling.apply(1.0) - wire.scaling.apply(0.0),
-            reading,
-            opened: opened.iter().position(|port| *port == wire.to || *port == wire.from),
-        })
-    };
-    system.wires().into_iter().filter_map(link).collect()
+/// Joins the responses of all signals to changes of each of them, one matrix for each lag.
+fn joined(phase: &[Response], of: &dyn Fn(&Response) -> &Matrix) -> Lags {
+    let columns: Vec<&Matrix> = phase.iter().map(of).collect();
+    (0..columns[0].ncols())
+        .map(|lag| Matrix::from_fn(columns.len(), columns.len(), |row, by| columns[by][(row, lag)]))
+        .collect()
+}
+
+/// Returns how far the responses of a model are from those that it was made of.
+fn deviation(steps: &[Step], phases: &[Lags]) -> f64 {
+    let mut largest = 0.0_f64;
+    for (phase, lags) in phases.iter().enumerate() {
+        let mut state = steps[phase].b.clone();
+        for (lag, given) in lags.iter().enumerate().skip(1) {
+            let Step { a, c, .. } = &steps[(phase + lag) % steps.len()];
+            largest = largest.max((c * &state - given).amax());
+            state = a * &state;
+        }
+    }
+    largest
+}
+
+/// Returns the largest response.
+fn largest(phases: &[Lags]) -> f64 {
+    phases.iter().flatten().map(Matrix::amax).fold(f64::MIN_POSITIVE, f64::max)
 }

@@ -32,9 +32,9 @@ pub fn asked(system: &System, interrupt: &Interrupt) -> Result<Measured, Error> 
 /// and of both sides of an edge. An unstable loop has none left. A margin without a limit has no
 /// value.
 pub fn measure(found: &Linearised) -> Measured {
-    let sides = found.sides.iter().flatten().map(|net| margins::margins(net, &net.open()));
+    let sides = found.sides.iter().flatten();
     let all: Vec<Margins> =
-        std::iter::once(margins::margins(&found.net, &found.open)).chain(sides).collect();
+        std::iter::once(&found.open).chain(sides).map(margins::margins).collect();
     let rows: Vec<&LoopMargins> =
         all.iter().flat_map(|margins| margins.loops.iter().chain(&margins.together)).collect();
     let is_stable = all.iter().all(|margins| margins.stable);

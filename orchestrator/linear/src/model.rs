@@ -42,11 +42,28 @@ pub struct OpenLoop {
     pub samples: usize,
     /// The opened signals.
     pub signals: Vec<Signal>,
-    /// Names of the states.
-    pub states: Vec<String>,
+    /// Rate of the slowest motion that the model distinguishes from none, 1/s.
+    pub slowest: f64,
 }
 
 impl OpenLoop {
+    /// Makes the open loop of the steps at each sample of a period, whose inputs and outputs are
+    /// the signals in their typical magnitudes.
+    pub(crate) fn new(steps: &[Step], signals: &[Signal], sampling: f64, slowest: f64) -> Self {
+        let Step { a, mut b, mut c, mut d } = lifted(steps);
+        for place in 0..d.nrows() {
+            let size = signals[place % signals.len()].size;
+            b.column_mut(place).unscale_mut(size);
+            d.column_mut(place).unscale_mut(size);
+            c.row_mut(place).scale_mut(size);
+            d.row_mut(place).scale_mut(size);
+        }
+        let samples = steps.len();
+        let period = sampling * samples as f64;
+        let signals = signals.to_vec();
+        Self { step: Step { a, b, c, d }, period, samples, signals, slowest }
+    }
+
     /// Returns the number of opened signals.
     pub fn channels(&self) -> usize {
         self.signals.len()
@@ -67,4 +84,70 @@ impl OpenLoop {
         let loops = Matrix::identity(d.nrows(), d.nrows()) - &k * d;
         Some(a + b * loops.try_inverse()? * k * c)
     }
+
+    /// Returns the matrix A of the closed loop in which some signals, given by their indices,
+    /// arrive later by a number of samples; `None` if it would be algebraic. A part of a sample is
+    /// interpolated between the two beside it.
+    pub fn delayed(&self, late: &[usize], samples: f64) -> Option<Matrix> {
+        let Step { a, b, c, d } = &self.step;
+        let (channels, rows, states) = (self.channels(), d.nrows(), a.nrows());
+        // What is received, by what arrives in this period and by what arrived late in the samples
+        // before it, the latest ones last.
+        let whole = samples.ceil() as usize;
+        let past = whole * late.len();
+        let (mut now, mut before) = (Matrix::zeros(rows, rows), Matrix::zeros(rows, past));
+        for row in 0..rows {
+            let (sample, channel) = (row / channels, row % channels);
+            let Some(place) = late.iter().position(|late| *late == channel) else {
+                now[(row, row)] = 1.0;
+                continue;
+            };
+            let newer = whole as f64 - samples;
+            for (age, share) in [(whole, 1.0 - newer), (whole.saturating_sub(1), newer)] {
+                match sample.checked_sub(age) {
+                    Some(sample) => now[(row, sample * channels + channel)] += share,
+                    None => before[(row, (whole + sample - age) * late.len() + place)] += share,
+                }
+            }
+        }
+        let inverse = (Matrix::identity(rows, rows) - &now * d).try_inverse()?;
+        let (received, received_past) = (&inverse * now * c, inverse * before);
+        let (arriving, arriving_past) = (c + d * &received, d * &received_past);
+        let mut all = Matrix::zeros(states + past, states + past);
+        all.view_mut((0, 0), (states, states)).copy_from(&(a + b * received));
+        all.view_mut((0, states), (states, past)).copy_from(&(b * received_past));
+        for place in 0..past {
+            let (sample, channel) = (place / late.len(), late[place % late.len()]);
+            let mut row = all.row_mut(states + place);
+            if let Some(sample) = (sample + self.samples).checked_sub(whole) {
+                let arrives = sample * channels + channel;
+                row.columns_mut(0, states).copy_from(&arriving.row(arrives));
+                row.columns_mut(states, past).copy_from(&arriving_past.row(arrives));
+            } else {
+                row[states + place + self.samples * late.len()] = 1.0;
+            }
+        }
+        Some(all)
+    }
+}
+
+/// Makes one step of those of a period: its inputs and outputs are those of the first, then those
+/// of the second, and so on.
+fn lifted(steps: &[Step]) -> Step {
+    let ((outputs, inputs), states) = (steps[0].d.shape(), steps[0].a.ncols());
+    let count = steps.len();
+    let mut all = Step {
+        a: Matrix::identity(states, states),
+        b: Matrix::zeros(states, count * inputs),
+        c: Matrix::zeros(count * outputs, states),
+        d: Matrix::zeros(count * outputs, count * inputs),
+    };
+    for (place, Step { a, b, c, d }) in steps.iter().enumerate() {
+        all.c.rows_mut(place * outputs, outputs).copy_from(&(c * &all.a));
+        all.d.rows_mut(place * outputs, outputs).copy_from(&(c * &all.b));
+        all.d.view_mut((place * outputs, place * inputs), (outputs, inputs)).copy_from(d);
+        (all.a, all.b) = (a * &all.a, a * &all.b);
+        all.b.columns_mut(place * inputs, inputs).copy_from(b);
+    }
+    all
 }

@@ -8,21 +8,24 @@
 
 use crate::Matrix;
 use crate::model::Step;
-use crate::responses::Lags;
 
-/// Returns a model of each step of a period. `phases` are the responses to changes at each step,
-/// for `2 blocks` lags each. States that add less than `tolerance` to them, relative to the
-/// largest, are left out.
-pub fn realise(phases: &[Lags], blocks: usize, tolerance: f64) -> Vec<Step> {
+/// Responses to changes at one step: one matrix, outputs by inputs, for each lag.
+pub type Lags = Vec<Matrix>;
+
+/// Returns a model of each step of a period. `phases` are the responses to changes at each step.
+/// Before a step, the changes of the last `memory` steps count. States that add less than
+/// `tolerance` to the responses, relative to the largest, are left out.
+pub fn realise(phases: &[Lags], memory: usize, tolerance: f64) -> Vec<Step> {
     let period = phases.len();
     let (outputs, inputs) = phases[0][0].shape();
+    let future = phases[0].len() - memory;
     // Before step j, the future outputs are the products of an observability matrix with the
     // state, and the state that of a reachability matrix with the past inputs.
     let factors: Vec<(Matrix, Matrix)> = (0..period)
         .map(|j| {
-            let mut hankel = Matrix::zeros(blocks * outputs, blocks * inputs);
-            for (ahead, ago) in (0..blocks).flat_map(|a| (1..=blocks).map(move |b| (a, b))) {
-                let phase = (j + blocks * period - ago) % period;
+            let mut hankel = Matrix::zeros(future * outputs, memory * inputs);
+            for (ahead, ago) in (0..future).flat_map(|a| (1..=memory).map(move |b| (a, b))) {
+                let phase = (j + memory * period - ago) % period;
                 let place = (ahead * outputs, (ago - 1) * inputs);
                 hankel.view_mut(place, (outputs, inputs)).copy_from(&phases[phase][ahead + ago]);
             }
@@ -33,7 +36,7 @@ pub fn realise(phases: &[Lags], blocks: usize, tolerance: f64) -> Vec<Step> {
         .map(|j| {
             let (observability, _) = &factors[j];
             let (next, reachability) = &factors[(j + 1) % period];
-            let rows = (blocks - 1) * outputs;
+            let rows = (future - 1) * outputs;
             let later = observability.rows(outputs, rows).into_owned();
             let a = least_squares(next.rows(0, rows).into_owned(), &later);
             Step {
@@ -70,7 +73,7 @@ fn factor(matrix: Matrix, tolerance: f64) -> (Matrix, Matrix) {
 }
 
 /// Returns the X with the smallest ‖M X − Y‖.
-pub(crate) fn least_squares(m: Matrix, y: &Matrix) -> Matrix {
+fn least_squares(m: Matrix, y: &Matrix) -> Matrix {
     let mut x = Matrix::zeros(m.ncols(), y.ncols());
     let (q, r, permutation) = decomposed(m, 1e-12);
     let rank = r.nrows();

@@ -14,6 +14,7 @@ mod ending;
 mod kept;
 mod transfer;
 
+pub use kept::OpenedInput;
 pub use transfer::Member;
 
 use crate::clock::Clock;
@@ -21,7 +22,7 @@ use crate::delay::Reading;
 use crate::instance::{CallFailure, Outcome};
 use crate::settings::{self, Setting};
 use crate::wiring::{Coupling, Port, Wire};
-use transfer::{Inputs, Row, Values};
+use transfer::{Inputs, Readings, Row, Values};
 
 /// The values at a communication point. Those that respond to the inputs set there were read after
 /// the step; at the last point, where no step begins, they are those of the step before.
@@ -81,6 +82,8 @@ pub struct Master {
     inputs: Vec<Inputs>,
     values: Values,
     row: Row,
+    /// Values that belong to the kept states of the instances.
+    kept: Vec<Readings>,
     /// Instance that may end the run before the stop time.
     ender: Option<usize>,
     /// How it ended the run.
@@ -107,6 +110,7 @@ impl Master {
             row: Row::new(&values, probes),
             members,
             values,
+            kept: Vec::new(),
             ender: None,
             end: None,
         }

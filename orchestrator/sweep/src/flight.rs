@@ -255,7 +255,7 @@ impl Flight<'_> {
             None => system.start_varied(changes, self.interrupt),
         };
         let found = started.and_then(|mut run| {
-            let found = lineariser.linearise(&mut run, self.interrupt);
+            let found = lineariser.linearise(&mut run);
             if found.is_ok() {
                 self.linearised = Some(run);
             }

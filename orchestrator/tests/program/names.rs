@@ -31,8 +31,6 @@ fn a_name_of_another_kind_is_told_what_to_call() {
         ("run", "Model.fmu", "--fmu COMPONENT=Model.fmu puts it into an existing experiment"),
         ("pack", "gains", "gains is a campaign: orchestrator campaign gains"),
         ("margins", "papers", "papers is a study: orchestrator reproduce papers"),
-        ("linearise", "gains", "gains is a campaign: orchestrator campaign gains"),
-        ("response", "gains", "gains is a campaign: orchestrator campaign gains"),
         ("reproduce", "loop", "loop is an experiment: orchestrator run loop"),
         ("reproduce", "gains", "gains is a campaign: orchestrator campaign gains"),
         ("reproduce", "Model", "Model is an FMU: orchestrator inspect Model"),
@@ -163,18 +161,6 @@ fn a_bad_value_is_blamed_on_its_option() {
         (&["campaign", "gains", "--worst", "--time", "-1"], "'-1' for '--time"),
         (&["reproduce", "papers", "--members", "-1"], "'-1' for '--members"),
         (&["margins", "loop", "--at", "-5", "--open", "plant.input"], "--at -5: "),
-        (
-            &["response", "loop", "--at", "1", "--open", "plant.input", "--amplitude", "-1"],
-            "--amplitude -1: ",
-        ),
-        (
-            &["response", "loop", "--at", "1", "--open", "plant.input", "--amplitude", "0"],
-            "--amplitude 0: ",
-        ),
-        (
-            &["response", "loop", "--at", "1", "--open", "plant.input", "--count", "-3"],
-            "'-3' for '--count",
-        ),
     ] {
         let (code, _, errors) = bench.call(arguments);
         assert!(code == 2 && errors.contains(blamed), "{arguments:?}: {errors}");

@@ -5,8 +5,10 @@ from __future__ import annotations
 
 import json
 import os
+import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -44,14 +46,12 @@ class OpenLoop:
     """Names of the opened signals."""
     units: list[str]
     """Their units."""
-    states: list[str]
-    """Names of the states."""
     time: float
     """Time of the run at which it was linearised, s."""
-    notes: list[str]
-    """How the model of each component was found."""
+    note: str
+    """How the model was found."""
     sides: tuple[OpenLoop, OpenLoop] | None
-    """The loop for increases and for decreases of every input, where a component has no derivative."""
+    """The loop for increases and for decreases of every signal, where it has no derivative."""
 
     def statespace(self) -> control.StateSpace:
         """The open loop for python-control, which must be installed."""
@@ -70,7 +70,6 @@ class OpenLoop:
             self.period,
             inputs=[name.replace(".", "_") for name in names],
             outputs=[name.replace(".", "_") + "_back" for name in names],
-            states=[name.replace(".", "_") for name in self.states],
         )
 
 
@@ -104,7 +103,10 @@ def linearise(
     Raises:
         OrchestratorError: The experiment was refused, or its run failed.
     """
-    found = answer(["linearise"], name, at, open, set, fmu, step, law)
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder, "model.json")
+        answer(["--model", str(path)], name, at, open, set, fmu, step, law)
+        found = json.loads(path.read_text(encoding="utf-8"))
     sides = found.get("sides")
     return open_loop(
         found,
@@ -147,13 +149,13 @@ def margins(
         factors of the gain, phase lag (deg) and delay (s) at which the loop becomes unstable, the
         radius of the disk margin with its frequency (rad/s), and the largest magnitude of the
         sensitivity. What has no limit is not a number. The table is empty if the loop is unstable;
-        `attrs` has "stable", "spectral_radius", "period", "notes", and "sides" with the answers for
-        increases and decreases where a component has no derivative.
+        `attrs` has "stable", "spectral_radius", "period", "note", and "sides" with the answers for
+        increases and decreases where the loop has no derivative.
 
     Raises:
         OrchestratorError: The experiment was refused, or its run failed.
     """
-    found = answer(["margins", "--json"], name, at, open, set, fmu, step, law)
+    found = answer([], name, at, open, set, fmu, step, law)
     rows = found["loops"] + ([found["together"]] if found["together"] else [])
 
     def value(crossing: dict[str, float] | None) -> float:
@@ -171,13 +173,13 @@ def margins(
         },
         index=pd.Index([row["signal"] for row in rows], name="signal"),
     )
-    kept = ("stable", "spectral_radius", "period", "notes", "sides")
+    kept = ("stable", "spectral_radius", "period", "note", "sides")
     table.attrs.update({key: found[key] for key in kept if key in found})
     return table
 
 
 def answer(
-    command: list[str],
+    more: list[str],
     name: str | os.PathLike[str],
     at: float,
     open: str | Sequence[str],
@@ -187,7 +189,8 @@ def answer(
     law: Law | None,
 ) -> dict[str, Any]:
     """The orchestrator's answer."""
-    arguments = [*command, experiment_path(name), *changes(set, fmu, law, at=at, step=step)]
+    arguments = ["margins", "--json", experiment_path(name), *more]
+    arguments += changes(set, fmu, law, at=at, step=step)
     for signal in [open] if isinstance(open, str) else open:
         arguments += ["--open", signal]
     laws = None if law is None else laws_of(law)
@@ -202,7 +205,7 @@ def open_loop(
     model: dict[str, Any], whole: dict[str, Any], sides: tuple[OpenLoop, OpenLoop] | None = None
 ) -> OpenLoop:
     """Reads one model of an answer."""
-    states, ports = len(model["states"]), model["samples"] * len(model["signals"])
+    states, ports = len(model["a"]), model["samples"] * len(model["signals"])
     shapes = {"a": (states, states), "b": (states, ports), "c": (ports, states), "d": (ports, ports)}
     matrices = {key: np.array(model[key], float).reshape(shape) for key, shape in shapes.items()}
     return OpenLoop(
@@ -211,8 +214,7 @@ def open_loop(
         samples=model["samples"],
         signals=[signal["name"] for signal in model["signals"]],
         units=[signal["unit"] for signal in model["signals"]],
-        states=model["states"],
         time=whole["time"],
-        notes=whole["notes"],
+        note=whole["note"],
         sides=sides,
     )

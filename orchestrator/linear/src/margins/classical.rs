@@ -3,7 +3,6 @@
 
 use crate::Matrix;
 use crate::model::{OpenLoop, Step};
-use crate::propagation::{Delay, Net};
 use crate::spectrum::{dominant, is_stable, spectral_radius};
 use nalgebra::{Complex, ComplexField, DMatrix};
 use serde::Serialize;
@@ -13,7 +12,7 @@ const FACTOR: f64 = 1.3;
 const LARGEST_GAIN: f64 = 1e3;
 /// Angle between the phases that are tried, deg.
 const TURN: f64 = 6.0;
-/// Most parts of a step between the delays that are tried, and the longest delay in steps.
+/// Most parts of a sample between the delays that are tried, and the longest delay in samples.
 const PARTS: f64 = 4.0;
 const LONGEST_DELAY: f64 = 200.0;
 /// Number of delays that are tried up to the one that the phase suggests.
@@ -47,43 +46,43 @@ pub struct Classical {
     pub longest_delay: f64,
 }
 
-/// Searches for one signal, or for all of them changed in the same way.
-pub(super) fn classical(net: &Net, open: &OpenLoop, channel: Option<usize>) -> Classical {
-    let count = open.channels();
+/// Searches for some signals, given by their indices, which change in the same way.
+pub(super) fn classical(open: &OpenLoop, changed: &[usize]) -> Classical {
     let gains = |gain: f64| -> Vec<f64> {
-        (0..count).map(|i| if channel.is_none_or(|c| c == i) { gain } else { 1.0 }).collect()
+        (0..open.channels()).map(|i| if changed.contains(&i) { gain } else { 1.0 }).collect()
     };
     let by_gain = |logarithm: f64| open.closed(&gains(logarithm.exp()));
     let by_phase = |lag: f64| {
         let turn = Complex::from_polar(1.0, -lag.to_radians());
-        let turned = |i: usize| channel.is_none_or(|c| c == i);
-        turned_loop(open, &|i| if turned(i) { turn } else { Complex::new(1.0, 0.0) })
+        turned_loop(open, &|i| if changed.contains(&i) { turn } else { Complex::new(1.0, 0.0) })
     };
-    let (step, takes_parts) = (net.receiving_step(channel), net.takes_parts(channel));
-    let whole = |steps: f64| if takes_parts { steps } else { steps.floor() };
-    let held = (open.sampling() / net.length).round() as u64;
-    let by_delay =
-        |steps: f64| Some(net.closed(Delay { channel, held, time: whole(steps) * step }));
+    let by_delay = |samples: f64| open.delayed(changed, samples);
     let gain = |direction: f64| {
         let last = LARGEST_GAIN.ln();
-        let crossing = first(&|x| by_gain(direction * x), FACTOR.ln(), last, [0.0, open.period])?;
+        let crossing = first(&|x| by_gain(direction * x), FACTOR.ln(), last, open)?;
         Some(Crossing { value: (direction * crossing.value).exp(), ..crossing })
     };
-    let phase = first(&by_phase, TURN, 180.0, [0.0, open.period]);
+    let phase = first(&by_phase, TURN, 180.0, open);
     // A delay turns the loop by its product with the frequency, which guides the search.
+    let sampling = open.sampling();
     let expected = phase
         .filter(|at| at.frequency > 0.0)
-        .map_or(0.0, |at| at.value.to_radians() / (at.frequency * step));
+        .map_or(0.0, |at| at.value.to_radians() / (at.frequency * sampling));
     let trial = (expected / TRIALS).clamp(1.0 / PARTS, LONGEST_DELAY / TRIALS);
-    let (trial, grain) = if takes_parts { (trial, 0.0) } else { (trial.ceil(), 1.0) };
-    let delay = first(&by_delay, trial, LONGEST_DELAY, [grain, open.period]);
+    let delay = first(&by_delay, trial, LONGEST_DELAY, open);
     Classical {
         gain_above: gain(1.0),
         gain_below: gain(-1.0),
         phase,
-        delay: delay.map(|found| Crossing { value: whole(found.value) * step, ..found }),
-        longest_delay: LONGEST_DELAY * step,
+        delay: delay.map(|found| Crossing { value: found.value * sampling, ..found }),
+        longest_delay: LONGEST_DELAY * sampling,
     }
+}
+
+/// Returns the rate 1/s of a motion with this eigenvalue over a period, its growth and its frequency
+/// together.
+pub(crate) fn rate(eigenvalue: Complex<f64>, open: &OpenLoop) -> f64 {
+    eigenvalue.ln().norm() / open.period
 }
 
 /// Closes the loop with a complex factor at each signal.
@@ -103,37 +102,40 @@ fn turned_loop(
 }
 
 /// Finds the least change at which the closed loop has an eigenvalue outside the unit circle, up to
-/// `last`, to the `grain` in which it changes. A loop that cannot be closed counts as unstable.
+/// `last`. A loop that cannot be closed counts as unstable. One that only moves more slowly than the
+/// model shows does not: two integrators in a row, which a reduced gain never makes unstable, have
+/// a pair of eigenvalues 1, which small errors move to both sides of the unit circle.
 fn first<T: ComplexField<RealField = f64>>(
     closed: &dyn Fn(f64) -> Option<DMatrix<T>>,
     step: f64,
     last: f64,
-    [grain, period]: [f64; 2],
+    open: &OpenLoop,
 ) -> Option<Crossing> {
-    let is_stable_at = |x: f64| closed(x).is_some_and(|a| is_stable(&a));
-    let mut stable = 0.0;
+    let growth = |x: f64| closed(x).map_or(1.0, |a| spectral_radius(&a).ln());
+    let is_certain = |x: f64| closed(x).is_none_or(|a| rate(dominant(&a), open) > open.slowest);
+    let (mut stable, mut next) = (0.0, step);
     let mut unstable = loop {
-        let next = stable + step;
         if next > last {
             return None;
         }
-        if !is_stable_at(next) {
+        if closed(next).is_some_and(|a| is_stable(&a)) {
+            stable = next;
+        } else if is_certain(next) {
             break next;
         }
-        stable = next;
+        next += step;
     };
     // Regula falsi (Illinois) on the logarithm of the largest magnitude, which is smooth there.
-    let excess = |x: f64| closed(x).map_or(1.0, |a| spectral_radius(&a).ln());
-    let (mut below, mut above) = (excess(stable), excess(unstable));
+    let (mut below, mut above) = (growth(stable), growth(unstable));
     for _ in 0..REFINEMENTS {
-        if unstable - stable <= grain.max(ACCURACY * unstable) {
+        if unstable - stable <= ACCURACY * unstable {
             break;
         }
         let mut middle = (stable * above - unstable * below) / (above - below);
         if !(middle > stable && middle < unstable) {
             middle = 0.5 * (stable + unstable);
         }
-        let value = excess(middle);
+        let value = growth(middle);
         if value < 0.0 {
             (stable, below, above) = (middle, value, 0.5 * above);
         } else {
@@ -144,6 +146,6 @@ fn first<T: ComplexField<RealField = f64>>(
             break;
         }
     }
-    let frequency = closed(stable).map_or(0.0, |a| dominant(&a).arg().abs() / period);
+    let frequency = closed(stable).map_or(0.0, |a| dominant(&a).arg().abs() / open.period);
     Some(Crossing { value: stable, frequency })
 }

@@ -183,3 +183,9 @@ pub fn sensitivity(open: &OpenLoop, frequency: f64) -> ComplexMatrix {
     let inverse = sines.adjoint() * Complex::new(1.0 / samples as f64, 0.0);
     inverse * lifted * sines
 }
+
+/// Returns the return ratio L at one signal while the loops of the others are closed, at a
+/// frequency (rad/s). It follows from the sensitivity S = 1/(1 + L).
+pub(crate) fn return_ratio(open: &OpenLoop, channel: usize, frequency: f64) -> Complex<f64> {
+    sensitivity(open, frequency)[(channel, channel)].inv() - 1.0
+}

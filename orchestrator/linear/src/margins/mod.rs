@@ -5,13 +5,13 @@ mod classical;
 pub mod disk;
 pub mod structured;
 
+pub(crate) use classical::rate;
 pub use classical::{Classical, Crossing};
 pub use disk::{Disk, Peak};
 
 use disk::Responses;
 
 use crate::model::OpenLoop;
-use crate::propagation::Net;
 use crate::spectrum::spectral_radius;
 use serde::Serialize;
 
@@ -41,8 +41,8 @@ pub struct Margins {
     pub together: Option<LoopMargins>,
 }
 
-/// Computes the margins of a loop and its open loop.
-pub fn margins(net: &Net, open: &OpenLoop) -> Margins {
+/// Computes the margins of a loop.
+pub fn margins(open: &OpenLoop) -> Margins {
     let radius =
         open.closed(&vec![1.0; open.channels()]).map_or(f64::INFINITY, |a| spectral_radius(&a));
     let stable = radius < 1.0;
@@ -50,17 +50,17 @@ pub fn margins(net: &Net, open: &OpenLoop) -> Margins {
         return Margins { stable, spectral_radius: radius, loops: Vec::new(), together: None };
     }
     let responses = Responses::of(open);
-    let of = |signal: String, channels: &[usize], channel: Option<usize>| LoopMargins {
+    let of = |signal: String, channels: &[usize]| LoopMargins {
         signal,
-        classical: classical::classical(net, open, channel),
+        classical: classical::classical(open, channels),
         disk: responses.disk(channels),
         sensitivity: responses.sensitivity(channels),
     };
     let loops = (0..open.channels())
-        .map(|channel| of(open.signals[channel].name.clone(), &[channel], Some(channel)))
+        .map(|channel| of(open.signals[channel].name.clone(), &[channel]))
         .collect();
     let all: Vec<usize> = (0..open.channels()).collect();
-    let together = (all.len() > 1).then(|| of("all together".into(), &all, None));
+    let together = (all.len() > 1).then(|| of("all together".into(), &all));
     Margins { stable, spectral_radius: radius, loops, together }
 }
 

@@ -2,84 +2,43 @@
 
 use super::*;
 use crate::Matrix;
-use crate::components::{Component, Dynamics};
-use crate::continuous::Continuous;
 use crate::model::{Signal, Step};
-use crate::propagation::Link;
-use cosim::experiment::Coupling;
-use fmi_master::delay::Reading;
-use fmi_master::description::Carrier;
-use fmi_master::wiring::Port;
 
 /// Period, s, and gains of the angle and of the rate.
 const STEP: f64 = 0.05;
 const ANGLE: f64 = 2.25;
 const RATE: f64 = 3.0;
 
-fn component(name: &str, ports: [usize; 2], every: u64, dynamics: Dynamics) -> Component {
-    let port =
-        |variable: usize| Port { component: 0, variable, reference: 0, carrier: Carrier::Real };
-    let [inputs, outputs] = ports.map(|count| (0..count).map(port).collect());
-    Component { name: name.into(), every, first: 0, inputs, outputs, states: Vec::new(), dynamics }
-}
-
-/// Double integrators ẍ = u, each under u = −k x − c ẋ that is sampled at every step of the law.
-/// The plant makes `per_step` communication steps meanwhile, and its input acts after `delay` (s).
-fn double_integrators(axes: usize, delay: f64, per_step: u64) -> Net {
-    let (none, one) = (Matrix::zeros(axes, axes), Matrix::identity(axes, axes));
-    let stacked = |rows: [[&Matrix; 2]; 2]| {
-        let mut all = Matrix::zeros(2 * axes, 2 * axes);
-        for (i, row) in rows.iter().enumerate() {
-            for (j, block) in row.iter().enumerate() {
-                all.view_mut((i * axes, j * axes), (axes, axes)).copy_from(block);
-            }
-        }
-        all
+/// Step of a double integrator ẍ = u under u = −k x − c ẋ, which is sampled at every step and
+/// arrives after a number of steps.
+fn double_integrator(delay: usize) -> Step {
+    let states = 2 + delay;
+    let mut one = Step {
+        a: Matrix::zeros(states, states),
+        b: Matrix::zeros(states, 1),
+        c: Matrix::zeros(1, states),
+        d: Matrix::zeros(1, 1),
     };
-    let mut b = Matrix::zeros(2 * axes, axes);
-    b.rows_mut(axes, axes).copy_from(&one);
-    let plant = Continuous {
-        a: stacked([[&none, &one], [&none, &none]]),
-        b,
-        c: Matrix::identity(2 * axes, 2 * axes),
-        d: Matrix::zeros(2 * axes, axes),
-        delay,
-    };
-    let mut d = Matrix::zeros(axes, 2 * axes);
-    d.columns_mut(0, axes).copy_from(&(&one * -ANGLE));
-    d.columns_mut(axes, axes).copy_from(&(&one * -RATE));
-    let law = Step {
-        a: Matrix::zeros(0, 0),
-        b: Matrix::zeros(0, 2 * axes),
-        c: Matrix::zeros(axes, 0),
-        d,
-    };
-    let link = |from: (usize, usize), to: (usize, usize), opened: Option<usize>| Link {
-        from,
-        to,
-        factor: 1.0,
-        reading: if opened.is_some() { Reading::AfterStep } else { Reading::BeforeStep },
-        opened,
-    };
-    let measured = (0..2 * axes).map(|i| link((1, i), (0, i), None));
-    let commanded = (0..axes).map(|i| link((0, i), (1, i), Some(i)));
-    Net {
-        components: vec![
-            component("law", [2 * axes, axes], per_step, Dynamics::Sampled(vec![law])),
-            component("plant", [axes, 2 * axes], 1, Dynamics::Continuous(plant)),
-        ],
-        links: measured.chain(commanded).collect(),
-        coupling: Coupling::Sequential,
-        first: 0,
-        length: STEP / per_step as f64,
-        signals: (0..axes)
-            .map(|i| Signal { name: format!("plant.u[{i}]"), unit: String::new(), size: 1.0 })
-            .collect(),
+    one.a.view_mut((0, 0), (2, 2)).copy_from_slice(&[1.0, 0.0, STEP, 1.0]);
+    one.b.rows_mut(0, 2).copy_from_slice(&[0.5 * STEP * STEP, STEP]);
+    let law = [-ANGLE, -RATE];
+    if delay == 0 {
+        one.c.copy_from_slice(&law);
+        return one;
     }
+    one.c[states - 1] = 1.0;
+    (0..2).for_each(|place| one.a[(2, place)] = law[place]);
+    (3..states).for_each(|state| one.a[(state, state - 1)] = 1.0);
+    one
 }
 
-fn of(net: &Net) -> Margins {
-    margins(net, &net.open())
+/// The loops of so many axes beside one another.
+fn double_integrators(axes: usize, delay: usize) -> OpenLoop {
+    let all = |matrix: &Matrix| Matrix::identity(axes, axes).kronecker(matrix);
+    let Step { a, b, c, d } = double_integrator(delay);
+    let step = Step { a: all(&a), b: all(&b), c: all(&c), d: all(&d) };
+    let signal = |axis| Signal { name: format!("plant.u[{axis}]"), unit: String::new(), size: 1.0 };
+    OpenLoop::new(&[step], &(0..axes).map(signal).collect::<Vec<_>>(), STEP, 0.0)
 }
 
 fn near(found: Option<Crossing>, expected: f64) {
@@ -97,11 +56,9 @@ fn coefficients() -> (f64, f64) {
 fn oracle_without_delay_the_gain_is_limited_at_half_the_sampling_frequency() {
     // z² + (g a − 2) z + 1 + g b has the root −1 for g (a − b) = 4.
     let (a, b) = coefficients();
-    for net in [double_integrators(1, 0.0, 1), double_integrators(1, 0.0, 4)] {
-        let found = &of(&net).loops[0];
-        near(found.classical.gain_above, 4.0 / (a - b));
-        assert!(found.classical.gain_below.is_none());
-    }
+    let found = &margins(&double_integrators(1, 0)).loops[0];
+    near(found.classical.gain_above, 4.0 / (a - b));
+    assert!(found.classical.gain_below.is_none());
 }
 
 #[test]
@@ -115,7 +72,7 @@ fn oracle_phase_and_delay_follow_from_the_crossover() {
     let numerator = phase_of(a * c + b, a * theta.sin());
     let denominator = 2.0 * phase_of(c - 1.0, theta.sin());
     let margin = (std::f64::consts::PI + numerator - denominator).rem_euclid(std::f64::consts::TAU);
-    let found = of(&double_integrators(1, 0.0, 1)).loops.remove(0).classical;
+    let found = margins(&double_integrators(1, 0)).loops.remove(0).classical;
     near(found.phase, margin.to_degrees());
     let frequency = found.phase.unwrap().frequency;
     assert!((frequency - theta / STEP).abs() < 1e-4 * frequency, "{frequency} {}", theta / STEP);
@@ -125,25 +82,58 @@ fn oracle_phase_and_delay_follow_from_the_crossover() {
 fn oracle_a_delay_of_one_step_is_a_cubic() {
     // z (z − 1)² + g (a z + b): by Jury's test stable below g = −(a + 2 b) / b².
     let (a, b) = coefficients();
-    let found = of(&double_integrators(1, STEP, 1)).loops.remove(0).classical;
+    let found = margins(&double_integrators(1, 1)).loops.remove(0).classical;
     near(found.gain_above, -(a + 2.0 * b) / (b * b));
 }
 
 #[test]
 fn oracle_what_a_delay_takes_a_delay_margin_loses() {
-    let whole = of(&double_integrators(1, 0.0, 1)).loops.remove(0).classical.delay.unwrap().value;
-    for delay in [0.3 * STEP, STEP, 2.7 * STEP] {
-        for per_step in [1, 5] {
-            let left = of(&double_integrators(1, delay, per_step)).loops.remove(0).classical;
-            near(left.delay, whole - delay);
-        }
+    let whole = margins(&double_integrators(1, 0)).loops.remove(0).classical.delay.unwrap().value;
+    for delay in [1, 2, 5] {
+        let left = margins(&double_integrators(1, delay)).loops.remove(0).classical;
+        near(left.delay, whole - delay as f64 * STEP);
     }
 }
 
 #[test]
+fn oracle_a_delay_of_whole_steps_is_a_chain_of_states() {
+    for delay in [0, 1, 2, 5] {
+        let [chain, delayed] = [
+            double_integrators(2, delay).closed(&[1.0, 1.0]),
+            double_integrators(2, 0).delayed(&[0, 1], delay as f64),
+        ];
+        let [chain, delayed] = [chain, delayed].map(|a| spectral_radius(&a.unwrap()));
+        assert!((chain - delayed).abs() < 1e-9, "{delay}: {chain} {delayed}");
+    }
+}
+
+#[test]
+fn oracle_a_loop_has_the_same_margins_over_two_of_its_steps() {
+    let one = double_integrators(1, 3);
+    let twice = OpenLoop::new(&[one.step.clone(), one.step.clone()], &one.signals, STEP, 0.0);
+    assert_eq!((twice.samples, twice.period), (2, 2.0 * STEP));
+    let [one, twice] = [one, twice].map(|open| margins(&open).loops.remove(0));
+    near(twice.classical.gain_above, one.classical.gain_above.unwrap().value);
+    near(twice.classical.delay, one.classical.delay.unwrap().value);
+    assert!((twice.disk.alpha - one.disk.alpha).abs() < 1e-6);
+}
+
+#[test]
+fn integrators_that_are_known_with_an_error_have_no_lower_gain_margin() {
+    // Eigenvalues 1 ± e of the double integrator make it unstable at low gains.
+    let e = 1e-2;
+    let mut open = double_integrators(1, 0);
+    open.step.a[(1, 0)] = e * e / STEP;
+    let found = |open: &OpenLoop| margins(open).loops[0].classical.gain_below;
+    near(found(&open), e * e / (ANGLE * STEP * STEP + 0.5 * RATE * STEP * e * e));
+    open.slowest = 1.1 * e / STEP;
+    assert!(found(&open).is_none());
+}
+
+#[test]
 fn oracle_equal_loops_beside_one_another_have_the_margin_of_one() {
-    let one = of(&double_integrators(1, 0.0, 1));
-    let three = of(&double_integrators(3, 0.0, 1));
+    let one = margins(&double_integrators(1, 0));
+    let three = margins(&double_integrators(3, 0));
     let together = three.together.unwrap();
     let single = &one.loops[0];
     assert!((together.disk.alpha - single.disk.alpha).abs() < 1e-6);
@@ -162,13 +152,13 @@ fn oracle_the_disk_is_the_one_that_the_nyquist_curve_touches() {
         largest = largest.max((s - 0.5).norm());
         sensitivity = sensitivity.max(s.norm());
     }
-    let found = &of(&double_integrators(1, 0.0, 1)).loops[0];
+    let found = &margins(&double_integrators(1, 0)).loops[0];
     assert!((found.disk.alpha * largest - 1.0).abs() < 1e-6, "{} {largest}", found.disk.alpha);
     assert!((found.sensitivity.value / sensitivity - 1.0).abs() < 1e-6);
 }
 
 #[test]
 fn a_loop_that_is_unstable_has_no_margins() {
-    let found = of(&double_integrators(1, 1.0, 1));
+    let found = margins(&double_integrators(1, 20));
     assert!(!found.stable && found.loops.is_empty() && found.spectral_radius > 1.0);
 }

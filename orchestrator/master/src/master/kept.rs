@@ -1,46 +1,49 @@
-//! Calls of one instance between two ticks, and values added on the way, for the analysis of a run.
+//! States to which a run goes back, and inputs at which its loop is opened.
 
 use super::{Failed, Master};
-use crate::instance::{CallFailure, Instance};
 use crate::wiring::Port;
 
-impl Master {
-    /// Calls an instance, given its index, between two ticks.
-    ///
-    /// # Errors
-    /// Returns an error that names the instance if the calls fail; `time` (s) is named with it.
-    pub fn call<T>(
-        &mut self,
-        index: usize,
-        time: f64,
-        calls: impl FnOnce(&mut dyn Instance) -> Result<T, CallFailure>,
-    ) -> Result<T, Failed> {
-        let instance = self.members[index].instance.as_mut();
-        calls(instance).map_err(|failure| self.failed(time, (index, failure)))
-    }
+/// A connected real input at which the loop is opened.
+pub struct OpenedInput {
+    /// Place among the real inputs of the instance.
+    pub(super) place: usize,
+    /// Value that arrived for the latest step.
+    pub arrived: f64,
+    /// Value that the instance receives instead, if there is one.
+    pub given: Option<f64>,
+}
 
-    /// Calls two instances, given their indices, between two ticks. A failure comes with the place
-    /// of the instance among the two.
-    ///
-    /// # Errors
-    /// Returns an error that names the instance if the calls fail; `time` (s) is named with it.
+impl Master {
+    /// Opens the loop at a connected real input.
     ///
     /// # Panics
-    /// Panics if the indices are equal, or if there is no such instance.
-    pub fn call_both<T>(
-        &mut self,
-        indices: [usize; 2],
-        time: f64,
-        calls: impl FnOnce([&mut dyn Instance; 2]) -> Result<T, (usize, CallFailure)>,
-    ) -> Result<T, Failed> {
-        let members = self.members.get_disjoint_mut(indices);
-        let [first, second] = members.expect("two different members");
-        let outcome = calls([first.instance.as_mut(), second.instance.as_mut()]);
-        outcome.map_err(|(place, failure)| self.failed(time, (indices[place], failure)))
+    /// Panics if the input is not connected.
+    pub fn opened(&mut self, input: Port) -> &mut OpenedInput {
+        self.inputs[input.component].opened(input.reference)
     }
 
-    /// Adds a value to those that a connected real input receives, from now on.
-    pub fn add(&mut self, input: Port, value: f64) {
-        self.inputs[input.component].add(input.reference, value);
+    /// Keeps the state between two ticks under a number, counted from 0 without gaps. `time` (s) is
+    /// named with a failure.
+    ///
+    /// # Errors
+    /// Returns an error if an instance keeps no states.
+    pub fn keep(&mut self, number: usize, time: f64) -> Result<(), Failed> {
+        self.each(time, |_, member| member.instance.save(number))?;
+        self.kept.truncate(number);
+        self.kept.push(self.values.readings.clone());
+        Ok(())
+    }
+
+    /// Goes back to the state that was kept under a number. `time` (s) is named with a failure.
+    ///
+    /// # Errors
+    /// Returns an error if an instance fails.
+    ///
+    /// # Panics
+    /// Panics if no state was kept under this number.
+    pub fn go_back(&mut self, number: usize, time: f64) -> Result<(), Failed> {
+        self.each(time, |_, member| member.instance.restore(number))?;
+        self.values.readings.clone_from(&self.kept[number]);
+        Ok(())
     }
 }

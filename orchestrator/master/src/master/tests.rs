@@ -18,6 +18,7 @@ struct Mock {
     is_set: bool,
     input: f64,
     state: f64,
+    kept: Vec<[f64; 2]>,
     fails_after: f64,
     journal: Journal,
 }
@@ -89,6 +90,15 @@ impl Instance for Mock {
         self.note("reset");
         Ok(())
     }
+    fn save(&mut self, number: usize) -> Outcome {
+        self.kept.truncate(number);
+        self.kept.push([self.input, self.state]);
+        Ok(())
+    }
+    fn restore(&mut self, number: usize) -> Outcome {
+        [self.input, self.state] = self.kept[number];
+        Ok(())
+    }
 }
 
 fn port(component: usize, reference: u32) -> Port {
@@ -131,6 +141,21 @@ fn run_on(
     fails_after: f64,
     varies: bool,
 ) -> (Result<(), Failed>, Vec<Vec<f64>>, Vec<String>) {
+    let (mut master, journal) = master(clock, coupling, order, every, fails_after, varies);
+    let mut rows = Rows::default();
+    let outcome = master.initialize().and_then(|()| master.run(&mut rows));
+    let journal = journal.borrow().clone();
+    (outcome, rows.0, journal)
+}
+
+fn master(
+    clock: Clock,
+    coupling: Coupling,
+    order: [&'static str; 2],
+    every: [u32; 2],
+    fails_after: f64,
+    varies: bool,
+) -> (Master, Journal) {
     let journal = Journal::default();
     let members = order
         .iter()
@@ -145,6 +170,7 @@ fn run_on(
                 is_set: false,
                 input: 0.0,
                 state,
+                kept: Vec::new(),
                 fails_after,
                 journal: Rc::clone(&journal),
             };
@@ -164,11 +190,7 @@ fn run_on(
         (port(integrator, 0), Reading::AfterStep),
         (port(integrator, 1), Reading::BeforeStep),
     ];
-    let mut master = Master::new(clock, coupling, members, &wires, &probes);
-    let mut rows = Rows::default();
-    let outcome = master.initialize().and_then(|()| master.run(&mut rows));
-    let journal = journal.borrow().clone();
-    (outcome, rows.0, journal)
+    (Master::new(clock, coupling, members, &wires, &probes), journal)
 }
 
 #[test]
@@ -206,6 +228,50 @@ fn oracle_jacobi_delays_by_one_step_in_either_order() {
         let (outcome, rows, _) = run(Coupling::Jacobi, order, [1, 1], [1.0, 3.0], 1e9);
         outcome.unwrap();
         assert_eq!(rows, DELAYED, "{order:?}");
+    }
+}
+
+#[test]
+fn a_run_goes_back_to_any_tick_and_an_opened_input_gets_what_it_is_given() {
+    let clock = Clock::new(0.0, 20.0, 1.0).unwrap();
+    for coupling in [Coupling::Sequential, Coupling::Jacobi] {
+        for (order, every) in [
+            (["gain", "integrator"], [1, 1]),
+            (["integrator", "gain"], [1, 1]),
+            (["gain", "integrator"], [1, 2]),
+            (["gain", "integrator"], [3, 1]),
+        ] {
+            let (mut master, _) = master(clock, coupling, order, every, 1e9, true);
+            master.initialize().unwrap();
+            let input = port(order.iter().position(|name| *name == "integrator").unwrap(), 0);
+            // A slow unit is within a step at some of these ticks.
+            for tick in 0..5 {
+                master.keep(tick, tick as f64).unwrap();
+                master.advance(tick as u64).unwrap();
+            }
+            for first in 0..5 {
+                let mut fly = |given: Option<&[f64]>| {
+                    master.go_back(first, first as f64).unwrap();
+                    let ticks = first as u64..first as u64 + 6;
+                    let flown = ticks.clone().map(|tick| {
+                        let given = given.map(|given| given[(tick - ticks.start) as usize]);
+                        master.opened(input).given = given;
+                        let row = master.advance(tick).unwrap().to_vec();
+                        (row, master.opened(input).arrived)
+                    });
+                    flown.collect::<Vec<_>>().into_iter().unzip()
+                };
+                let (rows, arrived): (Vec<Vec<f64>>, Vec<f64>) = fly(None);
+                assert_eq!(rows, fly(None).0);
+                assert_eq!(rows, fly(Some(&arrived)).0);
+                // The integrator does not move, and the gain's output stays in the end.
+                let (still, arrived) = fly(Some(&[0.0; 6]));
+                let last = still.last().unwrap();
+                assert_eq!(arrived[5], 2.0 * last[2]);
+                assert_eq!(still[3..], vec![still[5].clone(); 3]);
+                assert!(rows[5][2] > last[2]);
+            }
+        }
     }
 }
 

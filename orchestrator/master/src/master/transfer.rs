@@ -1,6 +1,7 @@
 //! Values on their way from instance to instance, which are read with one call per instance and
 //! type.
 
+use super::kept::OpenedInput;
 use crate::delay::Reading;
 use crate::description::Carrier;
 use crate::instance::{Instance, Outcome};
@@ -37,6 +38,12 @@ pub(super) struct Values {
     ports: Vec<Port>,
     /// Reads of each instance: those of connected outputs, then those that only observers ask for.
     reads: Vec<[Vec<Read>; 2]>,
+    pub(super) readings: Readings,
+}
+
+/// Values of all ports.
+#[derive(Clone, Default)]
+pub(super) struct Readings {
     /// Values at the communication point at which an instance stands before its step.
     before: Vec<f64>,
     /// Values that were read last.
@@ -48,13 +55,13 @@ impl Values {
     /// observers (`probed`).
     pub(super) fn new(instances: usize, wired: &[Port], probed: &[Port]) -> Self {
         let mut values =
-            Self { ports: Vec::new(), reads: Vec::new(), before: Vec::new(), latest: Vec::new() };
+            Self { ports: Vec::new(), reads: Vec::new(), readings: Readings::default() };
         for instance in 0..instances {
             let reads = [values.add(instance, wired), values.add(instance, probed)];
             values.reads.push(reads);
         }
-        values.before = vec![0.0; values.ports.len()];
-        values.latest = values.before.clone();
+        let zeros = vec![0.0; values.ports.len()];
+        values.readings = Readings { before: zeros.clone(), latest: zeros };
         values
     }
 
@@ -93,7 +100,7 @@ impl Values {
         let [wired, others] = &mut self.reads[index];
         let others = others.iter_mut().take(if probed { usize::MAX } else { 0 });
         for read in wired.iter_mut().chain(others) {
-            let into = &mut self.latest[read.first..read.first + read.references.len()];
+            let into = &mut self.readings.latest[read.first..read.first + read.references.len()];
             match read.carrier {
                 Carrier::Real => instance.get_real(&read.references, into)?,
                 Carrier::Integer => instance.get_integer(&read.references, &mut read.integers)?,
@@ -108,9 +115,10 @@ impl Values {
 
     /// Keeps the values that an instance has at its communication point as those before its step.
     pub(super) fn arrive(&mut self, index: usize) {
+        let Readings { before, latest } = &mut self.readings;
         for read in self.reads[index].iter().flatten() {
             let range = read.first..read.first + read.references.len();
-            self.before[range.clone()].copy_from_slice(&self.latest[range]);
+            before[range.clone()].copy_from_slice(&latest[range]);
         }
     }
 }
@@ -125,8 +133,8 @@ struct Place {
 impl Place {
     fn value(self, values: &Values) -> f64 {
         match self.reading {
-            Reading::BeforeStep => values.before[self.index],
-            Reading::AfterStep => values.latest[self.index],
+            Reading::BeforeStep => values.readings.before[self.index],
+            Reading::AfterStep => values.readings.latest[self.index],
         }
     }
 }
@@ -161,6 +169,7 @@ pub(super) struct Inputs {
     boolean: Bundle<i32>,
     /// Instances that give any of the values.
     pub(super) sources: Vec<usize>,
+    opened: Vec<OpenedInput>,
 }
 
 /// Inputs of one type: they are written by one call.
@@ -168,8 +177,6 @@ struct Bundle<T> {
     references: Vec<u32>,
     places: Vec<(Place, Scaling)>,
     values: Vec<T>,
-    /// Offsets that are added to the values on the way; empty for none.
-    added: Vec<T>,
 }
 
 impl<T: Copy + Default> Bundle<T> {
@@ -181,7 +188,7 @@ impl<T: Copy + Default> Bundle<T> {
         };
         let references: Vec<u32> = wires.clone().map(|(wire, _)| wire.to.reference).collect();
         let values = vec![T::default(); references.len()];
-        Self { references, places: wires.map(place).collect(), values, added: Vec::new() }
+        Self { references, places: wires.map(place).collect(), values }
     }
 
     /// Takes the values over; `convert` is exact for what was read.
@@ -203,24 +210,28 @@ impl Inputs {
             integer: Bundle::new(values, wires, target, Carrier::Integer),
             boolean: Bundle::new(values, wires, target, Carrier::Boolean),
             sources: sources.into_iter().collect(),
+            opened: Vec::new(),
         }
     }
 
-    /// Adds a value to those that a real input receives from now on.
-    pub(super) fn add(&mut self, reference: u32, value: f64) {
-        let Bundle { references, added, .. } = &mut self.real;
-        added.resize(references.len(), 0.0);
-        for (added, other) in added.iter_mut().zip(references) {
-            if *other == reference {
-                *added = value;
-            }
-        }
+    /// Opens the loop at a real input, unless it is opened already.
+    pub(super) fn opened(&mut self, reference: u32) -> &mut OpenedInput {
+        let place = self.real.references.iter().position(|other| *other == reference);
+        let place = place.expect("a connected real input");
+        let index = self.opened.iter().position(|opened| opened.place == place);
+        let index = index.unwrap_or_else(|| {
+            self.opened.push(OpenedInput { place, arrived: 0.0, given: None });
+            self.opened.len() - 1
+        });
+        &mut self.opened[index]
     }
 
     pub(super) fn gather(&mut self, values: &Values) {
         self.real.gather(values, |value| value);
-        for (value, added) in self.real.values.iter_mut().zip(&self.real.added) {
-            *value += added;
+        for OpenedInput { place, arrived, given } in &mut self.opened {
+            let value = &mut self.real.values[*place];
+            *arrived = *value;
+            *value = given.unwrap_or(*value);
         }
         self.integer.gather(values, |value| value as i32);
         self.boolean.gather(values, |value| value as i32);

@@ -1,4 +1,4 @@
-//! The commands `linearise` and `margins`.
+//! The command `margins`.
 
 use crate::failure::Failure;
 use crate::picture;
@@ -11,19 +11,19 @@ use cosim::search::named::{Kind, find};
 use cosim::system::System;
 use cosim_report::figure::{Color, Curve, Figure, Legend, Panel, Shape, svg};
 use fmi_master::quantity::rounded;
+use linear::Matrix;
 use linear::curves::{ResponseCurves, excluded};
 use linear::linearise::{Linearised, Lineariser};
-use linear::margins::{Crossing, LoopMargins};
+use linear::margins::{self, Crossing, LoopMargins, Margins};
 use linear::model::{OpenLoop, Step};
-use linear::{Matrix, margins as analysis};
 use serde_json::{Value, json};
 use std::fs;
 use std::io::Write;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
-/// The loop to linearise, the instant, and where the loop is opened.
+/// Arguments of `margins`.
 #[derive(Args)]
-pub(crate) struct Instant {
+pub(crate) struct PrintMargins {
     /// Experiment: a file, an SSP archive, or the name of an experiment that `list` shows.
     experiment: PathBuf,
     /// Time of the run at which it is linearised, s [default: that of the experiment's
@@ -34,6 +34,15 @@ pub(crate) struct Instant {
     /// option may be given several times [default: those of [observe.margins]].
     #[arg(long, value_name = "SIGNAL", help_heading = "Linearisation")]
     open: Vec<String>,
+    /// Print JSON, for other programs.
+    #[arg(long)]
+    pub(crate) json: bool,
+    /// File for the open loop as a discrete state-space model (JSON).
+    #[arg(long, value_name = "FILE")]
+    model: Option<PathBuf>,
+    /// File for a Nichols plot of the return ratio and a plot of the sensitivity (.svg).
+    #[arg(long, value_name = "FILE")]
+    plot: Option<PathBuf>,
     /// Also look for FMUs in this folder, besides those of the experiment and the program. The
     /// option may be given several times.
     #[arg(long, value_name = "DIR")]
@@ -42,10 +51,8 @@ pub(crate) struct Instant {
     pub(crate) overrides: Overrides,
 }
 
-impl Instant {
-    /// Returns the system of the experiment, the time at which it is linearised (s), and the
-    /// signals at which the loop is opened.
-    pub(crate) fn system(&self) -> Result<(System, f64, Vec<String>), Failure> {
+impl PrintMargins {
+    fn linearise(&self, interrupt: &Interrupt) -> Result<Linearised, Failure> {
         let path = find(&self.experiment, Kind::Experiment)?;
         let (system, _) = run::system(&path, &self.overrides, &self.fmu_dir)?;
         let asked = system.experiment.observe.margins.clone();
@@ -61,11 +68,6 @@ impl Instant {
         if open.is_empty() {
             open = asked.ok_or_else(|| missing("--open SIGNAL"))?.open;
         }
-        Ok((system, at, open))
-    }
-
-    fn linearise(&self, interrupt: &Interrupt) -> Result<Linearised, Failure> {
-        let (system, at, open) = self.system()?;
         // What is wrong with the arguments comes first.
         Lineariser::new(system.clone(), at, &open)?;
         refuse_closed(&system)?;
@@ -75,7 +77,7 @@ impl Instant {
 
 /// Refuses a system whose instances are to run in a closed process, as a model is needed in this
 /// one.
-pub(crate) fn refuse_closed(system: &System) -> Result<(), Error> {
+fn refuse_closed(system: &System) -> Result<(), Error> {
     if !system.is_closed {
         return Ok(());
     }
@@ -83,55 +85,19 @@ pub(crate) fn refuse_closed(system: &System) -> Result<(), Error> {
     Err(Error::experiment(problem))
 }
 
-/// Arguments of `linearise`.
-#[derive(Args)]
-pub(crate) struct Linearise {
-    /// File for the model [default: standard output].
-    #[arg(long, value_name = "FILE")]
-    pub(crate) out: Option<PathBuf>,
-    #[command(flatten)]
-    pub(crate) instant: Instant,
-}
-
-/// Arguments of `margins`.
-#[derive(Args)]
-pub(crate) struct PrintMargins {
-    /// Print JSON, for other programs.
-    #[arg(long)]
-    pub(crate) json: bool,
-    /// Also write the margins to this file, as JSON.
-    #[arg(long, value_name = "FILE")]
-    out: Option<PathBuf>,
-    /// File for a Nichols plot of the return ratio and a plot of the sensitivity (.svg).
-    #[arg(long, value_name = "FILE")]
-    plot: Option<PathBuf>,
-    #[command(flatten)]
-    pub(crate) instant: Instant,
-}
-
-/// Writes the open loop of an experiment.
-pub(crate) fn linearise(
-    asked: &Linearise,
-    out: &mut impl Write,
-    interrupt: &Interrupt,
-) -> Result<(), Failure> {
-    let found = asked.instant.linearise(interrupt)?;
-    let mut model = model(&found.open);
+/// Returns the model as JSON.
+fn model(found: &Linearised) -> Value {
+    let mut model = state_space(&found.open);
     model["time"] = json!(found.time);
-    model["notes"] = json!(found.notes);
+    model["note"] = json!(found.note);
     if let Some(sides) = &found.sides {
-        let [increases, decreases] = sides.each_ref().map(|net| self::model(&net.open()));
+        let [increases, decreases] = sides.each_ref().map(state_space);
         model["sides"] = json!({ "increases": increases, "decreases": decreases });
     }
-    let text = format!("{}\n", serde_json::to_string(&model).unwrap_or_default());
-    match &asked.out {
-        Some(path) => fs::write(path, text).map_err(Error::file(path))?,
-        None => out.write_all(text.as_bytes())?,
-    }
-    Ok(())
+    model
 }
 
-fn model(open: &OpenLoop) -> Value {
+fn state_space(open: &OpenLoop) -> Value {
     let Step { a, b, c, d } = &open.step;
     let rows = |matrix: &Matrix| -> Vec<Vec<f64>> {
         matrix.row_iter().map(|row| row.iter().copied().collect()).collect()
@@ -140,40 +106,33 @@ fn model(open: &OpenLoop) -> Value {
         "period": open.period,
         "samples": open.samples,
         "signals": open.signals,
-        "states": open.states,
         "a": rows(a), "b": rows(b), "c": rows(c), "d": rows(d),
     })
 }
 
-/// Writes JSON to the file that is asked for, if there is one.
-pub(crate) fn keep(path: Option<&Path>, value: &Value) -> Result<(), Error> {
-    path.map_or(Ok(()), |path| fs::write(path, format!("{value:#}\n")).map_err(Error::file(path)))
-}
-
 /// Prints the margins of an experiment.
-pub(crate) fn margins(
+pub(crate) fn print(
     asked: &PrintMargins,
     out: &mut impl Write,
     interrupt: &Interrupt,
 ) -> Result<(), Failure> {
     picture::check(asked.plot.as_deref())?;
-    let found = asked.instant.linearise(interrupt)?;
-    let margins = analysis::margins(&found.net, &found.open);
+    let found = asked.linearise(interrupt)?;
+    let margins = margins::margins(&found.open);
     if let Some(path) = &asked.plot {
         svg::write(&figure(&found, &margins)?, path)?;
     }
-    let sides = found
-        .sides
-        .as_ref()
-        .map(|sides| sides.each_ref().map(|net| analysis::margins(net, &net.open())));
+    if let Some(path) = &asked.model {
+        fs::write(path, format!("{}\n", model(&found))).map_err(Error::file(path))?;
+    }
+    let sides = found.sides.as_ref().map(|sides| sides.each_ref().map(margins::margins));
     let mut value = serde_json::to_value(&margins).unwrap_or_default();
     value["time"] = json!(found.time);
     value["period"] = json!(found.open.period);
-    value["notes"] = json!(found.notes);
+    value["note"] = json!(found.note);
     if let Some([increases, decreases]) = &sides {
         value["sides"] = json!({ "increases": increases, "decreases": decreases });
     }
-    keep(asked.out.as_deref(), &value)?;
     if asked.json {
         return Ok(writeln!(out, "{value:#}")?);
     }
@@ -181,23 +140,21 @@ pub(crate) fn margins(
         out,
         "t = {} s, {} states, period {} s",
         rounded(found.time),
-        found.open.states.len(),
+        found.open.step.a.nrows(),
         rounded(found.open.period)
     )?;
-    for note in &found.notes {
-        writeln!(out, "  {note}")?;
-    }
-    print(&margins, out)?;
+    writeln!(out, "  {}", found.note)?;
+    write_table(&margins, out)?;
     for (title, side) in ["increases", "decreases"].iter().zip(sides.iter().flatten()) {
-        writeln!(out, "\na component has an edge here; for {title} of every input:")?;
-        print(side, out)?;
+        writeln!(out, "\nthe loop has an edge here; for {title} of every signal:")?;
+        write_table(side, out)?;
     }
     Ok(())
 }
 
 /// Draws the return ratio at the signal with the smallest disk margin in a Nichols plot, with the
 /// set that it does not enter, and the sensitivity over the frequency.
-fn figure(found: &Linearised, margins: &analysis::Margins) -> Result<Figure, Failure> {
+fn figure(found: &Linearised, margins: &Margins) -> Result<Figure, Failure> {
     let curves = ResponseCurves::of(found);
     let worst = margins.loops.iter().min_by(|a, b| a.disk.alpha.total_cmp(&b.disk.alpha));
     let (Some(curves), Some(worst)) = (curves, worst) else {
@@ -230,7 +187,7 @@ fn figure(found: &Linearised, margins: &analysis::Margins) -> Result<Figure, Fai
     })
 }
 
-fn print(margins: &analysis::Margins, out: &mut impl Write) -> Result<(), Failure> {
+fn write_table(margins: &Margins, out: &mut impl Write) -> Result<(), Failure> {
     if !margins.stable {
         writeln!(
             out,
