@@ -259,7 +259,9 @@ def test_a_signal_has_the_same_margins_whatever_else_is_opened():
     for one, other in zip(alone["loops"], beside["loops"]):
         assert other["signal"] == one["signal"]
         for margin in ("gain_above", "phase", "delay"):
-            assert other["classical"][margin]["value"] == pytest.approx(one["classical"][margin]["value"], rel=1e-6), margin
+            # Rates arrive every 0.01 s, moments every 0.04 s, and delays are interpolated between samples.
+            near = 1e-3 if margin == "delay" else 1e-6
+            assert other["classical"][margin]["value"] == pytest.approx(one["classical"][margin]["value"], rel=near), margin
     # N m and rad/s are compared in their typical magnitudes.
     assert beside["together"]["sensitivity"]["value"] < 10.0
 

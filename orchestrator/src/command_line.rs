@@ -273,7 +273,7 @@ mod tests {
             .filter(|command| has(command, "fmu_dir") || has(command, "fmu"))
             .filter(|command| !command.is_hide_set())
             .collect();
-        assert!(loading.len() >= 8, "{}", loading.len());
+        assert_eq!(loading.len(), 6);
         for command in loading {
             assert!(has(command, "isolate"), "{} has no --isolate", command.get_name());
         }

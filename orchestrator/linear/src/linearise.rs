@@ -31,7 +31,7 @@ const MEMORY: [usize; 2] = [24, 200];
 const COMPARED: usize = 6;
 /// Changes that are tried, in relation to the typical magnitude of a signal. A loop that is not
 /// smooth needs a small one, and one that iterates a larger one.
-const CHANGES: [f64; 4] = [1e-3, 1e-5, 1e-7, 1e-9];
+const CHANGES: [f64; 5] = [1e-3, 1e-5, 1e-7, 1e-8, 1e-9];
 /// Difference of responses, relative to the largest, that counts as none. Differences of periods
 /// count as equal if they are in this relation to the least one.
 const EQUAL: f64 = 1e-6;
@@ -97,6 +97,14 @@ struct Trial {
     drift: f64,
 }
 
+/// A model, and how far it is from the responses, relative to the largest.
+struct Realised {
+    found: Linearised,
+    deviation: f64,
+    /// Deviation that the error of the responses explains.
+    expected: f64,
+}
+
 impl Lineariser {
     /// Prepares a system to be linearised at `time` (s), with the loop opened at these signals.
     ///
@@ -144,66 +152,77 @@ impl Lineariser {
 
     fn model(&self, flights: &mut Flights) -> Result<Linearised, Error> {
         self.find_sample(flights)?;
-        let sampling = self.sampling(flights);
         let trial = self.trial(flights)?;
-        let Trial { change, period, drift } = trial;
-        let mut memory = MEMORY[0].max(2 * period);
-        loop {
-            let count = window(sampling).max(2 * memory);
-            flights.record(period + count, period)?;
-            let phases = self.responses(flights, &trial, count)?;
-            let lags = |of: &dyn Fn(&Response) -> &Matrix| -> Vec<Lags> {
-                phases.iter().map(|phase| joined(phase, of)).collect()
-            };
-            let central = lags(&|response| &response.central);
-            let largest = largest(&central);
-            let all = || phases.iter().flatten();
-            let noise = all().map(|one| one.error / largest).fold(0.0, f64::max);
-            let error = noise.max(drift);
-            let tolerance = SMALLEST.max(drift).max(ERRORS * noise);
-            // A loop that changes from period to period has changed by the sum at the end.
-            let drifted = error.max(drift * (count / period) as f64);
-            let steps = realise(&central, memory, tolerance);
-            let deviation = deviation(&steps, &central) / largest;
-            if deviation > EQUAL.max(ERRORS * drifted) && memory < MEMORY[1] {
-                memory = (2 * memory).min(MEMORY[1]);
-                continue;
+        let mut memory = MEMORY[0].max(2 * trial.period);
+        let mut best = self.realised(flights, &trial, memory)?;
+        // The memory of a loop takes as many samples to show as it is long.
+        while best.deviation > best.expected && memory < MEMORY[1] {
+            memory = (2 * memory).min(MEMORY[1]);
+            let next = self.realised(flights, &trial, memory)?;
+            if next.deviation < best.deviation {
+                best = next;
             }
-            if deviation > DEVIATES {
-                return Err(self.failure(format!(
-                    "a linear model is {:.0} % off the response to a change within {} s: its steps show too little of the motion, or it is not linear here",
-                    1e2 * deviation,
-                    rounded(count as f64 * sampling)
-                )));
-            }
-            // A motion of the rate s differs from none by about (s t)²/2 after the time t.
-            let seen = 2.0 * drifted.max(deviation).max(SMALLEST);
-            let slowest = CERTAIN * seen.sqrt() / (count as f64 * sampling);
-            let open =
-                |steps: &[Step]| OpenLoop::new(steps, &self.opening.signals, sampling, slowest);
-            let side = |side: usize| {
-                open(&realise(&lags(&|response| &response.sides[side]), memory, tolerance))
-            };
-            let has_edge = all().any(|response| response.has_edge);
-            let open = open(&steps);
-            self.check_verdict(&open)?;
-            let repeats = if period == 1 {
-                String::new()
-            } else {
-                format!(", which repeat after {period} of them")
-            };
-            let note = format!(
-                "responses to changes of {change:.0e} of the typical magnitudes, for {count} samples of {} s{repeats}; their relative error is {error:.0e}, that of the model {deviation:.0e}",
-                rounded(sampling)
-            );
-            let sides = has_edge.then(|| [side(0), side(1)]);
-            return Ok(Linearised {
-                time: self.system.clock.time(self.opening.first),
-                open,
-                sides,
-                note,
-            });
         }
+        if best.deviation > DEVIATES {
+            return Err(self.failure(format!(
+                "a linear model is {:.0} % off the response to a change: its samples of {} s show too little of the motion, or it is not linear here",
+                1e2 * best.deviation,
+                rounded(self.sampling(flights))
+            )));
+        }
+        self.check_verdict(&best.found.open)?;
+        Ok(best.found)
+    }
+
+    /// Realises a model of the loop from responses in which the changes of the last samples count.
+    fn realised(
+        &self,
+        flights: &mut Flights,
+        trial: &Trial,
+        memory: usize,
+    ) -> Result<Realised, Error> {
+        let Trial { change, period, drift } = *trial;
+        let sampling = self.sampling(flights);
+        let count = window(sampling).max(2 * memory);
+        flights.record(period + count, period)?;
+        let phases = self.responses(flights, trial, count)?;
+        let lags = |of: &dyn Fn(&Response) -> &Matrix| -> Vec<Lags> {
+            phases.iter().map(|phase| joined(phase, of)).collect()
+        };
+        let central = lags(&|response| &response.central);
+        let largest = largest(&central);
+        let all = || phases.iter().flatten();
+        let noise = all().map(|one| one.error / largest).fold(0.0, f64::max);
+        let tolerance = SMALLEST.max(drift).max(ERRORS * noise);
+        let steps = realise(&central, memory, tolerance);
+        let deviation = deviation(&steps, &central) / largest;
+        // A loop that changes from period to period has changed by the sum at the end.
+        let error = noise.max(drift * (count / period) as f64);
+        // A motion of the rate s differs from none by about (s t)²/2 after the time t.
+        let seen = 2.0 * error.max(deviation).max(SMALLEST);
+        let slowest = CERTAIN * seen.sqrt() / (count as f64 * sampling);
+        let open = |steps: &[Step]| OpenLoop::new(steps, &self.opening.signals, sampling, slowest);
+        let side = |side: usize| {
+            open(&realise(&lags(&|response| &response.sides[side]), memory, tolerance))
+        };
+        let has_edge = all().any(|response| response.has_edge);
+        let repeats = if period == 1 {
+            String::new()
+        } else {
+            format!(", which repeat after {period} of them")
+        };
+        let note = format!(
+            "responses to changes of {change:.0e} of the typical magnitudes, for {count} samples of {} s{repeats}; their relative error is {:.0e}, that of the model {deviation:.0e}",
+            rounded(sampling),
+            noise.max(drift)
+        );
+        let found = Linearised {
+            time: self.system.clock.time(self.opening.first),
+            open: open(&steps),
+            sides: has_edge.then(|| [side(0), side(1)]),
+            note,
+        };
+        Ok(Realised { found, deviation, expected: EQUAL.max(ERRORS * error) })
     }
 
     /// Finds the communication points between which nothing that arrives changes, because a
