@@ -312,7 +312,7 @@ fn settings_that_cannot_work_are_refused_by_name() {
         (&|s| s.weight_surface = f64::NAN, "weight.surface"),
         (&|s| s.pwpf.off = 0.45, "pwpf.off"),
         (&|s| s.pwpf.on = 4.5, "pwpf.on"),
-        (&|s| s.effectors.min[2] = 0.1, "surface 3"),
+        (&|s| s.effectors.min[2] = 0.1, "limit.surfaceMin[3]"),
         (&|s| s.effectors.jet_moments[(0, 0)] = f64::NAN, "jetMoment"),
     ];
     for (change, name) in cases {
