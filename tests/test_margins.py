@@ -343,7 +343,7 @@ def test_oracle_the_loop_in_flight_has_the_frequency_response_of_the_model(law, 
     period, samples = found["period"], found["samples"]
     step = period / samples
     # The gain of TwoLoopSMC depends on the amplitude.
-    amplitude = 1e-4 if law == "TwoLoopSMC" else 0.01
+    amplitude = 1e-5 if law == "TwoLoopSMC" else 0.01
     (tmp_path / "sine.toml").write_text(SINE.format(rest=FOLDER / "margins" / "rest.toml", law=law))
     for frequency in np.geomspace(0.3, 0.77 * np.pi / step, 5):
         # A periodic loop responds at all frequencies that its period mixes with that of the sine.

@@ -36,11 +36,12 @@ const CHANGES: [f64; 5] = [1e-3, 1e-5, 1e-7, 1e-8, 1e-9];
 /// count as equal if they are in this relation to the least one.
 const EQUAL: f64 = 1e-6;
 const AS_EQUAL: f64 = 3.0;
-/// Difference of two periods, relative to the largest response, above which the response is not
-/// periodic.
+/// Difference of the responses of two periods, or to changes of two sizes, relative to the largest,
+/// above which there is no linear model.
 const REPEATS: f64 = 0.1;
-/// Least share of the responses that a state must add, also in relation to their error.
+/// Least share of the responses that a state must add.
 const SMALLEST: f64 = 1e-9;
+/// Deviation of a model from the responses, in relation to their error, that this explains.
 const ERRORS: f64 = 10.0;
 /// Difference of a model from the responses, relative to the largest, from which on it does not
 /// describe them.
@@ -193,7 +194,13 @@ impl Lineariser {
         let largest = largest(&central);
         let all = || phases.iter().flatten();
         let noise = all().map(|one| one.error / largest).fold(0.0, f64::max);
-        let tolerance = SMALLEST.max(drift).max(ERRORS * noise);
+        if noise > REPEATS {
+            return Err(self.failure(format!(
+                "responses to changes of different sizes differ by {:.0} %: a component rounds its outputs, or the loop is not linear here",
+                1e2 * noise
+            )));
+        }
+        let tolerance = SMALLEST.max(drift).max(noise);
         let steps = realise(&central, memory, tolerance);
         let deviation = deviation(&steps, &central) / largest;
         // A loop that changes from period to period has changed by the sum at the end.
@@ -257,7 +264,7 @@ impl Lineariser {
         let count = begin + COMPARED;
         let mut best = (CHANGES[0], f64::INFINITY);
         for change in CHANGES {
-            let response = flights.response(at, &self.direction(1.0), change, count)?;
+            let response = flights.response(at, &self.direction(1.0), change, window(sampling))?;
             let error = response.error / response.central.amax().max(f64::MIN_POSITIVE);
             if error < best.1 {
                 best = (change, error);
