@@ -47,7 +47,7 @@ const ERRORS: f64 = 10.0;
 /// describe them.
 const DEVIATES: f64 = 0.05;
 /// Factor from the rate of a motion that the responses just show to the one that counts.
-const CERTAIN: f64 = 3.0;
+const CERTAIN: f64 = 10.0;
 
 /// A linearised loop.
 #[derive(Clone, Debug)]
@@ -192,9 +192,12 @@ impl Lineariser {
         };
         let central = lags(&|response| &response.central);
         let largest = largest(&central);
+        if largest == 0.0 {
+            return Err(self.silent(count as f64 * sampling));
+        }
         let all = || phases.iter().flatten();
         let noise = all().map(|one| one.error / largest).fold(0.0, f64::max);
-        if noise > REPEATS {
+        if noise > DEVIATES {
             return Err(self.failure(format!(
                 "responses to changes of different sizes differ by {:.0} %: a component rounds its outputs, or the loop is not linear here",
                 1e2 * noise
@@ -311,11 +314,16 @@ impl Lineariser {
                 return Ok((sample, begin));
             }
         }
-        Err(self.failure(format!(
+        Err(self.silent(count as f64 * self.sampling(flights)))
+    }
+
+    /// Returns the error of a loop that does not respond within this time (s).
+    fn silent(&self, time: f64) -> Error {
+        self.failure(format!(
             "the loop does not respond to a change of {} within {} s: a component may delay it for longer, or round or hold its outputs",
             self.opening.signals[0].name,
-            rounded(count as f64 * self.sampling(flights))
-        )))
+            rounded(time)
+        ))
     }
 
     /// Takes the responses to a change of each signal at each sample of a period.
@@ -396,5 +404,5 @@ fn deviation(steps: &[Step], phases: &[Lags]) -> f64 {
 
 /// Returns the largest response.
 fn largest(phases: &[Lags]) -> f64 {
-    phases.iter().flatten().map(Matrix::amax).fold(f64::MIN_POSITIVE, f64::max)
+    phases.iter().flatten().map(Matrix::amax).fold(0.0, f64::max)
 }
