@@ -41,13 +41,13 @@ const AS_EQUAL: f64 = 3.0;
 const REPEATS: f64 = 0.1;
 /// Least share of the responses that a state must add.
 const SMALLEST: f64 = 1e-9;
-/// Deviation of a model from the responses, in relation to their error, that this explains.
+/// Error of a model in relation to that of the responses.
 const ERRORS: f64 = 10.0;
 /// Difference of a model from the responses, relative to the largest, from which on it does not
 /// describe them.
-const DEVIATES: f64 = 0.05;
+const DEVIATES: f64 = 0.02;
 /// Factor from the rate of a motion that the responses just show to the one that counts.
-const CERTAIN: f64 = 10.0;
+const CERTAIN: f64 = 3.0;
 
 /// A linearised loop.
 #[derive(Clone, Debug)]
@@ -207,7 +207,7 @@ impl Lineariser {
         let steps = realise(&central, memory, tolerance);
         let deviation = deviation(&steps, &central) / largest;
         // A loop that changes from period to period has changed by the sum at the end.
-        let error = noise.max(drift * (count / period) as f64);
+        let error = (ERRORS * noise).max(drift * (count / period) as f64);
         // A motion of the rate s differs from none by about (s t)²/2 after the time t.
         let seen = 2.0 * error.max(deviation).max(SMALLEST);
         let slowest = CERTAIN * seen.sqrt() / (count as f64 * sampling);
@@ -232,7 +232,7 @@ impl Lineariser {
             sides: has_edge.then(|| [side(0), side(1)]),
             note,
         };
-        Ok(Realised { found, deviation, expected: EQUAL.max(ERRORS * error) })
+        Ok(Realised { found, deviation, expected: EQUAL.max(error) })
     }
 
     /// Finds the communication points between which nothing that arrives changes, because a
