@@ -160,7 +160,8 @@ def test_oracle_margins_of_a_law_are_those_of_its_fmu():
 def test_oracle_the_memory_of_a_law_is_part_of_its_linear_model(make):
     """The model has the pole of the filter, and the law itself is as it was."""
     law = make()
-    loop = linearise("lqr", at=10.0, open="plant.moment.*", law=law, set={"plant.disturbance.kind": "none"})
+    still = {"plant.disturbance.kind": "none", "controller.reference.profile": "constant"}
+    loop = linearise("lqr", at=40.0, open="plant.moment.*", law=law, set=still)
     assert loop.a.shape == (9, 9)
     assert np.sum(np.isclose(np.linalg.eigvals(loop.a), 0.8, atol=1e-4)) == 3
     if make is Filtered:

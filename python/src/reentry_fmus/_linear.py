@@ -131,7 +131,7 @@ def margins(
 
     >>> table = margins("lqr", at=10.0, open="plant.moment.*", set={"plant.disturbance.kind": "none"})
     >>> float(table.loc["all together", "disk"].round(2))
-    1.35
+    1.34
 
     Args:
         name: An experiment of `experiments()`, or the path of an experiment file (TOML).
