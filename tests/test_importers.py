@@ -408,7 +408,7 @@ def test_oracle_the_orchestrator_steps_a_controller_by_pythonfmu(foreign, expect
     monkeypatch.setenv("LD_PRELOAD", libpython)
     shutil.copy(foreign, tmp_path)
     text = EXPERIMENT.format("PdController", SECONDS, STEP).replace('unconnected = ["achievedMoment.*", "knownMoment.*", "reference.*", "trajectory.*"]', "")
-    found = orchestrate(tmp_path, text.replace("rate.*", "attitudeRate.*"))
+    found = orchestrate(tmp_path, text.replace("rate.*", "attitudeRate.*"), "--isolate=false")
     names = [f"plant.{name}" for name in ANGLES + TURNS] + [f"controller.{name}" for name in MOMENT]
     agree(np.array([found[name] for name in names]).T, expected)
 

@@ -115,7 +115,6 @@ def test_loops_by_hand_keep_to_fmi_2(watched, jacobi):
 # Every way in which the orchestrator uses units.
 USES = {
     "run": ["run", "lqr", "--out", "out", "--quiet", "--stop", "2"],
-    "isolated": ["run", "lqr", "--out", "out", "--quiet", "--stop", "2", "--isolate"],
     "margins": ["margins", "lqr", "--at", "1", "--open", "plant.moment.*", "--model", "out.json"],
     "exchange": ["run", "exchange.toml", "--out", "out", "--quiet", "--stop", "2"],
     "campaign": ["campaign", "few.toml", "--out", "out", "--jobs", "1", "--quiet", "--stop", "2"],

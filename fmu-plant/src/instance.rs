@@ -5,6 +5,7 @@ use crate::plant::{ATTITUDE, Output, ReentryPlant};
 use crate::roles::{Unknown, role};
 use crate::table;
 use fmi_export::{Context, Description, EventInfo, Failure, Inputs, LastEvent, Model, Restoration};
+use vehicle::Vehicle;
 use vehicle::actuators::Command;
 use vehicle::effectors::SURFACES;
 use vehicle::entry::{End, Passage};
@@ -40,6 +41,8 @@ impl Model for ReentryPlant {
     }
 
     fn new() -> Self {
+        // Reading it needs much of a small stack, of which initialization has used some already.
+        Vehicle::papers();
         Self {
             parameters: Parameters::default(),
             input: Input::default(),

@@ -2,7 +2,6 @@
 
 use crate::catalogue::{self, Filter};
 use crate::failure::Failure;
-use crate::list;
 use cosim::error::Error;
 use cosim::experiment::Process;
 use fmi_master::description::{Interface, ModelDescription, ScalarType, Variable, VariableKind};
@@ -10,9 +9,10 @@ use fmi_master::instance::CallFailure;
 use fmu_import::description::CAUSALITIES;
 use fmu_import::fmu::Fmu;
 use fmu_import::isolation::{self, Closed, Closing, Ended};
-use std::io::{self, Write};
+use std::io::{self, Write, stdout};
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
+use terminal_size::Width;
 use textwrap::Options;
 
 /// Prints the interfaces and platforms of an archive, and those of its variables that fit the
@@ -94,7 +94,7 @@ fn print(fmu: &Fmu, out: &mut impl Write) -> io::Result<()> {
     } else {
         writeln!(out, "{} (FMI {})", d.model_name, d.fmi_version)?;
     }
-    let width = list::width();
+    let width = width();
     let mut line = |label: &str, text: &str| {
         if text.is_empty() {
             return Ok(());
@@ -155,6 +155,15 @@ fn print(fmu: &Fmu, out: &mut impl Write) -> io::Result<()> {
 
 /// Margin of what is said of a variable below its name.
 const MARGIN: &str = "      ";
+
+/// Width of printed texts where there is no terminal.
+const WIDTH: usize = 80;
+
+/// Returns the width to which texts are wrapped.
+pub(crate) fn width() -> usize {
+    let columns = terminal_size::terminal_size_of(stdout());
+    columns.map_or(WIDTH, |(Width(columns), _)| usize::from(columns).clamp(40, 120))
+}
 
 /// Writes a text in lines of this width, with these margins of the first line and of the others.
 pub(crate) fn wrapped(

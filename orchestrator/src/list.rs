@@ -1,7 +1,7 @@
 //! Lists the experiments, studies, campaigns and FMUs that the program finds.
 
 use crate::failure::Failure;
-use crate::inspect::wrapped;
+use crate::inspect::{width, wrapped};
 use campaign::definition::Campaign;
 use cosim::error::Error;
 use cosim::experiment::Experiment;
@@ -9,10 +9,9 @@ use cosim::search::named::Kind;
 use fmu_import::fmu::Fmu;
 use serde::Serialize;
 use std::fs;
-use std::io::{Write, stdout};
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use study::definition::Study;
-use terminal_size::Width;
 
 /// An entry of the list.
 #[derive(Debug, Serialize)]
@@ -53,15 +52,6 @@ pub(crate) fn list(folder: Option<&Path>, json: bool, out: &mut impl Write) -> R
         print(rows, width, out)?;
     }
     Ok(())
-}
-
-/// Width of printed texts where there is no terminal.
-const WIDTH: usize = 80;
-
-/// Returns the width to which texts are wrapped.
-pub(crate) fn width() -> usize {
-    let columns = terminal_size::terminal_size_of(stdout());
-    columns.map_or(WIDTH, |(Width(columns), _)| usize::from(columns).clamp(40, 120))
 }
 
 /// Largest width of the column of names.

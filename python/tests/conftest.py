@@ -37,8 +37,10 @@ def usual_signals():
 
 USUAL = {} if os.name == "nt" else {"preexec_fn": usual_signals}
 
-# A process that was started with Ctrl-C ignored has no handler that raises KeyboardInterrupt.
-signal.signal(signal.SIGINT, signal.default_int_handler)
+
+def pytest_configure():
+    """A process that was started with Ctrl-C ignored has no handler that raises KeyboardInterrupt."""
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 @pytest.fixture

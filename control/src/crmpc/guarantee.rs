@@ -26,4 +26,17 @@ pub use lemmas::Lemmas;
 pub(super) use losses::{End, Held};
 pub(super) use observable::{MEANS, Observable};
 pub use tightening::Tightening;
-pub(super) use tightening::{tighten, with_share};
+pub(super) use tightening::with_share;
+
+use super::settings::Settings;
+use crate::error::DesignError;
+
+/// Computes tightening and assessment of `settings`.
+///
+/// # Errors
+/// Returns an error that names the gain that does not stabilise, with its spectral radius.
+pub(super) fn tighten(settings: &Settings) -> Result<(Tightening, Assessment), DesignError> {
+    let (tightening, dynamics) = tightening::tighten(settings)?;
+    let assessment = assessment::assess(settings, &dynamics, &tightening);
+    Ok((tightening, assessment))
+}

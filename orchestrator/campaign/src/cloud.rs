@@ -9,7 +9,8 @@ use cosim_metrics::progress::Parts;
 use cosim_report::figure::{self, Color, Curve, Figure, Legend, Shape, with_unit};
 use cosim_report::panels::{self, Panel};
 use sweep::closed;
-use sweep::runner::{self, Options, Worked};
+use sweep::runner::{self, Options};
+use sweep::threads::{Worked, on_parts};
 use sweep::track::Track;
 
 /// Number of cases that the band is made of.
@@ -72,7 +73,7 @@ pub(crate) fn draw(
             progress.advance(1);
             fly(state, flight)
         };
-        runner::on_parts(&flights, threads, begin, fly, |_| false)
+        on_parts(&flights, threads, begin, fly, |_| false)
     };
     progress.finish();
     if let Some(error) = failures.into_values().next() {

@@ -3,7 +3,7 @@
 use crate::definition::{Campaign, Limit, kept_column};
 use crate::prepare::{Recorded, keys, observe, read_experiment, recorded};
 use cosim::error::Error;
-use cosim::experiment::{MeasureKind, Overrides};
+use cosim::experiment::MeasureKind;
 use cosim::files;
 use cosim::system::Opened;
 use cosim_metrics::metrics::{Meters, Metrics};
@@ -12,16 +12,7 @@ use std::path::{Path, PathBuf};
 use sweep::cases::Sweep;
 use sweep::vary::Variation;
 
-/// Changes that the command line makes to a campaign.
-#[derive(Clone, Debug, Default)]
-pub struct Changes {
-    /// Experiment in place of that of the campaign.
-    pub experiment: Option<PathBuf>,
-    /// Changes to the experiment.
-    pub overrides: Overrides,
-    /// Command that flies one case with these changes, in which `CASE` stands for its number.
-    pub command: String,
-}
+pub use crate::prepare::Changes;
 
 /// A campaign that is ready to be flown.
 pub struct Plan {

@@ -1,15 +1,26 @@
 //! Looks up what a campaign names: its experiment, its metrics and measures.
 
 use crate::definition::Campaign;
-use crate::plan::Changes;
 use cosim::error::Error;
 use cosim::experiment::{Experiment, Margins, Measure, MeasureKind, Observe, Overrides, Process};
 use cosim::files;
 use cosim::search::named::{Kind, find};
 use cosim_metrics::metrics::{Meters, Metrics};
 use std::collections::BTreeMap;
+use std::path::PathBuf;
 use sweep::vary::DesignKind;
 use toml::Spanned;
+
+/// Changes that the command line makes to a campaign.
+#[derive(Clone, Debug, Default)]
+pub struct Changes {
+    /// Experiment in place of that of the campaign.
+    pub experiment: Option<PathBuf>,
+    /// Changes to the experiment.
+    pub overrides: Overrides,
+    /// Command that flies one case with these changes, in which `CASE` stands for its number.
+    pub command: String,
+}
 
 /// A number that is recorded of each case.
 #[derive(Clone, Debug, PartialEq)]

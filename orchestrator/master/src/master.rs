@@ -14,8 +14,7 @@ mod ending;
 mod kept;
 mod transfer;
 
-pub use kept::OpenedInput;
-pub use transfer::Member;
+pub use transfer::{Member, OpenedInput};
 
 use crate::clock::Clock;
 use crate::delay::Reading;

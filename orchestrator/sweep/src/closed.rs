@@ -1,6 +1,6 @@
 //! Work on parts in a closed process.
 
-use crate::runner::{self, Worked};
+use crate::threads::{self, Worked};
 use cosim::interrupt::Interrupt;
 use cosim::system::System;
 use fmu_import::isolation::{Closed, Closing, Ended};
@@ -18,13 +18,13 @@ pub fn closing(systems: &[System]) -> Option<Closing> {
     })
 }
 
-/// Works on parts as [`runner::on_parts`] does, with threads in a closed process. Results are
+/// Works on parts as [`threads::on_parts`] does, with threads in a closed process. Results are
 /// `kept` in this one. If an instance ends or stops the process, the part fails, and another
 /// process works on what is left.
 #[expect(clippy::too_many_arguments, reason = "each is part of what a part goes through")]
 pub fn on_parts<P: Sync, S, R, K, E>(
     parts: &[P],
-    mut threads: usize,
+    mut count: usize,
     (closing, interrupt): (&Closing, &Interrupt),
     begin: impl Fn() -> Result<S, E> + Sync,
     work: impl Fn(&mut S, &P) -> Result<R, E> + Sync,
@@ -49,7 +49,7 @@ where
                 let _ = link.send(&(*place, Ok::<R, E>(result)));
                 Ok(())
             };
-            let done = runner::on_parts(&left, threads, &begin, fly, &goes_on);
+            let done = threads::on_parts(&left, count, &begin, fly, &goes_on);
             for (at, error) in done.failures {
                 let _ = link.send(&(left[at], Err::<R, E>(error)));
             }
@@ -75,9 +75,9 @@ where
             Ended::Failed(last) => last.part.filter(|part| left.contains(part)),
             Ended::Refused(_) => None,
         };
-        if part.is_none() && threads > 1 && matches!(ended, Ended::Failed(_)) {
+        if part.is_none() && count > 1 && matches!(ended, Ended::Failed(_)) {
             // Alone, a part shows whether it is the one.
-            threads = 1;
+            count = 1;
             continue;
         }
         let Some(place) = part.or(left.first().copied()) else { break };

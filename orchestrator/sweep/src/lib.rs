@@ -19,6 +19,7 @@ pub mod runner;
 pub mod statistics;
 pub mod table;
 pub mod texts;
+pub mod threads;
 pub mod track;
 pub mod varied;
 pub mod vary;

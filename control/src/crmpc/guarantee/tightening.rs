@@ -1,6 +1,5 @@
 //! The tightening of the robust set, tick by tick, and how it is computed.
 
-use super::assessment::{Assessment, assess};
 use super::deviation::Deviation;
 use super::dynamics::Dynamics;
 use super::losses::{MomentLoss, RateLoss, induced_norm};
@@ -60,11 +59,11 @@ impl Tightening {
     }
 }
 
-/// Computes tightening and assessment of `settings`.
+/// Computes the tightening of `settings`, and returns it with the dynamics that it holds for.
 ///
 /// # Errors
 /// Returns an error that names the gain that does not stabilise, with its spectral radius.
-pub(in crate::crmpc) fn tighten(s: &Settings) -> Result<(Tightening, Assessment), DesignError> {
+pub(super) fn tighten(s: &Settings) -> Result<(Tightening, Dynamics), DesignError> {
     let error = SampledError::delayed(s.feedback, s.period_feedback, s.delay);
     let steps = error.settling().ok_or_else(|| DesignError::Unstable {
         k1: s.feedback.k1,
@@ -89,8 +88,7 @@ pub(in crate::crmpc) fn tighten(s: &Settings) -> Result<(Tightening, Assessment)
         induced_norm,
         observable: Observable::all(s, &dynamics, &parts),
     };
-    let assessment = assess(s, &dynamics, &tightening);
-    Ok((tightening, assessment))
+    Ok((tightening, dynamics))
 }
 
 /// Returns the largest mean acceleration over one period that the assumptions explain, rad/s²: Δ̄,

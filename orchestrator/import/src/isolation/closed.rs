@@ -3,7 +3,7 @@
 #![allow(unsafe_code)]
 
 use super::ended::ended;
-use super::inside::{self, Link};
+use super::inside::{self, Kind, Link, Pipes};
 use super::page::{Doing, Page, SLOTS};
 use super::{Closing, Ended, LastCall};
 use crate::folder::TemporaryFolder;
@@ -29,28 +29,6 @@ const LONGEST_PAUSE: Duration = Duration::from_millis(100);
 const LARGEST: usize = 1 << 28;
 /// Largest number of bytes of a printed line that is passed on.
 const LINE: usize = 2000;
-
-/// Kind of what a process sends.
-#[derive(Clone, Copy)]
-#[repr(u8)]
-pub(super) enum Kind {
-    /// A message of its work.
-    Message = b'm',
-    /// Text for the log.
-    Log = b'l',
-    /// A warning that it prints when its run is over.
-    Warning = b'w',
-    /// Why it could not be closed.
-    Refusal = b'r',
-    /// The work is done.
-    Done = b'd',
-}
-
-/// Ends of pipes that a process holds.
-pub(super) struct Pipes {
-    pub(super) messages: File,
-    pub(super) prints: File,
-}
 
 /// A closed process.
 pub struct Closed {

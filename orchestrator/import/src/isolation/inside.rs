@@ -3,7 +3,6 @@
 #![allow(unsafe_code)]
 
 use super::Closing;
-use super::closed::{Kind, Pipes};
 use super::{page, sandbox};
 use crate::law;
 use parking_lot::Mutex;
@@ -18,6 +17,28 @@ use std::path::Path;
 unsafe extern "C" {
     /// The environment, as the C library defines it.
     static environ: *mut *mut c_char;
+}
+
+/// Kind of what a process sends.
+#[derive(Clone, Copy)]
+#[repr(u8)]
+pub(super) enum Kind {
+    /// A message of its work.
+    Message = b'm',
+    /// Text for the log.
+    Log = b'l',
+    /// A warning that it prints when its run is over.
+    Warning = b'w',
+    /// Why it could not be closed.
+    Refusal = b'r',
+    /// The work is done.
+    Done = b'd',
+}
+
+/// Ends of pipes that a process holds.
+pub(super) struct Pipes {
+    pub(super) messages: File,
+    pub(super) prints: File,
 }
 
 /// Where this process sends its messages, if it is closed, and room for one of them.

@@ -1,17 +1,7 @@
 //! States to which a run goes back, and inputs at which its loop is opened.
 
-use super::{Failed, Master};
+use super::{Failed, Master, OpenedInput};
 use crate::wiring::Port;
-
-/// A connected real input at which the loop is opened.
-pub struct OpenedInput {
-    /// Place among the real inputs of the instance.
-    pub(super) place: usize,
-    /// Value that arrived for the latest step.
-    pub arrived: f64,
-    /// Value that the instance receives instead, if there is one.
-    pub given: Option<f64>,
-}
 
 impl Master {
     /// Opens the loop at a connected real input.

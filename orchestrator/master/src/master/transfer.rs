@@ -1,13 +1,22 @@
 //! Values on their way from instance to instance, which are read with one call per instance and
 //! type.
 
-use super::kept::OpenedInput;
 use crate::delay::Reading;
 use crate::description::Carrier;
 use crate::instance::{Instance, Outcome};
 use crate::quantity::Scaling;
 use crate::wiring::{Port, Wire};
 use std::collections::BTreeSet;
+
+/// A connected real input at which the loop is opened.
+pub struct OpenedInput {
+    /// Place among the real inputs of the instance.
+    place: usize,
+    /// Value that arrived for the latest step.
+    pub arrived: f64,
+    /// Value that the instance receives instead, if there is one.
+    pub given: Option<f64>,
+}
 
 /// An instance together with the data that the master needs to step it. Members are kept in the
 /// order in which they are stepped.
