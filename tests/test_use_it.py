@@ -49,7 +49,7 @@ def test_the_steps_of_the_page(pytestconfig, libpython, tmp_path):
         done = subprocess.run([*command, text], cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=120)
         assert done.returncode == 0, text + done.stdout + done.stderr
     made = [path.name for path in (tmp_path / "out").iterdir()]
-    expected = "crmpc paced loop.ssp again plant.csv exchange.csv closed_loop.csv variation.csv closed_loop.png archive loop.fmu container.csv PdController.fmu pd".split()
+    expected = "crmpc paced loop.ssp again plant.csv exchange.csv closed_loop.csv archive loop.fmu container.csv PdController.fmu pd".split()
     if {"all", "importers"} & set(pytestconfig.getoption("--tier")):
         expected.append("crmpc.csv")
     assert set(expected) <= set(made)

@@ -1,8 +1,8 @@
 //! Flies the instances of a run, in this process or in a closed one.
 
-use crate::run::Options;
 use cosim::error::Error;
 use cosim::interrupt::Interrupt;
+use cosim::pacing::Settings;
 use cosim::pacing::pacer::Pacer;
 use cosim::pacing::report::RealTime;
 use cosim::pacing::timer::{self, Monotonic};
@@ -55,30 +55,32 @@ pub(crate) struct Flown {
 /// Returns an error if the run could not begin.
 pub(crate) fn fly(
     system: &System,
-    options: &Options,
+    real_time: Option<Settings>,
+    interrupt: &Interrupt,
     heard: &mut dyn Heard,
 ) -> Result<Flown, Error> {
-    if options.real_time.is_some() {
+    if real_time.is_some() {
         timer::wake_up_sharply();
     }
     match system.closing() {
-        Some(closing) => fly_closed(system, &closing, options, heard),
-        None => fly_here(system, options, heard, |_| ()),
+        Some(closing) => fly_closed(system, &closing, (real_time, interrupt), heard),
+        None => fly_here(system, real_time, interrupt, heard, |_| ()),
     }
 }
 
 /// Flies a run in this process. `tell` is called before the instances are freed.
 fn fly_here(
     system: &System,
-    options: &Options,
+    real_time: Option<Settings>,
+    interrupt: &Interrupt,
     heard: &mut dyn Heard,
     tell: impl FnOnce(&Flown),
 ) -> Result<Flown, Error> {
     let warnings = warnings::collect();
     warnings::at(system.clock.start());
-    let mut run = system.start(&options.interrupt)?;
+    let mut run = system.start(interrupt)?;
     heard.begin(system.parameters(&mut run)?)?;
-    if let Some(settings) = options.real_time {
+    if let Some(settings) = real_time {
         run.pace(settings, Rc::new(Monotonic));
     }
     let begin = Instant::now();
@@ -87,7 +89,7 @@ fn fly_here(
     heard.stop();
     drop(warnings);
     let margins = match outcome {
-        Ok(()) => margins(system, &options.interrupt),
+        Ok(()) => margins(system, interrupt),
         Err(_) => Ok(Measured::new()),
     };
     let end = run.master.end().map(String::from);
@@ -158,7 +160,7 @@ impl Heard for Teller<'_> {
 fn fly_closed(
     system: &System,
     closing: &Closing,
-    options: &Options,
+    (real_time, interrupt): (Option<Settings>, &Interrupt),
     heard: &mut dyn Heard,
 ) -> Result<Flown, Error> {
     let begin = Instant::now();
@@ -167,7 +169,7 @@ fn fly_closed(
         let tell = |flown: &Flown| {
             let _ = Teller(link).tell(&Told::Flown(json!(flown).to_string()));
         };
-        if let Err(error) = fly_here(system, options, &mut Teller(link), tell) {
+        if let Err(error) = fly_here(system, real_time, interrupt, &mut Teller(link), tell) {
             let _ = Teller(link).tell(&Told::Failed(error));
         }
     };
@@ -192,7 +194,7 @@ fn fly_closed(
         Told::Failed(error) => Err(error),
     };
     let ended = closed.hear(
-        || options.interrupt.signal(),
+        || interrupt.signal(),
         |told| {
             // After a fault, only the end of the run is heard.
             if (fault.is_none() || matches!(told, Told::Flown(_)))

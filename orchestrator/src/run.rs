@@ -176,7 +176,7 @@ fn ended(reason: Option<Error>, quiet: bool) -> Result<(), Failure> {
 /// Returns an error if an FMU fails, or if a file cannot be written.
 fn record(system: &mut System, options: &Options) -> Result<RunReport, Failure> {
     let mut outputs = Outputs::new(system, options)?;
-    let flown = flight::fly(outputs.system, options, &mut outputs)?;
+    let flown = flight::fly(outputs.system, options.real_time, &options.interrupt, &mut outputs)?;
     let Flown { outcome, wall, end, real_time, margins, late } = flown;
     let out = outputs.out.clone();
     let written = outputs.write(outcome.as_ref().err(), wall, real_time, margins);
