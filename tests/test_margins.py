@@ -209,7 +209,6 @@ def test_oracle_surfaces_give_small_motions_the_margins_of_the_loop_without_them
     arguments = [part for value in arguments[2:] for part in ("--set", value)]
     law_of = ["--fmu", f"controller={law}.fmu"]
     found = json.loads(call("margins", experiment, "--json", *law_of, *arguments))
-    assert "sides" not in found
     ideal = json.loads(call("margins", FOLDER / "margins" / "rest.toml", "--json", *law_of, *arguments))
     assert found["together"]["disk"]["alpha"] == pytest.approx(ideal["together"]["disk"]["alpha"], rel=5e-3)
     gain = found["together"]["classical"]["gain_above"]["value"]
@@ -217,8 +216,9 @@ def test_oracle_surfaces_give_small_motions_the_margins_of_the_loop_without_them
     # The gain of TwoLoopSMC depends on the amplitude. Smaller motions drown in what the allocator's iterations leave.
     if (start := {"FBL": 3e-5, "CRMPC": 1e-4}.get(law)) is None:
         return
-    # Beyond the margin a small motion grows until the surfaces are too slow for it.
-    for share, is_stable in ((0.98, True), (1.02, False)):
+    # Beyond the margin a small motion grows until the surfaces are too slow for it. Near the margin it
+    # grows no faster than what the allocator's iterations leave.
+    for share, is_stable in ((0.98, True), (1.05, False)):
         rates = [f"plant.initial.{name}={rate * start} deg/s" for name, rate in zip("pqr", (1.3, 1.0, 0.7))]
         more = [f"plant.inertia.scale={1.0 / (share * gain)}", *rates]
         command = ["run", experiment, *law_of, *arguments, *(part for value in more for part in ("--set", value))]

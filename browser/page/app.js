@@ -192,7 +192,7 @@ function show() {
   const limits = { rate: summary.limits.rate * DEG, moment: summary.limits.moment * 1e-3 };
   const runs = [{ time: flight.time }, ...(other ? [{ time: other.time, faint: true }] : [])];
   stop = settings.isEntry ? flight.time.at(-1) : settings.scenario.stop;
-  player.range(0, flight.time.at(-1) || stop);
+  player.range(0, flight.time.at(-1) ?? stop);
   charts.loads.figure.hidden = $("entry").hidden = !settings.isEntry;
   for (const id of Object.keys(PANELS)) if (!charts[id].figure.hidden) charts[id].show(panel(id, limits), runs, [0, stop]);
   if (settings.isEntry) {
