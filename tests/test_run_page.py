@@ -151,6 +151,22 @@ def test_keys_play_and_seek(runs, opened):
     assert shown_time(page) == 25
 
 
+def test_whoever_pauses_and_plays_within_a_frame_plays_no_faster(runs, opened):
+    page = opened(runs / "crmpc-robust" / "page.html")
+    second = """() => {
+        let frames = [];
+        window.requestAnimationFrame = (frame) => frames.push(frame);
+        for (let k = 0; k < 3; k++) document.getElementById("play").click();
+        for (const now of [0, 1000]) {
+            const due = frames;
+            frames = [];
+            for (const frame of due) frame(now);
+        }
+    }"""
+    page.evaluate(second)
+    assert shown_time(page) == float(page.input_value("#speed"))
+
+
 def test_the_vehicle_moves_with_the_run(runs, opened):
     page = opened(runs / "crmpc-2022-allocated" / "page.html")
     picture = "document.querySelector('.view').toDataURL()"

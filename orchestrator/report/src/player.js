@@ -51,11 +51,12 @@ class Player {
     this.label();
     if (!this.isPlaying) return;
     if (this.time >= this.stop) this.seek(this.start);
-    let last = null;
+    // Whoever pauses and plays within a frame has two of these at a time.
+    this.last = null;
     const frame = (now) => {
       if (!this.isPlaying) return;
-      if (last !== null) this.seek(this.time + ((now - last) / 1000) * Number(this.speed.value));
-      last = now;
+      if (this.last !== null) this.seek(this.time + ((now - this.last) / 1000) * Number(this.speed.value));
+      this.last = now;
       if (this.time >= this.stop) this.toggle();
       else requestAnimationFrame(frame);
     };
