@@ -5,7 +5,6 @@ use crate::failure::Failure;
 use crate::flight::{self, Flown, Heard};
 use crate::summary::{self, RunReport};
 use cosim::check::check;
-use cosim::choice::choice;
 use cosim::error::Error;
 use cosim::experiment::{Experiment, Overrides};
 use cosim::files;
@@ -13,7 +12,7 @@ use cosim::interrupt::Interrupt;
 use cosim::metadata;
 use cosim::pacing;
 use cosim::pacing::report::RealTime;
-use cosim::recorder::{Format, Recorder};
+use cosim::recorder::{FILE, Recorder};
 use cosim::run::{Observer, Sample};
 use cosim::ssp;
 use cosim::system::{Opened, Parameters, System};
@@ -41,16 +40,13 @@ struct Pictures {
     page: bool,
 }
 
-/// Choice of the files that a run writes, and of their format.
+/// Choice of the files that a run writes.
 #[derive(Clone, Copy, Debug, Default, clap::Args)]
 #[command(next_help_heading = "Results")]
 pub(crate) struct Files {
     /// Write no results.csv.
     #[arg(long)]
     no_csv: bool,
-    /// Choose the format of the file of recorded variables.
-    #[arg(long, value_parser = choice::<Format>(&[]), value_name = "FORMAT", default_value = "csv", conflicts_with = "no_csv")]
-    format: Format,
     #[command(flatten)]
     pictures: Pictures,
     /// Write the header of results.csv as name [unit], and items of enumerations by their names.
@@ -58,17 +54,6 @@ pub(crate) struct Files {
     /// NumPy expect; results.json holds the units and items.
     #[arg(long, conflicts_with = "no_csv")]
     labels: bool,
-}
-
-impl Files {
-    /// Rejects options that would have no effect.
-    fn check(self) -> Result<(), Error> {
-        if self.labels && self.format != Format::Csv {
-            let problem = "--labels applies to results.csv only: leave it out, because results.parquet has units and items in its metadata";
-            return Err(Error::experiment(problem));
-        }
-        Ok(())
-    }
 }
 
 /// Options of a run: where its results go, how it is paced, and what is shown.
@@ -209,7 +194,6 @@ impl<'a> Outputs<'a> {
     /// # Errors
     /// Returns an error if a signal is unknown, or if there are results that may not be replaced.
     fn new(system: &'a mut System, options: &'a Options) -> Result<Self, Failure> {
-        options.files.check()?;
         let meters = Meters::new(system)?.ending_when_lost();
         // A panel of a wrong signal is refused before the run, whether it is drawn or not.
         Panel::resolve_all(system)?;
@@ -252,7 +236,7 @@ impl<'a> Outputs<'a> {
         let mut files = vec!["results.json", "metrics.json"];
         if let Some(recorder) = &mut self.recorder {
             recorder.finish()?;
-            files.insert(0, self.options.files.format.file());
+            files.insert(0, FILE);
         }
         files::write_json(&self.out.join("results.json"), &metadata)?;
         let mut metrics = self.measured(wall);
@@ -302,8 +286,7 @@ impl Heard for Outputs<'_> {
         // Another process may have written to the folder in the meantime.
         Folder::check(&self.out, *force)?;
         folder.clear()?;
-        let recorder =
-            (!files.no_csv).then(|| self.system.recorder(&self.out, files.format, files.labels));
+        let recorder = (!files.no_csv).then(|| self.system.recorder(&self.out, files.labels));
         self.recorder = recorder.transpose()?;
         let title = &self.system.experiment.title;
         self.progress = Some(Progress::new(title, clock.ticks(), *quiet, real_time.is_some()));

@@ -4,7 +4,6 @@ use crate::definition::kept_column;
 use crate::plan::Plan;
 use cosim::error::Error;
 use cosim::interrupt::Interrupt;
-use cosim::recorder::Format;
 use cosim::run::Observer;
 use cosim::system::{Opened, System};
 use cosim::variation::SettingValue;
@@ -111,7 +110,7 @@ impl<'a> Flight<'a> {
     pub fn keep(&mut self, case: u64, folder: &Path, title: &str) -> Result<Row, Error> {
         let system = self.instances.system();
         let mut watch = Watch::new(system)?;
-        let mut recorder = system.recorder(folder, Format::Csv, false)?;
+        let mut recorder = system.recorder(folder, false)?;
         let bounds = self.instances.replace_bounds(Vec::new());
         let values = self.plan.sweep.values(case);
         let row = self.fly_with(case, values, &mut [&mut recorder, &mut watch]);

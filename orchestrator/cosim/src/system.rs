@@ -4,7 +4,7 @@
 use crate::error::Error;
 use crate::experiment::Experiment;
 use crate::interrupt::Interrupt;
-use crate::recorder::{self, Format, Recorder};
+use crate::recorder::{self, Recorder};
 use crate::run::{Observer, Run};
 use crate::signal::{Resolved, Signal, Term};
 use crate::watch::Watched;
@@ -330,7 +330,7 @@ impl System {
     ///
     /// # Errors
     /// Returns an error if the file cannot be written.
-    pub fn recorder(&self, folder: &Path, format: Format, labels: bool) -> Result<Recorder, Error> {
+    pub fn recorder(&self, folder: &Path, labels: bool) -> Result<Recorder, Error> {
         let places: HashMap<Port, usize> =
             self.probes.iter().enumerate().rev().map(|(place, port)| (*port, place)).collect();
         let column = |column: &Column| {
@@ -342,8 +342,8 @@ impl System {
             Some(recorder::Column { name, place, carrier, unit, items })
         };
         let columns: Vec<_> = self.columns.iter().filter_map(column).collect();
-        let path = folder.join(format.file());
-        Recorder::create(&path, format, &columns, self.experiment.record.every, labels)
+        let path = folder.join(recorder::FILE);
+        Recorder::create(&path, &columns, self.experiment.record.every, labels)
     }
 }
 

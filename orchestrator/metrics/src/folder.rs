@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 /// Names of the files that a run may write.
-pub const RESULTS: [&str; 6] =
-    ["results.csv", "results.parquet", "results.json", "metrics.json", "plot.svg", "page.html"];
+pub const RESULTS: [&str; 5] =
+    ["results.csv", "results.json", "metrics.json", "plot.svg", "page.html"];
 
 /// Time for which a folder that is taken is waited for.
 const PATIENCE: Duration = Duration::from_millis(300);

@@ -15,8 +15,8 @@ use std::path::PathBuf;
 /// Options of `plot`.
 #[derive(Args)]
 pub(crate) struct Plot {
-    /// Run to draw: a folder of results (also by its name below out), or its results.csv or
-    /// results.parquet. Several runs are drawn over one another.
+    /// Run to draw: a folder of results (also by its name below out), or its results.csv.
+    /// Several runs are drawn over one another.
     #[arg(required = true, value_name = "RUN")]
     runs: Vec<PathBuf>,
     /// Signal to draw: a variable, a pattern with an asterisk as `plant.rate.*`, or a difference or

@@ -3,17 +3,13 @@
 use crate::summary;
 use cosim::error::Error;
 use cosim::experiment::{MeasureKind, Observe};
+use cosim::recorder::FILE;
 use cosim_metrics::metrics::Metrics;
 use cosim_report::recording::{Recording, Track, display_unit};
 use serde_json::{Map, Value};
 use std::collections::{BTreeMap, BTreeSet};
-use std::ffi::OsStr;
 use std::fs;
 use std::path::{Path, PathBuf};
-use sweep::table;
-
-/// Files of recorded variables in a folder of results.
-const TABLES: [&str; 2] = ["results.csv", "results.parquet"];
 
 /// Columns of numbers with their names, and the units that the file itself gives, by name.
 type Columns = (Vec<(String, Vec<f64>)>, BTreeMap<String, String>);
@@ -26,18 +22,14 @@ pub(super) fn recording(path: &Path) -> Result<Recording, Error> {
     let file = table_of(path)?;
     let folder = file.parent().unwrap_or(Path::new(""));
     let metadata = json_of(&folder.join("results.json"))?;
-    let ending = file.extension().and_then(OsStr::to_str).map(str::to_ascii_lowercase);
-    let (columns, units) = match ending.as_deref() {
-        Some("parquet") => parquet(&file)?,
-        Some("csv") => text(&file, &metadata)?,
-        _ => {
-            let problem = format!(
-                "{} is no table of recorded variables: name a folder of results, or a .csv or .parquet file",
-                file.display()
-            );
-            return Err(Error::experiment(problem));
-        }
-    };
+    if !file.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("csv")) {
+        let problem = format!(
+            "{} is no table of recorded variables: name a folder of results, or a .csv file",
+            file.display()
+        );
+        return Err(Error::experiment(problem));
+    }
+    let (columns, units) = text(&file, &metadata)?;
     check_names(&columns, &file)?;
     let mut columns = columns.into_iter();
     let first = columns.next().filter(|(name, _)| name.eq_ignore_ascii_case("time"));
@@ -52,7 +44,7 @@ pub(super) fn recording(path: &Path) -> Result<Recording, Error> {
         (name.clone(), track(column.unwrap_or(&Value::Null), units.get(&name), values))
     });
     let name = match file.file_name().and_then(|name| name.to_str()) {
-        Some(name) if TABLES.contains(&name) => fs::canonicalize(folder).ok(),
+        Some(FILE) => fs::canonicalize(folder).ok(),
         _ => Some(file.with_extension("")),
     };
     let name = name.as_deref().and_then(Path::file_name).unwrap_or(file.as_os_str());
@@ -80,8 +72,8 @@ fn check_names(columns: &[(String, Vec<f64>)], file: &Path) -> Result<(), Error>
 
 /// Checks that time never goes backwards.
 fn check_time(time: &[f64], file: &Path) -> Result<(), Error> {
-    // A CSV file has its header in the first row.
-    let first = if file.extension().is_some_and(|ending| ending == "parquet") { 1 } else { 2 };
+    // The header is in the first row.
+    let first = 2;
     let not_a_number = time.iter().position(|time| !time.is_finite());
     let backwards = time.windows(2).position(|pair| pair[1] < pair[0]).map(|before| before + 1);
     let problem = match (not_a_number, backwards) {
@@ -110,10 +102,11 @@ fn table_of(path: &Path) -> Result<PathBuf, Error> {
     if found.is_file() {
         return Ok(found.to_path_buf());
     }
-    TABLES.map(|name| found.join(name)).into_iter().find(|file| file.is_file()).ok_or_else(|| {
-        let problem = format!("{} holds neither {}", found.display(), TABLES.join(" nor "));
-        Error::experiment(problem)
-    })
+    let file = found.join(FILE);
+    if file.is_file() {
+        return Ok(file);
+    }
+    Err(Error::experiment(format!("{} holds no {FILE}", found.display())))
 }
 
 /// Reads a JSON file; null if there is none.
@@ -147,14 +140,6 @@ fn usual_unit(unit: &str) -> (String, f64) {
         }
         _ => (unit.into(), 1.0),
     }
-}
-
-fn parquet(path: &Path) -> Result<Columns, Error> {
-    let reader = table::Reader::open(path)?;
-    let units = reader.metadata("units").unwrap_or("{}");
-    let units: BTreeMap<String, String> = serde_json::from_str(units).unwrap_or_default();
-    let columns = reader.table()?.columns.into_iter();
-    Ok((columns.map(|column| (column.name, column.values.numbers())).collect(), units))
 }
 
 /// Reads a CSV file, also one whose header has units and whose cells have names of items.
@@ -295,6 +280,6 @@ mod tests {
             assert!(fault.exit_code() == 2 && fault.to_string().contains(name), "{fault}");
         }
         let fault = read("a.parquet", "PAR1 and nothing else", None).unwrap_err().to_string();
-        assert!(fault.contains("a.parquet"), "{fault}");
+        assert!(fault.contains("a.parquet is no table of recorded variables"), "{fault}");
     }
 }

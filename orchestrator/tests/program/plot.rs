@@ -106,11 +106,8 @@ fn oracle_the_numbers_of_a_page_are_those_of_the_runs() {
 fn oracle_a_table_of_another_form_gives_the_same_picture() {
     let bench = flown();
     let picture = plotted(&bench, &["a"]);
-    for (out, options) in [("p", &["--format", "parquet"][..]), ("l", &["--labels"])] {
-        bench.flown(&[&["--out", out, "--set", "gain.gain=1.0", "--quiet"], options].concat());
-        assert!(plotted(&bench, &[out]) == picture, "{out}");
-    }
-    assert!(plotted(&bench, &["p/results.parquet"]) == picture);
+    bench.flown(&["--out", "l", "--set", "gain.gain=1.0", "--quiet", "--labels"]);
+    assert!(plotted(&bench, &["l"]) == picture);
     // Without results.json nobody knows panels and title.
     fs::copy(bench.path("a/results.csv"), bench.path("alone.csv")).unwrap();
     let picture = plotted(&bench, &["alone.csv"]);
@@ -165,7 +162,7 @@ fn what_cannot_be_drawn_is_refused_by_name() {
         ),
         (&["a", "--signals", "plent.*"], "no recorded variable matches \"plent.*\""),
         (&["c"], "there is no run c"),
-        (&["."], "holds neither results.csv nor results.parquet"),
+        (&["."], "holds no results.csv"),
         (&["a", "--out", "a.pdf"], "must end with .svg or .html"),
         (&["a", "--from", "7"], "it goes from 0 s to 3 s"),
         (&["a", "--from", "2", "--to", "1"], "--from 2 must be below --to 1"),

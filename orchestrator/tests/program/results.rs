@@ -283,17 +283,6 @@ fn results_can_be_left_out_or_labelled() {
     let summary = bench.flown(&["--no-csv", "--no-plot", "--out", "few"]);
     assert!(summary.contains("few: results.json, metrics.json\n"), "{summary}");
     assert!(!bench.path("few/results.csv").exists() && !bench.path("few/plot.svg").exists());
-    let summary = bench.flown(&["--format", "parquet", "--out", "columnar"]);
-    assert!(summary.contains("columnar: results.parquet, results.json"), "{summary}");
-    assert!(
-        bench.path("columnar/results.parquet").exists()
-            && !bench.path("columnar/results.csv").exists()
-    );
-    let (code, _, errors) = bench.run(&["--format", "parquet", "--labels", "--out", "neither"]);
-    assert!(
-        code == 2 && errors.contains("--labels") && !bench.path("neither").exists(),
-        "{code} {errors}"
-    );
     let head = |arguments: &[&str]| {
         assert_eq!(bench.run(arguments).0, 0);
         let rows = bench.results();

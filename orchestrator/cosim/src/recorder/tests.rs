@@ -1,8 +1,5 @@
 use super::*;
-use ::parquet::file::reader::{FileReader, SerializedFileReader};
-use ::parquet::record::Field;
 use fmi_master::description::Carrier;
-use std::fs::File;
 use std::path::PathBuf;
 
 const VALUES: [f64; 5] = [0.1 + 0.2, 1e-300, f64::MAX, -0.0, 5e-324];
@@ -13,14 +10,14 @@ fn column(name: &str, place: usize, carrier: Carrier) -> Column {
     Column { name: name.into(), place, carrier, unit: None, items: Vec::new() }
 }
 
-fn record(folder: &Path, format: Format, labels: bool) -> PathBuf {
-    let path = folder.join(format.file());
+fn record(folder: &Path, labels: bool) -> PathBuf {
+    let path = folder.join(FILE);
     let columns = vec![
         Column { unit: Some("rad/s".into()), ..column("a.x", 1, Carrier::Real) },
         Column { items: vec![("warm, \"red\"".into(), 7)], ..column("a.n", 0, Carrier::Integer) },
         column("a.on", 2, Carrier::Boolean),
     ];
-    let mut recorder = Recorder::create(&path, format, &columns, 2, labels).unwrap();
+    let mut recorder = Recorder::create(&path, &columns, 2, labels).unwrap();
     for (tick, value) in VALUES.iter().enumerate() {
         let time = tick as f64 * 0.04;
         let values = [7.0, *value, f64::from(tick as u32 % 2)];
@@ -35,7 +32,7 @@ fn record(folder: &Path, format: Format, labels: bool) -> PathBuf {
 #[test]
 fn text_reads_back_to_the_same_bits() {
     let folder = tempfile::tempdir().unwrap();
-    let mut reader = csv::Reader::from_path(record(folder.path(), Format::Csv, false)).unwrap();
+    let mut reader = csv::Reader::from_path(record(folder.path(), false)).unwrap();
     assert_eq!(reader.headers().unwrap(), vec!["time", "a.x", "a.n", "a.on"]);
     let rows: Vec<Vec<String>> =
         reader.records().map(|row| row.unwrap().iter().map(String::from).collect()).collect();
@@ -47,79 +44,22 @@ fn text_reads_back_to_the_same_bits() {
 #[test]
 fn labels_name_units_and_items() {
     let folder = tempfile::tempdir().unwrap();
-    let text = std::fs::read_to_string(record(folder.path(), Format::Csv, true)).unwrap();
+    let text = std::fs::read_to_string(record(folder.path(), true)).unwrap();
     let head = "time [s],a.x [rad/s],a.n,a.on\n0.0,0.30000000000000004,\"warm, \"\"red\"\"\",0\n";
     assert!(text.starts_with(head), "{text}");
-}
-
-#[test]
-fn columnar_reads_back_to_the_same_bits_with_units_and_items() {
-    let folder = tempfile::tempdir().unwrap();
-    let file = File::open(record(folder.path(), Format::Parquet, false)).unwrap();
-    let reader = SerializedFileReader::new(file).unwrap();
-    let metadata = reader.metadata().file_metadata();
-    let said: Vec<(&str, &str)> = metadata
-        .key_value_metadata()
-        .unwrap()
-        .iter()
-        .map(|pair| (pair.key.as_str(), pair.value.as_deref().unwrap()))
-        .collect();
-    assert_eq!(
-        said,
-        [("units", r#"{"a.x":"rad/s","time":"s"}"#), ("items", r#"{"a.n":{"7":"warm, \"red\""}}"#)]
-    );
-    let rows: Vec<Vec<(String, Field)>> =
-        reader.into_iter().map(|row| row.unwrap().into_columns()).collect();
-    let names: Vec<&str> = rows[0].iter().map(|(name, _)| name.as_str()).collect();
-    assert_eq!(names, ["time", "a.x", "a.n", "a.on"]);
-    assert_eq!(rows.len(), ROWS.len());
-    for (row, tick) in rows.iter().zip(ROWS) {
-        let Field::Double(value) = row[1].1 else { panic!("{row:?}") };
-        assert_eq!(value.to_bits(), VALUES[tick].to_bits());
-        assert_eq!(row[2].1, Field::Int(7));
-        assert_eq!(row[3].1, Field::Bool(tick % 2 == 1));
-    }
-}
-
-#[test]
-fn columnar_takes_more_rows_than_it_holds() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("results.parquet");
-    let columns = vec![column("a.x", 0, Carrier::Real)];
-    let mut recorder = Recorder::create(&path, Format::Parquet, &columns, 1, false).unwrap();
-    let count = 2 * columnar::GROUP + 3;
-    for tick in 0..count {
-        let time = tick as f64;
-        recorder
-            .observe(&Sample { tick: tick as u64, time, last: false, values: &[-time] })
-            .unwrap();
-    }
-    recorder.finish().unwrap();
-    let reader = SerializedFileReader::new(File::open(path).unwrap()).unwrap();
-    assert_eq!(reader.num_row_groups(), 3);
-    let sum: f64 = reader
-        .into_iter()
-        .map(|row| match row.unwrap().into_columns()[1].1 {
-            Field::Double(value) => value,
-            _ => f64::NAN,
-        })
-        .sum();
-    assert_eq!(sum, -((count * (count - 1)) as f64) / 2.0);
 }
 
 #[test]
 #[cfg(target_os = "linux")]
 fn a_full_disk_is_told_as_such() {
     let folder = tempfile::tempdir().unwrap();
-    for (format, name) in [(Format::Csv, "a.csv"), (Format::Parquet, "a.parquet")] {
-        let path = folder.path().join(name);
-        std::os::unix::fs::symlink("/dev/full", &path).unwrap();
-        let mut recorder =
-            Recorder::create(&path, format, &[column("a.x", 0, Carrier::Real)], 1, false).unwrap();
-        let row = |tick: u64| Sample { tick, time: tick as f64, last: false, values: &[0.1; 4] };
-        let outcome = (0..100_000).try_for_each(|tick| recorder.observe(&row(tick)));
-        let told = outcome.and_then(|()| recorder.finish()).unwrap_err().to_string();
-        assert!(told.contains("No space left on device"), "{told}");
-        assert!(recorder.finish().is_ok(), "{name}");
-    }
+    let path = folder.path().join("a.csv");
+    std::os::unix::fs::symlink("/dev/full", &path).unwrap();
+    let mut recorder =
+        Recorder::create(&path, &[column("a.x", 0, Carrier::Real)], 1, false).unwrap();
+    let row = |tick: u64| Sample { tick, time: tick as f64, last: false, values: &[0.1; 4] };
+    let outcome = (0..100_000).try_for_each(|tick| recorder.observe(&row(tick)));
+    let told = outcome.and_then(|()| recorder.finish()).unwrap_err().to_string();
+    assert!(told.contains("No space left on device"), "{told}");
+    assert!(recorder.finish().is_ok());
 }
