@@ -77,7 +77,7 @@ pub fn dominant<T: ComplexField<RealField = f64>>(a: &DMatrix<T>) -> Complex<f64
 }
 
 /// Returns the larger eigenvalue of a pair in whose span a sum of the columns of a high power is,
-/// and the relative error that is left of this sum. All eigenvalues are about as large as `radius`.
+/// and its relative error, about. All eigenvalues are about as large as `radius`.
 fn pair<T: ComplexField<RealField = f64>>(
     a: &DMatrix<Complex<f64>>,
     power: &DMatrix<T>,
@@ -88,20 +88,22 @@ fn pair<T: ComplexField<RealField = f64>>(
     let v = sum.map(|value| Complex::new(value.clone().real(), value.imaginary()));
     let w = a * &v * Complex::new(1.0 / radius, 0.0);
     let x = a * &w * Complex::new(1.0 / radius, 0.0);
-    // A² v = s A v − p v.
-    let (vv, vw, ww) = (v.dotc(&v), v.dotc(&w), w.dotc(&w));
-    let (vx, wx) = (v.dotc(&x), w.dotc(&x));
-    let determinant = vv * ww - vw * vw.conj();
-    if determinant.norm() <= 1e-10 * (vv * ww).norm() {
-        let one = vw / vv;
-        return (one * radius, (&w - &v * one).norm() / v.norm());
+    let vv = v.dotc(&v);
+    let one = v.dotc(&w) / vv;
+    // The part of A v beside v: without it, there is one eigenvalue.
+    let beside = &w - &v * one;
+    let size = beside.dotc(&beside);
+    if size.norm() <= 1e-14 * w.norm_squared() {
+        return (one * radius, beside.norm() / v.norm());
     }
-    // Normal equations for (s, −p).
-    let s = (vv * wx - vw.conj() * vx) / determinant;
-    let p = -(ww * vx - vw * wx) / determinant;
+    // A² v = s A v − p v, of which the part beside v gives s: so pairs that are nearly equal keep
+    // their digits.
+    let s = beside.dotc(&(&x - &v * (v.dotc(&x) / vv))) / size;
+    let p = -v.dotc(&(&x - &w * s)) / vv;
     let root = (s * s * 0.25 - p).sqrt();
     let (one, other) = (s * 0.5 + root, s * 0.5 - root);
-    let residual = (&x - &w * s + &v * p).norm() / v.norm();
+    // An eigenvalue errs by this, the more the nearer the pair is to one.
+    let residual = (&x - &w * s + &v * p).norm() / beside.norm();
     ((if one.norm() >= other.norm() { one } else { other }) * radius, residual)
 }
 
