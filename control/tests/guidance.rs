@@ -1,6 +1,6 @@
 //! Entry guidance: where its flights end, and the limits of its reference.
 
-use crate::harness::entry::{Flight, fly, start};
+use crate::harness::entry::{Flight, fly, fly_for, start};
 use control::guidance::{Command, Guidance, Limits, Memory, Navigation, PERIOD, Settings, Shaped};
 use proptest::prelude::*;
 use vehicle::entry::Motion;
@@ -64,6 +64,40 @@ fn commanded(settings: &Settings, motion: Motion, ticks: u64) -> Command {
     (0..ticks).map(|tick| guidance.update(&mut memory, tick, &navigation)).last().unwrap()
 }
 
+/// Whatever is measured, before or during a flight, the guidance answers with finite numbers; what
+/// is no entry flight leaves the command, and is neither in reach nor within limits.
+#[test]
+fn the_last_command_is_held_while_the_measurements_are_those_of_no_flight() {
+    let guidance = Guidance::new(Settings::default()).unwrap();
+    let good = Navigation { motion: Flight::lower().start, ..Navigation::default() };
+    let values = [0.0, -1.0, 1e-300, 1.6, -1e9, 1e9, 1e200, -f64::MAX, f64::MAX, f64::NAN];
+    for begun in [false, true] {
+        let mut memory = Memory::default();
+        let before = begun.then(|| guidance.update(&mut memory, 0, &good));
+        for (i, value) in (0..8).flat_map(|i| values.map(|value| (i, value))) {
+            let mut memory = memory;
+            let mut measured = good;
+            match i {
+                6 => measured.lift = value,
+                7 => measured.drag = value,
+                _ => measured.motion[i] = value,
+            }
+            for tick in 25..40 {
+                let command = guidance.update(&mut memory, tick, &measured);
+                assert!(guidance.fits(&memory), "{i} {value}: {command:?}");
+                if !guidance.is_plausible(&measured) {
+                    assert!(!command.in_reach && !command.keeps_limits, "{i} {value}");
+                    let held = before.map_or(Settings::default().initial.sigma, |last| last.bank);
+                    assert_eq!(command.bank, held, "{i} {value}");
+                }
+            }
+            let again = guidance.update(&mut memory, 50, &good);
+            let is_held = !guidance.is_plausible(&measured);
+            assert!(again.in_reach && again.keeps_limits || !is_held, "{i} {value}: {again:?}");
+        }
+    }
+}
+
 /// The first turn is towards the target: a positive bank angle turns to the left.
 #[test]
 fn oracle_the_first_bank_turns_towards_the_target() {
@@ -91,6 +125,20 @@ fn a_start_or_a_target_that_is_not_feasible_is_reported() {
     let skipping = start([120e3, 0.0, 0.0, 7500.0, -1.0, 90.0]);
     let command = commanded(&Settings::default(), skipping, 1);
     assert!(!command.in_reach, "{command:?}");
+}
+
+/// From too fast a start the vehicle skips, and the predicted range changes by hundreds of kilometres
+/// from one correction to the next.
+#[test]
+fn the_verdict_on_reach_does_not_flicker_in_a_skip() {
+    let fast =
+        Flight { start: start([120e3, 0.0, -10.0, 7600.0, -1.0, 60.0]), ..Flight::nominal() };
+    let mut settings = Settings::default();
+    settings.target.longitude += 0.3;
+    let mut verdicts = Vec::new();
+    fly_for(&settings, &fast, 2750.0, |_, _, memory| verdicts.push(memory.command.in_reach));
+    let changes = verdicts.windows(2).filter(|pair| pair[0] != pair[1]).count();
+    assert!(verdicts.len() > 2700 && changes == 0, "{changes} of {}", verdicts.len());
 }
 
 /// Without damping the flight skips several times.

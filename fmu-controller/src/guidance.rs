@@ -97,14 +97,6 @@ impl SampledInstance for GuidanceInstance {
 
     fn evaluate(&self, guidance: &mut Guidance, ticks: &mut Ticks<Self>) -> Result<(), Failure> {
         let navigation = self.navigation;
-        let Navigation { motion, lift, drag } = navigation;
-        if !motion.iter().chain(&[lift, drag]).all(|value| value.is_finite()) {
-            return Err(Failure::Error("an input motion.* or load.* is not finite".into()));
-        }
-        if motion[3] <= 0.0 {
-            let problem = format!("motion.speed = {} m/s must be positive", motion[3]);
-            return Err(Failure::Error(problem));
-        }
         ticks.evaluate_with(navigation, |memory, tick| {
             guidance.update(memory, tick, &navigation);
         });

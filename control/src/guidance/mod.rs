@@ -25,6 +25,7 @@ use crate::error::DesignError;
 use ::settings::Declared;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
+use std::f64::consts::{FRAC_PI_2, TAU};
 use vehicle::aerodynamics::Aerodynamics;
 use vehicle::axes::nearest;
 use vehicle::entry::{MOTION, Motion, NOMINALS, UNITS, great_circle};
@@ -44,6 +45,12 @@ const BISECTIONS: u32 = 20;
 /// Energy that is left when the bank angle is no longer corrected, relative to that of a circular
 /// orbit: a bank angle has hardly any influence on where the flight ends then.
 const FROZEN: f64 = 0.01;
+/// Corrections in a row after which a target counts as in reach again: in a skip the predicted range
+/// changes by hundreds of kilometres within seconds.
+const REGAINED: u64 = 30;
+/// Largest specific force (m/s²) and number of turns that count as those of an entry flight.
+const LARGEST_LOAD: f64 = 1e3;
+const MOST_TURNS: f64 = 100.0;
 
 /// Measurements of the guidance.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, Declared)]
@@ -120,6 +127,8 @@ pub struct Memory {
     reversed: u64,
     /// Number of reversals.
     pub reversals: u64,
+    /// Corrections in a row with the target in reach.
+    reached: u64,
     /// Ratios of the measured to the predicted lift and drag.
     ratios: [f64; 2],
     alpha: Shaped,
@@ -182,26 +191,75 @@ impl Guidance {
         self.predictor.model.aerodynamics()
     }
 
-    /// Returns whether a restored memory can be used.
+    /// Returns whether a memory can be used: all of its numbers are finite.
     pub fn fits(&self, memory: &Memory) -> bool {
-        let Memory { magnitude, commanded, before, ratios, alpha, bank, .. } = memory;
-        [
-            *magnitude,
-            *commanded,
-            *before,
-            alpha.value,
-            alpha.rate,
-            bank.value,
-            bank.rate,
-            ratios[0],
-            ratios[1],
-        ]
-        .iter()
-        .all(|value| value.is_finite())
+        let Memory { magnitude, commanded, before, ratios, alpha, bank, command, .. } = *memory;
+        let state = [magnitude, commanded, before, alpha.value, alpha.rate, bank.value, bank.rate];
+        let Command { range, heading_error, miss, loads, heat_load, .. } = command;
+        let shown = [command.alpha, command.bank, range, heading_error, miss, heat_load];
+        let mut numbers = state.into_iter().chain(ratios).chain(shown).chain(loads.all());
+        numbers.all(f64::is_finite)
     }
 
-    /// Evaluates the guidance at the tick with this number.
+    /// Evaluates the guidance at the tick with this number. If the measurements are those of no
+    /// entry flight, the last command is held, and neither target nor limits count as kept.
     pub fn update(&self, memory: &mut Memory, tick: u64, measured: &Navigation) -> Command {
+        let mut next = *memory;
+        let is_plausible = self.is_plausible(measured);
+        if is_plausible {
+            self.decide(&mut next, tick, measured);
+        }
+        if !(is_plausible && self.fits(&next)) {
+            next = *memory;
+            next.command = Command { in_reach: false, keeps_limits: false, ..next.command };
+        }
+        if !next.begun {
+            next.alpha.value = self.settings.initial.alpha;
+            next.bank.value = self.settings.initial.sigma;
+            (next.command.alpha, next.command.bank) = (next.alpha.value, next.bank.value);
+        }
+        let Command { alpha, bank, .. } = next.command;
+        let Shaping { bank_rate, bank_acceleration, alpha_rate, alpha_acceleration } =
+            self.settings.shaping;
+        let limits = Limits { rate: alpha_rate, acceleration: alpha_acceleration };
+        next.alpha.follow(alpha, &limits, PERIOD);
+        let limits = Limits { rate: bank_rate, acceleration: bank_acceleration };
+        next.bank.follow(bank, &limits, PERIOD);
+        let vector =
+            |part: fn(&Shaped) -> f64| Vector3::new(part(&next.alpha), 0.0, part(&next.bank));
+        next.command.reference = Reference {
+            angles: vector(|shaped| shaped.value),
+            rates: vector(|shaped| shaped.rate),
+            accelerations: vector(|shaped| shaped.acceleration),
+        };
+        *memory = next;
+        next.command
+    }
+
+    /// Returns whether measurements can be those of an entry flight. A navigation that has diverged
+    /// gives others.
+    pub fn is_plausible(&self, measured: &Navigation) -> bool {
+        let [altitude, longitude, latitude, speed, path, heading] = measured.motion.into();
+        let planet = &self.settings.planet;
+        let circular = (planet.gravitation / planet.radius).sqrt();
+        let most = MOST_TURNS * TAU;
+        speed > 0.0
+            && [
+                (altitude, planet.radius),
+                (longitude, most),
+                (latitude, FRAC_PI_2),
+                (speed, 2.0 * circular),
+                (path, FRAC_PI_2),
+                (heading, most),
+                (measured.lift, LARGEST_LOAD),
+                (measured.drag, LARGEST_LOAD),
+            ]
+            .iter()
+            .all(|(value, largest)| value.abs() <= *largest)
+    }
+
+    /// Decides upon the commands of angle of attack and bank angle, before they are shaped.
+    fn decide(&self, memory: &mut Memory, tick: u64, measured: &Navigation) {
         let [_, _, _, speed, _, heading] = measured.motion.into();
         let target = [self.settings.target.longitude, self.settings.target.latitude];
         let here = [measured.motion[1], measured.motion[2]];
@@ -225,29 +283,14 @@ impl Guidance {
         }
         let share = (tick % TICKS + 1) as f64 / TICKS as f64;
         let magnitude = memory.before + share * (memory.commanded - memory.before);
-        let bank = if memory.to_left { magnitude } else { -magnitude };
-        let alpha = self.schedule(memory).at(speed);
-        let Shaping { bank_rate, bank_acceleration, alpha_rate, alpha_acceleration } =
-            self.settings.shaping;
+        command.bank = if memory.to_left { magnitude } else { -magnitude };
+        command.alpha = self.schedule(memory).at(speed);
         if first {
             memory.alpha.value = self.settings.initial.alpha;
-            memory.bank.value = nearest(self.settings.initial.sigma, bank);
+            memory.bank.value = nearest(self.settings.initial.sigma, command.bank);
             memory.begun = true;
         }
-        let limits = Limits { rate: alpha_rate, acceleration: alpha_acceleration };
-        memory.alpha.follow(alpha, &limits, PERIOD);
-        let limits = Limits { rate: bank_rate, acceleration: bank_acceleration };
-        memory.bank.follow(bank, &limits, PERIOD);
-        let vector =
-            |part: fn(&Shaped) -> f64| Vector3::new(part(&memory.alpha), 0.0, part(&memory.bank));
-        command.reference = Reference {
-            angles: vector(|shaped| shaped.value),
-            rates: vector(|shaped| shaped.rate),
-            accelerations: vector(|shaped| shaped.acceleration),
-        };
-        (command.alpha, command.bank) = (alpha, bank);
         memory.command = command;
-        command
     }
 
     /// Compares measured and predicted lift and drag.
@@ -319,13 +362,10 @@ impl Guidance {
         let here = wanted - range;
         let tolerance = settings.target.tolerance;
         command.miss = here;
-        command.in_reach = arrives && here.abs() <= tolerance;
+        let mut is_reached = arrives && here.abs() <= tolerance;
         if left.abs() >= FROZEN {
-            if !command.in_reach {
-                // The plan with the largest bank angle is the shortest one, that with none the
-                // longest.
-                command.in_reach = miss(largest) >= -tolerance && miss(0.0) <= tolerance;
-            }
+            // The plan with the largest bank angle is the shortest one, that with none the longest.
+            is_reached = is_reached || miss(largest) >= -tolerance && miss(0.0) <= tolerance;
             let slope = (miss(memory.magnitude + PROBE) - here) / PROBE;
             // A larger bank angle makes the flight shorter. Where it does not, only the sign of the
             // correction is right.
@@ -333,6 +373,12 @@ impl Guidance {
             let change = change.clamp(-CORRECTION, CORRECTION);
             memory.magnitude = (memory.magnitude + change).clamp(0.0, largest);
         }
+        memory.reached = match (is_reached, memory.begun) {
+            (true, true) => memory.reached.saturating_add(1),
+            (true, false) => REGAINED,
+            (false, _) => 0,
+        };
+        command.in_reach = memory.reached >= REGAINED;
         let present = Glide {
             alpha: memory.alpha.value,
             accelerations: [measured.lift, measured.drag],
