@@ -173,7 +173,8 @@ fn fly_closed(
             let _ = Teller(link).tell(&Told::Failed(error));
         }
     };
-    let mut closed = Closed::begin(closing, work).map_err(|ended| system.ended(ended))?;
+    let mut closed =
+        Closed::begin(closing, work).map_err(|ended| system.ended(ended, interrupt))?;
     let wrong = || Error::experiment("the closed process told what no run has");
     let (width, mut left) = (system.probed().len(), system.clock.ticks() + 2);
     let (mut flown, mut fault): (Option<Flown>, Option<Error>) = (None, None);
@@ -206,7 +207,7 @@ fn fly_closed(
             ControlFlow::Continue(())
         },
     );
-    let mut late = ended.map_err(|ended| system.ended(ended)).err();
+    let mut late = ended.map_err(|ended| system.ended(ended, interrupt)).err();
     // Without a fault, the process has told its end, or ended before.
     let fault = if flown.is_none() { fault.or_else(|| late.take()) } else { fault };
     if !heard.has_begun() {

@@ -66,7 +66,7 @@ pub(crate) fn draw(
         };
         let apart = (&closing, &options.interrupt);
         let system = flight.system().clone();
-        let failed = |_: &_, ended| system.ended(ended);
+        let failed = |_: &_, ended| system.ended(ended, &options.interrupt);
         closed::on_parts(&flights, threads, apart, begin, fly, keep, failed, |_| false)
     } else {
         let fly = |state: &mut _, flight: &_| {

@@ -51,12 +51,13 @@ impl System {
         });
         begun
             .and_then(|mut closed| closed.hear(|| interrupt.signal(), hear))
-            .map_err(|ended| self.ended(ended))?;
-        outcome.unwrap_or_else(|| Err(self.ended(Ended::silent())))
+            .map_err(|ended| self.ended(ended, interrupt))?;
+        outcome.unwrap_or_else(|| Err(self.ended(Ended::silent(), interrupt)))
     }
 
-    /// Returns the error for a closed process that has ended before its work was done.
-    pub fn ended(&self, ended: Ended) -> Error {
+    /// Returns the error for a closed process that has ended before its work was done, by itself or
+    /// because it was asked to end and did not.
+    pub fn ended(&self, ended: Ended, interrupt: &Interrupt) -> Error {
         let (component, time, failure) = match ended {
             Ended::Refused(reason) => {
                 return Error::experiment(format!(
@@ -76,7 +77,7 @@ impl System {
             }
             _ => {
                 let component = component.unwrap_or_else(|| "an FMU".into());
-                Error::Call { component, time, failure }
+                interrupt.or(Error::Call { component, time, failure })
             }
         }
     }

@@ -68,9 +68,9 @@ pub enum Error {
         reason: String,
     },
     /// A run was asked to end before its stop time.
-    #[error("ended by {request} before t = {} s", rounded(*time))]
+    #[error("ended by {request} at t = {} s", rounded(*time))]
     Interrupted {
-        /// Time of the first communication point that was not reached, s.
+        /// Time of the communication point from which no step was completed, s.
         time: f64,
         /// The request that ended the run.
         request: Request,
@@ -111,16 +111,16 @@ impl Error {
         move |source| Self::File { path, source }
     }
 
-    /// Returns the exit code of a process that ends with this error: 0 for a run that an instance
-    /// or the user ended, 1 for a run that failed, 2 for bad usage or a bad experiment, 3 for a run
+    /// Returns the exit code of a process that ends with this error: 0 if there is none,
+    /// 1 for a run that failed or that an instance ended without results, 2 for bad usage or a bad experiment, 3 for a run
     /// that was lost, and 130 or 143 for a run that a signal ended.
     pub fn exit_code(&self) -> u8 {
         match self {
             Self::Experiment { .. } | Self::Import(Import::Fmu { .. }) => 2,
             Self::Interrupted { request, .. } | Self::Ended(request) => request.exit_code(),
-            Self::EndedByInstance { .. } => 0,
             Self::Lost { .. } => 3,
             Self::Call { .. }
+            | Self::EndedByInstance { .. }
             | Self::Deadline { .. }
             | Self::Import(Import::File { .. })
             | Self::File { .. } => 1,

@@ -1,6 +1,7 @@
 //! Requests from outside to end the work. The results so far are kept, and temporary files are
 //! removed.
 
+use crate::error::Error;
 use serde::{Deserialize, Serialize};
 #[cfg(unix)]
 use signal_hook::flag;
@@ -76,6 +77,24 @@ impl Interrupt {
             let number = usize::try_from(signal).unwrap_or_default();
             flag::register_usize(signal, Arc::clone(&self.signal), number)?;
         }
+        #[cfg(target_os = "linux")]
+        self.end_with_parent()?;
+        Ok(())
+    }
+
+    /// Treats the end of the process named by the environment, which must have started this one, as
+    /// the signal SIGTERM.
+    #[cfg(target_os = "linux")]
+    fn end_with_parent(&self) -> io::Result<()> {
+        use rustix::process::{Signal, getppid, set_parent_process_death_signal};
+        let parent: Option<i32> =
+            std::env::var("ORCHESTRATOR_PARENT").ok().and_then(|text| text.parse().ok());
+        let Some(parent) = parent else { return Ok(()) };
+        set_parent_process_death_signal(Some(Signal::TERM))?;
+        // It may have ended before.
+        if getppid().is_none_or(|present| present.as_raw_nonzero().get() != parent) {
+            self.ask(Request(SIGTERM));
+        }
         Ok(())
     }
 
@@ -93,6 +112,20 @@ impl Interrupt {
             interrupt.ask(Request::INTERRUPT);
         };
         ctrlc::set_handler(handler).map_err(io::Error::other)
+    }
+
+    /// Lets requests end steps of this thread's instances, too.
+    pub(crate) fn watch(&self) {
+        fmu_import::halt::watch(&self.signal);
+    }
+
+    /// Returns the request, if there was one, in place of the failure of a call: it may have ended
+    /// that call.
+    pub(crate) fn or(&self, failed: Error) -> Error {
+        match (failed, self.asked()) {
+            (Error::Call { time, .. }, Some(request)) => Error::Interrupted { time, request },
+            (failed, _) => failed,
+        }
     }
 
     /// Records a request to end the work.

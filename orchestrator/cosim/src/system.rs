@@ -282,6 +282,7 @@ impl System {
         settings: &[Vec<Setting>],
         interrupt: &Interrupt,
     ) -> Result<Run, Error> {
+        interrupt.watch();
         let mut members = Vec::new();
         for component in &self.components {
             let CheckedComponent { name, fmu, interface, every, .. } = component;

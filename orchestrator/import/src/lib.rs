@@ -15,6 +15,7 @@ mod fmi3;
 pub mod fmu;
 pub mod folder;
 mod functions;
+pub mod halt;
 pub mod isolation;
 pub mod law;
 mod library;

@@ -75,7 +75,8 @@ where
             Ended::Failed(last) => last.part.filter(|part| left.contains(part)),
             Ended::Refused(_) => None,
         };
-        if part.is_none() && count > 1 && matches!(ended, Ended::Failed(_)) {
+        let is_failed = matches!(ended, Ended::Failed(_)) && interrupt.asked().is_none();
+        if part.is_none() && count > 1 && is_failed {
             // Alone, a part shows whether it is the one.
             count = 1;
             continue;

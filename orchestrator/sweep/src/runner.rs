@@ -147,7 +147,10 @@ impl<'a, R: Send> Work<'a, R> {
                 },
                 |part, ended| {
                     let case = if let Ended::Failed(last) = &ended { last.case } else { None };
-                    failed(part, case, systems[part.sweep].ended(ended))
+                    match systems[part.sweep].ended(ended, &options.interrupt) {
+                        error @ Single::Interrupted { .. } => Error::Single(error),
+                        error => failed(part, case, error),
+                    }
                 },
                 goes_on,
             )

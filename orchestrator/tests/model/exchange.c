@@ -15,9 +15,13 @@ enum Kind {
     HELD,    /* x' = the integer input, v' = the real input */
     COOLING, /* x' = -(x - AMBIENT) from START on, an event where x passes THRESHOLD */
     DOMAIN,  /* x' = 1 for x up to 1.001 only, an event at 1 sets x back to 0 */
-    RESTLESS /* the discrete states never settle */
+    RESTLESS, /* the discrete states never settle */
+    ANNOUNCE /* x' = 1, the next event is announced for the time NEXT */
 };
 
+#if !defined(NEXT)
+#define NEXT INFINITY
+#endif
 #if !defined(START)
 #define START 0.0
 #define AMBIENT 0.0
@@ -105,6 +109,7 @@ int fmi2NewDiscreteStates(Model *m, EventInfo *info) {
         break;
     case SWING: info->changes_nominals = m->has_new_nominals = 1; break;
     case CHATTER: m->side = m->x[0] > 0.0; break;
+    case ANNOUNCE: info->has_next = 1, info->next = NEXT; break;
     case RESTLESS: info->needs_another = 1; break;
     default: break;
     }

@@ -225,3 +225,32 @@ impl Bench {
         serde_json::from_str(&self.text(name)).unwrap()
     }
 }
+
+/// Random numbers by SplitMix64: G. L. Steele, D. Lea, C. H. Flood, Fast splittable pseudorandom
+/// number generators, OOPSLA (2014).
+pub(crate) struct Random(pub(crate) u64);
+
+impl Random {
+    /// Returns a number from 0 up to but not including 1.
+    pub(crate) fn part(&mut self) -> f64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
+    }
+
+    pub(crate) fn between(&mut self, low: f64, high: f64) -> f64 {
+        low + self.part() * (high - low)
+    }
+
+    pub(crate) fn below(&mut self, count: usize) -> usize {
+        (self.part() * count as f64) as usize
+    }
+
+    /// Returns a number of either sign, whose magnitude is a power of ten between these.
+    pub(crate) fn power(&mut self, low: f64, high: f64) -> f64 {
+        let magnitude = 10.0_f64.powf(self.between(low, high));
+        if self.below(2) == 0 { -magnitude } else { magnitude }
+    }
+}

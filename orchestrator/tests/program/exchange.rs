@@ -292,3 +292,47 @@ fn the_interface_and_the_tolerance_are_checked() {
         assert!(told.contains("continuous states: 2, event indicators: 1\n"), "{told}");
     }
 }
+
+#[test]
+fn values_that_no_unit_may_give_are_refused_by_name() {
+    let announced = "-DKIND=ANNOUNCE";
+    for (flags, expected) in [
+        (
+            &[announced, "-DNEXT=NAN"][..],
+            "its next event (nextEventTime) at t = 0 s for the time NaN",
+        ),
+        (
+            &[announced, "-DNEXT=-1.0"],
+            "its next event (nextEventTime) at t = 0 s for t = -1 s, which is past",
+        ),
+        (
+            &["-DKIND=COOLING", "-DSTART=1.0", "-DAMBIENT=NAN", "-DTHRESHOLD=0.0"],
+            "the derivative of \"x",
+        ),
+        (&["-DKIND=COOLING", "-DSTART=NAN", "-DAMBIENT=0.0", "-DTHRESHOLD=0.0"], "the state \"x"),
+        (
+            &["-DKIND=COOLING", "-DSTART=1.0", "-DAMBIENT=0.0", "-DTHRESHOLD=NAN"],
+            "event indicator 1 of 1 is not a number",
+        ),
+    ] {
+        for errors in failures(&defined(&[flags, &["-lm"]].concat(), ALONE, [["", ""]; 2]), &[]) {
+            assert!(errors.contains(expected), "{errors}");
+        }
+    }
+    // There is no event at infinity.
+    let last =
+        rows(&defined(&[announced, "-DNEXT=INFINITY", "-lm"], ALONE, [["", ""]; 2]), &[]).pop();
+    assert_eq!(last.unwrap()[4], 1.0);
+}
+
+#[cfg(unix)]
+#[test]
+fn a_signal_ends_a_run_within_a_step_of_many_events() {
+    let text = ALONE.replace("step = 0.1", "step = 2.0");
+    let benches = defined(&["-DKIND=ANNOUNCE", "-DNEXT=m->time+1e-8", "-lm"], &text, [["", ""]; 2]);
+    for (bench, isolation) in benches.iter().zip(["--isolate=false", "--isolate"]) {
+        let arguments = ["run", "loop.toml", isolation];
+        let code = crate::timing::signalled(bench, &arguments, "-TERM", "out/loop/results.csv");
+        assert_eq!(code, Some(143));
+    }
+}

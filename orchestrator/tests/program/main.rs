@@ -6,6 +6,7 @@ mod ends;
 mod exchange;
 mod fmi3;
 mod foreign;
+mod generated;
 #[cfg(target_os = "linux")]
 mod hostile;
 mod isolation;

@@ -83,7 +83,13 @@ fn factors_that_make_no_sense_are_refused() {
 
 /// Starts the program, sends it a signal once the file `awaited` exists, and returns its exit code.
 #[cfg(unix)]
-fn signalled(bench: &Bench, arguments: &[&str], signal: &str, awaited: &str) -> Option<i32> {
+pub(crate) fn signalled(
+    bench: &Bench,
+    arguments: &[&str],
+    signal: &str,
+    awaited: &str,
+) -> Option<i32> {
+    fs::create_dir_all(bench.path("tmp")).unwrap();
     let mut child = bench
         .command(arguments)
         .env("TMPDIR", bench.path("tmp"))
@@ -101,7 +107,6 @@ fn signalled(bench: &Bench, arguments: &[&str], signal: &str, awaited: &str) -> 
 #[test]
 fn a_signal_ends_any_run_and_keeps_its_results() {
     let bench = Bench::new();
-    fs::create_dir(bench.path("tmp")).unwrap();
     // A step takes ten hours in the paced run, and as long as the instance takes in the usual one.
     let paced = ["run", "loop.toml", "--force", "--real-time", "2.7e-5"];
     let usual = ["run", "loop.toml", "--force", "--stop", "1000", "--set", "plant.pause=0.02"];
@@ -118,7 +123,7 @@ fn a_signal_ends_any_run_and_keeps_its_results() {
         assert_eq!(signalled(&bench, arguments, signal, "out/loop/results.csv"), Some(code));
         let status = bench.json("out/loop/results.json")["status"].as_str().unwrap().to_string();
         assert!(status.starts_with("ended by a signal (SIG"), "{status}");
-        assert!(status.contains(") before t = "), "{status}");
+        assert!(status.contains(") at t = "), "{status}");
         assert_eq!(bench.json("out/loop/metrics.json")["completed"], false);
         let rows = bench.results();
         assert!(rows.starts_with("time,gain.output.direct") && rows.ends_with('\n'), "{rows}");

@@ -43,7 +43,7 @@ def orchestrate(
     there are none. With `laws`, these give the moment in place of the controller; an error of them
     ends the orchestrator and is raised."""
     command = [str(program()), *arguments]
-    environment = {**os.environ, "RUST_LOG": level}
+    environment = {**os.environ, "RUST_LOG": level, "ORCHESTRATOR_PARENT": str(os.getpid())}
     if laws is not None:
         exit_code, said, printed = converse([*command, "--law", laws.key], environment, laws)
     else:
@@ -105,7 +105,7 @@ def converse(command: list[str], environment: dict[str, str], laws: Laws) -> tup
     return process.returncode, said, laws.printed.decode()
 
 
-PATIENCE = 2.0
+PATIENCE = 0.4
 """Time that the orchestrator gets to end by itself, s."""
 
 

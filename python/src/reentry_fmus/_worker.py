@@ -10,6 +10,8 @@ import os
 import pickle
 import signal
 import sys
+import threading
+import time
 import warnings
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -28,6 +30,7 @@ def main() -> None:
     os.dup2(2, 1)
     # Who interrupts the work ends this process.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=end_with, args=(os.getppid(),), daemon=True).start()
     # The law may be in a module that the other process has found.
     sys.path[:] = pickle.load(tasks)
     begun: dict[str, Any] = pickle.load(tasks)
@@ -37,6 +40,13 @@ def main() -> None:
     except BrokenPipeError:
         # The other process has ended.
         pass
+
+
+def end_with(parent: int) -> None:
+    """Ends this process when the one that has started it is no more."""
+    while os.getppid() == parent:
+        time.sleep(0.2)
+    os._exit(1)
 
 
 def serve(

@@ -84,10 +84,17 @@ impl<F: Table> FmuInstance<F> {
         self.refusal(outcome)
     }
 
-    /// Computes the event indicators.
+    /// Computes the event indicators. One that is not a number has no sign, as if the model refused
+    /// the states.
     pub(super) fn indicators(&mut self, indicators: &mut [f64]) -> Result<(), Refusal> {
-        let outcome = self.get_vector("getEventIndicators", |f| f.get_indicators, indicators);
-        self.refusal(outcome)
+        let call = "getEventIndicators";
+        let outcome = self.get_vector(call, |f| f.get_indicators, indicators);
+        self.refusal(outcome)?;
+        indicators.iter().position(|value| value.is_nan()).map_or(Ok(()), |place| {
+            let (number, count) = (place + 1, indicators.len());
+            let text = format!("event indicator {number} of {count} is not a number");
+            Err(Refusal::Discarded(CallFailure::answer(call, text)))
+        })
     }
 
     /// Enters event mode from continuous-time mode.
@@ -121,6 +128,8 @@ impl<F: Table> FmuInstance<F> {
             has_states |= info.changes_states;
             has_nominals |= info.changes_nominals;
             if !info.needs_another {
+                info.next_event = next_event(info.next_event, time)
+                    .map_err(|text| CallFailure::answer(F::UPDATE, text))?;
                 info.changes_states = has_states;
                 info.changes_nominals = has_nominals;
                 return Ok(info);
@@ -148,5 +157,27 @@ impl<F: Table> FmuInstance<F> {
             status
         })?;
         Ok(answer)
+    }
+}
+
+/// Judges the time (s) of the next event that a unit announces at a time, s. There is no event at
+/// infinity.
+///
+/// # Errors
+/// Returns why there cannot be such an event.
+fn next_event(next: Option<f64>, time: f64) -> Result<Option<f64>, String> {
+    let Some(next) = next.filter(|next| *next != f64::INFINITY) else { return Ok(None) };
+    let shown = rounded(time);
+    if next.is_nan() {
+        Err(format!(
+            "it announces its next event (nextEventTime) at t = {shown} s for the time NaN"
+        ))
+    } else if next < time - 8.0 * f64::EPSILON * time.abs().max(1.0) {
+        Err(format!(
+            "it announces its next event (nextEventTime) at t = {shown} s for t = {} s, which is past",
+            rounded(next)
+        ))
+    } else {
+        Ok(Some(next))
     }
 }

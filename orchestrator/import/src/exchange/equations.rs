@@ -1,10 +1,15 @@
 //! The equations of a model between two events, as the integrator sees them.
 
-use super::events::{Events, rounding};
+use super::events::Events;
 use super::model::{ContinuousModel, Layout, Refusal};
 use super::rodas::{Point, Step, System};
 use crate::functions::Table as _;
 use nalgebra::DMatrix;
+
+/// Parts of a step at which the indicators are looked at, since one may cross zero and come back. It
+/// often comes back soon after an event, for instance that of a ball which bounces.
+const LOOKS: [f64; 10] =
+    [1.0 / 512.0, 1.0 / 64.0, 0.125, 0.25, 0.375, 0.5, 0.625, 0.75, 0.875, 1.0];
 
 /// The equations of a model between two events.
 pub(super) struct Equations<'a, M> {
@@ -34,16 +39,16 @@ impl<M: ContinuousModel> Equations<'_, M> {
         }
         let (begin, end) = (step.begin.time, step.end.time);
         let mut indicators = vec![0.0; count];
-        let mut states = step.end.states.clone();
+        let mut point = step.end.clone();
         let mut crossed = |time: f64, this: &mut Self| {
-            step.states(time, &mut states);
-            this.place(time, &states)?;
+            step.interpolate(time, &mut point);
+            this.place(time, &point.states)?;
             this.model.unit().indicators(&mut indicators)?;
             Ok(events.crossed(&indicators))
         };
-        // An indicator may cross zero and come back within the step.
         let (mut low, mut found) = (begin, None);
-        for time in [begin + (end - begin) / 3.0, begin + (end - begin) / 1.5, end] {
+        for part in LOOKS {
+            let time = if part < 1.0 { begin + part * (end - begin) } else { end };
             if let Some(indicator) = crossed(time, self)? {
                 found = Some((time, indicator));
                 break;
@@ -51,8 +56,11 @@ impl<M: ContinuousModel> Equations<'_, M> {
             low = time;
         }
         let Some((mut high, mut indicator)) = found else { return Ok(None) };
-        while high - low > rounding(high) {
+        while high - low > f64::EPSILON * (end - begin) {
             let middle = f64::midpoint(low, high);
+            if middle <= low || middle >= high {
+                break;
+            }
             match crossed(middle, self)? {
                 Some(other) => (high, indicator) = (middle, other),
                 None => low = middle,

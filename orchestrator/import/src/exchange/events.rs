@@ -1,11 +1,5 @@
 //! What is known of the events of a model.
 
-/// Returns the distance (s) up to which two times near this one (s) may be the same but for
-/// rounding.
-pub(super) fn rounding(time: f64) -> f64 {
-    4.0 * f64::EPSILON * time.abs()
-}
-
 /// What is known of events.
 #[derive(Clone, Default)]
 pub(super) struct Events {
@@ -29,6 +23,13 @@ impl Events {
     /// Returns the first indicator that is on another side of zero than after the last event.
     pub(super) fn crossed(&self, indicators: &[f64]) -> Option<usize> {
         indicators.iter().zip(&self.is_positive).position(|(z, was)| (*z > 0.0) != *was)
+    }
+
+    /// Returns the time of the next time event of the communication step that ends at `end` (s). One
+    /// that rounding separates from the end belongs to it.
+    pub(super) fn next_within(&self, end: f64) -> Option<f64> {
+        let rounding = 4.0 * f64::EPSILON * end.abs().max(self.step);
+        self.next_time.filter(|next| *next <= end + rounding)
     }
 
     /// Counts an event. Returns whether too many have come without progress.

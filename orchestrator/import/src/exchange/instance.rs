@@ -1,10 +1,11 @@
 //! A model together with its integrator, as the master sees it.
 
 use super::equations::Equations;
-use super::events::{Events, MOST_EVENTS, rounding};
+use super::events::{Events, MOST_EVENTS};
 use super::model::{ContinuousModel, Layout, Refusal};
 use super::rodas::{Point, Rodas, Step};
-use crate::functions::Completed;
+use crate::functions::{Completed, Table as _};
+use crate::halt;
 use crate::library::put;
 use fmi_master::description::Carrier;
 use fmi_master::forward;
@@ -13,6 +14,8 @@ use fmi_master::quantity::rounded;
 use std::collections::BTreeMap;
 use std::fmt::Display;
 
+/// Largest number of steps of the integrator and events within a communication step.
+const MOST_STEPS: usize = 10_000_000;
 /// Number of steps within which a state event must have been located.
 const MOST_LOCATIONS: usize = 20;
 /// Part of a step at either end within which the interpolation is as good as the ends, whose error it
@@ -92,19 +95,20 @@ impl<M: ContinuousModel> Exchange<M> {
         if self.progress.mode == Mode::Event {
             self.settle()?;
         }
-        loop {
+        for _ in 0..MOST_STEPS {
+            halt::check()?;
             let Progress { point, events, .. } = &self.progress;
-            let time = point.time;
-            if let Some(event) = events.next_time.filter(|next| is_due(*next, time)) {
-                self.time_event(event)?;
-            } else if is_due(end, time) {
-                return Ok(());
-            } else {
-                // A time event that rounding separates from the end is at the end.
-                let before = events.next_time.filter(|next| !is_due(end, *next));
-                self.advance(before.unwrap_or(end))?;
+            match events.next_within(end) {
+                Some(event) if event <= point.time => self.event(&"a time event")?,
+                None if end <= point.time => return Ok(()),
+                event => self.advance(event.unwrap_or(end))?,
             }
         }
+        let time = rounded(self.progress.point.time);
+        let text = format!(
+            "{MOST_STEPS} steps of the integration and events have only reached t = {time} s: a shorter communication step allows more"
+        );
+        Err(CallFailure::new("doStep", text))
     }
 
     /// Makes a step of the integrator, which ends at an event or at the time `stop` (s) at last.
@@ -132,11 +136,6 @@ impl<M: ContinuousModel> Exchange<M> {
 
 fn bits(value: i32) -> u64 {
     value.cast_unsigned().into()
-}
-
-/// Returns whether an instant is not later than a time (s), apart from rounding.
-fn is_due(instant: f64, time: f64) -> bool {
-    instant <= time + rounding(time)
 }
 
 impl Progress {
@@ -167,7 +166,7 @@ impl<M: ContinuousModel> Exchange<M> {
         loop {
             trials += 1;
             let next = integrator.next;
-            let mut step = if point.states.is_empty() {
+            let step = if point.states.is_empty() {
                 equations.place(until, &[]).map_err(Refusal::failure)?;
                 Step::empty(point, until)
             } else {
@@ -179,33 +178,25 @@ impl<M: ContinuousModel> Exchange<M> {
                     let part = step.part(instant);
                     let is_near = !(NEAR..=1.0 - NEAR).contains(&part);
                     if is_near || trials == MOST_LOCATIONS {
-                        let mut states = step.end.states.clone();
-                        step.states(instant, &mut states);
-                        equations.place(instant, &states).map_err(Refusal::failure)?;
-                        (step.end.time, step.end.states) = (instant, states);
-                        return Ok((step.end, Some(indicator)));
+                        let mut event = step.end.clone();
+                        step.interpolate(instant, &mut event);
+                        equations.place(instant, &event.states).map_err(Refusal::failure)?;
+                        return Ok((event, Some(indicator)));
                     }
-                    point.time + (1.0 + 0.5 * NEAR) * (instant - point.time)
+                    instant.max(point.time + (1.0 + 0.5 * NEAR) * (instant - point.time))
                 }
                 // The step may reach beyond an event.
-                Err(Refusal::Discarded(_)) if trials < MOST_LOCATIONS => {
-                    f64::midpoint(point.time, step.end.time)
+                Err(Refusal::Discarded(failure)) if trials < MOST_LOCATIONS => {
+                    let middle = f64::midpoint(point.time, step.end.time);
+                    if middle <= point.time {
+                        return Err(failure);
+                    }
+                    middle
                 }
                 Err(refusal) => return Err(refusal.failure()),
             };
             integrator.next = next;
         }
-    }
-
-    /// Carries out the time event at this instant, s.
-    fn time_event(&mut self, instant: f64) -> Outcome {
-        // Rounding may put the instant behind the present time.
-        let point = &mut self.progress.point;
-        if instant > point.time {
-            point.time = instant;
-            self.model.unit().set_time(instant)?;
-        }
-        self.event(&"a time event")
     }
 
     fn event(&mut self, cause: &dyn Display) -> Outcome {
@@ -232,15 +223,18 @@ impl<M: ContinuousModel> Exchange<M> {
 
     /// Returns to continuous-time mode, and reads what may have changed.
     fn resume(&mut self, has_states: bool, has_nominals: bool) -> Outcome {
-        let Layout { states, indicators, .. } = &self.layout;
+        let Layout { states, names, indicators, .. } = &self.layout;
         self.model.unit().enter_continuous_time_mode()?;
         let Progress { mode, point, integrator, events, .. } = &mut self.progress;
         *mode = Mode::ContinuousTime;
         point.states.resize(states.len(), 0.0);
+        point.rests.resize(states.len(), 0.0);
         point.derivatives.resize(states.len(), 0.0);
         if !states.is_empty() {
             if has_states {
                 self.model.unit().states(&mut point.states)?;
+                point.rests.fill(0.0);
+                finite("getContinuousStates", "the state", names, &point.states, point.time)?;
             }
             if has_nominals {
                 integrator.nominals.resize(states.len(), 1.0);
@@ -249,6 +243,8 @@ impl<M: ContinuousModel> Exchange<M> {
                 integrator.nominals.iter_mut().filter(|n| !usable(**n)).for_each(|n| *n = 1.0);
             }
             self.model.unit().derivatives(&mut point.derivatives).map_err(Refusal::failure)?;
+            let (call, values) = (M::Functions::DERIVATIVES, &point.derivatives);
+            finite(call, "the derivative of", names, values, point.time)?;
         }
         integrator.next = f64::INFINITY;
         let mut values = vec![0.0; *indicators];
@@ -257,6 +253,17 @@ impl<M: ContinuousModel> Exchange<M> {
         }
         events.is_positive = values.iter().map(|value| *value > 0.0).collect();
         Ok(())
+    }
+}
+
+/// Checks that values of a unit for its states are finite at a time, s.
+fn finite(call: &'static str, kind: &str, names: &[String], values: &[f64], time: f64) -> Outcome {
+    match names.iter().zip(values).find(|(_, value)| !value.is_finite()) {
+        None => Ok(()),
+        Some((name, value)) => {
+            let text = format!("{kind} \"{name}\" is {value} at t = {} s", rounded(time));
+            Err(CallFailure::answer(call, text))
+        }
     }
 }
 

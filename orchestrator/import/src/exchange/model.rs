@@ -36,6 +36,8 @@ pub(crate) trait ContinuousModel: Instance {
 pub(crate) struct Layout {
     /// Value references of the continuous states.
     pub(super) states: Vec<u32>,
+    /// Their names.
+    pub(super) names: Vec<String>,
     /// Value references of their derivatives.
     pub(super) derivatives: Vec<u32>,
     /// Number of event indicators.
@@ -72,6 +74,7 @@ impl Layout {
                 format!("lists \"{}\" among the derivatives of its model structure, which is the derivative of no variable", derivative.name)
             })?;
             layout.states.push(state.reference);
+            layout.names.push(state.name.clone());
             layout.derivatives.push(derivative.reference);
         }
         Ok(layout)

@@ -37,13 +37,16 @@ pub(super) trait System {
 pub(super) struct Point {
     pub(super) time: f64,
     pub(super) states: Vec<f64>,
+    /// What rounding has left out of the states, so that slow changes of large states add up.
+    pub(super) rests: Vec<f64>,
     pub(super) derivatives: Vec<f64>,
 }
 
-/// A step, with the coefficients of the states within it.
+/// A step, with the change of the states and the coefficients of what they are within it.
 pub(super) struct Step {
     pub(super) begin: Point,
     pub(super) end: Point,
+    change: DVector<f64>,
     inner: [DVector<f64>; 3],
 }
 
@@ -51,7 +54,7 @@ impl Step {
     /// A step without states.
     pub(super) fn empty(begin: &Point, time: f64) -> Self {
         let end = Point { time, ..Point::default() };
-        Self { begin: begin.clone(), end, inner: <_>::default() }
+        Self { begin: begin.clone(), end, change: <_>::default(), inner: <_>::default() }
     }
 
     /// Returns the part of the step after which this time (s) comes.
@@ -59,18 +62,38 @@ impl Step {
         (time - self.begin.time) / (self.end.time - self.begin.time)
     }
 
-    /// Interpolates the states at a time (s) within the step.
-    pub(super) fn states(&self, time: f64, states: &mut [f64]) {
+    /// Interpolates time and states of a point at a time (s) within the step. The change since its
+    /// begin is rounded once, so that a small one does not turn back.
+    pub(super) fn interpolate(&self, time: f64, point: &mut Point) {
         if time >= self.end.time {
-            return states.copy_from_slice(&self.end.states);
+            return point.clone_from(&self.end);
         }
+        point.time = time;
         let part = self.part(time);
         let [first, second, third] = &self.inner;
-        for (i, state) in states.iter_mut().enumerate() {
+        for i in 0..self.change.len() {
             let inner = first[i] + part * (second[i] + part * third[i]);
-            let end = self.end.states[i] + (1.0 - part) * inner;
-            *state = (1.0 - part) * self.begin.states[i] + part * end;
+            let change = part * (self.change[i] + (1.0 - part) * inner);
+            (point.states[i], point.rests[i]) = self.begin.changed(i, change);
         }
+    }
+}
+
+impl Point {
+    /// Becomes another point whose states have changed.
+    fn change(&mut self, from: &Self, change: &DVector<f64>) {
+        for (place, change) in change.iter().enumerate() {
+            (self.states[place], self.rests[place]) = from.changed(place, *change);
+        }
+    }
+
+    /// Returns a state and its rest after a change, by the sum of two numbers without an error: D. E.
+    /// Knuth, The Art of Computer Programming, volume 2, section 4.2.2, theorem B.
+    fn changed(&self, place: usize, change: f64) -> (f64, f64) {
+        let (state, change) = (self.states[place], self.rests[place] + change);
+        let sum = state + change;
+        let added = sum - state;
+        (sum, (state - (sum - added)) + (change - added))
     }
 }
 
@@ -146,20 +169,22 @@ impl Rodas {
         jacobian: &DMatrix<f64>,
     ) -> Result<(Step, f64), Refusal> {
         let (count, length) = (from.states.len(), at - from.time);
-        let start = DVector::from_column_slice(&from.states);
+        let zero = DVector::zeros(count);
         let slope = slope(system, from, length)?;
         let diagonal = DMatrix::from_diagonal_element(count, count, 1.0 / (GAMMA * length));
         let matrix = (diagonal - jacobian).lu();
         let mut stages: Vec<DVector<f64>> = Vec::with_capacity(STATES.len());
         let mut value = DVector::from_column_slice(&from.derivatives);
-        let mut states = start.clone();
+        let mut change = zero.clone();
+        let mut end = from.clone();
         for (stage, row) in VALUES.iter().enumerate() {
             if stage > 0 {
-                states = sum(&start, STATES[stage], &stages);
+                change = sum(&zero, STATES[stage], &stages);
+                end.change(from, &change);
                 let time = (from.time + TIMES[stage] * length).min(at);
-                system.derivatives(time, states.as_slice(), value.as_mut_slice())?;
+                system.derivatives(time, &end.states, value.as_mut_slice())?;
             }
-            value += sum(&DVector::zeros(count), row, &stages) / length;
+            value += sum(&zero, row, &stages) / length;
             value += &slope * (SLOPES[stage] * length);
             // A singular matrix gives stages that are not finite, and so a shorter step.
             if !matrix.solve_mut(&mut value) {
@@ -168,23 +193,28 @@ impl Rodas {
             stages.push(value.clone());
         }
         // The last stage is the difference to the solution of order 4.
-        states += &value;
-        let error = self.measured(&from.states, &value);
-        let mut end = Point { time: at, states: states.as_slice().to_vec(), ..from.clone() };
+        change += &value;
+        end.change(from, &change);
+        end.time = at;
+        let mut error = self.measured([&from.states, &end.states], &value);
         if error < 1.0 {
             system.derivatives(at, &end.states, &mut end.derivatives)?;
+            if end.derivatives.iter().any(|value| !value.is_finite()) {
+                error = f64::NAN;
+            }
         }
-        let inner = INNER.map(|row| sum(&DVector::zeros(count), &row, &stages));
-        Ok((Step { begin: from.clone(), end, inner }, error))
+        let inner = INNER.map(|row| sum(&zero, &row, &stages));
+        Ok((Step { begin: from.clone(), end, change, inner }, error))
     }
 
     /// Returns the root of the mean of the squares of an error, each value as a multiple of what
-    /// the tolerance allows at these states.
-    fn measured(&self, states: &[f64], error: &DVector<f64>) -> f64 {
-        let allowed = states.iter().zip(&self.nominals);
-        let allowed = allowed.map(|(state, nominal)| self.tolerance * (nominal + state.abs()));
-        let squares = error.iter().zip(allowed).map(|(error, allowed)| (error / allowed).powi(2));
-        (squares.sum::<f64>() / states.len() as f64).sqrt()
+    /// the tolerance allows at the states at begin and end: Hairer and Wanner, volume I, (4.10).
+    fn measured(&self, [begin, end]: [&[f64]; 2], error: &DVector<f64>) -> f64 {
+        let squares = error.iter().enumerate().map(|(place, error)| {
+            let magnitude = begin[place].abs().max(end[place].abs());
+            (error / (self.tolerance * (self.nominals[place] + magnitude))).powi(2)
+        });
+        (squares.sum::<f64>() / error.len() as f64).sqrt()
     }
 }
 

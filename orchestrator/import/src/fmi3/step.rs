@@ -10,12 +10,13 @@
 use super::functions::{InterfaceFunctions, StepFunctions, Truth};
 use super::unit::Fmi3Unit;
 use crate::fmi::Status;
+use crate::halt;
 use crate::library::put;
 use fmi_master::forward;
 use fmi_master::instance::{CallFailure, Instance, Outcome};
 use fmi_master::quantity::rounded;
 
-/// Part of a step by which a time may be wrong.
+/// Part of a step, and time (s), by which a unit may round times.
 const TOLERANCE: f64 = 1e-9;
 /// Largest number of parts of a step, and of those without progress.
 const PARTS: usize = 1_000_000;
@@ -142,7 +143,7 @@ impl StepInstance {
 
 /// Returns the difference below which two times of a step are the same, s.
 fn tolerance(time: f64, step: f64) -> f64 {
-    (TOLERANCE * step).max(4.0 * f64::EPSILON * time.abs())
+    (TOLERANCE * step.min(1.0)).max(8.0 * f64::EPSILON * time.abs())
 }
 
 impl Instance for StepInstance {
@@ -165,9 +166,10 @@ impl Instance for StepInstance {
         let (end, tolerance) = (time + step, tolerance(time, step));
         let (mut now, mut rest, mut idle) = (time, step, 0);
         for _ in 0..PARTS {
+            halt::check()?;
             self.enter_step_mode(now)?;
             let next = self.present.next_event;
-            let inside = next.filter(|next| *next > now + tolerance && *next < end - tolerance);
+            let inside = next.filter(|next| *next > now && *next < end - tolerance);
             let reached = self.do_part(now, inside.map_or(rest, |next| next - now))?;
             self.present.is_due |= next.is_some_and(|next| next <= reached + tolerance);
             if reached >= end - tolerance {

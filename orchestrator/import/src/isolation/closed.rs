@@ -20,7 +20,7 @@ use std::process::ExitStatus;
 use std::time::{Duration, Instant};
 
 /// Time within which a process that is asked to end must have ended.
-const END_TIMEOUT: Duration = Duration::from_secs(10);
+const END_TIMEOUT: Duration = Duration::from_millis(800);
 /// Time between two looks at a process.
 const PAUSE: Duration = Duration::from_millis(1);
 /// Largest time that counts between two looks: the supervisor itself may have been stopped.
@@ -52,9 +52,8 @@ pub struct Closed {
     calls: [(u64, Duration); SLOTS],
     /// Thread whose call is late.
     late: Option<usize>,
-    /// Time for which the process has not ended although it was asked to.
+    /// Time since the process was asked to end.
     ending: Option<Duration>,
-    is_asked: bool,
     status: Option<ExitStatus>,
     /// Its home, which is removed when it has ended.
     _home: TemporaryFolder,
@@ -132,7 +131,6 @@ impl Closed {
             calls: [(0, Duration::ZERO); SLOTS],
             late: None,
             ending: None,
-            is_asked: false,
             status: None,
             _home: home,
         })
@@ -161,10 +159,11 @@ impl Closed {
     fn pass_on(&mut self, signal: Option<i32>) {
         if let Some(signal) = signal
             && self.status.is_none()
-            && !std::mem::replace(&mut self.is_asked, true)
+            && self.ending.is_none()
         {
             // SAFETY: the process was not waited for yet, so that its number is still its own.
             unsafe { libc::kill(self.process, signal) };
+            self.ending = Some(Duration::ZERO);
         }
     }
 
@@ -230,8 +229,11 @@ impl Closed {
         if let Some(ending) = &mut self.ending {
             *ending += passed;
         }
-        let is_late = self.late.is_some() || self.ending > Some(END_TIMEOUT);
-        is_late.then(|| format!("no answer within {} s (call_timeout)", self.timeout.as_secs_f64()))
+        if self.ending > Some(END_TIMEOUT) {
+            return Some("its process was asked to end, and did not".into());
+        }
+        let seconds = self.timeout.as_secs_f64();
+        self.late.map(|_| format!("no answer within {seconds} s (call_timeout)"))
     }
 
     /// Reads what the process has printed.
@@ -285,7 +287,6 @@ impl Closed {
                         let message = postcard::from_bytes(content).map_err(|_| undecodable())?;
                         if hear(message).is_break() {
                             self.pass_on(Some(libc::SIGTERM));
-                            self.ending.get_or_insert(Duration::ZERO);
                         }
                     }
                     b'l' => print(&text()),

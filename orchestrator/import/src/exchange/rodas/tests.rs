@@ -42,7 +42,8 @@ fn integrated(
     rodas.nominals = vec![1.0; states.len()];
     let mut derivatives = vec![0.0; states.len()];
     system.derivatives(0.0, states, &mut derivatives).unwrap();
-    let mut point = Point { time: 0.0, states: states.to_vec(), derivatives };
+    let mut point =
+        Point { time: 0.0, states: states.to_vec(), rests: vec![0.0; states.len()], derivatives };
     let mut steps = 0;
     while point.time < end {
         point = rodas.step(&mut system, &point, end).unwrap().end;
@@ -83,12 +84,13 @@ fn oracle_the_polynomial_of_a_step_is_that_of_its_stages() {
     let mut system = Function(|t: f64, _: &[f64], dy: &mut [f64]| dy[0] = 3.0 * t * t);
     let mut rodas = Rodas::new(1e-6);
     rodas.nominals = vec![1.0];
-    let from = Point { time: 0.0, states: vec![0.0], derivatives: vec![0.0] };
+    let zero = vec![0.0];
+    let from = Point { time: 0.0, states: zero.clone(), rests: zero.clone(), derivatives: zero };
     let step = rodas.step(&mut system, &from, 0.5).unwrap();
-    let mut state = [0.0];
+    let mut at = from.clone();
     for part in [0.0, 0.2, 0.7, 1.0] {
         let time = part * step.end.time;
-        step.states(time, &mut state);
-        assert!((state[0] - time.powi(3)).abs() < 1e-14, "{part}: {state:?}");
+        step.interpolate(time, &mut at);
+        assert!((at.states[0] - time.powi(3)).abs() < 1e-14, "{part}: {at:?}");
     }
 }
