@@ -2,9 +2,11 @@
 //! sensors and winds are drawn.
 
 use crate::harness::navigated::{Case, Figures, fly};
-use control::navigation::{Health, Line, Navigation, Settings};
+use control::navigation::{Contradiction, Health, Line, Navigation, Settings};
 use nalgebra::Vector3;
+use vehicle::fault::{Fault, FaultKind};
 use vehicle::fixes::Fixes;
+use vehicle::triad::Window;
 
 fn figures(case: impl Fn(u64) -> Case + Sync, seeds: std::ops::Range<u64>) -> Figures {
     let seeds: Vec<u64> = seeds.collect();
@@ -120,7 +122,125 @@ fn health_names_a_filter_that_expects_too_much() {
     let mut healths = Vec::new();
     fly(&case, |seen| healths.push(seen.health));
     assert!(healths.contains(&Health::Inconsistent));
-    assert!(!healths[..60].contains(&Health::Inconsistent));
+}
+
+/// Returns a flight whose receiver (0), star tracker (1) or inertial unit (2) has a fault.
+fn faulty(device: usize, kind: FaultKind, size: f64, window: [f64; 2], seed: u64) -> Case {
+    let mut case = Case::new(4, device == 1, seed);
+    let [start, end] = window;
+    case.faults[device] = Fault { kind, window: Window { start, end }, size };
+    case
+}
+
+const FOR_EVER: f64 = 1e9;
+
+/// Fixes that come up to a second late, with the right time, are as good as those in time.
+#[test]
+fn oracle_a_late_fix_is_applied_at_its_own_time() {
+    for size in [1.0, 5.0] {
+        let case = |seed| faulty(0, FaultKind::Late, size, [0.0, FOR_EVER], seed);
+        let all = figures(case, 600..604);
+        assert!((0.95..1.05).contains(&all.innovation()), "{size}: {all:?}");
+        assert!(all.angles()[0].to_degrees() < 0.12, "{size}: {all:?}");
+    }
+}
+
+/// A fault of a device costs little more than the time without it, and is said as long as it makes
+/// the shown errors larger than five of their deviations.
+#[test]
+fn faults_are_survived_and_said() {
+    use FaultKind::{Clock, Dropout, Frozen, Position, Restart, Velocity};
+    let cases = [
+        // Device, fault, size, window, most error of an angle (deg) and of the position at the end (m).
+        (0, Velocity, 10.0, [0.0, 0.02], 0.4, 10.0),
+        (0, Position, 10.0, [0.0, 0.02], 0.4, 10.0),
+        (0, Velocity, 1.0, [120.0, FOR_EVER], 0.7, 4e3),
+        (0, Position, 1.0, [120.0, FOR_EVER], 0.4, 900.0),
+        (0, Frozen, 1.0, [1540.0, 1570.0], 0.4, 10.0),
+        (0, Clock, -1.0, [0.0, FOR_EVER], 0.4, 100.0),
+        (0, Restart, 1.0, [130.0, FOR_EVER], 0.4, 10.0),
+        (1, FaultKind::Attitude, 1.0, [60.0, FOR_EVER], 0.4, 10.0),
+        (2, Restart, 1.0, [700.0, FOR_EVER], 0.4, 10.0),
+        (2, Clock, 1.0, [700.0, 760.0], 0.5, 10.0),
+        (2, Dropout, 1.0, [1600.0, 1602.0], 8.0, 10.0),
+    ];
+    crate::harness::in_parallel(&cases, |&(device, kind, size, window, angle, position)| {
+        let case = faulty(device, kind, size, window, 23);
+        let name = format!("{kind:?} {size} from {} s of device {device}", window[0]);
+        let (mut beyond, mut worst, mut last) = (0.0, 0.0_f64, [0.0; 2]);
+        fly(&case, |seen| {
+            let is_said =
+                matches!(seen.health, Health::Suspect | Health::Inconsistent | Health::Lost);
+            let of_angles = seen.errors.iter().zip(seen.predicted);
+            let largest = of_angles.map(|(error, deviation)| error.abs() / deviation);
+            let [error, deviation] = seen.position_error;
+            let largest = largest.fold(error / (3_f64.sqrt() * deviation), f64::max);
+            beyond = if largest > 5.0 && !is_said { beyond + 1.0 } else { 0.0 };
+            assert!(beyond <= 10.0, "{name}: {largest} deviations at {} s", seen.time);
+            if seen.time > 60.0 {
+                worst = worst.max(seen.errors[..3].iter().fold(0.0, |a, b| b.abs().max(a)));
+            }
+            last = seen.position_error;
+        });
+        assert!(worst.to_degrees() < angle, "{name}: {} deg", worst.to_degrees());
+        assert!(last[0] < position, "{name}: {} m", last[0]);
+    });
+}
+
+/// Without a fault nothing is said, and each kind of fault is said by its device.
+#[test]
+fn what_contradicts_is_named() {
+    let named = |case: &Case| {
+        let mut seen = Vec::new();
+        fly(case, |now| seen.push(now.contradiction));
+        seen
+    };
+    let alarms = named(&Case::new(4, true, 24)).into_iter();
+    assert!(alarms.filter(|what| *what != Contradiction::None).count() <= 2);
+    for (device, kind, from, expected) in [
+        (0, FaultKind::Frozen, 100.0, Contradiction::Gnss),
+        (1, FaultKind::Attitude, 60.0, Contradiction::Star),
+        (2, FaultKind::Frozen, 1000.0, Contradiction::Gyroscope),
+    ] {
+        let seen = named(&faulty(device, kind, 1.0, [from, from + 20.0], 25));
+        assert!(seen.contains(&expected), "{kind:?}: {expected:?}");
+    }
+}
+
+/// Whatever finite numbers arrive, what is shown is finite, and good ones are followed again.
+#[test]
+fn any_finite_input_leaves_finite_numbers() {
+    let navigation = Navigation::new(Settings::default()).unwrap();
+    let values = [0.0, -1.0, 1e-300, 1e9, 1e200, f64::MAX, -f64::MAX];
+    for (i, value) in (0..8).flat_map(|i| values.map(|value| (i, value))) {
+        let mut memory = navigation.memory();
+        for tick in 0..60 {
+            let time = f64::from(tick) * 0.04;
+            let force = Vector3::new(-3.0, 0.0, -9.0 + time);
+            let mut line = Line { sample: tick + 1, time, force, ..Line::default() };
+            if (20..40).contains(&tick) {
+                let star = [1.0, 0.0, 0.0, 0.0];
+                (line.fixes.gnss.number, line.fixes.gnss.time) = (tick, time);
+                (line.fixes.star.number, line.fixes.star.time) = (tick, time);
+                line.fixes.star.attitude = star;
+                match i {
+                    0 => line.rate.x = value,
+                    1 => line.force.y = value,
+                    2 => line.time = value,
+                    3 => line.sample = value as i32,
+                    4 => line.fixes.gnss.position.z = value,
+                    5 => line.fixes.gnss.velocity.x = value,
+                    6 => line.fixes.gnss.time = value,
+                    _ => line.fixes.star.attitude[1] = value,
+                }
+            }
+            navigation.update(&mut memory, time, &line);
+            let shown = &memory.shown;
+            let all = shown.motion.iter().chain(&shown.angles).chain(&shown.deviations.angles);
+            assert!(all.copied().all(f64::is_finite), "{i} {value}: {shown:?}");
+        }
+        assert!(memory.health != Health::Lost, "{i} {value}");
+    }
 }
 
 /// The sample of a tick, or none, repeated or late, leaves a finite state.

@@ -1,7 +1,7 @@
 //! `EntryNavigation`: motion, attitude and wind along an entry flight, from inertial sensors,
 //! satellite navigation and star tracker, and from the forces of the air.
 
-use control::navigation::{Health, Line, Memory, Navigation, Settings, Shown};
+use control::navigation::{Contradiction, Health, Line, Memory, Navigation, Settings, Shown};
 use controller_export::own_vehicle::OwnVehicle;
 use controller_export::sampled::{SampledFmu, SampledInstance, Ticks};
 use fmi_export::{Context, Description, Failure, VariableTable};
@@ -10,7 +10,6 @@ use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 use settings::Declared;
 use vehicle::axes::{LETTERS, QUATERNION};
-use vehicle::error::rounded_time;
 use vehicle::fixes::{Fixes, GnssFix, StarFix};
 
 /// The navigation as an FMU.
@@ -25,6 +24,8 @@ pub struct NavigationInstance {
     pub(crate) shown: Shown,
     #[setting(output, depends_on = ["*"])]
     health: Health,
+    #[setting(output, depends_on = ["*"])]
+    contradiction: Contradiction,
     #[setting(name = "")]
     pub(crate) settings: Settings,
     #[setting(name = "")]
@@ -112,6 +113,7 @@ impl SampledInstance for NavigationInstance {
             input: Input { force: Vector3::new(0.0, 0.0, -1e-3), ..Input::default() },
             shown: Shown::default(),
             health: Health::default(),
+            contradiction: Contradiction::default(),
         }
     }
 
@@ -153,18 +155,12 @@ impl SampledInstance for NavigationInstance {
         }
         let time = ticks.next_time();
         ticks.evaluate_with(line, |memory, _| navigation.update(memory, time, &line));
-        let Shown { motion, motion_rate, angles, .. } = &ticks.in_force().1.shown;
-        if motion.iter().chain(motion_rate).chain(angles).all(|value| value.is_finite()) {
-            return Ok(());
-        }
-        Err(Failure::Error(format!(
-            "the navigated motion at t = {} s is not finite; check the inputs measured.*, gnss.* and star.*",
-            rounded_time(time)
-        )))
+        Ok(())
     }
 
     fn show(&mut self, _time: f64, _navigation: &Navigation, ((), memory): ((), &Memory)) {
         (self.shown, self.health) = (memory.shown, memory.health);
+        self.contradiction = memory.contradiction;
     }
 
     fn warning(before: &Memory, after: &Memory) -> Option<&'static str> {
@@ -181,7 +177,11 @@ impl SampledInstance for NavigationInstance {
             )
         } else if becomes(Health::Inconsistent) {
             Some(
-                "the fixes contradict what the filter expects: sensor.set, the noise of fixes or the initial state is not that of the plant (see health and innovation.*)",
+                "the fixes contradict what the filter expects: sensor.set, the noise of fixes or the initial state is not that of the plant (see health, contradiction and innovation.*)",
+            )
+        } else if becomes(Health::Suspect) {
+            Some(
+                "a sensor contradicts itself, or an estimate what is known beforehand (see health and contradiction)",
             )
         } else {
             None

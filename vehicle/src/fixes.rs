@@ -5,12 +5,16 @@
 
 use crate::axes::{Entry, QUATERNION};
 use crate::error::Error;
+use crate::fault::{Fault, FaultKind};
 use crate::frames::Place;
 use crate::noise::{normal_pair, uniform};
 use crate::time::tick_tolerance;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 use settings::Declared;
+
+/// Most by which a fault makes samples of the inertial sensors late, s.
+pub const LATEST: f64 = 1.0;
 
 /// Receiver of satellite navigation.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, Declared)]
@@ -34,6 +38,9 @@ pub struct Gnss {
     #[setting(name = "blackout.bottom", unit = "m", nominal = 1e5)]
     #[setting(used_with = "~.period > 0")]
     pub blackout_bottom: f64,
+    /// Fault of the receiver: {}
+    #[setting(used_with = "~.period > 0")]
+    pub fault: Fault,
 }
 
 /// Star tracker.
@@ -50,6 +57,9 @@ pub struct StarTracker {
     #[setting(name = "altitude", unit = "m", nominal = 1e5)]
     #[setting(used_with = "~.period > 0")]
     pub least_altitude: f64,
+    /// Fault of the star tracker: {}
+    #[setting(used_with = "~.period > 0")]
+    pub fault: Fault,
 }
 
 /// Both devices.
@@ -59,6 +69,9 @@ pub struct Devices {
     pub gnss: Gnss,
     /// Star tracker.
     pub star: StarTracker,
+    /// Fault of gyroscope and accelerometer with their line: {}
+    #[setting(name = "inertial.fault")]
+    pub inertial: Fault,
 }
 
 impl Default for Devices {
@@ -71,9 +84,16 @@ impl Default for Devices {
                 velocity_noise: 0.1,
                 blackout_top: 85e3,
                 blackout_bottom: 45e3,
+                fault: Fault::default(),
             },
             // Some ten seconds of arc.
-            star: StarTracker { period: 0.0, noise: 5e-5, least_altitude: 90e3 },
+            star: StarTracker {
+                period: 0.0,
+                noise: 5e-5,
+                least_altitude: 90e3,
+                fault: Fault::default(),
+            },
+            inertial: Fault::default(),
         }
     }
 }
@@ -134,7 +154,11 @@ impl StarFix {
 impl Devices {
     /// Refuses values that are negative or not finite.
     pub(crate) fn check(&self) -> Result<(), Error> {
-        let Self { gnss, star } = self;
+        let Self { gnss, star, inertial } = self;
+        let inertial_measures = [FaultKind::Gyroscope, FaultKind::Accelerometer];
+        gnss.fault.check("gnss", &[FaultKind::Position, FaultKind::Velocity], gnss.period)?;
+        star.fault.check("star", &[FaultKind::Attitude], star.period)?;
+        inertial.check("inertial", &inertial_measures, LATEST)?;
         for (name, value) in [
             ("gnss.period", gnss.period),
             ("gnss.noise.position", gnss.position_noise),
@@ -170,34 +194,71 @@ impl Devices {
             every > 0.0 && (tick == 0 || multiples(elapsed) > multiples(elapsed - period))
         };
         let hears = altitude >= self.gnss.blackout_top || altitude <= self.gnss.blackout_bottom;
-        let by_gnss = is_due(self.gnss.period) && hears;
-        let by_star = is_due(self.star.period) && altitude >= self.star.least_altitude;
+        let (receiver, tracker) = (&self.gnss.fault, &self.star.fault);
+        let works = |fault: &Fault| !fault.is(FaultKind::Dropout, time);
+        let by_gnss = is_due(self.gnss.period) && hears && works(receiver);
+        let sees = altitude >= self.star.least_altitude;
+        let by_star = is_due(self.star.period) && sees && works(tracker);
         if !(by_gnss || by_star) {
             return fixes;
         }
         // Another sequence than those of the sensors and of a disturbance with the same seed.
         let draws: [f64; 10] = uniform(seed.rotate_left(32) ^ 0x6e61_7669, tick);
         let [a, b, c, d, e] = [0, 2, 4, 6, 8].map(|i| normal_pair([draws[i], draws[i + 1]]));
+        let next = |fault: &Fault, before: (i32, f64)| {
+            if fault.restarts(before.1, time) { 1 } else { before.0.saturating_add(1) }
+        };
         if by_gnss {
             // Along the level axes, so that no longitude is special.
             let turned = place.level().transpose();
+            let off = Vector3::new(a[0], a[1], b[0]) * self.gnss.position_noise;
+            let fast = Vector3::new(b[1], c[0], c[1]) * self.gnss.velocity_noise;
+            let [away, faster] = [FaultKind::Position, FaultKind::Velocity]
+                .map(|kind| Vector3::repeat(receiver.of(kind, time)));
             fixes.gnss = GnssFix {
-                number: before.gnss.number.saturating_add(1),
-                time,
-                position: place.position
-                    + turned * Vector3::new(a[0], a[1], b[0]) * self.gnss.position_noise,
-                velocity: place.velocity
-                    + turned * Vector3::new(b[1], c[0], c[1]) * self.gnss.velocity_noise,
+                number: next(receiver, (before.gnss.number, before.gnss.time)),
+                time: time + receiver.of(FaultKind::Clock, time),
+                position: place.position + turned * (off + away),
+                velocity: place.velocity + turned * (fast + faster),
             };
+            if receiver.is(FaultKind::Frozen, time) && before.gnss.number > 0 {
+                fixes.gnss.position = before.gnss.position;
+                fixes.gnss.velocity = before.gnss.velocity;
+            }
         }
         if by_star {
-            let error = Vector3::new(d[0], d[1], e[0]) * self.star.noise;
+            let error = Vector3::new(d[0], d[1], e[0]) * self.star.noise
+                + Vector3::repeat(tracker.of(FaultKind::Attitude, time));
             let seen = UnitQuaternion::from_scaled_axis(error) * place.attitude;
+            let is_frozen = tracker.is(FaultKind::Frozen, time) && before.star.number > 0;
             fixes.star = StarFix {
-                number: before.star.number.saturating_add(1),
-                time,
-                attitude: [seen.w, seen.i, seen.j, seen.k],
+                number: next(tracker, (before.star.number, before.star.time)),
+                time: time + tracker.of(FaultKind::Clock, time),
+                attitude: if is_frozen {
+                    before.star.attitude
+                } else {
+                    [seen.w, seen.i, seen.j, seen.k]
+                },
             };
+        }
+        fixes
+    }
+
+    /// Returns the fixes that have arrived at `time` (s), of those that had been taken at the sample
+    /// before and at this one, and those that had arrived before.
+    pub(crate) fn arrived(&self, time: f64, taken: [&Fixes; 2], before: &Fixes) -> Fixes {
+        let has_come = |fault: &Fault, since: f64| {
+            let late = fault.of(FaultKind::Late, time);
+            late == 0.0 || time >= since + late - tick_tolerance(time, late)
+        };
+        let mut fixes = *before;
+        for Fixes { gnss, star } in taken {
+            if has_come(&self.gnss.fault, gnss.time) {
+                fixes.gnss = *gnss;
+            }
+            if has_come(&self.star.fault, star.time) {
+                fixes.star = *star;
+            }
         }
         fixes
     }

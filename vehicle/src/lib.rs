@@ -15,6 +15,7 @@ pub mod dynamics;
 pub mod effectors;
 pub mod entry;
 pub mod error;
+pub mod fault;
 pub mod fixes;
 pub mod frames;
 mod given;

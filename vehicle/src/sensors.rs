@@ -7,6 +7,7 @@
 
 use crate::axes::AXES;
 use crate::error::Error;
+use crate::fault::FaultKind;
 use crate::fixes::{Devices, Fixes};
 use crate::frames;
 use crate::noise::{normal_pair, uniform};
@@ -146,16 +147,21 @@ impl From<&Readings> for Felt {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 struct Taken {
     at: Instant,
+    /// Number and time that are given with it, s.
+    number: i64,
+    stamp: f64,
     memories: [Memory; 3],
+    /// Latest fixes that were taken, and those that have arrived.
+    taken: Fixes,
     fixes: Fixes,
     dropped: bool,
 }
 
 impl Taken {
     fn sample(&self) -> Sample {
-        let number = i32::try_from(self.at.tick + 1).unwrap_or(i32::MAX);
+        let number = i32::try_from(self.number).unwrap_or(i32::MAX);
         let readings = self.memories.map(|memory| memory.value);
-        Sample { number, time: self.at.time, readings, fixes: self.fixes }
+        Sample { number, time: self.stamp, readings, fixes: self.fixes }
     }
 }
 
@@ -232,7 +238,9 @@ impl Sensors {
     pub fn new(config: &Config, start: f64) -> Result<Self, Error> {
         config.check()?;
         check_resolution(start, config.line.period)?;
-        let length = (config.line.delay / config.line.period) as usize + 2;
+        let late =
+            config.devices.inertial.of(FaultKind::Late, config.devices.inertial.window.start);
+        let length = ((config.line.delay + late) / config.line.period) as usize + 2;
         let arrived = Sample { time: start, ..Sample::default() };
         Ok(Self {
             config: *config,
@@ -255,8 +263,9 @@ impl Sensors {
     /// lies in the future. A step that has `failed` may have gone beyond `time`.
     pub(crate) fn fits(&self, time: f64, failed: bool) -> bool {
         let latest = if failed { i64::MAX / 2 } else { self.tick_at(time) };
-        let past =
-            |taken: &Taken| (0..=latest).contains(&taken.at.tick) && taken.at.time.is_finite();
+        let past = |taken: &Taken| {
+            (0..=latest).contains(&taken.at.tick) && (taken.at.time + taken.stamp).is_finite()
+        };
         check_resolution(time, self.config.line.period).is_ok()
             && self.before.iter().chain(&self.last).chain(self.line.iter().flatten()).all(past)
             && self.arrived.time.is_finite()
@@ -280,6 +289,7 @@ impl Sensors {
     /// Last tick whose sample has had the time to arrive by `time` (s).
     fn tick_arrived(&self, time: f64) -> i64 {
         let Line { period, delay, .. } = self.config.line;
+        let delay = delay + self.config.devices.inertial.of(FaultKind::Late, time);
         ((time - delay - self.start + tick_tolerance(time, period)) / period).floor() as i64
     }
 
@@ -306,23 +316,36 @@ impl Sensors {
         };
         let Config { triads, line, devices, seed } = &self.config;
         let (draws, chance) = self.config.draw(at.tick);
-        let memories = std::array::from_fn(|i| {
+        let fault = &devices.inertial;
+        let memories: [Memory; 3] = std::array::from_fn(|i| {
             let before =
                 before.as_ref().map(|before| (&before.memories[i], at.time - before.at.time));
-            triads[i].drifted(at.time - self.start).sample(
-                at.time,
-                &felt.readings[i],
-                &draws[i],
-                before,
-            )
+            let mut triad = triads[i].drifted(at.time - self.start);
+            if let Some(kind) = [FaultKind::Gyroscope, FaultKind::Accelerometer].get(i) {
+                triad.bias += Vector3::repeat(fault.of(*kind, at.time));
+                if fault.is(FaultKind::Frozen, at.time) {
+                    triad.freeze = fault.window;
+                }
+            }
+            triad.sample(at.time, &felt.readings[i], &draws[i], before)
         });
-        let mut fixes = before.map_or_else(Fixes::default, |before| before.fixes);
+        let [earlier, mut fixes] =
+            before.map_or_else(Default::default, |before| [before.taken, before.fixes]);
+        let mut taken = earlier;
         if let Some((place, altitude)) = &felt.place {
             let times = (at.time, at.time - self.start, line.period);
-            fixes = devices.taken((*seed, at.tick), times, (place, *altitude), &fixes);
+            taken = devices.taken((*seed, at.tick), times, (place, *altitude), &earlier);
+            fixes = devices.arrived(at.time, [&earlier, &taken], &fixes);
         }
-        let dropped = line.drop_window.holds(at.time) && chance < line.drop_probability;
-        Taken { at, memories, fixes, dropped }
+        let dropped = line.drop_window.holds(at.time) && chance < line.drop_probability
+            || fault.is(FaultKind::Dropout, at.time);
+        let number = match before {
+            Some(before) if fault.restarts(before.at.time, at.time) => 1,
+            Some(before) => before.number.saturating_add(at.tick - before.at.tick),
+            None => at.tick + 1,
+        };
+        let stamp = at.time + fault.of(FaultKind::Clock, at.time);
+        Taken { at, number, stamp, memories, taken, fixes, dropped }
     }
 
     fn slot(&self, tick: i64) -> usize {
@@ -336,7 +359,10 @@ impl Sensors {
         let on_the_line = (0..=newest).rev().take(self.line.len()).find_map(|tick| {
             self.line[self.slot(tick)].filter(|taken| taken.at.tick == tick && !taken.dropped)
         });
-        on_the_line.map_or(self.arrived, |taken| taken.sample())
+        // A line that becomes slower gives nothing older than it has given.
+        let newest = on_the_line.map(|taken| taken.sample());
+        let is_late = self.config.devices.inertial.is(FaultKind::Late, time);
+        newest.filter(|sample| !is_late || sample.time >= self.arrived.time).unwrap_or(self.arrived)
     }
 
     /// Takes the sample that is due at `time` (s), if there is one, and receives what has arrived.

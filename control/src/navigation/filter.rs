@@ -3,16 +3,17 @@
 //!
 //! The error x is true less estimated: position, velocity, attitude as a rotation vector φ in
 //! inertial axes (R = exp(φ) R̂), biases of gyroscope and accelerometer, wind to the north and
-//! east, and the relative errors of the models of the side force and of the drag.
+//! east, the relative errors of the models of the side force and of the drag, and the offset of the
+//! receiver's clock.
 
 use super::settings::{Drag, Errors, Wind};
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 use vehicle::math::exp;
 
 /// Number of states of the error.
-pub const STATES: usize = 19;
-/// First state of the error of the position, velocity, attitude, both biases, the wind, and the
-/// models of the side force and of the drag.
+pub const STATES: usize = 20;
+/// First state of the error of the position, velocity, attitude, both biases, the wind, the
+/// models of the side force and of the drag, and the receiver's clock.
 pub(super) const POSITION: usize = 0;
 pub(super) const VELOCITY: usize = 3;
 pub(super) const ATTITUDE: usize = 6;
@@ -21,6 +22,7 @@ pub(super) const ACCELEROMETER: usize = 12;
 pub(super) const WIND: usize = 15;
 pub(super) const SIDE: usize = 17;
 pub(super) const DRAG: usize = 18;
+pub(super) const CLOCK: usize = 19;
 
 /// Error of the state.
 pub type Error = SVector<f64, STATES>;
@@ -30,6 +32,10 @@ pub type Covariance = SMatrix<f64, STATES, STATES>;
 /// Least standard deviations, so that a perfect sensor leaves the covariance regular: noise of a
 /// rate (rad/s/√Hz) and of a specific force (m/s²/√Hz).
 const LEAST_NOISE: [f64; 2] = [3e-8, 3e-6];
+/// Least deviations of the biases of gyroscope (rad/s) and accelerometer (m/s²).
+pub(super) const LEAST_BIASES: [f64; 2] = [1e-12, 1e-9];
+/// Standard deviations of angular rate (rad/s) and specific force (m/s²) that no sensor shows.
+pub(super) const UNSEEN: [f64; 2] = [0.05, 5.0];
 
 /// A way of the vehicle over which the covariance is propagated at once.
 #[derive(Clone, Copy, Debug)]
@@ -44,6 +50,8 @@ pub(super) struct Way {
     pub(super) gradient: Matrix3<f64>,
     /// Change of the altitude, m.
     pub(super) climbed: f64,
+    /// Part of its duration in which gyroscope and accelerometer showed nothing, s.
+    pub(super) blind: [f64; 2],
 }
 
 /// What the filter expects of the sensors and of the air.
@@ -83,7 +91,7 @@ pub(super) fn propagated(
     way: &Way,
     expected: &Expected<'_>,
 ) -> Covariance {
-    let Way { time, pushed, attitude, gradient, climbed } = way;
+    let Way { time, pushed, attitude, gradient, climbed, blind } = way;
     let Expected { errors, period, wind, drag } = expected;
     let cross = pushed.cross_matrix();
     let kept_biases = errors.map(|errors| kept(&errors, *time));
@@ -113,7 +121,9 @@ pub(super) fn propagated(
         let noise = errors[i].noise * period.sqrt();
         noise * noise + LEAST_NOISE[i] * LEAST_NOISE[i]
     };
-    let (by_rate, by_force) = (density(0) * time, density(1) * time);
+    // What is not seen stays what it is for about a second.
+    let added = |i: usize| density(i) * time + UNSEEN[i] * UNSEEN[i] * blind[i];
+    let (by_rate, by_force) = (added(0), added(1));
     let wandered = |i: usize| {
         let deviation = errors[i].instability;
         deviation * deviation * (1.0 - kept_biases[i] * kept_biases[i])
@@ -127,7 +137,7 @@ pub(super) fn propagated(
         (ACCELEROMETER..WIND, wandered(1)),
         (WIND..SIDE, wind.deviation * wind.deviation * blown),
         (SIDE..DRAG, wind.model * wind.model * blown),
-        (DRAG..STATES, drag.model * drag.model * renewed),
+        (DRAG..CLOCK, drag.model * drag.model * renewed),
     ];
     for (states, variance) in added {
         for i in states {

@@ -21,7 +21,16 @@ pub struct Line {
     pub fixes: Fixes,
 }
 
+/// Largest angular rate (rad/s) and specific force (m/s²) that a sample can have.
+const LARGEST: [f64; 2] = [100.0, 1e4];
+
 impl Line {
+    /// Returns whether there are readings, and they can be those of a vehicle.
+    pub(super) fn is_plausible(&self) -> bool {
+        let is_there = self.sample > 0 || self.rate.amax() > 0.0 || self.force.amax() > 0.0;
+        is_there && self.rate.amax() <= LARGEST[0] && self.force.amax() <= LARGEST[1]
+    }
+
     /// Returns the name of the inputs that hold a value that is not finite.
     pub fn fault(&self) -> Option<&'static str> {
         let Fixes { gnss, star } = &self.fixes;
@@ -56,4 +65,27 @@ pub enum Health {
     Inconsistent,
     /// No sample has arrived for half a second.
     Lost,
+    /// A device contradicts itself, or an estimate what is known beforehand.
+    Suspect,
+}
+
+/// What contradicts what the navigation expects.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Choice)]
+#[setting(name = "NavigationContradiction")]
+pub enum Contradiction {
+    /// Nothing does.
+    #[default]
+    None,
+    /// Satellite navigation: its fixes contradict each other or the filter.
+    Gnss,
+    /// The star tracker: its fixes contradict each other or the filter.
+    Star,
+    /// The side force: its innovations or the wind are too large.
+    Side,
+    /// The drag: its innovations or drag.ratio are too large.
+    Drag,
+    /// The gyroscope: its bias is too large, or its samples repeat themselves.
+    Gyroscope,
+    /// The accelerometer: its bias is too large, or its samples repeat themselves.
+    Accelerometer,
 }

@@ -8,6 +8,8 @@
 mod air;
 mod device;
 mod filter;
+mod history;
+mod judge;
 mod line;
 mod running;
 mod settings;
@@ -16,22 +18,21 @@ mod strapdown;
 
 pub use device::Navigation;
 pub use filter::{Covariance, Error, STATES};
-pub use line::{Health, Line};
+pub use line::{Contradiction, Health, Line};
 pub use settings::{Alignment, Drag, Errors, Fix, Initial, Settings, Trust, Wind};
 pub use shown::{Deviations, Shown};
 pub use strapdown::State;
 
-use nalgebra::Vector3;
 use running::Running;
 use serde::{Deserialize, Serialize};
 use strapdown::Felt;
 use vehicle::frames::Place;
 use vehicle::math::exp;
 
-/// Time without a sample from which the navigation is lost, s.
+/// Time without a sample from which the navigation is lost, and a clock that lags is not believed, s.
 const LOST_AFTER: f64 = 0.5;
-/// Average of the squares of the normalised innovations from which the filter is inconsistent.
-const INCONSISTENT: f64 = 3.0;
+/// Longest time over which the motion is shown without a sample, s.
+const LONGEST: f64 = 60.0;
 
 /// State that is carried from tick to tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -41,6 +42,8 @@ pub struct Memory {
     pub shown: Shown,
     /// Health of the navigation.
     pub health: Health,
+    /// What contradicts what the navigation expects.
+    pub contradiction: Contradiction,
     /// Number of samples that never arrived.
     pub missed: u32,
 }
@@ -61,51 +64,58 @@ impl Navigation {
     /// taken as those of the instant.
     pub fn update(&self, memory: &mut Memory, time: f64, line: &Line) {
         let mut line = *line;
-        let is_counted = line.sample > 0;
-        if !is_counted {
-            if line.rate == Vector3::zeros() && line.force == Vector3::zeros() {
-                return;
-            }
-            line.time = time;
-        }
+        line.time = if line.sample > 0 { line.time.min(time) } else { time };
         let running = match &mut memory.running {
-            None => memory.running.insert(self.begin(&line)),
             Some(running) => {
-                if !is_counted || line.sample > running.last.sample {
-                    let passed = line.sample.saturating_sub(running.last.sample);
-                    memory.missed += u32::try_from(passed - 1).unwrap_or(0);
+                if let Some(missed) = running.succeeds(&mut line, time) {
+                    memory.missed = memory.missed.saturating_add(missed);
                     self.take(running, &line);
                 }
                 running
             }
+            None if line.is_plausible() => memory.running.insert(self.begin(&line)),
+            None => return,
         };
         let felt = running.felt(&running.last);
         let (state, wind, unbiased) = running.blended();
-        let age = (time - running.last.time).max(0.0);
+        let age = (time - running.last.time).clamp(0.0, LONGEST);
         let (state, _) = state.after(&self.settings.planet, age, &felt, &felt);
-        memory.shown.deviations = running.deviations;
-        memory.shown.innovations = running.innovations;
-        memory.shown.biases = running.biases;
-        memory.shown.drag_ratio = exp(running.drag);
-        memory.shown.rejected = running.rejected;
+        let mut shown = memory.shown;
+        shown.deviations = self.deviations((time, &state), wind, &running.shown_covariance(age));
+        shown.innovations = running.innovations;
+        shown.biases = running.biases;
+        shown.drag_ratio = exp(running.drag);
+        shown.rejected = running.rejected;
         let felt = Felt { rate: felt.rate + unbiased[0], force: felt.force + unbiased[1] };
-        self.show(&mut memory.shown, (time, &state), &felt, wind);
-        memory.health = self.health(running, time);
+        self.show(&mut shown, (time, &state), &felt, wind);
+        (memory.health, memory.contradiction) = self.health(running, time, &shown.deviations);
+        if shown.is_finite() {
+            memory.shown = shown;
+        } else {
+            memory.health = Health::Lost;
+        }
     }
 
-    fn health(&self, running: &Running, time: f64) -> Health {
+    fn health(
+        &self,
+        running: &Running,
+        time: f64,
+        deviations: &Deviations,
+    ) -> (Health, Contradiction) {
         let Trust { deviation, after } = self.settings.health;
-        if time - running.last.time > LOST_AFTER {
+        let (contradiction, of_filter) = self.contradiction(running, time);
+        let health = if time - running.last.time > LOST_AFTER {
             Health::Lost
-        } else if running.average > INCONSISTENT {
-            Health::Inconsistent
-        } else if running.deviations.angles.max() > deviation {
+        } else if contradiction != Contradiction::None {
+            if of_filter { Health::Inconsistent } else { Health::Suspect }
+        } else if deviations.angles.max() > deviation {
             Health::Degraded
         } else if time - running.fixed > after {
             Health::Bridging
         } else {
             Health::Aided
-        }
+        };
+        (health, contradiction)
     }
 
     /// Returns the covariance of the filter's error, and the error itself, given the true place at

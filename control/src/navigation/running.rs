@@ -3,18 +3,19 @@
 use super::air::{drag, side_force};
 use super::device::Navigation;
 use super::filter::{
-    ACCELEROMETER, ATTITUDE, Covariance, DRAG, Error, Expected, GYROSCOPE, Measured, POSITION,
-    SIDE, VELOCITY, WIND, Way, gravity_gradient, kept, propagated, updated,
+    ACCELEROMETER, ATTITUDE, CLOCK, Covariance, DRAG, Error, Expected, GYROSCOPE, LEAST_BIASES,
+    Measured, POSITION, SIDE, UNSEEN, VELOCITY, WIND, Way, gravity_gradient, kept, propagated,
 };
+use super::history::History;
+use super::judge::{Heard, Watch};
 use super::line::Line;
 use super::settings::{Alignment, Settings};
-use super::shown::Deviations;
-use super::strapdown::{Felt, State, rotation};
+use super::strapdown::{Felt, State};
 use nalgebra::{UnitQuaternion, Vector3};
 use serde::{Deserialize, Serialize};
 use vehicle::atmosphere::air_anywhere;
-use vehicle::fixes::{GnssFix, StarFix};
-use vehicle::frames::{Place, fixed_from_inertial};
+use vehicle::fixes::Fixes;
+use vehicle::frames::Place;
 use vehicle::math::{exp, hypot};
 use vehicle::noise::{normal_pair, uniform};
 
@@ -25,46 +26,61 @@ const AIR_PERIOD: f64 = 1.0;
 /// Corrections of attitude (rad) and wind (m/s) that are too small to be blended.
 const SMALL_TILT: f64 = 2e-4;
 const SMALL_WIND: f64 = 0.5;
-/// Rejections in a row after which a fix is taken.
-const REJECTIONS: u32 = 5;
-/// Number of fixes over which the innovations are averaged.
-const AVERAGED: f64 = 20.0;
+/// Equal samples in a row, with noise on them, that only a frozen sensor gives.
+const STILL: u32 = 5;
+/// Time from which the motion since the last sample counts as unseen, s.
+const UNSEEN_AFTER: f64 = super::LOST_AFTER;
 
 /// State once a sample has arrived.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Running {
     pub(super) last: Line,
+    /// What is added to the given times of the samples, s.
+    ahead: f64,
     /// State at the last sample.
-    state: State,
+    pub(super) state: State,
     /// Biases of gyroscope (rad/s) and accelerometer (m/s²).
     pub(super) biases: [Vector3<f64>; 2],
     /// Wind to the north and to the east, m/s.
-    wind: [f64; 2],
+    pub(super) wind: [f64; 2],
     /// Ratio of the side force to that of the model.
     side: f64,
     /// Logarithm of the ratio of the drag to that of the model.
     pub(super) drag: f64,
     pub(super) covariance: Covariance,
+    /// Offset of the receiver's clock: true less given time of its fixes, s.
+    pub(super) clock: f64,
     /// Way since the last propagation of the covariance: its duration (s), the change of the
     /// velocity on it (m/s), and the distance from the centre at its beginning (m).
     way: (f64, Vector3<f64>, f64),
+    /// Time of it in which gyroscope and accelerometer showed nothing, s.
+    blind: [f64; 2],
+    /// Samples in a row that equal the one before, of both.
+    still: [u32; 2],
+    /// Past states.
+    pub(super) history: History,
     /// What the shown state lacks of the filter's, and its rate.
     offset: [Error; 2],
     /// Time of the last fix, and of the last measurement of the air's forces, s.
     pub(super) fixed: f64,
     felt_air: f64,
-    /// Rejections in a row, of satellite navigation and star tracker.
-    refused: [u32; 2],
+    /// Measurements of each source so far.
+    pub(super) watches: [Watch; 4],
+    /// What the receiver has said of its motion, and the error by the last fix of the star tracker
+    /// (rad) with its time (s).
+    pub(super) heard: Heard,
+    pub(super) pointed: Option<(f64, Vector3<f64>)>,
+    /// Disagreement with the filter of the positions (m) and attitudes (rad) with which it began
+    /// anew, and the time of the last such event, s.
+    pub(super) doubts: [f64; 2],
+    pub(super) restarted: f64,
     pub(super) rejected: u32,
-    /// Average of the squares of the innovations.
-    pub(super) average: f64,
     pub(super) innovations: [f64; 4],
-    pub(super) deviations: Deviations,
 }
 
 /// Where measurements come from, in the order of the innovations.
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum Source {
+pub(super) enum Source {
     Gnss,
     Star,
     Side,
@@ -77,12 +93,59 @@ impl Running {
         Felt { rate: line.rate - self.biases[0], force: line.force - self.biases[1] }
     }
 
+    /// Returns the number of samples that were missed before that of `line`, if it is a new one, and
+    /// corrects its time, which is not after `now` (s). A number that does not grow is that of a
+    /// unit that began anew; if its clock did, too, its samples come now.
+    pub(super) fn succeeds(&mut self, line: &mut Line, now: f64) -> Option<u32> {
+        let last = &self.last;
+        if !line.is_plausible() || line.sample > 0 && line.sample == last.sample {
+            return None;
+        }
+        let time = (line.time + self.ahead).min(now);
+        if time > last.time {
+            line.time = time;
+        } else if now - last.time > UNSEEN_AFTER {
+            self.ahead = now - line.time;
+            line.time = now;
+        } else {
+            return None;
+        }
+        let missed = line.sample.saturating_sub(last.sample).saturating_sub(1);
+        Some(u32::try_from(missed).unwrap_or(0))
+    }
+
+    /// Returns whether gyroscope and accelerometer show nothing: their samples repeat themselves.
+    pub(super) fn is_blind(&self) -> [bool; 2] {
+        self.still.map(|still| still >= STILL)
+    }
+
+    /// Returns the covariance of what is shown a time `age` (s) after the last sample: of the
+    /// filter's state, what the blended one lacks of it, the disagreements that are not resolved, and
+    /// what moves unseen.
+    pub(super) fn shown_covariance(&self, age: f64) -> Covariance {
+        let offset = &self.offset[0];
+        let mut covariance = self.covariance + offset * offset.transpose();
+        let unseen = if age > UNSEEN_AFTER { age } else { 0.0 };
+        let [turned, pushed] = UNSEEN.map(|unknown| unknown * unseen);
+        let [position, attitude] = self.doubts;
+        for (from, deviation) in [
+            (POSITION, hypot(position, pushed * unseen / 2.0)),
+            (VELOCITY, pushed),
+            (ATTITUDE, hypot(attitude, turned)),
+        ] {
+            for i in from..from + 3 {
+                covariance[(i, i)] += deviation * deviation;
+            }
+        }
+        covariance
+    }
+
     /// Returns the state, the wind, and the corrections of rate and specific force that are to be
     /// shown.
     pub(super) fn blended(&self) -> (State, [f64; 2], [Vector3<f64>; 2]) {
         let offset = &self.offset[0];
         let mut state = self.state;
-        moved(&mut state, offset, -1.0);
+        state.correct(&-offset, 0.0);
         let part = |from: usize| Vector3::from(offset.fixed_rows::<3>(from));
         let wind = [self.wind[0] - offset[WIND], self.wind[1] - offset[WIND + 1]];
         (state, wind, [part(GYROSCOPE), part(ACCELEROMETER)])
@@ -105,38 +168,20 @@ impl Navigation {
         let flat = pairs.as_flattened();
         let scale = if seed == 0 { 0.0 } else { 1.0 };
         let normal = |i: usize| Vector3::from_fn(|axis, _| scale * flat[i + axis]);
-        let fix = &line.fixes.gnss;
-        let has_fix = fix.number > 0;
-        let [mut off, mut fast] = [position, velocity];
-        if has_fix {
-            let motion = Place { position: fix.position, velocity: fix.velocity, ..place }
-                .motion(&settings.planet);
-            place = Place {
-                position: fix.position,
-                velocity: fix.velocity,
-                ..Place::of(&settings.planet, &motion, &settings.initial.angles, line.time)
-            };
-            [off, fast] = [settings.fix.position, settings.fix.velocity];
-        } else {
-            // Along the level axes, so that no longitude is special.
-            let turned = place.level().transpose();
-            place.position += turned * normal(0) * position;
-            place.velocity += turned * normal(3) * velocity;
-        }
+        // Along the level axes, so that no longitude is special.
+        let turned = place.level().transpose();
+        place.position += turned * normal(0) * position;
+        place.velocity += turned * normal(3) * velocity;
         let mut state = State::at(&settings.planet, &place, line.time);
         state.attitude *= UnitQuaternion::from_scaled_axis(normal(6) * attitude);
-        let mut tilt = attitude;
-        if let Some(seen) = seen(line, &line.rate).filter(|_| line.fixes.star.number > 0) {
-            (state.attitude, tilt) = (seen, settings.fix.attitude);
-        }
         let mut covariance = Covariance::zeros();
         let [gyroscope, accelerometer] = self.errors.map(|errors| errors.instability);
         for (from, deviation) in [
-            (POSITION, off),
-            (VELOCITY, fast),
-            (ATTITUDE, tilt),
-            (GYROSCOPE, gyroscope.max(1e-12)),
-            (ACCELEROMETER, accelerometer.max(1e-9)),
+            (POSITION, position),
+            (VELOCITY, velocity),
+            (ATTITUDE, attitude),
+            (GYROSCOPE, gyroscope.max(LEAST_BIASES[0])),
+            (ACCELEROMETER, accelerometer.max(LEAST_BIASES[1])),
         ] {
             for i in from..from + 3 {
                 covariance[(i, i)] = deviation * deviation;
@@ -151,32 +196,46 @@ impl Navigation {
         ] {
             covariance[(i, i)] = deviation * deviation;
         }
-        let deviations = self.deviations((line.time, &state), [0.0; 2], &covariance);
-        Running {
+        let mut running = Running {
             last: *line,
+            ahead: 0.0,
             state,
             biases: [Vector3::zeros(); 2],
             wind: [0.0; 2],
             side: 1.0,
             drag: 0.0,
             covariance,
+            clock: 0.0,
             way: (0.0, Vector3::zeros(), state.position.norm()),
+            blind: [0.0; 2],
+            still: [0; 2],
+            history: History::default(),
             offset: [Error::zeros(); 2],
             fixed: line.time,
             felt_air: line.time,
-            refused: [0; 2],
+            watches: [Watch::default(); 4],
+            heard: Heard::default(),
+            pointed: None,
+            doubts: [0.0; 2],
+            restarted: f64::NEG_INFINITY,
             rejected: 0,
-            average: 1.0,
             innovations: [0.0; 4],
-            deviations,
-        }
+        };
+        self.measure(&mut running, &Fixes::default());
+        running
     }
 
     /// Takes the next sample, with the fixes that came with it.
     pub(super) fn take(&self, running: &mut Running, line: &Line) {
         let elapsed = line.time - running.last.time;
-        if elapsed <= 0.0 {
-            return;
+        running.history.keep(running.last.time, &running.state);
+        let equal = [line.rate == running.last.rate, line.force == running.last.force];
+        for i in 0..2 {
+            let is_still = equal[i] && self.errors[i].noise > 0.0;
+            running.still[i] = if is_still { running.still[i].saturating_add(1) } else { 0 };
+            if running.is_blind()[i] || elapsed > UNSEEN_AFTER {
+                running.blind[i] += elapsed;
+            }
         }
         let (from, to) = (running.felt(&running.last), running.felt(line));
         let (state, pushed) = running.state.after(&self.settings.planet, elapsed, &from, &to);
@@ -185,32 +244,36 @@ impl Navigation {
         running.way.0 += elapsed;
         running.way.1 += pushed;
         self.decay(running, elapsed);
-        let by_gnss = line.fixes.gnss.number > before.gnss.number;
-        let by_star = line.fixes.star.number > before.star.number;
-        let by_air = line.time - running.felt_air >= AIR_PERIOD - 1e-9;
+        self.measure(running, &before);
+    }
+
+    /// Takes the measurements that are there at the last sample, given the fixes before it.
+    fn measure(&self, running: &mut Running, before: &Fixes) {
+        let Line { time, fixes: Fixes { gnss, star }, .. } = running.last;
+        let is_new = |number: i32, before: i32| number > 0 && number != before;
+        let by_gnss = is_new(gnss.number, before.gnss.number);
+        let by_star = is_new(star.number, before.star.number);
+        let by_air = time - running.felt_air >= AIR_PERIOD - 1e-9;
         let is_due = running.way.0 >= LONGEST_WAY - 1e-9;
         if !(is_due || by_gnss || by_star || by_air) {
             return;
         }
         self.propagate(running);
         if by_gnss {
-            let measured = self.by_gnss(running, &line.fixes.gnss);
-            self.correct(running, &measured, Source::Gnss);
+            self.take_gnss(running, &gnss);
         }
-        if by_star && let Some(measured) = self.by_star(running) {
-            self.correct(running, &measured, Source::Star);
+        if by_star {
+            self.take_star(running, &star);
         }
         if by_air {
-            running.felt_air = line.time;
+            running.felt_air = time;
             for source in [Source::Side, Source::Drag] {
                 let measured = self.by_air(running, source).filter(Measured::is_finite);
                 if let Some(measured) = measured {
-                    self.correct(running, &[measured], source);
+                    self.judge(running, &[measured], source, true);
                 }
             }
         }
-        running.deviations =
-            self.deviations((line.time, &running.state), running.wind, &running.covariance);
     }
 
     /// Propagates the covariance over the way since the last time, and lets the estimated biases
@@ -224,6 +287,7 @@ impl Navigation {
             attitude: running.state.attitude.to_rotation_matrix().into_inner(),
             gradient: gravity_gradient(self.settings.planet.gravitation, &running.state.position),
             climbed: radius - from,
+            blind: std::mem::take(&mut running.blind),
         };
         let Settings { period, wind, drag, .. } = &self.settings;
         let expected = Expected { errors: &self.errors, period: *period, wind, drag };
@@ -236,33 +300,6 @@ impl Navigation {
         running.side = 1.0 + (running.side - 1.0) * kept;
         running.drag *= kept_drag;
         running.way = (0.0, Vector3::zeros(), radius);
-    }
-
-    /// Returns what a fix of satellite navigation shows.
-    fn by_gnss(&self, running: &Running, fix: &GnssFix) -> [Measured; 6] {
-        let planet = &self.settings.planet;
-        let to_inertial = fixed_from_inertial(planet, fix.time).transpose();
-        let velocity =
-            to_inertial * fix.velocity + rotation(planet).cross(&(to_inertial * fix.position));
-        // A fix may come with a later sample, if that of its instant was lost.
-        let position = to_inertial * fix.position + velocity * (running.last.time - fix.time);
-        let [off, fast] = [position - running.state.position, velocity - running.state.velocity];
-        let noise = &self.settings.fix;
-        std::array::from_fn(|i| {
-            if i < 3 {
-                Measured::state(POSITION + i, off[i], noise.position)
-            } else {
-                Measured::state(VELOCITY + i - 3, fast[i - 3], noise.velocity)
-            }
-        })
-    }
-
-    /// Returns what a fix of the star tracker shows.
-    fn by_star(&self, running: &Running) -> Option<[Measured; 3]> {
-        let seen = seen(&running.last, &running.felt(&running.last).rate)?;
-        let error = (seen * running.state.attitude.inverse()).scaled_axis();
-        let noise = self.settings.fix.attitude;
-        Some(std::array::from_fn(|i| Measured::state(ATTITUDE + i, error[i], noise)))
     }
 
     /// Returns what the side force or the drag shows.
@@ -283,32 +320,31 @@ impl Navigation {
         side_force(&self.aerodynamics, &air, mach, force, running.side)
     }
 
-    /// Corrects the filter by measurements. The shown state stays where it is.
-    fn correct(&self, running: &mut Running, measured: &[Measured], source: Source) {
-        let (error, covariance, squares) = updated(&running.covariance, measured);
-        let i = source as usize;
-        running.innovations[i] = squares;
+    /// Corrects the filter by an error of its state. The shown state stays where it is.
+    pub(super) fn apply(
+        &self,
+        running: &mut Running,
+        error: &Error,
+        covariance: Covariance,
+        source: Source,
+    ) {
+        let now = running.last.time;
         if matches!(source, Source::Gnss | Source::Star) {
-            running.average += (squares.min(self.settings.fix.gate) - running.average) / AVERAGED;
-            let is_far = squares > self.settings.fix.gate;
-            if is_far && running.refused[i] < REJECTIONS {
-                running.refused[i] += 1;
-                running.rejected += 1;
-                return;
-            }
-            running.refused[i] = 0;
-            running.fixed = running.last.time;
-        } else if squares > self.settings.fix.gate {
-            return;
+            running.fixed = now;
         }
         running.covariance = covariance;
-        moved(&mut running.state, &error, 1.0);
+        running.state.correct(error, 0.0);
+        running.history.correct(error, now);
         let part = |from: usize| Vector3::from(error.fixed_rows::<3>(from));
         running.biases[0] += part(GYROSCOPE);
         running.biases[1] += part(ACCELEROMETER);
         running.wind = [running.wind[0] + error[WIND], running.wind[1] + error[WIND + 1]];
         running.side += error[SIDE];
         running.drag += error[DRAG];
+        running.clock += error[CLOCK];
+        if let Some((_, pointed)) = &mut running.pointed {
+            *pointed -= part(ATTITUDE);
+        }
         // A corrected altitude is no climb through another wind.
         running.way.2 = running.state.position.norm();
         // Small corrections by the side force always come, and would be late if they were blended.
@@ -349,20 +385,4 @@ impl Navigation {
         }
         error
     }
-}
-
-/// Returns the rotation from the body axes to the inertial ones that the star tracker has seen,
-/// turned on at a rate (rad/s) to the time of the sample.
-fn seen(line: &Line, rate: &Vector3<f64>) -> Option<UnitQuaternion<f64>> {
-    let StarFix { time, .. } = line.fixes.star;
-    let turned = UnitQuaternion::from_scaled_axis(rate * (line.time - time));
-    Some(line.fixes.star.rotation()?.inverse() * turned)
-}
-
-/// Moves a state by a multiple of an error.
-fn moved(state: &mut State, error: &Error, factor: f64) {
-    let part = |from: usize| Vector3::from(error.fixed_rows::<3>(from)) * factor;
-    state.position += part(POSITION);
-    state.velocity += part(VELOCITY);
-    state.attitude = UnitQuaternion::from_scaled_axis(part(ATTITUDE)) * state.attitude;
 }

@@ -86,6 +86,17 @@ pub struct Shown {
     pub rejected: u32,
 }
 
+impl Shown {
+    /// Returns whether all of it are finite numbers.
+    pub(super) fn is_finite(&self) -> bool {
+        let Self { motion, motion_rate, angles, rates, biases, deviations, .. } = self;
+        let vectors = [angles, rates, &biases[0], &biases[1], &deviations.angles];
+        let numbers = [motion, motion_rate].into_iter().flatten();
+        let mut numbers = numbers.chain(vectors.into_iter().flatten()).chain(&deviations.flow);
+        numbers.all(|value| value.is_finite())
+    }
+}
+
 const SOURCES: [Entry; 4] = [
     (".gnss", "fix of satellite navigation"),
     (".star", "fix of the star tracker"),

@@ -9,6 +9,7 @@ use vehicle::aerodynamics::Aerodynamics;
 use vehicle::air::{Air, ROWS, Row};
 use vehicle::disturbance::{Disturbance, DisturbanceKind};
 use vehicle::entry::{Config, Deviations, End, Following, Prescribed, Trim};
+use vehicle::fault::Fault;
 use vehicle::fixes::Devices;
 use vehicle::frames::Place;
 use vehicle::kinematics::Kinematics;
@@ -40,6 +41,8 @@ pub(crate) struct Case {
     /// Ticks from one time at which it is seen to the next.
     pub(crate) every: u64,
     pub(crate) settings: navigation::Settings,
+    /// Faults of the receiver, the star tracker and the inertial sensors.
+    pub(crate) faults: [Fault; 3],
 }
 
 impl Case {
@@ -57,6 +60,7 @@ impl Case {
             deviations: Deviations::default(),
             every: 25,
             settings,
+            faults: [Fault::default(); 3],
         }
     }
 
@@ -225,6 +229,9 @@ pub(crate) struct Seen {
     pub(crate) altitude_error: [f64; 2],
     pub(crate) innovations: [f64; 4],
     pub(crate) health: navigation::Health,
+    pub(crate) contradiction: navigation::Contradiction,
+    /// Shown less true position (m), and its predicted standard deviation along an axis, m.
+    pub(crate) position_error: [f64; 2],
 }
 
 /// Returns the entry flight of a case, and the plant with its sensors.
@@ -249,6 +256,7 @@ fn vehicle(case: &Case) -> (Config, vehicle::plant::Config) {
     };
     let mut devices = Devices::default();
     devices.star.period = if case.stars { 1.0 } else { 0.0 };
+    [devices.gnss.fault, devices.star.fault, devices.inertial] = case.faults;
     let data = SensorData::embedded();
     let triads = if case.set == 1 { PerSensor::default() } else { data.inertial(case.set, PERIOD) };
     let scenario = Scenario {
@@ -336,6 +344,12 @@ pub(crate) fn fly(case: &Case, mut see: impl FnMut(&Seen)) {
                 altitude_error: [shown.motion[0] - altitude, shown.deviations.altitude],
                 innovations: shown.innovations,
                 health: memory.health,
+                contradiction: memory.contradiction,
+                position_error: {
+                    let place = Place::of(&entry.planet, &shown.motion, &shown.angles, time);
+                    let off = (place.position - truth.position).norm();
+                    [off, shown.deviations.position]
+                },
             });
         }
         // A reference that is held would shake the vehicle between the samples.

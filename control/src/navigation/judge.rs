@@ -1,0 +1,331 @@
+//! Which measurements the filter takes, and what follows from those that it does not.
+//!
+//! A device that contradicts itself, such as a receiver whose positions do not move as its
+//! velocities say, is faulty, and waits until it agrees with itself again. One that agrees with
+//! itself and contradicts the filter several times in a row shows that the filter is wrong: what it
+//! measures begins anew there, with its own deviation plus the size of the disagreement.
+
+use super::device::Navigation;
+use super::filter::{
+    self, ATTITUDE, CLOCK, Covariance, DRAG, Error, GYROSCOPE, Measured, POSITION, VELOCITY, WIND,
+    updated,
+};
+use super::line::Contradiction;
+use super::running::{Running, Source};
+use super::strapdown::{State, rotation};
+use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
+use std::ops::Range;
+use vehicle::fixes::{GnssFix, StarFix};
+use vehicle::frames::fixed_from_inertial;
+use vehicle::math::exp;
+
+/// Measurements in a row that show that the filter is wrong, or that a device agrees with itself
+/// again.
+const RUN: u32 = 5;
+/// Times over which innovations are averaged, s.
+const WINDOWS: [f64; 3] = [1.0, 10.0, 60.0];
+/// Number of standard deviations by which such an average may exceed 1.
+const SURPRISE: f64 = 6.0;
+/// Square beyond which an innovation counts no more: one outlier is forgotten within ten seconds.
+const LARGEST: f64 = 25.0;
+/// Greatest offset of the receiver's clock that is estimated, and greatest time by which a state is
+/// extrapolated to that of a measurement, s.
+const CLOCK_RANGE: f64 = 0.25;
+/// Multiple of the noise of a fix, and share of the way, by which the positions of a receiver may
+/// depart from its velocities; time over which the departure is forgotten, s.
+const DEPARTURE: [f64; 2] = [6.0, 1e-3];
+const FORGOTTEN: f64 = 30.0;
+/// Time without a contradiction after which the filter counts as right again, s.
+const RECOVERY: f64 = 60.0;
+/// Factor by which standard deviations grow that have turned out too small.
+const GROWTH: f64 = 4.0;
+/// Standard deviations of the estimates of drag, wind, biases from which they are implausible.
+const IMPLAUSIBLE: [f64; 3] = [4.0, 3.0, 5.0];
+
+/// Measurements of one source so far.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub(super) struct Watch {
+    /// Time of the last one, s.
+    at: f64,
+    /// Number in a row that contradicted the filter, and that agreed among themselves.
+    refused: u32,
+    agreed: u32,
+    /// Whether the device has contradicted itself since it last agreed with the filter.
+    jumped: bool,
+    /// Averages of the squares of the normalised innovations per component over [`WINDOWS`].
+    averages: [f64; 3],
+    /// Number of components of a measurement.
+    size: usize,
+}
+
+impl Default for Watch {
+    fn default() -> Self {
+        Self {
+            at: f64::NEG_INFINITY,
+            refused: 0,
+            agreed: RUN,
+            jumped: false,
+            averages: [1.0; 3],
+            size: 1,
+        }
+    }
+}
+
+impl Watch {
+    /// Notes the squares of normalised innovations at `time` (s).
+    fn note(&mut self, time: f64, squares: f64, size: usize) {
+        // A gap counts as a second.
+        let elapsed = (time - self.at).clamp(0.0, 1.0);
+        (self.at, self.size) = (time, size);
+        for (average, window) in self.averages.iter_mut().zip(WINDOWS) {
+            *average += (squares.min(LARGEST) - *average) * (1.0 - exp(-elapsed / window));
+        }
+    }
+
+    /// Returns whether the innovations are larger than chance makes them. The mean of n squares has
+    /// the variance 2/n, and the weights of an average over a time T are those of (2 − a)/a
+    /// measurements, with a the weight of one, if they come once a second.
+    fn is_surprised(&self) -> bool {
+        self.averages.iter().zip(WINDOWS).any(|(average, window)| {
+            let weight = 1.0 - exp(-1.0 / window);
+            let number = self.size as f64 * (2.0 - weight) / weight;
+            *average > 1.0 + SURPRISE * (2.0 / number).sqrt()
+        })
+    }
+}
+
+/// What a receiver of satellite navigation has said of its own motion, in inertial axes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub(super) struct Heard {
+    /// Time (s), position (m) and velocity (m/s) of the last fix, if there was one.
+    last: Option<(f64, Vector3<f64>, Vector3<f64>)>,
+    /// By how much its positions have moved beyond its velocities of late, m.
+    departure: Vector3<f64>,
+}
+
+impl Heard {
+    /// Takes a fix with this noise (m), and returns whether it agrees with those before.
+    fn agrees(&mut self, fix: (f64, Vector3<f64>, Vector3<f64>), noise: f64) -> bool {
+        let (time, position, velocity) = fix;
+        let Some((before, from, slower)) = self.last.replace(fix) else { return true };
+        let elapsed = time - before;
+        if elapsed > FORGOTTEN {
+            self.departure = Vector3::zeros();
+            return true;
+        }
+        let way = (velocity + slower) * (elapsed / 2.0);
+        self.departure = self.departure * exp(-elapsed / FORGOTTEN) + position - from - way;
+        let agrees = elapsed > 0.0
+            && self.departure.norm() <= DEPARTURE[0] * noise + DEPARTURE[1] * way.norm();
+        if !agrees {
+            self.departure = Vector3::zeros();
+        }
+        agrees
+    }
+}
+
+impl Navigation {
+    /// Returns the state at a time (s) that need not be that of the last sample.
+    fn state_at(&self, running: &Running, time: f64) -> Option<State> {
+        let now = running.last.time;
+        if let Some(state) = running.history.at(time, (now, &running.state)) {
+            return Some(state);
+        }
+        let felt = running.felt(&running.last);
+        let extrapolated = || running.state.after(&self.settings.planet, time - now, &felt, &felt);
+        ((time - now).abs() <= CLOCK_RANGE).then(|| extrapolated().0)
+    }
+
+    /// Takes a fix of satellite navigation at its own time.
+    pub(super) fn take_gnss(&self, running: &mut Running, fix: &GnssFix) {
+        let planet = &self.settings.planet;
+        let noise = &self.settings.fix;
+        let time = fix.time + running.clock;
+        let to_inertial = fixed_from_inertial(planet, time).transpose();
+        let position = to_inertial * fix.position;
+        let velocity = to_inertial * fix.velocity + rotation(planet).cross(&position);
+        let agrees = running.heard.agrees((time, position, velocity), noise.position);
+        let (radius, speed) = (position.norm() / planet.radius, velocity.norm());
+        let circular = (planet.gravitation / planet.radius).sqrt();
+        let is_plausible = radius > 0.9 && radius < 2.0 && speed < 2.0 * circular;
+        let Some(then) = self.state_at(running, time).filter(|_| is_plausible) else {
+            return self.refuse(running, Source::Gnss);
+        };
+        let felt = running.felt(&running.last);
+        let over_ground = then.over_ground(planet);
+        let turning = then.attitude * felt.force + planet.gravity_vector(&then.position)
+            - rotation(planet).cross(&then.velocity);
+        let off = [position - then.position, velocity - then.velocity];
+        let measured: [Measured; 6] = std::array::from_fn(|i| {
+            let (kind, axis) = (i / 3, i % 3);
+            let deviation = [noise.position, noise.velocity][kind];
+            let mut measured = Measured::state(POSITION + i, off[kind][axis], deviation);
+            if kind == 0 {
+                measured.row[VELOCITY + axis] = time - running.last.time;
+            }
+            measured.row[CLOCK] = [over_ground, turning][kind][axis];
+            measured
+        });
+        self.judge(running, &measured, Source::Gnss, agrees);
+    }
+
+    /// Takes a fix of the star tracker at its own time.
+    pub(super) fn take_star(&self, running: &mut Running, fix: &StarFix) {
+        let then = self.state_at(running, fix.time);
+        let (Some(then), Some(seen)) = (then, fix.rotation()) else {
+            return self.refuse(running, Source::Star);
+        };
+        let error = (seen.inverse() * then.attitude.inverse()).scaled_axis();
+        let noise = self.settings.fix.attitude;
+        let before = running.pointed.replace((fix.time, error));
+        // What the gyroscope makes of the difference of two fixes is small within seconds.
+        let agrees = before.is_none_or(|(time, before)| {
+            let elapsed = fix.time - time;
+            elapsed > FORGOTTEN
+                || elapsed > 0.0 && (error - before).norm() <= 2.0 * DEPARTURE[0] * noise
+        });
+        let measured: [Measured; 3] =
+            std::array::from_fn(|i| Measured::state(ATTITUDE + i, error[i], noise));
+        self.judge(running, &measured, Source::Star, agrees);
+    }
+
+    /// Refuses a measurement of a device that contradicts itself.
+    fn refuse(&self, running: &mut Running, source: Source) {
+        running.rejected += 1;
+        let watch = &mut running.watches[source as usize];
+        (watch.agreed, watch.refused, watch.jumped) = (0, 0, true);
+    }
+
+    /// Corrects the filter by measurements, unless they contradict it or their device itself.
+    pub(super) fn judge(
+        &self,
+        running: &mut Running,
+        measured: &[Measured],
+        source: Source,
+        agrees: bool,
+    ) {
+        let size = measured.len();
+        let (error, covariance, squares) = updated(&running.covariance, measured);
+        running.innovations[source as usize] = squares.min(f64::MAX);
+        let watch = &mut running.watches[source as usize];
+        watch.note(running.last.time, squares, size);
+        if !agrees {
+            return self.refuse(running, source);
+        }
+        watch.agreed = (watch.agreed + 1).min(RUN);
+        if watch.agreed < RUN {
+            running.rejected += 1;
+            return;
+        }
+        // The mean of several squares departs less from 1 than a single one.
+        let gate = (self.settings.fix.gate + 3.0 * (size - 1) as f64) / size as f64;
+        if squares <= gate {
+            (watch.refused, watch.jumped) = (0, false);
+            self.apply(running, &error, covariance, source);
+            return;
+        }
+        watch.refused += 1;
+        let refused = watch.refused;
+        if matches!(source, Source::Gnss | Source::Star) {
+            running.rejected += 1;
+        }
+        if refused < RUN {
+            return;
+        }
+        running.watches[source as usize].refused = 0;
+        match source {
+            Source::Gnss => {
+                if !self.explain_by_clock(running, measured, gate) {
+                    self.restart(running, measured, POSITION, source);
+                }
+            }
+            // The gyroscope does not jump: a star tracker that does is wrong, and not the filter.
+            Source::Star if running.watches[source as usize].jumped => {}
+            Source::Star => self.restart(running, measured, ATTITUDE, source),
+            Source::Side => widen(&mut running.covariance, WIND..DRAG),
+            Source::Drag => widen(&mut running.covariance, DRAG..CLOCK),
+        }
+    }
+
+    /// Corrects the filter by an offset of the receiver's clock, if that explains a fix.
+    fn explain_by_clock(&self, running: &mut Running, measured: &[Measured], gate: f64) -> bool {
+        let mut open = running.covariance;
+        open[(CLOCK, CLOCK)] = CLOCK_RANGE * CLOCK_RANGE;
+        let (error, covariance, squares) = updated(&open, measured);
+        let explains = squares <= gate && (running.clock + error[CLOCK]).abs() <= CLOCK_RANGE;
+        if explains {
+            running.heard = Heard::default();
+            self.apply(running, &error, covariance, Source::Gnss);
+        }
+        explains
+    }
+
+    /// Begins anew with the states from `from` on that are measured. The others keep their values,
+    /// and after a second contradiction within a minute their deviations grow.
+    fn restart(&self, running: &mut Running, measured: &[Measured], from: usize, source: Source) {
+        let mut error = Error::zeros();
+        let mut covariance = running.covariance;
+        // The velocities, on which the positions depend, come last.
+        for (i, Measured { row, residual, .. }) in measured.iter().enumerate().rev() {
+            error[from + i] = residual - row.dot(&error);
+        }
+        for (i, Measured { variance, .. }) in measured.iter().enumerate() {
+            let group: Vector3<f64> = error.fixed_rows::<3>(from + i - i % 3).into();
+            covariance.fill_row(from + i, 0.0);
+            covariance.fill_column(from + i, 0.0);
+            covariance[(from + i, from + i)] = variance + group.norm_squared() / 3.0;
+        }
+        let now = running.last.time;
+        if now - running.restarted < RECOVERY {
+            widen(&mut covariance, if from == ATTITUDE { GYROSCOPE } else { ATTITUDE }..WIND);
+        }
+        let doubt = &mut running.doubts[usize::from(from == ATTITUDE)];
+        *doubt = doubt.max(error.fixed_rows::<3>(from).norm());
+        running.restarted = now;
+        self.apply(running, &error, covariance, source);
+    }
+
+    /// Returns what contradicts what at `time` (s), and whether it is the filter that the fixes
+    /// contradict.
+    pub(super) fn contradiction(&self, running: &Running, time: f64) -> (Contradiction, bool) {
+        let [gnss, star, side, drag] = &running.watches;
+        for (watch, device) in [(gnss, Contradiction::Gnss), (star, Contradiction::Star)] {
+            if time - watch.at > RECOVERY {
+                continue;
+            }
+            if watch.agreed < RUN {
+                return (device, false);
+            }
+            if watch.refused > 0 || watch.is_surprised() {
+                return (device, true);
+            }
+        }
+        let sensors = [Contradiction::Gyroscope, Contradiction::Accelerometer];
+        let [by_drag, by_wind, by_bias] = IMPLAUSIBLE;
+        for (i, sensor) in sensors.into_iter().enumerate() {
+            let largest = by_bias * self.errors[i].instability.max(filter::LEAST_BIASES[i]);
+            if running.is_blind()[i] || running.biases[i].amax() > largest {
+                return (sensor, false);
+            }
+        }
+        let settings = &self.settings;
+        let wind = running.wind[0].abs().max(running.wind[1].abs());
+        if side.is_surprised() || wind > by_wind * settings.wind.deviation {
+            return (Contradiction::Side, false);
+        }
+        if drag.is_surprised() || running.drag.abs() > by_drag * settings.drag.model {
+            return (Contradiction::Drag, false);
+        }
+        let recovers = time - running.restarted < RECOVERY;
+        (if recovers { Contradiction::Gnss } else { Contradiction::None }, recovers)
+    }
+}
+
+/// Widens the deviations of states, with their correlations.
+fn widen(covariance: &mut Covariance, states: Range<usize>) {
+    for i in states {
+        covariance.row_mut(i).scale_mut(GROWTH);
+        covariance.column_mut(i).scale_mut(GROWTH);
+    }
+}
