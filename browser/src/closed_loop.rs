@@ -64,7 +64,7 @@ impl ClosedLoop {
             let wrong = |text: String| problem(&from, &text);
             let from = Written::new(&from, &parts).map_err(wrong)?;
             let to = Written::new(&to, &parts).map_err(wrong)?;
-            let connected = connect(&from, &to);
+            let connected = connect(&from, &to, None);
             wires.extend(connected.map_err(|(Fault::From(text) | Fault::To(text))| wrong(text))?);
         }
 

@@ -73,7 +73,8 @@ fn variable((reference, variable): (u32, &exported::Variable)) -> Variable {
         Exported::Real { unit, min, max, start, .. } => {
             written = start.map(|start| start.to_string());
             let (unit, min, max) = (unit.as_ref().map(|unit| unit.name.clone()), *min, *max);
-            VariableKind::Real { unit, min, max, display_unit: None, nominal: None }
+            let (display_unit, nominal, is_relative) = (None, None, false);
+            VariableKind::Real { unit, min, max, display_unit, nominal, is_relative }
         }
         Exported::Integer { min, max, .. } => VariableKind::Integer { min: *min, max: *max },
         Exported::Boolean { .. } => VariableKind::Boolean,

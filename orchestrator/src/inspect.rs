@@ -6,6 +6,7 @@ use cosim::error::Error;
 use cosim::experiment::Process;
 use fmi_master::description::{Interface, ModelDescription, ScalarType, Variable, VariableKind};
 use fmi_master::instance::CallFailure;
+use fmi_master::quantity::UnitDefinition;
 use fmu_import::description::CAUSALITIES;
 use fmu_import::fmu::Fmu;
 use fmu_import::isolation::{self, Closed, Closing, Ended};
@@ -190,7 +191,8 @@ fn facts(description: &ModelDescription, variable: &Variable) -> String {
             let unit = unit.as_deref().unwrap_or_default();
             let display = display_unit.as_deref().filter(|display| *display != unit);
             let converted = display.and_then(|display| {
-                Some(format!("{} {display}", shown(description, Some(unit), display, &start)?))
+                let units = description.units_of(&variable.kind);
+                Some(format!("{} {display}", shown(&units, unit, display, &start)?))
             });
             let own = format!("{start} {unit}").trim().to_string();
             start = match (converted, display) {
@@ -214,13 +216,8 @@ fn facts(description: &ModelDescription, variable: &Variable) -> String {
 }
 
 /// Converts a start value to its display unit, rounded to the digits that people read.
-fn shown(
-    description: &ModelDescription,
-    unit: Option<&str>,
-    display: &str,
-    start: &str,
-) -> Option<f64> {
-    let unit = description.units.iter().find(|u| Some(u.name.as_str()) == unit)?;
+fn shown(units: &[UnitDefinition], unit: &str, display: &str, start: &str) -> Option<f64> {
+    let unit = units.iter().find(|defined| defined.name == unit)?;
     let (_, factor, offset) = unit.displays.iter().find(|(name, ..)| name == display)?;
     let value = factor * start.parse::<f64>().ok()? + offset;
     format!("{value:.6}").parse().ok()

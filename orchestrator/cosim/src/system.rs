@@ -72,12 +72,12 @@ impl CheckedComponent {
     /// with an offset stay as they are.
     pub(crate) fn display(&self, variable: usize) -> (f64, String) {
         let description = &self.fmu.description;
-        let VariableKind::Real { unit: Some(unit), display_unit, .. } =
-            &description.variables[variable].kind
-        else {
+        let kind = &description.variables[variable].kind;
+        let VariableKind::Real { unit: Some(unit), display_unit, .. } = kind else {
             return (1.0, String::new());
         };
-        let defined = description.units.iter().find(|defined| defined.name == *unit);
+        let units = description.units_of(kind);
+        let defined = units.iter().find(|defined| defined.name == *unit);
         let shown = defined.and_then(|defined| {
             let display = display_unit.as_deref()?;
             let (_, factor, _) = defined.displays.iter().find(|d| d.0 == display && d.2 == 0.0)?;

@@ -57,11 +57,11 @@ impl System {
     /// # Errors
     /// Returns an error if the text is no number with a unit that fits.
     pub fn number(&self, target: Target, text: &str) -> Result<f64, String> {
-        let VariableKind::Real { unit, .. } = &self.variable(target).kind else {
+        let kind @ VariableKind::Real { unit, .. } = &self.variable(target).kind else {
             return Err(format!("\"{text}\" is no number"));
         };
         let description = &self.components[target.component].fmu.description;
-        quantity::convert(text, unit.as_deref(), &description.units)
+        quantity::convert(text, unit.as_deref(), &description.units_of(kind))
     }
 
     /// Returns the texts that are set, which may name files.

@@ -73,21 +73,23 @@ pub(crate) fn wires(experiment: &Experiment, parts: &[Part]) -> Result<Vec<Wire>
     for connection in &experiment.connections {
         let from = Reference::new(&connection.from, parts, experiment)?;
         let to = Reference::new(&connection.to, parts, experiment)?;
-        let connected = connect(&from.written, &to.written).map_err(|fault| match fault {
-            Fault::From(message) => from.refuse(message),
-            Fault::To(message) => to.refuse(message),
-        })?;
+        let connected = connect(&from.written, &to.written, connection.scaling).map_err(
+            |fault| match fault {
+                Fault::From(message) => from.refuse(message),
+                Fault::To(message) => to.refuse(message),
+            },
+        )?;
+        let is_given = connection.scaling.is_some();
         let converts = connected.iter().any(|wire| wire.scaling != Scaling::default());
-        for mut wire in connected {
+        for wire in connected {
             let input = name(wire.to);
-            if wire.scaling != Scaling::default() && !connection.convert_units {
+            if wire.scaling != Scaling::default() && !connection.convert_units && !is_given {
                 return Err(to.refuse(format!(
                     "the units of {} and {input} measure the same quantity on another scale: \
                      write convert_units = true in this connection",
                     name(wire.from)
                 )));
             }
-            wire.scaling = wire.scaling.then(connection.scaling);
             if wire.scaling != Scaling::default() && wire.from.carrier != Carrier::Real {
                 return Err(to.refuse(format!("{input} is no real number: it cannot be scaled")));
             }
@@ -96,8 +98,7 @@ pub(crate) fn wires(experiment: &Experiment, parts: &[Part]) -> Result<Vec<Wire>
             }
             wires.push(wire);
         }
-        // An SSP archive has no such key.
-        if connection.convert_units && !converts && !connection.to.span().is_empty() {
+        if connection.convert_units && !converts {
             warn_once(format!(
                 "{}: convert_units has no effect on the connection to \"{}\", whose units are equal",
                 experiment.source.path.display(),

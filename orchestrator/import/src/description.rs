@@ -3,6 +3,8 @@
 
 mod fmi3;
 
+pub use fmi3::indices;
+
 use crate::xml::Element;
 use fmi_master::description::{
     Array, ByName, DefaultExperiment, Interface, ModelDescription, Place, Variable, VariableKind,
@@ -306,6 +308,10 @@ fn real(typed: &Element, declared: Option<&Element>) -> Result<VariableKind, Str
     Ok(VariableKind::Real {
         unit: text("unit"),
         display_unit: text("displayUnit"),
+        is_relative: matches!(
+            text("relativeQuantity").as_deref().map(str::trim),
+            Some("true" | "1")
+        ),
         min: bound("min")?,
         max: bound("max")?,
         nominal: bound("nominal")?,

@@ -209,6 +209,8 @@ pub enum VariableKind {
         unit: Option<String>,
         /// Unit in which the value is displayed.
         display_unit: Option<String>,
+        /// Whether the value is a difference of two, so that the zero of a unit does not matter.
+        is_relative: bool,
         /// Smallest allowed value, in the variable's unit.
         min: Option<f64>,
         /// Largest allowed value, in the variable's unit.
@@ -249,6 +251,11 @@ impl VariableKind {
             Self::Real { unit, .. } => unit.as_deref(),
             _ => None,
         }
+    }
+
+    /// Returns whether the value is a difference of two.
+    pub fn is_relative(&self) -> bool {
+        matches!(self, Self::Real { is_relative: true, .. })
     }
 
     /// Returns the items of an enumeration; none for other types.
@@ -300,21 +307,31 @@ impl ModelDescription {
         self.arrays.get(array).map_or(0..0, |array| array.elements.clone())
     }
 
-    /// Returns the scaling that converts values in a unit of this FMU to values in a unit of
-    /// another.
+    /// Returns the units of a variable of this kind. FMI ignores their offsets for a difference.
+    pub fn units_of(&self, kind: &VariableKind) -> Cow<'_, [UnitDefinition]> {
+        if kind.is_relative() {
+            return self.units.iter().map(UnitDefinition::of_differences).collect();
+        }
+        Cow::Borrowed(&self.units)
+    }
+
+    /// Returns the scaling that converts values of a variable of this kind to values of a variable
+    /// of another FMU.
     ///
     /// # Errors
     /// Returns an error that says how the units differ, if they do not measure the same quantity.
     pub fn conversion(
         &self,
-        unit: Option<&str>,
+        kind: &VariableKind,
         to: &Self,
-        to_unit: Option<&str>,
+        to_kind: &VariableKind,
     ) -> Result<Scaling, String> {
+        let (unit, to_unit) = (kind.unit(), to_kind.unit());
+        let to_units = to.units_of(to_kind);
         if self.is_lookup_table {
-            quantity::named(unit, to_unit, &to.units)
+            quantity::named(unit, to_unit, &to_units)
         } else {
-            quantity::conversion(unit, &self.units, to_unit, &to.units)
+            quantity::conversion(unit, &self.units_of(kind), to_unit, &to_units)
         }
     }
 

@@ -18,6 +18,15 @@ pub struct UnitDefinition {
     pub displays: Vec<(String, f64, f64)>,
 }
 
+impl UnitDefinition {
+    /// Returns the unit as differences of two values have it, which have no offset.
+    #[must_use]
+    pub fn of_differences(&self) -> Self {
+        let displays = self.displays.iter().map(|(name, factor, _)| (name.clone(), *factor, 0.0));
+        Self { offset: 0.0, displays: displays.collect(), ..self.clone() }
+    }
+}
+
 /// Converts a text such as `"2 deg/s2"` to a value in the unit `target`. A bare `"2"` is already in
 /// that unit.
 ///

@@ -116,7 +116,8 @@ pub fn value(written: &Value, variable: &Variable, part: Part) -> Result<Setting
                 Value::Float(value) => *value,
                 Value::Integer(value) => *value as f64,
                 Value::String(text) => {
-                    quantity::convert(text, unit.as_deref(), &part.description.units)?
+                    let units = part.description.units_of(&variable.kind);
+                    quantity::convert(text, unit.as_deref(), &units)?
                 }
                 _ => return mismatch("a number, or a text with a number and a unit"),
             };

@@ -142,11 +142,12 @@ pub enum Fault {
 
 /// Connects outputs with inputs, and determines how values are converted by their units. An output
 /// behind a prefix is connected with the input of the same name behind the other prefix, if there
-/// is one. An array is connected with an array of the same shape, element by element.
+/// is one. An array is connected with an array of the same shape, element by element. If `scaling`
+/// is given, it takes the place of the conversion of units.
 ///
 /// # Errors
 /// Says which name does not exist or has a wrong causality, or which types or units do not match.
-pub fn connect(from: &Written, to: &Written) -> Result<Vec<Wire>, Fault> {
+pub fn connect(from: &Written, to: &Written, scaling: Option<Scaling>) -> Result<Vec<Wire>, Fault> {
     let pairs = match (from.prefix(), to.prefix()) {
         (None, None) => elements(from, to)?,
         (Some(from_prefix), Some(to_prefix)) => expand(from, from_prefix, to, to_prefix)?,
@@ -161,7 +162,8 @@ pub fn connect(from: &Written, to: &Written) -> Result<Vec<Wire>, Fault> {
         let start = from.port(&output, "output").map_err(Fault::From)?;
         let end = to.port(&input, "input").map_err(Fault::To)?;
         let names = format!("\"{}.{output}\" and \"{}.{input}\"", from.part.name, to.part.name);
-        let scaling = conversion(from.part.description, start, to.part.description, end, &names);
+        let parts = (from.part.description, to.part.description);
+        let scaling = conversion(parts, (start, end), &names, scaling);
         Ok(Wire { from: start, to: end, scaling: scaling.map_err(Fault::To)? })
     };
     pairs.into_iter().map(wire).collect()
@@ -229,15 +231,14 @@ fn expand(
 
 /// Determines how values of the output are converted to values of the input, by their units.
 fn conversion(
-    from: &ModelDescription,
-    output: Port,
-    to: &ModelDescription,
-    input: Port,
+    (from, to): (&ModelDescription, &ModelDescription),
+    (output, input): (Port, Port),
     names: &str,
+    given: Option<Scaling>,
 ) -> Result<Scaling, String> {
     match (&from.variables[output.variable].kind, &to.variables[input.variable].kind) {
-        (VariableKind::Real { unit: a, .. }, VariableKind::Real { unit: b, .. }) => from
-            .conversion(a.as_deref(), to, b.as_deref())
+        (a @ VariableKind::Real { .. }, b @ VariableKind::Real { .. }) => given
+            .map_or_else(|| from.conversion(a, to, b), Ok)
             .map_err(|difference| format!("the units of {names} do not match: {difference}")),
         (VariableKind::Enumeration { items: a }, VariableKind::Enumeration { items: b })
             if a != b =>

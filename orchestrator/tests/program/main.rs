@@ -21,5 +21,6 @@ mod sense;
 mod table;
 mod timing;
 mod together;
+mod units;
 mod usage;
 mod verdicts;

@@ -159,10 +159,10 @@ pub struct Connection {
     /// is refused.
     #[serde(default)]
     pub convert_units: bool,
-    /// Scaling that is applied after the conversion of units. This is not a key of an experiment
-    /// file.
+    /// Scaling in place of the conversion of units, as an SSP archive gives it. This is not a key of
+    /// an experiment file.
     #[serde(skip)]
-    pub scaling: Scaling,
+    pub scaling: Option<Scaling>,
 }
 
 /// Variables that are written to the results.

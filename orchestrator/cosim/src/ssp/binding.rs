@@ -8,6 +8,7 @@ use fmu_import::description;
 use fmu_import::xml::{self, Element};
 use percent_encoding::percent_decode_str;
 use std::path::Path;
+use std::rc::Rc;
 
 /// A value that an archive gives to a variable.
 #[derive(Debug)]
@@ -22,14 +23,14 @@ pub(super) struct Given {
     pub(super) file: String,
 }
 
-/// Collects the values that are bound to a component or a system, in their order, and the units
-/// that their sets define.
+/// Collects the values that are bound to a component or a system, in their order. The units of the
+/// archive hold beside those that a set defines.
 pub(super) fn read(
     element: &Element,
     owner: &str,
     folder: &Path,
     values: &mut Vec<Given>,
-    units: &mut Vec<UnitDefinition>,
+    units: &[UnitDefinition],
 ) -> Result<(), String> {
     for binding in element.list("ParameterBindings", "ParameterBinding") {
         let prefix = binding.attribute("prefix").unwrap_or_default();
@@ -40,9 +41,8 @@ pub(super) fn read(
         let (set, file) = content(binding, "ParameterValues", "ParameterSet", folder)
             .and_then(|set| set.ok_or_else(|| "there is a ParameterBinding without values".into()))
             .map_err(of_owner)?;
-        for unit in set.list("Units", "Unit") {
-            units.push(description::unit(unit)?);
-        }
+        let own = set.list("Units", "Unit").map(description::unit);
+        let units = own.chain(units.iter().cloned().map(Ok)).collect::<Result<Rc<_>, _>>()?;
         let mapping = match binding.child("ParameterMapping") {
             None => None,
             Some(mapping) => content(mapping, "ParameterMapping", "ParameterMapping", folder)
@@ -53,7 +53,7 @@ pub(super) fn read(
         for parameter in set.list("Parameters", "Parameter") {
             let source = format!("{prefix}{}", parameter.required("name")?);
             let mut give = |name: &str, passage| -> Result<(), String> {
-                let quantity = Quantity::read(parameter).map_err(of_owner)?;
+                let quantity = Quantity::read(parameter, &units).map_err(of_owner)?;
                 let (owner, name, file) = (owner.to_string(), name.to_string(), file.clone());
                 values.push(Given { owner, name, quantity, passage, file });
                 Ok(())

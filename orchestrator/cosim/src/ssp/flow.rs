@@ -2,13 +2,14 @@
 //! the FMUs.
 
 use super::binding::Given;
-use super::structure::{Link, Node, Structure};
-use super::value::{Passage, Quantity};
+use super::structure::{Connector, Link, Node, Structure};
+use super::value::{Passage, Quantity, Unit};
 use crate::experiment::Connection;
 use fmi_master::description::{Variable, VariableKind};
 use fmi_master::names;
-use fmi_master::quantity::{Scaling, UnitDefinition};
+use fmi_master::quantity::Scaling;
 use fmi_master::wiring::Part;
+use fmu_import::description::indices;
 use fmu_import::warnings::warn_once;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -26,7 +27,7 @@ pub(super) struct Resolved {
 
 /// A connection with the connector that gives the value, without the one that it ends at.
 struct Edge<'a> {
-    start: &'a Node,
+    start: Node,
     passage: &'a Passage,
 }
 
@@ -34,7 +35,7 @@ struct Edge<'a> {
 struct Flow<'a> {
     structure: &'a Structure,
     parts: &'a [Part<'a>],
-    edges: BTreeMap<&'a Node, Edge<'a>>,
+    edges: BTreeMap<Node, Edge<'a>>,
     values: BTreeMap<Node, Quantity>,
 }
 
@@ -56,7 +57,7 @@ pub(super) fn resolve(
 
     let parameters = vec![BTreeMap::new(); parts.len()];
     let mut resolved = Resolved { connections: Vec::new(), parameters };
-    let ends: BTreeSet<&Node> = flow.edges.keys().copied().chain(flow.values.keys()).collect();
+    let ends: BTreeSet<&Node> = flow.edges.keys().chain(flow.values.keys()).collect();
     for end in ends {
         let Some(component) = structure.component_of(end) else { continue };
         let way = flow.way(end)?;
@@ -76,20 +77,47 @@ impl<'a> Flow<'a> {
         self.parts[component].description.find(&node.1).map(|(_, variable)| variable)
     }
 
-    fn unit(&self, node: &Node) -> Option<&'a str> {
-        match self.variable(node) {
-            Some(Variable { kind: VariableKind::Real { unit, .. }, .. }) => unit.as_deref(),
-            Some(_) => None,
-            None => self.structure.connectors.get(node)?.unit.as_deref(),
-        }
+    /// Returns a connector, or the array to which an element belongs.
+    fn connector(&self, node: &Node) -> Option<&'a Connector> {
+        let array = || (node.0.clone(), node.1.split('[').next().unwrap_or_default().to_string());
+        let connectors = &self.structure.connectors;
+        connectors.get(node).or_else(|| connectors.get(&array()))
     }
 
-    /// Returns the units for values at a node. Those of an FMU have precedence over those of the
-    /// archive.
-    fn units(&self, node: &Node) -> Vec<UnitDefinition> {
-        let component = self.structure.component_of(node);
-        let own = component.map_or(&[][..], |index| &self.parts[index].description.units);
-        own.iter().chain(&self.structure.units).cloned().collect()
+    /// Returns the unit that a component's FMU gives its variable.
+    fn unit_of_variable(&self, node: &Node) -> Option<Unit> {
+        let kind = &self.variable(node)?.kind;
+        let description = self.parts[self.structure.component_of(node)?].description;
+        let unit = Unit {
+            name: kind.unit()?.to_string(),
+            units: description.units.as_slice().into(),
+            is_relative: false,
+        };
+        Some(unit.relative(kind.is_relative()))
+    }
+
+    /// Returns the unit of the values at a node: that of its connector, otherwise that of its
+    /// variable, and for a system that of the connectors inside which it is connected to, if they
+    /// have one in common.
+    fn unit(&self, node: &Node) -> Option<Unit> {
+        let is_relative = self.variable(node).is_some_and(|variable| variable.kind.is_relative());
+        let declared = self.connector(node).and_then(|connector| connector.unit.clone());
+        let declared = declared.map(|unit| unit.relative(is_relative));
+        let declared = declared.or_else(|| self.unit_of_variable(node));
+        if declared.is_some() || self.structure.component_of(node).is_some() {
+            return declared;
+        }
+        let links = self.structure.links.iter().filter(|link| link.system == node.0);
+        let others = links.filter_map(|link| match (&link.start, &link.end) {
+            (start, end) if start == node => Some(end),
+            (start, end) if end == node => Some(start),
+            _ => None,
+        });
+        let inside = others.filter(|other| other.0 != node.0);
+        let units: Vec<Unit> = inside.filter_map(|other| self.unit(other)).collect();
+        let is_same =
+            |unit: &Unit| Unit::scaling(units.first(), Some(unit)) == Ok(Scaling::default());
+        units.iter().all(is_same).then(|| units.first().cloned()).flatten()
     }
 
     /// Returns whether a value comes into the connection at this connector of it, and `None` if
@@ -97,7 +125,7 @@ impl<'a> Flow<'a> {
     fn gives(&self, node: &Node, link: &Link) -> Option<bool> {
         let kind = match self.variable(node) {
             Some(variable) => &*variable.causality,
-            None => self.structure.connectors.get(node)?.kind.as_str(),
+            None => self.connector(node)?.kind.as_str(),
         };
         let from_outside = match kind {
             "input" | "parameter" => true,
@@ -109,17 +137,45 @@ impl<'a> Flow<'a> {
 
     fn connect(&mut self) -> Result<(), String> {
         for link in &self.structure.links {
-            let sides = (self.gives(&link.start, link), self.gives(&link.end, link));
-            let is_reversed =
-                matches!(sides, (Some(false), Some(true) | None) | (None, Some(true)));
-            let (start, end) =
-                if is_reversed { (&link.end, &link.start) } else { (&link.start, &link.end) };
-            let edge = Edge { start, passage: &link.passage };
-            if self.edges.insert(end, edge).is_some() {
-                return Err(format!("{} is connected twice", dotted(end)));
+            for (start, end) in self.pairs(link) {
+                let sides = (self.gives(&start, link), self.gives(&end, link));
+                let is_reversed =
+                    matches!(sides, (Some(false), Some(true) | None) | (None, Some(true)));
+                let (start, end) = if is_reversed { (end, start) } else { (start, end) };
+                let name = dotted(&end);
+                if self.edges.insert(end, Edge { start, passage: &link.passage }).is_some() {
+                    return Err(format!("{name} is connected twice"));
+                }
             }
         }
         Ok(())
+    }
+
+    /// Returns the ends of a connection, of arrays element by element.
+    fn pairs(&self, link: &Link) -> Vec<(Node, Node)> {
+        let [start, end] = [&link.start, &link.end];
+        let named = |node: &Node, indices: &str| (node.0.clone(), format!("{}{indices}", node.1));
+        match (self.indices(start), self.indices(end)) {
+            (Some(indices), other) | (other @ None, Some(indices))
+                if other.as_ref().is_none_or(|other| *other == indices) =>
+            {
+                indices.iter().map(|each| (named(start, each), named(end, each))).collect()
+            }
+            _ => vec![(start.clone(), end.clone())],
+        }
+    }
+
+    /// Returns the indices of the elements of an array, such as `[1,2]`.
+    fn indices(&self, node: &Node) -> Option<Vec<String>> {
+        if let Some(component) = self.structure.component_of(node) {
+            let description = self.parts[component].description;
+            let elements = &description.variables[description.elements(&node.1)];
+            let indices = elements.iter().map(|element| element.name[node.1.len()..].to_string());
+            return Some(indices.collect()).filter(|indices: &Vec<_>| !indices.is_empty());
+        }
+        let shape = &self.structure.connectors.get(node)?.shape;
+        let count = shape.iter().product();
+        (!shape.is_empty()).then(|| (0..count).map(|number| indices(number, shape)).collect())
     }
 
     /// Gives the values to the variables and connectors of their names.
@@ -135,10 +191,9 @@ impl<'a> Flow<'a> {
                 names.push(format!("{name}{}", near.unwrap_or_default()));
             }
             for node in nodes {
-                let (unit, units) = (self.unit(&node), self.units(&node));
                 let quantity = given
                     .passage
-                    .apply(given.quantity.clone(), unit, &units)
+                    .apply(given.quantity.clone(), self.unit(&node))
                     .map_err(|fault| format!("\"{}\": {fault}", dotted(&node)))?;
                 self.values.insert(node, quantity);
             }
@@ -171,8 +226,13 @@ impl<'a> Flow<'a> {
             let node = (component.name.clone(), rest.to_string());
             self.variable(&node).map(|_| node)
         });
-        let connectors = self.structure.connectors.keys().filter(|node| dotted(node) == name);
-        variables.chain(connectors.cloned()).collect()
+        variables.chain(self.of_systems().filter(|node| dotted(node) == name).cloned()).collect()
+    }
+
+    /// Returns the connectors of systems.
+    fn of_systems(&self) -> impl Iterator<Item = &'a Node> {
+        let structure = self.structure;
+        structure.connectors.keys().filter(|node| structure.component_of(node).is_none())
     }
 
     fn nearest(&self, given: &Given) -> Option<String> {
@@ -183,7 +243,7 @@ impl<'a> Flow<'a> {
             let variables = kinds.flat_map(|kind| part.description.names(kind));
             variables.map(|name| dotted(&(part.name.to_string(), name.to_string())))
         });
-        let connectors = self.structure.connectors.keys().filter(|_| own.is_none()).map(dotted);
+        let connectors = self.of_systems().filter(|_| own.is_none()).map(dotted);
         let all: Vec<String> = all.chain(connectors).collect();
         let wrong = dotted(&(given.owner.clone(), given.name.clone()));
         names::nearest(&wrong, all.iter().map(String::as_str)).map(String::from)
@@ -194,8 +254,8 @@ impl<'a> Flow<'a> {
     fn way<'b>(&'b self, end: &'b Node) -> Result<Vec<&'b Node>, String> {
         let mut way = vec![end];
         while let Some(edge) = self.edges.get(way[way.len() - 1]) {
-            way.push(edge.start);
-            if self.structure.component_of(edge.start).is_some() {
+            way.push(&edge.start);
+            if self.structure.component_of(&edge.start).is_some() {
                 break;
             }
             if way.len() > self.edges.len() + 1 {
@@ -206,17 +266,24 @@ impl<'a> Flow<'a> {
     }
 
     fn connection(&self, way: &[&Node]) -> Result<Connection, String> {
-        let (mut scaling, mut converts) = (Scaling::default(), true);
+        let (start, last) = (way[way.len() - 1], way[0]);
+        let of_connection =
+            |end: &Node, fault| format!("the connection to {} {fault}", dotted(end));
+        let mut unit = self.unit(start);
+        let between = |from: Option<Unit>, to: Option<&Unit>| {
+            Unit::scaling(from.as_ref(), to).map_err(|fault| of_connection(last, fault))
+        };
+        let mut scaling = between(self.unit_of_variable(start), unit.as_ref())?;
         for end in way[..way.len() - 1].iter().rev() {
-            let passage = self.edges[*end].passage;
-            let own = passage.scaling();
-            let own = own.map_err(|fault| format!("the connection to {} {fault}", dotted(end)))?;
-            scaling = scaling.then(own);
-            converts &= passage.converts;
+            let next = self.unit(end);
+            let own = self.edges[*end].passage.scaling(unit.as_ref(), next.as_ref());
+            scaling = scaling.then(own.map_err(|fault| of_connection(end, fault))?);
+            unit = next.or(unit);
         }
+        scaling = scaling.then(between(unit, self.unit_of_variable(last).as_ref())?);
         let name = |node: &Node| Spanned::new(0..0, format!("{}.{}", node.0, node.1));
-        let from = name(way[way.len() - 1]);
-        Ok(Connection { from, to: name(way[0]), convert_units: converts, scaling })
+        let (from, to, scaling) = (name(start), name(last), Some(scaling));
+        Ok(Connection { from, to, convert_units: false, scaling })
     }
 
     /// Returns the value that comes to the beginning of a way, if one is known. The value of the
@@ -229,9 +296,12 @@ impl<'a> Flow<'a> {
         for end in way[..first].iter().rev() {
             let passage = self.edges[*end].passage;
             quantity = passage
-                .apply(quantity, self.unit(end), &self.units(end))
+                .apply(quantity, self.unit(end))
                 .map_err(|fault| format!("\"{}\": {fault}", dotted(end)))?;
         }
+        quantity = quantity
+            .converted(self.unit_of_variable(way[0]))
+            .map_err(|fault| format!("\"{}\": {fault}", dotted(way[0])))?;
         // Enumerations may be written as their numbers.
         let kind = self.variable(way[0]).map(|variable| &variable.kind);
         if let (Some(VariableKind::Enumeration { items }), Value::Integer(number)) =

@@ -3,13 +3,14 @@
 
 use super::FMU;
 use super::binding::{self, Given};
-use super::value::Passage;
+use super::value::{Passage, Unit};
 use crate::experiment::Interface;
 use fmi_master::quantity::UnitDefinition;
 use fmu_import::description;
 use fmu_import::xml::Element;
 use std::collections::BTreeMap;
 use std::path::Path;
+use std::rc::Rc;
 
 /// A component of the system or of one of its subsystems.
 pub(super) struct SystemComponent {
@@ -24,11 +25,13 @@ pub(super) struct SystemComponent {
 /// The name of the outermost system is empty.
 pub(super) type Node = (String, String);
 
-/// A connector of a system.
+/// A connector of a system or of a component.
 pub(super) struct Connector {
     /// Kind of the connector: `input`, `parameter`, `output`, ….
     pub(super) kind: String,
-    pub(super) unit: Option<String>,
+    pub(super) unit: Option<Unit>,
+    /// Number of elements along each dimension.
+    pub(super) shape: Vec<usize>,
 }
 
 /// A connection as the archive writes it. Which of its ends gives the value follows from the kinds
@@ -50,8 +53,8 @@ pub(super) struct Structure {
     /// Values of parameters. Later ones have precedence: those of a system come after those of its
     /// elements, and each binding comes after the bindings before it.
     pub(super) values: Vec<Given>,
-    /// Units of measure that the archive defines.
-    pub(super) units: Vec<UnitDefinition>,
+    /// Units of measure that the structure defines.
+    units: Rc<[UnitDefinition]>,
 }
 
 impl Structure {
@@ -60,9 +63,8 @@ impl Structure {
             return Err(format!("is a {}, not a SystemStructureDescription", root.name));
         }
         let mut structure = Self::default();
-        for unit in root.list("Units", "Unit") {
-            structure.units.push(description::unit(unit)?);
-        }
+        let units = root.list("Units", "Unit").map(description::unit);
+        structure.units = units.collect::<Result<_, _>>()?;
         structure.system(root.child("System").ok_or("has no System")?, "", folder)?;
         if structure.components.is_empty() {
             return Err("has no component that could be run: put FMUs into the system".into());
@@ -82,12 +84,7 @@ impl Structure {
             let name = name.replace('.', "/");
             if path.is_empty() { name } else { format!("{path}/{name}") }
         };
-        for connector in system.list("Connectors", "Connector") {
-            let node = (path.to_string(), connector.required("name")?.to_string());
-            let kind = connector.required("kind")?.to_string();
-            let unit = connector.children.iter().find_map(|typed| typed.attribute("unit"));
-            self.connectors.insert(node, Connector { kind, unit: unit.map(String::from) });
-        }
+        self.connectors(system, path)?;
         for element in system.child("Elements").map(|e| e.children.as_slice()).unwrap_or_default() {
             let name = inside(element.required("name")?);
             match element.name.as_str() {
@@ -108,23 +105,41 @@ impl Structure {
             }
         }
         for connection in system.list("Connections", "Connection") {
-            let node = |element: &str, connector: &str| {
+            let node = |side: &str| {
                 // Some tools name the system itself by an empty text.
-                let owner = connection.attribute(element).filter(|name| !name.is_empty());
-                let owner = owner.map(inside);
-                Ok::<_, String>((
-                    owner.unwrap_or_else(|| path.to_string()),
-                    connection.required(connector)?.to_string(),
-                ))
+                let owner = connection.attribute(&format!("{side}Element"));
+                let owner = owner.filter(|name| !name.is_empty()).map(inside);
+                let mut name = connection.required(&format!("{side}Connector"))?.to_string();
+                if let Some(indices) = connection.attribute(&format!("{side}Indices")) {
+                    let indices: Vec<&str> = indices.split_whitespace().collect();
+                    name = format!("{name}[{}]", indices.join(","));
+                }
+                Ok::<_, String>((owner.unwrap_or_else(|| path.to_string()), name))
             };
             self.links.push(Link {
                 system: path.to_string(),
-                start: node("startElement", "startConnector")?,
-                end: node("endElement", "endConnector")?,
+                start: node("start")?,
+                end: node("end")?,
                 passage: Passage::read(connection)?,
             });
         }
-        binding::read(system, path, folder, &mut self.values, &mut self.units)
+        binding::read(system, path, folder, &mut self.values, &self.units)
+    }
+
+    /// Adds the connectors of a system or a component.
+    fn connectors(&mut self, element: &Element, owner: &str) -> Result<(), String> {
+        for connector in element.list("Connectors", "Connector") {
+            let node = (owner.to_string(), connector.required("name")?.to_string());
+            let kind = connector.required("kind")?.to_string();
+            let unit = connector.children.iter().find_map(|typed| typed.attribute("unit"));
+            let (name, units) = (unit.map(String::from), Rc::clone(&self.units));
+            let unit = name.map(|name| Unit { name, units, is_relative: false });
+            let dimensions = connector.children.iter().filter(|child| child.name == "Dimension");
+            let sizes = dimensions.map(|child| child.parsed("size", "a number of elements"));
+            let shape = sizes.filter_map(Result::transpose).collect::<Result<_, _>>()?;
+            self.connectors.insert(node, Connector { kind, unit, shape });
+        }
+        Ok(())
     }
 
     fn component(&mut self, element: &Element, name: String, folder: &Path) -> Result<(), String> {
@@ -150,7 +165,8 @@ impl Structure {
         if self.components.iter().any(|other| other.name == name) {
             return refuse("is defined twice".into());
         }
-        binding::read(element, &name, folder, &mut self.values, &mut self.units)?;
+        self.connectors(element, &name)?;
+        binding::read(element, &name, folder, &mut self.values, &self.units)?;
         self.components.push(SystemComponent { name, source, interface });
         Ok(())
     }

@@ -2,13 +2,46 @@
 
 use fmi_master::quantity::{self, Scaling, UnitDefinition};
 use fmu_import::xml::Element;
+use std::rc::Rc;
 use toml::Value;
 
+/// A unit by its name, with the units among which it is defined.
+#[derive(Clone, Debug)]
+pub(super) struct Unit {
+    pub(super) name: String,
+    pub(super) units: Rc<[UnitDefinition]>,
+    /// Whether the values are differences, whose units have no offset.
+    pub(super) is_relative: bool,
+}
+
+impl Unit {
+    /// Returns the unit for differences, if they are some.
+    pub(super) fn relative(self, is_relative: bool) -> Self {
+        if !is_relative {
+            return self;
+        }
+        let units = self.units.iter().map(UnitDefinition::of_differences).collect();
+        Self { units, is_relative, ..self }
+    }
+
+    /// Returns the scaling to another unit. One that is defined nowhere may be a display unit of
+    /// the other. Without one of the two, values stay as they are.
+    pub(super) fn scaling(from: Option<&Self>, to: Option<&Self>) -> Result<Scaling, String> {
+        let (Some(from), Some(to)) = (from, to) else { return Ok(Scaling::default()) };
+        let (name, target) = (Some(from.name.as_str()), Some(to.name.as_str()));
+        if from.units.iter().any(|unit| unit.name == from.name) {
+            quantity::conversion(name, &from.units, target, &to.units)
+        } else {
+            quantity::named(name, target, &to.units)
+        }
+    }
+}
+
 /// A value with its unit, if it has one.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub(super) struct Quantity {
     pub(super) value: Value,
-    pub(super) unit: Option<String>,
+    pub(super) unit: Option<Unit>,
 }
 
 /// Reads a value of one of the types of SSP.
@@ -37,8 +70,8 @@ fn typed(kind: &str, text: &str) -> Result<Value, String> {
 }
 
 impl Quantity {
-    /// Reads the value of a parameter of a parameter set.
-    pub(super) fn read(parameter: &Element) -> Result<Self, String> {
+    /// Reads the value of a parameter of a parameter set, for which these units are defined.
+    pub(super) fn read(parameter: &Element, units: &Rc<[UnitDefinition]>) -> Result<Self, String> {
         let name = parameter.required("name")?;
         let fault = |message: String| format!("the parameter \"{name}\": {message}");
         let is_value = |child: &&Element| !matches!(&*child.name, "Annotations" | "Dimension");
@@ -47,18 +80,28 @@ impl Quantity {
         let value = typed(&element.name, element.required("value")?).map_err(fault)?;
         // Some tools write units in brackets, which belong to no definition.
         let bare = |unit: &str| Some(unit.strip_prefix('[')?.strip_suffix(']')?.to_string());
-        let unit = element.attribute("unit").map(|unit| bare(unit).unwrap_or_else(|| unit.into()));
+        let unit = element.attribute("unit").map(|unit| Unit {
+            name: bare(unit).unwrap_or_else(|| unit.into()),
+            units: Rc::clone(units),
+            is_relative: false,
+        });
         Ok(Self { value, unit })
     }
 
-    /// Returns the value in this unit. A value without a unit is in that unit already.
-    fn converted(mut self, unit: Option<&str>, units: &[UnitDefinition]) -> Result<Self, String> {
-        let Some(unit) = unit else { return Ok(self) };
-        if let (Value::Float(number), Some(from)) = (&self.value, &self.unit) {
-            let text = format!("{number:?} {from}");
-            self.value = Value::Float(quantity::convert(&text, Some(unit), units)?);
+    /// Returns the value in this unit. A value without a unit is in that unit already, and without
+    /// a unit there it keeps its own.
+    pub(super) fn converted(mut self, unit: Option<Unit>) -> Result<Self, String> {
+        let is_relative = unit.as_ref().is_some_and(|unit| unit.is_relative);
+        let own = self.unit.map(|own| own.relative(is_relative));
+        let scaling = Unit::scaling(own.as_ref(), unit.as_ref())?;
+        match self.value {
+            Value::Float(number) => self.value = Value::Float(scaling.apply(number)),
+            Value::Integer(number) if scaling != Scaling::default() => {
+                self.value = Value::Float(scaling.apply(number as f64));
+            }
+            _ => {}
         }
-        self.unit = Some(unit.to_string());
+        self.unit = unit.or(own);
         Ok(self)
     }
 }
@@ -121,12 +164,12 @@ impl Transformation {
 }
 
 /// What a connection or a mapping makes of the values that pass it: a conversion of the unit, and
-/// a transformation afterwards.
+/// a transformation afterwards: SSP 1.0.1 and 2.0, `LinearTransformation`.
 #[derive(Clone, Debug)]
 pub(super) struct Passage {
     transformation: Option<Transformation>,
     /// Whether units are converted.
-    pub(super) converts: bool,
+    converts: bool,
 }
 
 impl Passage {
@@ -140,27 +183,27 @@ impl Passage {
         Ok(Self { transformation, converts: suppresses != Some(true) })
     }
 
-    /// Returns the value after the passage, in the unit of the variable or connector where it
-    /// ends. Without a unit there, the value keeps its own.
-    pub(super) fn apply(
-        &self,
-        quantity: Quantity,
-        unit: Option<&str>,
-        units: &[UnitDefinition],
-    ) -> Result<Quantity, String> {
+    /// Returns the value after the passage, in the unit of the variable or connector where it ends.
+    pub(super) fn apply(&self, quantity: Quantity, unit: Option<Unit>) -> Result<Quantity, String> {
         let own = quantity.unit.filter(|_| self.converts);
-        let mut quantity = Quantity { unit: own, ..quantity }.converted(unit, units)?;
+        let mut quantity = Quantity { unit: own, ..quantity }.converted(unit)?;
         if let Some(transformation) = &self.transformation {
             quantity.value = transformation.apply(quantity.value)?;
         }
         Ok(quantity)
     }
 
-    /// Returns the scaling of a passage between two components.
-    pub(super) fn scaling(&self) -> Result<Scaling, String> {
+    /// Returns the scaling of the passage from one unit to another.
+    pub(super) fn scaling(
+        &self,
+        from: Option<&Unit>,
+        to: Option<&Unit>,
+    ) -> Result<Scaling, String> {
+        let units = Unit::scaling(from.filter(|_| self.converts), to)
+            .map_err(|difference| format!("joins units that do not match: {difference}"))?;
         match &self.transformation {
-            None => Ok(Scaling::default()),
-            Some(Transformation::Linear(scaling)) => Ok(*scaling),
+            None => Ok(units),
+            Some(Transformation::Linear(scaling)) => Ok(units.then(*scaling)),
             Some(Transformation::Table(kind, _)) => Err(format!(
                 "has a {kind}MappingTransformation, which is supported for parameters only: let \
                  the FMU that gives the value map it"

@@ -194,7 +194,7 @@ fn starts(element: &Element) -> Vec<String> {
 }
 
 /// Writes the indices of an element, which count from 1; nothing for a scalar.
-fn indices(number: usize, shape: &[usize]) -> String {
+pub fn indices(number: usize, shape: &[usize]) -> String {
     let mut rest = number;
     let mut indices: Vec<String> = Vec::new();
     for size in shape.iter().rev() {

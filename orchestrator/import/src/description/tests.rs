@@ -38,6 +38,7 @@ fn everything_needed_is_read() {
     let real = VariableKind::Real {
         unit: Some("rad".into()),
         display_unit: None,
+        is_relative: false,
         min: None,
         max: Some(2.0),
         nominal: None,

@@ -38,6 +38,7 @@ impl LookupTable {
         let seconds = || VariableKind::Real {
             unit: Some("s".into()),
             display_unit: None,
+            is_relative: false,
             min: Some(-LONGEST),
             max: Some(LONGEST),
             nominal: None,
@@ -104,6 +105,7 @@ impl Form {
             Self::Real(unit) => VariableKind::Real {
                 unit: unit.clone(),
                 display_unit: None,
+                is_relative: false,
                 min: None,
                 max: None,
                 nominal: None,

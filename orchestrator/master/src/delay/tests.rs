@@ -87,6 +87,7 @@ fn with_duration(mut description: ModelDescription, name: &str, unit: &str) -> M
     let kind = VariableKind::Real {
         unit: Some(unit.into()),
         display_unit: None,
+        is_relative: false,
         min: Some(0.0),
         max: None,
         nominal: None,
