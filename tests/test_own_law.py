@@ -68,6 +68,7 @@ def test_it_is_judged_beside_another_law(chromium):
         ("function law() {\n  return [1, 2];\n}", "at 0.00 s it returns [1,2]: three finite numbers are needed"),
         ("const a = 1;", "there is no function named law"),
         ("function law() {\n  while (true);\n}", "a flight takes more than ten seconds"),
+        ("function law() {\n  throw null;\n}", "your law: it throws null"),
     ],
 )
 def test_a_fault_is_told_with_its_line_and_the_page_goes_on(chromium, code, said):
@@ -77,6 +78,29 @@ def test_a_fault_is_told_with_its_line_and_the_page_goes_on(chromium, code, said
     assert said in page.inner_text("#code-says") and said in page.inner_text("#verdict")
     written(page, "function law() { return [0, 0, 0]; }")
     assert page.inner_text("#code-says") == ""
+
+
+def test_a_law_flies_as_it_is_written_whatever_text_flew_before(chromium):
+    page = opened(chromium, "controller=own")
+    flown = "flight.signals[10]"
+    # A text that never returns, and one that spoils what later ones need.
+    written(page, "function law() { while (true); }", wait=False)
+    page.wait_for_function("busy && sent.code.includes('while')")
+    written(page, "const all = Array.isArray; Array.isArray = () => false; function law() { return all([]) ? [1e3, 0, 0] : null; }", wait=False)
+    page.wait_for_function("document.querySelector('#code-says').textContent.includes('three finite numbers')")
+    written(page, "function law() { return [2e3, 0, 0]; }")
+    assert page.evaluate(flown) == 2e3 and page.inner_text("#code-says") == ""
+    count = flights(page)
+    page.select_option("#controller", "lqr")
+    after(page, count)
+    assert page.evaluate("flight.name") == "LQR" and abs(page.evaluate(flown)) != 2e3
+
+
+def test_a_moment_of_any_size_is_scaled_into_its_limit(chromium):
+    page = opened(chromium, "controller=own&controller.saturation=true")
+    written(page, "function law() { return [1e200, 0, -1e200]; }")
+    moment = signals(page)[[f"controller.moment.{axis}" for axis in "xyz"]].to_numpy()[0]
+    np.testing.assert_allclose(moment, np.array([1, 0, -1]) * page.evaluate("flight.summary.limits.moment") / 2**0.5, rtol=1e-12)
 
 
 def test_a_law_of_an_address_is_not_run_unasked(chromium):

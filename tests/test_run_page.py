@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import json
 import os
+import random
 import subprocess
 
 import pandas as pd
@@ -196,6 +197,31 @@ def test_two_runs_side_by_side(runs, opened):
     page.check("#different-only")
     page.uncheck("#set-only")
     assert page.locator("#parameter-table tbody tr:visible").count() > 3
+
+
+def test_a_loss_and_a_peak_of_one_tick_are_seen_in_any_run(runs, tmp_path, opened):
+    """Planted anywhere into a run of 5,001 rows: the words, the strip, the vehicle, and the curves show them."""
+    long = tmp_path / "long"
+    call("run", "crmpc-plan", "--stop", "200", "--quiet", "--out", long, cwd=os.getcwd())
+    table = pd.read_csv(long / "results.csv")
+    draws = random.Random(4)
+    for _ in range(3):
+        lost, peak = draws.sample(range(1, len(table) - 1), 2)
+        planted = table.copy()
+        planted.loc[lost, ["controller.guarantee.inForce", "controller.guarantee.status"]] = [0, 6]
+        planted.loc[peak, "plant.appliedMoment.x"] = 3e5
+        planted.to_csv(long / "results.csv", index=False)
+        call("plot", long, "--out", tmp_path / "page.html", cwd=os.getcwd())
+        page = opened(tmp_path / "page.html")
+        assert page.inner_text("#guarantees") == "guarantee in force for 99.98 % of the time"
+        loss = page.locator("#guarantees i").last
+        assert loss.bounding_box()["width"] == pytest.approx(2, abs=0.1) and "warn" in loss.get_attribute("style")
+        page.fill("#seek", str(table["time"][lost]))
+        assert "guarantee: exceeded" in page.locator("canvas.view").get_attribute("aria-label")
+        data = page.evaluate("JSON.parse(document.getElementById('run-data').textContent)")
+        assert max(data["runs"][0]["vehicle"]["moment"][0]) == 3e5
+        assert max(max(panel["curves"][-1]["values"]) for panel in data["panels"]) >= 300
+        page.close()
 
 
 def test_a_limit_that_is_exceeded_many_times_is_seen(tmp_path, opened):

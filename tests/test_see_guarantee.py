@@ -104,6 +104,26 @@ def test_a_new_visitor_is_shown_around_until_any_touch(chromium):
     assert page.evaluate("time") == stood
 
 
+@pytest.mark.parametrize("wait", [0, 1500])
+def test_nothing_is_said_of_a_flight_before_it_is_flown(chromium, wait):
+    page = chromium.new_context().new_page()
+    page.goto(PAGE.as_uri())
+    after(page, 0)
+    page.wait_for_timeout(wait)
+    # Whatever is shown of an entry from now on is kept.
+    page.evaluate("""() => {
+        window.told = [];
+        new MutationObserver(() => told.push([flight?.isEntry, $("entry").hidden ? "" : $("arrival").textContent, $("proof").hidden]))
+            .observe(document.body, { subtree: true, childList: true, characterData: true, attributes: true });
+    }""")
+    page.click("#fly-entry")
+    page.wait_for_function("flight?.isEntry && !busy && !wanted")
+    told = page.evaluate("told")
+    assert told and all(entry in (None, True) or not arrival for entry, arrival, _ in told[1:])
+    assert {arrival for _, arrival, _ in told} - {""} == {page.inner_text("#arrival")}
+    assert "reaches the terminal area" in page.inner_text("#arrival")
+
+
 def test_the_keyboard_plays_and_back_undoes(chromium):
     page = opened(chromium)
     page.locator("#plan").press("ArrowRight")

@@ -34,13 +34,16 @@ const LOADS = [
 // Ratio up to which a limit counts as met: 1 up to rounding.
 const MET = 1 + 1e-9;
 
-// Longest time that a flight of a law of the page may take, ms.
-const LONGEST = 1e4;
+const packed = Uint8Array.from(atob($("module").textContent.trim()), (letter) => letter.charCodeAt(0));
+const unpacked = new Response(new Blob([packed]).stream().pipeThrough(new DecompressionStream("gzip"))).arrayBuffer();
+const compiled = unpacked.then(WebAssembly.compile);
+// Who flies what is shown, and what it is compared with.
+const pilot = new Pilot(compiled), rival = new Pilot(compiled);
 
-let settings, worker, busy = false, wanted = null, patience = null, overdue = null;
+let settings, busy = false;
 let flight = null;
-// The request that is being flown, and what is to be said of an address once it is.
-let sent = null, remark = null;
+// What is asked for and not yet flown, what is being flown, and what is to be said of an address once it is.
+let wanted = null, sent = null, remark = null;
 // When the first flight was drawn, ms after the page was opened.
 let first = null;
 let time = 26;
@@ -52,8 +55,8 @@ const charts = Object.fromEntries(Object.keys(PANELS).map((id) => [id, new Chart
 let proof = null;
 const player = new Player((at) => point(at));
 const entry = new EntryPictures($("entry"), (at) => point(at));
-// The flight of another law under the same disturbance, and the request that it answers.
-let ghost = null, ghostRequest = null;
+// The flight of another law under the same disturbance: { text, shown }, with what was asked for as a text.
+let ghost = null;
 
 // --- The flight -----------------------------------------------------------------------------------------------------
 
@@ -63,50 +66,41 @@ function fly() {
     $("verdict").textContent = "Not flown yet: the law came with the address";
     return;
   }
-  wanted = settings.request();
+  wanted = settings.asked();
   if (!busy) send();
+  // A law that has been mended does not wait for the text that it replaces.
+  else if (sent.code !== null && wanted.code !== sent.code) pilot.dismiss();
 }
 
-function send() {
-  if (!wanted) return;
-  busy = true;
-  patience = setTimeout(() => { $("cost").textContent = "Computing …"; }, 400);
-  sent = { name: settings.choice.name.replace(", ", " with ") };
-  worker.postMessage({ call: "fly", request: wanted, code: settings.own.code });
-  overdue = setTimeout(stuck, LONGEST);
-  wanted = null;
-}
-
-// A law that does not return keeps its worker busy: another one takes its place.
-function stuck() {
-  if (settings.choice.id !== OWN) return;
-  worker.terminate();
-  employ();
-  received({ data: { call: "fly", error: "your law: a flight takes more than ten seconds" } });
-}
-
-function received({ data }) {
-  if (data.call === "describe") return begin(data);
-  if (data.call === "experiment") return saved(data);
-  if (data.call === "ghost") return compared(data);
-  busy = false;
-  clearTimeout(patience);
-  clearTimeout(overdue);
-  // The shown flight is not that of the settings.
-  document.body.classList.toggle("refused", Boolean(data.error));
-  if (data.error) {
-    refused(data);
-  } else {
-    if (settings.choice.id === OWN) settings.own.say("");
-    flight = { ...read(data), ghost: null };
-    compare();
-    say(remark?.text ?? "", remark?.wrong);
-    show();
-    first ??= performance.now();
-    document.documentElement.dataset.flights = 1 + Number(document.documentElement.dataset.flights ?? 0);
+async function send() {
+  while (wanted) {
+    [sent, wanted, busy] = [wanted, null, true];
+    const patience = setTimeout(() => { $("cost").textContent = "Computing …"; }, 400);
+    const answer = await pilot.ask("fly", sent.request, sent.code);
+    clearTimeout(patience);
+    busy = false;
+    if (answer && isStillAsked(sent)) received(answer, sent);
+    if (!wanted) remark = null;
   }
-  if (!wanted) remark = null;
-  send();
+}
+
+// Whether no other flight, law or text has been chosen meanwhile. Other values are: a slider is still being dragged.
+function isStillAsked({ request, code }) {
+  const isText = code === null || code === settings.own.code;
+  return request.scenario === settings.flight && request.controller === settings.choice.id && isText;
+}
+
+function received(answer, asked) {
+  // The shown flight is not that of the settings.
+  document.body.classList.toggle("refused", Boolean(answer.error));
+  if (answer.error) return refused(answer);
+  if (asked.code !== null) settings.own.say("");
+  flight = read(answer, asked);
+  compare();
+  say(remark?.text ?? "", remark?.wrong);
+  show();
+  first ??= performance.now();
+  document.documentElement.dataset.flights = 1 + Number(document.documentElement.dataset.flights ?? 0);
 }
 
 async function refused({ error, line, isSyntax }) {
@@ -120,9 +114,10 @@ async function refused({ error, line, isSyntax }) {
   $("verdict").textContent = `Refused: ${error}`;
 }
 
-function read({ text, signals, plans, ms }, name = sent.name) {
+// A flight: what was asked for, and the columns of what was flown.
+function read({ text, signals, plans, ms }, asked) {
   const summary = JSON.parse(text);
-  const { columns } = settings.scenario;
+  const { columns } = asked.scenario;
   const width = columns.length;
   const rows = signals.length / width;
   const column = (index, factor) => Float64Array.from({ length: rows }, (_, row) => signals[row * width + index] * factor);
@@ -130,32 +125,32 @@ function read({ text, signals, plans, ms }, name = sent.name) {
   const angles = three(1, DEG), reference = three(7, DEG);
   const errors = angles.map((angle, i) => angle.map((value, row) => value - reference[i][row]));
   return {
-    summary, signals, columns, ms, rows, width, name, time: column(0, 1), angles, reference, errors, plans: readPlans(plans),
+    ...asked, ghost: null, summary, signals, columns, ms, rows, width, time: column(0, 1), angles, reference, errors, plans: readPlans(plans),
     rates: three(4, DEG), moment: three(10, 1e-3), status: column(width - 2, 1), contradiction: column(width - 1, 1),
     of: (name) => column(columns.indexOf(name), 1),
   };
 }
 
 // Asks for the flight to compare with: that of another law with the settings that all laws share.
-function compare() {
-  const id = $("ghost").value;
-  const shared = Object.entries(settings.set).filter(([name]) => !name.startsWith("controller.") || settings.common.has(name.replace("controller.", "")));
-  const request = JSON.stringify({ scenario: settings.flight, controller: id, set: Object.fromEntries(shared) });
-  if (!id || id === settings.choice.id || (id === OWN && !settings.own.isAgreed)) ghost = ghostRequest = null;
+async function compare() {
+  const id = $("ghost").value, choice = settings.controllers.get(id);
+  const { scenario, request: { controller, scenario: name, set } } = flight;
+  const shared = Object.entries(set).filter(([name]) => !name.startsWith("controller.") || settings.common.has(name.replace("controller.", "")));
+  const code = id === OWN ? settings.own.code : null;
+  const request = { scenario: name, controller: id, set: Object.fromEntries(shared) };
+  const text = JSON.stringify([request, code]);
+  if (!choice || id === controller || (code !== null && !settings.own.isAgreed)) ghost = null;
   // A flight of another disturbance is not shown beside this one.
-  else if (request !== ghostRequest) {
-    worker.postMessage({ call: "ghost", request: JSON.parse(ghostRequest = request), code: settings.own.code });
+  else if (text !== ghost?.text) {
+    const mine = ghost = { text, shown: null };
+    const answer = await rival.ask("fly", request, code);
+    if (ghost !== mine || !flight || !answer || answer.error) return;
+    const other = read(answer, { scenario, name: choice.name.split(",")[0] });
+    mine.shown = { ...other, norms: [norm(other.rates), norm(other.moment)] };
+    flight.ghost = mine.shown;
+    return show();
   }
-  if (!ghostRequest || ghost?.request === ghostRequest) flight.ghost = ghost;
-}
-
-function compared({ error, ...data }) {
-  const { controller } = JSON.parse(ghostRequest ?? "{}");
-  if (error || !controller) return;
-  const other = read(data, settings.controllers.get(controller).name.split(",")[0]);
-  ghost = { ...other, norms: [norm(other.rates), norm(other.moment)], request: ghostRequest };
-  flight.ghost = ghost;
-  show();
+  flight.ghost = ghost?.shown ?? null;
 }
 
 function norm([x, y, z]) {
@@ -167,7 +162,7 @@ function panel(id, limits) {
   const [label, unit, bold, names] = PANELS[id];
   if (id === "loads") {
     const curves = LOADS.map(([column, limit], place) => {
-      const most = settings.number(`guidance.limit.${limit}`);
+      const most = flight.number(`guidance.limit.${limit}`);
       return { name: names[place], role: "signal", run: 0, place, values: flight.of(column).map((value) => value / most) };
     });
     return { label, unit, curves, limits: [{ name: "limit", value: 1 }] };
@@ -191,12 +186,12 @@ function show() {
   const { summary, ghost: other } = flight;
   const limits = { rate: summary.limits.rate * DEG, moment: summary.limits.moment * 1e-3 };
   const runs = [{ time: flight.time }, ...(other ? [{ time: other.time, faint: true }] : [])];
-  stop = settings.isEntry ? flight.time.at(-1) : settings.scenario.stop;
+  stop = flight.isEntry ? flight.time.at(-1) : flight.scenario.stop;
   player.range(0, flight.time.at(-1) ?? stop);
-  charts.loads.figure.hidden = $("entry").hidden = !settings.isEntry;
+  charts.loads.figure.hidden = $("entry").hidden = !flight.isEntry;
   for (const id of Object.keys(PANELS)) if (!charts[id].figure.hidden) charts[id].show(panel(id, limits), runs, [0, stop]);
-  if (settings.isEntry) {
-    const of = (name) => settings.number(`guidance.${name}`);
+  if (flight.isEntry) {
+    const of = (name) => flight.number(`guidance.${name}`);
     const allowed = Object.fromEntries(LOADS.map(([, name]) => [name, of(`limit.${name}`)]));
     entry.show({ time: flight.time, of: flight.of, limits: allowed, planet: { radius: of("planet.radius"), gravitation: of("planet.gravitation") }, target: [of("target.longitude") * DEG, of("target.latitude") * DEG] });
   }
@@ -233,16 +228,16 @@ function guarantee() {
   }
   if (good === rows) return ["good", "in force throughout"];
   const [[why, { light }]] = [...reasons].sort((a, b) => b[1].rows - a[1].rows);
-  return [light, good ? `in force ${((100 * good) / rows).toFixed(0)} % of the time; ${why}` : why];
+  return [light, good ? `in force ${Math.floor((1e4 * good) / rows) / 100} % of the time; ${why}` : why];
 }
 
 // How an entry ends, and what of its loads is above a limit.
 function arrival(verdict) {
   const last = (column) => flight.of(column).at(-1);
-  const off = (last("guidance.range") - settings.number("guidance.target.range")) / 1e3;
-  const reaches = Math.abs(off) * 1e3 <= settings.number("guidance.target.tolerance");
+  const off = (last("guidance.range") - flight.number("guidance.target.range")) / 1e3;
+  const reaches = Math.abs(off) * 1e3 <= flight.number("guidance.target.tolerance");
   const place = reaches ? `reaches the terminal area after ${(stop / 60).toFixed(0)} minutes, ${Math.abs(off).toFixed(1)} km off` : `ends ${Math.abs(off).toFixed(0)} km ${off > 0 ? "short" : "long"}`;
-  const over = LOADS.filter(([column, name]) => Math.max(...flight.of(column)) > settings.number(`guidance.limit.${name}`) * MET);
+  const over = LOADS.filter(([column, name]) => Math.max(...flight.of(column)) > flight.number(`guidance.limit.${name}`) * MET);
   const loads = over.length ? `exceeds the limit of ${over.map(([, name]) => ({ heatFlux: "heat flux", load: "load", pressure: "dynamic pressure" })[name]).join(" and ")}` : "within its loads";
   return `${verdict}. The vehicle ${place}, ${loads}`;
 }
@@ -253,7 +248,7 @@ function judge(limits) {
   const percent = (ratio) => `${(100 * ratio).toFixed(0)} %`;
   let verdict = `${name} keeps both limits, of rate and moment`;
   if (over.length) verdict = `${name} exceeds the ${over.map(([limit, ratio]) => `${limit} limit (${percent(ratio)})`).join(" and the ")}`;
-  if (settings.isEntry && !summary.end) verdict = arrival(verdict);
+  if (flight.isEntry && !summary.end) verdict = arrival(verdict);
   if (summary.end) verdict = `${summary.lost ? `${name} loses the attitude` : "The flight ends"} at ${summary.end.time.toFixed(1)} s`;
   $("verdict").textContent = $("arrival").textContent = verdict[0].toUpperCase() + verdict.slice(1);
   const other = flight.ghost?.summary;
@@ -289,7 +284,7 @@ function point(at) {
   player.show(time);
   if (!flight) return;
   for (const chart of Object.values(charts)) if (!chart.figure.hidden) chart.point(at);
-  if (settings.isEntry) entry.point(at);
+  if (flight.isEntry) entry.point(at);
   proof.point(at);
   pose(at);
 }
@@ -442,8 +437,13 @@ function number(input, parameter, { names, low, high, exact, needs }) {
   input.oninput = () => changed(names, parameter.written(input.chosen()), needs);
 }
 
-// Another flight begins: its own time, and nothing beside an entry, which would take twice as long.
+// Another flight begins: its own time, nothing of the one before, and nothing beside an entry, which would take twice
+// as long.
 function begun() {
+  flight = null;
+  $("proof").hidden = $("entry").hidden = true;
+  $("arrival").textContent = "";
+  $("verdict").textContent = "Computing …";
   $("ghost").value = settings.isEntry ? "" : "lqr";
   time = settings.isEntry ? 900 : 26;
   player.pace(settings.isEntry ? 1500 : 50);
@@ -468,7 +468,7 @@ function load(address) {
 // --- Beginning and leaving ------------------------------------------------------------------------------------------
 
 function begin({ text, error }) {
-  if (error) return say(error, true);
+  if (error) return say(`The flights cannot be computed: ${error}`, true);
   settings = new Settings(JSON.parse(text));
   const { controllers, version } = settings.description;
   for (const { id, name, fmu } of controllers) {
@@ -489,7 +489,10 @@ function begin({ text, error }) {
   if (isNew) proof.begin();
 }
 
-function saved({ text, error }) {
+async function save() {
+  const scribe = new Pilot(compiled);
+  const { text, error } = await scribe.ask("experiment", settings.request());
+  scribe.dismiss();
   if (error) return say(error, true);
   const link = document.createElement("a");
   link.href = URL.createObjectURL(new Blob([text], { type: "application/toml" }));
@@ -512,7 +515,7 @@ for (const id of ["attitude", "entry"]) {
     changed([], null);
   };
 }
-$("ghost").onchange = () => { compare(); show(); };
+$("ghost").onchange = () => { if (flight) { compare(); show(); } };
 $("reset").onclick = () => {
   settings.set = {};
   settings.choose(settings.choice.id);
@@ -527,17 +530,8 @@ $("copy").onclick = async () => {
     say("The address of this page holds all settings; this browser does not let the page copy it.");
   }
 };
-$("save").onclick = () => worker.postMessage({ call: "experiment", request: settings.request() });
+$("save").onclick = save;
 window.addEventListener("hashchange", () => load(location.hash.slice(1)));
 for (const what of ["(prefers-color-scheme: dark)", "print"]) matchMedia(what).addEventListener("change", () => flight && show());
 
-const packed = Uint8Array.from(atob($("module").textContent.trim()), (letter) => letter.charCodeAt(0));
-
-function employ() {
-  worker = new Worker(URL.createObjectURL(new Blob([$("worker").textContent], { type: "text/javascript" })));
-  worker.onmessage = received;
-  worker.onerror = (event) => say(`The flights cannot be computed: ${event.message}`, true);
-  worker.postMessage({ module: packed, call: settings ? "ready" : "describe" });
-}
-
-employ();
+pilot.ask("describe").then(begin, (error) => say(`The flights cannot be computed: ${error.message}`, true));

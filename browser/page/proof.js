@@ -72,7 +72,7 @@ class Proof {
     this.picture.show(shown, Math.min(time, at.at(-1)));
     const chosen = this.chosen();
     this.buttons.forEach((button, index) => button.setAttribute("aria-pressed", index === chosen));
-    const [acting, assumed] = this.bounds();
+    const [acting, assumed] = [ACTING, ASSUMED].map((name) => flight.number(name) * DEG);
     $("assumed").value = chosen === 2 ? acting : assumed;
     $("bound-of").textContent = chosen === 2 ? "Disturbance that acts" : "Disturbance, acting and assumed";
     $("bound-value").textContent = `${(chosen === 2 ? acting : assumed).toFixed(2)} deg/s²`;

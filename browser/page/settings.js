@@ -187,12 +187,6 @@ class Settings {
     return this.set[name] ?? this.parameters.get(name).initial;
   }
 
-  // Value of a number in SI units.
-  number(name) {
-    const parameter = this.parameters.get(name);
-    return parameter.shown(this.value(name)) / parameter.shown(1);
-  }
-
   change(name, value) {
     if (this.parameters.get(name).isInitial(value)) delete this.set[name];
     else this.set[name] = value;
@@ -200,6 +194,19 @@ class Settings {
 
   request() {
     return { scenario: this.flight, controller: this.choice.id, set: { ...this.set } };
+  }
+
+  // The flight that is asked for, which stays the same whatever is changed meanwhile. `number` is a parameter's value in
+  // SI units.
+  asked() {
+    const { choice, isEntry, parameters, scenario } = this;
+    const request = this.request();
+    const number = (name) => {
+      const parameter = parameters.get(name);
+      return parameter.shown(request.set[name] ?? parameter.initial) / parameter.shown(1);
+    };
+    const code = choice.id === OWN ? this.own.code : null;
+    return { request, code, name: choice.name.replace(", ", " with "), isEntry, number, scenario };
   }
 
   address() {

@@ -1,5 +1,5 @@
-// The flights, computed beside the page. A message is { call, request } or, first, { module }. `ghost` is a flight to
-// compare with. A message has the text of the page's own law as well.
+// The flights, computed beside the page. A message is { call, id, request, code } or, first, { module }; its answer has
+// the same call and id. The code is the text of the page's own law.
 "use strict";
 
 // The page's own law, what it keeps between ticks, and its fault in the flight that is computed.
@@ -37,7 +37,7 @@ function ask(given, moment) {
       }
       out.splice(0, 3, ...answer);
     } catch (error) {
-      fault = error;
+      fault = { error };
     }
   }
   new Float64Array(exports.memory.buffer, moment, 3).set(out);
@@ -46,14 +46,12 @@ function ask(given, moment) {
 // What the page says of a fault of its law, with the line if the browser tells it.
 function told(error) {
   const line = /own-law\.js:(\d+)/.exec(error?.stack ?? "")?.[1] ?? (error?.fileName?.includes("own-law.js") ? error.lineNumber : null);
-  return { error: `your law${line ? `, line ${line}` : ""}: ${error?.message ?? error}`, line: Number(line) || null, isSyntax: error instanceof SyntaxError };
+  return { error: `your law${line ? `, line ${line}` : ""}: ${error?.message ?? `it throws ${String(error)}`}`, line: Number(line) || null, isSyntax: error instanceof SyntaxError };
 }
 
 let exports = null;
 
-async function load(packed) {
-  const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("gzip"));
-  const module = await WebAssembly.compile(await new Response(stream).arrayBuffer());
+function load(module) {
   // A dependency would ask a browser for the time, and has the glue of wasm-bindgen for that. Nothing here depends on
   // time, so it gets zero.
   const imports = {};
@@ -68,7 +66,7 @@ function call(name, request) {
   const address = exports.reserve(bytes.length);
   // A call that needs more memory replaces the buffer, so it is asked for after the call.
   new Uint8Array(exports.memory.buffer, address, bytes.length).set(bytes);
-  const right = exports[name === "ghost" ? "fly" : name]() === 1;
+  const right = exports[name]() === 1;
   const memory = exports.memory.buffer;
   const text = new TextDecoder().decode(new Uint8Array(memory, exports.answer(), exports.answer_length()));
   if (!right) throw new Error(text);
@@ -77,23 +75,23 @@ function call(name, request) {
   return { text, signals, plans };
 }
 
-onmessage = async ({ data }) => {
+onmessage = ({ data }) => {
   const begun = performance.now();
-  const isOwn = data.request?.controller === "own" && data.call !== "experiment";
-  const answer = (content, ...moved) => postMessage({ call: data.call, ...content }, moved);
+  const { call: name, id } = data;
+  const isOwn = name === "fly" && data.request.controller === "own";
+  const answer = (content, ...moved) => postMessage({ call: name, id, ...content }, moved);
   try {
     if (data.module) {
-      start = await load(data.module);
-      start();
+      start = load(data.module);
+      return start();
     }
-    if (data.call === "ready") return;
     if (isOwn) compile(data.code);
-    const { text, signals, plans } = call(data.call, data.request);
-    if (isOwn && fault) return answer(told(fault));
+    const { text, signals, plans } = call(name, data.request);
+    if (isOwn && fault) return answer(told(fault.error));
     answer({ text, signals, plans, ms: performance.now() - begun }, signals.buffer, plans.buffer);
   } catch (error) {
     // After a trap the memory may be in any state.
     if (error instanceof WebAssembly.RuntimeError) start();
-    answer(isOwn && (fault || !law) ? told(fault ?? error) : { error: error.message });
+    answer(isOwn && (fault || !law) ? told(fault ? fault.error : error) : { error: error.message });
   }
 };

@@ -179,6 +179,9 @@ pub fn saturated(moment: Vector3<f64>, limit: f64) -> Vector3<f64> {
         let excess = moment.norm() / limit;
         if excess > 1.0 { moment / excess } else { moment }
     };
+    // The squares of a moment of 1e200 N m have no finite sum.
+    let is_beyond = moment.norm().is_infinite() && limit.is_finite();
+    let moment = if is_beyond { moment / moment.amax() * limit } else { moment };
     // The second scaling removes the excess that rounding leaves above the limit.
     scaled(scaled(moment))
 }

@@ -5,7 +5,7 @@ use cosim::experiment::{Coupling, Observe};
 use cosim::system::System;
 use cosim_metrics::guarantee::margins_text;
 use cosim_metrics::metrics::{Metrics, Value};
-use cosim_report::recording::SummaryLine;
+use cosim_report::recording::{SummaryLine, share_text};
 use fmi_master::quantity::rounded;
 use std::io::{self, Write};
 use std::path::PathBuf;
@@ -141,7 +141,11 @@ fn against(ratio: f64, limit: &str) -> (String, bool) {
     // A value that is not a number is not within a limit. A limit counts as met up to rounding.
     let is_within = ratio <= 1.0 + 1e-9;
     let verdict = if is_within { "within" } else { "EXCEEDS" };
-    (format!("   {verdict} its limit {limit}: {:.1} %", ratio * 100.0), is_within)
+    // A limit that is exceeded is told with as many digits as tell it from 100 %.
+    let mut texts = (1..=9).map(|digits| format!("{:.digits$}", ratio * 100.0));
+    let is_told = |text: &String| is_within || text.parse() != Ok(100.0);
+    let text = texts.find(is_told).unwrap_or_default();
+    (format!("   {verdict} its limit {limit}: {text} %"), is_within)
 }
 
 /// Describes how the controller's guarantee fared, if the controller gives one.
@@ -155,14 +159,11 @@ fn guarantee(metrics: &Metrics) -> Option<SummaryLine> {
         Some((metrics.number(name), margin))
     });
     let margins = margins_text(margins);
+    let in_force = format!("in force at {} % of the ticks", share_text(share));
     let text = match number("lost_at").map(rounded) {
         _ if share == 0.0 => format!("never in force{status}"),
-        Some(time) => {
-            format!("in force at {:.1} % of the ticks, lost at t = {time} s{status}", share * 100.0)
-        }
-        None if share < 1.0 => {
-            format!("in force at {:.1} % of the ticks, never lost{margins}", share * 100.0)
-        }
+        Some(time) => format!("{in_force}, lost at t = {time} s{status}"),
+        None if share < 1.0 => format!("{in_force}, never lost{margins}"),
         None => format!("in force throughout{margins}"),
     };
     let broken = number("broken") == Some(1.0);
@@ -242,6 +243,7 @@ mod tests {
         let within = "   within its limit 1 N m: 100.0 %".to_string();
         assert_eq!(told(1.0000000000000004), (within, true));
         assert_eq!(told(1.001), ("   EXCEEDS its limit 1 N m: 100.1 %".into(), false));
+        assert_eq!(told(1.000_02).0, "   EXCEEDS its limit 1 N m: 100.002 %");
         let (text, is_within) = told(f64::NAN);
         assert!(text.contains("EXCEEDS") && !is_within);
     }
@@ -279,6 +281,8 @@ mod tests {
             ("status", text("exceeded")),
         ];
         assert_eq!(told(&lost), "in force at 97.2 % of the ticks, lost at t = 12.4 s (exceeded)");
+        let once = [("share", number(0.99999)), ("lost_at", number(3.0))];
+        assert_eq!(told(&once), "in force at 99.99 % of the ticks, lost at t = 3 s");
         let never = metrics(&[("share", number(0.0)), ("status", text("refused"))]);
         assert_eq!(guarantee(&never).unwrap().text, "never in force (refused)");
         let without_margins = guarantee(&metrics(&[("share", number(1.0))])).unwrap();

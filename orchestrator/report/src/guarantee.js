@@ -65,8 +65,7 @@ class GuaranteePicture {
   }
 
   row(time = this.cursor, { time: times } = this.data) {
-    const step = times[1] - times[0] || 1;
-    return Math.max(0, Math.min(times.length - 1, Math.floor((time - times[0]) / step + 1e-6)));
+    return rowAt(times, time);
   }
 
   // Index of the plan that is followed at a time; −1 before the first.
@@ -235,12 +234,9 @@ class GuaranteePicture {
   ghost(i, limit, box) {
     const { context, data: { ghost } } = this;
     const [first, last] = [box.from, this.cursor].map((time) => this.row(time, ghost));
-    let largest = first;
     const points = [];
-    for (let row = first; row <= last; row++) {
-      if (ghost.norms[i][row] > ghost.norms[i][largest]) largest = row;
-      points.push([this.x(ghost.time[row]), this.y(ghost.norms[i][row])]);
-    }
+    for (let row = first; row <= last; row++) points.push([this.x(ghost.time[row]), this.y(ghost.norms[i][row])]);
+    const largest = ghost.norms[i].reduce((most, value, row) => (value > ghost.norms[i][most] ? row : most), 0);
     const y = this.y(limit);
     this.area(points.map(([x, at]) => [x, Math.min(at, y)]), points.map(([x]) => [x, y]), "y", 0.3);
     context.strokeStyle = this.colour("y");
@@ -250,7 +246,8 @@ class GuaranteePicture {
     const beyond = value > limit * GuaranteePicture.TOP;
     context.textAlign = "left";
     context.textBaseline = "top";
-    const text = `${beyond ? "▲ " : ""}${ghost.name} ${value.toFixed(value < 20 ? 1 : 0)}, ${((100 * value) / limit).toFixed(0)} %`;
+    // The peak of the whole flight, wherever the cursor is.
+    const text = `${beyond ? "▲ " : ""}${ghost.name}: up to ${value.toFixed(value < 20 ? 1 : 0)}, ${((100 * value) / limit).toFixed(0)} %`;
     const { width } = context.measureText(text);
     const x = Math.max(box.left + 4, Math.min(this.x(ghost.time[largest]) + 6, box.right - width - 4));
     const at = Math.max(box.top + 1, this.y(value) - 15);
@@ -299,23 +296,24 @@ class GuaranteePicture {
     this.area([[x(from), top], [x(Math.min(to, data.stop)), top]], [[x(from), bottom], [x(Math.min(to, data.stop)), bottom]], "muted", 0.13);
     const draw = ({ time, norms }, colour, dash) => {
       context.strokeStyle = this.colour(colour);
-      const every = Math.max(1, Math.floor(time.length / (right - left)));
-      this.path(Array.from(shares(norms)).flatMap((share, row) => (row % every ? [] : [[x(time[row]), y(share)]])), 1, dash);
+      // Of the rows of a column of pixels the largest one is drawn.
+      const columns = new Map();
+      Array.from(shares(norms)).forEach((share, row) => {
+        const column = Math.floor(x(time[row]));
+        columns.set(column, Math.max(share, columns.get(column) ?? 0));
+      });
+      this.path([...columns].map(([column, share]) => [column, y(share)]), 1, dash);
     };
     if (data.ghost) draw(data.ghost, "y", [3, 2]);
     draw(data, "x", []);
     context.strokeStyle = this.colour("ink");
     this.path([[left, y(1)], [right, y(1)]], 1, [7, 4]);
-    context.fillStyle = this.colour("good");
+    // A loss of one row is seen in a flight of any length.
     const { time } = data;
-    let begin = null;
-    for (let row = 0; row <= time.length; row++) {
-      const holds = row < time.length && data.holds(row);
-      if (holds && begin === null) begin = row;
-      if (holds || begin === null) continue;
-      context.fillRect(x(time[begin]), bottom + 3, x(time[Math.min(row, time.length - 1)]) - x(time[begin]), 5);
-      begin = null;
-    }
+    const lost = Array.from(time).flatMap((at, row) => (data.holds(row) ? [] : [[x(at), Math.max(x(at) + 1.5, x(time[row + 1] ?? at))]]));
+    context.fillStyle = this.colour("good");
+    context.fillRect(left, bottom + 3, x(time.at(-1)) - left, 5);
+    for (const [begin, end] of lost) context.clearRect(begin, bottom + 3, end - begin, 5);
     context.strokeStyle = this.colour("muted");
     context.strokeRect(left + 0.5, bottom + 3.5, right - left - 1, 4);
     this.path([[x(this.cursor), top - 3], [x(this.cursor), bottom + 10]], 1.5);

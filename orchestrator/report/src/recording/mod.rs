@@ -249,6 +249,12 @@ pub fn number_text(number: f64) -> String {
     }
 }
 
+/// Formats a share in percent, rounded down: only the whole is 100 %.
+pub fn share_text(share: f64) -> String {
+    // A share of 0.57 is 57 %, whatever its last bit.
+    number_text((1e4 * share + 1e-6).floor() / 100.0)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -322,6 +328,12 @@ mod tests {
             [parameter("law.limit", "5.7 deg", true), parameter("law.mode", "fast", false)]
         );
         assert_eq!(recording().observe.summary, ["x"]);
+    }
+
+    #[test]
+    fn a_share_is_rounded_down() {
+        let texts = [1.0, 0.57, 0.999_999, 1.0 / 3.0, 1e-6].map(share_text);
+        assert_eq!(texts, ["100", "57", "99.99", "33.33", "0"]);
     }
 
     #[test]

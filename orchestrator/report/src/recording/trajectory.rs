@@ -27,7 +27,7 @@ pub(crate) struct Flight {
 /// Returns the flight of a run, if its variables are recorded.
 pub(crate) fn flight(run: &Recording) -> Option<Flight> {
     let named = run.observe.trajectory.as_ref()?;
-    let rows = thin::frames(run.time.len());
+    let rows = thin::frames(run.time.len(), &[]);
     let at = |path: &str, factor: f64| values(run, path, &rows, factor);
     let [longitude, latitude] = &named.position;
     let energy = [at(&named.speed, 1e-3)?, at(&named.altitude, 1e-3)?];

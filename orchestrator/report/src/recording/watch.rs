@@ -14,8 +14,6 @@ use std::collections::BTreeMap;
 use std::iter;
 use std::path::Path;
 
-/// Largest number of rows that are kept.
-const ROWS: u64 = 100_000;
 /// Place that names the variables that are recorded.
 const RECORD: &str = "[record]";
 /// Place that names the variables of a guarantee, which an FMU may lack.
@@ -27,7 +25,6 @@ pub struct Watch {
     /// Number of columns, the first ones, that are drawn because the experiment has no panels.
     unasked: usize,
     time: Vec<f64>,
-    stride: u64,
     observe: Observe,
 }
 
@@ -63,13 +60,8 @@ impl Watch {
             };
             columns.push((name, probed.place, track));
         }
-        let stride = system.clock.ticks().div_ceil(ROWS).max(1);
-        let rows = (system.clock.ticks() / stride + 2) as usize;
-        for (_, _, track) in &mut columns {
-            track.values.reserve_exact(rows);
-        }
-        let (time, observe) = (Vec::with_capacity(rows), system.experiment.observe.clone());
-        Ok(Self { columns, unasked: count, time, stride, observe })
+        let observe = system.experiment.observe.clone();
+        Ok(Self { columns, unasked: count, time: Vec::new(), observe })
     }
 
     /// Draws the figure that the experiment asks for, if it does, and returns whether it does.
@@ -149,11 +141,9 @@ fn names(observe: &Observe) -> BTreeMap<String, &'static str> {
 
 impl Observer for Watch {
     fn observe(&mut self, sample: &Sample) -> Result<(), Error> {
-        if sample.tick.is_multiple_of(self.stride) || sample.last {
-            self.time.push(sample.time);
-            for (_, place, track) in &mut self.columns {
-                track.values.push(sample.values[*place]);
-            }
+        self.time.push(sample.time);
+        for (_, place, track) in &mut self.columns {
+            track.values.push(sample.values[*place]);
         }
         Ok(())
     }

@@ -4,9 +4,10 @@ use super::numbers::{DIGITS, TIME_DIGITS, numbers, rounded};
 use super::{plans, thin};
 use crate::recording::panels::{Panel, Role, symbols};
 use crate::recording::trajectory;
-use crate::recording::{Recording, Track};
+use crate::recording::{Recording, Track, share_text};
 use cosim::experiment::Vehicle;
 use serde_json::{Map, Value, json};
+use std::iter;
 
 /// Returns the data that the scripts of a page draw.
 pub fn page(runs: &[Recording], panels: &[Panel], vehicles: &[usize]) -> Value {
@@ -16,7 +17,7 @@ pub fn page(runs: &[Recording], panels: &[Panel], vehicles: &[usize]) -> Value {
             "name": run.name,
             "time": numbers(thin::times(&run.time), TIME_DIGITS),
             "vehicle": is_shown.then(|| vehicle(run)).flatten(),
-            "guarantee": guarantee(run, &thin::frames(run.time.len())),
+            "guarantee": guarantee(run),
             "guaranteed": guaranteed(run),
             "flight": flight(run),
             "plans": is_shown.then(|| plans::of(run)).flatten(),
@@ -73,7 +74,7 @@ pub fn has_vehicle(run: &Recording) -> bool {
 /// Returns the vehicle at some instants of the run, in SI units and radians.
 fn vehicle(run: &Recording) -> Option<Value> {
     let named: &Vehicle = run.observe.vehicle.as_ref()?;
-    let frames = thin::frames(run.time.len());
+    let frames = frames(run, named);
     let at_frames = |track: &Track, factor: f64| {
         numbers(frames.iter().map(|row| factor * track.values[*row]), DIGITS)
     };
@@ -115,21 +116,45 @@ fn vehicle(run: &Recording) -> Option<Value> {
     Some(Value::Object(value))
 }
 
-/// Returns whether the guarantee is in force, and why, at some rows; null if that is not recorded.
-fn guarantee(run: &Recording, frames: &[usize]) -> Value {
+/// Returns the rows at which a vehicle is shown, with every peak of its rates and its moment, and
+/// every loss of its guarantee.
+fn frames(run: &Recording, named: &Vehicle) -> Vec<usize> {
+    let norm = |paths: &Option<[String; 3]>| {
+        let tracks: Option<Vec<_>> =
+            paths.iter().flatten().map(|path| run.tracks.get(path)).collect();
+        let square =
+            |row| -> f64 { tracks.iter().flatten().map(|track| track.values[row].powi(2)).sum() };
+        (0..run.time.len()).map(square).collect()
+    };
+    let in_force = run.observe.guarantee.as_ref().and_then(|named| run.tracks.get(&named.in_force));
+    let lost = in_force.map(|track| track.values.iter().map(|is| -is).collect());
+    let quantities = [norm(&named.rate), norm(&named.moment), lost.unwrap_or_default()];
+    thin::frames(run.time.len(), &quantities)
+}
+
+/// Returns whether the guarantee is in force, and why, from each row on at which that changes; null
+/// if it is not recorded.
+fn guarantee(run: &Recording) -> Value {
     let Some(named) = &run.observe.guarantee else { return Value::Null };
     let Some(in_force) = run.tracks.get(&named.in_force) else { return Value::Null };
-    let values = |track: &Track| -> Vec<i64> {
-        frames.iter().map(|row| track.values[*row] as i64).collect()
-    };
     let status = named.status.as_ref().and_then(|status| run.tracks.get(status));
+    let differs = |row: usize| {
+        let mut tracks = iter::once(in_force).chain(status);
+        row == 0 || tracks.any(|track| track.values[row] as i64 != track.values[row - 1] as i64)
+    };
+    let rows: Vec<usize> = (0..run.time.len()).filter(|row| differs(*row)).collect();
+    let values =
+        |track: &Track| rows.iter().map(|row| track.values[*row] as i64).collect::<Vec<_>>();
     let items: Map<String, Value> = status
         .iter()
         .flat_map(|track| &track.items)
         .map(|(name, value)| (value.to_string(), json!(words(name))))
         .collect();
-    let time = numbers(frames.iter().map(|row| run.time[*row]), TIME_DIGITS);
-    json!({ "time": time, "inForce": values(in_force), "status": status.map(values), "items": items })
+    let time = numbers(rows.iter().map(|row| run.time[*row]), TIME_DIGITS);
+    let held = in_force.values.iter().filter(|is| **is != 0.0).count();
+    let share = share_text(held as f64 / run.time.len().max(1) as f64);
+    let (in_force, status) = (values(in_force), status.map(values));
+    json!({ "time": time, "inForce": in_force, "status": status, "items": items, "share": share })
 }
 
 /// Returns what the summary says of the guarantee, without its margins.

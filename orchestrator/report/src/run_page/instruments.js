@@ -63,11 +63,14 @@ class Instruments {
     });
   }
 
-  light(frame) {
-    const { guarantee, guaranteed } = this;
+  light(time) {
+    const { guarantee, guaranteed, vehicle } = this;
+    const end = vehicle.time.at(-1);
+    if (time > end + 1e-6) return { state: "none", text: `ended at ${minus(end.toFixed(1))} s` };
     if (!guarantee) return { state: "none", text: guaranteed ? `guarantee over the run: ${guaranteed}` : "no guarantee recorded" };
-    const isInForce = guarantee.inForce[frame] !== 0;
-    const status = guarantee.status && guarantee.items[guarantee.status[frame]];
+    const row = rowAt(guarantee.time, time);
+    const isInForce = guarantee.inForce[row] !== 0;
+    const status = guarantee.status && guarantee.items[guarantee.status[row]];
     return { state: isInForce ? "good" : "warn", text: `guarantee: ${status || (isInForce ? "in force" : "not in force")}` };
   }
 
@@ -75,7 +78,7 @@ class Instruments {
     const { vehicle } = this;
     const frame = rowAt(vehicle.time, time);
     const at = (list) => (list && list.every((values) => values[frame] !== null) ? list.map((values) => values[frame]) : undefined);
-    const state = { angles: at(vehicle.angles) || [0, 0, 0], light: this.light(frame) };
+    const state = { angles: at(vehicle.angles) || [0, 0, 0], light: this.light(time) };
     for (const key of ["reference", "flaps"]) if (at(vehicle[key])) state[key] = at(vehicle[key]);
     for (const [key, limit] of [["rates", "rateLimit"], ["moment", "momentLimit"]]) {
       if (at(vehicle[key]) && vehicle[limit]) {
@@ -114,24 +117,20 @@ class Places {
   }
 }
 
-// A strip that shows when the guarantee of a run is in force.
-const guaranteeStrip = ({ name, guarantee }, isNamed) => {
-  const { time, inForce } = guarantee;
-  const [start, span] = [time[0], time.at(-1) - time[0] || 1];
-  const parts = [];
-  inForce.forEach((is, row) => {
-    if (row === 0 || is !== inForce[row - 1]) parts.push({ is, from: time[row], to: time.at(-1) });
-    if (row > 0 && is !== inForce[row - 1]) parts.at(-2).to = time[row];
-  });
-  const stops = parts.map(({ is, from, to }) => {
-    const [begin, end] = [from, to].map((at) => `${((100 * (at - start)) / span).toFixed(2)}%`);
-    return `var(--${is ? "good" : "warn"}) ${begin} ${end}`;
-  });
+// A strip that shows when the guarantee of a run is in force, below the times from `start` to `stop`.
+const guaranteeStrip = ({ name, time, guarantee }, isNamed, [start, stop]) => {
   const strip = document.createElement("div");
-  strip.style.background = `linear-gradient(to right, ${stops.join(", ")})`;
-  const share = parts.reduce((sum, { is, from, to }) => sum + (is ? to - from : 0), 0) / span;
+  const add = (isIn, from, to) => {
+    const part = strip.appendChild(document.createElement("i"));
+    const [left, width] = [from - start, to - from].map((span) => `${(100 * span) / (stop - start || 1)}%`);
+    // A loss of one tick is seen in a run of any length.
+    Object.assign(part.style, { left, width: isIn ? width : `max(2px, ${width})`, background: `var(--${isIn ? "good" : "warn"})` });
+  };
+  const parts = guarantee.time.map((from, row) => [guarantee.inForce[row] !== 0, from, guarantee.time[row + 1] ?? time.at(-1)]);
+  // Losses lie on top.
+  for (const part of parts.sort(([a], [b]) => b - a)) add(...part);
   const note = document.createElement("small");
-  note.textContent = `${isNamed ? `${name}: ` : ""}guarantee in force for ${(100 * share).toFixed(1).replace(".0", "")} % of the time`;
+  note.textContent = `${isNamed ? `${name}: ` : ""}guarantee in force for ${guarantee.share} % of the time`;
   return [strip, note];
 };
 
@@ -146,7 +145,8 @@ const guaranteePicture = (run, other, [stop, onPoint]) => {
   const ghost = other ? { name: other.name, ...flown(other.vehicle) } : null;
   if (ghost) document.getElementById("ghost").textContent = ` Dashed: ${ghost.name}.`;
   const limits = [(rateLimit * 180) / Math.PI, momentLimit * 1e-3];
-  const holds = (row) => run.guarantee?.inForce[row] === 1;
+  const { guarantee, vehicle: { time } } = run;
+  const holds = (row) => Boolean(guarantee?.inForce[rowAt(guarantee.time, time[row])]);
   picture.show({ stop, ...flown(run.vehicle), limits, plans: run.plans, holds, ghost }, 0);
   return picture;
 };

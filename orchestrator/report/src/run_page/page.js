@@ -19,7 +19,7 @@
   data.runs.forEach((run, place) => {
     const isNamed = data.runs.length > 1;
     if (run.flight) parts.push(new Places(document.querySelectorAll("#flight .panel"), run.flight, `var(--c${place % 6})`));
-    if (run.guarantee) find("guarantees").append(...guaranteeStrip(run, isNamed));
+    if (run.guarantee) find("guarantees").append(...guaranteeStrip(run, isNamed, [start, stop]));
   });
 
   const planned = data.runs.find((run) => run.plans);

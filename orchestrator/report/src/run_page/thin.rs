@@ -4,8 +4,8 @@ use std::ops::Range;
 
 /// Number of pixel columns for which a curve keeps its smallest and its largest value.
 const COLUMNS: usize = 1000;
-/// Largest number of instants at which a vehicle is shown.
-const FRAMES: usize = 1500;
+/// Number of rows that are all shown, and of parts of a longer run of which some rows are.
+const FRAMES: usize = 700;
 
 /// Returns the rows of each pixel column; `None` if all rows can be kept.
 fn columns(rows: usize) -> Option<impl Iterator<Item = Range<usize>>> {
@@ -35,13 +35,23 @@ pub(crate) fn values(values: &[f64]) -> Vec<f64> {
     columns.flat_map(extremes).collect()
 }
 
-/// Returns the rows at which a vehicle is shown, evenly spaced, the last one among them.
-pub(crate) fn frames(rows: usize) -> Vec<usize> {
+/// Returns the rows at which a vehicle is shown: of each even part of a run the first row and those
+/// at which one of these quantities is largest, and the last row of the run.
+pub(crate) fn frames(rows: usize, quantities: &[Vec<f64>]) -> Vec<usize> {
     let stride = rows.div_ceil(FRAMES).max(1);
-    let mut frames: Vec<usize> = (0..rows).step_by(stride).collect();
-    if rows > 0 && frames.last() != Some(&(rows - 1)) {
-        frames.push(rows - 1);
+    let mut frames = Vec::new();
+    for first in (0..rows).step_by(stride) {
+        let part = first..rows.min(first + stride);
+        let largest = |values: &Vec<f64>| {
+            let later = |most: usize, row| if values[row] > values[most] { row } else { most };
+            part.clone().filter(|row| values[*row].is_finite()).reduce(later)
+        };
+        frames.push(first);
+        frames.extend(quantities.iter().filter_map(largest));
     }
+    frames.extend(rows.checked_sub(1));
+    frames.sort_unstable();
+    frames.dedup();
     frames
 }
 
@@ -75,10 +85,14 @@ mod tests {
     }
 
     #[test]
-    fn frames_end_with_the_last_row() {
-        assert_eq!(frames(0), [0_usize; 0]);
-        assert_eq!(frames(3), [0, 1, 2]);
-        let many = frames(100_001);
-        assert!(many.len() <= FRAMES + 1 && many.last() == Some(&100_000));
+    fn frames_have_the_ends_of_a_run_and_every_peak_of_one_row() {
+        assert_eq!(frames(0, &[]), [0_usize; 0]);
+        assert_eq!(frames(3, &[]), [0, 1, 2]);
+        let (mut rate, mut lost) = (vec![1.0; 100_001], vec![0.0; 100_001]);
+        rate[..300].fill(f64::NAN);
+        (rate[77_777], lost[77_778], lost[5]) = (9.0, 1.0, 1.0);
+        let many = frames(100_001, &[rate, lost]);
+        assert!(many.len() <= FRAMES + 4 && many.is_sorted());
+        assert!([0, 5, 77_777, 77_778, 100_000].iter().all(|row| many.contains(row)));
     }
 }
