@@ -119,9 +119,6 @@ pub(crate) enum Command {
         /// Show neither progress nor summary.
         #[arg(long)]
         quiet: bool,
-        /// As that of `run`.
-        #[arg(long, hide = true)]
-        law: Option<String>,
         #[command(flatten)]
         process: Process,
     },
@@ -240,7 +237,6 @@ impl Command {
             Self::Run { overrides, .. } | Self::Pack { overrides, .. } => overrides,
             Self::Campaign(asked) => &asked.overrides,
             Self::Margins(asked) => &asked.overrides,
-            Self::Reproduce { law, .. } => return law.as_deref(),
             _ => return None,
         };
         overrides.law.as_deref()

@@ -134,11 +134,10 @@ fn execute(command: Command, out: &mut impl Write, interrupt: &Interrupt) -> Res
             members,
             fresh,
             quiet,
-            law,
             process,
         } => {
             let study = Study::load_with(&find(&study, Kind::Study)?, members)?;
-            let overrides = Overrides { law, process, ..Default::default() };
+            let overrides = Overrides { process, ..Default::default() };
             let interrupt = interrupt.clone();
             let options =
                 runner::Options { out: folder, jobs, fresh, quiet, interrupt, time: None };

@@ -11,28 +11,11 @@ import numpy as np
 import pytest
 from laws import lqr
 from laws import pd as pd_law
-from reentry_fmus import LawError, OrchestratorError, campaign, experiment, linearise, margins, reproduce
+from reentry_fmus import LawError, OrchestratorError, campaign, experiment, linearise, margins
 from reentry_fmus._data import experiment_path, program
 from test_campaign import CAMPAIGN
 
 ANGLES = [f"plant.attitude.{axis}" for axis in ("alpha", "beta", "sigma")]
-STUDY = """
-title = "LQR with another start"
-paper = "none"
-summary = "One run of three cases."
-values = []
-
-[[run]]
-id = "start"
-label = "LQR"
-color = "#0072b2"
-experiment = "{lqr}"
-cases = 3
-
-[[run.vary]]
-parameter = "plant.disturbance.seed"
-case = 1
-"""
 # The law in Python knows no turn of the trajectory, so that the FMU does not receive it either.
 ENTRY = """
 extends = '{base}'
@@ -183,18 +166,6 @@ def test_a_search_flies_a_law(tmp_path):
     assert largest == pytest.approx(by_law.outcome["largest"], rel=1e-9)
 
 
-def test_a_study_flies_a_law(tmp_path):
-    (tmp_path / "mine").mkdir()
-    (tmp_path / "mine" / "study.toml").write_text(STUDY.format(lqr=experiment_path("lqr")))
-    by_law = reproduce(tmp_path / "mine", out=tmp_path / "law", law=lqr)
-    by_fmu = reproduce(tmp_path / "mine", out=tmp_path / "fmu")
-    both = [study.runs["start"]["ems_deg"].to_numpy() for study in (by_law, by_fmu)]
-    assert len(both[0]) == 3 and np.allclose(*both, rtol=1e-9)
-    # The flights of one law are not taken for another's.
-    other = reproduce(tmp_path / "mine", out=tmp_path / "law", law=pd_law)
-    assert not np.allclose(other.runs["start"]["ems_deg"], both[0])
-
-
 # Failure
 
 
@@ -212,17 +183,13 @@ def fails(state):
         lambda folder, law: margins("lqr", at=10.0, open="plant.moment.*", law=law),
         lambda folder, law: linearise("lqr", at=10.0, open="plant.moment.*", law=law),
         lambda folder, law: campaign(folder / "gusts.toml", law=law).worst(out=folder / "out"),
-        lambda folder, law: reproduce(folder, out=folder / "out", law=law),
     ],
 )
 def test_an_error_of_a_law_is_one_wherever_it_flies(fly, tmp_path):
     (tmp_path / "gusts.toml").write_text(CAMPAIGN)
-    (tmp_path / "study.toml").write_text(STUDY.format(lqr=experiment_path("lqr")))
-    # Only a study's cases have numbers by which they can be flown again.
-    with pytest.raises(LawError, match="the law fails failed (in case 0 )?at t = 0.52 s: ZeroDivisionError: so") as caught:
+    with pytest.raises(LawError, match="the law fails failed at t = 0.52 s: ZeroDivisionError: so") as caught:
         fly(tmp_path, fails)
-    assert (caught.value.case is None) == ("in case" not in str(caught.value))
-    assert caught.value.time == pytest.approx(0.52) and 'raise ZeroDivisionError("so")' in str(caught.value)
+    assert caught.value.case is None and caught.value.time == pytest.approx(0.52) and 'raise ZeroDivisionError("so")' in str(caught.value)
 
 
 def told(fly):

@@ -139,10 +139,10 @@ fn members(study: &Study, run: &Run, result: &RunResult) -> Vec<Value> {
     members
 }
 
-/// Describes the runs that lose the attitude, and the runs that vary a parameter without any
-/// effect, for example the seed of a constant disturbance.
+/// Describes a quick look, the runs that lose the attitude, and the runs that vary a parameter
+/// without any effect, for example the seed of a constant disturbance.
 pub(crate) fn notes(results: &Results) -> Vec<String> {
-    let mut notes = Vec::new();
+    let mut notes = Vec::from_iter(page::quickly(results.study));
     for (run, result) in results.pairs() {
         let id = run.id.get_ref();
         let count = result.cases();

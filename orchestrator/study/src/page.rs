@@ -5,6 +5,7 @@ mod evidence;
 mod numbers;
 
 use crate::claims::{Judged, Verdict};
+use crate::comparisons::Overview;
 use crate::definition::Study;
 use crate::drawings::Figure;
 use crate::results::{Results, RunResult};
@@ -26,19 +27,17 @@ pub(crate) fn page(
     origin: &[(String, String)],
 ) -> String {
     let study = results.study;
-    let overviews = study.overviews.iter().map(|o| (&o.title, overview(o, results)));
+    let with_counts = |o| html! { (overview(o, results)) (counts(results, o)) };
+    let overviews = study.overviews.iter().map(|o| (&o.title, with_counts(o)));
     let tables = study.tables.iter().map(|table| &table.title).zip(tables.iter().cloned());
     let tables = html! {
         @for (title, table) in tables.chain(overviews) {
             details { summary { h3 { (title) } } (table) }
         }
     };
-    let about = html! {
-        (paragraphs(&study.summary))
-        @if let Some(most) = study.most_cases {
-            p.note { "A quick look: of each run, at most " (most) " cases were flown. Texts name the full numbers." }
-        }
-    };
+    let about = paragraphs(&study.summary);
+    let quickly = quickly(study).map(|quickly| format!(" This is {quickly}."));
+    let told = answer(judged) + &quickly.unwrap_or_default();
     let claims = Section {
         class: Some("claims"),
         ..Section::new("claims", "Claims", claims(study, judged))
@@ -52,14 +51,16 @@ pub(crate) fn page(
     let page = Page {
         title: study.title.clone(),
         about: study.paper.clone(),
-        answer: answer(judged),
+        answer: told,
         sections: vec![
             lead,
             claims.headed("Claims, and whether they hold here"),
             Section::new("about", "Compared quantities", about),
             Section::new("figures", "Figures", figures(results, drawn)),
             Section::new("tables", "Numbers", tables),
-            Section::new("scenario", "Scenario", scenario(study)).folded(),
+            Section::new("scenario", "Scenario", scenario(study))
+                .headed("Scenario of the paper, as it is printed")
+                .folded(),
             Section::new("assumptions", "Assumptions", assumed(study))
                 .headed("Assumptions where the paper is incomplete or in error")
                 .folded(),
@@ -82,6 +83,25 @@ fn claims(study: &Study, judged: &[Judged]) -> Markup {
             }
         }
     }
+}
+
+/// Says that verdicts rest on a part of the cases, if they do.
+pub(crate) fn quickly(study: &Study) -> Option<String> {
+    let most = study.most_cases?;
+    let s = if most == 1 { "" } else { "s" };
+    Some(format!("a quick look at {most} case{s} of each run at most, not the whole study"))
+}
+
+/// Returns how many cases the runs of an overview had, in a note; nothing if each had one.
+fn counts(results: &Results, overview: &Overview) -> Markup {
+    let shown = results.pairs().filter(|(run, _)| overview.runs.contains(&run.id));
+    let counts: Vec<_> = shown.map(|(_, result)| result.cases()).collect();
+    let ends = counts.iter().min().zip(counts.iter().max());
+    html! { @if let Some((least, most)) = ends && *most > 1 {
+        p.note {
+            @if least == most { (most) " cases of each run." } @else { (least) " to " (most) " cases of a run." }
+        }
+    } }
 }
 
 /// Returns how many claims hold, in a sentence.
@@ -133,9 +153,11 @@ fn lead(results: &Results, drawn: &[figure::Figure]) -> Markup {
             div {
                 h2 { (first.title) }
                 (small(first, results))
+                (counts(results, first))
                 p.note {
                     @for (term, meaning) in study.terms.iter().filter(|(term, _)| uses(term)) { b { (term) } ": " (meaning) ". " }
-                    "Numbers are means over the runs; further down, brackets hold the smallest and the largest."
+                    "Numbers are means over the cases, the largest where there is a limit; further down, brackets hold the smallest "
+                    "and the largest."
                 }
             }
         }

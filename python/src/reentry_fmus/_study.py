@@ -11,9 +11,7 @@ from typing import Any
 import pandas as pd
 
 from ._data import FMUS
-from ._law import PickledLaw
 from ._orchestrator import OrchestratorError, orchestrate
-from ._state import Law, name_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,7 +49,6 @@ def reproduce(
     jobs: int | None = None,
     *,
     members: int | None = None,
-    law: Law | None = None,
 ) -> Study:
     """Runs a study and returns the numbers of all runs and the verdicts on the claims. What was
     finished before in the folder is not run again.
@@ -61,25 +58,20 @@ def reproduce(
         out: Folder of the results, by default out/NAME.
         jobs: Number of threads, by default one for each core.
         members: Largest number of cases of each run, for a quick look.
-        law: Law in Python that replaces the controller of every run, as in `campaign`. Its results
-            are by default in out/NAME-LAW.
 
     Raises:
         OrchestratorError: The study was refused, or a run failed.
-        LawError: The law failed.
     """
     path = Path(name)
     stem = path.absolute().parent.name if path.is_file() else path.name
-    laws = None if law is None else PickledLaw(law).laws()
-    named = stem if law is None else f"{stem}-{name_of(law).strip('<>')}"
-    folder = Path("out", named) if out is None else Path(out)
+    folder = Path("out", stem) if out is None else Path(out)
     command = ["reproduce", os.fspath(name), "--fmu-dir", str(FMUS), "--quiet"]
     command += ["--out", str(folder)]
     for option, number in (("--jobs", jobs), ("--members", members)):
         if number is not None:
             command += [option, str(number)]
     # A study may have a thousand runs, and its report counts their warnings.
-    exit_code, error, _ = orchestrate(command, level="error", laws=laws)
+    exit_code, error, _ = orchestrate(command, level="error")
     if exit_code != 0:
         raise OrchestratorError(error, exit_code, None)
     results = json.loads((folder / "results.json").read_text("utf-8"))

@@ -120,10 +120,9 @@ fn vehicle(run: &Recording) -> Option<Value> {
 /// every loss of its guarantee.
 fn frames(run: &Recording, named: &Vehicle) -> Vec<usize> {
     let norm = |paths: &Option<[String; 3]>| {
-        let tracks: Option<Vec<_>> =
-            paths.iter().flatten().map(|path| run.tracks.get(path)).collect();
-        let square =
-            |row| -> f64 { tracks.iter().flatten().map(|track| track.values[row].powi(2)).sum() };
+        let tracks = paths.iter().flatten().map(|path| run.tracks.get(path));
+        let tracks = tracks.collect::<Option<Vec<&Track>>>().unwrap_or_default();
+        let square = |row: usize| tracks.iter().map(|track| track.values[row].powi(2)).sum();
         (0..run.time.len()).map(square).collect()
     };
     let in_force = run.observe.guarantee.as_ref().and_then(|named| run.tracks.get(&named.in_force));

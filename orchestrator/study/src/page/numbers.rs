@@ -23,7 +23,7 @@ pub(super) fn small(full: &Overview, results: &Results) -> Markup {
     part.note.clear();
     let is_part = part.runs.len() < full.runs.len() || part.metrics.len() < full.metrics.len();
     html! {
-        (rows(&part, results, &mean))
+        (rows(&part, results, &one))
         @if is_part { p.note.on-screen { a href="#tables" { "All rows and columns" } } }
     }
 }
@@ -70,7 +70,7 @@ fn row(row: &ComparisonRow, has_beside: bool, results: &Results) -> Result<Vec<M
 
 /// Returns all rows and columns of an overview.
 pub(super) fn overview(overview: &Overview, results: &Results) -> Markup {
-    rows(overview, results, &several)
+    rows(overview, results, &|numbers, _| several(numbers))
 }
 
 /// Returns the names that the figures draw in a colour: those of runs, and of lines through runs.
@@ -88,11 +88,18 @@ fn names(study: &Study, color: Color) -> BTreeSet<&String> {
     curves.filter(|(other, _)| *other == color).map(|(_, name)| name).collect()
 }
 
-fn mean(numbers: &Numbers) -> String {
-    if numbers.0.is_empty() { "–".into() } else { shown(numbers.mean()) }
+/// Returns the number that stands for all cases: their mean, or the one that is nearest to a limit.
+fn one(numbers: &Numbers, limit: Option<f64>) -> String {
+    let largest = numbers.0.iter().copied().reduce(f64::max);
+    let number = if limit.is_some() { largest } else { largest.map(|_| numbers.mean()) };
+    number.map_or("–".into(), shown)
 }
 
-fn rows(overview: &Overview, results: &Results, cell: &dyn Fn(&Numbers) -> String) -> Markup {
+fn rows(
+    overview: &Overview,
+    results: &Results,
+    cell: &dyn Fn(&Numbers, Option<f64>) -> String,
+) -> Markup {
     let mut rows = Vec::new();
     for id in &overview.runs {
         let Some(run) = results.study.run(id.get_ref()) else { continue };
@@ -120,8 +127,8 @@ fn rows(overview: &Overview, results: &Results, cell: &dyn Fn(&Numbers) -> Strin
                         }
                         @for (column, numbers) in overview.metrics.iter().zip(numbers) {
                             @if is_beyond(numbers, column.limit) {
-                                td.beyond title="beyond the limit" { (cell(numbers)) }
-                            } @else { td { (cell(numbers)) } }
+                                td.beyond title="beyond the limit" { (cell(numbers, column.limit)) }
+                            } @else { td { (cell(numbers, column.limit)) } }
                         }
                     }
                 }
