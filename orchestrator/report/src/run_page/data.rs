@@ -127,7 +127,8 @@ fn frames(run: &Recording, named: &Vehicle) -> Vec<usize> {
     };
     let in_force = run.observe.guarantee.as_ref().and_then(|named| run.tracks.get(&named.in_force));
     let lost = in_force.map(|track| track.values.iter().map(|is| -is).collect());
-    let quantities = [norm(&named.rate), norm(&named.moment), lost.unwrap_or_default()];
+    let quantities: Vec<_> =
+        [norm(&named.rate), norm(&named.moment)].into_iter().chain(lost).collect();
     thin::frames(run.time.len(), &quantities)
 }
 
