@@ -209,7 +209,7 @@ def test_a_loss_and_a_peak_of_one_tick_are_seen_in_any_run(runs, tmp_path, opene
         lost, peak = draws.sample(range(1, len(table) - 1), 2)
         planted = table.copy()
         planted.loc[lost, ["controller.guarantee.inForce", "controller.guarantee.status"]] = [0, 6]
-        planted.loc[peak, "plant.appliedMoment.x"] = 3e5
+        planted.loc[peak, "controller.moment.x"] = 3e5
         planted.to_csv(long / "results.csv", index=False)
         call("plot", long, "--out", tmp_path / "page.html", cwd=os.getcwd())
         page = opened(tmp_path / "page.html")
