@@ -56,8 +56,8 @@ impl Default for Scheduled {
 /// Fault that measurements show without knowledge of the law.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Doubt {
-    /// Angles and rates have been the same at three ticks, although the vehicle moves.
-    Frozen,
+    /// The angles have not moved as the measured rates say.
+    Motion,
     /// The delay of the loop differs from the declared one.
     OtherDelay,
     /// The acceleration over the last period is larger than [`Controller::explained`].
@@ -65,6 +65,15 @@ pub enum Doubt {
 }
 
 impl Measurement {
+    /// Returns whether all numbers that a law computes with are finite.
+    pub fn is_finite(&self) -> bool {
+        let Self { angles, rates, turn, achieved_moment, known_moment, scheduled, .. } = self;
+        let vectors = [angles, rates, turn, known_moment];
+        vectors.into_iter().chain(achieved_moment).flatten().all(|value| value.is_finite())
+            && !scheduled.limit_moment.is_nan()
+            && !scheduled.disturbance_bound.is_nan()
+    }
+
     /// Returns the measurement with the rates relative to axes that turn with the trajectory, for a
     /// law that assumes Θ̇ = R ω. While the trajectory turns, Θ̇ = R ω + Δ_f by Chai 2022 (2), with
     /// Δ_f by Wu 2015 (1); relative to it, Θ̇ = R (ω + R⁻¹ Δ_f). `turn_rate` (rad/s) comes from
@@ -83,14 +92,21 @@ impl Measurement {
     }
 }
 
-/// Largest angular acceleration that the assumptions of a law explain, beyond that of the moment
-/// that acts after the declared delay.
+/// What the assumptions of a law explain: the angular acceleration beyond that of the moment that
+/// acts after the declared delay, and differences of measurements from each other.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Explained {
     /// Largest part in each component of ẋ_ω, whatever the moment, rad/s².
     pub disturbance: f64,
     /// Largest part relative to the acceleration by the moment.
     pub share: f64,
+    /// Largest difference of each angle's change from the sum of its measured rates over any time,
+    /// rad.
+    pub angle: f64,
+    /// What is added to it in each period, rad: at rest, and relative to ‖x_ω‖ (s).
+    pub motion: [f64; 2],
+    /// Largest measured ‖ω‖ for which they hold, rad/s.
+    pub rate: f64,
 }
 
 /// The reference as a function of time (s), so that a controller with preview can also ask for the
@@ -221,8 +237,8 @@ pub trait Controller {
         f64::INFINITY
     }
 
-    /// Returns the angular acceleration that the law's assumptions explain, if it has any. A delay
-    /// other than the declared one is then reported only if they do not explain the measurements.
+    /// Returns what the law's assumptions explain, if it has any. A delay other than the declared
+    /// one is then reported only if they do not explain the measurements.
     fn explained(&self) -> Option<Explained> {
         None
     }
@@ -234,6 +250,10 @@ pub trait Controller {
     /// Evaluates a tick, and returns the moment to hold until the next one, N m: the command less
     /// the moment that is known to act already. It is limited here alone, except that the inner law
     /// of [`Dlmpc`](crate::Dlmpc) also limits its moment. A limit that is scheduled always holds.
+    ///
+    /// A measurement that is not finite is refused: the moment is NaN, the memory stays as it was,
+    /// and the tick is still due. The last measurement, marked as stale, may replace one that is
+    /// lost.
     fn update(
         &mut self,
         memory: &mut Self::Memory,
@@ -242,6 +262,9 @@ pub trait Controller {
         measured: &Measurement,
         reference: ReferenceAt,
     ) -> Vector3<f64> {
+        if !measured.is_finite() {
+            return Vector3::repeat(f64::NAN);
+        }
         let commanded = self.command(memory, tick, time, measured, reference);
         let known = measured.known_moment;
         let limit = self.limit(memory).min(measured.scheduled.limit_moment).max(0.0);

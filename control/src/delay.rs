@@ -14,10 +14,10 @@
 //! Control 27 (1982), with the nonlinear equations of motion in place of the linear ones.
 
 use crate::clone_in_place::clone_in_place;
+use crate::consistency::Consistency;
 use crate::controller::{Controller, Doubt, Measurement, ReferenceAt};
 use crate::delay_estimate::{LoopDelay, LoopDelaySettings};
 use crate::error::{DesignError, invalid};
-use crate::frozen::Frozen;
 use crate::turns::{Turns, turned_reference};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
@@ -128,8 +128,8 @@ pub struct Memory<M> {
     pub loop_delay: LoopDelay,
     /// Turns of the measured angles and of the reference.
     pub turns: Turns,
-    /// Last measurement, and how often it has repeated.
-    pub frozen: Frozen,
+    /// Consistency of the measurements with each other.
+    pub consistency: Consistency,
 }
 
 clone_in_place!([M: Clone + Default] Memory<M> { inner, under_way, loop_delay });
@@ -214,7 +214,7 @@ impl<C: Controller> Controller for Delayed<C> {
             under_way: Vec::with_capacity(self.predictor.count),
             loop_delay: self.loop_delay.memory(),
             turns: Turns::default(),
-            frozen: Frozen::default(),
+            consistency: Consistency::default(),
         }
     }
 
@@ -233,12 +233,15 @@ impl<C: Controller> Controller for Delayed<C> {
         measured: &Measurement,
         reference: ReferenceAt,
     ) -> Vector3<f64> {
-        let Memory { inner, under_way, loop_delay, turns, frozen } = memory;
-        let is_frozen = frozen.observe(measured);
+        let Memory { inner, under_way, loop_delay, turns, consistency } = memory;
         let measured = turns.continued(measured);
         self.loop_delay.observe(loop_delay, &measured);
+        let LoopDelaySettings { explained, period, .. } = &self.loop_delay;
+        let is_consistent = explained
+            .as_ref()
+            .is_none_or(|explained| consistency.observe(explained, *period, &measured));
         let doubt = match loop_delay {
-            _ if is_frozen => Some(Doubt::Frozen),
+            _ if !is_consistent => Some(Doubt::Motion),
             LoopDelay { is_other: true, .. } => Some(Doubt::OtherDelay),
             LoopDelay { is_unexplained: true, .. } => Some(Doubt::Unexplained),
             _ => None,

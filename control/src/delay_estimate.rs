@@ -196,7 +196,7 @@ impl LoopDelaySettings {
     /// Returns whether the law's assumptions explain the acceleration over the last period with the
     /// declared delay.
     fn explains(&self, explained: Explained, memory: &LoopDelay, angles: &Vector3<f64>) -> bool {
-        let Explained { disturbance, share } = explained;
+        let Explained { disturbance, share, .. } = explained;
         let r = kinematics::r(angles);
         let command = self.command(memory);
         let (left, command) = (r * (memory.accelerations[0] - command), (r * command).abs());

@@ -18,6 +18,7 @@ mod hard_optimisations;
 mod harness;
 mod known_moment;
 mod known_turn;
+mod lost_measurement;
 mod navigation;
 mod optimisation;
 mod platform_functions;

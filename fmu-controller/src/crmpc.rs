@@ -127,8 +127,8 @@ impl Law for CrmpcLaw {
                 Contradiction::Disturbance => {
                     "the guarantee is no longer in force: the observed disturbance is larger than disturbance.bound, inertia.error and estimation.rateError allow with the given delay"
                 }
-                Contradiction::Frozen => {
-                    "the guarantee is no longer in force: the measured angles and rates have been the same at three ticks, although the vehicle moves"
+                Contradiction::Motion => {
+                    "the guarantee is no longer in force: the measured angles have not moved as the measured rates say"
                 }
                 Contradiction::KnownMoment => {
                     "the guarantee is no longer in force: knownMoment.* is larger than knownMoment.bound, or has changed by more than knownMoment.change while a plan was followed"

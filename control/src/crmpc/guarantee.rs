@@ -24,7 +24,7 @@ pub(super) use dynamics::Dynamics;
 pub use geometry::{BRAKING, CURVATURE, DRIFT_BY_ANGLES_TWICE, DRIFT_MIXED, Domain, FOURTH, TURN};
 pub use lemmas::Lemmas;
 pub(super) use losses::{End, Held};
-pub(super) use observable::{MEANS, Observable};
+pub(super) use observable::Observable;
 pub use tightening::Tightening;
 pub(super) use tightening::with_share;
 

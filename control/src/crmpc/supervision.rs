@@ -55,8 +55,9 @@ pub enum Contradiction {
     Deviation,
     /// a limit is exceeded, or the law requires a moment beyond limit.moment.
     Limit,
-    /// Measured angles and rates have been the same at three ticks, although the vehicle moves.
-    Frozen,
+    /// The measured angles have not moved as the measured rates say, by more than the assumed errors
+    /// and disturbance allow.
+    Motion,
     /// knownMoment.* is larger than knownMoment.bound, or has changed by more than
     /// knownMoment.change since the plan in force was made.
     KnownMoment,

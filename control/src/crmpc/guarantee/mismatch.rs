@@ -17,6 +17,8 @@ pub struct Drive {
     /// Bound on the angle drift: the norm of the difference between the derivative of the navigated
     /// angles and the navigated rates, rad/s.
     pub angle_drift: f64,
+    /// Part of it relative to the rates.
+    pub angle_drift_by_rates: f64,
     /// Bound on the norm of the acceleration that the slow errors amount to, rad/s².
     pub of_angle_drift: f64,
     /// Bound on the norm of the error of the measured rates, rad/s.
@@ -38,13 +40,15 @@ impl Drive {
         let turned = TURN * SQRT_2 * s.slow_angle_error;
         let secant = |more: f64| 1.0 / cos((vehicle.sideslip + more).min(FRAC_PI_2));
         let (r, x) = (secant(0.0), secant(0.0) * vehicle.rate);
-        let angle_drift = root3 * s.slow_angle_rate + secant(s.slow_angle_error) * turned * x;
+        let angle_drift_by_rates = secant(s.slow_angle_error) * turned;
+        let angle_drift = root3 * s.slow_angle_rate + angle_drift_by_rates * x;
         let of_angle_drift = r * (TURN * angle_drift * x + turned * root3 * s.disturbance_bound);
         Self {
             of_inertia,
             all: root3 * s.disturbance_bound + of_inertia + of_angle_drift,
             of_two: SQRT_2 * s.disturbance_bound + of_inertia + of_angle_drift,
             angle_drift,
+            angle_drift_by_rates,
             of_angle_drift,
             rate_error: root3 * s.rate_error,
             rate_error_of_two: SQRT_2 * s.rate_error,

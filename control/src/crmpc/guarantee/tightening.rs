@@ -4,14 +4,19 @@ use super::deviation::Deviation;
 use super::dynamics::Dynamics;
 use super::losses::{MomentLoss, RateLoss, induced_norm};
 use super::mismatch::relative;
-use super::observable::{MEANS, Observable};
+use super::observable::Observable;
 use super::parts::Parts;
 use super::sequence::Sequence;
 use crate::controller::Explained;
+use crate::crmpc::set::ROUNDING;
 use crate::crmpc::settings::Settings;
 use crate::error::DesignError;
 use crate::error_dynamics::SampledError;
+use crate::linearise;
 use vehicle::math::powi;
+
+/// Largest difference of a delay from whole periods that is due to rounding, in periods.
+const WHOLE: f64 = 1e-6;
 
 /// Tightening of the robust set, by feedback ticks since the nominal trajectory began at the
 /// measured state.
@@ -21,9 +26,10 @@ pub struct Tightening {
     pub(super) ticks: Vec<AtTick>,
     /// Largest ‖I W s‖ over the corners s of the unit box at any attitude of the domain, kg m².
     pub induced_norm: f64,
-    /// Largest means of an observed disturbance that the assumptions explain.
-    pub(in crate::crmpc) observable: [Observable; MEANS],
-    /// Largest mean acceleration over a period that the assumptions explain.
+    /// Largest observed disturbance that the assumptions explain.
+    pub(in crate::crmpc) observable: Observable,
+    /// Largest mean acceleration over a period, and differences of measurements, that the
+    /// assumptions explain.
     pub explained: Explained,
 }
 
@@ -86,24 +92,48 @@ pub(super) fn tighten(s: &Settings) -> Result<(Tightening, Dynamics), DesignErro
         ticks: sequence.ticks.iter().enumerate().map(at).collect(),
         explained: explained(s, &dynamics, &parts),
         induced_norm,
-        observable: Observable::all(s, &dynamics, &parts),
+        observable: Observable::new(s, &dynamics, &parts),
     };
     Ok((tightening, dynamics))
 }
 
-/// Returns the largest mean acceleration over one period that the assumptions explain, rad/s²: Δ̄,
-/// the tensor's error in any direction, the effect of the angle drift, and both errors of the rates at
-/// the period's ends. The measured rates become x_ω at an attitude that is wrong, with ‖∂R[o]‖ ≤
-/// √2 sec²β ‖o‖.
+/// Returns what the assumptions explain of measurements from one tick to the next.
+///
+/// The largest mean acceleration over a period is Δ̄, the tensor's error in any direction, the effect
+/// of the angle drift, and both errors of the rates at the period's ends. The measured rates become
+/// x_ω at an attitude that is wrong, with ‖∂R[o]‖ ≤ √2 sec²β ‖o‖.
+///
+/// An angle differs from the sum of its rates by the trapezoidal rule by −∫ (t − τ/2) ẋ dt, to which
+/// the mean of ẋ adds nothing: Δ, the inertia error and the slow errors count with τ²/4, F with τ³/12
+/// times its slope, and a command that takes over within the period with τ²/8 times its jump. The
+/// slow errors add their own rates, and turn x_ω.
 fn explained(s: &Settings, dynamics: &Dynamics, parts: &Parts) -> Explained {
-    let Dynamics { domain, geometry, smallest, .. } = dynamics;
+    let Dynamics { domain, geometry, smallest, acceleration, by_rates, by_angles, .. } = dynamics;
+    let (tau, drive) = (s.period_feedback, &parts.drive);
     let of_angles = 2.0 * powi(geometry.r, 2) * domain.rate * s.angle_error;
+    let late = s.delay / tau;
+    let jump = if (late - late.round()).abs() > WHOLE { *acceleration } else { 0.0 };
+    let slope =
+        by_rates * (acceleration + drive.all) + by_angles * (dynamics.rate + drive.angle_drift);
+    // The measured rates at both ends of a period differ from those in between by no more.
+    let beside = drive.rate_error + tau * (acceleration + drive.all);
+    let unsteady = s.disturbance_bound + drive.of_inertia + drive.of_angle_drift + jump;
     Explained {
         disturbance: s.disturbance_bound
             + parts.inertia.moments.any * geometry.r / smallest
-            + 2.0 * (s.rate_error + of_angles) / s.period_feedback
-            + parts.drive.of_angle_drift,
+            + 2.0 * (s.rate_error + of_angles) / tau
+            + drive.of_angle_drift,
         share: relative(s.inertia_error),
+        angle: 2.0 * s.angle_error,
+        motion: [
+            tau * (s.rate_error + s.slow_angle_rate + drive.angle_drift_by_rates * beside)
+                + tau * tau * (unsteady / 4.0 + slope * tau / 12.0),
+            tau * drive.angle_drift_by_rates,
+        ],
+        rate: (s.limit_rate
+            + 3.0_f64.sqrt() * s.rate_error
+            + linearise::TURN_BY_ANGLES * 1.5 * s.limit_rate * s.angle_error)
+            * (1.0 + ROUNDING),
     }
 }
 

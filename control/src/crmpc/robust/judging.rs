@@ -8,7 +8,6 @@ use crate::crmpc::plan::Terms;
 use crate::crmpc::set::ROUNDING;
 use crate::crmpc::settings::Settings;
 use crate::crmpc::supervision::{Contradiction, GuaranteeStatus};
-use crate::linearise;
 use nalgebra::Vector3;
 use vehicle::math::cos;
 
@@ -21,7 +20,7 @@ fn keeps(value: f64, bound: f64) -> bool {
 fn shown(measured: &Measurement) -> Option<Contradiction> {
     match measured.doubt {
         _ if measured.stale => Some(Contradiction::Step),
-        Some(Doubt::Frozen) => Some(Contradiction::Frozen),
+        Some(Doubt::Motion) => Some(Contradiction::Motion),
         Some(Doubt::OtherDelay) => Some(Contradiction::Delay),
         Some(Doubt::Unexplained) => Some(Contradiction::Disturbance),
         None => None,
@@ -48,7 +47,7 @@ impl Robust {
         let asked = moment - measured.known_moment;
         let limit_moment = self.settings.limit_moment.min(measured.scheduled.limit_moment);
         let limits_kept = asked.norm() <= limit_moment * (1.0 + ROUNDING)
-            && (measured.rates - measured.turn).norm() <= self.rate_shown();
+            && (measured.rates - measured.turn).norm() <= self.design.tightening.explained.rate;
         let Feedback { deviation, nominal, commanded } = feedback;
         let explained = self.explains(memory, tick.within, deviation, &(commanded - nominal));
         let assumed = [
@@ -175,13 +174,5 @@ impl Robust {
         keeps(angles.xy().norm(), bounds.seen_angle)
             && keeps(rates.norm(), bounds.seen_rate)
             && feedback.iter().all(|value| keeps(value.abs(), bounds.feedback + norm_part))
-    }
-
-    /// Returns the largest measured ‖ω‖ that is compatible with the limit, rad/s.
-    pub(super) fn rate_shown(&self) -> f64 {
-        let Settings { limit_rate, rate_error, angle_error, .. } = self.settings;
-        let of_rates = 3.0_f64.sqrt() * rate_error;
-        (limit_rate + of_rates + linearise::TURN_BY_ANGLES * 1.5 * limit_rate * angle_error)
-            * (1.0 + ROUNDING)
     }
 }

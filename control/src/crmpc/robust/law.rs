@@ -3,6 +3,7 @@
 
 use super::certificate::Certified;
 use super::{Beginning, Robust};
+use crate::controller::Measurement;
 use crate::crmpc::feedback::{Feedback, Tick};
 use crate::crmpc::guarantee::BRAKING;
 use crate::crmpc::memory::Memory;
@@ -15,6 +16,7 @@ use crate::linearise;
 use crate::mpc::OptimiserReport;
 use crate::report::SolverStatus;
 use nalgebra::{Vector3, Vector6};
+use vehicle::kinematics;
 
 /// Shares of the tightening that are tried if no plan is certified.
 const LESS: [f64; 2] = [0.5, 0.0];
@@ -42,7 +44,7 @@ impl Robust {
         memory: &mut Memory,
         tick: &Tick,
     ) -> Vector3<f64> {
-        self.observe(memory, &tick.angle_rates);
+        self.observe(memory, tick);
         let found = if tick.within == 0 { self.optimise(planner, memory, tick) } else { None };
         // Without guarantee no plan reserves moment for the disturbance, so that the command
         // compensates for it at once.
@@ -55,12 +57,16 @@ impl Robust {
         moment
     }
 
-    /// Takes the rates x_ω (rad/s) that were measured at a tick, before it is planned.
-    fn observe(&self, memory: &mut Memory, angle_rates: &Vector3<f64>) {
+    /// Takes the rates that were measured at a tick, before it is planned.
+    fn observe(&self, memory: &mut Memory, tick: &Tick) {
         memory.pending = memory.pending.saturating_sub(1);
         memory.recent_bound = self.recent_bound(memory);
         memory.acting.ticks = memory.acting.ticks.saturating_sub(1);
-        memory.observed.observe(&self.settings, &self.design.tightening.observable, angle_rates);
+        let Self { settings, design, .. } = self;
+        let Measurement { angles, known_moment, .. } = tick.measured;
+        memory.observed.observe(settings, &design.tightening.observable, &tick.angle_rates, || {
+            kinematics::r(angles) * settings.body.inverse * known_moment
+        });
     }
 
     /// Returns the moment for an acceleration, N m. It is exact in the middle of the period over

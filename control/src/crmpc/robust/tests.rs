@@ -326,7 +326,7 @@ fn oracle_rates_at_their_limit_are_never_shown_beyond_what_errors_explain() {
         let shown = kinematics::r(&angles) * rates + corner(settings.rate_error);
         largest = largest.max((kinematics::r_inverse(&seen) * shown).norm());
     }
-    let (beyond, explained) = (settings.limit_rate, robust.rate_shown());
+    let (beyond, explained) = (settings.limit_rate, robust.design.tightening.explained.rate);
     assert!(largest <= explained, "{largest} {explained}");
     assert!(largest - beyond > 0.8 * (explained - beyond), "{largest} {explained}");
 }

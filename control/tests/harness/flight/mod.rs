@@ -25,7 +25,7 @@ use vehicle::reference::Reference;
 use vehicle::scenario::Scenario;
 use waveform::Progress;
 
-pub use fault::{BEGIN, Fault};
+pub use fault::{BEGIN, Fault, Stuck};
 pub use random::Random;
 pub use settings::{Tried, optimised_every, random_settings, tried};
 pub use slow::Slow;
@@ -105,6 +105,8 @@ pub struct Shown {
     pub sideslip: f64,
     /// Largest ‖m‖ relative to its limit that was commanded under guarantee.
     pub moment: f64,
+    /// Number of ticks under guarantee in whose period ‖ω‖ exceeded its limit.
+    pub ticks_over: u32,
     /// Whether ‖ω‖, |β| or ‖m‖ exceeded its limit under guarantee.
     pub broken: bool,
     /// Time at which the guarantee ended, s.
@@ -209,7 +211,7 @@ impl Flight {
         let mut vehicle = Vehicle::new(self);
         let mut disturbance = Progress::new(&self.disturbance, self.seed);
         let mut eyes = Eyes::new(self);
-        let mut faulty = Faulty::new(self.fault);
+        let mut faulty = Faulty::new(self.fault, self.seed);
         let reference = |time: f64| self.reference.at(self.reference_start + time);
         let (ticks, checks) =
             ((self.duration / period).round() as u64, (period / CHECK).round() as u64);
@@ -237,6 +239,7 @@ impl Flight {
                 let limit = s.limit_moment.min(scheduled.limit_moment);
                 shown.moment = shown.moment.max(moment.norm() / limit);
             }
+            let mut is_over = false;
             for i in 0..checks {
                 let at = |i: u64| time + i as f64 * CHECK;
                 let check = tick * checks + i;
@@ -249,7 +252,9 @@ impl Flight {
                 for j in 0..FINE {
                     vehicle.advance(fine(j), fine(j + 1), &delta);
                     let rate = vehicle.rates().norm() / s.limit_rate;
-                    if now && rate > shown.rate && !faulty.is_unseen(time, self.age) {
+                    let seen = now && !faulty.is_unseen(time, self.age);
+                    is_over |= seen && rate > 1.0 + SLACK;
+                    if seen && rate > shown.rate {
                         (shown.rate, shown.rate_time) = (rate, fine(j + 1));
                     }
                     if now {
@@ -260,6 +265,7 @@ impl Flight {
                 }
                 eyes.sample(at(i + 1), &vehicle);
             }
+            shown.ticks_over += u32::from(is_over);
         }
         let largest = shown.rate.max(shown.moment).max(shown.sideslip);
         shown.broken = largest > 1.0 + SLACK;

@@ -1,0 +1,72 @@
+//! Consistency of measurements with each other: the angles must move as the measured rates say.
+//!
+//! Faults of sensors need not show in one measurement. A measurement that is stuck, rates with a
+//! bias or in wrong axes, and angles that lag behind contradict each other only after some time.
+//! All windows of time that end at present are therefore examined, by cumulative sums (E. S. Page,
+//! "Continuous inspection schemes", Biometrika 41 (1954)).
+
+use crate::controller::{Explained, Measurement};
+use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
+use vehicle::kinematics;
+
+/// Tolerance for rounding, relative, and in rad or rad/s.
+const ROUNDING: f64 = 1e-9;
+const LEAST: f64 = 1e-12;
+
+/// Largest excess of the sum of steps, over any window that ends at present, beyond what is allowed
+/// in it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Excess {
+    up: Vector3<f64>,
+    down: Vector3<f64>,
+}
+
+impl Excess {
+    /// Adds a step, of which each component may be as large as `allowed`. Returns whether the sum
+    /// of the steps in every window is at most `once` beyond the sum of what was allowed.
+    ///
+    /// An excess beyond `once` is not forgotten: the next step beyond what is allowed contradicts
+    /// again.
+    pub(crate) fn add(&mut self, step: &Vector3<f64>, allowed: &Vector3<f64>, once: f64) -> bool {
+        let bound = once * (1.0 + ROUNDING) + LEAST;
+        let mut keeps = true;
+        for (sum, step) in [(&mut self.up, *step), (&mut self.down, -step)] {
+            *sum = (*sum + step - allowed).map(|value| value.max(0.0));
+            keeps &= sum.max() <= bound;
+            sum.apply(|value| *value = value.min(bound));
+        }
+        keeps
+    }
+}
+
+/// The last measurement, and the excess of the angles' changes beyond those by the rates.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Consistency {
+    last: Option<[Vector3<f64>; 2]>,
+    excess: Excess,
+}
+
+impl Consistency {
+    /// Takes the measurement of a tick, one `period` (s) after the last. Returns whether its angles
+    /// have moved as the rates say, as far as a law's assumptions explain a difference.
+    pub(crate) fn observe(
+        &mut self,
+        explained: &Explained,
+        period: f64,
+        measured: &Measurement,
+    ) -> bool {
+        if measured.stale || (measured.rates - measured.turn).norm() > explained.rate {
+            *self = Self::default();
+            return true;
+        }
+        let rates = kinematics::r(&measured.angles) * measured.rates;
+        let Some([angles, before]) = self.last.replace([measured.angles, rates]) else {
+            return true;
+        };
+        let step = measured.angles - angles - (before + rates) * (0.5 * period);
+        let [at_rest, by_rates] = explained.motion;
+        let allowed = at_rest + by_rates * before.norm().max(rates.norm());
+        self.excess.add(&step, &Vector3::repeat(allowed), explained.angle)
+    }
+}
